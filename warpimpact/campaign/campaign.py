@@ -12,6 +12,7 @@ import numpy as np
 from pydantic import Field, PrivateAttr, ValidationError, model_validator
 
 from ..results.files import ResultError
+from ..results.kinds import CAMPAIGN
 from ..results.variables import BENDING_VARIABLES, BROKEN_VARIABLES
 from ..scene import (
     AnyCore,
@@ -132,7 +133,7 @@ class Campaign(Model):
             CampaignError: the file is missing, is not TOML, or has a value that is not allowed.
         """
         path = Path(path)
-        named = "" if posterior is None else f"posterior = {json.dumps(str(posterior.resolve()))}\n"
+        named = "" if posterior is None else f"posterior = {json.dumps(str(posterior.absolute()))}\n"
         return cls.from_text(named + read_text(path), name=str(path), folder=path.parent, count=count)
 
     @classmethod
@@ -148,7 +149,7 @@ class Campaign(Model):
         Raises:
             CampaignError: the text is not TOML, or has a value that is not allowed.
         """
-        data = parsed(text, name)
+        data = parsed(text, name, CAMPAIGN)
         if isinstance(plates := data.get("plate"), list):
             raise CampaignError(
                 f"{name}: plate: got {len(plates)} plates, but this takes one; warpimpact compare {name} runs them all "

@@ -5,6 +5,7 @@ import re
 from pathlib import Path
 from typing import Any
 
+from ..results.kinds import CAMPAIGN
 from ..scene.units import quoted
 from .campaign import Campaign
 from .text import CampaignError, parsed, read_text
@@ -29,7 +30,7 @@ def read_plates(path: str | Path, *, count: int | None = None) -> dict[str, Camp
         CampaignError: the file is missing, is not TOML, has only one plate, or contains an invalid value.
     """
     path = Path(path)
-    shared = parsed(read_text(path), str(path))
+    shared = parsed(read_text(path), str(path), CAMPAIGN)
     plates, behind = shared.pop("plate", None), shared.pop("layer", None)
     if not isinstance(plates, list) or len(plates) < 2:
         raise CampaignError(f"{path}: plate: a comparison needs two or more tables [[plate]], each with a name")

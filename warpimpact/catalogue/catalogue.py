@@ -14,7 +14,7 @@ from typing import Any, NoReturn, TypeVar
 from pydantic import ValidationError
 
 from warpimpact.catalogue.entries import Material, Threat, reason
-from warpimpact.scene.files import check_bytes
+from warpimpact.scene.text import parsed, read_text
 from warpimpact.scene.units import quoted
 
 Entry = TypeVar("Entry", Threat, Material)
@@ -22,8 +22,6 @@ Entry = TypeVar("Entry", Threat, Material)
 HERE = Path(__file__).parent
 FOLDERS: Mapping[type[Any], Path] = {Threat: HERE / "threats", Material: HERE / "materials"}
 """A file of each entry of the package."""
-_MOST_BYTES = 2**20
-"""Of a user's file."""
 
 
 @dataclass(frozen=True)
@@ -45,11 +43,7 @@ class Catalogue:
         """
         if path is None:
             return cls()
-        check_bytes(path, _MOST_BYTES)
-        try:
-            data = tomllib.loads(path.read_text(encoding="utf-8"))
-        except (OSError, ValueError) as error:
-            raise ValueError(f"{path.name} is not valid TOML: {error}") from None
+        data = parsed(read_text(path), path.name)
         if foreign := [key for key in data if key not in ("threat", "material")]:
             raise ValueError(f"{path.name}: got the unknown key {quoted(foreign[0])}; allowed are threat, material")
         kinds: dict[type[Any], str] = {Threat: "threat", Material: "material"}

@@ -103,18 +103,17 @@ def add_report(commands: Commands) -> None:
 
 def _report(arguments: argparse.Namespace) -> None:
     from warpimpact.report.report import write_report
-    from warpimpact.results import files
-    from warpimpact.results.front import is_front
-    from warpimpact.results.posterior_file import is_posterior
+    from warpimpact.results import files, kinds
 
     paths = arguments.results
     output = arguments.output or paths[0].with_suffix(".html")
     check_suffix(output, "a report", ".html")
     check_output(output, overwrite=arguments.overwrite)
-    if any(map(is_posterior, paths)):
+    found = {*map(files.kind_of, paths)}
+    if kinds.POSTERIOR in found:
         _report_posterior(paths, output)
         return
-    if any(map(is_front, paths)):
+    if kinds.FRONT in found:
         _report_front(paths, output, arguments.campaign_folder)
         return
     by_name = named(paths)

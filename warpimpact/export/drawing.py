@@ -33,7 +33,7 @@ def write_drawing(plate: Plate, output: Path) -> None:
         raise OutputError(f"{output}: the plate has no holes to draw")
     holes = [_MM * outline for outline in outlines]
     with aside(output) as file:
-        (_write_svg if output.suffix == ".svg" else _write_dxf)(holes, _MM * half, file)
+        (_write_svg if output.suffix.lower() == ".svg" else _write_dxf)(holes, _MM * half, file)
 
 
 def _write_svg(holes: list[NDArray[np.float64]], half: NDArray[np.float64], file: Path) -> None:

@@ -11,6 +11,7 @@ from warpimpact.campaign.problems import sentence
 from warpimpact.campaign.text import CampaignError, parsed, read_text
 from warpimpact.firing.plan import FiringTest
 from warpimpact.firing.requirements import with_requirement
+from warpimpact.results.kinds import TEST
 
 
 def read_test(path: str | Path) -> FiringTest:
@@ -25,7 +26,7 @@ def read_test(path: str | Path) -> FiringTest:
 
 def firing_test(text: str, name: str, folder: Path) -> FiringTest:
     """Read a test from its text; `name` is what errors call it."""
-    data: dict[str, Any] = parsed(text, name)
+    data: dict[str, Any] = parsed(text, name, TEST)
     try:
         test = FiringTest.model_validate(data, context={"folder": folder})
     except ValidationError as error:

@@ -180,7 +180,11 @@ def response_of_sweep(sweep: xarray.Dataset, layer: int | None = None) -> Respon
         ValueError: it sweeps something else, or more.
     """
     names = list(json.loads(sweep.attrs[attr.SWEEP]))
-    if len(names) != 1 or sweep[names[0]].attrs.get("long_name") != "impact.velocity":
+    if (
+        len(names) != 1
+        or sweep[names[0]].dims != (names[0],)
+        or sweep[names[0]].attrs.get("long_name") != "impact.velocity"
+    ):
         raise ValueError(f"sweeps {' and '.join(names)}, but it must sweep impact.velocity alone")
     along = names[0]
     if layer is not None and v.LAYER_STATUS not in sweep.variables:
@@ -199,6 +203,8 @@ def response_of_sweep(sweep: xarray.Dataset, layer: int | None = None) -> Respon
 
 
 def _with_places(dataset: xarray.Dataset, changes: Array, sound: Flags) -> Response:
+    if not np.isfinite(changes[sound]).any():
+        raise ValueError("has no limit velocity: no hit perforates at any velocity that was tried")
     columns = (dataset[v.HIT_Y].values, dataset[v.HIT_Z].values, np.degrees(inclination(dataset)))
     cell = dataset.attrs[attr.PLATE_PERIOD]
     holes = outlines(dataset)

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -39,16 +40,23 @@ def known_target(test: FiringTest) -> Response | None:
         return normal_response(target.mean, target.deviation)
     if target.velocities is not None and target.shares is not None:
         return known_response(target.velocities, target.shares)
-    path = target.limits or target.sweep
-    if path is None:
-        return None
+    if target.limits is not None:
+        with _told_of(target.limits):
+            return response_of_limits(files.read(target.limits))
+    if target.sweep is not None:
+        with _told_of(target.sweep):
+            return response_of_sweep(files.read_sweep_result(target.sweep), target.layer)
+    return None
+
+
+@contextmanager
+def _told_of(path: Path) -> Iterator[None]:
+    """Tell that a file has no response as an error of it."""
     try:
-        if target.limits is not None:
-            return response_of_limits(files.read(path))
-        return response_of_sweep(files.read_sweep_result(path), target.layer)
+        yield
+    except files.ResultError:
+        raise
     except ValueError as error:
-        if isinstance(error, files.ResultError):
-            raise
         raise CampaignError(f"{path}: {error}") from None
 
 
@@ -94,4 +102,6 @@ def searched_target(
     team = local_team(campaign, device, LimitMap.of(campaign, tolerance=tolerance))
     run_to_file(campaign, output, team=team, resume=resume, overwrite=overwrite, progress=progress, tell=tell)
     dataset = files.read(output)
-    return response_of_limits(dataset), {f.SEARCH: float(dataset[v.LIMITS["velocity"].runs].values.mean())}
+    with _told_of(output):
+        response = response_of_limits(dataset)
+    return response, {f.SEARCH: float(dataset[v.LIMITS["velocity"].runs].values.mean())}

@@ -26,6 +26,7 @@ from warpimpact.identification.parameters import (
     read_priors,
     with_medians,
 )
+from warpimpact.results.kinds import FIT
 from warpimpact.results.measures import Measure, place_of_standoff
 from warpimpact.scene import Core, Impact, Numerics, Plate, Record, Scatter, Scene, exclusions
 from warpimpact.scene.distributions import EDGE, Distribution
@@ -82,7 +83,7 @@ class _WithScene(Model):
 class _ShotTable(_WithScene):
     """A table [[shot]] of a fit file; `measured` is read with the stand-offs of the record."""
 
-    name: str = ""
+    name: Title = ""
     hit: Annotated[Any, BeforeValidator(read_hit)] = "unknown"
     impact: _Table = Field(default_factory=dict)
     measured: Any = None
@@ -111,7 +112,7 @@ class _FitFile(_WithScene):
 
 def fit_from(text: str, name: str, folder: FilePath) -> Fit:
     """Read a fit from its text; `name` is what errors call it."""
-    data = parsed(text, name)
+    data = parsed(text, name, FIT)
     catalogue = catalogue_of(data, name, folder)
     given: _FitFile = _model(_FitFile, with_cores(data, catalogue, name), name)
     parameters, record = read_priors(given.prior, given.tables, name), given.record

@@ -19,6 +19,7 @@ from warpimpact.campaign.problems import sentence
 from warpimpact.campaign.text import CampaignError, parsed, read_text
 from warpimpact.optimisation import measures
 from warpimpact.optimisation.space import Space, read_space
+from warpimpact.results.kinds import DESIGN
 from warpimpact.scene.model import Model
 from warpimpact.scene.units import (
     Number,
@@ -283,7 +284,7 @@ def read_design(path: str | Path) -> Design:
 
 def design_from(text: str, name: str, folder: Path) -> Design:
     """Read a design from its text; `name` is what errors call it."""
-    data = parsed(text, name)
+    data = parsed(text, name, DESIGN)
     own = {key: data.pop(key) for key in OWN if key in data}
     for table in ("stop", "burst"):
         if table in data:

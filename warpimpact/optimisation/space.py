@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from warpimpact.campaign.places import is_table, put, resolved
 from warpimpact.campaign.text import CampaignError
-from warpimpact.scene.units import quoted
+from warpimpact.scene.units import LARGEST, quoted
 
 Array = NDArray[np.float64]
 
@@ -174,12 +174,14 @@ def _range(name: str, place: str, given: dict[str, Any], where: str, under: Any)
     numbers, units = {}, {}
     for key, value in given.items():
         match = _NUMBER.fullmatch(value) if isinstance(value, str) else None
-        if isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value):
-            numbers[key], units[key] = float(value), ""
-        elif match is not None:
-            numbers[key], units[key] = float(match[1]), (match[2] or "").strip()
-        else:
-            raise CampaignError(f"{where}.{key}: got {quoted(value)}, but it must be a number or a string with a unit")
+        is_number = isinstance(value, int | float) and not isinstance(value, bool)
+        numbers[key] = _number(value if is_number else match[1] if match else math.nan)
+        units[key] = (match[2] or "").strip() if match else ""
+        if not abs(numbers[key]) <= LARGEST:
+            raise CampaignError(
+                f"{where}.{key}: got {quoted(value)}, but it must be a number or a string with a unit, at most "
+                f"{LARGEST:g}"
+            )
     if len(set(units.values())) > 1:
         raise CampaignError(f"{where}: got the units {', '.join(map(quoted, units.values()))}, but they must be one")
     low, high, step = numbers["low"], numbers["high"], numbers.get("step")
@@ -192,6 +194,13 @@ def _range(name: str, place: str, given: dict[str, Any], where: str, under: Any)
     return Variable(name, place, low, high, step, units["low"], under=under)
 
 
+def _number(value: float | str) -> float:
+    try:
+        return float(value)
+    except OverflowError:  # a whole number of hundreds of digits
+        return math.inf
+
+
 def _read_choice(found: list[Variable], name: str, place: str, given: list[Any], where: str, under: Any) -> None:
     """A list of values, or of tables with names; ranges and lists in a table are variables below it."""
     whole = is_table(place) or place == "layer" or all(isinstance(one, dict) for one in given)
@@ -202,6 +211,8 @@ def _read_choice(found: list[Variable], name: str, place: str, given: list[Any],
     labels = tuple(
         one["name"] if whole else one if isinstance(one, str) else json.dumps(one, default=str) for one in given
     )
+    if wrong := next((label for label in labels if not label.isprintable()), None):
+        raise CampaignError(f"{where}: got {quoted(wrong)}, but it must be one line without control characters")
     if len(set(labels)) < len(labels):
         raise CampaignError(f"{where}: got a value twice, but each must differ")
     number, values, below = len(found), [], []

@@ -79,6 +79,12 @@ FINGERPRINT = _declared("fingerprint")
 COMPUTE_TIME = _declared("compute_time", "number", "s")
 HITS_PER_SECOND = _declared("hits_per_second", "number", "s-1")
 
+# By which a file of another kind is recognised; its room has its other attributes
+DESIGN_FILE = "design_file"
+"""The text of the design file."""
+FIRING_TEST = "firing_test"
+"""The text of the test file."""
+
 # The shots
 SAMPLING = _declared("sampling")
 SEED = _declared("seed", "number")

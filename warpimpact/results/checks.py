@@ -1,9 +1,8 @@
-"""Whether a file that says it is a result is one: what variables and attributes the readers of a Dataset rely on."""
+"""Whether a file that says it is a result, a history, a sweep or a study is one."""
 
 from __future__ import annotations
 
-import json
-from collections.abc import Callable, Collection
+from collections.abc import Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -11,14 +10,26 @@ import numpy as np
 from warpimpact.kernels.status import Status
 from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
+from warpimpact.results.declared import (
+    Declaration,
+    Positive,
+    Text,
+    among,
+    attribute_faults,
+    finite,
+    metadata_faults,
+    missing_fault,
+    not_negative,
+    texts,
+)
+from warpimpact.scene.display import STORED
 from warpimpact.scene.shots import FARTHEST
+from warpimpact.scene.text import parsed_json
 from warpimpact.scene.units import LARGEST
 
 if TYPE_CHECKING:
     import xarray
 
-_LABELS = (v.AXIS, v.QUATERNION, v.SETTING, v.SCHEME, v.STUDY_LEVEL)
-"""Variables that hold words."""
 _TOGETHER = (
     (attr.SAMPLING, attr.SEED, attr.REPLICATES),
     (attr.AREAL_DENSITY, attr.OPEN_AREA),
@@ -31,75 +42,98 @@ _TOGETHER = (
     (attr.RESIDUAL_VELOCITY_ERROR, attr.TILT_ERROR, attr.PROMISE_KEPT),
 )
 """Attributes of which the first needs the others."""
-
-
-_OF_A_STUDY = (attr.TITLE, attr.HISTORY, attr.DEVICE)
-"""Attributes of a study."""
 _SLICE = 2**22
 """Hits that are looked at together."""
 
 
-def fault(dataset: xarray.Dataset, known: Collection[v.Variable]) -> str | None:
-    """What keeps a Dataset from being what it should be, as a phrase; None if nothing does.
-
-    Args:
-        known: the variables that may be in it.
-    """
-    found = (_variable_fault(dataset[str(one)], one) for one in known if one in dataset.variables)
-    return next(filter(None, found), None) or _attribute_fault(dataset.attrs) or _map_fault(dataset, known)
-
-
-def study_fault(dataset: xarray.Dataset) -> str | None:
-    """What keeps a Dataset from being a study, as a phrase; None if nothing does."""
-    if missing := [name for name in _OF_A_STUDY if name not in dataset.attrs]:
-        return f'it has no attribute "{missing[0]}"'
-    if not {0.5, 0.9} <= set(dataset[v.QUANTILE].values.ravel().tolist()):
-        return f'its variable "{v.QUANTILE}" lacks the median or the 90th percentile'
-    return fault(dataset, (*v.STUDY_COORDINATES, *v.STUDY_VARIABLES))
-
-
-def history_fault(dataset: xarray.Dataset) -> str | None:
-    """What keeps a Dataset from being the history of a hit, as a phrase; None if nothing does."""
-    known = (*v.HISTORY_COORDINATES, *v.HISTORY_VARIABLES)
-    if missing := [name for name in known if name not in dataset.variables]:
-        return f'it has no variable "{missing[0]}"'
-    return fault(dataset, known)
-
-
-def packing_fault(dataset: xarray.Dataset) -> str | None:
-    """Numbers may be stored with a factor and an offset, which are read only when the numbers are."""
-    for name, array in dataset.variables.items():
-        for one in ("scale_factor", "add_offset"):
-            if one in array.encoding and not isinstance(array.encoding[one], int | float | np.number):
-                return f'its variable "{name}" has a {one} that is no number'
-    return None
-
-
-def _map_fault(dataset: xarray.Dataset, known: Collection[v.Variable]) -> str | None:
-    """What only a map of hits is held to."""
-    if "hit" not in dataset.sizes:
-        return None
-    chosen = json.loads(dataset.attrs[attr.SWEEP]) if attr.SWEEP in dataset.attrs else ()  # inputs of a sweep's point
+def _of_columns(dataset: xarray.Dataset, known: Sequence[v.Variable]) -> Iterator[str]:
+    """What is wrong with the variables of hits, whose values are not read."""
     for one in known:
-        if one in chosen and dataset.variables[one].dims == ():
-            continue
-        if one in dataset.variables and dataset.variables[one].dims != one.dims:
-            return f'its variable "{one}" is along {dataset.variables[one].dims}, not {one.dims}'
-    for names in v.whole_groups():
-        there = [name for name in names if name in dataset.variables]
-        if there and (missing := [name for name in names if name not in there]):
-            return f'it has "{there[0]}", but no variable "{missing[0]}"'
-    status, codes = dataset[v.STATUS], [*Status]
-    if not all(np.isin(status[at : at + _SLICE].values, codes).all() for at in range(0, len(status), _SLICE)):
-        return f'its variable "{v.STATUS}" has unknown codes'
-    for place in (dataset[name] for name in (v.HIT_Y, v.HIT_Z) if name in dataset.variables):
-        if not all((np.abs(place[at : at + _SLICE].values) <= FARTHEST).all() for at in range(0, place.size, _SLICE)):
-            return f'its variable "{place.name}" has values that are not numbers, or are more than {FARTHEST:g} m'
-    if v.STANDOFF in dataset.coords:
-        standoffs = dataset[v.STANDOFF].values
-        if not ((np.abs(standoffs) <= LARGEST).all() and np.unique(standoffs).size == standoffs.size):
-            return f'its variable "{v.STANDOFF}" has values that are no lengths, or one of them twice'
-    return None
+        if one in dataset.variables and one is not v.AXIS:
+            array = dataset.variables[one]
+            if array.dtype.kind not in "iuf":
+                yield f'its variable "{one}" has no numbers'
+            yield from metadata_faults(array, one)
+
+
+def _attribute_faults(told: Mapping[Any, Any]) -> Iterator[str]:
+    """What is wrong with the attributes of hits."""
+    yield from attribute_faults(told)
+    for first, *others in _TOGETHER:
+        missing = [name for name in others if name not in told]
+        if first in told and missing:
+            yield f'it has "{first}", but no attribute "{missing[0]}"'
+
+
+def _hit_variables() -> list[v.Variable]:
+    in_groups = (name for names in v.GROUPS.values() for name in names)
+    return [*v.COORDINATES, *v.hit_variables(), *in_groups]
+
+
+def map_fault(dataset: xarray.Dataset) -> str | None:
+    """What keeps a Dataset from being a map of hits, as a phrase; None if nothing does. Of its hits only what a reader
+    relies on is looked at, a part at a time."""
+    return next(_map_faults(dataset), None)
+
+
+def _map_faults(dataset: xarray.Dataset) -> Iterator[str]:
+    known = _hit_variables()
+    yield from _of_columns(dataset, known)
+    yield from _attribute_faults(dataset.attrs)
+    chosen = parsed_json(dataset.attrs.get(attr.SWEEP)) or ()  # inputs of a sweep's point
+    for one in known:
+        if one in dataset.variables and dataset.variables[one].dims not in (
+            (one.dims, ()) if one in chosen else (one.dims,)
+        ):
+            yield f'its variable "{one}" is along {dataset.variables[one].dims}, not {one.dims}'
+    yield from filter(None, (missing_fault(dataset, names) for names in v.whole_groups()))
+    yield from _of_hits(dataset)
+
+
+def _of_hits(dataset: xarray.Dataset) -> Iterator[str]:
+    """What is wrong with how hits ended, where they are and at what stand-offs they are told."""
+    codes = np.array([*Status])
+    if not all(_ended(part, codes) for part in _parts(dataset[v.STATUS])):
+        yield f'its variable "{v.STATUS}" has unknown codes'
+    for name in (v.HIT_Y, v.HIT_Z):
+        if not all((np.abs(part) <= FARTHEST).all() for part in _parts(dataset[name])):
+            yield f'its variable "{name}" has values that are not numbers, or are more than {FARTHEST:g} m'
+    standoffs = dataset[v.STANDOFF].values
+    if not ((np.abs(standoffs) <= LARGEST).all() and np.unique(standoffs).size == standoffs.size):
+        yield f'its variable "{v.STANDOFF}" has values that are no lengths, or one of them twice'
+
+
+def _parts(array: xarray.DataArray) -> Iterator[np.ndarray[Any, Any]]:
+    along = array.sizes[v.HIT] if v.HIT in array.dims else 1
+    return (array.isel(hit=slice(at, at + _SLICE), missing_dims="ignore").values for at in range(0, along, _SLICE))
+
+
+def _ended(status: np.ndarray[Any, Any], codes: np.ndarray[Any, Any]) -> bool:
+    """A point of a sweep may lack hits that another has: they are NaN."""
+    return bool((np.isin(status, codes) | np.isnan(status)).all())
+
+
+def sweep_fault(dataset: xarray.Dataset) -> str | None:
+    """What keeps a Dataset from being a sweep, as a phrase; None if nothing does."""
+    return next(_sweep_faults(dataset), None)
+
+
+def _sweep_faults(dataset: xarray.Dataset) -> Iterator[str]:
+    yield from _of_columns(dataset, [*v.COORDINATES, *v.hit_variables()])
+    yield from _attribute_faults(dataset.attrs)
+    inputs = parsed_json(dataset.attrs[attr.SWEEP])
+    for name, labels in inputs.items():
+        if name not in dataset.coords or dataset[name].dims not in ((), (name,)):
+            yield f'it has no coordinate "{name}", which it sweeps'
+        elif dataset.sizes.get(name, len(labels)) != len(labels):
+            yield f'it has {dataset.sizes[name]} values of "{name}", but names {len(labels)}'
+        elif dataset[name].dtype.kind == "f" and dataset[name].attrs.get("units") not in STORED:
+            yield f'its coordinate "{name}" has an unknown unit'
+    along = tuple(name for name in inputs if name in dataset.dims)
+    for one in (*v.COORDINATES, *v.hit_variables()):
+        if one in dataset.variables and one not in inputs and dataset[one].dims not in (one.dims, along + one.dims):
+            yield f'its variable "{one}" is along {dataset[one].dims}, not {along + one.dims}'
+    yield from _of_hits(dataset)
 
 
 def unusable(dataset: xarray.Dataset) -> str | None:
@@ -114,96 +148,58 @@ def unusable(dataset: xarray.Dataset) -> str | None:
     return None
 
 
-def _variable_fault(array: xarray.DataArray, declared: v.Variable) -> str | None:
-    one = array.variable
-    if any(declared is label for label in _LABELS):
-        return None
-    if one.dtype.kind not in "iuf":
-        return f'its variable "{declared}" has no numbers'
-    if one.dims not in {declared.dims, ()} and array.ndim != len(declared.dims) - 1:
-        return f'its variable "{declared}" is along {one.dims}, not {declared.dims}'
-    for name, value in declared.attributes.items():
-        given = one.attrs.get(name)
-        if not isinstance(given, type(value)) or (name == "units" and given != value):
-            return f'its variable "{declared}" has no {name} as it should'
+def packing_fault(dataset: xarray.Dataset) -> str | None:
+    """Numbers may be stored with a factor and an offset, which are read only when the numbers are."""
+    for name, array in dataset.variables.items():
+        for one in ("scale_factor", "add_offset"):
+            if one in array.encoding and not isinstance(array.encoding[one], int | float | np.number):
+                return f'its variable "{name}" has a {one} that is no number'
     return None
 
 
-def _attribute_fault(attributes: dict[str, Any]) -> str | None:
-    for name, value in attributes.items():
-        if not _is_allowed(name, value):
-            return f'its attribute "{name}" is not what it should be'
-    for first, *others in _TOGETHER:
-        missing = [name for name in others if name not in attributes]
-        if first in attributes and missing:
-            return f'it has "{first}", but no attribute "{missing[0]}"'
-    return None
+def _study_fault(dataset: xarray.Dataset) -> str | None:
+    if not {0.5, 0.9} <= set(dataset[v.QUANTILE].values.ravel().tolist()):
+        return f'its variable "{v.QUANTILE}" lacks the median or the 90th percentile'
+    empty = [name for name in ("setting", "level", "standoff", "hit") if not dataset.sizes[name]]
+    return f'it has nothing along "{empty[0]}"' if empty else None
 
 
-def _is_allowed(name: str, value: Any) -> bool:
-    return _is_of_its_kind(name, value) and _HELD.get(name, lambda value: True)(value)
+_OF_A_COMPUTATION = {attr.TITLE: Text, attr.HISTORY: Text}
+STUDY = Declaration(
+    {one: one.dims for one in (*v.STUDY_COORDINATES, *v.STUDY_VARIABLES)},
+    rules={
+        **dict.fromkeys((v.SETTING, v.SCHEME, v.STUDY_LEVEL), texts),
+        v.CONVERGED_STATUS: among(*Status),
+        v.OTHER_STATUS: not_negative,
+    },
+    attributes={**_OF_A_COMPUTATION, attr.DEVICE: Text},
+    more=_study_fault,
+)
 
 
-def _is_core(value: str) -> bool:
-    from pydantic import TypeAdapter, ValidationError
-
-    from warpimpact.scene import AnyCore
-
-    try:
-        TypeAdapter[Any](AnyCore).validate_json(value)
-    except ValidationError:
-        return False
-    return True
+def _history_fault(dataset: xarray.Dataset) -> str | None:
+    least = {v.CELL_Y: 2, v.CELL_Z: 2, v.STATION: 2, v.TIME: 1, v.SNAPSHOT: 1}
+    few = [name for name, size in least.items() if dataset.sizes[str(name)] < size]
+    return f'it has too few values of "{few[0]}"' if few else None
 
 
-def _is_resolution(value: str) -> bool:
-    from warpimpact.scene import Numerics
-
-    try:
-        return Numerics.model_validate_json(value).explicit is not None
-    except ValueError:
-        return False
+def _turns(values: np.ndarray[Any, Any], sizes: Mapping[str, int]) -> bool:
+    """Quaternions, of which none is 0."""
+    return finite(values, sizes) and values.shape[-1] == 4 and bool((np.linalg.norm(values, axis=-1) > 0.0).all())
 
 
-def _has_number(key: str) -> Callable[[str], bool]:
-    return lambda value: isinstance(json.loads(value).get(key), int | float)
+def _ascending(values: np.ndarray[Any, Any], sizes: Mapping[str, int]) -> bool:
+    return finite(values, sizes) and bool((np.diff(values) > 0.0).all())
 
 
-_HELD: dict[str, Callable[[Any], bool]] = {
-    attr.CORE: _is_core,
-    attr.RESOLUTION: _is_resolution,
-    attr.ACCURACY: _has_number("share"),
-    attr.MATERIAL: _has_number("resistance"),
-    attr.NUMERICS_GIVEN: lambda value: "fidelity" in json.loads(value),
-    attr.DISCREPANCY: lambda value: all(isinstance(one, int | float) for one in json.loads(value).values()),
-    attr.LAYERS: lambda value: all(isinstance(one, dict) for one in json.loads(value).values()),
-    attr.LIMIT: lambda value: value in v.LIMITS,
-    attr.PLATE_PERIOD: lambda value: bool(((np.asarray(value) > 0.0) & (np.asarray(value) <= LARGEST)).all()),
-}
-"""What the readers of an attribute rely on beyond its kind."""
-
-
-def _is_of_its_kind(name: str, value: Any) -> bool:
-    if name in v.OUTLINE_VARIABLES:
-        return np.asarray(value).dtype.kind == "f"
-    if name not in attr.ATTRIBUTES:
-        return isinstance(value, str) or name.removesuffix("_units") not in attr.ATTRIBUTES
-    match attr.ATTRIBUTES[name].kind:
-        case "text":
-            return isinstance(value, str)
-        case "table":
-            return isinstance(value, str) and isinstance(parsed_json(value), dict)
-        case "pair":
-            return np.shape(value) == (2,) and np.asarray(value).dtype.kind in "iuf"
-        case "count":
-            return isinstance(value, int | np.integer) and bool(value >= 1)
-        case "number":
-            return isinstance(value, int | float | np.number)
-
-
-def parsed_json(text: Any) -> Any:
-    """What a text says as JSON; None if it is none."""
-    try:
-        return json.loads(text)
-    except (TypeError, ValueError, RecursionError):
-        return None
+HISTORY = Declaration(
+    {one: one.dims for one in (*v.HISTORY_COORDINATES, *v.HISTORY_VARIABLES)},
+    rules={
+        v.QUATERNION: texts,
+        v.ATTITUDE: _turns,
+        **dict.fromkeys((v.TIME, v.SNAPSHOT, v.STATION, v.CORE_RADIUS, v.PLATE_POSITION), finite),
+        **dict.fromkeys((v.CELL_Y, v.CELL_Z), _ascending),
+    },
+    attributes={attr.PLATE_THICKNESS: Positive, attr.PLATE_PERIOD: tuple[Positive, Positive]},
+    more=_history_fault,
+)

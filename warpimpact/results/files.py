@@ -4,21 +4,24 @@ from __future__ import annotations
 
 import os
 import shutil
-from collections.abc import Callable, Collection, Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NoReturn
 
 import netCDF4
 
 from warpimpact.results import attributes as attr
+from warpimpact.results import kinds
 from warpimpact.results import variables as v
-from warpimpact.results.checks import fault, history_fault, packing_fault, parsed_json, study_fault, unusable
+from warpimpact.results.checks import HISTORY, STUDY, map_fault, packing_fault, sweep_fault, unusable
 from warpimpact.results.dataset import numbered
+from warpimpact.results.declared import Declaration
 from warpimpact.results.interrupts import uninterrupted
 from warpimpact.results.netcdf import write_table
 from warpimpact.results.outlines import in_a_file, in_memory
 from warpimpact.results.table import Table
+from warpimpact.scene.files import check_file
 
 if TYPE_CHECKING:
     import xarray
@@ -113,8 +116,7 @@ def read(path: Path) -> xarray.Dataset:
         ResultError: The file is missing, is not netCDF, or is not a warpimpact result.
     """
     with uninterrupted(), opened(path) as file:
-        dataset = file.load()
-    return dataset.set_xindex(v.HIT) if v.HIT in dataset.coords else numbered(dataset)
+        return _numbered(file.load())
 
 
 def open_result(path: str | Path) -> xarray.Dataset:
@@ -131,10 +133,14 @@ def open_result(path: str | Path) -> xarray.Dataset:
     """
     with opened(Path(path)):
         pass  # checked; the file that is returned stays open
-    dataset = _opened(Path(path))
-    found = dataset.set_xindex(v.HIT) if v.HIT in dataset.coords else numbered(dataset)
-    found.set_close(dataset.close)
-    return found
+    dataset = _joined(Path(path))
+    result = _numbered(dataset)
+    result.set_close(dataset.close)
+    return result
+
+
+def _numbered(dataset: xarray.Dataset) -> xarray.Dataset:
+    return dataset.set_xindex(v.HIT) if v.HIT in dataset.coords else numbered(dataset)
 
 
 @contextmanager
@@ -144,9 +150,8 @@ def opened(path: Path) -> Iterator[xarray.Dataset]:
     Raises:
         ResultError: as in `read`.
     """
-    with opened_either(path) as dataset:
-        if is_history(dataset):
-            raise ResultError(f"{path}: is the history of a single hit, not a map of hits")
+    with _netcdf(path, "a map of hits", kinds.RESULT) as dataset:
+        _check_map(dataset, path)
         yield dataset
 
 
@@ -157,33 +162,11 @@ def opened_either(path: Path) -> Iterator[xarray.Dataset]:
     Raises:
         ResultError: The file is missing, is not netCDF, or is neither.
     """
-    with _netcdf(path) as dataset:
-        if v.SETTING in dataset.variables:
-            raise ResultError(f"{path}: is a study of the numerics, as warpimpact study writes, not a map of hits")
-        if attr.EFFECTIVE in dataset.attrs:
-            raise ResultError(f"{path}: is a posterior, as warpimpact identify writes, not a map of hits")
-        inputs = list(parsed_json(dataset.attrs.get(attr.SWEEP)) or ())
-        if inputs and dataset.get(v.STATUS, dataset).dims != (v.HIT,):
-            raise ResultError(
-                f"{path}: is a sweep of {' and '.join(inputs)}; its points are results, or choose one with "
-                f"isel({', '.join(f'{name}=0' for name in inputs)})"
-            )
-        missing = {*v.COORDINATES, *v.VARIABLES} - {v.HIT} - dataset.variables.keys()
-        if missing:
-            raise ResultError(f'{path}: not a warpimpact result, it has no variable "{min(missing)}"')
-        if attr.PLATE_PERIOD not in dataset.attrs:
-            raise ResultError(
-                f'{path}: not a warpimpact result, it has no attribute "{attr.PLATE_PERIOD}"; where it was chosen from '
-                "one, keep its attributes"
-            )
+    with _netcdf(path, "a map of hits", kinds.RESULT, kinds.HISTORY) as dataset:
         if is_history(dataset):
-            if found := history_fault(dataset):
-                raise ResultError(f"{path}: not the history of a hit, or damaged: {found}")
+            _refuse(path, "the history of a hit", HISTORY.fault(dataset))
         else:
-            if found := unusable(dataset):
-                raise ResultError(f"{path}: {found}")
-            in_groups = (name for names in v.GROUPS.values() for name in names)
-            _check(dataset, path, (*v.COORDINATES, *v.hit_variables(), *in_groups))
+            _check_map(dataset, path)
         yield dataset
 
 
@@ -193,11 +176,10 @@ def read_sweep_result(path: Path) -> xarray.Dataset:
     Raises:
         ResultError: The file is missing, is not netCDF, or is not a sweep.
     """
-    with _netcdf(path) as dataset:
-        if attr.SWEEP not in dataset.attrs or v.STATUS not in dataset.variables:
-            raise ResultError(f"{path}: is not a sweep, as warpimpact sweep writes")
-        found = dataset.load()
-    return found.set_xindex(v.HIT)
+    with uninterrupted(), _netcdf(path, "a sweep", kinds.SWEEP) as dataset:
+        _check_has(dataset, path, *v.COORDINATES)
+        _refuse(path, "a sweep", sweep_fault(dataset))
+        return _numbered(dataset.load())
 
 
 def read_study(path: Path) -> xarray.Dataset:
@@ -206,20 +188,47 @@ def read_study(path: Path) -> xarray.Dataset:
     Raises:
         ResultError: The file is missing, is not netCDF, or is not a study.
     """
-    with _netcdf(path) as dataset:
-        missing = {*v.STUDY_COORDINATES, *v.STUDY_VARIABLES} - dataset.variables.keys()
-        if missing:
-            raise ResultError(f'{path}: not a study of warpimpact, it has no variable "{min(missing)}"')
-        if found := study_fault(dataset):
-            raise ResultError(f"{path}: not a study of warpimpact, or damaged: {found}")
-        return dataset.load()
+    return read_declared(path, "a study", kinds.STUDY, STUDY)
 
 
-def _check(dataset: xarray.Dataset, path: Path, known: Collection[v.Variable]) -> None:
-    if dataset.sizes.get("hit") == 0:
+def read_declared(path: Path, what: str, kind: kinds.Kind, declared: Declaration) -> xarray.Dataset:
+    """Read a file that has what is declared into memory.
+
+    Args:
+        what: it is, as messages say it.
+
+    Raises:
+        ResultError: the file is missing, is not netCDF, or is not such a file.
+    """
+    with uninterrupted(), _netcdf(path, what, kind) as file:
+        dataset = file.load()
+        _refuse(path, what, declared.fault(dataset))
+    return dataset
+
+
+def _check_has(dataset: xarray.Dataset, path: Path, *names: str) -> None:
+    missing = {*names, *v.COORDINATES, *v.VARIABLES} - {v.HIT} - dataset.variables.keys()
+    if missing:
+        raise ResultError(f'{path}: not a warpimpact result, it has no variable "{min(missing)}"')
+    if attr.PLATE_PERIOD not in dataset.attrs:
+        raise ResultError(
+            f'{path}: not a warpimpact result, it has no attribute "{attr.PLATE_PERIOD}"; where it was chosen from '
+            "one, keep its attributes"
+        )
+
+
+def _check_map(dataset: xarray.Dataset, path: Path) -> None:
+    _check_has(dataset, path)
+    if found := unusable(dataset):
+        raise ResultError(f"{path}: {found}")
+    if dataset.sizes[v.HIT] == 0:
         raise ResultError(f"{path}: has no hits, so there is nothing to show")
-    if found := fault(dataset, known):
-        raise ResultError(f"{path}: not a result of warpimpact, or damaged: {found}")
+    _refuse(path, "a result", map_fault(dataset))
+
+
+def _refuse(path: Path, what: str, fault: str | None) -> None:
+    if fault is not None:
+        raise ResultError(f"{path}: not {what} of warpimpact, or damaged: {fault}")
 
 
 def is_history(dataset: xarray.Dataset) -> bool:
@@ -232,10 +241,17 @@ _MOST_PACKED = 2000
 
 
 @contextmanager
-def _netcdf(path: Path) -> Iterator[xarray.Dataset]:
-    """An open netCDF file; what the library finds damaged in it, now or when it is read, is told in a sentence."""
+def _netcdf(path: Path, wanted: str, *wanted_kinds: kinds.Kind) -> Iterator[xarray.Dataset]:
+    """An open netCDF file of some kind; what the library finds damaged in it, now or when it is read, is told in a
+    sentence."""
+    kind = kind_of(path)
+    told_later = kind is None and kinds.RESULT in wanted_kinds and kinds.is_netcdf(path)  # by what it lacks
+    if kind not in wanted_kinds and not told_later:
+        refuse_kind(path, kind, wanted)
     try:
-        with _opened(path) as dataset:
+        with readable(path):
+            dataset = _joined(path)
+        with dataset:
             needed, size = dataset.nbytes, path.stat().st_size
             if needed > 2**20 + _MOST_PACKED * size:
                 raise ResultError(f"{path}: damaged: it has {size} bytes, but declares {needed} of data")
@@ -248,28 +264,57 @@ def _netcdf(path: Path) -> Iterator[xarray.Dataset]:
         raise ResultError(f"{path}: damaged, it cannot be read ({error})") from error
 
 
-def _opened(path: Path) -> xarray.Dataset:
-    """An open netCDF file, with room for some chunks of a variable instead of for tens of megabytes."""
-    if not path.is_file():  # a pipe or a device may have no end
-        raise ResultError(f"{path}: cannot be read (it {'is no file' if path.exists() else 'is not there'})")
-    _, slots, preemption = kept = netCDF4.get_chunk_cache()
-    netCDF4.set_chunk_cache(4 * 8 * CHUNK, slots, preemption)
+def kind_of(path: Path) -> kinds.Kind | None:
+    """What a file is, by its contents; None of one that is nothing known.
+
+    Raises:
+        ResultError: it is missing, is no regular file, or is damaged.
+    """
     try:
-        return _joined(path)
-    except Exception as error:  # a file that was altered leads xarray into errors of any class
+        check_file(path)
+    except ValueError as error:
+        raise ResultError(str(error)) from None
+    with readable(path):
+        return kinds.kind_of(path)
+
+
+def refuse_kind(path: Path, kind: kinds.Kind | None, wanted: str) -> NoReturn:
+    """Say what a file is that is not what is wanted.
+
+    Raises:
+        ResultError: always.
+    """
+    if kind is not None:
+        raise ResultError(kinds.told(path, kind, wanted))
+    if not kinds.is_netcdf(path):
+        raise ResultError(f"{path}: cannot be read as a netCDF file")
+    raise ResultError(f"{path}: not {wanted} of warpimpact")
+
+
+@contextmanager
+def readable(path: Path) -> Iterator[None]:
+    """Tell what goes wrong in opening a file as a ResultError: one that was altered leads the libraries into errors of
+    any class."""
+    try:
+        yield
+    except Exception as error:
         raise ResultError(f"{path}: cannot be read as a netCDF file ({str(error)[:200]})") from error
-    finally:
-        netCDF4.set_chunk_cache(*kept)
 
 
 def _joined(path: Path) -> xarray.Dataset:
-    """The root of a file with the contents of its groups as coordinates.
+    """The root of a file with the contents of its groups as coordinates, and with room for some chunks of a variable
+    instead of for tens of megabytes.
 
     Numbers of hits have no index, which would be in memory as a whole.
     """
     import xarray
 
-    root = xarray.open_dataset(path, engine="netcdf4", create_default_indexes=False)
+    _, slots, preemption = kept = netCDF4.get_chunk_cache()
+    netCDF4.set_chunk_cache(4 * 8 * CHUNK, slots, preemption)
+    try:
+        root = xarray.open_dataset(path, engine="netcdf4", create_default_indexes=False)
+    finally:
+        netCDF4.set_chunk_cache(*kept)
     dataset = root.copy()
     with netCDF4.Dataset(path) as file:
         groups = [group for group in v.GROUPS if group in file.groups]

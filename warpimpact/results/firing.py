@@ -13,10 +13,13 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from pydantic import Json
 
 from warpimpact.records.variable import Variable
 from warpimpact.results import attributes as attr
-from warpimpact.results.files import ResultError, aside
+from warpimpact.results import kinds
+from warpimpact.results.declared import Declaration, Text, among, finite
+from warpimpact.results.files import aside, read_declared
 from warpimpact.results.interrupts import uninterrupted
 
 if TYPE_CHECKING:
@@ -94,8 +97,7 @@ VARIABLES = (
 )
 COORDINATES = (VELOCITY, QUANTILE, SIZE, AZIMUTH, ELEVATION)
 
-TEST = "firing_test"
-"""Attribute: the text of the test file."""
+TEST = attr.FIRING_TEST
 SETTINGS = "firing_test_settings"
 """Attribute: all settings in SI, defaults included, as JSON."""
 REQUIREMENT = "requirement"
@@ -145,15 +147,23 @@ def read(path: Path) -> xarray.Dataset:
     Raises:
         ResultError: the file is missing, is not netCDF, or is no firing test.
     """
-    import xarray
+    return read_declared(path, "a firing test", kinds.FIRING, _DECLARED)
 
-    if not path.is_file():
-        raise ResultError(f"{path}: cannot be read (it {'is no file' if path.exists() else 'is not there'})")
-    try:
-        with uninterrupted(), xarray.open_dataset(path, engine="netcdf4") as file:
-            found = file.load()
-    except Exception as error:  # a file that was altered leads xarray into errors of any class
-        raise ResultError(f"{path}: cannot be read as a netCDF file ({str(error)[:200]})") from error
-    if TEST not in found.attrs or not {SHARE, DIRECTION_SHARE} & {*found.variables}:
-        raise ResultError(f"{path}: is no firing test, as warpimpact test writes")
-    return found
+
+_RESPONSE = (SHARE, SHARE_LOW, SHARE_HIGH, VELOCITY, QUANTILE, QUANTILE_VELOCITY, QUANTILE_LOW, QUANTILE_HIGH)
+_PLACES = (CHANGES, HIT_Y, HIT_Z, YAW, OUTLINE_Y, OUTLINE_Z)
+_REPORTED = (SHOT_VELOCITY, SHOT_PERFORATED, SHOT_PLACE, V50, SPREAD, V50_LOW, V50_HIGH, SHOTS)
+_OF_SIZES = (SIZE, SIZE_SHOTS, SIZE_WITHIN, SIZE_BIAS, SIZE_DEVIATION)
+_PROOF = (PROOF_PERFORATION, PASS, PASS_SAME_PLACE)
+_OF_DIRECTIONS = (
+    *(AZIMUTH, ELEVATION, DIRECTION_SHARE, DIRECTION_LOW, DIRECTION_HIGH, DIRECTION_OBLIQUITY),
+    *(DIRECTION_WEIGHT, DIRECTION_HITS, DIRECTION_FAILED),
+)
+_DECLARED = Declaration(
+    {one: one.dims for one in VARIABLES},
+    optional=VARIABLES,
+    whole=(_RESPONSE, _PLACES, _REPORTED, _OF_SIZES, _PROOF, _OF_DIRECTIONS),
+    rules={SHOT_PERFORATED: among(0, 1, -1), **dict.fromkeys((VELOCITY, AZIMUTH, ELEVATION, SIZE), finite)},
+    attributes={**dict.fromkeys((attr.TITLE, TEST, DISCLAIMER, REQUIREMENT), Text), SETTINGS: Json[dict[str, Any]]},
+    more=lambda dataset: None if {SHARE, DIRECTION_SHARE} & {*dataset.variables} else "it has neither part of a test",
+)

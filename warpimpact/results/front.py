@@ -10,16 +10,19 @@ generation  of the search
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import netCDF4
 import numpy as np
 
 from warpimpact.records.variable import Variable
 from warpimpact.results import attributes as attr
-from warpimpact.results.files import ResultError, aside
+from warpimpact.results import kinds
+from warpimpact.results.declared import Declaration, Size, Text, among, finite, not_negative, place_in, texts
+from warpimpact.results.files import aside, read_declared
 from warpimpact.results.interrupts import uninterrupted
+from warpimpact.scene.text import parsed_json
 
 if TYPE_CHECKING:
     import xarray
@@ -98,8 +101,7 @@ VARIABLES = (
 )
 COORDINATES = (NAME, ASKED, REFERENCE)
 
-DESIGN = "design_file"
-"""Attribute: the text of the design file."""
+DESIGN = attr.DESIGN_FILE
 OUTCOME, FEASIBLE, NONE_FEASIBLE = "outcome", "front", "no design within the bounds"
 """Attribute: how the search ended, one of both."""
 BOX = "hypervolume_box"
@@ -141,24 +143,46 @@ def read(path: Path) -> xarray.Dataset:
     Raises:
         ResultError: the file is missing, is not netCDF, or is no search.
     """
-    import xarray
-
-    if not path.is_file():
-        raise ResultError(f"{path}: cannot be read (it {'is no file' if path.exists() else 'is not there'})")
-    try:
-        with uninterrupted(), xarray.open_dataset(path, engine="netcdf4") as file:
-            found = file.load()
-    except Exception as error:  # a file that was altered leads xarray into errors of any class
-        raise ResultError(f"{path}: cannot be read as a netCDF file ({str(error)[:200]})") from error
-    if DESIGN not in found.attrs or not {FOUND, VALUE, HITS} <= {*found.variables}:
-        raise ResultError(f"{path}: is no search for designs, as warpimpact optimise writes")
-    return found
+    return read_declared(path, "a search for designs", kinds.FRONT, _DECLARED)
 
 
-def is_front(path: Path) -> bool:
-    """Whether a file is a search for designs."""
-    try:
-        with netCDF4.Dataset(path) as file:
-            return DESIGN in file.ncattrs()
-    except OSError:
-        return False
+def _labels(values: np.ndarray[Any, Any], sizes: Mapping[str, int]) -> bool:
+    """JSON lists of what a variable chooses from, empty of a range."""
+    choices = [parsed_json(text) for text in values.flat if text] if texts(values, sizes) else [None]
+    return all(isinstance(one, list) and all(isinstance(label, str) for label in one) for one in choices)
+
+
+def _more(dataset: xarray.Dataset) -> str | None:
+    if not np.isnan(dataset[LIMIT].values).any():
+        return "it has no objective"
+    if not dataset.sizes["design"]:
+        return "it has no design"
+    for place, labels in enumerate(dataset[LABELS].values):
+        values = dataset[VALUE].values[:, place]
+        known = values[~np.isnan(values)]
+        if labels and not np.isin(known, np.arange(len(parsed_json(labels)))).all():
+            return f'its variable "{VALUE}" has numbers that choose nothing'
+    return None
+
+
+_TEXTS = (NAME, UNIT, ASKED, LABEL, LEVELS, CAMPAIGN, FILE, FRESH_LEVELS, REFERENCE, REFERENCE_CAMPAIGN)
+_DECLARED = Declaration(
+    {one: one.dims for one in VARIABLES},
+    optional=(HIT_Y, HIT_Z, HIT_VALUE),
+    whole=((HIT_Y, HIT_Z, HIT_VALUE),),
+    rules={
+        **dict.fromkeys(_TEXTS, texts),
+        **dict.fromkeys((HIT_Y, HIT_Z), finite),
+        **dict.fromkeys((HITS, COST, COMPUTED), not_negative),
+        **dict.fromkeys((ON_FRONT, KEPT), among(0, 1)),
+        LABELS: _labels,
+        SIGN: among(1, -1),
+        NUMBER: place_in("design"),
+        GROUP: place_in("front"),
+    },
+    attributes={
+        **dict.fromkeys((attr.TITLE, attr.HISTORY, attr.WARPIMPACT_VERSION, DESIGN, OUTCOME), Text),
+        **dict.fromkeys((REFUSED, PILOTS), Size),
+    },
+    more=_more,
+)

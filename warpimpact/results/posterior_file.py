@@ -11,19 +11,20 @@ best                      the set of smallest misfit
 
 from __future__ import annotations
 
-import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import netCDF4
 import numpy as np
+from pydantic import BaseModel, Json
 
 from warpimpact.results import attributes as attr
-from warpimpact.results.checks import parsed_json
-from warpimpact.results.files import ResultError, aside
+from warpimpact.results import kinds
+from warpimpact.results.declared import Declaration, Finite, Number, Size, Text, finite, not_negative, numbers, texts
+from warpimpact.results.files import ResultError, aside, kind_of, readable, refuse_kind
 from warpimpact.results.interrupts import uninterrupted
-from warpimpact.scene.units import LARGEST
+from warpimpact.scene.text import parsed_json
 
 if TYPE_CHECKING:
     import xarray
@@ -67,11 +68,26 @@ _OF_A_POSTERIOR: Mapping[str, Mapping[str, tuple[str, ...]]] = {
     "posterior_predictive": {MEASURED: _DRAWS + _OBSERVED, FITTED: _DRAWS + _OBSERVED},
 }
 """Numbers of a posterior beside its parameters, by group, and what they are along."""
-_MAY_LACK = (("best", "misfit"), ("posterior_predictive", MEASURED), ("posterior_predictive", FITTED))
-"""NaN where a core does not come through."""
+_MAY_LACK = {"best": ("misfit",), "posterior_predictive": (MEASURED, FITTED)}
+"""NaN where a core does not come through, by group."""
 _OF_A_PARAMETER = {"prior": _DRAWS, "posterior": _DRAWS, "sets": ("set",), "best": ()}
-_OF_A_REPORT = (attr.TITLE, attr.HISTORY, attr.DEVICE)
-_NUMBERS = (EFFECTIVE, PARETO_K, HIT_NOISE, CONVERGED, WANTED, SETS)
+_GROUPS_OF_DRAWS = ("posterior",)
+
+
+class _Material(BaseModel):
+    plate: dict[str, Any]
+    interaction: dict[str, Any]
+    discrepancy: dict[str, Finite] = {}
+
+
+_OF_THE_DRAWS: Mapping[str, Any] = {attr.WARPIMPACT_VERSION: Text, FIT: Text, MATERIAL: Json[_Material]}
+_OF_A_REPORT: Mapping[str, Any] = {
+    **dict.fromkeys((attr.TITLE, attr.HISTORY, attr.DEVICE), Text),
+    **dict.fromkeys((EFFECTIVE, WANTED), Finite),
+    **dict.fromkeys((PARETO_K, HIT_NOISE), Number),
+    **dict.fromkeys((CONVERGED, SETS), Size),
+    ROW_PROBABILITY: Json[dict[str, Number]],
+}
 
 
 def write(tree: xarray.DataTree, path: Path) -> None:
@@ -93,75 +109,52 @@ def read(path: Path, *, draws_alone: bool = False) -> xarray.DataTree:
     Raises:
         ResultError: the file is missing, is not netCDF, or is no posterior.
     """
-    if not path.is_file():
-        raise ResultError(f"{path}: cannot be read (it {'is no file' if path.exists() else 'is not there'})")
-    try:
-        with uninterrupted():
-            loaded = _loaded(path)
-    except Exception as error:  # a file that was altered leads xarray into errors of any class
-        raise ResultError(f"{path}: cannot be read as a netCDF file ({str(error)[:200]})") from error
-    missing = [name for name in GROUPS if name not in loaded.children]
-    wanted = [attr.WARPIMPACT_VERSION, FIT, MATERIAL, *([] if draws_alone else _OF_A_REPORT)]
-    untold = [name for name in wanted if name not in loaded.attrs]
-    if missing or untold:
-        what = f'group "{missing[0]}"' if missing else f'attribute "{untold[0]}"'
-        raise ResultError(f"{path}: not a posterior of warpimpact identify, it has no {what}")
-    groups = {name: loaded[name].to_dataset() for name in GROUPS}
-    if draws_alone:
-        found = _draws_fault(groups["posterior"].drop_vars(HITS, errors="ignore"), loaded.attrs)
-    else:
-        found = _fault(groups, loaded.attrs)
-    if found:
-        raise ResultError(f"{path}: not a posterior of warpimpact identify, or damaged: {found}")
+    if (kind := kind_of(path)) is not kinds.POSTERIOR:
+        refuse_kind(path, kind, "a posterior")
+    with uninterrupted(), readable(path):
+        loaded = _loaded(path)
+    if fault := _fault(loaded, _GROUPS_OF_DRAWS if draws_alone else GROUPS):
+        raise ResultError(f"{path}: not a posterior of warpimpact identify, or damaged: {fault}")
     return loaded
 
 
-def _fault(groups: Mapping[str, xarray.Dataset], attributes: Mapping[Any, Any]) -> str | None:
-    """What keeps the groups of a posterior from being one, as a phrase; None if nothing does.
-
-    Args:
-        attributes: global attributes.
-    """
-    parameters = [str(name) for name in groups["prior"].data_vars]
-    wanted = [(group, name, dims) for name in parameters for group, dims in _OF_A_PARAMETER.items()]
-    wanted += [(group, name, dims) for group, names in _OF_A_POSTERIOR.items() for name, dims in names.items()]
-    if not groups["observed_data"].data_vars:  # of limits and of how shots ended alone
-        wanted = [one for one in wanted if _OBSERVED[0] not in one[2]]
-    for group, name, dims in wanted:
-        array = groups[group].variables.get(name)
-        if array is None or array.dims != dims or array.dtype.kind not in "iuf" or not array.size:
-            return f'its group "{group}" has no numbers "{name}" along {dims}'
-        if (group, name) not in _MAY_LACK and not (np.abs(array.values) <= LARGEST).all():
-            return f'its group "{group}" has a number "{name}" that is not finite, or is more than {LARGEST:g}'
-        if set(dims) & {*_SHOTS, *_OBSERVED} - groups[group].coords.keys():
-            return f'its group "{group}" does not name what "{name}" is along'
-    for name in _NUMBERS:
-        if not isinstance(attributes.get(name), int | float | np.number):
-            return f'its attribute "{name}" is no number'
-    if not math.isfinite(attributes[WANTED]):
-        return f'its attribute "{WANTED}" is not finite'
-    shares = parsed_json(attributes.get(ROW_PROBABILITY))
-    if not isinstance(shares, dict) or not all(isinstance(one, int | float) for one in shares.values()):
-        return f'its attribute "{ROW_PROBABILITY}" is not what it should be'
-    return _draws_fault(groups["posterior"][parameters], attributes)
+def _fault(tree: xarray.DataTree, groups: Sequence[str]) -> str | None:
+    """What keeps a tree from being a posterior in some of its groups, as a phrase; None if nothing does."""
+    if missing := [name for name in groups if name not in tree.children]:
+        return f'it has no group "{missing[0]}"'
+    alone = groups == _GROUPS_OF_DRAWS
+    root = Declaration({}, attributes=_OF_THE_DRAWS if alone else {**_OF_THE_DRAWS, **_OF_A_REPORT})
+    if fault := root.fault(tree.to_dataset()):
+        return fault
+    datasets = {name: tree[name].to_dataset() for name in groups}
+    parameters = [name for name in datasets["posterior" if alone else "prior"].data_vars if name not in HITS]
+    for name, dataset in datasets.items():
+        if fault := _declared(name, parameters, datasets).fault(dataset):
+            return f'in its group "{name}" {fault}'
+    return next((fault for name in parameters if (fault := _path_fault(datasets["posterior"][name]))), None)
 
 
-def _draws_fault(draws: xarray.Dataset, attributes: Mapping[Any, Any]) -> str | None:
-    """What keeps the draws of parameters from being drawn from, as a phrase; None if nothing does.
+def _declared(group: str, parameters: Sequence[Any], datasets: Mapping[str, xarray.Dataset]) -> Declaration:
+    """What a group has: the parameters, along what they are in it, and what stands beside them."""
+    variables = dict.fromkeys(map(str, parameters), _OF_A_PARAMETER[group]) if group in _OF_A_PARAMETER else {}
+    if len(datasets) > 1:
+        variables |= _OF_A_POSTERIOR.get(group, {})
+        if not datasets["observed_data"].data_vars:  # of limits and of how shots ended alone
+            variables = {name: dims for name, dims in variables.items() if _OBSERVED[0] not in dims}
+    along = {dim: (dim,) for dims in variables.values() for dim in dims if dim in (*_SHOTS, *_OBSERVED)}
+    rules = {name: numbers if name in _MAY_LACK.get(group, ()) else _some for name in variables}
+    rules |= {STD: not_negative} if group == "observed_data" else {}
+    return Declaration(variables | along, rules=rules | dict.fromkeys(along, texts))
 
-    Args:
-        attributes: global attributes of the posterior.
-    """
-    for name, array in draws.data_vars.items():
-        if array.dims != _DRAWS or array.dtype.kind not in "iuf" or not array.size:
-            return f'its group "posterior" has no numbers "{name}" along {_DRAWS}'
-        if not isinstance(parsed_json(array.attrs.get(PATH)), list):
-            return f'its parameter "{name}" has no path as it should'
-    material = parsed_json(attributes.get(MATERIAL))
-    tables = material if isinstance(material, dict) else {}
-    if not all(isinstance(tables.get(one), dict) for one in ("plate", "interaction")):
-        return f'its attribute "{MATERIAL}" is not what it should be'
-    return None
+
+def _some(values: np.ndarray[Any, Any], sizes: Mapping[str, int]) -> bool:
+    return values.size > 0 and finite(values, sizes)
+
+
+def _path_fault(parameter: xarray.DataArray) -> str | None:
+    path = parsed_json(parameter.attrs.get(PATH))
+    is_path = isinstance(path, list) and all(isinstance(one, str | int) for one in path)
+    return None if is_path else f'its parameter "{parameter.name}" has no path as it should'
 
 
 def _loaded(path: Path) -> xarray.DataTree:
@@ -176,12 +169,3 @@ def _loaded(path: Path) -> xarray.DataTree:
         names = list(file.groups)
     groups = {name: xarray.load_dataset(path, group=name, engine="netcdf4") for name in names}
     return xarray.DataTree.from_dict({"/": xarray.load_dataset(path, engine="netcdf4"), **groups})
-
-
-def is_posterior(path: Path) -> bool:
-    """Whether a file says that it is a posterior."""
-    try:
-        with netCDF4.Dataset(path) as file:
-            return "posterior" in file.groups
-    except OSError:
-        return False

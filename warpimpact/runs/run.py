@@ -44,11 +44,16 @@ _REPORT_EVERY = 0.2
 
 
 def run(
-    campaign: Campaign, *, device: str = "auto", progress: Follow | None = None, cancel: Cancel | None = None
+    campaign: Campaign | str | Path,
+    *,
+    device: str = "auto",
+    progress: Follow | None = None,
+    cancel: Cancel | None = None,
 ) -> xarray.Dataset:
     """Compute every hit of a campaign, in memory.
 
     Args:
+        campaign: the campaign, or its file.
         device: "auto" (every CUDA device if there is one, else the CPU), "cpu", "cuda:0", "cuda:0,cuda:1", …
         progress: called several times a second; without it a notebook shows a bar.
         cancel: ends the run from another thread.
@@ -57,9 +62,11 @@ def run(
         The Dataset of results/dataset.py, one entry per hit.
 
     Raises:
+        CampaignError: the file is no campaign, or has a value that is not allowed.
         DeviceError: the device is absent.
         Cancelled: by `cancel`.
     """
+    campaign = _read(campaign)
     total = len(campaign.sampler())
     with local_team(campaign, device, cancel=cancel) as team, followed(progress) as follow:
         shards = Shards(extent(total, campaign.at_a_plate))
@@ -69,8 +76,8 @@ def run(
 
 
 def run_to_file(
-    campaign: Campaign,
-    output: Path,
+    campaign: Campaign | str | Path,
+    output: str | Path,
     *,
     device: str = "auto",
     team: AbstractContextManager[Team] | None = None,
@@ -82,6 +89,7 @@ def run_to_file(
     """Compute every hit of a campaign into a file; what is computed is on the disk at once, in `output`.parts.
 
     Args:
+        campaign: the campaign, or its file.
         output: the netCDF file, which appears when it is complete.
         device, progress: as in `run`.
         team: who computes, in place of `device`.
@@ -90,11 +98,13 @@ def run_to_file(
         tell: called with a sentence for what was damaged and is computed again.
 
     Raises:
+        CampaignError: as in `run`.
         OutputError: something cannot be written, must not be overwritten or is no part of this campaign, or another
             run is at work on it.
         DeviceError: the device is absent.
         Interrupted: by the keyboard; what is saved can be resumed.
     """
+    campaign, output = _read(campaign), Path(output)
     with claimed(output), team or local_team(campaign, device) as members:
         content, total = manifest(campaign, members.made_by), len(campaign.sampler())
         parts = ShardsOnDisk(output, content, total, tell, grows=campaign.stop is None)
@@ -111,6 +121,10 @@ def run_to_file(
         except BaseException:
             parts.kept()
             raise
+
+
+def _read(campaign: Campaign | str | Path) -> Campaign:
+    return campaign if isinstance(campaign, Campaign) else Campaign.from_toml(campaign)
 
 
 @dataclass(frozen=True)

@@ -3,6 +3,7 @@
 import csv
 import math
 import re
+import stat
 from array import array
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -42,18 +43,24 @@ def _reason(error: Exception) -> str:
     return (error.strerror if isinstance(error, OSError) else None) or str(error)
 
 
-def check_bytes(path: Path, most: int) -> None:
-    """Refuse a file of more than so many bytes, before any of it is read.
+def check_file(path: Path, most: int | None = None) -> None:
+    """Refuse what is no regular file, as a pipe or a device may have no end, and one of more bytes than `most`, before
+    any of it is read.
 
     Raises:
-        ValueError: names the file and its size.
+        ValueError: names the file and what is wrong with it.
     """
+    name = brief(str(path), _LONGEST_PATH)
     try:
-        size = path.stat().st_size
-    except OSError as error:
-        raise ValueError(f"{path.name} cannot be read: {_reason(error)}") from None
-    if size > most:
-        raise ValueError(f"{path.name} has {size / 2**20:.4g} MiB, but at most {most / 2**20:g} MiB are read")
+        status = path.stat()
+    except FileNotFoundError:
+        raise ValueError(f"{name}: cannot be read (it is not there)") from None
+    except (OSError, ValueError) as error:
+        raise ValueError(f"{name}: cannot be read ({_reason(error)})") from None
+    if not stat.S_ISREG(status.st_mode):
+        raise ValueError(f"{name}: cannot be read (it is {'a folder' if path.is_dir() else 'no file'})")
+    if most is not None and status.st_size > most:
+        raise ValueError(f"{name}: has {status.st_size / 2**20:.4g} MiB, but at most {most / 2**20:g} MiB are read")
 
 
 InputFile = Annotated[Path, BeforeValidator(input_file)]
@@ -121,7 +128,7 @@ def _got(header: tuple[str, ...], known: tuple[str, ...]) -> str:
 @contextmanager
 def _open_table(path: Path) -> Iterator[tuple[tuple[str, ...], Any]]:
     """Header of a CSV file, and the reader of what follows."""
-    check_bytes(path, _MOST_BYTES)
+    check_file(path, _MOST_BYTES)
     try:
         with path.open(encoding="utf-8-sig", newline="") as lines:
             reader = csv.reader(lines, skipinitialspace=True)

@@ -20,6 +20,7 @@ import psutil
 import warp as wp
 
 from warpimpact.kernels import lanes
+from warpimpact.scene.text import parsed_json
 
 _logger = logging.getLogger(__name__)
 Scratch = TypeVar("Scratch")
@@ -60,6 +61,11 @@ def _start_warp() -> None:
         os.dup2(aside.fileno(), 2)
         try:
             wp.init()
+        except OSError as error:
+            raise DeviceError(
+                f"{error.filename}: kernels cannot be kept there ({error.strerror}); name another folder in the "
+                "environment variable WARP_CACHE_PATH"
+            ) from None
         finally:
             os.dup2(kept, 2)
             os.close(kept)
@@ -151,8 +157,8 @@ def _is_whole(folder: Path) -> bool:
     """If the files of a compiled module are those that were sealed."""
     sums = folder / _SUMS
     try:
-        return sums.is_file() and json.loads(sums.read_bytes()) == _sums(folder)
-    except (OSError, ValueError):
+        return sums.is_file() and parsed_json(sums.read_bytes()) == _sums(folder)
+    except OSError:
         return False
 
 

@@ -21,6 +21,7 @@ from warpimpact.campaign.text import CampaignError, parsed, read_text
 from warpimpact.results import attributes as attr
 from warpimpact.results import files
 from warpimpact.results import variables as v
+from warpimpact.results.kinds import CAMPAIGN
 from warpimpact.runs.run import run_to_file
 from warpimpact.scene.units import quoted, reader_in
 
@@ -99,7 +100,7 @@ def read_sweep(path: str | Path, *, count: int | None = None) -> Sweep:
     """
     path = Path(path)
     text = read_text(path)
-    shared = parsed(text, str(path))
+    shared = parsed(text, str(path), CAMPAIGN)
     swept = shared.pop("sweep", None)
     if not isinstance(swept, dict) or not swept:
         raise CampaignError(f'{path}: sweep: needs a table [sweep] of lists, as obliquity = ["0 deg", "15 deg"]')
@@ -136,6 +137,10 @@ def _input(key: str, values: Any, path: str) -> Input:
             raise CampaignError(f"{path}: sweep.{key}: must be a list of tables, each with a name")
         labels = tuple(value["name"] for value in values)
         given = tuple({name: one for name, one in value.items() if name != "name"} for value in values)
+    if wrong := next((label for label in labels if not label.isprintable()), None):
+        raise CampaignError(
+            f"{path}: sweep.{key}: got {quoted(wrong)}, but it must be one line without control characters"
+        )
     if len(set(labels)) < len(labels):
         raise CampaignError(f"{path}: sweep.{key}: got a value twice, but each must differ")
     return Input(place, labels, given)

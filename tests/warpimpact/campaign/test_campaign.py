@@ -252,8 +252,8 @@ def test_a_mistake_is_told_in_one_sentence(tmp_path: Path, right: str, wrong: st
 @pytest.mark.parametrize(
     ("write", "sentence"),
     [
-        (lambda path: None, "there is no such file"),
-        (lambda path: path.mkdir(), "cannot be read (Is a directory)"),
+        (lambda path: None, "cannot be read (it is not there)"),
+        (lambda path: path.mkdir(), "cannot be read (it is a folder)"),
         (lambda path: path.write_text("a = 1\nb 2"), "is not valid TOML: Expected '=' after a key"),
         (lambda path: path.write_bytes(b"a = '\xff'"), "is not valid TOML: 'utf-8' codec can't decode"),
     ],

@@ -15,7 +15,9 @@ from pathlib import Path
 from typing import Any
 from urllib.parse import urlsplit
 
+import numpy as np
 import pytest
+import xarray
 
 from warpimpact.campaign.text import CampaignError
 from warpimpact.catalogue.catalogue import Catalogue
@@ -283,7 +285,7 @@ def test_threats_materials_and_layers_can_be_chosen(small: Path) -> None:
 @pytest.mark.parametrize(
     ("arguments", "sentence"),
     [
-        (["nothing.toml"], "nothing.toml: there is no such file"),
+        (["nothing.toml"], "nothing.toml: cannot be read (it is not there)"),
         ([str(CAMPAIGNS / "designs" / "lightest_plate.toml")], "this takes one design; warpimpact optimise"),
         (["http://127.0.0.1:1/x/#rubbish"], 'holds no design behind its "#"'),
         (["--port", "70000"], "--port: got 70000"),
@@ -294,11 +296,16 @@ def test_a_mistake_ends_the_command(arguments: list[str], sentence: str, capsys:
     assert sentence in capsys.readouterr().err
 
 
-def test_a_shelf_has_every_design_of_its_files(small: Path, make_result: Callable[..., Any], tmp_path: Path) -> None:
+def test_a_shelf_has_every_design_of_its_files(
+    small: Path, make_result: Callable[..., Any], searched: xarray.Dataset, tmp_path: Path
+) -> None:
     text, search, result = small.read_text(), tmp_path / "front.nc", tmp_path / "slotted.nc"
-    columns = {front.FOUND: [[1.0]], front.VALUE: [[1.0]], front.HITS: [64]}
-    columns |= {front.FILE: ["design_00.toml", "design_01.toml"], front.CAMPAIGN: [text, text.replace("4 mm", "5 mm")]}
-    front.write(front.dataset_of(columns, {front.DESIGN: ""}), search)
+    columns = {front.FILE: ["design_00.toml", "design_01.toml"], front.CAMPAIGN: [text, text.replace("4 mm", "5 mm")]}
+    told = {name: ("front", np.array(texts, dtype=object), name.attributes) for name, texts in columns.items()}
+    front.write(
+        searched.isel(front=[0, 0]).assign({front.GROUP: ("front", [0, 0], front.GROUP.attributes)}).assign(told),
+        search,
+    )
     files.write(make_result().assign_attrs({attr.CAMPAIGN: text}), result)
     shelf = shelf_of([CAMPAIGNS / "two_plates.toml", search, result])
     assert list(shelf.designs) == ["slots", "round holes", "design_00", "design_01", "slotted"]

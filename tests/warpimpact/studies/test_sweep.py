@@ -88,7 +88,7 @@ def test_a_point_is_a_result_and_a_sweep_says_that_it_is_one(folder: Path, capsy
     assert main(["replay", str(points[4]), "--hit", "3", "-o", str(folder / "hit.nc")]) == 0
     assert "bit-identical" in capsys.readouterr().out
     assert main(["inspect", str(folder / "a.nc")]) == 2
-    assert "is a sweep of obliquity and width; its points are results" in capsys.readouterr().err
+    assert "is a sweep, as warpimpact sweep writes, not a map of hits; its points" in capsys.readouterr().err
     files.read_sweep_result(folder / "a.nc").isel(obliquity=1, width=0).to_netcdf(folder / "chosen.nc")
     assert main(["inspect", str(folder / "chosen.nc")]) == 0
     assert main(["run", str(folder / "a.toml")]) == 2

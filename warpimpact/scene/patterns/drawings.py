@@ -4,7 +4,7 @@ import re
 import xml.etree.ElementTree as xml
 from pathlib import Path
 
-from ..files import check_bytes
+from ..files import check_file
 from ..units import brief
 
 _NOT_UNDERSTOOD = {"text", "image", "foreignObject", "clip-path", "mask"}
@@ -19,7 +19,7 @@ def check_drawing(path: Path) -> None:
     Raises:
         ValueError: names the file and what is wrong with it.
     """
-    check_bytes(path, _MOST_BYTES)
+    check_file(path, _MOST_BYTES)
     root = _parsed(path)
     if _tag(root) != "svg":
         raise ValueError(f'{path.name} is not an SVG drawing: it begins with "{brief(_tag(root))}"')

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..files import check_bytes
+from ..files import check_file
 from ..model import Array
 from ..units import PositiveLength, brief, quantity
 from .drawings import check_drawing
@@ -45,7 +45,7 @@ def read_mask(path: Path, cell_size: float) -> BoolArray:
     Raises:
         ValueError: names the file and what is wrong with it.
     """
-    check_bytes(path, _MOST_BYTES)
+    check_file(path, _MOST_BYTES)
     match path.suffix.lower():
         case ".png":
             return _material(path, _read_png(path))

@@ -1,0 +1,210 @@
+"""Files that are not what a command takes: no regular file, nested without end, or a file of another kind."""
+
+import os
+from collections.abc import Callable
+from pathlib import Path
+
+import netCDF4
+import numpy as np
+import pytest
+import xarray
+from PIL import Image
+
+from warpimpact import Campaign, CampaignError, run, run_to_file
+from warpimpact.catalogue.catalogue import Catalogue
+from warpimpact.cli import main
+from warpimpact.export.table import write_csv
+from warpimpact.firing.response import Response, response_of_limits
+from warpimpact.identification.reading import read_fit
+from warpimpact.optimisation.design import read_design
+from warpimpact.results import files, kinds
+from warpimpact.scene.text import parsed
+from warpimpact.solver import device as devices
+
+CAMPAIGNS = Path(__file__).parents[3] / "campaigns"
+SLOTTED = (CAMPAIGNS / "slotted_plate.toml").read_text(encoding="utf-8")
+TEXTS: dict[str, tuple[str, str]] = {
+    "a campaign": (SLOTTED, "warpimpact run takes it"),
+    "a design file": ("variables = { thickness = [1, 2] }", "warpimpact optimise takes it"),
+    "a fit": ("[[shot]]\nname = 'a'", "warpimpact identify takes it"),
+    "a firing test": ("[target]\nmean = 800", "warpimpact test takes it"),
+    "a catalogue": ("[[material]]\nname = 'a'", "warpimpact catalogue --file takes it"),
+}
+ResultMaker = Callable[..., xarray.Dataset]
+
+
+def _said(arguments: list[str], capsys: pytest.CaptureFixture[str]) -> str:
+    assert main(arguments) == 2
+    said = capsys.readouterr().err
+    assert said.count("\n") == 1
+    return said.removeprefix("warpimpact: error: ").strip()
+
+
+@pytest.mark.parametrize("path", ["/dev/zero", "pipe"])
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        *(["catalogue", "--file", "{}"], ["run", "{}"], ["sweep", "{}"], ["identify", "{}"], ["optimise", "{}"]),
+        *(["test", "{}"], ["design", "--no-browser", "{}"], ["inspect", "{}"], ["report", "{}", "-o", "a.html"]),
+        *(["plot", "{}"], ["export", "{}"], ["compare", "{}", "b.nc"], ["replay", "{}", "--hit", "0"]),
+    ],
+    ids=lambda arguments: arguments[0],
+)
+def test_what_may_have_no_end_is_not_opened(
+    arguments: list[str], path: str, in_tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    os.mkfifo("pipe")
+    assert _said([one.format(path) for one in arguments], capsys) == f"{path}: cannot be read (it is no file)"
+
+
+@pytest.mark.parametrize("path", ["/dev/zero", "pipe"])
+@pytest.mark.parametrize(
+    ("before", "after", "key"),
+    [
+        ("title =", 'catalogue = "{}"\ntitle =', "catalogue"),
+        ("title =", 'posterior = "{}"\ntitle =', "posterior"),
+        ('sampling = "sobol"', 'sampling = "list"\nfile = "{}"', "hits.file"),
+    ],
+)
+def test_nor_is_it_where_a_campaign_names_it(
+    before: str, after: str, key: str, path: str, in_tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    os.mkfifo("pipe")
+    Path("a.toml").write_text(SLOTTED.replace(before, after.format(path), 1), encoding="utf-8")
+    assert f'{key}: got "{path}", but there is no file' in _said(["run", "a.toml", "-o", "a.nc"], capsys)
+
+
+def test_a_large_file_is_read_up_to_its_bound(in_tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    with Path("large.toml").open("wb") as file:
+        file.truncate(2**32)
+    for arguments in (["catalogue", "--file", "large.toml"], ["run", "large.toml"]):
+        assert "large.toml: at most 1048576 characters are read" in _said(arguments, capsys)
+
+
+@pytest.mark.parametrize(
+    "text", ["[" * 100_000, "a = " + "{a=" * 100_000, "x = { " + ".".join("a" * 500_000) + " = 1 }"]
+)
+def test_a_catalogue_nested_without_end_is_refused(text: str, tmp_path: Path) -> None:
+    (tmp_path / "a.toml").write_text(text)
+    with pytest.raises(ValueError, match=r"a\.toml: (is not valid TOML|its tables and arrays|at most)"):
+        Catalogue.of(tmp_path / "a.toml")
+
+
+def test_dots_in_a_value_are_not_those_of_a_key() -> None:
+    path = "/".join([".."] * 20)
+    assert parsed(f'file = "{path}"\nx = [1, {{ y = "{path}" }}]', "a") == {"file": path, "x": [1, {"y": path}]}
+
+
+@pytest.mark.parametrize("content", ["[" * 200_000, '{"a":' * 200_000])
+def test_checksums_nested_without_end_are_none(content: str, tmp_path: Path) -> None:
+    (tmp_path / "checksums.json").write_text(content)
+    assert not devices._is_whole(tmp_path)
+
+
+def test_a_cache_that_cannot_be_written_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
+    def refuse() -> None:
+        raise PermissionError(13, "Permission denied", "/cache")
+
+    monkeypatch.setattr("warp.init", refuse)
+    with pytest.raises(devices.DeviceError, match=r"/cache: kernels cannot be kept there .* WARP_CACHE_PATH"):
+        devices._start_warp.__wrapped__()
+
+
+@pytest.mark.parametrize("kind", TEXTS)
+def test_a_text_is_named_as_what_it_is(kind: str, in_tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    text, use = TEXTS[kind]
+    Path("a.toml").write_text(text, encoding="utf-8")
+    for arguments in (["inspect", "a.toml"], ["report", "a.toml", "-o", "a.html"]):
+        assert _said(arguments, capsys) == f"a.toml: is {kind}, not a map of hits; {use}"
+    commands = {"run": "a campaign", "optimise": "a design file", "identify": "a fit", "test": "a firing test"}
+    for command, wanted in commands.items():
+        if wanted != kind:
+            assert _said([command, "a.toml"], capsys) == f"a.toml: is {kind}, not {wanted}; {use}"
+
+
+def test_a_result_is_named_where_a_text_is_taken(
+    make_result: ResultMaker, in_tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    files.write(make_result(20), Path("a.nc"))
+    files.write(make_result(20), Path("b.toml"))
+    told = f"is {kinds.RESULT.what}, not a TOML file; {kinds.RESULT.use}"
+    for command in ("run", "plate", "sweep", "optimise", "identify", "test", "limit"):
+        assert _said([command, "a.nc"], capsys) == f"a.nc: {told}"
+    assert _said(["export", "b.toml"], capsys) == f"b.toml: {told}"
+    for read in (run, read_design, read_fit):
+        with pytest.raises(CampaignError, match="a result, as warpimpact run and limit write, not a TOML file"):
+            read("a.nc")
+
+
+def test_a_picture_is_neither(in_tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    Image.new("1", (2, 2)).save("a.png")
+    assert _said(["inspect", "a.png"], capsys) == "a.png: cannot be read as a netCDF file"
+    assert "a.png: is not valid TOML" in _said(["run", "a.png"], capsys)
+
+
+def test_a_flipped_bit_of_the_header_is_told(
+    make_result: ResultMaker, in_tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def broken(*_: object, **__: object) -> None:
+        raise AttributeError("NetCDF: Attribute not found")
+
+    files.write(make_result(20), Path("a.nc"))
+    monkeypatch.setattr(netCDF4, "Dataset", broken)
+    assert _said(["report", "a.nc"], capsys).startswith("a.nc: cannot be read as a netCDF file")
+
+
+def test_a_run_takes_the_name_of_a_campaign(in_tmp_path: Path) -> None:
+    text = SLOTTED.replace('fidelity = "standard"', "level = 0").replace("count = 4096", "count = 16")
+    Path("a.toml").write_text(text, encoding="utf-8")
+    expected = run(Campaign.from_toml("a.toml"), device="cpu")
+    assert np.array_equal(run("a.toml", device="cpu")["tilt"], expected["tilt"], equal_nan=True)
+    run_to_file("a.toml", "a.nc", device="cpu")
+    assert np.array_equal(files.read(Path("a.nc"))["tilt"], expected["tilt"], equal_nan=True)
+
+
+def test_a_posterior_that_links_to_itself_is_told(in_tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    Path("loop.nc").symlink_to("loop.nc")
+    Path("a.toml").write_text(SLOTTED, encoding="utf-8")
+    assert "but there is no file" in _said(["run", "a.toml", "--posterior", "loop.nc", "-o", "a.nc"], capsys)
+
+
+def test_a_target_without_limits_is_told(make_result: ResultMaker) -> None:
+    result = make_result(20).assign(limit_velocity=("hit", np.full(20, np.inf))).assign_attrs(limit="velocity")
+    with pytest.raises(ValueError, match="no hit perforates at any velocity that was tried"):
+        response_of_limits(result)
+    one = result.assign(limit_velocity=("hit", np.where(np.arange(20) == 3, 500.0, np.inf)))
+    assert isinstance(response_of_limits(one), Response)
+
+
+@pytest.mark.parametrize(
+    ("variables", "said"),
+    [
+        ('thickness = { low = "1 mm", high = "1e999 mm" }', 'thickness.high: got "1e999 mm", but it must be a number'),
+        (f"thickness = {{ low = 1, high = 1{'0' * 400} }}", 'thickness.high: got "a number of more than 80 digits"'),
+        ('thickness = ["1 mm", "2 mm\\u0000"]', "one line without control characters"),
+        ('"plate.pattern" = [{ name = "a\\u0000", shape = "none" }]', "one line without control characters"),
+    ],
+)
+def test_a_variable_without_a_number_or_a_name_is_told(
+    variables: str, said: str, in_tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    Path("a.toml").write_text(f'title = "a"\n[variables]\n{variables}\n', encoding="utf-8")
+    assert said in _said(["optimise", "a.toml"], capsys)
+
+
+def test_a_table_has_no_formulas(make_result: ResultMaker, tmp_path: Path) -> None:
+    result = make_result(3).assign({"=1+1": ("hit", [-1.0, 2.0, 3.0], {"units": "m"})})
+    result["status"].attrs["flag_meanings"] = "=cmd " + result["status"].attrs["flag_meanings"].split(" ", 1)[1]
+    write_csv(result, tmp_path / "a.csv")
+    header, *rows = (tmp_path / "a.csv").read_text(encoding="utf-8").splitlines()
+    assert "'=1+1 [m]" in header.split(",")
+    assert ",'=cmd," in rows[0]
+    assert rows[0].endswith(",-1.0")  # a number is one
+    cells = [cell for line in (header, *rows) for cell in line.split(",")]
+    assert not [cell for cell in cells if cell.startswith(("=", "+", "@"))]
+
+
+@pytest.mark.parametrize(("name", "begin"), [("A.SVG", "<svg"), ("a.svg", "<svg"), ("a b;=(1).svg", "<svg")])
+def test_a_drawing_is_what_its_name_says(name: str, begin: str, in_tmp_path: Path) -> None:
+    assert main(["export", str(CAMPAIGNS / "slotted_plate.toml"), "-o", name]) == 0
+    assert Path(name).read_text(encoding="utf-8").startswith(begin)

@@ -1,0 +1,90 @@
+"""The text of a file that a user names, TOML or JSON: read and parsed within bounds, not yet validated."""
+
+import json
+import re
+import tomllib
+from pathlib import Path
+from typing import Any
+
+from .files import check_file
+from .units import brief
+
+_MOST_TEXT, _MOST_DOTS, _MOST_DEEP = 2**20, 16, 16
+_BESIDE_A_KEY = re.compile("([#=\n,])")
+
+
+def read_text(path: Path) -> str:
+    """The text of a file, or so much of it that `parsed` refuses it.
+
+    Raises:
+        ValueError: it is missing or cannot be read.
+    """
+    check_file(path)
+    try:
+        with path.open(encoding="utf-8") as file:
+            return file.read(_MOST_TEXT + 1)
+    except UnicodeDecodeError as error:
+        raise ValueError(f"{path}: is not valid TOML: {error}") from None
+    except OSError as error:
+        raise ValueError(f"{path}: cannot be read ({error.strerror})") from None
+
+
+def parsed(text: str, name: str) -> dict[str, Any]:
+    """The tables of a text, TOML or JSON.
+
+    Raises:
+        ValueError: the text, which errors call `name`, is neither.
+    """
+    if len(text) > _MOST_TEXT or (not text.startswith("{") and _has_long_key(text)):
+        raise ValueError(f"{name}: at most {_MOST_TEXT} characters are read, with {_MOST_DOTS} dots in a key")
+    try:
+        data: dict[str, Any] = _from_json(text) if text.startswith("{") else tomllib.loads(text)
+    except ValueError as error:
+        raise ValueError(f"{name}: is not valid TOML: {brief(str(error))}") from None
+    except RecursionError:
+        nested = True
+    else:
+        nested = _is_nested(data)
+    if nested:
+        raise ValueError(f"{name}: its tables and arrays are nested more than {_MOST_DEEP} deep")
+    return data
+
+
+def parsed_json(text: Any) -> Any:
+    """What a text, or bytes, that a program wrote says as JSON; None if it is none."""
+    try:
+        return json.loads(text)
+    except (TypeError, ValueError, RecursionError):
+        return None
+
+
+def _has_long_key(text: str) -> bool:
+    """Whether what begins a line, or ends at an equals sign, has more than _MOST_DOTS dots: the parser takes the square
+    of their number."""
+    _, *parts = _BESIDE_A_KEY.split(f"\n{text}\n")
+    around = zip(parts[::2], parts[1::2], parts[2::2], strict=False)
+    return any((before == "\n" or behind == "=") and key.count(".") > _MOST_DOTS for before, key, behind in around)
+
+
+def _from_json(text: str) -> Any:
+    """The tables of a JSON text. It may escape half a character, which is no text and cannot be told or written.
+
+    Raises:
+        ValueError: it is not JSON, or has such a half.
+    """
+    data = json.loads(text)
+    json.dumps(data, ensure_ascii=False).encode()
+    return data
+
+
+def _is_nested(data: Any) -> bool:
+    """Whether tables and arrays lie in each other more than _MOST_DEEP deep."""
+    level = [data]
+    for _ in range(_MOST_DEEP):
+        level = [
+            inner
+            for one in level
+            if isinstance(one, dict | list)
+            for inner in (one.values() if isinstance(one, dict) else one)
+        ]
+    return bool(level)
