@@ -14,7 +14,7 @@ from warpimpact.analysis.hit_map import hit_points
 from warpimpact.analysis.inspect import inspect_text
 from warpimpact.analysis.numbers import intervals_text, number_text
 from warpimpact.analysis.summary import promise_text
-from warpimpact.kernels.status import Status
+from warpimpact.records.group import failures
 from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
 from warpimpact.results.dataset import passed
@@ -76,7 +76,7 @@ def _drawing(dataset: xarray.Dataset) -> str:
     gaps = np.flatnonzero(np.isnan(holes[:, 0]))
     rings = [ring[~np.isnan(ring[:, 0])] for ring in np.split(holes, gaps)] if len(holes) else []
     mark = 0.006 * half.max() * np.array([(-1, -1), (1, -1), (1, 1), (-1, 1)])
-    broken = np.isin(status, [one for one in Status if one.failed])
+    broken = failures(status)
     kinds = ((came, _PASSED), (~came & ~broken, _STOPPED), (broken, _FAILED))
     marks = [(path([hit + mark for hit in hits[which]]), colour) for which, colour in kinds]
     legend = "orange: the core passes; blue: it is stopped; black: not computed; grey: holes"

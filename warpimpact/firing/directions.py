@@ -19,6 +19,7 @@ from pydantic import Field, model_validator
 from warpimpact.campaign.campaign import Campaign
 from warpimpact.campaign.text import CampaignError
 from warpimpact.kernels.status import Status
+from warpimpact.records.group import failures
 from warpimpact.scene import Numerics, Shots
 from warpimpact.scene.model import Model
 from warpimpact.scene.units import Angle, Number, PositiveSpeed
@@ -179,7 +180,7 @@ def _answers(campaign: Campaign, shots: Shots, numerics: Numerics, worker: Worke
     """1 for a shot that perforates, 0 for one that is stopped, NaN for one that failed."""
     status = computed(prepare(campaign.scene, shots, numerics), worker).status
     answers = np.isin(status, (Status.PERFORATED, Status.MISSED)).astype(float)
-    failed = (status >= Status.UNFINISHED) & (status < Status.NOT_REACHED)
+    failed = failures(status)
     return np.where(failed, np.nan, answers)
 
 

@@ -19,6 +19,7 @@ from scipy import special
 
 from warpimpact.analysis.proxy import inclination
 from warpimpact.kernels.status import Status
+from warpimpact.records.group import failures
 from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
 from warpimpact.results.dataset import failed
@@ -194,7 +195,7 @@ def response_of_sweep(sweep: xarray.Dataset, layer: int | None = None) -> Respon
     order = np.argsort(velocity)
     velocity, status = velocity[order], ended.transpose(v.HIT, along).values[:, order]
     through = (status == Status.PERFORATED) | (status == Status.MISSED)
-    sound = ~((status >= Status.UNFINISHED) & (status < Status.NOT_REACHED)).any(axis=1)
+    sound = np.asarray(~failures(status).any(axis=1))
     before = np.concatenate([np.zeros((len(through), 1), dtype=bool), through[:, :-1]], axis=1)
     middle = np.concatenate([[0.0], 0.5 * (velocity[1:] + velocity[:-1])])
     changes = np.sort(np.where(through != before, middle, np.inf), axis=1)

@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 from warpimpact.identification.aim import Aim
 from warpimpact.identification.between import changes, signs
 from warpimpact.identification.measured import Observation
-from warpimpact.kernels.status import Status
+from warpimpact.records.group import failures
 from warpimpact.records.outcomes import Outcomes
 from warpimpact.results import variables as v
 from warpimpact.results.measures import STATUSES, Measure, place_of_standoff
@@ -204,7 +204,7 @@ def score(
 
 def _counted(data: Data, outcomes: Outcomes) -> Array:
     """1 where a shot would have been measured, shape [shots]: its computation did not fail, and the selection holds."""
-    kept = ~np.isin(outcomes.status, [status for status in Status if status.failed])
+    kept = ~failures(outcomes.status)
     for condition in data.selection:
         kept &= holds(condition, outcomes, data.standoffs)
     return kept.astype(np.float64)

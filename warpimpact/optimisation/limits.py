@@ -7,8 +7,8 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
-from warpimpact.kernels.status import Status
 from warpimpact.optimisation.measures import Key
+from warpimpact.records.group import failures
 from warpimpact.scene import Numerics, Scene, Shots
 from warpimpact.solver.limit import (
     HIGHEST_VELOCITY,
@@ -38,7 +38,7 @@ def limits_said(scene: Scene, shots: Shots, key: Key, numerics: Numerics, worker
     sought = sought_by(scene, key)
     found = limits(scene, shots, sought, numerics, worker)
     value = np.minimum(found.value, sought.highest)
-    value = np.where(found.outcomes.status >= Status.UNFINISHED, np.nan, value)
+    value = np.where(failures(found.outcomes.status), np.nan, value)
     if key.effect == "limit_velocity":
         return np.asarray(value)
     if key.effect == "limit_thickness":

@@ -41,7 +41,12 @@ class Returned(NamedTuple):
     @property
     def failed(self) -> NDArray[np.bool_]:
         """Whether the computation of each shot failed, shape [shots]."""
-        return np.asarray(self.status >= Status.UNFINISHED)
+        return failures(self.status)
+
+
+def failures(status: NDArray[Any]) -> NDArray[np.bool_]:
+    """Whether the computation of each shot failed, by its status; of the shape of `status`."""
+    return np.isin(status, [each for each in Status if each.failed])
 
 
 @dataclass(frozen=True)

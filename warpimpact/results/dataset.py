@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from warpimpact.kernels.status import Status
+from warpimpact.records.group import failures
 from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
 from warpimpact.results.layers import faces, fields, own_columns, sections
@@ -292,7 +293,7 @@ def passed(dataset: Result) -> NDArray[np.bool_]:
 
 def failed(dataset: Result) -> NDArray[np.bool_]:
     """Whether the computation of each shot failed, shape (hit,)."""
-    return np.isin(dataset[v.STATUS].values, [status for status in Status if status.failed])
+    return failures(dataset[v.STATUS].values)
 
 
 def shots_at_a_plate(dataset: Result) -> int:

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpimpact.kernels.status import Status
+from warpimpact.records.group import failures
 from warpimpact.records.layers import LAYER_RESIDUAL_VELOCITY
 from warpimpact.records.outcomes import Outcomes
 from warpimpact.scene import Accuracy, Numerics, Shots
@@ -220,7 +221,7 @@ def changes(
     if LAYER_RESIDUAL_VELOCITY in coarse:
         other = ended_otherwise(coarse, fine)
         speed, tilt, depth = (np.where(other, math.nan, x) for x in (speed, tilt, np.abs(fine.depth - coarse.depth)))
-    failed = (coarse.status >= Status.UNFINISHED) != (fine.status >= Status.UNFINISHED)
+    failed = failures(coarse.status) != failures(fine.status)
     return np.where(failed, math.inf, speed), np.where(failed, math.inf, tilt), depth
 
 

@@ -13,7 +13,7 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
-from warpimpact.kernels.status import Status
+from warpimpact.records.group import failures
 from warpimpact.records.limit import LIMITS
 from warpimpact.records.outcomes import Outcomes
 from warpimpact.scene import Numerics, Plate, Scene, Shots
@@ -254,7 +254,7 @@ def _searched(
         tried = search.trial(which)
         ended = computed(prepare(scene, put(shots[which], tried), numerics), worker)
         kept.take(search.learn(which, tried, ended), which, tried, ended)
-        failing.take(np.flatnonzero(ended.status >= Status.UNFINISHED), which, tried, ended)
+        failing.take(np.flatnonzero(failures(ended.status)), which, tried, ended)
         progress(total - len(search.pending))
     failed = np.flatnonzero(search.failed)
     if len(failed):

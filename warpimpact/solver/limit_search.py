@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpimpact.kernels.status import Status
+from warpimpact.records.group import failures
 from warpimpact.records.outcomes import Outcomes
 
 Array = NDArray[np.float64]
@@ -136,7 +137,7 @@ class Search:
     def learn(self, which: NDArray[np.int64], tried: Array, outcomes: Outcomes) -> NDArray[np.int64]:
         """Take in one run of some shots; returns the places of those that say how a shot ends at its limit."""
         status = outcomes.status
-        passes, failed, untouched = status == Status.PERFORATED, status >= Status.UNFINISHED, status == Status.MISSED
+        passes, failed, untouched = status == Status.PERFORATED, failures(status), status == Status.MISSED
         through, back = which[passes], which[~passes]
         self.runs[which] += 1
         for known, new in ((self.drives, self._drive(tried)), (self.speeds, outcomes.residual_velocity)):

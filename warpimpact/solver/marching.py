@@ -18,6 +18,7 @@ import warp as wp
 from numpy.typing import NDArray
 
 from warpimpact.kernels.status import Status
+from warpimpact.records.group import failures
 from warpimpact.solver.chunks import CHUNK, SHARES, Chunks
 from warpimpact.solver.device import halving, launching, load
 from warpimpact.solver.memory import Memory
@@ -214,5 +215,5 @@ def spoilt(status: NDArray[np.int32], count: int) -> NDArray[np.int32]:
     rows = status.reshape(-1, count).copy()
     for order in range(1, count):
         before = rows[:, order - 1]
-        rows[:, order] = np.where(before >= Status.UNFINISHED, before, rows[:, order])
+        rows[:, order] = np.where(failures(before), before, rows[:, order])
     return rows.reshape(-1)

@@ -414,6 +414,6 @@ def test_a_pipe_in_the_folder_of_a_run_blocks_nothing(tmp_path: Path) -> None:
     folder.mkdir()
     for name in ("manifest.json", "hits_0000000000_0123456789abcdef.nc"):
         os.mkfifo(folder / name)
-    with pytest.warns(UserWarning, match="is damaged; it is written again"):
+    with pytest.warns(UserWarning, match="is missing or damaged; it is written again"):
         run_to_file(campaign, tmp_path / "a.nc", device="cpu", resume=True)
     assert not folder.exists()
