@@ -298,8 +298,8 @@ def starved(pid: int) -> float:
     """Seconds that a thread of a process, or of those that it started, has waited for a core at most."""
     waits = [0.0]
     for process in (pid, *(child.pid for child in offspring(pid))):
-        for thread in Path(f"/proc/{process}/task").glob("*/schedstat"):
-            with suppress(OSError):
+        with suppress(OSError):  # it has ended meanwhile
+            for thread in Path(f"/proc/{process}/task").glob("*/schedstat"):
                 waits.append(1e-9 * int(thread.read_text().split()[1]))
     return max(waits)
 

@@ -9,11 +9,11 @@ from dataclasses import dataclass
 from html import escape
 from typing import NamedTuple
 
-from warpimpact.analysis.declared import SHOWN_UNITS
 from warpimpact.analysis.effectiveness import EffectMeasure
 from warpimpact.analysis.numbers import Ends, intervals_text, of_each
 from warpimpact.analysis.numbers import number_text as number
 from warpimpact.analysis.survival import Survival, survival_text
+from warpimpact.analysis.vocabulary import SHOWN_UNITS
 
 
 @dataclass(frozen=True)

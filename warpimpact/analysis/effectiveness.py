@@ -16,10 +16,10 @@ import xarray
 from numpy.typing import NDArray
 
 from warpimpact.analysis.base import solid_note
-from warpimpact.analysis.declared import MEAN, SHARE, SHOWN_UNITS, WORST_POINT, WORST_TENTH, Statistic
 from warpimpact.analysis.effects import Effect, effects
 from warpimpact.analysis.numbers import Ends, intervals_text, number_text
 from warpimpact.analysis.survival import by_draws, over_draws
+from warpimpact.analysis.vocabulary import MEAN, SHARE, SHOWN_UNITS, WORST_POINT, WORST_TENTH, Statistic
 from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
 from warpimpact.results.dataset import finer_pair, solid_reference

@@ -1,4 +1,4 @@
-"""What every shot says of how well a plate protects: one number per shot of each effect of declared.py."""
+"""What every shot says of how well a plate protects: one number per shot of each effect of vocabulary.py."""
 
 from __future__ import annotations
 
@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 from pydantic import TypeAdapter, ValidationError
 
 from warpimpact.analysis import base
-from warpimpact.analysis.declared import EFFECTS, Declaration, angle_text, layer_text, length_text
 from warpimpact.analysis.summary import slices
+from warpimpact.analysis.vocabulary import EFFECTS, Meaning, angle_text, layer_text, length_text
 from warpimpact.campaign.problems import complaint
 from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
@@ -37,7 +37,7 @@ EFFECT_VARIABLES = (*_OF_A_HIT, _THICKNESS, _VELOCITY, *base.NEEDED)
 
 
 @dataclass(frozen=True, kw_only=True)
-class Effect(Declaration):
+class Effect(Meaning):
     """An effect of a result.
 
     Attributes:
@@ -58,9 +58,9 @@ class Effect(Declaration):
         margin: Callable[[Result], Array] | None = None,
         **words: str,
     ) -> Self:
-        """An effect as it is declared, with these words in its label and definition."""
-        declared = EFFECTS[name]
-        told = replace(declared, label=declared.label.format(**words), definition=declared.definition.format(**words))
+        """An effect with its meaning, and these words in its label and definition."""
+        meaning = EFFECTS[name]
+        told = replace(meaning, label=meaning.label.format(**words), definition=meaning.definition.format(**words))
         return cls(**vars(told), values=values, margin=margin)
 
     def judged(self, dataset: Result) -> Array:

@@ -8,12 +8,12 @@ from html import escape
 import numpy as np
 import xarray
 
-from warpimpact.analysis.declared import SHOWN_UNITS
 from warpimpact.analysis.effectiveness import effectiveness
 from warpimpact.analysis.hit_map import hit_points
 from warpimpact.analysis.inspect import inspect_text
 from warpimpact.analysis.numbers import intervals_text, number_text
 from warpimpact.analysis.summary import promise_text
+from warpimpact.analysis.vocabulary import SHOWN_UNITS
 from warpimpact.records.group import failures
 from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v

@@ -68,6 +68,7 @@ def _identify(arguments: argparse.Namespace) -> int:
             overwrite=arguments.overwrite,
             progress=lambda now: show(Step(now.done, now.total, now.resumed, _running(now))),
             processes=min(cores(), PROCESSES),
+            tell=warn,
         )
     tree = posterior_file.read(output)
     print(posterior_text(tree))

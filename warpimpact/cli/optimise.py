@@ -11,7 +11,7 @@ from warpimpact.results.interrupts import terminated_as_interrupted
 from .mistakes import memory_told
 from .options import Commands, add_command, add_computing, add_output, add_overwrite
 from .paths import check_picture, check_place, check_suffix, replaces
-from .progress import Step, show_progress
+from .progress import Step, show_progress, warn
 
 if TYPE_CHECKING:
     from warpimpact.optimisation.search import SearchProgress
@@ -68,6 +68,7 @@ def _optimise(arguments: argparse.Namespace) -> int:
             progress=lambda now: show(
                 Step(now.done, now.total, now.resumed, _running(now), certain=now.certain, now=now.what)
             ),
+            tell=warn,
         )
     dataset = front.read(output)
     print("\n".join(front_lines(dataset)))

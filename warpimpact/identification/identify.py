@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import threading
+import warnings
 from collections.abc import Callable
 from dataclasses import dataclass, fields
 from pathlib import Path
@@ -66,11 +67,13 @@ def identify_to_file(
     overwrite: bool = False,
     progress: Follow | None = None,
     processes: int = 1,
+    tell: Callable[[str], object] = warnings.warn,
 ) -> None:
     """Compute the posterior of a fit into a file; what is computed is on the disk at once, in `output`.parts.
 
     Args:
         processes: as in `Crew`.
+        tell: called with a sentence for what was damaged and is computed again.
 
     Raises:
         OutputError: something cannot be written, must not be overwritten or is no part of this fit.
@@ -79,7 +82,7 @@ def identify_to_file(
     """
     made = made_by(device)
     content = content_of(fit.text, "fit", fit.folder, made)
-    with stored(output, content, "fit", resume=resume, overwrite=overwrite) as store:
+    with stored(output, content, "fit", resume=resume, overwrite=overwrite, tell=tell) as store:
         if store is not None:
             sampled = sample(fit, device=device, store=store, progress=progress, processes=processes)
             tree = to_datatree(fit, sampled, made)

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field, ValidationError, model_validator
 
-from warpimpact.analysis.declared import EFFECTS
+from warpimpact.analysis.vocabulary import EFFECTS
 from warpimpact.campaign.campaign import Campaign
 from warpimpact.campaign.problems import sentence
 from warpimpact.campaign.text import CampaignError, parsed, read_text

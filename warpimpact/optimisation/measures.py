@@ -1,11 +1,11 @@
-"""What a search may ask of a design: the effects of analysis/declared.py, their worst tenths, and areal density."""
+"""What a search may ask of a design: the effects of analysis/vocabulary.py, their worst tenths, and areal density."""
 
 from __future__ import annotations
 
 import math
 from typing import NamedTuple
 
-from warpimpact.analysis.declared import EFFECTS, SHOWN_UNITS, WORST_TENTH, angle_text, layer_text, length_text
+from warpimpact.analysis.vocabulary import EFFECTS, SHOWN_UNITS, WORST_TENTH, angle_text, layer_text, length_text
 
 AREAL_DENSITY = "areal_density"
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import warnings
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -50,6 +52,7 @@ def optimise_to_file(
     resume: bool = False,
     overwrite: bool = False,
     progress: Follow | None = None,
+    tell: Callable[[str], object] = warnings.warn,
 ) -> list[Path]:
     """Search the best designs into a file, with a campaign file for each design of the front in `folder_of(output)`;
     what is computed is on the disk at once, in `output`.parts.
@@ -58,6 +61,7 @@ def optimise_to_file(
         crew: who computes, in place of `device`.
         resume: continue what is in `output`.parts; of a search that is complete, write the campaigns that are missing.
         overwrite: replace an existing result with its campaigns, and begin anew in place of an unfinished search.
+        tell: called with a sentence for what was damaged and is computed again, or is kept as it was changed.
 
     Returns:
         The campaign files.
@@ -70,11 +74,11 @@ def optimise_to_file(
     crew, folder = crew or local_crew(device), folder_of(output)
     content = content_of(design.text, design.name, design.folder, crew.made_by)
     check_campaigns(folder, overwrite=overwrite or (resume and is_begun(output)))
-    with stored(output, content, "search", resume=resume, overwrite=overwrite) as store:
+    with stored(output, content, "search", resume=resume, overwrite=overwrite, tell=tell) as store:
         if store is not None:
             dataset = _found(design, crew, store, progress or (lambda now: None))
             f.write(dataset.assign_attrs({attr.FINGERPRINT: store.parts.fingerprint}), output)
-    return write_campaigns(design, f.read(output), folder, overwrite=overwrite)
+    return write_campaigns(design, f.read(output), folder, overwrite=overwrite, tell=tell)
 
 
 def folder_of(output: Path) -> Path:

@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 from matplotlib.layout_engine import ConstrainedLayoutEngine
 
 from warpimpact.analysis.comparison_text import hits_used
-from warpimpact.analysis.declared import SHOWN_UNITS
+from warpimpact.analysis.vocabulary import SHOWN_UNITS
 from warpimpact.plotting.style import BLUE, GREY, VERMILION, bars, hide_sides
 
 if TYPE_CHECKING:
@@ -19,7 +19,6 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
     from warpimpact.analysis.comparison_text import Comparison, Difference
-    from warpimpact.analysis.declared import SHOWN_UNITS
 from warpimpact.analysis.effectiveness import EffectMeasure
 
 # Markers differ for a print in grey.

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any
 
 from matplotlib.figure import Figure
 
-from warpimpact.analysis.declared import SHOWN_UNITS
 from warpimpact.analysis.effectiveness import depth_note
+from warpimpact.analysis.vocabulary import SHOWN_UNITS
 from warpimpact.plotting.style import BLUE, GREY, VERMILION, bars, hide_sides
 
 if TYPE_CHECKING:
@@ -19,7 +19,6 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
     from warpimpact.analysis.comparison_text import Comparison, Contestant
-    from warpimpact.analysis.declared import SHOWN_UNITS
 from warpimpact.analysis.effectiveness import EffectMeasure
 
 _STYLES = {

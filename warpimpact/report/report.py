@@ -21,8 +21,8 @@ from jinja2 import Environment, PackageLoader, StrictUndefined
 from plotly.offline import get_plotlyjs
 
 import warpimpact
-from warpimpact.analysis.declared import SHOWN_UNITS
 from warpimpact.analysis.numbers import interval_text, intervals_text, number_text
+from warpimpact.analysis.vocabulary import SHOWN_UNITS
 from warpimpact.report.hits import MOST_HITS, page_data, thinned, trajectory_data, worst_and_spread
 from warpimpact.report.words import compared, conclusion, result_content, study_table
 from warpimpact.results import variables as v

@@ -15,7 +15,6 @@ from numpy.typing import NDArray
 from warpimpact.analysis.base import solid_note
 from warpimpact.analysis.comparison import compare
 from warpimpact.analysis.comparison_text import RANKING_HEAD, Comparison, best_rows, conditions, rankings
-from warpimpact.analysis.declared import SHOWN_UNITS
 from warpimpact.analysis.effectiveness import depth_note, effectiveness
 from warpimpact.analysis.numbers import ends_of, intervals_text, number_text
 from warpimpact.analysis.summary import (
@@ -28,6 +27,7 @@ from warpimpact.analysis.summary import (
     status_shares,
 )
 from warpimpact.analysis.survival import draws_note
+from warpimpact.analysis.vocabulary import SHOWN_UNITS
 from warpimpact.campaign.text import parsed
 from warpimpact.plotting.cell import range_text, words
 from warpimpact.plotting.comparison import comparison_figure

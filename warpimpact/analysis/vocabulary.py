@@ -14,7 +14,7 @@ MIL_STD_662F = "MIL-STD-662F, V50 Ballistic Test for Armor"
 
 
 @dataclass(frozen=True, kw_only=True)
-class Declaration:
+class Meaning:
     """An effect: one number per shot, and what is said of it.
 
     Attributes:
@@ -63,10 +63,10 @@ SHOWN_UNITS = {"1": "", "mm": " [mm]", "J mm-2": " [J/mmÂ²]", "kg m-2": " [kg/mÂ
 """Units of effects behind a label, as people read them."""
 
 
-EFFECTS: Mapping[str, Declaration] = {
-    declaration.name: declaration
-    for declaration in (
-        Declaration(
+EFFECTS: Mapping[str, Meaning] = {
+    meaning.name: meaning
+    for meaning in (
+        Meaning(
             name="base_perforated_share",
             label="P(base perforated)",
             units="1",
@@ -77,7 +77,7 @@ EFFECTS: Mapping[str, Declaration] = {
             kind="share",
             needs="layer",
         ),
-        Declaration(
+        Meaning(
             name="base_pierced_share",
             label="P(base pierced)",
             units="1",
@@ -89,7 +89,7 @@ EFFECTS: Mapping[str, Declaration] = {
             kind="share",
             needs="layer",
         ),
-        Declaration(
+        Meaning(
             name="base_depth",
             label="depth in the base",
             units="mm",
@@ -103,7 +103,7 @@ EFFECTS: Mapping[str, Declaration] = {
             kind="mean",
             needs="layer",
         ),
-        Declaration(
+        Meaning(
             name="residual_energy_fraction",
             label="residual energy fraction",
             units="1",
@@ -113,7 +113,7 @@ EFFECTS: Mapping[str, Declaration] = {
             higher_is_better=False,
             kind="mean",
         ),
-        Declaration(
+        Meaning(
             name="residual_energy_density",
             label="proxy: energy per presented area at {standoff}",
             units="J mm-2",
@@ -127,7 +127,7 @@ EFFECTS: Mapping[str, Declaration] = {
             kind="mean",
             needs="standoff",
         ),
-        Declaration(
+        Meaning(
             name="tilted_share",
             label="P(inclined > {angle} at {standoff}, either end first, or stopped)",
             units="1",
@@ -140,7 +140,7 @@ EFFECTS: Mapping[str, Declaration] = {
             kind="share",
             needs="standoff",
         ),
-        Declaration(
+        Meaning(
             name="stopped_share",
             label="P(stopped)",
             units="1",
@@ -149,7 +149,7 @@ EFFECTS: Mapping[str, Declaration] = {
             higher_is_better=True,
             kind="share",
         ),
-        Declaration(
+        Meaning(
             name="broken_share",
             label="P(broken)",
             units="1",
@@ -159,7 +159,7 @@ EFFECTS: Mapping[str, Declaration] = {
             kind="share",
             needs="bending",
         ),
-        Declaration(
+        Meaning(
             name="stopped_or_broken_share",
             label="P(stopped, or broken)",
             units="1",
@@ -169,7 +169,7 @@ EFFECTS: Mapping[str, Declaration] = {
             kind="share",
             needs="bending",
         ),
-        Declaration(
+        Meaning(
             name="limit_velocity",
             label="limit velocity",
             units="m s-1",
@@ -180,7 +180,7 @@ EFFECTS: Mapping[str, Declaration] = {
             kind="mean",
             is_limit=True,
         ),
-        Declaration(
+        Meaning(
             name="limit_thickness",
             label="limit thickness of {layer}",
             units="mm",
@@ -191,7 +191,7 @@ EFFECTS: Mapping[str, Declaration] = {
             kind="mean",
             is_limit=True,
         ),
-        Declaration(
+        Meaning(
             name="limit_areal_density",
             label="areal density needed",
             units="kg m-2",
