@@ -29,7 +29,7 @@ import netCDF4
 import psutil
 
 TOP = Path(__file__).parents[2]
-FIGURES = Path(__file__).parent / "results" / "soak.json"
+FIGURES = Path(__file__).parent / "results" / "soak_commands.json"
 CAMPAIGNS = TOP / "campaigns"
 SCENE = (CAMPAIGNS / "slotted_plate.toml").read_text(encoding="utf-8")
 COMMAND = """
