@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 from matplotlib.figure import Figure
 
+from warpimpact import Campaign
 from warpimpact.cli import main
 from warpimpact.studies import accuracy
 
@@ -58,10 +59,10 @@ def test_each_line_works_after_those_above_it(
     made = {path.name for path in tmp_path.iterdir()}
     assert {"slotted.toml", "slotted.nc", "slotted.csv", "slots.nc", "slots.html", "slotted_hit34.nc"} <= made
     (code,) = re.findall(r"```python\n(.*?)```", README, re.DOTALL)
-    few_hits = code.replace('from_toml("slotted.toml")', 'from_toml("slotted.toml", count=128)')
+    few_hits = code.replace('run("slotted.toml")', 'run(Campaign.from_toml("slotted.toml", count=128))')
     assert few_hits != code
     capsys.readouterr()
-    exec(few_hits, {})
+    exec(few_hits, {"Campaign": Campaign})
     assert "perforated" in capsys.readouterr().out
 
 
