@@ -73,6 +73,8 @@ class _Material(BaseModel):
     degradation_depth: Finite | None = None
 
 
+_Shifts = Annotated[list[Number], Field(min_length=1, max_length=2)]
+"""Of the means of residual velocity and, where there is a stand-off, tilt."""
 _TYPES: Mapping[str, Any] = {
     "text": Text,
     "table": Json[dict[str, Any]],
@@ -89,7 +91,7 @@ _SHAPES: Mapping[str, Any] = {
     attr.NUMERICS_GIVEN: Json[_Fidelity],
     attr.DISCREPANCY: Json[dict[str, Finite]],
     attr.LAYERS: Json[dict[str, _Layer]],
-    attr.LEVEL_SHIFTS: Json[dict[Annotated[str, Field(pattern=r"^\d{1,3}$")], tuple[Number, Number]]],
+    attr.LEVEL_SHIFTS: Json[dict[Annotated[str, Field(pattern=r"^\d{1,3}$")], _Shifts]],
     attr.SWEEP: Json[dict[str, Annotated[list[Text], Field(min_length=1)]]],
     attr.LIMIT: _one_of(v.LIMITS),
     attr.LIMIT_LAYER: Size,

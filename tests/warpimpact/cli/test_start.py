@@ -127,7 +127,7 @@ def test_bash_completes_commands_and_options(capsys: pytest.CaptureFixture[str])
     [
         ([], "64 of 64 hits", "warpimpact.solver"),
         (["-q"], "", "of 64 hits"),
-        (["-v"], "warpimpact.solver.pilot: pilot of 64 hits at level", "warpimpact.solver.device"),
+        (["-v"], "warpimpact.solver.pilot: pilot: 64 shots at level", "warpimpact.solver.device"),
     ],
 )
 def test_more_or_less_is_told(option: list[str], told: str, untold: str, capsys: pytest.CaptureFixture[str]) -> None:
