@@ -29,7 +29,7 @@ from .progress import verbosity
 from .replay import add_replay
 from .run import add_run
 from .show import add_inspect, add_plate, add_plot
-from .start import add_completion, add_examples, add_new, add_schema
+from .start import add_examples, add_new, add_schema
 from .sweep import add_sweep
 
 _COMMANDS = (
@@ -53,7 +53,6 @@ _COMMANDS = (
     add_optimise,
     add_test,
     add_schema,
-    add_completion,
 )
 """In the order of the help."""
 
@@ -115,5 +114,4 @@ def parser() -> argparse.ArgumentParser:
     commands = program.add_subparsers(metavar="COMMAND", required=True)
     for add in _COMMANDS:
         add(commands)
-    program.set_defaults(program=program)  # from which completion is made
     return program

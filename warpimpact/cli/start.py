@@ -1,4 +1,4 @@
-"""The commands examples, new, schema and completion: what helps to write a campaign and to type a command."""
+"""The commands examples, new and schema: what helps to write a campaign."""
 
 import argparse
 import re
@@ -143,36 +143,3 @@ def _schema_text(kind: str) -> str:
 
     made = {"campaign": campaign_schema, "fit": fit_schema, "test": firing_schema, "design": design_schema}[kind]
     return json.dumps(made(), indent=1, ensure_ascii=False) + "\n"
-
-
-def add_completion(commands: Commands) -> None:
-    parser = add_command(
-        commands,
-        "completion",
-        _completion,
-        summary="print a script that completes commands in a shell",
-        description="Print a script that lets the Tab key complete commands, options and file names. Put it where your "
-        'shell looks, or into a session: eval "$(warpimpact completion bash)"',
-        example="completion bash > ~/.local/share/bash-completion/completions/warpimpact",
-    )
-    parser.add_argument("shell", choices=("bash", "zsh", "tcsh"), help="the shell")
-
-
-def _completion(arguments: argparse.Namespace) -> None:
-    import shtab
-
-    for command in _commands(arguments.program):
-        for action in command._actions:
-            if command.prog.endswith(" new") and action.dest == "name":
-                action.choices = list(_campaigns())
-            elif action.dest == "device":
-                action.choices = ("auto", "cpu", "cuda:0")
-            if action.type is Path:
-                vars(action)["complete"] = shtab.FILE
-    print(shtab.complete(arguments.program, arguments.shell))
-
-
-def _commands(program: argparse.ArgumentParser) -> Iterator[argparse.ArgumentParser]:
-    for action in program._actions:
-        if isinstance(action, argparse._SubParsersAction):
-            yield from action.choices.values()

@@ -1,4 +1,4 @@
-"""The commands that help to start: examples, new, schema, completion; and what -v and -q tell."""
+"""The commands that help to start: examples, new and schema; and what -v and -q tell."""
 
 import json
 import subprocess
@@ -108,18 +108,6 @@ def test_the_schema_of_fits_takes_the_fits_and_finds_slips() -> None:
         for table, slip in (("plate", {"thicknes": 1}), ("sampling", {"set": 1}), ("discrepancy", {"speed": 1})):
             (error,) = validator.iter_errors(fit | {table: fit.get(table, {}) | slip})
             assert error.json_path == f"$.{table}"
-
-
-def test_bash_completes_commands_and_options(capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["completion", "bash"]) == 0
-    script = capsys.readouterr().out + (
-        "COMP_WORDS=(warpimpact pl); COMP_CWORD=1; _shtab_warpimpact; echo ${COMPREPLY[@]}\n"
-        "COMP_WORDS=(warpimpact run --ov); COMP_CWORD=2; _shtab_warpimpact; echo ${COMPREPLY[@]}\n"
-        "COMP_WORDS=(warpimpact new slo); COMP_CWORD=2; _shtab_warpimpact; echo ${COMPREPLY[@]}\n"
-        "COMP_WORDS=(warpimpact run --device c); COMP_CWORD=3; _shtab_warpimpact; echo ${COMPREPLY[@]}\n"
-    )
-    done = subprocess.run(["bash"], input=script, capture_output=True, text=True, check=False)
-    assert done.stdout.splitlines() == ["plot plate", "--overwrite", "slotted_plate", "cpu cuda:0"]
 
 
 @pytest.mark.parametrize(
