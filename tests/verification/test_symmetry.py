@@ -1,13 +1,12 @@
 """Mirrored, shifted and turned scenes have mirrored, shifted and turned outcomes (docs/model.md §6.7)."""
 
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
 from warpimpact.records.outcomes import Outcomes
-from warpimpact.scene import MaskPattern, Shots, SlotPattern
+from warpimpact.scene import PolygonsPattern, Shots, SlotPattern
 
 from .scenes import paper_plate, scattered_hits, shots_at, simulate
 
@@ -85,14 +84,16 @@ def test_hits_a_lattice_vector_apart_are_the_same_bit_for_bit(
 
 
 @PRECISIONS
-def test_plate_turned_by_90_degrees_with_its_shot(precision: str, device: str, tmp_path: Path) -> None:
+def test_plate_turned_by_90_degrees_with_its_shot(precision: str, device: str) -> None:
     # (y, z) → (−z, y); the hole has neither a mirror nor a turn of its own, and the period is no square.
-    material = np.ones((32, 40), dtype=np.uint8)
-    material[8:14, 10:30] = material[14:24, 10:16] = 0
-    plates = []
-    for name, mask in (("plain.npy", material), ("turned.npy", np.rot90(material))):
-        np.save(tmp_path / name, mask)
-        plates.append(paper_plate(pattern=MaskPattern(file=tmp_path / name, cell_size=0.25e-3)))
+    corners = 0.25e-3 * np.array([(-8, -10), (8, -10), (8, -4), (-2, -4), (-2, 10), (-8, 10)])
+    spacing = np.array([8e-3, 10e-3])
+    plates = [
+        paper_plate(
+            pattern=PolygonsPattern(polygons=[hole.tolist()], spacing=tuple(extent.tolist()), cell_size=0.25e-3)
+        )
+        for hole, extent in ((corners, spacing), (corners[:, ::-1] * (-1.0, 1.0), spacing[::-1]))
+    ]
     scene: dict[str, Any] = {"precision": precision, "device": device}
     plain = simulate(plates[0], shots(), **scene)
     turned = simulate(plates[1], shots(y=-Z, z=Y, azimuth=120.0, pitch=-3.0, yaw=-2.0), **scene)

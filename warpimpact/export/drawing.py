@@ -21,7 +21,7 @@ _MM = 1e3
 def write_drawing(plate: Plate, output: Path) -> None:
     """Write the holes of a plate, or of one period of an unbounded one, with the rim of that.
 
-    In an SVG drawing filled shapes are holes, so a mask reads it. A DXF drawing has closed polylines in the layers
+    In an SVG drawing filled shapes are holes. A DXF drawing has closed polylines in the layers
     HOLES and RIM.
 
     Raises:

@@ -27,8 +27,8 @@ def outlines(dataset: xarray.Dataset | Table, layer: int = 0) -> dict[str, NDArr
     """Outlines of the holes of a layer, 0 the plate, [m], each of shape (vertex,), by the axis "y" and "z", with a NaN
     between one and the next.
 
-    They follow from the plate. Those of a mask do so only where its file is at hand; that of the plate is an attribute.
-    They are empty if nothing tells them.
+    They follow from the plate. Where they do not, as in files of version 0.1 whose holes came from an image, those of
+    the plate are an attribute. They are empty if nothing tells them.
     """
     if not layer and v.OUTLINE_Y in dataset.attrs:
         return {axis: np.atleast_1d(dataset.attrs[name]) for axis, name in v.OUTLINE.items()}
@@ -37,7 +37,7 @@ def outlines(dataset: xarray.Dataset | Table, layer: int = 0) -> dict[str, NDArr
     text = json.dumps({name: fields[name] for name in Plate.model_fields if name in fields}) if layer else None
     try:
         plate = Plate.model_validate_json(text or dataset.attrs.get(attr.PLATE, ""))
-    except ValueError:  # without a plate, or the file of its mask
+    except ValueError:  # without a plate, or with holes from an image
         return dict.fromkeys(v.OUTLINE, np.empty(0))
     halves = [0.5 * float(side) for side in dataset.attrs[attr.PLATE_PERIOD]]
     found = outlines_in(plate, *((-half - at, half - at) for half, at in zip(halves, offset, strict=True)))

@@ -237,7 +237,7 @@ def check_alike(device: str, kind: dict[str, str]) -> None:
 
 
 def _looked_at(campaign: Campaign) -> Campaign:
-    """The campaign, which carries the ligament of its plate from then on: that of a mask takes seconds, and every shard
-    tells it."""
+    """The campaign, which carries the ligament of its plate from then on: that of a free form takes seconds, and every
+    shard tells it."""
     _ = campaign.plate.ligament
     return campaign

@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Mapping
-from pathlib import Path
 from typing import Any
 
 from warpimpact.campaign.campaign import Campaign
@@ -133,11 +132,7 @@ def _material(campaign: Campaign) -> str:
 
 
 def _plate(campaign: Campaign) -> str:
-    """The plate as JSON; of a mask, the name of its file."""
-    told = campaign.plate.model_dump(mode="json")
-    if isinstance(file := told["pattern"].get("file"), str):
-        told["pattern"]["file"] = Path(file).name
-    return json.dumps(told)
+    return json.dumps(campaign.plate.model_dump(mode="json"))
 
 
 def _layers(campaign: Campaign) -> str:

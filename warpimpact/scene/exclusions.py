@@ -23,7 +23,7 @@ LAYER_STANDOFFS = "output.layer_standoffs"
 STOP_BENDING, STOP_BROKEN = "stop.quantity of a bending moment or stress", "stop.quantity of broken cores"
 WHOLE_PLATE, SIZE, MARGIN = 'hits.area = "plate"', "size of the plate", "margin"
 BY_TIME, STAGGERED, HOLES = "plate.degradation_interval", "staggered", "holes"
-CELLS = 'shape = "mask", "supershape" or "level_set"'
+CELLS = 'shape = "supershape", "level_set" or "polygons"'
 THICKNESS, AREAL_DENSITY = "thickness", "areal_density"
 SPACING, OFFSETS, HIT_SCATTER = "burst.spacing", "burst.offsets", "burst.scatter"
 LIMIT = "warpimpact limit"
@@ -49,7 +49,11 @@ EXCLUDED = (
     Rule(BY_TIME, BY_PATH, "exposure counts either time or path"),
     Rule(THICKNESS, AREAL_DENSITY, "with the holes each gives the other"),
     Rule(STAGGERED, HOLES, "it stands for two holes; list all holes of the cell"),
-    Rule(MARGIN, CELLS, "it has no single holes to leave out; draw a mask as large as the plate"),
+    Rule(
+        MARGIN,
+        CELLS,
+        "it has no single holes to leave out; give polygons in a cell as large as the plate",
+    ),
     Rule(LAYERS, NODAL, "the nodal scheme knows one plate and no layers behind it"),
     Rule(BY_PATH, NODAL, "the nodal scheme weakens the plate once per time step"),
     Rule(BENDING, NODAL, "the nodal scheme has no bending moment"),

@@ -258,11 +258,12 @@ def test_a_complete_search_is_resumed_to_its_campaigns(tmp_path: Path) -> None:
         optimise_to_file(read_design(file), output)
 
 
-def test_a_search_with_another_drawing_is_not_resumed(tmp_path: Path) -> None:
+def test_a_search_with_another_catalogue_is_not_resumed(tmp_path: Path) -> None:
     """The contents of a file that the design names decide its numbers."""
-    np.save(tmp_path / "holes.npy", np.eye(8, dtype=bool))
-    mask = '[plate.pattern]\nshape = "mask"\nfile = "holes.npy"\ncell_size = "1 mm"\n'
-    one = design(THICKNESS, mask, WEIGHT_AND_ENERGY, SEARCH, folder=tmp_path)
+    entry = '[[material]]\nname = "{}"\ndensity = 7850\nresistance = 2.6e9\n'
+    (tmp_path / "own.toml").write_text(entry.format("steel"), encoding="utf-8")
+    tables = "\n".join(["catalogue = 'own.toml'", CORE, THICKNESS, WEIGHT_AND_ENERGY, SEARCH])
+    one = design_from(tables, "design.toml", tmp_path)
 
     def stop(now: search.SearchProgress) -> None:
         if now.done:
@@ -270,8 +271,8 @@ def test_a_search_with_another_drawing_is_not_resumed(tmp_path: Path) -> None:
 
     with pytest.raises(Interrupted, match="batches are saved"):
         optimise_to_file(one, tmp_path / "front.nc", progress=stop)
-    np.save(tmp_path / "holes.npy", ~np.eye(8, dtype=bool))
-    with pytest.raises(OutputError, match=r"cannot be resumed: files\.holes\.npy was"):
+    (tmp_path / "own.toml").write_text(entry.format("armour"), encoding="utf-8")
+    with pytest.raises(OutputError, match=r"cannot be resumed: files\.own\.toml was"):
         optimise_to_file(one, tmp_path / "front.nc", resume=True)
 
 

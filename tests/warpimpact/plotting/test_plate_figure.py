@@ -13,7 +13,7 @@ from warpimpact.campaign.plates import read_plates
 from warpimpact.cli import main
 from warpimpact.plotting import plate_figure
 from warpimpact.plotting.dimensions import hole_dimensions, smallest_ligament
-from warpimpact.scene import ConeCore, Layer, MaskPattern, NoPattern, Plate, SlotPattern, Target
+from warpimpact.scene import ConeCore, Layer, NoPattern, Plate, PolygonsPattern, SlotPattern, Target
 from warpimpact.studies.sweep import read_sweep
 
 CAMPAIGNS = Path(__file__).parents[3] / "campaigns"
@@ -105,13 +105,11 @@ def test_dimensions_are_those_of_the_plate() -> None:
     assert sorted(filter(None, shown)) == ["12", "16", "16", "4", "4"]
 
 
-def test_islands_of_a_mask_are_steel_and_its_resolution_is_told(tmp_path: Path) -> None:
-    cells = np.ones((16, 16))
-    cells[3:13, 3:13] = 0
-    cells[6:10, 6:10] = 1
-    np.save(tmp_path / "a.npy", cells)
-    figure = plate_figure(plate(pattern=MaskPattern(file=tmp_path / "a.npy", cell_size="1 mm")))
-    np.testing.assert_allclose(colours(figure, (0.5, 0.5), (-4, 1), (-6, 1)), [STEEL, HOLE, STEEL], atol=0.01)
+def test_the_resolution_of_a_free_form_is_told() -> None:
+    hole = 1e-3 * np.array([(-5, -5), (5, -5), (5, 5), (-5, 5)])
+    pattern = PolygonsPattern(polygons=[hole.tolist()], spacing=("16 mm", "16 mm"), cell_size="1 mm")
+    figure = plate_figure(plate(pattern=pattern))
+    np.testing.assert_allclose(colours(figure, (-4, 1), (-6, 1)), [HOLE, STEEL], atol=0.01)
     title = " ".join(figure.axes[0].get_title().split())
     assert "smallest ligament 6.00 mm (resolved to 1 mm)" in title
 

@@ -161,7 +161,7 @@ def test_results_of_different_plates_are_joined(result: xarray.Dataset, tmp_path
     np.testing.assert_array_equal(by_plate["residual_velocity"][1], other["residual_velocity"])
 
 
-def test_the_outlines_of_a_mask_are_kept(make_result: Any, tmp_path: Path) -> None:
+def test_outlines_that_do_not_follow_from_the_plate_are_kept(make_result: Any, tmp_path: Path) -> None:
     one = make_result()  # no attribute tells its plate
     assert one.attrs[v.OUTLINE_Y].shape == (5,)
     files.write(one, tmp_path / "a.nc")

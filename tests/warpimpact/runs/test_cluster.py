@@ -9,7 +9,6 @@ from collections.abc import Callable, Iterator
 from concurrent.futures import CancelledError
 from pathlib import Path
 
-import numpy as np
 import pytest
 
 from warpimpact import Campaign
@@ -159,22 +158,19 @@ def test_workers_that_would_compute_other_bits_are_refused(campaign: Campaign) -
         _compute_alike(HitMap(), campaign, Task(campaign.sampler().shots(0, 1)), _How("cpu", None, kind))
 
 
-def test_the_ligament_of_a_mask_is_found_once_for_all_workers(
-    campaign: Campaign, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+def test_the_ligament_of_a_free_form_is_found_once_for_all_workers(
+    campaign: Campaign, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    mask = np.ones((16, 32), dtype=np.uint8)
-    mask[4:8, 4:8] = mask[10:14, 20:24] = 0
-    np.save(tmp_path / "mask.npy", mask)
-    pattern = {"shape": "mask", "file": tmp_path / "mask.npy", "cell_size": "0.5 mm"}
-    masked = campaign.model_copy(update={"plate": campaign.plate.model_copy(update={"pattern": pattern})})
-    found = _looked_at(masked)
+    pattern = {"shape": "supershape", "spacing": ["8 mm", "8 mm"], "forms": [{"radius": "2 mm"}]}
+    free_form = campaign.model_copy(update={"plate": campaign.plate.model_copy(update={"pattern": pattern})})
+    found = _looked_at(free_form)
 
     def again(_: object) -> float:
         raise AssertionError("was computed again")
 
     monkeypatch.setattr("warpimpact.scene.patterns.cells.smallest_gap", again)
     with pytest.raises(AssertionError):
-        _ = masked.model_copy().plate.pattern.model_copy().ligament()
+        _ = free_form.model_copy().plate.pattern.model_copy().ligament()
     assert pickle.loads(pickle.dumps(found)).plate.ligament == found.plate.ligament > 0.0
 
 

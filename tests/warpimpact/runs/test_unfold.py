@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 import xarray
 
-from warpimpact import Campaign, Hits, Impact, MaskPattern, Numerics, Plate, PolynomialCore, SlotPattern, run
+from warpimpact import Campaign, Hits, Impact, Numerics, Plate, PolygonsPattern, PolynomialCore, SlotPattern, run
 from warpimpact.analysis.inspect import inspect_text
 from warpimpact.analysis.summary import estimated
 from warpimpact.campaign.campaign import Output
@@ -71,13 +71,12 @@ def computed(monkeypatch: pytest.MonkeyPatch) -> list[int]:
 
 
 @pytest.fixture
-def glide(tmp_path: Path) -> MaskPattern:
+def glide() -> PolygonsPattern:
     """Holes whose only symmetry is a mirror image in z with a shift by half a cell."""
-    material = np.ones((64, 64), dtype=np.uint8)
-    material[4:20, 8:40] = 0
-    material[4:12, 8:24] = 1
-    np.save(tmp_path / "mask.npy", material & np.roll(material[:, ::-1], (32, 32), axis=(0, 1)))
-    return MaskPattern(file=tmp_path / "mask.npy", cell_size=0.25e-3)
+    hole = np.array([(-5, -6), (-3, -6), (-3, 2), (-7, 2), (-7, -2), (-5, -2)])
+    shift = np.array([8, 8])
+    polygons = [(1e-3 * hole).tolist(), (1e-3 * (hole * (1, -1) + shift)).tolist()]
+    return PolygonsPattern(polygons=polygons, spacing=(16e-3, 16e-3), cell_size=0.25e-3)
 
 
 @pytest.mark.parametrize(

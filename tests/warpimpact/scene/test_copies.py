@@ -13,7 +13,6 @@ from warpimpact import (
     CirclePattern,
     Impact,
     Interaction,
-    MaskPattern,
     Numerics,
     Plate,
     PolynomialCore,
@@ -45,7 +44,7 @@ mass = "4 g"
 thickness = "4 mm"
 resistance = "2600 MPa"
 degradation = 0.8
-pattern = { shape = "mask", file = "mask.npy", cell_size = "1 mm" }
+pattern = { shape = "circle", diameter = "5 mm", spacing = ["8 mm", "8 mm"] }
 [numerics]
 fidelity = "draft"
 [output]
@@ -75,9 +74,6 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     place.mkdir()
     (place / "profile.csv").write_text("s,r\n0,0\n0.012,0.003\n0.02,0.003\n")
     (place / "hits.csv").write_text("hit_y,hit_z,velocity\n0.001,0.002,820\n0.002,0.001,810\n0.0,0.0,800\n")
-    material = np.ones((12, 12), dtype=np.uint8)
-    material[3:8, 4:9] = 0
-    np.save(place / "mask.npy", material)
     monkeypatch.chdir(tmp_path)
     return Path("campaigns")
 
@@ -114,15 +110,12 @@ def test_a_copy_takes_what_the_model_takes() -> None:
     assert PLATE.model_copy(update={"pattern": {"shape": "none"}}).pattern == NoPattern()
 
 
-def test_nothing_computed_goes_along(folder: Path) -> None:
+def test_nothing_computed_goes_along() -> None:
     assert CORE.mass_properties.mass == 4e-3
     assert CORE.model_copy(update={"mass": 8e-3}).mass_properties.mass == 8e-3
     slots = SlotPattern(length=12 * MM, width=4 * MM, spacing=(8 * MM, 16 * MM))
     assert slots.ligament() == pytest.approx(4 * MM)
     assert slots.model_copy(update={"spacing": (10 * MM, 18 * MM)}).ligament() == pytest.approx(6 * MM)
-    mask = MaskPattern(file=folder / "mask.npy", cell_size=1 * MM)
-    np.save(folder / "mask.npy", np.pad(mask.material, 2, constant_values=True))
-    assert mask.model_copy(update={"cell_size": 2 * MM}).period == pytest.approx((32 * MM, 32 * MM))
 
 
 def test_a_pattern_keeps_no_rim_of_another_plate() -> None:

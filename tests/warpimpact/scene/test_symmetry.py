@@ -6,16 +6,17 @@ from typing import Any
 
 import numpy as np
 import pytest
+import shapely
 from pydantic import ValidationError
 
 from warpimpact.scene import (
     CirclePattern,
     Hits,
     Impact,
-    MaskPattern,
     NoPattern,
     Pattern,
     Plate,
+    PolygonsPattern,
     Sampler,
     Scatter,
     SlotPattern,
@@ -90,16 +91,20 @@ def test_of_a_shot(impact: dict[str, Any], expected: set[str]) -> None:
     assert found(plate(SLOTS), Impact(velocity=825, **impact)) == expected
 
 
-def mask(folder: Path, material: np.ndarray) -> Plate:
-    np.save(folder / "mask.npy", material.astype(np.uint8))
-    return plate(MaskPattern(file=folder / "mask.npy", cell_size=0.25 * MM))
+def of_cells(material: np.ndarray) -> Plate:
+    """A plate with holes where square cells of 0.25 mm are 0; the pattern has four of its own in each."""
+    corners = 0.25 * MM * (np.argwhere(material == 0) - 0.5 * np.array(material.shape))
+    holes = shapely.union_all(shapely.box(*corners.T, *(corners + 0.25 * MM).T), grid_size=1e-7)
+    polygons = [hole.exterior.coords[:-1] for hole in shapely.get_parts(holes)]
+    spacing = tuple(0.25 * MM * side for side in material.shape)
+    return plate(PolygonsPattern(polygons=polygons, spacing=spacing, cell_size=0.125 * MM))
 
 
 @pytest.mark.parametrize("sides", [(12, 16), (13, 16), (13, 17)])
-def test_of_a_mask_are_those_of_its_cells(tmp_path: Path, sides: tuple[int, int]) -> None:
+def test_of_a_free_form_are_those_of_its_cells(sides: tuple[int, int]) -> None:
     blank = np.ones(sides)
     blank[3:-3, 5:-5] = 0
-    assert found(mask(tmp_path, blank)) == {*ALL}
+    assert found(of_cells(blank)) == {*ALL}
     for notch, expected in (
         ([(3, 5)], {"(y, z)"}),
         ([(3, 5), (-4, -6)], {"(y, z)", "(-y, -z)"}),
@@ -109,18 +114,18 @@ def test_of_a_mask_are_those_of_its_cells(tmp_path: Path, sides: tuple[int, int]
         notched = blank.copy()
         for cell in notch:
             notched[cell] = 1
-        assert found(mask(tmp_path, notched)) == expected
+        assert found(of_cells(notched)) == expected
 
 
-def test_a_mask_may_be_centred_or_glide(tmp_path: Path) -> None:
+def test_a_free_form_may_be_centred_or_glide() -> None:
     material = np.ones((12, 16))
     material[1:3, 6:10] = 0
     material[7:9, [14, 15, 0, 1]] = 0  # the hole again, half a cell on along both sides
-    assert found(mask(tmp_path, material)) == centred("(y, z)", "(y, -z)")
+    assert found(of_cells(material)) == centred("(y, z)", "(y, -z)")
     material[1, 6] = material[7, 14] = 1
-    assert found(mask(tmp_path, material)) == centred("(y, z)")
+    assert found(of_cells(material)) == centred("(y, z)")
     material[7, 14], material[7, 1] = 0, 1
-    assert found(mask(tmp_path, material)) == {"(y, z)", "(y, -z) + centring"}
+    assert found(of_cells(material)) == {"(y, z)", "(y, -z) + centring"}
 
 
 def groups() -> list[tuple[Symmetry, ...]]:

@@ -13,7 +13,6 @@ from warpimpact.runs.foreseen import cost_of
 from warpimpact.scene import (
     CirclePattern,
     LevelSetPattern,
-    MaskPattern,
     Numerics,
     Plate,
     SlotPattern,
@@ -72,15 +71,11 @@ def test_tile_looks_closely_only_where_edges_are_and_misses_none(pattern: Any, s
     assert tile.material.mean() == pytest.approx(1.0 - pattern.open_area, abs=1e-4)
 
 
-def test_tile_is_kept_for_the_next_shots_but_not_for_another_mask_of_the_same_name(tmp_path: Path) -> None:
-    def masked(hole: tuple[int, int]) -> Plate:
-        mask = np.ones((4, 4), dtype=np.uint8)
-        mask[hole] = 0
-        np.save(tmp_path / "mask.npy", mask)
-        pattern = MaskPattern(file=str(tmp_path / "mask.npy"), cell_size=1e-3)
-        return PLATE.model_copy(update={"pattern": pattern})
+def test_tile_is_kept_for_the_next_shots_but_not_for_another_pattern() -> None:
+    def with_slots(width: float) -> Plate:
+        return PLATE.model_copy(update={"pattern": PATTERNS[0].model_copy(update={"width": width})})
 
-    one, other = masked((0, 0)), masked((2, 1))
+    one, other = with_slots(2e-3), with_slots(1e-3)
     slotted, again = (PLATE.model_copy(update={"pattern": PATTERNS[0].model_copy()}) for _ in range(2))
     assert tile_of(slotted, 0.5e-3) is tile_of(again, 0.5e-3)
     assert tile_of(one, 0.5e-3) is tile_of(one.model_copy(update={"thickness": 1.0}), 0.5e-3)

@@ -1,12 +1,11 @@
-"""Hole patterns: one hole shape on a lattice, free forms, or any mask, repeated periodically (docs/model.md §3)."""
+"""Hole patterns: one hole shape on a lattice, or free forms in a cell, repeated periodically (docs/model.md §3)."""
 
 from typing import Annotated
 
 from pydantic import Field
 
-from .free_form import LevelSetPattern, Supershape, SupershapePattern, Wave
+from .free_form import LevelSetPattern, PolygonsPattern, Supershape, SupershapePattern, Wave
 from .lattice import LatticePattern, Place
-from .mask import MaskPattern
 from .pattern import WHOLE_CELL as WHOLE_CELL
 from .pattern import BoolArray, NoPattern, Pattern
 from .shapes import CirclePattern, EllipsePattern, HexagonPattern, SlotPattern, SquarePattern, TrianglePattern
@@ -21,6 +20,6 @@ AnyPattern = Annotated[
     | NoPattern
     | SupershapePattern
     | LevelSetPattern
-    | MaskPattern,
+    | PolygonsPattern,
     Field(discriminator="shape"),
 ]

@@ -1,17 +1,19 @@
-"""Free forms: holes of no named shape, as square cells, from a few numbers (docs/model.md §3).
+"""Free forms: holes of no named shape, as square cells, from a few numbers or from corners (docs/model.md §3).
 
 A form is drawn in cells. A tool of some diameter then opens it: what the tool does not reach stays material (the
 opening of mathematical morphology: J. Serra, Image Analysis and Mathematical Morphology, Academic Press 1982). Material
 that a hole surrounds falls out.
 """
 
+import itertools
 import math
 from abc import abstractmethod
+from collections.abc import Sequence
 from functools import cached_property
-from typing import Annotated, Literal, Self
+from typing import Annotated, Any, Literal, NamedTuple, Self
 
 import numpy as np
-from pydantic import Field, model_validator
+from pydantic import Field, ValidationInfo, field_validator, model_validator
 
 from ..model import Array, Model
 from ..units import Angle, Length, NonNegativeLength, PositiveLength
@@ -19,6 +21,7 @@ from .cells import CellsPattern
 from .pattern import BoolArray
 
 _MOST_CELLS = 4_000_000
+_MOST_POLYGONS, _MOST_CORNERS = 400, 400  # which are read and drawn within seconds
 _Exponent = Annotated[float, Field(gt=0.05, le=100.0)]
 
 
@@ -121,18 +124,51 @@ class _FreeForm(CellsPattern):
         return material
 
 
-class SupershapePattern(_FreeForm):
-    """Unions of one to three supershapes in a cell.
+class _Polygon(NamedTuple):
+    """One hole with straight edges.
 
     Attributes:
-        shape: "supershape".
-        forms: the supershapes.
+        y, z: its place, the middle of its extent [m].
+        reach: the farthest that it extends from its place along y or z [m].
+        outline: a shapely polygon, from its place.
+    """
+
+    y: float
+    z: float
+    reach: float
+    outline: Any
+
+    @classmethod
+    def of(cls, corners: Array) -> Self:
+        """From corners of shape [corners, 2] [m]."""
+        import shapely
+
+        low, high = corners.min(axis=0), corners.max(axis=0)
+        place = 0.5 * (low + high)
+        outline = shapely.Polygon(corners - place)
+        shapely.prepare(outline)
+        return cls(float(place[0]), float(place[1]), 0.5 * float((high - low).max()), outline)
+
+    def holds(self, y: Array, z: Array) -> BoolArray:
+        """Whether points, from its place [m], lie in it; of their broadcast shape."""
+        import shapely
+
+        return np.asarray(shapely.contains_xy(self.outline, *np.broadcast_arrays(y, z)))
+
+
+class _UnionPattern(_FreeForm):
+    """Forms in a cell; forms that overlap make one hole.
+
+    Attributes:
         staggered: shifts every odd row of cells along y by b/2 along z.
     """
 
-    shape: Literal["supershape"] = "supershape"
-    forms: Annotated[tuple[Supershape, ...], Field(min_length=1, max_length=3)]
     staggered: Annotated[bool, Field(strict=True)] = False
+
+    @property
+    @abstractmethod
+    def _forms(self) -> Sequence[Supershape | _Polygon]:
+        """The forms of a cell."""
 
     @property
     def extent(self) -> tuple[float, float]:
@@ -142,18 +178,68 @@ class SupershapePattern(_FreeForm):
         sides = (len(y) * self.side, len(z) * self.side)
         rows = ((-0.25, -0.25), (0.25, 0.25)) if self.staggered else ((0.0, 0.0),)
         holes = np.zeros((len(y), len(z)), dtype=bool)
-        for form in self.forms:
+        for form in self._forms:
             for row in rows:
-                at = [place + share * side for place, share, side in zip((form.y, form.z), row, sides, strict=True)]
-                images = [_images(place, form.reach, side) for place, side in zip(at, sides, strict=True)]
-                for in_y in images[0]:
-                    for in_z in images[1]:
-                        rows_of, columns = (
-                            np.abs(axis.ravel() - place) <= form.reach for axis, place in ((y, in_y), (z, in_z))
-                        )
-                        part = np.ix_(rows_of, columns)
-                        holes[part] |= form.holds(y[rows_of] - in_y, z[columns] - in_z)
+                place = [at + share * side for at, share, side in zip((form.y, form.z), row, sides, strict=True)]
+                images = [_images(at, form.reach, side) for at, side in zip(place, sides, strict=True)]
+                for at_y, at_z in itertools.product(*images):
+                    near_y, near_z = (np.abs(axis.ravel() - at) <= form.reach for axis, at in ((y, at_y), (z, at_z)))
+                    holes[np.ix_(near_y, near_z)] |= form.holds(y[near_y] - at_y, z[near_z] - at_z)
         return holes
+
+
+class SupershapePattern(_UnionPattern):
+    """Unions of one to three supershapes in a cell.
+
+    Attributes:
+        shape: "supershape".
+        forms: the supershapes.
+    """
+
+    shape: Literal["supershape"] = "supershape"
+    forms: Annotated[tuple[Supershape, ...], Field(min_length=1, max_length=3)]
+
+    @property
+    def _forms(self) -> Sequence[Supershape | _Polygon]:
+        return self.forms
+
+
+_Corners = Annotated[tuple[tuple[Length, Length], ...], Field(min_length=3, max_length=_MOST_CORNERS, fail_fast=True)]
+
+
+class PolygonsPattern(_UnionPattern):
+    """Holes of any outline in a cell, by their corners.
+
+    Attributes:
+        shape: "polygons".
+        polygons: corners (y, z) of each hole, from the middle of the cell [m].
+    """
+
+    shape: Literal["polygons"] = "polygons"
+    polygons: Annotated[tuple[_Corners, ...], Field(min_length=1, max_length=_MOST_POLYGONS, fail_fast=True)]
+
+    @field_validator("polygons")
+    @classmethod
+    def _bound_holes_in_the_cell(cls, polygons: tuple[_Corners, ...], info: ValidationInfo) -> tuple[_Corners, ...]:
+        import shapely
+
+        farthest = np.abs([corner for corners in polygons for corner in corners]).max(axis=0)
+        if (farthest > info.data.get("spacing", math.inf)).any():
+            raise ValueError(
+                f"got corners as far as ({1e3 * farthest[0]:g}, {1e3 * farthest[1]:g}) mm from the middle of the cell, "
+                "but they may be at most one spacing away"
+            )
+        holes = shapely.MultiPolygon([shapely.Polygon(corners) for corners in polygons])
+        if not shapely.is_valid(holes):
+            raise ValueError(
+                f"got polygons that cross themselves or overlap ({shapely.is_valid_reason(holes)}, in m), "
+                "but each must bound a hole of its own"
+            )
+        return polygons
+
+    @property
+    def _forms(self) -> Sequence[Supershape | _Polygon]:
+        return [_Polygon.of(np.array(corners)) for corners in self.polygons]
 
 
 class LevelSetPattern(_FreeForm):
