@@ -1,5 +1,6 @@
 """The paper's two model rows (its Tables 1 and 2) from its own parameters, at hit points that a search found."""
 
+import re
 from importlib.resources import files
 from pathlib import Path
 
@@ -26,12 +27,12 @@ def test_the_papers_model_rows_are_met(paper_shots: xarray.Dataset, hit: int, sh
 
 def test_the_table_shows_every_source_and_the_difference(paper_shots: xarray.Dataset) -> None:
     table = validation_table(paper_shots)
+    lines = [re.split(r"\s{3,}", line) for line in table.splitlines()]
     for shot, rows in PUBLISHED.items():
-        assert shot in table
         for source, row in rows.items():
-            assert f"  {source:26}{row.residual_velocity:9.1f}" in table
+            assert [shot, source, f"{row.residual_velocity:.1f}"] in [line[:3] for line in lines]
     difference = computed_row(paper_shots, 0).residual_velocity - 746
-    assert f"{difference:+9.1f}" in table
+    assert ["through a hole", "warpimpact less the paper's model", f"{difference:+.1f}"] in [line[:3] for line in lines]
 
 
 CAMPAIGNS = Path(__file__).parents[2] / "campaigns"

@@ -20,6 +20,7 @@ from warpimpact.results.measures import Array, Measure, dealing
 from warpimpact.statistics.clusters import cluster_estimate, cluster_numbers
 from warpimpact.statistics.comparisons import confidence_of_each
 from warpimpact.statistics.intervals import Estimate, Estimating, estimate_of
+from warpimpact.view.view import Column, Section, Table, number
 
 if TYPE_CHECKING:
     from warpimpact.results.table import Result
@@ -139,22 +140,25 @@ def label_of(measure: Measure) -> str:
 PASSED_ALONE = "velocity and tilt are those of the cores that passed"
 
 
-def orders_text(result: Bursts) -> str:
+def orders_view(result: Bursts) -> Section:
     """The table of hits by their order."""
-    return "\n".join([*_table(result.measures, "hit of a burst", result.orders), f"({PASSED_ALONE})"])
+    return Section([_table(result.measures, "hit of a burst", result.orders), f"({PASSED_ALONE})"])
 
 
-def bursts_text(result: Bursts) -> str:
+def bursts_view(result: Bursts) -> list[Section]:
     """Both tables, and the distances from which a hit no longer notices an earlier one."""
     by_distance = _table(result.measures, "nearest earlier hit [mm]", result.distances)
-    return "\n".join([orders_text(result), "", *by_distance, *_reaches(result)])
+    return [orders_view(result), Section([by_distance, *_reaches(result)])]
 
 
-def _table(measures: Sequence[Measure], title: str, groups: Sequence[Group]) -> Iterator[str]:
-    yield f"{title:<25}{'hits':>7}   " + "".join(f"{label_of(measure):<26}" for measure in measures).rstrip()
-    for group in groups:
-        cells = [_cell(measure, group.estimates[measure]) for measure in measures]
-        yield f"{group.name:<25}{group.count:>7}   " + "".join(f"{cell:<26}" for cell in cells).rstrip()
+def _table(measures: Sequence[Measure], title: str, groups: Sequence[Group]) -> Table:
+    return Table(
+        [Column(title), number("hits", digits="d"), *(Column(label_of(measure)) for measure in measures)],
+        [
+            (group.name, group.count, *(_cell(measure, group.estimates[measure]) for measure in measures))
+            for group in groups
+        ],
+    )
 
 
 def _cell(measure: Measure, estimate: Estimate) -> str:

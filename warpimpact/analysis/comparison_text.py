@@ -6,14 +6,12 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from html import escape
-from typing import NamedTuple
 
 from warpimpact.analysis.effectiveness import EffectMeasure
-from warpimpact.analysis.numbers import Ends, intervals_text, of_each
-from warpimpact.analysis.numbers import number_text as number
+from warpimpact.analysis.numbers import Ends, intervals_text, number_text, of_each
 from warpimpact.analysis.survival import Survival, survival_text
 from warpimpact.analysis.vocabulary import SHOWN_UNITS
+from warpimpact.view.view import Column, Section, Table, html_of, number, text_of
 
 
 @dataclass(frozen=True)
@@ -93,11 +91,7 @@ class Comparison:
 
     def _repr_html_(self) -> str:
         """What a notebook shows."""
-        best = "".join(
-            f'<tr><th style="text-align: left">{escape(label)}</th><td style="text-align: left">{escape(who)}</td></tr>'
-            for label, who in best_rows(self)
-        )
-        return f"<table><tr><th>best at</th><th>plate</th></tr>{best}</table><pre>{escape(comparison_text(self))}</pre>"
+        return html_of(comparison_view(self))
 
     def ranks(self, measure: str) -> dict[str, int]:
         """Name of each plate → its rank, by value. Plates that share a rank are a group in which no two are told apart;
@@ -124,33 +118,16 @@ class Comparison:
         return [plate.name for plate in sorted(self.plates, key=worse)]
 
 
-class Ranking(NamedTuple):
-    """One measure of all plates.
-
-    Attributes:
-        title: measure, unit, and what is better.
-        rows: of every plate, the best first: rank, plate, areal density, value, interval, ratio and its interval.
-        differences: a sentence for every pair.
-    """
-
-    title: str
-    rows: list[tuple[str, ...]]
-    differences: list[str]
-
-
-RANKING_HEAD = ("rank", "plate", "kg/m²", "value", "95 % interval", "ratio to the solid plate", "")
-
-
 def comparison_text(comparison: Comparison) -> str:
-    """Who is best at what, then every measure as a ranking with differences in words."""
-    best = best_rows(comparison)
-    width = max(len(label) for label, _ in best)
-    blocks = [
-        conditions(comparison),
-        [f"{'best at':<{width}}   plate", *(f"{label:<{width}}   {who}" for label, who in best)],
-        *(_ranking_lines(ranking) for ranking in rankings(comparison)),
-    ]
-    return "\n\n".join("\n".join(block) for block in blocks)
+    """The view of a comparison as text."""
+    return text_of(comparison_view(comparison))
+
+
+def comparison_view(comparison: Comparison) -> list[Section]:
+    """What was compared, who is best at what, then every measure as a ranking with differences in words."""
+    best = Table((Column("best at"), Column("plate")), best_rows(comparison))
+    rankings = (_ranking(comparison, measure) for measure in _compared(comparison))
+    return [Section(conditions(comparison)), Section([best]), *rankings]
 
 
 def conditions(comparison: Comparison) -> list[str]:
@@ -233,37 +210,25 @@ def _listed(names: Sequence[str]) -> str:
     return " and ".join([", ".join(names[:-1]), names[-1]] if len(names) > 1 else names)
 
 
-def rankings(comparison: Comparison) -> list[Ranking]:
-    """Every measure as a ranking."""
-    return [_ranking(comparison, measure) for measure in _compared(comparison)]
-
-
-def _ranking(comparison: Comparison, measure: EffectMeasure) -> Ranking:
+def _ranking(comparison: Comparison, measure: EffectMeasure) -> Section:
+    """One measure of all plates, the best first, and a sentence for every pair."""
     place = comparison.plates[0].measures.index(measure)
     ranks, better = comparison.ranks(measure.name), "higher" if measure.higher_is_better else "lower"
-    by_ratio = measure.name in (comparison.at_equal_weight or ())
+    ranked = is_ranked(comparison, measure.name)
     plates = {plate.name: plate for plate in comparison.plates}
-    rows: list[tuple[str, ...]] = []
-    for plate in (plates[name] for name in ranks):
-        told = plate.measures[place]
-        value = (f"{plate.areal_density:.2f}", number(told.value), intervals_text(told.ends))
-        rank = str(ranks[plate.name]) if is_ranked(comparison, measure.name) else "-"
-        rows.append((rank, plate.name, *value, number(told.ratio), told.ratio_text))
-    what = " in the ratio to the solid plate" if by_ratio else ""
-    return Ranking(
-        f"{measure.label}{SHOWN_UNITS[measure.units]}; {better} is better{weighed(comparison, measure.name)}",
-        rows,
-        [_in_words(pair, measure, what) for pair in comparison.differences if pair.measure == measure.name],
+    rows = []
+    for name, rank in ranks.items():
+        plate, shown = plates[name], plates[name].measures[place]
+        value = (plate.areal_density, shown.value, intervals_text(shown.ends))
+        rows.append((rank if ranked else "-", name, *value, shown.ratio, shown.ratio_text))
+    columns = (
+        *(number("rank", digits="d"), Column("plate"), number("kg/m²", digits=".2f")),
+        *(number("value"), Column("95 % interval"), number("ratio to the solid plate"), Column("95 % interval")),
     )
-
-
-def _ranking_lines(ranking: Ranking) -> list[str]:
-    width, wide = (max(least, *(len(row[at]) for row in ranking.rows)) for at, least in ((1, 5), (4, 18)))
-    lines = [ranking.title]
-    for rank, plate, density, value, interval, ratio, against in (RANKING_HEAD, *ranking.rows):
-        start = f"{rank:>4}  {plate:<{width}}{density:>8}{value:>10}   {interval:<{wide}}  {ratio}"
-        lines.append(f"{start}  {against}" if against else start)
-    return lines + ranking.differences
+    what = " in the ratio to the solid plate" if measure.name in (comparison.at_equal_weight or ()) else ""
+    differences = [_in_words(pair, measure, what) for pair in comparison.differences if pair.measure == measure.name]
+    title = f"{measure.label}{SHOWN_UNITS[measure.units]}; {better} is better{weighed(comparison, measure.name)}"
+    return Section([Table(columns, rows), *differences], title)
 
 
 def weighed(comparison: Comparison, measure: str) -> str:
@@ -278,17 +243,18 @@ def weighed(comparison: Comparison, measure: str) -> str:
 def _in_words(pair: Difference, measure: EffectMeasure, what: str) -> str:
     """Such as "a better than b by 0.1 (0.05 to 0.15)"; `what` follows the difference."""
     if math.isnan(pair.low):
-        told = f"difference{what} {number(pair.value)}"
+        told = f"difference{what} {number_text(pair.value)}"
         return f"{pair.one} and {pair.other}: {told}, of which these hits give no interval"
     if not pair.told_apart:
-        interval = f"({intervals_text(Ends(pair.low, pair.high, pair.parameters))})"
-        return f"{pair.one} and {pair.other} cannot be told apart: difference{what} {number(pair.value)} {interval}"
+        interval = intervals_text(Ends(pair.low, pair.high, pair.parameters))
+        difference = f"difference{what} {number_text(pair.value)} ({interval})"
+        return f"{pair.one} and {pair.other} cannot be told apart: {difference}"
     names = [pair.one, pair.other] if (pair.value > 0.0) == measure.higher_is_better else [pair.other, pair.one]
     by_hits, by_parameters = (pair.low, pair.high), pair.parameters
     if pair.value < 0.0:
         by_hits, by_parameters = _negative(by_hits), by_parameters and _negative(by_parameters)
     interval = intervals_text(Ends(*by_hits, by_parameters))
-    verdict = f"{names[0]} better than {names[1]} by {number(abs(pair.value))}{what} ({interval})"
+    verdict = f"{names[0]} better than {names[1]} by {number_text(abs(pair.value))}{what} ({interval})"
     return verdict + survival_text(pair.survival)
 
 

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from warpimpact.analysis.base import solid_note
 from warpimpact.analysis.effects import Effect, effects
-from warpimpact.analysis.numbers import Ends, intervals_text, number_text
+from warpimpact.analysis.numbers import Ends, intervals_text
 from warpimpact.analysis.survival import by_draws, over_draws
 from warpimpact.analysis.vocabulary import MEAN, SHARE, SHOWN_UNITS, WORST_POINT, WORST_TENTH, Statistic
 from warpimpact.results import attributes as attr
@@ -31,6 +31,7 @@ from warpimpact.statistics.intervals import Estimate, Estimating, estimate_of
 from warpimpact.statistics.of_groups import of_worst_tenth
 from warpimpact.statistics.shifts import shift_of_mean, shift_of_share, shift_of_yes
 from warpimpact.statistics.worst_tenth import has_interval, worst_tenth
+from warpimpact.view.view import Column, Section, Table, number, text_of
 
 Array = NDArray[np.float64]
 
@@ -248,26 +249,42 @@ def effectiveness_text(
     dataset: xarray.Dataset, *, angle: float | str = ANGLE, standoff: float | str | None = None
 ) -> str:
     """The measures of `effectiveness` as a table, beside those of the solid plate of equal areal density."""
+    return text_of([effectiveness_view(dataset, angle=angle, standoff=standoff)])
+
+
+def effectiveness_view(
+    dataset: xarray.Dataset, *, angle: float | str = ANGLE, standoff: float | str | None = None
+) -> Section:
+    """The same as a view."""
     measures = effectiveness(dataset, angle=angle, standoff=standoff)
-    labels = [measure.label + SHOWN_UNITS[measure.units] for measure in measures]
-    width, wide = max(map(len, labels)), max(18, *(len(_second(measure)) for measure in measures))
-    title = f"effectiveness{plate_text(dataset)}"
-    head = f"{title:<{width}}{'':>10}   {'95 % interval':<{wide}}"
     with_solid = any(not math.isnan(measure.solid) for measure in measures)
-    rows = [head + f"{'solid plate':>12}   ratio to it" if with_solid else head.rstrip()]
-    for label, measure in zip(labels, measures, strict=True):
-        row = f"{label:<{width}}{number_text(measure.value):>10}   {_second(measure):<{wide}}"
-        rows.append((row + _against_text(measure) if with_solid else row).rstrip())
-    if note := depth_note(measures):
-        rows.append(note)
-    if note := solid_note(dataset):
-        rows.append(note)
+    notes = [depth_note(measures), solid_note(dataset)]
     if not with_solid and attr.OPEN_AREA in dataset.attrs and attr.LIMIT not in dataset.attrs:
-        rows.append(
+        notes.append(
             "There is no solid plate to compare with: the result has no shots at one. They are computed unless "
             'output.solid_reference is false, and stand in the group "solid" of the file.'
         )
-    return "\n".join(rows)
+    table = measures_table(measures, with_solid=with_solid)
+    return Section([table, *filter(None, notes)], f"effectiveness{plate_text(dataset)}")
+
+
+def measures_table(measures: Sequence[EffectMeasure], *, with_solid: bool = True) -> Table:
+    """Measures with their intervals, and beside the solid plate where that is wanted."""
+    columns = [Column(), number("value"), Column("95 % interval")]
+    if with_solid:
+        columns += [number("solid plate"), number("ratio to it"), Column("95 % interval")]
+    rows = [
+        (
+            measure.label + SHOWN_UNITS[measure.units],
+            measure.value,
+            intervals_text(measure.ends) if measure.hit is None else f"at hit {measure.hit}",
+            measure.solid,
+            measure.ratio,
+            measure.ratio_text,
+        )[: len(columns)]
+        for measure in measures
+    ]
+    return Table(columns, rows)
 
 
 def depth_note(measures: Sequence[EffectMeasure]) -> str:
@@ -288,11 +305,3 @@ def plate_text(dataset: xarray.Dataset) -> str:
     if attr.AREAL_DENSITY not in told:
         return ""
     return f", {told[attr.AREAL_DENSITY]:.4g} kg/m², {told[attr.OPEN_AREA]:.1%} open"
-
-
-def _second(measure: EffectMeasure) -> str:
-    return f"at hit {measure.hit}" if measure.hit is not None else intervals_text(measure.ends)
-
-
-def _against_text(measure: EffectMeasure) -> str:
-    return f"{number_text(measure.solid):>12}   {number_text(measure.ratio)}  {measure.ratio_text}".rstrip()

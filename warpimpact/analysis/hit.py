@@ -7,6 +7,7 @@ import xarray
 from warpimpact.kernels.status import Status
 from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
+from warpimpact.view.view import Column, Section, Table, number, text_of
 
 _AGREEMENT = {
     "bit-identical": "The end is bit-identical to the stored outcome.",
@@ -18,17 +19,14 @@ _AGREEMENT = {
 def hit_text(history: xarray.Dataset) -> str:
     """The end of a replayed hit in a few lines."""
     place = ", ".join(f"{axis} = {float(history[v.HIT_POINT[axis]]) * 1e3:.3f} mm" for axis in "yz")
-    lines = [
-        f"hit {history.attrs[attr.HIT]} at {place}",
-        Status(int(history[v.STATUS])).sentence,
-        f"{'residual velocity':<20}{float(history[v.RESIDUAL_VELOCITY]):>8.1f} m/s",
+    tilts = [tilt for tilt in history[v.TILT] if tilt.notnull()]
+    numbers = [
+        ("residual velocity", float(history[v.RESIDUAL_VELOCITY]), "m/s"),
+        *((f"tilt at {float(tilt.standoff) * 1e3:g} mm", float(tilt), "°") for tilt in tilts),
     ]
-    lines += [
-        f"{f'tilt at {float(tilt.standoff) * 1e3:g} mm':<20}{float(tilt):>8.1f} °"
-        for tilt in history[v.TILT]
-        if tilt.notnull()
-    ]
-    return "\n".join([*lines, *_broken(history), _AGREEMENT[history.attrs[attr.AGREEMENT]]])
+    table = Table((Column(), number(digits=".1f"), Column()), numbers)
+    end, agreement = Status(int(history[v.STATUS])).sentence, _AGREEMENT[history.attrs[attr.AGREEMENT]]
+    return text_of([Section([f"hit {history.attrs[attr.HIT]} at {place}", end, table, *_broken(history), agreement])])
 
 
 def _broken(history: xarray.Dataset) -> list[str]:

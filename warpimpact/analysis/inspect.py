@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable
+from typing import Any
 
 import numpy as np
 import xarray
 
-from warpimpact.analysis.bursts import bursts, bursts_text
-from warpimpact.analysis.effectiveness import effectiveness_text
+from warpimpact.analysis.bursts import bursts, bursts_view
+from warpimpact.analysis.effectiveness import effectiveness_view
 from warpimpact.analysis.numbers import ends_of, intervals_text
 from warpimpact.analysis.plate import plate_numbers
 from warpimpact.analysis.summary import (
@@ -31,108 +32,113 @@ from warpimpact.results import variables as v
 from warpimpact.results.dataset import failed, hit_numbers, passed
 from warpimpact.results.measures import Measure
 from warpimpact.statistics.intervals import Estimate
+from warpimpact.view.view import Column, Section, Table, labelled, number, text_of
 
 _QUANTILES = (0.05, 0.5, 0.95)
 
 
 def inspect_text(dataset: xarray.Dataset) -> str:
     """All that a person may ask of a hit map, as text; of an open file only a part is in memory at a time."""
-    tables: list[Iterable[str]] = [
+    return text_of(inspect_view(dataset))
+
+
+def inspect_view(dataset: xarray.Dataset) -> list[Section]:
+    """The view of a hit map: its origin, how shots ended, its numbers, its measures of protection, and what failed."""
+    return [
         _origin(dataset),
         _statuses(dataset),
         _numbers(dataset),
-        [effectiveness_text(dataset)],
+        *(bursts_view(bursts(dataset)) if v.BURST_ORDER in dataset else []),
+        effectiveness_view(dataset),
         failures(dataset),
     ]
-    if v.BURST_ORDER in dataset:
-        tables.insert(3, [bursts_text(bursts(dataset))])
-    return "\n\n".join("\n".join(table) for table in tables)
 
 
-def _origin(dataset: xarray.Dataset) -> Iterator[str]:
+def _origin(dataset: xarray.Dataset) -> Section:
     told = dataset.attrs
     hits = f"{dataset.sizes['hit']} hits"
     if attr.SAMPLING in told:
         hits += f", {told[attr.SAMPLING]} sampling, seed {told[attr.SEED]}"
         hits += f", {told[attr.REPLICATES]} replicates" if told[attr.REPLICATES] > 1 else ""
-    yield told.get(attr.TITLE, "untitled")
-    yield f"{'hits':<12}{hits}"
+    rows = [("hits", hits)]
     if attr.SYMMETRIES in told:
-        yield f"{'symmetry':<12}{symmetry_text(dataset)}"
+        rows.append(("symmetry", symmetry_text(dataset)))
     if attr.AREAL_DENSITY in told:
         numbers = plate_numbers(told[attr.OPEN_AREA], told.get(attr.LIGAMENT, math.inf), told[attr.AREAL_DENSITY])
         whole = " of the whole target" if v.LAYER_STATUS in dataset else ""
-        yield f"{'plate':<12}{', '.join(f'{label} {number}' for label, number in numbers.items())}{whole}"
-    yield from told.get(attr.EVIDENCE, "").splitlines()
+        rows.append(("plate", f"{', '.join(f'{label} {number}' for label, number in numbers.items())}{whole}"))
     if (promise := promise_text(dataset)) is not None:
-        yield f"{'accuracy':<12}{promise}"
-    for name in (attr.NUMERICS, attr.DEVICE, attr.HISTORY):
-        if name in told:
-            yield f"{name:<12}{told[name]}"
+        rows.append(("accuracy", promise))
+    rows += [(name, str(told[name])) for name in (attr.NUMERICS, attr.DEVICE, attr.HISTORY) if name in told]
     if attr.WARPIMPACT_VERSION in told:
-        yield f"{'made by':<12}warpimpact {told[attr.WARPIMPACT_VERSION]}, Warp {told[attr.WARP_VERSION]}"
+        rows.append(("made by", f"warpimpact {told[attr.WARPIMPACT_VERSION]}, Warp {told[attr.WARP_VERSION]}"))
     if attr.COMPUTE_TIME in told:
         rate = f"{told[attr.HITS_PER_SECOND]:.4g} hits per second"
-        yield f"{'took':<12}{told[attr.COMPUTE_TIME]:.4g} s of computing, {rate}"
+        rows.append(("took", f"{told[attr.COMPUTE_TIME]:.4g} s of computing, {rate}"))
+    evidence = told.get(attr.EVIDENCE, "").splitlines()
+    return Section([labelled(rows), *evidence], told.get(attr.TITLE, "untitled"))
 
 
-def _statuses(dataset: xarray.Dataset) -> Iterator[str]:
+def _statuses(dataset: xarray.Dataset) -> Section:
     """Shares of the shots that ended, with intervals."""
-    yield f"{'status':<22}{'share':>10}   95 % interval"
-    for status, share in status_shares(dataset).items():
-        yield f"{status:<22}{share.value:>10.2%}   {intervals_text(ends_of(share), '{:.2%}'.format)}"
+    percent = "{:.2%}".format
+    columns = Column("status"), Column("share", write=percent, right=True), Column("95 % interval")
+    rows = [
+        (status, share.value, intervals_text(ends_of(share), percent))
+        for status, share in status_shares(dataset).items()
+    ]
+    return Section([Table(columns, rows)])
 
 
-def _numbers(dataset: xarray.Dataset) -> Iterator[str]:
+def _numbers(dataset: xarray.Dataset) -> Section:
     """Means and quantiles of the cores that passed the plate, or the target, with intervals."""
     what = "target" if v.LAYER_STATUS in dataset else "plate"
-    if count := sum(int(passed(part).sum()) for part in slices(dataset[[v.STATUS]])):
-        of_how_many = f"{count} of {dataset.sizes['hit']} hits passed the {what}"
-        yield f"{of_how_many:<43}{'':>10}   95 % interval"
-    else:
-        yield f"no core passed the {what}"
+    count = sum(int(passed(part).sum()) for part in slices(dataset[[v.STATUS]]))
+    title = f"{count} of {dataset.sizes['hit']} hits passed the {what}" if count else f"no core passed the {what}"
     shown = [name for name in v.shown_by("inspect") if name in dataset]
+    rows = []
     for mean in means_of(shown, dataset[v.STANDOFF].values.tolist()):
         name = mean.text.removeprefix("mean(").removesuffix(")")
         quantiles = [Measure.parse(f"quantile({name}, {share})") for share in _QUANTILES]
-        for measure, estimate in estimated(dataset, [mean, *quantiles]).items():
-            if estimate.count:
-                yield _row(measure, estimate)
-    yield from filter(None, (sampling_note(dataset), numerics_note(dataset), levels_note(dataset), draws_note(dataset)))
-    yield from stop_lines(dataset)
+        estimates = estimated(dataset, [mean, *quantiles]).items()
+        rows += [_row(measure, estimate) for measure, estimate in estimates if estimate.count]
+    columns = Column(), Column(), number(digits=".2f"), Column("95 % interval"), number("spread", digits=".2f")
+    table = [Table(columns, rows)] if rows else []
+    notes = (sampling_note(dataset), numerics_note(dataset), levels_note(dataset), draws_note(dataset))
+    return Section([*table, *filter(None, notes), *stop_lines(dataset)], title)
 
 
-def _row(measure: Measure, estimate: Estimate) -> str:
-    name, what = "", f"{measure.share * 100.0:g} % quantile"
-    unit, factor = measure.display.shown, measure.display.factor
-    if measure.kind == "mean":
-        name, what = f"{measure.variable.replace('_', ' ')}{measure.place}, {unit}", "mean"
-    interval = intervals_text(ends_of(estimate), lambda end: f"{factor * end:.2f}")
-    row = f"{name:<29}{what:<14}{factor * estimate.value:>10.2f}   {interval}"
-    return f"{row:<78} spread {factor * estimate.spread:.2f}" if measure.kind == "mean" else row
+def _row(measure: Measure, estimate: Estimate) -> tuple[Any, ...]:
+    shown = estimate.times(measure.display.factor)
+    interval = intervals_text(ends_of(shown), "{:.2f}".format)
+    if measure.kind != "mean":
+        return ("", f"{measure.share * 100.0:g} % quantile", shown.value, interval, None)
+    name = f"{measure.variable.replace('_', ' ')}{measure.place}, {measure.display.shown}"
+    return (name, "mean", shown.value, interval, shown.spread)
 
 
-def failures(dataset: xarray.Dataset) -> Iterator[str]:
+def failures(dataset: xarray.Dataset) -> Section:
     """Every shot whose computation failed: its number, status and inputs."""
     inputs = [v.HIT_Y, v.HIT_Z, *v.shot_variables(dataset)]
     places = [(name, layer) for name in inputs for layer in _layers_of(dataset, name)]
-    count = 0
+    rows: list[tuple[Any, ...]] = []
     for part in slices(dataset[[v.STATUS, *inputs]]):
         for place in np.flatnonzero(failed(part)):
             shot = part.isel(hit=place)
-            if not count:
-                yield "failed shots: " + ", ".join(["hit", "status", *(_labelled(dataset, *place) for place in places)])
-            count += 1
-            own = (shot[name] if layer is None else shot[name][layer] for name, layer in places)
-            values = "".join(f"{float(value):>14.6g}" for value in own)
-            yield f"{int(hit_numbers(part)[place]):>10d}  {Status(int(shot[v.STATUS])).name.lower():<14}{values}"
-    yield f"{count} of {dataset.sizes['hit']} shots failed"
+            values = (float(shot[name] if layer is None else shot[name][layer]) for name, layer in places)
+            rows.append((int(hit_numbers(part)[place]), Status(int(shot[v.STATUS])).name.lower(), *values))
+    if not rows:
+        return Section([f"0 of {dataset.sizes['hit']} shots failed"])
+    columns = [
+        *(number("hit", digits="d"), Column("status")),
+        *(number(_name(name, layer), str(dataset[name].attrs["units"]), ".6g") for name, layer in places),
+    ]
+    return Section([Table(columns, rows)], f"{len(rows)} of {dataset.sizes['hit']} shots failed")
+
+
+def _name(variable: str, layer: int | None) -> str:
+    return variable if layer is None else f"{variable}_{layer}"
 
 
 def _layers_of(dataset: xarray.Dataset, name: str) -> Iterable[int | None]:
     return range(dataset.sizes["layer"]) if "layer" in dataset[name].dims else [None]
-
-
-def _labelled(dataset: xarray.Dataset, name: str, layer: int | None) -> str:
-    number = "" if layer is None else f"_{layer}"
-    return f"{name}{number} [{dataset[name].attrs['units']}]"

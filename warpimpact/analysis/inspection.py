@@ -8,11 +8,11 @@ from html import escape
 import numpy as np
 import xarray
 
-from warpimpact.analysis.effectiveness import effectiveness
+from warpimpact.analysis.effectiveness import EffectMeasure, effectiveness
 from warpimpact.analysis.hit_map import hit_points
 from warpimpact.analysis.inspect import inspect_text
 from warpimpact.analysis.numbers import intervals_text, number_text
-from warpimpact.analysis.summary import promise_text
+from warpimpact.analysis.summary import numerics_sentence, slices
 from warpimpact.analysis.vocabulary import SHOWN_UNITS
 from warpimpact.records.group import failures
 from warpimpact.results import attributes as attr
@@ -50,18 +50,16 @@ class Inspection:
 
 def inspect(dataset: xarray.Dataset) -> Inspection:
     """A result as text, with a verdict and a map; of an open file only a part is in memory at a time."""
-    return Inspection(inspect_text(dataset), verdict(dataset), _drawing(dataset))
+    return Inspection(inspect_text(dataset), verdict(dataset, effectiveness(dataset)[0]), _drawing(dataset))
 
 
-def verdict(dataset: xarray.Dataset) -> str:
-    """How many cores pass, the first measure of protection, and how exact the numerics are."""
-    hits, first = dataset.sizes["hit"], effectiveness(dataset)[0]
-    interval = intervals_text(first.ends)
-    told = f"{int(passed(dataset).sum())} of {hits} cores pass. {first.label}{SHOWN_UNITS[first.units]} "
-    told += number_text(first.value) + ("" if interval == "-" else f" ({interval})")
-    told += "" if np.isnan(first.ratio) else f", {number_text(first.ratio)} of the solid plate's"
-    numerics = promise_text(dataset)
-    return f"{told}. Numerics: {numerics}." if numerics else f"{told}."
+def verdict(dataset: xarray.Dataset, first: EffectMeasure) -> str:
+    """How many cores pass, one measure of protection, and how exact the numerics are."""
+    count, interval = sum(int(passed(part).sum()) for part in slices(dataset[[v.STATUS]])), intervals_text(first.ends)
+    protection = f"{first.label}{SHOWN_UNITS[first.units]} {number_text(first.value)}"
+    protection += "" if interval == "-" else f" ({interval})"
+    protection += "" if np.isnan(first.ratio) else f", {number_text(first.ratio)} of the solid plate's"
+    return f"{count} of {dataset.sizes['hit']} cores pass. {protection}. {numerics_sentence(dataset)}"
 
 
 def _drawing(dataset: xarray.Dataset) -> str:

@@ -12,6 +12,7 @@ from warpimpact.campaign.campaign import Campaign
 from warpimpact.campaign.text import CampaignError
 from warpimpact.results import variables as v
 from warpimpact.runs.parts import first_difference
+from warpimpact.view.view import Column, Section, Table, number, text_of
 
 
 class Row(NamedTuple):
@@ -99,19 +100,12 @@ def _positive_at_last(angles: list[float]) -> list[float]:
 def validation_table(dataset: xarray.Dataset) -> str:
     """Experiment, LS-DYNA, the paper's model and the Dataset's hits as one table of text; hits in the order of
     PUBLISHED."""
-    lines = [f"{'':28}{'velocity':>9}{'pitch 50':>10}{'yaw 50':>8}{'pitch 130':>11}{'yaw 130':>9}"]
-    for hit, (shot, rows) in enumerate(PUBLISHED.items()):
-        row = computed_row(dataset, hit)
-        target = rows["paper's model"]
-        lines.append(shot)
-        lines += [_line(source, published) for source, published in rows.items()]
-        lines.append(_line("warpimpact", row))
-        lines.append(_line("  less the paper's model", Row(*(a - b for a, b in zip(row, target, strict=True))), "+"))
-    return "\n".join([*lines, "", NOTE])
-
-
-def _line(source: str, row: Row, sign: str = "") -> str:
-    velocity, *angles = row
-    widths = (10, 8, 11, 9)
-    columns = "".join(f"{angle:{sign}{width}.1f}" for angle, width in zip(angles, widths, strict=True))
-    return f"  {source:26}{velocity:{sign}9.1f}{columns}"
+    columns = [Column("shot"), Column("source")]
+    columns += [number(name.replace("_", " "), digits=".1f") for name in ("velocity", *Row._fields[1:])]
+    rows: list[tuple[Any, ...]] = []
+    for hit, (shot, published) in enumerate(PUBLISHED.items()):
+        computed = computed_row(dataset, hit)
+        off = [f"{ours - theirs:+.1f}" for ours, theirs in zip(computed, published["paper's model"], strict=True)]
+        rows += [(shot, source, *row) for source, row in published.items()]
+        rows += [(shot, "warpimpact", *computed), (shot, "warpimpact less the paper's model", *off)]
+    return text_of([Section([Table(columns, rows)]), Section(NOTE.splitlines())])

@@ -22,6 +22,7 @@ from warpimpact.solver.findings import accuracy_text, errors_text
 from warpimpact.statistics.intervals import Estimate, estimate_of
 from warpimpact.statistics.of_groups import of_quantile
 from warpimpact.statistics.shifts import shift_of_mean
+from warpimpact.view.view import Column, Section, Table, number, text_of
 
 if TYPE_CHECKING:
     from warpimpact.results.table import Result
@@ -93,6 +94,12 @@ def promise_text(dataset: Result) -> str | None:
     if told[attr.PROMISE_KEPT]:
         return f"{name} keeps its promise ({stated}); {found}"
     return f"{name} does not keep its promise ({stated}) at the level that it may use; {found}"
+
+
+def numerics_sentence(dataset: Result) -> str:
+    """What is known of the errors of the numerics, as a sentence."""
+    promise = promise_text(dataset)
+    return f"Numerics: {promise}." if promise else "The error of the numerics is not known."
 
 
 def _fixed_by(told: Mapping[str, Any]) -> str:
@@ -219,24 +226,37 @@ def sampling_note(dataset: Result) -> str:
 
 
 def summary_text(dataset: Result) -> str:
-    """The summary as a short table; statuses that did not occur are left out."""
-    result = summary(dataset)
-    hits = dataset.sizes["hit"]
-    rows = [_count_row(meaning, count, hits) for meaning, count in result.counts.items() if count]
+    """The summary as text; statuses that did not occur are left out."""
+    result, hits = summary(dataset), dataset.sizes["hit"]
+    counts = {name.replace("_", " "): count for name, count in result.counts.items() if count}
     if result.broken is not None:
-        rows.append(_count_row("broken", result.broken, hits))
-    means = [
-        ("residual velocity", result.residual_velocity, "m/s"),
-        ("deflection", result.deflection, "°"),
-        *((f"tilt at {standoff * 1e3:g} mm", tilt, "°") for standoff, tilt in result.tilt.items()),
+        counts["broken"] = result.broken
+    shares = Table(
+        (Column(), number(digits="d"), number(digits=".1%")),
+        [(name, count, count / hits) for name, count in counts.items()],
+    )
+    spreads = [
+        ("residual velocity", "m/s", result.residual_velocity),
+        ("deflection", "°", result.deflection),
+        *((f"tilt at {standoff * 1e3:g} mm", "°", tilt) for standoff, tilt in result.tilt.items()),
     ]
     if (depth := result.base_depth) is not None and depth.count:
-        means.append(("depth in the base", depth.times(1e3), "mm"))
-    wide = max(18, *(len(_intervals(spread)) for _, spread, _ in means))
-    rows.append(f"{'':<20}{'mean':>8}   {'95 % interval':<{wide}}  spread")
-    rows += [_spread_row(name, spread, unit, hits, wide) for name, spread, unit in means]
+        spreads.append(("depth in the base", "mm", depth.times(1e3)))
+    columns = (
+        *(Column(), number("mean", digits=".2f"), Column()),
+        *(Column("95 % interval"), number("spread", digits=".1f"), Column()),
+    )
+    rows = [
+        (name, spread.mean, unit, _intervals(spread), spread.standard_deviation, _counted(spread.count, hits))
+        for name, unit, spread in spreads
+    ]
     notes = (numerics_note(dataset), levels_note(dataset), draws_note(dataset))
-    return "\n".join([*rows, *stop_lines(dataset), *filter(None, notes)])
+    return text_of([Section([shares, Table(columns, rows), *stop_lines(dataset), *filter(None, notes)])])
+
+
+def _counted(count: int, hits: int) -> str:
+    """Which hits a mean is over; empty where it is over all."""
+    return "no core behind the plate" if not count else f"of {count} hits" if count < hits else ""
 
 
 def numerics_note(dataset: Result) -> str:
@@ -315,18 +335,6 @@ def symmetry_text(dataset: Result) -> str:
     if computed == hits:
         return f"all {hits} hits computed: plate and shot have no symmetry in common"
     return f"{computed} of {hits} hits computed, the others are their images by {dataset.attrs[attr.SYMMETRIES]}"
-
-
-def _count_row(meaning: str, count: int, hits: int) -> str:
-    return f"{meaning.replace('_', ' '):<20}{count:>8d}   {count / hits:.1%}"
-
-
-def _spread_row(name: str, spread: Spread, unit: str, hits: int, wide: int) -> str:
-    if spread.count == 0:
-        return f"{name:<20}{'-':>8}   no core behind the plate"
-    some = f"   of {spread.count} hits" if spread.count < hits else ""
-    interval = f"{_intervals(spread):<{wide}}"
-    return f"{name:<20}{spread.mean:>8.2f}   {interval}  {spread.standard_deviation:.1f} {unit}{some}"
 
 
 def _intervals(spread: Spread) -> str:

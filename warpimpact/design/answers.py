@@ -13,7 +13,7 @@ import xarray
 from jinja2 import ChoiceLoader, Environment, PackageLoader, StrictUndefined
 
 from warpimpact.analysis.hit import hit_text
-from warpimpact.analysis.summary import breaks_promise, promise_text
+from warpimpact.analysis.summary import breaks_promise, numerics_sentence
 from warpimpact.campaign.campaign import Campaign
 from warpimpact.campaign.evidence import evidence_of
 from warpimpact.campaign.plausible import doubted
@@ -24,7 +24,7 @@ from warpimpact.design.designs import FOLDER, Design, Shelf, stage_of
 from warpimpact.design.drawing import drawn
 from warpimpact.plotting.trajectory import FIGURES
 from warpimpact.report.hits import MOST_HITS, PIXELS, page_data, thinned, trajectory_data
-from warpimpact.report.report import report_page, texts
+from warpimpact.report.report import report_page
 from warpimpact.report.words import compared, result_content
 from warpimpact.results import attributes as attr
 from warpimpact.runs.replay import replay
@@ -105,7 +105,6 @@ class Answers:
         datasets = {label: self.result(design.text, cancel) for label, design in designs.items()}
         cancel.check()
         own = datasets[OWN]
-        promise = promise_text(own)
         most = MOST_HITS // len(datasets)
         resolution = json.loads(own.attrs[attr.RESOLUTION]) if attr.RESOLUTION in own.attrs else {}
         return {
@@ -113,7 +112,7 @@ class Answers:
             "stage": name,
             "hits": own.sizes["hit"],
             "total": total,
-            "numerics": _FIRST if name == "first" or promise is None else f"Numerics: {promise}.",
+            "numerics": _FIRST if name == "first" else numerics_sentence(own),
             "kept": not breaks_promise(own),
             "level": resolution.get("level"),
             "data": page_data(
@@ -130,9 +129,7 @@ class Answers:
             results.append(result_content(label, dataset))
         cancel.check()
         comparison = compared(datasets, picture=False) if len(datasets) > 1 else None
-        html = self._environment.get_template("answer.html").render(
-            results=results, comparison=comparison, texts=texts()
-        )
+        html = self._environment.get_template("answer.html").render(results=results, comparison=comparison)
         return {"kind": "numbers", "html": html}
 
     def trajectory(self, design: Design, level: int, stage: str, hit: int, cancel: Cancel) -> dict[str, Any]:

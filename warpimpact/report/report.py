@@ -21,8 +21,6 @@ from jinja2 import Environment, PackageLoader, StrictUndefined
 from plotly.offline import get_plotlyjs
 
 import warpimpact
-from warpimpact.analysis.numbers import interval_text, intervals_text, number_text
-from warpimpact.analysis.vocabulary import SHOWN_UNITS
 from warpimpact.report.hits import MOST_HITS, page_data, thinned, trajectory_data, worst_and_spread
 from warpimpact.report.words import compared, conclusion, result_content, study_table
 from warpimpact.results import variables as v
@@ -151,11 +149,5 @@ def _page(*, results: Sequence[dict[str, Any]], data: dict[str, Any], **content:
         variables=data["variables"],
         made=f"{datetime.now(UTC):%Y-%m-%d %H:%M} UTC",
         version=warpimpact.__version__,
-        texts=texts(),
         **content,
     )
-
-
-def texts() -> dict[str, Any]:
-    """How tables.html writes numbers, intervals and units."""
-    return {"number": number_text, "interval": interval_text, "intervals": intervals_text, "units": SHOWN_UNITS}

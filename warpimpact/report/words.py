@@ -2,32 +2,33 @@
 
 from __future__ import annotations
 
-import math
 from base64 import b64encode
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from io import BytesIO
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 import xarray
+from markupsafe import Markup
 from numpy.typing import NDArray
 
 from warpimpact.analysis.base import solid_note
 from warpimpact.analysis.comparison import compare
-from warpimpact.analysis.comparison_text import RANKING_HEAD, Comparison, best_rows, conditions, rankings
-from warpimpact.analysis.effectiveness import depth_note, effectiveness
-from warpimpact.analysis.numbers import ends_of, intervals_text, number_text
+from warpimpact.analysis.comparison_text import Comparison, best_rows, comparison_view
+from warpimpact.analysis.effectiveness import depth_note, effectiveness, measures_table
+from warpimpact.analysis.inspection import verdict
+from warpimpact.analysis.numbers import ends_of, intervals_text
 from warpimpact.analysis.summary import (
     estimated,
     means_of,
     numerics_note,
+    numerics_sentence,
     promise_text,
     sampling_note,
     slices,
     status_shares,
 )
 from warpimpact.analysis.survival import draws_note
-from warpimpact.analysis.vocabulary import SHOWN_UNITS
 from warpimpact.campaign.text import parsed
 from warpimpact.plotting.cell import range_text, words
 from warpimpact.plotting.comparison import comparison_figure
@@ -37,6 +38,7 @@ from warpimpact.results.dataset import passed
 from warpimpact.results.files import ResultError
 from warpimpact.results.outlines import outlines
 from warpimpact.studies.accuracy_text import study_text
+from warpimpact.view.view import Column, Section, Table, html_of, table_html
 
 _MM = 1e3
 _PROVENANCE = (
@@ -55,34 +57,26 @@ _PROVENANCE = (
 )
 
 
-class Row(NamedTuple):
-    """A number of a table and its interval, as text."""
-
-    label: str
-    value: str
-    interval: str
-
-
 def result_content(name: str, dataset: xarray.Dataset) -> dict[str, Any]:
     """Text, tables and drawing of a result for the page; of an open file, one slice at a time is in memory."""
     attributes, measures = dataset.attrs, effectiveness(dataset)
-    promise = promise_text(dataset)
-    numerics = f"Numerics: {promise}." if promise else "The error of the numerics is not known."
+    hits, came_through = dataset.sizes["hit"], sum(int(passed(part).sum()) for part in slices(dataset[[v.STATUS]]))
+    means_over = f"{name}: with 95 % intervals; means are over the {came_through} of {hits} cores that passed"
+    against_solid = f"{name}: with 95 % intervals, compared with the solid plate of equal areal density"
     return {
         "name": name,
         "title": attributes.get(attr.TITLE, "untitled"),
-        "hits": dataset.sizes["hit"],
-        "passed": sum(int(passed(part).sum()) for part in slices(dataset[[v.STATUS]])),
+        "hits": hits,
+        "verdict": verdict(dataset, measures[0]),
         "asked": _asked(dataset),
         "evidence": attributes.get(attr.EVIDENCE, "").splitlines(),
         "campaign": attributes.get(attr.CAMPAIGN, ""),
-        "promise": promise,
-        "numerics": numerics,
-        "caveats": [numerics, *_caveats(dataset), *filter(None, [depth_note(measures), solid_note(dataset)])],
+        "promise": promise_text(dataset),
+        "caveats": [*_caveats(dataset), *filter(None, [depth_note(measures), solid_note(dataset)])],
         "tables": _tables(dataset),
-        "statuses": list(_statuses(dataset)),
-        "numbers": list(_numbers(dataset)),
         "measures": measures,
+        "through": Markup(table_html(_through(dataset), means_over)),
+        "protects": Markup(table_html(measures_table(measures), against_solid)),
         "plate": _plate(dataset),
         "provenance": {words(key): str(attributes[key]) for key in _PROVENANCE if key in attributes},
         "speed": float(f"{attributes.get(attr.HITS_PER_SECOND, 0.0):.2g}"),
@@ -90,17 +84,15 @@ def result_content(name: str, dataset: xarray.Dataset) -> dict[str, Any]:
 
 
 def compared(datasets: Mapping[str, xarray.Dataset], *, picture: bool = True) -> dict[str, Any]:
-    """The comparison of plates as sentences, tables and a picture, if one is wanted; if there is no comparison, a
-    sentence gives the reason."""
+    """The comparison of plates as HTML and a picture, if one is wanted; if there is no comparison, a sentence gives the
+    reason."""
     try:
         comparison = compare(list(datasets.values()), list(datasets))
     except ResultError as error:
-        return {"conditions": [str(error)], "best": [], "rankings": [], "head": RANKING_HEAD, "picture": ""}
+        return {"view": Markup(html_of([Section([str(error)])])), "best": [], "picture": ""}
     return {
-        "conditions": conditions(comparison),
+        "view": Markup(html_of(comparison_view(comparison))),
         "best": best_rows(comparison),
-        "rankings": rankings(comparison),
-        "head": RANKING_HEAD,
         "picture": _picture(comparison) if picture else "",
     }
 
@@ -114,19 +106,8 @@ def _picture(comparison: Comparison) -> str:
 
 def conclusion(results: Sequence[Mapping[str, Any]], comparison: Mapping[str, Any] | None) -> list[str]:
     """What a reader wants first, a sentence each: what passes of every plate, and which plate is best at what."""
-    told = []
-    for result in results:
-        first = next(iter(result["measures"]))
-        interval = intervals_text(first.ends)
-        told.append(
-            f"{result['name']}: {result['passed']} of {result['hits']} cores pass. {first.label}"
-            f"{SHOWN_UNITS[first.units]} {number_text(first.value)}"
-            + ("" if interval == "-" else f" ({interval})")
-            + ("" if math.isnan(first.ratio) else f", {number_text(first.ratio)} of the solid plate's")
-            + f". {result['numerics']}"
-        )
     best = [] if comparison is None else [f"Best at {label}: {who}." for label, who in comparison["best"]]
-    return [*told, *best]
+    return [*(f"{result['name']}: {result['verdict']}" for result in results), *best]
 
 
 def study_table(study: xarray.Dataset) -> dict[str, Any]:
@@ -169,9 +150,10 @@ def _asked(dataset: xarray.Dataset) -> str:
 
 def _caveats(dataset: xarray.Dataset) -> list[str]:
     """What limits the numbers of a result, a sentence each, beside every table of them."""
+    numerics = numerics_sentence(dataset)
     chance = "Intervals describe the hits that were drawn."
     model = "The core stays one rigid body, which overstates what comes through where cores break or erode."
-    notes = (chance, sampling_note(dataset), numerics_note(dataset), draws_note(dataset), model)
+    notes = (numerics, chance, sampling_note(dataset), numerics_note(dataset), draws_note(dataset), model)
     return [sentence for sentence in notes if sentence]
 
 
@@ -204,19 +186,19 @@ def _plain(value: object) -> str:
     return ", ".join(map(str, value)) if isinstance(value, list) else str(value)
 
 
-def _statuses(dataset: xarray.Dataset) -> Iterator[Row]:
-    for status, share in status_shares(dataset).items():
-        yield Row(words(status), f"{share.value:.2%}", intervals_text(ends_of(share), "{:.2%}".format))
-
-
-def _numbers(dataset: xarray.Dataset) -> Iterator[Row]:
+def _through(dataset: xarray.Dataset) -> Table:
+    """How the shots ended, and the means of what comes through."""
     means = means_of([name for name in v.shown_by("report") if name in dataset], dataset[v.STANDOFF].values.tolist())
+    rows = [
+        (words(status), f"{share.value:.2%}", intervals_text(ends_of(share), "{:.2%}".format))
+        for status, share in status_shares(dataset).items()
+    ]
     for measure, estimate in estimated(dataset, means).items():
         if estimate.count:
             interval = intervals_text(ends_of(estimate.times(measure.display.factor)), "{:.2f}".format)
-            yield Row(
-                f"mean {words(measure.variable)}{measure.place}", measure.display.text(estimate.value, ".2f"), interval
-            )
+            name = f"mean {words(measure.variable)}{measure.place}"
+            rows.append((name, measure.display.text(estimate.value, ".2f"), interval))
+    return Table((Column(), Column("value", right=True), Column("95 % interval")), rows)
 
 
 def _plate(dataset: xarray.Dataset) -> dict[str, Any]:

@@ -7,10 +7,11 @@ import pytest
 import xarray
 from matplotlib.figure import Figure
 
-from warpimpact.analysis.bursts import bursts, bursts_text, orders_text
+from warpimpact.analysis.bursts import bursts, bursts_view
 from warpimpact.analysis.inspect import inspect_text
 from warpimpact.kernels.status import Status
 from warpimpact.plotting import bursts_figure
+from warpimpact.view.view import text_of
 
 SAMPLES, MEMBERS, REACH = 800, 4, 6e-3
 
@@ -82,8 +83,7 @@ def test_replicates_give_the_intervals(make_plate_result: object) -> None:
 
 
 def test_tables_and_figure(result: xarray.Dataset) -> None:
-    text = bursts_text(bursts(result))
-    assert orders_text(bursts(result)) in text
+    text = text_of(bursts_view(bursts(result)))
     assert "from the nearest earlier hit" in text
     assert "P(perforated): differs from that of first hits up to 1.0 mm" in text
     assert text in inspect_text(result)

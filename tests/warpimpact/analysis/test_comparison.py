@@ -59,7 +59,7 @@ def test_identical_plates_cannot_be_told_apart(make_plate_result) -> None:
     text = comparison_text(comparison)
     assert text.count("a and b cannot be told apart: difference 0.000 (") == 6
     assert "better than" not in text
-    assert "<pre>500 hits of each plate: " in comparison._repr_html_()
+    assert "<p>500 hits of each plate: " in comparison._repr_html_()
 
 
 @pytest.mark.parametrize(("apart", "told"), [(1e-8, False), (1e-4, True)])

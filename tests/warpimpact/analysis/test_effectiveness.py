@@ -139,8 +139,8 @@ def test_the_table_says_what_a_result_carries(mixed, make_result) -> None:
     assert "solid plate" not in text  # no reference
     assert "proxy" not in text  # no core
     told = effectiveness_text(with_solid(mixed, np.array([800.0])).assign_attrs(open_area=0.25, areal_density=23.55))
-    head, first, *_ = told.splitlines()
-    assert head.startswith("effectiveness, 23.55 kg/m², 25.0% open ")
+    title, head, first, *_ = told.splitlines()
+    assert title == "effectiveness, 23.55 kg/m², 25.0% open"
     assert "solid plate   ratio to it" in head
     assert first.split()[:5] == ["residual", "energy", "fraction,", "mean", "0.4000"]
-    assert " 0.6400   0.6250" in first
+    assert " 0.6400        0.6250   0.000 to 1.459" in first

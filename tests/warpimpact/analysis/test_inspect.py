@@ -60,16 +60,12 @@ def test_failed_shots_are_listed_with_their_inputs_and_count_in_no_number(make_r
     statuses[[1, 4]] = Status.UNFINISHED, Status.NOT_FINITE
     dataset = make_result(statuses)
     monkeypatch.setattr("warpimpact.analysis.summary.SLICE", 4)
-    head, first, second, count = failures(dataset)
-    assert head.startswith(
-        "failed shots: hit, status, hit_y [m], hit_z [m], impact_velocity [m s-1], obliquity [degree]"
-    )
-    assert first.split()[:2] == ["1", "unfinished"]
-    assert second.split()[:2] == ["4", "not_finite"]
-    assert [float(value) for value in second.split()[2:5]] == pytest.approx(
-        [float(dataset["hit_y"][4]), float(dataset["hit_z"][4]), 825.0], rel=1e-5
-    )
-    assert count == "2 of 6 shots failed"
+    shown = failures(dataset)
+    (table,) = shown.parts
+    assert table.heads[:5] == ["hit", "status", "hit_y [m]", "hit_z [m]", "impact_velocity [m s-1]"]
+    assert [row[:2] for row in table.rows] == [(1, "unfinished"), (4, "not_finite")]
+    assert table.rows[1][2:5] == (dataset["hit_y"][4], dataset["hit_z"][4], 825.0)
+    assert shown.title == "2 of 6 shots failed"
     row = next(line for line in inspect_text(dataset).splitlines() if line.startswith("perforated"))
     assert row.split()[1] == "100.00%"
 

@@ -60,7 +60,7 @@ def test_a_notebook_shows_a_result_with_its_verdict(make_result, make_plate_resu
     assert shown.drawing.count(" Z") == 1 + 40  # a hole, and a mark for every hit
     plates = [make_plate_result(np.full(64, velocity)) for velocity in (700.0, 800.0)]
     text = compare(plates, ["a", "b"])._repr_html_()
-    rows = dict(re.findall(r"<th[^>]*>([^<]*)</th><td[^>]*>([^<]*)</td>", text))
+    rows = dict(re.findall(r"<tr><td>([^<]*)</td><td>([^<]*)</td></tr>", text))
     assert rows["residual energy fraction, mean"] == "a"
 
 

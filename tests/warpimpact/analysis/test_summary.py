@@ -63,8 +63,8 @@ def test_text_states_the_numbers_with_their_units(mixed):
     assert ["perforated", "1", "20.0%"] in lines
     assert ["unfinished", "1", "20.0%"] in lines
     # Student's interval of 700 and 800: 750 ± 12.7062·50√2/√2.
-    assert ["residual", "velocity", "750.00", "114.69", "to", "1385.31", "50.0", "m/s", "of", "2", "hits"] in lines
-    assert ["tilt", "at", "130", "mm", "40.00", "-", "0.0", "°", "of", "1", "hits"] in lines  # of one core
+    assert ["residual", "velocity", "750.00", "m/s", "114.69", "to", "1385.31", "50.0", "of", "2", "hits"] in lines
+    assert ["tilt", "at", "130", "mm", "40.00", "°", "-", "0.0", "of", "1", "hits"] in lines  # of one core
     assert "left window" not in summary_text(mixed)
 
 

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 from warpimpact.analysis.comparison import compare
-from warpimpact.analysis.comparison_text import rankings
+from warpimpact.analysis.comparison_text import comparison_view
 from warpimpact.analysis.effectiveness import effectiveness
 from warpimpact.analysis.numbers import number_text
 from warpimpact.campaign.campaign import Campaign
@@ -149,8 +149,8 @@ def test_a_pinned_design_is_compared_shot_by_shot(page: Any, small: Path) -> Non
     thicker = Campaign.from_text(json.dumps(tables), name="thicker", folder=small.parent)
     results = [run(one, device="cpu") for one in (thicker, Campaign.from_toml(small))]
     shown = page.text("#answer")
-    for ranking in rankings(compare(results, ["this design", "pin A"])):
-        assert all(sentence in shown for sentence in ranking.differences)
+    for section in comparison_view(compare(results, ["this design", "pin A"])):
+        assert all(part in shown for part in section.parts if isinstance(part, str))
     scales = page.driver.execute_script(
         "return [0, 1].map((k) => document.getElementById(`map-${k}`).data[0]).map((t) => [t.zmin, t.zmax])"
     )
