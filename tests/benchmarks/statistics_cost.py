@@ -23,7 +23,7 @@ from warpimpact.scene import Hits, Numerics, Shots
 from warpimpact.scene.symmetry import symmetries_used
 from warpimpact.solver.simulate import simulate
 from warpimpact.statistics.intervals import _student, estimate_of
-from warpimpact.statistics.worst_tenth import worst_tenth
+from warpimpact.statistics.tails import worst_tenth
 
 Array = NDArray[np.float64]
 

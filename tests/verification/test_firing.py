@@ -11,7 +11,7 @@ from warpimpact.firing.estimators import Estimator, reported
 from warpimpact.firing.fire import Firings, fire
 from warpimpact.firing.procedures import Langlie, MilStd662F, Neyer, Procedure, ThreePod, UpAndDown
 from warpimpact.firing.response import Response, known_response, normal_response
-from warpimpact.statistics.acceptance import acceptance, clustered_acceptance
+from warpimpact.statistics.acceptance import acceptance
 from warpimpact.statistics.quantal import weight
 
 Array = NDArray[np.float64]
@@ -136,7 +136,7 @@ def test_a_plate_of_two_values_is_known_by_hand() -> None:
     assert plate.share(np.array([650.0, 800.0, 950.0])) == pytest.approx([0.0, 0.3, 1.0])
     by_place = plate.by_place(np.array([800.0]), np.zeros(1))
     assert acceptance(22, 0, by_place.mean(axis=1)) == pytest.approx(0.7**22)
-    assert clustered_acceptance(22, 0, by_place) == pytest.approx(0.7)
+    assert acceptance(22, 0, by_place).mean(axis=-1) == pytest.approx(0.7)
     procedure = UpAndDown(start=800.0, step=10.0, shots=6)
     aimed = simulated(procedure, plate, 4000).aimed[:, 5]
     assert aimed.mean() == pytest.approx(800.0 + 5 * 10.0 * (0.7 - 0.3), abs=4.0 * 20.5 / np.sqrt(4000))

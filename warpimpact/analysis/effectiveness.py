@@ -28,9 +28,8 @@ from warpimpact.results.measures import dealing
 from warpimpact.scene.units import Radians
 from warpimpact.statistics.comparisons import Ratio, ratio_numbers
 from warpimpact.statistics.intervals import Estimate, Estimating, estimate_of
-from warpimpact.statistics.of_groups import of_worst_tenth
 from warpimpact.statistics.shifts import shift_of_mean, shift_of_share, shift_of_yes
-from warpimpact.statistics.worst_tenth import has_interval, worst_tenth
+from warpimpact.statistics.tails import has_interval, worst_tenth, worst_tenth_weights
 from warpimpact.view.view import Column, Section, Table, number, text_of
 
 Array = NDArray[np.float64]
@@ -169,10 +168,10 @@ def _averaged(
     of_solid = solid_drawn = solid
     if statistic is WORST_TENTH:
         sign = -1.0 if effect.higher_is_better else 1.0
-        numbers, drawn = sign * worst_tenth(sign * values), sign * by_draws(dataset, sign * values, of_worst_tenth)
+        numbers, drawn = sign * worst_tenth(sign * values), sign * by_draws(dataset, sign * values, worst_tenth_weights)
         if solid is not None:
             of_solid = sign * worst_tenth(sign * solid)
-            solid_drawn = of_solid if len(solid) == 1 else sign * by_draws(dataset, sign * solid, of_worst_tenth)
+            solid_drawn = of_solid if len(solid) == 1 else sign * by_draws(dataset, sign * solid, worst_tenth_weights)
     estimate = estimate_of(effect.kind, numbers, **dealt)
     if statistic is WORST_TENTH and not has_interval(estimate.count, dealt["images"]):
         estimate = _without_interval(estimate.value)

@@ -20,8 +20,8 @@ from warpimpact.results.measures import MEASURED, STATUSES, Measure, Tally, deal
 from warpimpact.scene.display import STORED
 from warpimpact.solver.findings import accuracy_text, errors_text
 from warpimpact.statistics.intervals import Estimate, estimate_of
-from warpimpact.statistics.of_groups import of_quantile
 from warpimpact.statistics.shifts import shift_of_mean
+from warpimpact.statistics.tails import quantile_weights
 from warpimpact.view.view import Column, Section, Table, number, text_of
 
 if TYPE_CHECKING:
@@ -198,7 +198,7 @@ def status_shares(dataset: Result) -> dict[str, Estimate]:
 def _drawn(dataset: Result, measure: Measure, values: Sequence[Any]) -> Any:
     """Numbers of the hits whose mean over those of a draw is the measure of the draw."""
     numbers = np.concatenate(values)
-    return by_draws(dataset, numbers, of_quantile(measure.share)) if measure.kind == "quantile" else numbers
+    return by_draws(dataset, numbers, quantile_weights(measure.share)) if measure.kind == "quantile" else numbers
 
 
 def slices(dataset: Result) -> Iterator[Any]:

@@ -18,8 +18,8 @@ from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
 from warpimpact.results.measures import Array, dealing
 from warpimpact.statistics.intervals import Estimate
-from warpimpact.statistics.of_groups import Weights, pseudo_values
-from warpimpact.statistics.random_effects import FEWEST, interval_of_means, positive_share
+from warpimpact.statistics.random_effects import FEWEST_GROUPS, interval_of_means, positive_share
+from warpimpact.statistics.tails import OrderWeights, pseudo_values
 
 if TYPE_CHECKING:
     import xarray
@@ -53,12 +53,12 @@ class Survival:
         return self.at_least >= self.needed
 
 
-def by_draws(dataset: Result, values: Array, weights: Weights) -> Array:
+def by_draws(dataset: Result, values: Array, weights: OrderWeights) -> Array:
     """Numbers of shots whose mean over those of a draw is the worst tenth or the quantile of that draw.
 
     Args:
         values: of the first shots, shape [shots].
-        weights: as in `of_groups.pseudo_values`.
+        weights: as in `tails.pseudo_values`.
     """
     if v.POSTERIOR_DRAW not in dataset:
         return values
@@ -136,7 +136,9 @@ def survival_of(
     images, draws = dealing(datasets[0])["images"], drawn[0][:common]
     found = positive_share(math.copysign(1.0, by_hits[0]) * apart, draws, images=images, confidence=confidence[0])
     if found is None:
-        return Survival(math.nan, math.nan, confidence[0], f"fewer than {FEWEST} draws have the shots that it takes")
+        return Survival(
+            math.nan, math.nan, confidence[0], f"fewer than {FEWEST_GROUPS} draws have the shots that it takes"
+        )
     interval = interval_of_means(apart, draws, images=images, confidence=confidence[1])
     return Survival(found.share, found.at_least, confidence[0], interval=_no_less(interval, by_hits[1:]))
 

@@ -19,7 +19,7 @@ from warpimpact.firing.rules import drawn_places, fair_places
 from warpimpact.records.variable import Variable
 from warpimpact.results import attributes as attr
 from warpimpact.results import firing as f
-from warpimpact.statistics.acceptance import acceptance, clustered_acceptance, fewest_shots
+from warpimpact.statistics.acceptance import acceptance, fewest_shots
 
 Array = NDArray[np.float64]
 
@@ -189,5 +189,5 @@ def _proof(test: FiringTest, proof: Proof, response: Response, velocity: Array) 
     return {
         f.PROOF_PERFORATION: by_place.mean(axis=1),
         f.PASS: acceptance(shots, allowed, by_place.mean(axis=1)),
-        f.PASS_SAME_PLACE: clustered_acceptance(shots, allowed, by_place),
+        f.PASS_SAME_PLACE: acceptance(shots, allowed, by_place).mean(axis=-1),
     }

@@ -20,7 +20,7 @@ from warpimpact.optimisation.measures import AREAL_DENSITY, effect_of, higher_is
 from warpimpact.statistics.comparisons import ROUNDED
 from warpimpact.statistics.intervals import Estimate, estimate_of
 from warpimpact.statistics.student import student_quantile
-from warpimpact.statistics.worst_tenth import worst_tenth
+from warpimpact.statistics.tails import worst_tenth
 
 Array = NDArray[np.float64]
 

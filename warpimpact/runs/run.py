@@ -33,8 +33,7 @@ from warpimpact.scene import Shots
 from warpimpact.solver.findings import Found
 from warpimpact.solver.resolution import at_level
 from warpimpact.solver.worker import Cancel
-from warpimpact.statistics.intervals import Dealing
-from warpimpact.statistics.stopping import looks
+from warpimpact.statistics.intervals import Dealing, looks
 
 if TYPE_CHECKING:
     import xarray

@@ -1,8 +1,8 @@
 """Adaptive importance sampling of a posterior whose prior is standard normal, and how far its weights can be trusted.
 
-Rounds of draws: the first from the prior, later ones from a mixture of Student's t distributions that is fitted to the
-weighted draws so far (mixture.py). All draws of all rounds count, weighted by prior · likelihood over the mixture of
-all proposals (Cornuet, Marin, Mira and Robert, "Adaptive multiple importance sampling", 2012). The largest weights are
+The first round draws from the prior, later ones from a mixture of Student's t distributions that is fitted to the
+weighted draws so far (mixture.py). All draws of all rounds count, weighted by prior · likelihood / mixture of all
+proposals (Cornuet, Marin, Mira and Robert, "Adaptive multiple importance sampling", 2012). The largest weights are
 smoothed, and their Pareto index k says whether they can be trusted (Vehtari, Simpson, Gelman, Yao and Gabry, "Pareto
 smoothed importance sampling", 2024).
 """
@@ -16,12 +16,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from warpimpact.statistics.intervals import Array
 from warpimpact.statistics.mixture import Mixture, Shared, fitted, log_prior, normal_numbers
 
-Array = NDArray[np.float64]
-
 FEWEST_PER_DIMENSION = 5
-"""Effective blocks of draws per dimension that a round is shaped by; where weights give fewer, they are tempered."""
+"""Effective blocks of draws per dimension that a proposal is fitted to; weights with fewer are tempered."""
 LARGEST_K = 0.7
 """Pareto index up to which weights can be trusted."""
 _FEWEST_TAIL = 5
@@ -32,9 +31,9 @@ class ImportanceSampler:
     """Draws of a posterior in rounds: `propose` points, compute their likelihood, `tell` it.
 
     Args:
-        dimensions: of the parameters; their prior is standard normal.
-        shared: which of them blocks of draws share, for what is costly to change.
-        seed: draws are a function of it and of what was told.
+        dimensions: number of parameters; their prior is standard normal.
+        shared: leading parameters that a block of draws shares because they are costly to change.
+        seed: draws depend on it and on the likelihoods alone.
     """
 
     dimensions: int
@@ -44,7 +43,7 @@ class ImportanceSampler:
     log_likelihood: Array = field(init=False)
     _proposals: list[tuple[int, Mixture | None]] = field(init=False, default_factory=list)
     _densities: list[Array] = field(init=False, default_factory=list)
-    """Logarithm of every proposal's density at the points, as many of them as were there when it was last asked."""
+    """Logarithm of every proposal's density at the points that existed when it was last computed."""
 
     def __post_init__(self) -> None:
         self.points = np.empty((0, self.dimensions))
@@ -61,7 +60,7 @@ class ImportanceSampler:
         return new
 
     def tell(self, log_likelihood: Array) -> None:
-        """The logarithm of the likelihood at the points that were proposed last."""
+        """Add the logarithms of the likelihood at the last proposed points."""
         self.log_likelihood = np.concatenate([self.log_likelihood, log_likelihood])
 
     def _from_prior(self, rng: np.random.Generator, count: int) -> Array:
@@ -72,7 +71,7 @@ class ImportanceSampler:
         return normal_numbers(ndtri(np.clip(uniform, 2.0**-31, 1.0 - 2.0**-31)), self.shared, rng)
 
     def _mixture(self, rng: np.random.Generator) -> Mixture | None:
-        """The proposal of the next round; None where no draw has a likelihood."""
+        """The proposal of the next round; None if no draw has a positive likelihood."""
         raw = self._raw()
         if not np.isfinite(raw).any():
             return None
@@ -81,7 +80,7 @@ class ImportanceSampler:
         return fitted(self.points, weights, _effective(weights, block), rng)
 
     def _raw(self) -> Array:
-        """Logarithms of the weights, not normalised."""
+        """Logarithms of the weights before they are normalised, shape [draws]."""
         from scipy.special import logsumexp
 
         total = sum(count for count, _ in self._proposals)
@@ -98,12 +97,14 @@ class ImportanceSampler:
         return raw
 
     def weighed(self) -> Weights:
+        """Normalised weights of all draws so far."""
         return Weights.of(self._raw())
 
 
 @dataclass(frozen=True)
 class Weights:
-    """Normalised weights of draws, shape [draws], with their Pareto index and the logarithm of their mean before."""
+    """Normalised weights of draws, shape [draws], their Pareto index, and the logarithm of the evidence, which is their
+    mean before they are normalised."""
 
     values: Array
     pareto_k: float
@@ -111,7 +112,7 @@ class Weights:
 
     @classmethod
     def of(cls, raw: Array) -> Weights:
-        """From logarithms of weights, of which the largest are smoothed."""
+        """From logarithms of weights; the largest weights are smoothed."""
         from scipy.special import logsumexp
 
         evidence = float(logsumexp(raw) - math.log(len(raw)))
@@ -121,22 +122,22 @@ class Weights:
         return cls(values / values.sum(), k, evidence)
 
     def effective(self, block: int = 1) -> float:
-        """Effective sample size; draws of a block count as one, since they share most of their numbers."""
+        """Effective sample size. The draws of a block count as one, because they share most of their numbers."""
         return _effective(self.values, block)
 
 
 def effective_size(weights: Array) -> float:
-    """Number of draws of equal weight that tell as much (Kish)."""
+    """Number of equally weighted draws with the same variance of a mean (Kish)."""
     return float(weights.sum() ** 2 / (weights**2).sum())
 
 
 def _effective(weights: Array, block: int) -> float:
-    """Effective size of draws of which those of a block count as one."""
+    """Effective size of the blocks of draws."""
     return effective_size(np.add.reduceat(weights, np.arange(0, len(weights), block)))
 
 
 def resampled(weights: Array, count: int, rng: np.random.Generator) -> NDArray[np.int64]:
-    """Indices of draws in proportion to their weights, by systematic resampling, in random order."""
+    """Indices of draws in proportion to their weights, by systematic resampling, in random order; shape [count]."""
     places = (np.arange(count) + rng.random()) / count
     which = np.searchsorted(np.cumsum(weights) / weights.sum(), places, side="right")
     chosen: NDArray[np.int64] = rng.permutation(np.minimum(which, len(weights) - 1))
@@ -144,7 +145,7 @@ def resampled(weights: Array, count: int, rng: np.random.Generator) -> NDArray[n
 
 
 def _tempered(raw: Array, effective: float, block: int) -> Array:
-    """Normalised weights to the largest power up to 1 that leaves them this effective size by blocks."""
+    """Normalised weights, raised to the largest power up to 1 with at least this effective size by blocks."""
 
     def at(power: float) -> Array:
         log = np.where(np.isfinite(raw), power * raw, -np.inf)
@@ -162,7 +163,7 @@ def _tempered(raw: Array, effective: float, block: int) -> Array:
 
 
 def _smoothed(weights: Array) -> tuple[Array, float]:
-    """Weights with their largest ones replaced by quantiles of a Pareto distribution, and its index k."""
+    """Weights, the largest replaced by quantiles of a Pareto distribution, and the index k of that distribution."""
     from scipy.stats import genpareto
 
     count = len(weights)
@@ -182,8 +183,8 @@ def _smoothed(weights: Array) -> tuple[Array, float]:
 def pareto_fit(beyond: Any) -> tuple[float, float]:
     """Index k and scale of a generalized Pareto distribution of positive numbers.
 
-    By the quasi-Bayesian estimate of Zhang and Stephens (Technometrics 51, 2009, 316), drawn towards k = 0.5 as of ten
-    more numbers.
+    This is the quasi-Bayesian estimate of Zhang and Stephens (Technometrics 51, 2009, 316), with a prior for k = 0.5
+    that counts as ten numbers.
     """
     x = np.sort(np.asarray(beyond, dtype=np.float64))
     x = np.maximum(x, 1e-300)

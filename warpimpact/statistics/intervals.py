@@ -1,16 +1,15 @@
 """Confidence intervals of means, shares, quantiles and differences of shares over shots.
 
-For independent shots, a mean has Student's interval, a share has Wilson's, and a quantile has that of the order
-statistics. A difference of shares among the same shots has the interval of Agresti and Min (Statistics in Medicine 24
-(2005) 729). Points of a Sobol sampling are not independent. Such shots are dealt to independent scramblings, the
-replicates. Student's interval over the results of the replicates is used (A. B. Owen, Monte Carlo theory, methods and
-examples, chapter 17).
+For independent shots, a mean has Student's interval, a share Wilson's, and a quantile that of the order statistics. A
+difference of two shares of the same shots has the interval of Agresti and Min (Statistics in Medicine 24 (2005) 729).
+Sobol points are not independent. They are dealt to independent scramblings, the replicates, and Student's interval over
+the results of the replicates is used (A. B. Owen, Monte Carlo theory, methods and examples, chapter 17).
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from statistics import NormalDist
 from typing import Self, TypedDict, Unpack
@@ -30,9 +29,9 @@ class Estimate:
     Attributes:
         count: number of shots that count.
         spread: standard deviation over these shots.
-        parameters: interval of the number for the true parameters, which are one draw of a posterior; None where shots
-            draw none, NaN where the hits do not tell it. `low` and `high` are by the drawn hits alone.
-        numerics: how far the numerics may shift the number, to either side; None or NaN where that is not known.
+        parameters: interval of the number over the draws of a posterior; None if shots draw no parameters, NaN if the
+            hits are too few. `low` and `high` are the interval by the sample of hits alone.
+        numerics: largest shift of the number by the numerics, to either side; None or NaN if it is not known.
     """
 
     value: float
@@ -50,47 +49,59 @@ class Estimate:
 
     def times(self, factor: float) -> Self:
         """The estimate in another unit."""
-        value, low, high, spread = (factor * one for one in (self.value, self.low, self.high, self.spread))
+        value, low, high, spread = (factor * number for number in (self.value, self.low, self.high, self.spread))
         parameters = self.parameters and (factor * self.parameters[0], factor * self.parameters[1])
         numerics = None if self.numerics is None else factor * self.numerics
         return replace(self, value=value, low=low, high=high, spread=spread, parameters=parameters, numerics=numerics)
 
     def within(self, least: float, most: float = math.inf) -> Self:
-        """The estimate of a number that lies between two others: no end of its interval is beyond them."""
+        """The estimate with the ends of its intervals limited to a range."""
         ends = (self.low, self.high, *(self.parameters or ()))
         low, high, *more = (end if math.isnan(end) else min(max(end, least), most) for end in ends)
         return replace(self, low=low, high=high, parameters=(more[0], more[1]) if more else None)
 
 
 class Dealing(TypedDict, total=False):
-    """How shots are dealt out, by the arguments of `Dealt`."""
+    """Arguments of `Dealt` that say how shots are dealt."""
 
     replicates: int
     images: int
 
 
 class Estimating(Dealing, total=False):
-    """How shots are dealt out, and the confidence of an interval."""
+    """Arguments of `Dealt` after the kind."""
 
     confidence: float
 
 
+def looks(sampling: str, shards: int) -> Iterator[int]:
+    """Numbers of shards after which a stop rule checks its interval.
+
+    Checks are few, because the spread may be small by accident at any of them. Sobol points are balanced at powers of
+    two.
+    """
+    count = 1
+    while count < shards:
+        yield count
+        count = 2 * count if sampling == "sobol" else max(count + 1, math.ceil(1.25 * count))
+    yield shards
+
+
 def estimate_of(kind: str, values: Array, *, share: float = 0.5, **dealt: Unpack[Estimating]) -> Estimate:
-    """The estimate from the numbers of all shots; NaN marks a shot that does not count. The arguments are those of
-    `Dealt`."""
-    gathered = Dealt(kind, share=share, **dealt)
-    gathered.add(values)
-    return gathered.estimate()
+    """Estimate from the numbers of all shots, NaN where a shot does not count. The arguments are those of `Dealt`."""
+    sample = Dealt(kind, share=share, **dealt)
+    sample.add(values)
+    return sample.estimate()
 
 
 class Dealt:
-    """Numbers of shots, in the order of the shots, dealt out to the replicates of the sampling.
+    """Numbers of shots, in the order of the shots, dealt to the replicates of the sampling in turn.
 
     Args:
         kind: "mean", "quantile", "share" (of numbers 0 or 1) or "difference" (of two shares, numbers −1, 0 or 1).
-        share: share of the numbers below a quantile.
-        replicates: number of independent scramblings to which the shots are dealt in turn; 1 for independent shots.
-        images: how many shots in a row are images of each other; together they count as one shot.
+        share: of the numbers below a quantile.
+        replicates: number of independent scramblings; 1 for independent shots.
+        images: number of consecutive shots that are images of each other; together they count as one shot.
         confidence: of the interval.
     """
 
@@ -106,8 +117,7 @@ class Dealt:
         replicates = len(self._replicates)
         dealt_to = (self._shots + np.arange(len(values))) // self._images % replicates
         for replicate, sample in enumerate(self._replicates):
-            mine = values[dealt_to == replicate]
-            sample.add(mine[~np.isnan(mine)])
+            sample.add(values[(dealt_to == replicate) & ~np.isnan(values)])
         self._shots += len(values)
 
     def estimate(self) -> Estimate:
@@ -120,7 +130,7 @@ class Dealt:
         return Estimate(value, *interval, pooled.count, pooled.deviation)
 
     def _of_replicates(self, pooled: _Sample, value: float) -> tuple[float, float] | None:
-        """Interval from the spread of the replicates; None where they do not give one.
+        """Interval from the spread of the replicates; None if it does not give one.
 
         A quantile has Woodruff's interval: the replicates give the uncertainty of the share below it (R. S. Woodruff,
         Journal of the American Statistical Association 47 (1952) 635). Quantiles of single replicates would be biased.
@@ -129,9 +139,9 @@ class Dealt:
         if len(replicates) < 2 or all(sample.count <= self._images for sample in replicates):  # independent shots
             return None
         quantile = self._kind == "quantile"
-        answers = [float((one.values <= value).mean()) if quantile else one.mean for one in replicates]
-        half = _student(self._confidence, len(answers)) * float(np.std(answers, ddof=1))
-        # Equal shares in all replicates (mostly 0) say nothing about the uncertainty.
+        results = [float((sample.values <= value).mean()) if quantile else sample.mean for sample in replicates]
+        half = _student(self._confidence, len(results)) * float(np.std(results, ddof=1))
+        # Equal shares in all replicates (usually 0) do not show the uncertainty.
         if half == 0.0 and self._kind != "mean":
             return None
         if self._kind == "share":
@@ -165,7 +175,7 @@ class Dealt:
 
 
 def _student(confidence: float, count: int) -> float:
-    """Half width of the interval of a mean of `count` numbers, in units of their standard deviation."""
+    """Half width of the interval of a mean of `count` numbers, in standard deviations."""
     return student_quantile(0.5 * (1.0 + confidence), count - 1) / math.sqrt(count)
 
 
@@ -179,7 +189,7 @@ def _wilson(successes: int, count: int, confidence: float) -> tuple[float, float
 
 
 def _matched(sample: _Sample, count: int, confidence: float) -> tuple[float, float]:
-    """Agresti and Min's interval: adds half a shot to each of the four cells of the 2 × 2 table."""
+    """Agresti and Min's interval, which adds half a shot to each cell of the 2 × 2 table."""
     difference = sample.mean * count
     discordant = (sample.deviation**2 + sample.mean**2) * count
     padded = count + 2
@@ -189,7 +199,7 @@ def _matched(sample: _Sample, count: int, confidence: float) -> tuple[float, flo
 
 
 class _Sample:
-    """Count, mean and sum of squared deviations of numbers; with `keeps`, also the numbers themselves."""
+    """Count, mean and sum of squared deviations of numbers; with `keeps`, the numbers, too."""
 
     def __init__(self, *, keeps: bool) -> None:
         self.count, self.mean, self._squares = 0, 0.0, 0.0
@@ -197,7 +207,7 @@ class _Sample:
 
     @classmethod
     def pooled(cls, samples: Sequence[_Sample]) -> _Sample:
-        """All numbers of some samples."""
+        """The sample of all numbers."""
         if len(samples) == 1:
             return samples[0]
         whole = cls(keeps=samples[0]._kept is not None)
@@ -216,11 +226,11 @@ class _Sample:
                 self._kept.append(values)
 
     def _merge(self, count: int, mean: float, squares: float) -> None:
-        """T. F. Chan, G. H. Golub, R. J. LeVeque, The American Statistician 37 (1983) 242."""
+        """Add another sample (T. F. Chan, G. H. Golub, R. J. LeVeque, The American Statistician 37 (1983) 242)."""
         if count:
-            total, apart = self.count + count, mean - self.mean
-            self._squares += squares + apart * apart * self.count * count / total
-            self.mean += apart * count / total
+            total, difference = self.count + count, mean - self.mean
+            self._squares += squares + difference * difference * self.count * count / total
+            self.mean += difference * count / total
             self.count = total
 
     @property
@@ -230,9 +240,9 @@ class _Sample:
 
     @property
     def values(self) -> Array:
-        """The numbers, if they are kept."""
+        """The numbers, empty unless they are kept."""
         return np.concatenate(self._kept) if self._kept else np.empty(0)
 
     def quantile(self, share: float) -> float:
-        """Value below which this share of the numbers lies."""
+        """The value that exceeds this share of the numbers."""
         return float(np.quantile(self.values, share, method="hazen"))

@@ -7,25 +7,25 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from warpimpact.statistics.intervals import Array
+
 Shared = Sequence[tuple[int, int]]
-"""How many of the first numbers are the same within blocks of how many draws, such as ((3, 16), (6, 4))."""
+"""Pairs (leading numbers, draws): a block of that many draws has the same leading numbers, as in ((3, 16), (6, 4))."""
 
 FREEDOM = 10.0
-"""Degrees of freedom: tails are heavier than a posterior's, so that no weight is without bound."""
+"""Degrees of freedom: the tails are heavier than those of a posterior, so that weights are bounded."""
 FROM_PRIOR = 0.1
-"""Share that is drawn from the prior."""
+"""Share of the blocks that is drawn from the prior."""
 MOST, DRAWS_EACH = 8, 40
-"""Components at most, and effective draws that each of them needs."""
-KNOWN_DRAWS, KNOWN_SHARE = 20.0, 0.5
-"""Draws that the covariance of a component counts as known before, and which share of the whole covariance they have:
-few draws alone make it too narrow."""
-KNOWN_PLACES = 2.0
-"""Draws that lie at the common mean before, likewise."""
+"""Largest number of components, and effective draws per component."""
+PRIOR_DRAWS, PRIOR_SHARE = 20.0, 0.5
+"""Weight of the prior of a component's covariance in draws, and its share of the covariance of all draws: a covariance
+of few draws alone is too narrow."""
+PRIOR_DRAWS_OF_CENTRE = 2.0
+"""Weight of the prior of a component's centre, the mean of all draws, in draws."""
 FITTED, PASSES = 4000, 25
-"""Draws that a mixture is fitted to at most, and passes over them."""
+"""Largest number of draws that a mixture is fitted to, and passes over them."""
 
 
 @dataclass(frozen=True)
@@ -43,18 +43,18 @@ class Mixture:
     factors: Array
 
     def draw(self, rng: np.random.Generator, count: int, shared: Shared) -> Array:
-        """Draws in blocks that share their first numbers, shape [count, dimensions].
+        """Draws in blocks that share their leading numbers, shape [count, dimensions].
 
-        Within a block the component, the scale and the first normal numbers are the same. As the factors are
-        triangular, so are the first numbers of the draws; each draw alone still has the whole distribution.
+        A block has one component, one scale and the same leading normal numbers. The factors are triangular, so the
+        leading numbers of the draws are the same, too. Each single draw has the distribution of the mixture.
         """
         largest = max((block for _, block in shared), default=1)
         blocks = -(-count // largest)
-        of = np.repeat(np.arange(blocks), largest)[:count]
+        block_of = np.repeat(np.arange(blocks), largest)[:count]
         normal = normal_numbers(rng.standard_normal((count, self.centres.shape[1])), shared, rng)
-        scale = np.sqrt(FREEDOM / rng.chisquare(FREEDOM, blocks))[of]
-        component = rng.choice(len(self.shares), blocks, p=self.shares)[of]
-        from_prior = (rng.random(blocks) < FROM_PRIOR)[of]
+        scale = np.sqrt(FREEDOM / rng.chisquare(FREEDOM, blocks))[block_of]
+        component = rng.choice(len(self.shares), blocks, p=self.shares)[block_of]
+        from_prior = (rng.random(blocks) < FROM_PRIOR)[block_of]
         turned = np.einsum("nij,nj->ni", self.factors[component], normal)
         return np.where(from_prior[:, None], normal, self.centres[component] + scale[:, None] * turned)
 
@@ -63,20 +63,21 @@ class Mixture:
         from scipy.special import logsumexp
         from scipy.stats import multivariate_t
 
-        own = [
+        of_components = [
             multivariate_t.logpdf(points, centre, factor @ factor.T, df=FREEDOM)
             for centre, factor in zip(self.centres, self.factors, strict=True)
         ]
-        terms = np.stack([*own, log_prior(points)])
+        terms = np.stack([*of_components, log_prior(points)])
         shares = np.append((1.0 - FROM_PRIOR) * self.shares, FROM_PRIOR)
         return np.asarray(logsumexp(terms, axis=0, b=shares[:, None]))
 
     def _distances(self, points: Array) -> tuple[Array, Array]:
-        """Squares of the distances from the centres in units of the scale matrices, shape [components, points], and the
-        logarithms of the factors' determinants, shape [components]."""
-        inverse = np.linalg.inv(self.factors)
+        """Squared Mahalanobis distances from the centres, shape [components, points], and logarithms of the factors'
+        determinants, shape [components]."""
+        inverses = np.linalg.inv(self.factors)
         squares = [
-            (((points - centre) @ own.T) ** 2).sum(axis=1) for centre, own in zip(self.centres, inverse, strict=True)
+            (((points - centre) @ inverse.T) ** 2).sum(axis=1)
+            for centre, inverse in zip(self.centres, inverses, strict=True)
         ]
         return np.stack(squares), np.log(np.diagonal(self.factors, axis1=1, axis2=2)).sum(axis=1)
 
@@ -87,8 +88,11 @@ def log_prior(points: Array) -> Array:
 
 
 def normal_numbers(normal: Array, shared: Shared, rng: np.random.Generator) -> Array:
-    """Standard normal numbers of draws in blocks: the first ones are those of the first draw of the block, and those
-    that no block shares cover their space evenly within each smallest block."""
+    """Standard normal numbers of draws in blocks, shape [draws, dimensions].
+
+    The draws of a block share the leading numbers of its first draw. Numbers that no block shares are shifted Sobol
+    points in each of the smallest blocks.
+    """
     from scipy.special import ndtri
     from scipy.stats.qmc import Sobol
 
@@ -105,37 +109,38 @@ def normal_numbers(normal: Array, shared: Shared, rng: np.random.Generator) -> A
     return normal
 
 
-def fitted(points: Array, weights: Array, worth: float, rng: np.random.Generator) -> Mixture:
-    """The mixture of weighted draws, by expectation and maximisation; of few components where few draws count.
+def fitted(points: Array, weights: Array, effective: float, rng: np.random.Generator) -> Mixture:
+    """Mixture fitted to weighted draws by expectation and maximisation. Fewer effective draws give fewer components.
 
     Args:
         points: shape [draws, dimensions].
         weights: normalised, shape [draws].
-        worth: their effective number.
+        effective: effective number of draws.
+        rng: chooses the draws that are fitted, and the first centres.
     """
     from scipy.special import softmax
 
     middle = weights @ points
     whole = _covariance(points - middle, weights) + 1e-6 * np.eye(len(middle))
-    count = int(np.clip(worth / DRAWS_EACH, 1, MOST))
-    some = points[rng.choice(len(points), min(FITTED, len(points)), p=weights)]
+    count = int(np.clip(effective / DRAWS_EACH, 1, MOST))
+    sample = points[rng.choice(len(points), min(FITTED, len(points)), p=weights)]
     if count == 1:
         return Mixture(np.ones(1), middle[None], _factors(whole[None]))
-    near = middle + 0.7 * (some[rng.choice(len(some), count)] - middle)
-    found = Mixture(np.full(count, 1.0 / count), near, _factors(np.repeat(0.6 * whole[None], count, axis=0)))
+    near = middle + 0.7 * (sample[rng.choice(len(sample), count)] - middle)
+    mixture = Mixture(np.full(count, 1.0 / count), near, _factors(np.repeat(0.6 * whole[None], count, axis=0)))
     for _ in range(PASSES):
-        squares, volumes = found._distances(some)
-        log = np.log(found.shares)[:, None] - 0.5 * squares - volumes[:, None]
-        own = softmax(log, axis=0) * (worth / len(some))
-        draws = own.sum(axis=1)
-        centres = (own @ some + KNOWN_PLACES * middle) / (draws + KNOWN_PLACES)[:, None]
-        spreads = [
-            (_covariance(some - centre, one) + KNOWN_DRAWS * KNOWN_SHARE * whole) / (total + KNOWN_DRAWS)
-            for centre, one, total in zip(centres, own, draws, strict=True)
+        squares, log_volumes = mixture._distances(sample)
+        log = np.log(mixture.shares)[:, None] - 0.5 * squares - log_volumes[:, None]
+        memberships = softmax(log, axis=0) * (effective / len(sample))
+        draws = memberships.sum(axis=1)
+        padded = draws + PRIOR_DRAWS_OF_CENTRE
+        centres = (memberships @ sample + PRIOR_DRAWS_OF_CENTRE * middle) / padded[:, None]
+        covariances = [
+            (_covariance(sample - centre, membership) + PRIOR_DRAWS * PRIOR_SHARE * whole) / (total + PRIOR_DRAWS)
+            for centre, membership, total in zip(centres, memberships, draws, strict=True)
         ]
-        shares = (draws + KNOWN_PLACES) / (draws + KNOWN_PLACES).sum()
-        found = Mixture(shares, centres, _factors(np.stack(spreads)))
-    return found
+        mixture = Mixture(padded / padded.sum(), centres, _factors(np.stack(covariances)))
+    return mixture
 
 
 def _factors(covariances: Array) -> Array:
@@ -143,5 +148,5 @@ def _factors(covariances: Array) -> Array:
     return np.linalg.cholesky(covariances).astype(np.float64)
 
 
-def _covariance(apart: Array, weights: Array) -> Array:
-    return np.asarray((weights[:, None] * apart).T @ apart)
+def _covariance(deviations: Array, weights: Array) -> Array:
+    return np.asarray((weights[:, None] * deviations).T @ deviations)

@@ -1,9 +1,9 @@
 """Median and scale of a threshold from yes-or-no answers at known levels: probit and logit of many tests at once.
 
-A test has levels x and answers y; P(y = 1 | x) = F((x − location) / scale), where F is the normal distribution (probit)
-or the logistic one (logit). The log likelihood is concave in location/scale and 1/scale and has a maximum where the
-answers overlap: some 0 at a higher level than some 1 (M. J. Silvapulle, Journal of the Royal Statistical Society B 43
-(1981) 310). Newton's method finds it. All functions take tests as rows; `used` marks the levels that count.
+A test has levels x and answers y. P(y = 1 | x) = F((x − location) / scale), where F is the normal distribution (probit)
+or the logistic one (logit). The log likelihood is concave in location/scale and 1/scale. It has a maximum at a finite
+slope if the answers overlap: one 0 at a higher level than one 1 (M. J. Silvapulle, Journal of the Royal Statistical
+Society B 43 (1981) 310). Newton's method finds it. Tests are rows of all arrays; `used` marks the levels that count.
 """
 
 from __future__ import annotations
@@ -15,24 +15,25 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import special
 
-Array = NDArray[np.float64]
+from warpimpact.statistics.intervals import Array
+
 Flags = NDArray[np.bool_]
 
 LINKS = ("probit", "logit")
 _LN_2_PI = math.log(2.0 * math.pi)
 _FARTHEST = 35.0
-"""In scales: beyond it an answer carries no information that a double can hold."""
+"""Distance from the location, in scales, beyond which the information of an answer is below double precision."""
 
 
 @dataclass(frozen=True)
 class QuantalFit:
-    """What was found of every test, each of shape [tests].
+    """Maximum of the likelihood of every test; all arrays have the shape [tests].
 
     Attributes:
-        location: level of equal odds; without overlap the middle of the gap; NaN where all answers are alike, or where
-            the odds fall with the level.
-        scale: standard deviation of the normal distribution, or the scale of the logistic one; 0 without overlap.
-        log_likelihood: its maximum.
+        location: level of equal odds; without overlap the middle of the gap; NaN if all answers are the same or the
+            odds fall with the level.
+        scale: standard deviation of the normal distribution, or scale of the logistic one; 0 without overlap.
+        log_likelihood: maximum.
         overlap: whether the maximum is at a finite slope.
     """
 
@@ -43,7 +44,7 @@ class QuantalFit:
 
 
 def fit_quantal(levels: Array, answers: Flags, used: Flags, link: str = "probit") -> QuantalFit:
-    """The fit of greatest likelihood of every test.
+    """Fit of maximum likelihood of every test.
 
     Args:
         levels, answers, used: shape [tests, shots].
@@ -55,27 +56,28 @@ def fit_quantal(levels: Array, answers: Flags, used: Flags, link: str = "probit"
     location[apart], scale[apart] = 0.5 * (below + above)[apart], 0.0
     likelihood = np.where(apart, -math.log(2.0) * _at_tie(levels, used, below, above), np.nan)
     if overlap.any():
-        some = _newton(levels[overlap], answers[overlap], used[overlap], link)
-        location[overlap], scale[overlap], likelihood[overlap] = some
+        maximum = _newton(levels[overlap], answers[overlap], used[overlap], link)
+        location[overlap], scale[overlap], likelihood[overlap] = maximum
     return QuantalFit(location, scale, likelihood, overlap & np.isfinite(location))
 
 
 def _ends(levels: Array, answers: Flags, used: Flags) -> tuple[Array, Array]:
-    """The highest level with answer 0 and the lowest with answer 1; infinite where there is none."""
+    """Highest level with answer 0 and lowest with answer 1, shape [tests] each; infinite if there is no such answer."""
     below = np.where(used & ~answers, levels, -np.inf).max(axis=1, initial=-np.inf)
     above = np.where(used & answers, levels, np.inf).min(axis=1, initial=np.inf)
     return below, above
 
 
 def _at_tie(levels: Array, used: Flags, below: Array, above: Array) -> NDArray[np.int64]:
-    """How many levels lie at the one where 0 and 1 meet: even a step says nothing of them."""
+    """Number of shots at the level where 0 and 1 meet, which even a step does not explain; shape [tests]."""
     return np.asarray((used & (levels == below[:, None]) & (below == above)[:, None]).sum(axis=1))
 
 
 def _newton(levels: Array, answers: Flags, used: Flags, link: str) -> tuple[Array, Array, Array]:
+    """Location, scale and log likelihood of tests whose answers overlap, shape [tests] each."""
     count = used.sum(axis=1)
     centre = np.where(used, levels, 0.0).sum(axis=1) / count
-    from_centre = np.where(used, levels - centre[:, None], 0.0)
+    from_centre = np.where(used, levels - centre[:, None], 0.0)  # F takes at + slope · u, u in standard deviations
     width = np.sqrt((from_centre**2).sum(axis=1) / count)
     u, sign = from_centre / width[:, None], np.where(answers, 1.0, -1.0)
     at, slope = np.zeros(len(u)), np.ones(len(u))
@@ -108,7 +110,7 @@ def _newton(levels: Array, answers: Flags, used: Flags, link: str) -> tuple[Arra
 
 
 def _terms(t: Array, used: Flags, link: str) -> tuple[Array, Array, Array]:
-    """ln F(t), its derivative and the negative of its second derivative; 0 where not used."""
+    """ln F(t), its derivative and minus its second derivative; 0 where `used` is false."""
     t = np.clip(np.where(used, t, 0.0), -1e7, 1e7)
     if link == "probit":
         value = special.log_ndtr(t)
@@ -123,37 +125,37 @@ def _terms(t: Array, used: Flags, link: str) -> tuple[Array, Array, Array]:
 def likelihood_interval(
     levels: Array, answers: Flags, used: Flags, fit: QuantalFit, *, confidence: float = 0.95, link: str = "probit"
 ) -> tuple[Array, Array]:
-    """Interval of the location by the likelihood ratio: the locations whose profile of the log likelihood over all
-    scales lies less than half a quantile of χ² (one degree of freedom) below the maximum (B. T. Neyer, Analysis of
-    sensitivity tests, MLM-3736, 1992).
+    """Interval of the location by the likelihood ratio (B. T. Neyer, Analysis of sensitivity tests, MLM-3736, 1992).
 
-    It exists without overlap, too. An end is infinite where no location is refuted, NaN where `fit.location` is.
+    It has all locations whose profile likelihood, the maximum over the scales, lies less than half a quantile of χ²
+    with one degree of freedom below the maximum. It exists without overlap, too. An end is infinite if no location on
+    its side is excluded, and NaN if `fit.location` is.
     """
     drop = 0.5 * float(special.chdtri(1, 1.0 - confidence))
     known = np.flatnonzero(np.isfinite(fit.location))
     low, high = np.full((2, len(levels)), np.nan)
     if len(known):
-        taken = levels[known], answers[known], used[known]
+        tests = levels[known], answers[known], used[known]
         floor = fit.log_likelihood[known] - drop
         start, scale = fit.location[known], fit.scale[known]
-        low[known] = _profile_end(taken, floor, start, scale, -1.0, link)
-        high[known] = _profile_end(taken, floor, start, scale, 1.0, link)
+        low[known] = _profile_end(tests, floor, start, scale, -1.0, link)
+        high[known] = _profile_end(tests, floor, start, scale, 1.0, link)
     return low, high
 
 
 def _profile_end(
-    taken: tuple[Array, Flags, Flags], floor: Array, start: Array, scale: Array, side: float, link: str
+    tests: tuple[Array, Flags, Flags], floor: Array, start: Array, scale: Array, side: float, link: str
 ) -> Array:
-    """Where the profile falls to `floor` on one side of `start`."""
-    levels, _, used = taken
+    """Location on one side of `start` at which the profile likelihood falls to `floor`, by bisection; shape [tests]."""
+    levels, _, used = tests
     reach = np.ptp(np.where(used, levels, start[:, None]), axis=1)
     reach = np.where(reach > 0.0, reach, 1.0)
     inside, outside = np.zeros(len(start)), np.full(len(start), np.inf)  # distances from start
     steep = np.where(scale > 0.0, 1.0 / np.maximum(scale, 1e-12), 1.0 / reach)
     trial = 0.25 * reach
     for _ in range(44):
-        found, steep = _profile(taken, start + side * trial, steep, link)
-        beyond = found < floor
+        likelihood, steep = _profile(tests, start + side * trial, steep, link)
+        beyond = likelihood < floor
         outside, inside = np.where(beyond, trial, outside), np.where(beyond, inside, trial)
         trial = np.where(np.isinf(outside), 2.0 * inside, 0.5 * (inside + np.where(np.isinf(outside), 0.0, outside)))
         if ((outside - inside <= 1e-7 * reach) | (inside > 1e4 * reach)).all():
@@ -161,9 +163,10 @@ def _profile_end(
     return np.where(np.isinf(outside) | (outside > 1e3 * reach), side * np.inf, start + side * 0.5 * (inside + outside))
 
 
-def _profile(taken: tuple[Array, Flags, Flags], location: Array, steep: Array, link: str) -> tuple[Array, Array]:
-    """The greatest log likelihood over all slopes from 0 on, for a location; and that slope, to begin the next at."""
-    levels, answers, used = taken
+def _profile(tests: tuple[Array, Flags, Flags], location: Array, steep: Array, link: str) -> tuple[Array, Array]:
+    """Maximum of the log likelihood over all slopes ≥ 0 at a location, and the slope from which the next search starts;
+    shape [tests] each."""
+    levels, answers, used = tests
     z = np.where(used, np.where(answers, 1.0, -1.0) * (levels - location[:, None]), 0.0)
     step_fits = (z >= 0.0).all(axis=1)  # a scale of 0
     flat = ~step_fits & (z.sum(axis=1) <= 0.0)  # an infinite scale: the likelihood is concave in the slope
@@ -186,8 +189,8 @@ def _profile(taken: tuple[Array, Flags, Flags], location: Array, steep: Array, l
 def wald_interval(
     levels: Array, used: Flags, fit: QuantalFit, *, confidence: float = 0.95, link: str = "probit"
 ) -> tuple[Array, Array]:
-    """Interval of the location by Fisher's information at the fit, as most programs of laboratories report it; NaN
-    without overlap."""
+    """Interval of the location by Fisher's information at the fit, as most laboratory programs report it; NaN without
+    overlap."""
     s0, s1, s2 = information(levels, used, fit.location, fit.scale, link)
     quantile = float(special.ndtri(0.5 * (1.0 + confidence)))
     with np.errstate(divide="ignore", invalid="ignore"):
@@ -218,12 +221,12 @@ _GRID = np.linspace(-4.0, 4.0, 401)
 
 
 def d_optimal(levels: Array, used: Flags, location: Array, scale: Array) -> Array:
-    """The next level at which the determinant of Fisher's information of all levels is greatest, for a probit with this
-    location and scale (B. T. Neyer, Technometrics 36 (1994) 61); shape [tests].
+    """Next level with the largest determinant of Fisher's information of all levels, for a probit with this location
+    and scale (B. T. Neyer, Technometrics 36 (1994) 61); shape [tests].
 
-    Another answer with weight w at z adds w (S₀ z² − 2 S₁ z + S₂) to the determinant.
+    An answer with weight w at z adds w (S₀ z² − 2 S₁ z + S₂) to the determinant.
     """
-    s0, s1, s2 = (one[:, None] for one in information(levels, used, location, scale))
+    s0, s1, s2 = (total[:, None] for total in information(levels, used, location, scale))
     gain = weight(_GRID) * (s0 * _GRID**2 - 2.0 * s1 * _GRID + s2)
     best = np.clip(gain.argmax(axis=1), 1, len(_GRID) - 2)
     rows = np.arange(len(levels))

@@ -1,8 +1,9 @@
-"""Means that differ from group to group, known by a few noisy numbers of each: how many of them are positive?
+"""True means of groups of shots, from a few noisy numbers per group: the share that is positive, and an interval.
 
-The groups are sets of parameters that are equally probable; the numbers of a group are those of the shots that had its
-parameters. The variance between groups is that of their means less what the scatter within them explains (analysis of
-variance with random effects: S. R. Searle, G. Casella, C. E. McCulloch, Variance Components, 1992, chapter 3).
+A group is one of several equally probable sets of parameters; its numbers are those of the shots with these parameters.
+The variance between groups is the variance of the sample means minus the part that the scatter within groups explains
+(analysis of variance with random effects: S. R. Searle, G. Casella, C. E. McCulloch, Variance Components, 1992, chapter
+3).
 """
 
 from __future__ import annotations
@@ -15,62 +16,66 @@ from numpy.typing import NDArray
 
 from warpimpact.statistics.intervals import Array
 
-FEWEST = 8
-"""Groups with two numbers or more that are needed."""
-
-
+FEWEST_GROUPS = 8
+"""Fewest groups with two numbers or more."""
 _FEWEST_FREE = 3.0
-"""Degrees of freedom of a variance that the scatter within groups nearly hides."""
+"""Degrees of freedom of a variance between groups that the scatter within groups nearly hides."""
 
 
 class Positive(NamedTuple):
-    """Share of the groups whose true mean is positive, and the lower end of its one-sided interval."""
+    """Share of the groups with a positive true mean, and the lower end of its one-sided interval."""
 
     share: float
     at_least: float
 
 
 class _Groups(NamedTuple):
-    """Mean over all numbers, means of the groups and variances of these by the scatter within groups, shape [groups],
-    and variance of the mean over all for a unit variance between groups and without one."""
+    """Groups with two numbers or more, and the mean over all numbers.
+
+    Attributes:
+        centre: mean over all numbers.
+        means: sample means of the groups, shape [groups].
+        noises: variances of these means by the scatter within groups, shape [groups].
+        centre_by_between: variance of `centre` per variance between groups.
+        centre_by_noise: variance of `centre` by the scatter within groups.
+    """
 
     centre: float
     means: Array
     noises: Array
-    of_between: float
-    of_noise: float
+    centre_by_between: float
+    centre_by_noise: float
 
 
 def positive_share(
     numbers: Array, groups: NDArray[np.number], *, images: int = 1, confidence: float = 0.95
 ) -> Positive | None:
-    """Share of the groups whose true mean is positive.
+    """Share of the groups with a positive true mean.
 
-    Every true mean has a normal distribution about the mean of its group, shrunk towards the mean over all (empirical
-    Bayes). The lower end takes the true means as normally distributed, with a mean and a variance at the
-    unfavourable ends of their intervals, which hold together (Bonferroni). Few groups do not show that a rare one is
-    far off on the other side.
+    The true mean of a group has a normal distribution about its sample mean, which is shrunk towards the mean over all
+    (empirical Bayes). The lower end assumes normally distributed true means, with mean and variance at the unfavourable
+    ends of their joint intervals (Bonferroni), because few groups cannot exclude a rare group far below 0.
 
     Args:
-        numbers: shape [shots]; NaN where a shot does not count.
-        groups: of the shots, same shape.
-        images: how many shots in a row are images of each other; together they count as one.
+        numbers: shape [shots]; NaN marks a shot that does not count.
+        groups: group of each shot, same shape.
+        images: number of consecutive shots that are images of each other; together they count as one.
 
     Returns:
-        None if fewer than `FEWEST` groups have two numbers.
+        None if fewer than `FEWEST_GROUPS` groups have two numbers.
     """
     from scipy.special import chdtri, ndtr, stdtrit
 
-    found = _grouped(numbers, groups, images)
-    count, tail = len(found.means), 0.5 * (1.0 - confidence)
-    if count < FEWEST:
+    sample = _grouped(numbers, groups, images)
+    count, tail = len(sample.means), 0.5 * (1.0 - confidence)
+    if count < FEWEST_GROUPS:
         return None
-    whole, noise = float(found.means.var(ddof=1)), float(found.noises.mean())
+    whole, noise = float(sample.means.var(ddof=1)), float(sample.noises.mean())
     free = count - 1.0
     largest = max(0.0, whole * free / float(chdtri(free, 1.0 - tail)) - noise)
-    error = math.sqrt(largest * found.of_between + found.of_noise)
-    lowest = found.centre + float(stdtrit(free, tail)) * error
-    share = float(np.mean(_above(*_true_means(found, max(0.0, whole - noise)))))
+    error = math.sqrt(largest * sample.centre_by_between + sample.centre_by_noise)
+    lowest = sample.centre + float(stdtrit(free, tail)) * error
+    share = float(np.mean(_positive_probability(*_true_means(sample, max(0.0, whole - noise)))))
     at_least = float(ndtr(lowest / math.sqrt(largest))) if largest > 0.0 else float(lowest > 0.0)
     return Positive(share, min(share, at_least))
 
@@ -78,46 +83,45 @@ def positive_share(
 def interval_of_means(
     numbers: Array, groups: NDArray[np.number], *, images: int = 1, confidence: float = 0.95, beside: float = 0.0
 ) -> tuple[float, float]:
-    """Interval that contains the true means of so many of the groups; NaN if fewer than `FEWEST` groups have two
-    numbers.
+    """Interval that contains this share of the true means; NaN if fewer than `FEWEST_GROUPS` groups have two numbers.
 
-    The means of the groups scatter more than the true means. They are drawn together until they have the variance of
-    these (T. A. Louis, Journal of the American Statistical Association 79 (1984) 393). Student's quantile in the place
-    of the normal one allows for the error of that variance, with the degrees of freedom of F. E. Satterthwaite,
-    Biometrics Bulletin 2 (1946) 110.
+    Sample means scatter more than true means. They are shrunk to the variance of the true means (T. A. Louis, Journal
+    of the American Statistical Association 79 (1984) 393). Student's quantile replaces the normal one to allow for the
+    error of that variance, with the degrees of freedom of F. E. Satterthwaite, Biometrics Bulletin 2 (1946) 110.
 
     Args:
         numbers, groups, images: as in `positive_share`.
-        beside: standard deviation of something independent that adds to every true mean.
+        confidence: share of the true means.
+        beside: standard deviation of an independent error that adds to every true mean.
     """
     from scipy.special import ndtri, stdtrit
 
-    found = _grouped(numbers, groups, images)
-    if len(found.means) < FEWEST:
+    sample = _grouped(numbers, groups, images)
+    if len(sample.means) < FEWEST_GROUPS:
         return math.nan, math.nan
-    whole, noise = float(found.means.var(ddof=1)), float(found.noises.mean())
-    count, tail = len(found.means), 0.5 * (1.0 - confidence)
+    whole, noise = float(sample.means.var(ddof=1)), float(sample.noises.mean())
+    count, tail = len(sample.means), 0.5 * (1.0 - confidence)
     share = max(0.0, whole - noise) / whole if whole > 0.0 else 0.0
     free = max(_FEWEST_FREE, (count - 1) * share**2)
     stretch = float(stdtrit(free, tail) / ndtri(tail)) * math.sqrt(1.0 + 1.0 / count)
-    means = found.centre + stretch * math.sqrt(share) * (found.means - found.means.mean())
+    means = sample.centre + stretch * math.sqrt(share) * (sample.means - sample.means.mean())
     spread = beside * ndtri((np.arange(64) + 0.5) / 64) if beside > 0.0 else np.zeros(1)
     low, high = np.quantile(np.add.outer(means, spread), [tail, 1.0 - tail], method="hazen")
     return float(low), float(high)
 
 
 def _grouped(numbers: Array, groups: NDArray[np.number], images: int) -> _Groups:
-    """The numbers by groups; groups of one number count for the mean over all alone."""
+    """The groups of the numbers. A group of one number counts in the mean over all only."""
     known = ~np.isnan(numbers)
-    shots, of_shot = np.unique(np.flatnonzero(known) // images, return_inverse=True)
-    values = np.bincount(of_shot, numbers[known]) / np.bincount(of_shot)
-    _, of = np.unique(groups[shots * images], return_inverse=True)
-    counts = np.bincount(of)
-    means = np.bincount(of, values) / counts
+    shots, shot_of = np.unique(np.flatnonzero(known) // images, return_inverse=True)
+    values = np.bincount(shot_of, numbers[known]) / np.bincount(shot_of)
+    _, group_of = np.unique(groups[shots * images], return_inverse=True)
+    counts = np.bincount(group_of)
+    means = np.bincount(group_of, values) / counts
     several = counts >= 2
     if not several.any():
         return _Groups(math.nan, np.empty(0), np.empty(0), math.nan, math.nan)
-    scatter = float(np.square(values - means[of]).sum()) / float((counts[several] - 1).sum())
+    scatter = float(np.square(values - means[group_of]).sum()) / float((counts[several] - 1).sum())
     total = float(counts.sum())
     return _Groups(
         float(values.mean()),
@@ -129,14 +133,14 @@ def _grouped(numbers: Array, groups: NDArray[np.number], images: int) -> _Groups
 
 
 def _true_means(groups: _Groups, between: float) -> tuple[Array, Array]:
-    """Mean and standard deviation of every group's true mean."""
+    """Mean and standard deviation of every group's true mean, shape [groups] each."""
     sums = between + groups.noises
     shrunk = np.divide(between, sums, out=np.zeros_like(sums), where=sums > 0.0)
     return groups.centre + shrunk * (groups.means - groups.centre), np.sqrt(shrunk * groups.noises)
 
 
-def _above(means: Array, deviations: Array) -> Array:
-    """Probabilities that normally distributed numbers are positive."""
+def _positive_probability(means: Array, deviations: Array) -> Array:
+    """Probability that a normally distributed number is positive; the shape is that of the arguments."""
     from scipy.special import ndtr
 
     certain = deviations == 0.0

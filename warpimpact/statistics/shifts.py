@@ -1,7 +1,7 @@
-"""How far the numerics may shift a number over shots: from the same shots computed at a finer level, too.
+"""How far the numerics may shift a number over shots, from the same shots at a finer level.
 
-Two levels differ shot by shot, so a mean has the shift and its interval from a few shots. A share of the shots beyond a
-limit has them from the shifts of the shots near the limit, be it that none of them crosses it.
+Two levels differ shot by shot, so a few shots give the shift of a mean and its interval. The shift of a share of shots
+beyond a limit follows from the shifts of the shots near the limit, even if none of them crosses it.
 """
 
 from __future__ import annotations
@@ -14,30 +14,30 @@ import numpy as np
 from warpimpact.statistics.intervals import Array, Estimate, Estimating, estimate_of
 
 SHIFT_MARGIN = 2.0
-"""Factor for the error of the finer level itself, two levels on: the errors of means about halve over two levels, where
-those of single hits fall to a quarter. With 1.4, which is enough for single hits, 7 of 44 means of random scenes
-shift by more (tests/benchmarks/random_shifts.py)."""
-WINDOW = 1.84
-"""Half the width of the window of a share, in standard deviations, for one shot: that of a normal density (B. W.
+"""Factor for the error of the finer level, which is two levels up: there errors of means are about half as large, and
+errors of single hits a quarter. With 1.4, which suffices for single hits, 7 of 44 means of random scenes shift by more
+(tests/benchmarks/random_shifts.py)."""
+_BANDWIDTH = 1.84
+"""Half the width of the window of a share, in standard deviations, for one shot: optimal for a normal density (B. W.
 Silverman, Density Estimation, 1986, section 3.4.2)."""
 
 
 def shift_of_mean(coarse: Array, fine: Array, **dealt: Unpack[Estimating]) -> float:
-    """Most that a mean over the shots that count may be off by.
+    """Largest probable error of a mean over the shots that count.
 
     Args:
-        coarse, fine: numbers of the same shots, shape [shots]; NaN where a shot does not count at that level.
+        coarse, fine: numbers of the same shots at both levels, shape [shots]; NaN marks a shot that does not count.
         dealt: arguments of `Dealt`.
 
     Returns:
-        NaN where the shots do not tell it.
+        NaN if no shot counts.
     """
-    return _most(change_of_mean(coarse, fine, **dealt))
+    return _largest(change_of_mean(coarse, fine, **dealt))
 
 
 def change_of_mean(coarse: Array, fine: Array, **dealt: Unpack[Estimating]) -> Estimate:
-    """By how much a mean over the shots that count differs at the finer level, with its interval. The arguments are
-    those of `shift_of_mean`."""
+    """Change of a mean from the coarse to the fine level, with its interval. The arguments are those of
+    `shift_of_mean`."""
     counts = ~np.isnan(coarse)
     if not counts.any():
         return Estimate(math.nan, math.nan, math.nan, 0, math.nan)
@@ -47,46 +47,47 @@ def change_of_mean(coarse: Array, fine: Array, **dealt: Unpack[Estimating]) -> E
 
 
 def shift_of_quantile(coarse: Array, fine: Array, share: float, **dealt: Unpack[Estimating]) -> float:
-    """As `shift_of_mean`, of the number that a share of the shots stays below: the shots near it tell how it moves."""
+    """Like `shift_of_mean`, of the number that exceeds this share of the shots: half of the shots, those nearest to it
+    in rank, show how it moves."""
     both = np.flatnonzero(np.isfinite(coarse) & np.isfinite(fine))
     if not len(both):
         return math.nan
-    place = np.abs(np.argsort(np.argsort(coarse[both])) + 0.5 - share * len(both))
-    near = both[place <= np.median(place)]
-    return _most(estimate_of("mean", fine[near] - coarse[near], **dealt))
+    ranks_away = np.abs(np.argsort(np.argsort(coarse[both])) + 0.5 - share * len(both))
+    near = both[ranks_away <= np.median(ranks_away)]
+    return _largest(estimate_of("mean", fine[near] - coarse[near], **dealt))
 
 
 def shift_of_share(coarse: Array, fine: Array, **dealt: Unpack[Estimating]) -> float:
-    """As `shift_of_mean`, of the share of the shots whose numbers are positive; they may be infinite.
+    """Like `shift_of_mean`, of the share of shots with a positive number; numbers may be infinite.
 
-    The share changes by the density of the numbers at 0 times their mean shift there, E[shift · δ(number)], with a
-    window in place of δ. A shot that shifts farther than that counts by the side that it is on. Where more shots cross
-    0 than this allows, as where many numbers lie within a part of the window, those that cross count alone.
+    The share changes by E[shift · δ(number)], with a window in place of δ. A shot that shifts by more than the window
+    counts by its sign at both levels. If more shots cross 0 than this estimate allows, because many numbers lie in a
+    part of the window, only crossings count.
     """
     known = ~np.isnan(coarse) & ~np.isnan(fine)
     if not known.any():
         return math.nan
     coarse, fine = coarse[known], fine[known]
     finite = np.isfinite(coarse) & np.isfinite(fine)
-    wide = WINDOW * float(np.std(coarse[finite])) * int(finite.sum()) ** -0.2 if finite.any() else 0.0
+    window = _BANDWIDTH * float(np.std(coarse[finite])) * int(finite.sum()) ** -0.2 if finite.any() else 0.0
     with np.errstate(invalid="ignore"):
         shift, middle = fine - coarse, 0.5 * (coarse + fine)
-        near = finite & (np.abs(shift) < wide)
+        near = finite & (np.abs(shift) < window)
     change = np.where(fine > 0.0, 1.0, 0.0) - np.where(coarse > 0.0, 1.0, 0.0)
     crossed = estimate_of("difference", change, **dealt)
-    change[near] = np.where(np.abs(middle[near]) < wide, shift[near] / (2.0 * wide), 0.0)
+    change[near] = np.where(np.abs(middle[near]) < window, shift[near] / (2.0 * window), 0.0)
     smooth = estimate_of("mean", change, **dealt)
-    return _most(smooth if crossed.low <= smooth.value <= crossed.high else crossed)
+    return _largest(smooth if crossed.low <= smooth.value <= crossed.high else crossed)
 
 
 def shift_of_yes(coarse: Array, fine: Array, **dealt: Unpack[Estimating]) -> float:
-    """As `shift_of_mean`, of a share of which shots say yes or no, 1 or 0, and no more; 0 where all say the same."""
+    """Like `shift_of_mean`, of the share of answers that are 1, not 0; 0 if all answers are the same."""
     both = np.concatenate([coarse, fine])
     if len(np.unique(both[~np.isnan(both)])) < 2:
         return 0.0
-    return _most(estimate_of("difference", fine - coarse, **dealt))
+    return _largest(estimate_of("difference", fine - coarse, **dealt))
 
 
-def _most(change: Estimate) -> float:
-    """The farther end of the interval of a shift, and what the finer level is off by."""
+def _largest(change: Estimate) -> float:
+    """The end of the interval of a change that is farther from 0, with the margin for the finer level."""
     return SHIFT_MARGIN * (abs(change.value) + change.half_width)

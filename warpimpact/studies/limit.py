@@ -44,8 +44,8 @@ from warpimpact.solver.marching import Progress
 from warpimpact.solver.pilot import limits_pilot_size
 from warpimpact.solver.worker import Worker
 from warpimpact.statistics.intervals import Estimate, estimate_of
-from warpimpact.statistics.of_groups import of_quantile
 from warpimpact.statistics.shifts import shift_of_quantile
+from warpimpact.statistics.tails import quantile_weights
 
 if TYPE_CHECKING:
     from warpimpact.results.table import Result
@@ -206,7 +206,7 @@ def quantiles(dataset: xarray.Dataset) -> dict[str, Estimate]:
     for name, share in QUANTILES.items():
         estimate = estimate_of("quantile", counted, share=share, **dealt)
         ends = (estimate.value, estimate.low, estimate.high)
-        drawn = by_draws(dataset, counted, of_quantile(share))
+        drawn = by_draws(dataset, counted, quantile_weights(share))
         estimate = over_draws(dataset, estimate, drawn, units=_UNITS_OF[quantity])
         value_, low, high = (math.inf if end >= highest else end for end in ends)
         if levels is not None:

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from warpimpact.statistics.intervals import Dealt, estimate_of
+from warpimpact.statistics.intervals import Dealt, estimate_of, looks
 from warpimpact.statistics.student import student_quantile
 
 TRIALS = 500
@@ -68,3 +68,9 @@ def test_the_interval_of_a_share_is_wilsons(successes: int, count: int) -> None:
     found = estimate_of("share", np.repeat([1.0, 0.0], [successes, count - successes]), confidence=0.9)
     wilson = stats.binomtest(successes, count).proportion_ci(0.9, method="wilson")
     assert (found.low, found.high) == pytest.approx((wilson.low, wilson.high), rel=1e-12, abs=1e-15)
+
+
+def test_a_rule_looks_at_balanced_points_or_at_steps_of_a_quarter() -> None:
+    assert list(looks("sobol", 20)) == [1, 2, 4, 8, 16, 20]
+    assert list(looks("random", 20)) == [1, 2, 3, 4, 5, 7, 9, 12, 15, 19, 20]
+    assert list(looks("random", 1)) == [1]

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.special import ndtr
 
-from warpimpact.statistics.random_effects import FEWEST, interval_of_means, positive_share
+from warpimpact.statistics.random_effects import FEWEST_GROUPS, interval_of_means, positive_share
 
 TRIALS = 200
 LEAST = 181  # 95 % of 200 trials: 190 ± 3.1, three standard deviations below
@@ -75,7 +75,7 @@ def test_images_count_once() -> None:
 
 
 def test_too_few_groups() -> None:
-    of = np.repeat(np.arange(FEWEST), 2)
-    assert positive_share(np.arange(2.0 * FEWEST), of) is not None
-    assert positive_share(np.arange(2.0 * FEWEST)[1:], of[1:]) is None
+    of = np.repeat(np.arange(FEWEST_GROUPS), 2)
+    assert positive_share(np.arange(2.0 * FEWEST_GROUPS), of) is not None
+    assert positive_share(np.arange(2.0 * FEWEST_GROUPS)[1:], of[1:]) is None
     assert positive_share(np.full(4, np.nan), np.arange(4)) is None
