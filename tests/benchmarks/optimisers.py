@@ -23,7 +23,7 @@ from warpimpact.optimisation.evaluate import Job, said_by
 from warpimpact.optimisation.feasible import checked
 from warpimpact.optimisation.judged import Record, objectives
 from warpimpact.optimisation.searcher import front_of, hypervolume
-from warpimpact.optimisation.space import Space, Variable
+from warpimpact.optimisation.space import DesignVariable, Space
 
 BUDGET, BATCH, SEEDS = 160, 20, (0, 1, 2)
 LEVEL, HITS = '{"level": 0}', 64
@@ -93,7 +93,7 @@ Tell = Callable[[list[Coordinates], np.ndarray, np.ndarray], None]
 Method = Callable[[Space, int, int], tuple[Ask, Tell]]
 
 
-def _unit(one: Variable, share: float) -> float:
+def _unit(one: DesignVariable, share: float) -> float:
     """A coordinate from a share of the range."""
     return share if one.count is None else float(min(int(share * one.count), one.count - 1))
 

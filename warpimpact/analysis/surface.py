@@ -22,7 +22,7 @@ _SPENT = 1e-9  # a smaller share of the resistance counts as none
 _AT_REST = 1e-5  # share of the speed; less is rounding: a wall that slides along itself does not close in
 
 
-class Surface(NamedTuple):
+class PressedSurface(NamedTuple):
     """A core's surface at an instant.
 
     Points in the plate [m] and outward normals have the shape [sections, around, 3]. Areas [m²] and the normal stress,
@@ -35,7 +35,7 @@ class Surface(NamedTuple):
     stress: Array
 
 
-def pressed(history: xarray.Dataset, step: int) -> Surface:
+def pressed(history: xarray.Dataset, step: int) -> PressedSurface:
     """The core's surface in a step of its history, with the normal stress of the paper's law (its eqs. 4 and 5).
 
     A point carries stress if it is in the plate and advances along its normal. The stress is the share of the
@@ -52,7 +52,7 @@ def pressed(history: xarray.Dataset, step: int) -> Surface:
     closing = np.sum(velocity * normal, axis=-1)
     inside = (point[..., 0] >= 0.0) & (point[..., 0] <= history.attrs[attr.PLATE_THICKNESS])
     touching = inside & (closing > _AT_REST * np.linalg.norm(velocity, axis=-1))
-    return Surface(point, normal, area, np.where(touching, _left(history, step, point), 0.0))
+    return PressedSurface(point, normal, area, np.where(touching, _left(history, step, point), 0.0))
 
 
 def largest_in_plate(history: xarray.Dataset) -> int:
@@ -69,7 +69,7 @@ def largest_in_plate(history: xarray.Dataset) -> int:
 
 
 def _body(history: xarray.Dataset) -> tuple[Array, Array, Array]:
-    """Points relative to the centre of mass and normals, both in body axes, and areas; shapes as in `Surface`."""
+    """Points relative to the centre of mass and normals in body axes, and areas; shapes as in `PressedSurface`."""
     station, radius = history[v.STATION].values, history[v.CORE_RADIUS].values
     along, outward = -np.diff(station), np.diff(radius)  # from one section to the next, towards the base
     slant = np.hypot(along, outward)

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpimpact.firing.procedures import Procedure
-from warpimpact.firing.steps import Estimate, Estimated, Optimal, Shot, Steps
+from warpimpact.firing.steps import Estimated, Optimal, Shot, StepEstimate, Steps
 from warpimpact.scene.sampling import stream
 from warpimpact.statistics.quantal import d_optimal, fit_quantal, information
 
@@ -135,4 +135,4 @@ def _answer_estimates(
     s0, s1, s2 = information(velocity, used, location, scale)
     for row, test in enumerate(asking):
         sums = float(s0[row]), float(s1[row]), float(s2[row])
-        asked[test] = procedures[test].send(Estimate(float(location[row]), float(scale[row]), sums))
+        asked[test] = procedures[test].send(StepEstimate(float(location[row]), float(scale[row]), sums))

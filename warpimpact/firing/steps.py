@@ -36,10 +36,10 @@ class Optimal(NamedTuple):
 
 
 class Estimated(NamedTuple):
-    """Asks for the fit of greatest likelihood so far; what is sent back is an Estimate in the place of a Shot."""
+    """Asks for the fit of greatest likelihood so far; what is sent back is a StepEstimate in the place of a Shot."""
 
 
-class Estimate(NamedTuple):
+class StepEstimate(NamedTuple):
     """The fit of greatest likelihood within the levels that were fired [m/s], and the information sums of it."""
 
     location: float

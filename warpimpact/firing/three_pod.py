@@ -9,7 +9,7 @@ import numpy as np
 from pydantic import Field
 from scipy import special
 
-from warpimpact.firing.steps import Count, Estimate, Estimated, InRange, Optimal, Shot, Steps, ends
+from warpimpact.firing.steps import Count, Estimated, InRange, Optimal, Shot, StepEstimate, Steps, ends
 from warpimpact.scene.units import Number, PositiveSpeed
 
 
@@ -94,7 +94,7 @@ class ThreePod(InRange):
             for aim in (middle,) if wide else (middle + 0.5 * spread, middle - 0.5 * spread):
                 fired.append((yield aim))
 
-    def _approach(self, estimate: Estimate) -> Steps:
+    def _approach(self, estimate: StepEstimate) -> Steps:
         """Phase III, in units of the standard deviation; τ² is the variance of the quantile that the fit leaves, kept
         between those of ± 3 and ± 5 at 95 %, and β = 1/2, as Wu and Tian take them."""
         z = float(special.ndtri(self.quantile))

@@ -27,7 +27,7 @@ _DIGITS = 6
 
 
 @dataclass(frozen=True)
-class Variable:
+class DesignVariable:
     """A free variable: a range, with or without a step, or a choice.
 
     Attributes:
@@ -86,7 +86,7 @@ class Variable:
 class Space:
     """All variables, a choice before what stands below it."""
 
-    variables: tuple[Variable, ...]
+    variables: tuple[DesignVariable, ...]
 
     @property
     def size(self) -> float:
@@ -96,7 +96,7 @@ class Space:
         return math.inf if None in counts else float(math.prod(count for count in counts if count is not None))
 
     def at(self, coordinates: Sequence[float]) -> Array:
-        """Values at coordinates as `Variable.at` takes them, shape [variables]; NaN of those that do not count."""
+        """Values at coordinates of `DesignVariable.at`, shape [variables]; NaN for variables that do not count."""
         values = np.full(len(self.variables), math.nan)
         for number, (one, coordinate) in enumerate(zip(self.variables, coordinates, strict=True)):
             if one.under is None or values[one.under[0]] == one.under[1]:
@@ -142,7 +142,7 @@ def read_space(given: Any, name: str) -> Space:
     """
     if not isinstance(given, dict):
         raise CampaignError(f"{name}: variables: got {quoted(given)}, but it must be a table")
-    found: list[Variable] = []
+    found: list[DesignVariable] = []
     for key, value in given.items():
         _read(found, key, resolved(key, f"{name}: variables"), value, f"{name}: variables.{key}")
     if len(found) > MOST_VARIABLES:
@@ -153,7 +153,7 @@ def read_space(given: Any, name: str) -> Space:
     return Space(tuple(found))
 
 
-def _read(found: list[Variable], name: str, place: str, given: Any, where: str, under: Any = None) -> None:
+def _read(found: list[DesignVariable], name: str, place: str, given: Any, where: str, under: Any = None) -> None:
     """Add a variable and those below its alternatives."""
     if isinstance(given, dict) and "low" in given:
         found.append(_range(name, place, given, where, under))
@@ -166,7 +166,7 @@ def _read(found: list[Variable], name: str, place: str, given: Any, where: str, 
         )
 
 
-def _range(name: str, place: str, given: dict[str, Any], where: str, under: Any) -> Variable:
+def _range(name: str, place: str, given: dict[str, Any], where: str, under: Any) -> DesignVariable:
     if unknown := next((key for key in given if key not in _RANGE), None):
         raise CampaignError(f"{where}: got the unknown key {quoted(unknown)}; allowed are low, high, step")
     if "high" not in given:
@@ -191,7 +191,7 @@ def _range(name: str, place: str, given: dict[str, Any], where: str, under: Any)
         raise CampaignError(
             f"{where}.step: got {step:g}, but it must be greater than 0 and divide the range into at most {MOST_STEPS}"
         )
-    return Variable(name, place, low, high, step, units["low"], under=under)
+    return DesignVariable(name, place, low, high, step, units["low"], under=under)
 
 
 def _number(value: float | str) -> float:
@@ -201,7 +201,7 @@ def _number(value: float | str) -> float:
         return math.inf
 
 
-def _read_choice(found: list[Variable], name: str, place: str, given: list[Any], where: str, under: Any) -> None:
+def _read_choice(found: list[DesignVariable], name: str, place: str, given: list[Any], where: str, under: Any) -> None:
     """A list of values, or of tables with names; ranges and lists in a table are variables below it."""
     whole = is_table(place) or place == "layer" or all(isinstance(one, dict) for one in given)
     if whole and not all(isinstance(one, dict) and isinstance(one.get("name"), str) for one in given):
@@ -224,7 +224,7 @@ def _read_choice(found: list[Variable], name: str, place: str, given: list[Any],
         inner: Any = table.get("layer", []) if place == "layer" else table
         values.append(inner)
         below += [(option, path, part) for path, part in _free(inner)]
-    found.append(Variable(name, place, labels=labels, values=tuple(values), under=under))
+    found.append(DesignVariable(name, place, labels=labels, values=tuple(values), under=under))
     for option, path, part in below:
         _read(
             found,

@@ -64,7 +64,7 @@ class _Fidelity(BaseModel):
     fidelity: Any
 
 
-class _Material(BaseModel):
+class _DeclaredMaterial(BaseModel):
     resistance: Finite
     density: Positive = 1.0
     degradation: Finite = 1.0
@@ -87,7 +87,7 @@ _SHAPES: Mapping[str, Any] = {
     attr.CORE: Json[_Core],
     attr.RESOLUTION: Json[_Resolution],
     attr.ACCURACY: Json[_Accuracy],
-    attr.MATERIAL: Json[_Material],
+    attr.MATERIAL: Json[_DeclaredMaterial],
     attr.NUMERICS_GIVEN: Json[_Fidelity],
     attr.DISCREPANCY: Json[dict[str, Finite]],
     attr.LAYERS: Json[dict[str, _Layer]],

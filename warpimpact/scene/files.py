@@ -78,7 +78,7 @@ def read_table(path: Path, columns: tuple[str, ...]) -> Array:
         return _rows(path, columns, reader, range(len(columns)))
 
 
-class Column(NamedTuple):
+class CsvColumn(NamedTuple):
     """A column of numbers, shape [rows], read-only; `unit` is what its header gives in brackets, or empty."""
 
     values: Array
@@ -87,7 +87,7 @@ class Column(NamedTuple):
 
 def read_columns(
     path: Path, required: tuple[str, ...], optional: tuple[str, ...], exported: Mapping[str, str]
-) -> dict[str, Column]:
+) -> dict[str, CsvColumn]:
     """Columns of a CSV file by their names: the required ones first in its header, then any of the optional ones.
 
     A name may be followed by its unit, as in "hit_y [mm]". A file whose first column is "hit" is one that
@@ -117,7 +117,7 @@ def read_columns(
                 f"and then any of {', '.join(optional)}"
             )
         rows = _rows(path, header, reader, wanted).T
-        return {name: Column(row, units[place]) for name, row, place in zip(found, rows, wanted, strict=True)}
+        return {name: CsvColumn(row, units[place]) for name, row, place in zip(found, rows, wanted, strict=True)}
 
 
 def _got(header: tuple[str, ...], known: tuple[str, ...]) -> str:

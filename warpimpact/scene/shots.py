@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from pydantic import Field, model_validator
 
 from .exclusions import SIZE, WHOLE_PLATE, check_together
-from .files import Column, InputFile, read_columns
+from .files import CsvColumn, InputFile, read_columns
 from .model import Array, Model
 from .plate import Plate
 from .quantities import BY_LAYER, LISTED, QUANTITIES
@@ -35,7 +35,7 @@ EXPORTED = {one.column: name for name, one in QUANTITIES.items() if one.column i
 """Names of columns in an exported result, and those of a list of hits."""
 
 
-def _in_si(name: str, column: Column, file: str) -> Array:
+def _in_si(name: str, column: CsvColumn, file: str) -> Array:
     """Values of a column of a list of hits in SI and radians; a number without a unit is degrees for an angle."""
     kind = quantity(QUANTITIES[name].type)
     if not column.unit:

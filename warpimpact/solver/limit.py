@@ -19,7 +19,7 @@ from warpimpact.records.outcomes import Outcomes
 from warpimpact.scene import Numerics, Plate, Scene, Shots
 from warpimpact.solver.findings import LimitErrors
 from warpimpact.solver.limit_near import Neighbours
-from warpimpact.solver.limit_search import Guess, Search
+from warpimpact.solver.limit_search import Guess, LimitSearch
 from warpimpact.solver.marching import Progress
 from warpimpact.solver.pilot import limits_pilot_size, pilot_limits
 from warpimpact.solver.prepare import prepare
@@ -245,7 +245,7 @@ def _searched(
     worker: Worker,
     guess: Guess,
     progress: Callable[[int], object],
-) -> tuple[Search, Limits]:
+) -> tuple[LimitSearch, Limits]:
     """The limits of some shots of which something is known, one run of each at a time, and their search."""
     search, put = _begun(scene, shots, sought, guess)
     total = len(shots)
@@ -273,13 +273,15 @@ def _joined(parts: list[Limits], order: NDArray[np.int64]) -> Limits:
     )
 
 
-def _begun(scene: Scene, shots: Shots, sought: Sought, guess: Guess) -> tuple[Search, Callable[[Shots, Array], Shots]]:
+def _begun(
+    scene: Scene, shots: Shots, sought: Sought, guess: Guess
+) -> tuple[LimitSearch, Callable[[Shots, Array], Shots]]:
     """A search of limits, and what gives shots the values that are tried."""
     tolerance, highest, layer = sought.tolerance, sought.highest, sought.layer
     if sought.quantity == "velocity":
-        return Search(shots.velocity, np.inf, np.zeros(len(shots)), tolerance, highest, guess), with_velocity
+        return LimitSearch(shots.velocity, np.inf, np.zeros(len(shots)), tolerance, highest, guess), with_velocity
     start = np.broadcast_to(shots.own_of(scene.target, "thickness", layer), len(shots))
-    search = Search(start, 0.0, shots.velocity, tolerance, highest, guess)
+    search = LimitSearch(start, 0.0, shots.velocity, tolerance, highest, guess)
     return search, partial(with_thickness, layer)
 
 

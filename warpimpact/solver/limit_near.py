@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from warpimpact.scene import IDENTITY, Scene, Shots, Symmetry
 from warpimpact.scene.shots import OF_A_SHOT
 from warpimpact.scene.symmetry import SYMMETRIES, of_plate
-from warpimpact.solver.limit_search import DOUBT, Guess, Search
+from warpimpact.solver.limit_search import DOUBT, Guess, LimitSearch
 from warpimpact.solver.simulate import spread_places
 
 Array = NDArray[np.float64]
@@ -53,7 +53,7 @@ class Neighbours:
         self._value, self._sums = np.full(len(shots), np.nan), np.zeros((5, len(shots)))
         self._errors = np.full((3, len(shots)), np.nan)
 
-    def learn(self, which: NDArray[np.int64], search: Search) -> None:
+    def learn(self, which: NDArray[np.int64], search: LimitSearch) -> None:
         """Take in limits that are found."""
         self._value[which], self._sums[:, which] = search.value(), search.curve_sums()
         self._errors[:, which] = search.errors()

@@ -66,7 +66,7 @@ class Guess:
         return cls(unknown, unknown, unknown, unknown, np.array(DOUBT))
 
 
-class Search:
+class LimitSearch:
     """The state of all searches; arrays of shape [shots].
 
     `passed` is the value nearest to the limit at which the core passed, `stopped` that at which it was stopped. One of

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import pytest
 
 from warpimpact.firing.procedures import Langlie, MilStd662F, Neyer, Procedure, ThreePod, UpAndDown
-from warpimpact.firing.steps import Estimate, Estimated, Optimal, Shot
+from warpimpact.firing.steps import Estimated, Optimal, Shot, StepEstimate
 
 
 def aims(procedure: Procedure, answers: Sequence[int]) -> list[float | Optimal]:
@@ -62,7 +62,7 @@ def test_the_third_phase_approaches_a_quantile() -> None:
     next(steps)
     steps.send(Shot(700.0, False))
     assert steps.send(Shot(900.0, True)) == Estimated()
-    begin = steps.send(Estimate(800.0, 20.0, (5.0, 0.0, 5.0)))
+    begin = steps.send(StepEstimate(800.0, 20.0, (5.0, 0.0, 5.0)))
     assert begin == pytest.approx(800.0 - 1.2816 * 20.0, abs=0.01)
     lower = steps.send(Shot(begin, True))
     higher = steps.send(Shot(lower, False))

@@ -24,7 +24,7 @@ from warpimpact.optimisation.judged import Record, excesses, objectives, undecid
 from warpimpact.optimisation.optimise import folder_of, optimise, optimise_to_file
 from warpimpact.optimisation.search import SearchProgress
 from warpimpact.optimisation.searcher import Searcher, front_of, hypervolume
-from warpimpact.optimisation.space import Space, Variable
+from warpimpact.optimisation.space import DesignVariable, Space
 from warpimpact.optimisation.text import front_lines
 from warpimpact.optimisation.work import Work
 from warpimpact.results import front as f
@@ -63,7 +63,7 @@ def _disc(coordinates: Sequence[Sequence[float]]) -> tuple[np.ndarray, np.ndarra
 
 
 def test_a_front_with_a_constraint_has_its_hypervolume() -> None:
-    space = Space((Variable("x", "x", 0.0, 1.0), Variable("y", "y", 0.0, 1.0)))
+    space = Space((DesignVariable("x", "x", 0.0, 1.0), DesignVariable("y", "y", 0.0, 1.0)))
     asking, kept = Searcher(space, 2, 1, 40, seed=1), []
     for _ in range(50):
         points, broken = _disc(asking.ask())

@@ -14,7 +14,7 @@ from warpimpact.scene import CirclePattern, Layer, Numerics, OgiveCore, Plate, S
 from warpimpact.solver import limit
 from warpimpact.solver.limit import STEPS, Sought, limit_thickness, limit_velocity, short_steps
 from warpimpact.solver.limit_near import Neighbours
-from warpimpact.solver.limit_search import MOST_RUNS, Guess, Search
+from warpimpact.solver.limit_search import MOST_RUNS, Guess, LimitSearch
 from warpimpact.solver.prepare import Prepared
 from warpimpact.solver.resolution import LADDER
 from warpimpact.solver.simulate import simulate
@@ -168,7 +168,7 @@ def test_what_is_found_says_where_the_others_begin() -> None:
     many = replace(scattered(40), obliquity=np.linspace(0.0, 0.3, 40))
     near = Neighbours(Scene(core=CORE, target=HOLES), many, ("velocity", 0), 1.0)
     value, first = 300.0 + 100.0 * np.sin(many.obliquity), np.arange(0, 40, 5)
-    search = Search(value[first], np.inf, np.zeros(8), 1.0, 3000.0, near.guess(first))
+    search = LimitSearch(value[first], np.inf, np.zeros(8), 1.0, 3000.0, near.guess(first))
     assert np.isnan(search.guess.value).all()
     search.passed, search.stopped = value[first] + 0.4, value[first] - 0.4
     near.learn(first, search)
@@ -179,7 +179,7 @@ def test_what_is_found_says_where_the_others_begin() -> None:
 
 def test_a_limit_that_others_tell_too_low_is_found_in_few_runs() -> None:
     guess = Guess(np.full(1, 577.1), np.full(1, 0.33), np.zeros(1), np.full(1, 0.93), np.array([0.1, 0.05, 0.03]))
-    search = Search(np.full(1, 600.0), np.inf, np.zeros(1), 1.0, 3000.0, guess)
+    search = LimitSearch(np.full(1, 600.0), np.inf, np.zeros(1), 1.0, 3000.0, guess)
     by_formula = outcomes_by(lambda some: (np.where(some.velocity > 584.6, 0, 1), speed_left(some.velocity, 584.6)))
     while len(which := search.pending):
         tried = search.trial(which)

@@ -5,7 +5,7 @@ from typing import Annotated
 from pydantic import Field
 
 from .free_form import LevelSetPattern, PolygonsPattern, Supershape, SupershapePattern, Wave
-from .lattice import LatticePattern, Place
+from .lattice import HolePlace, LatticePattern
 from .pattern import WHOLE_CELL as WHOLE_CELL
 from .pattern import BoolArray, NoPattern, Pattern
 from .shapes import CirclePattern, EllipsePattern, HexagonPattern, SlotPattern, SquarePattern, TrianglePattern

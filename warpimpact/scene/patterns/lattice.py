@@ -26,7 +26,7 @@ _SAME = 1e-9
 _PAIR = tuple[PositiveLength, PositiveLength]
 
 
-class Place(NamedTuple):
+class HolePlace(NamedTuple):
     """The place of a hole in a cell: its origin [m], and its rotation from +y towards +z [rad]."""
 
     y: Length
@@ -52,7 +52,7 @@ class LatticePattern(Pattern):
 
     staggered: Annotated[bool, Field(strict=True)] = False
     spacing: _PAIR
-    holes: Annotated[tuple[Place, ...], Field(fail_fast=True, min_length=1, max_length=_MOST_HOLES)] | None = None
+    holes: Annotated[tuple[HolePlace, ...], Field(fail_fast=True, min_length=1, max_length=_MOST_HOLES)] | None = None
     rotation: Angle = 0.0
     _plate: tuple[tuple[float, float], float] | None = PrivateAttr(None)
     """Size and margin of the plate that bounds the pattern; None if it is unbounded."""
