@@ -24,7 +24,7 @@ from random_layers import broken, counted, drawn, errors
 from random_scenes import RUN, Case, draw
 from roads import ROUNDS, Road
 
-from warpimpact.records.layers import LAYER_RESIDUAL_VELOCITY
+from warpimpact.records.layer_variables import LAYER_RESIDUAL_VELOCITY
 from warpimpact.records.outcomes import Outcomes
 from warpimpact.scene import PRESETS, Numerics, Scene, Shots
 from warpimpact.solver.pilot import pilot_size

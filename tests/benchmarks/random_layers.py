@@ -22,7 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 from random_scenes import Case, _pattern, draw, p90
 
-from warpimpact.records.layers import LAYER_RESIDUAL_VELOCITY
+from warpimpact.records.layer_variables import LAYER_RESIDUAL_VELOCITY
 from warpimpact.records.outcomes import Outcomes
 from warpimpact.scene import (
     PRESETS,

@@ -19,7 +19,7 @@ from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
 from warpimpact.results.dataset import passed
 from warpimpact.results.outlines import outlines
-from warpimpact.scene.drawing import path, picture
+from warpimpact.scene.notebook import path, picture
 
 _MOST = 2000
 """Hits that a drawing has."""

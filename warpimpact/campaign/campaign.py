@@ -35,7 +35,7 @@ from ..scene import (
 )
 from ..scene.distributions import EDGE
 from ..scene.exclusions import check_together
-from ..scene.files import InputFile
+from ..scene.input_files import InputFile
 from ..scene.model import Model
 from ..scene.quantities import SCATTERED
 from ..scene.scatter import check_range

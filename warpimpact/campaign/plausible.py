@@ -10,7 +10,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from ..scene import Core, Hits, Impact, Record, Scene, Target
-from ..scene.plausible import USUAL, Implausible, hit_bounds, implausible, impossible
+from ..scene.bounds import USUAL, Implausible, hit_bounds, implausible, impossible
 from ..scene.quantities import SCATTERED
 
 _OF_A_PLATE = (

@@ -8,8 +8,8 @@ from typing import Any
 from ..results import kinds
 from ..results.files import kind_of
 from ..results.kinds import Kind
-from ..scene import text as scene_text
-from ..scene.files import check_file
+from ..scene import toml_text
+from ..scene.input_files import check_file
 
 
 class CampaignError(ValueError):
@@ -34,7 +34,7 @@ def parsed(text: str, name: str, kind: Kind | None = None) -> dict[str, Any]:
         CampaignError: the text, which errors call `name`, is neither, or is of another kind.
     """
     with _as_campaign():
-        tables = scene_text.parsed(text, name)
+        tables = toml_text.parsed(text, name)
     other = kinds.kind_of_tables(tables)
     if kind is not None and other not in (None, kind) and not {*kind.marks} & {*tables}:
         raise CampaignError(kinds.told(name, other, kind.what))
@@ -51,4 +51,4 @@ def read_text(path: Path) -> str:
         check_file(path)
         if kinds.is_netcdf(path) and (kind := kind_of(path)) is not None:
             raise CampaignError(kinds.told(path, kind, "a TOML file"))
-        return scene_text.read_text(path)
+        return toml_text.read_text(path)

@@ -14,7 +14,7 @@ from typing import Any, NoReturn, TypeVar
 from pydantic import ValidationError
 
 from warpimpact.catalogue.entries import Material, Threat, reason
-from warpimpact.scene.text import parsed, read_text
+from warpimpact.scene.toml_text import parsed, read_text
 from warpimpact.scene.units import quoted
 
 Entry = TypeVar("Entry", Threat, Material)

@@ -30,7 +30,7 @@ from warpimpact.design.desk import Desk
 from warpimpact.design.guard import Guard
 from warpimpact.design.hasty import Hasty
 from warpimpact.results.files import ResultError
-from warpimpact.scene.plausible import Implausible
+from warpimpact.scene.bounds import Implausible
 from warpimpact.scene.units import quoted
 from warpimpact.solver.device import DeviceError
 from warpimpact.solver.resolution import TooManySteps

@@ -10,7 +10,7 @@ from warpimpact.firing.directions import Directions
 from warpimpact.firing.estimators import Estimator
 from warpimpact.firing.procedures import AnyProcedure
 from warpimpact.firing.rules import FairHit, Gun
-from warpimpact.scene.files import InputFile
+from warpimpact.scene.input_files import InputFile
 from warpimpact.scene.model import Model
 from warpimpact.scene.units import NonNegativeNumber, Number, PositiveSpeed, Title
 

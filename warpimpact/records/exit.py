@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from warpimpact.kernels.status import OF_SHOTS, Status
-from warpimpact.records.group import Columns, Group, Returned, doubles
+from warpimpact.records.group import Columns, Returned, VariableGroup, doubles
 from warpimpact.records.variable import AT_STANDOFF, HITS, MAIN, VECTORS, Variable
 
 STATUS = Variable("status", HITS, "1", "how the shot ended", flags=OF_SHOTS)
@@ -28,7 +28,7 @@ EXIT_AXIS = Variable(
 EXIT_POSITION = Variable(
     "exit_position", VECTORS, "m", "centre of mass at the end of contact, in the plate frame", mirror="polar"
 )
-"""Of outcomes, from the hit point."""
+"""In outcomes it counts from the hit point."""
 
 _OF_FLIGHT = (
     *(RESIDUAL_VELOCITY, DEFLECTION, ANGULAR_VELOCITY, ENERGY_LOSS, CONTACT_DURATION),
@@ -37,11 +37,11 @@ _OF_FLIGHT = (
 
 
 def _ends(returned: Returned) -> Columns:
-    return {STATUS: returned.status} | {one: doubles(getattr(returned.flight, one.field)) for one in _OF_FLIGHT}
+    return {STATUS: returned.status} | {name: doubles(getattr(returned.flight, name.field)) for name in _OF_FLIGHT}
 
 
 def _exits(returned: Returned) -> Columns:
-    """NaN where the computation failed; an arrested core has the velocity 0."""
+    """State at the end of contact: NaN if the computation failed. The velocity of an arrested core is 0."""
     arrested, contact = (returned.status == Status.ARRESTED)[:, None], returned.contact
     state = {
         EXIT_VELOCITY: np.where(arrested, 0.0, doubles(contact.velocity)),
@@ -51,8 +51,8 @@ def _exits(returned: Returned) -> Columns:
     return {name: np.where(returned.failed[:, None], np.nan, values) for name, values in state.items()}
 
 
-OUTCOME_VARIABLES = Group("How the shot ended", (STATUS, *_OF_FLIGHT), lambda scene, shots: True, _ends)
-EXIT_VARIABLES = Group(
+OUTCOME_VARIABLES = VariableGroup("How the shot ended", (STATUS, *_OF_FLIGHT), lambda scene, shots: True, _ends)
+EXIT_VARIABLES = VariableGroup(
     "At the end of contact", (EXIT_VELOCITY, EXIT_AXIS, EXIT_POSITION), lambda scene, shots: True, _exits
 )
 """In a file unless `output.exit_state` is false. With `angular_velocity` they start a flight behind the plate."""

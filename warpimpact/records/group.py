@@ -1,4 +1,4 @@
-"""A group of variables that are recorded together, and what a device returned of some shots, which fills them."""
+"""A group of variables that are recorded together, and the device's results that fill them."""
 
 from __future__ import annotations
 
@@ -20,13 +20,13 @@ Columns: TypeAlias = dict[Variable, NDArray[Any]]
 
 
 class Returned(NamedTuple):
-    """What a device returned of some shots; members of structs are arrays of the device.
+    """Results of a device for some shots; the members of structs are arrays on the device.
 
     Attributes:
         status: codes of `Status`, shape [shots].
         contact: the end of contact, the struct `Outcomes` of kernels/structs.py.
         flight: the flight behind the target, the struct `Report` of kernels/free_flight.py.
-        bending: the struct `Bending` of kernels/bending.py, shape [shots] on the host; [0] where it is not recorded.
+        bending: the struct `Bending` of kernels/bending.py, shape [shots] on the host; [0] if it is not recorded.
         passage: through the layers, the struct `Passage` of kernels/passage.py; empty if the plate stands alone.
         free: whether a core flies free at each stand-off behind each layer, shape [layers, stand-offs].
     """
@@ -45,23 +45,23 @@ class Returned(NamedTuple):
 
 
 def failures(status: NDArray[Any]) -> NDArray[np.bool_]:
-    """Whether the computation of each shot failed, by its status; of the shape of `status`."""
-    return np.isin(status, [each for each in Status if each.failed])
+    """Whether the computation of each shot failed, by its status; same shape."""
+    return np.isin(status, [code for code in Status if code.failed])
 
 
 @dataclass(frozen=True)
-class Group(Collection[Variable]):
+class VariableGroup(Collection[Variable]):
     """Variables that are recorded together.
 
     Attributes:
-        title: what they are, or when they are recorded, as a heading.
-        variables: they, in the order of a file.
-        recorded: whether a computation of such shots at a scene records them; False where something else fills them.
-        filled: their columns, SI and radians, by their names.
-        beside: variables of the Dataset that are no columns of shots and stand beside them.
-        whole: whether a result has all of them, and those beside them, or none.
-        measured: whether one can ask for their numbers, as in mean(tilt@130mm), and for maps of them.
-        exact: whether they stay in double precision where shots are computed in single precision.
+        title: heading that says what they are or when they are recorded.
+        variables: in the order of a file.
+        recorded: whether a computation of these shots at this scene records them; never if something else fills them.
+        filled: columns by variable, SI and radians.
+        beside: variables of the Dataset without an axis along the shots that go with the group.
+        whole: whether a result has all variables of the group, and those beside it, or none.
+        measured: whether measures, as in mean(tilt@130mm), and maps of the variables are allowed.
+        exact: whether columns stay in double precision when shots are computed in single precision.
     """
 
     title: str

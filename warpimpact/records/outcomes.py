@@ -1,4 +1,4 @@
-"""How shots ended: columns by their names, with what is done to all of them alike."""
+"""How shots ended: columns by name, with the operations that treat all columns the same way."""
 
 from __future__ import annotations
 
@@ -18,8 +18,8 @@ Which = slice | NDArray[np.int64] | NDArray[np.bool_]
 
 
 class Outcomes:
-    """How the shots ended: arrays as attributes, of which the first axis is along the shots, SI and radians; NaN where
-    a value does not exist. The reference of variables says what each holds.
+    """How the shots ended: arrays as attributes, in SI and radians, the first axis along the shots; NaN if a value does
+    not exist. The reference of variables describes each.
 
     Every computation has `status`, `residual_velocity`, `deflection`, `angular_velocity`, `energy_loss`,
     `contact_duration`, `exit_velocity`, `exit_axis` and `exit_position` (from the hit point), and at each stand-off
@@ -34,7 +34,7 @@ class Outcomes:
 
     @classmethod
     def collected(cls, scene: Scene, shots: Shots, returned: Returned) -> Self:
-        """All columns that a scene records, filled from what a device returned."""
+        """All columns that a scene records, from the results of a device."""
         groups = (group for group in registry.RECORDS if group.recorded(scene, shots))
         return cls(**{str(name): values for group in groups for name, values in group.filled(returned).items()})
 
@@ -42,7 +42,7 @@ class Outcomes:
     def joined(cls, parts: Iterable[Self]) -> Self:
         """Outcomes with the same columns, one after the other."""
         columns = [vars(part) for part in parts]
-        return cls(**{name: np.concatenate([one[name] for one in columns]) for name in columns[0]})
+        return cls(**{name: np.concatenate([part[name] for part in columns]) for name in columns[0]})
 
     def __getattr__(self, name: str) -> NDArray[Any]:
         titles = [group.title for group in registry.RECORDS if name in group]
@@ -65,18 +65,18 @@ class Outcomes:
         return f"{type(self).__name__} of {len(self)} shots: {', '.join(vars(self))}"
 
     def assign(self, **columns: NDArray[Any]) -> Self:
-        """The same with these columns, new ones or in place of old ones."""
+        """A copy with these columns added or replaced."""
         return type(self)(**vars(self) | columns)
 
     def with_rows(self, which: Which, other: Self) -> Self:
-        """Copies of the columns, with other outcomes of some shots."""
+        """A copy in which some shots have the outcomes of `other`."""
         columns = {name: values.copy() for name, values in vars(self).items()}
         for name, values in columns.items():
             values[which] = getattr(other, name)
         return type(self)(**columns)
 
     def unfolded(self, group: Sequence[Symmetry]) -> Self:
-        """Outcomes of all images of the shots under a group; the images of a shot follow each other."""
+        """Outcomes of all images of the shots under a group of symmetries; the images of a shot follow each other."""
         return type(self)(**{name: _images(name, values, group) for name, values in vars(self).items()})
 
 

@@ -1,16 +1,15 @@
-"""All records, a line for each, in the order of a file."""
+"""All groups of variables, in the order of a file."""
 
 from __future__ import annotations
 
-from warpimpact.records.bending import BENDING_VARIABLES
-from warpimpact.records.broken import BROKEN_VARIABLES
+from warpimpact.records.bending_variables import BENDING_VARIABLES, BROKEN_VARIABLES
 from warpimpact.records.exit import EXIT_VARIABLES, OUTCOME_VARIABLES
-from warpimpact.records.group import Group
-from warpimpact.records.layers import LAYER_STANDOFF_VARIABLES, LAYER_VARIABLES
-from warpimpact.records.limit import LIMIT_RECORDS
+from warpimpact.records.group import VariableGroup
+from warpimpact.records.layer_variables import LAYER_STANDOFF_VARIABLES, LAYER_VARIABLES
+from warpimpact.records.limit_variables import LIMIT_RECORDS
 from warpimpact.records.variable import Variable
 
-RECORDS: tuple[Group, ...] = (
+RECORDS: tuple[VariableGroup, ...] = (
     OUTCOME_VARIABLES,
     EXIT_VARIABLES,
     BENDING_VARIABLES,
@@ -22,14 +21,14 @@ RECORDS: tuple[Group, ...] = (
 
 
 def variables() -> tuple[Variable, ...]:
-    """Those of all records."""
-    return tuple(dict.fromkeys(one for group in RECORDS for one in group))
+    """The variables of all groups."""
+    return tuple(dict.fromkeys(name for group in RECORDS for name in group))
 
 
 def variable(name: str) -> Variable:
-    """That of a column.
+    """The variable of a column.
 
     Raises:
-        KeyError: no record has it.
+        KeyError: no group has it.
     """
-    return {str(one): one for one in variables()}[name]
+    return {str(variable): variable for variable in variables()}[name]

@@ -1,4 +1,4 @@
-"""A variable of a Dataset: its name with what is known of it."""
+"""A variable of a Dataset: its name with its metadata."""
 
 from __future__ import annotations
 
@@ -12,9 +12,9 @@ Mirror: TypeAlias = Literal["polar", "axial", "along_y", "along_z"]
 
 HITS, AT_STANDOFF, VECTORS = ("hit",), ("hit", "standoff"), ("hit", "axis")
 IN_LAYER, BEHIND_LAYER = ("hit", "layer"), ("hit", "layer", "layer_standoff")
-"""Dimensions of what is recorded of a shot."""
+"""Dimensions of the variables of shots."""
 MAIN = ("run", "inspect", "plot", "report")
-"""Commands that show the main variables."""
+"""Commands that show the main variables by default."""
 
 
 class Variable(str):
@@ -23,11 +23,11 @@ class Variable(str):
     Attributes:
         dims: names of its dimensions.
         units: as CF writes them; "degree" where the package itself computes in radians.
-        long_name: what it is, for people.
-        flags: the codes that it may hold, if it holds codes (CF: flag_values, flag_meanings).
-        field: name of what it is filled from: a field of shots or history, or a member of the kernels' struct.
-        shown_by: commands that show it by default. Other commands show it on request, or they show all variables.
-        mirror: the factors of `Symmetry` by which it changes under a mirror image; None where it stays.
+        long_name: description for people.
+        flags: codes that it may hold (CF: flag_values, flag_meanings); None for numbers.
+        field: name of its source: a field of shots or history, or a member of the kernels' struct.
+        shown_by: commands that show it by default; other commands show it on request, or show all variables.
+        mirror: factors of `Symmetry` that a mirror image applies to it; None if it does not change.
     """
 
     dims: tuple[str, ...]
@@ -56,7 +56,7 @@ class Variable(str):
         return self
 
     def __reduce__(self) -> tuple[type[str], tuple[str]]:
-        """A copy in another process is the plain name. It finds the same entries."""
+        """Pickled, it is the plain name, which finds the same entries."""
         return str, (str(self),)
 
     @property
@@ -70,5 +70,5 @@ class Variable(str):
 
     @property
     def is_number_of_hit(self) -> bool:
-        """Whether it has one number with a unit per hit, or one per hit and stand-off. Maps and measures need this."""
+        """Whether it has one number with a unit per hit, or per hit and stand-off, as maps and measures need."""
         return self.flags is None and self.units != "1" and self.dims in {HITS, AT_STANDOFF}

@@ -24,7 +24,7 @@ from warpimpact.results.declared import (
 )
 from warpimpact.scene.display import STORED
 from warpimpact.scene.shots import FARTHEST
-from warpimpact.scene.text import parsed_json
+from warpimpact.scene.toml_text import parsed_json
 from warpimpact.scene.units import LARGEST
 
 if TYPE_CHECKING:

@@ -21,7 +21,7 @@ from warpimpact.results.interrupts import uninterrupted
 from warpimpact.results.netcdf import write_table
 from warpimpact.results.outlines import in_a_file, in_memory
 from warpimpact.results.table import Table
-from warpimpact.scene.files import check_file
+from warpimpact.scene.input_files import check_file
 
 if TYPE_CHECKING:
     import xarray

@@ -22,7 +22,7 @@ from warpimpact.results import kinds
 from warpimpact.results.declared import Declaration, Size, Text, among, finite, not_negative, place_in, texts
 from warpimpact.results.files import aside, read_declared
 from warpimpact.results.interrupts import uninterrupted
-from warpimpact.scene.text import parsed_json
+from warpimpact.scene.toml_text import parsed_json
 
 if TYPE_CHECKING:
     import xarray

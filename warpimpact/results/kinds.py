@@ -10,7 +10,7 @@ import netCDF4
 
 from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
-from warpimpact.scene.text import parsed, read_text
+from warpimpact.scene.toml_text import parsed, read_text
 
 _BEGIN_NETCDF = b"\x89HDF", b"CDF"
 

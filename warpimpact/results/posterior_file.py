@@ -24,7 +24,7 @@ from warpimpact.results import kinds
 from warpimpact.results.declared import Declaration, Finite, Number, Size, Text, finite, not_negative, numbers, texts
 from warpimpact.results.files import ResultError, aside, kind_of, readable, refuse_kind
 from warpimpact.results.interrupts import uninterrupted
-from warpimpact.scene.text import parsed_json
+from warpimpact.scene.toml_text import parsed_json
 
 if TYPE_CHECKING:
     import xarray

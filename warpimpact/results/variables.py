@@ -7,11 +7,10 @@ from typing import TYPE_CHECKING
 
 from warpimpact.kernels.status import OF_SHOTS
 from warpimpact.records import registry
-from warpimpact.records.bending import *
-from warpimpact.records.broken import *
+from warpimpact.records.bending_variables import *
 from warpimpact.records.exit import *
-from warpimpact.records.layers import *
-from warpimpact.records.limit import *
+from warpimpact.records.layer_variables import *
+from warpimpact.records.limit_variables import *
 from warpimpact.records.variable import *
 from warpimpact.scene.quantities import BY_LAYER, OF_THE_SCENE, QUANTITIES
 from warpimpact.scene.units import quantity

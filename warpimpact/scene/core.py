@@ -9,7 +9,7 @@ import numpy as np
 from numpy.polynomial import Polynomial
 from pydantic import Field, ValidationInfo, model_validator
 
-from .files import input_file, read_table
+from .input_files import input_file, read_table
 from .model import Array, Model
 from .units import Length, Number, PositiveDensity, PositiveInertia, PositiveLength, PositiveMass, PositiveStress, Title
 

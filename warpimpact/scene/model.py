@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, model_validator
 
-from .drawing import html_of
+from .notebook import html_of
 from .units import MOST_QUOTED, quoted
 
 Array = NDArray[np.float64]

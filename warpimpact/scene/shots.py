@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from pydantic import Field, model_validator
 
 from .exclusions import SIZE, WHOLE_PLATE, check_together
-from .files import CsvColumn, InputFile, read_columns
+from .input_files import CsvColumn, InputFile, read_columns
 from .model import Array, Model
 from .plate import Plate
 from .quantities import BY_LAYER, LISTED, QUANTITIES

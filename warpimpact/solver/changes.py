@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from warpimpact.kernels.status import Status
 from warpimpact.records.group import failures
-from warpimpact.records.layers import LAYER_RESIDUAL_VELOCITY
+from warpimpact.records.layer_variables import LAYER_RESIDUAL_VELOCITY
 from warpimpact.records.outcomes import Outcomes
 from warpimpact.scene import Accuracy, Numerics, Shots
 from warpimpact.solver.findings import HitErrors

@@ -20,7 +20,7 @@ import psutil
 import warp as wp
 
 from warpimpact.kernels import lanes
-from warpimpact.scene.text import parsed_json
+from warpimpact.scene.toml_text import parsed_json
 
 _logger = logging.getLogger(__name__)
 Scratch = TypeVar("Scratch")

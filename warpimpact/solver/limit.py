@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpimpact.records.group import failures
-from warpimpact.records.limit import LIMITS
+from warpimpact.records.limit_variables import LIMITS
 from warpimpact.records.outcomes import Outcomes
 from warpimpact.scene import Numerics, Plate, Scene, Shots
 from warpimpact.solver.findings import LimitErrors

@@ -10,7 +10,7 @@ from warpimpact import Campaign
 from warpimpact.campaign.plates import read_plates
 from warpimpact.campaign.text import CampaignError
 from warpimpact.cli import main
-from warpimpact.scene.plausible import USUAL, Implausible
+from warpimpact.scene.bounds import USUAL, Implausible
 from warpimpact.studies.sweep import read_sweep
 
 CAMPAIGNS = Path(__file__).parents[3] / "campaigns"

@@ -18,7 +18,7 @@ from warpimpact.firing.response import Response, response_of_limits
 from warpimpact.identification.reading import read_fit
 from warpimpact.optimisation.design import read_design
 from warpimpact.results import files, kinds
-from warpimpact.scene.text import parsed
+from warpimpact.scene.toml_text import parsed
 from warpimpact.solver import device as devices
 
 CAMPAIGNS = Path(__file__).parents[3] / "campaigns"

@@ -29,7 +29,7 @@ from warpimpact.design.changes import SHAPES, changed
 from warpimpact.design.designs import FILE_KEYS, shelf_of, stages
 from warpimpact.results import attributes as attr
 from warpimpact.results import files, front
-from warpimpact.scene.files import input_file
+from warpimpact.scene.input_files import input_file
 from warpimpact.scene.model import Model
 from warpimpact.solver.marching import March
 

@@ -24,7 +24,7 @@ from warpimpact import (
     simulate,
 )
 from warpimpact.records import registry
-from warpimpact.records.group import Group, Returned, doubles
+from warpimpact.records.group import Returned, VariableGroup, doubles
 from warpimpact.records.outcomes import Outcomes
 from warpimpact.records.variable import HITS, Variable
 from warpimpact.results import files
@@ -38,7 +38,7 @@ def sideways(returned: Returned) -> dict[Variable, Any]:
     return {SIDEWAYS: doubles(returned.contact.velocity)[:, 1]}
 
 
-TOY = Group("With the toy", (SIDEWAYS,), lambda scene, shots: True, sideways)
+TOY = VariableGroup("With the toy", (SIDEWAYS,), lambda scene, shots: True, sideways)
 
 
 @pytest.fixture

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from warpimpact.records.group import Group
+from warpimpact.records.group import VariableGroup
 from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
 from warpimpact.results.dataset import images
@@ -17,7 +17,7 @@ def groups() -> dict[str, tuple[v.Variable, ...]]:
         name: tuple(group)
         for name, group in vars(v).items()
         if name.isupper()
-        and isinstance(group, (tuple, dict, Group))
+        and isinstance(group, (tuple, dict, VariableGroup))
         and all(isinstance(one, v.Variable) for one in group)
     }
 

@@ -1,17 +1,16 @@
 """How each core left each layer of the target, and where it came to rest (kernels/passage.py).
 
-A core leaves a layer at the instant when its last point passes the rear face; NaN where it does not.
+A core leaves a layer when its last point passes the rear face; values are NaN if it does not.
 """
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
 from warpimpact.kernels.status import Status
-from warpimpact.records.group import Columns, Group, Returned
+from warpimpact.records.group import Columns, Returned, VariableGroup
 from warpimpact.records.variable import BEHIND_LAYER, HITS, IN_LAYER, Variable
 
 if TYPE_CHECKING:
@@ -58,7 +57,7 @@ LAYER_STANDOFF_YAW = Variable(
 LAYER_FRONT = Variable("layer_front", ("layer",), "m", "front face of the layer, from that of the target")
 LAYER_REAR = Variable("layer_rear", ("layer",), "m", "rear face of the layer, from the front face of the target")
 LAYER_FACES = (LAYER_FRONT, LAYER_REAR)
-"""Of the means where thicknesses scatter."""
+"""Means over the shots if thicknesses scatter."""
 LAYER_STANDOFF = Variable("layer_standoff", ("layer_standoff",), "m", "distance behind the rear face of a layer")
 LAYER_COORDINATES = (LAYER_STANDOFF,)
 
@@ -69,31 +68,30 @@ def _layered(scene: Scene, shots: Shots) -> bool:
     return len(scene.target.layers) > 1
 
 
-def _column(returned: Returned, one: Variable) -> NDArray[Any]:
-    return np.asarray(getattr(returned.passage, one.field.removeprefix("layer_")).numpy())
-
-
-def _left(returned: Returned) -> Columns:
-    return {one: _column(returned, one).astype(np.int8 if one in _CODES else np.float64) for one in LAYER_VARIABLES}
+def _columns(returned: Returned, group: VariableGroup) -> Columns:
+    """Columns of a group from the struct of the same names."""
+    arrays = {name: getattr(returned.passage, name.field.removeprefix("layer_")).numpy() for name in group}
+    return {name: values.astype(np.int8 if name in _CODES else np.float64) for name, values in arrays.items()}
 
 
 def _behind(returned: Returned) -> Columns:
-    """No value where free flight ends at the next layer: a stand-off and the size of the core are more than the gap."""
-    columns = {one: _column(returned, one).astype(np.float64) for one in LAYER_STANDOFF_VARIABLES}
-    deflection = columns.pop(LAYER_DEFLECTION)
-    at_standoffs = {one: np.where(returned.free, values, np.nan) for one, values in columns.items()}
-    return {LAYER_DEFLECTION: deflection} | at_standoffs
+    """Columns of the free flight behind each layer; NaN at stand-offs that the next layer is too near for."""
+    columns = _columns(returned, LAYER_STANDOFF_VARIABLES)
+    return {
+        name: values if name == LAYER_DEFLECTION else np.where(returned.free, values, np.nan)
+        for name, values in columns.items()
+    }
 
 
-LAYER_VARIABLES = Group(
+LAYER_VARIABLES: VariableGroup = VariableGroup(
     "With layers behind the plate",
     (LAYER_STATUS, LAYER_RESIDUAL_VELOCITY, LAYER_TILT, LAYER_TIME, STOPPED_IN, DEPTH),
     _layered,
-    _left,
+    lambda returned: _columns(returned, LAYER_VARIABLES),
     beside=LAYER_FACES,
     whole=True,
 )
-LAYER_STANDOFF_VARIABLES = Group(
+LAYER_STANDOFF_VARIABLES: VariableGroup = VariableGroup(
     "With `output.layer_standoffs`",
     (LAYER_DEFLECTION, LAYER_STANDOFF_TILT, LAYER_STANDOFF_PITCH, LAYER_STANDOFF_YAW),
     lambda scene, shots: _layered(scene, shots) and bool(scene.record.layer_standoffs),
@@ -102,4 +100,4 @@ LAYER_STANDOFF_VARIABLES = Group(
     whole=True,
 )
 LAYER_NUMBERS = (LAYER_RESIDUAL_VELOCITY, LAYER_TILT, LAYER_TIME, *LAYER_STANDOFF_VARIABLES)
-"""Variables with one number per hit and layer, or one for each stand-off behind the layer."""
+"""Variables with one number per hit and layer, or per hit, layer and stand-off behind the layer."""

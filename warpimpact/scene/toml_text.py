@@ -6,7 +6,7 @@ import tomllib
 from pathlib import Path
 from typing import Any
 
-from .files import check_file
+from .input_files import check_file
 from .units import brief
 
 _MOST_TEXT, _MOST_DOTS, _MOST_DEEP = 2**20, 16, 16

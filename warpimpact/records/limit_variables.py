@@ -1,10 +1,10 @@
-"""Limits of single shots, which their search fills (solver/limit.py)."""
+"""Limits of single shots; the search of limits fills them (solver/limit.py)."""
 
 from __future__ import annotations
 
 from typing import NamedTuple
 
-from warpimpact.records.group import Group
+from warpimpact.records.group import VariableGroup
 from warpimpact.records.variable import HITS, MAIN, Variable
 
 
@@ -33,11 +33,11 @@ LIMITS = {
     "velocity": _limit_variables("velocity", "m s-1", "limit velocity"),
     "thickness": _limit_variables("thickness", "m", "limit thickness of the plate"),
 }
-"""By the quantity of a search. Present only in a result of `warpimpact limit`, whose other variables are those of the
-shot as it just perforates: at the end of its limit where the core passed."""
+"""By the quantity of the search. Only results of `warpimpact limit` have them. Their other variables belong
+to the shot that just perforates, at the end of the limit at which the core passes."""
 LIMIT_VARIABLES = tuple(variables.value for variables in LIMITS.values())
 
 LIMIT_RECORDS = tuple(
-    Group(f"With `warpimpact limit --quantity {quantity}`", variables, measured=False, exact=True)
+    VariableGroup(f"With `warpimpact limit --quantity {quantity}`", variables, measured=False, exact=True)
     for quantity, variables in LIMITS.items()
 )
