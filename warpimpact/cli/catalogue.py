@@ -26,8 +26,9 @@ def add_catalogue(commands: Commands) -> None:
 def _catalogue(arguments: argparse.Namespace) -> None:
     from warpimpact.campaign.text import CampaignError
     from warpimpact.catalogue.catalogue import Catalogue
+    from warpimpact.catalogue.catalogue_view import catalogue_view, material_view, threat_view
     from warpimpact.catalogue.entries import Threat
-    from warpimpact.catalogue.text import catalogue_text, material_text, threat_text
+    from warpimpact.view.view import text_of
 
     try:
         catalogue = Catalogue.of(arguments.file)
@@ -38,9 +39,9 @@ def _catalogue(arguments: argparse.Namespace) -> None:
     if arguments.output and core is None:
         raise CampaignError("--output: only a threat whose core is known can be drawn")
     if entry is None:
-        print(catalogue_text(catalogue))
+        print(text_of(catalogue_view(catalogue)))
     else:
-        print(threat_text(entry) if isinstance(entry, Threat) else material_text(entry))
+        print(text_of(threat_view(entry) if isinstance(entry, Threat) else material_view(entry)))
     if arguments.output and core is not None and entry is not None:
         from warpimpact.plotting.core import core_figure
 

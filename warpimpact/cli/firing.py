@@ -39,11 +39,12 @@ def add_test(commands: Commands) -> None:
 
 def _test(arguments: argparse.Namespace) -> None:
     from warpimpact.campaign.text import CampaignError
+    from warpimpact.firing.firing_view import firing_view
     from warpimpact.firing.reading import read_test
     from warpimpact.firing.simulate import simulate_test
-    from warpimpact.firing.text import report_lines
     from warpimpact.plotting.firing import directions_figure, firing_figure
     from warpimpact.results import firing as files
+    from warpimpact.view.view import text_of
 
     test = read_test(arguments.test)
     output = arguments.output or Path(arguments.test.stem + ".nc")
@@ -61,7 +62,7 @@ def _test(arguments: argparse.Namespace) -> None:
     except ValueError as error:
         raise CampaignError(f"{arguments.test}: {error}") from None
     files.write(dataset, output)
-    print("\n".join(report_lines(dataset)))
+    print(text_of(firing_view(dataset)))
     figures = {picture: firing_figure} if test.needs_limits else {}
     if sector is not None:
         figures[polar] = directions_figure

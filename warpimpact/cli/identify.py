@@ -44,11 +44,12 @@ def add_identify(commands: Commands) -> None:
 
 def _identify(arguments: argparse.Namespace) -> int:
     from warpimpact.identification.identify import identify_to_file
+    from warpimpact.identification.posterior_view import posterior_view
     from warpimpact.identification.reading import read_fit
-    from warpimpact.identification.text import posterior_text
     from warpimpact.plotting.posterior import FIGURES
     from warpimpact.results import posterior_file
     from warpimpact.solver.device import cores
+    from warpimpact.view.view import text_of
 
     fit = read_fit(arguments.fit)
     output = arguments.output or Path(arguments.fit.stem + ".nc")
@@ -71,7 +72,7 @@ def _identify(arguments: argparse.Namespace) -> int:
             tell=warn,
         )
     tree = posterior_file.read(output)
-    print(posterior_text(tree))
+    print(text_of(posterior_view(tree)))
     print(f"written to {output}")
     for picture, draw in pictures.items():
         draw(tree).savefig(picture, dpi=150)

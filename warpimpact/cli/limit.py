@@ -52,7 +52,8 @@ def _limit(arguments: argparse.Namespace) -> int:
     from warpimpact.plotting.limit import limit_figure
     from warpimpact.results import files
     from warpimpact.studies.limit import LimitMap, warning_of
-    from warpimpact.studies.limit_text import limits_text
+    from warpimpact.studies.limit_view import limit_view
+    from warpimpact.view.view import text_of
 
     campaign = Campaign.from_toml(arguments.campaign, count=arguments.count, posterior=arguments.posterior)
     output = arguments.output or Path(arguments.campaign.stem + "_limit.nc")
@@ -64,7 +65,7 @@ def _limit(arguments: argparse.Namespace) -> int:
         warn(sentence)
     run_shown(campaign, output, arguments, computation)
     dataset = files.read(output)
-    print(limits_text(dataset))
+    print(text_of(limit_view(dataset)))
     if attr.EVIDENCE in dataset.attrs:
         print(dataset.attrs[attr.EVIDENCE])
     limit_figure(dataset).savefig(picture, dpi=150)

@@ -44,10 +44,11 @@ def add_optimise(commands: Commands) -> None:
 def _optimise(arguments: argparse.Namespace) -> int:
     from warpimpact.optimisation.crew import cluster_crew, local_crew
     from warpimpact.optimisation.design import read_design
+    from warpimpact.optimisation.front_view import front_view
     from warpimpact.optimisation.optimise import folder_of, optimise_to_file
-    from warpimpact.optimisation.text import front_lines
     from warpimpact.plotting.front import front_figure
     from warpimpact.results import front
+    from warpimpact.view.view import text_of
 
     design = read_design(arguments.design)
     output = arguments.output or Path(arguments.design.stem + ".nc")
@@ -71,7 +72,7 @@ def _optimise(arguments: argparse.Namespace) -> int:
             tell=warn,
         )
     dataset = front.read(output)
-    print("\n".join(front_lines(dataset)))
+    print(text_of(front_view(dataset)))
     front_figure(dataset, design.folder).savefig(picture, dpi=150)
     beside = f", campaigns in {folder_of(output)}" if campaigns else ""
     print(f"written to {output}, figure in {picture}{beside}")

@@ -12,7 +12,7 @@ import xarray
 from matplotlib.figure import Figure
 from matplotlib.layout_engine import ConstrainedLayoutEngine
 
-from warpimpact.firing.text import verdict
+from warpimpact.firing.firing_view import verdict
 from warpimpact.plotting.style import BLUE, GREEN, VERMILION
 from warpimpact.results import attributes as attr
 from warpimpact.results import firing as f

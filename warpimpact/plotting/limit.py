@@ -20,7 +20,7 @@ from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
 from warpimpact.results.limits import solid_limits
 from warpimpact.studies.limit import QUANTILES, quantiles
-from warpimpact.studies.limit_text import promise_line, shown_unit
+from warpimpact.studies.limit_view import promise_line, shown_unit
 from warpimpact.studies.published import published_beside
 
 if TYPE_CHECKING:

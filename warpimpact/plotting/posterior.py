@@ -11,8 +11,8 @@ import xarray
 from matplotlib.figure import Figure
 
 from warpimpact.identification.posterior import learnt, parameters_of
+from warpimpact.identification.posterior_view import unit_of
 from warpimpact.identification.reading import fit_from
-from warpimpact.identification.text import unit_of
 from warpimpact.plotting.style import BLUE, VERMILION
 from warpimpact.results import attributes as attr
 from warpimpact.results import posterior_file

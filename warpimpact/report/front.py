@@ -11,18 +11,20 @@ from typing import Any
 import numpy as np
 import xarray
 from jinja2 import Environment, PackageLoader, StrictUndefined
+from markupsafe import Markup
 from numpy.typing import NDArray
 
 from warpimpact.campaign.campaign import Campaign
 from warpimpact.campaign.text import CampaignError, parsed
 from warpimpact.optimisation.evaluate import is_even
-from warpimpact.optimisation.text import design_text, front_lines, numbers_of_front, numbers_of_reference
+from warpimpact.optimisation.front_view import design_text, front_view, numbers_of_front, numbers_of_reference
 from warpimpact.plotting.front import front_figure, front_leaders
 from warpimpact.report.words import svg_path
 from warpimpact.results import attributes as attr
 from warpimpact.results import front as f
 from warpimpact.results.files import aside
 from warpimpact.scene.symmetry import IDENTITY, symmetries
+from warpimpact.view.view import html_of
 
 Array = NDArray[np.float64]
 
@@ -66,7 +68,7 @@ def write_front_report(dataset: xarray.Dataset, path: Path, folder: Path) -> Non
         designs=designs,
         references=references,
         picture=_picture(dataset, folder),
-        text="\n".join(front_lines(dataset)),
+        view=Markup(html_of(front_view(dataset))),
         design=str(dataset.attrs[f.DESIGN]),
     )
     with aside(path) as file:

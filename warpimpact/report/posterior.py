@@ -10,11 +10,12 @@ from pathlib import Path
 import xarray
 from matplotlib.figure import Figure
 
-from warpimpact.identification.text import posterior_text
+from warpimpact.identification.posterior_view import posterior_view
 from warpimpact.plotting.posterior import hits_figure, measured_figure, pairs_figure
 from warpimpact.results import attributes as attr
 from warpimpact.results import posterior_file
 from warpimpact.results.files import aside
+from warpimpact.view.view import html_of
 
 _FIGURES = {
     "Parameters, in pairs": pairs_figure,
@@ -43,7 +44,7 @@ def write_posterior_report(tree: xarray.DataTree, path: Path) -> None:
         "<meta http-equiv='Content-Security-Policy' "
         "content=\"default-src 'none'; img-src data:; style-src 'unsafe-inline'\">"
         f"<title>{title}</title><style>{_STYLE}</style></head><body><h1>{title}</h1>"
-        f"<pre>{escape(posterior_text(tree))}</pre>{drawn}"
+        f"{html_of(posterior_view(tree), 'h2')}{drawn}"
         f"<h2>The fit</h2><pre>{escape(str(told[posterior_file.FIT]))}</pre><p>{made}</p></body></html>\n"
     )
     with aside(path) as file:

@@ -15,6 +15,7 @@ from warpimpact.campaign.text import CampaignError, parsed
 from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
 from warpimpact.studies.limit import quantiles
+from warpimpact.view.view import Column, Section, Table, number
 
 _SAME_OBLIQUITY = 0.5
 """Hits whose obliquity is within so many degrees of a published one are beside it [degree]."""
@@ -54,17 +55,19 @@ def _computed(dataset: xarray.Dataset, obliquity: float) -> float:
     return quantiles(dataset.isel(hit=near))["V50"].value if near.any() else math.nan
 
 
-def published_lines(dataset: xarray.Dataset) -> list[str]:
-    """A table of the published limits, and their sources; none of a campaign that names none."""
-    rows = published_beside(dataset)
-    if not rows:
+def published_view(dataset: xarray.Dataset) -> list[Section]:
+    """The published limits beside the computed ones, and their sources; nothing of a campaign that names none."""
+    beside = published_beside(dataset)
+    if not beside:
         return []
-    lines = [f"{'published':>10} {'obliquity':>10} {'computed':>10} {'difference':>11}   of"]
-    sources = list(dict.fromkeys(row.published.source for row in rows))
-    for published, computed in rows:
-        shown = "-" if math.isnan(computed) else f"{computed:.4g}"
-        apart = "-" if math.isnan(computed) else f"{100.0 * (computed / published.velocity - 1.0):+.1f} %"
-        mark = f"{published.label} [{sources.index(published.source) + 1}]".strip()
-        angle = f"{math.degrees(published.obliquity):.4g}°"
-        lines.append(f"{published.velocity:>6.4g} m/s {angle:>10} {shown:>10} {apart:>11}   {mark}")
-    return lines + [f"[{number}] {source}" for number, source in enumerate(sources, start=1)]
+    sources = list(dict.fromkeys(row.published.source for row in beside))
+    columns = (
+        *(number("published", "m/s", ".4g"), number("obliquity", "°", ".4g"), number("computed", "m/s", ".4g")),
+        *(number("difference", "%", "+.1f"), Column("of")),
+    )
+    rows = []
+    for published, computed in beside:
+        of = f"{published.label} [{sources.index(published.source) + 1}]".strip()
+        difference = 100.0 * (computed / published.velocity - 1.0)
+        rows.append((published.velocity, math.degrees(published.obliquity), computed, difference, of))
+    return [Section([Table(columns, rows), *(f"[{place}] {source}" for place, source in enumerate(sources, start=1))])]

@@ -10,10 +10,13 @@ import math
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from html import escape
+from textwrap import wrap
 from typing import Any, NamedTuple
 
 _GAP = "   "
 """Between two columns of a text."""
+_HEAD = 24
+"""Characters that a head may take in a line of text, where its column is narrower."""
 
 
 class Column(NamedTuple):
@@ -96,7 +99,11 @@ def _lines(section: Section) -> Iterable[str]:
 
 
 def _table_lines(table: Table) -> list[str]:
-    lines = [*([table.heads] if table.heads else []), *table.cells]
+    widths = [max(map(len, column)) for column in zip(*table.cells, strict=True)] or [0] * len(table.columns)
+    heads = [wrap(head, max(width, _HEAD)) for head, width in zip(table.heads, widths, strict=False)]
+    tallest = max(map(len, heads), default=0)
+    rows = zip(*([""] * (tallest - len(head)) + head for head in heads), strict=True)
+    lines = [*map(list, rows), *table.cells]
     widths = [max(map(len, column)) for column in zip(*lines, strict=True)]
     sides = [">" if column.right else "<" for column in table.columns]
     return [

@@ -25,7 +25,8 @@ from warpimpact.scene import Numerics
 from warpimpact.solver.limit import Sought
 from warpimpact.solver.worker import Worker
 from warpimpact.studies.limit import LimitMap
-from warpimpact.studies.limit_text import limits_text
+from warpimpact.studies.limit_view import limit_view
+from warpimpact.view.view import text_of
 
 CAMPAIGNS = Path(__file__).parents[3] / "campaigns"
 
@@ -263,4 +264,4 @@ def test_the_proxy_beside_the_limit_thickness() -> None:
     assert thickness[0] / thickness[-1] == pytest.approx(2.8, abs=0.1)
     assert found.depth[0] / found.depth[-1] == pytest.approx(4.44, abs=0.01)
     assert found.ratio == pytest.approx([1.51, 1.01, 1.01, 1.08, 1.10, 1.04, 0.95], abs=0.03)
-    assert "proxy" in limits_text(dataset)
+    assert "proxy" in text_of(limit_view(dataset))

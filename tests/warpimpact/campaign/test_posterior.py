@@ -175,7 +175,7 @@ def test_limits_have_both_intervals_too(tmp_path: Path, monkeypatch, capsys) -> 
     Path("c.toml").write_text(changed, encoding="utf-8")
     assert main(["limit", "c.toml", "--posterior", path.name, "--tolerance", "20 m/s", "--device", "cpu", "-q"]) == 0
     told = capsys.readouterr().out
-    assert re.search(r"V50 = \d+\S* m/s   95 % interval by hits .* to .*, by parameters \d+.* to ", told)
+    assert re.search(r"V50 +\d+\S*   by hits .* to .*, by parameters \d+.* to ", told)
     assert "those by parameters contain the number for 95 % of the draws" in told
 
 

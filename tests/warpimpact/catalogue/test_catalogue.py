@@ -5,9 +5,10 @@ from pathlib import Path
 import pytest
 
 from warpimpact.catalogue.catalogue import FOLDERS, Catalogue, file_name
+from warpimpact.catalogue.catalogue_view import catalogue_view, drawn, material_view, threat_view
 from warpimpact.catalogue.entries import Material, Threat
-from warpimpact.catalogue.text import catalogue_text, drawn, material_text, threat_text
 from warpimpact.scene import ConeCore
+from warpimpact.view.view import text_of
 
 THREATS = Catalogue().all(Threat)
 CORES = [name for name, threat in THREATS.items() if threat.core is not None]
@@ -61,7 +62,7 @@ def test_mass_of_the_geometry(name: str) -> None:
 @pytest.mark.parametrize("name", THREATS)
 def test_what_is_open_is_called_assumed(name: str) -> None:
     threat = THREATS[name]
-    text = threat_text(threat)
+    text = text_of(threat_view(threat))
     second_hand = [key for key, source in threat.known.items() if "second-hand" in source]
     for key in [*threat.assumed, *second_hand]:
         assert key.replace("_", " ") in threat.evidence.partition("assumed")[2]
@@ -82,8 +83,8 @@ def test_own_entries(own: Path) -> None:
     plate = catalogue.material("plate A")
     assert plate.resistance_at(16.0) == pytest.approx(4e9)
     assert "12 limit velocities" in plate.evidence
-    assert "steel cone" in catalogue_text(catalogue)
-    assert "3 to 12 mm" in material_text(plate)
+    assert "steel cone" in text_of(catalogue_view(catalogue))
+    assert "3 to 12 mm" in text_of(material_view(plate))
     assert catalogue.threat("7.62x51 P80 AP") == THREATS["7.62x51 P80 AP"]
 
 

@@ -9,12 +9,13 @@ import pytest
 from warpimpact import Campaign
 from warpimpact.campaign.text import CampaignError
 from warpimpact.firing.directions import Directions, impact_azimuth, obliquity, protect, weighted_mean
+from warpimpact.firing.firing_view import firing_view
 from warpimpact.firing.reading import firing_test
 from warpimpact.firing.requirements import REQUIREMENTS, Requirement, requirement_line, threat_of, with_threat
 from warpimpact.firing.simulate import simulate_test
-from warpimpact.firing.text import report_lines
 from warpimpact.plotting.firing import directions_figure
 from warpimpact.solver.worker import Worker
+from warpimpact.view.view import text_of
 
 TEXT = """title = "slots"
 core = { shape = "ogive", diameter = "6.17 mm", length = "27 mm", crh = 3.0, mass = "5.25 g" }
@@ -79,7 +80,7 @@ def test_more_hits_are_computed_where_the_share_is_between_0_and_1() -> None:
         update={"directions": directions, "target": {"campaign": __file__}}
     )
     dataset = simulate_test(test, None, None, sector)
-    assert any(line.startswith("mean, weighted by area: ") for line in report_lines(dataset))
+    assert "\nmean, weighted by area: " in text_of(firing_view(dataset))
     assert "mean by area" in str(directions_figure(dataset).get_suptitle())
 
 

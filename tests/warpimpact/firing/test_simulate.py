@@ -8,12 +8,13 @@ import pytest
 import xarray
 
 from warpimpact.cli import main
+from warpimpact.firing.firing_view import firing_view, verdict
 from warpimpact.firing.reading import firing_test
 from warpimpact.firing.response import normal_response
 from warpimpact.firing.simulate import simulate_test
-from warpimpact.firing.text import report_lines, verdict
 from warpimpact.plotting.firing import firing_figure
 from warpimpact.results import firing as f
+from warpimpact.view.view import text_of
 
 TEXT = """
 title = "known"
@@ -72,7 +73,7 @@ def test_numbers_of_a_known_target(dataset: xarray.Dataset) -> None:
 
 
 def test_the_text_and_the_figure_say_what_it_is(dataset: xarray.Dataset) -> None:
-    lines = report_lines(dataset)
+    lines = text_of(firing_view(dataset)).splitlines()
     assert lines[1] == f.SENTENCE
     assert any(line.startswith("proof: 38 shots at 760 m/s, at most 1 perforate") for line in lines)
     assert any("within ± 10 m/s in 90 % of the tests" in line for line in lines)

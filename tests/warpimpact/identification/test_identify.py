@@ -13,13 +13,14 @@ from warpimpact.identification import crew, identify
 from warpimpact.identification.fit import Fit
 from warpimpact.identification.identify import FitProgress, identify_to_file, rounds
 from warpimpact.identification.posterior import Sampled, learnt, parameters_of
-from warpimpact.identification.text import posterior_text
+from warpimpact.identification.posterior_view import posterior_view
 from warpimpact.plotting.posterior import hits_figure, measured_figure, pairs_figure
 from warpimpact.results import posterior_file
 from warpimpact.results.files import OutputError, ResultError
 from warpimpact.runs.parts import Interrupted
 from warpimpact.runs.store import Store
 from warpimpact.solver.worker import Worker
+from warpimpact.view.view import text_of
 
 FitMaker = Callable[..., Fit]
 
@@ -60,7 +61,7 @@ def test_the_resistance_is_learnt_and_told(posterior: Path) -> None:
     tree = posterior_file.read(posterior)
     resistance = learnt(tree)["resistance"]
     assert resistance.quantiles[2] - resistance.quantiles[0] < 0.8 * (resistance.prior[2] - resistance.prior[0])
-    text = posterior_text(tree)
+    text = text_of(posterior_view(tree))
     assert "resistance [GPa]" in text
     assert "effective sample size" in text
     assert ("NOT CONVERGED" in text) == (not tree.attrs[posterior_file.CONVERGED])

@@ -20,17 +20,18 @@ from warpimpact.optimisation import search, searcher
 from warpimpact.optimisation.confirm import fresh_seed, is_better
 from warpimpact.optimisation.crew import cluster_crew, local_crew
 from warpimpact.optimisation.design import design_from, read_design
+from warpimpact.optimisation.front_view import front_view
 from warpimpact.optimisation.judged import Record, excesses, objectives, undecided
 from warpimpact.optimisation.optimise import folder_of, optimise, optimise_to_file
 from warpimpact.optimisation.search import SearchProgress
 from warpimpact.optimisation.searcher import Searcher, front_of, hypervolume
 from warpimpact.optimisation.space import DesignVariable, Space
-from warpimpact.optimisation.text import front_lines
 from warpimpact.optimisation.work import Work
 from warpimpact.results import front as f
 from warpimpact.results.files import OutputError, read
 from warpimpact.runs.parts import Interrupted
 from warpimpact.runs.parts import folder_of as folder_of_parts
+from warpimpact.view.view import text_of
 
 from ..campaign.test_posterior import posterior
 from .conftest import CORE, HOLES, SEARCH, WEIGHT_AND_ENERGY, design
@@ -199,7 +200,7 @@ def test_a_campaign_of_the_front_runs_as_it_is(tmp_path: Path) -> None:
     assert campaigns[0].parent == folder_of(tmp_path / "front.nc")
     for path, density in zip(campaigns, found[f.FRESH].values[:, 0], strict=True):
         assert Campaign.from_toml(path).target.areal_density == pytest.approx(density, rel=1e-9)
-    assert any("shrinkage" in line for line in front_lines(found))
+    assert "shrinkage" in text_of(front_view(found))
 
 
 def test_a_folder_with_files_of_somebody_is_left_alone(tmp_path: Path) -> None:
@@ -295,7 +296,7 @@ def test_no_design_within_the_bounds_is_an_outcome() -> None:
     found = optimise(design(*SEARCHED, bound, SEARCH))
     assert found.attrs[f.OUTCOME] == f.NONE_FEASIBLE
     assert (found.sizes["design"], found.sizes["front"]) == (12, 0)
-    assert any("no design keeps the bounds: P(stopped) >= 0.9" in line for line in front_lines(found))
+    assert "no design keeps the bounds: P(stopped) >= 0.9" in text_of(front_view(found))
 
 
 @pytest.mark.parametrize(
@@ -354,7 +355,7 @@ def test_the_front_says_what_survives_the_uncertainty_of_the_parameters(tmp_path
     # Twice the plate takes more in every draw; the last design of a front has no next one.
     assert found[f.SURVIVAL].values[0, 1] > 0.99
     assert np.isnan(found[f.SURVIVAL].values[[0, 1], [0, 1]]).all()
-    assert any("1 of 1 differences" in line for line in front_lines(found))
+    assert "1 of 1 differences" in text_of(front_view(found))
 
 
 def test_a_search_says_which_library_it_needs(monkeypatch: pytest.MonkeyPatch) -> None:

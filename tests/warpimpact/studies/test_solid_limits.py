@@ -16,7 +16,8 @@ from warpimpact.results import files
 from warpimpact.runs.run import run_to_file
 from warpimpact.runs.team import local_team
 from warpimpact.studies.limit import LimitMap
-from warpimpact.studies.limit_text import limits_text
+from warpimpact.studies.limit_view import limit_view
+from warpimpact.view.view import text_of
 
 LAYER = '[[layer]]\ngap = "60 mm"\nthickness = "2 mm"\nresistance = "2600 MPa"\n'
 TEXT = """\
@@ -119,13 +120,13 @@ def test_of_a_thickness_it_tells_the_areal_density_that_a_solid_plate_needs(thic
     assert measures["limit_areal_density"].solid == pytest.approx(solid)
     assert measures["limit_areal_density"].ratio == pytest.approx(measures["limit_areal_density"].value / solid)
     assert np.isnan(measures["limit_thickness"].solid)  # it has no layer 1
-    assert f"{solid:.4g} kg/m² (the target as given has" in limits_text(thickness)
+    assert f"{solid:.4g} kg/m² (the target as given has" in text_of(limit_view(thickness))
 
 
 def test_text_and_figure_tell_of_it(velocity: xarray.Dataset) -> None:
     solid = float(velocity["solid_limit_velocity"][0])
-    assert f"limit velocity {solid:.5g} m/s" in limits_text(velocity)
-    assert "; 1 hit searched in " in limits_text(velocity)
+    assert f"limit velocity {solid:.5g} m/s" in text_of(limit_view(velocity))
+    assert "; 1 hit searched in " in text_of(limit_view(velocity))
     *_, curve = limit_figure(velocity).axes[:2]
     (line,) = [line for line in curve.lines if line.get_label().startswith("solid plate of equal areal density")]
     assert line.get_xdata()[0] == pytest.approx(solid)
@@ -137,5 +138,5 @@ def test_failed_hits_are_told_and_named_with_the_thickness_of_each_layer(thickne
     failed = thickness.copy(deep=True)
     failed["status"][2] = Status.UNFINISHED
     failed["limit_thickness"][2] = np.nan
-    assert "1 hits failed, and count in none of these numbers" in limits_text(failed)
+    assert "1 hits failed, and count in none of these numbers" in text_of(limit_view(failed))
     assert "layer_thickness_1 [m]" in inspect_text(failed)

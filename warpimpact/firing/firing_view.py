@@ -1,4 +1,4 @@
-"""A simulated firing test as text: the target, what tests report of it, and what the plan of a proof means."""
+"""The view of a simulated firing test: the target, what tests report of it, and what the plan of a proof means."""
 
 from __future__ import annotations
 
@@ -13,6 +13,7 @@ from warpimpact.results import attributes as attr
 from warpimpact.results import firing as f
 from warpimpact.statistics.acceptance import acceptance, shown_stop_probability
 from warpimpact.statistics.intervals import Estimate, estimate_of
+from warpimpact.view.view import Column, Section, Table, number
 
 
 @dataclass(frozen=True)
@@ -65,100 +66,94 @@ def share_text(estimate: Estimate) -> str:
     return f"{100 * estimate.value:.3g} % ({100 * estimate.low:.3g} to {100 * estimate.high:.3g} %)"
 
 
-def report_lines(dataset: xarray.Dataset) -> list[str]:
-    """What a file says, as lines for a person."""
-    test = json.loads(dataset.attrs[f.SETTINGS])
-    lines = [str(dataset.attrs[attr.TITLE]), dataset.attrs[f.DISCLAIMER]]
-    lines += [dataset.attrs[f.REQUIREMENT]] if dataset.attrs[f.REQUIREMENT] else []
-    lines += _target_lines(dataset) if f.SHARE in dataset else []
+def firing_view(dataset: xarray.Dataset) -> list[Section]:
+    """The view of a firing test: what it is, its target, what the tests report, and the questions that were asked."""
+    told, test = dataset.attrs, json.loads(dataset.attrs[f.SETTINGS])
     required = test.get("required") or {}
-    found = verdict(dataset, required.get("v50"), required.get("by", "v50"))
-    if found is not None:
-        lines += _verdict_lines(dataset, found, test)
-    if f.SIZE in dataset:
-        lines += _size_lines(dataset, test["precision"])
-    if f.PASS in dataset:
-        lines += proof_lines(dataset, test["proof"])
-    if f.DIRECTION_SHARE in dataset:
-        lines += _direction_lines(dataset)
-    return lines
+    worth = verdict(dataset, required.get("v50"), required.get("by", "v50"))
+    return [
+        Section([told[f.DISCLAIMER], *filter(None, [told[f.REQUIREMENT]])], str(told[attr.TITLE])),
+        *([_target(dataset)] if f.SHARE in dataset else []),
+        *([_reported(dataset, worth, test)] if worth is not None else []),
+        *([Section([_size(dataset, test["precision"])])] if f.SIZE in dataset else []),
+        *([_proof(dataset, test["proof"])] if f.PASS in dataset else []),
+        *([_directions(dataset)] if f.DIRECTION_SHARE in dataset else []),
+    ]
 
 
-def _direction_lines(dataset: xarray.Dataset) -> list[str]:
+def _directions(dataset: xarray.Dataset) -> Section:
     """P(perforation) by azimuth and elevation, and its mean."""
     share, hits = dataset[f.DIRECTION_SHARE], dataset[f.DIRECTION_HITS].values
     low, high = dataset.attrs[f.MEAN_INTERVAL]
-    weight = json.loads(dataset.attrs[f.SETTINGS])["directions"]["weight"]
-    lines = ["P(perforation) by direction: azimuth along, elevation down"]
-    lines.append("         " + "".join(f"{one:>7.4g}°" for one in share[f.AZIMUTH].values))
-    for elevation in share[f.ELEVATION].values[::-1]:
-        lines.append(f"{elevation:>7.4g}° " + "".join(f"{one:>8.3f}" for one in share.sel(elevation=elevation).values))
+    weight = json.loads(dataset.attrs[f.SETTINGS])["directions"]["weight"].replace("_", " ")
+    columns = [number("elevation", "°", ".4g")]
+    columns += [number(f"{azimuth:.4g}°", digits=".3f") for azimuth in share[f.AZIMUTH].values]
+    rows = [(at, *share.sel(elevation=at).values) for at in share[f.ELEVATION].values[::-1]]
     failed = int(dataset[f.DIRECTION_FAILED].values.sum())
-    lines.append(
-        f"mean, weighted by {weight.replace('_', ' ')}: {float(dataset.attrs[f.MEAN]):.4g}, 95 % interval {low:.4g} to "
+    mean = (
+        f"mean, weighted by {weight}: {float(dataset.attrs[f.MEAN]):.4g}, 95 % interval {low:.4g} to "
         f"{high:.4g}; {hits.sum()} hits, {hits.min()} to {hits.max()} in a direction"
-        + (f", {failed} failed" if failed else "")
     )
-    return lines
+    title = "P(perforation) by direction: azimuth along, elevation down"
+    return Section([Table(columns, rows), mean + (f", {failed} failed" if failed else "")], title)
 
 
-def _target_lines(dataset: xarray.Dataset) -> list[str]:
-    lines = []
-    for row, share in enumerate(dataset[f.QUANTILE].values):
-        value, low, high = (
-            float(dataset[name][row]) for name in (f.QUANTILE_VELOCITY, f.QUANTILE_LOW, f.QUANTILE_HIGH)
-        )
+def _target(dataset: xarray.Dataset) -> Section:
+    """Quantiles of the limit velocities of the target, and the shots that no rule counts."""
+    searched = f.CHANGES in dataset
+    columns = [Column("target"), number("velocity", "m/s", ".5g"), *([Column("95 % interval")] if searched else [])]
+    names = (f.QUANTILE, f.QUANTILE_VELOCITY, f.QUANTILE_LOW, f.QUANTILE_HIGH)
+    rows: list[tuple[Any, ...]] = []
+    for share, value, low, high in zip(*(dataset[name].values for name in names), strict=True):
         ends = [f"{end:.5g}" if np.isfinite(end) else "open" for end in (low, high)]
-        interval = f"   95 % interval {ends[0]} to {ends[1]}" if f.CHANGES in dataset else ""
-        lines.append(f"target: V{100 * share:02.0f} = {value:.5g} m/s{interval}")
-    lines.append(f"target: half the distance from V16 to V84 is {float(dataset.attrs[f.TRUE_SPREAD]):.3g} m/s")
-    if f.CHANGES in dataset:
-        hits = dataset.sizes["place"]
+        rows.append((f"V{100 * share:02.0f}", value, f"{ends[0]} to {ends[1]}")[: len(columns)])
+    notes = [f"Half the distance from V16 to V84 is {float(dataset.attrs[f.TRUE_SPREAD]):.3g} m/s."]
+    if searched:
         runs = dataset.attrs.get(f.SEARCH)
-        cost = "" if runs is None else f", {float(runs):.3g} runs of a hit"
         several = int((np.isfinite(dataset[f.CHANGES].values).sum(axis=1) > 1).sum())
-        lines.append(f"target: {hits} hits{cost}" + (f"; {several} have several limits" if several else ""))
-    unfair = [(f.UNFAIR_YAW, "yaw"), (f.UNFAIR_VELOCITY, "velocity window")]
-    for name, rule in unfair:
-        if dataset.attrs[name] > 0.0:
-            lines.append(f"fair hits: the {rule} refuses {100 * float(dataset.attrs[name]):.3g} % of the shots")
-    return lines
-
-
-def _verdict_lines(dataset: xarray.Dataset, found: Verdict, test: dict[str, Any]) -> list[str]:
-    tests, shots = dataset.sizes["test"], dataset[f.SHOTS].values
-    taken = f"{shots.min()}" if np.ptp(shots) == 0 else f"{shots.min()} to {shots.max()}, mean {shots.mean():.3g},"
-    lines = [f"{test['procedure']['name']}: {tests} tests of {taken} shots"]
-    if found.known.value < 1.0:
-        lines.append(f"reports a V50 in {share_text(found.known)} of the tests")
-    lines += [
-        f"reported V50: {found.bias:+.3g} m/s off on average, standard deviation {found.deviation:.3g} m/s",
-        f"reported spread: median {found.spread:.3g} m/s, of {float(dataset.attrs[f.TRUE_SPREAD]):.3g} m/s",
+        cost = "" if runs is None else f", {float(runs):.3g} runs of a hit"
+        notes.append(f"{dataset.sizes['place']} hits{cost}" + (f"; {several} have several limits" if several else ""))
+    notes += [
+        f"The {rule} refuses {100 * float(dataset.attrs[name]):.3g} % of the shots."
+        for name, rule in ((f.UNFAIR_YAW, "yaw"), (f.UNFAIR_VELOCITY, "velocity window"))
+        if dataset.attrs[name] > 0.0
     ]
-    if found.coverage is not None:
+    return Section([Table(columns, rows), *notes])
+
+
+def _reported(dataset: xarray.Dataset, worth: Verdict, test: dict[str, Any]) -> Section:
+    """What the tests report, beside the truth."""
+    tests, shots = dataset.sizes["test"], dataset[f.SHOTS].values
+    shot_count = f"{shots.min()}" if np.ptp(shots) == 0 else f"{shots.min()} to {shots.max()}, mean {shots.mean():.3g},"
+    notes = [f"reports a V50 in {share_text(worth.known)} of the tests"] if worth.known.value < 1.0 else []
+    notes += [
+        f"reported V50: {worth.bias:+.3g} m/s off on average, standard deviation {worth.deviation:.3g} m/s",
+        f"reported spread: median {worth.spread:.3g} m/s, of {float(dataset.attrs[f.TRUE_SPREAD]):.3g} m/s",
+    ]
+    if worth.coverage is not None:
         confidence = 100 * float((test.get("estimator") or {}).get("confidence", 0.95))
-        lines.append(
-            f"reported {confidence:g} % interval of V50: contains the true V50 in {share_text(found.coverage)} of the "
-            f"tests; open in {100 * found.open:.3g} %"
+        notes.append(
+            f"reported {confidence:g} % interval of V50: contains the true V50 in {share_text(worth.coverage)} of the "
+            f"tests; open in {100 * worth.open:.3g} %"
         )
-    if found.passed is not None:
-        lines.append(
-            f"required V50 of {test['required']['v50']:g} m/s: reported in {share_text(found.passed)} of the tests"
-        )
-    return lines
+    if worth.passed is not None:
+        required = test["required"]["v50"]
+        notes.append(f"required V50 of {required:g} m/s: reported in {share_text(worth.passed)} of the tests")
+    return Section(notes, f"{test['procedure']['name']}: {tests} tests of {shot_count} shots")
 
 
-def _size_lines(dataset: xarray.Dataset, precision: dict[str, Any]) -> list[str]:
+def _size(dataset: xarray.Dataset, precision: dict[str, Any]) -> str:
+    """How many shots a test takes to be as exact as asked."""
     within, share = float(precision["within"]), float(precision["share"])
     enough = np.flatnonzero(dataset[f.SIZE_WITHIN].values >= share)
     what = f"V50 within ± {within:g} m/s in {100 * share:g} % of the tests"
     if not len(enough):
         best = 100 * float(dataset[f.SIZE_WITHIN].values.max())
-        return [f"{what}: not with {int(dataset[f.SIZE].values.max())} shots ({best:.3g} % at best)"]
-    return [f"{what}: {float(dataset[f.SIZE_SHOTS].values[enough[0]]):.3g} shots"]
+        return f"{what}: not with {int(dataset[f.SIZE].values.max())} shots ({best:.3g} % at best)"
+    return f"{what}: {float(dataset[f.SIZE_SHOTS].values[enough[0]]):.3g} shots"
 
 
-def proof_lines(dataset: xarray.Dataset, proof: dict[str, Any]) -> list[str]:
+def _proof(dataset: xarray.Dataset, proof: dict[str, Any]) -> Section:
     """What the plan of a proof shows, and what this target does in it."""
     shots, allowed = int(dataset.attrs[f.PROOF_SHOTS]), int(dataset.attrs[f.PROOF_ALLOWED])
     velocity = float(dataset.attrs[f.PROOF_VELOCITY])
@@ -170,8 +165,7 @@ def proof_lines(dataset: xarray.Dataset, proof: dict[str, Any]) -> list[str]:
     good = 1.0 - perforation >= stop
     risk = ("producer's", "rejects", 1.0 - passed) if good else ("consumer's", "accepts", passed)
     shown = 100 * shown_stop_probability(shots, allowed, confidence)
-    return [
-        f"proof: {shots} shots at {velocity:g} m/s, at most {allowed} perforate",
+    sentences = [
         f"a pass shows P(stop) >= {shown:.3g} % at {100 * confidence:g} % confidence, if every shot may hit any place",
         f"a target of P(stop) = {100 * stop:g} % passes in {100 * consumer:.3g} % of the tests",
         f"this target: P(stop) = {100 * (1.0 - perforation):.4g} %; the plan {risk[1]} it in {100 * risk[2]:.3g} % of "
@@ -179,3 +173,4 @@ def proof_lines(dataset: xarray.Dataset, proof: dict[str, Any]) -> list[str]:
         f"if all shots of a test hit the same place, it passes in {100 * same:.3g} % of the tests, in place of "
         f"{100 * passed:.3g} %",
     ]
+    return Section(sentences, f"proof: {shots} shots at {velocity:g} m/s, at most {allowed} perforate")

@@ -1,4 +1,4 @@
-"""A posterior as text: parameters with their intervals, what the shots determine, and what the numbers are worth."""
+"""The view of a posterior: parameters with their intervals, what the shots determine, what the numbers are worth."""
 
 from __future__ import annotations
 
@@ -12,6 +12,7 @@ from warpimpact.results import attributes as attr
 from warpimpact.results import posterior_file
 from warpimpact.scene.display import STORED, Unit
 from warpimpact.statistics.importance import LARGEST_K
+from warpimpact.view.view import Column, Section, Table, labelled, number
 
 
 def unit_of(array: xarray.DataArray | xarray.DataTree) -> tuple[str, float]:
@@ -21,62 +22,63 @@ def unit_of(array: xarray.DataArray | xarray.DataTree) -> tuple[str, float]:
     return unit.shown, unit.factor
 
 
-def posterior_text(tree: xarray.DataTree) -> str:
-    return "\n".join([*_parameters(tree), "", *_rows(tree), "", *_best(tree), "", *_worth(tree)])
+def posterior_view(tree: xarray.DataTree) -> list[Section]:
+    """The view of a posterior: its parameters, measured numbers beside computed ones, the best set, and its worth."""
+    return [_parameters(tree), _measured(tree), _best(tree), Section(_worth(tree))]
 
 
-def _parameters(tree: xarray.DataTree) -> list[str]:
-    lines = [
-        str(tree.attrs[attr.TITLE]),
-        f"{'parameter':26}{'median':>9}  {'90 % interval':18}{'90 % of the prior':20}verdict",
-    ]
-    for name, one in learnt(tree).items():
+def _parameters(tree: xarray.DataTree) -> Section:
+    columns = (
+        *(Column("parameter"), number("median", digits=".3g"), Column("90 % interval"), Column("90 % of the prior")),
+        Column("verdict"),
+    )
+    rows = []
+    for name, knowledge in learnt(tree).items():
         unit, factor = unit_of(tree["posterior"][name])
-        low, middle, high = (factor * value for value in one.quantiles)
-        prior = f"{factor * one.prior[0]:.3g} to {factor * one.prior[2]:.3g}"
+        low, middle, high = (factor * value for value in knowledge.quantiles)
+        prior = f"{factor * knowledge.prior[0]:.3g} to {factor * knowledge.prior[2]:.3g}"
         label = f"{name} [{unit}]" if unit else name
-        lines.append(f"{label:26}{middle:9.3g}  {f'{low:.3g} to {high:.3g}':18}{prior:20}{one.verdict}")
-    lines += [
+        rows.append((label, middle, f"{low:.3g} to {high:.3g}", prior, knowledge.verdict))
+    correlations = [
         f"{one} and {other} are determined together more than each alone: their correlation is {value:+.2f}"
         for one, other, value in together(tree)
     ]
-    return lines
+    return Section([Table(columns, rows), *correlations], str(tree.attrs[attr.TITLE]))
 
 
-def _rows(tree: xarray.DataTree) -> list[str]:
+def _measured(tree: xarray.DataTree) -> Section:
     """Measured numbers beside what is computed for them, and what another shot would show."""
     observed, computed = tree["observed_data"].to_dataset(), tree["posterior_predictive"].to_dataset()
-    lines = [f"{'measured':42}{'':18}{'computed at its hit':22}{'another such shot':20}(90 % intervals)"]
+    rows = []
     for place, label in enumerate(observed["observation"].values if "observation" in observed else ()):
         value, std = (float(observed[name][place]) for name in (posterior_file.MEASURED, posterior_file.STD))
         spans = [
             "{:.4g} to {:.4g}".format(*np.nanquantile(computed[name].values[..., place], [0.05, 0.95]))
             for name in (posterior_file.FITTED, posterior_file.MEASURED)
         ]
-        lines.append(f"{label!s:42}{f'{value:g} ± {std:g}':18}{spans[0]:22}{spans[1]:20}")
-    for shot, share in json.loads(str(tree.attrs[posterior_file.ROW_PROBABILITY])).items():
-        lines.append(
-            f"{shot}: {share:.2g} of the rows that another such shot would show are less probable than this one"
-        )
-    return lines
+        rows.append((str(label), f"{value:g} ± {std:g}", *spans))
+    heads = ("quantity", "measured", "computed at its hit, 90 %", "another such shot, 90 %")
+    probabilities = json.loads(str(tree.attrs[posterior_file.ROW_PROBABILITY]))
+    notes = [
+        f"{shot}: {share:.2g} of the rows that another such shot would show are less probable than this one"
+        for shot, share in probabilities.items()
+    ]
+    return Section([*([Table([*map(Column, heads)], rows)] if rows else []), *notes])
 
 
-def _best(tree: xarray.DataTree) -> list[str]:
+def _best(tree: xarray.DataTree) -> Section:
+    """The set of parameters and hits with the smallest misfit."""
     best = tree["best"].to_dataset()
-    values = []
+    rows = []
     for name in learnt(tree):
         unit, factor = unit_of(best[name])
-        values.append(f"{name} {factor * float(best[name]):.3g} {unit}".strip())
-    hits = ", ".join(
-        f"{shot} ({1e3 * float(best['hit_y'][place]):.2f}, {1e3 * float(best['hit_z'][place]):.2f}) mm"
-        for place, shot in enumerate(best["shot"].values)
-    )
-    return [
-        f"smallest misfit {float(best['misfit'].sum()):.3g} = "
-        f"{' + '.join(f'{value:.3g}' for value in best['misfit'].values)}, sum of squares over the uncertainties, at",
-        f"  {', '.join(values)}",
-        f"  hits: {hits}",
-    ]
+        rows.append((name, f"{factor * float(best[name]):.3g} {unit}".strip()))
+    for place, shot in enumerate(best["shot"].values):
+        y, z = (1e3 * float(best[axis][place]) for axis in ("hit_y", "hit_z"))
+        rows.append((f"hit of {shot}", f"({y:.2f}, {z:.2f}) mm"))
+    terms = " + ".join(f"{value:.3g}" for value in best["misfit"].values)
+    title = f"smallest misfit {float(best['misfit'].sum()):.3g} = {terms}, sum of squares over the uncertainties, at"
+    return Section([labelled(rows)], title)
 
 
 def _worth(tree: xarray.DataTree) -> list[str]:

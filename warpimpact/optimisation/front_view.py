@@ -1,0 +1,192 @@
+"""The view of a search for designs."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from warpimpact.analysis.numbers import interval_text, number_text
+from warpimpact.results import front as f
+from warpimpact.view.view import Column, Section, Table, number
+
+if TYPE_CHECKING:
+    import xarray
+
+NEEDED = 0.95
+"""Share of the draws of a posterior from which a difference survives."""
+
+
+def front_view(dataset: xarray.Dataset) -> list[Section]:
+    """The view of a search: its front with intervals, the values of its variables, and what fresh hits took from it."""
+    designs, told = dataset.sizes["design"], dataset.attrs
+    computed = (
+        f"{designs} designs computed, {int(dataset[f.HITS].sum())} hits, {told[f.PILOTS]} pilots; "
+        f"{told[f.REFUSED]} more broke a constraint and were not computed"
+    )
+    if told[f.OUTCOME] == f.NONE_FEASIBLE:
+        return [Section([computed, *_nearest(dataset)])]
+    on_front, confirmed = int(dataset[f.ON_FRONT].sum()), dataset.sizes["front"]
+    again = f"front: {on_front} designs, of which {confirmed} were computed again with fresh hits"
+    references = [line for place in range(dataset.sizes["reference"]) for line in _against(dataset, place)]
+    notes = [*_shrinkage(dataset), *_survival(dataset)]
+    return [
+        Section([computed, again]),
+        Section([_front_table(dataset)]),
+        Section([_variables_table(dataset)] if confirmed else []),
+        *([Section([*references, *notes])] if references or notes else []),
+    ]
+
+
+def _front_table(dataset: xarray.Dataset) -> Table:
+    """Objectives and bounds of the front and of what it is compared with, by fresh hits."""
+    columns = [Column("design")]
+    for label in dataset[f.LABEL].values:
+        name, unit = label_and_unit(label)
+        columns += [number(name, unit), Column("95 % interval")]
+    rows: list[tuple[Any, ...]] = []
+    for place, file in enumerate(dataset[f.FILE].values):
+        notes = []
+        if (group := int(dataset[f.GROUP][place])) != place:
+            notes.append(f"cannot be told from {dataset[f.FILE].values[group]}")
+        if not int(dataset[f.KEPT][place]):
+            notes.append("not on the front by fresh hits")
+        rows.append((file, *_cells(dataset, _OF_FRONT, place), "; ".join(notes)))
+    for place, name in enumerate(dataset[f.REFERENCE].values):
+        rows.append((name, *_cells(dataset, _OF_REFERENCE, place), ""))
+    return Table([*columns, Column("note")], rows)
+
+
+_OF_FRONT = (f.FRESH, f.FRESH_LOW, f.FRESH_HIGH)
+_OF_REFERENCE = (f.REFERENCE_FOUND, f.REFERENCE_LOW, f.REFERENCE_HIGH)
+
+
+def _cells(dataset: xarray.Dataset, names: tuple[str, str, str], place: int) -> Iterator[Any]:
+    """Value and interval of everything asked of a design."""
+    for value, low, high in zip(*(dataset[name].values[place] for name in names), strict=True):
+        yield from (value, "" if low == high else interval_text(low, high, "{:.4g}".format))
+
+
+def _variables_table(dataset: xarray.Dataset) -> Table:
+    """The values of the variables on the front."""
+    names = zip(dataset[f.NAME].values, dataset[f.UNIT].values, strict=True)
+    columns = [Column("design"), *(Column(str(name), str(unit), right=True) for name, unit in names)]
+    rows = [
+        (file, *(value for _, value, _ in _values(dataset, int(design))))
+        for file, design in zip(dataset[f.FILE].values, dataset[f.NUMBER].values, strict=True)
+    ]
+    return Table(columns, rows)
+
+
+def _survival(dataset: xarray.Dataset) -> Iterator[str]:
+    """Which part of the order of the front survives the uncertainty of the parameters."""
+    for place, label in enumerate(dataset[f.LABEL].values):
+        least = dataset[f.SURVIVAL_AT_LEAST].values[:, place]
+        if (known := np.isfinite(least)).any():
+            name, survive = label_and_unit(label)[0], int((least[known] >= NEEDED).sum())
+            yield (
+                f"{name}: {survive} of {int(known.sum())} differences between neighbours on the front survive the "
+                f"uncertainty of the parameters (in at least {NEEDED:.0%} of the draws)"
+            )
+
+
+def _against(dataset: xarray.Dataset, reference: int) -> Iterator[str]:
+    """How much better than a reference a design is in one of two objectives that is no worse in the other."""
+    goals = np.flatnonzero(np.isnan(dataset[f.LIMIT].values))
+    if len(goals) != 2:
+        return
+    signs, names = dataset[f.SIGN].values[goals], [label_and_unit(label)[0] for label in dataset[f.LABEL].values]
+    kept = dataset[f.KEPT].values == 1
+    fresh, files = (signs * dataset[f.FRESH].values[:, goals])[kept], dataset[f.FILE].values[kept]
+    rival = signs * dataset[f.REFERENCE_FOUND].values[reference, goals]
+    for better, other in ((0, 1), (1, 0)):
+        no_worse = np.flatnonzero(fresh[:, other] <= rival[other])
+        if len(no_worse) and rival[better]:
+            best = no_worse[np.argmin(fresh[no_worse, better])]
+            gain = (rival[better] - fresh[best, better]) / abs(rival[better])
+            more = "less" if gain * signs[better] > 0 else "more"
+            yield (
+                f"{files[best]} has {abs(gain):.1%} {more} {names[goals[better]]} than "
+                f"{dataset[f.REFERENCE].values[reference]}, and is no worse in {names[goals[other]]}"
+            )
+
+
+def numbers_of_front(dataset: xarray.Dataset, place: int) -> list[str]:
+    """Objectives and bounds of a design of the front by fresh hits, with their intervals."""
+    return _numbers(dataset, _OF_FRONT, place)
+
+
+def numbers_of_reference(dataset: xarray.Dataset, place: int) -> list[str]:
+    """Objectives and bounds of a target to compare with."""
+    return _numbers(dataset, _OF_REFERENCE, place)
+
+
+def _numbers(dataset: xarray.Dataset, names: tuple[str, str, str], place: int) -> list[str]:
+    cells = list(_cells(dataset, names, place))
+    numbers = []
+    for label, value, interval in zip(dataset[f.LABEL].values, cells[::2], cells[1::2], strict=True):
+        name, unit = label_and_unit(label)
+        numbers.append(f"{name} {number_text(value)}{f' ({interval})' if interval else ''} {unit}".rstrip())
+    return numbers
+
+
+def label_and_unit(label: str) -> tuple[str, str]:
+    """What was asked, without and with its unit: "thickness [mm]" → "thickness", "mm"."""
+    name, _, unit = str(label).removesuffix("]").partition(" [")
+    return name, unit
+
+
+def design_text(dataset: xarray.Dataset, design: int) -> str:
+    """The variables of a design with their values."""
+    values = _values(dataset, design)
+    return ", ".join(f"{name} = {value} {unit}".rstrip() for name, value, unit in values if value)
+
+
+def _values(dataset: xarray.Dataset, design: int) -> Iterator[tuple[str, str, str]]:
+    """Name, value and unit of every variable of a design; the value is empty where the design does not use it."""
+    for name, value, labels, unit in zip(
+        dataset[f.NAME].values,
+        dataset[f.VALUE].values[design],
+        dataset[f.LABELS].values,
+        dataset[f.UNIT].values,
+        strict=True,
+    ):
+        unused = bool(np.isnan(value))
+        yield str(name), "" if unused else json.loads(labels)[int(value)] if labels else f"{value:.6g}", str(unit)
+
+
+def _shrinkage(dataset: xarray.Dataset) -> Iterator[str]:
+    """By how much fresh hits are worse than the search had it."""
+    searched, fresh = dataset[f.FOUND].values[dataset[f.NUMBER].values], dataset[f.FRESH].values
+    for place, (label, sign, limit) in enumerate(
+        zip(dataset[f.LABEL].values, dataset[f.SIGN].values, dataset[f.LIMIT].values, strict=True)
+    ):
+        if not np.isnan(limit) or not len(fresh) or str(dataset[f.ASKED].values[place]).startswith("areal_density"):
+            continue
+        worse = float(np.mean(sign * (fresh[:, place] - searched[:, place])))
+        before = float(np.mean(searched[:, place]))
+        share = f", {abs(worse / before):.1%} of it" if before else ""
+        name, unit = label_and_unit(label)
+        yield (
+            f"shrinkage: by fresh hits {name} is {'worse' if worse > 0 else 'better'} by "
+            f"{number_text(abs(worse))}{' ' + unit if unit else ''}{share}, mean over the front"
+        )
+
+
+def _nearest(dataset: xarray.Dataset) -> Iterator[str]:
+    """Which design comes nearest to the bounds where none keeps them."""
+    limits, signs, found = dataset[f.LIMIT].values, dataset[f.SIGN].values, dataset[f.FOUND].values
+    bounds = np.flatnonzero(~np.isnan(limits))
+    over = np.maximum(
+        signs[bounds] * (found[:, bounds] - limits[bounds]) / np.maximum(np.abs(limits[bounds]), 1e-30), 0.0
+    )
+    nearest = int(np.nanargmin(over.sum(axis=1))) if len(bounds) and np.isfinite(over).any() else 0
+    asked = [
+        f"{dataset[f.LABEL].values[one]!s} {'<' if signs[one] > 0 else '>'}= {limits[one]:.4g}"
+        f" (nearest: {number_text(float(found[nearest, one]))})"
+        for one in bounds
+    ]
+    yield f"no design keeps the bounds: {'; '.join(asked) or 'no hit of any design could be computed'}"
+    yield f"the nearest: {design_text(dataset, nearest)}"

@@ -1,0 +1,142 @@
+"""The view of a search of limits."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator
+
+import numpy as np
+import xarray
+
+from warpimpact.analysis.numbers import ends_of, intervals_text
+from warpimpact.analysis.proxy import proxy
+from warpimpact.analysis.summary import numerics_note
+from warpimpact.analysis.survival import draws_note
+from warpimpact.results import attributes as attr
+from warpimpact.results import variables as v
+from warpimpact.results.limits import solid_limits
+from warpimpact.scene.quantities import QUANTITIES
+from warpimpact.scene.units import quantity as reader_of
+from warpimpact.solver.findings import hits_text, limit_error_text
+from warpimpact.solver.limit_search import MOST_RUNS
+from warpimpact.studies.limit import QUANTILES, quantiles
+from warpimpact.studies.published import published_view
+from warpimpact.view.view import Column, Section, Table, number
+
+_MOST_LISTED = 12
+
+
+def shown_unit(name: str) -> tuple[str, float]:
+    """Unit that people see a limit in, and the factor to it."""
+    shown = reader_of(QUANTITIES[name].type).display
+    return shown.shown, shown.factor
+
+
+def limit_view(dataset: xarray.Dataset) -> list[Section]:
+    """The view of a search of limits: every hit of a short list, or V50 and V05; what it is compared with; notes."""
+    short = len(dataset[v.LIMITS[dataset.attrs[attr.LIMIT]].value]) <= _MOST_LISTED
+    return [
+        *([Section([_hits(dataset)]), *_proxies(dataset)] if short else [Section([_quantiles(dataset)])]),
+        *published_view(dataset),
+        Section([*_left_out(dataset), *_solid(dataset), *_costs(dataset)]),
+    ]
+
+
+def _hits(dataset: xarray.Dataset) -> Table:
+    """Every hit with its limit and the two ends that enclose it."""
+    quantity = dataset.attrs[attr.LIMIT]
+    unit, factor = shown_unit(quantity)
+    value, lower, upper = (factor * dataset[name].values for name in v.LIMITS[quantity][:3])
+    columns = (
+        *(number("hit", digits="d"), number("obliquity", "°", ".4g")),
+        *(number(header, unit, ".5g") for header in (f"limit {quantity}", "lower end", "upper end")),
+    )
+    return Table(columns, list(zip(range(len(value)), dataset[v.OBLIQUITY].values, value, lower, upper, strict=True)))
+
+
+def _quantiles(dataset: xarray.Dataset) -> Table:
+    """V50 and V05 with their intervals."""
+    quantity = dataset.attrs[attr.LIMIT]
+    unit, factor = shown_unit(quantity)
+    what = "perforate" if quantity == "velocity" else "have a smaller limit"
+    rows = []
+    for name, estimate in quantiles(dataset).items():
+        shown = estimate.times(factor)
+        interval = intervals_text(ends_of(shown), "{:.5g}".format, "{:.2g}".format)
+        rows.append((name, shown.value, interval, f"{100.0 * QUANTILES[f'V{name[1:]}']:g} % of the hits {what}"))
+    columns = Column("quantile"), number(f"limit {quantity}", unit, ".5g"), Column("95 % interval"), Column("meaning")
+    return Table(columns, rows)
+
+
+def _left_out(dataset: xarray.Dataset) -> Iterator[str]:
+    """Hits without a limit, and limits that are less exact than asked for."""
+    attributes, quantity = dataset.attrs, dataset.attrs[attr.LIMIT]
+    unit, factor = shown_unit(quantity)
+    value, _, _, _, converged = (dataset[name].values for name in v.LIMITS[quantity])
+    if failed := int(np.isnan(value).sum()):
+        yield f"{failed} hits failed, and count in none of these numbers"
+    if beyond := int(np.isposinf(value).sum()):
+        yield f"{beyond} hits have no limit {quantity} up to {factor * attributes[attr.LIMIT_HIGHEST]:g} {unit}"
+    if missed := int((value == 0.0).sum()):
+        yield f"{missed} hits touch no material"
+    if open_ := int((converged == 0).sum()) - failed:
+        yield f"{open_} hits were not found to {factor * attributes[attr.LIMIT_TOLERANCE]:g} {unit} in {MOST_RUNS} runs"
+
+
+def _costs(dataset: xarray.Dataset) -> Iterator[str]:
+    """How many runs the search took, and how exact its limits are."""
+    runs = dataset[v.LIMITS[dataset.attrs[attr.LIMIT]].runs].values
+    yield f"{runs.mean():.2g} runs of a hit on average, {runs.max()} at most"
+    yield promise_line(dataset)
+    yield from filter(None, [numerics_note(dataset), draws_note(dataset)])
+
+
+def _solid(dataset: xarray.Dataset) -> Iterator[str]:
+    """The solid plate that replaces the whole target, and what its search cost; nothing without one."""
+    reference = solid_limits(dataset)
+    if reference is None:
+        return
+    quantity = dataset.attrs[attr.LIMIT]
+    unit, factor = shown_unit(quantity)
+    value = reference[v.LIMITS[quantity].value].values
+    limit = f"{factor * float(np.nanmean(value)):.5g} {unit}" + (", mean" if len(value) > 1 else "")
+    density = float(dataset.attrs[attr.AREAL_DENSITY])
+    if quantity == "thickness":
+        limit += f", {float(np.nanmean(value)) * reference.attrs[attr.LIMIT_DENSITY]:.4g} kg/m²"
+        limit += f" (the target as given has {density:.4g} kg/m²)"
+    else:
+        limit += f", of {density:.4g} kg/m² as the target"
+    hits = f"{len(value)} hit{'s' if len(value) > 1 else ''}"
+    seconds = float(dataset.attrs[attr.SOLID_LIMIT_TIME])
+    yield f"solid plate in place of the whole target: limit {quantity} {limit}; {hits} searched in {seconds:.2g} s"
+
+
+def _proxies(dataset: xarray.Dataset) -> list[Section]:
+    """The proxy beside the limit thickness of a solid plate; nothing for another search."""
+    proxies = proxy(dataset) if dataset.attrs[attr.LIMIT] == "thickness" else None
+    if proxies is None:
+        return []
+    title = "proxy: energy over presented area and resistance, as a depth, and its ratio to the limit thickness"
+    columns = (
+        *(number("hit", digits="d"), number("inclination", "°", ".4g"), number("proxy", "mm", ".4g")),
+        number("ratio", digits=".3f"),
+    )
+    rows = [
+        (hit, inclination, 1e3 * depth, ratio)
+        for hit, (inclination, depth, ratio) in enumerate(zip(*proxies, strict=True))
+    ]
+    return [Section([Table(columns, rows)], title)]
+
+
+def promise_line(dataset: xarray.Dataset) -> str:
+    """How far off the limits are estimated to be."""
+    attributes = dataset.attrs
+    unit, factor = shown_unit(attributes[attr.LIMIT])
+    of_layer = f"thickness of layer {attributes[attr.LIMIT_LAYER]}; " if attributes[attr.LIMIT_LAYER] else ""
+    ends = f"{of_layer}ends of a limit at most {factor * attributes[attr.LIMIT_TOLERANCE]:g} {unit} apart"
+    if attr.LIMIT_ERROR not in attributes:
+        return f"{ends}; the error of the numerics was not measured, as the campaign fixes the resolution"
+    kept = "" if attributes[attr.PROMISE_KEPT] else ", more than was asked for"
+    error = limit_error_text(attributes[attr.LIMIT_ERROR], attributes[attr.LIMIT])
+    hits = hits_text(json.loads(attributes[attr.ACCURACY])["share"])
+    return f"{ends}; against a finer level {hits} are within {error}{kept}"
