@@ -17,7 +17,7 @@ from warpimpact.identification.evaluate import evaluate
 from warpimpact.identification.fit import Fit
 from warpimpact.identification.reading import fit_from
 from warpimpact.results import posterior_file
-from warpimpact.scene.distributions import Continuous
+from warpimpact.scene.distributions import EDGE
 from warpimpact.solver.worker import Worker
 
 ROUNDS, SETS, HITS, KEPT = 10, 24, 2048, 6
@@ -58,11 +58,10 @@ def main() -> None:
     tree = posterior_file.read(Path(sys.argv[1]))
     fit = fit_from(str(tree.attrs[posterior_file.FIT]), sys.argv[1], Path("campaigns"))
     sets = tree["sets"].to_dataset()
-    shares = []
+    shares, grid = [], np.linspace(EDGE, 1.0 - EDGE, 10_001)
     for one in fit.parameters:
         values = sets[one.name].values
-        assert isinstance(one.prior, Continuous)
-        shares.append(one.prior._frozen().cdf(np.radians(values) if one.unit == "rad" else values))
+        shares.append(np.interp(np.radians(values) if one.unit == "rad" else values, one.prior.quantile(grid), grid))
     points = ndtri(np.clip(np.stack(shares, axis=-1), 1e-9, 1.0 - 1e-9))
     refined(fit, points, sets["misfit"].values.sum(axis=1))
 

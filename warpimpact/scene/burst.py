@@ -8,7 +8,7 @@ from typing import Annotated, Any, Self
 import numpy as np
 from pydantic import Field, field_validator, model_validator
 
-from .distributions import EDGE, AnyDistribution, Distribution
+from .distributions import EDGE, AnyDistribution, Distribution, normal_quantile
 from .exclusions import BURST, HIT_SCATTER, IMAGES, OFFSETS, SPACING, check_together
 from .model import Array
 from .plate import Plate
@@ -85,7 +85,7 @@ class Burst(Scattering):
         if self.spacing is not None:
             return (self.count - 1) * float(self.spacing.quantile(np.array(1.0 - EDGE)))
         placed = max((abs(at) for offset in self.offsets or () for at in offset), default=0.0)
-        return placed + float(_normal(np.array(1.0 - EDGE))) * max(self.scatter or (0.0,))
+        return placed + float(normal_quantile(np.array(1.0 - EDGE))) * max(self.scatter or (0.0,))
 
     def places(self, seed: int, first: int, samples: int) -> tuple[Array, Array]:
         """Places (y, z) of the hits of some samples from their aims [m], shape [samples, count] each.
@@ -106,7 +106,7 @@ class Burst(Scattering):
         places = np.zeros((self.count, 2)) if self.offsets is None else np.array(self.offsets)
         std_y, std_z = self.scatter or (0.0, 0.0)
         y, z = np.broadcast_to(places[:, 0], shape), np.broadcast_to(places[:, 1], shape)
-        return y + std_y * _normal(drawn(_ALONG_Y)), z + std_z * _normal(drawn(_ALONG_Z))
+        return y + std_y * normal_quantile(drawn(_ALONG_Y)), z + std_z * normal_quantile(drawn(_ALONG_Z))
 
 
 class BurstSampler(Sampler):
@@ -174,12 +174,6 @@ class BurstSampler(Sampler):
 def draws(seed: int, column: int, first: int, count: int) -> Array:
     """Independent numbers between 0 and 1 of a column, shape [count]: shot k has draw k."""
     return np.clip(stream(seed, (_BURST, column), first, count), EDGE, 1.0 - EDGE)
-
-
-def _normal(share: Array) -> Array:
-    from scipy.special import ndtri
-
-    return np.asarray(ndtri(share))
 
 
 def _nearest_earlier(hits: Array) -> Array:

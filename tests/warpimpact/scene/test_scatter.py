@@ -45,7 +45,10 @@ def same(one: Shots, other: Shots) -> bool:
 )
 @pytest.mark.parametrize("sampling", ["sobol", "random", "grid"])
 def test_draws_follow_the_distribution(parameters: dict[str, object], expected: object, sampling: str) -> None:
-    shots = sampler(sampling, 4096, scatter=Scatter(velocity=parameters)).shots(0, 4096)
+    scatter = Scatter(velocity=parameters)
+    shares = np.linspace(2.0**-31, 1.0 - 2.0**-31, 1001)
+    np.testing.assert_array_equal(scatter.velocity.quantile(shares), expected.ppf(shares))
+    shots = sampler(sampling, 4096, scatter=scatter).shots(0, 4096)
     assert stats.kstest(shots.velocity, expected.cdf).pvalue > 1e-3
     assert abs(stats.spearmanr(shots.velocity, shots.hit_y).statistic) < 0.06  # 4096 independent pairs: ± 0.016
 

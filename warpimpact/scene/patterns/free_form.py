@@ -1,26 +1,19 @@
-"""Free forms: holes of no named shape, as square cells, from a few numbers or from corners (docs/model.md §3).
-
-A form is drawn in cells. A tool of some diameter then opens it: what the tool does not reach stays material (the
-opening of mathematical morphology: J. Serra, Image Analysis and Mathematical Morphology, Academic Press 1982). Material
-that a hole surrounds falls out.
-"""
+"""Free forms from a few numbers, or from the corners of their holes."""
 
 import itertools
 import math
 from abc import abstractmethod
 from collections.abc import Sequence
-from functools import cached_property
 from typing import Annotated, Any, Literal, NamedTuple, Self
 
 import numpy as np
-from pydantic import Field, ValidationInfo, field_validator, model_validator
+from pydantic import Field, ValidationInfo, field_validator
 
 from ..model import Array, Model
-from ..units import Angle, Length, NonNegativeLength, PositiveLength
-from .cells import CellsPattern
+from ..units import Angle, Length, PositiveLength
+from .cells import FreeForm
 from .pattern import BoolArray
 
-_MOST_CELLS = 4_000_000
 _MOST_POLYGONS, _MOST_CORNERS = 400, 400  # which are read and drawn within seconds
 _Exponent = Annotated[float, Field(gt=0.05, le=100.0)]
 
@@ -80,50 +73,6 @@ class Wave(Model):
     phase: Angle = 0.0
 
 
-class _FreeForm(CellsPattern):
-    """A form in a rectangular cell that repeats.
-
-    Attributes:
-        spacing: extent (a, b) of the cell along y and z [m]; that along z is rounded to whole cells of the drawing.
-        smallest_feature: diameter of the tool that cuts the holes: no part of a hole is narrower [m].
-        cell_size: side of the squares of the drawing, about [m]; a whole number of them is `spacing` along y.
-    """
-
-    spacing: tuple[PositiveLength, PositiveLength]
-    smallest_feature: NonNegativeLength = 0.0
-    cell_size: PositiveLength = 5e-5
-
-    @property
-    @abstractmethod
-    def extent(self) -> tuple[float, float]:
-        """Of the period along y and z [m], before it is rounded."""
-
-    @abstractmethod
-    def drawn(self, y: Array, z: Array) -> BoolArray:
-        """Where a form has holes, before a tool opens it, at cells y of shape [cells along y, 1] and z [m]."""
-
-    @model_validator(mode="after")
-    def _is_in_one_piece(self) -> Self:
-        count = math.prod(side / self.side for side in self.extent)
-        if count > _MOST_CELLS:
-            raise ValueError(f"got {count:.3g} cells, but at most {_MOST_CELLS:.1g}; a larger cell_size gives fewer")
-        _ = self.material
-        return self
-
-    @property
-    def side(self) -> float:
-        return self.spacing[0] / max(1, round(self.spacing[0] / self.cell_size))
-
-    @cached_property
-    def material(self) -> BoolArray:
-        """Where a cell is material, bool of shape [cells along y, cells along z], read-only."""
-        counts = [max(1, round(length / self.side)) for length in self.extent]
-        y, z = (self.side * (np.arange(count, dtype=np.float64) + 0.5 - 0.5 * count) for count in counts)
-        material = _in_one_piece(~_opened(self.drawn(y[:, None], z), 0.5 * self.smallest_feature / self.side))
-        material.setflags(write=False)
-        return material
-
-
 class _Polygon(NamedTuple):
     """One hole with straight edges.
 
@@ -156,7 +105,7 @@ class _Polygon(NamedTuple):
         return np.asarray(shapely.contains_xy(self.outline, *np.broadcast_arrays(y, z)))
 
 
-class _UnionPattern(_FreeForm):
+class _UnionPattern(FreeForm):
     """Forms in a cell; forms that overlap make one hole.
 
     Attributes:
@@ -242,7 +191,7 @@ class PolygonsPattern(_UnionPattern):
         return [_Polygon.of(np.array(corners)) for corners in self.polygons]
 
 
-class LevelSetPattern(_FreeForm):
+class LevelSetPattern(FreeForm):
     """Holes where a sum of a few waves is largest.
 
     Attributes:
@@ -274,36 +223,3 @@ def _images(place: float, reach: float, side: float) -> list[float]:
     """Places of the images of a hole that reach into a period about the origin."""
     first, last = (math.ceil((-0.5 * side - reach - place) / side), math.floor((0.5 * side + reach - place) / side))
     return [place + number * side for number in range(first, last + 1)]
-
-
-def _opened(holes: BoolArray, radius: float) -> BoolArray:
-    """What a disc of a radius [cells] reaches of some holes, without leaving them."""
-    if radius < 0.5 or not holes.any() or holes.all():
-        return holes
-    from scipy.ndimage import distance_transform_edt
-
-    margin = min(math.ceil(2.0 * radius) + 2, *holes.shape)
-    wide = np.pad(holes, margin, mode="wrap")
-    centres = distance_transform_edt(wide) > radius
-    reached = distance_transform_edt(~centres) <= radius
-    return np.asarray(reached[margin:-margin, margin:-margin] & holes)
-
-
-def _in_one_piece(material: BoolArray) -> BoolArray:
-    """Material without what holes surround.
-
-    Raises:
-        ValueError: the holes cut the plate apart.
-    """
-    from scipy.ndimage import label
-
-    rows, columns = material.shape
-    labels = label(np.tile(material, (3, 3)))[0]
-    middle = labels[rows : 2 * rows, columns : 2 * columns]
-    counts = np.bincount(middle[middle > 0], minlength=1)
-    piece = int(counts.argmax()) if counts.any() else 0
-    row, column = (int(index[0]) for index in np.nonzero(middle == piece)) if piece else (0, 0)
-    whole = [(row + k * rows, column + m * columns) for k, m in ((1, 1), (0, 1), (2, 1), (1, 0), (1, 2))]
-    if not piece or any(labels[at] != piece for at in whole):
-        raise ValueError("got holes that cut the plate apart, but the material must hold together")
-    return np.asarray(middle == piece)
