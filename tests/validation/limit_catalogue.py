@@ -11,26 +11,26 @@ import pandas as pd
 from warpimpact.campaign.doubts import nose_length
 from warpimpact.catalogue.catalogue import FOLDERS, HERE, file_name
 from warpimpact.catalogue.entries import Material
+from warpimpact.catalogue.strength import FIT, HEAVY, NINETY, Plates, limit_fit
 
-from .limit_model import HEAVY, Fit, Model
+from .limit_model import Fit, packaged
 from .limit_rows import PROJECTILES, Rows, core, published
 from .limit_splits import CARBIDE
 from .limit_velocities import PREDICTIONS, errors, stored_fit
 
 DATABASE = "ballistic limit database, Mendeley Data 10.17632/4f92y6jzzh.2"
 HARD, THIN = 450.0, 0.65
-"""Hardness of hard steel [HV], and calibres below which it fails otherwise."""
+"""Hardness of hard steel [HV], and calibres of a thin plate of it."""
 _APART = 1.25
 """The thicknesses between which an exponent is found differ at least by this ratio."""
 
 
 def entries(rows: Rows, found: Fit, predicted: pd.DataFrame) -> list[str]:
-    """The text of the file of every material."""
-    model = Model(rows, found.law).weighed(found.values)
-    return [_entry(rows, model, found, name, predicted) for name in dict.fromkeys(rows.material.tolist())]
+    """The text of the file of every material, from the fit that the package holds."""
+    return [_entry(rows, found, name, predicted) for name in dict.fromkeys(rows.material.tolist())]
 
 
-def _entry(rows: Rows, model: Model, found: Fit, name: str, predicted: pd.DataFrame) -> str:
+def _entry(rows: Rows, found: Fit, name: str, predicted: pd.DataFrame) -> str:
     own = rows[rows.material == name]
     counts = {one: int((own.projectile == one).sum()) for one in PROJECTILES if (own.projectile == one).any()}
     projectile = ".30 AP M2" if ".30 AP M2" in counts else max(counts, key=lambda one: counts[one])
@@ -38,11 +38,10 @@ def _entry(rows: Rows, model: Model, found: Fit, name: str, predicted: pd.DataFr
     low, high = of_it.calibres.min(), of_it.calibres.max()
     if high < _APART * low:
         low, high = np.sqrt(low * high / _APART), np.sqrt(low * high * _APART)
-    wanted = _plates(of_it, np.array([low, np.sqrt(low * high), high]))
-    mean, deviation = model.strength(found.values, wanted)
+    mean, deviation = limit_fit(name).predicted(_plates(of_it, np.array([low, np.sqrt(low * high), high])))
     exponent = (mean[2] - mean[0]) / np.log(high / low)
     strength = float(np.exp(mean[1] - exponent * np.log(np.sqrt(low * high))))
-    spread = float(np.exp(1.645 * deviation[1]))
+    spread = float(np.exp(NINETY * deviation[1]))
     left = predicted[predicted["material"] == name]
     split = "one row out" if (left["split"] == "one row out").any() else "one material out"
     miss = errors(left[left["split"] == split], ["material"]).iloc[0]
@@ -87,12 +86,10 @@ def figures(rows: Rows, predicted: pd.DataFrame) -> dict[str, dict[str, float]]:
     """Errors of what the model fails at, for the sentences of a campaign (warpimpact/campaign/doubts.py)."""
     error = predicted["predicted"] / predicted["published"] - 1.0
     of, steel = predicted["split"], rows.density[predicted["row"]] > HEAVY
-    hard = steel & (rows.hardness[predicted["row"]] >= HARD) & (rows.calibres[predicted["row"]] < THIN)
-    thin = error[(of == "one thickness out") & hard]
     in_steel, in_aluminium = (error[(of == CARBIDE) & which] for which in (steel, ~steel))
     found = {
         "nose": {"least": min(nose_length(core(name)) for name in PROJECTILES)},
-        "thin hard steel": {"calibres": THIN, "rows": len(thin), "bias": thin.median(), "most": thin.max()},
+        "thin hard steel": thin_hard_steel(rows),
         "carbide": {
             "steel": in_steel.median(),
             "steel rows": len(in_steel),
@@ -103,20 +100,37 @@ def figures(rows: Rows, predicted: pd.DataFrame) -> dict[str, dict[str, float]]:
     return {name: {key: round(float(value), 4) for key, value in one.items()} for name, one in found.items()}
 
 
-def _plates(some: Rows, calibres: np.ndarray) -> Rows:
-    """Plates of a material at normal incidence, of these thicknesses in diameters of the core."""
-    first = some[np.zeros(len(calibres), dtype=np.int64)]
-    changed = {
-        "thickness": calibres * first.diameter,
-        "obliquity": np.zeros(len(calibres)),
-        "bare": np.zeros(len(calibres), dtype=bool),
-        "flow_stress": np.full(len(calibres), some.flow_stress.mean()),
-    }
-    return Rows(**(vars(first) | changed))
+def thin_hard_steel(rows: Rows) -> dict[str, float]:
+    """Share of its Y at one calibre that hard steel has at the thickness of the thinnest row; the median of steels."""
+    thin = rows[(rows.density > HEAVY) & (rows.hardness >= HARD) & (rows.calibres < THIN)]
+    shares = []
+    for name in dict.fromkeys(thin.material.tolist()):
+        of_it = thin[thin.material == name]
+        mean, _ = limit_fit(name).predicted(_plates(of_it, np.array([thin.calibres.min(), 1.0])))
+        shares.append(float(np.exp(mean[0] - mean[1])))
+    return {"calibres": thin.calibres.min(), "materials": len(shares), "share": float(np.median(shares))}
+
+
+def _plates(rows: Rows, calibres: np.ndarray) -> Plates:
+    """Plates of the material of some rows at normal incidence, of these thicknesses in diameters of the core."""
+    count = len(calibres)
+    return Plates(
+        projectile=np.full(count, rows.projectile[0]),
+        bare=np.zeros(count, dtype=bool),
+        material=np.full(count, rows.material[0]),
+        source=np.full(count, "this plate"),
+        thickness=calibres * rows.diameter[0],
+        calibres=calibres,
+        obliquity=np.zeros(count),
+        density=np.full(count, rows.density[0]),
+        flow_stress=np.full(count, rows.flow_stress.mean()),
+        hardness=np.full(count, rows.hardness.mean()),
+    )
 
 
 def main() -> None:
     rows, predicted = published(), pd.read_csv(PREDICTIONS)
+    FIT.write_text(json.dumps(packaged(rows, stored_fit()), separators=(",", ":")) + "\n", encoding="utf-8")
     (HERE / "figures.json").write_text(json.dumps(figures(rows, predicted), indent=1) + "\n", encoding="utf-8")
     for text in entries(rows, stored_fit(), predicted):
         name = text.partition('"')[2].partition('"')[0]

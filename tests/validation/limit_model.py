@@ -11,6 +11,7 @@ decomposition.
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,28 +19,18 @@ from scipy.linalg import cho_factor, cho_solve
 from scipy.optimize import minimize
 from scipy.stats import t as student
 
-from .limit_rows import Array, Rows, joined, log_unit, unit
+from warpimpact.catalogue.strength import PART_SCALES, Plates, part_names, shared
 
-HEAVY = 5000.0
-"""Plate density that parts steel from aluminium [kg/m³]."""
-CONSTRAINT = 3.0
-"""Prior median of Y over flow stress: that of indentation (Tabor)."""
-TYPICAL = {True: (1500e6, 480.0), False: (350e6, 120.0)}
-"""Flow stress [Pa] and hardness [HV] of a usual steel and a usual aluminium."""
-PART_SCALES = {
-    "material": 0.15,
-    "projectile": 0.1,
-    "projectile in a material": 0.05,
-    "source": 0.04,
-    "angle in a material": 0.2,
-    "exponent in a material": 0.05,
-    "thickness": 0.05,
-    "test": 0.03,
-}
-"""Prior medians of the standard deviations of the parts of ln Y; each is lognormal with σ = 0.7."""
+from .limit_rows import Array, Rows, log_unit, unit
+
+METALS = ("steel", "aluminium")
+_STEP = 1e-4
+"""Over which derivatives by coefficients of a law are taken."""
+
 _OF_SCALES = 0.7
-_NEAR = 0.2
-"""Ratio of thicknesses, as a logarithm, over which rows of a plate share what the law misses."""
+"""Standard deviation of the logarithm of every size, a priori."""
+TEST = 0.03
+"""Prior median of the scatter of tests, in ln Y, of each metal."""
 UNMEASURED = 0.0115
 """Relative standard deviation of a row that has none: the median of those that have."""
 TAILS = 4.0
@@ -98,7 +89,7 @@ class Fit:
 
     @property
     def scales(self) -> dict[str, float]:
-        """Standard deviations of the parts of ln Y."""
+        """Standard deviations of the parts of ln Y, and of tests."""
         return dict(zip(names(self.law), np.exp(self.values).tolist(), strict=False))
 
     @property
@@ -108,8 +99,14 @@ class Fit:
 
 
 def names(law: Law) -> list[str]:
-    """The parts of ln Y in a law whose size is fitted."""
-    return [name for name in PART_SCALES if law.exponent or name != "exponent in a material"]
+    """The parts of ln Y in a law whose size is fitted; the scatter of tests comes last."""
+    return [*part_names(by_thickness=law.exponent), *(f"test, {metal}" for metal in METALS)]
+
+
+def medians(law: Law) -> Array:
+    """Logarithms of the prior medians of `names`."""
+    scales = [PART_SCALES.get(name.rpartition(", ")[0], TEST) for name in names(law)]
+    return np.asarray(np.log(scales))
 
 
 def coefficients(law: Law, values: Array) -> dict[str, float]:
@@ -121,12 +118,13 @@ def coefficients(law: Law, values: Array) -> dict[str, float]:
 
 @dataclass
 class Model:
-    """Rows under a law: covariances of the parts of ln Y, shape [rows, rows] each.
+    """Rows under a law.
 
     Attributes:
         rows: what was measured.
         law: the law.
         weights: of rows, below 1 where a row lies far outside.
+        fixed, parts: what rows share (`strength.shared`), shape [rows, rows] each.
     """
 
     rows: Rows
@@ -137,32 +135,10 @@ class Model:
         rows = self.rows
         self.nodes = unit(rows, self.law.onset)
         self.weights = np.ones(len(rows)) if not len(self.weights) else self.weights
-        steel = rows.density > HEAVY
-        flow, hardness = (_mean_of(rows.material, values) for values in (rows.flow_stress, rows.hardness))
-        usual = np.array([TYPICAL[bool(one)] for one in steel]).T
-        self.expected = np.log(CONSTRAINT * flow)
-        excess = np.log(flow / usual[0])
-        harder = np.log(hardness / usual[1]) - excess
-        metal, material = _same(steel), _same(rows.material)
-        angle, size = -np.log(np.cos(rows.obliquity)), np.log(rows.calibres)
-        self.basis = {"usual": steel, "excess": excess, "harder": harder, "size": size, "angle": angle}
-        bare = rows.bare.astype(float)
-        self.fixed = metal * (0.5**2 + 0.3**2 * (np.outer(excess, excess) + np.outer(harder, harder)))
-        self.fixed += 0.3**2 * metal * np.outer(angle, angle) + 0.1**2 * np.outer(bare, bare)
-        if self.law.exponent:
-            self.fixed += 0.2**2 * metal * np.outer(size, size)
-        plate = material * _same(rows.projectile)
-        near = np.subtract.outer(np.log(rows.thickness), np.log(rows.thickness)) / _NEAR
-        parts = {
-            "material": material,
-            "projectile": _same(rows.projectile) * metal,
-            "projectile in a material": plate,
-            "source": _same(rows.source),
-            "angle in a material": material * np.outer(angle, angle),
-            "exponent in a material": material * np.outer(size - 1.0, size - 1.0),
-            "thickness": plate * _same(rows.obliquity.round(3)) * np.exp(-0.5 * near**2),
-        }
-        self.parts = {name: parts[name] for name in names(self.law) if name in parts}
+        plates = plates_of(rows)
+        self.expected = plates.expected
+        self.fixed, self.parts = shared(plates, plates, by_thickness=self.law.exponent)
+        self.of_metal = {"steel": plates.steel, "aluminium": ~plates.steel}
         relative = rows.deviation / rows.velocity
         self.measured = (2.0 * np.where(np.isfinite(relative), relative, UNMEASURED)) ** 2
 
@@ -175,45 +151,54 @@ class Model:
 
     def noise(self, values: Array) -> Array:
         """Variance of ln Y that a single row has of its own, shape [rows]."""
-        return np.asarray(self.measured + np.exp(2.0 * values[names(self.law).index("test")]))
+        total = self.measured.copy()
+        for place, metal in enumerate(METALS, start=len(self.parts)):
+            total += np.exp(2.0 * values[place]) * self.of_metal[metal]
+        return total
 
     def signal(self, values: Array) -> Array:
         """Covariance of ln Y without the noise, shape [rows, rows]."""
-        found = self.fixed.copy()
-        for name, part in self.parts.items():
-            found += np.exp(2.0 * values[names(self.law).index(name)]) * part
-        return found
-
-    def strength(self, values: Array, wanted: Rows) -> tuple[Array, Array]:
-        """Mean and standard deviation of ln Y of some plates of these materials, without what a source and a single
-        thickness add, of each shape [wanted]."""
-        count = len(self.rows)
-        both = Model(joined(self.rows, wanted), self.law)
-        shared = both.fixed.copy()
-        for name, part in both.parts.items():
-            if name not in ("thickness", "source"):
-                shared += np.exp(2.0 * values[names(self.law).index(name)]) * part
-        known = self.signal(values) + np.diag(self.noise(values) / self.weights)
-        factor, across = cho_factor(known, lower=True), shared[count:, :count]
-        mean = both.expected[count:] + across @ cho_solve(factor, self.residual(values))
-        left = np.diag(shared)[count:] - (across * cho_solve(factor, across.T).T).sum(axis=1)
-        return mean, np.sqrt(left)
+        total = self.fixed.copy()
+        for part, value in zip(self.parts.values(), values, strict=False):
+            total += np.exp(2.0 * value) * part
+        return total
 
     def log_posterior(self, values: Array) -> float:
         """Logarithm of marginal likelihood and prior."""
-        count = len(names(self.law))
-        medians = np.log([PART_SCALES[name] for name in names(self.law)])
-        prior = -0.5 * (((values[:count] - medians) / _OF_SCALES) ** 2).sum()
-        for name, value in zip(self.law.free, values[count:], strict=True):
-            mean, spread = COEFFICIENTS[name]
-            prior -= 0.5 * ((value - mean) / spread) ** 2
-        if (values[:count] < -9.0).any() or (values[:count] > 1.0).any():
+        means, spreads = self._prior()
+        sizes = values[: len(self.parts) + len(METALS)]
+        if (sizes < -9.0).any() or (sizes > 1.0).any():
             return -1e10
+        factor = cho_factor(self.signal(values) + np.diag(self.noise(values) / self.weights), lower=True)
+        residual = self.residual(values)
+        likelihood = -np.log(np.diag(factor[0])).sum() - 0.5 * residual @ cho_solve(factor, residual)
+        prior = -0.5 * (((values - means) / spreads) ** 2).sum()
+        return float(prior + likelihood - 0.5 * len(residual) * np.log(2.0 * np.pi))
+
+    def gradient(self, values: Array) -> Array:
+        """Derivatives of `log_posterior` by the values."""
+        means, spreads = self._prior()
+        sizes = values[: len(self.parts) + len(METALS)]
+        if (sizes < -9.0).any() or (sizes > 1.0).any():
+            return np.zeros(len(values))
         covariance = self.signal(values) + np.diag(self.noise(values) / self.weights)
-        factor = cho_factor(covariance, lower=True)
-        y = self.residual(values)
-        likelihood = -np.log(np.diag(factor[0])).sum() - 0.5 * y @ cho_solve(factor, y)
-        return float(prior + likelihood - 0.5 * len(y) * np.log(2.0 * np.pi))
+        residual, precision = self.residual(values), np.linalg.inv(covariance)
+        pulled = precision @ residual
+        by_covariance = 0.5 * (np.outer(pulled, pulled) - precision)
+        slopes = [2.0 * np.exp(2.0 * v) * (by_covariance * part).sum() for v, part in zip(values, self.parts.values())]  # noqa: B905
+        for metal, value in zip(METALS, values[len(self.parts) :], strict=False):
+            own = np.diag(by_covariance) * self.of_metal[metal] / self.weights
+            slopes.append(2.0 * np.exp(2.0 * value) * own.sum())
+        for place in range(len(slopes), len(values)):
+            moved = values + _STEP * (np.arange(len(values)) == place)
+            slopes.append(-pulled @ (self.residual(moved) - residual) / _STEP)
+        return np.asarray(slopes) - (values - means) / spreads**2
+
+    def _prior(self) -> tuple[Array, Array]:
+        """Means and standard deviations of the values."""
+        scales, of_law = medians(self.law), [COEFFICIENTS[name] for name in self.law.free]
+        means = np.concatenate([scales, [mean for mean, _ in of_law]])
+        return means, np.concatenate([np.full(len(scales), _OF_SCALES), [spread for _, spread in of_law]])
 
     def weighed(self, values: Array) -> Model:
         """The same with the weights that Student's tails give its rows, each seen from all others."""
@@ -253,22 +238,41 @@ class Model:
         return np.exp(middle), np.exp(middle - half), np.exp(middle + half)
 
 
-def fit(rows: Rows, law: Law = CHOSEN, *, rounds: int = 2) -> Fit:
+def fit(rows: Rows, law: Law = CHOSEN, *, rounds: int = 3) -> Fit:
     """Find the most probable sizes of the parts and coefficients of a law; rows that lie far outside count less."""
-    start = np.log([PART_SCALES[name] for name in names(law)])
-    values = np.concatenate([start, [COEFFICIENTS[name][0] for name in law.free]])
     model = Model(rows, law)
+    values = model._prior()[0]
     for turn in range(rounds):
-        options = {"maxiter": 25 if turn < rounds - 1 else 60}
-        found = minimize(lambda at, model=model: -model.log_posterior(at), values, method="L-BFGS-B", options=options)
-        values = found.x
+
+        def cost(at: Array, model: Model = model) -> tuple[float, Array]:
+            return -model.log_posterior(at), -model.gradient(at)
+
+        values = minimize(cost, values, jac=True, method="L-BFGS-B", options={"maxiter": 80}).x
         if turn < rounds - 1:
             model = model.weighed(values)
     return Fit(law, values, model.log_posterior(values))
 
 
-def _same(labels: NDArray[np.generic]) -> Array:
-    return (labels[:, None] == labels[None, :]).astype(float)
+def plates_of(rows: Rows) -> Plates:
+    """The plates of rows; flow stress and hardness are the means of their material."""
+    flow, hardness = (_mean_of(rows.material, values) for values in (rows.flow_stress, rows.hardness))
+    names = ("projectile", "bare", "material", "source", "thickness", "calibres", "obliquity", "density")
+    return Plates(**{name: getattr(rows, name) for name in names}, flow_stress=flow, hardness=hardness)
+
+
+def packaged(rows: Rows, found: Fit) -> dict[str, Any]:
+    """What the package holds of a fit (`strength.limit_fit`)."""
+    model = Model(rows, found.law).weighed(found.values)
+    columns: dict[str, list[Any]] = {name: values.tolist() for name, values in vars(plates_of(rows)).items()}
+    columns["residual"] = model.residual(found.values).tolist()
+    columns["noise"] = (model.noise(found.values) / model.weights).tolist()
+    rounded = {
+        name: [float(f"{value:.7g}") if isinstance(value, float) else value for value in values]
+        for name, values in columns.items()
+    }
+    sizes = {name: float(f"{size:.6g}") for name, size in found.scales.items()}
+    test = {metal: float(f"{np.hypot(sizes.pop(f'test, {metal}'), 2.0 * UNMEASURED):.4g}") for metal in METALS}
+    return {"sizes": sizes, "test": test, "rows": rounded}
 
 
 def _mean_of(labels: NDArray[np.str_], values: Array) -> Array:

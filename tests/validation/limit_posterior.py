@@ -15,7 +15,7 @@ import xarray
 from .limit_model import CHOSEN, Fit, Model, fit, names
 from .limit_rows import Array, Rows, published
 
-ENSEMBLES, WALKERS, STEPS, BURNT, DRAWS = 2, 24, 700, 200, 250
+ENSEMBLES, WALKERS, STEPS, BURNT, DRAWS = 2, 48, 700, 200, 250
 """Ensembles that know nothing of each other; their walkers and steps; steps that are left out; draws that are kept of
 each ensemble."""
 _STEP = 0.05

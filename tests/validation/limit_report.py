@@ -8,7 +8,7 @@ import numpy as np
 import pandas as pd
 from matplotlib.figure import Figure
 
-from .limit_model import CHOSEN, Fit
+from .limit_model import CHOSEN, METALS, Fit
 from .limit_rows import PROJECTILES, STORED, Rows
 from .limit_splits import CARBIDE, LAW, RIVALS
 from .limit_velocities import PREDICTIONS, SUMMARY, errors
@@ -126,8 +126,12 @@ def _laws(summary: dict[str, Any]) -> str:
 
 def _parts(summary: dict[str, Any]) -> str:
     parts = summary["fits"][CHOSEN.name]["parts"]
-    lines = ["| part of ln Y | standard deviation, % of the limit velocity |", "|---|---|"]
-    return "\n".join([*lines, *(f"| {name} | {50 * size:.1f} |" for name, size in parts.items())])
+    names = dict.fromkeys(name.rpartition(", ")[0] for name in parts)
+    lines = ["| part of ln Y | steel, % of the limit velocity | aluminium |", "|---|---|---|"]
+    for name in names:
+        cells = (f"{50 * parts[of]:.1f}" if (of := f"{name}, {metal}") in parts else "-" for metal in METALS)
+        lines.append(f"| {name} | {' | '.join(cells)} |")
+    return "\n".join(lines)
 
 
 def with_tables(page: str, parts: dict[str, str]) -> str:

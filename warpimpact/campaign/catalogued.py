@@ -11,11 +11,12 @@ from pydantic import TypeAdapter, ValidationError
 from ..catalogue.catalogue import Catalogue
 from ..catalogue.entries import Material, Threat, Velocity
 from ..scene import AnyCore, Core, Layer, Plate
-from ..scene.units import quoted
+from ..scene.units import Obliquity, quoted
 from .text import CampaignError
 
 _Table = dict[str, Any]
 _CORE: TypeAdapter[Core] = TypeAdapter(AnyCore)
+_OBLIQUITY: TypeAdapter[float] = TypeAdapter(Obliquity)
 _OF_ANY_CORE = set(Core.model_fields)
 _LAW = ("linear", "quadratic", "onset")
 """Keys of [interaction] that belong to a material."""
@@ -136,7 +137,7 @@ def with_materials(data: _Table, catalogue: Catalogue, name: str) -> _Table:
         except ValueError as error:
             raise CampaignError(f"{name}: {place}.material: {error}") from None
         found[place] = material
-        own = plate_of(material, table, calibres(data, {"density": material.density} | table))
+        own = plate_of(material, table, _resistance(data, material, table, catalogue))
         if number is None:
             resolved[key] = own
         else:
@@ -157,29 +158,29 @@ def _plates(data: Mapping[str, Any]) -> Iterator[tuple[str, str, int | None, _Ta
             yield f"layer[{k}]", "layer", k, layer
 
 
-def plate_of(material: Material, given: Mapping[str, Any], thickness: float | None) -> _Table:
-    """The table of a plate of a material, under the keys that are given.
-
-    Args:
-        thickness: of the plate in diameters of the core; None where it is not known.
-    """
+def plate_of(material: Material, given: Mapping[str, Any], resistance: float) -> _Table:
+    """The table of a plate of a material, under the keys that are given."""
     base = {
-        "resistance": material.resistance_at(1.0 if thickness is None else thickness),
+        "resistance": resistance,
         "shear_coefficient": material.shear_coefficient,
         "density": material.density,
     }
     return base | dict(given)
 
 
-def calibres(data: Mapping[str, Any], plate: Mapping[str, Any]) -> float | None:
-    """Thickness of a plate in diameters of the core; None if something of either is not valid."""
-    solid = {key: value for key, value in plate.items() if key != "pattern" or "areal_density" in plate}
+def _resistance(data: Mapping[str, Any], material: Material, plate: Mapping[str, Any], catalogue: Catalogue) -> float:
+    """Y of a plate of a material [Pa]; that of the entry if something of core, plate or shot is not valid, which the
+    validation of the whole campaign says better."""
+    keys = {key: value for key, value in plate.items() if key != "pattern" or "areal_density" in plate}
+    impact = data.get("impact", {})
     try:
         core = _CORE.validate_python(data.get("core"))
         model = Layer if {"gap", "offset"} & set(plate) else Plate
-        return calibres_of(core, model.model_validate({"resistance": 1.0} | solid))
+        shot = model.model_validate({"resistance": 1.0, "density": material.density} | keys)
+        obliquity = _OBLIQUITY.validate_python(impact.get("obliquity", 0.0) if isinstance(impact, dict) else 0.0)
     except ValidationError:
-        return None  # which the validation of the whole campaign says better
+        return material.resistance
+    return catalogue.resistance(material, core, shot.thickness, obliquity).median
 
 
 def calibres_of(core: Core, plate: Plate) -> float:

@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING
 
 from ..catalogue.catalogue import Catalogue
 from ..catalogue.entries import Material, Threat
+from ..catalogue.strength import NINETY
 from ..results.attributes import NOT_TESTED
 from ..scene import Core, Plate
-from .catalogued import calibres_of
 from .doubts import doubts_of
 
 if TYPE_CHECKING:
@@ -28,6 +28,25 @@ def evidence_of(campaign: Campaign) -> list[str]:
         if plate.material is not None:
             lines.append(_of_material(campaign, place, plate, catalogue))
     return lines + [f"{NOT_TESTED}{doubt}" for doubt in dict.fromkeys(doubts_of(campaign, catalogue.all(Material)))]
+
+
+def limit_velocity_factors(campaign: Campaign) -> tuple[float, float] | None:
+    """Ends of the 90 % interval of a limit velocity, over the velocity: what the published rows leave open of the
+    resistance, and the scatter of a test.
+
+    It holds where the limit velocity goes with the root of Y: a solid plate of a material, which does not weaken, and
+    whose resistance does not depend on the velocity. None elsewhere.
+    """
+    plate, law, catalogue = campaign.plate, campaign.interaction, Catalogue.of(campaign.catalogue)
+    material = catalogue.all(Material).get(str(plate.material))
+    alone = not campaign.layer and plate == plate.solid and plate.degradation == 1.0
+    if material is None or not alone or law.linear or law.quadratic:
+        return None
+    known = catalogue.resistance(material, campaign.core, plate.thickness, campaign.impact.obliquity)
+    if not known.deviation or not _same(plate.resistance, known.median):
+        return None
+    factor = math.exp(0.5 * NINETY * math.hypot(known.deviation, known.test))
+    return 1.0 / factor, factor
 
 
 def _of_threat(core: Core, catalogue: Catalogue) -> str:
@@ -54,16 +73,21 @@ def _of_material(campaign: Campaign, place: str, plate: Plate, catalogue: Catalo
     material = catalogue.all(Material).get(str(plate.material))
     if material is None:
         return f"{place}: {plate.material}, which is not in the catalogue"
-    resistance = material.resistance_at(calibres_of(campaign.core, plate))
+    known = catalogue.resistance(material, campaign.core, plate.thickness, campaign.impact.obliquity)
     expected = {
-        "resistance": (plate.resistance, resistance),
+        "resistance": (plate.resistance, known.median),
         "shear_coefficient": (plate.shear_coefficient, material.shear_coefficient),
         "density": (plate.density, material.density),
         **{name: (getattr(campaign.interaction, name), getattr(material, name)) for name in ("linear", "quadratic")},
         "onset": (campaign.interaction.onset, material.onset),
     }
     own = [name for name, pair in expected.items() if not _same(*pair)]
-    return f"{place}: {material.name}{_own(own)}, Y {plate.resistance / 1e9:.3g} GPa ({material.evidence})"
+    interval = "" if "resistance" in own or not known.deviation else _interval(*known.ends)
+    return f"{place}: {material.name}{_own(own)}, Y {plate.resistance / 1e9:.3g} GPa{interval} ({material.evidence})"
+
+
+def _interval(low: float, high: float) -> str:
+    return f", {low / 1e9:.3g} to {high / 1e9:.3g} with 90 %"
 
 
 def _own(names: list[str]) -> str:

@@ -14,6 +14,8 @@ from typing import Any, NoReturn, TypeVar
 from pydantic import ValidationError
 
 from warpimpact.catalogue.entries import Material, Threat, reason
+from warpimpact.catalogue.strength import Resistance, resistance_of
+from warpimpact.scene import Core
 from warpimpact.scene.toml_text import parsed, read_text
 from warpimpact.scene.units import quoted
 
@@ -64,6 +66,23 @@ class Catalogue:
             ValueError: there is none of that name.
         """
         return self._found(Material, name)
+
+    def resistance(self, material: Material, core: Core, thickness: float, obliquity: float) -> Resistance:
+        """What is known of the resistance of a plate of a material against a core.
+
+        Args:
+            thickness, obliquity: of the plate [m], and of the shot [rad].
+        """
+        diameter = 2.0 * core.max_radius
+        if self.is_own(material):
+            return material.resistance_at(thickness / diameter)
+        return resistance_of(
+            material.name, projectile=core.threat, diameter=diameter, thickness=thickness, obliquity=obliquity
+        )
+
+    def is_own(self, material: Material) -> bool:
+        """Whether a material is of the user's file, so that its own numbers are all that is known."""
+        return material.name in self.own.get(Material, {})
 
     def entry(self, name: str) -> Threat | Material:
         """A threat or a material.

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import math
+from collections import Counter
 from collections.abc import Iterator
 
 import numpy as np
 
 from warpimpact.catalogue.catalogue import Catalogue
 from warpimpact.catalogue.entries import Material, Threat
+from warpimpact.catalogue.strength import limit_fit, resistance_of
 from warpimpact.scene import Core
 from warpimpact.view.view import Column, Section, Table, labelled
 
@@ -49,8 +51,12 @@ def threat_view(threat: Threat) -> list[Section]:
     return [Section([*picture, labelled([*rows, *_sources(threat.known, threat.assumed)])], threat.name)]
 
 
-def material_view(material: Material) -> list[Section]:
-    """A material: its strength and law with their uncertainty, the rows that they come from, and its evidence."""
+def material_view(material: Material, *, is_own: bool = False) -> list[Section]:
+    """A material: its strength and law with their uncertainty, the rows that they come from, and its evidence.
+
+    Args:
+        is_own: whether it is of a user's file, whose numbers are all that is known.
+    """
     law = (
         f"Y = {material.resistance / 1e9:.3g} GPa · (h / d)^{material.thickness_exponent:.3g}, "
         f"η = {material.shear_coefficient:g}, B = {material.quadratic:g}, C = {material.linear:g}, "
@@ -60,6 +66,7 @@ def material_view(material: Material) -> list[Section]:
     if material.resistance_low is not None and material.resistance_high is not None:
         low, high = material.resistance_low / 1e9, material.resistance_high / 1e9
         rows.append(("Y, 90 %", f"{low:.3g} to {high:.3g} GPa, of a plate one calibre thick"))
+    rows += [] if is_own else _predicted(material)
     if material.hardness is not None:
         rows.append(("hardness", f"{material.hardness:g} HV"))
     rows += _rows(material)
@@ -92,6 +99,29 @@ def _core(threat: Threat, core: Core) -> Iterator[tuple[str, str]]:
     yield "centre of mass", f"{_MM * own.centre_of_mass:.4g} mm behind the nose"
     inertia = f"axial {own.inertia_axial:.4g} kg m², transverse {own.inertia_transverse:.4g} kg m²"
     yield "moments of inertia", inertia
+
+
+def _predicted(material: Material) -> Iterator[tuple[str, str]]:
+    """Y against each projectile with rows, at the ends of their thicknesses, at the angle of most of them."""
+    rows = limit_fit(material.name).rows
+    for projectile in material.rows:
+        of_it = (rows.material == material.name) & (rows.projectile == projectile)
+        thickness, calibres, angles = rows.thickness[of_it], rows.calibres[of_it], rows.obliquity[of_it]
+        obliquity = Counter(angles.tolist()).most_common(1)[0][0]
+        parts = []
+        for place in dict.fromkeys((int(thickness.argmin()), int(thickness.argmax()))):
+            known = resistance_of(
+                material.name,
+                projectile=projectile,
+                diameter=thickness[place] / calibres[place],
+                thickness=thickness[place],
+                obliquity=obliquity,
+            )
+            low, high = (end / 1e9 for end in known.ends)
+            parts.append(
+                f"{known.median / 1e9:.3g} GPa ({low:.3g} to {high:.3g}, 90 %) of {_MM * thickness[place]:.4g} mm"
+            )
+        yield f"Y, {projectile}", f"{'; '.join(parts)}, at {math.degrees(obliquity):.3g}°"
 
 
 def _rows(material: Material) -> Iterator[tuple[str, str]]:

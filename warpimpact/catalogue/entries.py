@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import math
 from functools import cached_property
 from typing import Annotated, Any, Self
 
 from pydantic import Field, TypeAdapter, ValidationError, model_validator
 
+from warpimpact.catalogue.strength import NINETY, Resistance
 from warpimpact.scene import AnyCore, Core
 from warpimpact.scene.model import Model
 from warpimpact.scene.units import (
@@ -95,7 +97,9 @@ class Threat(Model):
 class Material(Model):
     """A material of plates, with the law that its strength was found with.
 
-    The law of resistance is Y·(h / d)^thickness_exponent: h is the thickness, d the largest diameter of the core.
+    The resistance of a material of the package follows from all published rows (`Catalogue.resistance`); here it stands
+    in short: for one projectile at normal incidence, Y·(h / d)^thickness_exponent, with the thickness h and the largest
+    diameter d of the core. The resistance of a material of a user's file is just that.
 
     Attributes:
         name: as `[plate] material` gives it.
@@ -139,9 +143,12 @@ class Material(Model):
     known: dict[str, Title] = Field(default_factory=dict)
     assumed: dict[str, Title] = Field(default_factory=dict)
 
-    def resistance_at(self, calibres: float) -> float:
-        """Y of a plate so many diameters of the core thick [Pa]."""
-        return float(self.resistance * calibres**self.thickness_exponent)
+    def resistance_at(self, calibres: float) -> Resistance:
+        """Resistance of a plate by the numbers of the entry alone, with its thickness in diameters of the core."""
+        median = float(self.resistance * calibres**self.thickness_exponent)
+        if self.resistance_low is None or self.resistance_high is None:
+            return Resistance(median)
+        return Resistance(median, math.log(self.resistance_high / self.resistance_low) / (2.0 * NINETY))
 
     @property
     def count(self) -> int:

@@ -27,7 +27,7 @@ def _catalogue(arguments: argparse.Namespace) -> None:
     from warpimpact.campaign.text import CampaignError
     from warpimpact.catalogue.catalogue import Catalogue
     from warpimpact.catalogue.catalogue_view import catalogue_view, material_view, threat_view
-    from warpimpact.catalogue.entries import Threat
+    from warpimpact.catalogue.entries import Material, Threat
     from warpimpact.view.view import text_of
 
     try:
@@ -41,7 +41,9 @@ def _catalogue(arguments: argparse.Namespace) -> None:
     if entry is None:
         print(text_of(catalogue_view(catalogue)))
     else:
-        print(text_of(threat_view(entry) if isinstance(entry, Threat) else material_view(entry)))
+        own = isinstance(entry, Material) and catalogue.is_own(entry)
+        view = threat_view(entry) if isinstance(entry, Threat) else material_view(entry, is_own=own)
+        print(text_of(view))
     if arguments.output and core is not None and entry is not None:
         from warpimpact.plotting.core import core_figure
 

@@ -155,6 +155,8 @@ SOLID_LIMIT_HIGHEST = _declared("solid_limit_highest", "number")
 LIMIT_TOLERANCE = _declared("limit_tolerance", "number")
 LIMIT_HIGHEST = _declared("limit_highest", "number")
 LIMIT_ERROR = _declared("limit_error", "number")
+LIMIT_FACTORS = _declared("limit_material_factors", "pair", "1")
+"""Ends of the 90 % interval of a limit velocity over the velocity, by what is known of the material."""
 """Of a limit velocity [m/s] or of a limit thickness [m]."""
 
 # A replayed hit

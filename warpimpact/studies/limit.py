@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from warpimpact.analysis.survival import by_draws, over_draws
 from warpimpact.campaign.campaign import Campaign
+from warpimpact.campaign.evidence import limit_velocity_factors
 from warpimpact.campaign.text import CampaignError
 from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
@@ -126,6 +127,8 @@ class LimitMap:
             attr.LIMIT_TOLERANCE: sought.tolerance,
             attr.LIMIT_HIGHEST: sought.highest,
         }
+        if sought.quantity == "velocity" and (factors := limit_velocity_factors(campaign)) is not None:
+            attributes[attr.LIMIT_FACTORS] = list(factors)
         beside = finer_hits(campaign, found, limits_pilot_size(campaign.numerics.asked))
         if task.solid is not None:
             solid, of_solid = self._at_solid(campaign, task.solid, numerics, worker)

@@ -38,7 +38,7 @@ def limit_view(dataset: xarray.Dataset) -> list[Section]:
     return [
         *([Section([_hits(dataset)]), *_proxies(dataset)] if short else [Section([_quantiles(dataset)])]),
         *published_view(dataset),
-        Section([*_left_out(dataset), *_solid(dataset), *_costs(dataset)]),
+        Section([*_left_out(dataset), *_expected(dataset), *_solid(dataset), *_costs(dataset)]),
     ]
 
 
@@ -81,6 +81,19 @@ def _left_out(dataset: xarray.Dataset) -> Iterator[str]:
         yield f"{missed} hits touch no material"
     if open_ := int((converged == 0).sum()) - failed:
         yield f"{open_} hits were not found to {factor * attributes[attr.LIMIT_TOLERANCE]:g} {unit} in {MOST_RUNS} runs"
+
+
+def _expected(dataset: xarray.Dataset) -> Iterator[str]:
+    """Where a test would find the limit velocity, by what is known of the material; nothing where that is not known."""
+    value = dataset[v.LIMITS[dataset.attrs[attr.LIMIT]].value].values
+    if attr.LIMIT_FACTORS not in dataset.attrs or not np.isfinite(value).any():
+        return
+    middle = float(np.median(value[np.isfinite(value)]))
+    low, high = (middle * float(factor) for factor in dataset.attrs[attr.LIMIT_FACTORS])
+    yield (
+        f"a test of this material is expected between {low:.4g} and {high:.4g} m/s (90 %): Y is not better known, and "
+        "tests scatter"
+    )
 
 
 def _costs(dataset: xarray.Dataset) -> Iterator[str]:

@@ -64,3 +64,24 @@ def test_the_command_lists_shows_and_draws(tmp_path: Path, capsys: pytest.Captur
     assert (tmp_path / "core.png").stat().st_size > 10_000
     assert main(["catalogue", "7.62x39 API BZ", "-o", str(tmp_path / "no.png")]) == 2
     assert main(["catalogue", "P80"]) == 2
+
+
+def test_limit_tells_where_a_test_is_expected(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    campaign = tmp_path / "hha.toml"
+    changes = {
+        'catalogue = "own.toml"\n': "",
+        "7.62x51 P80 AP": ".30 AP M2",
+        '"own steel", thickness = "20 mm"': '"HHA Class 1", thickness = "6 mm"',
+        "count = 4": "count = 1",
+    }
+    text = CAMPAIGN
+    for old, new in changes.items():
+        text = text.replace(old, new)
+    campaign.write_text(text, encoding="utf-8")
+    assert main(["limit", str(campaign), "-o", str(tmp_path / "limit.nc"), "--device", "cpu"]) == 0
+    (line,) = (line for line in capsys.readouterr().out.splitlines() if "a test of this material" in line)
+    low, high = (float(word) for word in line.split() if word.replace(".", "").isdigit())
+    dataset = files.read(tmp_path / "limit.nc")
+    factors = dataset.attrs[attr.LIMIT_FACTORS]
+    value = float(dataset["limit_velocity"].item())
+    assert (low, high) == pytest.approx((value * factors[0], value * factors[1]), rel=1e-3)
