@@ -33,7 +33,6 @@ FEWER = {
     "run": ["--count", "128"],
     "compare": ["--count", "128"],
     "report": ["--trajectories", "1"],
-    "study": ["--hits", "2"],
 }
 
 

@@ -17,7 +17,6 @@ import time
 import warnings
 from collections.abc import Collection, Iterator, Sequence
 from pathlib import Path
-from unittest.mock import patch
 
 from altered_files import NOTHING, altered_files
 from matplotlib.figure import Figure
@@ -82,7 +81,6 @@ COMMANDS: dict[str, Sequence[Sequence[str]]] = {
     "limits": (*_MAP[:4], (*_TEST, "limits.toml")),
     "history": (("export", "altered.nc", "-o", "vtk"), ("inspect", "altered.nc")),
     "sweep": ((*_TEST, "sweep.toml"), ("inspect", "altered.nc")),
-    "study": (("report", "result.nc", "--study", "altered.nc", "--trajectories", "0", *_REPORT[2:]),),
     "posterior": (_REPORT, ("run", "drawn.toml", "--posterior", "altered.nc", "-o", "d.nc", "--overwrite")),
     "front": (_REPORT, ("design", "altered.nc", "--no-browser", "--port", "70000")),
     "firing": (("inspect", "altered.nc"), ("report", "altered.nc", "-o", "a.html", "--overwrite")),
@@ -101,9 +99,6 @@ def write_files(folder: Path) -> None:
     from warpimpact.runs.replay import replay
     from warpimpact.runs.run import run, run_to_file
     from warpimpact.runs.team import local_team
-    from warpimpact.scene import Numerics
-    from warpimpact.solver.resolution import Level
-    from warpimpact.studies import accuracy
     from warpimpact.studies.limit import LimitMap
     from warpimpact.studies.sweep import read_sweep, run_sweep
 
@@ -114,11 +109,6 @@ def write_files(folder: Path) -> None:
     run_to_file(plate, folder / "limits.nc", team=local_team(plate, "cpu", LimitMap.of(plate)))
     (folder / "sweep_campaign.toml").write_text(FIXED + TARGET + SWEEP)
     run_sweep(read_sweep(folder / "sweep_campaign.toml"), folder / "sweep.nc", device="cpu")
-    settings = {name: Numerics(level=level) for level, name in enumerate(("level 0", "level 1"))}
-    levels = (Level(8, 16, 1.0, 0.8), Level(16, 32, 2.0, 0.4))
-    with patch.multiple(accuracy, MEASURED_TIME=0.0, SHORTEST_RUN=0.0, SINGLES=0.0):
-        measured = accuracy.study(plate, hits=16, device="cpu", settings=settings, levels=levels)
-    files.write(measured, folder / "study.nc")
     fit = (Path(__file__).parents[1] / "validation" / "calibration.toml").read_text(encoding="utf-8")
     small = fit.replace("[sampling]\nhits = 64", "[sampling]\nsets = 128\ndraws = 50\neffective = 60\nhits = 32")
     identify_to_file(fit_from(small, "fit.toml", Path()), folder / "posterior.nc", device="cpu")

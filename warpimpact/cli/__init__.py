@@ -14,7 +14,6 @@ from typing import NoReturn
 from warpimpact import __version__
 from warpimpact.results.interrupts import terminated_as_interrupted
 
-from .accuracy import add_study, add_validate
 from .catalogue import add_catalogue
 from .compare import add_compare
 from .design import add_design
@@ -31,6 +30,7 @@ from .run import add_run
 from .show import add_inspect, add_plate, add_plot
 from .start import add_examples, add_new, add_schema
 from .sweep import add_sweep
+from .validate import add_validate
 
 _COMMANDS = (
     add_examples,
@@ -47,7 +47,6 @@ _COMMANDS = (
     add_replay,
     add_export,
     add_report,
-    add_study,
     add_validate,
     add_identify,
     add_optimise,

@@ -96,7 +96,6 @@ def add_report(commands: Commands) -> None:
         metavar="N",
         help="number of hits to replay per result: the worst hits, and others spread evenly (default: 32)",
     )
-    parser.add_argument("--study", type=Path, metavar="STUDY.nc", help="accuracy to show, written by warpimpact study")
     add_campaign_folder(parser, "folder of the files that the campaigns name (default: the folder of each result)")
     add_overwrite(parser, "an existing report")
 
@@ -119,7 +118,6 @@ def _report(arguments: argparse.Namespace) -> None:
     by_name = named(paths)
     with ExitStack() as stack:
         datasets = {name: stack.enter_context(files.opened(path)) for name, path in by_name.items()}
-        study = files.read_study(arguments.study) if arguments.study else None
         progress = stack.enter_context(show_count())
         with folder_told(", or --trajectories 0, which needs none of them"):
             write_report(
@@ -127,7 +125,6 @@ def _report(arguments: argparse.Namespace) -> None:
                 output,
                 folders={name: arguments.campaign_folder or path.parent for name, path in by_name.items()},
                 trajectories=arguments.trajectories,
-                study=study,
                 progress=progress,
             )
     print(output)

@@ -20,7 +20,6 @@ from warpimpact.plotting.maps import (
     variable_maps,
 )
 from warpimpact.plotting.plate import plate_figure
-from warpimpact.plotting.study import study_figure
 from warpimpact.plotting.trajectory import course, flight, largest_load, passage
 from warpimpact.plotting.weight import weight_figure
 
@@ -44,7 +43,6 @@ __all__ = [
     "save_beside",
     "save_maps",
     "status_map",
-    "study_figure",
     "uncertainty",
     "variable_map",
     "variable_maps",

@@ -22,7 +22,7 @@ from plotly.offline import get_plotlyjs
 
 import warpimpact
 from warpimpact.report.hits import MOST_HITS, page_data, thinned, trajectory_data, worst_and_spread
-from warpimpact.report.words import compared, conclusion, result_content, study_table
+from warpimpact.report.words import compared, conclusion, result_content
 from warpimpact.results import variables as v
 from warpimpact.results.dataset import hit_numbers
 from warpimpact.results.files import aside
@@ -38,20 +38,19 @@ def write_report(
     *,
     folders: Mapping[str, Path],
     trajectories: int = 32,
-    study: xarray.Dataset | None = None,
     progress: Progress | None = None,
 ) -> None:
     """Write the report of some results, whole or not at all.
 
     Args:
         path: the HTML file; an existing one is replaced.
-        datasets, folders, trajectories, study, progress: as in `report_page`.
+        datasets, folders, trajectories, progress: as in `report_page`.
 
     Raises:
         OutputError: the file cannot be written.
         ResultError, CampaignError: a hit cannot be replayed.
     """
-    page = report_page(datasets, folders=folders, trajectories=trajectories, study=study, progress=progress)
+    page = report_page(datasets, folders=folders, trajectories=trajectories, progress=progress)
     with aside(path) as file:
         file.write_text(page, encoding="utf-8")
 
@@ -61,7 +60,6 @@ def report_page(
     *,
     folders: Mapping[str, Path],
     trajectories: int = 32,
-    study: xarray.Dataset | None = None,
     progress: Progress | None = None,
 ) -> str:
     """The report of some results as HTML.
@@ -70,7 +68,6 @@ def report_page(
         datasets: results by the names to show; of an open file only the needed parts are read.
         folders: for each result, the folder of the files that its campaign names.
         trajectories: number of hits of each result to replay on the CPU.
-        study: error and speed of the numerics on a similar scene (`analysis.study.study`).
         progress: called with (hits replayed, hits to replay).
 
     Raises:
@@ -98,7 +95,6 @@ def report_page(
         results=[result | {"shown": few.sizes["hit"]} for result, few in zip(results, shown, strict=True)],
         comparison=comparison,
         conclusion=conclusion(results, comparison),
-        study=None if study is None else study_table(study),
     )
 
 

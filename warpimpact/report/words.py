@@ -37,7 +37,6 @@ from warpimpact.results import variables as v
 from warpimpact.results.dataset import passed
 from warpimpact.results.files import ResultError
 from warpimpact.results.outlines import outlines
-from warpimpact.studies.accuracy_text import study_text
 from warpimpact.view.view import Column, Section, Table, html_of, table_html
 
 _MM = 1e3
@@ -108,27 +107,6 @@ def conclusion(results: Sequence[Mapping[str, Any]], comparison: Mapping[str, An
     """What a reader wants first, a sentence each: what passes of every plate, and which plate is best at what."""
     best = [] if comparison is None else [f"Best at {label}: {who}." for label, who in comparison["best"]]
     return [*(f"{result['name']}: {result['verdict']}" for result in results), *best]
-
-
-def study_table(study: xarray.Dataset) -> dict[str, Any]:
-    """A study as head, rows from fast to slow, and what else there is to say."""
-    last = study.isel(standoff=-1).sortby(v.HITS_PER_SECOND, ascending=False)
-    quoted = [f"{share:.0%}" if share < 1.0 else "max" for share in last[v.QUANTILE].values]
-    units = {v.RESIDUAL_VELOCITY: "m/s", v.TILT: "°"}
-    head = [
-        "setting",
-        "hits/s",
-        *(f"{words(name)}, {share} [{units[name]}]" for name in v.STUDIED for share in quoted),
-    ]
-    rows = []
-    for index in range(last.sizes["setting"]):
-        one = last.isel(setting=index)
-        errors = [f"{value:.3f}" for name in v.STUDIED for value in one[v.ERRORS[name]].values]
-        rows.append([one[v.SETTING].item(), f"{one[v.HITS_PER_SECOND].item():.4g}", *errors])
-    return {"title": study.attrs[attr.TITLE], "device": study.attrs[attr.DEVICE], "head": head, "rows": rows} | {
-        "made": study.attrs[attr.HISTORY][:10],
-        "notes": [line for line in study_text(study).splitlines() if line.startswith(("converged", "left out"))],
-    }
 
 
 def _asked(dataset: xarray.Dataset) -> str:

@@ -1,4 +1,4 @@
-"""Whether a file that says it is a result, a history, a sweep or a study is one."""
+"""Whether a file that says it is a result, a history or a sweep is one."""
 
 from __future__ import annotations
 
@@ -14,12 +14,10 @@ from warpimpact.results.declared import (
     Declaration,
     Positive,
     Text,
-    among,
     attribute_faults,
     finite,
     metadata_faults,
     missing_fault,
-    not_negative,
     texts,
 )
 from warpimpact.scene.display import STORED
@@ -157,24 +155,7 @@ def packing_fault(dataset: xarray.Dataset) -> str | None:
     return None
 
 
-def _study_fault(dataset: xarray.Dataset) -> str | None:
-    if not {0.5, 0.9} <= set(dataset[v.QUANTILE].values.ravel().tolist()):
-        return f'its variable "{v.QUANTILE}" lacks the median or the 90th percentile'
-    empty = [name for name in ("setting", "level", "standoff", "hit") if not dataset.sizes[name]]
-    return f'it has nothing along "{empty[0]}"' if empty else None
-
-
 _OF_A_COMPUTATION = {attr.TITLE: Text, attr.HISTORY: Text}
-STUDY = Declaration(
-    {one: one.dims for one in (*v.STUDY_COORDINATES, *v.STUDY_VARIABLES)},
-    rules={
-        **dict.fromkeys((v.SETTING, v.SCHEME, v.STUDY_LEVEL), texts),
-        v.CONVERGED_STATUS: among(*Status),
-        v.OTHER_STATUS: not_negative,
-    },
-    attributes={**_OF_A_COMPUTATION, attr.DEVICE: Text},
-    more=_study_fault,
-)
 
 
 def _history_fault(dataset: xarray.Dataset) -> str | None:

@@ -1,4 +1,4 @@
-"""The Datasets of a hit map, a history and a study: functions that build and read them. variables.py says what they
+"""The Datasets of a hit map and of a history: functions that build and read them. variables.py says what they
 hold.
 
 Inside the package everything is in SI and radians; angles become degrees here. The Dataset follows the CF conventions
@@ -193,22 +193,6 @@ def solid_reference(dataset: xarray.Dataset) -> xarray.Dataset | None:
     solid = dataset[list(v.SOLID_VARIABLES)].reset_coords(list(v.SOLID_VARIABLES)).isel(solid_hit=numbers).load()
     first = dataset[v.shot_variables(dataset)].isel(hit=slice(len(numbers))).load()
     return first.assign({of_hits: solid[name].rename(solid_hit="hit") for name, of_hits in v.SOLID_VARIABLES.items()})
-
-
-def study_dataset(values: Mapping[str, Any], attributes: Mapping[str, Any]) -> xarray.Dataset:
-    """Gather a study of speed and accuracy.
-
-    Args:
-        values: of every name in STUDY_VARIABLES and STUDY_COORDINATES, SI and radians.
-        attributes: global attributes: title, history, campaign, versions, device, ...
-    """
-    import xarray
-
-    return xarray.Dataset(
-        stored_columns(v.STUDY_VARIABLES, values),
-        stored_columns(v.STUDY_COORDINATES, values),
-        _ATTRIBUTES | attr.with_units(attributes),
-    )
 
 
 def history_dataset(

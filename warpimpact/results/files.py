@@ -14,7 +14,7 @@ import netCDF4
 from warpimpact.results import attributes as attr
 from warpimpact.results import kinds
 from warpimpact.results import variables as v
-from warpimpact.results.checks import HISTORY, STUDY, map_fault, packing_fault, sweep_fault, unusable
+from warpimpact.results.checks import HISTORY, map_fault, packing_fault, sweep_fault, unusable
 from warpimpact.results.dataset import numbered
 from warpimpact.results.declared import Declaration
 from warpimpact.results.interrupts import uninterrupted
@@ -180,15 +180,6 @@ def read_sweep_result(path: Path) -> xarray.Dataset:
         _check_has(dataset, path, *v.COORDINATES)
         _refuse(path, "a sweep", sweep_fault(dataset))
         return _numbered(dataset.load())
-
-
-def read_study(path: Path) -> xarray.Dataset:
-    """Read a study of speed and accuracy into memory.
-
-    Raises:
-        ResultError: The file is missing, is not netCDF, or is not a study.
-    """
-    return read_declared(path, "a study", kinds.STUDY, STUDY)
 
 
 def read_declared(path: Path, what: str, kind: kinds.Kind, declared: Declaration) -> xarray.Dataset:

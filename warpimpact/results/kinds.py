@@ -44,16 +44,13 @@ FIRING = Kind(
     "its text and figure stand beside it; xarray.open_dataset reads it",
     (attr.FIRING_TEST,),
 )
-STUDY = Kind(
-    "a study of the numerics, as warpimpact study writes", "warpimpact report takes it with --study", (v.SETTING,)
-)
 HISTORY = Kind("the history of a single hit, as warpimpact replay writes", "warpimpact export takes it", (v.TIME,))
 SWEEP = Kind(
     "a sweep, as warpimpact sweep writes",
     "its points, in the folder beside it, are results, as is what isel(INPUT=0) chooses of it",
     (attr.SWEEP,),
 )
-_NETCDF = (POSTERIOR, FRONT, FIRING, STUDY, HISTORY)
+_NETCDF = (POSTERIOR, FRONT, FIRING, HISTORY)
 
 DESIGN = Kind("a design file", "warpimpact optimise takes it", ("variables", "objectives"))
 FIT = Kind("a fit", "warpimpact identify takes it", ("shot", "prior"))

@@ -5,7 +5,6 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from warpimpact.kernels.status import OF_SHOTS
 from warpimpact.records import registry
 from warpimpact.records.bending_variables import *
 from warpimpact.records.exit import *
@@ -187,50 +186,6 @@ OUTLINE = {"y": OUTLINE_Y, "z": OUTLINE_Z}
 CELL = {"y": CELL_Y, "z": CELL_Z}
 LAYER_SOLID_ALONG = {"y": LAYER_SOLID_ALONG_Y, "z": LAYER_SOLID_ALONG_Z}
 SOLID_ALONG = {"y": SOLID_ALONG_Y, "z": SOLID_ALONG_Z}
-
-# --- Study of speed and accuracy; some names also occur in a hit map, with another meaning ---
-SETTING = Variable("setting", ("setting",), "1", "numerics under study")
-QUANTILE = Variable("quantile", ("quantile",), "1", "share of the hits with at most this error")
-STUDY_LEVEL = Variable("level", ("level",), "1", "level of refinement behind the converged answer")
-
-STUDY_COORDINATES = (SETTING, QUANTILE, STUDY_LEVEL, STANDOFF, HIT_Y, HIT_Z)
-
-_SETTING = ("setting",)
-SCHEME = Variable("scheme", _SETTING, "1", "scheme")
-PATCHES_AXIAL = Variable("patches_axial", _SETTING, "1", "surface patches along the core")
-PATCHES_AROUND = Variable("patches_around", _SETTING, "1", "surface patches around the core")
-GRID_SPACING = Variable("grid_spacing", _SETTING, "m", "spacing of the plate grid")
-TIME_STEP = Variable("time_step", _SETTING, "s", "time step at impact velocity")
-HITS_PER_SECOND = Variable("hits_per_second", _SETTING, "s-1", "hits computed per second")
-OTHER_STATUS = Variable("other_status", _SETTING, "1", "hits whose status differs from the converged answer")
-SETTLED = Variable("settled", HITS, "1", "1 where the hit ends with the same status on all levels")
-STUDIED = (RESIDUAL_VELOCITY, TILT)
-"""Quantities whose errors a study measures."""
-
-
-def _studied(suffix: str, along: tuple[str, ...], meaning: str) -> dict[Variable, Variable]:
-    """A variable for each quantity of a study; `meaning` has a place for its name."""
-    return {
-        one: Variable(f"{one}{suffix}", (*along, *one.dims[1:]), one.units, meaning.format(one.replace("_", " ")))
-        for one in STUDIED
-    }
-
-
-ERRORS = _studied("_error", ("setting", "quantile"), "error of the {}")
-FRONTS = {
-    one: Variable(f"{one}_front", _SETTING, "1", "1 where no faster setting has a smaller 90 % error, last stand-off")
-    for one in STUDIED
-}
-CHANGES = _studied("_change", ("level", "quantile"), "change of the {} from the level before")
-CONVERGED = _studied("", HITS, "{}, converged")
-UNCERTAINTIES = _studied("_uncertainty", HITS, "change of the {} on the last level")
-CONVERGED_STATUS = Variable("status", HITS, "1", "how the shot ended, converged", flags=OF_SHOTS)
-
-STUDY_VARIABLES = (
-    *(SCHEME, PATCHES_AXIAL, PATCHES_AROUND, GRID_SPACING, TIME_STEP, HITS_PER_SECOND, OTHER_STATUS),
-    *(one for group in (ERRORS, FRONTS, CHANGES) for one in group.values()),
-    *(SETTLED, CONVERGED_STATUS, *CONVERGED.values(), *UNCERTAINTIES.values()),
-)
 
 
 def shown_by(command: str) -> tuple[Variable, ...]:

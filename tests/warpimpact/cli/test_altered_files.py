@@ -15,7 +15,6 @@ ONCE_FOUND = {
     "result": ("@level_shifts: ('0',) [1, [2]]", "@material: ('degradation',) 'x'"),
     "sweep": ("/hit_z: texts",),
     "history": ("/cell_y: first 99.0",),
-    "study": ("/other_status: all nan",),
     "posterior": ("observed_data/std: first -1.0",),
     "front": (
         *(

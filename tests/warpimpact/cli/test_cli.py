@@ -23,7 +23,6 @@ SLOTTED_PLATE = Path(__file__).parents[3] / "campaigns" / "slotted_plate.toml"
         ["inspect"],
         ["plot"],
         ["validate"],
-        ["study"],
         ["compare"],
         ["plate"],
         ["identify"],

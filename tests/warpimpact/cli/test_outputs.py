@@ -60,7 +60,6 @@ def test_what_is_asked_for_has_a_picture_of_its_own(
     ("command", "sentence"),
     [
         (["run", "a.toml", "-o", "a.csv"], "a.csv: the name of a result must end in .nc"),
-        (["study", "a.toml", "-o", "a.png"], "a.png: the name of a study must end in .nc"),
         (["report", "a.nc", "-o", "a.pdf"], "a.pdf: the name of a report must end in .html"),
         (["plate", "a.toml", "-o", "a.nc"], "a.nc: the name of a picture must end in .png, .pdf or .svg"),
     ],

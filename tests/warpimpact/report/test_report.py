@@ -241,10 +241,6 @@ def test_what_is_missing_is_told_and_nothing_written(
 
     monkeypatch.setattr(report, "replay", lost)
     for command, sentence in (
-        (
-            ["-o", page, "--study", result],
-            "is a result, as warpimpact run and limit write, not a study; warpimpact inspect",
-        ),
         (["-o", str(folder / "a.html")], "a.html: exists already"),
         ([result, "-o", page], "got this result 2 times, but each result counts once"),
         (["-o", page], "hits.csv; give the folder of the campaign's files with --campaign-folder, or --trajectories 0"),

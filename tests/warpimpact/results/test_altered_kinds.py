@@ -1,15 +1,13 @@
-"""Results with layers, studies and histories that somebody altered are refused in a sentence."""
+"""Results with layers and histories that somebody altered are refused in a sentence."""
 
 from collections.abc import Callable
 from pathlib import Path
 
-import numpy as np
 import pytest
 import xarray
 
 from warpimpact.campaign.campaign import Campaign
 from warpimpact.results import checks, files
-from warpimpact.results import variables as v
 from warpimpact.results.files import ResultError
 from warpimpact.runs.replay import replay
 from warpimpact.runs.run import run
@@ -57,19 +55,3 @@ def test_an_altered_history_is_refused(layered: xarray.Dataset, tmp_path: Path) 
             files.opened_either(tmp_path / "a.nc"),
         ):
             pass
-
-
-def test_an_altered_study_is_refused() -> None:
-    known = (*v.STUDY_COORDINATES, *v.STUDY_VARIABLES)
-    sizes = {"setting": 2, "quantile": 2, "level": 2, "standoff": 1, "hit": 3}
-    study = xarray.Dataset(
-        {str(one): (one.dims, np.zeros([sizes[dim] for dim in one.dims]), one.attributes) for one in known},
-        attrs={"title": "t", "history": "h", "device": "cpu"},
-    ).assign({v.QUANTILE: (("quantile",), np.array([0.5, 0.9]), v.QUANTILE.attributes)})
-    labels = (v.SETTING, v.SCHEME, v.STUDY_LEVEL)
-    study = study.assign({one: (one.dims, np.array(["a", "b"]), one.attributes) for one in labels})
-    assert checks.STUDY.fault(study) is None
-    for name in ("title", "history", "device"):
-        kept = {key: value for key, value in study.attrs.items() if key != name}
-        assert checks.STUDY.fault(study.drop_attrs(deep=False).assign_attrs(kept)) == f'it has no attribute "{name}"'
-    assert "90th percentile" in str(checks.STUDY.fault(study.isel(quantile=[0, 0])))

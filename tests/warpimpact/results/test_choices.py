@@ -130,13 +130,6 @@ def test_shots_at_the_solid_plate_stay_with_their_hits() -> None:
         np.testing.assert_array_equal(later[name], chosen[name])
 
 
-def test_a_study_is_named_as_what_it_is(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    xarray.Dataset(coords={"setting": ["draft"]}).to_netcdf(tmp_path / "study.nc")
-    for command in ("inspect", "plot", "export"):
-        assert main([command, str(tmp_path / "study.nc")]) == 2
-        assert "is a study of the numerics, as warpimpact study writes, not a map of hits" in capsys.readouterr().err
-
-
 def test_a_posterior_is_named_as_what_it_is(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     xarray.Dataset(attrs={posterior_file.EFFECTIVE: 1000.0}).to_netcdf(tmp_path / "fit.nc")
     for command in ("inspect", "plot", "export"):

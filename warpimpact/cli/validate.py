@@ -1,0 +1,36 @@
+"""The command validate: the published shots beside what others measured and computed of them."""
+
+import argparse
+from pathlib import Path
+
+from .options import Commands, add_command, add_device
+
+
+def add_validate(commands: Commands) -> None:
+    parser = add_command(
+        commands,
+        "validate",
+        _validate,
+        summary="compute the published shots and compare",
+        description="Compute the paper's two shots. Compare them with the paper's model, its experiment and LS-DYNA.",
+        example="validate",
+    )
+    parser.add_argument(
+        "campaign",
+        type=Path,
+        nargs="?",
+        metavar="CAMPAIGN.toml",
+        help="the paper's scene with two hits; lattice and numerics may differ (default: the example paper_shots)",
+    )
+    add_device(parser)
+
+
+def _validate(arguments: argparse.Namespace) -> None:
+    from warpimpact.analysis.paper import check_scene, paper_campaign, validation_table
+    from warpimpact.campaign.campaign import Campaign
+    from warpimpact.runs.run import run
+
+    path = arguments.campaign or paper_campaign()
+    campaign = Campaign.from_toml(path)
+    check_scene(campaign, str(path))
+    print(validation_table(run(campaign, device=arguments.device)))
