@@ -11,7 +11,6 @@ from matplotlib.figure import Figure
 
 from warpimpact import Campaign
 from warpimpact.cli import main
-from warpimpact.studies import accuracy
 
 CHECKOUT = Path(__file__).parents[2]
 README = (CHECKOUT / "README.md").read_text(encoding="utf-8")
@@ -42,8 +41,6 @@ def test_each_line_works_after_those_above_it(
     """All of them, on few hits and in coarse pictures; then the example in Python."""
     save = Figure.savefig
     monkeypatch.setattr(Figure, "savefig", lambda figure, file, **how: save(figure, file, **how | {"dpi": 20}))
-    monkeypatch.setattr(accuracy, "MEASURED_TIME", 0.0)
-    monkeypatch.setattr(accuracy, "SHORTEST_RUN", 0.0)
     monkeypatch.chdir(tmp_path)
     lines = commands()
     assert len(lines) > 10
