@@ -18,17 +18,16 @@ benchmark: $(INSTALLED)
 	$(VENV)/bin/pip install --quiet --editable '.[bench]'
 	$(VENV)/bin/python tests/benchmarks/page.py all
 
-# Pages in build/docs/index.html; tutorials are executed, examples in pages checked. A warning is an error.
+# Pages in build/docs/index.html; tutorials are executed. A warning is an error. The tests check the examples in pages.
 docs: $(INSTALLED)
 	$(VENV)/bin/sphinx-build -q -W --keep-going -j auto -b html -d build/doctrees docs build/docs
-	$(VENV)/bin/sphinx-build -q -W --keep-going -b doctest -D nb_execution_mode=off -d build/doctest/trees docs build/doctest
 
 # The kernel and verification tests run once more in Warp's debug mode, which checks array bounds.
 test: $(INSTALLED)
 	$(VENV)/bin/ruff check .
 	$(VENV)/bin/ruff format --check .
 	$(VENV)/bin/mypy
-	$(VENV)/bin/pytest $(PARALLEL)
+	$(VENV)/bin/pytest $(PARALLEL) --durations=40
 	$(VENV)/bin/pytest $(PARALLEL) tests/kernels tests/verification/test_determinism.py::test_any_chunk --warp-mode debug
 
 clean:
