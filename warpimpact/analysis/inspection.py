@@ -19,7 +19,7 @@ from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
 from warpimpact.results.dataset import passed
 from warpimpact.results.outlines import outlines
-from warpimpact.scene.notebook import path, picture
+from warpimpact.view import svg
 
 _MOST = 2000
 """Hits that a drawing has."""
@@ -70,12 +70,11 @@ def _drawing(dataset: xarray.Dataset) -> str:
     some = dataset[needed].isel(hit=slice(_MOST)).load()
     hits, status, came = hit_points(some), some[v.STATUS].values, passed(some)
     half = np.maximum(0.5 * np.asarray(dataset.attrs[attr.PLATE_PERIOD]), np.abs(hits).max(axis=0))
-    holes = np.column_stack([outlines(dataset)[axis] for axis in ("y", "z")])
-    gaps = np.flatnonzero(np.isnan(holes[:, 0]))
-    rings = [ring[~np.isnan(ring[:, 0])] for ring in np.split(holes, gaps)] if len(holes) else []
+    holes = outlines(dataset)
     mark = 0.006 * half.max() * np.array([(-1, -1), (1, -1), (1, 1), (-1, 1)])
     broken = failures(status)
     kinds = ((came, _PASSED), (~came & ~broken, _STOPPED), (broken, _FAILED))
-    marks = [(path([hit + mark for hit in hits[which]]), colour) for which, colour in kinds]
+    marks = [svg.Shape([hit + mark for hit in hits[which]], colour) for which, colour in kinds]
+    shapes = [svg.Shape(svg.rings(holes["y"], holes["z"]), _EDGE), *marks]
     legend = "orange: the core passes; blue: it is stopped; black: not computed; grey: holes"
-    return f"{picture([(path(rings), _EDGE), *marks], -half, half, 'map of the hits')}<br><small>{legend}</small>"
+    return f"{svg.drawing(shapes, -half, half, 'map of the hits')}<br><small>{legend}</small>"

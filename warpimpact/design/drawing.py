@@ -11,9 +11,9 @@ import numpy as np
 from warpimpact.analysis.plate import plate_numbers
 from warpimpact.plotting.dimensions import Dimension, hole_dimensions, smallest_ligament
 from warpimpact.plotting.plate import drawn_extent
-from warpimpact.report.words import svg_path
 from warpimpact.scene import NoPattern
 from warpimpact.scene.patterns.lattice import LatticePattern
+from warpimpact.view import svg
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -38,7 +38,7 @@ def drawn(campaign: Campaign) -> dict[str, Any]:
     cell = None if isinstance(plate.pattern, NoPattern) else _rounded(np.array(plate.pattern.unit_cell) * _MM)
     return {
         "extent": _rounded(extent),
-        "path": svg_path(rings),
+        "path": svg.path(rings),
         "cell": cell,
         "core": round(core.max_radius * _MM, _DIGITS),
         "dimensions": [_line(one) for one in hole_dimensions(plate, ligament)],

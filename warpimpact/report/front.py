@@ -19,11 +19,11 @@ from warpimpact.campaign.text import CampaignError, parsed
 from warpimpact.optimisation.evaluate import is_even
 from warpimpact.optimisation.front_view import design_text, front_view, numbers_of_front, numbers_of_reference
 from warpimpact.plotting.front import front_figure, front_leaders
-from warpimpact.report.words import svg_path
 from warpimpact.results import attributes as attr
 from warpimpact.results import front as f
 from warpimpact.results.files import aside
 from warpimpact.scene.symmetry import IDENTITY, symmetries
+from warpimpact.view import svg
 from warpimpact.view.view import html_of
 
 Array = NDArray[np.float64]
@@ -66,6 +66,7 @@ def write_front_report(dataset: xarray.Dataset, path: Path, folder: Path) -> Non
         version=str(dataset.attrs[attr.WARPIMPACT_VERSION]),
         chart=chart.drawn(),
         designs=designs,
+        side=f"{1e3 * _SIDE:.3g}",
         references=references,
         picture=_picture(dataset, folder),
         view=Markup(html_of(front_view(dataset))),
@@ -150,16 +151,17 @@ def _design(dataset: xarray.Dataset, place: int, chart: _Chart, folder: Path) ->
         "variables": design_text(dataset, int(dataset[f.NUMBER][place])),
         "campaign": text,
         "bar": chart.bar(place),
-        "plate": None if campaign is None else _plate(campaign),
+        "plate": None if campaign is None else _plate(campaign, str(dataset[f.FILE].values[place])),
         "map": None if campaign is None or f.HIT_VALUE not in dataset else _map(dataset, place, campaign, text),
         **chart.at(dataset[f.FRESH].values[place]),
     }
 
 
-def _plate(campaign: Campaign) -> dict[str, Any]:
-    half = 0.5 * _SIDE
-    outlines = campaign.plate.pattern.outlines((-half, half), (-half, half))
-    return {"path": svg_path(outlines), "y": 1e3 * _SIDE, "z": 1e3 * _SIDE}
+def _plate(campaign: Campaign, file: str) -> Markup:
+    """A part of the plate."""
+    half = np.full(2, 0.5 * _SIDE)
+    outlines = campaign.plate.pattern.outlines((-half[0], half[0]), (-half[1], half[1]))
+    return Markup(svg.drawing([svg.plate(outlines, -half, half)], -half, half, f"plate of {file}", scale=12.0))
 
 
 def _map(dataset: xarray.Dataset, place: int, campaign: Campaign, text: str) -> dict[str, Any]:
@@ -174,18 +176,17 @@ def _map(dataset: xarray.Dataset, place: int, campaign: Campaign, text: str) -> 
     shown, low, high = _coloured(images, np.tile(values, len(group)), cell)
     buffer = BytesIO()
     Image.fromarray(shown).save(buffer, "PNG")
-    half = [0.5 * side for side in cell]
+    half = 0.5 * np.array(cell)
+    holes = svg.Shape(campaign.plate.pattern.outlines((-half[0], half[0]), (-half[1], half[1])), "none", "white")
+    image = f"data:image/png;base64,{b64encode(buffer.getvalue()).decode()}"
+    label = f"map of {dataset[f.FILE].values[place]}"
     effects = [
         str(label)
         for label, name in zip(dataset[f.LABEL].values, dataset[f.ASKED].values, strict=True)
         if not str(name).startswith("areal_density")
     ]
     return {
-        "image": f"data:image/png;base64,{b64encode(buffer.getvalue()).decode()}",
-        "path": svg_path(campaign.plate.pattern.outlines((-half[0], half[0]), (-half[1], half[1]))),
-        "y": 1e3 * cell[0],
-        "z": 1e3 * cell[1],
-        "scale": 360.0 / (1e3 * max(cell)),
+        "drawing": Markup(svg.drawing([holes], -half, half, label, scale=0.36 / max(cell), image=image)),
         "label": effects[0].removesuffix(", worst tenth"),
         "low": low,
         "high": high,

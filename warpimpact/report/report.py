@@ -22,14 +22,13 @@ from plotly.offline import get_plotlyjs
 
 import warpimpact
 from warpimpact.report.hits import MOST_HITS, page_data, thinned, trajectory_data, worst_and_spread
-from warpimpact.report.words import compared, conclusion, result_content
+from warpimpact.report.words import cell_drawings, compared, conclusion, result_content
 from warpimpact.results import variables as v
 from warpimpact.results.dataset import hit_numbers
 from warpimpact.results.files import aside
 from warpimpact.runs.replay import replay
 
 Progress = Callable[[int, int], None]
-_PLATE_WIDTH = 240.0  # of the widest plate on the page [px]
 
 
 def write_report(
@@ -92,7 +91,10 @@ def report_page(
     comparison = compared(datasets) if len(datasets) > 1 else None
     return _page(
         data=data,
-        results=[result | {"shown": few.sizes["hit"]} for result, few in zip(results, shown, strict=True)],
+        results=[
+            result | {"shown": few.sizes["hit"], "plate": plate}
+            for result, few, plate in zip(results, shown, cell_drawings(datasets), strict=True)
+        ],
         comparison=comparison,
         conclusion=conclusion(results, comparison),
     )
@@ -139,7 +141,6 @@ def _page(*, results: Sequence[dict[str, Any]], data: dict[str, Any], **content:
     )
     return environment.get_template("page.html").render(
         results=results,
-        pixels_per_mm=_PLATE_WIDTH / max(result["plate"]["y"] for result in results),
         plotly=_packed(_without_addresses(get_plotlyjs())),
         packed=_packed(json.dumps(data, separators=(",", ":"), allow_nan=False)),
         variables=data["variables"],

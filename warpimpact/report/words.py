@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 from base64 import b64encode
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from io import BytesIO
 from typing import Any
 
 import numpy as np
 import xarray
 from markupsafe import Markup
-from numpy.typing import NDArray
 
 from warpimpact.analysis.base import solid_note
 from warpimpact.analysis.comparison import compare
@@ -37,9 +36,12 @@ from warpimpact.results import variables as v
 from warpimpact.results.dataset import passed
 from warpimpact.results.files import ResultError
 from warpimpact.results.outlines import outlines
+from warpimpact.view import svg
 from warpimpact.view.view import Column, Section, Table, html_of, table_html
 
 _MM = 1e3
+_PLATE_WIDTH = 240.0
+"""Of the widest cell on the page [px]."""
 _PROVENANCE = (
     attr.HISTORY,
     attr.WARPIMPACT_VERSION,
@@ -76,7 +78,6 @@ def result_content(name: str, dataset: xarray.Dataset) -> dict[str, Any]:
         "measures": measures,
         "through": Markup(table_html(_through(dataset), means_over)),
         "protects": Markup(table_html(measures_table(measures), against_solid)),
-        "plate": _plate(dataset),
         "provenance": {words(key): str(attributes[key]) for key in _PROVENANCE if key in attributes},
         "speed": float(f"{attributes.get(attr.HITS_PER_SECOND, 0.0):.2g}"),
     }
@@ -179,16 +180,15 @@ def _through(dataset: xarray.Dataset) -> Table:
     return Table((Column(), Column("value", right=True), Column("95 % interval")), rows)
 
 
-def _plate(dataset: xarray.Dataset) -> dict[str, Any]:
-    """The cell of the hits, with its holes as an SVG path: lengths in mm, y to the right, z up."""
-    holes = outlines(dataset)
-    vertices = np.stack([holes["y"], holes["z"]], axis=-1)
-    gaps = np.flatnonzero(np.isnan(vertices[:, 0]))
-    rings = [ring[~np.isnan(ring[:, 0])] for ring in np.split(vertices, gaps)]
-    y, z = (float(length) * _MM for length in dataset.attrs[attr.PLATE_PERIOD])
-    return {"path": svg_path(rings), "y": y, "z": z}
-
-
-def svg_path(rings: Iterable[NDArray[np.float64]]) -> str:
-    """Closed outlines [m], each of shape [vertices, 2], as an SVG path: lengths in mm, y to the right, z up."""
-    return " ".join("M" + "L".join(f"{y:.3f},{-z:.3f}" for y, z in ring * _MM) + "Z" for ring in rings if len(ring))
+def cell_drawings(datasets: Mapping[str, xarray.Dataset]) -> list[dict[str, Any]]:
+    """The cells that were hit, drawn at one scale, and their sides [mm]."""
+    halves = {name: 0.5 * np.asarray(dataset.attrs[attr.PLATE_PERIOD]) for name, dataset in datasets.items()}
+    scale = _PLATE_WIDTH / (2.0 * _MM * max(half[0] for half in halves.values()))
+    drawings = []
+    for name, dataset in datasets.items():
+        half, holes = halves[name], outlines(dataset)
+        cell = svg.plate(svg.rings(holes["y"], holes["z"]), -half, half)
+        label = f"cell of the plate {name}"
+        drawn = svg.drawing([cell], -half, half, label, scale=scale, bar=True)
+        drawings.append({"drawing": Markup(drawn), "y": 2.0 * _MM * half[0], "z": 2.0 * _MM * half[1]})
+    return drawings

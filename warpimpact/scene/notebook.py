@@ -5,7 +5,7 @@ The models import this file, so it knows cores, plates and targets by what they 
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from html import escape
 from typing import Any, get_args, get_origin
 
@@ -13,16 +13,16 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import BaseModel
 
+from warpimpact.view import svg
+
 from .units import reader_in, typed
 
 Array = NDArray[np.float64]
 
-_PIXELS = 260
-"""Longer side of a drawing."""
 _CELLS = 3
 """Of an unbounded plate, along each side."""
 _MOST_HOLES = 2000
-_STEEL, _CORE = "#b8b8b8", "#D55E00"
+_CORE = "#D55E00"
 
 
 def html_of(model: BaseModel) -> str:
@@ -77,8 +77,7 @@ def _holes(plate: Any) -> str:
     whole = plate.size is not None and np.prod(np.array(plate.size) / cell) <= _MOST_HOLES
     half = 0.5 * (np.array(plate.size) if whole else _CELLS * cell)
     outlines = plate.pattern.outlines((-half[0], half[0]), (-half[1], half[1]))
-    corners = half * np.array([(-1, -1), (1, -1), (1, 1), (-1, 1)])
-    return picture([(path([corners, *outlines]), _STEEL)], -half, half, "plate")
+    return svg.drawing([svg.plate(outlines, -half, half)], -half, half, "plate")
 
 
 def _core(core: Any) -> str:
@@ -87,7 +86,7 @@ def _core(core: Any) -> str:
     radius = core.radius(stations)
     along = np.concatenate([-stations, -stations[::-1]])
     shape = np.column_stack([along, np.concatenate([radius, -radius[::-1]])])
-    return picture([(path([shape]), _CORE)], shape.min(axis=0), shape.max(axis=0), "core")
+    return svg.drawing([svg.Shape([shape], _CORE)], shape.min(axis=0), shape.max(axis=0), "core")
 
 
 def _section(target: Any) -> str:
@@ -96,27 +95,4 @@ def _section(target: Any) -> str:
     shapes = [
         np.array([(front, 0.0), (rear, 0.0), (rear, 0.3 * depth), (front, 0.3 * depth)]) for front, rear in target.faces
     ]
-    return picture([(path(shapes), _STEEL)], np.zeros(2), np.array([depth, 0.3 * depth]), "layers")
-
-
-def path(outlines: Sequence[Array]) -> str:
-    """Closed outlines, each of shape [points, 2] [m], as the data of an SVG path in millimetres, the second axis up."""
-    rings = (" ".join(f"{1e3 * x:.3f},{-1e3 * y:.3f}" for x, y in outline) for outline in outlines)
-    return " ".join(f"M {ring} Z" for ring in rings)
-
-
-def picture(paths: Sequence[tuple[str, str]], low: Array, high: Array, what: str) -> str:
-    """An SVG picture of filled paths, to scale.
-
-    Args:
-        paths: data in millimetres, and colour.
-        low, high: corners of what it shows [m].
-        what: what it shows, for those who do not see it.
-    """
-    (width, height), (left, top) = 1e3 * (high - low), (1e3 * low[0], -1e3 * high[1])
-    scale = _PIXELS / max(width, height)
-    shapes = "".join(f'<path d="{data}" fill="{colour}" fill-rule="evenodd"/>' for data, colour in paths)
-    return (
-        f'<svg role="img" aria-label="{what}" width="{scale * width:.0f}" height="{scale * height:.0f}" '
-        f'viewBox="{left:.4f} {top:.4f} {width:.4f} {height:.4f}">{shapes}</svg>'
-    )
+    return svg.drawing([svg.Shape(shapes)], np.zeros(2), np.array([depth, 0.3 * depth]), "layers")

@@ -1,4 +1,5 @@
-"""What a person sees of a result, as data; and the text and the HTML of it.
+"""What a person sees of a result, as data; its text and its HTML, and drawings to scale as SVG.
 
-Change how tables look here; what stands in them belongs in the room of the result. It imports no other room.
+Change how tables and drawings look here; what stands in them belongs in the room of the result. It imports no
+other room.
 """
