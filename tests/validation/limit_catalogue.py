@@ -8,7 +8,7 @@ import json
 import numpy as np
 import pandas as pd
 
-from warpimpact.campaign.doubts import nose_length
+from warpimpact.campaign.tested import nose_length
 from warpimpact.catalogue.catalogue import FOLDERS, HERE, file_name
 from warpimpact.catalogue.entries import Material
 from warpimpact.catalogue.strength import FIT, HEAVY, NINETY, Plates, limit_fit
@@ -83,12 +83,15 @@ def _entry(rows: Rows, found: Fit, name: str, predicted: pd.DataFrame) -> str:
 
 
 def figures(rows: Rows, predicted: pd.DataFrame) -> dict[str, dict[str, float]]:
-    """Errors of what the model fails at, for the sentences of a campaign (warpimpact/campaign/doubts.py)."""
+    """Errors of what the model fails at, for the sentences of a campaign (warpimpact/campaign/tested.py)."""
     error = predicted["predicted"] / predicted["published"] - 1.0
     of, steel = predicted["split"], rows.density[predicted["row"]] > HEAVY
     in_steel, in_aluminium = (error[(of == CARBIDE) & which] for which in (steel, ~steel))
+    steel_plates = rows.density > HEAVY
     found = {
-        "nose": {"least": min(nose_length(core(name)) for name in PROJECTILES)},
+        "core": _cores(rows),
+        "steel": _range(rows[steel_plates]),
+        "aluminium": _range(rows[~steel_plates]),
         "thin hard steel": thin_hard_steel(rows),
         "carbide": {
             "steel": in_steel.median(),
@@ -98,6 +101,34 @@ def figures(rows: Rows, predicted: pd.DataFrame) -> dict[str, dict[str, float]]:
         },
     }
     return {name: {key: round(float(value), 4) for key, value in one.items()} for name, one in found.items()}
+
+
+def _cores(rows: Rows) -> dict[str, float]:
+    """Noses in diameters, diameters [mm] and velocities [m/s] of all rows."""
+    return {
+        "nose": min(nose_length(core(name)) for name in PROJECTILES),
+        "diameter_low": 1e3 * rows.diameter.min(),
+        "diameter_high": 1e3 * rows.diameter.max(),
+        "velocity_low": rows.velocity.min(),
+        "velocity_high": rows.velocity.max(),
+    }
+
+
+def _range(rows: Rows) -> dict[str, float]:
+    """What plates of one metal were: densities [kg/m³], thicknesses in calibres, angles [deg], resistances [GPa]."""
+    resistance = []
+    for name in dict.fromkeys(rows.material.tolist()):
+        fit = limit_fit(name)
+        resistance += (np.exp(fit.predicted(fit.rows)[0][fit.rows.material == name]) / 1e9).tolist()
+    return {
+        "density_low": rows.density.min(),
+        "density_high": rows.density.max(),
+        "calibres_low": rows.calibres.min(),
+        "calibres_high": rows.calibres.max(),
+        "obliquity_high": np.degrees(rows.obliquity.max()),
+        "resistance_low": min(resistance),
+        "resistance_high": max(resistance),
+    }
 
 
 def thin_hard_steel(rows: Rows) -> dict[str, float]:

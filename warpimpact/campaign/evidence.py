@@ -11,7 +11,7 @@ from ..catalogue.entries import Material, Threat
 from ..catalogue.strength import NINETY
 from ..results.attributes import NOT_TESTED
 from ..scene import Core, Plate
-from .doubts import doubts_of
+from .tested import standings_of, summary_of
 
 if TYPE_CHECKING:
     from .campaign import Campaign
@@ -21,13 +21,15 @@ _CLOSE = 1e-6
 
 
 def evidence_of(campaign: Campaign) -> list[str]:
-    """A line for every name and a sentence for every doubt; empty for a campaign of which nothing is to be said."""
+    """One line on what an answer rests on, a line for every name, and a sentence for all that was not measured."""
     catalogue = Catalogue.of(campaign.catalogue)
-    lines = [] if campaign.core.threat is None else [_of_threat(campaign.core, catalogue)]
+    standings = standings_of(campaign, catalogue.all(Material))
+    lines = [summary_of(campaign, standings)]
+    lines += [] if campaign.core.threat is None else [_of_threat(campaign.core, catalogue)]
     for place, plate in campaign.target.named:
         if plate.material is not None:
             lines.append(_of_material(campaign, place, plate, catalogue))
-    return lines + [f"{NOT_TESTED}{doubt}" for doubt in dict.fromkeys(doubts_of(campaign, catalogue.all(Material)))]
+    return [*lines, *(f"{NOT_TESTED}{standing.sentence}" for standing in standings)]
 
 
 def limit_velocity_factors(campaign: Campaign) -> tuple[float, float] | None:

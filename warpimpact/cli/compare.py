@@ -57,6 +57,7 @@ def add_compare(commands: Commands) -> None:
 def _compare(arguments: argparse.Namespace) -> int:
     from warpimpact.analysis.comparison import compare
     from warpimpact.analysis.comparison_text import comparison_text
+    from warpimpact.analysis.evidence_lines import evidence_of_all
     from warpimpact.plotting import comparison_figure, weight_figure
     from warpimpact.results import files
 
@@ -77,8 +78,11 @@ def _compare(arguments: argparse.Namespace) -> int:
     with ExitStack() as stack:
         datasets = [stack.enter_context(files.opened(path)) for path in paths.values()]
         comparison = compare(datasets, list(paths), angle=angle, standoff=standoff)
+        evidence = evidence_of_all(dict(zip(paths, datasets, strict=True)))
         code = max(failure_code(dataset, path) for dataset, path in zip(datasets, paths.values(), strict=True))
     print(comparison_text(comparison))
+    for line in evidence:
+        print(line)
     comparison_figure(comparison).savefig(figure, dpi=150)
     print(f"{figure}{replaced}")
     if (against_weight := weight_figure(comparison)) is not None:

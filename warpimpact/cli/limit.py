@@ -4,8 +4,6 @@ import argparse
 from pathlib import Path
 from typing import Any
 
-from warpimpact.results import attributes as attr
-
 from .options import Commands, add_campaign, add_command, add_output, at_least, read_option
 from .paths import check_picture, check_place, replaces
 from .progress import warn
@@ -48,6 +46,7 @@ def add_limit(commands: Commands) -> None:
 
 
 def _limit(arguments: argparse.Namespace) -> int:
+    from warpimpact.analysis.evidence_lines import evidence_lines
     from warpimpact.campaign.campaign import Campaign
     from warpimpact.plotting.limit import limit_figure
     from warpimpact.results import files
@@ -66,8 +65,8 @@ def _limit(arguments: argparse.Namespace) -> int:
     run_shown(campaign, output, arguments, computation)
     dataset = files.read(output)
     print(text_of(limit_view(dataset)))
-    if attr.EVIDENCE in dataset.attrs:
-        print(dataset.attrs[attr.EVIDENCE])
+    for line in evidence_lines(dataset, file=str(output)):
+        print(line)
     limit_figure(dataset).savefig(picture, dpi=150)
     print(f"written to {output}, figure in {picture}")
     return failure_code(dataset, output)

@@ -40,4 +40,5 @@ def heading(dataset: xarray.Dataset, width: int = _WIDTH) -> str:
 def names(dataset: xarray.Dataset, width: int = _WIDTH) -> list[str]:
     """Lines of the names of the catalogue that a result has, each with the state of its evidence."""
     lines = dataset.attrs.get(attr.EVIDENCE, "").splitlines()
-    return [part for line in lines if not line.startswith(attr.NOT_TESTED) for part in wrap(line, width)]
+    named = [line for line in lines if not line.startswith((attr.RESTS_ON, attr.NOT_TESTED))]
+    return [part for line in named for part in wrap(line, width)]

@@ -104,10 +104,10 @@ PLATE = _declared("plate", "table", _SI)
 IMPACT = _declared("impact", "table", _SI)
 MATERIAL = _declared("material", "table", _SI)
 EVIDENCE = _declared("evidence")
-"""Names of threat and materials with the state of their evidence, and what is beyond it: a line each; not there where
-nothing is to be said."""
-NOT_TESTED = "not tested: "
-"""Begins a line of the evidence that is a doubt."""
+"""What a result rests on, names of threat and materials with the state of their evidence, and what was not measured: a
+line each."""
+RESTS_ON, NOT_TESTED = "evidence: ", "not tested: "
+"""Begin the first line of the evidence, and those of what was not measured."""
 EFFECTIVE = "effective_sample_size"
 """Of a posterior, which has no map of hits."""
 DISCREPANCY = _declared("discrepancy", "table")

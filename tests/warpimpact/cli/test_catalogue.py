@@ -27,9 +27,10 @@ rows = { "7.62x51 P80 AP" = 3 }
 thickness_high = "10 mm"
 """
 LINES = (
+    "evidence: limit velocities; beyond them: thickness",
     "core: 7.62x51 P80 AP (assumed, as second-hand: bullet mass, velocity)",
     "plate: own steel, Y 1 GPa (3 limit velocities; nothing assumed)",
-    "not tested: plate is 20 mm thick, but the limit velocities of own steel are of 0 to 10 mm",
+    "not tested: thickness (plate): 20 mm, but limit velocities of own steel are of 0 to 10 mm",
 )
 
 
@@ -39,10 +40,18 @@ def test_names_are_carried_along(
     monkeypatch.chdir(tmp_path)
     Path("own.toml").write_text(OWN, encoding="utf-8")
     Path("named.toml").write_text(CAMPAIGN, encoding="utf-8")
-    for command in (["run", "named.toml", "--device", "cpu"], ["inspect", "named.nc"]):
-        assert main(command) == 0
-        told = capsys.readouterr().out.splitlines()
-        assert [line for line in LINES if line not in told] == []
+    assert main(["run", "named.toml", "--device", "cpu"]) == 0
+    told = capsys.readouterr().out.splitlines()
+    assert f"{LINES[0]} (warpimpact inspect named.nc says by how much)" in told
+    assert LINES[1] in told
+    assert LINES[3] not in told
+    assert main(["inspect", "named.nc"]) == 0
+    told = capsys.readouterr().out.splitlines()
+    assert [line for line in LINES if line not in told] == []
+    assert main(["run", "named.toml", "--count", "8", "-o", "other.nc", "--device", "cpu"]) == 0
+    capsys.readouterr()
+    assert main(["compare", "named.nc", "other.nc"]) == 0
+    assert capsys.readouterr().out.splitlines().count(LINES[0]) == 1
     dataset = files.read(Path("named.nc"))
     assert dataset.attrs[attr.EVIDENCE].splitlines() == list(LINES)
     over = variable_map(dataset, "residual_velocity").get_suptitle().splitlines()

@@ -1,0 +1,33 @@
+"""The lines on what results rest on, as commands print them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING
+
+from warpimpact.results import attributes as attr
+
+if TYPE_CHECKING:
+    from warpimpact.results.table import Result
+
+
+def evidence_lines(dataset: Result, *, file: str | None = None) -> list[str]:
+    """What a result rests on in a line, and its names with their evidence; what was not measured is counted only.
+
+    Args:
+        file: of the result, whose `inspect` tells more.
+    """
+    lines = str(dataset.attrs.get(attr.EVIDENCE, "")).splitlines()
+    told = [line for line in lines if not line.startswith(attr.NOT_TESTED)]
+    if len(told) < len(lines) and file is not None:
+        told[0] += f" (warpimpact inspect {file} says by how much)"
+    return told
+
+
+def evidence_of_all(datasets: Mapping[str, Result]) -> list[str]:
+    """What results of these names rest on, a line for those that rest on the same."""
+    names: dict[str, list[str]] = {}
+    for name, dataset in datasets.items():
+        for line in evidence_lines(dataset)[:1]:
+            names.setdefault(line, []).append(name)
+    return list(names) if len(names) == 1 else [f"{', '.join(those)}: {line}" for line, those in names.items()]

@@ -1,0 +1,239 @@
+"""What of a campaign was ever measured: published limit velocities of solid plates, and two shots at one slotted plate
+(docs/validation.md). Everything else of a campaign rests on the model alone, and is named here with its range."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from functools import cache
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from ..catalogue.catalogue import HERE
+from ..catalogue.entries import Material
+from ..results.attributes import RESTS_ON
+from ..scene import Core, Plate
+from .catalogued import calibres_of
+
+if TYPE_CHECKING:
+    from .campaign import Campaign
+
+Figures = Mapping[str, Mapping[str, float]]
+
+_CLOSE = 0.05
+"""Relative distance from the end of a range that still counts as inside."""
+_HEAVY, _CARBIDE = 5000.0, 11_000.0
+"""Density above which a plate is steel, and above which a core is a carbide or a heavy metal [kg/m³]."""
+_STRONG, _STEP = 2.0e9, 1.0
+"""A steel may be hard from this resistance on [Pa], and its resistance falls below this thickness in calibres."""
+_NOSE, _SHORT = 0.95, 0.75
+"""A nose ends where this share of the largest radius is reached; a blunt one is shorter, in diameters."""
+_STRAIGHT = math.radians(2.0)
+"""Obliquity or yaw on impact that the two shots through holes may have had [rad]."""
+_HOLED_CALIBRES, _HOLED_LIGAMENT = 0.66, 1.0
+"""The plate of the two shots: its thickness in calibres, and about its ligament over its thickness, as the spacing of
+the slots is not published (the paper's §2)."""
+_ALIKE = 1.5
+"""Ratio up to which a plate with holes is like that of the two shots. It is chosen."""
+
+
+class Standing(NamedTuple):
+    """Something of a campaign that lies beyond what was measured, or that nobody measured.
+
+    Attributes:
+        subject: what it is, in a word or two.
+        text: what was found, and what was measured.
+        place: layer of the target as a campaign names it; empty for the shot as a whole.
+    """
+
+    subject: str
+    text: str
+    place: str = ""
+
+    @property
+    def sentence(self) -> str:
+        """Subject, place and text."""
+        return f"{self.subject}{f' ({self.place})' if self.place else ''}: {self.text}"
+
+
+def standings_of(campaign: Campaign, materials: Mapping[str, Material]) -> list[Standing]:
+    """Everything of a campaign that lies beyond what was measured; layers that say the same are told together."""
+    figures = _figures()
+    found = list(_of_shot(campaign, figures))
+    for place, plate in campaign.target.named:
+        material = None if plate.material is None else materials.get(plate.material)
+        found += [standing._replace(place=place) for standing in _of_plate(campaign, plate, material, figures)]
+    places: dict[tuple[str, str], list[str]] = {}
+    for subject, text, place in found:
+        places.setdefault((subject, text), []).append(place)
+    return [Standing(subject, text, _joined(where)) for (subject, text), where in places.items()]
+
+
+def summary_of(campaign: Campaign, standings: Sequence[Standing]) -> str:
+    """One sentence on what an answer for the campaign rests on."""
+    holed = any(plate.open_area for plate in campaign.target.layers)
+    base = "two shots at one slotted plate, and limit velocities of solid plates" if holed else "limit velocities"
+    if not standings:
+        return f"{RESTS_ON}inside what was measured ({base})"
+    subjects = list(dict.fromkeys(standing.subject for standing in standings))
+    return f"{RESTS_ON}{base}; beyond them: {', '.join(subjects)}"
+
+
+def nose_length(core: Core) -> float:
+    """Where a core is nearly as wide as it gets, in its largest diameters behind the tip."""
+    s = np.linspace(0.0, core.length, 1001)
+    first = int(np.argmax(core.radius(s) >= _NOSE * core.max_radius))
+    return float(s[first] / (2.0 * core.max_radius))
+
+
+def _joined(places: list[str]) -> str:
+    named = list(dict.fromkeys(filter(None, places)))
+    return named[0] if len(named) == 1 else f"{named[0]} and {len(named) - 1} more" if named else ""
+
+
+@cache
+def _figures() -> Figures:
+    """Ranges of what was measured, and errors of what the model fails at (tests/validation/limit_catalogue.py)."""
+    figures: Figures = json.loads((HERE / "figures.json").read_text(encoding="utf-8"))
+    return figures
+
+
+def _of_shot(campaign: Campaign, figures: Figures) -> Iterator[Standing]:
+    core, impact, layers = campaign.core, campaign.impact, campaign.target.layers
+    nose, rows = nose_length(core), figures["core"]
+    if nose < _SHORT:
+        yield Standing(
+            "the blunt nose",
+            f"it is {nose:.2g} diameters long, but every core with a limit velocity had a nose of {rows['nose']:.2g}; "
+            "a blunt nose shears out a plug, which the model lacks",
+        )
+    yield from _outside(
+        "the diameter of the core", 2e3 * core.max_radius, rows["diameter_low"], rows["diameter_high"], "mm"
+    )
+    yield from _outside("the impact velocity", impact.velocity, rows["velocity_low"], rows["velocity_high"], "m/s")
+    if max(abs(impact.pitch), abs(impact.yaw)) > _STRAIGHT:
+        yield Standing("yaw on impact", "no published shot had any")
+    if len(layers) > 1:
+        yield Standing("several layers", "no published shot was at more than one")
+    if any(layer.degradation < 1.0 for layer in layers):
+        yield Standing(
+            "weakening",
+            "β is below 1, which rests on the two shots alone; solid plates were fitted without it",
+        )
+    holed = [layer for layer in layers if layer.open_area]
+    if holed and impact.obliquity > _STRAIGHT:
+        yield Standing("holes hit at an angle", "both shots at a plate with holes were along its normal")
+    if holed and core.strength is None:
+        yield Standing(
+            "whether the core breaks",
+            "[core] gives no strength, so it cannot; the paper's plate is meant to break cores",
+        )
+
+
+def _of_plate(campaign: Campaign, plate: Plate, material: Material | None, figures: Figures) -> Iterator[Standing]:
+    """Where a plate leaves what was measured; the material's own rows count where it has some."""
+    core, steel = campaign.core, plate.density > _HEAVY
+    rows = figures["steel" if steel else "aluminium"]
+    if not _within(plate.density, rows["density_low"], rows["density_high"], 0.03):
+        yield Standing(
+            "the kind of material",
+            f"{plate.density:.4g} kg/m³ is neither steel nor aluminium, and no other plate was measured",
+        )
+        return
+    if plate.open_area:
+        yield from _of_holes(core, plate)
+    if material is not None and material.rows:
+        yield from _of_rows(campaign, plate, material)
+    else:
+        kind = "steel" if steel else "aluminium"
+        ratio, angle = calibres_of(core, plate), math.degrees(campaign.impact.obliquity)
+        yield from _outside("thickness", ratio, rows["calibres_low"], rows["calibres_high"], "calibres", kind)
+        yield from _outside("obliquity", angle, 0.0, rows["obliquity_high"], "°", kind)
+        resistance = plate.resistance / 1e9
+        yield from _outside("resistance", resistance, rows["resistance_low"], rows["resistance_high"], "GPa", kind)
+    if material is None:
+        yield from _thin_hard(core, plate, figures["thin hard steel"])
+    yield from _dense(core, plate, figures["carbide"])
+
+
+def _of_rows(campaign: Campaign, plate: Plate, material: Material) -> Iterator[Standing]:
+    """Where a plate leaves the rows that its material comes from."""
+    core, name = campaign.core, material.name
+    high, farthest = material.calibres_high or math.inf, material.obliquity_high or math.inf
+    thickest = material.thickness_high or math.inf
+    yield from _outside("thickness", 1e3 * plate.thickness, 1e3 * material.thickness_low, 1e3 * thickest, "mm", name)
+    yield from _outside("thickness", calibres_of(core, plate), material.calibres_low, high, "calibres", name)
+    angle, low = math.degrees(campaign.impact.obliquity), math.degrees(material.obliquity_low)
+    yield from _outside("obliquity", angle, low, math.degrees(farthest), "°", name)
+    if core.threat not in material.rows:
+        threat = "this core" if core.threat is None else f"the {core.threat}"
+        told = ", ".join(material.rows)
+        yield Standing("the threat", f"no limit velocity of {name} is of {threat}, but of {told}")
+
+
+def _of_holes(core: Core, plate: Plate) -> Iterator[Standing]:
+    """How a plate with holes differs from the one that was shot at."""
+    ratio, share = calibres_of(core, plate), plate.ligament / plate.thickness
+    if not _alike(ratio, _HOLED_CALIBRES) or not _alike(share, _HOLED_LIGAMENT):
+        yield Standing(
+            "holes",
+            f"{ratio:.2g} calibres thick, ligaments of {1e3 * plate.ligament:.3g} mm ({share:.2g} of the thickness); "
+            f"the two shots were at one plate of {_HOLED_CALIBRES:.2g} calibres, with ligaments about as wide as thick",
+        )
+
+
+def _alike(value: float, other: float) -> bool:
+    return other / _ALIKE <= value <= other * _ALIKE
+
+
+def _thin_hard(core: Core, plate: Plate, figure: Mapping[str, float]) -> Iterator[Standing]:
+    """Of a plate whose Y is not the catalogue's, which follows the thickness."""
+    ratio = calibres_of(core, plate)
+    if plate.density < _HEAVY or ratio >= _STEP or plate.resistance < _STRONG:
+        return
+    yield Standing(
+        "thin hard steel",
+        f"steel that may be hard, {ratio:.2g} calibres thick: hard steel has {figure['share']:.0%} of its Y at one "
+        f"calibre where it is {figure['calibres']:.2g} calibres thick (median of {figure['materials']:.0f} steels); "
+        "check that your Y is of such a thickness",
+    )
+
+
+def _dense(core: Core, plate: Plate, figure: Mapping[str, float]) -> Iterator[Standing]:
+    """Of a core of a carbide or a heavy metal that has no rows of its own."""
+    if _density(core) < _CARBIDE or core.threat is not None:
+        return
+    steel = plate.density >= _HEAVY
+    bias, rows = (figure["steel"], figure["steel rows"]) if steel else (figure["aluminium"], figure["aluminium rows"])
+    yield Standing(
+        "the dense core",
+        "the core is as dense as a carbide: from rows of steel cores the model predicts limit velocities of the BS41 "
+        f"carbide core in {'steel' if steel else 'aluminium'} {abs(bias):.0%} too {'high' if bias > 0 else 'low'} "
+        f"(median of {rows:.0f})",
+    )
+
+
+def _density(core: Core) -> float:
+    """Mass over volume [kg/m³]."""
+    if core.density is not None:
+        return core.density
+    s = np.linspace(0.0, core.length, 2001)
+    volume = float(np.trapezoid(np.pi * core.radius(s) ** 2, s))
+    return core.mass_properties.mass / volume
+
+
+def _outside(subject: str, value: float, low: float, high: float, unit: str, whose: str = "") -> Iterator[Standing]:
+    """A number that lies beyond a range that was measured."""
+    if _within(value, low, high):
+        return
+    of = f" of {whose}" if whose else ""
+    measured = f"{low:.3g} to {high:.3g}" if math.isfinite(high) else f"from {low:.3g} on"
+    measured = f"{low:.3g}" if low == high else measured
+    text = f"{value:.3g} {unit}, but limit velocities{of} are of {measured} {unit}"
+    yield Standing(subject, text.replace(" °", "°"))
+
+
+def _within(value: float, low: float, high: float, close: float = _CLOSE) -> bool:
+    return low * (1.0 - close) - 1e-12 <= value <= high * (1.0 + close) + 1e-12
