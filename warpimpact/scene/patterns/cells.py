@@ -170,7 +170,7 @@ def _means(values: NDArray[Any], count: int, width: float) -> Array:
 
 
 def _opened(holes: BoolArray, radius: float) -> BoolArray:
-    """What a disc of a radius [cells] reaches of some holes, without leaving them."""
+    """The parts of holes that a disc of this radius [squares] reaches without leaving the holes."""
     if radius < 0.5 or not holes.any() or holes.all():
         return holes
     from scipy.ndimage import distance_transform_edt
@@ -183,7 +183,7 @@ def _opened(holes: BoolArray, radius: float) -> BoolArray:
 
 
 def _in_one_piece(material: BoolArray) -> BoolArray:
-    """Material without what holes surround.
+    """The largest connected part of the material; parts that holes surround fall out.
 
     Raises:
         ValueError: the holes cut the plate apart.

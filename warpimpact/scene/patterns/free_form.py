@@ -26,9 +26,9 @@ class Supershape(Model):
     Attributes:
         y, z: its place in the cell [m].
         radius: its largest radius, before `stretch` [m].
-        lobes: m, how many equal parts it has around; 0 for a circle.
+        lobes: m, number of equal parts around; 0 for a circle.
         exponents: n1, n2 and n3.
-        stretch: its length along its own z as a multiple of that along y.
+        stretch: length along its z over length along its y, before the rotation.
         rotation: from +y towards +z [rad].
     """
 
@@ -42,20 +42,22 @@ class Supershape(Model):
 
     @property
     def reach(self) -> float:
-        """The farthest that it may extend from its place [m]."""
+        """Largest distance of its edge from its place [m]."""
         return self.radius * max(1.0, self.stretch)
 
     def holds(self, y: Array, z: Array) -> BoolArray:
-        """Whether points, from its place [m], lie in it; of their broadcast shape."""
+        """Whether points, relative to its place [m], lie in it; in their broadcast shape."""
         cosine, sine = math.cos(self.rotation), math.sin(self.rotation)
         along_y, along_z = cosine * y + sine * z, (cosine * z - sine * y) / self.stretch
-        turn = 0.25 * self.lobes * np.arctan2(along_z, along_y)
-        of_all = 0.25 * self.lobes * np.linspace(-np.pi, np.pi, 1441)
-        return np.asarray(np.hypot(along_y, along_z) <= self.radius * self._form(turn) / self._form(of_all).max())
+        radius = self._form(np.arctan2(along_z, along_y))
+        largest = self._form(np.linspace(-np.pi, np.pi, 1441)).max()
+        return np.asarray(np.hypot(along_y, along_z) <= self.radius * radius / largest)
 
-    def _form(self, turn: Array) -> Array:
-        one, two, three = self.exponents
-        return np.asarray((np.abs(np.cos(turn)) ** two + np.abs(np.sin(turn)) ** three) ** (-1.0 / one))
+    def _form(self, angle: Array) -> Array:
+        """r(θ) of the class's formula, up to a factor."""
+        n1, n2, n3 = self.exponents
+        turn = 0.25 * self.lobes * angle
+        return np.asarray((np.abs(np.cos(turn)) ** n2 + np.abs(np.sin(turn)) ** n3) ** (-1.0 / n1))
 
 
 class Wave(Model):
@@ -63,8 +65,8 @@ class Wave(Model):
 
     Attributes:
         along_y, along_z: k and l, periods in the cell.
-        amplitude: as a multiple of those of the others.
-        phase: how far the wave is shifted [rad].
+        amplitude: relative to the other waves.
+        phase: shift of the wave [rad].
     """
 
     along_y: Annotated[int, Field(strict=True, ge=-6, le=6)]
@@ -99,7 +101,7 @@ class _Polygon(NamedTuple):
         return cls(float(place[0]), float(place[1]), 0.5 * float((high - low).max()), outline)
 
     def holds(self, y: Array, z: Array) -> BoolArray:
-        """Whether points, from its place [m], lie in it; of their broadcast shape."""
+        """Whether points, relative to its place [m], lie in it; in their broadcast shape."""
         import shapely
 
         return np.asarray(shapely.contains_xy(self.outline, *np.broadcast_arrays(y, z)))
@@ -197,7 +199,7 @@ class LevelSetPattern(FreeForm):
     Attributes:
         shape: "level_set".
         waves: the terms of the sum.
-        share: of holes in the cell, before a tool opens them.
+        share: open area of the cell, before a tool opens the holes.
     """
 
     shape: Literal["level_set"] = "level_set"
@@ -211,8 +213,8 @@ class LevelSetPattern(FreeForm):
     def drawn(self, y: Array, z: Array) -> BoolArray:
         a, b = len(y) * self.side, len(z) * self.side
         height = sum(
-            one.amplitude * np.cos(2.0 * np.pi * (one.along_y * y / a + one.along_z * z / b) + one.phase)
-            for one in self.waves
+            wave.amplitude * np.cos(2.0 * np.pi * (wave.along_y * y / a + wave.along_z * z / b) + wave.phase)
+            for wave in self.waves
         )
         if np.ptp(height) < 1e-9:
             raise ValueError("got waves that cancel, but their sum must differ from place to place")
@@ -220,6 +222,6 @@ class LevelSetPattern(FreeForm):
 
 
 def _images(place: float, reach: float, side: float) -> list[float]:
-    """Places of the images of a hole that reach into a period about the origin."""
+    """Places [m] of the images of a hole that reach into a period about the origin."""
     first, last = (math.ceil((-0.5 * side - reach - place) / side), math.floor((0.5 * side + reach - place) / side))
     return [place + number * side for number in range(first, last + 1)]

@@ -18,16 +18,16 @@ from .pattern import BoolArray, Check, Counts, Pattern, Range, half_sides, no_en
 from .roundings import area, chords, distance, geometries, neighbours, outline, placed
 
 _MOST_HOLES = 20_000
-_ROWS = 64
-"""Of cells that are computed between two looks at who may end it."""
+_ROWS_PER_CHECK = 64
+"""Rows of cells between two calls of `check`."""
 _SAME = 1e-9
-"""Two lengths are equal if they differ by less than this share of the period."""
+"""Largest difference of two equal lengths, as a share of the period."""
 
 _PAIR = tuple[PositiveLength, PositiveLength]
 
 
 class HolePlace(NamedTuple):
-    """The place of a hole in a cell: its origin [m], and its rotation from +y towards +z [rad]."""
+    """Place of a hole in a cell: its origin [m] and its rotation from +y towards +z [rad]."""
 
     y: Length
     z: Length
@@ -37,9 +37,9 @@ class HolePlace(NamedTuple):
 class LatticePattern(Pattern):
     """Holes of one shape in a rectangular cell that repeats.
 
-    A shape has a `spine`, which is a convex polygon, a line or a point. The hole is all that lies within the distance
-    `rounding` of the spine. A slot is a line and a radius. A triangle with rounded corners is a smaller triangle and
-    the radius of the corners.
+    A shape has a `spine`, which is a convex polygon, a line or a point. The hole has all points within the distance
+    `rounding` of the spine. The spine of a slot is a line; that of a triangle with rounded corners is a smaller
+    triangle.
 
     Attributes:
         staggered: shifts every odd row of cells along y by b/2 along z.
@@ -83,14 +83,14 @@ class LatticePattern(Pattern):
 
     @property
     def hole_size(self) -> tuple[float, float]:
-        """Diameter of the largest circle in a hole, about its place, and greatest extent of a hole [m]."""
-        apart = np.linalg.norm(self.spine[:, None] - self.spine[None], axis=-1).max()
+        """Diameter of the largest circle in a hole about its place, and largest extent of a hole [m]."""
+        longest = np.linalg.norm(self.spine[:, None] - self.spine[None], axis=-1).max()
         inside = float(self._depth(np.zeros(1), np.zeros(1))[0])
-        return 2.0 * inside, float(apart) + 2.0 * self.rounding
+        return 2.0 * inside, float(longest) + 2.0 * self.rounding
 
     @property
     def _marks(self) -> Array:
-        """Points, shape [marks, 2] [m]. Two holes of the shape are the same if their marks are the same."""
+        """Points that identify a hole of the shape, shape [marks, 2] [m]."""
         return self.spine
 
     def _depth(self, y: Array, z: Array) -> Array:
@@ -109,11 +109,11 @@ class LatticePattern(Pattern):
         self._check_shape()
         if self.open_area >= 1:
             raise ValueError(f"got spacing = {_millimetres(self.spacing)}, but the cell must be larger than its holes")
-        gap, one, other = self._nearest
+        gap, first, second = self._nearest
         if gap <= _SAME * max(self.spacing):
             raise ValueError(
-                f"got spacing = {_millimetres(self.spacing)}, which lets the holes at {_millimetres(one)} and "
-                f"{_millimetres(other)} overlap or touch, but a ligament must be left between them"
+                f"got spacing = {_millimetres(self.spacing)}, which lets the holes at {_millimetres(first)} and "
+                f"{_millimetres(second)} overlap or touch, but a ligament must be left between them"
             )
         return self
 
@@ -125,7 +125,7 @@ class LatticePattern(Pattern):
 
     @property
     def period(self) -> tuple[float, float]:
-        """That of the unit cell, or the size of the plate that bounds the pattern [m]."""
+        """Extent of the unit cell, or size of the plate that bounds the pattern [m]."""
         return self.unit_cell if self._plate is None else self._plate[0]
 
     @property
@@ -147,7 +147,7 @@ class LatticePattern(Pattern):
         return self if self._plate is None else self._on(None)
 
     def _on(self, plate: tuple[tuple[float, float], float] | None) -> Self:
-        """The same holes on a plate of this size and margin [m]. Computed values are not copied."""
+        """A copy on a plate of this size and margin [m], without computed values."""
         pattern = copy(self)
         pattern.__dict__ = {name: getattr(self, name) for name in type(self).model_fields}
         pattern._plate = plate
@@ -167,18 +167,18 @@ class LatticePattern(Pattern):
         extents = self._boxes(places)
         along_y = half_shares(self._chords(places, exchanged=False), extents[:, :, 1], counts, sides, check)
         along_z = half_shares(self._chords(places, exchanged=True), extents[:, :, 0], counts[::-1], sides[::-1], check)
-        for first in range(0, counts[0], _ROWS):
+        for first in range(0, counts[0], _ROWS_PER_CHECK):
             check()
-            along_y[first : first + _ROWS] += along_z[:, first : first + _ROWS].T
+            along_y[first : first + _ROWS_PER_CHECK] += along_z[:, first : first + _ROWS_PER_CHECK].T
         return along_y
 
     def _chords(self, places: Array, *, exchanged: bool) -> Chords:
-        """Those of the holes at some places; `exchanged`, with y and z in each other's place."""
+        """Chords of the holes at these places; `exchanged` swaps y and z."""
         spines = placed(self.spine, places)
         return partial(chords, spines[:, ::-1, ::-1] if exchanged else spines, self.rounding)
 
     def _deepest(self, y: Array, z: Array) -> Array:
-        """Depth of points inside a hole [m]; negative outside, −inf where no hole is in sight."""
+        """Depth of points inside a hole [m]; negative outside, −inf if no hole is in sight."""
         (period_y, period_z), (count_y, count_z) = self.period, self._bins[0]
         y, z = y - period_y * np.round(y / period_y), z - period_z * np.round(z / period_z)
         cell = _bin(y, period_y, count_y) * count_z + _bin(z, period_z, count_z)
@@ -194,7 +194,7 @@ class LatticePattern(Pattern):
         return [outline(spine, self.rounding) for spine in placed(self.spine, self._reaching(y_range, z_range))]
 
     def ligament(self, size: tuple[float, float] | None = None) -> float:
-        """Smallest distance between two holes, or between a whole hole and the rim of a plate of this `size` [m]. It is
+        """Smallest distance between two holes, or between a whole hole and the rim of a plate of this `size` [m];
         exact, except for ellipses, which are polygons here."""
         if size is None:
             return self._nearest[0]
@@ -208,16 +208,15 @@ class LatticePattern(Pattern):
         period, mirror = np.array(self.period), np.array([along_y, along_z])
         middles, marks, tree = self._marked
         images = middles * mirror + (period / 2 if centred else 0.0)
-        apart, same = tree.query(images % period % period)
-        if apart.max() > _SAME * period.max():
+        distances, nearest = tree.query(images % period % period)
+        if distances.max() > _SAME * period.max():
             return False
-        turned, there = marks * mirror, marks[same]
-        apart = np.linalg.norm(turned[:, :, None] - there[:, None], axis=-1).min(axis=-1)
-        return bool(apart.max() <= _SAME * period.max())
+        mirrored = (marks * mirror)[:, :, None] - marks[nearest][:, None]
+        return bool(np.linalg.norm(mirrored, axis=-1).min(axis=-1).max() <= _SAME * period.max())
 
     @cached_property
     def _marked(self) -> tuple[Array, Array, Any]:
-        """Middles of the holes of a period [m], their marks from there [m], and a tree of the middles."""
+        """Middles of the holes of a period [m], their marks relative to these [m], and a tree of the middles."""
         from scipy.spatial import KDTree
 
         period, marks = np.array(self.period), placed(self._marks, self._places)
@@ -250,7 +249,7 @@ class LatticePattern(Pattern):
         return kept
 
     def _reaching(self, y_range: Range, z_range: Range) -> Array:
-        """Places of the holes that reach into a rectangle, shape [holes, 3]; none beyond the plate."""
+        """Places of the holes that reach into a rectangle, shape [holes, 3]; none lies beyond the plate."""
         if self._plate is None:
             return self._repeated(self._places, self.period, y_range, z_range)
         boxes, (low, high) = self._boxes(self._places), np.array([y_range, z_range]).T
@@ -258,7 +257,7 @@ class LatticePattern(Pattern):
         return kept
 
     def _repeated(self, places: Array, period: tuple[float, float], y_range: Range, z_range: Range) -> Array:
-        """Places repeated by whole periods, as far as their holes reach into a rectangle."""
+        """Places repeated by whole periods whose holes reach into a rectangle, shape [holes, 3]."""
         repeated = []
         for place, (low, high) in zip(places, self._boxes(places), strict=True):
             along_y, along_z = (
@@ -270,13 +269,13 @@ class LatticePattern(Pattern):
         return np.concatenate(repeated)
 
     def _boxes(self, places: Array) -> Array:
-        """Lower and upper corners (y, z) of the holes at some places, shape [holes, 2, 2] [m]."""
+        """Lower and upper corners (y, z) of the holes at these places, shape [holes, 2, 2] [m]."""
         spines = placed(self.spine, places)
         return np.stack([spines.min(axis=1) - self.rounding, spines.max(axis=1) + self.rounding], axis=1)
 
     @cached_property
     def _nearest(self) -> tuple[float, Array, Array]:
-        """Smallest distance between two holes of the unbounded lattice [m], and the origins of these."""
+        """Smallest distance between two holes of the unbounded lattice [m], and the origins of both [m]."""
         extent, cell = np.ptp(self._boxes(self._cell_places), axis=1).max(axis=0), np.array(self.unit_cell)
         around = [
             np.arange(-count, count + 1) * step for count, step in zip(1 + np.ceil(extent / cell), cell, strict=True)
@@ -284,8 +283,8 @@ class LatticePattern(Pattern):
         shifts = np.stack(np.meshgrid(*around, 0.0, indexing="ij"), axis=-1).reshape(-1, 3)
         shifts = shifts[np.argsort(np.abs(shifts).sum(axis=1), kind="stable")]  # the cell itself comes first
         places = (shifts[:, None] + self._cell_places).reshape(-1, 3)
-        gap, one, other = neighbours(geometries(placed(self.spine, places)), len(self._cell_places))
-        return gap - 2 * self.rounding, places[one, :2], places[other, :2]
+        gap, first, second = neighbours(geometries(placed(self.spine, places)), len(self._cell_places))
+        return gap - 2 * self.rounding, places[first, :2], places[second, :2]
 
     @property
     def _sight(self) -> float:
@@ -296,8 +295,8 @@ class LatticePattern(Pattern):
     def _bins(self) -> tuple[tuple[int, int], list[tuple[Array, ...]]]:
         """Numbers of bins of a period along y and z, and the holes in sight of each bin.
 
-        Entry k of the list has the origin, and the cosine and sine of the rotation, of the k-th hole of every bin, each
-        of shape [bins]. It is NaN in a bin with fewer holes.
+        Entry k has the origin (y, z), the cosine and the sine of the rotation of the k-th hole of every bin, shape
+        [bins] each; NaN in a bin with fewer holes.
         """
         period, boxes = np.array(self.period), self._boxes(self._places)
         finest = math.ceil(8 * math.sqrt(len(boxes)))
@@ -319,7 +318,7 @@ class LatticePattern(Pattern):
 
 
 def _bin(at: Array, period: Any, count: Any) -> Numbers:
-    """Index of the bin of each coordinate, of `count` bins of a period about the origin. The outermost bins have no
+    """Index of the bin of each coordinate among `count` bins of a period about the origin; the outer bins have no
     end."""
     return np.asarray(np.clip(np.floor((at / period + 0.5) * count), 0, count - 1), dtype=np.int64)
 

@@ -19,24 +19,24 @@ Check = Callable[[], object]
 
 
 WHOLE_CELL = 24576
-"""Parts of a cell in which its share in holes is counted: integers, of which a cell inside a hole has exactly all."""
+"""Parts of a cell that count its share in holes as an integer; a cell inside a hole has exactly all."""
 
 
 def no_end() -> None:
-    """Nobody ends the work."""
+    """A `check` that never ends the work."""
 
 
 def rounded(share: Array, whole: Any) -> Counts:
-    """Shares of `whole` as integers. A half is rounded up, also where rounding errors take a little from it: mirrored
-    holes have mirrored shares."""
+    """Shares of `whole` as integers. A half is rounded up, even after a rounding error, so that mirrored holes have
+    mirrored shares."""
     return np.asarray(np.floor(share * whole + (0.5 + 1e-6)), dtype=np.int16)
 
 
 def half_sides(size: tuple[float, float], cell: tuple[float, float], reach: Array) -> Array:
-    """Half the sides of a small plate that has the ligaments of a plate of this `size` [m].
+    """Half the sides of a small plate with the same ligaments as a plate of this `size` [m].
 
-    If a plate is smaller by whole cells on every side, its rim cuts the same holes. It must be larger by two cells than
-    the `reach` of a single hole.
+    A plate that is smaller by whole cells on every side cuts the same holes. It is at least two cells larger than the
+    `reach` of a hole.
     """
     half, sides = np.array(size) / 2, np.array(cell)
     spare: Array = np.maximum(0.0, np.floor((half - reach) / sides) - 2)
@@ -53,7 +53,7 @@ class Pattern(Model, ABC):
 
     @property
     def unit_cell(self) -> tuple[float, float]:
-        """Extent along y and z [m] of the cell that represents the pattern. It is the period, unless the pattern is
+        """Extent along y and z [m] of the cell that represents the pattern: the period, unless the pattern is
         bounded."""
         return self.period
 
@@ -67,10 +67,8 @@ class Pattern(Model, ABC):
         """Whether points y, z [m] lie in a hole; bool, of their broadcast shape."""
 
     def has_edge(self, y: Array, z: Array, reach: float) -> BoolArray:
-        """Whether the edge of a hole may lie within `reach` of points y, z [m]; bool, of their broadcast shape.
-
-        Where it is False, there is certainly no edge.
-        """
+        """Whether the edge of a hole may lie within `reach` of points y, z [m]; bool, of their broadcast shape. False
+        is certain."""
         return np.ones(np.broadcast_shapes(np.shape(y), np.shape(z)), dtype=bool)
 
     @abstractmethod
@@ -80,7 +78,7 @@ class Pattern(Model, ABC):
         Args:
             counts: cells of a period along y and z, from the origin on.
             sides: of a cell [m].
-            check: called all the time; it raises to end the work.
+            check: called often; it raises to end the work.
         """
 
     def edge_distance(self, y: Array, z: Array) -> Array:

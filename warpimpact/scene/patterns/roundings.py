@@ -1,4 +1,4 @@
-"""Geometry of rounded convex shapes. A shape is all that lies within the distance `rounding` of a spine, which is a
+"""Geometry of rounded convex shapes. A shape has all points within the distance `rounding` of a spine, which is a
 convex polygon, a line or a point. Areas, distances and extents are exact. Spines are arrays of shape [corners, 2] [m].
 """
 
@@ -11,7 +11,7 @@ import numpy as np
 from ..model import Array
 
 _PIECE = 16
-"""Chords in a piece of an outline."""
+"""Chords per piece of an outline."""
 _QUARTER = 16
 """Chords per quarter of a turn in an outline; a circle loses 1.6e-3 of its area."""
 
@@ -21,8 +21,8 @@ def area(spine: Array, rounding: float) -> float:
     import shapely
 
     shape = geometries(spine[None])[0]
-    around = shape.length * (2.0 if len(spine) == 2 else 1.0)  # of a line there and back
-    return float(shapely.area(shape) + rounding * around + np.pi * rounding**2)
+    perimeter = shape.length * (2.0 if len(spine) == 2 else 1.0)  # a line counts on both sides
+    return float(shapely.area(shape) + rounding * perimeter + np.pi * rounding**2)
 
 
 def distance(spine: Array, y: Array, z: Array) -> Array:
@@ -37,36 +37,37 @@ def distance(spine: Array, y: Array, z: Array) -> Array:
         along_y, along_z = (end - start) / (2.0 * half) if half > 0.0 else np.zeros(2)
         from_y, from_z = y - 0.5 * (start[0] + end[0]), z - 0.5 * (start[1] + end[1])
         along = np.clip(from_y * along_y + from_z * along_z, -half, half)
-        apart = np.hypot(from_y - along * along_y, from_z - along * along_z)
+        to_edge = np.hypot(from_y - along * along_y, from_z - along * along_z)
         if len(spine) < 3:
-            return np.asarray(apart)
-        nearest = np.minimum(nearest, apart)
+            return np.asarray(to_edge)
+        nearest = np.minimum(nearest, to_edge)
         within = within & (from_z * along_y - from_y * along_z > 0.0)
     return np.where(within, -nearest, nearest)
 
 
 def chords(spines: Array, rounding: float, which: Any, z: Array, slack: float) -> tuple[Array, Array]:
-    """Ends along y [m] of what lines at z [m] have of shapes, each of the shape of z; NaN where a line misses its shape
-    by more than `slack` [m].
+    """Both ends along y [m] of lines at z [m] in shapes, with the shape of z; NaN if a line misses its shape by more
+    than `slack` [m].
+
+    An end lies on the arc about a corner or on a straight part of the outline. Both kinds of points are in the convex
+    shape, so the outermost one is the end.
 
     Args:
         spines: of the shapes, shape [shapes, corners, 2] [m].
-        which: shape that each line may cross; of the last axis of z.
-
-    An end of a line within a convex shape lies on the arc about a corner or on a straight part of the outline, and both
-    are in the shape: the outermost counts.
+        which: index of the shape that each line may cross, along the last axis of z.
     """
     low, high = np.full(z.shape, np.nan), np.full(z.shape, np.nan)
-    for own, following in zip(*(np.moveaxis(of, 1, 0) for of in (spines, np.roll(spines, -1, axis=1))), strict=True):
-        from_y, from_z = own.T
+    corners = np.moveaxis(spines, 1, 0)
+    for corner, following in zip(corners, np.roll(corners, -1, axis=0), strict=True):
+        from_y, from_z = corner.T
         left = rounding**2 - np.square(z - from_z[which])
         half = np.sqrt(np.maximum(left, 0.0))
         half[left < -slack * (slack + 2.0 * rounding)] = np.nan
         low, high = np.fmin(low, from_y[which] - half), np.fmax(high, from_y[which] + half)
         if spines.shape[1] == 1:
             break
-        along_y, along_z = (following - own).T
-        with np.errstate(divide="ignore", invalid="ignore"):  # of a part along y the arcs have the ends
+        along_y, along_z = (following - corner).T
+        with np.errstate(divide="ignore", invalid="ignore"):  # a part along y has its ends on the arcs
             outwards = rounding / np.hypot(along_y, along_z)
             above = z - (from_z - outwards * along_y)[which]
             part = above * (1.0 / along_z)[which]
@@ -92,19 +93,19 @@ def outline(spine: Array, rounding: float) -> Array:
 
 
 def distance_to(geometries: Any, y: Array, z: Array) -> Array:
-    """Distance of points y, z from the nearest geometry [m], of their broadcast shape; inf if there is none."""
+    """Distance of points y, z from the nearest geometry [m], in their broadcast shape; inf if there is none."""
     import shapely
 
     points: Any = shapely.points(*np.broadcast_arrays(y, z))
     if not len(geometries):
         return np.full(points.shape, np.inf)
     tree = shapely.STRtree(geometries, node_capacity=2)  # 1.5 us per point; 6 us with the default
-    _, apart = tree.query_nearest(points.ravel(), all_matches=False, return_distance=True)
-    return apart.reshape(points.shape)
+    _, distances = tree.query_nearest(points.ravel(), all_matches=False, return_distance=True)
+    return distances.reshape(points.shape)
 
 
 def neighbours(geometries: Any, first: int) -> tuple[float, int, int]:
-    """The two nearest geometries, one of them among the `first`: their distance [m] and their indices.
+    """Smallest distance [m] of one of the `first` geometries from another one, and the indices of both.
 
     The distance is 0 if they overlap, and inf if there are fewer than two geometries.
     """
@@ -113,22 +114,22 @@ def neighbours(geometries: Any, first: int) -> tuple[float, int, int]:
     if len(geometries) < 2:
         return np.inf, 0, 0
     tree = shapely.STRtree(geometries)
-    one, other = tree.query(geometries[:first], predicate="intersects")
-    if (crossing := np.flatnonzero(one != other)).size:
-        return 0.0, int(one[crossing[0]]), int(other[crossing[0]])
-    (one, other), gaps = tree.query_nearest(geometries[:first], exclusive=True, return_distance=True)
+    pairs = tree.query(geometries[:first], predicate="intersects")
+    if (crossing := np.flatnonzero(pairs[0] != pairs[1])).size:
+        return 0.0, int(pairs[0, crossing[0]]), int(pairs[1, crossing[0]])
+    pairs, gaps = tree.query_nearest(geometries[:first], exclusive=True, return_distance=True)
     least = gaps.argmin()
-    return float(gaps[least]), int(one[least]), int(other[least])
+    return float(gaps[least]), int(pairs[0, least]), int(pairs[1, least])
 
 
 def smallest_gap(shapes: Sequence[Sequence[Array]]) -> float:
     """Smallest distance [m] between two shapes that do not overlap; inf if there are fewer than two.
 
-    Args:
-        shapes: the closed outlines of each, each of shape [points, 2] [m].
+    A tree finds the nearest of short pieces of the outlines. The numbers of two shapes differ in a binary digit; so for
+    every digit, the pieces of the shapes with 1 are compared with the pieces of the shapes with 0.
 
-    Outlines are cut into short pieces, of which a tree finds the nearest. Two different numbers differ in some binary
-    digit: for every digit the pieces of the shapes that have it are held against those of the others.
+    Args:
+        shapes: closed outlines of each shape; an outline has the shape [points, 2] [m].
     """
     import shapely
 
@@ -136,17 +137,17 @@ def smallest_gap(shapes: Sequence[Sequence[Array]]) -> float:
     counts = [sum(math.ceil((len(ring) - 1) / _PIECE) for ring in rings) for rings in shapes]
     owner, least = np.repeat(np.arange(len(shapes)), counts), np.inf
     for digit in range((len(shapes) - 1).bit_length() if shapes else 0):
-        has = (owner >> digit & 1).astype(bool)
+        is_one = (owner >> digit & 1).astype(bool)
         limit = least if np.isfinite(least) and least > 0.0 else None
-        gaps = shapely.STRtree(lines[~has]).query_nearest(
-            lines[has], max_distance=limit, return_distance=True, all_matches=False
+        gaps = shapely.STRtree(lines[~is_one]).query_nearest(
+            lines[is_one], max_distance=limit, return_distance=True, all_matches=False
         )[1]
         least = min(least, float(gaps.min(initial=np.inf)))
     return least
 
 
 def pieces(rings: Sequence[Array]) -> Any:
-    """Closed outlines, each of shape [points, 2] [m], as an array of shapely geometries: short pieces of them."""
+    """Short pieces of closed outlines, each of shape [points, 2] [m], as an array of shapely geometries."""
     import shapely
 
     parts = [ring[at : at + _PIECE + 1] for ring in rings for at in range(0, len(ring) - 1, _PIECE)]

@@ -104,12 +104,12 @@ class EllipsePattern(_OblongPattern):
 
     def _chords(self, places: Array, *, exchanged: bool) -> Chords:
         width, length = (self.length, self.width) if exchanged else (self.width, self.length)
-        own = places[:, [1, 0, 2]] * (1.0, 1.0, -1.0) if exchanged else places
+        places = places[:, [1, 0, 2]] * (1.0, 1.0, -1.0) if exchanged else places
 
         def ends(hole: Numbers, z: Array, _: float) -> tuple[Array, Array]:
-            middle_y, middle_z, turn = own[hole].T
+            middle_y, middle_z, turn = places[hole].T
             cosine, sine, above = np.cos(turn), np.sin(turn), z - middle_z
-            # Factors of y² and of y times z in a quadratic form, which is 1/4 on the edge.
+            # Factors of y² and y·z in a quadratic form that is 1/4 on the edge.
             square = (cosine / width) ** 2 + (sine / length) ** 2
             mixed = cosine * sine * (width**-2 - length**-2)
             left = 0.25 * square - (above / (width * length)) ** 2
