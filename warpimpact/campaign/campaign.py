@@ -39,7 +39,7 @@ from ..scene.input_files import InputFile
 from ..scene.model import Model
 from ..scene.quantities import SCATTERED
 from ..scene.scatter import check_range
-from ..scene.shots import FARTHEST
+from ..scene.shots import FARTHEST_HIT
 from ..scene.symmetry import unsymmetric
 from ..scene.target import MOST_LAYERS
 from ..scene.units import Number, PositiveLength, Title
@@ -313,7 +313,7 @@ class Campaign(Model):
         farthest += 0.0 if self.burst is None else self.burst.reach
         # Cells of the plate have 32-bit numbers, counted from the origin.
         cell = min(self.plate.degradation_length / 25.0, (self.numerics.grid_spacing or math.inf) / 5.0)
-        allowed = min(FARTHEST, 2**30 * cell)
+        allowed = min(FARTHEST_HIT, 2**30 * cell)
         if farthest > allowed:
             raise ValueError(
                 f"got hits up to {farthest:.6g} m from the origin, but they are exact up to {allowed:.4g} m; a pattern "

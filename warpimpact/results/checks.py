@@ -21,7 +21,7 @@ from warpimpact.results.declared import (
     texts,
 )
 from warpimpact.scene.display import STORED
-from warpimpact.scene.shots import FARTHEST
+from warpimpact.scene.shots import FARTHEST_HIT
 from warpimpact.scene.toml_text import parsed_json
 from warpimpact.scene.units import LARGEST
 
@@ -94,8 +94,8 @@ def _of_hits(dataset: xarray.Dataset) -> Iterator[str]:
     if not all(_ended(part, codes) for part in _parts(dataset[v.STATUS])):
         yield f'its variable "{v.STATUS}" has unknown codes'
     for name in (v.HIT_Y, v.HIT_Z):
-        if not all((np.abs(part) <= FARTHEST).all() for part in _parts(dataset[name])):
-            yield f'its variable "{name}" has values that are not numbers, or are more than {FARTHEST:g} m'
+        if not all((np.abs(part) <= FARTHEST_HIT).all() for part in _parts(dataset[name])):
+            yield f'its variable "{name}" has values that are not numbers, or are more than {FARTHEST_HIT:g} m'
     standoffs = dataset[v.STANDOFF].values
     if not ((np.abs(standoffs) <= LARGEST).all() and np.unique(standoffs).size == standoffs.size):
         yield f'its variable "{v.STANDOFF}" has values that are no lengths, or one of them twice'

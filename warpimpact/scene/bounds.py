@@ -1,4 +1,4 @@
-"""What a value is likely to be, and what it cannot be: bounds that a slip of units leaves."""
+"""Usual and possible ranges of quantities, which a wrong unit usually leaves."""
 
 import math
 from collections.abc import Iterable, Mapping
@@ -8,18 +8,18 @@ from .display import UNITS
 
 
 class Implausible(UserWarning):
-    """A value that is possible, but probably not what was meant."""
+    """A possible value that is probably a mistake."""
 
 
 class Bounds(NamedTuple):
-    """Usual values of a quantity in SI or radians, about which a person is warned, and what no target or core has.
+    """Usual range of a quantity in SI or radians, outside which there is a warning, and its possible range.
 
     Attributes:
-        low, high: of usual values.
+        low, high: usual range.
         unit: SI unit.
-        meant: units that may have been left out, with the factor from what was read to what was meant.
-        least, most: beyond which a value is refused.
-        why: what these bounds follow from.
+        meant: units that may have been left out, with the factor from the value read to the value meant.
+        least, most: possible range, outside which a value is refused.
+        why: reason for the possible range.
     """
 
     low: float
@@ -31,13 +31,13 @@ class Bounds(NamedTuple):
     why: str = ""
 
     def warning(self, place: str, value: float) -> str | None:
-        """A sentence about a value beyond the usual bounds, None for a usual one; zero is usual."""
+        """A sentence about an unusual value, None for a usual one; zero is usual."""
         if value == 0.0 or self.low <= abs(value) <= self.high:
             return None
         return f"{self._read(place, value)}, but {self._range(self.low, self.high)} is usual{self._slip(place, value)}"
 
     def refusal(self, place: str, value: float) -> str | None:
-        """A sentence about a value that nothing has, None for any other one; zero is possible."""
+        """A sentence about an impossible value, None for a possible one; zero is possible."""
         if value == 0.0 or self.least <= abs(value) <= self.most:
             return None
         allowed = self._range(self.least, self.most)
@@ -103,9 +103,8 @@ USUAL = {
     "impact.spin": Bounds(0.0, 1e5, "rad/s", most=1e6, why="a core would burst"),
     "output.standoffs": _length(5.0, 100_000.0, 1_000_000.0, "nothing behind a target is as far"),
 }
-"""By the place in a campaign: of what a person is warned, and what is refused. Foils, slow cores, shallow depths and
-wide scatter may be studied, so most quantities have no least value; and listed hits may lie anywhere, as a pattern
-repeats."""
+"""Bounds by the place in a campaign. Most quantities have no smallest possible value, since foils, slow cores and
+shallow depths may be studied. Listed hits may lie anywhere, since a pattern repeats."""
 
 
 def hit_bounds(period: tuple[float, float], size: tuple[float, float] | None) -> Bounds:
@@ -114,10 +113,10 @@ def hit_bounds(period: tuple[float, float], size: tuple[float, float] | None) ->
 
 
 def implausible(values: Iterable[tuple[str, str, float]], usual: Mapping[str, Bounds] = USUAL) -> list[str]:
-    """A sentence for every value that is probably not what was meant.
+    """A sentence for every value that is probably a mistake.
 
     Args:
-        values: the place to name, the place in `usual`, and the value.
+        values: the place that the sentence names, the key in `usual`, and the value.
         usual: bounds.
     """
     warnings = (usual[kind].warning(place, value) for place, kind, value in values if kind in usual)
@@ -125,6 +124,6 @@ def implausible(values: Iterable[tuple[str, str, float]], usual: Mapping[str, Bo
 
 
 def impossible(values: Iterable[tuple[str, str, float]]) -> str | None:
-    """A sentence for the first value, as `implausible` takes them, that nothing has."""
+    """A sentence for the first impossible value; `values` are those of `implausible`."""
     refusals = (USUAL[kind].refusal(place, value) for place, kind, value in values if kind in USUAL)
     return next((refusal for refusal in refusals if refusal is not None), None)

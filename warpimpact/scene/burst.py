@@ -19,26 +19,26 @@ from .shots import Hits, Impact, Shots
 from .units import Length
 
 _BURST = 2**20
-"""First part of the keys of all that is drawn for the later shots of bursts. The others have their columns there."""
+"""First part of the keys of random numbers for the later shots of bursts; other keys begin with a column."""
 _DISTANCE, _DIRECTION, _ALONG_Y, _ALONG_Z = range(DRAWN, DRAWN + 4)
-"""Columns of the draws that place the hits; those of the quantities come before."""
+"""Columns of the random numbers that place the hits, after those of the quantities."""
 _NonNegativeLength = Annotated[Length, Field(ge=0)]
 
 
 def _or_one_length(schema: dict[str, Any]) -> None:
-    """A file may give one length, too."""
+    """Allow a single length in the JSON schema."""
     schema["anyOf"].append({"type": ["number", "string"], "unit": "m"})
 
 
 class Burst(Scattering):
-    """Shots at one plate, one after another: how many, and how their hits lie. Every sample is a fresh plate.
+    """Consecutive shots at one plate: their number, and where they hit. Every sample is a fresh plate.
 
     Attributes:
-        count: shots at a plate; where there are offsets it follows from them.
-        spacing: distance of each hit from the one before [m], in a random direction: a distribution or a number. The
+        count: shots at a plate; offsets give it, too.
+        spacing: distance of each hit from the previous one [m], in a random direction: a distribution or a number. The
             first hit is the aim.
         offsets: place (y, z) of each hit from the aim [m].
-        scatter: standard deviations (y, z) of every hit about its place [m]; a number holds for both.
+        scatter: standard deviations (y, z) of every hit about its place [m], or one number for both.
     """
 
     _quantities = {"spacing": Quantity("burst", _NonNegativeLength)}  # noqa: RUF012 (pydantic keeps it private)
@@ -88,11 +88,12 @@ class Burst(Scattering):
         return placed + float(normal_quantile(np.array(1.0 - EDGE))) * max(self.scatter or (0.0,))
 
     def places(self, seed: int, first: int, samples: int) -> tuple[Array, Array]:
-        """Places (y, z) of the hits of some samples from their aims [m], shape [samples, count] each.
+        """Places of the hits relative to their aims, y and z [m], shape [samples, count] each.
 
         Args:
-            seed: of all that is drawn.
+            seed: of the random numbers.
             first: number of the first sample.
+            samples: number of samples.
         """
         shape = samples, self.count
 
@@ -110,11 +111,11 @@ class Burst(Scattering):
 
 
 class BurstSampler(Sampler):
-    """The shots of a campaign of bursts: shot k is number k mod n of the burst at plate k // n, n shots each.
+    """The shots of a campaign of bursts of n shots: shot k is number k mod n of the burst at plate k // n.
 
-    `hits` give the aim of every burst, and what belongs to the plate. What belongs to a shot is drawn for each. It
-    follows from the seed and the number of the shot alone. The first shot of a burst has what the shot at its aim has
-    in a campaign without bursts.
+    `hits` give the aim of every burst and the quantities of its plate. Quantities of a shot are drawn for each shot and
+    depend on the seed and the number of the shot alone. The first shot of a burst equals the shot at its aim in a
+    campaign without bursts.
 
     Raises:
         ValueError: images of shots (`hits.irreducible`), and as a `Sampler`.
@@ -138,27 +139,27 @@ class BurstSampler(Sampler):
         return self._burst.count * super().__len__()
 
     def shots(self, first: int, count: int) -> Shots:
-        each, count = self._burst.count, min(count, len(self) - first)
-        sample, skipped = divmod(first, each)
-        samples = -(-(skipped + count) // each)
+        per_plate, count = self._burst.count, min(count, len(self) - first)
+        sample, skipped = divmod(first, per_plate)
+        samples = -(-(skipped + count) // per_plate)
         aims = super().shots(sample, samples)
         y, z = self._burst.places(self._hits.seed, sample, samples)
         hits = np.stack([aims.hit_y[:, None] + y, aims.hit_z[:, None] + z], axis=-1)
-        every = aims[np.repeat(np.arange(samples), each)]
-        order = np.tile(np.arange(each), samples)
+        at_aim = aims[np.repeat(np.arange(samples), per_plate)]
+        order = np.tile(np.arange(per_plate), samples)
         shots = replace(
-            every,
-            **self._of_later_shots(every, order, sample * each),
+            at_aim,
+            **self._of_later_shots(at_aim, order, sample * per_plate),
             hit_y=hits[..., 0].ravel(),
             hit_z=hits[..., 1].ravel(),
-            sample=sample + np.repeat(np.arange(samples), each),
+            sample=sample + np.repeat(np.arange(samples), per_plate),
             burst_order=order,
             nearest_earlier_hit=_nearest_earlier(hits).ravel(),
         )
         return shots[skipped : skipped + count]
 
     def _of_later_shots(self, shots: Shots, order: Any, first: int) -> dict[str, Array]:
-        """What differs from shot to shot, with draws of their own for all but the first shots of bursts."""
+        """Quantities that differ from shot to shot, with new draws for all but the first shots of bursts."""
         listed = self._hits.listed or {}
         return {
             name: np.where(
@@ -172,13 +173,13 @@ class BurstSampler(Sampler):
 
 
 def draws(seed: int, column: int, first: int, count: int) -> Array:
-    """Independent numbers between 0 and 1 of a column, shape [count]: shot k has draw k."""
+    """Independent uniform numbers of a column, shape [count]: shot k has draw k."""
     return np.clip(stream(seed, (_BURST, column), first, count), EDGE, 1.0 - EDGE)
 
 
 def _nearest_earlier(hits: Array) -> Array:
-    """Distance of every hit from the nearest earlier one of its burst [m], NaN for the first; shapes [bursts, n, 2] and
-    [bursts, n]."""
+    """Distance of every hit from the nearest earlier one of its burst [m], shape [bursts, n], NaN for the first; `hits`
+    has the shape [bursts, n, 2]."""
     nearest = np.full(hits.shape[:2], np.nan)
     for order in range(1, hits.shape[1]):
         nearest[:, order] = np.linalg.norm(hits[:, :order] - hits[:, order, None], axis=-1).min(axis=1)

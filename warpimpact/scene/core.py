@@ -16,11 +16,11 @@ from .units import Length, Number, PositiveDensity, PositiveInertia, PositiveLen
 # Gauss–Legendre on 32 nodes is exact to degree 63: r⁴ of any polynomial core up to degree 15.
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(32)
 _OUTLINE_STATIONS = 1001  # per smooth stretch of the profile
-_SILHOUETTE_STATIONS = 101  # likewise; chords lose 1e-4 of the area
+_SILHOUETTE_STATIONS = 101  # per smooth stretch; chords lose 1e-4 of the area
 
 
 class MassProperties(NamedTuple):
-    """Properties of a core that its motion depends on.
+    """Properties of a core that determine its motion.
 
     Attributes:
         mass: [kg]
@@ -41,14 +41,14 @@ class Core(Model, ABC):
     Attributes:
         mass: of the core [kg]; exactly one of mass and density is given.
         density: of its material [kg/m³].
-        centre_of_mass: distance behind the nose tip [m]; it follows from the shape unless it is given.
+        centre_of_mass: distance behind the nose tip [m]; by default it follows from the shape.
         inertia_axial, inertia_transverse: moments of inertia [kg m²] about the axis, and about a line across it through
-            the centre of mass; likewise.
-        strength: nominal bending stress above which the core counts as broken [Pa]; None is a core that never breaks.
+            the centre of mass; by default they follow from the shape.
+        strength: nominal bending stress above which the core breaks [Pa]; None is a core that never breaks.
         threat: name of a bullet in the catalogue. In a file it gives shape, mass and velocity; a key beside it
-            overrides what it gives.
-        standard: whose velocity of that bullet is taken, if impact.velocity is not given; the first one of the
-            catalogue, unless given.
+            overrides its value.
+        standard: standard that gives the velocity of that bullet if impact.velocity is missing; by default the first
+            one of the catalogue.
         velocity_tolerance: whether that velocity scatters evenly within the tolerance of the standard.
     """
 
@@ -100,9 +100,9 @@ class Core(Model, ABC):
 
     @cached_property
     def mass_properties(self) -> MassProperties:
-        """Integrals over the solid of revolution, with the overrides in place.
+        """Integrals over the solid of revolution, unless they are overridden.
 
-        The transverse moment is that about the centroid, also where `centre_of_mass` is overridden.
+        The transverse moment is about the centroid, even if `centre_of_mass` is overridden.
         """
         s, weight = self._quadrature()
         area = np.pi * self.radius(s) ** 2 * weight
@@ -127,8 +127,8 @@ class Core(Model, ABC):
     def presented_area(self, inclination: Array) -> Array:
         """Area of the silhouette along a line of sight [m²].
 
-        The silhouette of a convex body has the area ½ ∮ |n·d| dS (Cauchy). Between stations the body is a frustum, and
-        its normal makes one angle with the axis. The convex hull of the profile is used, so a hollow counts as filled.
+        The silhouette of a convex body has the area ½ ∮ |n·d| dS (Cauchy). Between stations the body is a frustum,
+        whose normals make one angle with the axis. The convex hull of the profile is used: hollows count as filled.
 
         Args:
             inclination: angle between axis and line of sight [rad]; the view from the nose equals that from the base.
@@ -146,7 +146,7 @@ class Core(Model, ABC):
         of_axial = np.abs(outwards * np.cos(inclination)[..., None])
         of_radial = np.abs(along * np.sin(inclination)[..., None])
         ratio = np.divide(of_axial, of_radial, out=np.ones_like(of_radial), where=of_radial > of_axial)
-        # Mean of |a + b cos φ| around the axis; it is a where the sign does not change.
+        # Mean of |a + b cos φ| around the axis; it is a if the sign does not change.
         mean = of_axial * (1.0 - 2.0 / np.pi * np.arccos(ratio)) + of_radial * 2.0 / np.pi * np.sqrt(1.0 - ratio**2)
         return np.asarray(0.5 * (area * mean).sum(axis=-1))
 
@@ -154,7 +154,7 @@ class Core(Model, ABC):
         return list(pairwise((0.0, *self.breaks, self.length)))
 
     def _quadrature(self) -> tuple[Array, Array]:
-        """Stations [m] and weights [m] of a Gauss–Legendre rule on every smooth stretch; both (n,)."""
+        """Stations [m] and weights [m] of a Gauss–Legendre rule on every smooth stretch, shape [nodes] each."""
         start, end = np.array(self._stretches()).T[..., None]
         half = (end - start) / 2
         return (start + half * (1 + _NODES)).ravel(), (half * _WEIGHTS).ravel()

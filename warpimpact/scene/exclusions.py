@@ -1,4 +1,4 @@
-"""What excludes what, and what needs what: rows from which the messages and a page of the documentation are made."""
+"""Options that exclude or need each other: rows that give the messages and a page of the documentation."""
 
 from collections.abc import Mapping
 from typing import NamedTuple
@@ -30,7 +30,7 @@ LIMIT = "warpimpact limit"
 
 
 class Rule(NamedTuple):
-    """Two things that a campaign may ask for, and why not both, or not one without the other."""
+    """Two options of a campaign, and the reason why one excludes or needs the other."""
 
     what: str
     other: str
@@ -78,18 +78,19 @@ NEEDED = (
 
 
 def check_together(given: Mapping[str, str | bool]) -> None:
-    """Refuse what cannot be combined.
+    """Refuse options that cannot be combined.
 
     Args:
-        given: whether each thing is asked for, or what of it was found. What it does not name is not judged.
+        given: whether each option is in use, or the text that names it in the message. Options without an entry are not
+            checked.
 
     Raises:
-        ValueError: names both things and says why.
+        ValueError: names both options and the reason.
     """
-    found = {what: what if one is True else one for what, one in given.items() if one}
-    for what, other, why in EXCLUDED:
-        if what in found and other in found:
-            raise ValueError(f"{found[what]} cannot be combined with {found[other]}: {why}")
-    for what, other, why in NEEDED:
-        if what in found and other in given and other not in found:
-            raise ValueError(f"{found[what]} needs {other}: {why}")
+    used = {option: option if name is True else name for option, name in given.items() if name}
+    for option, other, why in EXCLUDED:
+        if option in used and other in used:
+            raise ValueError(f"{used[option]} cannot be combined with {used[other]}: {why}")
+    for option, other, why in NEEDED:
+        if option in used and other in given and other not in used:
+            raise ValueError(f"{used[option]} needs {other}: {why}")

@@ -17,24 +17,24 @@ from .model import Array
 from .units import brief, quoted
 
 _LONGEST_PATH = 255
-"""That is quoted whole."""
+"""Characters of a path that a message quotes."""
 _NAME_AND_UNIT = re.compile(r"(\w+)\s*(?:\[\s*([^\[\]]*?)\s*\])?")
 _MOST_BYTES, _MOST_ROWS = 2**28, 2**22
-"""Of a table."""
+"""Limits of a table."""
 
 
 def input_file(name: object, info: ValidationInfo) -> Path:
-    """Absolute path of an existing file; a relative name counts from the validation context's `folder`, if any, else
-    from the working directory."""
+    """Absolute path of an existing file. A relative name starts at the validation context's `folder`, if given, or at
+    the working directory."""
     if not isinstance(name, str | Path):
         raise ValueError(f"got {quoted(name)}, which is not a file name")
     path = Path((info.context or {}).get("folder", "")) / name
     try:
-        found = path.is_file()
+        exists = path.is_file()
     except (OSError, ValueError) as error:  # a name that is too long, or has a character that none can have
         raise ValueError(f"got {quoted(name)}, which is no file name ({_reason(error)})") from None
-    if not found:
-        got, place = (brief(str(one), _LONGEST_PATH) for one in (name, path))
+    if not exists:
+        got, place = (brief(str(text), _LONGEST_PATH) for text in (name, path))
         raise ValueError(f'got "{got}", but there is no file {place}')
     return path.absolute()
 
@@ -44,8 +44,7 @@ def _reason(error: Exception) -> str:
 
 
 def check_file(path: Path, most: int | None = None) -> None:
-    """Refuse what is no regular file, as a pipe or a device may have no end, and one of more bytes than `most`, before
-    any of it is read.
+    """Refuse a pipe or a device, which may have no end, and a file of more than `most` bytes, before it is read.
 
     Raises:
         ValueError: names the file and what is wrong with it.
@@ -88,14 +87,14 @@ class CsvColumn(NamedTuple):
 def read_columns(
     path: Path, required: tuple[str, ...], optional: tuple[str, ...], exported: Mapping[str, str]
 ) -> dict[str, CsvColumn]:
-    """Columns of a CSV file by their names: the required ones first in its header, then any of the optional ones.
+    """Columns of a CSV file by name: the required ones first in its header, then any of the optional ones.
 
-    A name may be followed by its unit, as in "hit_y [mm]". A file whose first column is "hit" is one that
-    `warpimpact export` wrote: its columns may stand in any order, and those that are neither required nor optional are
-    left out.
+    A unit may follow a name, as in "hit_y [mm]". A file whose first column is "hit" comes from `warpimpact export`: its
+    columns may have any order, and columns that are neither required nor optional are ignored.
 
     Args:
-        exported: names in an exported file, and what they are called here.
+        required, optional: names of columns.
+        exported: name in an exported file → name here.
 
     Raises:
         ValueError: names the file, the line and what is wrong with it.
@@ -106,28 +105,29 @@ def read_columns(
         if names[:1] == ["hit"]:
             names = [exported.get(name, name) for name in names]
             wanted = [place for place, name in enumerate(names) if name in (*required, *optional)]
-            found = [names[place] for place in wanted]
-            is_known = set(required) <= set(found)
+            present = [names[place] for place in wanted]
+            is_known = set(required) <= set(present)
         else:
-            wanted, found = list(range(len(header))), names
+            wanted, present = list(range(len(header))), names
             is_known = tuple(names[: len(required)]) == required and set(names[len(required) :]) <= set(optional)
-        if not is_known or len(set(found)) < len(found):
+        if not is_known or len(set(present)) < len(present):
             raise ValueError(
                 f"{path.name}, line 1: {_got(header, (*required, *optional))}the header must be {','.join(required)} "
                 f"and then any of {', '.join(optional)}"
             )
         rows = _rows(path, header, reader, wanted).T
-        return {name: CsvColumn(row, units[place]) for name, row, place in zip(found, rows, wanted, strict=True)}
+        return {name: CsvColumn(row, units[place]) for name, row, place in zip(present, rows, wanted, strict=True)}
 
 
 def _got(header: tuple[str, ...], known: tuple[str, ...]) -> str:
-    """The header as a message quotes it; a file that has none of the known columns is another, and quoted nowhere."""
+    """The start of a message that quotes the header; empty if it has no known column: an unrelated file is not
+    quoted."""
     return f'got "{brief(",".join(header))}", but ' if set(header) & set(known) else ""
 
 
 @contextmanager
 def _open_table(path: Path) -> Iterator[tuple[tuple[str, ...], Any]]:
-    """Header of a CSV file, and the reader of what follows."""
+    """Header of a CSV file, and the reader of its rows."""
     check_file(path, _MOST_BYTES)
     try:
         with path.open(encoding="utf-8-sig", newline="") as lines:

@@ -18,10 +18,9 @@ class Interaction(Model):
         static: A, share of the resistance Y.
         linear: C, of √(ρY)·v_n.
         quadratic: B, of ρ·v_n².
-        onset: κ, the closing speed over which contact sets in, as a share of the speed v of the centre of mass. Normal
-            stress, friction and exposure are multiplied by min(1, v_n / (κ v)). With 0 contact jumps. Where a wall
-            with friction slides along itself, as a shank does, the outcome then has no limit: it depends on the
-            numerics.
+        onset: κ, closing speed over which contact sets in, as a share of the speed v of the centre of mass. Normal
+            stress, friction and exposure are multiplied by min(1, v_n / (κ v)). With 0 contact sets in at once; the
+            outcome of a wall with friction that slides along itself, such as a shank, then depends on the numerics.
     """
 
     static: NonNegativeNumber = 1.0
@@ -33,7 +32,7 @@ class Interaction(Model):
 def coefficients(static: Any, linear: Any, quadratic: Any, resistance: Any, density: float) -> tuple[Any, Any, Any]:
     """(a0 [Pa], a1 [Pa s/m], a2 [Pa s²/m²]) of σ = a0 + a1·v_n + a2·v_n² in undegraded material.
 
-    All but the density may be of any shapes that go together.
+    All but the density may be arrays of shapes that broadcast.
 
     Args:
         static, linear, quadratic: as in `Interaction`.

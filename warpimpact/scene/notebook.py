@@ -1,6 +1,6 @@
-"""What a notebook shows of a model: a drawing to scale where it has a shape, and its values with their units.
+"""HTML of a model for a notebook: a drawing to scale if it has a shape, and its values with units.
 
-The models import this file, so it knows cores, plates and targets by what they have.
+The models import this file, so it recognises cores, plates and targets by their attributes.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from .units import reader_in, typed
 Array = NDArray[np.float64]
 
 _CELLS = 3
-"""Of an unbounded plate, along each side."""
+"""Unit cells of an unbounded plate along each side of a drawing."""
 _MOST_HOLES = 2000
 _CORE = "#D55E00"
 
@@ -48,17 +48,17 @@ def values_of(model: BaseModel, place: str = "") -> Iterator[tuple[str, str]]:
         if isinstance(value, BaseModel):
             yield from values_of(value, f"{place}{name}.")
         elif several is not None:
-            for number, one in enumerate(several):
-                yield from values_of(one, f"{place}{name}[{number}].")
+            for number, part in enumerate(several):
+                yield from values_of(part, f"{place}{name}[{number}].")
         else:
             yield f"{place}{name}", _text(value, typed(field))
 
 
 def _text(value: Any, kind: Any) -> str:
     if isinstance(value, tuple):
-        inner = next((one for one in (kind, *get_args(kind)) if get_origin(one) is tuple), tuple[Any, ...])
-        kinds = [one for one in get_args(inner) if one is not Ellipsis] or [Any]
-        return ", ".join(_text(one, kinds[min(place, len(kinds) - 1)]) for place, one in enumerate(value))
+        inner = next((option for option in (kind, *get_args(kind)) if get_origin(option) is tuple), tuple[Any, ...])
+        kinds = [item for item in get_args(inner) if item is not Ellipsis] or [Any]
+        return ", ".join(_text(item, kinds[min(place, len(kinds) - 1)]) for place, item in enumerate(value))
     reader = reader_in(kind)
     return str(value) if reader is None or not isinstance(value, int | float) else reader.text(value)
 

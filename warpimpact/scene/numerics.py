@@ -21,18 +21,17 @@ class _AsGiven(Model):
 
 
 class Accuracy(_AsGiven):
-    """Errors that a share of the hits must stay within; a quantity that is not given has no limit.
+    """Largest errors for a share of the hits; a quantity that is not given has no limit.
 
     Attributes:
         residual_velocity: of the residual velocity [m/s].
         tilt: of the tilt at the largest stand-off [rad].
-        residual_velocity_share, tilt_share: behind several layers, what an error may have beyond that, as a share of
-            the residual velocity, and of the tilt.
+        residual_velocity_share, tilt_share: additional error behind several layers, as a share of the residual velocity
+            or of the tilt.
         depth: of the depth in a layer that stops a core [m].
-        status_share: of the hits at several layers, those that may end otherwise: in another status or in another
-            layer.
-        limit: of a limit velocity, as a share of the median limit; of a limit thickness twice that.
-        share: of the hits, from 0.5 to 0.99.
+        status_share: largest share of the hits at several layers with another status or another stopping layer.
+        limit: of a limit velocity, as a share of the median limit; twice as large for a limit thickness.
+        share: of the hits that keep the errors, from 0.5 to 0.99.
     """
 
     residual_velocity: PositiveSpeed = math.inf
@@ -52,13 +51,13 @@ class Accuracy(_AsGiven):
 
     @property
     def strictness(self) -> float:
-        """How many times as strict as draft it is, in residual velocity or in tilt, whichever is more."""
+        """Error of draft over this error, in residual velocity or tilt, whichever is larger."""
         draft = PRESETS["draft"]
         return max(draft.residual_velocity / self.residual_velocity, draft.tilt / self.tilt)
 
 
 def _preset(strictness: float, limit: float) -> Accuracy:
-    """So many times as strict as standard."""
+    """The standard accuracy with errors divided by the strictness."""
     return Accuracy(
         residual_velocity=1.0 / strictness,
         tilt=1.0 / strictness,
@@ -71,11 +70,11 @@ def _preset(strictness: float, limit: float) -> Accuracy:
 
 
 PRESETS = {"draft": _preset(0.2, 0.02), "standard": _preset(1.0, 0.006), "reference": _preset(5.0, 0.0015)}
-"""What a fidelity stands for."""
+"""Accuracy by fidelity."""
 
 
 class Coarser(_AsGiven):
-    """Levels of single settings, where a coarser one than the level of all is enough.
+    """Levels of single settings that may be coarser than the common level.
 
     Attributes:
         along, around: of the patches along the core and around it.
@@ -93,20 +92,20 @@ class Coarser(_AsGiven):
 
 
 class Numerics(_AsGiven):
-    """What resolution to compute with: an accuracy, for which a pilot finds it, or a level and single settings.
+    """Resolution of the computation: an accuracy, for which a pilot finds the level, or a level and single settings.
 
     Attributes:
         fidelity: the name of an accuracy: 90 % of the hits are within 5 m/s and 5° ("draft"), 1 m/s and 1°
             ("standard"), or 0.2 m/s and 0.2° ("reference").
-        accuracy: the same in numbers, in place of a name.
-        level: of the ladder of resolutions, 0 (coarse) to 9, in place of an accuracy: no pilot chooses, and nothing is
-            promised. A single setting below does that, too; the others are then those of the level, or of the coarsest
-            one at which the accuracy would be looked for.
-        coarser: coarser levels of single settings beside `level`: `along` and `around` (patches), `grid` and `step`. A
-            pilot of a long run finds them where they keep the promise, too.
+        accuracy: errors in numbers, in place of a fidelity.
+        level: of the ladder of resolutions, 0 (coarse) to 9, in place of an accuracy: no pilot runs, and no accuracy is
+            promised. A single setting below has the same effect; the other settings are then those of the level, or of
+            the coarsest level that a pilot would try.
+        coarser: coarser levels of single settings beside `level`: `along` and `around` (patches), `grid` and `step`.
+            The pilot of a long run uses them if they keep the promised accuracy.
         scheme: "consistent", or "nodal" for the paper's literal scheme (docs/model.md §4).
         time_step: length of a step [s].
-        travel: way per time step at impact velocity, as a share of the thickness of the plate, in place of time_step.
+        travel: path per time step at impact velocity, as a share of the thickness of the plate, in place of time_step.
         patches_axial, patches_around: surface patches per length of the core and around it. The consistent scheme takes
             shorter patches behind the widest station. With a multiple of 4 around the core, mirrored shots have exactly
             mirrored outcomes.
@@ -132,12 +131,13 @@ class Numerics(_AsGiven):
 
     @property
     def asked(self) -> Accuracy:
-        """The accuracy that is asked for, if no setting fixes the resolution."""
+        """The accuracy that a pilot must reach, unless a setting fixes the resolution."""
         return self.accuracy or PRESETS[self.fidelity]
 
     @property
     def explicit(self) -> str | None:
-        """The first setting that fixes the resolution, so that nothing is promised; None if a pilot is to find it."""
+        """Name of the first setting that fixes the resolution, without a promised accuracy; None if a pilot finds
+        it."""
         fixed = ("level", "time_step", "travel", "patches_axial", "patches_around", "grid_spacing")
         given = [name for name in fixed if getattr(self, name) is not None]
         return "scheme" if self.scheme == "nodal" else next(iter(given), None)
@@ -147,11 +147,11 @@ class Numerics(_AsGiven):
         other = "level" if self.level is not None else "accuracy" if self.accuracy is not None else None
         if "fidelity" in self.model_fields_set and other is not None:
             raise ValueError(f"fidelity and {other} cannot be combined: each sets the resolution")
-        for name, own in self.coarser or ():
-            if own is not None and self.level is None:
+        for name, level in self.coarser or ():
+            if level is not None and self.level is None:
                 raise ValueError(f"coarser.{name} needs level")
-            if own is not None and own > (self.level or 0):
-                raise ValueError(f"coarser.{name} must be at most level, {self.level}, but is {own}")
+            if level is not None and level > (self.level or 0):
+                raise ValueError(f"coarser.{name} must be at most level, {self.level}, but is {level}")
         if self.accuracy is not None and self.explicit is not None:
             raise ValueError(f"{self.explicit} and accuracy cannot be combined: each sets the resolution")
         if self.travel is not None and (self.time_step is not None or self.scheme == "nodal"):

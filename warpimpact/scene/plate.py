@@ -20,7 +20,7 @@ from .units import (
 )
 
 INTERVAL = 1.0e-6
-"""Δt_β where neither it nor Δs_β is given [s]: that of the paper's rows (docs/model.md §4)."""
+"""Default of Δt_β if Δs_β is not given [s], as in the paper's rows (docs/model.md §4)."""
 
 
 class _Weight(BaseModel):
@@ -31,25 +31,25 @@ class Plate(Model):
     """A perforated plate. It is unbounded, or rectangular if `size` is given.
 
     Attributes:
-        thickness: that of the plate, h [m].
-        areal_density: mass per area of the plate with its holes [kg/m²], in place of the thickness, which follows.
+        thickness: thickness h of the material, along x [m].
+        areal_density: mass per area of the plate with its holes [kg/m²], in place of the thickness.
         resistance: Y, the stress of the material against the core [Pa].
         shear_coefficient: η, friction per normal stress.
-        degradation: β, the share of Y that is left after contact for `degradation_interval` or over
-            `degradation_distance`; 1 means that Y does not fall.
-        degradation_interval: Δt_β [s], 1 us unless one of both is given; None where exposure counts the path.
-        degradation_distance: Δs_β, a path of the centre of mass [m]; None where exposure counts the time. By path, the
-            law has no rate: outcomes depend on Y/v² alone.
-        degradation_length: ℓ, how far around a contact the material weakens in the plane of the plate [m].
-        degradation_depth: d, how far from a contact it weakens along the thickness [m]. A plate no thicker than that
-            weakens as a whole, as in the paper; every depth of a thicker one loses the same share of its resistance.
+        degradation: β, share of Y that remains after contact for `degradation_interval` or over
+            `degradation_distance`; with 1 the material does not weaken.
+        degradation_interval: Δt_β [s], by default 1 us; None if exposure counts the path.
+        degradation_distance: Δs_β, a path of the centre of mass [m]; None if exposure counts the time. By path, the law
+            has no rate: outcomes depend on Y/v² alone.
+        degradation_length: ℓ, distance from a contact in the plane of the plate within which the material weakens [m].
+        degradation_depth: d, distance from a contact along the thickness within which the material weakens [m]. A plate
+            that is not thicker weakens as a whole, as in the paper. All depths of a thicker plate lose the same share.
         density: of the material [kg/m³].
-        material: its name in the catalogue. In a file it gives resistance, shear_coefficient and density, and the law
-            of [interaction]; a key beside it overrides what it gives.
-        size: extent along y and z of a finite plate centred on the origin [m]; a plate without it is unbounded.
-        margin: width of a band along the rim that has no holes [m]. A hole that would reach into it is left out.
-            Without a margin the rim cuts holes.
-        pattern: shape and lattice of the holes; with a margin, only the holes that are left on the plate.
+        material: name in the catalogue. In a file it gives resistance, shear_coefficient and density, and the law of
+            [interaction]; a key beside it overrides its value.
+        size: extent along y and z of a finite plate centred on the origin [m]; without it the plate is unbounded.
+        margin: width of a band along the rim without holes [m]; holes that reach into it are left out. Without a margin
+            the rim cuts holes.
+        pattern: shape and lattice of the holes; with a margin, only the holes on the plate.
     """
 
     thickness: PositiveLength
@@ -117,17 +117,17 @@ class Plate(Model):
 
     @property
     def ligament(self) -> float:
-        """Smallest distance between two holes, or between a whole hole and the rim [m]; inf where there is none."""
+        """Smallest distance between two holes, or between a whole hole and the rim [m]; inf without holes."""
         return self.pattern.ligament(self.size)
 
     def is_solid(self, y: Array, z: Array) -> BoolArray:
-        """Whether points y, z [m] lie on the plate and in none of its holes; bool, of their broadcast shape."""
+        """Whether points y, z [m] lie on the plate and outside its holes, in their broadcast shape."""
         half_y, half_z = (0.5 * side for side in self.size or (np.inf, np.inf))
         return (np.abs(y) <= half_y) & (np.abs(z) <= half_z) & ~self.pattern.is_hole(y, z)
 
     def edge_distance(self, y: Array, z: Array) -> Array:
-        """Distance of points y, z [m] from the nearest edge, that of a hole or the rim of a finite plate, of their
-        broadcast shape: positive in material, negative in a hole and off the plate, NaN where there is no edge."""
+        """Distance of points y, z [m] from the nearest edge of a hole or of the plate, in their broadcast shape:
+        positive in material, negative in a hole and off the plate, NaN without an edge."""
         of_holes = self.pattern.edge_distance(y, z)
         if self.size is None:
             return np.where(np.isinf(of_holes), np.nan, of_holes)
@@ -136,7 +136,7 @@ class Plate(Model):
         return np.where(off > 0.0, -off, np.minimum(of_holes, -np.maximum(beyond_y, beyond_z)))
 
     def has_edge(self, y: Array, z: Array, reach: float) -> BoolArray:
-        """`Pattern.has_edge`, where the rim of the plate is an edge, too."""
+        """`Pattern.has_edge`, including the rim of the plate."""
         near_y, near_z = (
             np.abs(np.abs(along) - 0.5 * side) <= reach
             for along, side in zip((y, z), self.size or (np.inf, np.inf), strict=True)
@@ -145,13 +145,13 @@ class Plate(Model):
 
     @property
     def sampled_cell(self) -> tuple[float, float]:
-        """Extent (y, z) of the cell over which hits are spread [m]: the unit cell, or a plate that is smaller."""
+        """Extent (y, z) of the cell that hits cover [m]: the unit cell, or a smaller plate."""
         cell_y, cell_z = self.pattern.unit_cell
         return (cell_y, cell_z) if self.size is None else (min(cell_y, self.size[0]), min(cell_z, self.size[1]))
 
     @property
     def solid(self) -> Self:
-        """The plate without holes, of the same material and areal density."""
+        """The plate without holes, with the same material and areal density."""
         thickness = self.thickness * (1.0 - self.open_area)
         return self.model_copy(update={"thickness": thickness, "margin": None, "pattern": NoPattern()})
 

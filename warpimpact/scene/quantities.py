@@ -1,7 +1,6 @@
-"""The quantities of a scene that something is done with: where a campaign has them, how they are read, and what may be
-done with each. Their units are in units.py.
+"""The quantities of a scene that may differ from shot to shot: their place in a campaign, their type, and their uses.
 
-Any of them, and all else that a campaign has, may be swept.
+Units are in units.py. These and all other values of a campaign may be swept.
 """
 
 from __future__ import annotations
@@ -33,14 +32,14 @@ class Quantity(NamedTuple):
     """A quantity of a scene.
 
     Attributes:
-        table: that of a campaign file which has it; of what layers have, that of the plate.
-        type: as it is read.
+        table: of a campaign file that has it; the plate's for a quantity of layers.
+        type: annotated type that reads it.
         meaning: long name of its column in a result.
-        by_layer: whether each layer has its own.
-        scatters: whether it may have a distribution, and so differ from shot to shot.
-        listed: whether a list of hits may have it.
+        by_layer: whether each layer has a value.
+        scatters: whether it may have a distribution.
+        listed: whether it may be a column in a list of hits.
         drawn: whether it may be drawn from a posterior.
-        column: name of its column in a result, where it is not its own.
+        column: name of its column in a result; None if it is the name of the quantity.
     """
 
     table: str
@@ -54,7 +53,7 @@ class Quantity(NamedTuple):
 
 
 def _of_material(table: str, kind: Any) -> Quantity:
-    """What only a posterior gives shot by shot."""
+    """A quantity of the material that only a posterior varies."""
     return Quantity(table, kind, scatters=False, listed=False, drawn=True)
 
 
@@ -104,20 +103,19 @@ BY_LAYER = tuple(name for name, quantity in QUANTITIES.items() if quantity.by_la
 OF_THE_SCENE = tuple(name for name, quantity in SCATTERED.items() if quantity.table in ("plate", "core"))
 """Quantities of plate and core that may differ from shot to shot."""
 OF_A_DRAW = ("degradation_length", "degradation_depth", "static", "linear", "quadratic", "onset")
-"""Quantities of plate and interaction that a shot has of its own only where a posterior draws them. A unit of exposure
-becomes a degradation."""
+"""Quantities of plate and interaction that only a posterior gives by shot. A unit of exposure becomes a degradation."""
 
-_IN_FRONT = [name for name, quantity in SCATTERED.items() if quantity.table != "layer"]
+_OF_THE_PLATE = [name for name, quantity in SCATTERED.items() if quantity.table != "layer"]
 _BEHIND = ("thickness", "resistance", "shear_coefficient", "degradation", "offset_y", "offset_z")
-DRAWN = len(_IN_FRONT)
-"""Columns of random numbers that all but the layers behind the plate have."""
+DRAWN = len(_OF_THE_PLATE)
+"""Columns of random numbers without those of layers behind the plate."""
 
 
 def drawn_columns(layers: int) -> int:
-    """How many columns of random numbers there are for a target of so many layers."""
+    """Number of columns of random numbers for a target of this number of layers."""
     return DRAWN + len(_BEHIND) * (layers - 1)
 
 
 def drawn_column(name: str, layer: int = 0) -> int:
-    """The column of random numbers of a quantity. So its draws do not depend on which other quantities scatter."""
-    return drawn_columns(layer) + _BEHIND.index(name) if layer else _IN_FRONT.index(name)
+    """Column of random numbers of a quantity, which does not depend on the other quantities that scatter."""
+    return drawn_columns(layer) + _BEHIND.index(name) if layer else _OF_THE_PLATE.index(name)

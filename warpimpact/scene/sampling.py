@@ -1,4 +1,4 @@
-"""Sampling: shot k depends on the seed and on k alone, not on the batch, the thread, the worker or the order."""
+"""Sampling: shot k depends on the seed and k alone, not on batch, thread, worker or order."""
 
 from __future__ import annotations
 
@@ -23,20 +23,20 @@ _HIT_COLUMNS = 2
 
 
 class Sampler:
-    """The shots of a campaign. Any part of them can be drawn at any time.
+    """The shots of a campaign; any part of them can be drawn at any time.
 
-    With hits.irreducible the images of a shot under `symmetries_used` follow each other. The first image is the shot
-    itself. Images differ only in their hit points.
+    With hits.irreducible, the images of a shot under `symmetries_used` are consecutive, the shot itself first. They
+    differ in their hit points only.
 
     Args:
-        impact: velocity and attitude, where hits and scatter do not give them.
-        hits: where the shots hit, and how numbers are drawn.
+        impact: velocity and attitude unless hits or scatter give them.
+        hits: where the shots hit, and how random numbers are drawn.
         plate: hits cover one unit cell of it, or the whole plate (`Hits.area`).
         scatter: distributions of quantities that differ from shot to shot.
         replicates: independent scramblings of a sobol sampling.
 
     Raises:
-        ValueError: hits.irreducible beside scatter that removes the symmetry; hits on the whole of an unbounded plate.
+        ValueError: scatter that removes the symmetry of hits.irreducible; hits on the whole of an unbounded plate.
     """
 
     def __init__(
@@ -59,11 +59,11 @@ class Sampler:
 
     @property
     def images(self) -> int:
-        """Shots in a row that are images of the first of them, itself included."""
+        """Number of consecutive shots that are images of the first of them, including it."""
         return len(self._group)
 
     def shots(self, first: int, count: int) -> Shots:
-        """`count` shots from number `first` on."""
+        """`count` shots from number `first` on, fewer at the end of the campaign."""
         count = min(count, len(self) - first)
         original, skipped = divmod(first, len(self._group))
         originals = self._originals(original, -(-(skipped + count) // len(self._group)))
@@ -76,7 +76,7 @@ class Sampler:
         return replace(shots[np.repeat(np.arange(len(shots)), len(self._group))], hit_y=hit_y, hit_z=hit_z)
 
     def _originals(self, first: int, count: int) -> Shots:
-        """`count` shots that are not images of another shot, from number `first` of these on."""
+        """`count` shots that are no images, from number `first` of such shots on."""
         columns = [_HIT_COLUMNS + drawn_column(name, layer) for name, layer in self._scatter]
         hit_y, hit_z, *uniform = self._uniform([0, 1, *columns], first, count)
         shots = Shots(
@@ -92,7 +92,7 @@ class Sampler:
         return shots
 
     def _uniform(self, columns: list[int], first: int, count: int) -> list[Array]:
-        """Numbers in [0, 1) of some columns, each of shape [count]."""
+        """Uniform numbers in [0, 1) of these columns, shape [count] each."""
         if self._hits.sampling == "sobol":
             points = self._net(first, count)
             return [points[:, column] for column in columns]
@@ -106,11 +106,11 @@ class Sampler:
         return (cell // along_z + 0.5) / along_y, (cell % along_z + 0.5) / along_z
 
     def _net(self, first: int, count: int) -> Array:
-        """Sobol points, shape [count, dimensions]; the replicates give one point each in turn."""
+        """Sobol points, shape [count, dimensions]; the replicates give one point in turn."""
         replicates, last = len(self._sobol), first + count
         points = np.empty((count, self._sobol[0].dimensions))
         for offset, sobol in enumerate(self._sobol):
-            start, stop = (-((offset - end) // replicates) for end in (first, last))  # of its own points
+            start, stop = (-((offset - end) // replicates) for end in (first, last))  # points of this replicate
             if stop > start:
                 points[start * replicates + offset - first :: replicates] = sobol.points(start, stop - start)
         return points
@@ -119,7 +119,7 @@ class Sampler:
 def make_shots(impact: Impact, hits: Hits, plate: Plate, scatter: Scatter | None = None) -> Shots:
     """All shots at once. Hit points cover one unit cell of the plate, or the whole plate (`Hits.area`).
 
-    With hits.irreducible a shot's images follow it. A `Sampler` gives the shots of a large campaign in parts.
+    With hits.irreducible, the images of a shot follow it. A `Sampler` gives the shots of a large campaign in parts.
     """
     sampler = Sampler(impact, hits, plate, scatter, hits.scramblings)
     return sampler.shots(0, len(sampler))
@@ -127,7 +127,7 @@ def make_shots(impact: Impact, hits: Hits, plate: Plate, scatter: Scatter | None
 
 @lru_cache(maxsize=128)
 def _sequence(dimensions: int, seed: int, replicate: int) -> Sobol:
-    """A scrambled sequence, kept: its scrambling takes as long as a hundred hits of a small plate."""
+    """A scrambled sequence; it is cached because its scrambling takes as long as a hundred hits of a small plate."""
     return Sobol(dimensions, _seed(seed, replicate))
 
 
@@ -136,13 +136,13 @@ def _seed(seed: int, replicate: int) -> np.random.SeedSequence:
 
 
 def _pairs(seed: int, first: int, count: int) -> tuple[Array, Array]:
-    """Independent numbers, two of shape [count]: shot k has the draws 2k and 2k + 1."""
+    """Two arrays of independent uniform numbers, shape [count] each: shot k has the draws 2k and 2k + 1."""
     pairs = _draws(np.random.Philox(seed), 2 * first, 2 * count)
     return pairs[::2], pairs[1::2]
 
 
 def stream(seed: int, key: tuple[int, ...], first: int, count: int) -> Array:
-    """Independent numbers of one key, such as a column, shape [count]: shot k has draw k."""
+    """Independent uniform numbers of one key, such as a column, shape [count]: shot k has draw k."""
     return _draws(np.random.Philox(np.random.SeedSequence(seed, spawn_key=key)), first, count)
 
 

@@ -1,4 +1,4 @@
-"""Scatter: distributions of quantities that differ from shot to shot, from scipy.stats."""
+"""Scatter: distributions of quantities that differ from shot to shot."""
 
 from __future__ import annotations
 
@@ -25,10 +25,10 @@ from .units import Radians, in_radians, quantity
 
 
 def check_range(name: str, low: float, high: float, known: Mapping[str, Quantity] = QUANTITIES) -> None:
-    """Refuse a range of a quantity, `low` to `high`, that contains values which are not allowed.
+    """Refuse a range of a quantity, `low` to `high`, with values that the quantity may not have.
 
     Raises:
-        ValueError: says what was reached and what is allowed.
+        ValueError: says which value is reached and what is allowed.
     """
     read = quantity(known[name].type)
     for value in (low, high):
@@ -41,7 +41,7 @@ def check_range(name: str, low: float, high: float, known: Mapping[str, Quantity
 
 
 def in_si(read: Any, given: Mapping[str, Any]) -> dict[str, Any]:
-    """A distribution as it was given, its parameters in SI; they may have units of the quantity that `read` reads.
+    """The parameters of a distribution in SI; `read` is the reader of its quantity.
 
     Raises:
         ValueError: names the parameter.
@@ -50,7 +50,7 @@ def in_si(read: Any, given: Mapping[str, Any]) -> dict[str, Any]:
 
 
 class Scattering(Model):
-    """Distributions of quantities; None does not differ from shot to shot."""
+    """Distributions of quantities; None for a quantity that all shots share."""
 
     _quantities: ClassVar[Mapping[str, Quantity]]
 
@@ -61,24 +61,24 @@ class Scattering(Model):
         known = cls._quantities.get(str(info.field_name))
         if known is not None and known.by_layer:
             layers = (value,) if isinstance(value, dict | Distribution) else value
-            return [_in_si(known, one) for one in layers] if isinstance(layers, list | tuple) else layers
+            return [_in_si(known, layer) for layer in layers] if isinstance(layers, list | tuple) else layers
         return value if known is None else _in_si(known, value)
 
     @field_validator("*", mode="after")
     @classmethod
     def _is_possible(cls, value: Any, info: ValidationInfo) -> Any:
-        for one in value if isinstance(value, tuple) else (value,):
-            if isinstance(one, Distribution):
-                low, high = one.quantile(np.array([EDGE, 1.0 - EDGE]))
+        for distribution in value if isinstance(value, tuple) else (value,):
+            if isinstance(distribution, Distribution):
+                low, high = distribution.quantile(np.array([EDGE, 1.0 - EDGE]))
                 try:
                     check_range(str(info.field_name), low, high, cls._quantities)
                 except ValueError as error:
-                    raise ValueError(f"got a {one.distribution} distribution that {error}") from None
+                    raise ValueError(f"got a {distribution.distribution} distribution that {error}") from None
         return value
 
     @field_serializer("*", mode="wrap")
     def _as_read(self, value: Any, write: SerializerFunctionWrapHandler, info: FieldSerializationInfo) -> Any:
-        """Angles as they are read again."""
+        """Angles in the form in which they are read."""
         written = write(value)
         known = self._quantities.get(info.field_name)
         if not isinstance(written, dict) or known is None or quantity(known.type).unit != "rad":
@@ -91,11 +91,11 @@ _ByLayer = tuple[AnyDistribution | None, ...]
 
 
 class Scatter(Scattering):
-    """Distributions of the quantities that differ from shot to shot, beside the hit point; None does not differ.
+    """Distributions of the quantities that differ from shot to shot, beside the hit point; None for all others.
 
     In a campaign file a distribution takes the place of the value:
     ``velocity = { distribution = "normal", mean = "820 m/s", std = "10 m/s" }``.
-    Of what each layer has its own, there is a distribution or None by layer; a distribution alone is that of the plate.
+    A quantity of layers has a distribution or None for each layer; a single distribution is that of the plate.
     """
 
     _quantities = SCATTERED
@@ -124,14 +124,18 @@ class Scatter(Scattering):
 
     @property
     def given(self) -> dict[tuple[str, int], Distribution]:
-        """The distributions that are given, by name and layer; what is not of a layer stands with the plate, 0."""
-        named = [(name, getattr(self, name)) for name in SCATTERED]
-        by_layer = [(name, value if isinstance(value, tuple) else (value,)) for name, value in named]
-        return {(name, k): one for name, layers in by_layer for k, one in enumerate(layers) if one is not None}
+        """The given distributions by name and layer; the layer is 0, the plate, for quantities of the shot."""
+        by_layer = {name: value if isinstance(value := getattr(self, name), tuple) else (value,) for name in SCATTERED}
+        return {
+            (name, layer): distribution
+            for name, layers in by_layer.items()
+            for layer, distribution in enumerate(layers)
+            if distribution is not None
+        }
 
     @property
     def layers(self) -> int:
-        """The number of the last layer that differs, and one."""
+        """One more than the number of the last layer with a distribution."""
         return 1 + max((layer for _, layer in self.given), default=0)
 
 
@@ -140,12 +144,12 @@ def _in_si(known: Quantity, value: Any) -> Any:
 
 
 def _marked(value: Any, mark: Callable[[float], Any]) -> Any:
-    return [mark(one) for one in value] if isinstance(value, list | tuple) else mark(value)
+    return [mark(number) for number in value] if isinstance(value, list | tuple) else mark(value)
 
 
 def _read(read: Any, name: str, value: Any) -> Any:
     try:
-        return [read(one) for one in value] if isinstance(value, list | tuple) else read(value)
+        return [read(number) for number in value] if isinstance(value, list | tuple) else read(value)
     except ValueError as error:
         raise ValueError(f"{name}: {error}") from None
 

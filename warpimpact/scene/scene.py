@@ -17,13 +17,13 @@ from .units import PositiveLength
 
 
 class Record(Model):
-    """What is recorded of every shot beside how it ended.
+    """Additional records of every shot.
 
     Attributes:
         standoffs: distances behind the rear face of the target at which the attitude is reported [m], increasing.
-        layer_standoffs: distances behind the rear face of every layer at which the attitude is reported, too [m],
-            increasing; no value where the next layer is too near for free flight.
-        standoff_point: the point of the core that passes them.
+        layer_standoffs: distances behind the rear face of every layer at which the attitude is reported [m],
+            increasing; NaN if the next layer is too near for free flight.
+        standoff_point: point of the core at which stand-offs are measured.
         bending: whether the largest bending moment and stress of each core are reported.
     """
 
@@ -52,17 +52,15 @@ class Record(Model):
         check_together({BENDING: self.bending, STRENGTH: strength, MASS_PROPERTIES: bool(given) and given[0]})
 
     def ahead(self, core: Core) -> float:
-        """How far ahead of the centre of mass the point is that passes the stand-offs [m]."""
+        """Distance of the stand-off point ahead of the centre of mass [m]."""
         return core.mass_properties.centre_of_mass if self.standoff_point == "nose" else 0.0
 
     def _clearance(self, core: Core) -> float:
-        """How far behind a layer, and before the next one, a core is certain to touch neither, however it is turned
-        [m]."""
+        """Distance from a layer beyond which a core certainly does not touch it, in any attitude [m]."""
         return core.bounding_radius + self.ahead(core)
 
     def check_standoffs(self, core: Core, target: Target) -> None:
-        """Refuse stand-offs at which a core may still be in the target, and those behind layers that no gap is wide
-        enough for.
+        """Refuse stand-offs at which a core may still be in the target, and layer stand-offs that fit in no gap.
 
         Raises:
             ValueError: names the stand-off and what is allowed.
@@ -92,8 +90,8 @@ class Record(Model):
         )
 
     def flies_free(self, core: Core, target: Target) -> NDArray[np.bool_]:
-        """Whether a core is certain to touch nothing at each of the stand-offs behind each layer, however it is turned:
-        shape [layers, stand-offs]. Behind the last layer it is."""
+        """Whether a core certainly touches nothing, in any attitude, at each stand-off behind each layer, shape
+        [layers, stand-offs]; always true behind the last layer."""
         gaps = np.array([*target.gaps[1:], np.inf])
         reach = np.array(self.layer_standoffs) + self._clearance(core)
         return np.asarray(reach <= gaps[:, None] * (1.0 + 1e-12))
@@ -111,13 +109,13 @@ else:
 
 
 class Scene(Model):
-    """What is shot at what, and what is recorded. Outcomes depend on the scene, the shots and the numerics only.
+    """Core, target and records. Outcomes depend on the scene, the shots and the numerics only.
 
     Attributes:
         core: the rigid core.
-        target: what it is shot at; a plate or a tuple of layers is accepted, too.
+        target: the layers; a plate or a tuple of layers is also accepted.
         interaction: stress on the surface of the core.
-        record: what is recorded of every shot.
+        record: additional records of every shot.
     """
 
     core: AnyCore
@@ -140,6 +138,6 @@ class Scene(Model):
 
     @property
     def free_behind(self) -> tuple[bool, ...]:
-        """Of each layer, whether a core that has left it touches no other yet, however it is turned: the gap behind it
-        is as wide as the core is long, or it is the last one."""
+        """For each layer, whether a core that leaves it certainly touches no other layer yet: the gap behind it is as
+        wide as the core is long, or it is the last layer."""
         return *(gap >= 2.0 * self.core.bounding_radius for gap in self.target.gaps[1:]), True

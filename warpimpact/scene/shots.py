@@ -20,23 +20,19 @@ from .units import Angle, AngularVelocity, Obliquity, PositiveSpeed, Tilt, quant
 
 _RIGHT_ANGLE = np.pi / 2
 
-FARTHEST = 100.0
-"""Of hits from the origin [m]."""
+FARTHEST_HIT = 100.0
+"""Largest distance of a hit from the origin [m]."""
 _REPLICATES = 16
-"""Unless told otherwise, whatever the count: a larger one keeps the earlier shots. Student's interval over 16 means is
-9 % wider than over very many."""
-
-
+"""Default, independent of the count, so that a larger count keeps the earlier shots. Student's interval over 16 means
+is 9 % wider than over infinitely many."""
 OF_A_SHOT = ("sample", "burst_order", "nearest_earlier_hit", "posterior_draw")
-"""Columns of shots that share their plates, or draw their parameters: no campaign gives their values."""
-
-
-EXPORTED = {one.column: name for name, one in QUANTITIES.items() if one.column is not None}
-"""Names of columns in an exported result, and those of a list of hits."""
+"""Columns of shots that share their plates or draw their parameters; no campaign gives their values."""
+EXPORTED = {quantity.column: name for name, quantity in QUANTITIES.items() if quantity.column is not None}
+"""Name of a column in an exported result → its name in a list of hits."""
 
 
 def _in_si(name: str, column: CsvColumn, file: str) -> Array:
-    """Values of a column of a list of hits in SI and radians; a number without a unit is degrees for an angle."""
+    """Values of a column of a list of hits, in SI and radians. An angle without a unit is in degrees."""
     kind = quantity(QUANTITIES[name].type)
     if not column.unit:
         return np.radians(column.values) if kind.unit == "rad" else column.values
@@ -50,7 +46,7 @@ def _in_si(name: str, column: CsvColumn, file: str) -> Array:
 
 
 class Impact(Model):
-    """Velocity and attitude at impact, of all shots or, where they scatter, at the median.
+    """Velocity and attitude at impact of all shots, or medians of the quantities that scatter.
 
     An angle is given in degrees, or as a string with its unit; the fields hold radians.
 
@@ -73,32 +69,32 @@ class Impact(Model):
     def _flies_nose_first(self) -> Self:
         """The axis is built from its projected angles, which flip at 90 degrees."""
         flight = np.tan(self.obliquity) * np.array([np.sin(self.azimuth), np.cos(self.azimuth)])
-        for name, own, of_flight in zip(("pitch", "yaw"), (self.pitch, self.yaw), np.arctan(flight), strict=True):
-            if abs(own + of_flight) >= _RIGHT_ANGLE:
+        for name, angle, of_flight in zip(("pitch", "yaw"), (self.pitch, self.yaw), np.arctan(flight), strict=True):
+            if abs(angle + of_flight) >= _RIGHT_ANGLE:
                 raise ValueError(
-                    f"got {name} = {math.degrees(own):g} deg on a line of flight that has {math.degrees(of_flight):.4g}"
-                    f" deg of its own, but their sum must lie between -90 and 90 deg"
+                    f"got {name} = {math.degrees(angle):g} deg on a line of flight that has "
+                    f"{math.degrees(of_flight):.4g} deg of its own, but their sum must lie between -90 and 90 deg"
                 )
         return self
 
 
 class Hits(Model):
-    """Where the cores hit, and how the numbers are drawn that hits and scatter are made of.
+    """Where the cores hit, and how the random numbers of hits and scatter are drawn.
 
     Attributes:
         sampling: "sobol" (scrambled, even at any count), "random" (independent), "grid" (cell centres), or
             "list" (those of `file`).
-        count: how many; a grid takes the most that a rectangle of nearly square cells gives.
-        seed: of all that is drawn.
+        count: number of hits; a grid takes the largest number in a rectangle of nearly square cells.
+        seed: of all random numbers.
         file: CSV file of a list, with the header hit_y,hit_z in metres; more columns, named as in `Shots`, override
             those quantities: angles in degrees, all else in SI, or in the unit behind the name, as in "hit_y [mm]".
             A result that `warpimpact export` wrote is such a list, too.
-        repeats: how often every hit of a grid or a list is shot, each time with other draws of what scatters.
-        replicates: independent scramblings that the shots of a sobol sampling are dealt out to in turn, a power of
-            two; 16 unless given. Their spread tells how certain a mean is.
-        area: what the sampling covers: one unit cell, or a plate smaller than it, or all of a finite "plate".
-        irreducible: sample only the part of the unit cell that the symmetries of plate and shot leave over, and give
-            each hit there with its images, as many in all as `count` holds, or one hit's.
+        repeats: number of shots at every hit of a grid or a list, each with other draws of the quantities that scatter.
+        replicates: number of independent scramblings of a sobol sampling, 16 by default; shots are dealt to them in
+            turn. Their spread gives the error of a mean.
+        area: what the sampling covers: one unit cell (or a smaller plate), or all of a finite "plate".
+        irreducible: sample only the irreducible part of the unit cell under the symmetries of plate and shot, and
+            include the images of each hit: at most `count` in all, but at least those of one hit.
     """
 
     sampling: Literal["sobol", "grid", "random", "list"] = "sobol"
@@ -127,7 +123,7 @@ class Hits(Model):
 
     @cached_property
     def listed(self) -> dict[str, Array] | None:
-        """Columns of the file by their names, SI and radians, each of shape [hits]; None where there is no file."""
+        """Columns of the file by name, in SI and radians, shape [hits] each; None without a file."""
         if self.file is None:
             return None
         required = ("hit_y", "hit_z")
@@ -137,14 +133,14 @@ class Hits(Model):
 
     @property
     def scramblings(self) -> int:
-        """The replicates in force: 16 of a sobol sampling that gives none; 1 of any other sampling."""
+        """Number of scramblings in use: 1 unless the sampling is sobol."""
         return self.replicates or (_REPLICATES if self.sampling == "sobol" else 1)
 
     def covered(self, plate: Plate) -> tuple[float, float]:
-        """Extent along y and z [m] of what the hits are spread over, about the origin.
+        """Extent along y and z [m] of the rectangle about the origin that the hits cover.
 
         Raises:
-            ValueError: all of a plate that has no end.
+            ValueError: it is an unbounded plate.
         """
         if self.area == "cell":
             return plate.sampled_cell
@@ -153,7 +149,7 @@ class Hits(Model):
         return plate.size
 
     def total(self, period: tuple[float, float]) -> int:
-        """How many shots there are over a unit cell of this extent along y and z [m]."""
+        """Number of shots over a unit cell of this extent along y and z [m]."""
         if self.listed is not None:
             return len(self.listed["hit_y"]) * self.repeats
         assert self.count is not None  # validated
@@ -168,8 +164,7 @@ class Hits(Model):
 
 @dataclass(frozen=True)
 class Shots:
-    """Shots as arrays, of shape [shots] unless told otherwise, in SI and radians; `Impact` and `Layer` say what the
-    quantities are.
+    """Shots as arrays of shape [shots] unless noted, in SI and radians; `Impact` and `Layer` define the quantities.
 
     Attributes:
         hit_y, hit_z: where the line of flight of the centre of mass crosses the front face [m].
@@ -177,17 +172,17 @@ class Shots:
         obliquity, azimuth: of the line of flight [rad].
         pitch, yaw: of the axis, beyond those of the line of flight [rad].
         spin: about the axis [rad/s].
-        mass [kg], strength [Pa]: of the core; None where all shots have the scene's own value.
-        degradation_length, degradation_depth [m]: of the plate, likewise, as a posterior draws them.
-        static, linear, quadratic, onset: of the interaction, likewise.
+        mass [kg], strength [Pa]: of the core; None if all shots have the value of the scene.
+        degradation_length, degradation_depth [m]: of the plate, drawn from a posterior; None as for `mass`.
+        static, linear, quadratic, onset: of the interaction, drawn from a posterior; None as for `mass`.
         resistance [Pa], shear_coefficient, degradation, thickness [m], offset_y, offset_z [m]: of the layers, shape
-            [shots, layers]; NaN where a layer has the scene's own value, None where all layers have. Layers behind
-            those of the column have the scene's own; a column of shape [shots] is that of the plate alone.
-        sample: number of the plate that a shot hits, where several hit one and the same; those are in a row. None where
-            every shot has a plate of its own.
-        burst_order: how many shots have hit that plate before.
-        nearest_earlier_hit: distance from the nearest hit on that plate before [m]; NaN for the first one.
-        posterior_draw: place of its parameters in a posterior; None where they are not drawn from one.
+            [shots, layers]; NaN where a layer has the value of the scene, None if all layers have. Layers beyond the
+            columns have the value of the scene. An array of shape [shots] is that of the plate.
+        sample: number of the plate that a shot hits; shots at one plate are consecutive. None if every shot hits a new
+            plate.
+        burst_order: number of earlier shots at that plate.
+        nearest_earlier_hit: distance from the nearest earlier hit on that plate [m]; NaN for the first one.
+        posterior_draw: index of its parameters in a posterior; None if they are not drawn.
     """
 
     hit_y: Array
@@ -218,7 +213,7 @@ class Shots:
     posterior_draw: Array | None = None
 
     def __post_init__(self) -> None:
-        """Make columns of the plate alone those of a first layer."""
+        """Make arrays of the plate alone columns of layer 0."""
         for name in BY_LAYER:
             if (column := getattr(self, name)) is not None and np.ndim(column) == 1:
                 object.__setattr__(self, name, column[:, None])
@@ -228,20 +223,20 @@ class Shots:
         return len(self.hit_y)
 
     def __getitem__(self, which: slice | NDArray[np.int64]) -> Self:
-        """The shots of a slice or of some indices."""
+        """The shots of a slice or of indices."""
         return type(self)(**{name: values[which] for name, values in self.columns.items()})
 
     @property
     def columns(self) -> dict[str, NDArray[Any]]:
-        """The arrays that there are, by name."""
+        """The arrays by name, without those that are None."""
         return {f.name: values for f in fields(self) if (values := getattr(self, f.name)) is not None}
 
     @property
     def at_a_plate(self) -> int:
-        """How many shots in a row hit one and the same plate.
+        """Number of consecutive shots at one plate.
 
         Raises:
-            ValueError: the shots at a plate are not complete, or not in order.
+            ValueError: the shots at a plate are incomplete or not in order.
         """
         if self.sample is None or self.burst_order is None or not len(self):
             return 1
@@ -252,28 +247,28 @@ class Shots:
         return count
 
     def own(self, name: str, otherwise: float) -> Array:
-        """A quantity of every shot, shape [shots]; where they do not have one of their own that of the scene, [1]."""
+        """A quantity of every shot, shape [shots], or the value of the scene, shape [1]."""
         return self.columns.get(name, np.array([otherwise]))
 
     def differs(self, name: str, layer: int) -> bool:
-        """Whether a layer has values of its own for a quantity."""
+        """Whether the shots have values of a quantity for a layer."""
         column = self.columns.get(name)
         return column is not None and layer < column.shape[1] and not np.isnan(column[:, layer]).all()
 
     def own_of(self, target: Target, name: str, layer: int) -> Array:
-        """A quantity of a layer of the target, as `own`."""
+        """A quantity of a layer of the target; shapes as in `own`."""
         otherwise = target.value(name, layer)
         if not self.differs(name, layer):
             return np.array([otherwise])
-        own = self.columns[name][:, layer]
-        return np.where(np.isnan(own), otherwise, own)
+        column = self.columns[name][:, layer]
+        return np.where(np.isnan(column), otherwise, column)
 
     def with_own(self, values: Mapping[str, Array], layer: int = 0) -> Self:
-        """With these values of some quantities, each of shape [shots]; of what layers have, in this layer alone."""
-        own: dict[str, Any] = {
+        """A copy with these values by quantity, shape [shots] each; quantities of layers change in this layer alone."""
+        columns: dict[str, Any] = {
             name: self._put(name, column, layer) if name in BY_LAYER else column for name, column in values.items()
         }
-        return replace(self, **own)
+        return replace(self, **columns)
 
     def _put(self, name: str, values: Array, layer: int) -> Array:
         before = self.columns.get(name, np.empty((len(self), 0)))
@@ -284,7 +279,7 @@ class Shots:
 
     @classmethod
     def joined(cls, parts: Sequence[Self]) -> Self:
-        """One after the other; all have the same columns."""
+        """The shots of all parts, one part after the other; all parts have the same columns."""
         return type(parts[0])(
             **{name: np.concatenate([part.columns[name] for part in parts]) for name in parts[0].columns}
         )

@@ -1,6 +1,7 @@
-"""Scrambled Sobol points by their number, without the 0.7 s that scipy.stats takes to import: up to TOGETHER
-dimensions those of scipy.stats.qmc.Sobol, whose scrambling of each dimension depends on how many there are. Further
-dimensions have a scrambling of their own, so that one more changes none of the others.
+"""Scrambled Sobol points by number, without scipy.stats, which takes 0.7 s to import.
+
+The first TOGETHER dimensions are those of scipy.stats.qmc.Sobol, which scrambles dimensions together. Each further
+dimension has its own scrambling, so that another one changes no earlier dimension.
 
 Direction numbers: S. Joe and F. Y. Kuo, "Constructing Sobol sequences with better two-dimensional projections", SIAM J.
 Sci. Comput. 30 (2008), in joe_kuo.txt. Scrambling: J. Matoušek's linear matrix and a digital shift.
@@ -19,9 +20,9 @@ from .model import Array
 Integers = NDArray[np.uint32]
 
 TOGETHER = 13
-"""Dimensions that are scrambled together: the hit, and the eleven quantities that could scatter at first."""
-_APART = 7
-"""Part of the key of dimensions that are scrambled on their own."""
+"""Dimensions that are scrambled together: the hit and the first eleven quantities that scatter."""
+_SINGLE = 7
+"""Part of the key of a dimension that is scrambled alone."""
 BITS = 30
 """Binary digits of a coordinate; a sequence has 2^BITS points."""
 _WEIGHTS = 1 << np.arange(BITS - 1, -1, -1, dtype=np.uint32)
@@ -32,7 +33,7 @@ MOST_DIMENSIONS = 1 + len(_STARTS)
 
 
 class Sobol:
-    """One scrambled sequence. Any of its points can be read at any time.
+    """One scrambled sequence; its points can be read in any order.
 
     Args:
         dimensions: of the unit cube, at most MOST_DIMENSIONS.
@@ -75,14 +76,14 @@ class Sobol:
         draw = np.random.default_rng(np.random.SeedSequence(self._seed.entropy, spawn_key=key)).spawn(1)[0]  # as scipy
         parts = [_scramble(directions[:TOGETHER], draw)]
         for place in range(TOGETHER, self.dimensions):
-            own = np.random.SeedSequence(self._seed.entropy, spawn_key=(*key, _APART, place))
-            parts.append(_scramble(directions[place : place + 1], np.random.default_rng(own)))
+            seed = np.random.SeedSequence(self._seed.entropy, spawn_key=(*key, _SINGLE, place))
+            parts.append(_scramble(directions[place : place + 1], np.random.default_rng(seed)))
         shift, scrambled = zip(*parts, strict=True)
         return np.concatenate(shift), np.concatenate(scrambled)
 
 
 def _scramble(directions: Integers, draw: np.random.Generator) -> tuple[Integers, Integers]:
-    """Digital shift and scrambled direction numbers of some dimensions."""
+    """Digital shift, shape [dimensions], and scrambled direction numbers, shape [dimensions, BITS]."""
     dimensions = len(directions)
     shift = draw.integers(2, size=(dimensions, BITS), dtype=np.uint32) @ _WEIGHTS[::-1]
     matrix = np.tril(draw.integers(2, size=(dimensions, BITS, BITS), dtype=np.uint32))
@@ -102,9 +103,9 @@ def _recurrence(polynomial: int, *start: int) -> list[int]:
     """The numbers m of one dimension, by the recurrence of its primitive polynomial."""
     numbers, degree = list(start), len(start)
     for j in range(degree, BITS):
-        found = numbers[j - degree]
+        number = numbers[j - degree]
         for i in range(1, degree + 1):
             if polynomial >> (degree - i) & 1:
-                found ^= numbers[j - i] << i
-        numbers.append(found)
+                number ^= numbers[j - i] << i
+        numbers.append(number)
     return numbers

@@ -15,8 +15,7 @@ from .shots import Hits, Impact
 from .target import Layer
 
 _ROUNDING = 1e-12
-"""A smaller component of the unit vector along the line of flight, or a smaller angle [rad], counts as 0: cos 90° is
-6e-17."""
+"""Components of the unit vector along the line of flight, and angles [rad], count as 0 below it: cos 90° is 6e-17."""
 
 
 @dataclass(frozen=True)
@@ -64,13 +63,12 @@ IDENTITY = SYMMETRIES[0]
 
 
 def symmetries_used(impact: Impact, hits: Hits, plate: Plate) -> tuple[Symmetry, ...]:
-    """Symmetries of which the hits are images; the identity alone without `hits.irreducible` or without any
-    symmetry."""
+    """Symmetries whose images are included in the hits; the identity alone without `hits.irreducible`."""
     return symmetries(plate, impact) if hits.irreducible else (IDENTITY,)
 
 
 def unsymmetric(scatter: Scatter, layers: Sequence[Layer] = ()) -> dict[str, str | bool]:
-    """What may remove a symmetry of the plate, as `check_together` takes it."""
+    """Options that remove a symmetry of the plate, as arguments of `check_together`."""
     turned = [name for name in ("obliquity", "azimuth", "pitch", "yaw", "spin") if getattr(scatter, name) is not None]
     holed = [k for k, layer in enumerate(layers) if layer.open_area > 0.0 or layer.size is not None]
     return {
@@ -80,7 +78,7 @@ def unsymmetric(scatter: Scatter, layers: Sequence[Layer] = ()) -> dict[str, str
 
 
 def symmetries(plate: Plate, impact: Impact) -> tuple[Symmetry, ...]:
-    """The symmetries that plate and shot both have, in the order of SYMMETRIES."""
+    """The common symmetries of plate and shot, in the order of SYMMETRIES."""
     return tuple(s for s in SYMMETRIES if s == IDENTITY or (_of_shot(s, impact) and of_plate(s, plate)))
 
 
@@ -102,10 +100,10 @@ def of_plate(symmetry: Symmetry, plate: Plate) -> bool:
 
 
 def irreducible_part(group: Sequence[Symmetry]) -> tuple[tuple[float, float], tuple[float, float]]:
-    """A part of the unit cell whose images under a group cover the cell exactly once: ((low, high) along y, along z).
+    """Part of the unit cell whose images under a group cover the cell exactly once: ((low, high) along y, along z).
 
     The limits are shares of the extent of the cell, from its middle. The actions of the group on y divide the cell
-    along y. A mirror image in z alone leaves y as it is, and divides the cell along z.
+    along y; a mirror image in z alone divides it along z.
     """
     actions_y = {(s.along_y, s.centred) for s in group}
     mirrored_z = any((s.along_y, s.along_z, s.centred) == (1, -1, False) for s in group)

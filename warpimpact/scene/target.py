@@ -13,9 +13,9 @@ from .plate import Plate
 from .units import Length
 
 _WIDEST_GAP = 10.0
-"""[m]. Positions are exact to a micrometre within such a gap, and air is left out."""
+"""[m]: within it positions are exact to a micrometre. Air has no effect on the core."""
 MOST_LAYERS = 64
-"""Behind the plate."""
+"""Largest number of layers behind the plate."""
 
 
 class Layer(Plate):
@@ -31,11 +31,11 @@ class Layer(Plate):
 
 
 class Target(Model):
-    """What is shot at: its layers, front to back. Nothing couples them but the core.
+    """The layers that are shot at, front to back. Only the core couples them.
 
     Attributes:
-        layers: at x = 0 a plate; then what stands behind it. A plate behind another layer touches it.
-    """
+        layers: the plate, whose front face is at x = 0, and the layers behind it. A `Plate` behind another layer
+    touches it."""
 
     layers: Annotated[tuple[Plate | Layer, ...], Field(fail_fast=True, min_length=1, max_length=1 + MOST_LAYERS)]
 
@@ -51,7 +51,7 @@ class Target(Model):
 
     @property
     def named(self) -> list[tuple[str, Plate]]:
-        """Everything in order, with its place in a campaign."""
+        """The layers in order, each with its place in a campaign."""
         return [(f"layer[{k - 1}]" if k else "plate", layer) for k, layer in enumerate(self.layers)]
 
     @property
@@ -60,14 +60,14 @@ class Target(Model):
         return tuple(layer.gap if isinstance(layer, Layer) else 0.0 for layer in self.layers)
 
     def value(self, name: str, layer: int) -> float:
-        """A quantity of a layer by the name under which it scatters."""
-        one = self.layers[layer]
+        """A quantity of a layer by its name in `Scatter`."""
+        plate = self.layers[layer]
         if name.startswith("offset"):
-            return one.offset["yz".index(name[-1])] if isinstance(one, Layer) else 0.0
-        return float(getattr(one, name))
+            return plate.offset["yz".index(name[-1])] if isinstance(plate, Layer) else 0.0
+        return float(getattr(plate, name))
 
     def fronts(self, thickness: Sequence[Array]) -> list[Array]:
-        """Front faces of all layers [m], if their thicknesses [m] are these, of their shapes."""
+        """Front faces of all layers [m] for these thicknesses [m]; the shapes are those of the thicknesses."""
         behind = zip(thickness[:-1], self.gaps[1:], strict=True)
         return list(accumulate((h + gap for h, gap in behind), initial=np.zeros_like(thickness[0])))
 
@@ -90,7 +90,7 @@ class Target(Model):
 
     @property
     def solid(self) -> Plate:
-        """One plate without holes, of the material of the first layer and of the areal density of all."""
+        """One plate without holes, with the material of the first layer and the areal density of all layers."""
         solid = self.layers[0].solid
         behind = sum(layer.areal_density for layer in self.layers[1:])
         return solid.model_copy(update={"thickness": solid.thickness + behind / solid.density}) if behind else solid

@@ -14,7 +14,7 @@ _BESIDE_A_KEY = re.compile("([#=\n,])")
 
 
 def read_text(path: Path) -> str:
-    """The text of a file, or so much of it that `parsed` refuses it.
+    """The text of a file, cut after the length that `parsed` refuses.
 
     Raises:
         ValueError: it is missing or cannot be read.
@@ -51,7 +51,7 @@ def parsed(text: str, name: str) -> dict[str, Any]:
 
 
 def parsed_json(text: Any) -> Any:
-    """What a text, or bytes, that a program wrote says as JSON; None if it is none."""
+    """The value of a JSON text, str or bytes, that a program wrote; None if it is not JSON."""
     try:
         return json.loads(text)
     except (TypeError, ValueError, RecursionError):
@@ -59,18 +59,17 @@ def parsed_json(text: Any) -> Any:
 
 
 def _has_long_key(text: str) -> bool:
-    """Whether what begins a line, or ends at an equals sign, has more than _MOST_DOTS dots: the parser takes the square
-    of their number."""
+    """Whether a key or a table has more than _MOST_DOTS dots: the time of the parser grows with their square."""
     _, *parts = _BESIDE_A_KEY.split(f"\n{text}\n")
     around = zip(parts[::2], parts[1::2], parts[2::2], strict=False)
     return any((before == "\n" or behind == "=") and key.count(".") > _MOST_DOTS for before, key, behind in around)
 
 
 def _from_json(text: str) -> Any:
-    """The tables of a JSON text. It may escape half a character, which is no text and cannot be told or written.
+    """The tables of a JSON text.
 
     Raises:
-        ValueError: it is not JSON, or has such a half.
+        ValueError: it is not JSON, or escapes half of a surrogate pair, which cannot be written as text.
     """
     data = json.loads(text)
     json.dumps(data, ensure_ascii=False).encode()
@@ -78,13 +77,9 @@ def _from_json(text: str) -> Any:
 
 
 def _is_nested(data: Any) -> bool:
-    """Whether tables and arrays lie in each other more than _MOST_DEEP deep."""
+    """Whether tables and arrays are nested more than _MOST_DEEP deep."""
     level = [data]
     for _ in range(_MOST_DEEP):
-        level = [
-            inner
-            for one in level
-            if isinstance(one, dict | list)
-            for inner in (one.values() if isinstance(one, dict) else one)
-        ]
+        containers = [value for value in level if isinstance(value, dict | list)]
+        level = [inner for value in containers for inner in (value.values() if isinstance(value, dict) else value)]
     return bool(level)

@@ -195,7 +195,7 @@ def test_a_tile_is_built_in_small_parts_that_may_end_it(
     whole = tile_of(plate, 0.1e-3, sharp=sharp).material
     forget_tiles()
     monkeypatch.setattr("warpimpact.solver.tile.AT_ONCE", 500)
-    monkeypatch.setattr("warpimpact.scene.patterns.cells._AT_ONCE", 700)
+    monkeypatch.setattr("warpimpact.scene.patterns.cells._CELLS_PER_CHECK", 700)
     part, looks = tile_of(plate, 0.1e-3, sharp=sharp), 0
 
     def look() -> None:
