@@ -94,14 +94,6 @@ def test_a_pattern_repeats_with_its_period(pattern: LatticePattern) -> None:
 
 
 @LATTICES
-def test_the_open_area_is_that_of_the_holes(pattern: LatticePattern) -> None:
-    count = 1000
-    y, z = ((np.arange(count) + 0.5) / count * extent for extent in pattern.period)
-    # A sample is wrong only where an outline crosses its cell, at random sign: far less than 1e-3.
-    assert pattern.is_hole(y[:, None], z).mean() == pytest.approx(pattern.open_area, abs=1e-3)
-
-
-@LATTICES
 def test_outlines_enclose_the_holes(pattern: LatticePattern) -> None:
     span = (-11 * MM, 12 * MM)
     y, z = np.random.default_rng(2).uniform(*span, (2, 20000))
@@ -139,6 +131,10 @@ def test_a_solid_plate_has_no_hole() -> None:
     assert solid.outlines((0, 1), (0, 1)) == []
 
 
+def circles(holes: list[Any]) -> CirclePattern:
+    return CirclePattern(diameter="5 mm", spacing=["20 mm", "20 mm"], holes=holes)
+
+
 @pytest.mark.parametrize(
     ("make", "complaint"),
     [
@@ -154,28 +150,26 @@ def test_a_solid_plate_has_no_hole() -> None:
         (lambda: CirclePattern(diameter="5 m", spacing=["1 um", "1 um"]), "the cell must be larger than its holes"),
         (lambda: TrianglePattern(side="-1 mm", spacing=[1, 1]), "greater than 0"),
         (lambda: CirclePattern(diameter="5 mm", spacing=["8 mm"]), "Field required"),
+        (
+            lambda: TrianglePattern(side="6 mm", corner_radius="1.8 mm", spacing=[1, 1]),
+            "must be smaller than the inradius of the hole",
+        ),
+        (
+            lambda: SLOT.model_validate(SLOT.model_dump() | {"holes": [[0, 0]]}),
+            "staggered cannot be combined with holes: it stands for two holes",
+        ),
+        (
+            lambda: circles([["0 mm", "0 mm"], ["3 mm", "0 mm"]]),
+            r"the holes at \(0, 0\) mm and \(3, 0\) mm overlap or touch",
+        ),
+        (lambda: circles([[0, 0], [0, 0]]), r"the holes at \(0, 0\) mm and \(0, 0\) mm overlap or touch"),
+        (lambda: circles([["0 mm", "0 mm"], ["160 mm", "80 mm"]]), "overlap or touch"),
+        (lambda: circles([]), "at least 1 item"),
     ],
 )
 def test_holes_without_a_ligament_are_refused(make: object, complaint: str) -> None:
     with pytest.raises(ValidationError, match=complaint):
         make()
-
-
-def test_what_belongs_to_two_kinds_of_lattice_is_refused() -> None:
-    with pytest.raises(ValidationError, match="staggered cannot be combined with holes: it stands for two holes"):
-        SLOT.model_validate(SLOT.model_dump() | {"holes": [[0, 0]]})
-    with pytest.raises(ValidationError, match=r"the holes at \(0, 0\) mm and \(3, 0\) mm overlap or touch"):
-        CirclePattern(diameter="5 mm", spacing=["20 mm", "20 mm"], holes=[["0 mm", "0 mm"], ["3 mm", "0 mm"]])
-    with pytest.raises(ValidationError, match=r"the holes at \(0, 0\) mm and \(0, 0\) mm overlap or touch"):
-        CirclePattern(diameter="5 mm", spacing=["20 mm", "20 mm"], holes=[[0, 0], [0, 0]])
-    with pytest.raises(ValidationError, match="at least 1 item"):
-        CirclePattern(diameter="5 mm", spacing=["20 mm", "20 mm"], holes=[])
-
-
-@pytest.mark.parametrize("corner_radius", ["1.8 mm", "2 mm"])
-def test_corners_rounder_than_the_hole_are_refused(corner_radius: str) -> None:
-    with pytest.raises(ValidationError, match="must be smaller than the inradius of the hole"):
-        TrianglePattern(side="6 mm", corner_radius=corner_radius, spacing=[1, 1])
 
 
 @pytest.mark.parametrize(
@@ -216,16 +210,24 @@ def test_areas_are_exact(pattern: LatticePattern, area: float) -> None:
         (UP_AND_DOWN, (math.sqrt(0.75) * 10.62 + 0.5 * 3.46 - 12 / math.sqrt(3)) * MM),
         # Side by side along both lattice vectors, end past end along their difference.
         (DIAGONAL, (math.hypot(7 * (0.5 + math.sqrt(0.75)) - 9, 7 * (math.sqrt(0.75) - 0.5)) - 1) * MM),
+        (EllipsePattern(length="7 mm", width="3 mm", spacing=["5 mm", "8 mm"]), 1 * MM),
     ],
-    ids=["slot", "circle", "hexagonal", "corner", "diamonds", "squares", "hexagons", "triangles", "diagonal"],
+    ids=[
+        "slot",
+        "circle",
+        "hexagonal",
+        "corner",
+        "diamonds",
+        "squares",
+        "hexagons",
+        "triangles",
+        "diagonal",
+        "ellipse",
+    ],
 )
 def test_ligaments_have_closed_forms(pattern: LatticePattern, ligament: float) -> None:
-    assert pattern.ligament() == pytest.approx(ligament, rel=1e-12)
-
-
-def test_ellipses_come_as_near_as_their_axes() -> None:
-    pattern = EllipsePattern(length="7 mm", width="3 mm", spacing=["5 mm", "8 mm"])
-    assert pattern.ligament() == pytest.approx(1 * MM, abs=1e-5 * 7 * MM)
+    near = 7e-5 if pattern.shape == "ellipse" else 1e-12  # an ellipse is a polygon here
+    assert pattern.ligament() == pytest.approx(ligament, rel=near)
 
 
 def test_to_the_rim_counts_what_the_rim_leaves_whole() -> None:
@@ -249,8 +251,6 @@ def test_a_hole_may_be_listed_whole_cells_away() -> None:
     near, far = ([["1 mm", "0 mm"], ["9 mm", "3 mm"]], [["-31 mm", "48 mm"], ["9 mm", "-45 mm"]])
     one, other = (CirclePattern(diameter="5 mm", spacing=["16 mm", "8 mm"], holes=holes) for holes in (near, far))
     assert other.ligament() == pytest.approx(one.ligament(), rel=1e-9)
-    with pytest.raises(ValidationError, match="overlap or touch"):
-        CirclePattern(diameter="5 mm", spacing=["16 mm", "8 mm"], holes=[["0 mm", "0 mm"], ["160 mm", "81 mm"]])
 
 
 def test_a_free_lattice_of_two_holes_is_the_staggered_one() -> None:
@@ -458,8 +458,3 @@ def test_a_margin_that_a_hole_just_reaches_keeps_it() -> None:
         CIRCLE.bounded((8 * MM, 9 * MM), 2 * MM)
     with pytest.raises(ValueError, match=r"a plate of some 1.59e\+06 holes, but with a margin at most 20000"):
         CIRCLE.bounded((10, 10), 2 * MM)
-
-
-def test_a_changed_copy_forgets_what_was_computed() -> None:
-    assert SLOT.ligament() == pytest.approx(4 * MM)
-    assert SLOT.model_copy(update={"spacing": (10 * MM, 18 * MM)}).ligament() == pytest.approx(6 * MM)

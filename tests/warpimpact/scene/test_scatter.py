@@ -1,5 +1,6 @@
 """Scatter: the distribution asked for, and shot k a function of seed and k alone."""
 
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -7,11 +8,17 @@ import pytest
 from scipy import stats
 
 from warpimpact import Impact, Plate
-from warpimpact.scene import Hits, NoPattern, Sampler, Scatter, Shots
+from warpimpact.scene import Burst, BurstSampler, Hits, NoPattern, Sampler, Scatter, Shots, SlotPattern
 from warpimpact.scene.quantities import QUANTITIES, SCATTERED
 
 PLATE = Plate(thickness="4 mm", resistance="2 GPa", pattern=NoPattern())
+SLOTTED = Plate(
+    thickness="4 mm",
+    resistance="2 GPa",
+    pattern=SlotPattern(length="12 mm", width="4 mm", spacing=["8 mm", "16 mm"], staggered=True),
+)
 IMPACT = Impact(velocity=820.0)
+BURST = Burst(count=4, spacing={"distribution": "uniform", "low": "1 mm", "high": "5 mm"})
 SCATTER = Scatter(
     velocity={"distribution": "normal", "mean": "820 m/s", "std": "10 m/s"},
     obliquity={"distribution": "uniform", "low": "0 deg", "high": "10 deg"},
@@ -25,7 +32,7 @@ def sampler(sampling: str, count: int, *, scatter: Scatter = SCATTER, replicates
 
 def same(one: Shots, other: Shots) -> bool:
     return one.columns.keys() == other.columns.keys() and all(
-        np.array_equal(one.columns[name], other.columns[name]) for name in one.columns
+        np.array_equal(one.columns[name], other.columns[name], equal_nan=True) for name in one.columns
     )
 
 
@@ -60,15 +67,36 @@ def test_a_discrete_distribution_gives_its_values_as_often_as_its_weights_say() 
     assert counts.tolist() == [3072, 1024]  # a net is exact
 
 
-@pytest.mark.parametrize(("sampling", "replicates"), [("sobol", 1), ("sobol", 8), ("random", 1)])
-def test_a_shot_depends_on_the_seed_and_its_number_alone(sampling: str, replicates: int) -> None:
-    whole = sampler(sampling, 1000, seed=3, replicates=replicates).shots(0, 1000)
-    asked = sampler(sampling, 1000, seed=3, replicates=replicates)
-    for first, count in ((600, 100), (0, 7), (997, 50), (7, 300), (999, 1), (6, 1)):  # any order, any batch
-        assert same(asked.shots(first, count), whole[first : first + count])
-    longer = sampler(sampling, 5000, seed=3, replicates=replicates)
-    assert same(longer.shots(0, 1000), whole)
-    assert not same(sampler(sampling, 1000, seed=4, replicates=replicates).shots(0, 1000), whole)
+SAMPLERS: dict[str, Callable[..., Sampler]] = {
+    "sobol": lambda count, **hits: sampler("sobol", count, **hits),
+    "replicates": lambda count, **hits: sampler("sobol", count, replicates=8, **hits),
+    "random": lambda count, **hits: sampler("random", count, **hits),
+    "images": lambda count, **hits: Sampler(
+        IMPACT, Hits(count=count, irreducible=True, **hits), SLOTTED, Scatter(velocity=SCATTER.velocity), 8
+    ),
+    "images of random hits": lambda count, **hits: Sampler(
+        IMPACT, Hits(sampling="random", count=count, irreducible=True, **hits), SLOTTED
+    ),
+    "bursts": lambda count, **hits: BurstSampler(
+        IMPACT, Hits(count=count // 4, **hits), PLATE, BURST, scatter=SCATTER, replicates=16
+    ),
+    "bursts of random hits": lambda count, **hits: BurstSampler(
+        IMPACT, Hits(sampling="random", count=count // 4, **hits), PLATE, BURST, scatter=SCATTER
+    ),
+}
+
+
+@pytest.mark.parametrize("make", SAMPLERS.values(), ids=SAMPLERS)
+def test_a_shot_depends_on_the_seed_and_its_number_alone(make: Callable[..., Sampler]) -> None:
+    count = len(make(1024, seed=3))
+    assert count == 1024
+    whole, kept = make(1024, seed=3).shots(0, count), make(1024, seed=3)
+    for first, some in ((600, 100), (0, 4), (5, 1), (1019, 50), (7, 300), (1023, 1), (512, 256)):  # any order and batch
+        part = whole[first : first + some]
+        assert same(kept.shots(first, some), part)
+        assert same(make(1024, seed=3).shots(first, some), part)
+    assert same(make(512, seed=3).shots(0, 512), whole[:512])  # a larger count keeps the earlier shots
+    assert not same(make(1024, seed=4).shots(0, count), whole)
 
 
 def test_what_else_scatters_changes_no_draw() -> None:

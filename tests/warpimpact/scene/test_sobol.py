@@ -24,13 +24,6 @@ def test_further_dimensions_change_none_of_the_others() -> None:
     assert np.abs(np.corrcoef(most.T) - np.eye(MOST_DIMENSIONS)).max() < 0.2
 
 
-def test_any_part_at_any_time() -> None:
-    whole = Sobol(5, np.random.SeedSequence(1)).points(0, 300)
-    late = Sobol(5, np.random.SeedSequence(1))
-    np.testing.assert_array_equal(late.points(200, 100), whole[200:])
-    np.testing.assert_array_equal(late.points(17, 40), whole[17:57])
-
-
 def test_the_last_point_exists_and_the_next_does_not() -> None:
     sobol = Sobol(2, np.random.SeedSequence(1))
     assert sobol.points((1 << BITS) - 1, 1).shape == (1, 2)

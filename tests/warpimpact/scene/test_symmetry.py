@@ -17,7 +17,6 @@ from warpimpact.scene import (
     Pattern,
     Plate,
     PolygonsPattern,
-    Sampler,
     Scatter,
     SlotPattern,
     Symmetry,
@@ -212,22 +211,11 @@ def test_a_list_has_no_irreducible_part(tmp_path: Path) -> None:
         Hits(count=3, irreducible="yes")
 
 
-VELOCITIES = Scatter(velocity={"distribution": "uniform", "low": 700.0, "high": 900.0})
-
-
-@pytest.mark.parametrize(("sampling", "replicates"), [("sobol", 1), ("sobol", 8), ("random", 1), ("grid", 1)])
-def test_images_are_the_same_shot_elsewhere_whatever_part_is_asked_for(sampling: str, replicates: int) -> None:
-    hits = Hits(sampling=sampling, count=1024, seed=5, irreducible=True)
-    sampler = Sampler(STRAIGHT, hits, plate(SLOTS), VELOCITIES, replicates)
-    whole = sampler.shots(0, len(sampler))
-    assert len(whole) == len(sampler) == 1024
-    velocity = whole.velocity.reshape(-1, 8)
+def test_images_are_the_same_shot_elsewhere() -> None:
+    velocities = Scatter(velocity={"distribution": "uniform", "low": 700.0, "high": 900.0})
+    velocity = make_shots(STRAIGHT, HITS, plate(SLOTS), velocities).velocity.reshape(-1, 8)
     assert (velocity == velocity[:, :1]).all()
     assert len(np.unique(velocity)) == 128
-    for first, count in ((0, 1), (3, 2), (5, 11), (512, 256), (1019, 100)):
-        part = sampler.shots(first, count)
-        for name, column in part.columns.items():
-            np.testing.assert_array_equal(column, whole.columns[name][first : first + count], err_msg=name)
 
 
 @pytest.mark.parametrize("name", ["obliquity", "azimuth", "pitch", "yaw", "spin"])
