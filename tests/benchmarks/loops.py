@@ -42,6 +42,7 @@ from warpimpact.cli.identify import PROCESSES
 from warpimpact.identification.identify import identify_to_file
 from warpimpact.identification.reading import read_fit
 from warpimpact.results import posterior_file
+from warpimpact.results.files import read_tree
 from warpimpact.solver.device import cores
 from warpimpact.solver.limit import limits, pilot_of_limits
 from warpimpact.solver.many import simulate_many
@@ -127,7 +128,7 @@ def identified(folder: Path) -> dict[str, Any]:
     for process in multiprocessing.active_children():
         process.join()  # what it took counts then
     seconds = sum(os.times()[:4]) - sum(begin[:4])
-    told = posterior_file.read(output).attrs
+    told = read_tree(output, posterior_file.POSTERIOR).attrs
     effective, sets = float(told[posterior_file.EFFECTIVE]), int(told[posterior_file.SETS])
     return {"seconds": seconds, "wall": wall, "effective": effective, "sets": sets}
 

@@ -17,6 +17,7 @@ from warpimpact.identification.evaluate import evaluate
 from warpimpact.identification.fit import Fit
 from warpimpact.identification.reading import fit_from
 from warpimpact.results import posterior_file
+from warpimpact.results.files import read_tree
 from warpimpact.scene.distributions import EDGE
 from warpimpact.solver.worker import Worker
 
@@ -55,7 +56,7 @@ def refined(fit: Fit, points: np.ndarray, misfit: np.ndarray, seed: int = 0) -> 
 
 
 def main() -> None:
-    tree = posterior_file.read(Path(sys.argv[1]))
+    tree = read_tree(Path(sys.argv[1]), posterior_file.POSTERIOR)
     fit = fit_from(str(tree.attrs[posterior_file.FIT]), sys.argv[1], Path("campaigns"))
     sets = tree["sets"].to_dataset()
     shares, grid = [], np.linspace(EDGE, 1.0 - EDGE, 10_001)

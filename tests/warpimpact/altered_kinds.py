@@ -95,7 +95,7 @@ def write_files(folder: Path) -> None:
     from warpimpact.identification.reading import fit_from
     from warpimpact.optimisation.design import design_from
     from warpimpact.optimisation.optimise import optimise
-    from warpimpact.results import files, firing, front
+    from warpimpact.results import files
     from warpimpact.runs.replay import replay
     from warpimpact.runs.run import run, run_to_file
     from warpimpact.runs.team import local_team
@@ -113,8 +113,8 @@ def write_files(folder: Path) -> None:
     small = fit.replace("[sampling]\nhits = 64", "[sampling]\nsets = 128\ndraws = 50\neffective = 60\nhits = 32")
     identify_to_file(fit_from(small, "fit.toml", Path()), folder / "posterior.nc", device="cpu")
     design = design_from(FIXED + HEAD + ASKED + PLATE + FREE, "design", Path())
-    front.write(optimise(design), folder / "front.nc")
-    firing.write(simulate_test(firing_test(FIRING, "test", Path()), None, {}, None), folder / "firing.nc")
+    files.write(optimise(design), folder / "front.nc")
+    files.write(simulate_test(firing_test(FIRING, "test", Path()), None, {}, None), folder / "firing.nc")
     (folder / "drawn.toml").write_text(FIXED + TARGET)
     for name in ("limits", "sweep"):
         (folder / f"{name}.toml").write_text('title = "a"\ntests = 20\n' + OF_A_FILE.format(name))

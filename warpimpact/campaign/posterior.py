@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from pydantic import ValidationError
 
 from warpimpact.results import posterior_file
+from warpimpact.results.files import read_tree
 from warpimpact.scene import Interaction, Plate, Sampler, Shots
 from warpimpact.scene.quantities import QUANTITIES
 from warpimpact.solver.columns import Path, columns_of
@@ -117,7 +118,7 @@ def read_posterior(path: FilePath) -> Posterior:
 
 @lru_cache(maxsize=4)
 def _read(path: FilePath, _changed: tuple[int, int] | None) -> Posterior:
-    tree = posterior_file.read(path, draws_alone=True)
+    tree = read_tree(path, posterior_file.DRAWS)
     draws = tree["posterior"].to_dataset()
     values: dict[Path, Array] = {}
     for array in draws.data_vars.values():

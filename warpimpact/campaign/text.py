@@ -7,7 +7,7 @@ from typing import Any
 
 from ..results import kinds
 from ..results.files import kind_of
-from ..results.kinds import Kind
+from ..results.kind import Kind
 from ..scene import toml_text
 from ..scene.input_files import check_file
 
@@ -37,7 +37,7 @@ def parsed(text: str, name: str, kind: Kind | None = None) -> dict[str, Any]:
         tables = toml_text.parsed(text, name)
     other = kinds.kind_of_tables(tables)
     if kind is not None and other not in (None, kind) and not {*kind.marks} & {*tables}:
-        raise CampaignError(kinds.told(name, other, kind.what))
+        raise CampaignError(other.told(name, kind.name))
     return tables
 
 
@@ -50,5 +50,5 @@ def read_text(path: Path) -> str:
     with _as_campaign():
         check_file(path)
         if kinds.is_netcdf(path) and (kind := kind_of(path)) is not None:
-            raise CampaignError(kinds.told(path, kind, "a TOML file"))
+            raise CampaignError(kind.told(path, "a TOML file"))
         return toml_text.read_text(path)

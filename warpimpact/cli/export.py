@@ -39,12 +39,13 @@ def _export(arguments: argparse.Namespace) -> None:
     from warpimpact.export.paraview import write_vtk
     from warpimpact.export.table import write_csv
     from warpimpact.results import files
+    from warpimpact.results.checks import HISTORY, RESULT
 
     path, output = arguments.file, arguments.output
     if path.suffix == ".toml":
         _export_drawing(path, output or path.with_suffix(".svg"), overwrite=arguments.overwrite)
         return
-    with files.opened_either(path) as dataset:
+    with files.opened(path, RESULT, HISTORY) as dataset:
         if files.is_history(dataset):
             output = output or path.with_name(f"{path.stem}_vtk")
             check_folder(output.parent)
@@ -102,19 +103,20 @@ def add_report(commands: Commands) -> None:
 
 def _report(arguments: argparse.Namespace) -> None:
     from warpimpact.report.report import write_report
-    from warpimpact.results import files, kinds
+    from warpimpact.results import files, front, posterior_file
 
     paths = arguments.results
     output = arguments.output or paths[0].with_suffix(".html")
     check_suffix(output, "a report", ".html")
     check_output(output, overwrite=arguments.overwrite)
-    found = {*map(files.kind_of, paths)}
-    if kinds.POSTERIOR in found:
-        _report_posterior(paths, output)
-        return
-    if kinds.FRONT in found:
-        _report_front(paths, output, arguments.campaign_folder)
-        return
+    alone = {posterior_file.POSTERIOR: _report_posterior, front.FRONT: _report_front}
+    for kind in map(files.kind_of, paths):
+        if kind in alone:
+            if len(paths) > 1:
+                raise files.ResultError(f"got {len(paths)} files, one of which is {kind.name}, which is reported alone")
+            alone[kind](paths[0], output, arguments.campaign_folder or paths[0].parent)
+            print(output)
+            return
     by_name = named(paths)
     with ExitStack() as stack:
         datasets = {name: stack.enter_context(files.opened(path)) for name, path in by_name.items()}
@@ -130,23 +132,15 @@ def _report(arguments: argparse.Namespace) -> None:
     print(output)
 
 
-def _report_posterior(paths: list[Path], output: Path) -> None:
+def _report_posterior(path: Path, output: Path, _: Path) -> None:
     from warpimpact.report.posterior import write_posterior_report
     from warpimpact.results import files, posterior_file
 
-    if len(paths) > 1:
-        raise files.ResultError(
-            f"got {len(paths)} files, one of which is a posterior, but a posterior is reported alone"
-        )
-    write_posterior_report(posterior_file.read(paths[0]), output)
-    print(output)
+    write_posterior_report(files.read_tree(path, posterior_file.POSTERIOR), output)
 
 
-def _report_front(paths: list[Path], output: Path, folder: Path | None) -> None:
+def _report_front(path: Path, output: Path, folder: Path) -> None:
     from warpimpact.report.front import write_front_report
     from warpimpact.results import files, front
 
-    if len(paths) > 1:
-        raise files.ResultError(f"got {len(paths)} files, one of which is a search, but a search is reported alone")
-    write_front_report(front.read(paths[0]), output, folder or paths[0].parent)
-    print(output)
+    write_front_report(files.read(path, front.FRONT), output, folder)

@@ -43,7 +43,7 @@ def _test(arguments: argparse.Namespace) -> None:
     from warpimpact.firing.reading import read_test
     from warpimpact.firing.simulate import simulate_test
     from warpimpact.plotting.firing import directions_figure, firing_figure
-    from warpimpact.results import firing as files
+    from warpimpact.results import files
     from warpimpact.view.view import text_of
 
     test = read_test(arguments.test)

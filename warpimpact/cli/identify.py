@@ -47,7 +47,7 @@ def _identify(arguments: argparse.Namespace) -> int:
     from warpimpact.identification.posterior_view import posterior_view
     from warpimpact.identification.reading import read_fit
     from warpimpact.plotting.posterior import FIGURES
-    from warpimpact.results import posterior_file
+    from warpimpact.results import files, posterior_file
     from warpimpact.solver.device import cores
     from warpimpact.view.view import text_of
 
@@ -71,7 +71,7 @@ def _identify(arguments: argparse.Namespace) -> int:
             processes=min(cores(), PROCESSES),
             tell=warn,
         )
-    tree = posterior_file.read(output)
+    tree = files.read_tree(output, posterior_file.POSTERIOR)
     print(text_of(posterior_view(tree)))
     print(f"written to {output}")
     for picture, draw in pictures.items():

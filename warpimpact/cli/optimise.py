@@ -47,7 +47,7 @@ def _optimise(arguments: argparse.Namespace) -> int:
     from warpimpact.optimisation.front_view import front_view
     from warpimpact.optimisation.optimise import folder_of, optimise_to_file
     from warpimpact.plotting.front import front_figure
-    from warpimpact.results import front
+    from warpimpact.results import files, front
     from warpimpact.view.view import text_of
 
     design = read_design(arguments.design)
@@ -71,7 +71,7 @@ def _optimise(arguments: argparse.Namespace) -> int:
             ),
             tell=warn,
         )
-    dataset = front.read(output)
+    dataset = files.read(output, front.FRONT)
     print(text_of(front_view(dataset)))
     front_figure(dataset, design.folder).savefig(picture, dpi=150)
     beside = f", campaigns in {folder_of(output)}" if campaigns else ""

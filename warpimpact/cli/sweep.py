@@ -33,6 +33,7 @@ def add_sweep(commands: Commands) -> None:
 def _sweep(arguments: argparse.Namespace) -> None:
     from warpimpact.plotting.sweep import sweep_figure
     from warpimpact.results import files
+    from warpimpact.results.checks import SWEEP
     from warpimpact.studies.sweep import folder_of, read_sweep, run_sweep
 
     sweep = read_sweep(arguments.campaign, count=arguments.count)
@@ -57,6 +58,6 @@ def _sweep(arguments: argparse.Namespace) -> None:
             progress=named,
             tell=warn,
         )
-    sweep_figure(files.read_sweep_result(output)).savefig(picture, dpi=150)
+    sweep_figure(files.read(output, SWEEP)).savefig(picture, dpi=150)
     for written in (output, folder_of(output), picture):
         print(written)

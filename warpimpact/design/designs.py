@@ -15,7 +15,7 @@ from warpimpact.campaign.plates import read_plates
 from warpimpact.campaign.text import CampaignError, parsed, read_text
 from warpimpact.campaign.toml import toml_text
 from warpimpact.results import attributes as attr
-from warpimpact.results import front, kinds
+from warpimpact.results import files, front
 from warpimpact.results.files import kind_of, opened
 from warpimpact.scene.units import quoted
 
@@ -126,11 +126,11 @@ def _texts(path: Path) -> Iterator[tuple[str, str]]:
 
 def _texts_of_results(path: Path) -> Iterator[tuple[str, str]]:
     """The same of a file of results: the campaigns of a front, or that of a hit map."""
-    if kind_of(path) is not kinds.FRONT:
+    if kind_of(path) is not front.FRONT:
         with opened(path) as dataset:
             yield path.stem, str(dataset.attrs.get(attr.CAMPAIGN, ""))
         return
-    found = front.read(path)
+    found = files.read(path, front.FRONT)
     for name, text in zip(found[front.FILE].values, found[front.CAMPAIGN].values, strict=True):
         yield Path(str(name)).stem, str(text)
 

@@ -19,6 +19,7 @@ from warpimpact.firing.rules import drawn_places, fair_places
 from warpimpact.records.variable import Variable
 from warpimpact.results import attributes as attr
 from warpimpact.results import firing as f
+from warpimpact.results.dataset import dataset_of
 from warpimpact.statistics.acceptance import acceptance, fewest_shots
 
 Array = NDArray[np.float64]
@@ -57,7 +58,7 @@ def simulate_test(
     }
     for some, more in (_fired(test, response), _directions(test, sector)):
         columns, told = columns | some, told | more
-    return f.dataset_of(columns, told | (attributes or {}))
+    return dataset_of(columns, f.FIXED | told | (attributes or {}))
 
 
 def _directions(test: FiringTest, sector: Sector | None) -> tuple[dict[Variable, Any], dict[str, Any]]:

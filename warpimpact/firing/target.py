@@ -22,6 +22,7 @@ from warpimpact.firing.response import (
 from warpimpact.results import files
 from warpimpact.results import firing as f
 from warpimpact.results import variables as v
+from warpimpact.results.checks import SWEEP
 from warpimpact.runs.progress import Follow
 from warpimpact.runs.run import run_to_file
 from warpimpact.runs.team import local_team
@@ -45,7 +46,7 @@ def known_target(test: FiringTest) -> Response | None:
             return response_of_limits(files.read(target.limits))
     if target.sweep is not None:
         with _told_of(target.sweep):
-            return response_of_sweep(files.read_sweep_result(target.sweep), target.layer)
+            return response_of_sweep(files.read(target.sweep, SWEEP), target.layer)
     return None
 
 

@@ -17,7 +17,7 @@ from warpimpact.identification.likelihood import Score
 from warpimpact.identification.parameters import FitError
 from warpimpact.identification.posterior import Sampled, to_datatree
 from warpimpact.results import attributes as attr
-from warpimpact.results import posterior_file
+from warpimpact.results.files import write_tree
 from warpimpact.runs.describe import made_by
 from warpimpact.runs.store import Store, content_of, stored
 from warpimpact.statistics.importance import LARGEST_K, ImportanceSampler
@@ -87,7 +87,7 @@ def identify_to_file(
             sampled = sample(fit, device=device, store=store, progress=progress, processes=processes)
             tree = to_datatree(fit, sampled, made)
             tree.attrs[attr.FINGERPRINT] = store.parts.fingerprint
-            posterior_file.write(tree, output)
+            write_tree(tree, output)
 
 
 def sample(

@@ -16,6 +16,7 @@ from warpimpact.optimisation.search import Follow, SearchProgress, search
 from warpimpact.optimisation.searcher import check_installed
 from warpimpact.optimisation.work import Work
 from warpimpact.results import attributes as attr
+from warpimpact.results import files
 from warpimpact.results import front as f
 from warpimpact.runs.parts import is_begun
 from warpimpact.runs.store import Store, content_of, stored
@@ -77,8 +78,8 @@ def optimise_to_file(
     with stored(output, content, "search", resume=resume, overwrite=overwrite, tell=tell) as store:
         if store is not None:
             dataset = _found(design, crew, store, progress or (lambda now: None))
-            f.write(dataset.assign_attrs({attr.FINGERPRINT: store.parts.fingerprint}), output)
-    return write_campaigns(design, f.read(output), folder, overwrite=overwrite, tell=tell)
+            files.write(dataset.assign_attrs({attr.FINGERPRINT: store.parts.fingerprint}), output)
+    return write_campaigns(design, files.read(output, f.FRONT), folder, overwrite=overwrite, tell=tell)
 
 
 def folder_of(output: Path) -> Path:

@@ -20,6 +20,7 @@ from warpimpact.optimisation.measures import label_of
 from warpimpact.optimisation.search import Searched
 from warpimpact.results import attributes as attr
 from warpimpact.results import front as f
+from warpimpact.results.dataset import dataset_of
 from warpimpact.results.files import OutputError, aside
 from warpimpact.runs.parts import remove
 
@@ -82,7 +83,7 @@ def to_dataset(design: Design, found: Searched, confirmed: Confirmed, made_by: M
     if design.keys and len(confirmed.records):
         columns |= {f.HIT_Y: confirmed.places[:, 0], f.HIT_Z: confirmed.places[:, 1]}
         columns[f.HIT_VALUE] = np.array([one.said[0] for one in confirmed.records])
-    return f.dataset_of(columns, _attributes(design, found, made_by))
+    return dataset_of(columns, {attr.REFERENCES: f.REFERENCES, **_attributes(design, found, made_by)})
 
 
 def _texts(texts: Any) -> Any:

@@ -20,6 +20,7 @@ from warpimpact.results.declared import (
     missing_fault,
     texts,
 )
+from warpimpact.results.kind import Kind
 from warpimpact.scene.display import STORED
 from warpimpact.scene.shots import FARTHEST_HIT
 from warpimpact.scene.toml_text import parsed_json
@@ -68,7 +69,7 @@ def _hit_variables() -> list[v.Variable]:
     return [*v.COORDINATES, *v.hit_variables(), *in_groups]
 
 
-def map_fault(dataset: xarray.Dataset) -> str | None:
+def _map_fault(dataset: xarray.Dataset) -> str | None:
     """What keeps a Dataset from being a map of hits, as a phrase; None if nothing does. Of its hits only what a reader
     relies on is looked at, a part at a time."""
     return next(_map_faults(dataset), None)
@@ -111,7 +112,7 @@ def _ended(status: np.ndarray[Any, Any], codes: np.ndarray[Any, Any]) -> bool:
     return bool((np.isin(status, codes) | np.isnan(status)).all())
 
 
-def sweep_fault(dataset: xarray.Dataset) -> str | None:
+def _sweep_fault(dataset: xarray.Dataset) -> str | None:
     """What keeps a Dataset from being a sweep, as a phrase; None if nothing does."""
     return next(_sweep_faults(dataset), None)
 
@@ -134,8 +135,23 @@ def _sweep_faults(dataset: xarray.Dataset) -> Iterator[str]:
     yield from _of_hits(dataset)
 
 
-def unusable(dataset: xarray.Dataset) -> str | None:
+def _missing(dataset: xarray.Dataset, *names: str) -> str | None:
+    """What every result has and this one has not, as a sentence; None if nothing is missing."""
+    missing = {*names, *v.COORDINATES, *v.VARIABLES} - {v.HIT} - dataset.variables.keys()
+    if missing:
+        return f'not a warpimpact result, it has no variable "{min(missing)}"'
+    if attr.PLATE_PERIOD in dataset.attrs:
+        return None
+    return (
+        f'not a warpimpact result, it has no attribute "{attr.PLATE_PERIOD}"; where it was chosen from one, keep its '
+        "attributes"
+    )
+
+
+def _misuse(dataset: xarray.Dataset) -> str | None:
     """What keeps hits that were chosen from a result from being used as one, as a sentence; None if nothing does."""
+    if (sentence := _missing(dataset)) is not None:
+        return sentence
     if v.HIT not in dataset.sizes:
         return "holds one hit without its dimension; choose hits as a list, as in isel(hit=[5])"
     if v.STANDOFF not in dataset.sizes:
@@ -143,7 +159,7 @@ def unusable(dataset: xarray.Dataset) -> str | None:
     status = dataset[v.STATUS]
     if status.dtype.kind == "f" and bool(status.isnull().any()):
         return "has hits without a status, as where(...) leaves them; choose hits with where(..., drop=True)"
-    return None
+    return None if dataset.sizes[v.HIT] else "has no hits, so there is nothing to show"
 
 
 def packing_fault(dataset: xarray.Dataset) -> str | None:
@@ -173,7 +189,7 @@ def _ascending(values: np.ndarray[Any, Any], sizes: Mapping[str, int]) -> bool:
     return finite(values, sizes) and bool((np.diff(values) > 0.0).all())
 
 
-HISTORY = Declaration(
+_HISTORY = Declaration(
     {one: one.dims for one in (*v.HISTORY_COORDINATES, *v.HISTORY_VARIABLES)},
     rules={
         v.QUATERNION: texts,
@@ -183,4 +199,23 @@ HISTORY = Declaration(
     },
     attributes={attr.PLATE_THICKNESS: Positive, attr.PLATE_PERIOD: tuple[Positive, Positive]},
     more=_history_fault,
+)
+
+
+RESULT = Kind(
+    "a map of hits",
+    "warpimpact inspect, plot, report, export, compare and replay take it",
+    maker="warpimpact run or limit",
+    misuse=_misuse,
+    fault=_map_fault,
+)
+SWEEP = Kind(
+    "a sweep",
+    "its points, in the folder beside it, are results, as is what isel(INPUT=0) chooses of it",
+    maker="warpimpact sweep",
+    misuse=lambda dataset: _missing(dataset, *v.COORDINATES),
+    fault=_sweep_fault,
+)
+HISTORY = Kind(
+    "the history of a hit", "warpimpact export takes it", (v.TIME,), maker="warpimpact replay", fault=_HISTORY.fault
 )

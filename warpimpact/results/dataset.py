@@ -246,6 +246,22 @@ def history_dataset(
     )
 
 
+def dataset_of(columns: Mapping[v.Variable, Any], attributes: Mapping[str, Any]) -> xarray.Dataset:
+    """The Dataset of a result that is no map of hits; its coordinates are the variables named as their dimension.
+
+    Args:
+        columns: values in the units that their variables are stored in.
+    """
+    import xarray
+
+    def stored(values: Any) -> NDArray[Any]:
+        array = np.asarray(values)
+        return array.astype(object) if array.dtype.kind == "U" else array
+
+    data = {name: (name.dims, stored(values), name.attributes) for name, values in columns.items()}
+    return xarray.Dataset(data, attrs={"Conventions": "CF-1.11", **attributes})
+
+
 def stored_columns(
     variables: Iterable[v.Variable], values: Mapping[str, Any], single: Collection[str] = ()
 ) -> dict[str, tuple[Any, ...]]:

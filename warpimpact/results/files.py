@@ -7,17 +7,16 @@ import shutil
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
-from typing import TYPE_CHECKING, NoReturn
+from typing import TYPE_CHECKING
 
 import netCDF4
 
-from warpimpact.results import attributes as attr
 from warpimpact.results import kinds
 from warpimpact.results import variables as v
-from warpimpact.results.checks import HISTORY, map_fault, packing_fault, sweep_fault, unusable
+from warpimpact.results.checks import RESULT, SWEEP, packing_fault
 from warpimpact.results.dataset import numbered
-from warpimpact.results.declared import Declaration
 from warpimpact.results.interrupts import uninterrupted
+from warpimpact.results.kind import Kind
 from warpimpact.results.netcdf import write_table
 from warpimpact.results.outlines import in_a_file, in_memory
 from warpimpact.results.table import Table
@@ -109,14 +108,39 @@ def _cause(error: Exception, path: Path) -> str:
     return str(error)
 
 
-def read(path: Path) -> xarray.Dataset:
-    """Read a result file into memory.
+def write_tree(tree: xarray.DataTree, path: Path) -> None:
+    """Write a tree of Datasets, whole or not at all; an existing file is replaced.
 
     Raises:
-        ResultError: The file is missing, is not netCDF, or is not a warpimpact result.
+        OutputError: The file cannot be written; what was there before is untouched.
     """
-    with uninterrupted(), opened(path) as file:
-        return _numbered(file.load())
+    with uninterrupted(), aside(path) as file:
+        tree.to_netcdf(file, engine="netcdf4", format="NETCDF4")
+
+
+def read(path: Path, kind: Kind = RESULT) -> xarray.Dataset:
+    """Read a file of a kind into memory.
+
+    Raises:
+        ResultError: The file is missing, is not netCDF, or is not of this kind.
+    """
+    with uninterrupted(), opened(path, kind) as dataset:
+        loaded = dataset.load()
+    return _numbered(loaded) if kind in (RESULT, SWEEP) else loaded
+
+
+def read_tree(path: Path, kind: Kind) -> xarray.DataTree:
+    """Read a file of groups into memory.
+
+    Raises:
+        ResultError: The file is missing, is not netCDF, or is not of this kind.
+    """
+    check_kind(path, kind)
+    with uninterrupted(), readable(path):
+        tree = _loaded(path)
+    if (mistake := kind.mistake(tree)) is not None:
+        raise ResultError(f"{path}: {mistake}")
+    return tree
 
 
 def open_result(path: str | Path) -> xarray.Dataset:
@@ -144,82 +168,31 @@ def _numbered(dataset: xarray.Dataset) -> xarray.Dataset:
 
 
 @contextmanager
-def opened(path: Path) -> Iterator[xarray.Dataset]:
-    """A result file of which only what is used is read.
+def opened(path: Path, *kinds_allowed: Kind) -> Iterator[xarray.Dataset]:
+    """A file of one of some kinds, of which only what is used is read; without kinds a map of hits.
+
+    What the library finds damaged, now or when it is read, is told in a sentence.
 
     Raises:
-        ResultError: as in `read`.
+        ResultError: The file is missing, is not netCDF, or is of no such kind.
     """
-    with _netcdf(path, "a map of hits", kinds.RESULT) as dataset:
-        _check_map(dataset, path)
-        yield dataset
-
-
-@contextmanager
-def opened_either(path: Path) -> Iterator[xarray.Dataset]:
-    """A result file, or the history of one of its hits, of which only what is used is read.
-
-    Raises:
-        ResultError: The file is missing, is not netCDF, or is neither.
-    """
-    with _netcdf(path, "a map of hits", kinds.RESULT, kinds.HISTORY) as dataset:
-        if is_history(dataset):
-            _refuse(path, "the history of a hit", HISTORY.fault(dataset))
-        else:
-            _check_map(dataset, path)
-        yield dataset
-
-
-def read_sweep_result(path: Path) -> xarray.Dataset:
-    """Read a sweep into memory.
-
-    Raises:
-        ResultError: The file is missing, is not netCDF, or is not a sweep.
-    """
-    with uninterrupted(), _netcdf(path, "a sweep", kinds.SWEEP) as dataset:
-        _check_has(dataset, path, *v.COORDINATES)
-        _refuse(path, "a sweep", sweep_fault(dataset))
-        return _numbered(dataset.load())
-
-
-def read_declared(path: Path, what: str, kind: kinds.Kind, declared: Declaration) -> xarray.Dataset:
-    """Read a file that has what is declared into memory.
-
-    Args:
-        what: it is, as messages say it.
-
-    Raises:
-        ResultError: the file is missing, is not netCDF, or is not such a file.
-    """
-    with uninterrupted(), _netcdf(path, what, kind) as file:
-        dataset = file.load()
-        _refuse(path, what, declared.fault(dataset))
-    return dataset
-
-
-def _check_has(dataset: xarray.Dataset, path: Path, *names: str) -> None:
-    missing = {*names, *v.COORDINATES, *v.VARIABLES} - {v.HIT} - dataset.variables.keys()
-    if missing:
-        raise ResultError(f'{path}: not a warpimpact result, it has no variable "{min(missing)}"')
-    if attr.PLATE_PERIOD not in dataset.attrs:
-        raise ResultError(
-            f'{path}: not a warpimpact result, it has no attribute "{attr.PLATE_PERIOD}"; where it was chosen from '
-            "one, keep its attributes"
-        )
-
-
-def _check_map(dataset: xarray.Dataset, path: Path) -> None:
-    _check_has(dataset, path)
-    if found := unusable(dataset):
-        raise ResultError(f"{path}: {found}")
-    if dataset.sizes[v.HIT] == 0:
-        raise ResultError(f"{path}: has no hits, so there is nothing to show")
-    _refuse(path, "a result", map_fault(dataset))
-
-
-def _refuse(path: Path, what: str, fault: str | None) -> None:
-    if fault is not None:
-        raise ResultError(f"{path}: not {what} of warpimpact, or damaged: {fault}")
+    kind = check_kind(path, *(kinds_allowed or (RESULT,)))
+    try:
+        with readable(path):
+            dataset = _joined(path)
+        with dataset:
+            needed, size = dataset.nbytes, path.stat().st_size
+            if needed > 2**20 + _MOST_PACKED * size:
+                raise ResultError(f"{path}: damaged: it has {size} bytes, but declares {needed} of data")
+            if fault := packing_fault(dataset):
+                raise ResultError(f"{path}: damaged: {fault}")
+            if (mistake := kind.mistake(dataset)) is not None:
+                raise ResultError(f"{path}: {mistake}")
+            yield dataset
+    except RuntimeError as error:
+        if not str(error).startswith("NetCDF"):
+            raise
+        raise ResultError(f"{path}: damaged, it cannot be read ({error})") from error
 
 
 def is_history(dataset: xarray.Dataset) -> bool:
@@ -231,31 +204,7 @@ _MOST_PACKED = 2000
 """How many times its size a file may hold: zlib packs a thousand bytes into one at best."""
 
 
-@contextmanager
-def _netcdf(path: Path, wanted: str, *wanted_kinds: kinds.Kind) -> Iterator[xarray.Dataset]:
-    """An open netCDF file of some kind; what the library finds damaged in it, now or when it is read, is told in a
-    sentence."""
-    kind = kind_of(path)
-    told_later = kind is None and kinds.RESULT in wanted_kinds and kinds.is_netcdf(path)  # by what it lacks
-    if kind not in wanted_kinds and not told_later:
-        refuse_kind(path, kind, wanted)
-    try:
-        with readable(path):
-            dataset = _joined(path)
-        with dataset:
-            needed, size = dataset.nbytes, path.stat().st_size
-            if needed > 2**20 + _MOST_PACKED * size:
-                raise ResultError(f"{path}: damaged: it has {size} bytes, but declares {needed} of data")
-            if found := packing_fault(dataset):
-                raise ResultError(f"{path}: damaged: {found}")
-            yield dataset
-    except RuntimeError as error:
-        if not str(error).startswith("NetCDF"):
-            raise
-        raise ResultError(f"{path}: damaged, it cannot be read ({error})") from error
-
-
-def kind_of(path: Path) -> kinds.Kind | None:
+def kind_of(path: Path) -> Kind | None:
     """What a file is, by its contents; None of one that is nothing known.
 
     Raises:
@@ -269,17 +218,23 @@ def kind_of(path: Path) -> kinds.Kind | None:
         return kinds.kind_of(path)
 
 
-def refuse_kind(path: Path, kind: kinds.Kind | None, wanted: str) -> NoReturn:
-    """Say what a file is that is not what is wanted.
+def check_kind(path: Path, *wanted: Kind) -> Kind:
+    """The kind of a file, if it is one of some; where nothing tells it, a map of hits counts, which says what it lacks.
 
     Raises:
-        ResultError: always.
+        ResultError: it is missing, is damaged, or is of another kind.
     """
+    kind = kind_of(path)
+    for one in wanted:
+        if kind is not None and kind.name == one.name:
+            return one
     if kind is not None:
-        raise ResultError(kinds.told(path, kind, wanted))
+        raise ResultError(kind.told(path, wanted[0].name))
     if not kinds.is_netcdf(path):
         raise ResultError(f"{path}: cannot be read as a netCDF file")
-    raise ResultError(f"{path}: not {wanted} of warpimpact")
+    if RESULT in wanted:
+        return RESULT
+    raise ResultError(f"{path}: not {wanted[0].name} of warpimpact")
 
 
 @contextmanager
@@ -318,3 +273,17 @@ def _joined(path: Path) -> xarray.Dataset:
     dataset = in_memory(dataset)
     dataset.set_close(root.close)
     return dataset
+
+
+def _loaded(path: Path) -> xarray.DataTree:
+    """The groups in memory, read one after the other.
+
+    Each is closed before the next one opens. A tree that stays open is closed when Python collects it, in the middle of
+    another access, which crashes netCDF.
+    """
+    import xarray
+
+    with netCDF4.Dataset(path) as file:
+        names = list(file.groups)
+    groups = {name: xarray.load_dataset(path, group=name, engine="netcdf4") for name in names}
+    return xarray.DataTree.from_dict({"/": xarray.load_dataset(path, engine="netcdf4"), **groups})

@@ -1,4 +1,4 @@
-"""The file of a simulated firing test: its variables and attributes, written whole or not at all.
+"""The file of a simulated firing test: its variables and attributes, and what is checked of it.
 
 response        probability of perforation against velocity, and the places that it comes from
 test            what every simulated test reports
@@ -9,21 +9,14 @@ proof           probability that n shots with at most k perforations pass, again
 
 from __future__ import annotations
 
-from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-import numpy as np
 from pydantic import Json
 
 from warpimpact.records.variable import Variable
 from warpimpact.results import attributes as attr
-from warpimpact.results import kinds
 from warpimpact.results.declared import Declaration, Text, among, finite
-from warpimpact.results.files import aside, read_declared
-from warpimpact.results.interrupts import uninterrupted
-
-if TYPE_CHECKING:
-    import xarray
+from warpimpact.results.kind import Kind
 
 _TESTS, _SHOTS, _SIZES, _ENDS = ("test",), ("test", "shot"), ("size",), ("bound",)
 
@@ -95,8 +88,6 @@ VARIABLES = (
     *(AZIMUTH, ELEVATION, DIRECTION_SHARE, DIRECTION_LOW, DIRECTION_HIGH, DIRECTION_OBLIQUITY, DIRECTION_WEIGHT),
     *(DIRECTION_HITS, DIRECTION_FAILED),
 )
-COORDINATES = (VELOCITY, QUANTILE, SIZE, AZIMUTH, ELEVATION)
-
 TEST = attr.FIRING_TEST
 SETTINGS = "firing_test_settings"
 """Attribute: all settings in SI, defaults included, as JSON."""
@@ -104,6 +95,8 @@ REQUIREMENT = "requirement"
 """Attribute: what a named requirement is taken to ask for, its source and what is assumed; empty without one."""
 DISCLAIMER = "disclaimer"
 SENTENCE = "a computation by a model, not a certificate: no shot was fired"
+FIXED = {attr.REFERENCES: "docs/firing.md of warpimpact", DISCLAIMER: SENTENCE}
+"""Attributes that every test has."""
 TRUE_V50, TRUE_SPREAD = "true_v50", "true_spread"
 """Of the target [m/s]: the median of its limit velocities, and half the distance from V16 to V84."""
 PROOF_SHOTS, PROOF_ALLOWED, PROOF_VELOCITY = "proof_shots", "proof_allowed", "proof_velocity"
@@ -114,40 +107,6 @@ MEAN, MEAN_INTERVAL = "mean_perforation_probability", "mean_perforation_probabil
 """Over all directions, weighted."""
 SEARCH = "limit_runs_per_hit"
 """Runs per hit that the search of limits took."""
-
-
-def dataset_of(columns: dict[Variable, Any], attributes: dict[str, Any]) -> xarray.Dataset:
-    """The Dataset of these columns; attributes that are velocities are in m/s."""
-    import xarray
-
-    data = {name: (name.dims, np.asarray(values), name.attributes) for name, values in columns.items()}
-    coordinates = {name: one for name, one in data.items() if name in COORDINATES}
-    fixed = {"Conventions": "CF-1.11", attr.REFERENCES: _REFERENCES, DISCLAIMER: SENTENCE}
-    own = {name: one for name, one in data.items() if name not in coordinates}
-    return xarray.Dataset(own, coordinates, fixed | attributes)
-
-
-_REFERENCES = "docs/firing.md of warpimpact"
-
-
-def write(dataset: xarray.Dataset, path: Path) -> None:
-    """Write a test; an existing file is replaced.
-
-    Raises:
-        OutputError: it cannot be written; what was there before is untouched.
-    """
-    bare = {name: {"_FillValue": None} for name in dataset.coords}  # CF: a coordinate has no missing values
-    with uninterrupted(), aside(path) as file:
-        dataset.to_netcdf(file, engine="netcdf4", format="NETCDF4", encoding=bare)
-
-
-def read(path: Path) -> xarray.Dataset:
-    """Read a test into memory.
-
-    Raises:
-        ResultError: the file is missing, is not netCDF, or is no firing test.
-    """
-    return read_declared(path, "a firing test", kinds.FIRING, _DECLARED)
 
 
 _RESPONSE = (SHARE, SHARE_LOW, SHARE_HIGH, VELOCITY, QUANTILE, QUANTILE_VELOCITY, QUANTILE_LOW, QUANTILE_HIGH)
@@ -166,4 +125,11 @@ _DECLARED = Declaration(
     rules={SHOT_PERFORATED: among(0, 1, -1), **dict.fromkeys((VELOCITY, AZIMUTH, ELEVATION, SIZE), finite)},
     attributes={**dict.fromkeys((attr.TITLE, TEST, DISCLAIMER, REQUIREMENT), Text), SETTINGS: Json[dict[str, Any]]},
     more=lambda dataset: None if {SHARE, DIRECTION_SHARE} & {*dataset.variables} else "it has neither part of a test",
+)
+FIRING = Kind(
+    "a firing test",
+    "its text and figure stand beside it; xarray.open_dataset reads it",
+    (TEST,),
+    maker="warpimpact test",
+    fault=_DECLARED.fault,
 )

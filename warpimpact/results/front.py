@@ -1,4 +1,4 @@
-"""The file of a search for designs: its variables and attributes, written whole or not at all.
+"""The file of a search for designs: its variables and attributes, and what is checked of it.
 
 design      every design that was computed
 variable    the free variables
@@ -11,17 +11,14 @@ generation  of the search
 from __future__ import annotations
 
 from collections.abc import Mapping
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from warpimpact.records.variable import Variable
 from warpimpact.results import attributes as attr
-from warpimpact.results import kinds
 from warpimpact.results.declared import Declaration, Size, Text, among, finite, not_negative, place_in, texts
-from warpimpact.results.files import aside, read_declared
-from warpimpact.results.interrupts import uninterrupted
+from warpimpact.results.kind import Kind
 from warpimpact.scene.toml_text import parsed_json
 
 if TYPE_CHECKING:
@@ -99,8 +96,6 @@ VARIABLES = (
     *(HIT_Y, HIT_Z, HIT_VALUE, REFERENCE, REFERENCE_FOUND, REFERENCE_LOW, REFERENCE_HIGH, REFERENCE_CAMPAIGN),
     *(COMPUTED, VOLUME),
 )
-COORDINATES = (NAME, ASKED, REFERENCE)
-
 DESIGN = attr.DESIGN_FILE
 OUTCOME, FEASIBLE, NONE_FEASIBLE = "outcome", "front", "no design within the bounds"
 """Attribute: how the search ended, one of both."""
@@ -108,42 +103,7 @@ BOX = "hypervolume_box"
 """Attribute: worst values of the first generation to minimise, then the distances from the best."""
 REFUSED, PILOTS = "refused_designs", "pilots"
 """Attributes: designs that broke a constraint, and pilots of the search."""
-_REFERENCES = "docs/howto/optimise.md of warpimpact"
-
-
-def dataset_of(columns: dict[Variable, Any], attributes: dict[str, Any]) -> xarray.Dataset:
-    """The Dataset of these columns."""
-    import xarray
-
-    data = {name: (name.dims, _array(values), name.attributes) for name, values in columns.items()}
-    coordinates = {name: one for name, one in data.items() if name in COORDINATES}
-    fixed = {"Conventions": "CF-1.11", attr.REFERENCES: _REFERENCES}
-    own = {name: one for name, one in data.items() if name not in coordinates}
-    return xarray.Dataset(own, coordinates, fixed | attributes)
-
-
-def _array(values: Any) -> Any:
-    found = np.asarray(values)
-    return found.astype(object) if found.dtype.kind == "U" else found
-
-
-def write(dataset: xarray.Dataset, path: Path) -> None:
-    """Write a search; an existing file is replaced.
-
-    Raises:
-        OutputError: it cannot be written; what was there before is untouched.
-    """
-    with uninterrupted(), aside(path) as file:
-        dataset.to_netcdf(file, engine="netcdf4", format="NETCDF4")
-
-
-def read(path: Path) -> xarray.Dataset:
-    """Read a search into memory.
-
-    Raises:
-        ResultError: the file is missing, is not netCDF, or is no search.
-    """
-    return read_declared(path, "a search for designs", kinds.FRONT, _DECLARED)
+REFERENCES = "docs/howto/optimise.md of warpimpact"
 
 
 def _labels(values: np.ndarray[Any, Any], sizes: Mapping[str, int]) -> bool:
@@ -185,4 +145,11 @@ _DECLARED = Declaration(
         **dict.fromkeys((REFUSED, PILOTS), Size),
     },
     more=_more,
+)
+FRONT = Kind(
+    "a search for designs",
+    "warpimpact report and design take it",
+    (DESIGN,),
+    maker="warpimpact optimise",
+    fault=_DECLARED.fault,
 )

@@ -1,4 +1,4 @@
-"""The file of a posterior: a tree of Datasets with the groups that ArviZ reads, written whole or not at all.
+"""The file of a posterior: a tree of Datasets with the groups that ArviZ reads.
 
 posterior, prior          draws of the parameters, along chain and draw; the posterior has the hit of every shot, too
 sample_stats              ln of the likelihood and the misfit of every draw
@@ -12,18 +12,15 @@ best                      the set of smallest misfit
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from pathlib import Path
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
-import netCDF4
 import numpy as np
 from pydantic import BaseModel, Json
 
 from warpimpact.results import attributes as attr
-from warpimpact.results import kinds
 from warpimpact.results.declared import Declaration, Finite, Number, Size, Text, finite, not_negative, numbers, texts
-from warpimpact.results.files import ResultError, aside, kind_of, readable, refuse_kind
-from warpimpact.results.interrupts import uninterrupted
+from warpimpact.results.kind import Kind
 from warpimpact.scene.toml_text import parsed_json
 
 if TYPE_CHECKING:
@@ -90,34 +87,6 @@ _OF_A_REPORT: Mapping[str, Any] = {
 }
 
 
-def write(tree: xarray.DataTree, path: Path) -> None:
-    """Write a posterior; an existing file is replaced.
-
-    Raises:
-        OutputError: it cannot be written; what was there before is untouched.
-    """
-    with uninterrupted(), aside(path) as file:
-        tree.to_netcdf(file, engine="netcdf4", format="NETCDF4")
-
-
-def read(path: Path, *, draws_alone: bool = False) -> xarray.DataTree:
-    """Read a posterior into memory.
-
-    Args:
-        draws_alone: whether its draws are all that is needed of it.
-
-    Raises:
-        ResultError: the file is missing, is not netCDF, or is no posterior.
-    """
-    if (kind := kind_of(path)) is not kinds.POSTERIOR:
-        refuse_kind(path, kind, "a posterior")
-    with uninterrupted(), readable(path):
-        loaded = _loaded(path)
-    if fault := _fault(loaded, _GROUPS_OF_DRAWS if draws_alone else GROUPS):
-        raise ResultError(f"{path}: not a posterior of warpimpact identify, or damaged: {fault}")
-    return loaded
-
-
 def _fault(tree: xarray.DataTree, groups: Sequence[str]) -> str | None:
     """What keeps a tree from being a posterior in some of its groups, as a phrase; None if nothing does."""
     if missing := [name for name in groups if name not in tree.children]:
@@ -157,15 +126,12 @@ def _path_fault(parameter: xarray.DataArray) -> str | None:
     return None if is_path else f'its parameter "{parameter.name}" has no path as it should'
 
 
-def _loaded(path: Path) -> xarray.DataTree:
-    """The groups in memory, read one after the other.
-
-    Each is closed before the next one opens. A tree that stays open is closed when Python collects it, in the middle of
-    another access, which crashes netCDF.
-    """
-    import xarray
-
-    with netCDF4.Dataset(path) as file:
-        names = list(file.groups)
-    groups = {name: xarray.load_dataset(path, group=name, engine="netcdf4") for name in names}
-    return xarray.DataTree.from_dict({"/": xarray.load_dataset(path, engine="netcdf4"), **groups})
+POSTERIOR = Kind(
+    "a posterior",
+    "warpimpact report takes it, and warpimpact run with --posterior",
+    ("posterior", EFFECTIVE),
+    maker="warpimpact identify",
+    fault=lambda tree: _fault(tree, GROUPS),
+)
+DRAWS = replace(POSTERIOR, fault=lambda tree: _fault(tree, _GROUPS_OF_DRAWS))
+"""The same, of which the draws alone are needed."""

@@ -19,7 +19,7 @@ from warpimpact.campaign.text import CampaignError
 from warpimpact.cli import main
 from warpimpact.plotting import overview, variable_map
 from warpimpact.results import posterior_file
-from warpimpact.results.files import read
+from warpimpact.results.files import read, read_tree, write_tree
 from warpimpact.runs.replay import replay
 from warpimpact.runs.run import run
 from warpimpact.scene import Interaction, Numerics, Plate, Scene, Shots
@@ -82,7 +82,7 @@ def posterior(folder: Path, interval: str = "degradation_interval", **of_draw: f
     told = {posterior_file.FIT: "", posterior_file.MATERIAL: json.dumps(material), "warpimpact_version": "0"}
     groups = {name: xarray.Dataset({"a": 1}) for name in posterior_file.GROUPS} | {"posterior": draws}
     path = folder / "posterior.nc"
-    posterior_file.write(xarray.DataTree.from_dict({"/": xarray.Dataset(attrs=told), **groups}), path)
+    write_tree(xarray.DataTree.from_dict({"/": xarray.Dataset(attrs=told), **groups}), path)
     return path
 
 
@@ -189,7 +189,7 @@ def test_images_share_their_draw(tmp_path: Path) -> None:
 
 def test_a_result_holds_its_draws_and_replays(tmp_path: Path) -> None:
     result = run(campaign(posterior(tmp_path)), device="cpu")
-    draws = posterior_file.read(tmp_path / "posterior.nc", draws_alone=True)["posterior"]
+    draws = read_tree(tmp_path / "posterior.nc", posterior_file.DRAWS)["posterior"]
     which = result["posterior_draw"].values.astype(int)
     assert (result["resistance"].values == draws["resistance"].values[0][which]).all()
     assert replay(result, 17, folder=tmp_path).attrs["agreement"] == "bit-identical"
@@ -272,4 +272,4 @@ def test_the_option(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pyt
     assert main(["run", "c.toml", "--posterior", path.name, "--device", "cpu"]) == 0
     assert "posterior_draw" in read(Path("c.nc"))
     assert main(["run", "c.toml", "--posterior", "c.nc", "-o", "d.nc"]) == 2
-    assert "c.nc: is a result, as warpimpact run and limit write, not a posterior" in capsys.readouterr().err
+    assert "c.nc: is a map of hits, as warpimpact run or limit writes, not a posterior" in capsys.readouterr().err

@@ -17,7 +17,8 @@ from warpimpact.export.table import write_csv
 from warpimpact.firing.response import Response, response_of_limits
 from warpimpact.identification.reading import read_fit
 from warpimpact.optimisation.design import read_design
-from warpimpact.results import files, kinds
+from warpimpact.results import files
+from warpimpact.results.checks import RESULT
 from warpimpact.scene.toml_text import parsed
 from warpimpact.solver import device as devices
 
@@ -127,12 +128,12 @@ def test_a_result_is_named_where_a_text_is_taken(
 ) -> None:
     files.write(make_result(20), Path("a.nc"))
     files.write(make_result(20), Path("b.toml"))
-    told = f"is {kinds.RESULT.what}, not a TOML file; {kinds.RESULT.use}"
+    told = RESULT.told("", "a TOML file").removeprefix(": ")
     for command in ("run", "plate", "sweep", "optimise", "identify", "test", "limit"):
         assert _said([command, "a.nc"], capsys) == f"a.nc: {told}"
     assert _said(["export", "b.toml"], capsys) == f"b.toml: {told}"
     for read in (run, read_design, read_fit):
-        with pytest.raises(CampaignError, match="a result, as warpimpact run and limit write, not a TOML file"):
+        with pytest.raises(CampaignError, match="a map of hits, as warpimpact run or limit writes, not a TOML file"):
             read("a.nc")
 
 

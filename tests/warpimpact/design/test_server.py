@@ -303,7 +303,7 @@ def test_a_shelf_has_every_design_of_its_files(
     text, search, result = small.read_text(), tmp_path / "front.nc", tmp_path / "slotted.nc"
     columns = {front.FILE: ["design_00.toml", "design_01.toml"], front.CAMPAIGN: [text, text.replace("4 mm", "5 mm")]}
     told = {name: ("front", np.array(texts, dtype=object), name.attributes) for name, texts in columns.items()}
-    front.write(
+    files.write(
         searched.isel(front=[0, 0]).assign({front.GROUP: ("front", [0, 0], front.GROUP.attributes)}).assign(told),
         search,
     )

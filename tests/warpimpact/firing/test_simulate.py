@@ -13,6 +13,7 @@ from warpimpact.firing.reading import firing_test
 from warpimpact.firing.response import normal_response
 from warpimpact.firing.simulate import simulate_test
 from warpimpact.plotting.firing import firing_figure
+from warpimpact.results import files
 from warpimpact.results import firing as f
 from warpimpact.view.view import text_of
 
@@ -88,7 +89,7 @@ def test_the_command_writes_a_file_with_cf_attributes(tmp_path: Path, capsys: py
     assert main(["test", str(tmp_path / "a.toml"), "-o", str(output)]) == 0
     assert f.SENTENCE in capsys.readouterr().out
     assert (tmp_path / "out.png").exists()
-    read = f.read(output)
+    read = files.read(output, f.FIRING)
     assert read.attrs["Conventions"] == "CF-1.11"
     assert json.loads(read.attrs[f.SETTINGS])["proof"]["velocity"] == 760.0
     assert all({"units", "long_name"} <= set(read[name].attrs) for name in read.variables)
@@ -111,7 +112,7 @@ output = { standoffs = ["50 mm"], solid_reference = false }
     (tmp_path / "a.toml").write_text(test, encoding="utf-8")
     output = tmp_path / "a.nc"
     assert main(["test", str(tmp_path / "a.toml"), "-o", str(output), "-q", "--device", "cpu"]) == 0
-    found, limits = f.read(output), xarray.load_dataset(tmp_path / "a_limits.nc")
+    found, limits = files.read(output, f.FIRING), xarray.load_dataset(tmp_path / "a_limits.nc")
     limit = float(limits.limit_velocity[0])
     assert found.attrs[f.TRUE_V50] == pytest.approx(limit, abs=1.0)
     assert found[f.V50].values == pytest.approx(np.full(20, limit), abs=20.0)
@@ -119,4 +120,4 @@ output = { standoffs = ["50 mm"], solid_reference = false }
     again = test.replace('campaign = "solid.toml"\ncount = 8', 'limits = "a_limits.nc"')
     (tmp_path / "b.toml").write_text(again, encoding="utf-8")
     assert main(["test", str(tmp_path / "b.toml"), "-o", str(tmp_path / "b.nc"), "-q"]) == 0
-    assert np.array_equal(f.read(tmp_path / "b.nc")[f.V50].values, found[f.V50].values)
+    assert np.array_equal(files.read(tmp_path / "b.nc", f.FIRING)[f.V50].values, found[f.V50].values)

@@ -15,7 +15,7 @@ from warpimpact.identification.fit import Fit
 from warpimpact.identification.parameters import FitError
 from warpimpact.identification.reading import fit_from
 from warpimpact.results import posterior_file
-from warpimpact.results.files import ResultError
+from warpimpact.results.files import ResultError, read_tree, write_tree
 
 TEXT = (Path(__file__).parents[2] / "validation" / "calibration.toml").read_text(encoding="utf-8")
 DISTRIBUTION = {"distribution": ["1 mm"] * 5000, "low": 0, "high": 1}
@@ -99,12 +99,12 @@ def test_an_altered_posterior_is_refused_in_a_sentence(
     case: str, posterior: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     group, change = ALTERATIONS[case]
-    tree = posterior_file.read(posterior)
+    tree = read_tree(posterior, posterior_file.POSTERIOR)
     groups = {name: tree[name].to_dataset() for name in ("/", *tree.children)}
     groups[group] = change(groups[group])
     path = tmp_path / "altered.nc"
-    posterior_file.write(xarray.DataTree.from_dict(groups), path)
-    with pytest.raises(ResultError, match="not a posterior of warpimpact identify"):
-        posterior_file.read(path)
+    write_tree(xarray.DataTree.from_dict(groups), path)
+    with pytest.raises(ResultError, match="not a posterior of warpimpact"):
+        read_tree(path, posterior_file.POSTERIOR)
     assert main(["report", str(path), "-o", str(tmp_path / "a.html")]) == 2
     assert capsys.readouterr().err.count("\n") == 1

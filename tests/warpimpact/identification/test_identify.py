@@ -16,7 +16,7 @@ from warpimpact.identification.posterior import Sampled, learnt, parameters_of
 from warpimpact.identification.posterior_view import posterior_view
 from warpimpact.plotting.posterior import hits_figure, measured_figure, pairs_figure
 from warpimpact.results import posterior_file
-from warpimpact.results.files import OutputError, ResultError
+from warpimpact.results.files import OutputError, ResultError, read_tree
 from warpimpact.runs.parts import Interrupted
 from warpimpact.runs.store import Store
 from warpimpact.solver.worker import Worker
@@ -46,7 +46,7 @@ def test_arviz_reads_it(posterior: Path) -> None:
 
 def test_draws_hold_together(posterior: Path) -> None:
     """A draw has the numbers of the set that it is."""
-    tree = posterior_file.read(posterior)
+    tree = read_tree(posterior, posterior_file.POSTERIOR)
     which = tree["sample_stats"]["set"].values[0]
     for name in parameters_of(tree):
         assert tree["posterior"][name].values[0] == pytest.approx(tree["sets"][name].values[which])
@@ -58,7 +58,7 @@ def test_draws_hold_together(posterior: Path) -> None:
 
 
 def test_the_resistance_is_learnt_and_told(posterior: Path) -> None:
-    tree = posterior_file.read(posterior)
+    tree = read_tree(posterior, posterior_file.POSTERIOR)
     resistance = learnt(tree)["resistance"]
     assert resistance.quantiles[2] - resistance.quantiles[0] < 0.8 * (resistance.prior[2] - resistance.prior[0])
     text = text_of(posterior_view(tree))
@@ -68,7 +68,7 @@ def test_the_resistance_is_learnt_and_told(posterior: Path) -> None:
 
 
 def test_figures_are_drawn(posterior: Path) -> None:
-    tree = posterior_file.read(posterior)
+    tree = read_tree(posterior, posterior_file.POSTERIOR)
     assert len(pairs_figure(tree).axes) == 10
     assert len(measured_figure(tree).axes) == 2
     assert len(hits_figure(tree).axes) == 2
@@ -92,7 +92,7 @@ def test_a_resumed_fit_equals_an_undisturbed_one(
     standings: list[FitProgress] = []
     identify_to_file(fit, path, device="cpu", resume=True, progress=standings.append)
     assert standings[-1].resumed >= 64
-    one, other = posterior_file.read(posterior), posterior_file.read(path)
+    one, other = read_tree(posterior, posterior_file.POSTERIOR), read_tree(path, posterior_file.POSTERIOR)
     for group in posterior_file.GROUPS:
         assert one[group].to_dataset().equals(other[group].to_dataset()), group
     assert not path.with_name("posterior.nc.parts").exists()
@@ -145,7 +145,7 @@ def test_another_file_is_no_posterior(tmp_path: Path) -> None:
     path = tmp_path / "other.nc"
     xarray.Dataset({"a": 1}).to_netcdf(path)
     with pytest.raises(ResultError, match="not a posterior of warpimpact"):
-        posterior_file.read(path)
+        read_tree(path, posterior_file.POSTERIOR)
 
 
 @pytest.mark.usefixtures("in_tmp_path")

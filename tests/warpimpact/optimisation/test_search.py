@@ -27,6 +27,7 @@ from warpimpact.optimisation.search import SearchProgress
 from warpimpact.optimisation.searcher import Searcher, front_of, hypervolume
 from warpimpact.optimisation.space import DesignVariable, Space
 from warpimpact.optimisation.work import Work
+from warpimpact.results import files
 from warpimpact.results import front as f
 from warpimpact.results.files import OutputError, read
 from warpimpact.runs.parts import Interrupted
@@ -163,7 +164,7 @@ def test_a_killed_search_is_resumed_to_the_same_file(tmp_path: Path) -> None:
     resumed = []
     optimise_to_file(read_design(file), killed, resume=True, progress=lambda now: resumed.append(now.resumed))
     assert max(resumed) > 0
-    _same(f.read(whole), f.read(killed))
+    _same(files.read(whole, f.FRONT), files.read(killed, f.FRONT))
     assert not parts.exists()
 
 
@@ -195,7 +196,7 @@ def test_a_seed_gives_one_search_and_another_seed_another() -> None:
 
 def test_a_campaign_of_the_front_runs_as_it_is(tmp_path: Path) -> None:
     campaigns = optimise_to_file(design(*SEARCHED, SEARCH, folder=tmp_path), tmp_path / "front.nc")
-    found = f.read(tmp_path / "front.nc")
+    found = files.read(tmp_path / "front.nc", f.FRONT)
     assert [path.name for path in campaigns] == list(found[f.FILE].values)
     assert campaigns[0].parent == folder_of(tmp_path / "front.nc")
     for path, density in zip(campaigns, found[f.FRESH].values[:, 0], strict=True):
@@ -322,7 +323,7 @@ def test_workers_do_not_change_the_front(tmp_path: Path) -> None:
     with cluster_crew(workers=2, device="cpu") as crew:
         optimise_to_file(one, tmp_path / "many.nc", crew=crew)
     optimise_to_file(one, tmp_path / "one.nc", crew=local_crew("cpu"))
-    _same(f.read(tmp_path / "many.nc"), f.read(tmp_path / "one.nc"))
+    _same(files.read(tmp_path / "many.nc", f.FRONT), files.read(tmp_path / "one.nc", f.FRONT))
 
 
 @pytest.mark.parametrize("measure", ["limit_velocity", "limit_thickness", "limit_areal_density"])
@@ -330,7 +331,7 @@ def test_a_limit_is_that_of_the_command(measure: str, tmp_path: Path) -> None:
     asked = f'[[objectives]]\nmeasure = "{measure}"\n'
     one = design(HOLES, asked, SEARCH.replace("most_hits = 64", "most_hits = 16"), folder=tmp_path)
     (path,) = optimise_to_file(one, tmp_path / "front.nc")
-    found = f.read(tmp_path / "front.nc")
+    found = files.read(tmp_path / "front.nc", f.FRONT)
     hits = f'[hits]\nsampling = "sobol"\ncount = 256\nirreducible = true\nseed = {fresh_seed(one)}'
     path.write_text(path.read_text().partition("[hits]")[0] + hits)
     quantity = "velocity" if measure == "limit_velocity" else "thickness"

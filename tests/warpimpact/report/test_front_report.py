@@ -7,11 +7,12 @@ import pytest
 import xarray
 
 from warpimpact.cli import main
+from warpimpact.results import files
 from warpimpact.results import front as f
 
 
 def test_a_click_shows_the_design(searched: xarray.Dataset, tmp_path: Path, browser: Any) -> None:
-    f.write(searched, tmp_path / "front.nc")
+    files.write(searched, tmp_path / "front.nc")
     assert main(["report", str(tmp_path / "front.nc")]) == 0
     browser.open(f"file://{tmp_path}/front.html")
     points, sections = browser.find("[data-design]"), browser.find(".design")
@@ -30,6 +31,6 @@ def test_a_search_is_reported_alone(
     searched: xarray.Dataset, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     for name in ("a.nc", "b.nc"):
-        f.write(searched, tmp_path / name)
+        files.write(searched, tmp_path / name)
     assert main(["report", str(tmp_path / "a.nc"), str(tmp_path / "b.nc")]) == 2
     assert "a search is reported alone" in capsys.readouterr().err

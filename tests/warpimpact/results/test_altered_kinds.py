@@ -8,6 +8,7 @@ import xarray
 
 from warpimpact.campaign.campaign import Campaign
 from warpimpact.results import checks, files
+from warpimpact.results.checks import HISTORY, RESULT
 from warpimpact.results.files import ResultError
 from warpimpact.runs.replay import replay
 from warpimpact.runs.run import run
@@ -33,7 +34,7 @@ MAPS: dict[str, tuple[Change, str]] = {
 def test_an_altered_map_is_refused(case: str, layered: xarray.Dataset, tmp_path: Path) -> None:
     change, expected = MAPS[case]
     changed = change(layered)
-    assert expected in str(checks.map_fault(changed))
+    assert expected in str(checks.RESULT.fault(changed))
     files.write(changed, tmp_path / "a.nc")
     with pytest.raises(ResultError, match="or damaged"):
         files.read(tmp_path / "a.nc")
@@ -52,6 +53,6 @@ def test_an_altered_history_is_refused(layered: xarray.Dataset, tmp_path: Path) 
         files.write(change(history), tmp_path / "a.nc")
         with (
             pytest.raises(ResultError, match="not the history of a hit of warpimpact, or damaged"),
-            files.opened_either(tmp_path / "a.nc"),
+            files.opened(tmp_path / "a.nc", RESULT, HISTORY),
         ):
             pass

@@ -13,7 +13,7 @@ from warpimpact.firing.directions import Directions, Sector
 from warpimpact.firing.reading import firing_test
 from warpimpact.firing.response import normal_response
 from warpimpact.firing.simulate import simulate_test
-from warpimpact.results import files, firing
+from warpimpact.results import files
 from warpimpact.runs.run import run
 from warpimpact.statistics.intervals import Estimate
 
@@ -48,7 +48,7 @@ def test_a_firing_test_with_directions_complies(tmp_path: Path) -> None:
     test = firing_test(KNOWN_TARGET.replace("tests = 1000", "tests = 20"), "a", tmp_path)
     target = {"campaign": Path(__file__)}
     asked = test.model_copy(update={"directions": directions, "target": target})
-    firing.write(simulate_test(asked, normal_response(800.0, 25.0), None, sector), tmp_path / "a.nc")
+    files.write(simulate_test(asked, normal_response(800.0, 25.0), None, sector), tmp_path / "a.nc")
     told = report(tmp_path / "a.nc")
     assert "All tests passed!" in told, told
 

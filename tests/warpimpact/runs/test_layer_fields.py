@@ -11,6 +11,7 @@ from warpimpact.analysis.slabs import LayerField, fields_behind
 from warpimpact.export.paraview import write_vtk
 from warpimpact.plotting.layers import layers
 from warpimpact.results import files
+from warpimpact.results.checks import HISTORY, RESULT
 from warpimpact.runs.replay import replay
 
 CAMPAIGN = """
@@ -107,7 +108,7 @@ def test_an_image_of_a_hit_is_mirrored() -> None:
 
 def test_a_file_a_figure_and_paraview_keep_it(hit: xarray.Dataset, tmp_path: Path) -> None:
     files.write(hit, tmp_path / "hit.nc")
-    with files.opened_either(tmp_path / "hit.nc") as again:
+    with files.opened(tmp_path / "hit.nc", RESULT, HISTORY) as again:
         np.testing.assert_array_equal(fields_behind(again)[0].share, fields_behind(hit)[0].share)
     panels = [axes for axes in layers(hit).axes if axes.images]
     assert len(panels) == hit.sizes["snapshot"]

@@ -11,6 +11,7 @@ from warpimpact.campaign.campaign import CampaignError
 from warpimpact.cli import main
 from warpimpact.plotting.sweep import sweep_figure
 from warpimpact.results import files
+from warpimpact.results.checks import SWEEP
 from warpimpact.runs.run import run
 from warpimpact.studies import sweep as module
 from warpimpact.studies.sweep import folder_of, joined, read_sweep, run_sweep
@@ -31,7 +32,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def test_every_point_is_what_its_campaign_gives(folder: Path) -> None:
-    sweep = files.read_sweep_result(folder / "a.nc")
+    sweep = files.read(folder / "a.nc", SWEEP)
     assert dict(sweep.sizes) | {"obliquity": 2, "width": 3, "hit": 24} == dict(sweep.sizes)
     np.testing.assert_allclose(sweep["obliquity"], [0.0, 30.0], rtol=1e-14)
     np.testing.assert_allclose(sweep["width"], [3e-3, 4e-3, 5e-3], rtol=1e-14)
@@ -89,7 +90,7 @@ def test_a_point_is_a_result_and_a_sweep_says_that_it_is_one(folder: Path, capsy
     assert "bit-identical" in capsys.readouterr().out
     assert main(["inspect", str(folder / "a.nc")]) == 2
     assert "is a sweep, as warpimpact sweep writes, not a map of hits; its points" in capsys.readouterr().err
-    files.read_sweep_result(folder / "a.nc").isel(obliquity=1, width=0).to_netcdf(folder / "chosen.nc")
+    files.read(folder / "a.nc", SWEEP).isel(obliquity=1, width=0).to_netcdf(folder / "chosen.nc")
     assert main(["inspect", str(folder / "chosen.nc")]) == 0
     assert main(["run", str(folder / "a.toml")]) == 2
     assert "this takes one combination of inputs; warpimpact sweep" in capsys.readouterr().err
@@ -118,7 +119,7 @@ def test_an_interrupted_sweep_continues_with_the_points_that_are_there(
     before = first.stat().st_mtime_ns
     run_sweep(sweep, tmp_path / "a.nc", device="cpu", resume=True)
     assert first.stat().st_mtime_ns == before
-    one, other = files.read_sweep_result(tmp_path / "a.nc"), files.read_sweep_result(folder / "a.nc")
+    one, other = files.read(tmp_path / "a.nc", SWEEP), files.read(folder / "a.nc", SWEEP)
     xarray.testing.assert_equal(one, other)
 
 
@@ -130,14 +131,14 @@ def test_plates_and_cores_are_swept_as_tables_with_names(tmp_path: Path) -> None
     )
     (tmp_path / "a.toml").write_text(f"{head}{tail}\n[sweep]\n{plates}\n", encoding="utf-8")
     run_sweep(read_sweep(tmp_path / "a.toml", count=8), tmp_path / "a.nc", device="cpu")
-    sweep = files.read_sweep_result(tmp_path / "a.nc")
+    sweep = files.read(tmp_path / "a.nc", SWEEP)
     assert sweep["plate"].values.tolist() == ["thin", "thick"]
     velocity = sweep["residual_velocity"].mean("hit")
     assert float(velocity.sel(plate="thin")) > float(velocity.sel(plate="thick"))
 
 
 def test_the_figure_shows_means_against_the_input(folder: Path) -> None:
-    sweep = files.read_sweep_result(folder / "a.nc")
+    sweep = files.read(folder / "a.nc", SWEEP)
     panels = sweep_figure(sweep).axes
     assert [axes.get_xlabel() for axes in panels[2:]] == ["obliquity [°]", "obliquity [°]"]
     lines = [container.lines[0] for container in panels[0].containers]
