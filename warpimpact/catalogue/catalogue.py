@@ -23,25 +23,25 @@ Entry = TypeVar("Entry", Threat, Material)
 
 HERE = Path(__file__).parent
 FOLDERS: Mapping[type[Any], Path] = {Threat: HERE / "threats", Material: HERE / "materials"}
-"""A file of each entry of the package."""
+"""Folders of the entries of the package, one file each."""
 
 
 @dataclass(frozen=True)
 class Catalogue:
-    """Entries by name. Those of a user's file come before those of the package.
+    """Entries by name. Entries of a user's file replace those of the package.
 
     Attributes:
-        own: a user's threats and materials.
+        of_user: threats and materials of the user's file, by kind and name.
     """
 
-    own: Mapping[type[Any], Mapping[str, Any]] = field(default_factory=dict)
+    of_user: Mapping[type[Any], Mapping[str, Any]] = field(default_factory=dict)
 
     @classmethod
     def of(cls, path: Path | None) -> Catalogue:
-        """The package's, with the entries of a TOML file of tables `[[threat]]` and `[[material]]`.
+        """The catalogue of the package with the tables `[[threat]]` and `[[material]]` of a TOML file.
 
         Raises:
-            ValueError: the file cannot be read, or has an entry that is not valid.
+            ValueError: the file cannot be read, or has an invalid entry.
         """
         if path is None:
             return cls()
@@ -52,20 +52,20 @@ class Catalogue:
         return cls({kind: _entries(kind, data.get(key, []), f"{path.name}: {key}") for kind, key in kinds.items()})
 
     def threat(self, name: str) -> Threat:
-        """A threat.
+        """The threat of this name.
 
         Raises:
-            ValueError: there is none of that name.
+            ValueError: there is none.
         """
-        return self._found(Threat, name)
+        return self._named(Threat, name)
 
     def material(self, name: str) -> Material:
-        """A material.
+        """The material of this name.
 
         Raises:
-            ValueError: there is none of that name.
+            ValueError: there is none.
         """
-        return self._found(Material, name)
+        return self._named(Material, name)
 
     def resistance(self, material: Material, core: Core, thickness: float, obliquity: float) -> Resistance:
         """What is known of the resistance of a plate of a material against a core.
@@ -81,34 +81,32 @@ class Catalogue:
         )
 
     def is_own(self, material: Material) -> bool:
-        """Whether a material is of the user's file, so that its own numbers are all that is known."""
-        return material.name in self.own.get(Material, {})
+        """Whether a material is an entry of the user's file; then its numbers are the whole evidence."""
+        return material.name in self.of_user.get(Material, {})
 
     def entry(self, name: str) -> Threat | Material:
-        """A threat or a material.
+        """The threat or the material of this name.
 
         Raises:
-            ValueError: there is none of that name.
+            ValueError: there is none.
         """
-        threats, materials = self.all(Threat), self.all(Material)
-        if name in threats:
-            return threats[name]
-        return materials[name] if name in materials else self._refuse(name, [*threats, *materials])
+        entries: dict[str, Threat | Material] = {**self.all(Material), **self.all(Threat)}
+        return entries[name] if name in entries else self._refuse(name, [*self.all(Threat), *self.all(Material)])
 
     def all(self, kind: type[Entry]) -> dict[str, Entry]:
-        """All threats or all materials by name, the user's own first."""
-        packaged = [_packaged(kind, path) for path in sorted(FOLDERS[kind].glob("*.toml"))]
-        own: Mapping[str, Entry] = self.own.get(kind, {})
-        return {**own, **{one.name: one for one in packaged if one.name not in own}}
+        """All threats or all materials by name, those of the user first."""
+        of_user: Mapping[str, Entry] = self.of_user.get(kind, {})
+        packaged: list[Entry] = [_read(kind, path) for path in sorted(FOLDERS[kind].glob("*.toml"))]
+        return {**of_user, **{entry.name: entry for entry in packaged if entry.name not in of_user}}
 
-    def _found(self, kind: type[Entry], name: str) -> Entry:
-        own: Mapping[str, Entry] = self.own.get(kind, {})
-        if name in own:
-            return own[name]
+    def _named(self, kind: type[Entry], name: str) -> Entry:
+        """One entry; of the package, only its file is read."""
+        of_user: Mapping[str, Entry] = self.of_user.get(kind, {})
+        if name in of_user:
+            return of_user[name]
         path = FOLDERS[kind] / f"{file_name(name)}.toml"
-        if path.is_file() and (entry := _packaged(kind, path)).name == name:
-            return entry
-        return self._refuse(name, list(self.all(kind)))
+        entry: Entry | None = _read(kind, path) if path.is_file() else None
+        return entry if entry is not None and entry.name == name else self._refuse(name, list(self.all(kind)))
 
     @staticmethod
     def _refuse(name: str, known: list[str]) -> NoReturn:
@@ -122,20 +120,16 @@ def file_name(name: str) -> str:
     return re.sub("[^a-z0-9]+", "_", name.lower()[:80]).rstrip("_")
 
 
-def _packaged(kind: type[Entry], path: Path) -> Entry:
-    entry: Entry = _read(kind, path)
-    return entry
-
-
 @cache
 def _read(kind: type[Any], path: Path) -> Any:
+    """An entry of the package."""
     return kind.model_validate(tomllib.loads(path.read_text(encoding="utf-8")))
 
 
 def _entries(kind: type[Entry], tables: Any, place: str) -> dict[str, Entry]:
     if not isinstance(tables, list):
         raise ValueError(f"{place}: got {quoted(tables)}, but it must be a list: tables [[{place.split()[-1]}]]")
-    found: dict[str, Entry] = {}
+    entries: dict[str, Entry] = {}
     for number, table in enumerate(tables):
         try:
             entry = kind.model_validate(table)
@@ -143,7 +137,7 @@ def _entries(kind: type[Entry], tables: Any, place: str) -> dict[str, Entry]:
             first = error.errors(include_url=False)[0]
             where = ".".join(map(str, first["loc"]))
             raise ValueError(f"{place}[{number}]{f'.{where}' if where else ''}: {reason(first)}") from None
-        if entry.name in found:
+        if entry.name in entries:
             raise ValueError(f"{place}[{number}].name: got {quoted(entry.name)} again, but each entry needs its own")
-        found[entry.name] = entry
-    return found
+        entries[entry.name] = entry
+    return entries

@@ -1,4 +1,4 @@
-"""What an entry of the catalogue holds."""
+"""Entries of the catalogue."""
 
 from __future__ import annotations
 
@@ -58,8 +58,8 @@ class Threat(Model):
         core_material, core_hardness: in words.
         bullet_mass: of the whole bullet [kg], which is not computed.
         velocities: what standards ask for; the first one is taken unless the campaign names another.
-        known: what is known from where, by what.
-        assumed: what is not known, and what stands in its place, by what.
+        known: source by property.
+        assumed: assumption in place of an unknown value, by property.
     """
 
     name: Name
@@ -90,7 +90,7 @@ class Threat(Model):
 
     @property
     def evidence(self) -> str:
-        """State of the evidence, as it stands behind the name."""
+        """State of the evidence in words, behind the name."""
         return ("" if self.core else "core not known; ") + evidence(self.known, self.assumed)
 
 
@@ -115,7 +115,7 @@ class Material(Model):
         misfit, misfit_p90: median and 90th percentile of the relative error of limit velocities that were left out.
         coverage: share of them inside their 90 % interval.
         hardness: Vickers hardness; None where it is not known.
-        known, assumed: as of a threat.
+        known, assumed: as in `Threat`.
     """
 
     name: Name
@@ -157,7 +157,7 @@ class Material(Model):
 
     @property
     def evidence(self) -> str:
-        """State of the evidence, as it stands behind the name."""
+        """State of the evidence in words, behind the name."""
         misfit = "" if self.misfit is None else f", error of rows left out {self.misfit:.1%} (median)"
         kind = "limit velocity" if self.count == 1 else "limit velocities"
         rows = f"{self.count} {kind}{misfit}; " if self.count else ""
@@ -165,7 +165,7 @@ class Material(Model):
 
 
 def reason(problem: Any) -> str:
-    """What is wrong with an entry, of a problem that pydantic found."""
+    """The sentence for an error of pydantic in an entry."""
     if problem["type"] in ("missing", "union_tag_not_found"):
         return "is missing, but must be given"
     if problem["type"] == "value_error":
@@ -174,8 +174,8 @@ def reason(problem: Any) -> str:
 
 
 def evidence(known: dict[str, str], assumed: dict[str, str]) -> str:
-    """What of an entry is known and what is assumed."""
+    """Names of the properties of an entry that are assumed, or known second-hand only."""
     second_hand = [name for name, source in known.items() if "second-hand" in source]
-    parts = {"assumed": list(assumed), "assumed, as second-hand": second_hand}
-    told = [f"{how}: {', '.join(names).replace('_', ' ')}" for how, names in parts.items() if names]
-    return "; ".join(told) or "nothing assumed"
+    groups = {"assumed": list(assumed), "assumed, as second-hand": second_hand}
+    parts = [f"{how}: {', '.join(names).replace('_', ' ')}" for how, names in groups.items() if names]
+    return "; ".join(parts) or "nothing assumed"

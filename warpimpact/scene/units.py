@@ -16,15 +16,15 @@ from pydantic_core import PydanticCustomError
 from .display import UNITS, Unit
 
 MOST_QUOTED = 80
-"""Characters of input that a message quotes at most, and those of a number with its unit."""
+"""Largest number of characters of input in a message, and of a number with its unit."""
 LARGEST = 1e30
-"""Of a quantity in SI: what is computed of it, such as a volume, stays finite."""
+"""Largest quantity in SI; results such as a volume then stay finite."""
 _RIGHT_ANGLE = math.pi / 2
 _TOWER = re.compile(r"(?:\*\*|\^)\s*(?:[-+]?\d{3}|\(|[-+]?\d+\s*(?:\*\*|\^))|[)⁰¹²³⁴-⁹]\s*(?:\*\*|\^)|[⁰¹²³⁴-⁹]{3}")
 """Powers of powers, and exponents of three digits: no unit has them, and they can take for ever."""
 _STRING = r"^\s*[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?\s*$"
 _STRING_WITH_UNIT = r"^\s*[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?\s*\S.*$"
-"""What editors accept, in the dialect of JSON schemas; which units there are is for the reader."""
+"""Strings that editors accept, in the dialect of JSON schemas; only the reader knows the units."""
 _NUMBER_AND_UNIT = re.compile(r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*(\S.*)?", re.DOTALL)
 
 
@@ -35,13 +35,13 @@ else:
 
 
 class Radians(float):
-    """An angle that was read. A number that a person gives for an angle is degrees; this one stays as it is.
+    """An angle that was read [rad]; it is not converted again, unlike plain numbers, which are degrees.
 
-    So do its sums and differences, and its products and quotients with numbers: half an `impact.obliquity` is half the
-    angle wherever it is given. What is added to it is radians.
+    Sums, differences, and products and quotients with numbers are `Radians`, too: half an `impact.obliquity` is half
+    the angle in any field. Added numbers are radians.
     """
 
-    __array_priority__ = 1000.0  # so that numpy's numbers leave what they are combined with to it
+    __array_priority__ = 1000.0  # numpy's numbers then use the operators of this class
 
     def __add__(self, other: Any) -> Any:
         return _angle(float(self) + other)
@@ -83,9 +83,9 @@ class _Quantity:
     """Reader of one physical quantity.
 
     Attributes:
-        name: what a person calls it, with its article.
-        unit: SI unit of the float that comes out; empty for a plain number.
-        example: a string that is accepted.
+        name: in words, with its article.
+        unit: SI unit of the result; empty for a plain number.
+        example: an accepted string.
     """
 
     name: str
@@ -93,7 +93,11 @@ class _Quantity:
     example: str
 
     def __call__(self, value: object) -> float:
-        """SI value of a number or of a string with a unit; ValueError says what is allowed."""
+        """SI value of a number or of a string with a unit.
+
+        Raises:
+            ValueError: says what is allowed.
+        """
         if isinstance(value, str):
             number = self._from_text(value)
         elif isinstance(value, Real) and not isinstance(value, bool):
@@ -108,16 +112,16 @@ class _Quantity:
         return self.as_read(number)
 
     def as_read(self, number: float) -> float:
-        """A number in SI as a value that is read as it is."""
+        """A number in SI as a value that the reader does not convert."""
         return Radians(number) if self.unit == "rad" else number
 
     @property
     def display(self) -> Unit:
-        """How it is stored and shown."""
+        """Stored and shown unit."""
         return UNITS[self.unit]
 
     def text(self, value: float) -> str:
-        """A value in SI as people see it."""
+        """A value in SI as text."""
         return self.display.text(math.degrees(value) if self.unit == "rad" else value)
 
     def _from_text(self, text: str) -> float:
@@ -180,13 +184,18 @@ COMMON = {
     ("deg", "rad"): math.pi / 180.0,
     ("rad/s", "rad/s"): 1.0,
 }
-"""Factors of the units that most campaigns use: reading these files needs no pint, which takes as long to load as some
-thousand hits take to compute. A test sets each beside pint's."""
+"""Factors of the common units, so that most campaigns need no pint, whose import takes as long as a thousand hits. A
+test compares each with pint."""
 
 
 @cache
 def _factor(unit: str, si_unit: str) -> float:
-    """Factor from `unit` to `si_unit`; LookupError for an unknown unit, ValueError for another kind."""
+    """Factor from `unit` to `si_unit`.
+
+    Raises:
+        LookupError: the unit is unknown.
+        ValueError: it is the unit of another quantity.
+    """
     if (unit, si_unit) in COMMON:
         return COMMON[unit, si_unit]
     return _by_pint(unit, si_unit)
@@ -210,18 +219,17 @@ def _by_pint(unit: str, si_unit: str) -> float:
 
 
 def brief(text: str, most: int = MOST_QUOTED) -> str:
-    """A text, its end left out where it is longer than messages quote."""
+    """A text, cut to the length that messages quote."""
     return text if len(text) <= most else f"{text[: MOST_QUOTED - 1]}…"
 
 
 def quoted(value: object) -> str:
-    """A value as the person wrote it, cut to what messages quote: TOML and JSON agree on all that gets here, save
-    dates."""
+    """A value as JSON, which equals TOML except for dates, cut to the length that messages quote."""
     return brief(json.dumps(_part(value), ensure_ascii=False, default=str))
 
 
 def _part(value: object, depth: int = 3) -> object:
-    """As much of a value as can matter where `MOST_QUOTED` characters are quoted."""
+    """The part of a value that its first `MOST_QUOTED` characters can show."""
     if isinstance(value, str):
         return value[:MOST_QUOTED]
     if isinstance(value, int) and not isinstance(value, bool) and abs(value) >= 10**MOST_QUOTED:
@@ -229,14 +237,14 @@ def _part(value: object, depth: int = 3) -> object:
     if isinstance(value, dict | list | tuple) and not depth:
         return "…"
     if isinstance(value, dict):
-        return {_part(str(key)): _part(one, depth - 1) for key, one in islice(value.items(), MOST_QUOTED)}
+        return {_part(str(key)): _part(item, depth - 1) for key, item in islice(value.items(), MOST_QUOTED)}
     if isinstance(value, list | tuple):
-        return [_part(one, depth - 1) for one in value[:MOST_QUOTED]]
+        return [_part(item, depth - 1) for item in value[:MOST_QUOTED]]
     return value
 
 
 def _quantity(name: str, unit: str, example: str) -> BeforeValidator:
-    """The reader of a quantity, and what the JSON schema of a campaign says of it."""
+    """The reader of a quantity, with its JSON schema."""
     schema = {"type": ["number", "string"], "pattern": _STRING_WITH_UNIT if unit else _STRING, "examples": [example]}
     if unit:
         schema["unit"] = "deg" if unit == "rad" else unit
@@ -246,30 +254,29 @@ def _quantity(name: str, unit: str, example: str) -> BeforeValidator:
 
 
 def in_radians(value: float) -> str:
-    """An angle [rad] as a string that gives every bit of it again."""
+    """An angle [rad] as a string that keeps every bit."""
     return f"{float(value)!r} rad"
 
 
 def quantity(kind: Any) -> _Quantity:
-    """The reader of one of the types below, or of one that is made of it; its ValueError says what is allowed."""
+    """The reader of one of the types below, or of a type that contains it."""
     reader = reader_in(kind)
     assert reader is not None, kind
     return reader
 
 
 def reader_in(kind: Any) -> _Quantity | None:
-    """The reader of the quantity that a type holds, such as `PositiveLength | None`; None where it holds none, or
-    several in a tuple."""
+    """The reader of the quantity in a type such as `PositiveLength | None`; None without a quantity or with a tuple."""
     for mark in getattr(kind, "__metadata__", ()):
         if isinstance(mark, BeforeValidator) and isinstance(mark.func, _Quantity):
             return mark.func
     if get_origin(kind) is tuple:
         return None
-    return next((found for one in get_args(kind) if (found := reader_in(one)) is not None), None)
+    return next((reader for part in get_args(kind) if (reader := reader_in(part)) is not None), None)
 
 
 def typed(field: FieldInfo) -> Any:
-    """The type of a field of a model, with its marks."""
+    """The type of a field of a model, with its metadata."""
     return Annotated[(field.annotation, *field.metadata)] if field.metadata else field.annotation
 
 
