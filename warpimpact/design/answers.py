@@ -20,7 +20,7 @@ from warpimpact.campaign.plausible import doubted
 from warpimpact.campaign.text import CampaignError
 from warpimpact.design.changes import choices
 from warpimpact.design.controls import groups
-from warpimpact.design.designs import FOLDER, Design, Shelf, stage_of
+from warpimpact.design.designs import FOLDER, Shelf, ValidDesign, stage_of
 from warpimpact.design.drawing import drawn
 from warpimpact.plotting.trajectory import FIGURES
 from warpimpact.report.hits import MOST_HITS, PIXELS, page_data, thinned, trajectory_data
@@ -64,7 +64,7 @@ class Answers:
         """The page without any design."""
         return self._environment.get_template("design.html").render(**content)
 
-    def plate(self, design: Design) -> dict[str, Any]:
+    def plate(self, design: ValidDesign) -> dict[str, Any]:
         """The plate, the controls and the campaign file of a design; no shot is computed."""
         campaign = design.campaign
         return {
@@ -91,7 +91,7 @@ class Answers:
         self._results.move_to_end(text)
         return self._results[text]
 
-    def maps(self, name: str, designs: Mapping[str, Design], total: int, cancel: Cancel) -> dict[str, Any]:
+    def maps(self, name: str, designs: Mapping[str, ValidDesign], total: int, cancel: Cancel) -> dict[str, Any]:
         """The maps of a design and of those that it is compared with, at one stage.
 
         Args:
@@ -120,7 +120,7 @@ class Answers:
             ),
         }
 
-    def numbers(self, designs: Mapping[str, Design], cancel: Cancel) -> dict[str, Any]:
+    def numbers(self, designs: Mapping[str, ValidDesign], cancel: Cancel) -> dict[str, Any]:
         """The tables of the same designs as HTML."""
         datasets = {label: self.result(design.text, cancel) for label, design in designs.items()}
         results = []
@@ -132,7 +132,7 @@ class Answers:
         html = self._environment.get_template("answer.html").render(results=results, comparison=comparison)
         return {"kind": "numbers", "html": html}
 
-    def trajectory(self, design: Design, level: int, stage: str, hit: int, cancel: Cancel) -> dict[str, Any]:
+    def trajectory(self, design: ValidDesign, level: int, stage: str, hit: int, cancel: Cancel) -> dict[str, Any]:
         """The trajectory of a hit of a design at a stage.
 
         Raises:
@@ -146,7 +146,9 @@ class Answers:
             "views": trajectory_data(history),
         }
 
-    def figure(self, design: Design, level: int, stage: str, hit: int, name: str, cancel: Cancel) -> dict[str, str]:
+    def figure(
+        self, design: ValidDesign, level: int, stage: str, hit: int, name: str, cancel: Cancel
+    ) -> dict[str, str]:
         """A figure of a hit's history as the address of an image.
 
         Raises:
@@ -167,7 +169,7 @@ class Answers:
                 self._histories.popitem(last=False)
         return self._histories[key]
 
-    def report(self, designs: Mapping[str, Design], cancel: Cancel) -> str:
+    def report(self, designs: Mapping[str, ValidDesign], cancel: Cancel) -> str:
         """The report of some designs as HTML.
 
         Raises:
@@ -179,7 +181,7 @@ class Answers:
         )
 
 
-def named(design: Design, others: Sequence[tuple[str, Design]]) -> dict[str, Design]:
+def named(design: ValidDesign, others: Sequence[tuple[str, ValidDesign]]) -> dict[str, ValidDesign]:
     """A design and those that it is compared with, by names that differ.
 
     Raises:

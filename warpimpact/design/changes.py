@@ -10,7 +10,7 @@ from typing import Any
 from warpimpact.campaign.catalogued import catalogue_of
 from warpimpact.campaign.text import CampaignError
 from warpimpact.catalogue.entries import Material, Threat
-from warpimpact.design.designs import FOLDER, Design, Shelf, Tables
+from warpimpact.design.designs import FOLDER, Shelf, Tables, ValidDesign
 from warpimpact.scene import Plate
 from warpimpact.scene.patterns.lattice import LatticePattern
 from warpimpact.scene.units import quoted
@@ -45,7 +45,7 @@ def choices(design: Tables) -> dict[str, list[str]]:
     return {"threat": threats, "material": list(catalogue.all(Material)), "shape": list(SHAPES)}
 
 
-def changed(design: Design, shelf: Shelf, what: str, layer: int, value: str) -> Tables:
+def changed(design: ValidDesign, shelf: Shelf, what: str, layer: int, value: str) -> Tables:
     """The tables of a design after a change.
 
     Args:
@@ -97,7 +97,7 @@ def _own(plate: Plate) -> dict[str, Any]:
     }
 
 
-def _take_threat(tables: Tables, design: Design, name: str) -> None:
+def _take_threat(tables: Tables, design: ValidDesign, name: str) -> None:
     """The core of a threat, with its velocity if the catalogue has it; or the same core with keys of its own."""
     impact, core = tables.setdefault("impact", {}), design.campaign.core
     if name:
@@ -125,7 +125,7 @@ def _take_material(table: Tables, plate: Plate, name: str) -> None:
         table |= _own(plate)
 
 
-def _take_shape(tables: Tables, design: Design, shelf: Shelf, layer: int, shape: str) -> None:
+def _take_shape(tables: Tables, design: ValidDesign, shelf: Shelf, layer: int, shape: str) -> None:
     """Holes of another shape and of the same area, or of the largest one that leaves ligaments."""
     table, old = _plate(tables, layer), design.campaign.target.layers[layer].pattern
     if shape == "none":

@@ -10,7 +10,7 @@ from pydantic import BaseModel
 
 from warpimpact.campaign.campaign import Campaign
 from warpimpact.campaign.schema import read_docstring
-from warpimpact.design.designs import Design, Tables
+from warpimpact.design.designs import Tables, ValidDesign
 from warpimpact.plotting.cell import words
 from warpimpact.scene import NoPattern, Plate
 from warpimpact.scene.units import reader_in, typed
@@ -55,7 +55,7 @@ _SHOT = ("velocity", "obliquity", "azimuth", "yaw", "pitch")
 _AXES = ("along y", "along z")
 
 
-def groups(design: Design) -> list[dict[str, Any]]:
+def groups(design: ValidDesign) -> list[dict[str, Any]]:
     """The controls of a design, by the parts that they change."""
     campaign, tables = design.campaign, design.tables
     threat = campaign.core.threat

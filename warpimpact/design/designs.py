@@ -46,7 +46,7 @@ class Shelf:
     designs: Mapping[str, Tables]
     files: frozenset[str] = field(default_factory=frozenset)
 
-    def checked(self, tables: Tables) -> Design:
+    def checked(self, tables: Tables) -> ValidDesign:
         """A design of the page.
 
         Raises:
@@ -63,11 +63,11 @@ class Shelf:
         if (null := _null_in(tables, "")) is not None:
             raise CampaignError(f"{_NAME}: {null}: got null, but it must be a value, or be left out")
         text = toml_text(tables)
-        return Design(tables, text, Campaign.from_text(text, name=_NAME, folder=FOLDER))
+        return ValidDesign(tables, text, Campaign.from_text(text, name=_NAME, folder=FOLDER))
 
 
 @dataclass(frozen=True)
-class Design:
+class ValidDesign:
     """A design that is valid.
 
     Attributes:
@@ -85,7 +85,7 @@ class Stage(NamedTuple):
     """A design as it is computed at one stage of refinement: "first", "draft" or "full"."""
 
     name: str
-    design: Design
+    design: ValidDesign
 
 
 def shelf_of(paths: list[Path]) -> Shelf:
@@ -163,7 +163,7 @@ def _null_in(part: Any, place: str) -> str | None:
     return None
 
 
-def stages(shelf: Shelf, design: Design, level: int) -> list[Stage]:
+def stages(shelf: Shelf, design: ValidDesign, level: int) -> list[Stage]:
     """The stages in which a design is computed: few hits at one level of resolution, which need no pilot; more hits at
     draft; and the campaign as it is. A stage that the campaign cannot have is left out.
 
@@ -189,7 +189,7 @@ def stages(shelf: Shelf, design: Design, level: int) -> list[Stage]:
     return [*found, Stage("full", design)]
 
 
-def _valid(shelf: Shelf, tables: Tables) -> Design | None:
+def _valid(shelf: Shelf, tables: Tables) -> ValidDesign | None:
     """A design, if it is valid."""
     try:
         return shelf.checked(tables)
@@ -197,7 +197,7 @@ def _valid(shelf: Shelf, tables: Tables) -> Design | None:
         return None
 
 
-def _of_few_hits(design: Design, most: int, *, irreducible: bool = False) -> Tables:
+def _of_few_hits(design: ValidDesign, most: int, *, irreducible: bool = False) -> Tables:
     """Tables of a design with so many hits at most, without a stop rule; a list has the hits of its file."""
     tables = {key: value for key, value in design.tables.items() if key != "stop"}
     count, together = design.campaign.hits.count, design.campaign.at_a_plate
@@ -208,7 +208,7 @@ def _of_few_hits(design: Design, most: int, *, irreducible: bool = False) -> Tab
     return tables | {"hits": dict(design.tables.get("hits", {})) | {"count": few} | part}
 
 
-def stage_of(shelf: Shelf, design: Design, level: int, name: str) -> Design:
+def stage_of(shelf: Shelf, design: ValidDesign, level: int, name: str) -> ValidDesign:
     """A design as it is computed at a stage; the last one that it has where it does not have that."""
     every = {stage.name: stage.design for stage in stages(shelf, design, level)}
     return every.get(name, every["full"])

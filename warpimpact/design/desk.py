@@ -18,7 +18,7 @@ Result = TypeVar("Result")
 
 
 @dataclass(order=True)
-class _Job:
+class _PageJob:
     """Attributes:
     urgency, number: what is less comes first.
     work: called with what ends it.
@@ -43,8 +43,8 @@ class Desk:
     """
 
     def __init__(self) -> None:
-        self._waiting: list[_Job] = []
-        self._running: _Job | None = None
+        self._waiting: list[_PageJob] = []
+        self._running: _PageJob | None = None
         self._numbers = count()
         self._change = threading.Condition()
         threading.Thread(target=self._work, daemon=True, name="desk").start()
@@ -56,7 +56,7 @@ class Desk:
             urgency: 0 is the most urgent.
             work: called with what ends it, in the thread of the desk.
         """
-        job = _Job(urgency, next(self._numbers), work)
+        job = _PageJob(urgency, next(self._numbers), work)
         with self._change:
             heapq.heappush(self._waiting, job)
             if self._running is not None and self._running.urgency > urgency:
@@ -83,7 +83,7 @@ class Desk:
                 job.cancel, self._running = Cancel(), job
             self._compute(job)
 
-    def _compute(self, job: _Job) -> None:
+    def _compute(self, job: _PageJob) -> None:
         try:
             result = job.work(job.cancel)
         except Cancelled:

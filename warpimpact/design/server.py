@@ -25,7 +25,7 @@ import warpimpact
 from warpimpact.campaign.text import CampaignError, parsed
 from warpimpact.design.answers import Answers, named
 from warpimpact.design.changes import changed
-from warpimpact.design.designs import Design, Shelf, Tables, as_json, stages
+from warpimpact.design.designs import Shelf, Tables, ValidDesign, as_json, stages
 from warpimpact.design.desk import Desk
 from warpimpact.design.guard import Guard
 from warpimpact.design.hasty import Hasty
@@ -112,7 +112,9 @@ class _Pages:
 
         return StreamingResponse(lines(), media_type=_LINES)
 
-    async def _lines(self, design: Design, others: list[tuple[str, Design]], level: int) -> AsyncGenerator[Any]:
+    async def _lines(
+        self, design: ValidDesign, others: list[tuple[str, ValidDesign]], level: int
+    ) -> AsyncGenerator[Any]:
         """The plate, and maps and numbers of each stage. The first map is computed while the plate is drawn."""
         total = design.campaign.hits.count or 0
         every = [{stage.name: stage.design for stage in stages(self._shelf, one, level)} for _, one in others]
@@ -179,7 +181,7 @@ class _Pages:
 
         return await _answered(request, answer)
 
-    def _designs(self, asked: Tables) -> tuple[Design, list[tuple[str, Design]]]:
+    def _designs(self, asked: Tables) -> tuple[ValidDesign, list[tuple[str, ValidDesign]]]:
         """The design that is asked about, and those to compare it with."""
         pins = asked.get("pins", [])
         if not isinstance(pins, list) or len(pins) > _MOST_PINS or not all(isinstance(pin, dict) for pin in pins):

@@ -17,7 +17,7 @@ from warpimpact.view.view import Column, Section, Table, number
 
 
 @dataclass(frozen=True)
-class Verdict:
+class ProcedureVerdict:
     """What the tests of a file are worth.
 
     Attributes:
@@ -39,7 +39,7 @@ class Verdict:
     passed: Estimate | None
 
 
-def verdict(dataset: xarray.Dataset, required: float | None = None, by: str = "v50") -> Verdict | None:
+def verdict(dataset: xarray.Dataset, required: float | None = None, by: str = "v50") -> ProcedureVerdict | None:
     """What the tests of a file are worth; None where no procedure was fired."""
     if f.V50 not in dataset:
         return None
@@ -50,7 +50,7 @@ def verdict(dataset: xarray.Dataset, required: float | None = None, by: str = "v
     coverage = estimate_of("share", held[bounded].astype(float)) if bounded.any() else None
     reached = v50 if by == "v50" else low
     passed = None if required is None else estimate_of("share", (np.nan_to_num(reached, nan=-np.inf) >= required) * 1.0)
-    return Verdict(
+    return ProcedureVerdict(
         estimate_of("share", known.astype(float)),
         float(np.mean(v50[known]) - true) if known.any() else np.nan,
         float(np.std(v50[known])) if known.any() else np.nan,
@@ -121,7 +121,7 @@ def _target(dataset: xarray.Dataset) -> Section:
     return Section([Table(columns, rows), *notes])
 
 
-def _reported(dataset: xarray.Dataset, worth: Verdict, test: dict[str, Any]) -> Section:
+def _reported(dataset: xarray.Dataset, worth: ProcedureVerdict, test: dict[str, Any]) -> Section:
     """What the tests report, beside the truth."""
     tests, shots = dataset.sizes["test"], dataset[f.SHOTS].values
     shot_count = f"{shots.min()}" if np.ptp(shots) == 0 else f"{shots.min()} to {shots.max()}, mean {shots.mean():.3g},"

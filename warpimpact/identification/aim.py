@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from warpimpact.identification.fit import MeasuredShot, Sampling
-from warpimpact.identification.hits import CLASSES, Place
+from warpimpact.identification.hits import CLASSES, HitPlace
 from warpimpact.scene import Core, Hits, Plate, Sampler, Shots, Symmetry, symmetries_used
 from warpimpact.scene.model import Array
 from warpimpact.scene.symmetry import irreducible_part
@@ -48,7 +48,7 @@ class Aim:
         """Places of the points [m], shape [sets, points, 2]."""
         return np.stack([self.shots.hit_y, self.shots.hit_z], axis=-1).reshape(*self.weight.shape, 2)
 
-    def of(self, hit: str | Place, plate: Plate, core: Core) -> Aim:
+    def of(self, hit: str | HitPlace, plate: Plate, core: Core) -> Aim:
         """The same points for another class."""
         inside = CLASSES[hit](plate, core, self.shots.hit_y, self.shots.hit_z) if isinstance(hit, str) else None
         weight = np.ones_like(self.weight) if inside is None else inside.reshape(self.weight.shape).astype(np.float64)
@@ -62,10 +62,10 @@ def aim(shot: MeasuredShot, plate: Plate, core: Core, sampling: Sampling, shifts
         shifts: uniform numbers that move the points of each set, shape [sets, 2]. So the error that few points leave
             differs from set to set, and the weights of the sets know it.
     """
-    placed = isinstance(shot.hit, Place)
+    placed = isinstance(shot.hit, HitPlace)
     turned = any(name != "velocity" for name, _ in shot.scatter.given)
     solid = plate.open_area == 0.0 and plate.size is None
-    alone = not shot.scatter.given and (solid or (isinstance(shot.hit, Place) and shot.hit.is_exact))
+    alone = not shot.scatter.given and (solid or (isinstance(shot.hit, HitPlace) and shot.hit.is_exact))
     count = 1 if alone else sampling.hits
     replicates = 1 if alone else REPLICATES
     alike = Hits(count=count, seed=sampling.seed, irreducible=not (placed or turned or alone))
@@ -73,7 +73,7 @@ def aim(shot: MeasuredShot, plate: Plate, core: Core, sampling: Sampling, shifts
     numbers = alike.model_copy(update={"irreducible": False})  # of what scatters: images share them
     shots = Sampler(shot.impact, numbers, plate, shot.scatter).shots(0, count)
     shares = np.mod(shifts[:, None] + np.arange(count)[:, None] * STEPS, 1.0).reshape(-1, 2).T
-    if isinstance(shot.hit, Place):
+    if isinstance(shot.hit, HitPlace):
         hit_y, hit_z = shot.hit.at(*shares)
     else:
         (low_y, high_y), (low_z, high_z) = irreducible_part(group)

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from warpimpact.identification.aim import Aim, aim
 from warpimpact.identification.fit import Fit, MeasuredShot
-from warpimpact.identification.hits import Place
+from warpimpact.identification.hits import HitPlace
 from warpimpact.identification.likelihood import Compared, Data, Score
 from warpimpact.records.outcomes import Outcomes
 from warpimpact.scene import Scene, Shots
@@ -62,7 +62,7 @@ def benches(fit: Fit) -> list[Bench]:
     """The shots of a fit by what they share."""
     found: dict[str, list[int]] = {}
     for place, shot in enumerate(fit.shots):
-        hit = shot.hit if isinstance(shot.hit, Place) else "cell"
+        hit = shot.hit if isinstance(shot.hit, HitPlace) else "cell"
         key = repr((hit, shot.impact, shot.scatter, shot.tables, sorted(map(str, shot.own))))
         found.setdefault(key, []).append(place)
     return [Bench(fit.shots[places[0]], tuple(places)) for places in found.values()]

@@ -10,7 +10,7 @@ from typing import Annotated, Any
 
 from pydantic import Field
 
-from warpimpact.identification.hits import Place
+from warpimpact.identification.hits import HitPlace
 from warpimpact.identification.measured import Observation
 from warpimpact.identification.parameters import Parameter, as_read, put
 from warpimpact.results.measures import Measure
@@ -53,7 +53,7 @@ class MeasuredShot:
     """
 
     name: str
-    hit: str | Place
+    hit: str | HitPlace
     impact: Impact
     scatter: Scatter
     tables: Mapping[str, Any]

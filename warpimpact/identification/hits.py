@@ -55,7 +55,7 @@ the core's largest circle crosses the edge of a hole."""
 
 
 @dataclass(frozen=True)
-class Place:
+class HitPlace:
     """A hit point that was measured: each coordinate a number [m] or a distribution."""
 
     y: float | Distribution
@@ -76,7 +76,7 @@ class Place:
         return along(self.y, share_y), along(self.z, share_z)
 
 
-def read_hit(given: Any) -> str | Place:
+def read_hit(given: Any) -> str | HitPlace:
     """A class, or the place of a hit.
 
     Raises:
@@ -91,7 +91,7 @@ def read_hit(given: Any) -> str | Place:
         return given
     if not isinstance(given, dict) or set(given) != {"y", "z"}:
         raise ValueError(f"got {quoted(given)}, but it must be the name of a class, or a table with y and z")
-    return Place(**{axis: _coordinate(value, axis) for axis, value in given.items()})
+    return HitPlace(**{axis: _coordinate(value, axis) for axis, value in given.items()})
 
 
 def _coordinate(value: Any, axis: str) -> float | Distribution:

@@ -12,7 +12,7 @@ import netCDF4
 import numpy as np
 
 from warpimpact.results import variables as v
-from warpimpact.results.table import Column, Table
+from warpimpact.results.table import StoredColumn, Table
 
 _PACKED = {"zlib": True, "complevel": 1}
 
@@ -39,7 +39,7 @@ def write_table(table: Table, file: Path, *, chunk: int | None = None, compresse
 
 
 def _write(
-    variables: Mapping[str, Column],
+    variables: Mapping[str, StoredColumn],
     coords: frozenset[str],
     target: Any,
     *,
@@ -120,4 +120,4 @@ def attribute(path: Path, name: str) -> Any:
 
 def _column(variable: Any) -> Any:
     attributes = {name: variable.getncattr(name) for name in variable.ncattrs() if name != "_FillValue"}
-    return Column(tuple(variable.dimensions), variable, attributes)
+    return StoredColumn(tuple(variable.dimensions), variable, attributes)

@@ -25,7 +25,7 @@ _HIT = "hit"
 
 
 @dataclass(frozen=True)
-class Column:
+class StoredColumn:
     """One variable.
 
     Attributes:
@@ -52,12 +52,12 @@ class Column:
         """The values, in memory."""
         return np.asarray(self.data[self.first : self.stop] if _HIT in self.dims else self.data[...])
 
-    def part(self, hits: slice | NDArray[np.int64]) -> Column:
+    def part(self, hits: slice | NDArray[np.int64]) -> StoredColumn:
         """The column of some of the hits."""
         if _HIT not in self.dims:
             return self
         if not isinstance(hits, slice):
-            return Column(self.dims, self.values[hits], self.attrs)
+            return StoredColumn(self.dims, self.values[hits], self.attrs)
         first, stop, _ = hits.indices(self.shape[0])
         return replace(self, first=self.first + first, stop=self.first + stop)
 
@@ -72,7 +72,7 @@ class Table:
         attrs: global attributes.
     """
 
-    variables: Mapping[str, Column]
+    variables: Mapping[str, StoredColumn]
     coords: frozenset[str]
     attrs: dict[str, Any]
 
@@ -98,12 +98,12 @@ class Table:
         return name in self.variables
 
     @overload
-    def __getitem__(self, name: str) -> Column: ...
+    def __getitem__(self, name: str) -> StoredColumn: ...
 
     @overload
     def __getitem__(self, name: list[str]) -> Table: ...
 
-    def __getitem__(self, name: str | list[str]) -> Column | Table:
+    def __getitem__(self, name: str | list[str]) -> StoredColumn | Table:
         """A column, or those of some names with all coordinates."""
         if isinstance(name, str):
             return self.variables[name]
@@ -156,8 +156,8 @@ def joined(tables: Iterable[Table]) -> Table:
     return first.assign(columns)
 
 
-def _columns(variables: Mapping[str, tuple[Any, ...]]) -> dict[str, Column]:
+def _columns(variables: Mapping[str, tuple[Any, ...]]) -> dict[str, StoredColumn]:
     return {
-        str(name): Column((dims,) if isinstance(dims, str) else tuple(dims), np.asarray(values), attrs)
+        str(name): StoredColumn((dims,) if isinstance(dims, str) else tuple(dims), np.asarray(values), attrs)
         for name, (dims, values, attrs) in variables.items()
     }
