@@ -51,6 +51,26 @@ class ExclusionReference(FromTheCode):
         yield from table(("this", "needs", "because"), [(code(a), code(b), why) for a, b, why in NEEDED])
 
 
+class MeasureReference(FromTheCode):
+    """Every quantity and event that a measure may be of."""
+
+    def lines(self) -> Iterator[str]:
+        from warpimpact.results.vocabulary import EVENTS, QUANTITIES
+        from warpimpact.scene.display import STORED
+
+        for what, entries in (("quantity", QUANTITIES), ("event", EVENTS)):
+            rows = [
+                (
+                    code(f"{entry.name}@…" if entry.has_standoff else entry.name),
+                    STORED[entry.units].shown,
+                    {True: "more", False: "less", None: ""}[entry.higher_is_better],
+                    f"{entry.definition} ({entry.source})",
+                )
+                for entry in entries.values()
+            ]
+            yield from table((what, "unit", "better", "what it is"), rows)
+
+
 # --- Keys of a campaign ---
 
 
@@ -401,6 +421,7 @@ def setup(app: Sphinx) -> dict[str, bool]:
         "exclusion-reference": ExclusionReference,
         "command-reference": CommandReference,
         "variable-reference": VariableReference,
+        "measure-reference": MeasureReference,
         "status-reference": StatusReference,
         "public-reference": PublicReference,
         "constant-reference": ConstantReference,

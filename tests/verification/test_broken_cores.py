@@ -10,7 +10,8 @@ from warpimpact import Campaign, run
 from warpimpact.analysis.effectiveness import effectiveness
 from warpimpact.campaign.text import CampaignError
 from warpimpact.records.outcomes import Outcomes
-from warpimpact.results.measures import Measure, Tally
+from warpimpact.results.measures import Measure
+from warpimpact.results.tallies import Tally
 from warpimpact.scene import Record, Scatter, Scene, Shots, make_shots
 from warpimpact.solver.simulate import simulate
 
@@ -109,8 +110,8 @@ def test_effectiveness_tells_of_broken_cores() -> None:
     share = float(dataset["broken"].mean())
     assert 0.0 < share < 1.0
     measures = {measure.name: measure for measure in effectiveness(dataset)}
-    assert measures["broken_share"].value == pytest.approx(share)
-    stopped, either = measures["stopped_share"].value, measures["stopped_or_broken_share"].value
+    assert measures["P(broken)"].value == pytest.approx(share)
+    stopped, either = measures["P(stopped)"].value, measures["P(stopped_or_broken)"].value
     assert max(stopped, share) - 1e-12 <= either <= stopped + share + 1e-12
     tally = Tally(Measure.parse("P(broken)"))
     tally.add(dataset)

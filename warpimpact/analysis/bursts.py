@@ -12,11 +12,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from warpimpact.analysis.estimates import means_of, slices
 from warpimpact.analysis.numbers import interval_text, plus_minus
-from warpimpact.analysis.summary import means_of, slices
 from warpimpact.results import variables as v
 from warpimpact.results.dataset import shots_at_a_plate
-from warpimpact.results.measures import Array, Measure, dealing
+from warpimpact.results.measures import Measure
+from warpimpact.results.per_hit import Array
+from warpimpact.results.tallies import dealing
 from warpimpact.statistics.clusters import cluster_estimate, cluster_numbers
 from warpimpact.statistics.comparisons import confidence_of_each
 from warpimpact.statistics.intervals import Estimate, Estimating, estimate_of
@@ -130,13 +132,6 @@ def _is_apart(difference: Estimate) -> bool:
     return difference.low > 0.0 or difference.high < 0.0
 
 
-def label_of(measure: Measure) -> str:
-    """A measure for people, with its unit."""
-    if measure.is_binary:
-        return str(measure.text)
-    return f"{measure.variable.replace('_', ' ')}{measure.place} [{measure.display.shown}]"
-
-
 PASSED_ALONE = "velocity and tilt are those of the cores that passed"
 
 
@@ -153,7 +148,7 @@ def bursts_view(result: Bursts) -> list[Section]:
 
 def _table(measures: Sequence[Measure], title: str, groups: Sequence[Group]) -> Table:
     return Table(
-        [Column(title), number("hits", digits="d"), *(Column(label_of(measure)) for measure in measures)],
+        [Column(title), number("hits", digits="d"), *(Column(measure.axis) for measure in measures)],
         [
             (group.name, group.count, *(_cell(measure, group.estimates[measure]) for measure in measures))
             for group in groups
@@ -178,5 +173,5 @@ def _reaches(result: Bursts) -> Iterator[str]:
             reach = "differs from that of first hits up to the largest distances"
         else:
             reach = f"differs from that of first hits up to {within * 1e3:.1f} mm"
-        yield f"{label_of(measure).partition(' [')[0]}: {reach} from the nearest earlier hit"
+        yield f"{measure.axis.partition(' [')[0]}: {reach} from the nearest earlier hit"
     yield "(intervals of the differences hold together at 95 %; more bursts show smaller differences)"

@@ -19,28 +19,22 @@ import math
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from itertools import combinations, pairwise
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 import xarray
 
-from warpimpact.analysis.base import base_thickness, has_base, solid_note, solid_plate
 from warpimpact.analysis.comparison_text import Comparison, Contestant, Difference, Pair
-from warpimpact.analysis.effectiveness import (
-    ANGLE,
-    EffectMeasure,
-    Evidence,
-    depth_note,
-    effect_names,
-    gather,
-    ratio_of_draws,
-)
+from warpimpact.analysis.effectiveness import Score, Scored, depth_note, measures_of, ratio_of_draws, scores
 from warpimpact.analysis.numbers import of_each
 from warpimpact.analysis.questions import check_same_question, other_shots
+from warpimpact.analysis.solid_plate import solid_note, solid_plate
 from warpimpact.analysis.summary import breaks_promise, hits_at_two_levels, sampling_note
 from warpimpact.analysis.survival import draws_note, survival_of, why_not_by_draws
 from warpimpact.results import attributes as attr
-from warpimpact.results.measures import dealing
+from warpimpact.results.bases import base_thickness, has_base
+from warpimpact.results.measures import Measure
+from warpimpact.results.tallies import dealing, estimate_from
 from warpimpact.runs.parts import first_difference
 from warpimpact.scene.quantities import QUANTITIES
 from warpimpact.scene.units import quantity as reader_of
@@ -61,9 +55,8 @@ _SAME_WEIGHT = 1.01
 def compare(
     datasets: Sequence[xarray.Dataset],
     names: Sequence[str],
+    texts: Sequence[str] = (),
     *,
-    angle: float | str = ANGLE,
-    standoff: float | str | None = None,
     confidence: float = 0.95,
 ) -> Comparison:
     """Compare the plates of some hit maps, by all their hits.
@@ -71,62 +64,73 @@ def compare(
     Args:
         datasets: two or more, of the same core under the same impact; of open files one number per hit is in memory.
         names: of the plates, each once.
-        angle, standoff: beyond which inclination a core counts as tilted, and where, as in `effectiveness`.
+        texts: of measures; those that `inspect` shows of all the plates if there are none.
         confidence: of all differences in a measure together.
 
     Raises:
-        ResultError: core, impact or stand-offs differ, so that the plates were not asked the same.
+        ResultError: core, impact or stand-offs differ, so that the plates were not asked the same; or a plate lacks
+            what a measure needs.
     """
     for dataset, name in zip(datasets[1:], names[1:], strict=True):
         check_same_question(datasets[0], names[0], dataset, name)
     pairs = list(combinations(range(len(datasets)), 2))
     used = [_used(datasets[i], names[i], datasets[j], names[j]) for i, j in pairs]
+    asked = [measures_of(dataset, texts) for dataset in datasets]
+    common = set.intersection(*({measure.quantity.name for measure in measures} for measures in asked))
     differ_in_weight, by_ratio = _differ_in_weight(datasets), set()
-    common = set.intersection(*(set(effect_names(dataset)) for dataset in datasets))
-    asked: dict[str, Any] = {"angle": angle, "standoff": standoff, "only": common}
     each = confidence_of_each(confidence, len(pairs))
-    measures: list[list[EffectMeasure]] = [[] for _ in datasets]
+    of_plates: list[list[Score]] = [[] for _ in datasets]
     differences = []
-    for evidences in zip(*(gather(dataset, **asked) for dataset in datasets), strict=True):
-        for told, evidence in zip(measures, evidences, strict=True):
-            told.append(evidence.measure)
-        if any(evidence.numbers is None for evidence in evidences):
+    for scored in zip(
+        *(
+            scores(dataset, [measure for measure in measures if measure.quantity.name in common])
+            for dataset, measures in zip(datasets, asked, strict=True)
+        ),
+        strict=True,
+    ):
+        for plate, side in zip(of_plates, scored, strict=True):
+            plate.append(side.score)
+        measure = scored[0].score.measure
+        if not measure.has_interval or (measure.name == "base_depth" and _depths_are_bounds(datasets, of_plates)):
             continue
-        name = evidences[0].measure.name
-        if name.startswith("base_depth") and _depths_are_bounds(datasets, measures):
-            continue
-        if differ_in_weight and not any(math.isnan(evidence.measure.ratio) for evidence in evidences):
-            by_ratio.add(name)
+        has_ratios = scored[0].of.numbers is not None and not any(math.isnan(side.score.ratio) for side in scored)
+        if differ_in_weight and has_ratios:
+            by_ratio.add(measure.text)
         for (i, j), pair in zip(pairs, used, strict=True):
-            dealt: list[Estimating] = [{**dealing(datasets[k]), "confidence": each} for k in (i, j)]
-            sides = [
-                _side(evidences[k], of, _sought_to(datasets[k], evidences[k].measure.units), by_ratio=name in by_ratio)
-                for k, of in zip((i, j), dealt, strict=True)
-            ]
-            value, low, high = _difference(sides[0], sides[1], dealt[0], paired=not pair.independent)
-            shift = sum(side.estimate.numerics or 0.0 for side in sides)
-            rounded = ROUNDED * max(abs(side.estimate.value) for side in sides)
-            value, low, high = (0.0 if abs(at) <= rounded else at for at in (value, low - shift, high + shift))
-            interval = value, low, high
-            drawn = sides[0].drawn, sides[1].drawn
-            why = why_not_by_draws(drawn, independent=pair.independent, by_ratio=name in by_ratio)
-            both = datasets[i], datasets[j]
+            both, is_ratio = (datasets[i], datasets[j]), measure.text in by_ratio
+            one, other = (
+                _side(scored[k], datasets[k], {**dealing(datasets[k]), "confidence": each}, by_ratio=is_ratio)
+                for k in (i, j)
+            )
+            paired = not pair.independent and measure.kind != "quantile"
+            difference = _difference(one, other, {**dealing(datasets[i]), "confidence": each}, paired=paired)
+            interval = _with_numerics(one.estimate, other.estimate, *difference)
+            drawn = one.drawn, other.drawn
+            why = why_not_by_draws(drawn, independent=pair.independent, by_ratio=is_ratio)
             survival = survival_of(both, drawn, interval, reason=why, confidence=(confidence, each))
-            differences.append(Difference(name, names[i], names[j], *interval, survival))
+            differences.append(Difference(measure.text, names[i], names[j], *interval, survival))
     plates = tuple(
         Contestant(
             name,
             dataset.sizes["hit"],
             dataset.attrs[attr.AREAL_DENSITY],
             dataset.attrs[attr.OPEN_AREA],
-            tuple(told),
+            tuple(plate),
             solid_plate(dataset),
         )
-        for name, dataset, told in zip(names, datasets, measures, strict=True)
+        for name, dataset, plate in zip(names, datasets, of_plates, strict=True)
     )
     at_equal_weight = frozenset(by_ratio) if differ_in_weight else None
     notes = (*_notes(datasets, names), *_notes_of_bases(datasets, plates))
     return Comparison(plates, tuple(differences), tuple(used), at_equal_weight, confidence, notes)
+
+
+def _with_numerics(one: Estimate, other: Estimate, value: float, low: float, high: float) -> tuple[float, float, float]:
+    """A difference with its interval, wider by what the numerics may shift both plates; rounding counts as 0."""
+    shift = (one.numerics or 0.0) + (other.numerics or 0.0)
+    rounded = ROUNDED * max(abs(one.value), abs(other.value))
+    value, low, high = (0.0 if abs(end) <= rounded else end for end in (value, low - shift, high + shift))
+    return value, low, high
 
 
 def _differ_in_weight(datasets: Sequence[xarray.Dataset]) -> bool:
@@ -135,7 +139,7 @@ def _differ_in_weight(datasets: Sequence[xarray.Dataset]) -> bool:
     return datasets[0].attrs.get(attr.LIMIT) != "thickness" and max(densities) > _SAME_WEIGHT * min(densities)
 
 
-def _depths_are_bounds(datasets: Sequence[xarray.Dataset], measures: Sequence[Sequence[EffectMeasure]]) -> bool:
+def _depths_are_bounds(datasets: Sequence[xarray.Dataset], measures: Sequence[Sequence[Score]]) -> bool:
     """Whether depths cannot be ranked: cores pierce a base and count with its thickness, and the thicknesses differ."""
     thicknesses = [float(np.mean(base_thickness(dataset))) for dataset in datasets]
     return max(thicknesses) > _SAME_WEIGHT * min(thicknesses) and any(map(depth_note, measures))
@@ -179,29 +183,30 @@ class _Side(NamedTuple):
     estimate: Estimate
 
 
-def _sought_to(dataset: xarray.Dataset, units: str) -> float:
-    """How far a limit of a result may lie from the one that is told, in the units of a measure; 0 of other results."""
+def _sought_to(dataset: xarray.Dataset, measure: Measure) -> float:
+    """How far a limit of a result may lie from the one that is told, as the measure is shown; 0 of other results, and
+    of a share, for which it is not known."""
     told = dataset.attrs
-    per_meter = {"mm": 1e3, "kg m-2": told.get(attr.LIMIT_DENSITY, 0.0)}
-    return float(told.get(attr.LIMIT_TOLERANCE, 0.0) * per_meter.get(units, 1.0))
+    if measure.is_binary:
+        return 0.0
+    factor = told.get(attr.LIMIT_DENSITY, 0.0) if measure.name == "limit_areal_density" else measure.display.factor
+    return float(told.get(attr.LIMIT_TOLERANCE, 0.0) * factor)
 
 
-def _side(evidence: Evidence, dealt: Estimating, sought_to: float, *, by_ratio: bool) -> _Side:
-    assert evidence.numbers is not None
-    assert evidence.drawn is not None
-    shift = float(np.nan_to_num(evidence.measure.numerics or 0.0)) + sought_to
-    estimate = replace(estimate_of(evidence.kind, evidence.numbers, **dealt), numerics=shift)
-    if math.isnan(evidence.measure.low):  # as of a worst tenth of few hits
-        estimate = replace(estimate, low=math.nan, high=math.nan)
+def _side(scored: Scored, dataset: xarray.Dataset, dealt: Estimating, *, by_ratio: bool) -> _Side:
+    score, measure, found = scored.score, scored.score.measure, scored.of
+    shift = float(np.nan_to_num(score.numerics or 0.0)) + _sought_to(dataset, measure)
+    estimate = replace(estimate_from(measure, found.values, **dealt), numerics=shift)
+    numbers = found.values if found.numbers is None else found.numbers
     if not by_ratio:
-        return _Side(evidence.kind == "share", False, evidence.numbers, evidence.drawn, estimate)
-    assert evidence.solid is not None
-    assert evidence.solid_drawn is not None
-    ratio = Ratio.of(estimate, evidence.numbers, evidence.solid, dealt)
-    numbers = ratio_numbers(evidence.numbers, evidence.solid, ratio.value)
-    drawn = ratio_of_draws(evidence.drawn, evidence.solid_drawn)
+        return _Side(measure.is_binary, False, numbers, found.drawn, estimate)
+    assert scored.solid is not None
+    assert scored.solid_drawn is not None
+    ratio = Ratio.of(estimate, numbers, scored.solid, dealt)
+    numbers = ratio_numbers(numbers, scored.solid, ratio.value)
+    drawn = ratio_of_draws(found.drawn, scored.solid_drawn)
     estimate = replace(estimate, value=ratio.value, low=ratio.low, high=ratio.high, numerics=shift / ratio.reference)
-    return _Side(evidence.kind == "share", True, numbers, drawn, estimate)
+    return _Side(measure.is_binary, True, numbers, drawn, estimate)
 
 
 def _difference(one: _Side, other: _Side, dealt: Estimating, *, paired: bool) -> tuple[float, float, float]:

@@ -7,10 +7,9 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from warpimpact.analysis.effectiveness import EffectMeasure
+from warpimpact.analysis.effectiveness import Score
 from warpimpact.analysis.numbers import Ends, intervals_text, number_text, of_each
 from warpimpact.analysis.survival import Survival, survival_text
-from warpimpact.analysis.vocabulary import SHOWN_UNITS
 from warpimpact.view.view import Column, Section, Table, html_of, number, text_of
 
 
@@ -23,7 +22,7 @@ class Contestant:
     hits: int
     areal_density: float
     open_area: float
-    measures: tuple[EffectMeasure, ...]
+    measures: tuple[Score, ...]
     solid: str = ""
 
 
@@ -113,7 +112,7 @@ class Comparison:
         def worse(plate: Contestant) -> float:
             (told,) = (told for told in plate.measures if told.name == measure)
             value = told.ratio if by_ratio else told.value
-            return math.inf if math.isnan(value) else -value if told.higher_is_better else value
+            return math.inf if math.isnan(value) else -value if told.measure.higher_is_better else value
 
         return [plate.name for plate in sorted(self.plates, key=worse)]
 
@@ -169,19 +168,21 @@ def hits_used(comparison: Comparison) -> list[str]:
     return lines
 
 
-def _compared(comparison: Comparison) -> list[EffectMeasure]:
-    return [measure for measure in comparison.plates[0].measures if measure.hit is None]
+def _compared(comparison: Comparison) -> list[Score]:
+    return [score for score in comparison.plates[0].measures if score.measure.kind != "worst_point"]
 
 
 def best_rows(comparison: Comparison) -> list[tuple[str, str]]:
     """Every measure and who is best at it."""
     rows = []
     for measure in _compared(comparison):
+        if measure.measure.higher_is_better is None:
+            continue
         first = [name for name, rank in comparison.ranks(measure.name).items() if rank == 1]
         told_apart = len(first) < len(comparison.plates)
         neither = "cannot be told apart" if is_ranked(comparison, measure.name) else "not ranked"
         told = _listed(first) + _as_good(comparison, measure.name, first) + _doubt(comparison, measure.name)
-        rows.append((measure.label, told if told_apart else neither))
+        rows.append((measure.measure.label, told if told_apart else neither))
     return rows
 
 
@@ -210,10 +211,10 @@ def _listed(names: Sequence[str]) -> str:
     return " and ".join([", ".join(names[:-1]), names[-1]] if len(names) > 1 else names)
 
 
-def _ranking(comparison: Comparison, measure: EffectMeasure) -> Section:
+def _ranking(comparison: Comparison, measure: Score) -> Section:
     """One measure of all plates, the best first, and a sentence for every pair."""
     place = comparison.plates[0].measures.index(measure)
-    ranks, better = comparison.ranks(measure.name), "higher" if measure.higher_is_better else "lower"
+    ranks = comparison.ranks(measure.name)
     ranked = is_ranked(comparison, measure.name)
     plates = {plate.name: plate for plate in comparison.plates}
     rows = []
@@ -227,7 +228,7 @@ def _ranking(comparison: Comparison, measure: EffectMeasure) -> Section:
     )
     what = " in the ratio to the solid plate" if measure.name in (comparison.at_equal_weight or ()) else ""
     differences = [_in_words(pair, measure, what) for pair in comparison.differences if pair.measure == measure.name]
-    title = f"{measure.label}{SHOWN_UNITS[measure.units]}; {better} is better{weighed(comparison, measure.name)}"
+    title = f"{measure.measure.title}; {measure.measure.better}{weighed(comparison, measure.name)}"
     return Section([Table(columns, rows), *differences], title)
 
 
@@ -240,7 +241,7 @@ def weighed(comparison: Comparison, measure: str) -> str:
     return "; ranked by the ratio to the solid plate" if by_ratio else "; ranked without regard to weight"
 
 
-def _in_words(pair: Difference, measure: EffectMeasure, what: str) -> str:
+def _in_words(pair: Difference, measure: Score, what: str) -> str:
     """Such as "a better than b by 0.1 (0.05 to 0.15)"; `what` follows the difference."""
     if math.isnan(pair.low):
         told = f"difference{what} {number_text(pair.value)}"
@@ -249,12 +250,14 @@ def _in_words(pair: Difference, measure: EffectMeasure, what: str) -> str:
         interval = intervals_text(Ends(pair.low, pair.high, pair.parameters))
         difference = f"difference{what} {number_text(pair.value)} ({interval})"
         return f"{pair.one} and {pair.other} cannot be told apart: {difference}"
-    names = [pair.one, pair.other] if (pair.value > 0.0) == measure.higher_is_better else [pair.other, pair.one]
+    better = measure.measure.higher_is_better
+    names = [pair.one, pair.other] if (pair.value > 0.0) == (better is not False) else [pair.other, pair.one]
     by_hits, by_parameters = (pair.low, pair.high), pair.parameters
     if pair.value < 0.0:
         by_hits, by_parameters = _negative(by_hits), by_parameters and _negative(by_parameters)
     interval = intervals_text(Ends(*by_hits, by_parameters))
-    verdict = f"{names[0]} better than {names[1]} by {number_text(abs(pair.value))}{what} ({interval})"
+    than = f"{'higher' if better is None else 'better'} than"
+    verdict = f"{names[0]} {than} {names[1]} by {number_text(abs(pair.value))}{what} ({interval})"
     return verdict + survival_text(pair.survival)
 
 

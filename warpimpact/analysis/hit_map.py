@@ -13,7 +13,7 @@ from scipy.spatial import KDTree
 from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
 from warpimpact.results.dataset import passed
-from warpimpact.results.measures import place_of_standoff
+from warpimpact.results.per_hit import place_of_standoff
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

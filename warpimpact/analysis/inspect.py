@@ -11,17 +11,14 @@ import xarray
 
 from warpimpact.analysis.bursts import bursts, bursts_view
 from warpimpact.analysis.effectiveness import effectiveness_view
+from warpimpact.analysis.estimates import estimated, means_of, slices, status_shares
 from warpimpact.analysis.numbers import ends_of, intervals_text
 from warpimpact.analysis.plate import plate_numbers
 from warpimpact.analysis.summary import (
-    estimated,
     levels_note,
-    means_of,
     numerics_note,
     promise_text,
     sampling_note,
-    slices,
-    status_shares,
     stop_lines,
     symmetry_text,
 )
@@ -113,7 +110,7 @@ def _row(measure: Measure, estimate: Estimate) -> tuple[Any, ...]:
     interval = intervals_text(ends_of(shown), "{:.2f}".format)
     if measure.kind != "mean":
         return ("", f"{measure.share * 100.0:g} % quantile", shown.value, interval, None)
-    name = f"{measure.variable.replace('_', ' ')}{measure.place}, {measure.display.shown}"
+    name = f"{measure.column.label}, {measure.display.shown}"
     return (name, "mean", shown.value, interval, shown.spread)
 
 

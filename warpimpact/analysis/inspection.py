@@ -8,12 +8,12 @@ from html import escape
 import numpy as np
 import xarray
 
-from warpimpact.analysis.effectiveness import EffectMeasure, effectiveness
+from warpimpact.analysis.effectiveness import Score, effectiveness
+from warpimpact.analysis.estimates import slices
 from warpimpact.analysis.hit_map import hit_points
 from warpimpact.analysis.inspect import inspect_text
 from warpimpact.analysis.numbers import intervals_text, number_text
-from warpimpact.analysis.summary import numerics_sentence, slices
-from warpimpact.analysis.vocabulary import SHOWN_UNITS
+from warpimpact.analysis.summary import numerics_sentence
 from warpimpact.records.group import failures
 from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
@@ -53,10 +53,10 @@ def inspect(dataset: xarray.Dataset) -> Inspection:
     return Inspection(inspect_text(dataset), verdict(dataset, effectiveness(dataset)[0]), _drawing(dataset))
 
 
-def verdict(dataset: xarray.Dataset, first: EffectMeasure) -> str:
+def verdict(dataset: xarray.Dataset, first: Score) -> str:
     """How many cores pass, one measure of protection, and how exact the numerics are."""
     count, interval = sum(int(passed(part).sum()) for part in slices(dataset[[v.STATUS]])), intervals_text(first.ends)
-    protection = f"{first.label}{SHOWN_UNITS[first.units]} {number_text(first.value)}"
+    protection = f"{first.measure.title} {number_text(first.value)}"
     protection += "" if interval == "-" else f" ({interval})"
     protection += "" if np.isnan(first.ratio) else f", {number_text(first.ratio)} of the solid plate's"
     return f"{count} of {dataset.sizes['hit']} cores pass. {protection}. {numerics_sentence(dataset)}"

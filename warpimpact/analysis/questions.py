@@ -12,7 +12,7 @@ import xarray
 from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
 from warpimpact.results.files import ResultError
-from warpimpact.results.measures import dealing
+from warpimpact.results.tallies import dealing
 from warpimpact.runs.parts import first_difference
 
 _SAME_PLACE = 1e-9

@@ -4,31 +4,27 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from warpimpact.analysis import base
+from warpimpact.analysis.estimates import estimated, means_of, slices
 from warpimpact.analysis.numbers import Ends, interval_text, intervals_text
-from warpimpact.analysis.survival import by_draws, draws_note, over_draws
+from warpimpact.analysis.survival import draws_note
 from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
+from warpimpact.results.bases import has_base
 from warpimpact.results.dataset import finer_pair, is_choice, status_codes
-from warpimpact.results.measures import MEASURED, STATUSES, Measure, Tally, dealing, shift_of
+from warpimpact.results.measures import Measure
 from warpimpact.scene.display import STORED
 from warpimpact.solver.findings import accuracy_text, errors_text
-from warpimpact.statistics.intervals import Estimate, estimate_of
-from warpimpact.statistics.shifts import shift_of_mean
-from warpimpact.statistics.tails import quantile_weights
+from warpimpact.statistics.intervals import Estimate
 from warpimpact.view.view import Column, Section, Table, number, text_of
 
 if TYPE_CHECKING:
     from warpimpact.results.table import Result
-
-SLICE = 2**18
-"""Hits in memory at a time."""
 
 
 @dataclass(frozen=True)
@@ -63,7 +59,7 @@ class Summary:
     """Outcome counts by status, and the spread of what left the rear face.
 
     Velocities are in m/s, angles in degrees; ``tilt`` is keyed by the stand-off [m]. ``base_depth`` [m] counts as
-    `analysis.base.base_depth`; None where no layer is behind the plate. ``broken`` counts the cores whose bending
+    `results.bases.base_depth`; None where no layer is behind the plate. ``broken`` counts the cores whose bending
     stress passed their strength, whatever their status; None if cores have none.
     """
 
@@ -125,11 +121,16 @@ def breaks_promise(dataset: Result) -> bool:
     return bool(dataset.attrs.get(attr.PROMISE_KEPT) == 0)
 
 
+_DEPTH, _BROKEN = Measure.parse("mean(base_depth)"), Measure.parse("P(broken)")
+
+
 def summary(dataset: Result) -> Summary:
     """Summarise a hit map; velocity, deflection and tilt count only the cores that passed the plate."""
     codes, standoffs = status_codes(dataset), dataset[v.STANDOFF].values.tolist()
     velocity, deflection, *tilt = means_of((v.RESIDUAL_VELOCITY, v.DEFLECTION, v.TILT), standoffs)
     estimates = estimated(dataset, [velocity, deflection, *tilt])
+    (depth,) = estimated(dataset, [_DEPTH]).values() if has_base(dataset) else (None,)
+    broken = estimated(dataset, [_BROKEN])[_BROKEN] if v.BROKEN in dataset else None
     counts = np.zeros(len(codes), dtype=int)
     for part in slices(dataset[[v.STATUS]]):
         counts += (part[v.STATUS].values[:, None] == list(codes.values())).sum(axis=0)
@@ -138,73 +139,9 @@ def summary(dataset: Result) -> Summary:
         residual_velocity=Spread.of(estimates[velocity]),
         deflection=Spread.of(estimates[deflection]),
         tilt={at: Spread.of(estimates[measure]) for at, measure in zip(standoffs, tilt, strict=True)},
-        base_depth=_base_depth(dataset),
-        broken=_broken(dataset),
+        base_depth=None if depth is None else Spread.of(depth),
+        broken=None if broken is None else round(broken.value * broken.count) if broken.count else 0,
     )
-
-
-def _base_depth(dataset: Result) -> Spread | None:
-    if not base.has_base(dataset):
-        return None
-    needed = dataset[[name for name in (*base.NEEDED, *v.GROUPS["finer"]) if name in dataset]]
-    depths = np.concatenate([base.base_depth(part) for part in slices(needed)])
-    estimate, dealt = estimate_of("mean", depths, **dealing(dataset)), dealing(dataset)
-    if (pair := finer_pair(needed)) is not None:
-        levels = base.base_depth(pair[0]), base.base_depth(pair[1])
-        estimate = replace(estimate, numerics=shift_of_mean(*levels, images=dealt["images"]))
-    return Spread.of(over_draws(dataset, estimate, depths))
-
-
-def _broken(dataset: Result) -> int | None:
-    if v.BROKEN not in dataset:
-        return None
-    return sum(int(np.nansum(part[v.BROKEN].values)) for part in slices(dataset[[v.BROKEN]]))
-
-
-def means_of(variables: Sequence[v.Variable], standoffs: Sequence[float]) -> list[Measure]:
-    """Means of some variables, at every stand-off [m] of those that have one."""
-    return [
-        Measure.parse(f"mean({variable})" if at is None else f"mean({variable}@{at!r}m)")
-        for variable in variables
-        for at in (standoffs if v.STANDOFF in variable.dims else [None])
-    ]
-
-
-def estimated(dataset: Result, measures: Sequence[Measure], confidence: float = 0.95) -> dict[Measure, Estimate]:
-    """Measures of a result with their intervals; of an open file only a slice is in memory at a time."""
-    tallies = [Tally(measure, **dealing(dataset), confidence=confidence) for measure in measures]
-    drawn: list[list[Any]] = [[] for _ in tallies]
-    for part in slices(dataset[[v.STATUS, *(name for name in MEASURED if name in dataset)]]):
-        for tally, values in zip(tallies, drawn, strict=True):
-            tally.add(part)
-            if v.POSTERIOR_DRAW in dataset:
-                values.append(tally.measure.values(part))
-    pair = finer_pair(dataset[[name for name in (v.STATUS, *MEASURED, *v.GROUPS["finer"]) if name in dataset]])
-    found = {tally.measure: replace(tally.estimate(), numerics=shift_of(tally.measure, pair)) for tally in tallies}
-    if v.POSTERIOR_DRAW not in dataset:
-        return found
-    return {
-        one: over_draws(dataset, estimate, _drawn(dataset, one, values), units=one.units).within(one.least)
-        for (one, estimate), values in zip(found.items(), drawn, strict=True)
-    }
-
-
-def status_shares(dataset: Result) -> dict[str, Estimate]:
-    """Shares of the shots by how they ended, of the statuses that occur."""
-    shares = estimated(dataset, [Measure.parse(f"P({name})") for name in STATUSES])
-    return {measure.variable: estimate for measure, estimate in shares.items() if estimate.value > 0.0}
-
-
-def _drawn(dataset: Result, measure: Measure, values: Sequence[Any]) -> Any:
-    """Numbers of the hits whose mean over those of a draw is the measure of the draw."""
-    numbers = np.concatenate(values)
-    return by_draws(dataset, numbers, quantile_weights(measure.share)) if measure.kind == "quantile" else numbers
-
-
-def slices(dataset: Result) -> Iterator[Any]:
-    """Its hits in slices that are loaded one at a time."""
-    for first in range(0, dataset.sizes["hit"], SLICE):
-        yield dataset.isel(hit=slice(first, first + SLICE)).load()
 
 
 _SAMPLINGS = {

@@ -16,7 +16,8 @@ import numpy as np
 
 from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
-from warpimpact.results.measures import Array, dealing
+from warpimpact.results.per_hit import Array
+from warpimpact.results.tallies import dealing
 from warpimpact.statistics.intervals import Estimate
 from warpimpact.statistics.random_effects import FEWEST_GROUPS, interval_of_means, positive_share
 from warpimpact.statistics.tails import OrderWeights, pseudo_values

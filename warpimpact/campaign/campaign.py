@@ -14,6 +14,7 @@ from pydantic import Field, PrivateAttr, ValidationError, model_validator
 from ..results.files import ResultError
 from ..results.kinds import CAMPAIGN
 from ..results.variables import BENDING_VARIABLES, BROKEN_VARIABLES
+from ..results.vocabulary import BASE
 from ..scene import (
     AnyCore,
     Burst,
@@ -263,7 +264,7 @@ class Campaign(Model):
     def _goes_together(self) -> Self:
         """All that scene/exclusions.py has rows for."""
         stop, hits, numerics = self.stop, self.hits, self.numerics
-        variable = "" if stop is None else stop.measure.variable
+        variable = "" if stop is None else stop.measure.name
         told = stop is not None and f'stop.quantity = "{stop.quantity}"'
         check_together(
             unsymmetric(self.scatter, self.layer)
@@ -297,6 +298,13 @@ class Campaign(Model):
                 f"hits.count = {self.hits.count} and stop.max_count = {self.stop.max_count} cannot be combined: "
                 "[stop] sets the number of hits; leave out hits.count"
             )
+        if self.stop.measure.is_limit:
+            raise ValueError(
+                f'stop.quantity = "{self.stop.quantity}" is told by warpimpact limit, which takes no [stop]'
+            )
+        need = self.stop.measure.quantity.need
+        if need == BASE and not self.layer:
+            raise ValueError(f'stop.quantity = "{self.stop.quantity}" needs {BASE.keys}')
         at = self.stop.measure.standoff
         if at is not None and not np.isclose(at, self.output.standoffs, rtol=1e-9, atol=0.0).any():
             standoffs = ", ".join(f"{standoff:g} m" for standoff in self.output.standoffs)

@@ -13,8 +13,8 @@ class Stop(Model):
     """When a run ends: as soon as a confidence interval is narrow enough.
 
     Attributes:
-        quantity: `mean(v)`, `quantile(v, 0.05)`, `P(v > limit)` or `P(status)`; v is a variable of the result, with
-            its stand-off if it has one, such as `tilt@130mm`.
+        quantity: a measure with an interval, such as `mean(residual_velocity)`, `quantile(tilt@130mm, 0.05)`,
+            `worst_tenth(residual_energy_density@130mm)` or `P(perforated)`.
         half_width: largest half width of the interval, SI; that of an angle is given in degrees or with its unit.
         confidence: of the interval.
         max_count: number of shots after which the run ends in any case.
@@ -28,7 +28,8 @@ class Stop(Model):
     @field_validator("quantity")
     @classmethod
     def _is_a_measure(cls, text: str) -> str:
-        Measure.parse(text)
+        if not Measure.parse(text).has_interval:
+            raise ValueError(f"got {quoted(text)}, but a run cannot stop by a number without an interval")
         return text
 
     @field_validator("half_width", mode="wrap")

@@ -1,13 +1,12 @@
 """The command compare: which of several plates protects better."""
 
 import argparse
-import math
 import sys
 from contextlib import ExitStack
 from pathlib import Path
 
 from .mistakes import memory_told
-from .options import Commands, add_command, add_count, add_device, add_output, add_overwrite, read_option
+from .options import Commands, add_command, add_count, add_device, add_measures, add_output, add_overwrite
 from .paths import check_picture, named
 from .progress import show_run, warn
 from .run import failure_code
@@ -37,17 +36,7 @@ def add_compare(commands: Commands) -> None:
         "FIGURE.png",
         "figure as PNG, PDF or SVG (default: comparison.png, or the campaign's name, in this folder)",
     )
-    parser.add_argument(
-        "--angle",
-        default="30 deg",
-        metavar="ANGLE",
-        help='a core with a larger inclination counts as tilted (default: "%(default)s")',
-    )
-    parser.add_argument(
-        "--standoff",
-        metavar="LENGTH",
-        help='stand-off at which the tilt counts, such as "130 mm" (default: the largest of the results)',
-    )
+    add_measures(parser)
     add_device(parser)
     add_count(parser)
     parser.add_argument("--resume", action="store_true", help="continue an interrupted campaign")
@@ -69,7 +58,6 @@ def _compare(arguments: argparse.Namespace) -> int:
     for picture in (figure, beside):
         check_picture(picture, overwrite=arguments.overwrite or (is_campaign and arguments.output is None))
     replaced = " (replaced)" if figure.exists() else ""
-    angle, standoff = _quantities(arguments)
     paths = _plates_run(arguments, figure.parent) if is_campaign else named(arguments.files)
     if len(paths) < 2:
         raise files.ResultError(
@@ -77,7 +65,7 @@ def _compare(arguments: argparse.Namespace) -> int:
         )
     with ExitStack() as stack:
         datasets = [stack.enter_context(files.opened(path)) for path in paths.values()]
-        comparison = compare(datasets, list(paths), angle=angle, standoff=standoff)
+        comparison = compare(datasets, list(paths), arguments.measure)
         evidence = evidence_of_all(dict(zip(paths, datasets, strict=True)))
         code = max(failure_code(dataset, path) for dataset, path in zip(datasets, paths.values(), strict=True))
     print(comparison_text(comparison))
@@ -89,19 +77,6 @@ def _compare(arguments: argparse.Namespace) -> int:
         against_weight.savefig(beside, dpi=150)
         print(beside)
     return code
-
-
-def _quantities(arguments: argparse.Namespace) -> tuple[float, float | None]:
-    """The angle [rad] and the stand-off [m] of the command line."""
-    from warpimpact.results.files import ResultError
-    from warpimpact.scene.units import Angle, Length
-
-    angle = read_option("--angle", Angle, arguments.angle, ResultError)
-    given = arguments.standoff
-    standoff = None if given is None else read_option("--standoff", Length, given, ResultError)
-    if not 0.0 <= angle < math.pi / 2:
-        raise ResultError(f'--angle: got "{arguments.angle}", but it must be at least 0 and less than 90 deg')
-    return angle, standoff
 
 
 def _plates_run(arguments: argparse.Namespace, folder: Path) -> dict[str, Path]:

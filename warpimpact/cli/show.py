@@ -8,7 +8,16 @@ from typing import TYPE_CHECKING
 
 from warpimpact.results import attributes as attr
 
-from .options import Commands, add_campaign, add_command, add_output, add_overwrite, add_result, add_results
+from .options import (
+    Commands,
+    add_campaign,
+    add_command,
+    add_measures,
+    add_output,
+    add_overwrite,
+    add_result,
+    add_results,
+)
 from .paths import check_folder, check_picture, named
 
 if TYPE_CHECKING:
@@ -26,6 +35,7 @@ def add_inspect(commands: Commands) -> None:
         example="inspect slotted.nc",
     )
     add_result(parser)
+    add_measures(parser)
     parser.add_argument("--campaign", action="store_true", help="print only the campaign that the result contains")
     parser.add_argument(
         "--discrepancy",
@@ -35,12 +45,16 @@ def add_inspect(commands: Commands) -> None:
 
 
 def _inspect(arguments: argparse.Namespace) -> None:
+    from warpimpact.analysis.effectiveness import effectiveness_text
     from warpimpact.analysis.inspect import inspect_text
     from warpimpact.results import files
 
     with files.opened(arguments.result) as dataset:
         asked = dataset.assign_attrs({attr.DISCREPANCY_COUNTS: 1}) if arguments.discrepancy else dataset
-        print(dataset.attrs[attr.CAMPAIGN] if arguments.campaign else inspect_text(asked))
+        if arguments.campaign:
+            print(dataset.attrs[attr.CAMPAIGN])
+        else:
+            print(effectiveness_text(asked, arguments.measure) if arguments.measure else inspect_text(asked))
 
 
 def add_plot(commands: Commands) -> None:
@@ -59,9 +73,9 @@ def add_plot(commands: Commands) -> None:
     add_overwrite(parser, "existing pictures")
     only = parser.add_mutually_exclusive_group()
     only.add_argument(
-        "--probability",
-        metavar="QUANTITY",
-        help='draw only the map of this probability, such as "P(tilt@130mm > 30 deg)"; takes one result',
+        "--measure",
+        metavar="TEXT",
+        help='draw only the map of this measure, such as "P(tilt@130mm > 30 deg)"; takes one result',
     )
     only.add_argument(
         "--variable", metavar="NAME", help="draw only the map of this variable, such as edge_distance; takes one result"
@@ -69,7 +83,7 @@ def add_plot(commands: Commands) -> None:
 
 
 def _plot(arguments: argparse.Namespace) -> None:
-    from warpimpact.plotting import probability_map, save_beside, save_maps, variable_map
+    from warpimpact.plotting import measure_map, save_beside, save_maps, variable_map
     from warpimpact.results import files
 
     datasets = {name: files.read(path) for name, path in named(arguments.results).items()}
@@ -78,7 +92,7 @@ def _plot(arguments: argparse.Namespace) -> None:
     stem = "_".join(path.stem for path in arguments.results)
     dataset, *others = datasets.values()
     asked: dict[str, tuple[str | None, Callable[..., Figure]]] = {
-        "--probability": (arguments.probability, probability_map),
+        "--measure": (arguments.measure, measure_map),
         "--variable": (arguments.variable, variable_map),
     }
     for option, (quantity, draw) in asked.items():
@@ -106,7 +120,7 @@ def _plot(arguments: argparse.Namespace) -> None:
 
 
 def _file_name(quantity: str) -> str:
-    """A part of a file name that tells a probability, such as "P_tilt_130mm_above_30_deg"."""
+    """A part of a file name that tells a measure, such as "P_tilt_130mm_above_30_deg"."""
     spoken = quantity.replace(">", " above ").replace("<", " below ")
     return "_".join(re.findall(r"[\w.]+", spoken))
 

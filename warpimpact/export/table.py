@@ -9,7 +9,7 @@ from typing import Any
 import pandas as pd
 import xarray
 
-from warpimpact.analysis.summary import slices
+from warpimpact.analysis.estimates import slices
 from warpimpact.results import variables as v
 from warpimpact.results.dataset import hit_numbers, status_codes
 from warpimpact.results.files import aside

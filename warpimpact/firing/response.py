@@ -23,8 +23,8 @@ from warpimpact.records.group import failures
 from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
 from warpimpact.results.dataset import failed
-from warpimpact.results.measures import dealing
 from warpimpact.results.outlines import outlines
+from warpimpact.results.tallies import dealing
 from warpimpact.statistics.intervals import Dealing, Estimate, estimate_of
 
 Array = NDArray[np.float64]

@@ -25,7 +25,8 @@ from warpimpact.identification.measured import Observation
 from warpimpact.records.group import failures
 from warpimpact.records.outcomes import Outcomes
 from warpimpact.results import variables as v
-from warpimpact.results.measures import STATUSES, Measure, place_of_standoff
+from warpimpact.results.measures import STATUSES, Measure
+from warpimpact.results.per_hit import place_of_standoff
 
 Array = NDArray[np.float64]
 
@@ -213,11 +214,11 @@ def _counted(data: Data, outcomes: Outcomes) -> Array:
 def holds(condition: Measure, outcomes: Outcomes, standoffs: Sequence[float]) -> NDArray[np.bool_]:
     """Whether a condition such as P(perforated) or P(bending_stress < 1.5 GPa) is true of each shot."""
     if condition.kind == "share":
-        return np.asarray(outcomes.status == STATUSES[condition.variable])
-    values: Array = getattr(outcomes, condition.variable)
+        return np.asarray(outcomes.status == STATUSES[condition.name])
+    values: Array = getattr(outcomes, condition.name)
     if condition.standoff is not None:
         values = values[:, place_of_standoff(standoffs, condition.standoff)]
-    (variable,) = (one for one in v.HIT_NUMBERS if one == condition.variable)
+    (variable,) = (one for one in v.HIT_NUMBERS if one == condition.name)
     shown = np.degrees(values) if variable.units == "degree" else values
     return np.asarray(shown > condition.limit if condition.above else shown < condition.limit)
 

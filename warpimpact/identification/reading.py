@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path as FilePath
 from typing import Annotated, Any
 
@@ -26,8 +27,10 @@ from warpimpact.identification.parameters import (
     read_priors,
     with_medians,
 )
+from warpimpact.results import variables as v
 from warpimpact.results.kinds import FIT
-from warpimpact.results.measures import Measure, place_of_standoff
+from warpimpact.results.measures import STATUSES, Measure
+from warpimpact.results.per_hit import place_of_standoff
 from warpimpact.scene import Core, Impact, Numerics, Plate, Record, Scatter, Scene, exclusions
 from warpimpact.scene.distributions import EDGE, Distribution
 from warpimpact.scene.model import Model
@@ -37,6 +40,8 @@ from warpimpact.solver.columns import Path
 from warpimpact.solver.limit import check_arrests
 
 _Table = dict[str, Any]
+_CONDITIONS = tuple(name for name in v.HIT_NUMBERS if name in (*v.OUTCOME_VARIABLES, *v.BENDING_VARIABLES))
+"""Recorded numbers of a hit that a condition may be of."""
 _MOST_SHOTS = 256
 DISCREPANCY = {
     "velocity": (Speed, {"distribution": "truncated_normal", "mean": 0, "std": 10, "low": 0, "high": 50}),
@@ -122,7 +127,7 @@ def fit_from(text: str, name: str, folder: FilePath) -> Fit:
         for place, one in enumerate(given.shot)
     )
     selection = tuple(_condition(one, record, f"{name}: selection") for one in given.selection)
-    if any(one.variable == "bending_stress" for one in selection):
+    if any(one.name == "bending_stress" for one in selection):
         record = record.model_copy(update={"bending": True})
     kinds = {one.kind for shot in shots for one in shot.observations}
     scales, fixed = _discrepancy(given.discrepancy, kinds, name)
@@ -212,8 +217,12 @@ def _condition(text: Any, record: Record, place: str) -> Measure:
     """A condition such as "perforated" or "bending_stress < 1.5 GPa"."""
     try:
         measure = Measure.parse(f"P({text})")
-        if measure.standoff is not None:
-            place_of_standoff(record.standoffs, measure.standoff)
+        if measure.name not in (*STATUSES, *_CONDITIONS):
+            raise ValueError(f"got {quoted(text)}, but a condition is of a status or one of {', '.join(_CONDITIONS)}")
+        if measure.quantity.has_standoff:
+            last = (*record.standoffs[-1:], 0.0)[0]
+            measure = replace(measure, standoff=last if measure.standoff is None else measure.standoff)
+            place_of_standoff(record.standoffs, measure.standoff or 0.0)
     except ValueError as error:
         raise FitError(f'{place}: {error}; a condition is "perforated" or "bending_stress < 1.5 GPa"') from None
     return measure

@@ -14,7 +14,6 @@ from warpimpact.campaign.text import CampaignError
 from warpimpact.optimisation.design import Design
 from warpimpact.optimisation.evaluate import Job, Told, campaign_of
 from warpimpact.optimisation.judged import Record, excesses, interval, means, numbers_of, objectives
-from warpimpact.optimisation.measures import AREAL_DENSITY
 from warpimpact.optimisation.search import Searched
 from warpimpact.optimisation.searcher import front_of
 from warpimpact.optimisation.work import Work
@@ -209,7 +208,7 @@ def is_better(design: Design, one: Record, other: Record) -> bool:
     signs = np.array([asked.sign for asked in design.objectives])[:, None]
     theirs = means(design, other, other.hits)[:count]
     low = interval(signs * (theirs - means(design, one, one.hits)[:count]))[0]
-    same = [SAME_WEIGHT if asked.measure == AREAL_DENSITY else ROUNDED for asked in design.objectives]
+    same = [SAME_WEIGHT if asked.asked.kind == "target" else ROUNDED for asked in design.objectives]
     return bool((low > np.array(same) * np.nan_to_num(np.abs(theirs)).max(axis=1)).any())
 
 
@@ -223,7 +222,7 @@ def survival(design: Design, front: Sequence[Record], draws: Sequence[Array], le
             continue
         for row, asked in enumerate(design.asked):
             apart = numbers_of(design, one, asked, one.hits) - numbers_of(design, other, asked, other.hits)
-            if asked.measure != AREAL_DENSITY and np.isfinite(apart).any():
+            if asked.asked.kind != "target" and np.isfinite(apart).any():
                 share = positive_share(np.sign(np.nanmean(apart)) * apart, draws[number])
                 found[number, row] = (np.nan, np.nan) if share is None else (share.share, share.at_least)
     return found

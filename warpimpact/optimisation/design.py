@@ -7,27 +7,25 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import lru_cache
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any
 
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field, ValidationError, model_validator
 
-from warpimpact.analysis.vocabulary import EFFECTS
 from warpimpact.campaign.campaign import Campaign
 from warpimpact.campaign.problems import sentence
 from warpimpact.campaign.text import CampaignError, parsed, read_text
-from warpimpact.optimisation import measures
+from warpimpact.optimisation.asked import Bound, Objective, check_needs
 from warpimpact.optimisation.space import Space, read_space
 from warpimpact.results.kinds import DESIGN
+from warpimpact.results.measures import Measure
 from warpimpact.scene.model import Model
 from warpimpact.scene.units import (
     Number,
-    Obliquity,
     PositiveArealDensity,
     PositiveLength,
     Title,
-    quoted,
 )
 
 Array = NDArray[np.float64]
@@ -36,80 +34,6 @@ _Name = Annotated[Title, Field(min_length=1, max_length=80)]
 
 OWN = ("variables", "objectives", "bounds", "threats", "constraints", "search", "references")
 """Tables that a design file has beside those of a campaign."""
-
-
-class _Asked(Model):
-    """A measure of `warpimpact inspect`, or the areal density.
-
-    Attributes:
-        measure: its name, as inspect gives it to programs.
-        angle: inclination beyond which a core counts as tilted [rad].
-        standoff: distance behind the rear face [m]; the largest of the campaign unless given.
-        threats: over several threats the "worst" one counts, or their weighted "mean".
-        layer: whose thickness a limit thickness is; 0 is the plate.
-    """
-
-    measure: str
-    angle: Annotated[Obliquity, Field(validate_default=True)] = "30 deg"
-    standoff: PositiveLength | None = None
-    threats: Literal["worst", "mean"] = "worst"
-    layer: Annotated[int, Field(strict=True, ge=0)] = 0
-
-    @model_validator(mode="after")
-    def _is_known(self) -> _Asked:
-        if self.measure not in measures.names():
-            raise ValueError(
-                f"got measure = {quoted(self.measure)}, but it must be one of {', '.join(measures.names())}"
-            )
-        return self
-
-    @property
-    def key(self) -> measures.Key:
-        """The effect that it is made of."""
-        return measures.Key(measures.effect_of(self.measure), float(self.angle), self.standoff, self.layer)
-
-
-class Objective(_Asked):
-    """What is minimised or maximised.
-
-    Attributes:
-        goal: "minimise" or "maximise"; unless given, what is better for whoever is behind the plate.
-    """
-
-    goal: Literal["minimise", "maximise"] | None = None
-
-    @property
-    def sign(self) -> float:
-        """Factor that makes it a quantity to minimise."""
-        if self.goal is not None:
-            return 1.0 if self.goal == "minimise" else -1.0
-        return -1.0 if measures.higher_is_better(self.measure) else 1.0
-
-
-class Bound(_Asked):
-    """A measure that is held within a limit, one of both.
-
-    Attributes:
-        at_most, at_least: limits, in the units in which inspect shows the measure.
-    """
-
-    at_most: Number | None = None
-    at_least: Number | None = None
-
-    @model_validator(mode="after")
-    def _has_a_limit(self) -> Bound:
-        if (self.at_most is None) == (self.at_least is None):
-            raise ValueError("needs at_most or at_least, one of both")
-        return self
-
-    @property
-    def limit(self) -> float:
-        return float(next(one for one in (self.at_most, self.at_least) if one is not None))
-
-    @property
-    def sign(self) -> float:
-        """Factor that makes it a quantity that must not exceed the limit."""
-        return 1.0 if self.at_most is not None else -1.0
 
 
 class Threat(Model):
@@ -222,6 +146,7 @@ class Design:
         space: its variables.
         objectives, bounds, threats, references, constraints, search: as in the file; without threats there is that of
             the campaign, without a name.
+        keys: what is computed of every hit: the columns of the measures that are asked for.
     """
 
     title: str
@@ -236,7 +161,7 @@ class Design:
     references: tuple[Reference, ...]
     constraints: Constraints
     search: Search
-    keys: tuple[measures.Key, ...] = field(default=())
+    keys: tuple[Measure, ...] = field(default=())
 
     @property
     def asked(self) -> tuple[Objective | Bound, ...]:
@@ -298,10 +223,16 @@ def design_from(text: str, name: str, folder: Path) -> Design:
     names = [one.name for one in threats] + [one.name for one in asking.references]
     if twice := next((one for one in names if names.count(one) > 1), None):
         raise CampaignError(f'{name}: got the name "{twice}" twice, but each threat and reference needs its own')
-    _check_needs(asking, data, space, name)
-    keys = dict.fromkeys(
-        one.key for one in (*asking.objectives, *asking.bounds) if one.measure != measures.AREAL_DENSITY
-    )
+    layered = "layer" in data or any(variable.place == "layer" for variable in space.variables)
+    places = {
+        f"{table}[{k}]": one for table in ("objectives", "bounds") for k, one in enumerate(getattr(asking, table))
+    }
+    try:
+        check_needs(places, data.get("output", {}), layered=layered)
+    except ValueError as error:
+        raise CampaignError(f"{name}: {error}") from None
+    asked = (one.asked for one in (*asking.objectives, *asking.bounds))
+    keys = dict.fromkeys(measure.column for measure in asked if measure.kind != "target")
     return Design(
         title=str(data.get("title", "")),
         text=text,
@@ -317,24 +248,3 @@ def design_from(text: str, name: str, folder: Path) -> Design:
         search=asking.search,
         keys=tuple(keys),
     )
-
-
-def _check_needs(asking: Asking, data: Mapping[str, Any], space: Space, name: str) -> None:
-    """Refuse a measure that the campaign does not have.
-
-    Raises:
-        CampaignError: names it, and what it needs.
-    """
-    output = data.get("output", {})
-    layered = "layer" in data or any(one.place == "layer" for one in space.variables)
-    missing = {
-        "layer": "" if layered else "a table [[layer]]",
-        "bending": "" if output.get("bending") is True else "output.bending = true and core.strength",
-        "standoff": "output.standoffs" if output.get("standoffs") == [] else "",
-    }
-    for table in ("objectives", "bounds"):
-        for place, one in enumerate(getattr(asking, table)):
-            if one.measure != measures.AREAL_DENSITY:
-                needs = missing.get(EFFECTS[one.key.effect].needs, "")
-                if needs:
-                    raise CampaignError(f'{name}: {table}[{place}].measure = "{one.measure}" needs {needs}')

@@ -5,25 +5,21 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from functools import lru_cache
 from itertools import count
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from warpimpact.analysis.effects import EFFECT_VARIABLES, Effect, effects
 from warpimpact.campaign.campaign import Campaign
 from warpimpact.optimisation.design import Design, Threat
 from warpimpact.optimisation.limits import limits_level, limits_said
 from warpimpact.records.outcomes import Outcomes
-from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
 from warpimpact.results.dataset import narrow_table
 from warpimpact.results.table import Table
 from warpimpact.runs.compute import at_solid
 from warpimpact.scene import Numerics, Scene, Shots
-from warpimpact.scene.units import Radians
 from warpimpact.solver.many import side_by_side, simulate_many
 from warpimpact.solver.pilot import pilot_size
 from warpimpact.solver.simulate import pilot_of
@@ -130,8 +126,9 @@ def said_by(
         [job.level for job in jobs], scenes, Worker(device, threads), lambda share: told(share * len(jobs) / steps)
     )
     said = []
+    needed = {v.STATUS, v.STOPPED_IN, *(name for measure in design.keys for name in measure.quantity.of)}
     for one, (_, scene, shots) in zip(outcomes, scenes, strict=True):
-        table = narrow_table(scene, shots, one, EFFECT_VARIABLES)
+        table = narrow_table(scene, shots, one, needed)
         draws = np.zeros(0) if shots.posterior_draw is None else shots.posterior_draw
         places = np.array([shots.hit_y, shots.hit_z])
         said.append(Said(said_of(design, table), places, draws, seconds / len(jobs)))
@@ -176,37 +173,13 @@ def _marched(
 
 
 def said_of(design: Design, table: Table) -> Array:
-    """What every effect of a design file says of the hits of a table, shape [effects, hits]; NaN of one that it lacks,
-    as a solid plate has no base."""
+    """What every measure of a design file counts of the hits of a table, in the unit in which it is shown, shape
+    [measures, hits]; NaN of one that the table lacks, as a solid plate has no base."""
     said = np.full((len(design.keys), table.sizes["hit"]), np.nan)
-    for row, key in enumerate(design.keys):
-        if (effect := effects_in(table, key.angle, key.standoff).get(key.effect)) is not None:
-            said[row] = effect.values(table)
+    for row, measure in enumerate(design.keys):
+        if not measure.quantity.lacking(table):
+            said[row] = measure.display.factor * measure.values(table)
     return said
-
-
-def effects_in(table: Table, angle: float, standoff: float | None) -> dict[str, Effect]:
-    """The effects of a table by their names."""
-    core, at = str(table.attrs[attr.CORE]), tuple(table[v.STANDOFF].values)
-    return _effects(core, angle, standoff, at, frozenset(table.variables))(table)
-
-
-_Of = Callable[[Table], dict[str, Effect]]
-
-
-@lru_cache(maxsize=256)
-def _effects(
-    core: str, angle: float, standoff: float | None, at: Any, has: Any
-) -> Callable[[Table], dict[str, Effect]]:
-    """Effects of tables of a core, made once: the silhouettes of a core take as long as some hits."""
-    kept: dict[str, Effect] = {}
-
-    def of(table: Table) -> dict[str, Effect]:
-        if not kept:
-            kept.update({one.name: one for one in effects(table, angle=Radians(angle), standoff=standoff)})
-        return kept
-
-    return of
 
 
 def level_of(

@@ -15,12 +15,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from warpimpact.optimisation.design import Bound, Design, Objective
-from warpimpact.optimisation.measures import AREAL_DENSITY, effect_of, higher_is_better
+from warpimpact.optimisation.asked import Bound, Objective
+from warpimpact.optimisation.design import Design
 from warpimpact.statistics.comparisons import ROUNDED
 from warpimpact.statistics.intervals import Estimate, estimate_of
 from warpimpact.statistics.student import student_quantile
-from warpimpact.statistics.tails import worst_tenth
 
 Array = NDArray[np.float64]
 
@@ -80,12 +79,12 @@ def values(design: Design, record: Record, hits: int | None = None) -> Array:
 
 def numbers_of(design: Design, record: Record, one: Objective | Bound, hits: int) -> Array:
     """Numbers of the hits whose mean is an objective or a bound, shape [hits]."""
-    if one.measure == AREAL_DENSITY:
+    measure = one.asked
+    if measure.kind == "target":
         return np.full(hits, record.areal_density)
-    said = record.said[:, design.keys.index(one.key), :hits]
-    if one.measure != effect_of(one.measure):
-        sign = -1.0 if higher_is_better(effect_of(one.measure)) else 1.0
-        said = sign * np.array([worst_tenth(sign * of_one) for of_one in said])
+    said = record.said[:, design.keys.index(measure.column), :hits]
+    if not measure.is_binary:
+        said = np.array([measure.averaged(measure.counted(of_one)) for of_one in said])
     if one.threats == "mean":
         weights = np.array([threat.weight for threat in design.threats])
         return np.asarray(weights @ said / weights.sum())
@@ -96,10 +95,9 @@ def numbers_of(design: Design, record: Record, one: Objective | Bound, hits: int
 def estimate(design: Design, record: Record, one: Objective | Bound) -> Estimate:
     """An objective or a bound with its interval, by all hits."""
     numbers = numbers_of(design, record, one, record.hits)
-    if one.measure == AREAL_DENSITY:
+    if one.asked.kind == "target":
         return Estimate(record.areal_density, record.areal_density, record.areal_density, record.hits, 0.0)
-    kind = "share" if set(np.unique(numbers[~np.isnan(numbers)])) <= {0.0, 1.0} else "mean"
-    return estimate_of(kind, numbers, replicates=SCRAMBLINGS)
+    return estimate_of("share" if one.asked.is_binary else "mean", numbers, replicates=SCRAMBLINGS)
 
 
 def objectives(design: Design, record: Record, hits: int | None = None) -> Array:

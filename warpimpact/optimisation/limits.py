@@ -7,8 +7,8 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
-from warpimpact.optimisation.measures import Key
 from warpimpact.records.group import failures
+from warpimpact.results.measures import Measure
 from warpimpact.scene import Numerics, Scene, Shots
 from warpimpact.solver.limit import (
     HIGHEST_VELOCITY,
@@ -25,30 +25,29 @@ from warpimpact.solver.worker import Worker
 Array = NDArray[np.float64]
 
 
-def sought_by(scene: Scene, key: Key) -> Sought:
+def sought_by(scene: Scene, key: Measure) -> Sought:
     """The limit that a measure is made of, with the tolerance of `warpimpact limit`."""
-    if key.effect == "limit_velocity":
+    if key.name == "limit_velocity":
         return Sought("velocity", VELOCITY_TOLERANCE, HIGHEST_VELOCITY)
-    return Sought("thickness", THICKNESS_TOLERANCE, thickest(scene, key.layer), key.layer)
+    layer = key.layer or 0
+    return Sought("thickness", THICKNESS_TOLERANCE, thickest(scene, layer), layer)
 
 
-def limits_said(scene: Scene, shots: Shots, key: Key, numerics: Numerics, worker: Worker) -> Array:
-    """What the limits of shots say, as the measures of analysis/effects.py have it: m/s, mm or kg/m², shape [shots];
-    NaN where the computation failed."""
+def limits_said(scene: Scene, shots: Shots, key: Measure, numerics: Numerics, worker: Worker) -> Array:
+    """The values of a measure of limits, in the unit in which it is shown, shape [shots]; NaN where the computation
+    failed."""
     sought = sought_by(scene, key)
     found = limits(scene, shots, sought, numerics, worker)
     value = np.minimum(found.value, sought.highest)
     value = np.where(failures(found.outcomes.status), np.nan, value)
-    if key.effect == "limit_velocity":
-        return np.asarray(value)
-    if key.effect == "limit_thickness":
-        return np.asarray(1e3 * value)
-    layer = scene.target.layers[key.layer]
-    return np.asarray(scene.target.areal_density + layer.areal_density * (value / layer.thickness - 1.0))
+    if key.name == "limit_areal_density":
+        layer = scene.target.layers[sought.layer]
+        value = scene.target.areal_density + layer.areal_density * (value / layer.thickness - 1.0)
+    return np.asarray(key.display.factor * key.counted(value))
 
 
 def limits_level(
-    scene: Scene, shots: Shots, key: Key, numerics: Numerics, worker: Worker, trying: Callable[[int], object]
+    scene: Scene, shots: Shots, key: Measure, numerics: Numerics, worker: Worker, trying: Callable[[int], object]
 ) -> Numerics:
     """The numerics that a pilot finds for a limit; `trying` is as in `pilot_of`."""
     some = shots[: limits_pilot_size(numerics.asked)]

@@ -13,10 +13,10 @@ from numpy.typing import NDArray
 
 from warpimpact.campaign.places import relocated
 from warpimpact.campaign.toml import toml_text
+from warpimpact.optimisation.asked import Bound
 from warpimpact.optimisation.confirm import Confirmed
-from warpimpact.optimisation.design import Bound, Design, Threat
+from warpimpact.optimisation.design import Design, Threat
 from warpimpact.optimisation.judged import Record, estimate
-from warpimpact.optimisation.measures import label_of
 from warpimpact.optimisation.search import Searched
 from warpimpact.results import attributes as attr
 from warpimpact.results import front as f
@@ -50,7 +50,7 @@ def to_dataset(design: Design, found: Searched, confirmed: Confirmed, made_by: M
         f.UNIT: _texts(one.unit for one in variables),
         f.LABELS: _texts(json.dumps(one.labels, ensure_ascii=False) if one.labels else "" for one in variables),
         f.ASKED: _texts(key_of(design, place) for place in range(len(asked))),
-        f.LABEL: _texts(label_of(measure.measure, measure.key) for measure in asked),
+        f.LABEL: _texts(one.asked.title for one in asked),
         f.SIGN: [int(one.sign) for one in asked],
         f.LIMIT: [one.limit if isinstance(one, Bound) else np.nan for one in asked],
         f.VALUE: np.array([one.values for one in found.records]).reshape(len(found.records), len(variables)),

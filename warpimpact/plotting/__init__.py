@@ -12,6 +12,7 @@ from warpimpact.plotting.distribution import dispersion, marginals, probability_
 from warpimpact.plotting.limit import limit_figure
 from warpimpact.plotting.maps import (
     layers_figure,
+    measure_map,
     overview,
     save_beside,
     save_maps,
@@ -36,6 +37,7 @@ __all__ = [
     "layers_figure",
     "limit_figure",
     "marginals",
+    "measure_map",
     "overview",
     "passage",
     "plate_figure",

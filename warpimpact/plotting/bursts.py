@@ -9,7 +9,7 @@ import numpy as np
 import xarray
 from matplotlib.figure import Figure
 
-from warpimpact.analysis.bursts import PASSED_ALONE, Bursts, bursts, label_of
+from warpimpact.analysis.bursts import PASSED_ALONE, Bursts, bursts
 from warpimpact.plotting.cell import shots_text
 from warpimpact.plotting.heading import heading
 from warpimpact.plotting.style import BLUE, GREY, VERMILION, hide_sides
@@ -39,7 +39,7 @@ def bursts_figure(dataset: xarray.Dataset) -> Figure:
     for (left, right), measure in zip(panels, shown, strict=True):
         _draw(left, [float(group.name) for group in result.orders], result.orders, measure)
         _draw_distances(right, result, measure)
-        left.set_ylabel(label_of(measure))
+        left.set_ylabel(measure.axis)
     panels[0, 1].legend(loc="best", fontsize="small")
     below_left, below_right = panels[-1]
     below_left.set_xlabel("hit of the burst")

@@ -10,7 +10,6 @@ from matplotlib.figure import Figure
 from matplotlib.layout_engine import ConstrainedLayoutEngine
 
 from warpimpact.analysis.comparison_text import hits_used
-from warpimpact.analysis.vocabulary import SHOWN_UNITS
 from warpimpact.plotting.style import BLUE, GREY, VERMILION, bars, hide_sides
 
 if TYPE_CHECKING:
@@ -19,13 +18,15 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
     from warpimpact.analysis.comparison_text import Comparison, Difference
-from warpimpact.analysis.effectiveness import EffectMeasure
+from warpimpact.analysis.effectiveness import Score
 
 # Markers differ for a print in grey.
-_STYLES = {  # by the ending of a measure's name; the last number is the distance from the line of its plate
-    "": ("mean, or share", "o", BLUE, -0.12),
-    "tenth": ("worst tenth", "s", VERMILION, 0.12),
-    "point": ("worst hit", "x", "#000000", 0.12),
+_AVERAGE = ("mean, or share", "o", BLUE, -0.12)
+_STYLES = {  # by the kind of a measure; the last number is the distance from the line of its plate
+    **dict.fromkeys(("mean", "share", "probability", "target"), _AVERAGE),
+    "quantile": ("quantile", "v", BLUE, 0.0),
+    "worst_tenth": ("worst tenth", "s", VERMILION, 0.12),
+    "worst_point": ("worst hit", "x", "#000000", 0.12),
 }
 _ROW, _MARGIN = 0.42, 0.75
 """Height of a line, and of the margin of a panel [inch]."""
@@ -39,15 +40,15 @@ def comparison_figure(comparison: Comparison) -> Figure:
     Args:
         comparison: the result of `analysis.comparison.compare`.
     """
-    effects = [list(some) for _, some in groupby(comparison.plates[0].measures, key=_effect)]
+    quantities = [list(some) for _, some in groupby(comparison.plates[0].measures, key=_quantity)]
     pairs = {(pair.one, pair.other) for pair in comparison.differences}
     heights = [
         _MARGIN + _ROW * max(len(comparison.plates), len(pairs)) * (1.5 if len(measures) > 1 else 1.0)
-        for measures in effects
+        for measures in quantities
     ]
     figure = Figure(figsize=(12.0, sum(heights) + 1.1), layout=ConstrainedLayoutEngine(h_pad=0.12))
-    panels = figure.subplots(len(effects), 2, squeeze=False, height_ratios=heights)
-    for measures, (left, right) in zip(effects, panels, strict=True):
+    panels = figure.subplots(len(quantities), 2, squeeze=False, height_ratios=heights)
+    for measures, (left, right) in zip(quantities, panels, strict=True):
         _draw_plates(left, comparison, measures)
         _draw_differences(right, comparison, measures)
     entries = [zip(*reversed(left.get_legend_handles_labels()), strict=True) for left in panels[:, 0]]
@@ -62,20 +63,17 @@ def comparison_figure(comparison: Comparison) -> Figure:
     return figure
 
 
-def _effect(measure: EffectMeasure) -> str:
-    return measure.name.partition("_worst_")[0]
+def _quantity(score: Score) -> tuple[str, bool]:
+    """What one panel shows: a quantity, or shares of it."""
+    return score.measure.name, score.measure.is_binary
 
 
-def _statistic(measure: EffectMeasure) -> str:
-    return measure.name.partition("_worst_")[2]
-
-
-def _draw_plates(axes: Axes, comparison: Comparison, measures: Sequence[EffectMeasure]) -> None:
-    """Measures of one effect, one line per plate."""
+def _draw_plates(axes: Axes, comparison: Comparison, measures: Sequence[Score]) -> None:
+    """Measures of one quantity, one line per plate."""
     plates = comparison.plates
     for line, plate in enumerate(plates):
-        for told in (told for told in plate.measures if _effect(told) == _effect(measures[0])):
-            label, marker, colour, offset = _STYLES[_statistic(told)]
+        for told in (told for told in plate.measures if _quantity(told) == _quantity(measures[0])):
+            label, marker, colour, offset = _STYLES[told.measure.kind]
             _draw_interval(axes, line + offset, told, (marker, colour), label=label)
             if told.name == measures[0].name and not math.isnan(told.solid):
                 axes.plot(
@@ -91,14 +89,14 @@ def _draw_plates(axes: Axes, comparison: Comparison, measures: Sequence[EffectMe
     axes.set_title(_title(measures[0]), fontsize="medium", loc="left")
 
 
-def _draw_differences(axes: Axes, comparison: Comparison, measures: Sequence[EffectMeasure]) -> None:
-    """Differences of one effect, one line per pair of plates."""
+def _draw_differences(axes: Axes, comparison: Comparison, measures: Sequence[Score]) -> None:
+    """Differences in one quantity, one line per pair of plates."""
     names = {measure.name: measure for measure in measures}
     lines: dict[tuple[str, str], int] = {}
     for pair in comparison.differences:
         if pair.measure in names:
             line = lines.setdefault((pair.one, pair.other), len(lines))
-            _, marker, colour, offset = _STYLES[_statistic(names[pair.measure])]
+            _, marker, colour, offset = _STYLES[names[pair.measure].measure.kind]
             hollow = not pair.told_apart
             _draw_interval(axes, line + offset, pair, (marker, colour), hollow=hollow)
     if not lines:
@@ -109,14 +107,15 @@ def _draw_differences(axes: Axes, comparison: Comparison, measures: Sequence[Eff
     _furnish(axes, [f"{one} − {other}" for one, other in lines])
     by_ratio = measures[0].name in (comparison.at_equal_weight or ())
     difference = "difference of the ratios to the solid plates;\n" if by_ratio else "difference; "
-    better = "right" if measures[0].higher_is_better else "left"
-    axes.set_title(f"{difference}{better} of 0 the first plate is better", fontsize="medium", loc="left")
+    better = measures[0].measure.higher_is_better
+    side = "neither is" if better is None else f"{'right' if better else 'left'} of 0 the first plate is"
+    axes.set_title(f"{difference}{side} better", fontsize="medium", loc="left")
 
 
 def _draw_interval(
     axes: Axes,
     line: float,
-    number: EffectMeasure | Difference,
+    number: Score | Difference,
     style: tuple[str, str],
     *,
     label: str | None = None,
@@ -151,6 +150,5 @@ def _furnish(axes: Axes, lines: Sequence[str]) -> None:
     axes.tick_params(axis="y", length=0.0)
 
 
-def _title(measure: EffectMeasure) -> str:
-    better = "higher" if measure.higher_is_better else "lower"
-    return f"{measure.label.removesuffix(', mean')}{SHOWN_UNITS[measure.units]}; {better} is better"
+def _title(score: Score) -> str:
+    return f"{score.measure.axis}; {score.measure.better}"

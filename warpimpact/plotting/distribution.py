@@ -9,8 +9,6 @@ import numpy as np
 import xarray
 from matplotlib.figure import Figure
 
-from warpimpact.analysis.effectiveness import ANGLE
-from warpimpact.analysis.effects import effects
 from warpimpact.analysis.hit_map import hit_points
 from warpimpact.analysis.local import NEIGHBOURS, plane_fit, share_of
 from warpimpact.plotting.cell import (
@@ -213,14 +211,9 @@ def probability_map(dataset: xarray.Dataset, quantity: str) -> Figure:
 
 def _of_every_hit(dataset: xarray.Dataset, quantity: str) -> Array:
     """1 or 0 of every hit, shape [hits]; NaN where it does not count."""
-    shares = {one.label: one for one in effects(dataset, angle=ANGLE, standoff=None) if one.kind == "share"}
-    if quantity in shares:
-        return shares[quantity].over(dataset)
-    measure = Measure.parse(quantity)
+    measure = Measure.parse(quantity).of(dataset)
     if not measure.is_binary:
         raise ValueError(f'got "{quantity}", but a map of a probability needs P(…), such as P(perforated)')
-    if measure.kind == "probability" and measure.variable not in dataset:
-        raise ValueError(f'got "{quantity}", but the result has no {measure.variable}')
     return measure.values(dataset)
 
 

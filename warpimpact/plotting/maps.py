@@ -21,12 +21,14 @@ from warpimpact.plotting.distribution import (
     is_uncertain,
     marginals,
     mean_and_spread,
+    probability_map,
     uncertainty,
 )
 from warpimpact.plotting.heading import add_heading, heading, names
 from warpimpact.results import variables as v
 from warpimpact.results.dataset import passed, status_codes
 from warpimpact.results.files import OutputError
+from warpimpact.results.measures import Measure
 
 if TYPE_CHECKING:
     from matplotlib.artist import Artist
@@ -57,6 +59,25 @@ def variable_map(dataset: xarray.Dataset, variable: str, standoff: float | None 
         return mean_and_spread(dataset, variable, standoff)
     figure, (axes,) = _sheet_of_one(dataset, maps=1, columns=1)
     _draw(axes, dataset, shown(dataset, variable, standoff))
+    return figure
+
+
+def measure_map(dataset: xarray.Dataset, text: str) -> Figure:
+    """Map of what a measure is made of: a probability from the nearest hits (`probability_map`), or its quantity.
+
+    Raises:
+        ValueError: the text is no measure of hits, or the result does not have it.
+    """
+    measure = Measure.parse(text).of(dataset)
+    if measure.is_binary:
+        return probability_map(dataset, text)
+    if measure.kind == "target":
+        raise ValueError(f'got "{text}", which is one number of the whole target')
+    values = measure.display.factor * measure.by_hit(dataset)
+    finite = np.where(np.isfinite(values), values, np.nan)
+    column = Shown(finite, measure.axis, measure.column.label, signed=measure.least < 0.0)
+    figure, (axes,) = _sheet_of_one(dataset, maps=1, columns=1)
+    _draw(axes, dataset, averaged(dataset, column))
     return figure
 
 

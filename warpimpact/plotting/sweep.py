@@ -10,7 +10,7 @@ import numpy as np
 import xarray
 from matplotlib.figure import Figure
 
-from warpimpact.analysis.summary import estimated
+from warpimpact.analysis.estimates import estimated
 from warpimpact.plotting.cell import words
 from warpimpact.plotting.heading import heading
 from warpimpact.results import attributes as attr
@@ -89,8 +89,8 @@ def _measures(sweep: xarray.Dataset) -> list[Measure]:
 
 def _label(measure: Measure) -> str:
     if measure.kind == "share":
-        return f"share {words(measure.variable)}"
-    return f"mean {words(measure.variable)}{measure.place} [{measure.display.shown}]\nof the cores that passed"
+        return f"share {measure.quantity.label}"
+    return f"mean {measure.column.label} [{measure.display.shown}]\nof the cores that passed"
 
 
 def _axis_label(values: xarray.DataArray) -> str:

@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Any
 from matplotlib.figure import Figure
 
 from warpimpact.analysis.effectiveness import depth_note
-from warpimpact.analysis.vocabulary import SHOWN_UNITS
 from warpimpact.plotting.style import BLUE, GREY, VERMILION, bars, hide_sides
 
 if TYPE_CHECKING:
@@ -19,14 +18,15 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
     from warpimpact.analysis.comparison_text import Comparison, Contestant
-from warpimpact.analysis.effectiveness import EffectMeasure
+from warpimpact.analysis.effectiveness import Score
 
 _STYLES = {
-    "": ("mean, or share", "o", BLUE),
-    "_worst_tenth": ("worst tenth", "s", VERMILION),
-    "_worst_point": ("worst hit", "x", "#000000"),
+    "mean": ("mean, or share", "o", BLUE),
+    "share": ("mean, or share", "o", BLUE),
+    "worst_tenth": ("worst tenth", "s", VERMILION),
+    "worst_point": ("worst hit", "x", "#000000"),
 }
-_AGAINST_WEIGHT = ("base_perforated_share", "base_depth", "limit_velocity")
+_AGAINST_WEIGHT = ("base_perforated", "base_depth", "limit_velocity")
 _THICKNESS, _NEEDED = "limit_thickness", "limit_areal_density"
 
 
@@ -40,7 +40,7 @@ def weight_figure(comparison: Comparison) -> Figure | None:
     Args:
         comparison: the result of `analysis.comparison.compare`.
     """
-    known = {measure.name for measure in comparison.plates[0].measures}
+    known = {score.measure.name for score in comparison.plates[0].measures if score.measure.kind in ("mean", "share")}
     wanted = [name for name in (*_AGAINST_WEIGHT, _THICKNESS) if name in known]
     if _NEEDED not in known:
         wanted = [name for name in wanted if name != _THICKNESS]
@@ -69,43 +69,50 @@ def _draw_against_weight(axes: Axes, comparison: Comparison, name: str) -> None:
     """One effect of every target, over its areal density."""
     middle = _middle([plate.areal_density for plate in comparison.plates])
     for plate in comparison.plates:
-        told = _by_name(plate)
-        for ending, style in _STYLES.items():
-            if (measure := told.get(name + ending)) is not None:
-                _draw_point(axes, plate.areal_density, measure, style)
-        if not math.isnan(told[name].solid):
+        scores = _scores(plate, name)
+        for kind, score in scores.items():
+            _draw_point(axes, plate.areal_density, score, _STYLES[kind])
+        first = next(iter(scores.values()))
+        if not math.isnan(first.solid):
             solid: dict[str, Any] = {"color": GREY, "fillstyle": "none", "markersize": 11.0, "linestyle": "none"}
-            axes.plot(plate.areal_density, told[name].solid, "D", label="solid plate of the same weight", **solid)
-        _name(axes, plate.name, (plate.areal_density, told[name].value), middle)
-    _furnish(axes, _by_name(comparison.plates[0])[name], "areal density of the whole target [kg/m²]")
+            axes.plot(plate.areal_density, first.solid, "D", label="solid plate of the same weight", **solid)
+        _name(axes, plate.name, (plate.areal_density, first.value), middle)
+    _furnish(axes, _first(comparison.plates[0], name), "areal density of the whole target [kg/m²]")
     if name == "base_depth" and any(depth_note(plate.measures) for plate in comparison.plates):
         axes.set_title("lower bounds: cores pierce a base, and count with its thickness", fontsize="medium", loc="left")
 
 
 def _draw_needed(axes: Axes, comparison: Comparison, name: str) -> None:
     """The limit thickness over the areal density that the target has with it, and what a solid plate needs."""
-    middle = _middle([_by_name(plate)[_NEEDED].value for plate in comparison.plates])
+    middle = _middle([_first(plate, _NEEDED).value for plate in comparison.plates])
     for plate in comparison.plates:
-        told = _by_name(plate)
-        for ending, style in _STYLES.items():
-            measure, density = told[name + ending], told[_NEEDED + ending]
-            across = None if math.isnan(density.low) else (density.low, density.high)
-            _draw_point(axes, density.value, measure, style, across)
-        _name(axes, plate.name, (told[_NEEDED].value, told[name].value), middle)
-    needed = {_by_name(plate)[_NEEDED].solid for plate in comparison.plates}
+        densities = _scores(plate, _NEEDED)
+        for kind, score in _scores(plate, name).items():
+            if (density := densities.get(kind)) is not None:
+                across = None if math.isnan(density.low) else (density.low, density.high)
+                _draw_point(axes, density.value, score, _STYLES[kind], across)
+        _name(axes, plate.name, (_first(plate, _NEEDED).value, _first(plate, name).value), middle)
+    needed = {_first(plate, _NEEDED).solid for plate in comparison.plates}
     for solid in filter(math.isfinite, needed):
         axes.axvline(solid, color=GREY, linestyle="--", label="what a solid plate in place of the target needs")
-    _furnish(axes, _by_name(comparison.plates[0])[name], "areal density that the target needs [kg/m²]")
+    _furnish(axes, _first(comparison.plates[0], name), "areal density that the target needs [kg/m²]")
 
 
-def _by_name(plate: Contestant) -> dict[str, EffectMeasure]:
-    return {measure.name: measure for measure in plate.measures}
+def _scores(plate: Contestant, name: str) -> dict[str, Score]:
+    """The scores of a plate in a quantity, by the kinds of measures that have a style."""
+    found = {score.measure.kind: score for score in plate.measures if score.measure.name == name}
+    return {kind: found[kind] for kind in _STYLES if kind in found}
+
+
+def _first(plate: Contestant, name: str) -> Score:
+    """The mean, or the share."""
+    return next(iter(_scores(plate, name).values()))
 
 
 def _draw_point(
     axes: Axes,
     density: float,
-    measure: EffectMeasure,
+    measure: Score,
     style: tuple[str, str, str],
     across: tuple[float, float] | None = None,
 ) -> None:
@@ -128,11 +135,10 @@ def _name(axes: Axes, name: str, place: tuple[float, float], middle: float) -> N
     axes.annotate(name, place, xytext=(side, 6), textcoords="offset points", ha=ha, fontsize="small")
 
 
-def _furnish(axes: Axes, measure: EffectMeasure, label: str) -> None:
-    better = "higher" if measure.higher_is_better else "lower"
-    axes.set(xlabel=label, ylabel=f"{measure.label.removesuffix(', mean')}{SHOWN_UNITS[measure.units]}")
-    axes.set_title(f"{better} is better", fontsize="medium", loc="left")
-    if measure.units == "1":
+def _furnish(axes: Axes, score: Score, label: str) -> None:
+    axes.set(xlabel=label, ylabel=score.measure.axis)
+    axes.set_title(score.measure.better, fontsize="medium", loc="left")
+    if score.measure.most == 1.0:
         axes.set_ylim(-0.04, 1.04)
     axes.grid(color="0.92")
     axes.margins(x=0.18)

@@ -11,22 +11,14 @@ import numpy as np
 import xarray
 from markupsafe import Markup
 
-from warpimpact.analysis.base import solid_note
 from warpimpact.analysis.comparison import compare
 from warpimpact.analysis.comparison_text import Comparison, best_rows, comparison_view
 from warpimpact.analysis.effectiveness import depth_note, effectiveness, measures_table
+from warpimpact.analysis.estimates import estimated, means_of, slices, status_shares
 from warpimpact.analysis.inspection import verdict
 from warpimpact.analysis.numbers import ends_of, intervals_text
-from warpimpact.analysis.summary import (
-    estimated,
-    means_of,
-    numerics_note,
-    numerics_sentence,
-    promise_text,
-    sampling_note,
-    slices,
-    status_shares,
-)
+from warpimpact.analysis.solid_plate import solid_note
+from warpimpact.analysis.summary import numerics_note, numerics_sentence, promise_text, sampling_note
 from warpimpact.analysis.survival import draws_note
 from warpimpact.campaign.text import parsed
 from warpimpact.plotting.cell import range_text, words
@@ -175,7 +167,7 @@ def _through(dataset: xarray.Dataset) -> Table:
     for measure, estimate in estimated(dataset, means).items():
         if estimate.count:
             interval = intervals_text(ends_of(estimate.times(measure.display.factor)), "{:.2f}".format)
-            name = f"mean {words(measure.variable)}{measure.place}"
+            name = f"mean {measure.column.label}"
             rows.append((name, measure.display.text(estimate.value, ".2f"), interval))
     return Table((Column(), Column("value", right=True), Column("95 % interval")), rows)
 

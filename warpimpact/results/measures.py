@@ -1,47 +1,78 @@
-"""Measures: numbers of a Dataset that a user can ask for (means, quantiles, probabilities), and their tallies."""
+"""Measures: the one language in which a number of a result is asked for.
+
+    mean(q)   worst_tenth(q)   worst_point(q)   quantile(q, 0.05)   P(q > 30 deg)   P(event)   areal_density
+
+q is a quantity of vocabulary.py, with its stand-off behind @ where it has one, as in `mean(tilt@130mm)`; without it the
+largest stand-off counts. A limit thickness is that of `@layer 1` where a search for designs asks for it.
+"""
 
 from __future__ import annotations
 
 import math
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any, Self, Unpack
+from difflib import get_close_matches
+from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
-from numpy.typing import NDArray
 
 from warpimpact.kernels.status import OF_SHOTS
 from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
-from warpimpact.results.dataset import failed, images, is_choice, passed, shots_at_a_plate
+from warpimpact.results.per_hit import Array, PerHit, place_of_standoff
+from warpimpact.results.vocabulary import EVENTS, LIMIT_THICKNESS, LIMIT_VELOCITY, OTHER_LAYERS, QUANTITIES
+from warpimpact.scene import units
 from warpimpact.scene.display import STORED, Unit
-from warpimpact.scene.units import Angle, Energy, Length, Moment, Number, Speed, Stress, Time, quantity, quoted
-from warpimpact.statistics.intervals import Dealing, Dealt, Estimate, Estimating
-from warpimpact.statistics.shifts import shift_of_mean, shift_of_quantile, shift_of_share, shift_of_yes
+from warpimpact.scene.units import quantity, quoted
+from warpimpact.statistics.tails import worst_tenth
 
 if TYPE_CHECKING:
     from warpimpact.results.table import Result
 
-Array = NDArray[np.float64]
-
 _KINDS: dict[str, Any] = {
-    quantity(kind).display.stored: kind for kind in (Speed, Angle, Energy, Time, Moment, Stress, Length, Number)
+    quantity(kind).display.stored: kind
+    for kind in (
+        *(units.Speed, units.Angle, units.Energy, units.EnergyDensity, units.Time, units.Moment, units.Stress),
+        *(units.Length, units.ArealDensity, units.Number),
+    )
 }
 """Types of the quantities that have these units in the Dataset."""
-_VARIABLES = {str(one): one for one in v.HIT_NUMBERS if one not in (*v.SHOT_VARIABLES, v.EDGE_DISTANCE)}
-MEASURED = tuple(_VARIABLES)
-_SIGNED = {v.PITCH, v.YAW, v.BROKEN_X}
-"""Those that may be negative."""
-STATUSES = {status.name.lower(): status for status in OF_SHOTS if not status.failed}
 
-_VARIABLE = r"(?P<variable>[a-z_]+)(?:\s*@\s*(?P<standoff>[^<>,]+?))?"
-_FORMS = {
-    "mean": re.compile(rf"mean\(\s*{_VARIABLE}\s*\)"),
-    "quantile": re.compile(rf"quantile\(\s*{_VARIABLE}\s*,\s*(?P<share>[\d.eE+-]+)\s*\)"),
-    "probability": re.compile(rf"P\(\s*{_VARIABLE}\s*(?P<relation>[<>])\s*(?P<limit>.+?)\s*\)"),
-    "share": re.compile(r"P\(\s*(?P<variable>[a-z_]+)\s*\)"),
+STATUSES = {status.name.lower(): status for status in OF_SHOTS if not status.failed}
+AREAL_DENSITY = "areal_density"
+_AREAL_DENSITY = PerHit(
+    name=AREAL_DENSITY,
+    label="areal density",
+    units="kg m-2",
+    definition="Mass per area of the whole target.",
+    source="mass of what is solid over the area of the cell",
+    higher_is_better=False,
+    values=lambda part, _: np.full(part.sizes["hit"], part.attrs.get(attr.AREAL_DENSITY, np.nan)),
+)
+NAMES = {"V50": "quantile(limit_velocity, 0.5)", "V05": "quantile(limit_velocity, 0.05)"}
+"""Measures that have a name of their own."""
+
+_FORM = re.compile(
+    r"(?P<statistic>\w+)\(\s*(?P<name>\w+)\s*(?:@\s*(?P<place>[^<>,]+?)\s*)?"
+    r"(?:,\s*(?P<share>[^<>]+?)\s*|(?P<relation>[<>])\s*(?P<limit>.+?)\s*)?\)"
+)
+_LAYER = re.compile(r"layer\s*(\d+)")
+_STATISTICS = {
+    "mean": (", mean", " Mean over the hits.", ""),
+    "worst_tenth": (
+        ", worst tenth",
+        " Mean over the worst tenth of the hits.",
+        "; R. T. Rockafellar, S. Uryasev, Journal of Risk 2 (2000) 21",
+    ),
+    "worst_point": (", worst point", " The worst of the hits, an observed extreme.", ""),
+    "quantile": (", {share:g} % quantile", " The value below which this share of the hits lies.", ""),
+    "probability": ("", " The share of the hits beyond the limit.", ""),
+    "share": ("", "", ""),
+    "target": ("", "", ""),
+    "by_hit": ("", "", ""),
 }
+"""Kinds of measures, with what each adds to label, definition and source of a quantity."""
 
 
 @dataclass(frozen=True)
@@ -49,74 +80,139 @@ class Measure:
     """One number of a result.
 
     Attributes:
-        text: as the user wrote it.
-        kind: "mean", "quantile", "probability" (of a variable beyond a limit) or "share" (of a status, or of broken
-            cores).
-        variable: of the Dataset, or the status of a share.
-        standoff: distance behind the rear face [m], if the variable depends on it.
+        text: the measure in the language of this file.
+        kind: "mean", "worst_tenth", "worst_point", "quantile", "probability" (of a quantity beyond a limit), "share"
+            (of the shots to which an event happens) or "target" (of a number of the target itself).
+        name: of the quantity or the event.
+        standoff: distance behind the rear face [m]; None where the largest counts, or there is none.
+        layer: whose limit thickness it is; None where that is the layer whose limits were sought.
         share: share of the values below a quantile.
         above, limit: side and limit of a probability, in the units of the Dataset.
-
-    A share, and what is asked of limits, counts all shots except those whose computation failed. The other kinds count
-    the cores that passed the plate.
     """
 
     text: str
     kind: str
-    variable: str
+    name: str
     standoff: float | None = None
+    layer: int | None = None
     share: float = 0.5
     above: bool = True
     limit: float = 0.0
 
     @classmethod
     def parse(cls, text: str) -> Self:
-        """Read ``mean(v)``, ``quantile(v, 0.05)``, ``P(v > limit)`` or ``P(status)``; v may be ``tilt@130mm``.
+        """Read a measure.
 
         Raises:
-            ValueError: says what is allowed.
+            ValueError: says what was found, what is allowed and, where it is clear, what was meant.
         """
-        for kind, form in _FORMS.items():
-            if (match := form.fullmatch(text.strip())) is not None:
-                return cls._from(text, kind, match.groupdict())
-        raise ValueError(
-            f"got {quoted(text)}, but it must be of the form mean(residual_velocity), "
-            "quantile(residual_velocity, 0.05), P(tilt@130mm > 30 deg) or P(perforated)"
-        )
-
-    @classmethod
-    def _from(cls, text: str, kind: str, parts: dict[str, str]) -> Self:
-        name, allowed = parts["variable"], (*STATUSES, str(v.BROKEN)) if kind == "share" else MEASURED
-        if name not in allowed:
-            raise ValueError(f'got "{name}", but it must be one of {", ".join(allowed)}')
-        if kind == "share":
-            return cls(text, kind, name)
-        variable = _VARIABLES[name]
-        has_standoff = "standoff" in variable.dims
-        if has_standoff != (parts["standoff"] is not None):
+        text = text.strip()
+        if text == AREAL_DENSITY:
+            return cls(text, "target", text)
+        match = _FORM.fullmatch(NAMES.get(text, text))
+        statistic = match["statistic"] if match else None
+        if match is None or statistic not in ("mean", "worst_tenth", "worst_point", "quantile", "P"):
             raise ValueError(
-                f'got "{name}", which {"needs a" if has_standoff else "has no"} stand-off, as in tilt@130mm'
+                f"got {quoted(text)}, but it must be of the form mean(residual_velocity), worst_tenth(base_depth), "
+                "worst_point(base_depth), quantile(residual_velocity, 0.05), P(tilt@130mm > 30 deg) or P(perforated), "
+                f"or be one of {AREAL_DENSITY}, {', '.join(NAMES)}{_meant(text)}"
             )
-        standoff = quantity(Length)(parts["standoff"]) if has_standoff else None
+        parts = match.groupdict()
+        if statistic == "P" and parts["relation"] is None:
+            name = _known(parts["name"], EVENTS)
+            if parts["place"] or parts["share"]:
+                raise ValueError(f"got {quoted(text)}, but the event {name} has neither a place nor a share")
+            return cls(text, "share", name)
+        name = _known(parts["name"], QUANTITIES)
+        kind = "probability" if statistic == "P" else str(statistic)
+        if (kind == "probability") != (parts["limit"] is not None) or (kind == "quantile") != (
+            parts["share"] is not None
+        ):
+            needed = {
+                "probability": "a limit, as in P(tilt@130mm > 30 deg)",
+                "quantile": "a share, as in quantile(…, 0.05)",
+            }
+            raise ValueError(f"got {quoted(text)}, but {statistic}(…) takes {needed.get(kind, 'a quantity alone')}")
+        measure = cls(text, kind, name, **_place(parts["place"], QUANTITIES[name]))
+        if kind.startswith("worst") and measure.higher_is_better is None:
+            raise ValueError(
+                f"got {quoted(text)}, but neither a high nor a low {name} is worse; quantile({name}, 0.95) has an end"
+            )
         if kind == "quantile":
-            share = quantity(Number)(parts["share"])
+            share = quantity(units.Number)(parts["share"])
             if not 0.0 < share < 1.0:
                 raise ValueError(f"got the quantile {share:g}, but it must lie between 0 and 1")
-            return cls(text, kind, name, standoff, share=share)
+            return replace(measure, share=share)
         if kind == "probability":
-            limit = _shown(variable.units, quantity(_KINDS[variable.units])(parts["limit"]))
-            return cls(text, kind, name, standoff, above=parts["relation"] == ">", limit=limit)
-        return cls(text, kind, name, standoff)
+            limit = _stored(quantity(_KINDS[measure.quantity.units])(parts["limit"]), measure.quantity.units)
+            return replace(measure, above=parts["relation"] == ">", limit=limit)
+        return measure
+
+    @property
+    def quantity(self) -> PerHit:
+        """The quantity or the event."""
+        if self.name == AREAL_DENSITY:
+            return _AREAL_DENSITY
+        return (EVENTS if self.kind == "share" else QUANTITIES)[self.name]
 
     @property
     def place(self) -> str:
-        """Where it is measured, such as " at 130 mm"; empty where it has no stand-off."""
-        return f" at {self.standoff * 1e3:g} mm" if self.standoff else ""
+        """Where it is measured, such as " at 130 mm"; empty where that is not given."""
+        if not self.quantity.has_standoff:
+            return ""
+        return " at the last stand-off" if self.standoff is None else f" at {self.standoff * 1e3:g} mm"
+
+    @property
+    def label(self) -> str:
+        """The measure for people, without its unit."""
+        layer = "the layer" if self.layer is None else f"layer {self.layer}" if self.layer else "the plate"
+        label = self.quantity.label.format(layer=layer) + self.place
+        if self.kind == "share":
+            return f"P({label})"
+        if self.kind == "probability":
+            unit = STORED[self.quantity.units]
+            either = self.quantity.or_else if self.above else ""
+            return f"P({label} {'>' if self.above else '<'} {unit.text(self.limit)}{either})"
+        return label + _STATISTICS[self.kind][0].format(share=100.0 * self.share)
+
+    @property
+    def title(self) -> str:
+        """The label with the unit."""
+        return f"{self.label} [{self.display.shown}]" if self.display.shown else self.label
+
+    @property
+    def axis(self) -> str:
+        """What an axis says: the quantity with its unit, or the probability."""
+        return self.column.title
+
+    @property
+    def definition(self) -> str:
+        return self.quantity.definition + _STATISTICS[self.kind][1]
+
+    @property
+    def source(self) -> str:
+        return self.quantity.source + _STATISTICS[self.kind][2]
+
+    @property
+    def higher_is_better(self) -> bool | None:
+        """For whoever is behind the target; None where neither is."""
+        better = self.quantity.higher_is_better
+        return not better if self.kind == "probability" and not self.above and better is not None else better
+
+    @property
+    def better(self) -> str:
+        """What is better, as text."""
+        return {True: "higher is better", False: "lower is better", None: "neither is better"}[self.higher_is_better]
 
     @property
     def least(self) -> float:
         """What no value is below."""
-        return -math.inf if self.variable in _SIGNED else 0.0
+        return 0.0 if self.is_binary else self.quantity.least
+
+    @property
+    def most(self) -> float:
+        """What no value is above."""
+        return 1.0 if self.is_binary else self.quantity.most
 
     @property
     def is_binary(self) -> bool:
@@ -124,14 +220,34 @@ class Measure:
         return self.kind in ("probability", "share")
 
     @property
+    def has_interval(self) -> bool:
+        """Whether hits give it an interval."""
+        return self.kind not in ("worst_point", "target")
+
+    @property
+    def is_limit(self) -> bool:
+        """Whether a search of limits tells it."""
+        return self.quantity.need in (LIMIT_VELOCITY, LIMIT_THICKNESS, OTHER_LAYERS)
+
+    @property
+    def column(self) -> Measure:
+        """The numbers of the shots that it is made of, as a measure: the same for all statistics of a quantity."""
+        return self if self.is_binary else replace(self, text=self.name, kind="by_hit", share=0.5)
+
+    @property
     def units(self) -> str:
         """Those of the Dataset; "1" for a probability."""
-        return "1" if self.is_binary else _VARIABLES[self.variable].units
+        return "1" if self.is_binary else self.quantity.units
 
     @property
     def display(self) -> Unit:
         """How its values are shown."""
         return STORED[self.units]
+
+    @property
+    def worse(self) -> float:
+        """Factor that makes larger values worse ones."""
+        return -1.0 if self.quantity.higher_is_better else 1.0
 
     def in_units(self, value: object) -> float:
         """SI value of a difference of this measure that a user wrote."""
@@ -139,99 +255,94 @@ class Measure:
 
     def shown(self, value: float) -> float:
         """An SI value in the units of the Dataset."""
-        return _shown(self.units, value)
+        return _stored(value, self.units)
 
-    def values(self, dataset: Result) -> Array:
-        """The number of every shot, shape [hits]; NaN for a shot that does not count.
+    def of(self, dataset: Result) -> Self:
+        """The measure with its place in a result: the largest stand-off unless it is given.
+
+        Raises:
+            ValueError: the result lacks what the measure needs.
+        """
+        if lacking := self.quantity.lacking(dataset):
+            raise ValueError(f"got {quoted(self.text)}, which needs {lacking}, but the result has none")
+        layer = int(dataset.attrs.get(attr.LIMIT_LAYER, 0))
+        if self.layer not in (None, layer):
+            raise ValueError(f"got {quoted(self.text)}, but limits of layer {layer} were sought")
+        if self.quantity.has_standoff and self.standoff is None:
+            last = float(dataset[v.STANDOFF].values[-1])
+            text = re.sub(rf"\b{self.name}\b", f"{self.name}@{last * 1e3:.12g}mm", self.text, count=1)
+            return replace(self, text=text, standoff=last)
+        if self.standoff is not None:
+            place_of_standoff(dataset[v.STANDOFF].values, self.standoff)
+        if self.quantity.has_layer and self.layer is None:
+            return replace(self, layer=layer)
+        return self
+
+    def by_hit(self, dataset: Result) -> Array:
+        """The quantity or event of every shot, shape [hits]; NaN for a shot that does not count.
 
         Raises:
             ValueError: the result does not have the stand-off.
         """
-        if self.kind == "share" and self.variable == v.BROKEN:
-            return np.asarray(dataset[v.BROKEN].values, dtype=np.float64)  # NaN of a failed shot
-        if self.kind == "share":
-            return np.where(failed(dataset), np.nan, dataset[v.STATUS].values == STATUSES[self.variable])
-        column = np.asarray(dataset[self.variable].values)
-        if self.standoff is not None:
-            column = column[:, place_of_standoff(dataset[v.STANDOFF].values, self.standoff)]
-        counts = ~failed(dataset) if self.variable in v.LIMIT_VARIABLES else passed(dataset)
-        values = np.where(counts, column.astype(np.float64), np.nan)
-        if self.kind == "mean":
-            return np.where(np.isinf(values), np.nan, values)  # a limit beyond the largest value tried
-        if self.kind != "probability":
+        standoff = self.standoff
+        if standoff is None:
+            standoff = float(dataset[v.STANDOFF].values[-1]) if self.quantity.has_standoff else math.nan
+        return self.quantity.values(dataset, standoff)
+
+    def values(self, dataset: Result) -> Array:
+        """What the measure counts of every shot, shape [hits]."""
+        return self.counted(self.by_hit(dataset))
+
+    def counted(self, by_hit: Array) -> Array:
+        """What the measure counts of the quantity of every shot: 1 or 0 of a probability, no infinite number of a
+        mean."""
+        if self.kind == "probability":
+            return np.where(np.isnan(by_hit), np.nan, self.margin(by_hit) > 0.0)
+        return np.where(np.isinf(by_hit), np.nan, by_hit) if self.kind == "mean" else by_hit
+
+    def margin(self, by_hit: Array) -> Array:
+        """How far the quantity of every shot is on the side of the limit that counts."""
+        return by_hit - self.limit if self.above else self.limit - by_hit
+
+    def averaged(self, values: Array) -> Array:
+        """Numbers of the shots whose mean is the measure, of their values; not of a quantile or a worst point."""
+        if self.kind != "worst_tenth":
             return values
-        return np.where(np.isnan(values), np.nan, self._beyond(values) > 0.0)
-
-    def _beyond(self, values: Array) -> Array:
-        """How far values are on the side of the limit that counts."""
-        return values - self.limit if self.above else self.limit - values
-
-    def numbers(self, dataset: Result) -> Array:
-        """As `values`; of a probability how far each shot is on the side that counts."""
-        if self.kind != "probability":
-            return self.values(dataset)
-        return self._beyond(replace(self, kind="quantile").values(dataset))
+        numbers = self.worse * worst_tenth(self.worse * values)
+        return np.where(np.isinf(numbers), np.nan, numbers)
 
 
-def place_of_standoff(distances: Sequence[float] | Array, standoff: float) -> int:
-    """Place of a stand-off [m] among those that there are.
-
-    Raises:
-        ValueError: it is none of them.
-    """
-    found = np.flatnonzero(np.isclose(distances, standoff, rtol=1e-9, atol=0.0))
-    if not len(found):
-        known = ", ".join(f"{distance * 1e3:g} mm" for distance in distances) or "not given"
-        raise ValueError(f"got {standoff * 1e3:g} mm, but the stand-offs are {known}")
-    return int(found[0])
-
-
-def _shown(units: str, value: float) -> float:
+def _stored(value: float, units: str) -> float:
     return math.degrees(value) if units == "degree" else value
 
 
-class Tally:
-    """Gathers a measure over shots, in the order of their numbers.
-
-    Means and probabilities keep a few numbers in all; a quantile keeps one number per shot.
-
-    Args:
-        dealt: `replicates`, `images` and `confidence` as in `Dealt`.
-    """
-
-    def __init__(self, measure: Measure, **dealt: Unpack[Estimating]) -> None:
-        kind = "share" if measure.is_binary else measure.kind
-        self.measure, self._dealt = measure, Dealt(kind, share=measure.share, **dealt)
-
-    def add(self, dataset: Result) -> None:
-        """Add the next shots."""
-        self._dealt.add(self.measure.values(dataset))
-
-    def estimate(self) -> Estimate:
-        """The estimate from the shots so far."""
-        return self._dealt.estimate().within(self.measure.least)
+def _known(name: str, allowed: Mapping[str, PerHit]) -> str:
+    if name in allowed:
+        return name
+    other = EVENTS if allowed is QUANTITIES else QUANTITIES
+    if name in other:
+        form = f"P({name})" if other is EVENTS else f"mean({name}) or P({name} > …)"
+        raise ValueError(f'got "{name}", which takes the form {form}')
+    known = ", ".join(allowed)
+    raise ValueError(f'got "{name}", but it must be one of {known}{_meant(name)}')
 
 
-def shift_of(measure: Measure, levels: tuple[Result, Result] | None, confidence: float = 0.95) -> float | None:
-    """How far the numerics may shift a measure, by hits of a result at two levels (`finer_pair`); None without them."""
-    if levels is None:
-        return None
-    dealt: Estimating = {**dealing(levels[0]), "replicates": 1, "confidence": confidence}
-    coarse, fine = (measure.numbers(level) for level in levels)
-    match measure.kind:
-        case "quantile":
-            return shift_of_quantile(coarse, fine, measure.share, **dealt)
-        case "probability":
-            return shift_of_share(coarse, fine, **dealt)
-        case "share":
-            return shift_of_yes(coarse, fine, **dealt)
-    return shift_of_mean(coarse, fine, **dealt)
+def _meant(text: str) -> str:
+    """What was probably meant, as the end of a sentence; empty where nothing is close."""
+    match = get_close_matches(text, (*NAMES, AREAL_DENSITY, *QUANTITIES, *EVENTS), n=1, cutoff=0.75)
+    if not match:
+        return ""
+    form = f"P({match[0]})" if match[0] in EVENTS else f"mean({match[0]})" if match[0] in QUANTITIES else match[0]
+    return f"; did you mean {form}?"
 
 
-def dealing(dataset: Result) -> Dealing:
-    """Arguments of `Dealt` that fit the sampling of a result. The shots at one plate count as one, like images. Chosen
-    hits are no longer dealt out in turn."""
-    if is_choice(dataset):
-        return {"replicates": 1, "images": 1}
-    together = images(dataset) * shots_at_a_plate(dataset)
-    return {"replicates": int(dataset.attrs.get(attr.REPLICATES, 1)), "images": together}
+def _place(text: str | None, asked: PerHit) -> dict[str, Any]:
+    """Stand-off or layer behind an @."""
+    if text is None:
+        return {}
+    layer = _LAYER.fullmatch(text)
+    if layer and asked.has_layer:
+        return {"layer": int(layer[1])}
+    if not asked.has_standoff:
+        raise ValueError(f'got "{asked.name}@{text}", but {asked.name} has no stand-off')
+    return {"standoff": quantity(units.Length)(text)}

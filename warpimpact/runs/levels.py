@@ -8,8 +8,9 @@ from warpimpact.campaign.campaign import Campaign
 from warpimpact.records.outcomes import Outcomes
 from warpimpact.results import attributes as attr
 from warpimpact.results.dataset import to_table
-from warpimpact.results.measures import Measure, shift_of
+from warpimpact.results.measures import Measure
 from warpimpact.results.table import Table
+from warpimpact.results.tallies import shift_of
 from warpimpact.scene import Shots
 from warpimpact.solver.findings import HitErrors
 from warpimpact.solver.pilot import Excess

@@ -18,9 +18,10 @@ from warpimpact.results import variables as v
 from warpimpact.results.dataset import failed, finer_pair, images, numbered
 from warpimpact.results.files import OutputError
 from warpimpact.results.interrupts import stop_if_asked
-from warpimpact.results.measures import Measure, Tally, shift_of
+from warpimpact.results.measures import Measure
 from warpimpact.results.outlines import in_memory
 from warpimpact.results.table import Table, joined
+from warpimpact.results.tallies import Tally, shift_of
 from warpimpact.runs.compute import numerics_of
 from warpimpact.runs.foreseen import Cost
 from warpimpact.runs.levels import OF_THE_NUMERICS
@@ -304,7 +305,11 @@ class _Watch:
     def progress(self, underway: int) -> RunProgress:
         """How far the run is, with shots of unfinished shards."""
         tallies = [*self._tallies, self._stop] if self._rule is not None else self._tallies
-        estimates = {tally.measure: tally.estimate() for tally in tallies if tally.measure.kind != "quantile"}
+        estimates = {
+            tally.measure: tally.estimate()
+            for tally in tallies
+            if tally.measure.kind not in ("quantile", "worst_tenth")
+        }
         done = self.done if self.done == self._total else min(self.done + underway, self._total - 1)
         return RunProgress(done, self._total, self.done, self.resumed, self.failed, estimates, found=self.found)
 

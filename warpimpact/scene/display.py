@@ -38,6 +38,7 @@ UNITS = {
     "kg m^2": Unit("kg m2", "kg m²"),
     "kg/m^3": Unit("kg m-3", "kg/m³"),
     "kg/m^2": Unit("kg m-2", "kg/m²"),
+    "J/m^2": Unit("J m-2", "J/mm²", 1e-6),
     "m/s": Unit("m s-1", "m/s"),
     "rad": Unit("degree", "°"),
     "rad/s": Unit("rad s-1", "rad/s"),

@@ -326,6 +326,7 @@ Tilt = Annotated[
 ]
 AngularVelocity = Annotated[Read, _quantity("an angular velocity", "rad/s", "17000 rad/s")]
 Energy = Annotated[Read, _quantity("an energy", "J", "10 J")]
+EnergyDensity = Annotated[Read, _quantity("an energy per area", "J/m^2", "5 J/mm^2")]
 Inertia = Annotated[Read, _quantity("a moment of inertia", "kg m^2", "1.5e-8 kg m^2")]
 
 PositiveLength = Annotated[Length, Field(gt=0)]

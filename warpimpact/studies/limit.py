@@ -19,8 +19,8 @@ from warpimpact.campaign.text import CampaignError
 from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
 from warpimpact.results.dataset import failed, finer_pair
-from warpimpact.results.measures import dealing
 from warpimpact.results.table import Table
+from warpimpact.results.tallies import dealing
 from warpimpact.runs.compute import at_solid, finer_hits, found_in, numerics_of, of_images, pilot_shots
 from warpimpact.runs.describe import computed_by, described, found_attributes
 from warpimpact.runs.shards import extent

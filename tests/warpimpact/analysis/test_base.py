@@ -10,7 +10,7 @@ import xarray
 
 from warpimpact.analysis.comparison import compare
 from warpimpact.analysis.comparison_text import best_rows, comparison_text
-from warpimpact.analysis.effectiveness import EffectMeasure, effectiveness, effectiveness_text
+from warpimpact.analysis.effectiveness import Score, effectiveness, effectiveness_text
 from warpimpact.analysis.proxy import proxy
 from warpimpact.analysis.summary import summary, summary_text
 from warpimpact.campaign.campaign import Campaign
@@ -45,7 +45,7 @@ def layered(
     )
 
 
-def named(dataset: xarray.Dataset) -> dict[str, EffectMeasure]:
+def named(dataset: xarray.Dataset) -> dict[str, Score]:
     return {measure.name: measure for measure in effectiveness(dataset)}
 
 
@@ -69,10 +69,13 @@ def mixed(make_plate_result) -> xarray.Dataset:
 
 def test_what_counts_in_the_base(mixed) -> None:
     measures = named(mixed)
-    assert measures["base_perforated_share"].value == pytest.approx(1 / 5)
-    assert measures["base_pierced_share"].value == pytest.approx(2 / 5)
-    assert measures["base_depth"].value == pytest.approx((10 + 6 + 10 + 0 + 0) / 5)
-    assert (measures["base_depth_worst_point"].value, measures["base_depth"].units) == (pytest.approx(10.0), "mm")
+    assert measures["P(base_perforated)"].value == pytest.approx(1 / 5)
+    assert measures["P(base_pierced)"].value == pytest.approx(2 / 5)
+    assert measures["mean(base_depth)"].value == pytest.approx((10 + 6 + 10 + 0 + 0) / 5)
+    assert (measures["worst_point(base_depth)"].value, measures["mean(base_depth)"].measure.display.shown) == (
+        pytest.approx(10.0),
+        "mm",
+    )
     text = effectiveness_text(mixed)
     assert text.index("P(base perforated)") < text.index("residual energy fraction")
     assert "40.0% of the cores pierce the base" in text
@@ -83,7 +86,7 @@ def test_what_counts_in_the_base(mixed) -> None:
 def test_a_base_that_holds_needs_no_note_and_a_single_plate_has_no_base(mixed, make_plate_result) -> None:
     held = mixed.isel(hit=[1, 3, 4])
     assert "of the cores pierce" not in effectiveness_text(held)
-    assert named(held)["base_depth"].value == pytest.approx(2.0)
+    assert named(held)["mean(base_depth)"].value == pytest.approx(2.0)
     alone = make_plate_result(np.full(3, 500.0))
     assert not [name for name in named(alone) if name.startswith("base")]
     alone["status"].attrs, alone["deflection"] = STATUS.attributes, alone["residual_velocity"]
@@ -93,14 +96,14 @@ def test_a_base_that_holds_needs_no_note_and_a_single_plate_has_no_base(mixed, m
 def test_the_thickness_of_the_base_is_that_of_the_shot(mixed) -> None:
     own = np.stack([np.full(6, 4e-3), [8e-3, 9e-3, 12e-3, 5e-3, 5e-3, 5e-3]], axis=1)
     scattered = mixed.assign(layer_thickness=(("hit", "layer"), own))
-    assert named(scattered)["base_depth"].value == pytest.approx((8 + 6 + 12 + 0 + 0) / 5)
+    assert named(scattered)["mean(base_depth)"].value == pytest.approx((8 + 6 + 12 + 0 + 0) / 5)
 
 
 def test_worst_tenth_and_intervals(make_plate_result) -> None:
     depth = np.linspace(1e-3, 9e-3, 1000)
     result = make_plate_result(np.zeros(1000), 0.0, Status.ARRESTED)
     measures = named(layered(result, np.ones(1000, dtype=int), depth))
-    mean, worst = measures["base_depth"], measures["base_depth_worst_tenth"]
+    mean, worst = measures["mean(base_depth)"], measures["worst_tenth(base_depth)"]
     assert (mean.value, worst.value) == (pytest.approx(5.0), pytest.approx(8.6, abs=0.01))
     assert mean.low < mean.value < mean.high
     assert worst.low < worst.value < worst.high
@@ -114,9 +117,9 @@ def test_the_solid_plate_of_the_whole_target_is_perforated_or_not(make_plate_res
         solid_residual_velocity=("solid_hit", [300.0]),
         solid_tilt=(("solid_hit", "standoff"), np.zeros((1, 2))),
     )
-    measure = named(solid)["base_perforated_share"]
+    measure = named(solid)["P(base_perforated)"]
     assert (measure.value, measure.solid, measure.ratio) == (pytest.approx(0.25), 1.0, pytest.approx(0.25))
-    assert math.isnan(named(solid)["base_depth"].solid)
+    assert math.isnan(named(solid)["mean(base_depth)"].solid)
 
 
 def test_targets_are_ranked_by_the_depth_in_bases_that_hold(make_plate_result) -> None:
@@ -126,7 +129,7 @@ def test_targets_are_ranked_by_the_depth_in_bases_that_hold(make_plate_result) -
     good, bad = layered(result, held, depth), layered(result, held, depth + 1e-3)
     comparison = compare([bad, good], ["bad", "good"])
     assert dict(best_rows(comparison))["depth in the base, mean"] == "good"
-    assert comparison.ranks("base_depth") == {"bad": 2, "good": 1}
+    assert comparison.ranks("mean(base_depth)") == {"bad": 2, "good": 1}
     # A thinner base that is pierced would win by its bound alone.
     thin = layered(result, held, depth + 1e-3, base=3e-3)
     comparison = compare([thin, good], ["thin", "good"])
@@ -140,10 +143,10 @@ def test_a_base_that_stands_elsewhere_is_as_thick(make_plate_result) -> None:
     """Its thickness is the distance of its faces, which rounding changes with their place."""
     near = layered(make_plate_result(np.full(64, 500.0)), np.full(64, -1), np.zeros(64), base=0.012)
     far = near.assign(layer_front=near["layer_front"] + 0.2, layer_rear=near["layer_rear"] + 0.2)
-    assert 0.0 < abs(named(near)["base_depth"].value - named(far)["base_depth"].value) < 1e-12
+    assert 0.0 < abs(named(near)["mean(base_depth)"].value - named(far)["mean(base_depth)"].value) < 1e-12
     comparison = compare([near, far], ["near", "far"])
     assert not any(pair.told_apart for pair in comparison.differences)
-    assert comparison.ranks("base_depth") == {"near": 1, "far": 1}
+    assert comparison.ranks("mean(base_depth)") == {"near": 1, "far": 1}
 
 
 def test_a_plate_without_layers_is_compared_in_what_both_have(make_plate_result, mixed) -> None:
@@ -170,8 +173,8 @@ def test_targets_are_ranked_by_the_weight_that_they_need(make_plate_result) -> N
     front, base = limits(result, thickness - 1e-3, 20.0), limits(result, thickness, 0.0)
     measures = named(front)
     expected = np.minimum(thickness - 1e-3, 20e-3)
-    assert measures["limit_thickness"].value == pytest.approx(1e3 * expected.mean())
-    assert measures["limit_areal_density"].value == pytest.approx(20.0 + 8000.0 * expected.mean())
+    assert measures["mean(limit_thickness)"].value == pytest.approx(1e3 * expected.mean())
+    assert measures["mean(limit_areal_density)"].value == pytest.approx(20.0 + 8000.0 * expected.mean())
     assert "solid plate" not in effectiveness_text(front)
     comparison = compare([front, base.assign_attrs(areal_density=99.0)], ["with a plate", "base alone"])
     assert dict(best_rows(comparison))["limit thickness of layer 1, mean"] == "with a plate"
@@ -236,10 +239,10 @@ def test_the_figure_of_limits_stands_over_the_weight_that_the_target_needs(make_
         for elsewhere in (20.0, 0.0)
     )
     measures = named(one)
-    assert measures["limit_areal_density"].solid == pytest.approx(7850.0 * 9e-3)
+    assert measures["mean(limit_areal_density)"].solid == pytest.approx(7850.0 * 9e-3)
     (axes,) = weight_figure(compare([one, other], ["one", "other"])).axes
     points = np.array([line.get_xydata()[0] for line in axes.lines if len(line.get_xdata()) == 1])
-    expected = measures["limit_areal_density"].value, measures["limit_thickness"].value
+    expected = measures["mean(limit_areal_density)"].value, measures["mean(limit_thickness)"].value
     assert np.isclose(points, expected).all(axis=1).any()
     assert any(np.allclose(line.get_xdata(), 7850.0 * 9e-3) for line in axes.lines)
 

@@ -1,16 +1,16 @@
 """Effectiveness against values computed by hand, and intervals that contain the answer as often as they claim."""
 
 import math
+import re
 
 import numpy as np
 import pytest
 import xarray
 
-from warpimpact.analysis.effectiveness import EffectMeasure, effectiveness, effectiveness_text
+from warpimpact.analysis.effectiveness import Score, effectiveness, effectiveness_text
 from warpimpact.analysis.inspect import inspect_text
 from warpimpact.kernels.status import Status
 from warpimpact.results.files import ResultError
-from warpimpact.scene import Radians
 
 TRIALS = 100
 LEAST = 88  # 95 % of 100 trials: 95 ± 2.2, three standard deviations below
@@ -26,8 +26,8 @@ def with_solid(dataset: xarray.Dataset, velocity: np.ndarray) -> xarray.Dataset:
     )
 
 
-def named(dataset: xarray.Dataset, **options: float) -> dict[str, EffectMeasure]:
-    return {measure.name: measure for measure in effectiveness(dataset, **options)}
+def named(dataset: xarray.Dataset, *texts: str) -> dict[str, Score]:
+    return {score.name: score for score in effectiveness(dataset, texts)}
 
 
 @pytest.fixture
@@ -40,22 +40,33 @@ def mixed(make_plate_result) -> xarray.Dataset:
 
 def test_what_counts_where(mixed) -> None:
     measures = named(mixed)
-    assert measures["residual_energy_fraction"].value == pytest.approx((0.64 + 1.0 + 0.0 + 0.0 + 0.36) / 5)
-    assert measures["residual_energy_fraction_worst_point"].value == pytest.approx(1.0)
-    assert measures["residual_energy_fraction_worst_point"].hit == 1
-    assert measures["stopped_share"].value == pytest.approx(2 / 5)
-    assert measures["tilted_share"].value == pytest.approx(3 / 5)  # broadside and stopped; not 20°, nor base first
-    assert named(mixed, angle=5.0)["tilted_share"].value == pytest.approx(5 / 5)
-    assert named(mixed, angle="5 deg") == named(mixed, angle=Radians(math.radians(5.0))) == named(mixed, angle=5.0)
-    with pytest.raises(ResultError, match="angle: got 95, but it must be at least 0 and less than 90 deg"):
-        named(mixed, angle=95)
-    assert named(mixed, standoff="50 mm") == named(mixed, standoff=0.05)
-    assert named(mixed, standoff=0.05)["tilted_share"].value == pytest.approx(2 / 5)
+    assert measures["mean(residual_energy_fraction)"].value == pytest.approx((0.64 + 1.0 + 0.0 + 0.0 + 0.36) / 5)
+    assert measures["worst_point(residual_energy_fraction)"].value == pytest.approx(1.0)
+    assert measures["worst_point(residual_energy_fraction)"].hit == 1
+    assert measures["P(stopped)"].value == pytest.approx(2 / 5)
+    tilted = "P(inclination@130mm > {})"
+    assert measures[tilted.format("30 deg")].value == pytest.approx(3 / 5)  # broadside and stopped, not base first
+    more = named(
+        mixed, tilted.format("5 deg"), tilted.format("0.09 rad"), "P(inclination@50mm > 30 deg)", "areal_density"
+    )
+    assert [score.value for score in more.values()] == pytest.approx([5 / 5, 5 / 5, 2 / 5, 23.55])
+
+
+def test_a_quantile_has_an_interval_and_a_quantity_without_a_better_side_has_a_mean(make_plate_result) -> None:
+    result = make_plate_result(np.linspace(500.0, 900.0, 401), np.linspace(0.0, 80.0, 401))
+    median, tilt, deep = effectiveness(
+        result, ["quantile(residual_velocity, 0.5)", "mean(tilt)", "P(residual_energy_density > 10 J/mm^2)"]
+    )
+    assert median.low < median.value < median.high
+    assert median.value == pytest.approx(700.0)
+    assert (tilt.name, tilt.value) == ("mean(tilt@130mm)", pytest.approx(40.0))
+    assert tilt.measure.better == "neither is better"
+    assert 0.0 < deep.value < 1.0
 
 
 def test_energy_per_area_is_that_of_a_cylinder_and_symmetric_about_broadside(make_plate_result) -> None:
     def density(tilt: float) -> float:
-        return named(make_plate_result(np.array([700.0]), tilt))["residual_energy_density"].value
+        return named(make_plate_result(np.array([700.0]), tilt))["mean(residual_energy_density@130mm)"].value
 
     energy, end, side = 0.5 * 0.004 * 700.0**2, math.pi * 3.0**2, 6.0 * 20.0  # [J], [mm²]
     assert density(0.0) == pytest.approx(energy / end, rel=1e-5)
@@ -64,15 +75,15 @@ def test_energy_per_area_is_that_of_a_cylinder_and_symmetric_about_broadside(mak
     assert density(35.0) == pytest.approx(energy / (end * math.cos(slope) + side * math.sin(slope)), rel=1e-4)
     assert density(145.0) == density(35.0)
     heavier = make_plate_result(np.array([700.0])).assign(mass=("hit", [0.008]))
-    assert named(heavier)["residual_energy_density"].value == pytest.approx(2 * energy / end, rel=1e-5)
+    assert named(heavier)["mean(residual_energy_density@130mm)"].value == pytest.approx(2 * energy / end, rel=1e-5)
 
 
 def test_numbers_without_a_valid_interval_have_none(make_plate_result) -> None:
     few, many = (named(make_plate_result(np.linspace(500.0, 900.0, count))) for count in (399, 400))
-    name = "residual_energy_fraction_worst_tenth"
+    name = "worst_tenth(residual_energy_fraction)"
     assert math.isnan(few[name].low)
     assert many[name].low < many[name].value < many[name].high
-    assert math.isnan(many["residual_energy_fraction_worst_point"].low)
+    assert math.isnan(many["worst_point(residual_energy_fraction)"].low)
     images = make_plate_result(np.linspace(500.0, 900.0, 400), images=2)
     assert math.isnan(named(images)[name].low)
 
@@ -91,7 +102,7 @@ def test_intervals_of_the_ratio_hold_as_often_as_they_say(make_plate_result, cou
         common = numbers.uniform(0.5, 1.0, count)
         fraction = 0.8 * common + numbers.uniform(0.0, 0.2, count)
         dataset = with_solid(make_plate_result(1000.0 * np.sqrt(fraction)), 1000.0 * np.sqrt(common[:400]))
-        measure = named(dataset)["residual_energy_fraction"]
+        measure = named(dataset)["mean(residual_energy_fraction)"]
         held += measure.ratio_low <= (0.8 * 0.75 + 0.1) / 0.75 <= measure.ratio_high
         widths.append((measure.ratio_high - measure.ratio_low) / (measure.high - measure.low) * measure.solid)
     assert held >= LEAST
@@ -102,12 +113,12 @@ def test_intervals_of_the_ratio_hold_as_often_as_they_say(make_plate_result, cou
 def test_one_shot_at_the_solid_plate_serves_all(make_plate_result) -> None:
     dataset = with_solid(make_plate_result(np.linspace(500.0, 900.0, 1000)), np.array([800.0]))
     measures = named(dataset)
-    mean, worst = measures["residual_energy_fraction"], measures["residual_energy_fraction_worst_point"]
+    mean, worst = measures["mean(residual_energy_fraction)"], measures["worst_point(residual_energy_fraction)"]
     assert (mean.solid, mean.ratio) == (pytest.approx(0.64), pytest.approx(mean.value / 0.64))
     assert (mean.ratio_low, mean.ratio_high) == (pytest.approx(mean.low / 0.64), pytest.approx(mean.high / 0.64))
     assert worst.ratio == pytest.approx(0.81 / 0.64)
-    assert math.isnan(measures["tilted_share"].ratio)  # the solid plate tilts no core
-    assert measures["tilted_share"].solid == 0.0
+    assert math.isnan(measures["P(inclination@130mm > 30 deg)"].ratio)  # the solid plate tilts no core
+    assert measures["P(inclination@130mm > 30 deg)"].solid == 0.0
 
 
 def test_a_solid_plate_is_its_own_reference(make_plate_result) -> None:
@@ -121,15 +132,29 @@ def test_a_solid_plate_is_its_own_reference(make_plate_result) -> None:
                 assert (measure.ratio_low, measure.ratio_high) == (pytest.approx(1.0), pytest.approx(1.0))
 
 
-def test_a_stand_off_that_is_not_there_is_refused(mixed) -> None:
-    with pytest.raises(ResultError, match=r"^standoff: got 100 mm, but the stand-offs are 50 mm, 130 mm$"):
-        effectiveness(mixed, standoff=0.1)
+@pytest.mark.parametrize(
+    ("text", "sentence"),
+    [
+        ("P(inclination@100mm > 30 deg)", "got 100 mm, but the stand-offs are 50 mm, 130 mm"),
+        (
+            "mean(base_depth)",
+            'measure: got "mean(base_depth)", which needs layers behind the plate, but the result has',
+        ),
+        ("P(broken)", 'measure: got "P(broken)", which needs cores with a strength, but the result has none'),
+        ("V50", 'measure: got "V50", which needs limit velocities (warpimpact limit), but the result has none'),
+        ("mean(bending_stress)", "which needs the variable bending_stress"),
+        ("mean(energy)", 'measure: got "energy"'),
+    ],
+)
+def test_what_a_result_lacks_is_refused(mixed, text: str, sentence: str) -> None:
+    with pytest.raises(ResultError, match=re.escape(sentence)):
+        effectiveness(mixed, [text])
 
 
 def test_every_measure_is_defined_and_cited(mixed) -> None:
     for measure in effectiveness(mixed):
-        assert measure.definition.endswith(".")
-        assert measure.source
+        assert measure.measure.definition.endswith(".")
+        assert measure.measure.source
 
 
 def test_the_table_says_what_a_result_carries(mixed, make_result) -> None:

@@ -51,7 +51,7 @@ def test_it_gives_the_campaign_back(result: Path, capsys: pytest.CaptureFixture[
 def test_slices_change_nothing(result: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     dataset = files.read(result)
     whole = inspect_text(dataset)
-    monkeypatch.setattr("warpimpact.analysis.summary.SLICE", 100)
+    monkeypatch.setattr("warpimpact.analysis.estimates.SLICE", 100)
     assert inspect_text(dataset) == whole
 
 
@@ -59,7 +59,7 @@ def test_failed_shots_are_listed_with_their_inputs_and_count_in_no_number(make_r
     statuses = np.array([Status.PERFORATED] * 6, dtype=np.int8)
     statuses[[1, 4]] = Status.UNFINISHED, Status.NOT_FINITE
     dataset = make_result(statuses)
-    monkeypatch.setattr("warpimpact.analysis.summary.SLICE", 4)
+    monkeypatch.setattr("warpimpact.analysis.estimates.SLICE", 4)
     shown = failures(dataset)
     (table,) = shown.parts
     assert table.heads[:5] == ["hit", "status", "hit_y [m]", "hit_z [m]", "impact_velocity [m s-1]"]

@@ -11,7 +11,8 @@ import xarray
 from warpimpact import Campaign, Numerics
 from warpimpact.campaign.campaign import CampaignError
 from warpimpact.results import files
-from warpimpact.results.measures import Measure, Tally, dealing
+from warpimpact.results.measures import Measure
+from warpimpact.results.tallies import Tally, dealing
 from warpimpact.runs import shards
 from warpimpact.runs.compute import HitMap
 from warpimpact.runs.parts import Interrupted

@@ -45,7 +45,7 @@ def test_what_is_asked_for_has_a_picture_of_its_own(
 ) -> None:
     files.write(make_result(100), tmp_path / "a.nc")
     for quantity in ("P(tilt@130mm > 30 deg)", "P(tilt@130mm < 30 deg)", "P(perforated)"):
-        assert main(["plot", str(tmp_path / "a.nc"), "--probability", quantity]) == 0
+        assert main(["plot", str(tmp_path / "a.nc"), "--measure", quantity]) == 0
     assert main(["plot", str(tmp_path / "a.nc"), "--variable", "edge_distance"]) == 0
     assert "--variable: " in refusal(["plot", str(tmp_path / "a.nc"), "--variable", "edges"], capsys)
     assert {path.name for path in tmp_path.glob("*.png")} == {

@@ -10,10 +10,11 @@ from dataclasses import replace
 import pytest
 
 from warpimpact.cli.progress import Step, show_progress, show_run
-from warpimpact.results.measures import Estimate, Measure
+from warpimpact.results.measures import Measure
 from warpimpact.runs.progress import RunProgress
 from warpimpact.scene import Numerics
 from warpimpact.solver.findings import HitErrors
+from warpimpact.statistics.intervals import Estimate
 
 
 def standing(done: int, *, failed: int = 0, resumed: int = 100) -> RunProgress:

@@ -6,19 +6,15 @@ import sys
 import tomllib
 from pathlib import Path
 
-import numpy as np
 import pytest
 from jsonschema import Draft202012Validator
 
 from warpimpact import Campaign
-from warpimpact.analysis.effectiveness import effectiveness
 from warpimpact.cli import main
-from warpimpact.cli.options import read_option
 from warpimpact.firing.reading import read_test
 from warpimpact.identification.reading import read_fit
 from warpimpact.identification.schema import fit_schema
 from warpimpact.optimisation.design import read_design
-from warpimpact.scene.units import Angle
 
 CAMPAIGNS = Path(__file__).parents[3] / "campaigns"
 
@@ -156,10 +152,3 @@ def test_a_signal_while_the_command_is_loaded_ends_it_in_a_sentence(name: str) -
 def test_the_command_listens_before_it_loads() -> None:
     project = tomllib.loads((CAMPAIGNS.parent / "pyproject.toml").read_text(encoding="utf-8"))
     assert project["project"]["scripts"]["warpimpact"] == "warpimpact.__main__:command"
-
-
-@pytest.mark.parametrize(("text", "shown"), [("30 deg", "30"), ("0.7853981633974483 rad", "45")])
-def test_an_angle_of_an_option_is_that_angle(text: str, shown: str, make_plate_result) -> None:
-    angle = read_option("--angle", Angle, text, ValueError)
-    labels = [one.label for one in effectiveness(make_plate_result(np.full(64, 700.0)), angle=angle)]
-    assert f"P(inclined > {shown}° at 130 mm, either end first, or stopped)" in labels

@@ -74,7 +74,7 @@ def test_a_slider_moves_and_the_numbers_are_those_of_run(page: Any, tmp_path: Pa
     shown = page.text("#answer")
     for measure in effectiveness(dataset):
         numbers = map(re.escape, map(number_text, (measure.value, measure.solid, measure.ratio)))
-        assert re.search(rf"{re.escape(measure.label)}.*?{'.*?'.join(numbers)}", shown)
+        assert re.search(rf"{re.escape(measure.measure.label)}.*?{'.*?'.join(numbers)}", shown)
     velocities = page.driver.execute_script("return document.getElementById('map-0').data[0].z.flat()")
     assert set(velocities) <= {float(f"{value:.5g}") for value in dataset["residual_velocity"].values.tolist()}
     assert len(set(velocities)) > 500

@@ -11,7 +11,7 @@ import pytest
 import xarray
 
 from warpimpact import Campaign, to_dataframe
-from warpimpact.analysis import summary
+from warpimpact.analysis import estimates
 from warpimpact.cli import main
 from warpimpact.export.paraview import AROUND, write_vtk
 from warpimpact.export.table import write_csv
@@ -58,7 +58,7 @@ def test_csv_holds_every_bit_whatever_the_slices(
     for written, name in zip(read, frame, strict=True):
         values = read[written] if name == "status" else read[written].astype(frame[name].dtype)
         np.testing.assert_array_equal(values, frame[name], err_msg=name)
-    monkeypatch.setattr(summary, "SLICE", 7)
+    monkeypatch.setattr(estimates, "SLICE", 7)
     assert main(["export", str(tmp_path / "a.nc"), "-o", str(tmp_path / "b.csv")]) == 0
     assert (tmp_path / "b.csv").read_bytes() == (tmp_path / "a.csv").read_bytes()
     assert main(["export", str(tmp_path / "a.nc")]) == 2

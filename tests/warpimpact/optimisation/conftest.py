@@ -34,7 +34,7 @@ WEIGHT_AND_ENERGY = """
 [[objectives]]
 measure = "areal_density"
 [[objectives]]
-measure = "residual_energy_fraction"
+measure = "mean(residual_energy_fraction)"
 """
 SEARCH = "[search]\ndesigns = 12\npopulation = 6\nhits = 16\nmost_hits = 64\nconfirm_hits = 64\n"
 

@@ -1,37 +1,47 @@
-"""What a search asks of a design has the words of `inspect`."""
-
-from pathlib import Path
+"""Measures of a design file: the language of results, and the names of earlier versions."""
 
 import pytest
 
-from warpimpact import Campaign, run
-from warpimpact.analysis.effectiveness import ANGLE, effectiveness
-from warpimpact.analysis.vocabulary import EFFECTS, SHOWN_UNITS
-from warpimpact.optimisation.measures import Key, effect_of, higher_is_better, label_of, names
-
-from .conftest import CORE, HOLES
-
-BASE = """
-[[layer]]
-thickness = "6 mm"
-resistance = "1 GPa"
-gap = "50 mm"
-"""
+from warpimpact.campaign.text import CampaignError
 
 
-@pytest.mark.parametrize("behind", ["", BASE])
-def test_labels_and_directions_are_those_of_inspect(behind: str) -> None:
-    text = CORE.replace('"130 mm"]', '"130 mm"]\nbending = true').replace(
-        'mass = "4 g"', 'mass = "4 g"\nstrength = "2 GPa"'
-    )
-    hits = '[hits]\nsampling = "sobol"\ncount = 64\n'
-    dataset = run(Campaign.from_text(text + HOLES + behind + hits, name="a.toml", folder=Path()), device="cpu")
-    told = {measure.name: measure for measure in effectiveness(dataset, standoff="130 mm")}
-    asked = [name for name in names() if name in told]
-    assert {effect_of(name) for name in asked} == {
-        name for name, effect in EFFECTS.items() if not effect.is_limit and (behind or effect.needs != "layer")
-    }
-    for name in asked:
-        label = told[name].label.removesuffix(", mean") + SHOWN_UNITS[told[name].units]
-        assert label_of(name, Key(effect_of(name), ANGLE, 0.13, 0)) == label
-        assert higher_is_better(name) == told[name].higher_is_better
+@pytest.mark.parametrize(
+    ("given", "text"),
+    [
+        ('"areal_density"', "areal_density"),
+        ('"residual_energy_density"\nstandoff = "50 mm"', "mean(residual_energy_density@50 mm)"),
+        ('"residual_energy_density_worst_tenth"', "worst_tenth(residual_energy_density)"),
+        ('"tilted_share"\nangle = "40 deg"\nstandoff = 0.13', "P(inclination@0.13 m > 40 deg)"),
+        ('"tilted_share"\nangle = 40', "P(inclination > 40 deg)"),
+        ('"stopped_share"', "P(stopped)"),
+        ('"limit_thickness"\nlayer = 1', "mean(limit_thickness@layer 1)"),
+        ('"limit_velocity_worst_tenth"', "worst_tenth(limit_velocity)"),
+    ],
+)
+def test_names_of_earlier_versions_are_measures(make, given: str, text: str) -> None:
+    old, new = (make(f"[[objectives]]\nmeasure = {measure}\n") for measure in (given, f'"{text}"'))
+    assert old.objectives[0].measure == text
+    assert (old.objectives, old.keys) == (new.objectives, new.keys)
+
+
+def test_all_statistics_of_a_quantity_share_its_column(make) -> None:
+    measures = ("mean(residual_velocity)", "worst_tenth(residual_velocity)", "P(residual_velocity > 500 m/s)")
+    keys = make(*(f'[[objectives]]\nmeasure = "{measure}"\n' for measure in measures)).keys
+    assert [key.text for key in keys] == ["residual_velocity", measures[2]]
+
+
+@pytest.mark.parametrize(
+    ("measure", "sentence"),
+    [
+        ('"base_depht"', "did you mean mean(base_depth)?"),
+        ('"mean(tilt)"', "neither is better"),
+        ('"V50"', "a search takes a mean, a worst tenth, a probability or areal_density"),
+        ('"mean(bending_stress)"\ngoal = "minimise"', "needs output.bending = true"),
+        ('"mean(broken_time)"\ngoal = "minimise"', "needs what a search does not compute"),
+        ('"P(stopped)"\nangle = "30 deg"', 'got the unknown key "angle"'),
+    ],
+)
+def test_what_cannot_be_sought_is_refused(make, measure: str, sentence: str) -> None:
+    with pytest.raises(CampaignError) as refused:
+        make(f"[[objectives]]\nmeasure = {measure}\n")
+    assert sentence in str(refused.value)

@@ -62,7 +62,7 @@ def test_points_of_a_finite_space_each_once() -> None:
         (('[variables]\nthickness = ["3 mm", "3 mm"]', WEIGHT_AND_ENERGY), "got a value twice"),
         (('[variables]\nthicknes = ["3 mm"]', WEIGHT_AND_ENERGY), 'unknown input "thicknes"'),
         (('[variables]\n"plate.pattern" = [{ shape = "none" }]', WEIGHT_AND_ENERGY), "each with a name"),
-        (('[[objectives]]\nmeasure = "weight"',), 'objectives[0]: got measure = "weight"'),
+        (('[[objectives]]\nmeasure = "weight"',), 'objectives[0].measure: got "weight"'),
         (("[variables]",), "objectives: is missing, but must be given"),
         ((WEIGHT_AND_ENERGY, '[[bounds]]\nmeasure = "stopped_share"'), "needs at_most or at_least"),
         ((WEIGHT_AND_ENERGY, '[[bounds]]\nmeasure = "stopped_share"\nat_most = "much"'), "bounds[0].at_most"),

@@ -105,7 +105,7 @@ def test_a_share_among_the_measures_of_protection_has_a_map(make_result):
     ("quantity", "complaint"),
     [
         ("mean(residual_velocity)", r"needs P\(…\)"),
-        ("P(bending_stress > 1 GPa)", "the result has no bending_stress"),
+        ("P(bending_stress > 1 GPa)", "which needs the variable bending_stress"),
         ("P(nonsense > 1)", "must be one of"),
     ],
 )

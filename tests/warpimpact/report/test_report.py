@@ -103,8 +103,8 @@ def test_page_says_how_well_each_plate_protects(folder: Path) -> None:
         for measure in effectiveness(files.read(folder / f"{name}.nc")):
             numbers = (measure.value, measure.solid, measure.ratio)
             row = r"\s+.*\s+".join(re.escape(number_text(number)) for number in numbers)
-            assert re.search(rf"{re.escape(measure.label)}.*\s+{row}", text)
-            assert measure.definition in text
+            assert re.search(rf"{re.escape(measure.measure.label)}.*\s+{row}", text)
+            assert measure.measure.definition in text
 
 
 def test_page_compares_the_plates(folder: Path, make_result: ResultMaker, tmp_path: Path) -> None:

@@ -14,8 +14,8 @@ from warpimpact.cli import main
 from warpimpact.results import files, posterior_file
 from warpimpact.results import variables as v
 from warpimpact.results.dataset import is_choice, solid_reference
-from warpimpact.results.measures import dealing
 from warpimpact.results.outlines import outlines
+from warpimpact.results.tallies import dealing
 from warpimpact.runs.run import run
 
 SLOTTED_PLATE = (Path(__file__).parents[3] / "campaigns" / "slotted_plate.toml").read_text(encoding="utf-8")
@@ -113,10 +113,10 @@ def test_chosen_hits_are_no_longer_dealt_out_in_turn(result: xarray.Dataset) -> 
 
 
 def test_a_number_names_the_same_hit_in_a_choice(result: xarray.Dataset) -> None:
-    worst = {measure.name: measure.hit for measure in effectiveness(result)}["residual_energy_fraction_worst_point"]
+    worst = {measure.name: measure.hit for measure in effectiveness(result)}["worst_point(residual_energy_fraction)"]
     rest = result.isel(hit=slice(worst, None))
     few = {measure.name: measure.hit for measure in effectiveness(rest)}
-    assert few["residual_energy_fraction_worst_point"] == worst == int(result["residual_velocity"].idxmax())
+    assert few["worst_point(residual_energy_fraction)"] == worst == int(result["residual_velocity"].idxmax())
 
 
 def test_shots_at_the_solid_plate_stay_with_their_hits() -> None:

@@ -127,7 +127,7 @@ def test_measures_say_what_the_numerics_may_shift_them_by_and_a_finer_level_agre
         assert abs(found[one].value - exact[one].value) <= shift + 2.0 * np.sqrt(changed) / told.sizes["hit"], one
         assert exact[one].numerics is None
     for one, other in zip(effectiveness(told), effectiveness(truth), strict=True):
-        if one.hit is None and not one.label.startswith("P("):
+        if one.hit is None and not one.measure.is_binary:
             assert abs(one.value - other.value) <= (one.numerics or 0.0), one.name
     assert "numerics ± " in summary_text(told)
     assert summary_text(truth).count("numerics ±") == 1

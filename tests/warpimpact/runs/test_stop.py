@@ -14,7 +14,8 @@ from warpimpact.analysis.summary import summary_text
 from warpimpact.campaign.campaign import CampaignError
 from warpimpact.kernels.status import Status
 from warpimpact.results import files
-from warpimpact.results.measures import Measure, Tally
+from warpimpact.results.measures import Measure
+from warpimpact.results.tallies import Tally
 from warpimpact.runs.parts import Interrupted
 from warpimpact.runs.replay import replay
 from warpimpact.runs.run import RunProgress, _Watch, run, run_to_file
@@ -127,9 +128,11 @@ def test_a_run_goes_on_as_long_as_hits_may_make_up_for_the_numerics(
     ("quantity", "half_width", "sentence"),
     [
         ("median(tilt)", "1 deg", 'stop.quantity: got "median(tilt)", but it must be of the form mean(residual_vel'),
-        ("mean(speed)", "1 m/s", 'stop.quantity: got "speed", but it must be one of limit_velocity, limit_thick'),
-        ("mean(tilt)", "1 deg", 'stop.quantity: got "tilt", which needs a stand-off, as in tilt@130mm'),
-        ("mean(deflection@130mm)", "1 deg", 'stop.quantity: got "deflection", which has no stand-off'),
+        ("mean(speed)", "1 m/s", 'stop.quantity: got "speed", but it must be one of base_depth, residual_energy_'),
+        ("mean(base_depth)", "1 mm", 'stop.quantity = "mean(base_depth)" needs a table [[layer]]'),
+        ("V50", "1 m/s", 'stop.quantity = "V50" is told by warpimpact limit'),
+        ("areal_density", "1 kg/m^2", "a run cannot stop by a number without an interval"),
+        ("mean(deflection@130mm)", "1 deg", 'stop.quantity: got "deflection@130mm", but deflection has no stand-off'),
         ("mean(tilt@100mm)", "1 deg", "at 0.1 m, but it must be one of output.standoffs: 0.05 m, 0.13 m"),
         ("P(tilt@130mm > 30 m)", "0.01", 'stop.quantity: got "30 m", which is not an angle'),
         ("P(broken)", "0.01", 'stop.quantity = "P(broken)" needs core.strength'),

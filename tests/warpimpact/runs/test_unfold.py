@@ -16,7 +16,8 @@ from warpimpact.campaign.stop import Stop
 from warpimpact.cli import main
 from warpimpact.records.outcomes import Outcomes
 from warpimpact.results import files
-from warpimpact.results.measures import Measure, Tally
+from warpimpact.results.measures import Measure
+from warpimpact.results.tallies import Tally
 from warpimpact.results.variables import OUTCOME_VARIABLES, SHOT_VARIABLES
 from warpimpact.runs import compute as computing
 from warpimpact.runs import shards

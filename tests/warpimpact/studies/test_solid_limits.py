@@ -85,9 +85,9 @@ def test_it_changes_no_bit_of_the_hits(velocity: xarray.Dataset, tmp_path: Path)
 def test_a_limit_velocity_has_measures_and_a_ratio(velocity: xarray.Dataset) -> None:
     mean, worst_tenth, worst = effectiveness(velocity)
     values, solid = velocity["limit_velocity"].values, float(velocity["solid_limit_velocity"][0])
-    assert [one.label for one in (mean, worst)] == ["limit velocity, mean", "limit velocity, worst point"]
+    assert [one.measure.label for one in (mean, worst)] == ["limit velocity, mean", "limit velocity, worst point"]
     assert mean.value == pytest.approx(values.mean())
-    assert mean.higher_is_better
+    assert mean.measure.higher_is_better
     assert mean.ratio == pytest.approx(values.mean() / solid)
     assert worst.value == values.min() == values[worst.hit]
     assert worst.value <= worst_tenth.value < mean.value
@@ -100,8 +100,8 @@ def test_plates_of_other_weight_are_ranked_by_the_ratio(velocity: xarray.Dataset
     heavy["limit_velocity"] = velocity["limit_velocity"] * 1.1
     heavy = heavy.assign_coords(solid_limit_velocity=velocity["solid_limit_velocity"] * 1.5)
     found = compare([velocity, heavy], ["light", "heavy"])
-    assert found.at_equal_weight == {"limit_velocity", "limit_velocity_worst_tenth"}
-    assert found.ranks("limit_velocity") == {"light": 1, "heavy": 2}
+    assert found.at_equal_weight == {"mean(limit_velocity)", "worst_tenth(limit_velocity)"}
+    assert found.ranks("mean(limit_velocity)") == {"light": 1, "heavy": 2}
 
 
 @pytest.mark.parametrize(("more", "ranks"), [(1.0, [1, 1]), (3.0, [2, 1])])
@@ -111,15 +111,15 @@ def test_limits_within_their_tolerance_are_not_told_apart(
     """Each limit is known to 1 m/s."""
     other = velocity.assign(limit_velocity=velocity["limit_velocity"] + more)
     found = compare([velocity, other], ["one", "other"])
-    assert [found.ranks("limit_velocity")[name] for name in ("one", "other")] == ranks
+    assert [found.ranks("mean(limit_velocity)")[name] for name in ("one", "other")] == ranks
 
 
 def test_of_a_thickness_it_tells_the_areal_density_that_a_solid_plate_needs(thickness: xarray.Dataset) -> None:
     measures = {one.name: one for one in effectiveness(thickness)}
     solid = 7850.0 * float(thickness["solid_limit_thickness"][0])
-    assert measures["limit_areal_density"].solid == pytest.approx(solid)
-    assert measures["limit_areal_density"].ratio == pytest.approx(measures["limit_areal_density"].value / solid)
-    assert np.isnan(measures["limit_thickness"].solid)  # it has no layer 1
+    density = measures["mean(limit_areal_density)"]
+    assert (density.solid, density.ratio) == (pytest.approx(solid), pytest.approx(density.value / solid))
+    assert np.isnan(measures["mean(limit_thickness)"].solid)  # it has no layer 1
     assert f"{solid:.4g} kg/m² (the target as given has" in text_of(limit_view(thickness))
 
 

@@ -1,58 +1,15 @@
-"""How deep cores go into the base: the last layer of a target, which the others protect."""
+"""The solid plate beside a result, which has the areal density of the whole target: what it is, as text."""
 
 from __future__ import annotations
 
 import json
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-from numpy.typing import NDArray
-
 from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
-from warpimpact.results.dataset import failed, passed
 
 if TYPE_CHECKING:
     from warpimpact.results.table import Result
-
-Array = NDArray[np.float64]
-
-NEEDED = (v.STATUS, v.STOPPED_IN, v.DEPTH, v.LAYER_THICKNESS, *v.LAYER_FACES)
-"""Variables that say so."""
-
-
-def has_base(dataset: Result) -> bool:
-    """Whether there are layers behind the plate."""
-    return v.STOPPED_IN in dataset
-
-
-def base_thickness(dataset: Result) -> Array:
-    """Thickness of the base [m]: one number, or shape [hits] where it scatters."""
-    if v.LAYER_THICKNESS in dataset:
-        return np.asarray(dataset[v.LAYER_THICKNESS].values[:, -1])
-    return np.asarray(dataset[v.LAYER_REAR].values[-1] - dataset[v.LAYER_FRONT].values[-1])
-
-
-def base_depth(dataset: Result) -> Array:
-    """How deep every core goes into the base [m], shape [hits]; NaN where the computation failed.
-
-    A core that stops before the base or bounces off it counts 0. A core that pierces or passes the base counts with the
-    thickness of the base, which is the least that it could go into a thicker one. NaN where the result has no depth, as
-    that of a single plate.
-    """
-    if not has_base(dataset):
-        return np.full(dataset.sizes["hit"], np.nan)
-    rests = dataset[v.STOPPED_IN].values == dataset.sizes["layer"] - 1
-    thickness = base_thickness(dataset)
-    depth = np.where(rests, np.minimum(dataset[v.DEPTH].values, thickness), 0.0)
-    return np.where(failed(dataset), np.nan, np.where(passed(dataset), thickness, depth))
-
-
-def is_pierced(dataset: Result) -> Array:
-    """1 where a core comes out of the rear face of the base, whether it rests in the base or passes it, else 0; shape
-    [hits]. NaN as in `base_depth`."""
-    depth = base_depth(dataset)
-    return np.where(np.isnan(depth), np.nan, depth >= base_thickness(dataset) if has_base(dataset) else np.nan)
 
 
 def solid_plate(dataset: Result) -> str:

@@ -1,0 +1,119 @@
+"""Measures of a result as estimates: with their intervals, what the numerics may shift them by, and the numbers of the
+shots that they are made of."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from warpimpact.analysis.survival import by_draws, over_draws
+from warpimpact.results import variables as v
+from warpimpact.results.dataset import finer_pair
+from warpimpact.results.measures import STATUSES, Measure
+from warpimpact.results.per_hit import Array
+from warpimpact.results.tallies import dealing, estimate_from, shift_of
+from warpimpact.statistics.intervals import Estimate
+from warpimpact.statistics.tails import quantile_weights, worst_tenth_weights
+
+if TYPE_CHECKING:
+    from warpimpact.results.table import Result
+
+SLICE = 2**18
+"""Hits in memory at a time."""
+
+
+@dataclass(frozen=True)
+class Evidence:
+    """A measure of a result, and what it is made of, in the units of the Dataset unless it is `shown`.
+
+    Attributes:
+        values: what the measure counts of each shot, NaN where it does not count, shape [hits].
+        drawn: numbers whose mean over the shots of a draw of a posterior is the measure of the draw, shape [hits].
+    """
+
+    measure: Measure
+    estimate: Estimate
+    values: Array
+    drawn: Array
+
+    @property
+    def numbers(self) -> Array | None:
+        """Numbers of the shots whose mean is the measure; None of a quantile, a worst point and areal density."""
+        has_none = self.measure.kind in ("quantile", "worst_point", "target")
+        return None if has_none else self.measure.averaged(self.values)
+
+    @property
+    def worst_shot(self) -> int | None:
+        """Index of the shot that is the worst point; None of other measures, and where no shot counts."""
+        known = ~np.isnan(self.values)
+        if self.measure.kind != "worst_point" or not known.any():
+            return None
+        return int(np.argmax(np.where(known, self.measure.worse * self.values, -np.inf)))
+
+    def shown(self) -> Evidence:
+        """The same in the units in which the measure is shown."""
+        factor = self.measure.display.factor
+        return Evidence(self.measure, self.estimate.times(factor), factor * self.values, factor * self.drawn)
+
+
+def evidence(dataset: Result, measures: Sequence[Measure], confidence: float = 0.95) -> Iterator[Evidence]:
+    """Measures one after the other; of an open file a slice is in memory at a time, and one number per hit."""
+    needed = (v.STATUS, *v.GROUPS["finer"], *(name for measure in measures for name in measure.quantity.of))
+    pair = finer_pair(dataset[[name for name in dict.fromkeys(needed) if name in dataset]])
+    dealt = dealing(dataset)
+    key, by_hit = None, np.empty(0)
+    for measure in measures:
+        if key != (key := (measure.quantity, measure.standoff)):
+            by_hit = by_hit_of(dataset, measure)
+        values = measure.counted(by_hit)
+        estimate = estimate_from(measure, values, **dealt, confidence=confidence)
+        estimate = replace(estimate, numerics=shift_of(measure, pair, confidence))
+        drawn = _drawn(dataset, measure, values)
+        if measure.has_interval:
+            units = "" if measure.name.startswith("limit_") else measure.units
+            estimate = over_draws(dataset, estimate, drawn, units=units).within(measure.least, measure.most)
+        yield Evidence(measure, estimate, values, drawn)
+
+
+def by_hit_of(dataset: Result, measure: Measure) -> Array:
+    """The quantity of every hit, shape [hits]; of an open file a slice is in memory at a time."""
+    names: list[str] = [name for name in (v.STATUS, *measure.quantity.of) if name in dataset]
+    return np.concatenate([measure.by_hit(part) for part in slices(dataset[names])])
+
+
+def _drawn(dataset: Result, measure: Measure, values: Array) -> Array:
+    """Numbers whose mean over the shots of a draw is the measure of the draw."""
+    if measure.kind == "quantile":
+        return by_draws(dataset, values, quantile_weights(measure.share))
+    if measure.kind == "worst_tenth":
+        return measure.worse * by_draws(dataset, measure.worse * values, worst_tenth_weights)
+    return values
+
+
+def estimated(dataset: Result, measures: Sequence[Measure], confidence: float = 0.95) -> dict[Measure, Estimate]:
+    """Measures of a result with their intervals, in the units of the Dataset."""
+    return {found.measure: found.estimate for found in evidence(dataset, measures, confidence)}
+
+
+def status_shares(dataset: Result) -> dict[str, Estimate]:
+    """Shares of the shots by how they ended, of the statuses that occur."""
+    shares = estimated(dataset, [Measure.parse(f"P({name})") for name in STATUSES])
+    return {measure.name: estimate for measure, estimate in shares.items() if estimate.value > 0.0}
+
+
+def means_of(variables: Sequence[v.Variable], standoffs: Sequence[float]) -> list[Measure]:
+    """Means of recorded quantities, at every stand-off [m] of those that have one."""
+    return [
+        Measure.parse(f"mean({variable})" if at is None else f"mean({variable}@{at!r}m)")
+        for variable in variables
+        for at in (standoffs if v.STANDOFF in variable.dims else [None])
+    ]
+
+
+def slices(dataset: Result) -> Iterator[Any]:
+    """Its hits in slices that are loaded one at a time."""
+    for first in range(0, dataset.sizes["hit"], SLICE):
+        yield dataset.isel(hit=slice(first, first + SLICE)).load()

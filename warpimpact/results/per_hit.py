@@ -1,0 +1,166 @@
+"""Numbers of single hits: what a quantity or an event of vocabulary.py has, and how the numbers are computed."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import TypeAdapter
+
+from warpimpact.kernels.status import Status
+from warpimpact.results import attributes as attr
+from warpimpact.results import variables as v
+from warpimpact.results.dataset import failed, passed
+from warpimpact.scene import AnyCore, Core
+
+if TYPE_CHECKING:
+    from warpimpact.results.table import Result
+
+Array = NDArray[np.float64]
+Values = Callable[["Result", float], Array]
+"""Numbers of all hits of a result, shape [hits], at a stand-off [m] where they have one; NaN where a hit does not
+count."""
+
+_THICKNESS = v.LIMITS["thickness"].value
+
+
+class Need(NamedTuple):
+    """What a result must have beside the columns of every result.
+
+    Attributes:
+        name: of a variable or an attribute that it has then.
+        words: what it is.
+        keys: of a campaign that asks for it.
+    """
+
+    name: str
+    words: str
+    keys: str
+
+
+@dataclass(frozen=True, kw_only=True)
+class PerHit:
+    """A quantity or an event.
+
+    Attributes:
+        name: in a measure.
+        label: for people, with {layer} where it names the layer.
+        units: as a result stores the numbers; "1" of an event.
+        definition: one sentence or two.
+        source: of the definition.
+        higher_is_better: for whoever is behind the target; None where neither is.
+        values: numbers of the hits. Infinite numbers are beyond every limit of a probability; a mean leaves them out.
+        of: variables that they are made of.
+        has_standoff: whether they depend on the distance behind the rear face.
+        has_layer: whether they depend on the layer whose limit thickness is sought.
+        need: what a result must have; None where every result has it.
+        or_else: what makes a number infinite, as text behind a probability.
+        least, most: ends of what the numbers can be.
+    """
+
+    name: str
+    label: str
+    units: str = "1"
+    definition: str
+    source: str
+    higher_is_better: bool | None
+    values: Values
+    of: tuple[v.Variable, ...] = ()
+    has_standoff: bool = False
+    has_layer: bool = False
+    need: Need | None = None
+    or_else: str = ""
+    least: float = 0.0
+    most: float = math.inf
+
+    def lacking(self, dataset: Result) -> str:
+        """What a result lacks of what is needed; empty where it has all."""
+        if self.need is not None and self.need.name not in dataset and self.need.name not in dataset.attrs:
+            return self.need.words
+        if self.has_standoff and not len(dataset[v.STANDOFF].values):
+            return "stand-offs (output.standoffs)"
+        return ""
+
+
+def place_of_standoff(distances: Sequence[float] | Array, standoff: float) -> int:
+    """Index of a stand-off [m] among those that there are.
+
+    Raises:
+        ValueError: it is none of them.
+    """
+    places = np.flatnonzero(np.isclose(distances, standoff, rtol=1e-9, atol=0.0))
+    if not len(places):
+        known = ", ".join(f"{distance * 1e3:g} mm" for distance in distances) or "not given"
+        raise ValueError(f"got {standoff * 1e3:g} mm, but the stand-offs are {known}")
+    return int(places[0])
+
+
+def at(part: Result, variable: v.Variable, standoff: float) -> Array:
+    """A variable with one number per hit, at a stand-off if it has stand-offs; NaN where it was not recorded, as at the
+    solid plate."""
+    if variable not in part:
+        return np.full(part.sizes["hit"], np.nan)
+    column = np.asarray(part[variable].values, dtype=np.float64)
+    return column[:, place_of_standoff(part[v.STANDOFF].values, standoff)] if column.ndim == 2 else column
+
+
+def of_all(part: Result, of_passed: Array, of_stopped: float) -> Array:
+    """Numbers of the cores that passed the target, one number of those that did not, NaN of failed computations."""
+    return np.where(failed(part), np.nan, np.where(passed(part), of_passed, of_stopped))
+
+
+def is_so(which: Callable[[Result], NDArray[np.bool_]]) -> Values:
+    """1 where it is so, 0 elsewhere, NaN of failed computations."""
+    return lambda part, _: np.where(failed(part), np.nan, which(part))
+
+
+def ended_as(status: Status) -> Values:
+    """1 where a shot ended so."""
+    return is_so(lambda part: np.asarray(part[v.STATUS].values == status))
+
+
+def energy_fraction(part: Result, _: float) -> Array:
+    return of_all(part, (at(part, v.RESIDUAL_VELOCITY, 0.0) / part[v.IMPACT_VELOCITY].values) ** 2, 0.0)
+
+
+def energy(part: Result) -> Array:
+    """Kinetic energy of translation [J], whether the core passed or not."""
+    mass = part[v.MASS].values if v.MASS in part else _core(part.attrs[attr.CORE]).mass_properties.mass
+    return np.asarray(0.5 * mass * part[v.RESIDUAL_VELOCITY].values.astype(float) ** 2)
+
+
+def inclination(part: Result, standoff: float) -> Array:
+    tilt = at(part, v.TILT, standoff)
+    return np.minimum(tilt, 180.0 - tilt)
+
+
+def energy_density(part: Result, standoff: float) -> Array:
+    silhouette = np.interp(inclination(part, standoff), *_silhouette(part.attrs[attr.CORE]))
+    return of_all(part, energy(part) / silhouette, 0.0)
+
+
+@lru_cache(maxsize=64)
+def _core(text: str) -> Core:
+    return TypeAdapter[Core](AnyCore).validate_json(text)
+
+
+@lru_cache(maxsize=64)
+def _silhouette(text: str) -> tuple[Array, Array]:
+    """Inclinations of a core [degree] and its presented areas [m²]; steps of a quarter of a degree err by 1e-5."""
+    inclinations = np.linspace(0.0, 90.0, 361)
+    return inclinations, _core(text).presented_area(np.radians(inclinations))
+
+
+def limit(part: Result, name: str) -> Array:
+    """Limits, at most the largest value that was tried; NaN where the computation failed."""
+    return np.where(failed(part), np.nan, np.minimum(part[name].values, part.attrs.get(attr.LIMIT_HIGHEST, np.inf)))
+
+
+def needed_density(part: Result, _: float) -> Array:
+    elsewhere, density = float(part.attrs[attr.LIMIT_ELSEWHERE]), float(part.attrs[attr.LIMIT_DENSITY])
+    return elsewhere + density * limit(part, _THICKNESS)

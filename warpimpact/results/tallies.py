@@ -1,0 +1,89 @@
+"""Numbers of measures: gathered over shots, with their intervals and what the numerics may shift them by."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from typing import TYPE_CHECKING, Unpack
+
+import numpy as np
+
+from warpimpact.results import attributes as attr
+from warpimpact.results.dataset import images, is_choice, shots_at_a_plate
+from warpimpact.results.measures import Measure
+from warpimpact.results.per_hit import Array
+from warpimpact.statistics.intervals import Dealing, Dealt, Estimate, Estimating, estimate_of
+from warpimpact.statistics.shifts import shift_of_mean, shift_of_quantile, shift_of_share, shift_of_yes
+from warpimpact.statistics.tails import has_interval
+
+if TYPE_CHECKING:
+    from warpimpact.results.table import Result
+
+
+class Tally:
+    """Gathers a measure over shots, in the order of their numbers.
+
+    Means and probabilities keep a few numbers in all; a quantile and a worst tenth keep one number per shot.
+
+    Args:
+        dealt: `replicates`, `images` and `confidence` as in `Dealt`.
+    """
+
+    def __init__(self, measure: Measure, **dealt: Unpack[Estimating]) -> None:
+        kind = "share" if measure.is_binary else measure.kind
+        self.measure, self._arguments = measure, dealt
+        self._kept: list[Array] = []
+        self._dealt = Dealt(kind, share=measure.share, **dealt)
+
+    def add(self, dataset: Result) -> None:
+        """Add the next shots."""
+        values = self.measure.values(dataset)
+        if self.measure.kind in ("mean", "quantile", "probability", "share"):
+            self._dealt.add(values)
+        else:
+            self._kept.append(values)
+
+    def estimate(self) -> Estimate:
+        """The estimate from the shots so far."""
+        if not self._kept:
+            return self._dealt.estimate().within(self.measure.least, self.measure.most)
+        return estimate_from(self.measure, np.concatenate(self._kept), **self._arguments)
+
+
+def estimate_from(measure: Measure, values: Array, **dealt: Unpack[Estimating]) -> Estimate:
+    """A measure with its interval, from the values of all shots; a worst point and a number of the target have none."""
+    known = values[~np.isnan(values)]
+    if not measure.has_interval or not len(known):
+        worst = measure.worse * float(np.max(measure.worse * known)) if len(known) else math.nan
+        return Estimate(worst, math.nan, math.nan, len(known), math.nan)
+    kind = "share" if measure.is_binary else "quantile" if measure.kind == "quantile" else "mean"
+    estimate = estimate_of(kind, measure.averaged(values), share=measure.share, **dealt)
+    if measure.kind == "worst_tenth" and not has_interval(estimate.count, dealt.get("images", 1)):
+        estimate = replace(estimate, low=math.nan, high=math.nan)
+    return estimate.within(measure.least, measure.most)
+
+
+def shift_of(measure: Measure, levels: tuple[Result, Result] | None, confidence: float = 0.95) -> float | None:
+    """How far the numerics may shift a measure, by hits of a result at two levels (`finer_pair`); None without them."""
+    if levels is None or not measure.has_interval:
+        return None
+    dealt: Estimating = {**dealing(levels[0]), "replicates": 1, "confidence": confidence}
+    coarse, fine = (measure.by_hit(level) for level in levels)
+    match measure.kind:
+        case "quantile":
+            return shift_of_quantile(coarse, fine, measure.share, **dealt)
+        case "probability":
+            return shift_of_share(measure.margin(coarse), measure.margin(fine), **dealt)
+        case "share":
+            return shift_of_yes(coarse, fine, **dealt)
+    averaged = (measure.averaged(measure.counted(numbers)) for numbers in (coarse, fine))
+    return shift_of_mean(*averaged, **dealt)
+
+
+def dealing(dataset: Result) -> Dealing:
+    """Arguments of `Dealt` that fit the sampling of a result. The shots at one plate count as one, like images. Chosen
+    hits are no longer dealt out in turn."""
+    if is_choice(dataset):
+        return {"replicates": 1, "images": 1}
+    together = images(dataset) * shots_at_a_plate(dataset)
+    return {"replicates": int(dataset.attrs.get(attr.REPLICATES, 1)), "images": together}
