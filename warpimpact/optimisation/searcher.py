@@ -1,7 +1,7 @@
 """The optimiser: NSGA-II of pymoo with mixed variables and constraints, asked for points and told what became of them.
 
 K. Deb and others, IEEE Transactions on Evolutionary Computation 6 (2002) 182; J. Blank, K. Deb, IEEE Access 8 (2020)
-89497. tests/benchmarks/optimisers.py compares it with others.
+89497. tests/benchmarks/NOTES.md compares it with others.
 """
 
 from __future__ import annotations
