@@ -28,7 +28,7 @@ test: $(INSTALLED)
 	$(VENV)/bin/ruff format --check .
 	$(VENV)/bin/mypy
 	$(VENV)/bin/pytest $(PARALLEL) --durations=40
-	$(VENV)/bin/pytest $(PARALLEL) tests/kernels tests/verification/test_determinism.py::test_any_chunk --warp-mode debug
+	$(VENV)/bin/pytest $(PARALLEL) tests/kernels tests/verification/test_any_company.py::test_threads_and_chunks_change_no_bit --warp-mode debug
 
 clean:
 	rm -rf $(VENV) build slotted.nc slotted.nc.parts slotted_*.png

@@ -191,16 +191,6 @@ def test_shot_that_leaves_its_window_is_told_or_computed_in_a_wider_one(
     assert np.isnan(outcomes.residual_velocity[0])
 
 
-def test_shot_computes_the_same_bits_in_any_window_and_company(device: str) -> None:
-    # The steepest shot of a batch sets the windows of all.
-    shot = {"hit_y": 5.1e-3, "hit_z": 1.3e-3, "obliquity": 0.3, "pitch": 0.05}
-    alone = simulate.simulate(at(HOLES), shots_of(**shot), numerics=DRAFT, device=device)
-    company = shots_of(**shot | {"hit_y": [1e-3, 5.1e-3], "obliquity": [1.2, 0.3]})
-    among = simulate.simulate(at(HOLES), company, numerics=DRAFT, device=device)
-    for name, values in vars(alone).items():
-        np.testing.assert_array_equal(getattr(among, name)[1], values[0], err_msg=name)
-
-
 def test_trace_adds_up_to_the_motion() -> None:
     # Mean force and moment of every step times its duration are the change of the momenta.
     shots = shots_of(hit_y=5.0e-3, hit_z=2.0e-3, velocity=800.0, pitch=0.05)

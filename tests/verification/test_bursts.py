@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 
 from warpimpact.records.outcomes import Outcomes
 from warpimpact.scene import Layer, Numerics, Plate, Record, Scene, Shots, Target
-from warpimpact.solver import marching, replay, windows
+from warpimpact.solver import marching, replay
 from warpimpact.solver import simulate as simulation
 from warpimpact.solver.marching import March
 from warpimpact.solver.memory import Memory
@@ -172,27 +172,6 @@ def test_the_exposure_of_a_burst_is_the_sum_of_what_its_shots_add(offset: float)
 
 
 @TARGETS
-@pytest.mark.parametrize("threads", [1, 3])
-@pytest.mark.parametrize("chunk", [1, 7, 100])
-def test_any_thread_and_chunk(behind: Any, threads: int, chunk: int, monkeypatch: pytest.MonkeyPatch) -> None:
-    shots = near_bursts()
-    expected = simulate(paper_plate(), shots, behind)
-    monkeypatch.setattr(marching, "launching", lambda _: threads)
-    monkeypatch.setattr(marching, "CHUNK", chunk)
-    assert_identical(simulate(paper_plate(), shots, behind), expected)
-
-
-@TARGETS
-@pytest.mark.parametrize("samples", [1, 5])
-def test_any_split_into_whole_bursts(behind: Any, samples: int, device: str) -> None:
-    shots, size = near_bursts(), samples * COUNT
-    parts = [simulate(paper_plate(), shots[k : k + size], behind, device) for k in range(0, len(shots), size)]
-    expected = simulate(paper_plate(), shots, behind, device)
-    for name, values in vars(expected).items():
-        np.testing.assert_array_equal(np.concatenate([getattr(part, name) for part in parts]), values, err_msg=name)
-
-
-@TARGETS
 @pytest.mark.parametrize("slots", [1, 5, SAMPLES])
 def test_the_order_of_a_device_with_many_slots(behind: Any, slots: int) -> None:
     shots = near_bursts()
@@ -206,22 +185,6 @@ def test_the_order_of_a_device_with_many_slots(behind: Any, slots: int) -> None:
         memory.launch(order, outcomes, scratch, slots, first, number)
     got = Outcomes.collected(prepared.scene, shots, memory.report(outcomes))
     assert_identical(got, simulate(paper_plate(), shots, behind))
-
-
-def test_a_shot_that_leaves_its_window_is_repeated_with_its_burst(monkeypatch: pytest.MonkeyPatch) -> None:
-    shots = near_bursts()
-    expected = simulate(paper_plate(), shots)
-    monkeypatch.setattr(windows, "SLACK", 0.9)
-    repeated, march_some = [], March._march_some
-
-    def counted(self: March, pending: Any, *rest: Any) -> None:
-        repeated.append(pending)
-        march_some(self, pending, *rest)
-
-    monkeypatch.setattr(March, "_march_some", counted)
-    assert_identical(simulate(paper_plate(), shots), expected)
-    assert 0 < len(repeated[1]) < len(shots)
-    assert len(repeated[1]) % COUNT == 0
 
 
 def test_every_shot_of_a_failed_burst_behind_the_failure_fails() -> None:

@@ -6,8 +6,6 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from warpimpact.kernels.status import Status
-from warpimpact.scene import Numerics
-from warpimpact.solver.simulate import simulate
 
 from .extremes import MOST_RISE, MOST_STRETCH, drawn, found
 
@@ -30,14 +28,3 @@ def test_extremes(shares: list[float]) -> None:
 @pytest.mark.parametrize("index", [1079, 4002])
 def test_energy_of_spin_and_tumbling(index: int) -> None:
     assert found(drawn(np.random.default_rng([1, index]).random, hits=3)).steep_rise <= MOST_RISE
-
-
-# A core turns back at two layers, and comes again where its own first window ends and that of another shot does not.
-def test_a_shot_does_not_depend_on_how_wide_the_windows_of_others_are() -> None:
-    scene, shots, precision = drawn(np.random.default_rng([1, 221]).random, hits=3)
-    some, others = (
-        simulate(scene, chosen, numerics=Numerics(level=0, precision=precision), device="cpu")
-        for chosen in (shots[::2], shots)
-    )
-    for name, values in vars(others[::2]).items():
-        np.testing.assert_array_equal(getattr(some, name), values, err_msg=name)

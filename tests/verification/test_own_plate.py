@@ -94,15 +94,6 @@ def test_a_shot_depends_on_its_own_numbers_alone(scheme: str, every: int, device
         np.testing.assert_allclose(plain.tilt, alone.tilt, atol=1e-5)
 
 
-@pytest.mark.parametrize("double", [False, True], ids=["single", "double"])
-def test_a_shot_is_the_same_in_any_company(double: bool, device: str) -> None:
-    numerics = {"level": 0, "precision": "double" if double else "single"}
-    together = simulated(PAPER_CORE, paper_plate(), SHOTS, device, **numerics)
-    backwards = simulated(PAPER_CORE, paper_plate(), SHOTS[np.arange(COUNT)[::-1]], device, **numerics)
-    for name, values in vars(together).items():
-        np.testing.assert_array_equal(getattr(backwards, name)[::-1], values, err_msg=name)
-
-
 def test_every_shot_does_the_work_of_its_own_plate(device: str) -> None:
     # m (v0² − v²)/2 = Y h π R² at η = 0, β = 1 (docs/model.md §6.1), each shot with its Y, h and m.
     own = own_numbers() | {"shear_coefficient": np.zeros(COUNT), "degradation": np.ones(COUNT)}

@@ -56,7 +56,7 @@ HAIRLINES = SlotPattern(
 )
 
 
-@pytest.mark.parametrize(("pattern", "spacing"), [(HAIRLINES, 0.25e-3), (PATTERNS[0], 0.05e-3), (PATTERNS[1], 0.03e-3)])
+@pytest.mark.parametrize(("pattern", "spacing"), [(HAIRLINES, 0.25e-3), (PATTERNS[0], 0.15e-3), (PATTERNS[1], 0.08e-3)])
 def test_tile_looks_closely_only_where_edges_are_and_misses_none(pattern: Any, spacing: float) -> None:
     tile = tile_of(PLATE.model_copy(update={"pattern": pattern}), spacing)
     samples = 24

@@ -1,0 +1,152 @@
+"""A shot has the same bits in any company: threads, chunks, batches, order, and how wide the windows of others are."""
+
+from collections.abc import Callable
+from functools import cache
+from typing import Any, NamedTuple
+
+import numpy as np
+import pytest
+
+from warpimpact.scene import Interaction, Layer, Numerics, Plate, Record, Scene, Shots, Target
+from warpimpact.solver import marching, windows
+from warpimpact.solver.simulate import simulate
+
+from .extremes import drawn
+from .scenes import PAPER_CORE, STANDOFFS, paper_plate, scattered_hits, shots_at
+
+SAMPLES, AT_A_PLATE = 24, 3
+BASE = Layer(**paper_plate(thickness=3e-3, resistance=1.5e9).model_dump(), gap=20e-3)
+
+
+class Case(NamedTuple):
+    """A build of the kernels: what is shot at, how it is computed, and how many shots hit one plate."""
+
+    plate: Plate = paper_plate()
+    behind: tuple[Layer, ...] = ()
+    numerics: dict[str, Any] = {}  # noqa: RUF012
+    interaction: Interaction = Interaction()
+    at_a_plate: int = 1
+    bending: bool = False
+    varies: tuple[str, ...] = ()
+
+
+CASES = {
+    "single": Case(),
+    "double": Case(numerics={"precision": "double"}),
+    "fixed step": Case(numerics={"time_step": 0.7e-6}),
+    "nodal": Case(paper_plate(degradation_depth=10e-3), numerics={"scheme": "nodal", "grid_spacing": 1e-4}),
+    "rate": Case(interaction=Interaction(static=0.9, linear=0.3, quadratic=0.2)),
+    "rim": Case(paper_plate(size=(24e-3, 30e-3))),
+    "bending": Case(bending=True),
+    "layers": Case(behind=(BASE,)),
+    "burst": Case(at_a_plate=AT_A_PLATE),
+    "burst at layers": Case(behind=(BASE,), at_a_plate=AT_A_PLATE),
+    "plates of their own": Case(varies=("resistance", "thickness", "degradation", "mass")),
+    "turned back at two layers": Case(),
+}
+"""All kinds of targets and schemes. The block layout has a build for every size of window, and another build may round
+otherwise: tests/kernels/test_block.py. The last scene is drawn: cores come again where their own first window ends
+and that of another shot does not."""
+RANGES = {"resistance": (1.5e9, 3.5e9), "thickness": (2e-3, 6e-3), "degradation": (0.6, 0.95), "mass": (3e-3, 6e-3)}
+
+
+@cache
+def scene_of(name: str) -> tuple[Scene, Shots, Numerics]:
+    """Velocities, obliquities and attitudes that differ from hit to hit, so that windows and steps do."""
+    case, rng = CASES[name], np.random.default_rng(1)
+    if name == "turned back at two layers":
+        scene, shots, precision = drawn(np.random.default_rng([1, 221]).random, hits=3)
+        return scene, shots, Numerics(level=0, precision=precision)
+    count = SAMPLES * case.at_a_plate
+    arrivals = {"velocity": (300.0, 900.0), "obliquity": (0.0, 60.0), "azimuth": (0.0, 360.0), "spin": (0.0, 2e4)}
+    arrivals |= dict.fromkeys(("pitch", "yaw"), (-10.0, 10.0))
+    hits = np.repeat(scattered_hits(SAMPLES), case.at_a_plate, axis=1) + rng.normal(0.0, 2e-3, (2, count))
+    shots = shots_at(*hits, **{column: rng.uniform(*ends, count) for column, ends in arrivals.items()})
+    own = {column: rng.uniform(*RANGES[column], count) for column in case.varies}
+    if case.at_a_plate > 1:
+        own |= {"sample": np.arange(count) // case.at_a_plate, "burst_order": np.arange(count) % case.at_a_plate}
+    record = Record(standoffs=STANDOFFS, bending=case.bending)
+    target = Target(layers=(case.plate, *case.behind))
+    scene = Scene(core=PAPER_CORE, target=target, interaction=case.interaction, record=record)
+    return scene, Shots(**shots.columns | own), Numerics(**{"level": 0} | case.numerics)
+
+
+def computed(name: str, which: Any = slice(None), device: str = "cpu", **settings: Any) -> dict[str, np.ndarray]:
+    """Outcomes of some of the shots of a case."""
+    scene, shots, numerics = scene_of(name)
+    return vars(simulate(scene, shots[which], numerics=numerics, device=device, **settings))
+
+
+@cache
+def expected(name: str, device: str) -> dict[str, np.ndarray]:
+    return computed(name, device=device)
+
+
+def assert_expected(got: dict[str, np.ndarray], name: str, device: str) -> None:
+    for column, values in expected(name, device).items():
+        np.testing.assert_array_equal(got[column], values, err_msg=column)
+
+
+def in_parts(name: str, device: str, bursts: int) -> dict[str, np.ndarray]:
+    size, count = bursts * CASES[name].at_a_plate, len(scene_of(name)[1])
+    parts = [computed(name, slice(first, first + size), device) for first in range(0, count, size)]
+    return {column: np.concatenate([part[column] for part in parts]) for column in parts[0]}
+
+
+def backwards(name: str, device: str) -> dict[str, np.ndarray]:
+    order = np.arange(len(scene_of(name)[1])).reshape(-1, CASES[name].at_a_plate)[::-1].ravel()
+    return {column: values[np.argsort(order)] for column, values in computed(name, order, device).items()}
+
+
+COMPANIES: dict[str, Callable[[str, str], dict[str, np.ndarray]]] = {
+    "again": lambda name, device: computed(name, device=device),
+    "alone": lambda name, device: in_parts(name, device, 1),
+    "in batches of 7": lambda name, device: in_parts(name, device, 7),
+    "backwards": backwards,
+}
+
+
+@pytest.mark.parametrize("name", CASES)
+@pytest.mark.parametrize("company", COMPANIES)
+def test_a_shot_has_the_same_bits_in_any_company(name: str, company: str, device: str) -> None:
+    assert_expected(COMPANIES[company](name, device), name, device)
+
+
+@pytest.mark.parametrize("name", CASES)
+@pytest.mark.parametrize(("threads", "chunk"), [(1, 64), (3, 1), (2, 5)])
+def test_threads_and_chunks_change_no_bit(name: str, threads: int, chunk: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(marching, "CHUNK", chunk)
+    assert_expected(computed(name, threads=threads), name, "cpu")
+
+
+# The last core may come again beyond its window, so that the width of its own first one counts.
+@pytest.mark.parametrize("name", [name for name in CASES if name != "turned back at two layers"])
+def test_shots_that_leave_narrow_windows_have_the_bits_of_wide_ones(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    marched, march_some = [], marching.March._march_some
+
+    def counted(self: marching.March, pending: Any, *rest: Any) -> None:
+        marched.append(len(pending))
+        march_some(self, pending, *rest)
+
+    expected(name, "cpu")
+    monkeypatch.setattr(marching.March, "_march_some", counted)
+    for width in ("SLACK", "NODAL_SLACK"):
+        monkeypatch.setattr(windows, width, 0.3 * getattr(windows, width))
+    assert_expected(computed(name), name, "cpu")
+    assert len(marched) > 1 or CASES[name].behind  # windows of several layers slide with the core
+    assert not any(count % CASES[name].at_a_plate for count in marched)  # whole bursts are repeated
+
+
+def test_first_window_is_wide_enough(monkeypatch: pytest.MonkeyPatch) -> None:
+    # A hit that leaves it is computed again: this is right, but twice the work. 9 % of these hits leave windows of 1.2
+    # radii.
+    marched, march_some = [], marching.March._march_some
+
+    def counted(self: marching.March, pending: Any, *rest: Any) -> None:
+        marched.append(len(pending))
+        march_some(self, pending, *rest)
+
+    monkeypatch.setattr(marching.March, "_march_some", counted)
+    scene = Scene(core=PAPER_CORE, target=paper_plate(), record=Record(standoffs=STANDOFFS))
+    simulate(scene, shots_at(*scattered_hits(100)), numerics=Numerics(level=2), device="cpu")
+    assert marched == [100]
