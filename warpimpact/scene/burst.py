@@ -6,7 +6,7 @@ from dataclasses import replace
 from typing import Annotated, Any, Self
 
 import numpy as np
-from pydantic import Field, field_validator, model_validator
+from pydantic import Field, model_validator
 
 from .distributions import EDGE, AnyDistribution, Distribution, normal_quantile
 from .exclusions import BURST, HIT_SCATTER, IMAGES, OFFSETS, SPACING, check_together
@@ -52,22 +52,19 @@ class Burst(Scattering):
 
     @model_validator(mode="before")
     @classmethod
-    def _counted(cls, values: Any) -> Any:
-        if isinstance(values, dict) and "count" not in values and isinstance(values.get("offsets"), list | tuple):
-            return values | {"count": len(values["offsets"])}
-        return values
-
-    @field_validator("spacing", mode="before")
-    @classmethod
-    def _of_a_number(cls, value: Any) -> Any:
-        if value is None or isinstance(value, dict | Distribution):
-            return value
-        return {"distribution": "discrete", "values": [value]}
-
-    @field_validator("scatter", mode="before")
-    @classmethod
-    def _along_both(cls, value: Any) -> Any:
-        return value if value is None or isinstance(value, list | tuple) else (value, value)
+    def _of_short_forms(cls, values: Any) -> Any:
+        """Count the offsets, and take one length as a spacing or as both standard deviations."""
+        if not isinstance(values, dict):
+            return values
+        offsets, spacing, scatter = (values.get(name) for name in ("offsets", "spacing", "scatter"))
+        short: dict[str, Any] = {}
+        if "count" not in values and isinstance(offsets, list | tuple):
+            short["count"] = len(offsets)
+        if spacing is not None and not isinstance(spacing, dict | Distribution):
+            short["spacing"] = {"distribution": "discrete", "values": [spacing]}
+        if scatter is not None and not isinstance(scatter, list | tuple):
+            short["scatter"] = (scatter, scatter)
+        return values | short
 
     @model_validator(mode="after")
     def _lie_somewhere(self) -> Self:

@@ -165,12 +165,14 @@ def test_a_campaign_copied_without_a_change_is_the_same(folder: Path) -> None:
 
 
 @pytest.mark.parametrize(("text", "options"), [(LISTED, {}), (PLAIN, {"count": 3})], ids=["listed", "another count"])
-def test_a_replay_computes_the_plate_of_a_changed_campaign(
+def test_a_replay_of_a_stored_result_computes_the_plate_of_a_changed_campaign(
     folder: Path, text: str, options: dict[str, int], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     original = read(folder, text, **options).model_copy(update={"numerics": {"fidelity": "draft"}})
-    changed = thinner(original)
-    result, before = (run(campaign, device="cpu") for campaign in (changed, original))
+    before = run(original, device="cpu")
+    run_to_file(thinner(original), Path("a.nc"), device="cpu")
+    result = files.read(Path("a.nc"))
+    assert json.loads(result.attrs["campaign"])["plate"]["thickness"] == 3e-3
     assert result.sizes["hit"] == 3
     assert (result["residual_velocity"] != before["residual_velocity"]).all()
     monkeypatch.chdir(Path.cwd().root)
@@ -178,14 +180,6 @@ def test_a_replay_computes_the_plate_of_a_changed_campaign(
     assert history.attrs["agreement"] == "bit-identical"
     assert history.attrs["plate_thickness"] == 3e-3
     np.testing.assert_array_equal(history["tilt"], result["tilt"][2])
-
-
-def test_a_stored_result_tells_the_changed_campaign(folder: Path) -> None:
-    changed = thinner(read(folder, PLAIN))
-    run_to_file(changed, Path("a.nc"), device="cpu")
-    stored = files.read(Path("a.nc"))
-    assert json.loads(stored.attrs["campaign"])["plate"]["thickness"] == 3e-3
-    assert replay(stored, 0, folder=Path()).attrs["agreement"] == "bit-identical"
 
 
 def test_a_plate_of_a_comparison_can_be_changed() -> None:
@@ -255,6 +249,3 @@ def test_angles_of_a_hit_list_are_degrees(folder: Path) -> None:
     (folder / "hits.csv").write_text("hit_y,hit_z,obliquity\n0,0,90\n")
     with pytest.raises(CampaignError, match="column obliquity that reaches 90 deg, but it must be at least 0 and less"):
         read(folder, LISTED)
-    oblique = PLAIN.replace("[impact]\n", '[impact]\nobliquity = "90 deg"\n')
-    with pytest.raises(CampaignError, match=r'impact.obliquity: got "90 deg", but it must be at least 0 and less than'):
-        read(folder, oblique)
