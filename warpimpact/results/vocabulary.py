@@ -23,6 +23,7 @@ from warpimpact.results.per_hit import (
     PerHit,
     at,
     ended_as,
+    energy,
     energy_density,
     energy_fraction,
     inclination,
@@ -38,7 +39,6 @@ if TYPE_CHECKING:
 MIL_STD_662F = "MIL-STD-662F, V50 Ballistic Test for Armor"
 _ROSENBERG = "Z. Rosenberg, E. Dekel, Terminal Ballistics, Springer 2012"
 _VELOCITY, _THICKNESS = (v.LIMITS[name].value for name in ("velocity", "thickness"))
-
 
 BASE = Need(v.STOPPED_IN, "layers behind the plate", "a table [[layer]]")
 STRENGTH = Need(v.BROKEN, "cores with a strength", "output.bending = true and core.strength")
@@ -61,6 +61,18 @@ _DERIVED = (
         values=lambda part, _: bases.base_depth(part),
         of=bases.NEEDED,
         need=BASE,
+    ),
+    PerHit(
+        name="residual_energy",
+        label="residual energy",
+        units="J",
+        definition="Kinetic energy of translation behind the target; 0 for a core that was arrested or ricocheted. A "
+        "limit such as 80 J tells which cores count as incapacitating.",
+        source="criterion of Rohne: B. P. Kneubuehl and others, Wound Ballistics, Springer 2011",
+        higher_is_better=False,
+        values=lambda part, _: of_all(part, energy(part), 0.0),
+        of=(v.RESIDUAL_VELOCITY, v.MASS),
+        need=CORE,
     ),
     PerHit(
         name="residual_energy_fraction",

@@ -1,5 +1,7 @@
 """Measures of a Dataset: which shots count, and intervals that contain the answer as often as they claim."""
 
+import re
+
 import numpy as np
 import pytest
 import xarray
@@ -60,6 +62,70 @@ def test_what_failed_or_stayed_counts_where_it_says() -> None:
         tally = Tally(Measure.parse(text))
         tally.add(mixed)
         assert (tally.estimate().value, tally.estimate().count) == (pytest.approx(value), count), text
+
+
+def test_residual_energy_is_that_of_the_core_that_came_through(make_plate_result) -> None:
+    ends = np.array([Status.PERFORATED, Status.MISSED, Status.RICOCHETED, Status.UNFINISHED, Status.PERFORATED])
+    result = make_plate_result(np.array([150.0, 250.0, 300.0, np.nan, 200.0]), status=ends)
+    energy = [0.5 * 0.004 * velocity**2 for velocity in (150.0, 250.0, 0.0, np.nan, 200.0)]  # [J], a core of 4 g
+    assert Measure.parse("mean(residual_energy)").values(result) == pytest.approx(energy, nan_ok=True)
+    tally = Tally(Measure.parse("P(residual_energy > 80 J)"))
+    tally.add(result)
+    assert (tally.estimate().value, tally.estimate().count) == (1 / 4, 4)  # 125 J; 80 J are not beyond 80 J
+
+
+def test_a_worst_tenth_of_shards_is_that_of_all_shots() -> None:
+    tally, values = Tally(Measure.parse("worst_tenth(residual_velocity)")), np.random.default_rng(3).random(1000)
+    for part in np.split(values, 4):
+        tally.add(shard_of(part))
+    estimate = tally.estimate()
+    assert estimate.value == pytest.approx(np.sort(values)[-100:].mean())
+    assert 0.9 < estimate.low < estimate.value < estimate.high < 1.0
+
+
+@pytest.mark.parametrize(
+    ("text", "sentence"),
+    [
+        ("mean(residual_velcity)", "did you mean mean(residual_velocity)?"),
+        ("mean(speed)", "but it must be one of base_depth, "),
+        ("P(perforatd)", "did you mean P(perforated)?"),
+        ("mean(perforated)", 'got "perforated", which takes the form P(perforated)'),
+        ("P(tilt)", 'got "tilt", which takes the form mean(tilt) or P(tilt > …)'),
+        ("base_depth", "did you mean mean(base_depth)?"),
+        ("median(tilt)", "but it must be of the form mean("),
+        ("mean(tilt, 0.5)", "but mean(…) takes a quantity alone"),
+        ("quantile(tilt)", "but quantile(…) takes a share"),
+        ("worst_tenth(tilt)", "neither a high nor a low tilt is worse"),
+        ("mean(base_depth@130mm)", "base_depth has no stand-off"),
+        ("P(stopped@130mm)", "the event stopped has neither a place nor a share"),
+        ("P(residual_energy_density > 5 mm)", 'got "5 mm", which is not an energy per area'),
+    ],
+)
+def test_a_text_that_is_no_measure_is_told_in_one_sentence(text: str, sentence: str) -> None:
+    with pytest.raises(ValueError, match=re.escape(sentence)):
+        Measure.parse(text)
+
+
+@pytest.mark.parametrize(
+    ("text", "title", "better"),
+    [
+        ("V50", "limit velocity, 50 % quantile [m/s]", "higher is better"),
+        ("P(inclination@130mm > 30 deg)", "P(inclination at 130 mm > 30°, or stopped)", "higher is better"),
+        ("P(inclination < 30 deg)", "P(inclination at the last stand-off < 30°)", "lower is better"),
+        (
+            "worst_tenth(residual_energy_density@50mm)",
+            "proxy: energy per presented area at 50 mm, worst tenth [J/mm²]",
+            "",
+        ),
+        ("mean(limit_thickness@layer 1)", "limit thickness of layer 1, mean [mm]", "lower is better"),
+        ("mean(yaw@50mm)", "yaw at 50 mm, mean [°]", "neither is better"),
+        ("areal_density", "areal density [kg/m²]", "lower is better"),
+    ],
+)
+def test_words_and_direction_of_a_measure(text: str, title: str, better: str | None) -> None:
+    measure = Measure.parse(text)
+    assert measure.title == title
+    assert measure.better == (better or "lower is better")
 
 
 def test_a_standoff_that_a_result_lacks_is_refused() -> None:
