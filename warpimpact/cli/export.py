@@ -39,7 +39,8 @@ def _export(arguments: argparse.Namespace) -> None:
     from warpimpact.export.paraview import write_vtk
     from warpimpact.export.table import write_csv
     from warpimpact.results import files
-    from warpimpact.results.checks import HISTORY, RESULT
+    from warpimpact.results.checks import RESULT
+    from warpimpact.results.replayed_hit import HISTORY
 
     path, output = arguments.file, arguments.output
     if path.suffix == ".toml":
@@ -102,19 +103,23 @@ def add_report(commands: Commands) -> None:
 
 
 def _report(arguments: argparse.Namespace) -> None:
+    from warpimpact.report.front import write_front_report
+    from warpimpact.report.one_file import is_shown, write_file_report
     from warpimpact.report.report import write_report
-    from warpimpact.results import files, front, posterior_file
+    from warpimpact.results import files, front
 
     paths = arguments.results
     output = arguments.output or paths[0].with_suffix(".html")
     check_suffix(output, "a report", ".html")
     check_output(output, overwrite=arguments.overwrite)
-    alone = {posterior_file.POSTERIOR: _report_posterior, front.FRONT: _report_front}
-    for kind in map(files.kind_of, paths):
-        if kind in alone:
+    for path, kind in zip(paths, map(files.kind_of, paths), strict=True):
+        if kind is not None and is_shown(kind):
             if len(paths) > 1:
                 raise files.ResultError(f"got {len(paths)} files, one of which is {kind.name}, which is reported alone")
-            alone[kind](paths[0], output, arguments.campaign_folder or paths[0].parent)
+            if kind.name == front.FRONT.name:
+                write_front_report(files.read(path, kind), output, arguments.campaign_folder or path.parent)
+            else:
+                write_file_report(path, kind, output)
             print(output)
             return
     by_name = named(paths)
@@ -130,17 +135,3 @@ def _report(arguments: argparse.Namespace) -> None:
                 progress=progress,
             )
     print(output)
-
-
-def _report_posterior(path: Path, output: Path, _: Path) -> None:
-    from warpimpact.report.posterior import write_posterior_report
-    from warpimpact.results import files, posterior_file
-
-    write_posterior_report(files.read_tree(path, posterior_file.POSTERIOR), output)
-
-
-def _report_front(path: Path, output: Path, folder: Path) -> None:
-    from warpimpact.report.front import write_front_report
-    from warpimpact.results import files, front
-
-    write_front_report(files.read(path, front.FRONT), output, folder)

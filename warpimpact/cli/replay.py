@@ -39,12 +39,13 @@ def add_replay(commands: Commands) -> None:
 
 
 def _replay(arguments: argparse.Namespace) -> None:
-    from warpimpact.analysis.hit import hit_text
     from warpimpact.plotting.animation import save_animation, writer_for
     from warpimpact.plotting.layers import layers
     from warpimpact.plotting.trajectory import FIGURES, save_figures
     from warpimpact.results import files
+    from warpimpact.results.replayed_hit import hit_view
     from warpimpact.runs.replay import replay
+    from warpimpact.view.view import text_of
 
     result, path, film = files.read(arguments.result), arguments.result, arguments.animation
     output = arguments.output or path.with_name(f"{path.stem}_hit{arguments.hit}.nc")
@@ -59,7 +60,7 @@ def _replay(arguments: argparse.Namespace) -> None:
         folder = arguments.campaign_folder or path.parent
         history = replay(result, arguments.hit, folder=folder, snapshots=arguments.snapshots)
     files.write(history, output)
-    print(hit_text(history))
+    print(text_of(hit_view(history)))
     for written in (output, *save_figures(history, output.parent, output.stem)):
         print(written)
     if film:

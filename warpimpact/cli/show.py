@@ -30,8 +30,8 @@ def add_inspect(commands: Commands) -> None:
         "inspect",
         _inspect,
         summary="print what a result contains",
-        description="Print the origin of a result, its campaign, its numbers with their intervals, and the shots that "
-        "failed.",
+        description="Print the origin of a result, its numbers with their intervals, and the shots that failed. Of a "
+        "posterior, a search, a firing test or a replayed hit print what the command that wrote it prints.",
         example="inspect slotted.nc",
     )
     add_result(parser)
@@ -47,8 +47,14 @@ def add_inspect(commands: Commands) -> None:
 def _inspect(arguments: argparse.Namespace) -> None:
     from warpimpact.analysis.effectiveness import effectiveness_text
     from warpimpact.analysis.inspect import inspect_text
+    from warpimpact.report.one_file import is_shown, view_of
     from warpimpact.results import files
+    from warpimpact.view.view import text_of
 
+    kind = files.kind_of(arguments.result)
+    if kind is not None and is_shown(kind) and not (arguments.campaign or arguments.discrepancy):
+        print(text_of(view_of(arguments.result, kind)))
+        return
     with files.opened(arguments.result) as dataset:
         asked = dataset.assign_attrs({attr.DISCREPANCY_COUNTS: 1}) if arguments.discrepancy else dataset
         if arguments.campaign:

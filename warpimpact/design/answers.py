@@ -12,7 +12,6 @@ from typing import Any
 import xarray
 from jinja2 import ChoiceLoader, Environment, PackageLoader, StrictUndefined
 
-from warpimpact.analysis.hit import hit_text
 from warpimpact.analysis.summary import breaks_promise, numerics_sentence
 from warpimpact.campaign.campaign import Campaign
 from warpimpact.campaign.evidence import evidence_of
@@ -27,9 +26,11 @@ from warpimpact.report.hits import MOST_HITS, PIXELS, page_data, thinned, trajec
 from warpimpact.report.report import report_page
 from warpimpact.report.words import compared, result_content
 from warpimpact.results import attributes as attr
+from warpimpact.results.replayed_hit import hit_view
 from warpimpact.runs.replay import replay
 from warpimpact.runs.run import run
 from warpimpact.solver.worker import Cancel
+from warpimpact.view.view import text_of
 
 _MOST_KEPT = 256 * 2**20
 """Bytes of results that are kept: to go back to a design computes nothing."""
@@ -141,7 +142,7 @@ class Answers:
         history = self._history(stage_of(self.shelf, design, level, stage).text, hit, cancel)
         return {
             "hit": hit,
-            "text": hit_text(history),
+            "text": text_of(hit_view(history)),
             "figures": [draw.__name__.replace("_", " ") for draw in FIGURES],
             "views": trajectory_data(history),
         }

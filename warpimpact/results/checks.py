@@ -11,14 +11,9 @@ from warpimpact.kernels.status import Status
 from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
 from warpimpact.results.declared import (
-    Declaration,
-    Positive,
-    Text,
     attribute_faults,
-    finite,
     metadata_faults,
     missing_fault,
-    texts,
 )
 from warpimpact.results.kind import Kind
 from warpimpact.scene.display import STORED
@@ -171,37 +166,6 @@ def packing_fault(dataset: xarray.Dataset) -> str | None:
     return None
 
 
-_OF_A_COMPUTATION = {attr.TITLE: Text, attr.HISTORY: Text}
-
-
-def _history_fault(dataset: xarray.Dataset) -> str | None:
-    least = {v.CELL_Y: 2, v.CELL_Z: 2, v.STATION: 2, v.TIME: 1, v.SNAPSHOT: 1}
-    few = [name for name, size in least.items() if dataset.sizes[str(name)] < size]
-    return f'it has too few values of "{few[0]}"' if few else None
-
-
-def _turns(values: np.ndarray[Any, Any], sizes: Mapping[str, int]) -> bool:
-    """Quaternions, of which none is 0."""
-    return finite(values, sizes) and values.shape[-1] == 4 and bool((np.linalg.norm(values, axis=-1) > 0.0).all())
-
-
-def _ascending(values: np.ndarray[Any, Any], sizes: Mapping[str, int]) -> bool:
-    return finite(values, sizes) and bool((np.diff(values) > 0.0).all())
-
-
-_HISTORY = Declaration(
-    {one: one.dims for one in (*v.HISTORY_COORDINATES, *v.HISTORY_VARIABLES)},
-    rules={
-        v.QUATERNION: texts,
-        v.ATTITUDE: _turns,
-        **dict.fromkeys((v.TIME, v.SNAPSHOT, v.STATION, v.CORE_RADIUS, v.PLATE_POSITION), finite),
-        **dict.fromkeys((v.CELL_Y, v.CELL_Z), _ascending),
-    },
-    attributes={attr.PLATE_THICKNESS: Positive, attr.PLATE_PERIOD: tuple[Positive, Positive]},
-    more=_history_fault,
-)
-
-
 RESULT = Kind(
     "a map of hits",
     "warpimpact inspect, plot, report, export, compare and replay take it",
@@ -215,7 +179,4 @@ SWEEP = Kind(
     maker="warpimpact sweep",
     misuse=lambda dataset: _missing(dataset, *v.COORDINATES),
     fault=_sweep_fault,
-)
-HISTORY = Kind(
-    "the history of a hit", "warpimpact export takes it", (v.TIME,), maker="warpimpact replay", fault=_HISTORY.fault
 )

@@ -6,6 +6,8 @@ from collections.abc import Callable, Collection
 from dataclasses import dataclass
 from typing import Any
 
+from warpimpact.view.view import Section
+
 
 @dataclass(frozen=True)
 class Kind:
@@ -19,6 +21,8 @@ class Kind:
         misuse: says of a Dataset what its user must do otherwise, as a sentence; None if nothing.
         fault: says what keeps a Dataset, or the tree of a posterior, from being of this kind, as a phrase; None if
             nothing does.
+        is_tree: whether it is read as a tree of its groups.
+        view: what `warpimpact inspect` and `report` show of it; None where a room above this one has its view.
     """
 
     name: str
@@ -27,6 +31,8 @@ class Kind:
     maker: str = ""
     misuse: Callable[[Any], str | None] = lambda dataset: None
     fault: Callable[[Any], str | None] = lambda dataset: None
+    is_tree: bool = False
+    view: Callable[[Any], list[Section]] | None = None
 
     def told(self, path: object, wanted: str) -> str:
         """A sentence that a file is of this kind and not what is wanted, with what takes it."""

@@ -8,7 +8,7 @@ from pathlib import Path
 import netCDF4
 
 from warpimpact.results import attributes as attr
-from warpimpact.results import checks, firing, front, posterior_file
+from warpimpact.results import checks, firing, front, posterior_file, replayed_hit
 from warpimpact.results import variables as v
 from warpimpact.results.kind import Kind
 from warpimpact.scene.toml_text import parsed, read_text
@@ -16,12 +16,12 @@ from warpimpact.scene.toml_text import parsed, read_text
 _BEGIN_NETCDF = b"\x89HDF", b"CDF"
 
 
-NETCDF = (posterior_file.POSTERIOR, front.FRONT, firing.FIRING, checks.HISTORY)
+NETCDF = (posterior_file.POSTERIOR, front.FRONT, firing.FIRING, replayed_hit.HISTORY)
 """Kinds that are recognised by their marks; a map of hits and a sweep by the variable of statuses."""
 
 DESIGN = Kind("a design file", "warpimpact optimise takes it", ("variables", "objectives"))
 FIT = Kind("a fit", "warpimpact identify takes it", ("shot", "prior"))
-TEST = Kind("a firing test", "warpimpact test takes it", ("target", "procedure"))
+TEST = Kind("a test file", "warpimpact test takes it", ("target", "procedure"))
 ENTRIES = Kind("a catalogue", "warpimpact catalogue --file takes it", ("threat", "material"))
 CAMPAIGN = Kind("a campaign", "warpimpact run takes it", ("hits", "sweep"))
 _TEXTS = (DESIGN, FIT, TEST, ENTRIES, CAMPAIGN)

@@ -132,6 +132,7 @@ POSTERIOR = Kind(
     ("posterior", EFFECTIVE),
     maker="warpimpact identify",
     fault=lambda tree: _fault(tree, GROUPS),
+    is_tree=True,
 )
 DRAWS = replace(POSTERIOR, fault=lambda tree: _fault(tree, _GROUPS_OF_DRAWS))
 """The same, of which the draws alone are needed."""

@@ -5,13 +5,14 @@ from pathlib import Path
 import pytest
 
 from warpimpact import Campaign
-from warpimpact.analysis.hit import hit_text
 from warpimpact.campaign.campaign import CampaignError
 from warpimpact.cli import main
 from warpimpact.plotting.maps import variable_map
 from warpimpact.results import files
+from warpimpact.results.replayed_hit import hit_view
 from warpimpact.results.variables import BENDING_VARIABLES, HIT_NUMBERS
 from warpimpact.runs.replay import replay
+from warpimpact.view.view import text_of
 
 SLOTTED_PLATE = (Path(__file__).parents[3] / "campaigns" / "slotted_plate.toml").read_text(encoding="utf-8")
 STOP = """
@@ -95,6 +96,6 @@ def test_run_and_replay_tell_which_cores_break(tmp_path: Path, capsys: pytest.Ca
     assert row.split() == ["broken", f"{broken.sum():.0f}", f"{broken.mean():.1%}"]
     hit = int(broken.argmax())
     time, section = (float(dataset[name][hit]) for name in ("broken_time", "broken_section"))
-    told = hit_text(replay(dataset, hit))
+    told = text_of(hit_view(replay(dataset, hit)))
     assert f"passed the core's strength after {1e6 * time:.1f} µs, {1e3 * section:.1f} mm behind the nose." in told
-    assert "stayed below the core's strength" in hit_text(replay(dataset, int(broken.argmin())))
+    assert "stayed below the core's strength" in text_of(hit_view(replay(dataset, int(broken.argmin()))))

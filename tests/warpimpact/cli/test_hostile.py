@@ -260,7 +260,7 @@ def test_a_result_that_was_altered_is_refused_in_a_sentence(
     change(make_result(20)).to_netcdf(path)
     assert main(["inspect", str(path)]) == 2
     said = capsys.readouterr().err
-    assert said.startswith(f"warpimpact: error: {path}: not a result of warpimpact")
+    assert said.startswith(f"warpimpact: error: {path}: not a map of hits of warpimpact")
     assert said.count("\n") == 1
 
 

@@ -28,7 +28,7 @@ TEXTS: dict[str, tuple[str, str]] = {
     "a campaign": (SLOTTED, "warpimpact run takes it"),
     "a design file": ("variables = { thickness = [1, 2] }", "warpimpact optimise takes it"),
     "a fit": ("[[shot]]\nname = 'a'", "warpimpact identify takes it"),
-    "a firing test": ("[target]\nmean = 800", "warpimpact test takes it"),
+    "a test file": ("[target]\nmean = 800", "warpimpact test takes it"),
     "a catalogue": ("[[material]]\nname = 'a'", "warpimpact catalogue --file takes it"),
 }
 ResultMaker = Callable[..., xarray.Dataset]
@@ -117,7 +117,7 @@ def test_a_text_is_named_as_what_it_is(kind: str, in_tmp_path: Path, capsys: pyt
     Path("a.toml").write_text(text, encoding="utf-8")
     for arguments in (["inspect", "a.toml"], ["report", "a.toml", "-o", "a.html"]):
         assert _said(arguments, capsys) == f"a.toml: is {kind}, not a map of hits; {use}"
-    commands = {"run": "a campaign", "optimise": "a design file", "identify": "a fit", "test": "a firing test"}
+    commands = {"run": "a campaign", "optimise": "a design file", "identify": "a fit", "test": "a test file"}
     for command, wanted in commands.items():
         if wanted != kind:
             assert _said([command, "a.toml"], capsys) == f"a.toml: is {kind}, not {wanted}; {use}"

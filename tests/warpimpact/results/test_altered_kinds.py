@@ -8,8 +8,9 @@ import xarray
 
 from warpimpact.campaign.campaign import Campaign
 from warpimpact.results import checks, files
-from warpimpact.results.checks import HISTORY, RESULT
+from warpimpact.results.checks import RESULT
 from warpimpact.results.files import ResultError
+from warpimpact.results.replayed_hit import HISTORY
 from warpimpact.runs.replay import replay
 from warpimpact.runs.run import run
 
@@ -48,7 +49,7 @@ def test_a_factor_that_is_no_number_is_refused(layered: xarray.Dataset, tmp_path
 
 def test_an_altered_history_is_refused(layered: xarray.Dataset, tmp_path: Path) -> None:
     history = replay(layered, 3, folder=Path())
-    assert checks.HISTORY.fault(history) is None
+    assert HISTORY.fault(history) is None
     for change in (lambda d: d.drop_vars("plate_position"), lambda d: d.assign(force=d["force"].astype(str))):
         files.write(change(history), tmp_path / "a.nc")
         with (

@@ -11,7 +11,8 @@ from warpimpact.analysis.slabs import LayerField, fields_behind
 from warpimpact.export.paraview import write_vtk
 from warpimpact.plotting.layers import layers
 from warpimpact.results import files
-from warpimpact.results.checks import HISTORY, RESULT
+from warpimpact.results.checks import RESULT
+from warpimpact.results.replayed_hit import HISTORY
 from warpimpact.runs.replay import replay
 
 CAMPAIGN = """

@@ -1,0 +1,134 @@
+"""Files of all kinds but hit maps: what `inspect` prints of one, and its report, one HTML file that works offline.
+
+A kind with a view of its own (`results.kind.Kind`) is shown without a line here; `_SHOWN` has what rooms above know.
+"""
+
+from __future__ import annotations
+
+from base64 import b64encode
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+from html import escape
+from io import BytesIO
+from pathlib import Path
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+from warpimpact.firing.firing_view import firing_view
+from warpimpact.identification.posterior_view import posterior_view
+from warpimpact.optimisation.front_view import front_view
+from warpimpact.plotting.firing import directions_figure, firing_figure
+from warpimpact.plotting.posterior import hits_figure, measured_figure, pairs_figure
+from warpimpact.plotting.trajectory import FIGURES
+from warpimpact.results import attributes as attr
+from warpimpact.results import files, firing, front, posterior_file, replayed_hit
+from warpimpact.results.kind import Kind
+from warpimpact.view.view import Section, html_of
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+_STYLE = (
+    "body{font:16px sans-serif;max-width:70rem;margin:2rem auto;padding:0 1rem}img{max-width:100%}pre{overflow:auto}"
+    "td,th{padding:.2rem .9rem .2rem 0;text-align:left;border-bottom:1px solid #d8d8d8}table{border-collapse:collapse}"
+    ".number{text-align:right}.wide{overflow-x:auto}"
+)
+
+
+class _Shown(NamedTuple):
+    """What is shown of a kind beside its own view.
+
+    Attributes:
+        view: its view, where results has none.
+        figures: by their headings, each with the variable that it needs, empty if none.
+        asked: attribute with the text of the file that it was computed from.
+    """
+
+    view: Callable[[Any], list[Section]] | None = None
+    figures: Mapping[str, tuple[str, Callable[[Any], Figure]]] = MappingProxyType({})
+    asked: str = ""
+
+
+_SHOWN = {
+    posterior_file.POSTERIOR.name: _Shown(
+        posterior_view,
+        {
+            "Parameters, in pairs": ("", pairs_figure),
+            "Measured and computed": ("", measured_figure),
+            "Where the shots hit": ("", hits_figure),
+        },
+        posterior_file.FIT,
+    ),
+    front.FRONT.name: _Shown(front_view, asked=front.DESIGN),
+    firing.FIRING.name: _Shown(
+        firing_view,
+        {
+            "What the tests report": (firing.SHARE, firing_figure),
+            "By direction": (firing.DIRECTION_SHARE, directions_figure),
+        },
+        firing.TEST,
+    ),
+    replayed_hit.HISTORY.name: _Shown(
+        figures={draw.__name__.replace("_", " ").capitalize(): ("", draw) for draw in FIGURES}
+    ),
+}
+
+
+def is_shown(kind: Kind) -> bool:
+    """Whether a kind has a view."""
+    return kind.view is not None or kind.name in _SHOWN
+
+
+def view_of(path: Path, kind: Kind) -> list[Section]:
+    """The view of a file of a kind that is shown.
+
+    Raises:
+        ResultError: it cannot be read.
+    """
+    return _view(kind, _loaded(path, kind))
+
+
+def _view(kind: Kind, dataset: Any) -> list[Section]:
+    view = kind.view or _SHOWN[kind.name].view
+    assert view is not None  # `is_shown`
+    return view(dataset)
+
+
+def _loaded(path: Path, kind: Kind) -> Any:
+    return files.read_tree(path, kind) if kind.is_tree else files.read(path, kind)
+
+
+def write_file_report(path: Path, kind: Kind, output: Path) -> None:
+    """Write the report of a file, whole or not at all.
+
+    Raises:
+        OutputError: the report cannot be written.
+        ResultError: the file cannot be read.
+    """
+    dataset, shown = _loaded(path, kind), _SHOWN.get(kind.name, _Shown())
+    told = dataset.attrs
+    title, (first, *others) = str(told.get(attr.TITLE, path.stem)), _view(kind, dataset)
+    sections = [replace(first, title="") if first.title == title else first, *others]
+    figures = "".join(
+        f"<h2>{name}</h2><img alt='{name}' src='{_picture(draw(dataset))}'>"
+        for name, (needed, draw) in shown.figures.items()
+        if not needed or needed in dataset
+    )
+    asked = f"<h2>What was asked</h2><pre>{escape(str(told[shown.asked]))}</pre>" if shown.asked in told else ""
+    made = escape(", ".join(str(told[name]) for name in (attr.HISTORY, attr.WARPIMPACT_VERSION) if name in told))
+    page = (
+        "<!DOCTYPE html><html lang='en'><head><meta charset='utf-8'>"
+        "<meta http-equiv='Content-Security-Policy' "
+        "content=\"default-src 'none'; img-src data:; style-src 'unsafe-inline'\">"
+        f"<title>{escape(title)}</title><style>{_STYLE}</style></head><body><h1>{escape(title)}</h1>"
+        f"{html_of(sections, 'h2')}{figures}{asked}<p>{made}</p></body></html>\n"
+    )
+    with files.aside(output) as file:
+        file.write_text(page, encoding="utf-8")
+
+
+def _picture(figure: Figure) -> str:
+    """A figure as the address of an image that holds itself."""
+    buffer = BytesIO()
+    figure.savefig(buffer, format="png", dpi=110)
+    return f"data:image/png;base64,{b64encode(buffer.getvalue()).decode()}"
