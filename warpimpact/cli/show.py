@@ -150,20 +150,19 @@ def _plate(arguments: argparse.Namespace) -> None:
     from warpimpact.analysis.plate import plate_numbers
     from warpimpact.campaign.campaign import Campaign
     from warpimpact.plotting import plate_figure
+    from warpimpact.view.view import Section, labelled, text_of
 
     output = arguments.output or Path(arguments.campaign.stem + "_plate.png")
     check_picture(output, overwrite=arguments.overwrite)
     campaign = Campaign.from_toml(arguments.campaign)
     plate = campaign.plate
     plate_figure(campaign.target, campaign.core, campaign.title).savefig(output, dpi=150)
-    print(campaign.title)
-    print(f"{'thickness':<18}  {1e3 * plate.thickness:g} mm")
-    numbers = plate_numbers(plate.open_area, plate.ligament, plate.areal_density, plate.pattern.resolution)
-    for name, number in numbers.items():
-        print(f"{name:<18}  {number}")
+    rows = [("thickness", f"{1e3 * plate.thickness:g} mm")]
+    rows += plate_numbers(plate.open_area, plate.ligament, plate.areal_density, plate.pattern.resolution).items()
     for place, layer in enumerate(campaign.layer, start=1):
-        told = f"{1e3 * layer.thickness:g} mm, {1e3 * layer.gap:g} mm behind the one before, {layer.open_area:.1%} open"
-        print(f"{f'layer {place}':<18}  {told}")
+        behind = f"{1e3 * layer.gap:g} mm behind the one before"
+        rows.append((f"layer {place}", f"{1e3 * layer.thickness:g} mm, {behind}, {layer.open_area:.1%} open"))
     if campaign.layer:
-        print(f"{'whole target':<18}  {campaign.target.areal_density:.1f} kg/m²")
+        rows.append(("whole target", f"{campaign.target.areal_density:.1f} kg/m²"))
+    print(text_of([Section([labelled(rows)], campaign.title)]))
     print(output)

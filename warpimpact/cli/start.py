@@ -11,11 +11,8 @@ from .options import Commands, add_command, add_output, add_overwrite
 from .paths import check_output
 
 _SCHEMA = "warpimpact.schema.json"
-_FIT_SCHEMA = "warpimpact.fit.schema.json"
-_TEST_SCHEMA = "warpimpact.test.schema.json"
-_DESIGN_SCHEMA = "warpimpact.design.schema.json"
-_FITS, _FIRING, _DESIGNS = "fits", "firing", "designs"
-"""Folders of the examples that warpimpact identify, warpimpact test and warpimpact optimise take."""
+_FOLDERS = (".", "fits", "firing", "designs")
+"""Folders of the examples: campaigns, and what identify, test and optimise take."""
 
 
 def add_examples(commands: Commands) -> None:
@@ -31,11 +28,12 @@ def add_examples(commands: Commands) -> None:
 
 
 def _examples(arguments: argparse.Namespace) -> None:
-    paths = _campaigns()
-    width = max(map(len, paths))
-    for name, path in paths.items():
-        question = path.read_text(encoding="utf-8").splitlines()[0].removeprefix("# ")
-        print(f"{name:<{width}}  {question}")
+    from warpimpact.view.view import Section, labelled, text_of
+
+    questions = [
+        (name, path.read_text(encoding="utf-8").splitlines()[0].removeprefix("# ")) for name, path in _paths().items()
+    ]
+    print(text_of([Section([labelled(questions)])]))
 
 
 def add_new(commands: Commands) -> None:
@@ -58,8 +56,9 @@ def _new(arguments: argparse.Namespace) -> None:
     from difflib import get_close_matches
 
     from warpimpact.campaign.text import CampaignError
+    from warpimpact.results import kinds
 
-    paths, name = _campaigns(), arguments.name.removesuffix(".toml")
+    paths, name = _paths(), arguments.name.removesuffix(".toml")
     if name not in paths:
         meant = get_close_matches(name, paths, n=1)
         hint = f'did you mean "{meant[0]}"?' if meant else f"allowed are {', '.join(paths)}"
@@ -67,7 +66,7 @@ def _new(arguments: argparse.Namespace) -> None:
     source, output = paths[name], arguments.output or Path(f"{name}.toml")
     # Commands in the comments name the file by its place in the checkout.
     text = re.sub(
-        rf"campaigns/(?:{_FITS}/|{_FIRING}/|{_DESIGNS}/)?{name}\.toml",
+        rf"campaigns/(?:\w+/)?{name}\.toml",
         lambda _: output.name,
         source.read_text(encoding="utf-8"),
     )
@@ -75,33 +74,33 @@ def _new(arguments: argparse.Namespace) -> None:
     copies = {source.parent / file: output.parent / file for file in _named(tables)}
     for file in (output, *copies.values()):
         check_output(file, overwrite=arguments.overwrite)
-    for one, copy in copies.items():
-        shutil.copyfile(one, copy)
-    kinds = {_FITS: "fit", _DESIGNS: "design"}
-    kind = kinds.get(source.parent.name, "test" if "target" in tables else "campaign")
-    schema = output.parent / {"fit": _FIT_SCHEMA, "test": _TEST_SCHEMA, "design": _DESIGN_SCHEMA}.get(kind, _SCHEMA)
+    for original, copy in copies.items():
+        shutil.copyfile(original, copy)
+    told_apart = ((kinds.FIT, "fit"), (kinds.TEST, "test"), (kinds.DESIGN, "design"))
+    kind = next((name for known, name in told_apart if kinds.kind_of_tables(tables) is known), "campaign")
+    schema = output.parent / (_SCHEMA if kind == "campaign" else f"warpimpact.{kind}.schema.json")
     output.write_text(f"#:schema {schema.name}\n{text}", encoding="utf-8")
     schema.write_text(_schema_text(kind), encoding="utf-8")
     for written in (output, *copies.values(), schema):
         print(written)
 
 
-def _campaigns() -> dict[str, Path]:
-    """Names of the campaigns and fits of this installation, and their files."""
+def _paths() -> dict[str, Path]:
+    """Names of the examples of this installation, and their files."""
     from importlib.resources import files
 
     folder = Path(str(files("warpimpact.campaigns")))
-    paths = [path for kind in (".", _FITS, _FIRING, _DESIGNS) for path in folder.glob(f"{kind}/*.toml")]
+    paths = [path for kind in _FOLDERS for path in folder.glob(f"{kind}/*.toml")]
     return {path.stem: path for path in sorted(paths, key=lambda path: path.stem)}
 
 
 def _named(value: Any) -> Iterator[str]:
     """Files that a campaign names."""
     inner = value.items() if isinstance(value, dict) else enumerate(value) if isinstance(value, list) else ()
-    for key, one in inner:
-        if key in ("file", "campaign") and isinstance(one, str):
-            yield one
-        yield from _named(one)
+    for key, entry in inner:
+        if key in ("file", "campaign") and isinstance(entry, str):
+            yield entry
+        yield from _named(entry)
 
 
 def add_schema(commands: Commands) -> None:
