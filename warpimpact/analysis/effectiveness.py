@@ -16,7 +16,7 @@ import xarray
 
 from warpimpact.analysis.estimates import Evidence, by_hit_of, evidence
 from warpimpact.analysis.numbers import Ends, intervals_text
-from warpimpact.analysis.solid_plate import solid_note
+from warpimpact.analysis.plate import plate_text, solid_note
 from warpimpact.analysis.survival import by_draws, over_draws
 from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
@@ -250,11 +250,3 @@ def depth_note(measures: Sequence[Score]) -> str:
         "bounds. A thicker base, a witness block, tells the depths; warpimpact limit --quantity thickness --layer N "
         "tells the thickness that each hit needs."
     )
-
-
-def plate_text(dataset: xarray.Dataset) -> str:
-    """Areal density and open area, where a result carries them."""
-    told = dataset.attrs
-    if attr.AREAL_DENSITY not in told:
-        return ""
-    return f", {told[attr.AREAL_DENSITY]:.4g} kg/m², {told[attr.OPEN_AREA]:.1%} open"

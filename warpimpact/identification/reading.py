@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path as FilePath
@@ -215,10 +216,11 @@ def _gives(tables: Any, path: Path) -> bool:
 
 def _condition(text: Any, record: Record, place: str) -> Measure:
     """A condition such as "perforated" or "bending_stress < 1.5 GPa"."""
+    name = re.split(r"[\s@<>]", str(text).strip(), maxsplit=1)[0]
+    if name not in (allowed := (*STATUSES, *_CONDITIONS)):
+        raise FitError(f"{place}: got {quoted(name)}, but it must be one of {', '.join(allowed)}")
     try:
         measure = Measure.parse(f"P({text})")
-        if measure.name not in (*STATUSES, *_CONDITIONS):
-            raise ValueError(f"got {quoted(text)}, but a condition is of a status or one of {', '.join(_CONDITIONS)}")
         if measure.quantity.has_standoff:
             last = (*record.standoffs[-1:], 0.0)[0]
             measure = replace(measure, standoff=last if measure.standoff is None else measure.standoff)

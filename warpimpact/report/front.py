@@ -187,7 +187,7 @@ def _map(dataset: xarray.Dataset, place: int, campaign: Campaign, text: str) -> 
     ]
     return {
         "drawing": Markup(svg.drawing([holes], -half, half, label, scale=0.36 / max(cell), image=image)),
-        "label": effects[0].removesuffix(", worst tenth"),
+        "label": effects[0].replace(", worst tenth", "").replace(", mean", ""),
         "low": low,
         "high": high,
     }
