@@ -1,4 +1,4 @@
-"""What the hits of designs say of objectives and bounds, and which paired differences decide.
+"""Objectives and bounds of designs from the numbers of their hits, and which paired differences decide.
 
 Hit k of every design lies at the same place of its irreducible part (common random numbers), and belongs to the
 scrambling k modulo their number. Means over the hits of a scrambling are independent of those of another. A difference
@@ -29,16 +29,16 @@ SCRAMBLINGS = 16
 
 @dataclass(frozen=True)
 class Record:
-    """A design, and what its hits have said so far.
+    """A target with the numbers of its hits so far.
 
     Attributes:
         values: of its variables, shape [variables].
         tables: of its campaign.
         areal_density: [kg/m²].
         levels: numerics for every threat, as JSON.
-        said: of every threat and effect, shape [threats, effects, hits].
-        seconds: processor time that its hits took.
-        means, known: what `means` and `values` found, by the number of hits.
+        said: columns of `Design.keys` by each threat, shape [threats, columns, hits].
+        seconds: processor time of its hits.
+        means, known: results of `means` and `values`, kept by the number of hits.
     """
 
     values: Array
@@ -64,7 +64,7 @@ class Record:
 def means(design: Design, record: Record, hits: int) -> Array:
     """Objectives and bounds over the first hits by scrambling, shape [asked, SCRAMBLINGS]."""
     if hits not in record.means:
-        rows = [_by_scrambling(numbers_of(design, record, one, hits)) for one in design.asked]
+        rows = [_by_scrambling(numbers_of(design, record, goal, hits)) for goal in design.asked]
         record.means[hits] = np.array(rows)
     return record.means[hits]
 
@@ -73,72 +73,76 @@ def values(design: Design, record: Record, hits: int | None = None) -> Array:
     """Objectives and bounds over the first hits, shape [asked]; NaN where no hit counts."""
     hits = record.hits if hits is None else hits
     if hits not in record.known:
-        record.known[hits] = np.array([_mean(numbers_of(design, record, one, hits)) for one in design.asked])
+        record.known[hits] = np.array([_mean(numbers_of(design, record, goal, hits)) for goal in design.asked])
     return record.known[hits]
 
 
-def numbers_of(design: Design, record: Record, one: Objective | Bound, hits: int) -> Array:
-    """Numbers of the hits whose mean is an objective or a bound, shape [hits]."""
-    measure = one.asked
+def numbers_of(design: Design, record: Record, goal: Objective | Bound, hits: int) -> Array:
+    """Numbers of the first hits whose mean is an objective or a bound, shape [hits]; of the worst threat, or weighted
+    over the threats."""
+    measure = goal.asked
     if measure.kind == "target":
         return np.full(hits, record.areal_density)
-    said = record.said[:, design.keys.index(measure.column), :hits]
+    by_threat = record.said[:, design.keys.index(measure.column), :hits]
     if not measure.is_binary:
-        said = np.array([measure.averaged(measure.counted(of_one)) for of_one in said])
-    if one.threats == "mean":
+        by_threat = np.array([measure.averaged(measure.counted(numbers)) for numbers in by_threat])
+    if goal.threats == "mean":
         weights = np.array([threat.weight for threat in design.threats])
-        return np.asarray(weights @ said / weights.sum())
-    of_threats = one.sign * np.array([_mean(of_one) for of_one in said])
-    return np.asarray(said[int(np.argmax(np.nan_to_num(of_threats, nan=np.inf)))])
+        return np.asarray(weights @ by_threat / weights.sum())
+    means_by_threat = goal.sign * np.array([_mean(numbers) for numbers in by_threat])
+    return np.asarray(by_threat[int(np.argmax(np.nan_to_num(means_by_threat, nan=np.inf)))])
 
 
-def estimate(design: Design, record: Record, one: Objective | Bound) -> Estimate:
+def estimate(design: Design, record: Record, goal: Objective | Bound) -> Estimate:
     """An objective or a bound with its interval, by all hits."""
-    numbers = numbers_of(design, record, one, record.hits)
-    if one.asked.kind == "target":
+    if goal.asked.kind == "target":
         return Estimate(record.areal_density, record.areal_density, record.areal_density, record.hits, 0.0)
-    return estimate_of("share" if one.asked.is_binary else "mean", numbers, replicates=SCRAMBLINGS)
+    numbers = numbers_of(design, record, goal, record.hits)
+    is_share = goal.asked.is_binary and (goal.threats == "worst" or len(design.threats) == 1)
+    return estimate_of("share" if is_share else "mean", numbers, replicates=SCRAMBLINGS)
 
 
 def objectives(design: Design, record: Record, hits: int | None = None) -> Array:
-    """What is to be minimised, shape [objectives]; infinite where no hit counts."""
-    signs = np.array([one.sign for one in design.objectives])
-    found = signs * values(design, record, hits)[: len(signs)]
-    return np.asarray(np.nan_to_num(found, nan=np.inf, posinf=np.inf, neginf=-np.inf))
+    """Objectives with signs that make them quantities to minimise, shape [objectives]; infinite where no hit counts."""
+    signs = np.array([objective.sign for objective in design.objectives])
+    signed = signs * values(design, record, hits)[: len(signs)]
+    return np.asarray(np.nan_to_num(signed, nan=np.inf, posinf=np.inf, neginf=-np.inf))
 
 
 def excesses(design: Design, record: Record, hits: int | None = None) -> Array:
-    """By how much each bound is violated, as a share of its limit; 0 where it is kept to rounding, shape [bounds]."""
-    found = values(design, record, hits)[len(design.objectives) :]
+    """Violation of each bound as a share of its limit, shape [bounds]; 0 where the bound is kept to rounding, 1 where
+    no hit counts."""
+    bounded = values(design, record, hits)[len(design.objectives) :]
     over = [
         bound.sign * (value - bound.limit) / (abs(bound.limit) or 1.0)
-        for bound, value in zip(design.bounds, found, strict=True)
+        for bound, value in zip(design.bounds, bounded, strict=True)
     ]
     shares = np.nan_to_num(np.array(over), nan=1.0)
     return np.where(shares > ROUNDED, shares, 0.0)
 
 
 def undecided(design: Design, candidates: Sequence[Record], rivals: Sequence[Record], hits: int) -> list[bool]:
-    """Whether each candidate may be on the front, by the first hits: it certainly breaks no bound, and no rival is
-    certainly better; rounding decides nothing."""
-    signs = np.array([one.sign for one in design.asked])[:, None]
+    """Whether the first hits leave open that each candidate is on the front: no bound is certainly broken, and no rival
+    is certainly better. A difference within rounding decides nothing."""
+    signs = np.array([goal.sign for goal in design.asked])[:, None]
     count = len(design.objectives)
-    limits = np.array([one.sign * one.limit for one in design.bounds]).reshape(-1, 1)
-    theirs = np.array([signs * means(design, one, hits) for one in rivals]).reshape(len(rivals), len(signs), -1)
-    found = []
-    for one in candidates:
-        own = signs * means(design, one, hits)
-        broken = (interval(own[count:] - limits)[0] > ROUNDED * np.abs(limits[:, 0])).any()
-        others = theirs[[rival is not one for rival in rivals]]
-        low = interval(own[None, :count] - others[:, :count])[0]
-        rounded = ROUNDED * np.nan_to_num(np.abs(own[:count])).max(axis=1)
-        worse = (low >= -rounded).all(axis=1) & (low > rounded).any(axis=1)
-        found.append(not broken and not bool(worse.any()))
-    return found
+    limits = np.array([bound.sign * bound.limit for bound in design.bounds]).reshape(-1, 1)
+    of_rivals = np.array([signs * means(design, rival, hits) for rival in rivals])
+    of_rivals = of_rivals.reshape(len(rivals), len(signs), -1)
+    still_open = []
+    for candidate in candidates:
+        signed = signs * means(design, candidate, hits)
+        is_broken = (interval(signed[count:] - limits)[0] > ROUNDED * np.abs(limits[:, 0])).any()
+        others = of_rivals[[rival is not candidate for rival in rivals]]
+        low = interval(signed[None, :count] - others[:, :count])[0]
+        rounded = ROUNDED * np.nan_to_num(np.abs(signed[:count])).max(axis=1)
+        is_worse = (low >= -rounded).all(axis=1) & (low > rounded).any(axis=1)
+        still_open.append(not is_broken and not bool(is_worse.any()))
+    return still_open
 
 
 def interval(numbers: Array, confidence: float = CONFIDENCE) -> tuple[Array, Array]:
-    """Student's interval of means over the last axis; (−inf, inf) where fewer than two numbers count."""
+    """Ends of Student's intervals of means over the last axis; (−inf, inf) where fewer than two numbers count."""
     count = np.sum(~np.isnan(numbers), axis=-1)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", RuntimeWarning)  # of no number
@@ -156,9 +160,9 @@ def _mean(numbers: Array) -> float:
 
 
 def _by_scrambling(numbers: Array) -> Array:
-    """Means of the hits of every scrambling, NaN of one without any, shape [SCRAMBLINGS]."""
-    short = -len(numbers) % SCRAMBLINGS
-    dealt = np.concatenate([numbers, np.full(short, np.nan)]).reshape(-1, SCRAMBLINGS)
+    """Mean over the hits of every scrambling, shape [SCRAMBLINGS]; NaN of a scrambling without a hit that counts."""
+    missing = -len(numbers) % SCRAMBLINGS
+    dealt = np.concatenate([numbers, np.full(missing, np.nan)]).reshape(-1, SCRAMBLINGS)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", RuntimeWarning)
         return np.asarray(np.nanmean(dealt, axis=0))

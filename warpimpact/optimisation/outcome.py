@@ -35,7 +35,7 @@ _LONGEST_ENDING = 80
 
 def key_of(design: Design, place: int) -> str:
     """Name of an objective or bound in the file, each its own."""
-    names = [one.measure for one in design.asked]
+    names = [goal.measure for goal in design.asked]
     return names[place] if names.count(names[place]) == 1 else f"{names[place]}_{place}"
 
 
@@ -46,13 +46,13 @@ def to_dataset(design: Design, found: Searched, confirmed: Confirmed, made_by: M
     on_front[found.front] = 1
     width = max(2, len(str(max(len(confirmed.numbers) - 1, 0))))
     columns: dict[Any, Any] = {
-        f.NAME: _texts(one.name for one in variables),
-        f.UNIT: _texts(one.unit for one in variables),
-        f.LABELS: _texts(json.dumps(one.labels, ensure_ascii=False) if one.labels else "" for one in variables),
+        f.NAME: _texts(variable.name for variable in variables),
+        f.UNIT: _texts(variable.unit for variable in variables),
+        f.LABELS: _texts(json.dumps(free.labels, ensure_ascii=False) if free.labels else "" for free in variables),
         f.ASKED: _texts(key_of(design, place) for place in range(len(asked))),
-        f.LABEL: _texts(one.asked.title for one in asked),
-        f.SIGN: [int(one.sign) for one in asked],
-        f.LIMIT: [one.limit if isinstance(one, Bound) else np.nan for one in asked],
+        f.LABEL: _texts(goal.asked.title for goal in asked),
+        f.SIGN: [int(goal.sign) for goal in asked],
+        f.LIMIT: [goal.limit if isinstance(goal, Bound) else np.nan for goal in asked],
         f.VALUE: np.array([one.values for one in found.records]).reshape(len(found.records), len(variables)),
         f.HITS: [one.hits for one in found.records],
         f.LEVELS: _texts(_levels(one) for one in found.records),
@@ -96,8 +96,8 @@ def _levels(record: Record) -> str:
 
 def _estimates(design: Design, records: Sequence[Record]) -> Array:
     """Values and both ends of their intervals, shape [3, records, asked]."""
-    rows = [[estimate(design, record, one) for one in design.asked] for record in records]
-    ends = [[[one.value, one.low, one.high] for one in row] for row in rows]
+    rows = [[estimate(design, record, goal) for goal in design.asked] for record in records]
+    ends = [[[number.value, number.low, number.high] for number in row] for row in rows]
     return np.moveaxis(np.array(ends, dtype=float).reshape(len(records), len(design.asked), 3), -1, 0)
 
 
