@@ -77,7 +77,7 @@ _MAP = (
 _TEST = ("test", "-q", "-o", "t.nc", "--overwrite")
 _REPORT = ("report", "altered.nc", "-o", "a.html", "--overwrite")
 COMMANDS: dict[str, Sequence[Sequence[str]]] = {
-    "result": _MAP,
+    "result": (*_MAP, ("replay", "altered.nc", "--hit", "3", "-o", "h.nc", "--overwrite")),
     "limits": (*_MAP[:4], (*_TEST, "limits.toml")),
     "history": (("export", "altered.nc", "-o", "vtk"), ("inspect", "altered.nc")),
     "sweep": ((*_TEST, "sweep.toml"), ("inspect", "altered.nc")),

@@ -30,7 +30,7 @@ SameBits = Callable[[Path, Path], None]
 SLOTTED_PLATE = (Path(__file__).parents[3] / "campaigns" / "slotted_plate.toml").read_text(encoding="utf-8")
 DRAFT = SLOTTED_PLATE.replace('"standard"', '"draft"')
 COUNT = 4000  # sixteen shards, the last one short
-KILLS = 8
+KILLS = 4
 LONG = "count = 1000000"  # minutes of computing, of which a test sees the first shard
 PATIENCE = 600.0
 """Until what must come is missing, however busy the machine [s]."""
