@@ -58,13 +58,13 @@ def mistakes() -> tuple[type[Exception], ...]:
 def implausible_told() -> Iterator[None]:
     """A value that is probably not what was meant, and a computation that takes long, get a line on stderr, once."""
     with warnings.catch_warnings():
-        show, told = warnings.showwarning, set[str]()
+        show, shown = warnings.showwarning, set[str]()
 
         def show_once(message: Warning | str, category: type[Warning], *place: Any, **more: Any) -> None:
             if category.__name__ not in ("Implausible", "Costly"):  # their modules take a while to import
                 show(message, category, *place, **more)
-            elif str(message) not in told:
-                told.add(str(message))
+            elif str(message) not in shown:
+                shown.add(str(message))
                 say(f"warning: {message}")
 
         warnings.showwarning = show_once

@@ -58,8 +58,8 @@ def _optimise(arguments: argparse.Namespace) -> int:
     check_picture(picture, overwrite=replaces(arguments, output))
     cluster = arguments.scheduler is not None or arguments.workers is not None
     where = {"address": arguments.scheduler, "workers": arguments.workers, "device": arguments.device}
-    own = cluster_crew(**where) if cluster else nullcontext(local_crew(arguments.device))
-    with memory_told(arguments.design), terminated_as_interrupted(), show_progress("design") as show, own as crew:
+    made_crew = cluster_crew(**where) if cluster else nullcontext(local_crew(arguments.device))
+    with memory_told(arguments.design), terminated_as_interrupted(), show_progress("design") as show, made_crew as crew:
         campaigns = optimise_to_file(
             design,
             output,

@@ -20,9 +20,9 @@ def add_command(
     """
     parser = commands.add_parser(name, help=summary, description=description, epilog=f"example: warpimpact {example}")
     parser.set_defaults(command=command)
-    told = parser.add_mutually_exclusive_group()
-    told.add_argument("-v", "--verbose", action="count", default=0, help="show what is done; -vv shows more")
-    told.add_argument("-q", "--quiet", action="store_true", help="show no progress")
+    volume = parser.add_mutually_exclusive_group()
+    volume.add_argument("-v", "--verbose", action="count", default=0, help="show what is done; -vv shows more")
+    volume.add_argument("-q", "--quiet", action="store_true", help="show no progress")
     return parser
 
 

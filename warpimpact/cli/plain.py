@@ -30,7 +30,9 @@ class Plain:
 
 def plain(text: str, keep: str = "") -> str:
     """The text with its control characters, but for those in `keep`, spelt out."""
-    return "".join(one if one.isprintable() or one in keep else ascii(one)[1:-1] for one in text)
+    return "".join(
+        character if character.isprintable() or character in keep else ascii(character)[1:-1] for character in text
+    )
 
 
 def say(sentence: str) -> None:

@@ -91,9 +91,9 @@ class _Chart:
         self._low, self._high = low - room, high + room
         self._ticks = [MaxNLocator(7).tick_values(*ends) for ends in zip(low, high, strict=True)]
 
-    def at(self, found: Array) -> dict[str, float]:
+    def at(self, values: Array) -> dict[str, float]:
         """Place of objectives and bounds, shape [asked]."""
-        x, y = self._place(np.asarray(found)[self._shown])
+        x, y = self._place(np.asarray(values)[self._shown])
         return {"x": x, "y": y}
 
     def _place(self, shown: Array) -> tuple[float, float]:
@@ -105,10 +105,10 @@ class _Chart:
         """What the page draws beside the front."""
         dataset, labels = self._dataset, self._dataset[f.LABEL].values
         found, solid = dataset[f.FOUND].values[:, self._shown], dataset[f.SOLID].values[:, self._shown]
-        every = (self._place(one) for one in found if np.isfinite(one).all())
-        line = [self._place(one) for one in solid[np.argsort(solid[:, 0])] if np.isfinite(one).all()]
+        every = (self._place(design) for design in found if np.isfinite(design).all())
+        line = [self._place(plate) for plate in solid[np.argsort(solid[:, 0])] if np.isfinite(plate).all()]
         ticks = [
-            [one for one in at if low <= one <= high]
+            [tick for tick in at if low <= tick <= high]
             for at, low, high in zip(self._ticks, self._low, self._high, strict=True)
         ]
         middle = 0.5 * (self._low + self._high)
@@ -119,8 +119,8 @@ class _Chart:
             "right": _WIDTH - 10.0,
             "top": _TOP,
             "bottom": _HEIGHT - _ROOM,
-            "across": [(self._place(np.array([one, middle[1]]))[0], f"{one:g}") for one in ticks[0]],
-            "up": [(self._place(np.array([middle[0], one]))[1], f"{one:g}") for one in ticks[1]],
+            "across": [(self._place(np.array([tick, middle[1]]))[0], f"{tick:g}") for tick in ticks[0]],
+            "up": [(self._place(np.array([middle[0], tick]))[1], f"{tick:g}") for tick in ticks[1]],
             "label_across": str(labels[self._shown[0]]),
             "label_up": str(labels[self._shown[1]]),
             "every": "".join(f"M{x},{y}h0" for x, y in every),
@@ -134,7 +134,7 @@ class _Chart:
         ends = [self._dataset[name].values[place, self._shown] for name in (f.FRESH, f.FRESH_LOW, f.FRESH_HIGH)]
         if not np.isfinite(ends).all():
             return ""
-        (x, _), (_, low), (_, high) = (self._place(one) for one in ends)
+        (x, _), (_, low), (_, high) = (self._place(end) for end in ends)
         return f"M{x},{low}V{high}"
 
 
@@ -172,7 +172,7 @@ def _map(dataset: xarray.Dataset, place: int, campaign: Campaign, text: str) -> 
     y, z = dataset[f.HIT_Y].values[place], dataset[f.HIT_Z].values[place]
     cell = campaign.plate.pattern.unit_cell
     group = symmetries(campaign.plate, campaign.impact) if is_even(parsed(text, "front")) else (IDENTITY,)
-    images = np.concatenate([np.transpose(one.image(y, z, cell)) for one in group])
+    images = np.concatenate([np.transpose(symmetry.image(y, z, cell)) for symmetry in group])
     shown, low, high = _coloured(images, np.tile(values, len(group)), cell)
     buffer = BytesIO()
     Image.fromarray(shown).save(buffer, "PNG")

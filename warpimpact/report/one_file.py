@@ -106,16 +106,20 @@ def write_file_report(path: Path, kind: Kind, output: Path) -> None:
         ResultError: the file cannot be read.
     """
     dataset, shown = _loaded(path, kind), _SHOWN.get(kind.name, _Shown())
-    told = dataset.attrs
-    title, (first, *others) = str(told.get(attr.TITLE, path.stem)), _view(kind, dataset)
+    attributes = dataset.attrs
+    title, (first, *others) = str(attributes.get(attr.TITLE, path.stem)), _view(kind, dataset)
     sections = [replace(first, title="") if first.title == title else first, *others]
     figures = "".join(
         f"<h2>{name}</h2><img alt='{name}' src='{_picture(draw(dataset))}'>"
         for name, (needed, draw) in shown.figures.items()
         if not needed or needed in dataset
     )
-    asked = f"<h2>What was asked</h2><pre>{escape(str(told[shown.asked]))}</pre>" if shown.asked in told else ""
-    made = escape(", ".join(str(told[name]) for name in (attr.HISTORY, attr.WARPIMPACT_VERSION) if name in told))
+    asked = (
+        f"<h2>What was asked</h2><pre>{escape(str(attributes[shown.asked]))}</pre>" if shown.asked in attributes else ""
+    )
+    made = escape(
+        ", ".join(str(attributes[name]) for name in (attr.HISTORY, attr.WARPIMPACT_VERSION) if name in attributes)
+    )
     page = (
         "<!DOCTYPE html><html lang='en'><head><meta charset='utf-8'>"
         "<meta http-equiv='Content-Security-Policy' "

@@ -111,11 +111,10 @@ def _asked(dataset: xarray.Dataset) -> str:
         f"{dataset.sizes['hit']} hits{sampling}, over a cell of {y} × {z} mm, at {velocity} and obliquity {obliquity}."
     )
     if attr.AREAL_DENSITY in dataset.attrs:
-        told = dataset.attrs
+        attributes = dataset.attrs
         weighs = "the whole target weighs" if v.LAYER_STATUS in dataset else "weighs"
-        text += (
-            f" The plate has {told[attr.OPEN_AREA]:.1%} open area and {weighs} {told[attr.AREAL_DENSITY]:.3g} kg/m²."
-        )
+        density = f"{attributes[attr.AREAL_DENSITY]:.3g} kg/m²"
+        text += f" The plate has {attributes[attr.OPEN_AREA]:.1%} open area and {weighs} {density}."
     return text
 
 

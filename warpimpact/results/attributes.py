@@ -189,7 +189,7 @@ def versions() -> dict[str, str]:
 @cache
 def machine() -> dict[str, str]:
     """The attributes that say what else was there: machine, processor, commit and other versions."""
-    found = {
+    description = {
         PYTHON_VERSION: platform.python_version(),
         NUMPY_VERSION: version("numpy"),
         XARRAY_VERSION: version("xarray"),
@@ -197,7 +197,7 @@ def machine() -> dict[str, str]:
         PROCESSOR: _processor(),
     }
     commit = _commit()
-    return found | ({COMMIT: commit} if commit else {})
+    return description | ({COMMIT: commit} if commit else {})
 
 
 def _processor() -> str:

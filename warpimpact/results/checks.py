@@ -42,20 +42,20 @@ _SLICE = 2**22
 
 def _of_columns(dataset: xarray.Dataset, known: Sequence[v.Variable]) -> Iterator[str]:
     """What is wrong with the variables of hits, whose values are not read."""
-    for one in known:
-        if one in dataset.variables and one is not v.AXIS:
-            array = dataset.variables[one]
+    for variable in known:
+        if variable in dataset.variables and variable is not v.AXIS:
+            array = dataset.variables[variable]
             if array.dtype.kind not in "iuf":
-                yield f'its variable "{one}" has no numbers'
-            yield from metadata_faults(array, one)
+                yield f'its variable "{variable}" has no numbers'
+            yield from metadata_faults(array, variable)
 
 
-def _attribute_faults(told: Mapping[Any, Any]) -> Iterator[str]:
+def _attribute_faults(attributes: Mapping[Any, Any]) -> Iterator[str]:
     """What is wrong with the attributes of hits."""
-    yield from attribute_faults(told)
+    yield from attribute_faults(attributes)
     for first, *others in _TOGETHER:
-        missing = [name for name in others if name not in told]
-        if first in told and missing:
+        missing = [name for name in others if name not in attributes]
+        if first in attributes and missing:
             yield f'it has "{first}", but no attribute "{missing[0]}"'
 
 
@@ -75,11 +75,11 @@ def _map_faults(dataset: xarray.Dataset) -> Iterator[str]:
     yield from _of_columns(dataset, known)
     yield from _attribute_faults(dataset.attrs)
     chosen = parsed_json(dataset.attrs.get(attr.SWEEP)) or ()  # inputs of a sweep's point
-    for one in known:
-        if one in dataset.variables and dataset.variables[one].dims not in (
-            (one.dims, ()) if one in chosen else (one.dims,)
+    for variable in known:
+        if variable in dataset.variables and dataset.variables[variable].dims not in (
+            (variable.dims, ()) if variable in chosen else (variable.dims,)
         ):
-            yield f'its variable "{one}" is along {dataset.variables[one].dims}, not {one.dims}'
+            yield f'its variable "{variable}" is along {dataset.variables[variable].dims}, not {variable.dims}'
     yield from filter(None, (missing_fault(dataset, names) for names in v.whole_groups()))
     yield from _of_hits(dataset)
 
@@ -124,9 +124,13 @@ def _sweep_faults(dataset: xarray.Dataset) -> Iterator[str]:
         elif dataset[name].dtype.kind == "f" and dataset[name].attrs.get("units") not in STORED:
             yield f'its coordinate "{name}" has an unknown unit'
     along = tuple(name for name in inputs if name in dataset.dims)
-    for one in (*v.COORDINATES, *v.hit_variables()):
-        if one in dataset.variables and one not in inputs and dataset[one].dims not in (one.dims, along + one.dims):
-            yield f'its variable "{one}" is along {dataset[one].dims}, not {along + one.dims}'
+    for variable in (*v.COORDINATES, *v.hit_variables()):
+        if (
+            variable in dataset.variables
+            and variable not in inputs
+            and dataset[variable].dims not in (variable.dims, along + variable.dims)
+        ):
+            yield f'its variable "{variable}" is along {dataset[variable].dims}, not {along + variable.dims}'
     yield from _of_hits(dataset)
 
 
@@ -160,9 +164,9 @@ def _misuse(dataset: xarray.Dataset) -> str | None:
 def packing_fault(dataset: xarray.Dataset) -> str | None:
     """Numbers may be stored with a factor and an offset, which are read only when the numbers are."""
     for name, array in dataset.variables.items():
-        for one in ("scale_factor", "add_offset"):
-            if one in array.encoding and not isinstance(array.encoding[one], int | float | np.number):
-                return f'its variable "{name}" has a {one} that is no number'
+        for attribute in ("scale_factor", "add_offset"):
+            if attribute in array.encoding and not isinstance(array.encoding[attribute], int | float | np.number):
+                return f'its variable "{name}" has a {attribute} that is no number'
     return None
 
 

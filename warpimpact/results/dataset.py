@@ -85,8 +85,8 @@ def to_table(
     coordinates |= outlines_in(scene.target.layers[0], *((-0.5 * side, 0.5 * side) for side in period))
     along = (*v.COORDINATES, *v.OUTLINE_VARIABLES, *v.LAYER_COORDINATES, *v.GROUPS["solid"], *v.GROUPS["finer"])
     values: dict[str, Any] = {variable: getattr(shots, variable.field) for variable in v.SHOT_VARIABLES}
-    own = own_columns(scene.target, shots)
-    values |= {name: own[name] for name in v.OPTIONAL_SHOT_VARIABLES if name in own}
+    columns = own_columns(scene.target, shots)
+    values |= {name: columns[name] for name in v.OPTIONAL_SHOT_VARIABLES if name in columns}
     values[v.EDGE_DISTANCE] = scene.target.layers[0].edge_distance(shots.hit_y, shots.hit_z)
     values |= vars(outcomes) | faces(scene.target)
     zero = np.zeros(len(shots))
@@ -104,9 +104,9 @@ def to_table(
 def narrow_table(scene: Scene, shots: Shots, outcomes: Outcomes, names: Collection[str]) -> Table:
     """Only some columns of `to_table`, as far as the outcomes have them, with stand-offs and the core: for who computes
     with many small results at once."""
-    own = own_columns(scene.target, shots)
+    columns = own_columns(scene.target, shots)
     values: dict[str, Any] = {variable: getattr(shots, variable.field) for variable in v.SHOT_VARIABLES}
-    values |= {name: own[name] for name in v.OPTIONAL_SHOT_VARIABLES if name in own}
+    values |= {name: columns[name] for name in v.OPTIONAL_SHOT_VARIABLES if name in columns}
     values |= vars(outcomes) | faces(scene.target)
     kept = [name for name in (*v.hit_variables(), *v.LAYER_FACES) if name in names and name in values]
     coordinates: dict[Any, Any] = {v.HIT: np.arange(len(shots)), v.STANDOFF: np.array(scene.record.standoffs)}
@@ -139,8 +139,8 @@ def finer_pair(dataset: Result) -> tuple[Any, Any] | None:
     if any(name not in dataset or dataset[name].dims != name.dims for name in (v.FINER_HIT, *stored)):
         return None  # results that were joined have several; altered ones lack some
     numbers, hits = dataset[v.FINER_HIT].values, hit_numbers(dataset)
-    found, places, those = np.intersect1d(hits, numbers, return_indices=True)
-    if not len(found) or v.STATUS not in stored.values() or np.isin(hits, found).sum() > len(found):
+    shared, places, those = np.intersect1d(hits, numbers, return_indices=True)
+    if not len(shared) or v.STATUS not in stored.values() or np.isin(hits, shared).sum() > len(shared):
         return None
     order = np.argsort(those)
     coarse = dataset.isel(hit=places[order]).load()
@@ -270,7 +270,10 @@ def stored_columns(
     Args:
         single: those whose numbers are stored in single precision.
     """
-    return {str(one): (one.dims, _stored(one, values[one], one in single), one.attributes) for one in variables}
+    return {
+        str(variable): (variable.dims, _stored(variable, values[variable], variable in single), variable.attributes)
+        for variable in variables
+    }
 
 
 def _stored(variable: v.Variable, values: Any, single: bool) -> Any:

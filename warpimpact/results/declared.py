@@ -170,7 +170,9 @@ class Declaration:
                 yield f'it has no attribute "{name}"'
             elif not _fits(dataset.attrs[name], TypeAdapter(kind)):
                 yield f'its attribute "{name}" is not what it should be'
-        yield from attribute_faults({name: told for name, told in dataset.attrs.items() if name not in self.attributes})
+        yield from attribute_faults(
+            {name: value for name, value in dataset.attrs.items() if name not in self.attributes}
+        )
         yield from filter(None, [self.more(dataset)])
 
     def _of_a_variable(self, dataset: xarray.Dataset, name: str, dims: tuple[str, ...]) -> Iterator[str]:
@@ -199,9 +201,9 @@ def metadata_faults(array: xarray.Variable, declared: v.Variable) -> Iterator[st
         yield f'its variable "{declared}" has flags without a meaning'
 
 
-def attribute_faults(told: Mapping[Any, Any]) -> Iterator[str]:
+def attribute_faults(attributes: Mapping[Any, Any]) -> Iterator[str]:
     """What is wrong with global attributes that any kind of file may have."""
-    for name, value in told.items():
+    for name, value in attributes.items():
         if not _is_allowed(str(name), value):
             yield f'its attribute "{name}" is not what it should be'
 

@@ -225,9 +225,9 @@ def check_kind(path: Path, *wanted: Kind) -> Kind:
         ResultError: it is missing, is damaged, or is of another kind.
     """
     kind = kind_of(path)
-    for one in wanted:
-        if kind is not None and kind.name == one.name:
-            return one
+    for allowed in wanted:
+        if kind is not None and kind.name == allowed.name:
+            return allowed
     if kind is not None:
         raise ResultError(kind.told(path, wanted[0].name))
     if not kinds.is_netcdf(path):

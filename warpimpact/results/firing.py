@@ -119,7 +119,7 @@ _OF_DIRECTIONS = (
     *(DIRECTION_WEIGHT, DIRECTION_HITS, DIRECTION_FAILED),
 )
 _DECLARED = Declaration(
-    {one: one.dims for one in VARIABLES},
+    {variable: variable.dims for variable in VARIABLES},
     optional=VARIABLES,
     whole=(_RESPONSE, _PLACES, _REPORTED, _OF_SIZES, _PROOF, _OF_DIRECTIONS),
     rules={SHOT_PERFORATED: among(0, 1, -1), **dict.fromkeys((VELOCITY, AZIMUTH, ELEVATION, SIZE), finite)},

@@ -109,7 +109,7 @@ REFERENCES = "docs/howto/optimise.md of warpimpact"
 def _labels(values: np.ndarray[Any, Any], sizes: Mapping[str, int]) -> bool:
     """JSON lists of what a variable chooses from, empty of a range."""
     choices = [parsed_json(text) for text in values.flat if text] if texts(values, sizes) else [None]
-    return all(isinstance(one, list) and all(isinstance(label, str) for label in one) for one in choices)
+    return all(isinstance(choice, list) and all(isinstance(label, str) for label in choice) for choice in choices)
 
 
 def _more(dataset: xarray.Dataset) -> str | None:
@@ -127,7 +127,7 @@ def _more(dataset: xarray.Dataset) -> str | None:
 
 _TEXTS = (NAME, UNIT, ASKED, LABEL, LEVELS, CAMPAIGN, FILE, FRESH_LEVELS, REFERENCE, REFERENCE_CAMPAIGN)
 _DECLARED = Declaration(
-    {one: one.dims for one in VARIABLES},
+    {variable: variable.dims for variable in VARIABLES},
     optional=(HIT_Y, HIT_Z, HIT_VALUE),
     whole=((HIT_Y, HIT_Z, HIT_VALUE),),
     rules={

@@ -35,7 +35,7 @@ class IncrementalFile:
             OutputError: they cannot be written; the file is of no use then.
         """
         self._waiting.append(table)
-        if sum(one.sizes["hit"] for one in self._waiting) >= CHUNK // 2:
+        if sum(table.sizes["hit"] for table in self._waiting) >= CHUNK // 2:
             with told_as(self._path):
                 self._write()
 

@@ -21,20 +21,20 @@ def own_columns(target: Target, shots: Shots) -> dict[str, NDArray[Any]]:
     """What differs from shot to shot under the names of a result: of what every layer has, the plate's own as
     `thickness`; those of all layers as `layer_thickness`, if a layer behind the plate differs."""
     elsewhere = (*BY_LAYER, *OF_A_DRAW)  # the latter in the posterior, at `posterior_draw`
-    columns: dict[str, NDArray[Any]] = {name: own for name, own in shots.columns.items() if name not in elsewhere}
+    columns: dict[str, NDArray[Any]] = {name: values for name, values in shots.columns.items() if name not in elsewhere}
     for name in BY_LAYER:
-        own = [shots.own_of(target, name, k) for k in range(len(target.layers))]
+        values = [shots.own_of(target, name, k) for k in range(len(target.layers))]
         if shots.differs(name, 0):
-            columns[name] = own[0]
-        if any(shots.differs(name, k) for k in range(1, len(own))):
-            columns[f"layer_{name}"] = np.stack(np.broadcast_arrays(*own, np.empty(len(shots)))[:-1], axis=1)
+            columns[name] = values[0]
+        if any(shots.differs(name, k) for k in range(1, len(values))):
+            columns[f"layer_{name}"] = np.stack(np.broadcast_arrays(*values, np.empty(len(shots)))[:-1], axis=1)
     return columns
 
 
 def values_of(target: Target, hit: xarray.Dataset, name: str) -> list[float]:
     """A quantity of every layer in a hit of a result, which has it under the names of `own_columns`."""
     if f"layer_{name}" in hit:
-        return [float(one) for one in hit[f"layer_{name}"]]
+        return [float(value) for value in hit[f"layer_{name}"]]
     values = [target.value(name, k) for k in range(len(target.layers))]
     return [float(hit[name]), *values[1:]] if name in hit else values
 
@@ -51,7 +51,7 @@ def sections(scene: Scene, hit: xarray.Dataset, section: NDArray[np.float64]) ->
     if len(target.layers) == 1:
         return {}
     thickness, offset_y, offset_z = (values_of(target, hit, name) for name in ("thickness", "offset_y", "offset_z"))
-    front = np.array(target.fronts([np.array(one) for one in thickness]))
+    front = np.array(target.fronts([np.array(value) for value in thickness]))
     places = list(zip(target.layers, offset_y, offset_z, strict=True))
     along_y = [plate.is_solid(hit_y - y + section, np.array(hit_z - z)) for plate, y, z in places]
     along_z = [plate.is_solid(np.array(hit_y - y), hit_z - z + section) for plate, y, z in places]

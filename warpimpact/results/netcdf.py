@@ -34,7 +34,7 @@ def write_table(table: Table, file: Path, *, chunk: int | None = None, compresse
         for group, names in groups.items():
             if names:
                 inner = {name: table[name] for name in names}
-                beside = {dim: table[dim] for one in inner.values() for dim in one.dims if dim in table.coords}
+                beside = {dim: table[dim] for column in inner.values() for dim in column.dims if dim in table.coords}
                 _write(inner | beside, frozenset(beside), target.createGroup(group))
 
 
@@ -59,7 +59,7 @@ def _write(
             options["chunksizes"] = (chunk, *column.shape[1:])
         if name not in coords:  # CF: a coordinate has no missing values
             options["fill_value"] = np.array(np.nan, values.dtype) if values.dtype.kind == "f" else None
-            near = " ".join(one for one in beside if {*variables[one].dims} <= {*column.dims})
+            near = " ".join(other for other in beside if {*variables[other].dims} <= {*column.dims})
             attributes |= {"coordinates": near} if near else {}
         kind = str if values.dtype.kind in "UO" else values.dtype
         written = target.createVariable(name, kind, column.dims, **options)
@@ -94,16 +94,16 @@ def open_table(path: Path) -> Iterator[Table]:
         groups = [group for group in v.GROUPS if group in source.groups]
         for group in groups:
             source[group].set_auto_maskandscale(False)
-        own = {name: _column(variable) for name, variable in source.variables.items()}
+        root = {name: _column(variable) for name, variable in source.variables.items()}
         grouped = {
             name: _column(source[group][name])
             for group in groups
             for name in v.GROUPS[group]
             if name in source[group].variables
         }
-        named = {name for column in own.values() for name in column.attrs.pop("coordinates", "").split()}
-        coords = {*named, *grouped, *(name for name in own if own[name].dims == (name,))}
-        yield Table(own | grouped, frozenset(coords), {name: source.getncattr(name) for name in source.ncattrs()})
+        named = {name for column in root.values() for name in column.attrs.pop("coordinates", "").split()}
+        coords = {*named, *grouped, *(name for name in root if root[name].dims == (name,))}
+        yield Table(root | grouped, frozenset(coords), {name: source.getncattr(name) for name in source.ncattrs()})
 
 
 def read_table(path: Path) -> Table:

@@ -40,8 +40,8 @@ def outlines(dataset: xarray.Dataset | Table, layer: int = 0) -> dict[str, NDArr
     except ValueError:  # without a plate, or with holes from an image
         return dict.fromkeys(v.OUTLINE, np.empty(0))
     halves = [0.5 * float(side) for side in dataset.attrs[attr.PLATE_PERIOD]]
-    found = outlines_in(plate, *((-half - at, half - at) for half, at in zip(halves, offset, strict=True)))
-    return {axis: found[name] + at for (axis, name), at in zip(v.OUTLINE.items(), offset, strict=True)}
+    vertices = outlines_in(plate, *((-half - at, half - at) for half, at in zip(halves, offset, strict=True)))
+    return {axis: vertices[name] + at for (axis, name), at in zip(v.OUTLINE.items(), offset, strict=True)}
 
 
 def outlines_in(

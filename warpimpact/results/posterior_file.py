@@ -122,7 +122,7 @@ def _some(values: np.ndarray[Any, Any], sizes: Mapping[str, int]) -> bool:
 
 def _path_fault(parameter: xarray.DataArray) -> str | None:
     path = parsed_json(parameter.attrs.get(PATH))
-    is_path = isinstance(path, list) and all(isinstance(one, str | int) for one in path)
+    is_path = isinstance(path, list) and all(isinstance(step, str | int) for step in path)
     return None if is_path else f'its parameter "{parameter.name}" has no path as it should'
 
 

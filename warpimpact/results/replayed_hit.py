@@ -34,7 +34,7 @@ def _ascending(values: np.ndarray[Any, Any], sizes: Mapping[str, int]) -> bool:
 
 
 _HISTORY = Declaration(
-    {one: one.dims for one in (*v.HISTORY_COORDINATES, *v.HISTORY_VARIABLES)},
+    {variable: variable.dims for variable in (*v.HISTORY_COORDINATES, *v.HISTORY_VARIABLES)},
     rules={
         v.QUATERNION: texts,
         v.ATTITUDE: _turns,

@@ -86,13 +86,17 @@ class Table:
     @classmethod
     def from_xarray(cls, dataset: xarray.Dataset) -> Table:
         """That of a Dataset, in memory."""
-        columns = {str(name): (one.dims, one.values, one.attrs) for name, one in dataset.variables.items()}
-        data = {name: one for name, one in columns.items() if name not in dataset.coords}
+        columns = {str(name): (column.dims, column.values, column.attrs) for name, column in dataset.variables.items()}
+        data = {name: column for name, column in columns.items() if name not in dataset.coords}
         return cls.of(data, {name: columns[name] for name in columns if name not in data}, dataset.attrs)
 
     @property
     def sizes(self) -> dict[str, int]:
-        return {name: size for one in self.variables.values() for name, size in zip(one.dims, one.shape, strict=True)}
+        return {
+            name: size
+            for column in self.variables.values()
+            for name, size in zip(column.dims, column.shape, strict=True)
+        }
 
     def __contains__(self, name: str) -> bool:
         return name in self.variables
@@ -108,15 +112,17 @@ class Table:
         if isinstance(name, str):
             return self.variables[name]
         kept = {*name, *self.coords}
-        return replace(self, variables={key: one for key, one in self.variables.items() if key in kept})
+        return replace(self, variables={key: column for key, column in self.variables.items() if key in kept})
 
     def isel(self, *, hit: slice | NDArray[np.int64]) -> Table:
         """Some of the hits."""
-        return replace(self, variables={name: one.part(hit) for name, one in self.variables.items()})
+        return replace(self, variables={name: column.part(hit) for name, column in self.variables.items()})
 
     def load(self) -> Table:
         """The same, in memory."""
-        return self.assign({name: (one.dims, one.values, one.attrs) for name, one in self.variables.items()})
+        return self.assign(
+            {name: (column.dims, column.values, column.attrs) for name, column in self.variables.items()}
+        )
 
     def assign(self, variables: Mapping[str, tuple[Any, ...]]) -> Table:
         """With other values of these variables; new ones are no coordinates."""
@@ -133,25 +139,27 @@ class Table:
 
     def drop_vars(self, names: Collection[str]) -> Table:
         """Without these variables, as far as they are there."""
-        kept = {name: one for name, one in self.variables.items() if name not in names}
+        kept = {name: column for name, column in self.variables.items() if name not in names}
         return replace(self, variables=kept, coords=self.coords - {*names})
 
     def to_xarray(self) -> xarray.Dataset:
         """The Dataset, in memory."""
         import xarray
 
-        columns = {name: (one.dims, one.values, dict(one.attrs)) for name, one in self.variables.items()}
-        data = {name: one for name, one in columns.items() if name not in self.coords}
-        return xarray.Dataset(data, {name: one for name, one in columns.items() if name in self.coords}, self.attrs)
+        columns = {name: (column.dims, column.values, dict(column.attrs)) for name, column in self.variables.items()}
+        data = {name: column for name, column in columns.items() if name not in self.coords}
+        return xarray.Dataset(
+            data, {name: column for name, column in columns.items() if name in self.coords}, self.attrs
+        )
 
 
 def joined(tables: Iterable[Table]) -> Table:
     """Tables of the same variables, one behind the other; what has no hits, and the attributes, from the first."""
     first, *others = tables
     columns = {
-        name: (one.dims, np.concatenate([one.values, *(other[name].values for other in others)]), one.attrs)
-        for name, one in first.variables.items()
-        if _HIT in one.dims
+        name: (column.dims, np.concatenate([column.values, *(other[name].values for other in others)]), column.attrs)
+        for name, column in first.variables.items()
+        if _HIT in column.dims
     }
     return first.assign(columns)
 

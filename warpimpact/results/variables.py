@@ -27,8 +27,8 @@ def _condition(name: str, of: str = "") -> Variable:
 
 def _by_layer(name: str) -> Variable:
     """The column of a quantity of every layer."""
-    one = _condition(name, " of each layer")
-    return Variable(f"layer_{name}", IN_LAYER, one.units, one.long_name)
+    variable = _condition(name, " of each layer")
+    return Variable(f"layer_{name}", IN_LAYER, variable.units, variable.long_name)
 
 
 # --- Coordinates of a hit map ---
@@ -40,7 +40,7 @@ AXIS = Variable("axis", ("axis",), "1", "axis of the plate frame")
 COORDINATES = (HIT, HIT_Y, HIT_Z, STANDOFF, AXIS)
 
 # --- Conditions of the shots ---
-SHOT_VARIABLES = tuple(_condition(name) for name, one in QUANTITIES.items() if one.table == "impact")
+SHOT_VARIABLES = tuple(_condition(name) for name, quantity in QUANTITIES.items() if quantity.table == "impact")
 IMPACT_VELOCITY, OBLIQUITY, AZIMUTH, IMPACT_PITCH, IMPACT_YAW, SPIN = SHOT_VARIABLES
 _OF_THE_SCENE = tuple(_condition(name, " of the plate" if name in BY_LAYER else "") for name in OF_THE_SCENE)
 RESISTANCE, SHEAR_COEFFICIENT, DEGRADATION, THICKNESS, MASS, STRENGTH = _OF_THE_SCENE
@@ -87,13 +87,15 @@ SOLID_LIMITS = {quantity: _solid(limit.value) for quantity, limit in LIMITS.item
 are alike. Present only in a result of `warpimpact limit` with `output.solid_reference`."""
 SOLID_LIMIT_VARIABLES = tuple(SOLID_LIMITS.values())
 
-_RECORDED = dict.fromkeys(one for group in registry.RECORDS if group.measured and not group.exact for one in group)
+_RECORDED = dict.fromkeys(
+    variable for group in registry.RECORDS if group.measured and not group.exact for variable in group
+)
 FINER_HIT = Variable("finer_hit", ("finer",), "1", "number of a hit that was computed at a finer level, too")
 FINER_COORDINATES = (FINER_HIT,)
 FINER_VARIABLES = {
-    _beside(one, "finer", "finer", "at a finer level"): one
-    for one in (*_RECORDED, STOPPED_IN, DEPTH, *LIMIT_VARIABLES)
-    if one.is_number_of_hit or one in (STATUS, STOPPED_IN, BROKEN)
+    _beside(variable, "finer", "finer", "at a finer level"): variable
+    for variable in (*_RECORDED, STOPPED_IN, DEPTH, *LIMIT_VARIABLES)
+    if variable.is_number_of_hit or variable in (STATUS, STOPPED_IN, BROKEN)
 }
 """Outcomes of some hits at a finer level of resolution, each with the variable of the hits that it corresponds to.
 Present where a pilot found the resolution."""
@@ -113,7 +115,7 @@ of hits spreads over the hits; outlines.py says what becomes of the outlines."""
 
 VARIABLES = (*SHOT_VARIABLES, *OUTCOME_VARIABLES)
 """Present in every hit map."""
-_MEASURED = tuple(one for group in registry.RECORDS if group.measured for one in group)
+_MEASURED = tuple(variable for group in registry.RECORDS if group.measured for variable in group)
 HIT_NUMBERS = tuple(v for v in (*LIMIT_VARIABLES, *SHOT_VARIABLES, EDGE_DISTANCE, *_MEASURED) if v.is_number_of_hit)
 """Variables of shots and outcomes with one number per hit, or one per hit and stand-off."""
 
@@ -200,18 +202,18 @@ def shot_variables(dataset: xarray.Dataset) -> list[Variable]:
 
 def outcome_variables(dataset: xarray.Dataset) -> list[Variable]:
     """Names of the variables that say how the shots ended."""
-    return [one for one in registry.variables() if one in dataset.variables]
+    return [variable for variable in registry.variables() if variable in dataset.variables]
 
 
 def computed_variables() -> set[Variable]:
     """The variables that are computed in the precision of the numerics."""
-    return {one for group in registry.RECORDS if not group.exact for one in group}
+    return {variable for group in registry.RECORDS if not group.exact for variable in group}
 
 
 def hit_variables() -> tuple[Variable, ...]:
     """All that a map of hits may have beside its coordinates, in the order of a file."""
     always, *others = registry.RECORDS
-    optional = (one for group in others for one in (*group, *group.beside))
+    optional = (variable for group in others for variable in (*group, *group.beside))
     return tuple(dict.fromkeys((*SHOT_VARIABLES, EDGE_DISTANCE, *always, *OPTIONAL_SHOT_VARIABLES, *optional)))
 
 

@@ -33,4 +33,4 @@ def test_a_search_is_reported_alone(
     for name in ("a.nc", "b.nc"):
         files.write(searched, tmp_path / name)
     assert main(["report", str(tmp_path / "a.nc"), str(tmp_path / "b.nc")]) == 2
-    assert "a search is reported alone" in capsys.readouterr().err
+    assert "one of which is a search for designs, which is reported alone" in capsys.readouterr().err
