@@ -2,14 +2,21 @@
 
 import argparse
 import sys
+from collections.abc import Mapping
 from contextlib import ExitStack
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from .mistakes import memory_told
 from .options import Commands, add_command, add_count, add_device, add_measures, add_output, add_overwrite
 from .paths import check_picture, named
 from .progress import show_run, warn
 from .run import failure_code
+
+if TYPE_CHECKING:
+    from xarray import Dataset
+
+    from warpimpact.campaign.campaign import Campaign
 
 
 def add_compare(commands: Commands) -> None:
@@ -37,6 +44,12 @@ def add_compare(commands: Commands) -> None:
         "figure as PNG, PDF or SVG (default: comparison.png, or the campaign's name, in this folder)",
     )
     add_measures(parser)
+    parser.add_argument(
+        "--assumptions",
+        action="store_true",
+        help="also say which verdicts survive what nobody measured: resistance, weakening, friction, onset, obliquity, "
+        "yaw; computes up to 1024 hits of each plate some twelve times",
+    )
     add_device(parser)
     add_count(parser)
     parser.add_argument("--resume", action="store_true", help="continue an interrupted campaign")
@@ -67,16 +80,37 @@ def _compare(arguments: argparse.Namespace) -> int:
         datasets = [stack.enter_context(files.opened(path)) for path in paths.values()]
         comparison = compare(datasets, list(paths), arguments.measure)
         evidence = evidence_of_all(dict(zip(paths, datasets, strict=True)))
+        campaigns = _campaigns(dict(zip(paths, datasets, strict=True)), paths) if arguments.assumptions else {}
         code = max(failure_code(dataset, path) for dataset, path in zip(datasets, paths.values(), strict=True))
     print(comparison_text(comparison))
     for line in evidence:
         print(line)
+    if campaigns:
+        print(_survival(campaigns, arguments))
     comparison_figure(comparison).savefig(figure, dpi=150)
     print(f"{figure}{replaced}")
     if (against_weight := weight_figure(comparison)) is not None:
         against_weight.savefig(beside, dpi=150)
         print(beside)
     return code
+
+
+def _campaigns(datasets: "Mapping[str, Dataset]", paths: "Mapping[str, Path]") -> "dict[str, Campaign]":
+    """The campaigns that results hold; files that they name are looked for beside the results."""
+    from warpimpact.runs.replay import campaign_in
+
+    return {name: campaign_in(dataset, paths[name].parent) for name, dataset in datasets.items()}
+
+
+def _survival(campaigns: "Mapping[str, Campaign]", arguments: argparse.Namespace) -> str:
+    """Which verdicts survive what nobody measured."""
+    from warpimpact.studies.assumptions import judged, judged_view
+    from warpimpact.view.view import text_of
+
+    def tell(assumption: str) -> None:
+        print(f"assumption: {assumption}", file=sys.stderr)
+
+    return text_of(judged_view(judged(campaigns, arguments.measure, device=arguments.device, tell=tell)))
 
 
 def _plates_run(arguments: argparse.Namespace, folder: Path) -> dict[str, Path]:

@@ -55,7 +55,7 @@ def replay(result: xarray.Dataset, hit: int, *, folder: str | Path = ".", snapsh
         choice = "hits" if numbers.max() - numbers.min() + 1 == hits else f"{hits} of the hits"
         raise ResultError(f"hit: got {hit}, but the result has {choice} {numbers.min()} to {numbers.max()}")
     place = int(places[0])
-    campaign = _campaign(result, Path(folder))
+    campaign = campaign_in(result, Path(folder))
     sampler = campaign.sampler()
     if hit >= len(sampler):
         raise ResultError(f"hit: got {hit}, but the campaign and the files it names give only {len(sampler)} hits")
@@ -105,7 +105,16 @@ def _numerics(campaign: Campaign, result: xarray.Dataset) -> Numerics:
     return short_steps(numerics) if attr.LIMIT in result.attrs else numerics
 
 
-def _campaign(result: xarray.Dataset, folder: Path) -> Campaign:
+def campaign_in(result: xarray.Dataset, folder: Path) -> Campaign:
+    """The campaign that a result holds.
+
+    Args:
+        folder: of the files that the campaign names, if it names any.
+
+    Raises:
+        ResultError: the result has none.
+        CampaignError: it cannot be read.
+    """
     if attr.CAMPAIGN not in result.attrs:
         raise ResultError("the result does not contain its campaign")
     count = int(result.attrs[attr.COUNT]) if attr.COUNT in result.attrs else None  # a list of hits has none
