@@ -13,7 +13,7 @@ from pydantic import Field, PrivateAttr, ValidationError, model_validator
 
 from ..results.files import ResultError
 from ..results.kinds import CAMPAIGN
-from ..results.variables import BENDING_VARIABLES, BROKEN_VARIABLES
+from ..results.variables import BENDING_VARIABLES, BROKEN_VARIABLES, DEPTH
 from ..results.vocabulary import BASE
 from ..scene import (
     AnyCore,
@@ -264,7 +264,7 @@ class Campaign(Model):
     def _goes_together(self) -> Self:
         """All that scene/exclusions.py has rows for."""
         stop, hits, numerics = self.stop, self.hits, self.numerics
-        variable = "" if stop is None else stop.measure.name
+        variable = "" if stop is None or stop.measure.quantity.need is None else stop.measure.quantity.need.name
         told = stop is not None and f'stop.quantity = "{stop.quantity}"'
         check_together(
             unsymmetric(self.scatter, self.layer)
@@ -298,14 +298,14 @@ class Campaign(Model):
                 f"hits.count = {self.hits.count} and stop.max_count = {self.stop.max_count} cannot be combined: "
                 "[stop] sets the number of hits; leave out hits.count"
             )
-        if self.stop.measure.is_limit:
-            raise ValueError(
-                f'stop.quantity = "{self.stop.quantity}" is told by warpimpact limit, which takes no [stop]'
-            )
-        need = self.stop.measure.quantity.need
-        if need == BASE and not self.layer:
-            raise ValueError(f'stop.quantity = "{self.stop.quantity}" needs {BASE.keys}')
-        at = self.stop.measure.standoff
+        measure, asked = self.stop.measure, f'stop.quantity = "{self.stop.quantity}"'
+        if measure.is_limit:
+            raise ValueError(f"{asked} is told by warpimpact limit, which takes no [stop]")
+        if measure.quantity.need is not None and measure.quantity.need.name in (BASE.name, DEPTH) and not self.layer:
+            raise ValueError(f"{asked} needs {BASE.keys}")
+        if measure.quantity.has_standoff and not self.output.standoffs:
+            raise ValueError(f"{asked} needs output.standoffs")
+        at = measure.standoff
         if at is not None and not np.isclose(at, self.output.standoffs, rtol=1e-9, atol=0.0).any():
             standoffs = ", ".join(f"{standoff:g} m" for standoff in self.output.standoffs)
             raise ValueError(f"got stop.quantity at {at:g} m, but it must be one of output.standoffs: {standoffs}")

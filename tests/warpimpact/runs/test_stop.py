@@ -128,8 +128,10 @@ def test_a_run_goes_on_as_long_as_hits_may_make_up_for_the_numerics(
     ("quantity", "half_width", "sentence"),
     [
         ("median(tilt)", "1 deg", 'stop.quantity: got "median(tilt)", but it must be of the form mean(residual_vel'),
-        ("mean(speed)", "1 m/s", 'stop.quantity: got "speed", but it must be one of base_depth, residual_energy_'),
+        ("mean(speed)", "1 m/s", 'stop.quantity: got "speed", but it must be one of base_depth, residual_energy'),
         ("mean(base_depth)", "1 mm", 'stop.quantity = "mean(base_depth)" needs a table [[layer]]'),
+        ("mean(depth)", "1 mm", 'stop.quantity = "mean(depth)" needs a table [[layer]]'),
+        ("P(stopped_or_broken)", "0.01", 'stop.quantity = "P(stopped_or_broken)" needs core.strength'),
         ("V50", "1 m/s", 'stop.quantity = "V50" is told by warpimpact limit'),
         ("areal_density", "1 kg/m^2", "a run cannot stop by a number without an interval"),
         ("mean(deflection@130mm)", "1 deg", 'stop.quantity: got "deflection@130mm", but deflection has no stand-off'),
