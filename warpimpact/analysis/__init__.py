@@ -1,5 +1,6 @@
-"""From a Dataset to numbers and their text: summary, effects, effectiveness, comparison.
+"""From a Dataset to numbers and their text: estimates, summary, effectiveness, comparison.
 
-Change what is computed from a result here; the uncertainty of a number belongs in statistics. It imports campaign and
+Change what is computed from a result here; a new measure belongs in results/vocabulary.py, and the
+uncertainty of a number in statistics. It imports campaign and
 the rooms below it, and draws nothing.
 """

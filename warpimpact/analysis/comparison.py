@@ -64,7 +64,7 @@ def compare(
     Args:
         datasets: two or more, of the same core under the same impact; of open files one number per hit is in memory.
         names: of the plates, each once.
-        texts: of measures; those that `inspect` shows of all the plates if there are none.
+        texts: of measures; by default those that `inspect` shows of all the plates.
         confidence: of all differences in a measure together.
 
     Raises:

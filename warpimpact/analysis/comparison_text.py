@@ -43,7 +43,7 @@ class Difference:
 
     @property
     def parameters(self) -> tuple[float, float] | None:
-        """Its interval by the parameters as of an `Estimate`."""
+        """Its interval by the parameters, as in `Estimate`."""
         return None if self.survival is None else self.survival.interval
 
     @property
@@ -57,7 +57,7 @@ class Pair:
     """How the hits of two plates were used.
 
     Attributes:
-        paired: so many first hits of each are the same shots, and compared shot by shot.
+        paired: number of first hits that are the same shots at both plates, which are compared shot by shot.
         independent: why the plates were compared as independent; empty where they were hit by the same shots.
     """
 

@@ -60,7 +60,7 @@ class Score:
         solid: the same of the solid plate of equal areal density.
         ratio, ratio_low, ratio_high: the value as a multiple of that.
         hit: number of the hit that is the worst point; None of anything else.
-        parameters: its interval by the parameters as of an `Estimate`.
+        parameters: its interval by the parameters, as in `Estimate`.
         ratio_parameters: that of the ratio.
         numerics: how far the numerics may shift the value; None or NaN where that is not known.
     """
@@ -113,7 +113,7 @@ class Scored:
 
 
 def measures_of(dataset: xarray.Dataset, texts: Sequence[str] = ()) -> list[Measure]:
-    """The measures of a result with these texts, at their stand-offs and layers; without texts, those that are shown.
+    """The measures with these texts at the stand-offs and layers of a result; by default SHOWN or SHOWN_OF_LIMITS.
 
     Raises:
         ResultError: a text is no measure, or the result lacks what it needs.
@@ -134,7 +134,7 @@ def effectiveness(dataset: xarray.Dataset, texts: Sequence[str] = ()) -> list[Sc
 
     Args:
         dataset: a hit map; of an open file a slice is in memory at a time, and one number per hit.
-        texts: of measures; those that `inspect` shows if there are none.
+        texts: of measures; by default those that `inspect` shows.
 
     Raises:
         ResultError: a text is no measure, or the result lacks what it needs.

@@ -105,7 +105,7 @@ def status_shares(dataset: Result) -> dict[str, Estimate]:
 
 
 def means_of(variables: Sequence[v.Variable], standoffs: Sequence[float]) -> list[Measure]:
-    """Means of recorded quantities, at every stand-off [m] of those that have one."""
+    """Means of recorded quantities; of a quantity with stand-offs one mean at each [m]."""
     return [
         Measure.parse(f"mean({variable})" if at is None else f"mean({variable}@{at!r}m)")
         for variable in variables

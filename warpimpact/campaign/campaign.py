@@ -142,7 +142,7 @@ class Campaign(Model):
         """Read what `text` gave.
 
         Args:
-            text: TOML, or JSON as of a campaign made in Python.
+            text: TOML, or the JSON of a campaign made in Python.
             name: what errors call it.
             folder: where the files are that it names.
             count: number of hits, in place of the text's.

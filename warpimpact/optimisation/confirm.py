@@ -83,7 +83,7 @@ def confirm(design: Design, work: Work, found: Searched, follow: Follow) -> Conf
 
 
 def spread(front: NDArray[np.int64], most: int) -> NDArray[np.int64]:
-    """So many designs of a front at even distances along it, both ends among them."""
+    """At most this number of designs, at even distances along a front and with both ends."""
     if len(front) <= most:
         return front
     places = np.unique(np.round(np.linspace(0, len(front) - 1, most)).astype(np.int64))
@@ -91,12 +91,12 @@ def spread(front: NDArray[np.int64], most: int) -> NDArray[np.int64]:
 
 
 def fresh_seed(design: Design) -> int:
-    """Of hits that no search has seen."""
+    """Seed of hits that no search has computed."""
     return int(np.random.SeedSequence(design.search.seed, spawn_key=(24,)).generate_state(1)[0] >> 1)
 
 
 def _reference(design: Design, place: int) -> Record:
-    """A target to compare with, not yet computed."""
+    """The record of a reference target, without hits."""
     given = design.references[place]
     tables: dict[str, Any] = dict(design.base) | {"plate": dict(given.plate)}
     if given.layer is not None:
@@ -120,7 +120,7 @@ def check_references(design: Design) -> None:
 
 
 def _telling(follow: Follow, targets: int, jobs: int, what: str) -> Told:
-    """Tells of jobs, as many of each target, how many targets are done."""
+    """Follows jobs, of which every target has the same number, by the number of targets that are done."""
     return lambda done: follow(int(targets * done / jobs), targets, what)
 
 
@@ -213,8 +213,8 @@ def is_better(design: Design, one: Record, other: Record) -> bool:
 
 
 def survival(design: Design, front: Sequence[Record], draws: Sequence[Array], leads: NDArray[np.bool_]) -> Array:
-    """Which part of the order of the front survives the uncertainty of the parameters, as `Confirmed.survival` has it.
-    Hit k of every design takes the same draw."""
+    """Whether the order of neighbours on the front survives the uncertainty of the parameters: the array of
+    `Confirmed.survival`. Hit k of every design takes the same draw."""
     found = np.full((len(front), len(design.asked), 2), np.nan)
     for number, following in pairwise(int(lead) for lead in np.flatnonzero(leads)):
         one, other = front[number], front[following]

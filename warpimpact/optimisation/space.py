@@ -90,8 +90,8 @@ class Space:
 
     @property
     def size(self) -> float:
-        """Number of its points, those that differ in variables that do not count included; infinite of a continuous
-        space."""
+        """Number of its points; infinite for a continuous space. Points that differ only in variables that do not
+        count are counted, too."""
         counts = [one.count for one in self.variables]
         return math.inf if None in counts else float(math.prod(count for count in counts if count is not None))
 

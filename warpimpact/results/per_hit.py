@@ -88,7 +88,7 @@ class PerHit:
 
 
 def place_of_standoff(distances: Sequence[float] | Array, standoff: float) -> int:
-    """Index of a stand-off [m] among those that there are.
+    """Index of a stand-off [m] among the distances of a result.
 
     Raises:
         ValueError: it is none of them.
@@ -110,7 +110,7 @@ def at(part: Result, variable: v.Variable, standoff: float) -> Array:
 
 
 def of_all(part: Result, of_passed: Array, of_stopped: float) -> Array:
-    """Numbers of the cores that passed the target, one number of those that did not, NaN of failed computations."""
+    """Numbers where cores passed the target, one number where they did not, NaN where the computation failed."""
     return np.where(failed(part), np.nan, np.where(passed(part), of_passed, of_stopped))
 
 

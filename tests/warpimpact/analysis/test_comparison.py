@@ -13,7 +13,7 @@ import xarray
 
 from warpimpact import Campaign
 from warpimpact.analysis.comparison import compare
-from warpimpact.analysis.comparison_text import Comparison, Difference, comparison_text
+from warpimpact.analysis.comparison_text import Comparison, Difference, best_rows, comparison_text
 from warpimpact.analysis.effectiveness import effectiveness
 from warpimpact.campaign.campaign import CampaignError
 from warpimpact.campaign.plates import read_plates
@@ -64,6 +64,23 @@ def test_identical_plates_cannot_be_told_apart(make_plate_result) -> None:
     assert text.count("a and b cannot be told apart: difference 0.000 (") == 6
     assert "better than" not in text
     assert "<p>500 hits of each plate: " in comparison._repr_html_()
+
+
+def test_any_measure_may_be_compared(make_plate_result) -> None:
+    velocity, tilt = NUMBERS.uniform(600.0, 700.0, 500), NUMBERS.uniform(0.0, 40.0, 500)
+    slow, fast = make_plate_result(velocity, tilt), make_plate_result(velocity + 50.0, tilt + 5.0, areal_density=23.55)
+    median, texts = "quantile(residual_velocity, 0.5)", ["mean(tilt@130mm)", "areal_density"]
+    comparison = compare([slow, fast], ["slow", "fast"], [median, *texts])
+    assert comparison.ranks(median) == {"slow": 1, "fast": 2}
+    assert (
+        difference(comparison, median, "slow", "fast").low < -50.0 < difference(comparison, median, "slow", "fast").high
+    )
+    text = comparison_text(comparison)
+    assert "fast higher than slow by 5.000" in text  # neither is better
+    assert "tilt at 130 mm, mean [°]; neither is better" in text
+    assert [label for label, _ in best_rows(comparison)] == ["residual velocity, 50 % quantile", "areal density"]
+    with pytest.raises(ResultError, match="which needs layers behind the plate"):
+        compare([slow, fast], ["slow", "fast"], ["P(base_pierced)"])
 
 
 @pytest.mark.parametrize(("apart", "told"), [(1e-8, False), (1e-4, True)])
