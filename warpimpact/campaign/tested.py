@@ -5,13 +5,14 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections import Counter
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from functools import cache
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from ..catalogue.catalogue import HERE
+from ..catalogue.catalogue import HERE, Catalogue
 from ..catalogue.entries import Material
 from ..results.attributes import RESTS_ON
 from ..scene import Core, Plate
@@ -73,12 +74,34 @@ def standings_of(campaign: Campaign, materials: Mapping[str, Material]) -> list[
 
 def summary_of(campaign: Campaign, standings: Sequence[Standing]) -> str:
     """One sentence on what an answer for the campaign rests on."""
-    holed = any(plate.open_area for plate in campaign.target.layers)
+    return _summary([campaign], [[standing.subject for standing in standings]], "")
+
+
+def summary_of_all(campaigns: Iterable[Campaign], what: str) -> str:
+    """One sentence on what answers for several campaigns rest on.
+
+    Args:
+        what: the campaigns are called, such as "designs".
+    """
+    several = list(campaigns)
+    materials = [Catalogue.of(campaign.catalogue).all(Material) for campaign in several]
+    subjects = [
+        [standing.subject for standing in standings_of(campaign, known)]
+        for campaign, known in zip(several, materials, strict=True)
+    ]
+    return _summary(several, subjects, what)
+
+
+def _summary(campaigns: Sequence[Campaign], subjects: Sequence[Sequence[str]], what: str) -> str:
+    """What answers rest on, and what lies beyond: of several campaigns with the number of those that it is true of."""
+    holed = any(plate.open_area for campaign in campaigns for plate in campaign.target.layers)
     base = "two shots at one slotted plate, and limit velocities of solid plates" if holed else "limit velocities"
-    if not standings:
+    counts = Counter(subject for beyond in subjects for subject in dict.fromkeys(beyond))
+    if not counts:
         return f"{RESTS_ON}inside what was measured ({base})"
-    subjects = list(dict.fromkeys(standing.subject for standing in standings))
-    return f"{RESTS_ON}{base}; beyond them: {', '.join(subjects)}"
+    total = len(campaigns)
+    told = [f"{name} ({count} of {total} {what})" if count < total else name for name, count in counts.items()]
+    return f"{RESTS_ON}{base}; beyond them: {', '.join(told)}"
 
 
 def nose_length(core: Core) -> float:

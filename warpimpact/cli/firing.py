@@ -38,10 +38,12 @@ def add_test(commands: Commands) -> None:
 
 
 def _test(arguments: argparse.Namespace) -> None:
+    from warpimpact.campaign.tested import summary_of_all
     from warpimpact.campaign.text import CampaignError
     from warpimpact.firing.firing_view import firing_view
     from warpimpact.firing.reading import read_test
     from warpimpact.firing.simulate import simulate_test
+    from warpimpact.firing.target import target_campaign
     from warpimpact.plotting.firing import directions_figure, firing_figure
     from warpimpact.results import files
     from warpimpact.view.view import text_of
@@ -63,6 +65,8 @@ def _test(arguments: argparse.Namespace) -> None:
         raise CampaignError(f"{arguments.test}: {error}") from None
     files.write(dataset, output)
     print(text_of(firing_view(dataset)))
+    if test.target.campaign is not None:
+        print(summary_of_all([target_campaign(test)], "targets"))
     figures = {picture: firing_figure} if test.needs_limits else {}
     if sector is not None:
         figures[polar] = directions_figure

@@ -31,6 +31,7 @@ def add_sweep(commands: Commands) -> None:
 
 
 def _sweep(arguments: argparse.Namespace) -> None:
+    from warpimpact.campaign.tested import summary_of_all
     from warpimpact.plotting.sweep import sweep_figure
     from warpimpact.results import files
     from warpimpact.results.checks import SWEEP
@@ -58,6 +59,7 @@ def _sweep(arguments: argparse.Namespace) -> None:
             progress=named,
             tell=warn,
         )
+    print(summary_of_all(sweep.campaigns.values(), "points"))
     sweep_figure(files.read(output, SWEEP)).savefig(picture, dpi=150)
     for written in (output, folder_of(output), picture):
         print(written)

@@ -4,18 +4,20 @@ from __future__ import annotations
 
 import json
 import warnings
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from warpimpact.campaign.campaign import Campaign
 from warpimpact.campaign.places import relocated
 from warpimpact.campaign.toml import toml_text
 from warpimpact.optimisation.asked import Bound
 from warpimpact.optimisation.confirm import Confirmed
 from warpimpact.optimisation.design import Design, Threat
+from warpimpact.optimisation.evaluate import campaign_of
 from warpimpact.optimisation.judged import Record, estimate
 from warpimpact.optimisation.search import Searched
 from warpimpact.results import attributes as attr
@@ -186,6 +188,17 @@ def write_campaigns(
     for path, text in texts.items():
         _write_campaign(path, text, tell if not overwrite else None)
     return list(texts)
+
+
+def campaigns_of(design: Design, values: NDArray[np.float64]) -> Iterator[Campaign]:
+    """The campaigns of designs under every threat.
+
+    Args:
+        values: of the variables, shape [designs, variables].
+    """
+    for row in values:
+        for threat in design.threats:
+            yield campaign_of(design, design.tables(row), threat)
 
 
 Tell = Callable[[str], object]

@@ -10,6 +10,7 @@ import pytest
 from warpimpact import Campaign
 from warpimpact.campaign.evidence import evidence_of, limit_velocity_factors
 from warpimpact.campaign.schema import campaign_schema
+from warpimpact.campaign.tested import summary_of_all
 from warpimpact.campaign.text import CampaignError
 from warpimpact.identification.reading import fit_from
 
@@ -201,6 +202,17 @@ def test_layers_that_say_the_same_are_told_once(folder: Path) -> None:
     lines = evidence_of(read(folder, plate=thin, layer=[thin] * 9))
     assert sum("0.16 calibres" in line for line in lines) == 2  # its thickness, and that Y is of such a thickness
     assert any(line.startswith("not tested: thickness (plate and 9 more): 0.16 calibres") for line in lines)
+
+
+def test_of_several_campaigns_it_is_said_how_many_leave_what_was_measured(folder: Path) -> None:
+    usual = {"impact": {"velocity": 800.0}}
+    thin = [read(folder, **usual, plate=STEEL | {"thickness": f"{h} mm"}) for h in (1, 7, 8)]
+    told = summary_of_all(thin, "designs")
+    assert "thickness (1 of 3 designs)" in told
+    assert "obliquity" not in told
+    assert summary_of_all(thin[1:], "designs") == "evidence: inside what was measured (limit velocities)"
+    fast = read(folder, plate=STEEL, impact={"velocity": 2000.0})
+    assert summary_of_all([fast], "targets") == "evidence: limit velocities; beyond them: the impact velocity"
 
 
 def test_two_shots_are_named_where_there_are_holes(folder: Path) -> None:
