@@ -10,7 +10,7 @@ from types import SimpleNamespace
 
 import warp as wp
 
-from . import core_surface, damping, rigid_body, structs
+from . import clock, core_surface, damping, rigid_body, structs
 from .variant import Variant
 
 
@@ -20,7 +20,7 @@ def build(variant: Variant) -> SimpleNamespace:
     struct = structs.build(variant)
     real, vec3 = variant.real, variant.vec3
     zero, half, one = real(0.0), real(0.5), real(1.0)
-    use = variant.use(core_surface, damping, rigid_body)
+    use = variant.use(clock, core_surface, damping, rigid_body)
 
     @wp.func
     def mean_force(sums: struct.Sums, dv: vec3, dw: vec3):
@@ -44,23 +44,22 @@ def build(variant: Variant) -> SimpleNamespace:
     def bent(
         before: struct.Bending,
         context: struct.Context,
-        sections: struct.Sections,
         footprint: struct.Footprint,
         pose: struct.Pose,
         state: struct.State,
         load: struct.Load,
         foreseen: struct.Change,
-        dt: real,
-        now: real,
+        clock: struct.Clock,
     ):
         """The larger of `before` and the bending in one step, whose load changes the velocities in `state`. The loads
-        on the rings are those at half of the foreseen change. `now` is the time at the middle of the step [s].
+        on the rings are those at half of the foreseen change.
 
         A slice at ξ ahead of the centre of mass accelerates across the axis by a + (α + ω_x J ω) × ξ. Its moment per
         rotary inertia is α − ω_x J ω. Here J ω = axis × ω. The terms with ω_x come from the spin: Euler's equations for
         a disc, whose axial moment of inertia is twice the transverse one.
         """
-        surface, body, touches = context.surface, context.body, context.touches
+        surface, sections, body, touches = context.surface, context.sections, context.body, context.touches
+        dt = clock.step
         worst = before
         dv, dw, felt_v, felt_w = use.rigid_body.velocity_change(body, load, dt)
         share = use.rigid_body.restraint_of(body, state, dv, dw)
@@ -95,7 +94,7 @@ def build(variant: Variant) -> SimpleNamespace:
                 ahead = sections.ahead[index]
         if worst.broken == 0 and worst.stress > worst.strength:
             worst.broken = 1
-            worst.broken_time = now
+            worst.broken_time = use.clock.now(clock)
             worst.broken_station = worst.stress_station
             worst.broken_x = state.position[0] + ahead * pose.axis[0]
         return worst

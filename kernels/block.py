@@ -109,9 +109,9 @@ def build(variant: Variant) -> SimpleNamespace:
 
     @wp.func
     def expose(
+        touches: struct.Touches,
         fields: struct.Fields,
         window: struct.Window,
-        touches: struct.Touches,
         base: wp.int32,
         begin: wp.int32,
         end: wp.int32,
@@ -148,25 +148,16 @@ def build(variant: Variant) -> SimpleNamespace:
         return total
 
     @wp.func
-    def load_in(
-        surface: struct.Surface,
-        plate: struct.Plate,
-        law: struct.Law,
-        fields: struct.Fields,
-        window: struct.Window,
-        touches: struct.Touches,
-        slot: wp.int32,
-        footprint: struct.Footprint,
-        pose: struct.Pose,
-        dt: real,
-    ):
+    def load_in(context: struct.Context, slab: struct.Slab, fields: struct.Fields):
         """`load_on` where the fields of the window are known to be in shared or in global memory."""
+        surface, touches = context.surface, context.touches
+        plate, law, window, footprint = slab.plate, slab.law, slab.window, slab.footprint
         load = struct.Load()
         box = footprint.box
         first, last = footprint.first_closing, footprint.last_closing
         begin, end = first * surface.around, (last + 1) * surface.around
-        base = use.core_surface.patches_before(surface, slot) - begin
-        use.contact.find_touches(surface, plate, law, fields, window, touches, pose, base, begin, end, dt)
+        base = use.core_surface.patches_before(surface, context.slot) - begin
+        use.contact.find_touches(context, slab, base, begin, end)
         if wp.static(variant.burst):
             if window.pierced:
                 use.channel.spare(fields, window, touches, base + begin, end - begin)
@@ -177,17 +168,17 @@ def build(variant: Variant) -> SimpleNamespace:
                     coarsest = zero
                     for index in range(first, last + 1):
                         coarsest = wp.max(coarsest, read(surface.area, index))
-                    units = use.fixed_point.units(law, window, coarsest, wp.length(pose.velocity), dt)
+                    units = use.fixed_point.units(law, window, coarsest, wp.length(slab.pose.velocity), slab.dt)
                     box = use.contact.gained_box(touches, footprint.box, base + begin, end - begin)
                     weakened = box.y_high > box.y_low
                     if weakened:
-                        expose(fields, window, touches, base, begin, end, units)
+                        expose(touches, fields, window, base, begin, end, units)
                         use.lanes.barrier()
                         use.fixed_point.measure(fields.gain, window, box, units)
                         use.lanes.barrier()
                         use.exposure.spread(plate, fields, window, box)
                         use.lanes.barrier()
-            sums = use.contact.summed(surface, law, fields, window, touches, pose, base, first, last)
+            sums = use.contact.summed(context, slab, fields, base, first, last)
             load = use.contact.load_of(total_of(sums))
             if wp.static(variant.degrades):
                 if weakened:
@@ -197,22 +188,11 @@ def build(variant: Variant) -> SimpleNamespace:
         return load
 
     @wp.func
-    def load_on(
-        surface: struct.Surface,
-        plate: struct.Plate,
-        law: struct.Law,
-        fields: struct.Fields,
-        window: struct.Window,
-        touches: struct.Touches,
-        slot: wp.int32,
-        footprint: struct.Footprint,
-        pose: struct.Pose,
-        dt: real,
-    ):
+    def load_on(context: struct.Context, slab: struct.Slab):
         """The load of one step by all lanes of a block (kernels/contracts.py)."""
         if wp.static(variant.layered and not variant.deep):  # two calls, so that none goes through generic addresses
-            if window.first == 0:
-                return load_in(surface, plate, law, in_front(fields), window, touches, slot, footprint, pose, dt)
-        return load_in(surface, plate, law, fields, window, touches, slot, footprint, pose, dt)
+            if slab.window.first == 0:
+                return load_in(context, slab, in_front(context.fields))
+        return load_in(context, slab, context.fields)
 
     return SimpleNamespace(**locals())

@@ -13,7 +13,7 @@ from typing import Any
 
 import warp as wp
 
-from . import constants, exposure, lanes, memory, structs
+from . import constants, exposure, lanes, memory, sliding, structs
 from .variant import Variant
 
 
@@ -24,7 +24,7 @@ def build(variant: Variant) -> SimpleNamespace:
     zero, one = real(0.0), real(1.0)
     outside, wall = real(constants.NO_CHANNEL.value), real(constants.WALL.value)
     steepest, spared = real(constants.STEEPEST.value), real(constants.SPARED.value)
-    use, share = variant.use(exposure, lanes), lanes.share(variant)
+    use, share = variant.use(exposure, lanes, sliding), lanes.share(variant)
     read, write = memory.build(real).read, memory.build(real).write
 
     def shifted(combined: str) -> Any:
@@ -147,11 +147,7 @@ def build(variant: Variant) -> SimpleNamespace:
     @wp.func
     def widen(earlier: struct.Earlier, index: wp.int32, box: struct.Box):
         """A channel may hold the nodes of a box, too."""
-        whole = earlier.box[index]
-        whole.y_low = wp.min(whole.y_low, box.y_low)
-        whole.z_low = wp.min(whole.z_low, box.z_low)
-        whole.y_high = wp.max(whole.y_high, box.y_high)
-        whole.z_high = wp.max(whole.z_high, box.z_high)
+        whole = use.sliding.around(earlier.box[index], box)
         use.lanes.barrier()
         earlier.box[index] = whole
 

@@ -32,35 +32,35 @@ STILL = Constant(
     "impact energy",
     "A core with less, at 1 % of its impact velocity, rests: it cannot do more than this share of the work.",
     "8",
-    "verification/test_outcomes.py::test_core_is_arrested_where_the_work_takes_all_its_energy",
+    "kernels/test_status.py::test_a_shot_ends_at_a_share_of_the_impact_energy",
 )
 SPENT = Constant(
     2.5e-3,
     "impact energy",
     "A core that turned back behind the plate with less, at 5 % of its impact velocity, does not come back through it.",
     "8",
-    "verification/test_layers.py::test_a_core_that_turns_back_from_the_base_with_little_speed_rests_there",
+    "kernels/test_status.py::test_a_shot_ends_at_a_share_of_the_impact_energy",
 )
 WEAK = Constant(
     2.25e-2,
     "impact energy",
     "Nor does a core that touches nothing and has less across the layers, at 15 %, however fast it goes along them.",
     "8",
-    "verification/test_layers.py::test_a_core_that_a_base_throws_aside_stays_between_the_layers",
+    "kernels/test_status.py::test_a_shot_ends_at_a_share_of_the_impact_energy",
 )
 BARRIER_SHARE = Constant(
     0.1,
     "work of the layers that it left, if they were solid",
     "WEAK holds only for a core that has less than this share too, since layers with holes take less work.",
     "8",
-    "verification/test_layers.py::test_a_core_that_a_base_throws_aside_stays_between_the_layers",
+    "kernels/test_status.py::test_a_shot_ends_at_a_share_of_the_impact_energy",
 )
 GAINED = Constant(
     1.01,
     "impact energy",
     "No law adds energy, and rounding errors add less than 1 % in many thousand steps. More is a failure.",
     "5",
-    "kernels/test_march.py::test_energy_that_rises_is_told",
+    "kernels/test_status.py::test_a_shot_ends_at_a_share_of_the_impact_energy",
 )
 
 # Contact (kernels/interaction.py, march.py)

@@ -42,21 +42,11 @@ def build(variant: Variant) -> SimpleNamespace:
     read_index, write_index = memory.build(wp.int32).read, memory.build(wp.int32).write
 
     @wp.func
-    def find_touches(
-        surface: struct.Surface,
-        plate: struct.Plate,
-        law: struct.Law,
-        fields: struct.Fields,
-        window: struct.Window,
-        touches: struct.Touches,
-        pose: struct.Pose,
-        base: wp.int32,
-        begin: wp.int32,
-        end: wp.int32,
-        dt: real,
-    ):
+    def find_touches(context: struct.Context, slab: struct.Slab, base: wp.int32, begin: wp.int32, end: wp.int32):
         """Fill in the touches of the patches begin ≤ j < end, from index `base` + begin on, as if there were material
         everywhere."""
+        surface, touches = context.surface, context.touches
+        plate, law, window, pose, dt = slab.plate, slab.law, slab.window, slab.pose, slab.dt
         per_node = use.interaction.exposure_in(law, dt, wp.length(pose.velocity)) * window.per_cell * window.per_cell
         # A ring outside the slab, between others, may be outside the window, too. It touches nothing.
         last_cell = window.first + (window.cells_y - 1) * window.cells_z - 2
@@ -100,13 +90,11 @@ def build(variant: Variant) -> SimpleNamespace:
         return use.plate_grid.meet(touches.area, touches.slope, touches.gain, touches.tile, plate.tile, first, count)
 
     @wp.func
-    def expose(
-        surface: struct.Surface, fields: struct.Fields, window: struct.Window, touches: struct.Touches, first: wp.int32
-    ):
+    def expose(context: struct.Context, window: struct.Window, first: wp.int32):
         """Add the exposure of a ring's patches to the plate, one patch of each quarter in turn. Neighbours share nodes,
         so a CPU would have to wait between them. A patch that does not touch adds zero, which is faster than a
         branch."""
-        quarter = surface.around // 4
+        fields, touches, quarter = context.fields, context.touches, context.surface.around // 4
         j = int(first)
         while j < first + quarter:
             for k in range(4):
@@ -175,17 +163,16 @@ def build(variant: Variant) -> SimpleNamespace:
 
         @wp.func(name="sum_weakened" if weakened else "sum_sound")
         def sum_patches(
-            surface: struct.Surface,
-            law: struct.Law,
+            context: struct.Context,
+            slab: struct.Slab,
             fields: struct.Fields,
-            window: struct.Window,
-            touches: struct.Touches,
-            pose: struct.Pose,
             base: wp.int32,
             begin: wp.int32,
             end: wp.int32,
         ):
             """Sum tractions and their slopes over the touches of the patches begin ≤ j < end."""
+            surface, touches = context.surface, context.touches
+            law, window, pose = slab.law, slab.window, slab.pose
             axial, right, up = real(0.0), real(0.0), real(0.0)
             roll, pitch, yaw = real(0.0), real(0.0), real(0.0)
             aa, ac, as_ = real(0.0), real(0.0), real(0.0)
@@ -278,10 +265,10 @@ def build(variant: Variant) -> SimpleNamespace:
         return kept
 
     @wp.func
-    def clear_sums(surface: struct.Surface, touches: struct.Touches, slot: wp.int32):
+    def clear_sums(context: struct.Context):
         """No layer has touched yet."""
-        first = use.core_surface.rings_before(surface, slot)
-        for index in range(first, first + surface.rings):
+        touches, first = context.touches, use.core_surface.rings_before(context.surface, context.slot)
+        for index in range(first, first + context.surface.rings):
             touches.total_area[index] = zero
             touches.sums[index] = struct.Sums()
 
@@ -293,22 +280,19 @@ def build(variant: Variant) -> SimpleNamespace:
 
     @wp.func
     def summed(
-        surface: struct.Surface,
-        law: struct.Law,
+        context: struct.Context,
+        slab: struct.Slab,
         fields: struct.Fields,
-        window: struct.Window,
-        touches: struct.Touches,
-        pose: struct.Pose,
         base: wp.int32,
         first: wp.int32,
         last: wp.int32,
     ):
         """The second pass over the rings from `first` to `last`, in a layer of either kind."""
-        begin, end = first * surface.around, (last + 1) * surface.around
+        begin, end = first * context.surface.around, (last + 1) * context.surface.around
         if wp.static(mixed):
-            if not window.weakens:
-                return sum_sound(surface, law, fields, window, touches, pose, base, begin, end)
-        return sum_patches(surface, law, fields, window, touches, pose, base, begin, end)
+            if not slab.window.weakens:
+                return sum_sound(context, slab, fields, base, begin, end)
+        return sum_patches(context, slab, fields, base, begin, end)
 
     @wp.func
     def load_of(sums: struct.Sums):
@@ -325,25 +309,18 @@ def build(variant: Variant) -> SimpleNamespace:
         return load
 
     @wp.func
-    def load_on(
-        surface: struct.Surface,
-        plate: struct.Plate,
-        law: struct.Law,
-        fields: struct.Fields,
-        window: struct.Window,
-        touches: struct.Touches,
-        slot: wp.int32,
-        footprint: struct.Footprint,
-        pose: struct.Pose,
-        dt: real,
-    ):
+    def load_on(context: struct.Context, slab: struct.Slab):
         """The load of one step by one thread (kernels/contracts.py)."""
+        surface, fields, touches = context.surface, context.fields, context.touches
+        plate, window, footprint = slab.plate, slab.window, slab.footprint
         load = struct.Load()
         box = footprint.box
         begin, end = footprint.first_closing * surface.around, (footprint.last_closing + 1) * surface.around
-        base = use.core_surface.patches_before(surface, slot) - begin  # what a step touches stays in the fastest cache
-        rings = use.core_surface.rings_before(surface, slot)
-        find_touches(surface, plate, law, fields, window, touches, pose, base, begin, end, dt)
+        base = (
+            use.core_surface.patches_before(surface, context.slot) - begin
+        )  # what a step touches stays in the fastest cache
+        rings = use.core_surface.rings_before(surface, context.slot)
+        find_touches(context, slab, base, begin, end)
         if wp.static(variant.burst):
             if window.pierced:
                 use.channel.spare(fields, window, touches, base + begin, end - begin)
@@ -363,7 +340,7 @@ def build(variant: Variant) -> SimpleNamespace:
                     # stored as vectors.
                     for index in range(first, last + 1):
                         if touches.ring_area[rings + index] > zero:
-                            expose(surface, fields, window, touches, base + index * surface.around)
+                            expose(context, window, base + index * surface.around)
                     box = gained_box(
                         touches, footprint.box, base + first * surface.around, (last + 1 - first) * surface.around
                     )
@@ -374,11 +351,11 @@ def build(variant: Variant) -> SimpleNamespace:
             if wp.static(variant.bends):
                 for index in range(first, last + 1):
                     if touches.ring_area[rings + index] > zero:
-                        part = summed(surface, law, fields, window, touches, pose, base, index, index)
+                        part = summed(context, slab, fields, base, index, index)
                         keep_sums(touches, rings + index, part)
                         sums = use.damping.joined(sums, part)
             else:
-                sums = summed(surface, law, fields, window, touches, pose, base, first, last)
+                sums = summed(context, slab, fields, base, first, last)
             load = load_of(sums)
             if wp.static(variant.degrades):
                 if weakened:

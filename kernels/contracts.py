@@ -27,8 +27,7 @@ class Scheme:
             window lies in shared memory.
         open_window: plate, its thickness [m], the fields of a slot, the number of the layer, the hit in the layer's
             frame [m] → Window about the hit, of a plate that nothing has touched.
-        load_on: → Load of the plate in a step of `dt` [s] at the pose at mid-step. The fields then have the exposure of
-            the step, too. `touches` are those of all slots; the footprint is that of the step.
+        load_on: → Load of one layer in a step. The fields of the context then have the exposure of the step, too.
     """
 
     fields_of_slot: Annotated[wp.Function, "fields: Fields, slot: int32"]
@@ -36,11 +35,7 @@ class Scheme:
     open_window: Annotated[
         wp.Function, "plate: Plate, thickness: real, fields: Fields, layer: int32, hit_y: float64, hit_z: float64"
     ]
-    load_on: Annotated[
-        wp.Function,
-        "surface: Surface, plate: Plate, law: Law, fields: Fields, window: Window, touches: Touches, slot: int32, "
-        "footprint: Footprint, pose: Pose, dt: real",
-    ]
+    load_on: Annotated[wp.Function, "context: Context, slab: Slab"]
 
 
 @dataclass(frozen=True)

@@ -21,15 +21,6 @@ def build(variant: Variant) -> SimpleNamespace:
     PERFORATED, ARRESTED = wp.constant(int(Status.PERFORATED)), wp.constant(int(Status.ARRESTED))
     MISSED, UNFINISHED = wp.constant(int(Status.MISSED)), wp.constant(int(Status.UNFINISHED))
 
-    @wp.func
-    def report_standoff(
-        report: struct.Report, shot: wp.int32, standoff: wp.int32, axis: vec3, flight: vec3, velocity: vec3
-    ):
-        report.tilt[shot, standoff] = angle_between(axis, flight)
-        report.pitch[shot, standoff] = wp.atan2(axis[2], axis[0])
-        report.yaw[shot, standoff] = wp.atan2(axis[1], axis[0])
-        report.total_yaw[shot, standoff] = angle_between(axis, velocity)
-
     def free_flight(
         # inputs
         shots: struct.Shots,
@@ -64,15 +55,14 @@ def build(variant: Variant) -> SimpleNamespace:
         report.energy_loss[shot] = wp.where(failed, undefined, contact.energy_loss[shot])
         report.contact_duration[shot] = wp.where(failed, undefined, contact.contact_duration[shot])
         for k in range(standoffs.shape[0]):
+            then = vec3(undefined, undefined, undefined)
             if passes:
                 distance = real(standoffs[k] + use.target.depth_of(target, shot)) - contact.position[shot][0]
                 then = axis_at(body, axis, momentum, ahead, velocity[0], distance)
-                report_standoff(report, shot, k, then, flight, velocity)
-            else:
-                report.tilt[shot, k] = undefined
-                report.pitch[shot, k] = undefined
-                report.yaw[shot, k] = undefined
-                report.total_yaw[shot, k] = undefined
+            report.tilt[shot, k] = angle_between(then, flight)
+            report.pitch[shot, k] = wp.atan2(then[2], then[0])
+            report.yaw[shot, k] = wp.atan2(then[1], then[0])
+            report.total_yaw[shot, k] = angle_between(then, velocity)
 
     kernel = variant.kernel(free_flight)
     return SimpleNamespace(**locals())

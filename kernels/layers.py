@@ -258,26 +258,21 @@ def build(variant: Variant) -> SimpleNamespace:
     @wp.func
     def load_on(context: struct.Context, law: struct.Law, reach: struct.Reach, pose: struct.Pose, dt: real):
         """The load of all layers over one step."""
-        surface, target, stack, touches = context.surface, context.target, context.stack, context.touches
-        shot, slot = context.shot, context.slot
+        target, stack, shot = context.target, context.stack, context.shot
         load = struct.Load()
         if wp.static(variant.bends):
-            use.contact.clear_sums(surface, touches, slot)
+            use.contact.clear_sums(context)
         for k in range(reach.first, reach.last + 1):
-            here = slot * target.count + k
+            here = context.slot * target.count + k
             if stack.footprint[here].last_ring >= 0:
-                part = use.scheme.load_on(
-                    surface,
-                    plate_of(target, k),
-                    use.target.law_of(target, law, k, shot),
-                    context.fields,
-                    stack.window[here],
-                    touches,
-                    slot,
-                    stack.footprint[here],
-                    in_layer(context, k, pose),
-                    dt,
-                )
+                slab = struct.Slab()
+                slab.plate = plate_of(target, k)
+                slab.law = use.target.law_of(target, law, k, shot)
+                slab.window = stack.window[here]
+                slab.footprint = stack.footprint[here]
+                slab.pose = in_layer(context, k, pose)
+                slab.dt = dt
+                part = use.scheme.load_on(context, slab)
                 if part.touching:
                     load.touching = True
                     use.passage.enter(context.passage, shot, k)

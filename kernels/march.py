@@ -91,9 +91,11 @@ def build(variant: Variant) -> SimpleNamespace:
         context.shot = shot
         context.slot = slot
         context.surface = inputs.surface
+        context.sections = inputs.sections
         context.target = inputs.target
         if wp.static(variant.tabled):
             context.surface = inputs.surfaces[shot_value(shots.surface, shot)]
+            context.sections = inputs.all_sections[shot_value(shots.surface, shot)]
             context.target = use.target.with_plates_of(inputs.target, shots, shot)
         context.body = use.shots.body_of(shots, shot)
         context.law = use.target.law_of(context.target, inputs.law, 0, shot)
@@ -140,9 +142,6 @@ def build(variant: Variant) -> SimpleNamespace:
         reach, status = kind.begin(context, state)
         touched, lost = bool(False), bool(False)
         if wp.static(variant.bends):
-            sections = inputs.sections
-            if wp.static(variant.tabled):
-                sections = inputs.all_sections[shot_value(shots.surface, shot)]
             worst = struct.Bending()
             worst.strength = shot_value(shots.strength, shot)
         last, before_last = struct.Change(), struct.Change()
@@ -177,9 +176,7 @@ def build(variant: Variant) -> SimpleNamespace:
                     load.force += load.damping_vv * last.velocity + load.damping_vw * last.omega
                     load.moment += wp.transpose(load.damping_vw) * last.velocity + load.damping_ww * last.omega
                     if wp.static(variant.bends):
-                        worst = use.bending.bent(
-                            worst, context, sections, reach.footprint, pose, state, load, last, dt, now
-                        )
+                        worst = use.bending.bent(worst, context, reach.footprint, pose, state, load, last, clock)
                     state = use.rigid_body.kick(body, state, load, dt)
                     last = use.rigid_body.change_between(body, before, state)
                 else:
@@ -221,4 +218,4 @@ def build(variant: Variant) -> SimpleNamespace:
         outcomes.angular_momentum[shot] = state.angular_momentum
 
     kernel = variant.kernel(march, (LANES, BLOCKS) if variant.window else None)
-    return SimpleNamespace(**vars(struct), kernel=kernel)
+    return SimpleNamespace(**vars(struct), kernel=kernel, status_of=status_of)

@@ -83,17 +83,11 @@ def build(variant: Variant) -> SimpleNamespace:
         return window.home + row * window.cells_z + column
 
     @wp.func
-    def total_load(
-        surface: struct.Surface,
-        law: struct.Law,
-        fields: struct.Fields,
-        window: struct.Window,
-        footprint: struct.Footprint,
-        pose: struct.Pose,
-    ):
+    def total_load(context: struct.Context, slab: struct.Slab):
         """Σ Y (−n + η t) dS over the points in the slab, t the meridian tangent towards the base."""
+        surface, fields, window, pose = context.surface, context.fields, slab.window, slab.pose
         load = struct.Load()
-        for index in range(footprint.first_ring, footprint.last_ring + 1):
+        for index in range(slab.footprint.first_ring, slab.footprint.last_ring + 1):
             ring = use.core_surface.ring_at(surface, pose, index)
             for j in range(surface.around):
                 outward = outward_of(surface, pose, j)
@@ -103,8 +97,8 @@ def build(variant: Variant) -> SimpleNamespace:
                     node = node_under(window, point)
                     normal = ring.normal_axial * pose.axis + ring.normal_radial * outward
                     tangent = ring.normal_axial * outward - ring.normal_radial * pose.axis
-                    resistance = law.a0 * fields.share[node]
-                    force = (resistance * ring.area) * (law.friction * tangent - normal)
+                    resistance = slab.law.a0 * fields.share[node]
+                    force = (resistance * ring.area) * (slab.law.friction * tangent - normal)
                     load.touching = load.touching or fields.share[node] > zero
                     load.force += force
                     load.moment += wp.cross(arm, force)
@@ -116,16 +110,10 @@ def build(variant: Variant) -> SimpleNamespace:
         return load
 
     @wp.func
-    def degrade(
-        surface: struct.Surface,
-        fields: struct.Fields,
-        window: struct.Window,
-        footprint: struct.Footprint,
-        pose: struct.Pose,
-        factor: real,
-    ):
+    def degrade(context: struct.Context, slab: struct.Slab):
         """Multiply every node that was touched in this step by β, once even if several points touched it (eq. 6)."""
-        for index in range(footprint.first_ring, footprint.last_ring + 1):
+        surface, fields, window, pose = context.surface, context.fields, slab.window, slab.pose
+        for index in range(slab.footprint.first_ring, slab.footprint.last_ring + 1):
             ring = use.core_surface.ring_at(surface, pose, index)
             for j in range(surface.around):
                 arm = ring.station * pose.axis + ring.radius * outward_of(surface, pose, j)
@@ -133,26 +121,15 @@ def build(variant: Variant) -> SimpleNamespace:
                 if point[0] >= zero and point[0] <= window.thickness:
                     node = node_under(window, point)
                     if fields.touched[node] > zero:
-                        fields.share[node] = fields.share[node] * factor
+                        fields.share[node] = fields.share[node] * slab.law.degradation
                         fields.touched[node] = zero
 
     @wp.func
-    def load_on(
-        surface: struct.Surface,
-        plate: struct.Plate,
-        law: struct.Law,
-        fields: struct.Fields,
-        window: struct.Window,
-        touches: struct.Touches,
-        slot: wp.int32,
-        footprint: struct.Footprint,
-        pose: struct.Pose,
-        dt: real,
-    ):
+    def load_on(context: struct.Context, slab: struct.Slab):
         """The load of one step in the literal scheme (kernels/contracts.py); touched nodes weaken."""
-        load = total_load(surface, law, fields, window, footprint, pose)
+        load = total_load(context, slab)
         if wp.static(variant.degrades):
-            degrade(surface, fields, window, footprint, pose, law.degradation)
+            degrade(context, slab)
         return load
 
     return SimpleNamespace(**locals())

@@ -53,7 +53,8 @@ def build(variant: Variant) -> SimpleNamespace:
         use.target.begin(context)
         reach = struct.Reach()
         reach.window = use.target.open_window(context, 0, vec3())
-        clear = use.plate_grid.clearance(use.target.plate_of(context.target, 0), reach.window)
+        plate = use.target.plate_of(context.target, 0)
+        clear = plate.clear[use.plate_grid.tile_at(plate, reach.window, zero, zero)]  # at the hit
         off = farthest_off(context.surface, reach.window.thickness, state)
         return reach, wp.where(clear > off, Status.MISSED, RUNNING)
 
@@ -81,13 +82,16 @@ def build(variant: Variant) -> SimpleNamespace:
     @wp.func
     def load_on(context: struct.Context, law: struct.Law, reach: struct.Reach, pose: struct.Pose, dt: real):
         """The load of the plate over one step."""
-        surface, touches, slot = context.surface, context.touches, context.slot
         if wp.static(variant.bends):
-            use.contact.clear_sums(surface, touches, slot)
-        plate = use.target.plate_of(context.target, 0)
-        return use.scheme.load_on(
-            surface, plate, law, context.fields, reach.window, touches, slot, reach.footprint, pose, dt
-        )
+            use.contact.clear_sums(context)
+        slab = struct.Slab()
+        slab.plate = use.target.plate_of(context.target, 0)
+        slab.law = law
+        slab.window = reach.window
+        slab.footprint = reach.footprint
+        slab.pose = pose
+        slab.dt = dt
+        return use.scheme.load_on(context, slab)
 
     @wp.func
     def follow(context: struct.Context, reach: struct.Reach, pose: struct.Pose):

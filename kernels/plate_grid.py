@@ -107,11 +107,6 @@ def build(variant: Variant) -> SimpleNamespace:
         ...
 
     @wp.func
-    def clearance(plate: struct.Plate, window: struct.Window):
-        """A lower bound of the hit's distance from material [m]."""
-        return plate.clear[tile_at(plate, window, zero, zero)]
-
-    @wp.func
     def on_plate(plate: struct.Plate, window: struct.Window, y: real, z: real):
         """Share of half a grid cell about a point that belongs to a finite plate."""
         width = half * plate.spacing

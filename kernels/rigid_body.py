@@ -72,11 +72,6 @@ def build(variant: Variant) -> SimpleNamespace:
         return quat(scale * vector[0], scale * vector[1], scale * vector[2], cosine)
 
     @wp.func
-    def roll_rate_of(body: struct.Body, axis: vec3, momentum: vec3):
-        """Rate about the axis within the precession: (L·a)(1/I_a − 1/I_t) [rad/s]."""
-        return wp.dot(momentum, axis) * (one / body.inertia_axial - one / body.inertia_transverse)
-
-    @wp.func
     def turned(body: struct.Body, axis: vec3, momentum: vec3, time: real):
         """The axis after torque-free motion over a time: it precesses about L at |L|/I_t."""
         return wp.quat_rotate(rotation((time / body.inertia_transverse) * momentum), axis)
@@ -100,7 +95,10 @@ def build(variant: Variant) -> SimpleNamespace:
     def drift(body: struct.Body, state: struct.State, dt: real):
         """Torque-free motion over dt, exact for any dt (the symmetric top)."""
         momentum = state.angular_momentum
-        roll_rate = roll_rate_of(body, axis_of(state.attitude), momentum)
+        # The rate about the axis within the precession: (L·a)(1/I_a − 1/I_t) [rad/s].
+        roll_rate = wp.dot(momentum, axis_of(state.attitude)) * (
+            one / body.inertia_axial - one / body.inertia_transverse
+        )
         precession = rotation((dt / body.inertia_transverse) * momentum)
         roll = rotation(vec3(dt * roll_rate, zero, zero))
         moved = struct.State()

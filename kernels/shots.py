@@ -44,17 +44,6 @@ def build(variant: Variant) -> SimpleNamespace:
         return wp.normalize(wp.quatd(wp.float64(0.0), -axis[2], axis[1], wp.float64(1.0) + axis[0]))
 
     @wp.func
-    def foremost(surface: struct.Surface, pose: struct.Pose):
-        """How far the core reaches ahead of its centre of mass along x [m]."""
-        front = -surface.bounding_radius
-        for index in range(surface.rings):
-            ring = use.core_surface.ring_at(surface, pose, index)
-            broadside = use.core_surface.broadside(pose)
-            middle = ring.station * pose.axis[0] + ring.radius * broadside
-            front = wp.max(front, middle + wp.abs(ring.half_axial * pose.axis[0] + ring.half_radial * broadside))
-        return front
-
-    @wp.func
     def launch_state(surface: struct.Surface, body: struct.Body, shots: struct.Shots, shot: wp.int32):
         """State with the foremost point at the front face, the centre of mass on the line through the hit."""
         flight = line_of_flight(shots, shot)
@@ -70,7 +59,8 @@ def build(variant: Variant) -> SimpleNamespace:
             state.attitude
         )
         pose = use.core_surface.pose_of(surface, vec3(), state.attitude, state.velocity, vec3())
-        state.position = (-foremost(surface, pose) / direction[0]) * direction
+        _, foremost = use.core_surface.ends_of(surface, pose)
+        state.position = (-foremost / direction[0]) * direction
         return state
 
     return SimpleNamespace(**locals())

@@ -419,6 +419,18 @@ def _build(double: bool, many_plates: bool) -> SimpleNamespace:
         box: Box
 
     @wp.struct
+    class Slab:
+        """One layer as a step loads it, in the frame of the layer: its front face is at x = 0, and the home of its
+        window at y = z = 0. `pose` is that at mid-step, and `dt` is the length of the step [s]."""
+
+        plate: Plate
+        law: Law
+        window: Window
+        footprint: Footprint
+        pose: Pose
+        dt: real
+
+    @wp.struct
     class Reach:
         """What a step can touch of the target: `footprint` is that of all layers together.
 
@@ -739,6 +751,7 @@ def _build(double: bool, many_plates: bool) -> SimpleNamespace:
         depth: real
         impact_energy: real
         surface: Surface
+        sections: Sections
         body: Body
         target: Target
         law: Law

@@ -58,18 +58,10 @@ def bend(
     context.surface = surface
     context.body = body
     context.touches = touches
-    found[0] = bent(
-        Bending(),
-        context,
-        sections,
-        footprint,
-        pose,
-        state,
-        load,
-        Change(),
-        wp.float64(1.0e-9),
-        wp.float64(0.0),
-    )
+    context.sections = sections
+    clock = struct.Clock()
+    clock.step = wp.float64(1.0e-9)
+    found[0] = bent(Bending(), context, footprint, pose, state, load, Change(), clock)
 
 
 def struck_at(share: float, device: str, omega: Any = (0.0, 0.0, 0.0), **sections: Any) -> tuple[Any, float]:

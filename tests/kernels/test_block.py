@@ -246,13 +246,20 @@ def probe_of(variant: Variant) -> Any:
     ) -> None:
         """Two steps at the same pose: the second one finds the exposure of the first."""
         i = wp.tid()
-        fields = scheme.fields_of_slot(fields, i)
-        window = scheme.open_window(plate, thickness, fields, 0, wp.float64(0.0), wp.float64(0.0))
-        pose = use.core_surface.pose_of(surface, position[i], attitude[i], velocity[i], omega[i])
-        found = use.footprint.footprint_of(surface, plate, window, pose, dt)
+        context, slab = struct.Context(), struct.Slab()
+        context.slot = i
+        context.surface = surface
+        context.touches = touches
+        context.fields = scheme.fields_of_slot(fields, i)
+        slab.plate = plate
+        slab.law = law
+        slab.dt = dt
+        slab.window = scheme.open_window(plate, thickness, context.fields, 0, wp.float64(0.0), wp.float64(0.0))
+        slab.pose = use.core_surface.pose_of(surface, position[i], attitude[i], velocity[i], omega[i])
+        slab.footprint = use.footprint.footprint_of(surface, plate, slab.window, slab.pose, dt)
         load = Load()
         for _ in range(2):
-            load = scheme.load_on(surface, plate, law, fields, window, touches, i, found, pose, dt)
+            load = scheme.load_on(context, slab)
         loads[i] = load
 
     kernel = variant.kernel(steps, (lanes.LANES, 1) if variant.window else None)

@@ -56,14 +56,20 @@ def loads(
     """The load of one step of every pose, each on its own plate, from slot `first` on; none if the window is too
     small."""
     i = wp.tid()
-    slot = first + i
-    fields = use.contact.fields_of_slot(fields, slot)
-    window = use.contact.open_window(plate, thickness, fields, 0, wp.float64(0.0), wp.float64(0.0))
-    pose = use.core_surface.pose_of(surface, position[i], attitude[i], velocity[i], omega[i])
-    found = use.footprint.footprint_of(surface, plate, window, pose, dt)
-    inside[i] = found.inside
-    if found.inside:
-        loads[i] = use.contact.load_on(surface, plate, law, fields, window, touches, slot, found, pose, dt)
+    context, slab = struct.Context(), struct.Slab()
+    context.slot = first + i
+    context.surface = surface
+    context.touches = touches
+    context.fields = use.contact.fields_of_slot(fields, first + i)
+    slab.plate = plate
+    slab.law = law
+    slab.dt = dt
+    slab.window = use.contact.open_window(plate, thickness, context.fields, 0, wp.float64(0.0), wp.float64(0.0))
+    slab.pose = use.core_surface.pose_of(surface, position[i], attitude[i], velocity[i], omega[i])
+    slab.footprint = use.footprint.footprint_of(surface, plate, slab.window, slab.pose, dt)
+    inside[i] = slab.footprint.inside
+    if slab.footprint.inside:
+        loads[i] = use.contact.load_on(context, slab)
 
 
 LOADS = VARIANT.kernel(loads)
