@@ -19,7 +19,6 @@ from numpy.typing import NDArray
 
 from warpimpact.kernels.status import Status
 from warpimpact.records.group import failures
-from warpimpact.solver.chunks import CHUNK, SHARES, Chunks
 from warpimpact.solver.device import halving, launching, load
 from warpimpact.solver.memory import Memory
 from warpimpact.solver.windows import Cells
@@ -35,6 +34,14 @@ FEWEST_CELLS = 16
 """Along a side of the plate's window, which would hold no core if it were smaller still."""
 MAX_DOUBLINGS = 6
 """Largest number of times that the windows are doubled for the shots that left theirs."""
+
+
+CHUNK = 64
+"""Most shots of a chunk, where other threads look for the progress."""
+SHARES = 3
+"""Chunks per thread into which the shots that are left would be divided at least."""
+SHORTEST, LONGEST = 0.002, 0.25
+"""Seconds that a chunk is to take. A computation can be broken off between two of them."""
 
 
 class Helpers(NamedTuple):
@@ -165,6 +172,49 @@ class March:
                 if not thread.cancel():
                     thread.result()
         progress(chunks.done)
+
+
+class Chunks:
+    """Some shots in chunks; safe to use by several threads.
+
+    The first chunks are of one shot each, as some scenes take seconds per shot. The last ones are small, as no thread
+    is to wait long for another.
+
+    Attributes:
+        total, done: shots, and how many of them are computed.
+    """
+
+    def __init__(self, total: int, together: int, shares: int, most: int) -> None:
+        """Shots that are not computed.
+
+        Args:
+            together: shots in a row that no two chunks share.
+            shares: into how many the shots that are left would be divided at least, if that takes no time.
+            most: shots of a chunk.
+        """
+        self.total, self.done = total, 0
+        self._together, self._shares, self._most = together, shares, most
+        self._begun, self._pace, self._lock = 0, math.inf, threading.Lock()
+
+    def take(self) -> tuple[int, int]:
+        """The first shot of a chunk that nobody has taken, and their number; 0 where none is left."""
+        with self._lock:
+            left, fewest, most = self.total - self._begun, SHORTEST / self._pace, LONGEST / self._pace
+            count = min(max(left // self._shares, int(fewest)), int(most), self._most)
+            first, count = self._begun, min(max(1, count // self._together) * self._together, left)
+            self._begun += count
+            return first, count
+
+    def computed(self, count: int, seconds: float) -> None:
+        """Count shots of a chunk that are computed, which took some seconds."""
+        with self._lock:
+            self.done += count
+            self._pace = max(seconds, 1e-9) / count
+
+    def end(self) -> None:
+        """Nobody takes what is left."""
+        with self._lock:
+            self._begun = self.total
 
 
 def _work(launch: Launch, scratch: Any, chunks: Chunks, ended: Callable[[int], object]) -> None:

@@ -18,7 +18,7 @@ from warpimpact.records.group import Returned
 from warpimpact.solver import earlier as earlier_hits
 from warpimpact.solver.device import SMALL, free_memory, load
 from warpimpact.solver.prepare import Prepared
-from warpimpact.solver.structs import Put, filled, plate_of, plates_of, surface_of, table_of
+from warpimpact.solver.structs import Put, filled, inputs_of
 from warpimpact.solver.windows import Cells
 from warpimpact.solver.worker import NEVER, Cancel
 
@@ -27,8 +27,6 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
-LARGEST_ONSET = 0.02
-"""Bound of the onset speed, as a share of the impact velocity."""
 CUDA_CHUNK = 65536
 MEMORY_SHARE = 0.5
 """Share of the free memory that scratch may take."""
@@ -43,8 +41,8 @@ class Memory:
         stage, flight: the builds of the march and of the free flight that the scene needs.
         put: puts values on the device.
         at_a_plate: shots in a row that share a slot of scratch, as the earlier ones leave the plate to the later ones.
-        surfaces, sections, tables, target, law, shots: structs of the inputs; `tables` has the first two where
-            shots have surfaces of their own.
+        inputs: what a launch of the march reads.
+        rings, patches: of the largest surface.
         bending, passage, history: what the march fills beside the outcomes.
     """
 
@@ -57,19 +55,9 @@ class Memory:
         self.stage, self.flight = built(variant)
         self.put = Put(device.alias, variant.real)
         self.at_a_plate = prepared.shots.at_a_plate if variant.burst else 1
-        self.surfaces, self.sections = self._surfaces(prepared), self._sections(prepared)
-        self.rings, self.patches = (
-            max(getattr(one, n) for one in self.surfaces) for n in ("most_rings", "most_patches")
-        )
-        most = {"most_rings": self.rings, "most_patches": self.patches}
-        tabled = slice(None if variant.tabled else 0)
-        self.tables = (
-            table_of(self.stage.Surface, self.surfaces[tabled], self.put, **most),
-            table_of(self.stage.Sections, self.sections[tabled], self.put),
-        )
-        self.target, self.shots = self._target(prepared), self._shots(prepared)
-        self.law = self.stage.Law()
-        self.law.onset_limit = LARGEST_ONSET
+        self.inputs, self._kept = inputs_of(self.stage, prepared, self.put)
+        self.rings = max(len(surface.rings.station) for surface in prepared.surfaces)
+        self.patches = max(len(surface.rings.station) * surface.around for surface in prepared.surfaces)
         self.free = scene.record.flies_free(scene.core, scene.target)
         self.bending = wp.empty(count if variant.bends else 0, dtype=self.stage.Bending, device=device)
         self.history = wp.empty((count * prepared.rows, WIDTH), dtype=variant.real, device=device)
@@ -77,46 +65,6 @@ class Memory:
         recorded = count if variant.layered else 0
         sizes = (recorded,), (recorded, layers), (recorded, layers, standoffs)
         self.passage = self.empty(self.stage.Passage, *sizes)
-
-    def _target(self, prepared: Prepared) -> Any:
-        """The Target (kernels/structs.py)."""
-        target, materials = self.stage.Target(), prepared.materials
-        target.count = len(materials)
-        # Kept, as an array of structs does not keep what its members point to.
-        if prepared.variant.layered or prepared.variant.tabled:
-            grids = [grid for plates in prepared.plates for grid in plates]
-            target.plates, self.plates = plates_of(self.stage.Plate, grids, self.put)
-        else:
-            target.plates = plate_of(self.stage.Plate, prepared.grid, self.put)
-        target.weakens = self.put(np.array([one.weakens for one in materials]), wp.bool)
-        target.laminate = self.put(np.array([one.laminate for one in materials]), wp.int32)
-        target.by_path = self.put(np.array([one.by_path for one in materials]), wp.bool)
-        target.slowing, target.slide = prepared.resolution.slowing, prepared.slide
-        record = prepared.scene.record
-        target.standoffs, target.ahead = self.put(np.array(record.layer_standoffs)), record.ahead(prepared.scene.core)
-        for name, variable in self.stage.Target.vars.items():
-            if getattr(variable.type, "ndim", 1) == 2:
-                own = prepared.stretch if name == "stretch" else [getattr(one, name) for one in materials]
-                rows = np.broadcast_arrays(*own)
-                setattr(target, name, self.put(np.stack(rows), variable.type.dtype))
-        return target
-
-    def _surfaces(self, prepared: Prepared) -> list[Any]:
-        core, struct = prepared.scene.core, self.stage.Surface
-        return [surface_of(struct, core, own.rings, own.azimuths, self.put) for own in prepared.surfaces]
-
-    def _sections(self, prepared: Prepared) -> list[Any]:
-        structs = [self.stage.Sections() for _ in prepared.surfaces]
-        for struct, own in zip(structs, prepared.surfaces, strict=True):
-            for name in self.stage.Sections.vars if own.sections is not None else ():
-                setattr(struct, name, self.put(getattr(own.sections, name), aligned=True))
-        return structs
-
-    def _shots(self, prepared: Prepared) -> Any:
-        shots = self.stage.Shots()
-        for name, variable in self.stage.Shots.vars.items():
-            setattr(shots, name, self.put(prepared.conditions[name], variable.type.dtype))
-        return shots
 
     def build(self) -> float:
         """Compile the kernels, once per version and machine, and load them; returns how long that took [s]."""
@@ -127,10 +75,10 @@ class Memory:
 
     def give_up_after(self, way: float) -> None:
         """Give up the last shot after this distance [m] at impact velocity."""
-        longest_way = self.shots.longest_way.numpy()
+        longest_way = self.inputs.shots.longest_way.numpy()
         ways = np.resize(longest_way, max(len(longest_way), len(self.prepared.shots)))
         ways[-1] = way
-        self.shots.longest_way = self.put(ways, wp.float64)
+        self.inputs.shots.longest_way = self.put(ways, wp.float64)
 
     def empty(self, struct: Any, *shapes: tuple[int, ...]) -> Any:
         """A struct of empty arrays; each has the shape with its number of dimensions."""
@@ -240,29 +188,14 @@ class Memory:
 
     def launch(self, order: Any, outcomes: Any, scratch: Any, slots: int, first: int, count: int) -> int:
         """March `count` shots from order[first] on; returns `count`."""
-        inputs = filled(
-            self.stage.Inputs,
-            surface=self.surfaces[0],
-            sections=self.sections[0],
-            surfaces=self.tables[0],
-            all_sections=self.tables[1],
-            target=self.target,
-            law=self.law,
-            shots=self.shots,
-            rows=self.prepared.rows,
-        )
         results = filled(
             self.stage.Results, outcomes=outcomes, passage=self.passage, bending=self.bending, trace=self.history
         )
         launch = partial(wp.launch, dim=count, block_dim=lanes.THREADS if self.device.is_cuda else 1)
         if self.variant.window:
             launch = partial(wp.launch_tiled, dim=[count], block_dim=lanes.LANES)
-        launch(
-            self.stage.kernel,
-            inputs=[first, slots, order, inputs, scratch],
-            outputs=[results],
-            device=self.device,
-        )
+        inputs = [first, slots, order, self.inputs, scratch]
+        launch(self.stage.kernel, inputs=inputs, outputs=[results], device=self.device)
         return count
 
     def report(self, contact: Any) -> Returned:
@@ -272,7 +205,7 @@ class Memory:
         report = self.empty(self.stage.Report, (count,), (count, len(standoffs)))
         load(flight.kernel, self.device)
         ahead = scene.record.ahead(scene.core)
-        inputs = [self.shots, self.target, contact, self.put(standoffs, wp.float64), ahead]
+        inputs = [self.inputs.shots, self.inputs.target, contact, self.put(standoffs, wp.float64), ahead]
         wp.launch(flight.kernel, count, inputs=inputs, outputs=[report], device=self.device)
         status = contact.status.numpy().astype(np.int8)
         return Returned(status, contact, report, self.bending.numpy(), self.passage, self.free)

@@ -41,6 +41,11 @@ class Surface(NamedTuple):
     azimuths: Array
     sections: Sections | None
 
+    @property
+    def around(self) -> int:
+        """Patches of a ring."""
+        return len(self.azimuths) // 2
+
 
 @dataclass(frozen=True)
 class Prepared:

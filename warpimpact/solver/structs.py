@@ -1,4 +1,4 @@
-"""Structs of the kernels that hold a core's surface and a plate, on a device."""
+"""The inputs of the kernels (kernels/structs.py, Inputs): what was prepared, put on a device once."""
 
 from __future__ import annotations
 
@@ -17,11 +17,14 @@ from warpimpact.solver.keys import Key
 if TYPE_CHECKING:
     from warpimpact.scene import Core
     from warpimpact.solver.grid import Grid
+    from warpimpact.solver.prepare import Prepared
     from warpimpact.solver.rings import Rings
     from warpimpact.solver.tile import Tile
 
 Array = NDArray[np.float64]
 
+LARGEST_ONSET = 0.02
+"""Bound of the onset speed, as a share of the impact velocity."""
 PROFILE = 128
 """Parts of a core's length, between which its radius is linear, as its channel has it."""
 
@@ -47,6 +50,57 @@ def filled(struct: Any, **members: Any) -> Any:
     for name, value in members.items():
         setattr(instance, name, value)
     return instance
+
+
+def inputs_of(stage: Any, prepared: Prepared, put: Put) -> tuple[Any, list[Any]]:
+    """The Inputs of the march, and what has to be kept with them: an array of structs does not keep the arrays that its
+    members point to.
+
+    Args:
+        stage: the build of the march.
+    """
+    core, variant = prepared.scene.core, prepared.variant
+    surfaces = [surface_of(stage.Surface, core, own.rings, own.azimuths, put) for own in prepared.surfaces]
+    sections = [
+        filled(stage.Sections, **{name: put(values, aligned=True) for name, values in vars(own.sections).items()})
+        if own.sections is not None
+        else stage.Sections()
+        for own in prepared.surfaces
+    ]
+    most = {name: max(getattr(surface, name) for surface in surfaces) for name in ("most_rings", "most_patches")}
+    shots = {name: put(prepared.conditions[name], variable.type.dtype) for name, variable in stage.Shots.vars.items()}
+    target, plates = _target_of(stage, prepared, put)
+    inputs = filled(
+        stage.Inputs,
+        surface=surfaces[0],
+        sections=sections[0],
+        surfaces=table_of(stage.Surface, surfaces if variant.tabled else [], put, **most),
+        all_sections=table_of(stage.Sections, sections if variant.tabled else [], put),
+        target=target,
+        law=filled(stage.Law, onset_limit=LARGEST_ONSET),
+        shots=filled(stage.Shots, **shots),
+        rows=prepared.rows,
+    )
+    return inputs, [surfaces, sections, plates]
+
+
+def _target_of(stage: Any, prepared: Prepared, put: Put) -> tuple[Any, Any]:
+    """The Target, and what has to be kept of its plates."""
+    target, kept, materials, record = stage.Target(), None, prepared.materials, prepared.scene.record
+    target.count = len(materials)
+    if prepared.variant.layered or prepared.variant.tabled:
+        target.plates, kept = plates_of(stage.Plate, [grid for plates in prepared.plates for grid in plates], put)
+    else:
+        target.plates = plate_of(stage.Plate, prepared.grid, put)
+    for name, dtype in {"weakens": wp.bool, "laminate": wp.int32, "by_path": wp.bool}.items():
+        setattr(target, name, put(np.array([getattr(material, name) for material in materials]), dtype))
+    target.slowing, target.slide = prepared.resolution.slowing, prepared.slide
+    target.standoffs, target.ahead = put(np.array(record.layer_standoffs)), record.ahead(prepared.scene.core)
+    for name, variable in stage.Target.vars.items():
+        if getattr(variable.type, "ndim", 1) == 2:
+            columns = prepared.stretch if name == "stretch" else [getattr(material, name) for material in materials]
+            setattr(target, name, put(np.stack(np.broadcast_arrays(*columns)), variable.type.dtype))
+    return target, kept
 
 
 def surface_of(struct: Any, core: Core, rings: Rings, azimuths: Array, put: Put) -> Any:

@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 
 from warpimpact import Campaign, Numerics, simulate
-from warpimpact.solver.chunks import Chunks
+from warpimpact.solver.marching import Chunks
 from warpimpact.solver.memory import Memory
 
 CAMPAIGN = Path(__file__).parents[3] / "campaigns" / "slotted_plate.toml"
