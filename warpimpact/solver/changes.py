@@ -79,7 +79,7 @@ def compared(
     weighed = _excess(accuracy, upper(relative=relative, impact=shots.velocity), layered)
     status = float(ended_otherwise(coarse, fine).mean()) if layered else math.nan
     if status > 1.0 - accuracy.share:
-        typical = math.inf  # shots that end otherwise have no errors, and are those that err most
+        typical = math.inf  # shots that end otherwise err most, but have no errors
     kept = excess <= 1.0 and not status > accuracy.status_share
     velocity, tilt, depth = (float(error) for error in upper())
     errors = HitErrors(numerics, kept, accuracy.share, velocity, tilt, depth, status, finer=fine)

@@ -102,7 +102,8 @@ def cores() -> int:
 
 
 def launching(threads: int | None) -> int:
-    """Threads that launch on a CPU: so many, or one for every core; where Warp runs blocks there, they crash in two."""
+    """Threads that launch on a CPU: the given number, or one for every core. One where Warp runs blocks on a CPU, as
+    two threads crash there."""
     return 1 if wp.config.enable_cpu_blocks else threads or cores()
 
 
@@ -154,7 +155,7 @@ def _sums(folder: Path) -> dict[str, int]:
 
 
 def _is_whole(folder: Path) -> bool:
-    """If the files of a compiled module are those that were sealed."""
+    """Whether the files of a compiled module have the checksums with which they were sealed."""
     sums = folder / _SUMS
     try:
         return sums.is_file() and parsed_json(sums.read_bytes()) == _sums(folder)

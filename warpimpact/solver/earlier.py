@@ -40,7 +40,7 @@ def _apart(prepared: Prepared) -> NDArray[np.float64]:
 
 
 def channel_nodes(prepared: Prepared, windows: Sequence[tuple[int, int]]) -> list[int]:
-    """Nodes of the channels through each layer in a slot, whose windows have so many cells."""
+    """Nodes of the channels through each layer in a slot, for windows of these cells along y and z."""
     return [number * math.prod(cells) for number, cells in zip(planes(prepared), windows, strict=True)]
 
 

@@ -103,7 +103,7 @@ def grids_of(
 def _grid(
     plate: Plate, resolution: Resolution, own: Lengths, wider: float, deep: Materials | None, shared: bool
 ) -> Grid:
-    """The grid of a layer with some degradation lengths, whose cells are so many times as wide as those of the plate.
+    """The grid of a layer with some degradation lengths. Its cells are `wider` times as wide as those of the plate.
 
     Args:
         deep: its material, where windows have planes through the thickness.

@@ -180,10 +180,10 @@ def pilot_of_limits(
         known[level] = limits(scene, pilot, sought, at_level(level, numerics), worker)
         return known[level].value
 
-    found = pilot_limits(limits_at, numerics, sought.quantity)
-    if found.finer_level is None:
-        return found
-    return replace(found, finer=known[found.finer_level].recorded(sought.quantity))
+    errors = pilot_limits(limits_at, numerics, sought.quantity)
+    if errors.finer_level is None:
+        return errors
+    return replace(errors, finer=known[errors.finer_level].recorded(sought.quantity))
 
 
 def limits(
@@ -201,7 +201,7 @@ def limits(
     found tell where the searches of the others begin (solver/limit_near.py).
 
     Args:
-        together: so many shots in turn are searched together; all if None.
+        together: number of shots that are searched together; None for all.
     """
     check_arrests(scene, shots)
     total, size = len(shots), together or max(1, len(shots))

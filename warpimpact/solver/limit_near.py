@@ -43,13 +43,13 @@ class Neighbours:
         cell, self._tolerance = scene.target.layers[0].sampled_cell, tolerance
         points, signed, others = _coordinates(shots, sought)
         group = _symmetries(scene, signed)
-        images = [np.stack(each.image(points[:, 0], points[:, 1], cell), axis=1) for each in group]
+        images = [np.stack(symmetry.image(points[:, 0], points[:, 1], cell), axis=1) for symmetry in group]
         self._points = [(image / cell + 0.5) % 1.0 for image in images]
-        columns = [np.column_stack([signed * _signs(each), others]) for each in group]
+        columns = [np.column_stack([signed * _signs(symmetry), others]) for symmetry in group]
         scale = columns[0].std(axis=0)
         moved = scale > 1e-9 * np.abs(columns[0]).max(axis=0, initial=0.0)
         mean, scale = columns[0].mean(axis=0), np.where(moved, scale, 1.0)
-        self._conditions = [((each - mean) / scale)[:, moved] for each in columns]
+        self._conditions = [((column - mean) / scale)[:, moved] for column in columns]
         self._value, self._sums = np.full(len(shots), np.nan), np.zeros((5, len(shots)))
         self._errors = np.full((3, len(shots)), np.nan)
 

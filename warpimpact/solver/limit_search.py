@@ -156,8 +156,8 @@ class LimitSearch:
         lower, upper = self.ends()
         expected = self._value(self.curve()[0])
         inside = (expected > lower) & (expected < upper)
-        found = np.where(inside, expected, 0.5 * (lower + upper))
-        return np.where(self.failed, np.nan, np.where(self.beyond, np.inf, found))
+        limit = np.where(inside, expected, 0.5 * (lower + upper))
+        return np.where(self.failed, np.nan, np.where(self.beyond, np.inf, limit))
 
     def ends(self) -> tuple[Array, Array]:
         """The lower and the upper end."""

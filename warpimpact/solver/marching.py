@@ -246,14 +246,14 @@ def whole_plates(which: NDArray[np.bool_], count: int) -> Numbers:
 
 
 def in_turns(which: Numbers, count: int, slots: int) -> Numbers:
-    """Shots in the order in which a device that computes so many plates at a time takes them: of each lot of plates
-    first all first shots, then all second ones. Those at one plate are then in one slot, one after another."""
+    """Shots in the order in which a device takes them that computes `slots` plates at a time: of each lot of plates
+    first all first shots, then all second ones. Shots at one plate are then in one slot, one after another."""
     lots = (which[first : first + slots * count] for first in range(0, len(which), slots * count))
     return np.concatenate([lot.reshape(-1, count).T.reshape(-1) for lot in lots])
 
 
 def turns(total: int, count: int, slots: int) -> Iterator[tuple[int, int]]:
-    """(first, number) of the launches that compute so many shots in the order of `in_turns`."""
+    """(first, number) of the launches that compute `total` shots in the order of `in_turns`."""
     for first in range(0, total, slots * count):
         plates = min(slots, (total - first) // count)
         yield from ((first + turn * plates, plates) for turn in range(count))

@@ -91,10 +91,10 @@ def weakens(target: Target, shots: Shots | None = None) -> list[bool]:
 def _laminates(target: Target, weakening: Sequence[bool], shots: Shots) -> list[int]:
     """For every layer, the first one of its laminate: of layers that weaken, touch each other and remember alike. A
     laminate of one material is the plate of its thickness. A plate that remembers as each shot has it is in none."""
-    own = any(name in shots.columns for name in OWN_LENGTHS)
+    differs = any(name in shots.columns for name in OWN_LENGTHS)
     first = [0]
     for k, (before, layer) in enumerate(pairwise(target.layers), start=1):
-        both = weakening[k - 1] and weakening[k] and target.gaps[k] == 0.0 and not (own and k == 1)
+        both = weakening[k - 1] and weakening[k] and target.gaps[k] == 0.0 and not (differs and k == 1)
         first.append(first[-1] if both and _memory(before) == _memory(layer) else k)
     return first
 

@@ -113,7 +113,7 @@ class Memory:
         return 0 if self.variant.nodal else self.patches
 
     def slots(self, cells: Cells, threads: int) -> int:
-        """Slots of scratch that the device's free memory and 32-bit indices allow, for so many threads of a CPU."""
+        """Slots of scratch that the device's free memory and 32-bit indices allow; on a CPU one per thread at most."""
         count, nodes = self.at_a_plate, max(sum(self.prepared.nodes(cells)), self._pierced(cells))
         wanted = threads if self.device.is_cpu else min(CUDA_CHUNK, len(self.prepared.shots) // count)
         bytes_of_one = self.slot_bytes(cells)
@@ -121,7 +121,7 @@ class Memory:
         return min(wanted, fitting, (2**31 - 1) // (count * max(nodes, 1)))
 
     def too_large(self, cells: Cells) -> str:
-        """Why there is no slot, if the plate's window has so many cells."""
+        """Why there is no slot for a window of the plate of these cells."""
         prepared = self.prepared
         windows = [
             f"{place}: {y} × {z} nodes" + (f" in {grid.planes.number} planes" if grid.planes.number > 1 else "")

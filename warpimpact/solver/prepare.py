@@ -56,10 +56,11 @@ class Prepared:
         resolution: its numerics with every choice made.
         variant: the build of the kernels that the scene needs.
         surfaces: of the core, of which each shot has one.
-        plates: the plate, and the layers behind it; likewise several where shots have degradation lengths of their own.
+        plates: grids of all layers; several sets where shots have degradation lengths of their own.
         materials: of the plate, and of the layers behind it.
         conditions: every member of the kernels' Shots (kernels/shots.py), each of shape [1] or [shots].
-        stretch: how many times longer than the shortest a step in each layer is (kernels/target.py), likewise.
+        stretch: length of a step in each layer over that of the shortest (kernels/structs.py, Target), each of shape
+            [1] or [shots].
         steps: of a passage that nothing hinders, at most.
         first_cells: nodes of a first window of the plate in each direction, as each shot by itself would have it, shape
             [shots].
@@ -103,7 +104,7 @@ class Prepared:
         return int(self.first_cells.max())
 
     def windows(self, cells: Cells) -> list[Cells]:
-        """Cells of the windows of all layers, if the plate's has so many; 0 where a layer keeps no field."""
+        """Cells of the windows of all layers, for those of the plate's window; 0 where a layer keeps no field."""
         counts = self.windows_behind(np.array(cells[:1])).max(axis=1)
         return [(int(count), int(count)) for count in counts]
 
@@ -115,8 +116,8 @@ class Prepared:
         )
 
     def nodes(self, cells: Cells) -> list[int]:
-        """Nodes that a shot has in the windows of all layers, likewise; those of a laminate are those of its first
-        layer."""
+        """Nodes of a shot in the windows of all layers, for the cells of the plate's window. Those of a laminate count
+        in its first layer."""
         return [
             max(grids[k].planes.number for grids in self.plates) * math.prod(own) if material.laminate == k else 0
             for k, (material, own) in enumerate(zip(self.materials, self.windows(cells), strict=True))

@@ -133,12 +133,14 @@ def _over_time(number: int, left: list[dict[int, Weakened]]) -> Weakened:
     """A layer at all snapshots, in its last window: before the core came there it was as new."""
     last = left[-1][number]
 
-    def share(one: Weakened | None) -> Array:
-        if one is None or not (np.array_equal(one.cell_y, last.cell_y) and np.array_equal(one.cell_z, last.cell_z)):
+    def share(layer: Weakened | None) -> Array:
+        if layer is None or not (
+            np.array_equal(layer.cell_y, last.cell_y) and np.array_equal(layer.cell_z, last.cell_z)
+        ):
             return last.material
-        return one.share
+        return layer.share
 
-    return last._replace(share=np.stack([share(one.get(number)) for one in left]))
+    return last._replace(share=np.stack([share(layer.get(number)) for layer in left]))
 
 
 def traced(scene: Scene, shots: Shots, numerics: Numerics, snapshots: int = 0) -> tuple[March, Any]:
@@ -147,7 +149,7 @@ def traced(scene: Scene, shots: Shots, numerics: Numerics, snapshots: int = 0) -
     They march twice: the most steps that a shot may take are thousands of times those that it takes.
 
     Raises:
-        MemoryError: the histories, and so many snapshots, do not fit.
+        MemoryError: the histories and the snapshots do not fit.
     """
     prepared = replace(prepare(scene, shots, numerics), slide=False)
     device = find_device("cpu")
@@ -187,8 +189,8 @@ def _hit(prepared: Prepared) -> tuple[float, float]:
 def _body(prepared: Prepared) -> MassProperties:
     """Mass properties of the last shot."""
     names = ("mass", "inertia_axial", "inertia_transverse")
-    own = {name: float(prepared.conditions[name][-1]) for name in names}
-    return prepared.scene.core.mass_properties._replace(**own)
+    values = {name: float(prepared.conditions[name][-1]) for name in names}
+    return prepared.scene.core.mass_properties._replace(**values)
 
 
 def _left_after(
@@ -229,15 +231,15 @@ def _behind(memory: Memory, scratch: Any, plate: Cells) -> dict[int, Weakened]:
     """
     prepared, hit = memory.prepared, _hit(memory.prepared)
     is_open, homes = scratch.stack.open.numpy(), scratch.stack.home.numpy()
-    found = {}
+    layers = {}
     for k, (cells, material) in enumerate(zip(memory.prepared.windows(plate), prepared.materials, strict=True)):
         if k > 0 and cells != (0, 0) and is_open[k]:
             spacing, place = prepared.grids[k].spacing, (float(homes[k][1]), float(homes[k][2]))
             y, z = nodes_about((hit[0] + place[0], hit[1] + place[1]), cells, spacing)
             offset = float(material.offset_y[-1]), float(material.offset_z[-1])
             solid = material_about(prepared.scene.target.layers[k], y - offset[0], z - offset[1], spacing)
-            found[k] = Weakened(y, z, solid, solid * _share_left(memory, k, scratch.fields, plate))
-    return found
+            layers[k] = Weakened(y, z, solid, solid * _share_left(memory, k, scratch.fields, plate))
+    return layers
 
 
 def _share_left(memory: Memory, layer: int, fields: Any, plate: Cells) -> Array:

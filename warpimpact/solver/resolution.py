@@ -103,9 +103,10 @@ def at_level(index: int, numerics: Numerics, **coarser: int) -> Numerics:
 
 def level_of(numerics: Numerics) -> Level:
     """What fills in what the numerics do not give."""
-    index, own = base_level(numerics), numerics.coarser or Coarser()
+    index, coarser = base_level(numerics), numerics.coarser or Coarser()
     along, around, grid, step = (
-        LADDER[index if level is None else level] for level in (own.along, own.around, own.grid, own.step)
+        LADDER[index if level is None else level]
+        for level in (coarser.along, coarser.around, coarser.grid, coarser.step)
     )
     return Level(along.patches_axial, around.patches_around, grid.cells_per_length, step.travel)
 
@@ -134,9 +135,9 @@ class Resolution:
     """The most of a step's way that may lie in the plane of a plate, in degradation lengths, if a quarter of it is
     enough for that."""
     weakening: float
-    """The most that contact may take off ln of the resistance in a step, likewise."""
+    """The most that contact may take off ln of the resistance in a step, with the same bound."""
     slowing: float
-    """The most that contact may take off the speed in a step, likewise."""
+    """The most that contact may take off the speed in a step, with the same bound."""
     section: float
     """The core's largest cross section [m²]."""
     mass: float
@@ -204,7 +205,7 @@ class Resolution:
         return float(self.step_at(impact.velocity, impact.obliquity, passage, longest_time, way_along))
 
     def step_in(self, impact: Impact, target: Target) -> float:
-        """Time step [s] of a target, likewise: that of the layer that needs the shortest."""
+        """Time step [s] of a target: that of the layer that needs the shortest."""
         return min(self.step_of(impact, plate, behind=k > 0) for k, plate in enumerate(target.layers))
 
 

@@ -80,7 +80,7 @@ def rings_of(core: Core, axial: int, around: int, widest: float = math.inf, *, d
 
 @lru_cache(maxsize=64)
 def _rings(key: Key[Core], edges: bytes, nose: int, base: int, around: int) -> Rings:
-    """Rings between some edges of the profile, and so many of the discs at the nose and at the base."""
+    """Rings between edges of the profile, and `nose` and `base` rings of the discs there."""
     core = key.value
     parts = [
         _disc_rings(0.0, _ends(key)[0], nose, facing=1.0),
@@ -132,7 +132,7 @@ def _stations(key: Key[Core], count: int) -> tuple[Array, Array]:
 
 @lru_cache(maxsize=64)
 def _divided(edges: bytes, parts: bytes) -> bytes:
-    """Edges with so many parts from one to the next."""
+    """Edges of rings, each of which is divided into its number of parts."""
     ends, counts = np.frombuffer(edges), np.frombuffer(parts, dtype=int)
     finer = [np.linspace(a, b, n, endpoint=False) for a, b, n in zip(ends[:-1], ends[1:], counts, strict=True)]
     return np.append(np.concatenate(finer), ends[-1]).tobytes()
@@ -187,7 +187,7 @@ def _discs(radius: float, widest: float) -> int:
 
 
 def _disc_rings(station: float, radius: float, count: int, *, facing: float) -> tuple[Array, ...]:
-    """As `_profile_rings`, for a disc in so many rings that faces along the axis (+1 towards the nose)."""
+    """As `_profile_rings`, for a disc in `count` rings that faces along the axis (+1 towards the nose)."""
     edges = np.linspace(0.0, radius, count + 1)
     low, high = edges[:-1], edges[1:]
     nothing = np.zeros(count)

@@ -60,12 +60,12 @@ def inputs_of(stage: Any, prepared: Prepared, put: Put) -> tuple[Any, list[Any]]
         stage: the build of the march.
     """
     core, variant = prepared.scene.core, prepared.variant
-    surfaces = [surface_of(stage.Surface, core, own.rings, own.azimuths, put) for own in prepared.surfaces]
+    surfaces = [surface_of(stage.Surface, core, surface.rings, surface.azimuths, put) for surface in prepared.surfaces]
     sections = [
-        filled(stage.Sections, **{name: put(values, aligned=True) for name, values in vars(own.sections).items()})
-        if own.sections is not None
+        filled(stage.Sections, **{name: put(values, aligned=True) for name, values in vars(surface.sections).items()})
+        if surface.sections is not None
         else stage.Sections()
-        for own in prepared.surfaces
+        for surface in prepared.surfaces
     ]
     most = {name: max(getattr(surface, name) for surface in surfaces) for name in ("most_rings", "most_patches")}
     shots = {name: put(prepared.conditions[name], variable.type.dtype) for name, variable in stage.Shots.vars.items()}

@@ -93,10 +93,10 @@ class Tile:
         if not wall.any():
             return np.full_like(self.material, math.inf)
         widths = (self.dy * rows / len(wall), self.dz * columns / wall.shape[1])
-        own = nearest_wall(wall, widths)
+        distance = nearest_wall(wall, widths)
         # Two blocks are subtracted, as distances are from centre to centre and the last block of a period may be
         # narrower.
-        kept = np.maximum(0.0, own - 2.0 * math.hypot(self.dy * block[0], self.dz * block[1]))
+        kept = np.maximum(0.0, distance - 2.0 * math.hypot(self.dy * block[0], self.dz * block[1]))
         every = kept.astype(self.material.dtype).repeat(block[1], axis=1)[:, :columns].repeat(block[0], axis=0)[:rows]
         return np.asarray(every)
 
@@ -129,7 +129,7 @@ def forget_tiles() -> None:
 
 
 def _make_room(needed: int) -> None:
-    """Keep the tiles that were asked for last, as far as they leave room for one of so many bytes."""
+    """Keep the tiles that were asked for last, as far as they leave room for another one of some size [bytes]."""
     with _KEEPING:
         for asked in [asked for asked, tile in _KEPT.items() if tile.built]:
             if sum(tile.bytes for tile in _KEPT.values() if tile.built) + needed <= MOST_BYTES:
@@ -172,7 +172,7 @@ def _planned(key: Key[Pattern], spacing: float, sharp: bool, real: Real) -> Tile
 
 
 def _sharp(pattern: Pattern, counts: tuple[int, int], sides: tuple[float, float], real: Real, check: Check) -> Floats:
-    """Whether the centres of so many cells of a period are material."""
+    """Whether the centres of the cells of a period are material, shape `counts`."""
     y, z = (
         np.float64(side / count) * (np.arange(count) + 0.5) for side, count in zip(pattern.period, counts, strict=True)
     )
@@ -198,7 +198,7 @@ def _blurred(pattern: Pattern, counts: tuple[int, int], sides: tuple[float, floa
 
 
 def _bands(counts: tuple[int, int]) -> Iterator[slice]:
-    """Rows of a tile of so many cells, AT_ONCE at a time."""
+    """Slices of the rows of a tile, of about AT_ONCE cells each."""
     rows, some = counts[0], max(1, AT_ONCE // counts[1])
     return (slice(first, min(first + some, rows)) for first in range(0, rows, some))
 
@@ -212,11 +212,11 @@ def _sums(values: Floats, count: int) -> Floats:
 
 
 def _any_of(marked: NDArray[np.bool_], size: int) -> NDArray[np.bool_]:
-    """Whether any of so many rows in a row is marked, column by column; the last ones may be fewer."""
-    found = marked[::size].copy()
+    """Whether any of `size` neighbouring rows is marked, column by column; the last group may have fewer rows."""
+    anything = marked[::size].copy()
     for part in (marked[k::size] for k in range(1, size)):
-        found[: len(part)] |= part
-    return found
+        anything[: len(part)] |= part
+    return anything
 
 
 def nearest_wall(wall: NDArray[np.bool_], widths: tuple[float, float]) -> Array:

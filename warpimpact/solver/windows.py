@@ -60,12 +60,12 @@ def windows_behind(
     *,
     burst: bool,
 ) -> Counts:
-    """Nodes of the windows of all layers, in each direction, shape [layers, shots], if those of the plate have so many;
-    0 where a layer keeps no field. A layer that earlier hits pierce keeps their channels.
+    """Nodes of the windows of all layers, in each direction, shape [layers, shots]; 0 where a layer keeps no field. A
+    layer that earlier hits pierce keeps their channels.
 
     Args:
         plates, which: as in `first_windows`.
-        plate: shape [1] or [shots].
+        plate: nodes of the plate's windows in each direction, shape [1] or [shots].
     """
     steep, own = np.tan(shots.obliquity), [np.broadcast_to(plate, len(shots))]
     wide = np.array([grids[0].spacing for grids in plates])[which]
@@ -80,5 +80,5 @@ def windows_behind(
 
 
 def block_window(cells: int) -> int:
-    """Nodes of the window of a block that holds so many in each direction; 0 if none does."""
+    """Nodes of the smallest window of a block that holds cells × cells nodes; 0 if none does."""
     return next((size for size in SIZES if size >= cells**2), 0)
