@@ -20,10 +20,10 @@ if TYPE_CHECKING:
     from .optimisation.optimise import optimise, optimise_to_file
     from .records.outcomes import Outcomes
     from .results.files import OutputError, ResultError, open_result
-    from .runs.cluster import cluster_team
+    from .runs.choice import executor_for
+    from .runs.executor import ClusterError
     from .runs.replay import replay
     from .runs.run import run, run_to_file
-    from .runs.team import ClusterError
     from .scene import (
         Accuracy,
         CirclePattern,
@@ -106,8 +106,8 @@ __all__ = [
     "TrianglePattern",
     "Wave",
     "__version__",
-    "cluster_team",
     "compare",
+    "executor_for",
     "hit_map",
     "inspect",
     "limit_thickness",
@@ -127,7 +127,7 @@ __all__ = [
 _HOMES = {
     "Campaign": ".campaign.campaign",
     "CampaignError": ".campaign.text",
-    "ClusterError": ".runs.team",
+    "ClusterError": ".runs.executor",
     "Comparison": ".analysis.comparison_text",
     "DeviceError": ".solver.device",
     "Outcomes": ".records.outcomes",
@@ -135,7 +135,7 @@ _HOMES = {
     "OutputError": ".results.files",
     "ResultError": ".results.files",
     "Stop": ".campaign.stop",
-    "cluster_team": ".runs.cluster",
+    "executor_for": ".runs.choice",
     "compare": ".analysis.comparison",
     "limit_thickness": ".solver.limit",
     "limit_velocity": ".solver.limit",

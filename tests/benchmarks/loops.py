@@ -38,11 +38,12 @@ from roads import (
 )
 
 from warpimpact import Numerics, Shots
-from warpimpact.cli.identify import PROCESSES
+from warpimpact.cli.identify import PROCESSES, WORTHWHILE
 from warpimpact.identification.identify import identify_to_file
 from warpimpact.identification.reading import read_fit
 from warpimpact.results import posterior_file
 from warpimpact.results.files import read_tree
+from warpimpact.runs.choice import executor_for
 from warpimpact.solver.device import cores
 from warpimpact.solver.limit import limits, pilot_of_limits
 from warpimpact.solver.many import simulate_many
@@ -123,7 +124,9 @@ def identified(folder: Path) -> dict[str, Any]:
     """The fit of the paper's two shots, as the command has it; its posterior goes into a folder."""
     began = time.perf_counter()
     output, begin = folder / "paper_fit.nc", os.times()
-    identify_to_file(read_fit(FIT), output, device="cpu", overwrite=True, processes=min(cores(), PROCESSES))
+    workers = min(cores(), PROCESSES)
+    with executor_for("cpu", workers=workers, apart=True, after=WORTHWHILE) as executor:
+        identify_to_file(read_fit(FIT), output, device=executor, overwrite=True)
     wall = time.perf_counter() - began
     for process in multiprocessing.active_children():
         process.join()  # what it took counts then

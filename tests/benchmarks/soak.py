@@ -40,8 +40,9 @@ def small_parts():
     shards.FEWEST = 256
     shards.HELD = 0.1
     if "identify" in sys.argv:
-        from warpimpact.identification import crew, identify
-        crew.WORTHWHILE, identify.BATCH = 0.2, 4
+        from warpimpact.cli import identify as command_of_fits
+        from warpimpact.identification import identify
+        command_of_fits.WORTHWHILE, identify.BATCH = 0.2, 4
 if __name__ == "__main__":  # not in a process of a fit
     small_parts()
     signal.signal(signal.SIGINT, signal.default_int_handler)

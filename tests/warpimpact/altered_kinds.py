@@ -98,7 +98,6 @@ def write_files(folder: Path) -> None:
     from warpimpact.results import files
     from warpimpact.runs.replay import replay
     from warpimpact.runs.run import run, run_to_file
-    from warpimpact.runs.team import local_team
     from warpimpact.studies.limit import LimitMap
     from warpimpact.studies.sweep import read_sweep, run_sweep
 
@@ -106,7 +105,7 @@ def write_files(folder: Path) -> None:
     files.write(result, folder / "result.nc")
     files.write(replay(result, 3, folder=Path()), folder / "history.nc")
     plate = Campaign.from_text(FIXED + TARGET, name="a", folder=Path())
-    run_to_file(plate, folder / "limits.nc", team=local_team(plate, "cpu", LimitMap.of(plate)))
+    run_to_file(plate, folder / "limits.nc", device="cpu", computation=LimitMap.of(plate))
     (folder / "sweep_campaign.toml").write_text(FIXED + TARGET + SWEEP)
     run_sweep(read_sweep(folder / "sweep_campaign.toml"), folder / "sweep.nc", device="cpu")
     fit = (Path(__file__).parents[1] / "validation" / "calibration.toml").read_text(encoding="utf-8")

@@ -8,7 +8,16 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from .mistakes import memory_told
-from .options import Commands, add_command, add_count, add_device, add_measures, add_output, add_overwrite
+from .options import (
+    Commands,
+    add_command,
+    add_computing,
+    add_count,
+    add_measures,
+    add_output,
+    add_overwrite,
+    executor_of,
+)
 from .paths import check_picture, named
 from .progress import show_run, warn
 from .run import failure_code
@@ -50,7 +59,7 @@ def add_compare(commands: Commands) -> None:
         help="also say which verdicts survive what nobody measured: resistance, weakening, friction, onset, obliquity, "
         "yaw; computes up to 1024 hits of each plate some twelve times",
     )
-    add_device(parser)
+    add_computing(parser)
     add_count(parser)
     parser.add_argument("--resume", action="store_true", help="continue an interrupted campaign")
     add_overwrite(parser, "an existing figure; of a campaign, compute all plates again")
@@ -125,16 +134,17 @@ def _plates_run(arguments: argparse.Namespace, folder: Path) -> dict[str, Path]:
         )
     campaigns = read_plates(arguments.files[0], count=arguments.count)
     paths = {name: folder / f"{name}.nc" for name in campaigns}
-    for name, campaign in campaigns.items():
-        print(f"plate {name}", file=sys.stderr)
-        with memory_told(arguments.files[0]), show_run() as progress:
-            run_to_file(
-                campaign,
-                paths[name],
-                device=arguments.device,
-                resume=arguments.resume or (paths[name].exists() and not arguments.overwrite),
-                overwrite=arguments.overwrite,
-                progress=progress,
-                tell=warn,
-            )
+    with memory_told(arguments.files[0]), executor_of(arguments) as executor:
+        for name, campaign in campaigns.items():
+            print(f"plate {name}", file=sys.stderr)
+            with show_run() as progress:
+                run_to_file(
+                    campaign,
+                    paths[name],
+                    device=executor,
+                    resume=arguments.resume or (paths[name].exists() and not arguments.overwrite),
+                    overwrite=arguments.overwrite,
+                    progress=progress,
+                    tell=warn,
+                )
     return paths

@@ -2,17 +2,11 @@
 
 import argparse
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
 
 from .mistakes import memory_told
-from .options import Commands, add_command, add_count, add_device, add_output, add_overwrite
+from .options import Commands, add_command, add_computing, add_count, add_output, add_overwrite, executor_of
 from .paths import check_output, check_picture, check_suffix
 from .progress import Step, show_progress, show_run, warn
-
-if TYPE_CHECKING:
-    from warpimpact.firing.directions import Sector
-    from warpimpact.firing.plan import FiringTest
-    from warpimpact.firing.response import Response
 
 
 def add_test(commands: Commands) -> None:
@@ -29,10 +23,10 @@ def add_test(commands: Commands) -> None:
     )
     parser.add_argument("test", type=Path, metavar="TEST.toml", help="test file: target, procedure, gun, questions")
     add_output(parser, "TEST.nc", "result file (default: the test's name, in this folder); the figure is TEST.png")
-    add_device(parser)
+    add_computing(parser)
     add_count(parser)
     parser.add_argument(
-        "--resume", action="store_true", help="keep the limits that are computed, and continue a search of them"
+        "--resume", action="store_true", help="keep the limits that are computed, and continue what was interrupted"
     )
     add_overwrite(parser, "an existing result with its figure and its limits")
 
@@ -43,7 +37,7 @@ def _test(arguments: argparse.Namespace) -> None:
     from warpimpact.firing.firing_view import firing_view
     from warpimpact.firing.reading import read_test
     from warpimpact.firing.simulate import simulate_test
-    from warpimpact.firing.target import target_campaign
+    from warpimpact.firing.target import directions_of, response_of, target_campaign
     from warpimpact.plotting.firing import directions_figure, firing_figure
     from warpimpact.results import files
     from warpimpact.view.view import text_of
@@ -57,53 +51,42 @@ def _test(arguments: argparse.Namespace) -> None:
     polar = picture.with_name(f"{picture.stem}_directions.png")
     for path in (picture, polar):
         check_picture(path, overwrite=replace)
-    response, attributes = _response(test, output, arguments) if test.needs_limits else (None, {})
-    sector = _sector(test, arguments) if test.directions is not None else None
-    try:
-        dataset = simulate_test(test, response, attributes, sector)
-    except ValueError as error:
-        raise CampaignError(f"{arguments.test}: {error}") from None
-    files.write(dataset, output)
+    resume, overwrite = arguments.resume, arguments.overwrite
+    with memory_told(arguments.test), executor_of(arguments) as executor:
+        with show_run() as progress:
+            response, attributes = response_of(
+                test,
+                output,
+                executor=executor,
+                count=arguments.count,
+                resume=resume,
+                overwrite=overwrite,
+                progress=progress,
+                tell=warn,
+            )
+        with (
+            show_progress("direction") as show,
+            directions_of(
+                test,
+                output,
+                executor=executor,
+                resume=resume,
+                overwrite=overwrite,
+                progress=lambda done, total: show(Step(done, total)),
+                tell=warn,
+            ) as sector,
+        ):
+            try:
+                dataset = simulate_test(test, response, attributes, sector)
+            except ValueError as error:
+                raise CampaignError(f"{arguments.test}: {error}") from None
+            files.write(dataset, output)
     print(text_of(firing_view(dataset)))
     if test.target.campaign is not None:
         print(summary_of_all([target_campaign(test)], "targets"))
     figures = {picture: firing_figure} if test.needs_limits else {}
-    if sector is not None:
+    if test.directions is not None:
         figures[polar] = directions_figure
     for path, draw in figures.items():
         draw(dataset).savefig(path, dpi=150)
     print(f"written to {output}, figure in {' and '.join(map(str, figures))}")
-
-
-def _sector(test: "FiringTest", arguments: argparse.Namespace) -> "Sector":
-    """P(perforation) in every direction."""
-    from warpimpact.firing.directions import protect
-    from warpimpact.firing.target import target_campaign
-    from warpimpact.solver.worker import Worker
-
-    assert test.directions is not None
-    with memory_told(arguments.test), show_progress("direction") as show:
-        follow = lambda done, total: show(Step(done, total, 0, ""))  # noqa: E731
-        return protect(target_campaign(test), test.directions, Worker(arguments.device), follow)
-
-
-def _response(test: "FiringTest", output: Path, arguments: argparse.Namespace) -> tuple["Response", dict[str, Any]]:
-    """The response of the target; a search writes its limits beside the output."""
-    from warpimpact.firing.target import known_target, searched_target, target_campaign
-
-    known = known_target(test)
-    if known is not None:
-        return known, {}
-    campaign = target_campaign(test, arguments.count)
-    limits = output.with_name(f"{output.stem}_limits.nc")
-    with memory_told(arguments.test), show_run() as progress:
-        return searched_target(
-            campaign,
-            limits,
-            tolerance=test.target.tolerance,
-            device=arguments.device,
-            resume=arguments.resume,
-            overwrite=arguments.overwrite,
-            progress=progress,
-            tell=warn,
-        )

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from warpimpact.results.interrupts import terminated_as_interrupted
 
 from .mistakes import memory_told
-from .options import Commands, add_command, add_device, add_output, add_overwrite
+from .options import Commands, add_command, add_computing, add_output, add_overwrite
 from .paths import check_picture, check_place, check_suffix, replaces
 from .progress import Step, show_progress, warn
 
@@ -16,7 +16,9 @@ if TYPE_CHECKING:
     from warpimpact.identification.identify import FitProgress
 
 PROCESSES = 16
-"""Of a fit at most, each of which takes some 0.4 GB."""
+"""Processes of a fit at most, where the user says no number; each takes some 0.4 GB."""
+WORTHWHILE = 2.0
+"""Seconds of computing from which on processes are begun, each of which needs as long until it computes."""
 
 
 def add_identify(commands: Commands) -> None:
@@ -35,7 +37,7 @@ def add_identify(commands: Commands) -> None:
         "fit", type=Path, metavar="FIT.toml", help="fit file: scene, measured shots, and priors of what is unknown"
     )
     add_output(parser, "POSTERIOR.nc", "file of the posterior (default: the fit's name, in this folder)")
-    add_device(parser)
+    add_computing(parser)
     parser.add_argument(
         "--resume", action="store_true", help="continue an interrupted fit; start a new one if there is none"
     )
@@ -48,7 +50,8 @@ def _identify(arguments: argparse.Namespace) -> int:
     from warpimpact.identification.reading import read_fit
     from warpimpact.plotting.posterior import FIGURES
     from warpimpact.results import files, posterior_file
-    from warpimpact.solver.device import cores
+    from warpimpact.runs.choice import executor_for
+    from warpimpact.solver.device import cores, find_device
     from warpimpact.view.view import text_of
 
     fit = read_fit(arguments.fit)
@@ -60,15 +63,23 @@ def _identify(arguments: argparse.Namespace) -> int:
         check_picture(picture, overwrite=replaces(arguments, output))
     for sentence in fit.warnings:
         warn(sentence)
-    with memory_told(arguments.fit), terminated_as_interrupted(), show_progress("set") as show:
+    device, workers, scheduler = arguments.device, arguments.workers, arguments.scheduler
+    after = 0.0
+    if workers is None and scheduler is None and find_device(device).is_cpu:
+        workers, after = min(cores(), PROCESSES), WORTHWHILE
+    with (
+        memory_told(arguments.fit),
+        terminated_as_interrupted(),
+        show_progress("set") as show,
+        executor_for(device, workers=workers, scheduler=scheduler, apart=True, after=after) as executor,
+    ):
         identify_to_file(
             fit,
             output,
-            device=arguments.device,
+            device=executor,
             resume=arguments.resume,
             overwrite=arguments.overwrite,
             progress=lambda now: show(Step(now.done, now.total, now.resumed, _running(now))),
-            processes=min(cores(), PROCESSES),
             tell=warn,
         )
     tree = files.read_tree(output, posterior_file.POSTERIOR)

@@ -47,7 +47,7 @@ def mistakes() -> tuple[type[Exception], ...]:
     """Classes of errors whose message is for the user."""
     from warpimpact.campaign.text import CampaignError
     from warpimpact.results.files import OutputError, ResultError
-    from warpimpact.runs.team import ClusterError
+    from warpimpact.runs.executor import ClusterError
     from warpimpact.solver.device import DeviceError
     from warpimpact.solver.resolution import TooManySteps
 

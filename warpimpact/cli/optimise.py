@@ -2,14 +2,13 @@
 
 import argparse
 import math
-from contextlib import nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from warpimpact.results.interrupts import terminated_as_interrupted
 
 from .mistakes import memory_told
-from .options import Commands, add_command, add_computing, add_output, add_overwrite
+from .options import Commands, add_command, add_computing, add_output, add_overwrite, executor_of
 from .paths import check_picture, check_place, check_suffix, replaces
 from .progress import Step, show_progress, warn
 
@@ -43,7 +42,6 @@ def add_optimise(commands: Commands) -> None:
 
 def _optimise(arguments: argparse.Namespace) -> int:
     from warpimpact.campaign.tested import summary_of_all
-    from warpimpact.optimisation.crew import cluster_crew, local_crew
     from warpimpact.optimisation.design import read_design
     from warpimpact.optimisation.front_view import front_view
     from warpimpact.optimisation.optimise import folder_of, optimise_to_file
@@ -58,14 +56,16 @@ def _optimise(arguments: argparse.Namespace) -> int:
     check_place(output)
     picture = output.with_suffix(".png")
     check_picture(picture, overwrite=replaces(arguments, output))
-    cluster = arguments.scheduler is not None or arguments.workers is not None
-    where = {"address": arguments.scheduler, "workers": arguments.workers, "device": arguments.device}
-    made_crew = cluster_crew(**where) if cluster else nullcontext(local_crew(arguments.device))
-    with memory_told(arguments.design), terminated_as_interrupted(), show_progress("design") as show, made_crew as crew:
+    with (
+        memory_told(arguments.design),
+        terminated_as_interrupted(),
+        show_progress("design") as show,
+        executor_of(arguments) as executor,
+    ):
         campaigns = optimise_to_file(
             design,
             output,
-            crew=crew,
+            device=executor,
             resume=arguments.resume,
             overwrite=arguments.overwrite,
             progress=lambda now: show(

@@ -2,8 +2,12 @@
 
 import argparse
 from collections.abc import Callable
+from contextlib import AbstractContextManager
 from pathlib import Path
-from typing import Any, TypeAlias
+from typing import TYPE_CHECKING, Any, TypeAlias
+
+if TYPE_CHECKING:
+    from warpimpact.runs.executor import Executor
 
 Commands: TypeAlias = "argparse._SubParsersAction[argparse.ArgumentParser]"
 Command: TypeAlias = Callable[[argparse.Namespace], int | None]
@@ -88,11 +92,18 @@ def add_posterior(parser: argparse.ArgumentParser) -> None:
 
 
 def add_computing(parser: argparse.ArgumentParser) -> None:
-    """Where to compute: a device, or the workers of a cluster."""
+    """Where to compute: a device, processes, or the workers of a cluster; `executor_of` makes an executor of it."""
     add_device(parser)
     cluster = parser.add_mutually_exclusive_group()
     cluster.add_argument("--scheduler", metavar="ADDRESS", help="compute on the workers of this Dask scheduler")
     cluster.add_argument("--workers", type=at_least(1), metavar="N", help="compute in N processes on this machine")
+
+
+def executor_of(arguments: argparse.Namespace) -> "AbstractContextManager[Executor]":
+    """The executor that the options of `add_computing` ask for."""
+    from warpimpact.runs.choice import executor_for
+
+    return executor_for(arguments.device, workers=arguments.workers, scheduler=arguments.scheduler)
 
 
 def read_option(option: str, kind: Any, text: str, mistake: type[ValueError]) -> float:

@@ -16,6 +16,7 @@ from .options import (
     add_output,
     add_overwrite,
     add_posterior,
+    executor_of,
 )
 from .paths import check_place, check_suffix
 from .plain import say
@@ -90,19 +91,20 @@ def run_shown(
         arguments: with those of `add_run_options`.
         computation: of every hit; a hit map if None.
     """
-    from warpimpact.runs.cluster import cluster_team
+    from warpimpact.runs.compute import HIT_MAP
     from warpimpact.runs.run import run_to_file
-    from warpimpact.runs.team import HIT_MAP, local_team
 
-    device, computation = arguments.device, computation or HIT_MAP
-    if arguments.scheduler or arguments.workers:
-        address, workers = arguments.scheduler, arguments.workers
-        team = cluster_team(campaign, address=address, workers=workers, device=device, computation=computation)
-    else:
-        team = local_team(campaign, device, computation)
-    resume, overwrite = arguments.resume, arguments.overwrite
-    with memory_told(arguments.campaign), show_run() as progress:
-        run_to_file(campaign, output, team=team, resume=resume, overwrite=overwrite, progress=progress, tell=warn)
+    with memory_told(arguments.campaign), show_run() as progress, executor_of(arguments) as executor:
+        run_to_file(
+            campaign,
+            output,
+            device=executor,
+            computation=computation or HIT_MAP,
+            resume=arguments.resume,
+            overwrite=arguments.overwrite,
+            progress=progress,
+            tell=warn,
+        )
 
 
 def failure_code(dataset: "Result", path: Path) -> int:

@@ -6,7 +6,16 @@ from pathlib import Path
 from typing import Any
 
 from .mistakes import memory_told
-from .options import Commands, add_campaign, add_command, add_count, add_device, add_output, add_overwrite
+from .options import (
+    Commands,
+    add_campaign,
+    add_command,
+    add_computing,
+    add_count,
+    add_output,
+    add_overwrite,
+    executor_of,
+)
 from .paths import check_picture, check_place, check_suffix, replaces
 from .progress import show_run, warn
 
@@ -24,7 +33,7 @@ def add_sweep(commands: Commands) -> None:
     )
     add_campaign(parser)
     add_output(parser, "SWEEP.nc", "file of the sweep (default: the campaign's name, in this folder)")
-    add_device(parser)
+    add_computing(parser)
     add_count(parser)
     parser.add_argument("--resume", action="store_true", help="keep the points that are complete, and compute the rest")
     add_overwrite(parser, "an existing sweep with its points and its figure")
@@ -44,7 +53,7 @@ def _sweep(arguments: argparse.Namespace) -> None:
     check_suffix(output, "a sweep", ".nc")
     check_picture(picture, overwrite=replaces(arguments, output))
 
-    with memory_told(arguments.campaign), show_run() as follow:
+    with memory_told(arguments.campaign), show_run() as follow, executor_of(arguments) as executor:
 
         def named(name: str) -> Any:
             print(f"point {name}", file=sys.stderr)
@@ -53,7 +62,7 @@ def _sweep(arguments: argparse.Namespace) -> None:
         run_sweep(
             sweep,
             output,
-            device=arguments.device,
+            device=executor,
             resume=arguments.resume,
             overwrite=arguments.overwrite,
             progress=named,

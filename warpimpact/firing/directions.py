@@ -20,6 +20,8 @@ from warpimpact.campaign.campaign import Campaign
 from warpimpact.campaign.text import CampaignError
 from warpimpact.kernels.status import Status
 from warpimpact.records.group import failures
+from warpimpact.runs.executor import Job
+from warpimpact.runs.questions import Arrays, Question, Round
 from warpimpact.scene import Numerics, Shots
 from warpimpact.scene.model import Model
 from warpimpact.scene.units import Angle, Number, PositiveSpeed
@@ -142,8 +144,8 @@ def check_directions(campaign: Campaign) -> None:
 
 
 def protect(
-    campaign: Campaign, directions: Directions, worker: Worker, progress: Callable[[int, int], object] | None = None
-) -> Sector:
+    campaign: Campaign, directions: Directions, progress: Callable[[int, int], object] = lambda done, total: None
+) -> Question[Sector]:
     """Compute P(perforation) in all directions.
 
     All directions have the same hits, as far as these go, so their errors are not independent. One pilot with hits from
@@ -162,26 +164,38 @@ def protect(
     sampler = campaign.model_copy(update={"hits": hits}).sampler()
     first = sampler.shots(0, directions.first_count)
     every = Shots.joined([toward(first, directions, cell) for cell in cells])
-    numerics = numerics_for(campaign.scene, every, campaign.numerics, worker)
+    (piloted,) = yield Round([Job(_piloted, (campaign, every))], ["pilot"])
+    numerics = str(piloted["numerics"])
     open_, count = list(cells), directions.first_count
     while open_:
-        for place, cell in enumerate(open_):
-            known = len(passed[cell])
-            shots = toward(sampler.shots(known, count - known), directions, cell)
-            passed[cell] = np.concatenate([passed[cell], _answers(campaign, shots, numerics, worker)])
-            if progress is not None:
-                progress(len(cells) - len(open_) + place, len(cells))
+        settled = len(cells) - len(open_)
+        known = len(passed[open_[0]])
+        more = sampler.shots(known, count - known)
+        results = yield Round(
+            [Job(_answers, (campaign, toward(more, directions, cell), numerics)) for cell in open_],
+            [f"{directions.azimuth[row]} {directions.elevation[column]} up to {count}" for row, column in open_],
+            lambda now, settled=settled: progress(settled + int(now.done), len(cells)),  # type: ignore[misc]
+        )
+        for cell, answers in zip(open_, results, strict=True):
+            passed[cell] = np.concatenate([passed[cell], answers["passed"]])
         open_ = [cell for cell in open_ if _wanted(campaign, passed[cell], directions)]
         count = min(2 * count, directions.max_count)
     return _sector(campaign, directions, passed)
 
 
-def _answers(campaign: Campaign, shots: Shots, numerics: Numerics, worker: Worker) -> Array:
+def _piloted(campaign: Campaign, shots: Shots, *, worker: Worker, report: Callable[[float], object]) -> Arrays:
+    """The numerics, as JSON, that a pilot of some of the shots finds."""
+    return {"numerics": np.array(numerics_for(campaign.scene, shots, campaign.numerics, worker).model_dump_json())}
+
+
+def _answers(
+    campaign: Campaign, shots: Shots, numerics: str, *, worker: Worker, report: Callable[[float], object]
+) -> Arrays:
     """1 for a shot that perforates, 0 for one that is stopped, NaN for one that failed."""
-    status = computed(prepare(campaign.scene, shots, numerics), worker).status
+    prepared = prepare(campaign.scene, shots, Numerics.model_validate_json(numerics))
+    status = computed(prepared, worker).status
     answers = np.isin(status, (Status.PERFORATED, Status.MISSED)).astype(float)
-    failed = failures(status)
-    return np.where(failed, np.nan, answers)
+    return {"passed": np.where(failures(status), np.nan, answers)}
 
 
 def toward(shots: Shots, directions: Directions, cell: tuple[int, int]) -> Shots:

@@ -10,6 +10,7 @@ from typing import Any
 
 from warpimpact.campaign.campaign import Campaign
 from warpimpact.campaign.text import CampaignError
+from warpimpact.firing.directions import Sector, protect
 from warpimpact.firing.plan import FiringTest
 from warpimpact.firing.requirements import with_threat
 from warpimpact.firing.response import (
@@ -23,9 +24,12 @@ from warpimpact.results import files
 from warpimpact.results import firing as f
 from warpimpact.results import variables as v
 from warpimpact.results.checks import SWEEP
+from warpimpact.runs.executor import Executor
 from warpimpact.runs.progress import Follow
+from warpimpact.runs.questions import answered
 from warpimpact.runs.run import run_to_file
-from warpimpact.runs.team import local_team
+from warpimpact.runs.shards import manifest
+from warpimpact.runs.store import stored
 from warpimpact.studies.limit import LimitMap
 
 
@@ -80,29 +84,75 @@ def target_campaign(test: FiringTest, count: int | None = None) -> Campaign:
     return with_threat(campaign, test)
 
 
-def searched_target(
-    campaign: Campaign,
+def response_of(
+    test: FiringTest,
     output: Path,
     *,
-    tolerance: float,
-    device: str = "auto",
+    executor: Executor,
+    count: int | None = None,
     resume: bool = False,
     overwrite: bool = False,
     progress: Follow | None = None,
     tell: Callable[[str], object] = warnings.warn,
-) -> tuple[Response, dict[str, Any]]:
-    """Search the limits of a campaign into a file, which `warpimpact inspect` and a test's `target.limits` take.
+) -> tuple[Response | None, dict[str, Any]]:
+    """The response of the target of a test, which is None where the test asks for directions alone.
+
+    The limits of a campaign are searched into OUTPUT_limits.nc, which `warpimpact inspect` and a test's
+    `target.limits` take.
 
     Args:
-        tolerance: how far the ends of a limit may lie apart [m/s].
-        output, device, resume, overwrite, progress, tell: as in `run_to_file`.
+        output: the file of the test.
+        count: number of hits of the campaign, instead of that in the file.
+        executor, resume, overwrite, progress, tell: as in `run_to_file`.
 
     Returns:
         The response, and attributes that say what the search took.
     """
-    team = local_team(campaign, device, LimitMap.of(campaign, tolerance=tolerance))
-    run_to_file(campaign, output, team=team, resume=resume, overwrite=overwrite, progress=progress, tell=tell)
-    dataset = files.read(output)
-    with _told_of(output):
+    if not test.needs_limits:
+        return None, {}
+    if (known := known_target(test)) is not None:
+        return known, {}
+    campaign, limits = target_campaign(test, count), output.with_name(f"{output.stem}_limits.nc")
+    computation = LimitMap.of(campaign, tolerance=test.target.tolerance)
+    run_to_file(
+        campaign,
+        limits,
+        device=executor,
+        computation=computation,
+        resume=resume,
+        overwrite=overwrite,
+        progress=progress,
+        tell=tell,
+    )
+    dataset = files.read(limits)
+    with _told_of(limits):
         response = response_of_limits(dataset)
     return response, {f.SEARCH: float(dataset[v.LIMITS["velocity"].runs].values.mean())}
+
+
+@contextmanager
+def directions_of(
+    test: FiringTest,
+    output: Path,
+    *,
+    executor: Executor,
+    resume: bool = False,
+    overwrite: bool = False,
+    progress: Callable[[int, int], object] = lambda done, total: None,
+    tell: Callable[[str], object] = warnings.warn,
+) -> Iterator[Sector | None]:
+    """What is computed of the directions of a test; None where it asks for none.
+
+    What is computed is on the disk at once, in `output`.parts, until the block ends, which writes the output.
+
+    Args:
+        progress: as in `protect`.
+        executor, resume, overwrite, tell: as in `run_to_file`; `resume` replaces the output, too.
+    """
+    if test.directions is None:
+        yield None
+        return
+    campaign = target_campaign(test)
+    content = manifest(campaign, executor.made_by) | {"directions": test.directions.model_dump(mode="json")}
+    with stored(output, content, "test", resume=resume, overwrite=overwrite or resume, tell=tell) as store:
+        yield answered(protect(campaign, test.directions, progress), executor, store)

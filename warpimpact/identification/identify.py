@@ -2,24 +2,27 @@
 
 from __future__ import annotations
 
-import threading
+import hashlib
 import warnings
 from collections.abc import Callable
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
-from warpimpact.identification.crew import Batch, Crew, crew_of
+from warpimpact.identification.evaluate import evaluate
 from warpimpact.identification.fit import Fit, Sampling
 from warpimpact.identification.likelihood import Score
 from warpimpact.identification.parameters import FitError
 from warpimpact.identification.posterior import Sampled, to_datatree
 from warpimpact.results import attributes as attr
 from warpimpact.results.files import write_tree
-from warpimpact.runs.describe import made_by
-from warpimpact.runs.store import Store, content_of, stored
+from warpimpact.runs.choice import opened
+from warpimpact.runs.executor import Executor, Job
+from warpimpact.runs.questions import Arrays, Question, Round, RoundProgress, answered
+from warpimpact.runs.store import content_of, stored
+from warpimpact.solver.worker import Worker
 from warpimpact.statistics.importance import LARGEST_K, ImportanceSampler
 
 Array = NDArray[np.float64]
@@ -62,17 +65,16 @@ def identify_to_file(
     fit: Fit,
     output: Path,
     *,
-    device: str = "auto",
+    device: str | Executor = "auto",
     resume: bool = False,
     overwrite: bool = False,
     progress: Follow | None = None,
-    processes: int = 1,
     tell: Callable[[str], object] = warnings.warn,
 ) -> None:
     """Compute the posterior of a fit into a file; what is computed is on the disk at once, in `output`.parts.
 
     Args:
-        processes: as in `Crew`.
+        device: as in `run_to_file`.
         tell: called with a sentence for what was damaged and is computed again.
 
     Raises:
@@ -80,49 +82,38 @@ def identify_to_file(
         FitError: the priors exclude what was measured.
         Interrupted: by the keyboard; what is saved can be resumed.
     """
-    made = made_by(device)
-    content = content_of(fit.text, "fit", fit.folder, made)
-    with stored(output, content, "fit", resume=resume, overwrite=overwrite, tell=tell) as store:
-        if store is not None:
-            sampled = sample(fit, device=device, store=store, progress=progress, processes=processes)
-            tree = to_datatree(fit, sampled, made)
-            tree.attrs[attr.FINGERPRINT] = store.parts.fingerprint
-            write_tree(tree, output)
+    with opened(device) as computing:
+        content = content_of(fit.text, "fit", fit.folder, computing.made_by)
+        with stored(output, content, "fit", resume=resume, overwrite=overwrite, tell=tell) as store:
+            if store is not None:
+                tree = to_datatree(fit, answered(sampled(fit, progress), computing, store), computing.made_by)
+                tree.attrs[attr.FINGERPRINT] = store.parts.fingerprint
+                write_tree(tree, output)
 
 
-def sample(
-    fit: Fit,
-    *,
-    device: str = "auto",
-    store: Store | None = None,
-    progress: Follow | None = None,
-    processes: int = 1,
-) -> Sampled:
+def sampled(fit: Fit, progress: Follow | None = None) -> Question[Sampled]:
     """Draw sets of parameters in rounds until their effective size is what the fit asks for, or all are drawn.
 
-    Args:
-        processes: as in `Crew`.
+    Raises:
+        FitError: the priors exclude what was measured.
     """
-    with crew_of(fit, device, processes) as crew:
-        return _sampled(fit, _Work(fit, crew, store, progress or (lambda now: None)))
-
-
-def _sampled(fit: Fit, work: _Work) -> Sampled:
     plan = fit.sampling
     sampler = ImportanceSampler(len(fit.parameters), shared(fit), plan.seed)
+    scored = _Scored(fit, progress or (lambda now: None))
     checked = False
     for count in rounds(plan):
         points = sampler.propose(count)
-        sampler.tell(work.round(points))
+        log_likelihood = yield from scored.round(points)
+        sampler.tell(log_likelihood)
         weights = sampler.weighed()
-        if not checked and work.done >= FIRST_SHARE * plan.sets - plan.shared:
-            _check_reach(fit, work.scores())
+        if not checked and scored.done >= FIRST_SHARE * plan.sets - plan.shared:
+            _check_reach(fit, scored.scores())
             checked = True
         effective = weights.effective(DISCREPANCIES)
-        work.tell(effective, weights.pareto_k)
+        scored.tell(effective, weights.pareto_k)
         if effective >= plan.effective and weights.pareto_k <= LARGEST_K:
             break
-    return Sampled(sampler.points, work.scores(), sampler.weighed(), DISCREPANCIES)
+    return Sampled(sampler.points, scored.scores(), sampler.weighed(), DISCREPANCIES)
 
 
 def shared(fit: Fit) -> list[tuple[int, int]]:
@@ -140,73 +131,66 @@ def rounds(plan: Sampling) -> list[int]:
     return [count * plan.shared * DISCREPANCIES for count in counts]
 
 
-class _Work:
-    """Scores sets in batches, and knows what was computed before."""
+class _Scored:
+    """Sets of parameters that are scored, in batches that are the jobs of rounds."""
 
-    def __init__(self, fit: Fit, crew: Crew, store: Store | None, follow: Follow) -> None:
-        self._fit, self._crew, self._store, self._follow = fit, crew, store, follow
+    def __init__(self, fit: Fit, follow: Follow) -> None:
+        self._fit, self._follow = fit, follow
         self._total = sum(rounds(fit.sampling)) // DISCREPANCIES
         self._batches: list[list[Score]] = []
-        self._lock = threading.Lock()
-        self._resumed, self.done = 0, 0
-        self._effective, self._pareto_k, self._misfit = np.nan, np.nan, np.inf
+        self.done = 0
+        self._progress = FitProgress(0, self._total, 0, np.nan, np.nan, np.inf)
 
-    def round(self, points: Array) -> Array:
+    def round(self, points: Array) -> Question[Array]:
         """Score the sets of one round; ln of their likelihood, shape [sets]."""
-        size, scores = BATCH * DISCREPANCIES, dict[int, list[Score]]()
-        first = len(self._batches)
-        batches = [Batch(first + place // size, points[place : place + size]) for place in range(0, len(points), size)]
+        size, first, before = BATCH * DISCREPANCIES, len(self._batches), self._progress
+        batches = [points[place : place + size] for place in range(0, len(points), size)]
+        sets = [len(batch) // DISCREPANCIES for batch in batches]
 
-        def ended(batch: Batch, found: list[Score]) -> None:
-            self._keep(batch, found)
-            scores[batch.number] = found
-            self._tell_of(batch, found)
+        def tell(now: RoundProgress) -> None:
+            misfits = [self._misfit(arrays) for arrays in now.results.copy().values()]
+            self._progress = replace(
+                before,
+                done=before.done + sum(sets[place] for place in now.results),
+                resumed=before.resumed + sum(sets[place] for place in [*now.results][: now.resumed]),
+                misfit=min([before.misfit, *misfits]),
+            )
+            self._follow(self._progress)
 
-        for batch in batches:
-            if (known := self._known(batch)) is not None:
-                scores[batch.number] = known
-                self._tell_of(batch, known, resumed=True)
-        self._crew.score([batch for batch in batches if batch.number not in scores], ended)
-        found = [scores[batch.number] for batch in batches]
-        self._batches += found
-        return np.concatenate([np.sum([one.log_likelihood for one in each], axis=0) for each in found])
+        results = yield Round(
+            [Job(_batch_scored, (self._fit, batch, first + place)) for place, batch in enumerate(batches)],
+            [hashlib.sha256(batch.tobytes()).hexdigest() for batch in batches],
+            tell,
+        )
+        self.done += len(points) // DISCREPANCIES
+        scores = [self._scores_in(arrays) for arrays in results]
+        self._batches += scores
+        return np.concatenate([np.sum([shot.log_likelihood for shot in batch], axis=0) for batch in scores])
 
-    def _known(self, batch: Batch) -> list[Score] | None:
-        """The scores of a batch that are on the disk."""
-        stored = None if self._store is None else self._store.load(batch.number)
-        if stored is None or not np.array_equal(stored["points"], batch.points):
-            return None
+    def _misfit(self, arrays: Arrays) -> float:
+        """The smallest misfit of a batch, over all shots."""
+        return float(np.sum([arrays[f"misfit_{place}"] for place in range(len(self._fit.shots))], axis=0).min())
+
+    def _scores_in(self, arrays: Arrays) -> list[Score]:
         return [
-            Score(**{f.name: stored[f"{f.name}_{place}"] for f in fields(Score)})
+            Score(**{f.name: arrays[f"{f.name}_{place}"] for f in fields(Score)})
             for place in range(len(self._fit.shots))
         ]
-
-    def _tell_of(self, batch: Batch, scores: list[Score], *, resumed: bool = False) -> None:
-        """Tell of a batch that is scored; by any thread."""
-        with self._lock:
-            self.done += len(batch.points) // DISCREPANCIES
-            self._resumed += resumed * len(batch.points) // DISCREPANCIES
-            self._misfit = min(self._misfit, float(np.sum([one.misfit for one in scores], axis=0).min()))
-            self._say()
-
-    def _keep(self, batch: Batch, scores: list[Score]) -> None:
-        """Put a batch on the disk."""
-        if self._store is not None:
-            arrays = {
-                f"{f.name}_{place}": getattr(one, f.name) for place, one in enumerate(scores) for f in fields(Score)
-            }
-            self._store.save(batch.number, {"points": batch.points, **arrays})
 
     def scores(self) -> list[Score]:
         """One score per shot over all sets so far."""
         return [Score.joined([batch[place] for batch in self._batches]) for place in range(len(self._fit.shots))]
 
     def tell(self, effective: float, pareto_k: float) -> None:
-        self._effective, self._pareto_k = effective, pareto_k
-        self._say()
+        """Tell what the weights are worth after a round."""
+        self._progress = replace(self._progress, effective=effective, pareto_k=pareto_k)
+        self._follow(self._progress)
 
-    def _say(self) -> None:
-        self._follow(FitProgress(self.done, self._total, self._resumed, self._effective, self._pareto_k, self._misfit))
+
+def _batch_scored(fit: Fit, points: Array, number: int, *, worker: Worker, report: Callable[[float], object]) -> Arrays:
+    """Scores of the sets of a batch; its number is the seed of the places of its hits."""
+    scores = evaluate(fit, points, worker, seed=number)
+    return {f"{f.name}_{place}": getattr(score, f.name) for place, score in enumerate(scores) for f in fields(Score)}
 
 
 def _check_reach(fit: Fit, scores: list[Score]) -> None:

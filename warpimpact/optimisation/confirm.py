@@ -12,11 +12,11 @@ from numpy.typing import NDArray
 
 from warpimpact.campaign.text import CampaignError
 from warpimpact.optimisation.design import Design
-from warpimpact.optimisation.evaluate import Job, Told, campaign_of
+from warpimpact.optimisation.evaluate import HitJob, Told, campaign_of, hits_asked, levels_asked
 from warpimpact.optimisation.judged import Record, excesses, interval, means, numbers_of, objectives
 from warpimpact.optimisation.search import Searched
 from warpimpact.optimisation.searcher import front_of
-from warpimpact.optimisation.work import Work
+from warpimpact.runs.questions import Question
 from warpimpact.statistics.comparisons import ROUNDED
 from warpimpact.statistics.random_effects import positive_share
 
@@ -61,14 +61,14 @@ Follow = Callable[[int, int, str], object]
 """Called with how many targets are done, how many there are, and what is computed of them."""
 
 
-def confirm(design: Design, work: Work, found: Searched, follow: Follow) -> Confirmed:
+def confirm(design: Design, found: Searched, follow: Follow) -> Question[Confirmed]:
     """Compute the front, its solid plates and the references with fresh hits at standard."""
     numbers = spread(found.front, design.search.confirmed)
     chosen = [found.records[int(number)] for number in numbers]
     others = [_reference(design, place) for place in range(len(design.references))]
-    records, places, draws = _fresh(design, work, [*chosen, *others], follow)
+    records, places, draws = yield from _fresh(design, [*chosen, *others], follow)
     front = records[: len(chosen)]
-    solids = _solids(design, work, front, follow)
+    solids = yield from _solids(design, front, follow)
     kept, leaders = _kept(design, front), groups(design, front)
     return Confirmed(
         numbers=numbers,
@@ -121,24 +121,25 @@ def check_references(design: Design) -> None:
 
 def _telling(follow: Follow, targets: int, jobs: int, what: str) -> Told:
     """Follows jobs, of which every target has the same number, by the number of targets that are done."""
-    return lambda done: follow(int(targets * done / jobs), targets, what)
+    return lambda done, _: follow(int(targets * done / jobs), targets, what)
 
 
 def _fresh(
-    design: Design, work: Work, targets: Sequence[Record], follow: Follow
-) -> tuple[list[Record], Array, list[Array]]:
+    design: Design, targets: Sequence[Record], follow: Follow
+) -> Question[tuple[list[Record], Array, list[Array]]]:
     """Targets with fresh hits, where these lie, and the draws of a posterior that they took."""
     seed, count = fresh_seed(design), design.search.confirm_hits if design.keys else 1
     threats = range(len(design.threats))
-    asked = [Job(one.tables, threat, 0, count, FIDELITY, seed) for one in targets for threat in threats]
+    asked = [HitJob(one.tables, threat, 0, count, FIDELITY, seed) for one in targets for threat in threats]
     if not design.keys:
         empty = np.zeros((len(threats), 0, count))
         found = [Record(one.values, one.tables, one.areal_density, ("",) * len(threats), empty) for one in targets]
         return found, np.zeros((len(targets), 2, 0)), [np.zeros(0)] * len(targets)
     whose = "the front and references" if design.references else "the front"
-    levels = work.levels(asked, _telling(follow, len(targets), len(asked), f"pilots for fresh hits of {whose}"))
-    jobs = [Job(*_of(job), level, seed) for job, level in zip(asked, levels, strict=True)]
-    said = work.said(jobs, _telling(follow, len(targets), len(jobs), f"fresh hits of {whose}"))
+    piloting = _telling(follow, len(targets), len(asked), f"pilots for fresh hits of {whose}")
+    levels = yield from levels_asked(design, asked, piloting)
+    jobs = [HitJob(*_of(job), level, seed) for job, level in zip(asked, levels, strict=True)]
+    said = yield from hits_asked(design, jobs, _telling(follow, len(targets), len(jobs), f"fresh hits of {whose}"))
     records = []
     for number, one in enumerate(targets):
         own = slice(number * len(threats), (number + 1) * len(threats))
@@ -156,20 +157,21 @@ def _fresh(
     return records, np.array([one.places for one in of_first]), [one.draws for one in of_first]
 
 
-def _of(job: Job) -> tuple[Any, int, int, int]:
+def _of(job: HitJob) -> tuple[Any, int, int, int]:
     return job.tables, job.threat, job.first, job.count
 
 
-def _solids(design: Design, work: Work, front: Sequence[Record], follow: Follow) -> list[Record]:
+def _solids(design: Design, front: Sequence[Record], follow: Follow) -> Question[list[Record]]:
     """The solid plate of the areal density of every design of the front."""
     if not design.keys or not front:
         return list(front)
     jobs = [
-        Job(one.tables, threat, 0, SOLID_HITS, level, fresh_seed(design), solid=True)
+        HitJob(one.tables, threat, 0, SOLID_HITS, level, fresh_seed(design), solid=True)
         for one in front
         for threat, level in enumerate(one.levels)
     ]
-    said = work.said(jobs, _telling(follow, len(front), len(jobs), "solid plates of the same weight"))
+    telling = _telling(follow, len(front), len(jobs), "solid plates of the same weight")
+    said = yield from hits_asked(design, jobs, telling)
     threats = len(design.threats)
     return [
         Record(

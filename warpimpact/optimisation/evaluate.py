@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import hashlib
+import json
 import time
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from itertools import count
 from typing import Any, NamedTuple
 
@@ -19,6 +21,8 @@ from warpimpact.results import variables as v
 from warpimpact.results.dataset import narrow_table
 from warpimpact.results.table import Table
 from warpimpact.runs.compute import at_solid
+from warpimpact.runs.executor import Job
+from warpimpact.runs.questions import Arrays, Question, Round
 from warpimpact.scene import Numerics, Scene, Shots
 from warpimpact.solver.many import side_by_side, simulate_many
 from warpimpact.solver.pilot import pilot_size
@@ -29,11 +33,13 @@ Array = NDArray[np.float64]
 
 MOST_HITS = 2**20
 """Images of hits that a sampler of a search has, far more than are computed."""
+TOGETHER = 16
+"""Jobs that are computed side by side by a worker at a time, and saved together."""
 _TURNING = ("obliquity", "azimuth", "pitch", "yaw", "spin")
 
 
 @dataclass(frozen=True)
-class Job:
+class HitJob:
     """Some hits of a target by a threat.
 
     Attributes:
@@ -98,17 +104,15 @@ def hits_of(campaign: Campaign, first: int, count: int) -> Shots:
     return sampler.shots(first * sampler.images, count * sampler.images)[:: sampler.images]
 
 
-Told = Callable[[float], object]
-"""Called with how many jobs are done, parts of jobs included, by any thread."""
+Told = Callable[[float, bool], object]
+"""Called with how many jobs are done, parts of jobs included, and with whether all of them come from the disk."""
 
 
-def untold(done: float) -> None:
-    """Nobody asks how many jobs are done."""
+Share = Callable[[float], object]
+"""Called with how much is done, by any thread."""
 
 
-def said_by(
-    design: Design, jobs: Sequence[Job], device: str = "auto", threads: int | None = None, told: Told = untold
-) -> list[Said]:
+def said_by(design: Design, jobs: Sequence[HitJob], worker: Worker, told: Share = lambda done: None) -> list[Said]:
     """Compute jobs side by side; what one says depends on nothing but the job.
 
     Raises:
@@ -123,7 +127,7 @@ def said_by(
     ]
     steps = 1 + len(limits)
     outcomes, seconds = _marched(
-        [job.level for job in jobs], scenes, Worker(device, threads), lambda share: told(share * len(jobs) / steps)
+        [job.level for job in jobs], scenes, worker, lambda share: told(share * len(jobs) / steps)
     )
     said = []
     needed = {v.STATUS, v.STOPPED_IN, *(name for measure in design.keys for name in measure.quantity.of)}
@@ -134,26 +138,29 @@ def said_by(
         said.append(Said(said_of(design, table), places, draws, seconds / len(jobs)))
     ended = count(1)
 
-    def limit(which: int, worker: Worker, _: Any) -> Array:
+    def limit(which: int, share: Worker, _: Any) -> Array:
         number, row = limits[which]
         numerics = Numerics.model_validate_json(jobs[number].level)
-        values = limits_said(*scenes[number][1:], design.keys[row], numerics, worker)
+        values = limits_said(*scenes[number][1:], design.keys[row], numerics, share)
         told((1 + next(ended)) * len(jobs) / steps)
         return values
 
-    for (number, row), values in zip(limits, side_by_side(limit, len(limits), Worker(device, threads)), strict=True):
+    for (number, row), values in zip(limits, side_by_side(limit, len(limits), worker), strict=True):
         said[number].values[row] = values
     return said
 
 
-def _scene_of(design: Design, job: Job) -> tuple[Campaign, Scene, Shots]:
+def _scene_of(design: Design, job: HitJob) -> tuple[Campaign, Scene, Shots]:
     campaign = campaign_of(design, job.tables, design.threats[job.threat], job.seed)
     shots = hits_of(campaign, job.first, job.count)
     return (campaign, *at_solid(campaign, shots)) if job.solid else (campaign, campaign.scene, shots)
 
 
 def _marched(
-    levels: Sequence[str], scenes: Sequence[tuple[Campaign, Scene, Shots]], worker: Worker, told: Told
+    levels: Sequence[str],
+    scenes: Sequence[tuple[Campaign, Scene, Shots]],
+    worker: Worker,
+    told: Callable[[float], object],
 ) -> tuple[list[Outcomes], float]:
     """Outcomes of the shots of scenes, each with its numerics as JSON, and the processor time [s] that they took; tells
     the share of the shots that are done."""
@@ -182,21 +189,66 @@ def said_of(design: Design, table: Table) -> Array:
     return said
 
 
-def level_of(
-    design: Design, job: Job, device: str = "auto", trying: Callable[[int], object] = lambda level: None
-) -> str:
+def level_of(design: Design, job: HitJob, worker: Worker) -> str:
     """The numerics, as JSON, that a pilot finds for a job; those of the campaign where it fixes a resolution.
 
     Args:
         job: its `level` is the fidelity that is asked for, where the campaign does not fix a resolution.
-        trying: as in `pilot_of`.
     """
     campaign = campaign_of(design, job.tables, design.threats[job.threat], job.seed)
     if campaign.numerics.explicit is not None:
         return campaign.numerics.model_dump_json()
     asked = campaign.numerics.model_copy(update={"fidelity": job.level, "accuracy": None})
-    shots, worker = hits_of(campaign, 0, pilot_size(asked.asked)), Worker(device)
-    found = [limits_level(campaign.scene, shots, key, asked, worker, trying) for key in design.keys if key.is_limit]
+    shots = hits_of(campaign, 0, pilot_size(asked.asked))
+    found = [
+        limits_level(campaign.scene, shots, key, asked, worker, lambda level: None)
+        for key in design.keys
+        if key.is_limit
+    ]
     if len(found) < len(design.keys):
-        found.append(pilot_of(campaign.scene, shots, asked, worker, trying).numerics)
+        found.append(pilot_of(campaign.scene, shots, asked, worker).numerics)
     return max(found, key=lambda one: one.level or 0).model_dump_json()
+
+
+def hits_asked(design: Design, jobs: Sequence[HitJob], tell: Told) -> Question[list[Said]]:
+    """What the hits of jobs say, in their order, as a round of a question; tells how many are done."""
+    if not jobs:
+        return []
+    groups = [jobs[first : first + TOGETHER] for first in range(0, len(jobs), TOGETHER)]
+    results = yield Round(
+        [Job(_hits_computed, (design, group)) for group in groups],
+        [_key(group) for group in groups],
+        lambda now: tell(min(now.done * TOGETHER, len(jobs)), now.resumed == len(groups)),
+    )
+    return [
+        Said(arrays[f"values_{k}"], arrays[f"places_{k}"], arrays[f"draws_{k}"], float(arrays[f"seconds_{k}"]))
+        for group, arrays in zip(groups, results, strict=True)
+        for k in range(len(group))
+    ]
+
+
+def _hits_computed(
+    design: Design, jobs: Sequence[HitJob], *, worker: Worker, report: Callable[[float], object]
+) -> Arrays:
+    said = said_by(design, jobs, worker, lambda done: report(done / len(jobs)))
+    return {f"{name}_{k}": np.asarray(part) for k, one in enumerate(said) for name, part in one._asdict().items()}
+
+
+def levels_asked(design: Design, jobs: Sequence[HitJob], tell: Told) -> Question[list[str]]:
+    """What the pilots of jobs find, as a round of a question; tells how many are done."""
+    if not jobs:
+        return []
+    results = yield Round(
+        [Job(_level_computed, (design, job)) for job in jobs],
+        [_key([job]) for job in jobs],
+        lambda now: tell(now.done, now.resumed == len(jobs)),
+    )
+    return [str(arrays["level"]) for arrays in results]
+
+
+def _level_computed(design: Design, job: HitJob, *, worker: Worker, report: Callable[[float], object]) -> Arrays:
+    return {"level": np.array(level_of(design, job, worker))}
+
+
+def _key(jobs: Sequence[HitJob]) -> str:
+    return hashlib.sha256(json.dumps([asdict(job) for job in jobs], default=str).encode()).hexdigest()

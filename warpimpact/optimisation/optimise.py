@@ -8,17 +8,18 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from warpimpact.optimisation.confirm import check_references, confirm
-from warpimpact.optimisation.crew import Crew, local_crew
+from warpimpact.optimisation.confirm import Confirmed, check_references, confirm
 from warpimpact.optimisation.design import Design, read_design
 from warpimpact.optimisation.outcome import check_campaigns, to_dataset, write_campaigns
-from warpimpact.optimisation.search import Follow, SearchProgress, search
+from warpimpact.optimisation.search import Follow, Searched, SearchProgress, search
 from warpimpact.optimisation.searcher import check_installed
-from warpimpact.optimisation.work import Work
 from warpimpact.results import attributes as attr
 from warpimpact.results import files
 from warpimpact.results import front as f
+from warpimpact.runs.choice import executor_for, opened
+from warpimpact.runs.executor import Executor
 from warpimpact.runs.parts import is_begun
+from warpimpact.runs.questions import Question, answered
 from warpimpact.runs.store import Store, content_of, stored
 
 if TYPE_CHECKING:
@@ -41,15 +42,15 @@ def optimise(design: Design | str | Path, *, device: str = "auto", progress: Fol
         DeviceError: the device is absent.
     """
     one = design if isinstance(design, Design) else read_design(design)
-    return _found(one, local_crew(device), None, progress or (lambda now: None))
+    with executor_for(device) as executor:
+        return _answered(one, executor, progress)
 
 
 def optimise_to_file(
     design: Design,
     output: Path,
     *,
-    device: str = "auto",
-    crew: Crew | None = None,
+    device: str | Executor = "auto",
     resume: bool = False,
     overwrite: bool = False,
     progress: Follow | None = None,
@@ -59,7 +60,7 @@ def optimise_to_file(
     what is computed is on the disk at once, in `output`.parts.
 
     Args:
-        crew: who computes, in place of `device`.
+        device: as in `run_to_file`.
         resume: continue what is in `output`.parts; of a search that is complete, write the campaigns that are missing.
         overwrite: replace an existing result with its campaigns, and begin anew in place of an unfinished search.
         tell: called with a sentence for what was damaged and is computed again, or is kept as it was changed.
@@ -72,13 +73,14 @@ def optimise_to_file(
         CampaignError: no design keeps the constraints.
         Interrupted: by the keyboard; what is saved can be resumed.
     """
-    crew, folder = crew or local_crew(device), folder_of(output)
-    content = content_of(design.text, design.name, design.folder, crew.made_by)
+    folder = folder_of(output)
     check_campaigns(folder, overwrite=overwrite or (resume and is_begun(output)))
-    with stored(output, content, "search", resume=resume, overwrite=overwrite, tell=tell) as store:
-        if store is not None:
-            dataset = _found(design, crew, store, progress or (lambda now: None))
-            files.write(dataset.assign_attrs({attr.FINGERPRINT: store.parts.fingerprint}), output)
+    with opened(device) as computing:
+        content = content_of(design.text, design.name, design.folder, computing.made_by)
+        with stored(output, content, "search", resume=resume, overwrite=overwrite, tell=tell) as store:
+            if store is not None:
+                dataset = _answered(design, computing, progress, store)
+                files.write(dataset.assign_attrs({attr.FINGERPRINT: store.parts.fingerprint}), output)
     return write_campaigns(design, files.read(output, f.FRONT), folder, overwrite=overwrite, tell=tell)
 
 
@@ -87,20 +89,26 @@ def folder_of(output: Path) -> Path:
     return output.with_name(f"{output.stem}_designs")
 
 
-def _found(design: Design, crew: Crew, store: Store | None, follow: Follow) -> xarray.Dataset:
+def _answered(
+    design: Design, executor: Executor, progress: Follow | None, store: Store | None = None
+) -> xarray.Dataset:
     check_installed()
     check_references(design)
-    work = Work(design, crew, store)
+    searched, confirmed = answered(_searched(design, progress or (lambda now: None)), executor, store)
+    return to_dataset(design, searched, confirmed, executor.made_by)
+
+
+def _searched(design: Design, follow: Follow) -> Question[tuple[Searched, Confirmed]]:
+    """The search and its front by fresh hits, as one question."""
     last: list[SearchProgress] = []
 
     def kept(now: SearchProgress) -> None:
         last[:] = [now]
         follow(now)
 
-    found = search(design, work, kept)
-
     def confirming(done: int, total: int, what: str) -> None:
         follow(replace(last[-1], done=done, total=total, resumed=0, what=what))
 
-    confirmed = confirm(design, work, found, confirming)
-    return to_dataset(design, found, confirmed, crew.made_by)
+    found = yield from search(design, kept)
+    confirmed = yield from confirm(design, found, confirming)
+    return found, confirmed

@@ -11,11 +11,11 @@ from numpy.typing import NDArray
 
 from warpimpact.campaign.text import CampaignError
 from warpimpact.optimisation.design import Design
-from warpimpact.optimisation.evaluate import Job
+from warpimpact.optimisation.evaluate import HitJob, hits_asked, levels_asked
 from warpimpact.optimisation.feasible import Checked, checked
 from warpimpact.optimisation.judged import Record, excesses, objectives, undecided
 from warpimpact.optimisation.searcher import Searcher, front_of, hypervolume
-from warpimpact.optimisation.work import Work
+from warpimpact.runs.questions import Question
 
 Array = NDArray[np.float64]
 
@@ -78,21 +78,21 @@ class Searched:
     pilots: int
 
 
-def search(design: Design, work: Work, follow: Follow = lambda now: None) -> Searched:
+def search(design: Design, follow: Follow = lambda now: None) -> Question[Searched]:
     """Search until the designs of the budget are computed, or there are no others.
 
     Raises:
         CampaignError: no design keeps the constraints; the message names the one that rules them out.
     """
-    state = _State(design, work, follow)
+    state = _State(design, follow)
     if design.space.size <= design.search.designs:
         every = state.feasible(design.space.points())
         state.total, state.certain = len(every), True
         for first in range(0, len(every), design.search.population):
-            state.generation(every[first : first + design.search.population])
+            yield from state.generation(every[first : first + design.search.population])
     else:
         for points, tell in _generations(design):
-            state.generation(points)
+            yield from state.generation(points)
             if state.done >= design.search.designs or state.idle >= IDLE:
                 break
             tell(*state.told(points))
@@ -123,10 +123,10 @@ class _State:
         drafts: designs that keep the constraints and are not yet computed.
         refused: designs that break a constraint.
         total, certain, resumed: as of `SearchProgress`.
+        is_resumed: whether all rounds of the generation so far come from the disk.
     """
 
     design: Design
-    work: Work
     follow: Follow
     records: dict[bytes, Record] = field(default_factory=dict)
     front: list[Record] = field(default_factory=list)
@@ -138,6 +138,7 @@ class _State:
     idle: int = 0
     certain: bool = False
     resumed: int = 0
+    is_resumed: bool = False
 
     def __post_init__(self) -> None:
         self.total = int(min(self.design.search.designs, self.design.space.size))
@@ -146,7 +147,7 @@ class _State:
     def done(self) -> int:
         return len(self.records)
 
-    def generation(self, points: Sequence[Array]) -> None:
+    def generation(self, points: Sequence[Array]) -> Question[None]:
         """Compute those points that are new and keep the constraints."""
         new: dict[bytes, Record] = {}
         for values in points:
@@ -159,9 +160,9 @@ class _State:
                 new[key] = self.drafts.pop(key)
         self.idle = 0 if new else self.idle + 1
         if new:
-            before = self.work.computed
-            self._compute(new)
-            self.resumed += len(new) if self.work.computed == before else 0
+            self.is_resumed = bool(self.design.keys)
+            yield from self._compute(new)
+            self.resumed += len(new) if self.is_resumed else 0
             self._measure()
 
     def feasible(self, points: Iterable[Array]) -> list[Array]:
@@ -184,16 +185,16 @@ class _State:
         nothing = np.zeros((len(self.design.threats), len(self.design.keys), 0))
         self.drafts[key] = Record(values, tables, found.campaign.target.areal_density, (), nothing)
 
-    def _compute(self, new: dict[bytes, Record]) -> None:
+    def _compute(self, new: dict[bytes, Record]) -> Question[None]:
         """Hits of designs, from rung to rung for those that may be on the front."""
-        levels = self._levels(list(new.values()))
+        levels = yield from self._levels(list(new.values()))
         for key, of_threats in zip(list(new), levels, strict=True):
             one = new[key]
             new[key] = Record(one.values, one.tables, one.areal_density, of_threats, one.said)
         going, before = list(new), 0
         for hits in self.design.search.rungs if self.design.keys else [self.design.search.hits]:
-            for key, record in zip(going, self._more([new[key] for key in going], before, hits), strict=True):
-                new[key] = record
+            with_more = yield from self._more([new[key] for key in going], before, hits)
+            new |= zip(going, with_more, strict=True)
             best = [record for record in self.front if record.hits >= hits]
             candidates = [new[key] for key in going]
             keep = undecided(self.design, candidates, [*best, *candidates], hits)
@@ -203,25 +204,31 @@ class _State:
         self._admit(list(new.values()))
         self.records |= new
 
-    def _more(self, records: Sequence[Record], first: int, stop: int) -> list[Record]:
+    def _more(self, records: Sequence[Record], first: int, stop: int) -> Question[list[Record]]:
         """Designs with their hits up to so many."""
         design = self.design
         if not design.keys:
             return [one.more(np.zeros((len(design.threats), 0, stop)), 0.0) for one in records]
         jobs = [
-            Job(one.tables, threat, first, stop - first, level, design.search.seed)
+            HitJob(one.tables, threat, first, stop - first, level, design.search.seed)
             for one in records
             for threat, level in enumerate(one.levels)
         ]
         what, threats = f"{len(records)} designs at {stop} hits", len(design.threats)
-        said = self.work.said(jobs, lambda done: self.tell(f"{what}, {done / len(jobs):.0%}"))
+
+        def tell(done: float, is_resumed: bool) -> None:
+            if done >= len(jobs):
+                self.is_resumed = self.is_resumed and is_resumed
+            self.tell(f"{what}, {done / len(jobs):.0%}")
+
+        said = yield from hits_asked(design, jobs, tell)
         found = []
         for number, one in enumerate(records):
             own = said[number * threats : (number + 1) * threats]
             found.append(one.more(np.array([part.values for part in own]), sum(part.seconds for part in own)))
         return found
 
-    def _levels(self, records: Sequence[Record]) -> list[tuple[str, ...]]:
+    def _levels(self, records: Sequence[Record]) -> Question[list[tuple[str, ...]]]:
         """Numerics of designs for every threat: those of the pilot of a neighbour, or of their own."""
         places = [self._place(one.values) for one in records]
         if not self.design.keys:
@@ -232,8 +239,9 @@ class _State:
             for threat in range(len(self.design.threats)):
                 if not any(of == threat and _near(place, centre) for centre, of in centres):
                     centres.append((place, threat))
-                    jobs.append(Job(one.tables, threat, 0, 0, FIDELITY, self.design.search.seed))
-        found = self.work.levels(jobs, lambda done: self.tell(f"{done:.0f} of {len(jobs)} pilots"))
+                    jobs.append(HitJob(one.tables, threat, 0, 0, FIDELITY, self.design.search.seed))
+        tell = lambda done, _: self.tell(f"{done:.0f} of {len(jobs)} pilots")  # noqa: E731
+        found = yield from levels_asked(self.design, jobs, tell)
         self.pilots += [(*centre, level) for centre, level in zip(centres[len(self.pilots) :], found, strict=True)]
         return [tuple(self._nearest(place, threat) for threat in range(len(self.design.threats))) for place in places]
 

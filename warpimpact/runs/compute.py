@@ -77,6 +77,9 @@ class HitMap:
         )
 
 
+HIT_MAP = HitMap()
+
+
 def compute(campaign: Campaign, task: Task, worker: Worker, progress: Progress | None = None) -> Table:
     """Compute some shots of a campaign. If it uses symmetry, only the first shot of each group of images is computed.
 

@@ -4,33 +4,38 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import FIRST_COMPLETED, Future, wait
-from contextlib import AbstractContextManager
+from contextlib import closing
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
 from warpimpact.campaign.campaign import Campaign
 from warpimpact.results import attributes as attr
-from warpimpact.results import variables as v
-from warpimpact.results.dataset import failed, finer_pair, images, numbered
+from warpimpact.results.dataset import failed, finer_pair, images
 from warpimpact.results.files import OutputError
-from warpimpact.results.interrupts import stop_if_asked
 from warpimpact.results.measures import Measure
 from warpimpact.results.outlines import in_memory
 from warpimpact.results.table import Table, joined
 from warpimpact.results.tallies import Tally, shift_of
-from warpimpact.runs.compute import numerics_of
+from warpimpact.runs.choice import executor_for, opened
+from warpimpact.runs.compute import HIT_MAP, numerics_of
+from warpimpact.runs.executor import Executor, Job, completed, result_of
 from warpimpact.runs.foreseen import Cost
+from warpimpact.runs.jobs import (
+    computed_hits,
+    pilot_job,
+    ranges,
+    solid_shots,
+    split,
+    task_job,
+    task_size,
+    with_ligament,
+)
 from warpimpact.runs.levels import OF_THE_NUMERICS
 from warpimpact.runs.parts import Interrupted, claimed
 from warpimpact.runs.progress import Follow, RunProgress, followed
 from warpimpact.runs.shards import Shards, ShardsOnDisk, extent, manifest
-from warpimpact.runs.task import Task
-from warpimpact.runs.team import Team, awaited, local_team
-from warpimpact.scene import Shots
+from warpimpact.runs.task import Computation, Task
 from warpimpact.solver.findings import Found
 from warpimpact.solver.resolution import at_level
 from warpimpact.solver.worker import Cancel
@@ -38,9 +43,6 @@ from warpimpact.statistics.intervals import Dealing, looks
 
 if TYPE_CHECKING:
     import xarray
-
-_REPORT_EVERY = 0.2
-"""Seconds between two looks at what is under way."""
 
 
 def run(
@@ -68,9 +70,9 @@ def run(
     """
     campaign = _read(campaign)
     total = len(campaign.sampler())
-    with local_team(campaign, device, cancel=cancel) as team, followed(progress) as follow:
+    with executor_for(device, cancel=cancel) as executor, followed(progress) as follow:
         shards = Shards(extent(total, campaign.at_a_plate))
-        end = _fill(campaign, shards, team, follow)
+        end = _fill(campaign, HIT_MAP, shards, executor, follow)
     table = joined(shards.shard(index) for index in range(end.shards))
     return in_memory(table.assign_attrs(_attributes(table, end)).to_xarray())
 
@@ -79,8 +81,8 @@ def run_to_file(
     campaign: Campaign | str | Path,
     output: str | Path,
     *,
-    device: str = "auto",
-    team: AbstractContextManager[Team] | None = None,
+    device: str | Executor = "auto",
+    computation: Computation = HIT_MAP,
     resume: bool = False,
     overwrite: bool = False,
     progress: Follow | None = None,
@@ -91,8 +93,9 @@ def run_to_file(
     Args:
         campaign: the campaign, or its file.
         output: the netCDF file, which appears when it is complete.
-        device, progress: as in `run`.
-        team: who computes, in place of `device`.
+        device: as in `run`, or an executor.
+        progress: as in `run`.
+        computation: of every hit.
         resume: continue what is in `output`.parts; begin where there is nothing.
         overwrite: replace an existing file, and begin anew in place of a run that has not ended.
         tell: called with a sentence for what was damaged and is computed again.
@@ -105,14 +108,15 @@ def run_to_file(
         Interrupted: by the keyboard; what is saved can be resumed.
     """
     campaign, output = _read(campaign), Path(output)
-    with claimed(output), team or local_team(campaign, device) as members:
-        content, total = manifest(campaign, members.made_by), len(campaign.sampler())
+    with claimed(output), opened(device) as computing:
+        content = manifest(campaign, {**computing.made_by, **computation.content})
+        total = len(campaign.sampler())
         parts = ShardsOnDisk(output, content, total, tell, grows=campaign.stop is None)
         if not parts.begin(resume=resume, overwrite=overwrite):
             return
         try:
             with followed(progress) as follow:
-                end = _fill(campaign, parts, members, follow)
+                end = _fill(campaign, computation, parts, computing, follow)
             parts.finish(end.shards, lambda first: _attributes(first, end))
         except KeyboardInterrupt:
             raise Interrupted(f"interrupted; {parts.kept()}") from None
@@ -138,88 +142,46 @@ class _End:
     stop: dict[str, Any]
 
 
-def _fill(campaign: Campaign, shards: Shards, team: Team, follow: Follow) -> _End:
+def _fill(campaign: Campaign, computation: Computation, shards: Shards, executor: Executor, follow: Follow) -> _End:
     """Compute the shards that are not there, until all are or the stop rule is met."""
-    sampler, computation = campaign.sampler(), team.computation
+    sampler = campaign.sampler()
     watch = _Watch(campaign, len(sampler), shards, computation.measures)
     there = sorted(shards.there())
     for index in there:
         watch.add(index, shards.shard(index))
-    watch.resumed, cost = watch.done, Cost(campaign, team.made_by[attr.DEVICE], computation.passages)
+    watch.resumed, cost = watch.done, Cost(campaign, executor.made_by[attr.DEVICE], computation.passages)
+    if watch.end is None:
+        campaign = result_of(executor, with_ligament, campaign)
     if 0 in there:  # it holds what the pilot found, and its hits at a finer level
         watch.found = computation.found_in(shards.shard(0))
     else:
 
-        def tick() -> None:
-            team.width()  # tells of a cluster that has lost its workers
-            if (trying := team.trying()) is not None:
-                cost.tell(at_level(trying, campaign.numerics))
-            follow(replace(watch.progress(0), piloting=True, trying=trying))
+        def piloting() -> None:
+            level = next(iter(executor.reports()), None)
+            if level is not None:
+                cost.tell(at_level(level, campaign.numerics))
+            follow(replace(watch.progress(0), piloting=True, trying=level))
 
-        watch.found = awaited(team.pilot(), _REPORT_EVERY, tick)
+        watch.found = result_of(executor, pilot_job, computation, campaign, tick=piloting)
     cost.tell(numerics_of(campaign, watch.found))
-    tasks = _tasks(shards, len(sampler), lambda: team.task(0.0 if campaign.stop else watch.rate))
-    waiting: dict[Future[Table], range] = {}
-    try:
+
+    def jobs() -> Iterator[tuple[range, Job]]:
+        most = lambda: task_size(executor, 0.0 if campaign.stop else watch.rate)  # noqa: E731
+        for task in ranges(shards, len(sampler), most):
+            shots = sampler.shots(task.start * shards.extent, len(task) * shards.extent)
+            first = shots[: shards.extent] if task.start == 0 else None
+            solid = None if first is None else solid_shots(campaign, first, computation.most_solid)
+            found = watch.found if task.start == 0 or watch.found is None else watch.found.told
+            yield task, Job(task_job, (computation, campaign, Task(shots, solid, found)))
+
+    with closing(completed(executor, jobs(), lambda: follow(watch.progress(sum(executor.reports()))))) as tables:
         while watch.end is None:
-            width = team.width()
-            while len(waiting) < width and (task := next(tasks, None)) is not None:
-                shots = sampler.shots(task.start * shards.extent, len(task) * shards.extent)
-                first = shots[: shards.extent] if task.start == 0 else None
-                solid = None if first is None else _solid_shots(campaign, first, computation.most_solid)
-                found = watch.found if task.start == 0 or watch.found is None else watch.found.told
-                waiting[team.submit(Task(shots, solid, found))] = task
-            finished, _ = wait(waiting, timeout=_REPORT_EVERY, return_when=FIRST_COMPLETED)
-            stop_if_asked()
-            for future in finished:
-                task = waiting.pop(future)
-                for index, shard in _split(future.result(), task, shards.extent):
-                    shards.save(index, shard)
-                    watch.add(index, shard)
-            follow(watch.progress(team.underway()))
-    finally:
-        for future in waiting:
-            future.cancel()
+            task, table = next(tables)
+            for index, shard in split(table, task, shards.extent):
+                shards.save(index, shard)
+                watch.add(index, shard)
     follow(watch.progress(0))
     return watch.end
-
-
-def _solid_shots(campaign: Campaign, shots: Shots, most: int) -> Shots | None:
-    """Those of the first shard's shots that the solid plate of equal areal density takes: one tells of all where no two
-    differ but in where they hit."""
-    plate = campaign.plate
-    if not campaign.output.solid_reference or campaign.target.solid == plate:
-        return None
-    elsewhere = (v.HIT_Y, v.HIT_Z, "offset_y", "offset_z")
-    conditions = [values for name, values in shots.columns.items() if name not in elsewhere]
-    alike = plate.size is None and not any(np.nan_to_num(np.ptp(values, axis=0)).any() for values in conditions)
-    if alike and campaign.burst is None:
-        return shots[:1]
-    return shots[: max(1, most // campaign.at_a_plate) * campaign.at_a_plate]
-
-
-def _tasks(shards: Shards, total: int, shots: Callable[[], int]) -> Iterator[range]:
-    """Ranges of shards that are not there, each of about as many shots as are asked for when it begins."""
-    there, count, first = frozenset(shards.there()), -(-total // shards.extent), 0
-    while first < count:
-        most, stop = max(1, shots() // shards.extent), first
-        while stop < min(first + most, count) and stop not in there:
-            stop += 1
-        if stop > first:
-            yield range(first, stop)
-        first = max(stop, first + 1)
-
-
-def _split(table: Table, task: range, size: int) -> Iterator[tuple[int, Table]]:
-    """The shards of a task, each with its share of the time and of what was computed; the first one of a campaign keeps
-    what is said once."""
-    hits, of_the_campaign = table.sizes["hit"], [name for names in v.GROUPS.values() for name in names]
-    for place, index in enumerate(task):
-        shard = numbered(table.isel(hit=slice(place * size, (place + 1) * size)), first=index * size)
-        if index:
-            shard = shard.drop_vars(of_the_campaign)
-        time = table.attrs[attr.COMPUTE_TIME] * shard.sizes["hit"] / hits
-        yield index, shard.assign_attrs({attr.COMPUTE_TIME: time} | _computed(table, shard.sizes["hit"]))
 
 
 class _Watch:
@@ -320,11 +282,6 @@ def _attributes(table: Table, end: _End) -> dict[str, Any]:
         attr.HISTORY: attr.history_line(table.attrs[attr.HISTORY].partition(" warpimpact ")[2]),
         attr.COMPUTE_TIME: end.compute_time,
         attr.HITS_PER_SECOND: end.hits / images(table) / end.compute_time,
-        **_computed(table, end.hits),
+        **computed_hits(table, end.hits),
         **end.stop,
     }
-
-
-def _computed(table: Table, hits: int) -> dict[str, int]:
-    """How many of some hits of a Table were computed, if that is not all the same."""
-    return {attr.COMPUTED_HITS: hits // images(table)} if attr.COMPUTED_HITS in table.attrs else {}

@@ -22,6 +22,8 @@ from warpimpact.results import attributes as attr
 from warpimpact.results import files
 from warpimpact.results import variables as v
 from warpimpact.results.kinds import CAMPAIGN
+from warpimpact.runs.choice import opened
+from warpimpact.runs.executor import Executor
 from warpimpact.runs.run import run_to_file
 from warpimpact.scene.units import quoted, reader_in
 
@@ -155,7 +157,7 @@ def run_sweep(
     sweep: Sweep,
     output: Path,
     *,
-    device: str = "auto",
+    device: str | Executor = "auto",
     resume: bool = False,
     overwrite: bool = False,
     progress: Callable[[str], Any] | None = None,
@@ -183,16 +185,17 @@ def run_sweep(
     except OSError as error:
         raise files.OutputError(f"{folder}: cannot be written into ({error.strerror})") from None
     paths = [folder / f"{name}.nc" for name in sweep.campaigns]
-    for (name, campaign), path in zip(sweep.campaigns.items(), paths, strict=True):
-        run_to_file(
-            campaign,
-            path,
-            device=device,
-            resume=resume,
-            overwrite=overwrite,
-            progress=progress(name) if progress else None,
-            tell=tell,
-        )
+    with opened(device) as computing:
+        for (name, campaign), path in zip(sweep.campaigns.items(), paths, strict=True):
+            run_to_file(
+                campaign,
+                path,
+                device=computing,
+                resume=resume,
+                overwrite=overwrite,
+                progress=progress(name) if progress else None,
+                tell=tell,
+            )
     files.write(joined(sweep, [files.read(path) for path in paths]), output)
 
 

@@ -14,7 +14,8 @@ from warpimpact.firing.reading import firing_test
 from warpimpact.firing.requirements import REQUIREMENTS, Requirement, requirement_line, threat_of, with_threat
 from warpimpact.firing.simulate import simulate_test
 from warpimpact.plotting.firing import directions_figure
-from warpimpact.solver.worker import Worker
+from warpimpact.runs.choice import executor_for
+from warpimpact.runs.questions import answered
 from warpimpact.view.view import text_of
 
 TEXT = """title = "slots"
@@ -71,7 +72,8 @@ def test_the_interval_of_the_mean_holds_as_often_as_it_says() -> None:
 def test_more_hits_are_computed_where_the_share_is_between_0_and_1() -> None:
     campaign = Campaign.from_text(TEXT, name="a", folder=Path())
     directions = Directions(azimuth=[0, "60 deg"], elevation=[0], first_count=32, max_count=128, half_width=0.01)
-    sector = protect(campaign, directions, Worker("cpu"))
+    with executor_for("cpu") as executor:
+        sector = answered(protect(campaign, directions), executor)
     assert sector.share[1, 0] in (0.0, 1.0)
     assert 0.0 < sector.share[0, 0] < 1.0
     assert sector.hits.ravel().tolist() == [128, 32]
@@ -93,7 +95,7 @@ def test_more_hits_are_computed_where_the_share_is_between_0_and_1() -> None:
 )
 def test_campaigns_that_have_no_directions_are_refused(change: tuple[str, str], message: str) -> None:
     with pytest.raises(CampaignError, match=message):
-        protect(Campaign.from_text(TEXT.replace(*change), name="a", folder=Path()), Directions(), Worker("cpu"))
+        next(protect(Campaign.from_text(TEXT.replace(*change), name="a", folder=Path()), Directions()))
 
 
 STANAG = 'title = "a"\nrequirement = "STANAG 4569 L3"\nthreat = "7.62x51 AP M993 (WC)"\n[target]\nmean = 800\n'

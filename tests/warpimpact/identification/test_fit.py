@@ -8,8 +8,10 @@ import pytest
 
 from warpimpact.identification.evaluate import benches
 from warpimpact.identification.fit import Fit
-from warpimpact.identification.identify import sample
+from warpimpact.identification.identify import sampled
 from warpimpact.identification.parameters import FitError
+from warpimpact.runs.choice import executor_for
+from warpimpact.runs.questions import answered
 
 FitMaker = Callable[..., Fit]
 RESISTANCE = 'resistance = { distribution = "uniform", low = "1 GPa", high = "4 GPa" }'
@@ -142,8 +144,11 @@ def test_more_parameters_than_numbers_are_told(make_fit: FitMaker, text: str) ->
 
 def test_priors_that_exclude_the_data_are_refused(make_fit: FitMaker) -> None:
     fit = make_fit(("600 m/s", "200 m/s"), ("[sampling]", "[sampling]\nsets = 64"))
-    with pytest.raises(FitError, match=r'the priors exclude shot "between holes": the nearest of .* sets'):
-        sample(fit, device="cpu")
+    with (
+        pytest.raises(FitError, match=r'the priors exclude shot "between holes": the nearest of .* sets'),
+        executor_for("cpu") as executor,
+    ):
+        answered(sampled(fit), executor)
 
 
 def test_an_impossible_scene_is_found_before_anything_is_computed(make_fit: FitMaker) -> None:

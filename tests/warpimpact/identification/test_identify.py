@@ -1,6 +1,5 @@
 """From a fit file to a posterior file: groups, resume, figures, and the command."""
 
-from collections import Counter
 from collections.abc import Callable
 from pathlib import Path
 
@@ -9,17 +8,16 @@ import pytest
 import xarray
 
 from warpimpact.cli import main
-from warpimpact.identification import crew, identify
+from warpimpact.identification import identify
 from warpimpact.identification.fit import Fit
 from warpimpact.identification.identify import FitProgress, identify_to_file, rounds
-from warpimpact.identification.posterior import Sampled, learnt, parameters_of
+from warpimpact.identification.posterior import learnt, parameters_of
 from warpimpact.identification.posterior_view import posterior_view
 from warpimpact.plotting.posterior import hits_figure, measured_figure, pairs_figure
 from warpimpact.results import posterior_file
 from warpimpact.results.files import OutputError, ResultError, read_tree
 from warpimpact.runs.parts import Interrupted
 from warpimpact.runs.store import Store
-from warpimpact.solver.worker import Worker
 from warpimpact.view.view import text_of
 
 FitMaker = Callable[..., Fit]
@@ -96,29 +94,6 @@ def test_a_resumed_fit_equals_an_undisturbed_one(
     for group in posterior_file.GROUPS:
         assert one[group].to_dataset().equals(other[group].to_dataset()), group
     assert not path.with_name("posterior.nc.parts").exists()
-
-
-def test_batches_side_by_side_are_those_of_one_thread(
-    make_fit: FitMaker, small: tuple[str, str], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    fit = make_fit(small)
-    monkeypatch.setattr(identify, "BATCH", 8)
-    threads = Counter[int]()
-
-    def sampled(number: int) -> Sampled:
-        def worker(device: str) -> Worker:
-            threads[number] += 1
-            return Worker(device, threads=number)
-
-        monkeypatch.setattr(crew, "Worker", worker)
-        return identify.sample(fit, device="cpu")
-
-    alone, together = sampled(1), sampled(3)
-    assert threads == {1: 1, 3: 1}
-    np.testing.assert_array_equal(together.points, alone.points)
-    for one, other in zip(together.scores, alone.scores, strict=True):
-        for name in ("log_likelihood", "misfit", "noise"):
-            np.testing.assert_array_equal(getattr(one, name), getattr(other, name), err_msg=name)
 
 
 def test_a_batch_with_a_flipped_bit_is_whole_or_none(tmp_path: Path) -> None:

@@ -16,9 +16,8 @@ from warpimpact import Campaign
 from warpimpact.analysis.effectiveness import effectiveness
 from warpimpact.campaign.text import CampaignError
 from warpimpact.cli import main
-from warpimpact.optimisation import search, searcher
+from warpimpact.optimisation import evaluate, search, searcher
 from warpimpact.optimisation.confirm import fresh_seed, is_better
-from warpimpact.optimisation.crew import cluster_crew, local_crew
 from warpimpact.optimisation.design import design_from, read_design
 from warpimpact.optimisation.front_view import front_view
 from warpimpact.optimisation.judged import Record, excesses, objectives, undecided
@@ -26,10 +25,10 @@ from warpimpact.optimisation.optimise import folder_of, optimise, optimise_to_fi
 from warpimpact.optimisation.search import SearchProgress
 from warpimpact.optimisation.searcher import Searcher, front_of, hypervolume
 from warpimpact.optimisation.space import DesignVariable, Space
-from warpimpact.optimisation.work import Work
 from warpimpact.results import files
 from warpimpact.results import front as f
 from warpimpact.results.files import OutputError, read
+from warpimpact.runs.choice import executor_for
 from warpimpact.runs.parts import Interrupted
 from warpimpact.runs.parts import folder_of as folder_of_parts
 from warpimpact.view.view import text_of
@@ -82,8 +81,11 @@ def test_a_space_of_one_point_returns_it(thickness: str) -> None:
     assert 'thickness = "4 mm"' in str(found[f.CAMPAIGN].values[0])
 
 
-def test_a_space_is_searched_whole_and_its_progress_is_that_of_what_keeps_the_constraints() -> None:
+def test_a_space_is_searched_whole_and_its_progress_is_that_of_what_keeps_the_constraints(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     """140 points of 151 break the constraint, more in a row than a search waits for."""
+    monkeypatch.setattr(evaluate, "TOGETHER", 4)
     told: list[SearchProgress] = []
     reference = '[[references]]\nname = "thin"\nplate = { thickness = "3 mm", resistance = "2600 MPa" }\n'
     least = "[constraints]\nsmallest_areal_density = 76.8\n"  # 9.78 mm
@@ -152,12 +154,12 @@ def test_a_killed_search_is_resumed_to_the_same_file(tmp_path: Path) -> None:
     command = [sys.executable, "-m", "warpimpact", "optimise", str(file), "-o", str(killed)]
     process = subprocess.Popen(command, stderr=subprocess.DEVNULL, stdout=subprocess.DEVNULL)
     parts, until = folder_of_parts(killed), time.monotonic() + 120.0
-    while len(list(parts.glob("batch_*"))) < 3 and process.poll() is None and time.monotonic() < until:
+    while len(list(parts.glob("batch_*"))) < 8 and process.poll() is None and time.monotonic() < until:
         time.sleep(0.01)
     process.send_signal(signal.SIGKILL)
     process.wait()
     kept = len(list(parts.glob("batch_*")))
-    assert kept >= 3
+    assert kept >= 8
     assert not killed.exists()
     with pytest.raises(OutputError, match="unfinished search"):
         optimise_to_file(read_design(file), killed)
@@ -285,7 +287,7 @@ def test_the_front_has_designs_that_keep_the_bounds_with_all_their_hits() -> Non
     def planted(density: float, fraction: float, hits: int = 64) -> Record:
         return Record(np.zeros(1), {}, density, ("",), np.full((1, len(plan.keys), hits), fraction))
 
-    state = search._State(plan, Work(plan, local_crew("cpu"), None), lambda now: None)
+    state = search._State(plan, lambda now: None)
     light, strong = planted(20.0, 0.4), planted(30.0, 0.2)
     state._admit([planted(10.0, 0.6), planted(15.0, 0.3, hits=32), planted(12.0, np.nan), planted(25.0, 0.45), light])
     state._admit([strong, planted(40.0, 0.2)])
@@ -320,9 +322,9 @@ def test_the_worst_threat_counts() -> None:
 
 def test_workers_do_not_change_the_front(tmp_path: Path) -> None:
     one = design(*SEARCHED, SEARCH)
-    with cluster_crew(workers=2, device="cpu") as crew:
-        optimise_to_file(one, tmp_path / "many.nc", crew=crew)
-    optimise_to_file(one, tmp_path / "one.nc", crew=local_crew("cpu"))
+    with executor_for("cpu", workers=2) as executor:
+        optimise_to_file(one, tmp_path / "many.nc", device=executor)
+    optimise_to_file(one, tmp_path / "one.nc", device="cpu")
     _same(files.read(tmp_path / "many.nc", f.FRONT), files.read(tmp_path / "one.nc", f.FRONT))
 
 

@@ -13,12 +13,13 @@ import pytest
 
 from warpimpact import Campaign
 from warpimpact.cli import main
-from warpimpact.runs.cluster import _compute_alike, _How, _looked_at, cluster_team
-from warpimpact.runs.compute import HitMap
+from warpimpact.runs.choice import executor_for
+from warpimpact.runs.cluster import _made_by, _on_worker
+from warpimpact.runs.executor import ClusterError, Job
+from warpimpact.runs.jobs import with_ligament
 from warpimpact.runs.run import RunProgress, run_to_file
-from warpimpact.runs.task import Task
-from warpimpact.runs.team import ClusterError
 from warpimpact.solver.device import DeviceError
+from warpimpact.solver.worker import Worker
 
 distributed = pytest.importorskip("distributed")
 
@@ -80,8 +81,8 @@ def test_a_killed_worker_costs_nothing(
             killed_at.append(standing.done)
 
     output, local = tmp_path / "a.nc", tmp_path / "local.nc"
-    team = cluster_team(campaign, address=cluster.scheduler_address, device="cpu")
-    run_to_file(campaign, output, team=team, progress=kill_one)
+    with executor_for("cpu", scheduler=cluster.scheduler_address) as executor:
+        run_to_file(campaign, output, device=executor, progress=kill_one)
     assert killed_at
     assert killed_at[0] < 2500  # in mid-run
     with distributed.Client(cluster) as client:
@@ -91,20 +92,19 @@ def test_a_killed_worker_costs_nothing(
     assert_same_bits(output, local)
 
 
-def test_settings_with_which_dask_does_not_start_are_named(campaign: Campaign, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_settings_with_which_dask_does_not_start_are_named(cluster: object, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("DASK_NONSENSE", "1")
     with (
-        pytest.importorskip("dask").config.set({"distributed.comm.timeouts.connect": "nonsense"}),
+        pytest.importorskip("dask").config.set({"distributed.client.heartbeat": "nonsense"}),
         pytest.raises(
             ClusterError, match=r"Dask does not start \(KeyError: .*nonsense.* variables DASK_NONSENSE; files"
         ),
-        cluster_team(campaign, workers=1),
+        executor_for(scheduler=cluster.scheduler_address),
     ):
         pass
 
 
-def test_workers_that_do_not_end_in_time_hide_no_interrupt(campaign: Campaign, monkeypatch: pytest.MonkeyPatch) -> None:
-    distributed = pytest.importorskip("distributed")
+def test_workers_that_do_not_end_in_time_hide_no_interrupt(cluster: object, monkeypatch: pytest.MonkeyPatch) -> None:
     close = distributed.Client.__exit__
 
     def slow(*arguments: object) -> None:
@@ -112,7 +112,7 @@ def test_workers_that_do_not_end_in_time_hide_no_interrupt(campaign: Campaign, m
         raise TimeoutError
 
     monkeypatch.setattr(distributed.Client, "__exit__", slow)
-    with pytest.raises(KeyboardInterrupt), cluster_team(campaign, workers=1, device="cpu"):
+    with pytest.raises(KeyboardInterrupt), executor_for("cpu", scheduler=cluster.scheduler_address):
         raise KeyboardInterrupt
 
 
@@ -152,10 +152,10 @@ def test_a_mistake_on_a_worker_is_told_and_leaves_nothing(
     assert [file.name for file in tmp_path.iterdir()] == ["campaign.toml"]
 
 
-def test_workers_that_would_compute_other_bits_are_refused(campaign: Campaign) -> None:
+def test_workers_that_would_compute_other_bits_are_refused() -> None:
     kind = {"warpimpact_version": "0.0.0", "warp_version": "1", "device": "cpu"}
     with pytest.raises(DeviceError, match=r'the workers differ: warpimpact_version is "0.0.0" on one and'):
-        _compute_alike(HitMap(), campaign, Task(campaign.sampler().shots(0, 1)), _How("cpu", None, kind))
+        _on_worker(Job(_made_by, ()), "cpu", kind)
 
 
 def test_the_ligament_of_a_free_form_is_found_once_for_all_workers(
@@ -163,7 +163,7 @@ def test_the_ligament_of_a_free_form_is_found_once_for_all_workers(
 ) -> None:
     pattern = {"shape": "supershape", "spacing": ["8 mm", "8 mm"], "forms": [{"radius": "2 mm"}]}
     free_form = campaign.model_copy(update={"plate": campaign.plate.model_copy(update={"pattern": pattern})})
-    found = _looked_at(free_form)
+    found = with_ligament(free_form, worker=Worker("cpu"), report=list)
 
     def again(_: object) -> float:
         raise AssertionError("was computed again")
@@ -185,9 +185,11 @@ def test_a_lost_scheduler_is_told_with_the_way_to_resume(
         raise error
 
     output = tmp_path / "a.nc"
-    team = cluster_team(campaign, address=cluster.scheduler_address, device="cpu")
-    with pytest.raises(ClusterError, match=r"was lost, perhaps killed .* continue with --resume"):
-        run_to_file(campaign, output, team=team, progress=lose_it)
+    with (
+        pytest.raises(ClusterError, match=r"was lost, perhaps killed .* continue with --resume"),
+        executor_for("cpu", scheduler=cluster.scheduler_address) as executor,
+    ):
+        run_to_file(campaign, output, device=executor, progress=lose_it)
 
 
 @pytest.mark.parametrize("lost", ["unreachable", "closed"])
@@ -207,17 +209,19 @@ def test_a_scheduler_that_is_lost_between_tasks_is_told(
     def lose_all(_: RunProgress) -> None:
         monkeypatch.setattr(distributed.Client, request_, lose_it)
 
-    team = cluster_team(campaign, address=cluster.scheduler_address, device="cpu")
-    with pytest.raises(ClusterError, match=r"was lost, perhaps killed .* continue with --resume"):
-        run_to_file(campaign, tmp_path / "a.nc", team=team, progress=lose_all)
+    with (
+        pytest.raises(ClusterError, match=r"was lost, perhaps killed .* continue with --resume"),
+        executor_for("cpu", scheduler=cluster.scheduler_address) as executor,
+    ):
+        run_to_file(campaign, tmp_path / "a.nc", device=executor, progress=lose_all)
 
 
-def test_what_dask_logs_of_a_lost_scheduler_is_not_printed(campaign: Campaign, cluster: object) -> None:
+def test_what_dask_logs_of_a_lost_scheduler_is_not_printed(cluster: object) -> None:
     said = io.StringIO()
     handler = logging.StreamHandler(said)
     logging.getLogger("distributed").addHandler(handler)
     try:
-        with cluster_team(campaign, address=cluster.scheduler_address, device="cpu"):
+        with executor_for("cpu", scheduler=cluster.scheduler_address):
             logging.getLogger("distributed.client").error("Traceback (most recent call last)")
         logging.getLogger("distributed.client").error("printed again")
     finally:
@@ -225,25 +229,11 @@ def test_what_dask_logs_of_a_lost_scheduler_is_not_printed(campaign: Campaign, c
     assert said.getvalue() == "printed again\n"
 
 
-def test_a_scheduler_without_workers_is_told(
-    campaign: Campaign, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_scheduler_without_workers_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("warpimpact.runs.cluster.LONELY", 0.3)
-    with distributed.LocalCluster(n_workers=0, dashboard_address="127.0.0.1:0") as empty:
-        computing = cluster_team(campaign, address=empty.scheduler_address, device="cpu")
-        with pytest.raises(ClusterError, match=r"has had no worker for 0.3 s; start some; .* continue with --resume"):
-            run_to_file(campaign, tmp_path / "a.nc", team=computing)
-
-
-def test_workers_of_this_machine_listen_on_the_loopback(campaign: Campaign, monkeypatch: pytest.MonkeyPatch) -> None:
-    seen = []
-
-    class Seen(distributed.LocalCluster):
-        def __init__(self, **options: object) -> None:
-            super().__init__(**options)
-            seen.append(self.scheduler_address)
-
-    monkeypatch.setattr(distributed, "LocalCluster", Seen)
-    with cluster_team(campaign, workers=1, device="cpu"):
+    with (
+        distributed.LocalCluster(n_workers=0, dashboard_address="127.0.0.1:0") as empty,
+        pytest.raises(ClusterError, match=r"has had no worker for 0.3 s; start some; .* continue with --resume"),
+        executor_for("cpu", scheduler=empty.scheduler_address),
+    ):
         pass
-    assert seen[0].startswith("tcp://127.0.0.1:")

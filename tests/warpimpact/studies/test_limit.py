@@ -21,7 +21,6 @@ from warpimpact.runs.parts import Interrupted
 from warpimpact.runs.replay import replay
 from warpimpact.runs.run import RunProgress, run_to_file
 from warpimpact.runs.task import Task
-from warpimpact.runs.team import local_team
 from warpimpact.scene import Numerics, make_shots
 from warpimpact.solver.limit import limit_velocity
 from warpimpact.solver.limit_search import MOST_RUNS
@@ -57,7 +56,7 @@ def campaign(text: str = TEXT) -> Campaign:
 
 def search(of: Campaign, path: Path, **how: object) -> xarray.Dataset:
     job = LimitMap.of(of, str(how.pop("quantity", "velocity")))
-    run_to_file(of, path, team=local_team(of, "cpu", job), **how)
+    run_to_file(of, path, device="cpu", computation=job, **how)
     return files.read(path)
 
 
@@ -178,7 +177,7 @@ def test_thickness_of_the_base_behind_a_perforated_plate(tmp_path: Path) -> None
     given = TEXT.replace("count = 64", "count = 4").replace('[numerics]\nfidelity = "draft"\n', GIVEN)
     behind = campaign(given + LAYER)
     job = LimitMap.of(behind, "thickness", layer=1)
-    run_to_file(behind, tmp_path / "base.nc", team=local_team(behind, "cpu", job))
+    run_to_file(behind, tmp_path / "base.nc", device="cpu", computation=job)
     found = files.read(tmp_path / "base.nc")
     passed = (found["status"] == Status.PERFORATED).values
     assert passed.any()

@@ -14,7 +14,6 @@ from warpimpact.kernels.status import Status
 from warpimpact.plotting.limit import limit_figure
 from warpimpact.results import files
 from warpimpact.runs.run import run_to_file
-from warpimpact.runs.team import local_team
 from warpimpact.studies.limit import LimitMap
 from warpimpact.studies.limit_view import limit_view
 from warpimpact.view.view import text_of
@@ -48,7 +47,7 @@ NONE = '{ shape = "none" }'
 def search(path: Path, quantity: str = "velocity", of_layer: int = 0, **given: str) -> xarray.Dataset:
     text = TEXT.format(**{"pattern": HOLES, "layer": "", "solid": "true"} | given)
     of = Campaign.from_text(text, name="text", folder=Path())
-    run_to_file(of, path, team=local_team(of, "cpu", LimitMap.of(of, quantity, layer=of_layer)))
+    run_to_file(of, path, device="cpu", computation=LimitMap.of(of, quantity, layer=of_layer))
     return files.read(path)
 
 
@@ -68,7 +67,7 @@ def test_it_is_the_search_of_a_solid_plate_that_is_as_heavy(velocity: xarray.Dat
     alone = search(tmp_path / "a.nc", pattern=NONE)
     thin = TEXT.format(pattern=NONE, layer="", solid="true").replace('"4 mm"', f"{density / 7850.0}")
     of = Campaign.from_text(thin, name="text", folder=Path(), count=1)
-    run_to_file(of, tmp_path / "b.nc", team=local_team(of, "cpu", LimitMap.of(of)))
+    run_to_file(of, tmp_path / "b.nc", device="cpu", computation=LimitMap.of(of))
     assert "solid_limit_velocity" not in alone.variables  # it is its own
     expected = files.read(tmp_path / "b.nc")["limit_velocity"].values
     assert velocity["solid_limit_velocity"].values == pytest.approx(expected, abs=1.0)

@@ -14,12 +14,14 @@ import numpy as np
 import psutil
 import pytest
 
-from warpimpact.identification import crew, identify
+from warpimpact.identification import identify
 from warpimpact.identification.fit import Fit
 from warpimpact.identification.identify import FitProgress
 from warpimpact.identification.likelihood import Score
 from warpimpact.identification.posterior import Sampled
-from warpimpact.solver.worker import Worker
+from warpimpact.runs import executor
+from warpimpact.runs.choice import executor_for
+from warpimpact.runs.questions import answered
 
 FitMaker = Callable[..., Fit]
 PATIENCE = 120.0
@@ -28,9 +30,13 @@ PATIENCE = 120.0
 
 @pytest.fixture
 def fit(make_fit: FitMaker, small: tuple[str, str], monkeypatch: pytest.MonkeyPatch) -> Fit:
-    monkeypatch.setattr(crew, "WORTHWHILE", 0.0)
     monkeypatch.setattr(identify, "BATCH", 8)
     return make_fit(small)
+
+
+def sample(fit: Fit, workers: int | None = None, progress: Callable[[FitProgress], None] | None = None) -> Sampled:
+    with executor_for("cpu", workers=workers, apart=True) as computing:
+        return answered(identify.sampled(fit, progress), computing)
 
 
 def check_equal(one: Sampled, other: Sampled) -> None:
@@ -47,9 +53,9 @@ def test_scores_of_processes_are_those_of_threads(fit: Fit) -> None:
         nonlocal most
         most = max(most, len(multiprocessing.active_children()))
 
-    together = identify.sample(fit, device="cpu", processes=2, progress=count)
+    together = sample(fit, 2, count)
     assert most == 2
-    check_equal(together, identify.sample(fit, device="cpu", progress=count))
+    check_equal(together, sample(fit))
 
 
 def test_a_killed_process_costs_nothing(fit: Fit) -> None:
@@ -60,35 +66,27 @@ def test_a_killed_process_costs_nothing(fit: Fit) -> None:
             killed.add(child.pid or 0)
             child.kill()
 
-    disturbed = identify.sample(fit, device="cpu", processes=2, progress=kill)
+    disturbed = sample(fit, 2, kill)
     assert killed
-    check_equal(disturbed, identify.sample(fit, device="cpu"))
+    check_equal(disturbed, sample(fit))
 
 
 def test_what_a_process_cannot_compute_is_told_by_this_one(fit: Fit, monkeypatch: pytest.MonkeyPatch) -> None:
-    real = crew.evaluate
+    def fails(*_: object, **__: object) -> list[Score]:
+        raise ValueError("of this process")
 
-    def fails_later(fit: Fit, points: crew.Array, worker: Worker, *, seed: int) -> list[Score]:
-        if multiprocessing.active_children():
-            raise ValueError("of this process")
-        return real(fit, points, worker, seed=seed)
-
-    monkeypatch.setattr(crew, "evaluate", fails_later)
-    monkeypatch.setattr(crew, "_scored", logging.debug)  # which returns None
+    monkeypatch.setattr(identify, "evaluate", fails)
+    monkeypatch.setattr(executor, "_in_process", logging.debug)  # which returns None
     with pytest.raises(ValueError, match="of this process"):
-        identify.sample(fit, device="cpu", processes=2)
+        sample(fit, 2)
 
 
 def begun(text: str, small: tuple[str, str], folder: Path) -> tuple[subprocess.Popen[str], list[psutil.Process]]:
     """A fit in a process of its own, and the processes that it has begun."""
     (folder / "fit.toml").write_text(text.replace(small[0], "[sampling]\nsets = 4096\neffective = 4000\nhits = 32"))
     code = (
-        "from warpimpact.solver import device\n"
-        "device.cores = lambda: 2\n"
         "from warpimpact.cli import main\n"
-        "from warpimpact.identification import crew\n"
-        "crew.WORTHWHILE = 0.0\n"
-        "raise SystemExit(main(['identify', 'fit.toml', '--device', 'cpu']))\n"
+        "raise SystemExit(main(['identify', 'fit.toml', '--device', 'cpu', '--workers', '2']))\n"
     )
     process = subprocess.Popen(
         [sys.executable, "-c", code], cwd=folder, stderr=subprocess.PIPE, text=True, start_new_session=True
@@ -113,6 +111,6 @@ def test_an_interrupt_is_told_once(text: str, small: tuple[str, str], tmp_path: 
     os.killpg(process.pid, signal.SIGINT)  # as a terminal does: to all of them, of which two are still loading
     told = process.communicate(timeout=PATIENCE)[1]
     assert process.returncode == 130
-    assert "Traceback" not in told
-    assert told.rstrip().splitlines()[-1].count("--resume") == 1
+    assert "Traceback" not in told, told
+    assert told.count("interrupted") == 1
     assert not psutil.wait_procs(of_crew, timeout=PATIENCE)[1]

@@ -1,0 +1,100 @@
+"""The jobs of a run: shots of a campaign that are computed together, and what a run does before and after them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+
+import numpy as np
+
+from warpimpact.campaign.campaign import Campaign
+from warpimpact.results import attributes as attr
+from warpimpact.results import variables as v
+from warpimpact.results.dataset import images, numbered
+from warpimpact.results.table import Table
+from warpimpact.runs.executor import Executor
+from warpimpact.runs.shards import Shards
+from warpimpact.runs.task import Computation, Task
+from warpimpact.scene import Shots
+from warpimpact.solver.findings import Found
+from warpimpact.solver.worker import Worker
+
+CUDA_SHOTS = 2**17
+"""Shots per task on a GPU, which fewer would not fill."""
+CPU_SHOTS, CPU_SECONDS = 2**14, 0.5
+"""Most shots of a task on the CPU of this machine, and the time that it is to take: its set-up, on one core, is lost in
+that. A task is one shard at least, and one shard where another process computes."""
+
+
+def with_ligament(campaign: Campaign, *, worker: Worker, report: Callable[[int], object]) -> Campaign:
+    """The campaign, which carries the ligament of its plate from then on: that of a free form takes seconds, and every
+    shard tells it."""
+    _ = campaign.plate.ligament
+    return campaign
+
+
+def pilot_job(
+    computation: Computation, campaign: Campaign, *, worker: Worker, report: Callable[[int], object]
+) -> Found | None:
+    """What the pilot of a campaign finds; it reports the levels that it computes."""
+    return computation.pilot(campaign, worker, report)
+
+
+def task_job(
+    computation: Computation, campaign: Campaign, task: Task, *, worker: Worker, report: Callable[[int], object]
+) -> Table:
+    """The columns of the shots of a task; it reports how many shots are done."""
+
+    def progress(done: int, total: int) -> None:
+        report(done)
+
+    return computation.compute(campaign, task, worker, progress)
+
+
+def task_size(executor: Executor, rate: float) -> int:
+    """Shots per task, at a rate of shots per second; 0 is one shard."""
+    if executor.made_by[attr.DEVICE] != "cpu":
+        return CUDA_SHOTS
+    return 0 if executor.is_remote else min(CPU_SHOTS, int(CPU_SECONDS * rate))
+
+
+def solid_shots(campaign: Campaign, shots: Shots, most: int) -> Shots | None:
+    """Those of the first shard's shots that the solid plate of equal areal density takes: one tells of all where no two
+    differ but in where they hit."""
+    plate = campaign.plate
+    if not campaign.output.solid_reference or campaign.target.solid == plate:
+        return None
+    elsewhere = (v.HIT_Y, v.HIT_Z, "offset_y", "offset_z")
+    conditions = [values for name, values in shots.columns.items() if name not in elsewhere]
+    alike = plate.size is None and not any(np.nan_to_num(np.ptp(values, axis=0)).any() for values in conditions)
+    if alike and campaign.burst is None:
+        return shots[:1]
+    return shots[: max(1, most // campaign.at_a_plate) * campaign.at_a_plate]
+
+
+def ranges(shards: Shards, total: int, shots: Callable[[], int]) -> Iterator[range]:
+    """Ranges of shards that are not there, each of about as many shots as are asked for when it begins."""
+    there, count, first = frozenset(shards.there()), -(-total // shards.extent), 0
+    while first < count:
+        most, stop = max(1, shots() // shards.extent), first
+        while stop < min(first + most, count) and stop not in there:
+            stop += 1
+        if stop > first:
+            yield range(first, stop)
+        first = max(stop, first + 1)
+
+
+def split(table: Table, task: range, size: int) -> Iterator[tuple[int, Table]]:
+    """The shards of a task, each with its share of the time and of what was computed; the first one of a campaign keeps
+    what is said once."""
+    hits, of_the_campaign = table.sizes["hit"], [name for names in v.GROUPS.values() for name in names]
+    for place, index in enumerate(task):
+        shard = numbered(table.isel(hit=slice(place * size, (place + 1) * size)), first=index * size)
+        if index:
+            shard = shard.drop_vars(of_the_campaign)
+        time = table.attrs[attr.COMPUTE_TIME] * shard.sizes["hit"] / hits
+        yield index, shard.assign_attrs({attr.COMPUTE_TIME: time} | computed_hits(table, shard.sizes["hit"]))
+
+
+def computed_hits(table: Table, hits: int) -> dict[str, int]:
+    """How many of some hits of a Table were computed, if that is not all the same."""
+    return {attr.COMPUTED_HITS: hits // images(table)} if attr.COMPUTED_HITS in table.attrs else {}
