@@ -2,6 +2,7 @@ VENV := .venv
 PYTHON ?= python3
 INSTALLED := $(VENV)/.installed
 PARALLEL := --numprocesses auto --dist worksteal
+THREADS := 'tests/verification/test_any_company.py::test_threads_and_chunks_change_no_bit[2-5-single]'
 
 .PHONY: demo gallery docs test benchmark clean
 
@@ -22,13 +23,13 @@ benchmark: $(INSTALLED)
 docs: $(INSTALLED)
 	$(VENV)/bin/sphinx-build -q -W --keep-going -j auto -b html -d build/doctrees docs build/docs
 
-# The kernel and verification tests run once more in Warp's debug mode, which checks array bounds.
+# The kernel tests and one run on several threads are repeated in Warp's debug mode, which checks array bounds.
 test: $(INSTALLED)
 	$(VENV)/bin/ruff check .
 	$(VENV)/bin/ruff format --check .
 	$(VENV)/bin/mypy
 	$(VENV)/bin/pytest $(PARALLEL) --durations=40
-	$(VENV)/bin/pytest $(PARALLEL) tests/kernels tests/verification/test_any_company.py::test_threads_and_chunks_change_no_bit --warp-mode debug
+	$(VENV)/bin/pytest $(PARALLEL) tests/kernels $(THREADS) --warp-mode debug
 
 clean:
 	rm -rf $(VENV) build slotted.nc slotted.nc.parts slotted_*.png

@@ -67,7 +67,7 @@ def test_exposure_spread_over_a_wide_length_degrades_nothing(shear_coefficient: 
 # Values of a separate march of the same law on a Cartesian grid of ℓ/16, whose own error is about 2e-3 m/s.
 @pytest.mark.parametrize(
     ("degradation_length", "shear_coefficient", "on_a_grid"),
-    [(0.5e-3, 0.0, 768.309), (0.5e-3, 0.05, 737.719), (0.25e-3, 0.0, 768.473), (0.25e-3, 0.05, 737.819)],
+    [(0.5e-3, 0.0, 768.309), (0.25e-3, 0.05, 737.819)],
 )
 def test_nonlocal_degradation_meets_a_cartesian_grid(
     degradation_length: float, shear_coefficient: float, on_a_grid: float
@@ -122,7 +122,7 @@ def test_arrest_is_an_error_of_the_residual_velocity() -> None:
     with pytest.raises(ValueError, match="arrested"):
         references.local_degradation_residual(**shot, **LASTING)
     with pytest.raises(ValueError, match="arrested"):
-        references.nonlocal_degradation_residual(**shot, **LASTING, degradation_length=2e-3)
+        references.nonlocal_degradation_residual(**shot, **LASTING, degradation_length=2e-3, resolution=2)
 
 
 MASS, VELOCITY, STATIC, QUADRATIC, SHEAR = 5.25e-3, 800.0, 2.6e9, 7850.0, 0.05
