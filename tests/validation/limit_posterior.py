@@ -4,8 +4,6 @@ python -m tests.validation.limit_posterior FILE.nc
 """
 
 import sys
-from functools import partial
-from multiprocessing import Pool
 from pathlib import Path
 
 import emcee
@@ -34,8 +32,7 @@ def posterior(
     model = Model(rows, found.law).weighed(found.values)
     root = np.linalg.cholesky(np.linalg.inv(_curvature(model, found.values)))
     starts = found.values + 0.5 * rng.standard_normal((ENSEMBLES, walkers, len(found.values))) @ root.T
-    with Pool(ENSEMBLES) as pool:
-        walks = np.stack(pool.starmap(partial(_walked, model, steps), enumerate(starts)))[:, burnt:]
+    walks = np.stack([_walked(model, steps, seed, start) for seed, start in enumerate(starts)])[:, burnt:]
     times = np.array([emcee.autocorr.integrated_time(walk, quiet=True, tol=0) for walk in walks])
     chains = walks.reshape(ENSEMBLES, -1, len(found.values))
     told = {

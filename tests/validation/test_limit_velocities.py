@@ -214,7 +214,7 @@ def test_rows_that_cannot_be_predicted(tmp_path: Path, old: str, new: str, said:
 def test_arviz_opens_the_posterior(rows: Rows, tmp_path: Path) -> None:
     arviz = pytest.importorskip("arviz_base")
     some = rows[np.isin(rows.material, ["AA6055-T651", "AA2060-T8", "AA7085-T711"])]
-    tree = posterior(some, fit(some, CHOSEN), steps=300, burnt=100, draws=50)
+    tree = posterior(some, fit(some, CHOSEN), steps=80, burnt=30, draws=50)
     assert tree["posterior"].attrs["r_hat"] < 1.2
     assert tree["posterior"].attrs["effective_sample_size"] > 20.0
     tree.to_netcdf(tmp_path / "posterior.nc")
