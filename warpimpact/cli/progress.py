@@ -35,7 +35,17 @@ def verbosity(*, verbose: int, quiet: bool) -> Iterator[None]:
         quiet: whether no progress is shown.
     """
     global _quiet
-    _quiet = quiet
+    _quiet, of_before = quiet, _quiet
+    try:
+        with _logged(verbose):
+            yield
+    finally:
+        _quiet = of_before
+
+
+@contextmanager
+def _logged(verbose: int) -> Iterator[None]:
+    """Show the log of the package; nothing of it at 0."""
     if not verbose:
         yield
         return

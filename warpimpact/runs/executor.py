@@ -194,7 +194,14 @@ class Processes:
             self._broken = True
             return self._threads.submit(job)
         future = Future[Any]()
-        in_process.add_done_callback(lambda ended: self._pass_on(job, ended, future))
+
+        def passed_on(ended: Future[Any]) -> None:
+            try:
+                self._pass_on(job, ended, future)
+            except Exception as error:  # which a callback would log alone, while who waits for the job waits for ever
+                future.set_exception(error)
+
+        in_process.add_done_callback(passed_on)
         return future
 
     def _begun_pool(self) -> ProcessPoolExecutor:
