@@ -10,13 +10,12 @@ import xarray
 from warpimpact.cli import main
 from warpimpact.identification import identify
 from warpimpact.identification.fit import Fit
-from warpimpact.identification.identify import FitProgress, identify_to_file, rounds
+from warpimpact.identification.identify import rounds
 from warpimpact.identification.posterior import learnt, parameters_of
 from warpimpact.identification.posterior_view import posterior_view
 from warpimpact.plotting.posterior import hits_figure, measured_figure, pairs_figure
 from warpimpact.results import posterior_file
-from warpimpact.results.files import OutputError, ResultError, read_tree
-from warpimpact.runs.parts import Interrupted
+from warpimpact.results.files import ResultError, read_tree
 from warpimpact.runs.store import Store
 from warpimpact.view.view import text_of
 
@@ -70,30 +69,6 @@ def test_figures_are_drawn(posterior: Path) -> None:
     assert len(pairs_figure(tree).axes) == 10
     assert len(measured_figure(tree).axes) == 2
     assert len(hits_figure(tree).axes) == 2
-
-
-def test_a_resumed_fit_equals_an_undisturbed_one(
-    posterior: Path, make_fit: FitMaker, small: tuple[str, str], tmp_path: Path
-) -> None:
-    fit, path = make_fit(small), tmp_path / "posterior.nc"
-
-    def stop(standing: FitProgress) -> None:
-        if standing.done >= 64 and not standing.resumed:
-            raise KeyboardInterrupt
-
-    with pytest.raises(Interrupted, match="batches are saved"):
-        identify_to_file(fit, path, device="cpu", progress=stop)
-    with pytest.raises(OutputError, match="continue it with --resume"):
-        identify_to_file(fit, path, device="cpu")
-    with pytest.raises(OutputError, match=r"cannot be resumed: [\w.]+ was .* and is "):
-        identify_to_file(make_fit(small, ("600 m/s", "601 m/s")), path, device="cpu", resume=True)
-    standings: list[FitProgress] = []
-    identify_to_file(fit, path, device="cpu", resume=True, progress=standings.append)
-    assert standings[-1].resumed >= 64
-    one, other = read_tree(posterior, posterior_file.POSTERIOR), read_tree(path, posterior_file.POSTERIOR)
-    for group in posterior_file.GROUPS:
-        assert one[group].to_dataset().equals(other[group].to_dataset()), group
-    assert not path.with_name("posterior.nc.parts").exists()
 
 
 def test_a_batch_with_a_flipped_bit_is_whole_or_none(tmp_path: Path) -> None:

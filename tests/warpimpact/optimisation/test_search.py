@@ -1,10 +1,6 @@
 """The whole search against fronts that are known, and against itself: killed, resumed, with other seeds."""
 
 import json
-import signal
-import subprocess
-import sys
-import time
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -30,7 +26,6 @@ from warpimpact.results import front as f
 from warpimpact.results.files import OutputError, read
 from warpimpact.runs.choice import executor_for
 from warpimpact.runs.parts import Interrupted
-from warpimpact.runs.parts import folder_of as folder_of_parts
 from warpimpact.view.view import text_of
 
 from ..campaign.test_posterior import posterior
@@ -145,29 +140,6 @@ SEARCHED = (
 def _same(one: xarray.Dataset, other: xarray.Dataset) -> None:
     kept = [name for name in one.variables if name != f.COST]
     xarray.testing.assert_identical(one[kept].drop_attrs(), other[kept].drop_attrs())
-
-
-def test_a_killed_search_is_resumed_to_the_same_file(tmp_path: Path) -> None:
-    file, whole, killed = (tmp_path / name for name in ("d.toml", "whole.nc", "killed.nc"))
-    file.write_text("\n".join([CORE, *SEARCHED, MANY]))
-    optimise_to_file(read_design(file), whole)
-    command = [sys.executable, "-m", "warpimpact", "optimise", str(file), "-o", str(killed)]
-    process = subprocess.Popen(command, stderr=subprocess.DEVNULL, stdout=subprocess.DEVNULL)
-    parts, until = folder_of_parts(killed), time.monotonic() + 120.0
-    while len(list(parts.glob("batch_*"))) < 8 and process.poll() is None and time.monotonic() < until:
-        time.sleep(0.01)
-    process.send_signal(signal.SIGKILL)
-    process.wait()
-    kept = len(list(parts.glob("batch_*")))
-    assert kept >= 8
-    assert not killed.exists()
-    with pytest.raises(OutputError, match="unfinished search"):
-        optimise_to_file(read_design(file), killed)
-    resumed = []
-    optimise_to_file(read_design(file), killed, resume=True, progress=lambda now: resumed.append(now.resumed))
-    assert max(resumed) > 0
-    _same(files.read(whole, f.FRONT), files.read(killed, f.FRONT))
-    assert not parts.exists()
 
 
 def test_rounding_decides_nothing() -> None:

@@ -11,7 +11,6 @@ from warpimpact import Campaign
 from warpimpact.kernels.status import Status
 from warpimpact.results import files
 from warpimpact.results.dataset import solid_reference
-from warpimpact.runs import team
 from warpimpact.runs.compute import HitMap
 from warpimpact.runs.run import run, run_to_file
 
@@ -88,7 +87,7 @@ def test_tasks_of_many_shards_give_the_same_file(tmp_path: Path, monkeypatch: py
     (tmp_path / "a.toml").write_text(SMALL, encoding="utf-8")
     campaign = Campaign.from_toml(tmp_path / "a.toml")
     run_to_file(campaign, tmp_path / "one.nc", device="cpu")
-    monkeypatch.setattr(team, "task_size", lambda kind: 2**17)
+    monkeypatch.setattr("warpimpact.runs.run.task_size", lambda executor, rate: 2**17)
     run_to_file(campaign, tmp_path / "many.nc", device="cpu")
     assert_same_bits(tmp_path / "one.nc", tmp_path / "many.nc")
     assert solids(files.read(tmp_path / "many.nc"))

@@ -124,17 +124,6 @@ class StopsAfter:
             raise KeyboardInterrupt
 
 
-def test_a_resumed_search_has_the_bits_of_a_straight_one(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("warpimpact.runs.shards.FEWEST", 16)
-    text = TEXT.replace('[numerics]\nfidelity = "draft"\n', GIVEN)
-    straight = search(campaign(text), tmp_path / "straight.nc")
-    with pytest.raises(Interrupted, match=r"shards are saved in .*--resume"):
-        search(campaign(text), tmp_path / "broken.nc", progress=StopsAfter(32))
-    resumed = search(campaign(text), tmp_path / "broken.nc", resume=True)
-    for name in straight.variables:
-        assert np.array_equal(straight[name], resumed[name], equal_nan=straight[name].dtype.kind == "f"), name
-
-
 def test_another_quantity_is_not_resumed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("warpimpact.runs.shards.FEWEST", 16)
     text = TEXT.replace('[numerics]\nfidelity = "draft"\n', GIVEN)
