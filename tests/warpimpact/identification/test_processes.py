@@ -83,7 +83,7 @@ def test_what_a_process_cannot_compute_is_told_by_this_one(fit: Fit, monkeypatch
 
 def begun(text: str, small: tuple[str, str], folder: Path) -> tuple[subprocess.Popen[str], list[psutil.Process]]:
     """A fit in a process of its own, and the processes that it has begun."""
-    (folder / "fit.toml").write_text(text.replace(small[0], "[sampling]\nsets = 4096\neffective = 4000\nhits = 32"))
+    (folder / "fit.toml").write_text(text.replace(small[0], "[sampling]\nsets = 1048576\neffective = 65536\nhits = 32"))
     code = (
         "from warpimpact.cli import main\n"
         "raise SystemExit(main(['identify', 'fit.toml', '--device', 'cpu', '--workers', '2']))\n"
