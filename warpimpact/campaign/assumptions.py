@@ -9,6 +9,8 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any, NamedTuple
 
+from pydantic import ValidationError
+
 from ..catalogue.catalogue import Catalogue
 from ..catalogue.entries import Material
 from ..scene import Plate
@@ -43,7 +45,10 @@ def alternatives(campaigns: Mapping[str, Campaign]) -> dict[str, dict[str, Campa
     """Campaigns by name, under every assumption that changes one of them; as they are given comes first."""
     found = {AS_GIVEN: dict(campaigns)}
     for name, changed in _ALTERNATIVES:
-        others = {plate: changed(campaign) for plate, campaign in campaigns.items()}
+        try:
+            others = {plate: changed(campaign) for plate, campaign in campaigns.items()}
+        except ValidationError:  # no campaign can have it, such as a line of flight along the plate
+            continue
         if any(others.values()):
             found[name] = {plate: other or campaigns[plate] for plate, other in others.items()}
     return found
@@ -55,7 +60,8 @@ def _of_plates(change: Callable[[Campaign, Plate], Mapping[str, Any]]) -> Callab
     def changed(campaign: Campaign) -> Campaign | None:
         plates: list[Plate] = [campaign.plate, *campaign.layer]
         updates = [dict(change(campaign, plate)) for plate in plates]
-        scattered = {name for name, _ in campaign.scatter.given}
+        drawn = set() if campaign.drawn is None else {str(path[1]) for path in campaign.drawn.values}
+        scattered = {name for name, _ in campaign.scatter.given} | drawn
         if not any(_differs(plate, update) for plate, update in zip(plates, updates, strict=True)):
             return None
         if scattered & {name for update in updates for name in update}:
@@ -129,9 +135,9 @@ def _turned(name: str, angle: float) -> Callable[[Campaign], Campaign | None]:
     """Another obliquity or yaw; not where these scatter."""
 
     def changed(campaign: Campaign) -> Campaign | None:
+        degrees = math.degrees(getattr(campaign.impact, name) + angle)
         if any(scattered == name for scattered, _ in campaign.scatter.given):
             return None
-        degrees = math.degrees(getattr(campaign.impact, name) + angle)
         impact = campaign.impact.model_copy(update={name: f"{degrees!r} deg"})
         return campaign.model_copy(update={"impact": impact})
 

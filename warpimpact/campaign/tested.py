@@ -171,29 +171,38 @@ def _of_plate(campaign: Campaign, plate: Plate, material: Material | None, figur
         yield from _of_rows(campaign, plate, material)
     else:
         kind = "steel" if steel else "aluminium"
-        ratio, angle = calibres_of(core, plate), math.degrees(campaign.impact.obliquity)
+        ratio = calibres_of(core, plate)
         yield from _outside("thickness", ratio, rows["calibres_low"], rows["calibres_high"], "calibres", kind)
-        yield from _outside("obliquity", angle, 0.0, rows["obliquity_high"], "°", kind)
+        yield from _oblique(campaign, 0.0, math.radians(rows["obliquity_high"]), kind)
         resistance = plate.resistance / 1e9
         yield from _outside("resistance", resistance, rows["resistance_low"], rows["resistance_high"], "GPa", kind)
     if material is None:
         yield from _thin_hard(core, plate, figures["thin hard steel"])
-    yield from _dense(core, plate, figures["carbide"])
+    if material is None or core.threat not in material.rows:
+        yield from _dense(core, plate, figures["carbide"])
 
 
 def _of_rows(campaign: Campaign, plate: Plate, material: Material) -> Iterator[Standing]:
     """Where a plate leaves the rows that its material comes from."""
     core, name = campaign.core, material.name
-    high, farthest = material.calibres_high or math.inf, material.obliquity_high or math.inf
+    high = material.calibres_high or math.inf
     thickest = material.thickness_high or math.inf
     yield from _outside("thickness", 1e3 * plate.thickness, 1e3 * material.thickness_low, 1e3 * thickest, "mm", name)
     yield from _outside("thickness", calibres_of(core, plate), material.calibres_low, high, "calibres", name)
-    angle, low = math.degrees(campaign.impact.obliquity), math.degrees(material.obliquity_low)
-    yield from _outside("obliquity", angle, low, math.degrees(farthest), "°", name)
+    farthest = math.inf if material.obliquity_high is None else material.obliquity_high  # 0 where no row is oblique
+    yield from _oblique(campaign, material.obliquity_low, farthest, name)
     if core.threat not in material.rows:
         threat = "this core" if core.threat is None else f"the {core.threat}"
         told = ", ".join(material.rows)
         yield Standing("the threat", f"no limit velocity of {name} is of {threat}, but of {told}")
+
+
+def _oblique(campaign: Campaign, low: float, high: float, whose: str) -> Iterator[Standing]:
+    """An obliquity beyond the ends of those that were measured [rad]; a shot of a test may lie a little off."""
+    obliquity = campaign.impact.obliquity
+    if not low - _STRAIGHT <= obliquity <= high + _STRAIGHT:
+        ends = math.degrees(low), math.degrees(high)
+        yield from _outside("obliquity", math.degrees(obliquity), ends[0], ends[1], "°", whose)
 
 
 def _of_holes(core: Core, plate: Plate) -> Iterator[Standing]:
@@ -226,7 +235,7 @@ def _thin_hard(core: Core, plate: Plate, figure: Mapping[str, float]) -> Iterato
 
 def _dense(core: Core, plate: Plate, figure: Mapping[str, float]) -> Iterator[Standing]:
     """Of a core of a carbide or a heavy metal that has no rows of its own."""
-    if _density(core) < _CARBIDE or core.threat is not None:
+    if _density(core) < _CARBIDE:
         return
     steel = plate.density >= _HEAVY
     bias, rows = (figure["steel"], figure["steel rows"]) if steel else (figure["aluminium"], figure["aluminium rows"])

@@ -106,8 +106,13 @@ def _compare(arguments: argparse.Namespace) -> int:
 
 def _campaigns(datasets: "Mapping[str, Dataset]", paths: "Mapping[str, Path]") -> "dict[str, Campaign]":
     """The campaigns that results hold; files that they name are looked for beside the results."""
+    from warpimpact.results import attributes as attr
+    from warpimpact.results.files import ResultError
     from warpimpact.runs.replay import campaign_in
 
+    for name, dataset in datasets.items():
+        if attr.LIMIT in dataset.attrs:
+            raise ResultError(f"--assumptions: {name} is a search of limits, but it takes results of warpimpact run")
     return {name: campaign_in(dataset, paths[name].parent) for name, dataset in datasets.items()}
 
 

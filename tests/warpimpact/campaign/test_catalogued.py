@@ -149,6 +149,7 @@ SLOTS = {"shape": "slot", "length": "12 mm", "width": "4 mm", "spacing": ["8 mm"
 HOLED = STEEL | {"thickness": "4.1 mm", "pattern": SLOTS}
 NARROW = HOLED | {"pattern": SLOTS | {"spacing": ["4.3 mm", "16 mm"], "staggered": False}}
 BLUNT = {"shape": "ogive", "crh": 0.5, "diameter": "7 mm", "length": "20 mm", "mass": "4 g"}
+ALUMINIUM = {"material": "AA2139-T8", "thickness": "40 mm"}
 BEHIND = [{"thickness": "7 mm", "resistance": "4 GPa"}]
 
 
@@ -182,6 +183,16 @@ BEHIND = [{"thickness": "7 mm", "resistance": "4 GPa"}]
             {"plate": STEEL | {"thickness": "5 mm"}},
             {"plate": {"material": "HHA Class 1", "thickness": "5 mm"}},
             "of its Y at one calibre",
+        ),
+        (
+            {"plate": ALUMINIUM, "impact": {"velocity": 800.0, "obliquity": "30 deg"}},
+            {"plate": ALUMINIUM, "impact": {"velocity": 800.0, "obliquity": "1 deg"}},
+            "obliquity (plate): 30°, but limit velocities of AA2139-T8 are of 0°",
+        ),
+        (
+            {"core": {"threat": "14.5 mm BS41"}},
+            {"core": {"threat": "14.5 mm BS41"}, "plate": {"material": "HHA Class 1", "thickness": "20 mm"}},
+            "carbide core in steel 15%",
         ),
         ({"core": BLUNT}, {"core": BLUNT | {"crh": 3.0}}, "the blunt nose: it is 0.35 diameters long"),
         (

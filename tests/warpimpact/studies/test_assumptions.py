@@ -70,6 +70,9 @@ def test_what_a_campaign_does_not_have_is_not_assumed() -> None:
     assert holed["weakening (β = 0.8 in 1 µs)"]["a"].plate.degradation == 0.8
     drawn = {"distribution": "normal", "mean": "2.6 GPa", "std": "0.1 GPa"}
     assert "Y at its low end" not in alternatives({"a": campaign(plate=PLATE | {"resistance": drawn})})
+    steep = campaign(impact={"velocity": "825 m/s", "obliquity": "88 deg"})
+    assert "5° more oblique" not in alternatives({"a": steep})
+    assert AS_GIVEN in alternatives({"a": campaign(numerics={"scheme": "nodal"})})
     both = alternatives({"a": campaign(plate=solid), "b": campaign()})["no weakening (β = 1)"]
     assert both["a"] == campaign(plate=solid)  # one that has it already stays
 
