@@ -21,7 +21,7 @@ from warpimpact.campaign.text import CampaignError
 from warpimpact.kernels.status import Status
 from warpimpact.records.group import failures
 from warpimpact.runs.executor import Job
-from warpimpact.runs.questions import Arrays, Question, Round
+from warpimpact.runs.questions import Arrays, Question, Round, RoundProgress
 from warpimpact.scene import Numerics, Shots
 from warpimpact.scene.model import Model
 from warpimpact.scene.units import Angle, Number, PositiveSpeed
@@ -168,13 +168,12 @@ def protect(
     numerics = str(piloted["numerics"])
     open_, count = list(cells), directions.first_count
     while open_:
-        settled = len(cells) - len(open_)
         known = len(passed[open_[0]])
         more = sampler.shots(known, count - known)
         results = yield Round(
             [Job(_answers, (campaign, toward(more, directions, cell), numerics)) for cell in open_],
             [f"{directions.azimuth[row]} {directions.elevation[column]} up to {count}" for row, column in open_],
-            lambda now, settled=settled: progress(settled + int(now.done), len(cells)),  # type: ignore[misc]
+            _told_from(len(cells) - len(open_), len(cells), progress),
         )
         for cell, answers in zip(open_, results, strict=True):
             passed[cell] = np.concatenate([passed[cell], answers["passed"]])
@@ -219,6 +218,11 @@ def _wanted(campaign: Campaign, passed: Array, directions: Directions) -> bool:
 
 def _estimate(campaign: Campaign, passed: Array) -> Estimate:
     return estimate_of("share", passed, replicates=campaign.replicates)
+
+
+def _told_from(settled: int, total: int, progress: Callable[[int, int], object]) -> Callable[[RoundProgress], object]:
+    """Tells of a round in which so many of all directions are settled."""
+    return lambda now: progress(settled + int(now.done), total)
 
 
 def _sector(campaign: Campaign, directions: Directions, passed: dict[tuple[int, int], Array]) -> Sector:
