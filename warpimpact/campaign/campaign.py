@@ -13,8 +13,7 @@ from pydantic import Field, PrivateAttr, ValidationError, model_validator
 
 from ..results.files import ResultError
 from ..results.kinds import CAMPAIGN
-from ..results.variables import BENDING_VARIABLES, BROKEN_VARIABLES, DEPTH
-from ..results.vocabulary import BASE
+from ..results.measures import Measure
 from ..scene import (
     AnyCore,
     Burst,
@@ -45,6 +44,7 @@ from ..scene.symmetry import unsymmetric
 from ..scene.target import MOST_LAYERS
 from ..scene.units import Number, PositiveLength, Title
 from .catalogued import catalogue_of, with_materials, with_threat
+from .needs import lacking
 from .plausible import check_plausible, warn_of
 from .posterior import DrawnSampler, Posterior, read_posterior
 from .problems import sentence
@@ -207,6 +207,17 @@ class Campaign(Model):
             return BurstSampler(self.impact, self.hits, self.plate, self.burst, **own)
         return Sampler(*sampled)
 
+    def lacking(self, measure: Measure) -> str:
+        """The keys that it lacks for a measure of its hits; empty if it lacks none."""
+        breakable = self.core.strength is not None or "strength" in (self.hits.listed or {})
+        return lacking(
+            measure,
+            standoffs=self.output.standoffs,
+            layered=bool(self.layer),
+            bending=self.output.bending,
+            breakable=breakable,
+        )
+
     @property
     def at_a_plate(self) -> int:
         """Shots at one plate."""
@@ -264,16 +275,12 @@ class Campaign(Model):
     def _goes_together(self) -> Self:
         """All that scene/exclusions.py has rows for."""
         stop, hits, numerics = self.stop, self.hits, self.numerics
-        variable = "" if stop is None or stop.measure.quantity.need is None else stop.measure.quantity.need.name
-        told = stop is not None and f'stop.quantity = "{stop.quantity}"'
         check_together(
             unsymmetric(self.scatter, self.layer)
             | {
                 exclusions.STOP: stop is not None,
                 exclusions.UNEVEN: hits.sampling in ("grid", "list") and f'hits.sampling = "{hits.sampling}"',
                 exclusions.ONE_SCRAMBLING: hits.sampling == "sobol" and self.replicates == 1,
-                exclusions.STOP_BENDING: variable in BENDING_VARIABLES and told,
-                exclusions.STOP_BROKEN: variable in BROKEN_VARIABLES and told,
                 exclusions.IMAGES: hits.irreducible,
                 exclusions.LISTED_STRENGTH: "strength" in (hits.listed or {}),
                 exclusions.BURST: self.burst is not None,
@@ -301,14 +308,8 @@ class Campaign(Model):
         measure, asked = self.stop.measure, f'stop.quantity = "{self.stop.quantity}"'
         if measure.is_limit:
             raise ValueError(f"{asked} is told by warpimpact limit, which takes no [stop]")
-        if measure.quantity.need is not None and measure.quantity.need.name in (BASE.name, DEPTH) and not self.layer:
-            raise ValueError(f"{asked} needs {BASE.keys}")
-        if measure.quantity.has_standoff and not self.output.standoffs:
-            raise ValueError(f"{asked} needs output.standoffs")
-        at = measure.standoff
-        if at is not None and not np.isclose(at, self.output.standoffs, rtol=1e-9, atol=0.0).any():
-            standoffs = ", ".join(f"{standoff:g} m" for standoff in self.output.standoffs)
-            raise ValueError(f"got stop.quantity at {at:g} m, but it must be one of output.standoffs: {standoffs}")
+        if keys := self.lacking(measure):
+            raise ValueError(f"{asked} needs {keys}")
         return self
 
     @model_validator(mode="after")

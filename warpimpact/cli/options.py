@@ -48,15 +48,15 @@ def add_output(parser: argparse.ArgumentParser, metavar: str, text: str) -> None
     parser.add_argument("-o", "--output", type=Path, metavar=metavar, help=text)
 
 
-def add_measures(parser: argparse.ArgumentParser) -> None:
-    """`--measure`: what is asked of the results."""
+def add_measures(parser: argparse.ArgumentParser, default: str = "the measures of docs/protection.md") -> None:
+    """`--measure`: what is asked of the results; `default` says what is shown without it."""
     parser.add_argument(
         "--measure",
         action="append",
         default=[],
         metavar="TEXT",
         help='what is asked, such as "worst_tenth(residual_energy_density@130mm)", "P(inclination > 40 deg)" or V50; '
-        "may be given several times (default: the measures of docs/protection.md)",
+        f"may be given several times (default: {default})",
     )
 
 

@@ -31,7 +31,7 @@ def add_inspect(commands: Commands) -> None:
         _inspect,
         summary="print what a result contains",
         description="Print the origin of a result, its numbers with their intervals, and the shots that failed. Of a "
-        "posterior, a search, a firing test or a replayed hit print what the command that wrote it prints.",
+        "sweep, a posterior, a search, a firing test or a replayed hit print what the command that wrote it prints.",
         example="inspect slotted.nc",
     )
     add_result(parser)
@@ -53,7 +53,7 @@ def _inspect(arguments: argparse.Namespace) -> None:
 
     kind = files.kind_of(arguments.result)
     if kind is not None and is_shown(kind) and not (arguments.campaign or arguments.discrepancy):
-        print(text_of(view_of(arguments.result, kind)))
+        print(text_of(view_of(arguments.result, kind, arguments.measure)))
         return
     with files.opened(arguments.result) as dataset:
         asked = dataset.assign_attrs({attr.DISCREPANCY_COUNTS: 1}) if arguments.discrepancy else dataset

@@ -12,6 +12,7 @@ from .options import (
     add_command,
     add_computing,
     add_count,
+    add_measures,
     add_output,
     add_overwrite,
     executor_of,
@@ -32,6 +33,7 @@ def add_sweep(commands: Commands) -> None:
         example="sweep campaigns/obliquity_sweep.toml -o sweep.nc",
     )
     add_campaign(parser)
+    add_measures(parser, "velocity, deflection and tilt behind the target, and the share that passes")
     add_output(parser, "SWEEP.nc", "file of the sweep (default: the campaign's name, in this folder)")
     add_computing(parser)
     add_count(parser)
@@ -40,13 +42,16 @@ def add_sweep(commands: Commands) -> None:
 
 
 def _sweep(arguments: argparse.Namespace) -> None:
+    from warpimpact.analysis.swept import sweep_view
     from warpimpact.campaign.tested import summary_of_all
     from warpimpact.plotting.sweep import sweep_figure
     from warpimpact.results import files
     from warpimpact.results.checks import SWEEP
     from warpimpact.studies.sweep import folder_of, read_sweep, run_sweep
+    from warpimpact.view.view import text_of
 
     sweep = read_sweep(arguments.campaign, count=arguments.count)
+    sweep.check(arguments.measure)
     output = arguments.output or Path(arguments.campaign.stem + ".nc")
     picture = output.with_suffix(".png")
     check_place(output)
@@ -68,7 +73,9 @@ def _sweep(arguments: argparse.Namespace) -> None:
             progress=named,
             tell=warn,
         )
+    dataset = files.read(output, SWEEP)
+    print(text_of(sweep_view(dataset, arguments.measure)))
     print(summary_of_all(sweep.campaigns.values(), "points"))
-    sweep_figure(files.read(output, SWEEP)).savefig(picture, dpi=150)
+    sweep_figure(dataset, arguments.measure).savefig(picture, dpi=150)
     for written in (output, folder_of(output), picture):
         print(written)

@@ -6,7 +6,7 @@ A kind with a view of its own (`results.kind.Kind`) is shown without a line here
 from __future__ import annotations
 
 from base64 import b64encode
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from html import escape
 from io import BytesIO
@@ -14,14 +14,16 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, NamedTuple
 
+from warpimpact.analysis.swept import sweep_view
 from warpimpact.firing.firing_view import firing_view
 from warpimpact.identification.posterior_view import posterior_view
 from warpimpact.optimisation.front_view import front_view
 from warpimpact.plotting.firing import directions_figure, firing_figure
 from warpimpact.plotting.posterior import hits_figure, measured_figure, pairs_figure
+from warpimpact.plotting.sweep import sweep_figure
 from warpimpact.plotting.trajectory import FIGURES
 from warpimpact.results import attributes as attr
-from warpimpact.results import files, firing, front, posterior_file, replayed_hit
+from warpimpact.results import checks, files, firing, front, posterior_file, replayed_hit
 from warpimpact.results.kind import Kind
 from warpimpact.view.view import Section, html_of
 
@@ -39,12 +41,14 @@ class _Shown(NamedTuple):
     """What is shown of a kind beside its own view.
 
     Attributes:
-        view: its view, where results has none.
+        view: its view, where results has none; of a kind with measures it takes their texts, too.
+        measured: whether it takes measures.
         figures: by their headings, each with the variable that it needs, empty if none.
         asked: attribute with the text of the file that it was computed from.
     """
 
-    view: Callable[[Any], list[Section]] | None = None
+    view: Callable[..., list[Section]] | None = None
+    measured: bool = False
     figures: Mapping[str, tuple[str, Callable[[Any], Figure]]] = MappingProxyType({})
     asked: str = ""
 
@@ -52,21 +56,22 @@ class _Shown(NamedTuple):
 _SHOWN = {
     posterior_file.POSTERIOR.name: _Shown(
         posterior_view,
-        {
+        figures={
             "Parameters, in pairs": ("", pairs_figure),
             "Measured and computed": ("", measured_figure),
             "Where the shots hit": ("", hits_figure),
         },
-        posterior_file.FIT,
+        asked=posterior_file.FIT,
     ),
     front.FRONT.name: _Shown(front_view, asked=front.DESIGN),
+    checks.SWEEP.name: _Shown(sweep_view, measured=True, figures={"By input": ("", sweep_figure)}, asked=attr.CAMPAIGN),
     firing.FIRING.name: _Shown(
         firing_view,
-        {
+        figures={
             "What the tests report": (firing.SHARE, firing_figure),
             "By direction": (firing.DIRECTION_SHARE, directions_figure),
         },
-        firing.TEST,
+        asked=firing.TEST,
     ),
     replayed_hit.HISTORY.name: _Shown(
         figures={draw.__name__.replace("_", " ").capitalize(): ("", draw) for draw in FIGURES}
@@ -79,19 +84,26 @@ def is_shown(kind: Kind) -> bool:
     return kind.view is not None or kind.name in _SHOWN
 
 
-def view_of(path: Path, kind: Kind) -> list[Section]:
+def view_of(path: Path, kind: Kind, measures: Sequence[str] = ()) -> list[Section]:
     """The view of a file of a kind that is shown.
 
+    Args:
+        measures: texts of what is asked of it; by default what the kind shows.
+
     Raises:
-        ResultError: it cannot be read.
+        ResultError: it cannot be read, or has no such measures.
     """
-    return _view(kind, _loaded(path, kind))
+    return _view(kind, _loaded(path, kind), measures)
 
 
-def _view(kind: Kind, dataset: Any) -> list[Section]:
-    view = kind.view or _SHOWN[kind.name].view
+def _view(kind: Kind, dataset: Any, measures: Sequence[str] = ()) -> list[Section]:
+    shown = _SHOWN.get(kind.name, _Shown())
+    if measures and not shown.measured:
+        raise files.ResultError(f"--measure: got {kind.name}, but measures are those of a map of hits or a sweep")
+    asked = (measures,) if shown.measured else ()
+    view: Callable[..., list[Section]] | None = kind.view or shown.view
     assert view is not None  # `is_shown`
-    return view(dataset)
+    return view(dataset, *asked)
 
 
 def _loaded(path: Path, kind: Kind) -> Any:

@@ -179,7 +179,8 @@ RESULT = Kind(
 )
 SWEEP = Kind(
     "a sweep",
-    "its points, in the folder beside it, are results, as is what isel(INPUT=0) chooses of it",
+    "warpimpact inspect and report take it; its points, in the folder beside it, are results, as is what isel(INPUT=0) "
+    "chooses of it",
     maker="warpimpact sweep",
     misuse=lambda dataset: _missing(dataset, *v.COORDINATES),
     fault=_sweep_fault,

@@ -20,7 +20,6 @@ UNEVEN = 'hits.sampling = "grid" or "list"'
 ONE_SCRAMBLING = "hits.replicates = 1"
 LISTED_STRENGTH = "a column strength in hits.file"
 LAYER_STANDOFFS = "output.layer_standoffs"
-STOP_BENDING, STOP_BROKEN = "stop.quantity of a bending moment or stress", "stop.quantity of broken cores"
 WHOLE_PLATE, SIZE, MARGIN = 'hits.area = "plate"', "size of the plate", "margin"
 BY_TIME, STAGGERED, HOLES = "plate.degradation_interval", "staggered", "holes"
 CELLS = 'shape = "supershape", "level_set" or "polygons"'
@@ -70,8 +69,6 @@ NEEDED = (
     Rule(LISTED_STRENGTH, BENDING, "a core breaks by its bending stress"),
     Rule(STRENGTH, BENDING, "a core breaks by its bending stress"),
     Rule(LAYER_STANDOFFS, LAYERS, "behind a plate alone output.standoffs count"),
-    Rule(STOP_BENDING, BENDING, "it is not recorded otherwise"),
-    Rule(STOP_BROKEN, STRENGTH, "other cores do not break"),
     Rule(WHOLE_PLATE, SIZE, "only a finite plate can be covered"),
     Rule(MARGIN, SIZE, "only a finite plate has a rim"),
 )

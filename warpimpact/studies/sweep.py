@@ -22,6 +22,7 @@ from warpimpact.results import attributes as attr
 from warpimpact.results import files
 from warpimpact.results import variables as v
 from warpimpact.results.kinds import CAMPAIGN
+from warpimpact.results.measures import Measure
 from warpimpact.runs.choice import opened
 from warpimpact.runs.executor import Executor
 from warpimpact.runs.run import run_to_file
@@ -85,6 +86,23 @@ class Sweep:
     def shape(self) -> tuple[int, ...]:
         """Number of values of every input."""
         return tuple(len(one.values) for one in self.inputs)
+
+    def check(self, texts: Sequence[str]) -> None:
+        """Refuse measures that a point will not have.
+
+        Raises:
+            CampaignError: names the measure, the point and what it needs.
+        """
+        for text in texts:
+            try:
+                measure = Measure.parse(text)
+            except ValueError as error:
+                raise CampaignError(f"--measure: {error}") from None
+            if measure.is_limit:
+                raise CampaignError(f"--measure: {text} is told by warpimpact limit")
+            for name, campaign in self.campaigns.items():
+                if keys := campaign.lacking(measure):
+                    raise CampaignError(f"--measure: {text} needs {keys}, which point {name} lacks")
 
 
 def read_sweep(path: str | Path, *, count: int | None = None) -> Sweep:

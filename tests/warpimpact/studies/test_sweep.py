@@ -88,8 +88,8 @@ def test_a_point_is_a_result_and_a_sweep_says_that_it_is_one(folder: Path, capsy
     assert len(points) == 6
     assert main(["replay", str(points[4]), "--hit", "3", "-o", str(folder / "hit.nc")]) == 0
     assert "bit-identical" in capsys.readouterr().out
-    assert main(["inspect", str(folder / "a.nc")]) == 2
-    assert "is a sweep, as warpimpact sweep writes, not a map of hits; its points" in capsys.readouterr().err
+    assert main(["plot", str(folder / "a.nc")]) == 2
+    assert "is a sweep, as warpimpact sweep writes, not a map of hits; warpimpact insp" in capsys.readouterr().err
     files.read(folder / "a.nc", SWEEP).isel(obliquity=1, width=0).to_netcdf(folder / "chosen.nc")
     assert main(["inspect", str(folder / "chosen.nc")]) == 0
     assert main(["run", str(folder / "a.toml")]) == 2
@@ -150,8 +150,35 @@ def test_the_figure_shows_means_against_the_input(folder: Path) -> None:
     status = sweep["status"].copy(deep=True)
     status[{"hit": slice(None, None, 2)}] = 1
     some = sweep_figure(sweep.assign(status=status)).axes[0]
-    assert some.get_ylabel().endswith("of the cores that passed")
     assert {text.get_text() for text in some.texts} == {"50%"}
+
+
+def test_a_sweep_is_asked_in_the_language_of_measures(
+    folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    sweep = str(folder / "a.nc")
+    assert main(["inspect", sweep, "--measure", "quantile(residual_velocity, 0.05)"]) == 0
+    shown = capsys.readouterr().out.splitlines()
+    assert shown[3] == "residual velocity, 5 % quantile [m/s]"
+    point = sorted(folder_of(folder / "a.nc").glob("*.nc"))[4]  # 30°, 4 mm
+    assert main(["inspect", str(point), "--measure", "quantile(residual_velocity, 0.05)"]) == 0
+    alone = next(line for line in capsys.readouterr().out.splitlines() if "5 % quantile" in line)
+    assert shown[9].split()[:5] == ["30", "deg", "4", "mm", alone.split()[6]]
+    assert main(["report", sweep, "-o", str(tmp_path / "a.html")]) == 0
+    page = (tmp_path / "a.html").read_text(encoding="utf-8")
+    assert "P(perforated)" in page
+    assert page.count("<img") == 1
+    panels = sweep_figure(files.read(folder / "a.nc", SWEEP), ["P(stopped)"]).axes
+    assert [axes.get_ylabel() for axes in panels] == ["P(stopped)"]
+    for text, reason in {
+        "P(broken)": "needs output.bending = true and core.strength, which point 0000_obliquity_0_deg_width_3_mm lacks",
+        "mean(tilt@1m)": "needs 1 m in output.standoffs, which are 0.05 m, 0.13 m",
+        "V50": "is told by warpimpact limit",
+        "mean(speed)": 'got "speed", but it must be one of',
+    }.items():
+        assert main(["sweep", str(folder / "a.toml"), "-o", str(tmp_path / "b.nc"), "--measure", text]) == 2
+        assert reason in capsys.readouterr().err
+        assert not (tmp_path / "b_points").exists()
 
 
 @pytest.mark.parametrize(

@@ -1,0 +1,89 @@
+"""The measures of a sweep: an estimate for every combination of the inputs that were swept."""
+
+from __future__ import annotations
+
+import itertools
+import json
+from collections.abc import Iterator, Sequence
+from typing import NamedTuple
+
+import numpy as np
+import xarray
+
+from warpimpact.analysis.estimates import estimated
+from warpimpact.analysis.numbers import ends_of, intervals_text
+from warpimpact.results import attributes as attr
+from warpimpact.results import variables as v
+from warpimpact.results.dataset import failed
+from warpimpact.results.files import ResultError
+from warpimpact.results.measures import Measure
+from warpimpact.statistics.intervals import Estimate
+from warpimpact.view.view import Column, Section, Table, number
+
+SHOWN = (f"mean({v.RESIDUAL_VELOCITY})", f"mean({v.DEFLECTION})", f"mean({v.TILT})", "P(perforated)")
+"""Measures that are shown of a sweep unless others are asked for, as far as it has them."""
+
+
+class Point(NamedTuple):
+    """One combination of the inputs.
+
+    Attributes:
+        labels: values of the inputs as the campaign says them, by input.
+        estimates: of the measures, in the units of the Dataset.
+        hits: number of the hits that did not fail.
+    """
+
+    labels: dict[str, str]
+    estimates: dict[Measure, Estimate]
+    hits: int
+
+
+def measures_of(sweep: xarray.Dataset, texts: Sequence[str] = ()) -> list[Measure]:
+    """The measures that are asked of a sweep, without a text those of `SHOWN`; of tilts the largest stand-off counts.
+
+    Raises:
+        ResultError: a text is no measure, or the sweep lacks what it needs.
+    """
+    try:
+        if texts:
+            return [Measure.parse(text).of(sweep) for text in texts]
+        measures = [Measure.parse(text) for text in SHOWN]
+        return [measure.of(sweep) for measure in measures if not measure.quantity.lacking(sweep)]
+    except ValueError as error:
+        raise ResultError(f"measure: {error}") from None
+
+
+def inputs_of(sweep: xarray.Dataset) -> dict[str, list[str]]:
+    """The values of every input as the campaign says them; without an input of which one value was chosen."""
+    return {name: labels for name, labels in json.loads(sweep.attrs[attr.SWEEP]).items() if name in sweep.dims}
+
+
+def points(sweep: xarray.Dataset, measures: Sequence[Measure]) -> Iterator[Point]:
+    """Every combination, the last input changing fastest."""
+    inputs = inputs_of(sweep)
+    for combination in itertools.product(*map(enumerate, inputs.values())):
+        chosen = dict(zip(inputs, combination, strict=True))
+        point = sweep.isel({name: place for name, (place, _) in chosen.items()})
+        point = point.isel(hit=np.flatnonzero(point[v.STATUS].notnull().values))
+        labels = {name: label for name, (_, label) in chosen.items()}
+        yield Point(labels, estimated(point, measures), int((~failed(point)).sum()))
+
+
+def sweep_view(sweep: xarray.Dataset, texts: Sequence[str] = ()) -> list[Section]:
+    """The view of a sweep: a table for every measure, with a row for every combination."""
+    measures = measures_of(sweep, texts)
+    every = list(points(sweep, measures))
+    title = str(sweep.attrs.get(attr.TITLE, "untitled"))
+    told = f"{len(every)} combinations of {', '.join(inputs_of(sweep))}, with at most {sweep.sizes[v.HIT]} hits each"
+    return [Section([told], title), *(Section([_table(every, measure)], measure.title) for measure in measures)]
+
+
+def _table(every: Sequence[Point], measure: Measure) -> Table:
+    columns = [Column(name.replace("_", " "), right=True) for name in every[0].labels]
+    columns += [number("value"), Column("95 % interval"), Column("hits that count", write="{:.1%}".format, right=True)]
+    rows = []
+    for point in every:
+        estimate = point.estimates[measure].times(measure.display.factor)
+        counted = estimate.count / point.hits if point.hits else 0.0
+        rows.append((*point.labels.values(), estimate.value, intervals_text(ends_of(estimate)), counted))
+    return Table(columns, rows)
