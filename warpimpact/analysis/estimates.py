@@ -3,6 +3,7 @@ shots that they are made of."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
@@ -10,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from warpimpact.analysis.survival import by_draws, over_draws
+from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
 from warpimpact.results.dataset import finer_pair
 from warpimpact.results.measures import STATUSES, Measure
@@ -21,6 +23,7 @@ from warpimpact.statistics.tails import quantile_weights, worst_tenth_weights
 if TYPE_CHECKING:
     from warpimpact.results.table import Result
 
+_LIMITS = tuple(names.value for names in v.LIMITS.values())
 SLICE = 2**18
 """Hits in memory at a time."""
 
@@ -75,7 +78,15 @@ def evidence(dataset: Result, measures: Sequence[Measure], confidence: float = 0
         if measure.has_interval:
             units = "" if measure.name.startswith("limit_") else measure.units
             estimate = over_draws(dataset, estimate, drawn, units=units).within(measure.least, measure.most)
+        if measure.kind == "quantile" and measure.name in _LIMITS:
+            estimate = _beyond(estimate, dataset.attrs.get(attr.LIMIT_HIGHEST, math.inf))
         yield Evidence(measure, estimate, values, drawn)
+
+
+def _beyond(estimate: Estimate, highest: float) -> Estimate:
+    """A quantile of limits, of which an end at the largest value tried lies beyond it."""
+    value, low, high = (math.inf if end >= highest else end for end in (estimate.value, estimate.low, estimate.high))
+    return replace(estimate, value=value, low=low, high=high)
 
 
 def by_hit_of(dataset: Result, measure: Measure) -> Array:

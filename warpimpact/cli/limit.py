@@ -4,7 +4,7 @@ import argparse
 from pathlib import Path
 from typing import Any
 
-from .options import Commands, add_campaign, add_command, add_output, at_least, read_option
+from .options import Commands, add_campaign, add_command, add_measures, add_output, at_least, read_option
 from .paths import check_picture, check_place, replaces
 from .progress import warn
 from .run import add_run_options, failure_code, run_shown
@@ -23,6 +23,7 @@ def add_limit(commands: Commands) -> None:
         example="limit campaigns/limit_velocity.toml -o limit.nc",
     )
     add_campaign(parser)
+    add_measures(parser, "V50 and V05, or H50 and H05 of thicknesses")
     add_output(parser, "LIMIT.nc", "result file (default: the campaign's name and _limit.nc); the figure is LIMIT.png")
     parser.add_argument(
         "--quantity",
@@ -60,11 +61,12 @@ def _limit(arguments: argparse.Namespace) -> int:
     check_place(output)
     check_picture(picture, overwrite=replaces(arguments, output))
     computation = LimitMap.of(campaign, arguments.quantity, _tolerance(arguments), arguments.layer)
+    computation.check(arguments.measure)
     if sentence := warning_of(campaign, arguments.quantity):
         warn(sentence)
     run_shown(campaign, output, arguments, computation)
     dataset = files.read(output)
-    print(text_of(limit_view(dataset)))
+    print(text_of(limit_view(dataset, arguments.measure)))
     for line in evidence_lines(dataset, file=str(output)):
         print(line)
     limit_figure(dataset).savefig(picture, dpi=150)

@@ -11,6 +11,7 @@ import numpy as np
 import xarray
 from matplotlib.figure import Figure
 
+from warpimpact.analysis.estimates import estimated
 from warpimpact.analysis.hit_map import hit_points
 from warpimpact.analysis.proxy import inclination
 from warpimpact.plotting.cell import draw_values, limits, scale_of, shown
@@ -19,8 +20,7 @@ from warpimpact.plotting.style import BLUE, GREY, VERMILION
 from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
 from warpimpact.results.limits import solid_limits
-from warpimpact.studies.limit import QUANTILES, quantiles
-from warpimpact.studies.limit_view import promise_line, shown_unit
+from warpimpact.studies.limit_view import measures_of, promise_line, shown_unit
 from warpimpact.studies.published import published_beside
 
 if TYPE_CHECKING:
@@ -150,13 +150,13 @@ def _draw_curve(axes: Axes, dataset: xarray.Dataset, quantity: str) -> None:
         steps = [ends[0], *found[finite], ends[1]], [0.0, *share[finite], share[finite][-1]]
         axes.step(factor * np.array(steps[0]), steps[1], where="post", color=BLUE, linewidth=1.5)
         axes.set_xlim(*(factor * np.array(ends)))
-    for name, estimate in quantiles(dataset).items():
-        level = QUANTILES[f"V{name[1:]}"]
+    for measure, estimate in estimated(dataset, measures_of(dataset)).items():
+        level = measure.share
         if np.isfinite(estimate.value):
             low, high = factor * np.array([estimate.low, estimate.high])
             axes.plot([low, high], [level, level], color=VERMILION, linewidth=4, alpha=0.4, solid_capstyle="butt")
             axes.plot(factor * estimate.value, level, "o", color=VERMILION, markersize=5)
-            text = f" {name} = {factor * estimate.value:.4g} {unit}"
+            text = f" {measure.text} = {factor * estimate.value:.4g} {unit}"
             axes.annotate(text, (factor * estimate.value, level), xytext=(8, -12), textcoords="offset points")
     reference = solid_limits(dataset)
     if reference is not None:

@@ -51,6 +51,7 @@ _AREAL_DENSITY = PerHit(
     values=lambda part, _: np.full(part.sizes["hit"], part.attrs.get(attr.AREAL_DENSITY, np.nan)),
 )
 NAMES = {"V50": "quantile(limit_velocity, 0.5)", "V05": "quantile(limit_velocity, 0.05)"}
+NAMES |= {"H50": "quantile(limit_thickness, 0.5)", "H05": "quantile(limit_thickness, 0.05)"}
 """Measures that have a name of their own."""
 
 _FORM = re.compile(

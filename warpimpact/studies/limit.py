@@ -2,25 +2,22 @@
 
 from __future__ import annotations
 
-import math
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
-import xarray
 from numpy.typing import NDArray
 
-from warpimpact.analysis.survival import by_draws, over_draws
 from warpimpact.campaign.campaign import Campaign
 from warpimpact.campaign.evidence import limit_velocity_factors
 from warpimpact.campaign.text import CampaignError
 from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
-from warpimpact.results.dataset import failed, finer_pair
+from warpimpact.results.measures import Measure
 from warpimpact.results.table import Table
-from warpimpact.results.tallies import dealing
+from warpimpact.results.vocabulary import LIMIT_VELOCITY
 from warpimpact.runs.compute import at_solid, finer_hits, found_in, numerics_of, of_images, pilot_shots
 from warpimpact.runs.describe import computed_by, described, found_attributes
 from warpimpact.runs.shards import extent
@@ -44,17 +41,9 @@ from warpimpact.solver.limit import (
 from warpimpact.solver.marching import Progress
 from warpimpact.solver.pilot import limits_pilot_size
 from warpimpact.solver.worker import Worker
-from warpimpact.statistics.intervals import Estimate, estimate_of
-from warpimpact.statistics.shifts import shift_of_quantile
-from warpimpact.statistics.tails import quantile_weights
 
 if TYPE_CHECKING:
     from warpimpact.results.table import Result
-
-_UNITS_OF = {quantity: names.value.units for quantity, names in v.LIMITS.items()}
-QUANTILES = {"V50": 0.5, "V05": 0.05}
-"""Names of the velocities at which half and a twentieth of the hits perforate."""
-
 
 Array = NDArray[np.float64]
 
@@ -91,6 +80,23 @@ class LimitMap:
         if layer >= len(plates):
             raise CampaignError(f"got layer {layer}, but the target has layers 0 (the plate) to {len(plates) - 1}")
         return cls(Sought(quantity, tolerance or THICKNESS_TOLERANCE, thickest(campaign.scene, layer), layer))
+
+    def check(self, texts: Sequence[str]) -> None:
+        """Refuse measures that this search does not tell.
+
+        Raises:
+            CampaignError: names the measure.
+        """
+        for text in texts:
+            try:
+                measure = Measure.parse(text)
+            except ValueError as error:
+                raise CampaignError(f"--measure: {error}") from None
+            of_velocities = measure.quantity.need is LIMIT_VELOCITY
+            if not measure.is_limit or of_velocities != (self.sought.quantity == "velocity"):
+                raise CampaignError(
+                    f"--measure: {text} is not told by a search of each hit's limit {self.sought.quantity}"
+                )
 
     @property
     def content(self) -> Mapping[str, str]:
@@ -193,26 +199,3 @@ def warning_of(campaign: Campaign, quantity: str) -> str | None:
         f"the {quantity} scatters in this campaign, but a limit {quantity} does not depend on that: the scatter only "
         "says where the searches begin"
     )
-
-
-def quantiles(dataset: xarray.Dataset) -> dict[str, Estimate]:
-    """V50 and V05 (of a thickness H50 and H05) with their 95 % intervals over the hits; infinite where so many hits
-    have a limit beyond the largest value tried."""
-    quantity, highest = dataset.attrs[attr.LIMIT], dataset.attrs[attr.LIMIT_HIGHEST]
-
-    def counted_of(some: xarray.Dataset) -> Array:
-        return np.where(failed(some), np.nan, np.minimum(some[v.LIMITS[quantity].value].values, highest))
-
-    counted, pair, dealt = counted_of(dataset), finer_pair(dataset), dealing(dataset)
-    levels = None if pair is None else (counted_of(pair[0]), counted_of(pair[1]))
-    found = {}
-    for name, share in QUANTILES.items():
-        estimate = estimate_of("quantile", counted, share=share, **dealt)
-        ends = (estimate.value, estimate.low, estimate.high)
-        drawn = by_draws(dataset, counted, quantile_weights(share))
-        estimate = over_draws(dataset, estimate, drawn, units=_UNITS_OF[quantity])
-        value_, low, high = (math.inf if end >= highest else end for end in ends)
-        if levels is not None:
-            estimate = replace(estimate, numerics=shift_of_quantile(*levels, share, images=dealt["images"]))
-        found[name if quantity == "velocity" else f"H{name[1:]}"] = replace(estimate, value=value_, low=low, high=high)
-    return found

@@ -3,23 +3,25 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 import xarray
 
+from warpimpact.analysis.estimates import estimated
 from warpimpact.analysis.numbers import ends_of, intervals_text
 from warpimpact.analysis.proxy import proxy
 from warpimpact.analysis.summary import numerics_note
 from warpimpact.analysis.survival import draws_note
 from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
+from warpimpact.results.files import ResultError
 from warpimpact.results.limits import solid_limits
+from warpimpact.results.measures import NAMES, Measure
 from warpimpact.scene.quantities import QUANTITIES
 from warpimpact.scene.units import quantity as reader_of
 from warpimpact.solver.findings import hits_text, limit_error_text
 from warpimpact.solver.limit_search import MOST_RUNS
-from warpimpact.studies.limit import QUANTILES, quantiles
 from warpimpact.studies.published import published_view
 from warpimpact.view.view import Column, Section, Table, number
 
@@ -32,11 +34,30 @@ def shown_unit(name: str) -> tuple[str, float]:
     return shown.shown, shown.factor
 
 
-def limit_view(dataset: xarray.Dataset) -> list[Section]:
-    """The view of a search of limits: every hit of a short list, or V50 and V05; what it is compared with; notes."""
+def measures_of(dataset: xarray.Dataset, texts: Sequence[str] = ()) -> list[Measure]:
+    """The measures that are asked of a search of limits; without a text V50 and V05, or H50 and H05.
+
+    Raises:
+        ResultError: a text is no measure, or the result lacks what it needs.
+    """
+    try:
+        limits = v.LIMITS[dataset.attrs[attr.LIMIT]].value
+        named = [text for text in NAMES if Measure.parse(text).name == limits]
+        return [Measure.parse(text).of(dataset) for text in texts or named]
+    except ValueError as error:
+        raise ResultError(f"measure: {error}") from None
+
+
+def limit_view(dataset: xarray.Dataset, texts: Sequence[str] = ()) -> list[Section]:
+    """The view of a search of limits: every hit of a short list, or its measures; what it is compared with; notes.
+
+    Args:
+        texts: of measures, which are shown of a short list, too; by default as in `measures_of`.
+    """
     short = len(dataset[v.LIMITS[dataset.attrs[attr.LIMIT]].value]) <= _MOST_LISTED
     return [
-        *([Section([_hits(dataset)]), *_proxies(dataset)] if short else [Section([_quantiles(dataset)])]),
+        *([Section([_hits(dataset)]), *_proxies(dataset)] if short else []),
+        *([] if short and not texts else [Section([_estimates(dataset, texts)])]),
         *published_view(dataset),
         Section([*_left_out(dataset), *_expected(dataset), *_solid(dataset), *_costs(dataset)]),
     ]
@@ -54,17 +75,14 @@ def _hits(dataset: xarray.Dataset) -> Table:
     return Table(columns, list(zip(range(len(value)), dataset[v.OBLIQUITY].values, value, lower, upper, strict=True)))
 
 
-def _quantiles(dataset: xarray.Dataset) -> Table:
-    """V50 and V05 with their intervals."""
-    quantity = dataset.attrs[attr.LIMIT]
-    unit, factor = shown_unit(quantity)
-    what = "perforate" if quantity == "velocity" else "have a smaller limit"
+def _estimates(dataset: xarray.Dataset, texts: Sequence[str]) -> Table:
+    """Measures with their intervals."""
     rows = []
-    for name, estimate in quantiles(dataset).items():
-        shown = estimate.times(factor)
+    for measure, estimate in estimated(dataset, measures_of(dataset, texts)).items():
+        shown = estimate.times(measure.display.factor)
         interval = intervals_text(ends_of(shown), "{:.5g}".format, "{:.2g}".format)
-        rows.append((name, shown.value, interval, f"{100.0 * QUANTILES[f'V{name[1:]}']:g} % of the hits {what}"))
-    columns = Column("quantile"), number(f"limit {quantity}", unit, ".5g"), Column("95 % interval"), Column("meaning")
+        rows.append((measure.text, shown.value, interval, measure.title))
+    columns = Column("measure"), number("value", digits=".5g"), Column("95 % interval"), Column("meaning")
     return Table(columns, rows)
 
 

@@ -9,14 +9,16 @@ import numpy as np
 import xarray
 from pydantic import ValidationError
 
+from warpimpact.analysis.estimates import estimated
 from warpimpact.campaign.problems import sentence
 from warpimpact.campaign.published import Published
 from warpimpact.campaign.text import CampaignError, parsed
 from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
-from warpimpact.studies.limit import quantiles
+from warpimpact.results.measures import Measure
 from warpimpact.view.view import Column, Section, Table, number
 
+_MEDIAN = Measure.parse("V50")
 _SAME_OBLIQUITY = 0.5
 """Hits whose obliquity is within so many degrees of a published one are beside it [degree]."""
 
@@ -52,7 +54,7 @@ def published_beside(dataset: xarray.Dataset) -> list[Beside]:
 
 def _computed(dataset: xarray.Dataset, obliquity: float) -> float:
     near = np.abs(dataset[v.OBLIQUITY].values - obliquity) <= _SAME_OBLIQUITY
-    return quantiles(dataset.isel(hit=near))["V50"].value if near.any() else math.nan
+    return estimated(dataset.isel(hit=near), [_MEDIAN])[_MEDIAN].value if near.any() else math.nan
 
 
 def published_view(dataset: xarray.Dataset) -> list[Section]:

@@ -26,7 +26,7 @@ from warpimpact.solver.limit import limit_velocity
 from warpimpact.solver.limit_search import MOST_RUNS
 from warpimpact.solver.pilot import LIMITS
 from warpimpact.solver.worker import Worker
-from warpimpact.studies.limit import LimitMap, quantiles, warning_of
+from warpimpact.studies.limit import LimitMap, warning_of
 from warpimpact.studies.limit_view import limit_view
 from warpimpact.view.view import text_of
 
@@ -47,6 +47,7 @@ count = 64
 fidelity = "draft"
 """
 MEAN = Measure.parse("mean(limit_velocity)")
+V50, V05 = Measure.parse("V50"), Measure.parse("V05")
 GIVEN = '[numerics]\npatches_axial = 14\npatches_around = 16\ntime_step = "0.5 us"\n'
 
 
@@ -89,7 +90,7 @@ def test_it_tells_its_error_against_a_finer_level(result: xarray.Dataset) -> Non
     at = result["finer_hit"].values
     assert len(at) == LIMITS
     np.testing.assert_allclose(result["finer_limit_velocity"].values, fine.value[at], rtol=0, atol=1.5)
-    mean, v50 = estimated(result, [MEAN])[MEAN], quantiles(result)["V50"]
+    mean, v50 = estimated(result, [MEAN])[MEAN], estimated(result, [V50])[V50]
     assert abs(change.mean()) <= mean.numerics < 2.0
     assert abs(np.quantile(fine.value, 0.5, method="hazen") - v50.value) <= v50.numerics < 3.0
     assert effectiveness(result)[0].numerics == pytest.approx(mean.numerics)
@@ -97,20 +98,22 @@ def test_it_tells_its_error_against_a_finer_level(result: xarray.Dataset) -> Non
 
 
 def test_v50_and_v05_are_quantiles_over_the_hits(result: xarray.Dataset) -> None:
-    found = quantiles(result)
+    v50, v05 = estimated(result, [V50, V05]).values()
     value = result["limit_velocity"].values
-    assert np.mean(value <= found["V50"].value) == pytest.approx(0.5, abs=0.02)
-    assert np.mean(value <= found["V05"].value) == pytest.approx(0.05, abs=0.02)
-    assert found["V50"].low < found["V50"].value < found["V50"].high
+    assert np.mean(value <= v50.value) == pytest.approx(0.5, abs=0.02)
+    assert np.mean(value <= v05.value) == pytest.approx(0.05, abs=0.02)
+    assert v50.low < v50.value < v50.high
     line = next(line for line in text_of(limit_view(result)).splitlines() if line.startswith("V50 "))
-    assert line.split()[1] == f"{found['V50'].value:.5g}"
+    assert line.split()[1] == f"{v50.value:.5g}"
 
 
 def test_a_limit_beyond_reach_makes_a_quantile_infinite_and_no_mean(result: xarray.Dataset) -> None:
     beyond = result.copy(deep=True)
     beyond["limit_velocity"][:40] = np.inf
-    assert quantiles(beyond)["V50"].value == np.inf
-    assert np.isfinite(quantiles(beyond)["V05"].value)
+    v50, v05 = estimated(beyond, [V50, V05]).values()
+    assert v50.value == np.inf
+    assert np.isfinite(v05.value)
+    assert effectiveness(beyond, ["V50"])[0].value == np.inf
     assert "40 hits have no limit velocity up to 3000 m/s" in text_of(limit_view(beyond))
     limit_figure(beyond)
 
@@ -204,7 +207,8 @@ def test_the_command_writes_a_result_and_a_figure(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.chdir(tmp_path)
-    assert main(["limit", str(CAMPAIGNS / "limit_velocity.toml"), "--device", "cpu"]) == 0
+    asked = ["--measure", "quantile(limit_velocity, 0.25)"]
+    assert main(["limit", str(CAMPAIGNS / "limit_velocity.toml"), "--device", "cpu", *asked]) == 0
     told = capsys.readouterr().out
     assert "limit velocity" in told
     assert "written to limit_velocity_limit.nc, figure in limit_velocity_limit.png" in told
@@ -213,7 +217,10 @@ def test_the_command_writes_a_result_and_a_figure(
     # Published for the bare core at 0, 15, 30, 45 deg: 514, 535, 597, 723 m/s; the resistance is fitted to the first.
     assert found["limit_velocity"].values == pytest.approx([514.0, 535.0, 597.0, 723.0], rel=0.06)
     assert found["limit_velocity"].values[0] == pytest.approx(514.0, abs=1.5)
-    assert main(["inspect", "limit_velocity_limit.nc"]) == 0
+    line = next(line for line in told.splitlines() if line.startswith("quantile(limit_velocity, 0.25)"))
+    assert main(["inspect", "limit_velocity_limit.nc", *asked]) == 0
+    (same,) = (line for line in capsys.readouterr().out.splitlines() if "25 % quantile" in line)
+    assert float(same.split()[6]) == pytest.approx(float(line.split()[2]), rel=1e-3)
     assert main(["limit", str(CAMPAIGNS / "limit_velocity.toml"), "--device", "cpu"]) == 2
     assert "exists already; name another file or give --overwrite" in capsys.readouterr().err
 
@@ -224,9 +231,12 @@ def test_the_command_writes_a_result_and_a_figure(
         (["--tolerance", "0 m/s"], "must be greater than 0"),
         (["--tolerance", "1 mm"], "which is not a speed"),
         (["--quantity", "thickness", "--tolerance", "1 m/s"], "which is not a length"),
+        (["--measure", "H50"], "--measure: H50 is not told by a search of each hit's limit velocity"),
+        (["--measure", "P(perforated)"], "--measure: P(perforated) is not told by a search"),
+        (["--measure", "V5"], '--measure: got "V5", but it must be of the form'),
     ],
 )
-def test_bad_tolerances(
+def test_what_a_search_cannot_tell_is_refused(
     arguments: list[str], sentence: str, capsys: pytest.CaptureFixture[str], tmp_path: Path
 ) -> None:
     out = ["-o", str(tmp_path / "limit.nc"), *arguments]
@@ -245,7 +255,7 @@ source = "somebody 2020"
 
 def test_published_limits_stand_beside_the_computed_ones(result: xarray.Dataset) -> None:
     told = result.assign_attrs(campaign=TEXT + PUBLISHED.format(300, 0) + PUBLISHED.format(700, 45))
-    median = quantiles(result)["V50"].value
+    median = estimated(result, [V50])[V50].value
     lines = text_of(limit_view(told)).splitlines()
     at = next(place for place, line in enumerate(lines) if line.split()[:1] == ["published"])
     assert lines[at + 1].split() == ["300", "0", f"{median:.4g}", f"{100 * (median / 300 - 1):+.1f}", *OF]
