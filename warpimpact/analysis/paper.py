@@ -11,7 +11,7 @@ import xarray
 from warpimpact.campaign.campaign import Campaign
 from warpimpact.campaign.text import CampaignError
 from warpimpact.results import variables as v
-from warpimpact.runs.parts import first_difference
+from warpimpact.runs.manifests import first_difference
 from warpimpact.view.view import Column, Section, Table, number, text_of
 
 

@@ -13,7 +13,7 @@ from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
 from warpimpact.results.files import ResultError
 from warpimpact.results.tallies import dealing
-from warpimpact.runs.parts import first_difference
+from warpimpact.runs.manifests import first_difference
 
 _SAME_PLACE = 1e-9
 """Rounding of a place in units of the cell."""

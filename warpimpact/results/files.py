@@ -44,20 +44,6 @@ def write(dataset: xarray.Dataset, path: Path) -> None:
         write_table(in_a_file(Table.from_xarray(dataset)), file)
 
 
-def write_shard(table: Table, path: Path, named: Callable[[Path], Path]) -> None:
-    """Write a part of a result to a netCDF file, whole or not at all, without compression, which costs time.
-
-    Args:
-        path: its name while it is written.
-        named: gives the name of what was written, by its contents.
-
-    Raises:
-        OutputError: The file cannot be written.
-    """
-    with uninterrupted(), aside(path, named=named) as file:
-        write_table(table, file, compressed=False)
-
-
 CHUNK = 2**15
 """Hits per chunk of a joined file: 256 KiB of one variable."""
 

@@ -11,19 +11,22 @@ from __future__ import annotations
 
 import hashlib
 import json
+import re
 import shutil
 import warnings
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 from filelock import FileLock, Timeout
 
 from warpimpact.results import attributes as attr
 from warpimpact.results import files
 from warpimpact.results.files import OutputError
+from warpimpact.results.interrupts import uninterrupted
 from warpimpact.results.netcdf import attribute
+from warpimpact.runs.manifests import difference, fingerprint
 
 _MANIFEST = "manifest.json"
 _LOCK = "lock"
@@ -31,45 +34,6 @@ _LOCK = "lock"
 
 class Interrupted(KeyboardInterrupt):
     """A computation was interrupted; the message says what is saved."""
-
-
-def digest(path: Path) -> str:
-    """The name and the contents of a file, for a manifest."""
-    with path.open("rb") as file:
-        return f"{path.name}, sha256 {hashlib.file_digest(file, 'sha256').hexdigest()}"
-
-
-def fingerprint(content: Mapping[str, Any]) -> str:
-    """Short name of a manifest: results with the same have the same bits."""
-    return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()[:16]
-
-
-def difference(begun: Any, now: Any) -> str | None:
-    """The first difference between two manifests as a phrase, None if there is none."""
-    found = first_difference(begun, now)
-    return found and "{} was {} and is {}".format(*found)
-
-
-def first_difference(one: Any, other: Any, place: str = "") -> tuple[str, str, str] | None:
-    """Where two nested dictionaries differ first, and what is there in each; None if they do not."""
-    if _are_tables(one) and _are_tables(other) and len(one) == len(other):
-        one, other = ({str(place): table for place, table in enumerate(tables)} for tables in (one, other))
-    if isinstance(one, dict) and isinstance(other, dict):
-        for name in sorted(one.keys() | other.keys()):
-            inner = f"{place}.{name}".removeprefix("campaign.").strip(".")
-            if found := first_difference(one.get(name), other.get(name), inner):
-                return found
-        return None
-    return None if one == other else (place, _brief(one), _brief(other))
-
-
-def _are_tables(value: Any) -> bool:
-    return isinstance(value, list) and any(isinstance(entry, dict) for entry in value)
-
-
-def _brief(value: Any) -> str:
-    text = "not given" if value is None else json.dumps(value, ensure_ascii=False)
-    return text if len(text) <= 80 else f"{text[:77]}..."
 
 
 def folder_of(output: Path) -> Path:
@@ -109,6 +73,56 @@ def claimed(output: Path) -> Iterator[None]:
             lock.release()
 
 
+@contextmanager
+def telling(kept: Callable[[], str]) -> Iterator[None]:
+    """Say what is kept of a computation that does not come to its end.
+
+    Args:
+        kept: saves what can be saved, and says what that is.
+
+    Raises:
+        Interrupted: by the keyboard.
+        OutputError: something cannot be written.
+    """
+    try:
+        yield
+    except KeyboardInterrupt:
+        raise Interrupted(f"interrupted; {kept()}") from None
+    except OutputError as error:
+        raise OutputError(f"{error}; {kept()}") from None
+    except BaseException:
+        kept()
+        raise
+
+
+class Form(NamedTuple):
+    """How parts are named: with what they hold, the number of the first of it, and their seal.
+
+    Attributes:
+        holds: what they hold, such as "hits".
+        suffix: of their files.
+        extent: how many of it a part holds.
+    """
+
+    holds: str
+    suffix: str
+    extent: int = 1
+
+    @property
+    def pattern(self) -> str:
+        """Of the names of parts."""
+        return f"{self.holds}_*{self.suffix}"
+
+    def stem(self, number: int) -> str:
+        """The name of a part before its seal."""
+        return f"{self.holds}_{number * self.extent:010d}"
+
+    def number_in(self, name: str) -> int:
+        """Number of the part of a name; 0 of a name that no part has."""
+        first = re.match(rf"{self.holds}_(\d{{10}})_", name)
+        return int(first[1]) // self.extent if first else 0
+
+
 class Parts:
     """The parts of one computation, in a folder that is `claimed`.
 
@@ -116,9 +130,14 @@ class Parts:
         output: the result file.
         content: what decides every bit of the result.
         kind: what messages call the computation: "run", "search" or "fit".
-        pattern: of the names of parts.
+        form: how the parts are named.
         counted: says how much a number of parts is, for example "3 of 32 shards".
         tell: called with a sentence for what was damaged and is computed again.
+
+    Attributes:
+        folder: where they are.
+        saved: the parts on the disk, by their numbers.
+        fingerprint: short name of the content.
     """
 
     def __init__(
@@ -126,21 +145,19 @@ class Parts:
         output: Path,
         content: Mapping[str, Any],
         kind: str,
-        pattern: str,
+        form: Form,
         counted: Callable[[int], str],
         tell: Callable[[str], object] = warnings.warn,
     ) -> None:
-        self.output, self._kind, self._pattern, self._counted, self._tell = output, kind, pattern, counted, tell
+        self.output, self._kind, self._form, self._counted, self._tell = output, kind, form, counted, tell
         self.folder = folder_of(output)
+        self.saved: dict[int, Path] = {}
         self.fingerprint = fingerprint(content)
         self._content = json.loads(json.dumps(content))
         self._manifest = self.folder / _MANIFEST
 
-    def begin(self, take: Callable[[Path], bool], *, resume: bool, overwrite: bool) -> bool:
+    def begin(self, *, resume: bool, overwrite: bool) -> bool:
         """Take the folder, with the parts in it if they are to be resumed.
-
-        Args:
-            take: counts a part as saved; returns whether it is what its name says.
 
         Returns:
             Whether there is anything to do: the result of this very computation may be complete already.
@@ -154,7 +171,7 @@ class Parts:
             return False
         begun = None if complete else self._begun()
         if begun is not None and resume:
-            self._take_up(begun, take, overwrite=overwrite)
+            self._take_up(begun, overwrite=overwrite)
             return True
         if begun is not None and not overwrite:
             raise OutputError(
@@ -192,7 +209,7 @@ class Parts:
             return {}
         return {} if damaged else {"content": begun, "replaces": replaces}
 
-    def _take_up(self, begun: dict[str, Any], take: Callable[[Path], bool], *, overwrite: bool) -> None:
+    def _take_up(self, begun: dict[str, Any], *, overwrite: bool) -> None:
         if begun and (changed := difference(begun["content"], self._content)):
             raise OutputError(
                 f"{self.folder}: cannot be resumed: {changed}; put it back, or begin anew with --overwrite"
@@ -205,7 +222,7 @@ class Parts:
         if not begun:
             self._tell(f"{self._manifest}: is missing or damaged; it is written again")
             self._write_manifest(replaces=replaces)
-        damaged = [path for path in self.paths() if not take(path)]
+        damaged = [path for path in self.paths() if not self._take(path)]
         for path in damaged:
             remove(path)
         if damaged:
@@ -221,9 +238,61 @@ class Parts:
             content = {**self._content, "replaces": replaces, "fingerprint": self.fingerprint}
             file.write_text(json.dumps(content, indent=1), encoding="utf-8")
 
+    def _take(self, path: Path) -> bool:
+        """Count a part as saved if it is what its name says, and no other is there for its place."""
+        number = self._form.number_in(path.name)
+        if number in self.saved or not self._is_whole(number, path):
+            return False
+        self.saved[number] = path
+        return True
+
+    def _is_whole(self, number: int, path: Path) -> bool:
+        try:
+            return path == self._named(number, path)
+        except OSError:  # a folder, for instance
+            return False
+
+    def _named(self, number: int, written: Path) -> Path:
+        """The name of a part with these bytes at this place."""
+        with written.open("rb") as file:
+            bits = hashlib.file_digest(file, "sha256").hexdigest()
+        seal = hashlib.sha256(f"{self.fingerprint} {number} {bits}".encode()).hexdigest()[:16]
+        return self.folder / f"{self._form.stem(number)}_{seal}{self._form.suffix}"
+
+    def path(self, number: int) -> Path:
+        """A part that is saved.
+
+        Raises:
+            OutputError: it is gone or damaged.
+        """
+        path = self.saved[number]
+        if not self._is_whole(number, path):
+            raise OutputError(f"{path}: this part is missing or damaged")
+        return path
+
+    def save(self, number: int, write: Callable[[Path], object]) -> None:
+        """Put a part on the disk, whole or not at all, in place of one of this number.
+
+        Args:
+            write: writes the file of a name.
+
+        Raises:
+            OutputError: it cannot be written.
+        """
+        before = self.saved.get(number)
+
+        def named(written: Path) -> Path:
+            self.saved[number] = self._named(number, written)
+            return self.saved[number]
+
+        with uninterrupted(), files.aside(self.folder / f"{self._form.stem(number)}", named=named) as file:
+            write(file)
+        if before not in (None, self.saved[number]):
+            remove(before)
+
     def paths(self) -> list[Path]:
         """The parts that are there."""
-        return sorted(path for path in self.folder.glob(self._pattern) if not path.is_fifo())
+        return sorted(path for path in self.folder.glob(self._form.pattern) if not path.is_fifo())
 
     @property
     def counted(self) -> str:
@@ -239,7 +308,7 @@ class Parts:
 
     def discard(self) -> None:
         """Empty the folder."""
-        for path in (*self.folder.glob(self._pattern), *self.folder.glob(".*.part"), self._manifest):
+        for path in (*self.folder.glob(self._form.pattern), *self.folder.glob(".*.part"), self._manifest):
             remove(path)
 
 

@@ -12,7 +12,6 @@ from typing import TYPE_CHECKING, Any
 from warpimpact.campaign.campaign import Campaign
 from warpimpact.results import attributes as attr
 from warpimpact.results.dataset import failed, finer_pair, images
-from warpimpact.results.files import OutputError
 from warpimpact.results.measures import Measure
 from warpimpact.results.outlines import in_memory
 from warpimpact.results.table import Table, joined
@@ -32,7 +31,7 @@ from warpimpact.runs.jobs import (
     with_ligament,
 )
 from warpimpact.runs.levels import OF_THE_NUMERICS
-from warpimpact.runs.parts import Interrupted, claimed
+from warpimpact.runs.parts import claimed, telling
 from warpimpact.runs.progress import Follow, RunProgress, followed
 from warpimpact.runs.shards import Shards, ShardsOnDisk, extent, manifest
 from warpimpact.runs.task import Computation, Task
@@ -111,20 +110,13 @@ def run_to_file(
     with claimed(output), opened(device) as computing:
         content = manifest(campaign, {**computing.made_by, **computation.content})
         total = len(campaign.sampler())
-        parts = ShardsOnDisk(output, content, total, tell, grows=campaign.stop is None)
-        if not parts.begin(resume=resume, overwrite=overwrite):
+        shards = ShardsOnDisk(output, content, total, tell, grows=campaign.stop is None)
+        if not shards.parts.begin(resume=resume, overwrite=overwrite):
             return
-        try:
+        with telling(shards.kept):
             with followed(progress) as follow:
-                end = _fill(campaign, computation, parts, computing, follow)
-            parts.finish(end.shards, lambda first: _attributes(first, end))
-        except KeyboardInterrupt:
-            raise Interrupted(f"interrupted; {parts.kept()}") from None
-        except OutputError as error:
-            raise OutputError(f"{error}; {parts.kept()}") from None
-        except BaseException:
-            parts.kept()
-            raise
+                end = _fill(campaign, computation, shards, computing, follow)
+            shards.finish(end.shards, lambda first: _attributes(first, end))
 
 
 def _read(campaign: Campaign | str | Path) -> Campaign:

@@ -2,20 +2,18 @@
 are there.
 
 A shard is the result of a fixed range of shots. A process that is killed loses what it was computing and what came in
-the last HELD seconds. The name of a shard ends with its seal. The result file grows beside the shards meanwhile; it is
-worth nothing before it is complete.
+the last HELD seconds. The result file grows beside the shards meanwhile; it is worth nothing before it is complete.
 """
 
 from __future__ import annotations
 
-import hashlib
 import json
 import logging
-import re
 import time
 import warnings
 from collections.abc import Callable, Collection, Mapping
 from contextlib import suppress
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -24,9 +22,10 @@ from warpimpact.results import attributes as attr
 from warpimpact.results import files
 from warpimpact.results.files import OutputError
 from warpimpact.results.incremental import IncrementalFile
-from warpimpact.results.netcdf import read_table
+from warpimpact.results.netcdf import read_table, write_table
 from warpimpact.results.table import Table
-from warpimpact.runs.parts import Parts, digest
+from warpimpact.runs.manifests import digest
+from warpimpact.runs.parts import Form, Parts
 
 _logger = logging.getLogger(__name__)
 
@@ -81,7 +80,6 @@ class ShardsOnDisk(Shards):
 
     Attributes:
         parts: the folder with the shards.
-        saved: the shards on the disk, by their numbers.
     """
 
     def __init__(
@@ -95,8 +93,8 @@ class ShardsOnDisk(Shards):
     ) -> None:
         super().__init__(content["extent"])
         self.total = total
-        self.parts = Parts(output, content, "run", "hits_*.nc", lambda count: f"{count} of {self.count} shards", tell)
-        self.saved: dict[int, Path] = {}
+        form = Form("hits", ".nc", self.extent)
+        self.parts = Parts(output, content, "run", form, lambda count: f"{count} of {self.count} shards", tell)
         self._written = time.monotonic()
         self._grows, self._grown = grows, 0
         self._growing: IncrementalFile | None = None
@@ -106,49 +104,9 @@ class ShardsOnDisk(Shards):
         """Number of shards of the whole campaign."""
         return -(-self.total // self.extent)
 
-    def begin(self, *, resume: bool, overwrite: bool) -> bool:
-        """See `Parts.begin`."""
-        return self.parts.begin(self._take, resume=resume, overwrite=overwrite)
-
-    def _take(self, path: Path) -> bool:
-        """Count a shard as saved if it is what its name says, and no other is there for its place."""
-        first = re.match(r"hits_(\d{10})_", path.name)
-        index = int(first[1]) // self.extent if first else 0
-        if index in self.saved or not self._is_whole(index, path):
-            return False
-        self.saved[index] = path
-        return True
-
-    def _is_whole(self, index: int, path: Path) -> bool:
-        try:
-            return path == self._named(index, path)
-        except OSError:  # a folder, for instance
-            return False
-
-    def _stem(self, index: int) -> str:
-        return f"hits_{index * self.extent:010d}"
-
-    def _path(self, index: int) -> Path:
-        """The shard of a place.
-
-        Raises:
-            OutputError: it is gone or damaged.
-        """
-        path = self.saved[index]
-        if not self._is_whole(index, path):
-            raise OutputError(f"{path}: this shard is missing or damaged")
-        return path
-
-    def _named(self, index: int, written: Path) -> Path:
-        """The name of a shard with these bytes at this place."""
-        with written.open("rb") as file:
-            bits = hashlib.file_digest(file, "sha256").hexdigest()
-        seal = hashlib.sha256(f"{self.parts.fingerprint} {index} {bits}".encode()).hexdigest()[:16]
-        return self.parts.folder / f"{self._stem(index)}_{seal}.nc"
-
     def there(self) -> Collection[int]:
         """Numbers of the shards that are there."""
-        return self._held.keys() | self.saved.keys()
+        return self._held.keys() | self.parts.saved.keys()
 
     def save(self, index: int, table: Table) -> None:
         """Take in a shard. It is on the disk after HELD seconds at most, if the run goes on.
@@ -174,19 +132,11 @@ class ShardsOnDisk(Shards):
         """
         while self._held:
             index = min(self._held)
-            self._write(index, self._held[index])
+            table = self._held[index]
+            self.parts.save(index, partial(write_table, table, compressed=False))
             del self._held[index]
+            _logger.info("shard %d of %d saved: %d hits", index + 1, self.count, table.sizes["hit"])
         self._written = time.monotonic()
-
-    def _write(self, index: int, table: Table) -> None:
-        placed: dict[int, Path] = {}
-
-        def named(written: Path) -> Path:
-            return placed.setdefault(index, self._named(index, written))
-
-        files.write_shard(table, self.parts.folder / f"{self._stem(index)}.nc", named)
-        self.saved |= placed
-        _logger.info("shard %d of %d saved: %d hits", index + 1, self.count, table.sizes["hit"])
 
     def kept(self) -> str:
         """What a run that breaks off leaves behind, in words."""
@@ -201,7 +151,7 @@ class ShardsOnDisk(Shards):
         Raises:
             OutputError: it is gone or damaged meanwhile.
         """
-        return super().shard(index) if index in self._held else read_table(self._path(index))
+        return super().shard(index) if index in self._held else read_table(self.parts.path(index))
 
     def _grow(self, count: int | None = None) -> None:
         """Add the shards to the result file that are there and follow those in it, or the first `count` shards."""

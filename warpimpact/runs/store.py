@@ -5,7 +5,6 @@ Batches follow from what is computed and from earlier batches alone, so a resume
 
 from __future__ import annotations
 
-import hashlib
 import json
 import warnings
 from collections.abc import Callable, Iterator, Mapping
@@ -18,9 +17,8 @@ from numpy.typing import NDArray
 
 from warpimpact.campaign.places import files_in
 from warpimpact.campaign.text import parsed
-from warpimpact.results import files
-from warpimpact.results.files import OutputError
-from warpimpact.runs.parts import Interrupted, Parts, claimed, digest
+from warpimpact.runs.manifests import digest
+from warpimpact.runs.parts import Form, Parts, claimed, telling
 
 
 def content_of(text: str, name: str, folder: Path, made_by: Mapping[str, str]) -> dict[str, Any]:
@@ -59,18 +57,11 @@ def stored(
     """
     with claimed(output):
         store = Store(output, content, kind, tell)
-        if not store.begin(resume=resume, overwrite=overwrite):
+        if not store.parts.begin(resume=resume, overwrite=overwrite):
             yield None
             return
-        try:
+        with telling(store.parts.kept):
             yield store
-        except KeyboardInterrupt:
-            raise Interrupted(f"interrupted; {store.parts.kept()}") from None
-        except OutputError as error:
-            raise OutputError(f"{error}; {store.parts.kept()}") from None
-        except BaseException:
-            store.parts.kept()
-            raise
         store.parts.discard()
 
 
@@ -88,35 +79,18 @@ class Store:
         def counted(count: int) -> str:
             return f"{count} batch{'' if count == 1 else 'es'}"
 
-        self.parts = Parts(output, content, kind, "batch_*.npz", counted, tell)
-
-    def begin(self, *, resume: bool, overwrite: bool) -> bool:
-        """See `Parts.begin`."""
-        return self.parts.begin(lambda path: self._read(path) is not None, resume=resume, overwrite=overwrite)
-
-    def _path(self, batch: int) -> Path:
-        return self.parts.folder / f"batch_{batch:06d}.npz"
+        self.parts = Parts(output, content, kind, Form("batch", ".npz"), counted, tell)
 
     def load(self, batch: int) -> dict[str, NDArray[Any]] | None:
-        """A batch that was computed; None if it is not there, is damaged or is of another place or computation."""
-        return self._read(self._path(batch))
+        """A batch that was computed; None if it is not there.
 
-    def _read(self, path: Path) -> dict[str, NDArray[Any]] | None:
-        try:
-            if not path.is_file():  # a pipe would be waited for
-                return None
-            with np.load(path, allow_pickle=False) as file:
-                arrays = dict(file)
-        except Exception:  # a bit that was flipped leads zipfile into errors of many classes
+        Raises:
+            OutputError: it is gone or damaged meanwhile.
+        """
+        if batch not in self.parts.saved:
             return None
-        return arrays if str(arrays.pop("seal", "")) == self._seal_of(path, arrays) else None
-
-    def _seal_of(self, path: Path, arrays: Mapping[str, NDArray[Any]]) -> str:
-        """Seal of a batch: zipfile leaves out a member whose entry is damaged, without an error."""
-        seal = hashlib.sha256(f"{self.parts.fingerprint} {path.name}".encode())
-        for name, array in sorted(arrays.items()):
-            seal.update(f"{name} {array.dtype} {array.shape}".encode() + array.tobytes())
-        return seal.hexdigest()
+        with np.load(self.parts.path(batch), allow_pickle=False) as file:
+            return dict(file)
 
     def save(self, batch: int, arrays: Mapping[str, NDArray[Any]]) -> None:
         """Put a batch on the disk.
@@ -124,6 +98,9 @@ class Store:
         Raises:
             OutputError: it cannot be written.
         """
-        path = self._path(batch)
-        with files.aside(path) as written, written.open("wb") as file:
-            np.savez(file, allow_pickle=False, **{"seal": np.array(self._seal_of(path, arrays)), **arrays})
+
+        def write(path: Path) -> None:
+            with path.open("wb") as file:
+                np.savez(file, allow_pickle=False, **arrays)
+
+        self.parts.save(batch, write)

@@ -16,7 +16,6 @@ from warpimpact.identification.posterior_view import posterior_view
 from warpimpact.plotting.posterior import hits_figure, measured_figure, pairs_figure
 from warpimpact.results import posterior_file
 from warpimpact.results.files import ResultError, read_tree
-from warpimpact.runs.store import Store
 from warpimpact.view.view import text_of
 
 FitMaker = Callable[..., Fit]
@@ -69,20 +68,6 @@ def test_figures_are_drawn(posterior: Path) -> None:
     assert len(pairs_figure(tree).axes) == 10
     assert len(measured_figure(tree).axes) == 2
     assert len(hits_figure(tree).axes) == 2
-
-
-def test_a_batch_with_a_flipped_bit_is_whole_or_none(tmp_path: Path) -> None:
-    store, arrays = Store(tmp_path / "a.nc", {"fit": "a"}, "fit"), {"points": np.arange(3.0), "misfit_0": np.ones(2)}
-    store.parts.folder.mkdir()
-    store.save(0, arrays)
-    path = store.parts.folder / "batch_000000.npz"
-    whole = path.read_bytes()
-    for place in range(whole.index(b"PK\x01\x02"), len(whole)):  # the directory of the archive
-        path.write_bytes(whole[:place] + bytes([whole[place] ^ 8]) + whole[place + 1 :])
-        loaded = store.load(0)
-        assert loaded is None or loaded.keys() == arrays.keys()
-    path.write_bytes(whole)
-    np.testing.assert_equal(store.load(0), arrays)
 
 
 def test_rounds_are_whole_blocks(make_fit: FitMaker, small: tuple[str, str]) -> None:

@@ -23,7 +23,8 @@ from warpimpact.cli import main
 from warpimpact.results import files
 from warpimpact.results.files import OutputError
 from warpimpact.runs import shards
-from warpimpact.runs.parts import Interrupted, difference, folder_of
+from warpimpact.runs.manifests import difference
+from warpimpact.runs.parts import Interrupted, folder_of
 from warpimpact.runs.run import RunProgress, run, run_to_file
 
 SameBits = Callable[[Path, Path], None]
@@ -392,7 +393,7 @@ def test_a_shard_that_is_damaged_during_the_run_ends_it_in_a_sentence(
         if standing.done == standing.total and output.with_name("a.nc.parts").exists():
             _cut(_shards(output))
 
-    with pytest.raises(OutputError, match=r"this shard is missing or damaged; 16 of 16 shards .* with --resume"):
+    with pytest.raises(OutputError, match=r"this part is missing or damaged; 16 of 16 shards .* with --resume"):
         run_to_file(campaign, output, device="cpu", progress=harm)
     with pytest.warns(UserWarning, match="computed again"):
         finished(output)

@@ -83,11 +83,38 @@ def test_batches_of_another_computation_do_not_count(damage: Callable[[Path], No
 
 
 def test_a_batch_in_another_place_does_not_count(tmp_path: Path) -> None:
+    output = tmp_path / "fit.nc"
+    begun(output)
+    path = next(folder_of(output).glob("batch_0000000000_*.npz"))
+    path.rename(path.with_name(path.name.replace("batch_0000000000", "batch_0000000007")))
+    told: list[str] = []
+    with stored(output, CONTENT, "fit", resume=True, overwrite=False, tell=told.append) as store:
+        assert store is not None
+        assert store.load(7) is None
+        np.testing.assert_equal(store.load(1), ARRAYS)
+    assert "batch_0000000007" in told[0]
+
+
+def test_a_batch_with_a_flipped_bit_is_computed_again(tmp_path: Path) -> None:
+    output = tmp_path / "fit.nc"
+    begun(output)
+    path = next(folder_of(output).glob("batch_0000000002_*.npz"))
+    whole = path.read_bytes()
+    path.write_bytes(whole[:-30] + bytes([whole[-30] ^ 8]) + whole[-29:])
+    told: list[str] = []
+    with stored(output, CONTENT, "fit", resume=True, overwrite=False, tell=told.append) as store:
+        assert store is not None
+        assert store.load(2) is None
+    assert "damaged, or not of this place or fit; computed again" in told[0]
+
+
+def test_a_batch_is_replaced_by_that_of_its_number(tmp_path: Path) -> None:
     store = Store(tmp_path / "fit.nc", CONTENT, "fit")
     store.parts.folder.mkdir()
-    store.save(0, ARRAYS)
-    (store.parts.folder / "batch_000000.npz").rename(store.parts.folder / "batch_000001.npz")
-    assert store.load(1) is None
+    for arrays in (ARRAYS, {"points": np.ones(4)}):
+        store.save(3, arrays)
+        np.testing.assert_equal(store.load(3), arrays)
+    assert len(store.parts.paths()) == 1
 
 
 def test_another_content_is_refused_with_the_difference(tmp_path: Path) -> None:

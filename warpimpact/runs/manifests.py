@@ -1,0 +1,48 @@
+"""Manifests: what decides every bit of a result, as nested dictionaries, and in what two of them differ."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+
+def digest(path: Path) -> str:
+    """The name and the contents of a file, for a manifest."""
+    with path.open("rb") as file:
+        return f"{path.name}, sha256 {hashlib.file_digest(file, 'sha256').hexdigest()}"
+
+
+def fingerprint(content: Mapping[str, Any]) -> str:
+    """Short name of a manifest: results with the same have the same bits."""
+    return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()[:16]
+
+
+def difference(begun: Any, now: Any) -> str | None:
+    """The first difference between two manifests as a phrase, None if there is none."""
+    found = first_difference(begun, now)
+    return found and "{} was {} and is {}".format(*found)
+
+
+def first_difference(one: Any, other: Any, place: str = "") -> tuple[str, str, str] | None:
+    """Where two nested dictionaries differ first, and what is there in each; None if they do not."""
+    if _are_tables(one) and _are_tables(other) and len(one) == len(other):
+        one, other = ({str(place): table for place, table in enumerate(tables)} for tables in (one, other))
+    if isinstance(one, dict) and isinstance(other, dict):
+        for name in sorted(one.keys() | other.keys()):
+            inner = f"{place}.{name}".removeprefix("campaign.").strip(".")
+            if found := first_difference(one.get(name), other.get(name), inner):
+                return found
+        return None
+    return None if one == other else (place, _brief(one), _brief(other))
+
+
+def _are_tables(value: Any) -> bool:
+    return isinstance(value, list) and any(isinstance(entry, dict) for entry in value)
+
+
+def _brief(value: Any) -> str:
+    text = "not given" if value is None else json.dumps(value, ensure_ascii=False)
+    return text if len(text) <= 80 else f"{text[:77]}..."
