@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from .campaign.plates import read_plates
     from .campaign.stop import Stop
     from .campaign.text import CampaignError
-    from .export.table import to_dataframe
+    from .export.spreadsheet import to_dataframe
     from .optimisation.optimise import optimise, optimise_to_file
     from .records.outcomes import Outcomes
     from .results.files import OutputError, ResultError, open_result
@@ -150,7 +150,7 @@ _HOMES = {
     "run": ".runs.run",
     "run_to_file": ".runs.run",
     "simulate": ".solver.simulate",
-    "to_dataframe": ".export.table",
+    "to_dataframe": ".export.spreadsheet",
 }
 """Modules of the names that are not in `warpimpact.scene`."""
 

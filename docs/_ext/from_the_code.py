@@ -226,7 +226,7 @@ class FiringReference(CampaignReference):
     """Every key of a test file, table by table, from its JSON schema."""
 
     def lines(self) -> Iterator[str]:
-        from warpimpact.firing.schema import firing_schema
+        from warpimpact.firing.plan_schema import firing_schema
 
         self.schema = firing_schema()
         yield from ["## Tables of the file", ""]
@@ -239,7 +239,7 @@ class DesignReference(CampaignReference):
     """Every key of a design file beside those of a campaign, table by table, from its JSON schema."""
 
     def lines(self) -> Iterator[str]:
-        from warpimpact.optimisation.schema import asking_schema
+        from warpimpact.optimisation.design_schema import asking_schema
 
         self.schema = asking_schema()
         yield from ["## Tables of the file", ""]

@@ -39,8 +39,8 @@ from roads import (
 
 from warpimpact import Numerics, Shots
 from warpimpact.cli.identify import PROCESSES, WORTHWHILE
+from warpimpact.identification.fit_file import read_fit
 from warpimpact.identification.identify import identify_to_file
-from warpimpact.identification.reading import read_fit
 from warpimpact.results import posterior_file
 from warpimpact.results.files import read_tree
 from warpimpact.runs.choice import executor_for

@@ -18,10 +18,10 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 from scipy.stats import chisquare
 
-from warpimpact.identification.evaluate import benches, data_of, discrepancies, evaluate, runs
 from warpimpact.identification.fit import Fit
+from warpimpact.identification.fit_file import fit_from
 from warpimpact.identification.likelihood import Compared, Data
-from warpimpact.identification.reading import fit_from
+from warpimpact.identification.scoring import benches, data_of, discrepancies, evaluate, runs
 from warpimpact.solver.worker import Worker
 from warpimpact.statistics.importance import ImportanceSampler, Weights
 

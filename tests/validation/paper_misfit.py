@@ -13,9 +13,9 @@ from pathlib import Path
 import numpy as np
 from scipy.special import ndtri
 
-from warpimpact.identification.evaluate import evaluate
 from warpimpact.identification.fit import Fit
-from warpimpact.identification.reading import fit_from
+from warpimpact.identification.fit_file import fit_from
+from warpimpact.identification.scoring import evaluate
 from warpimpact.results import posterior_file
 from warpimpact.results.files import read_tree
 from warpimpact.scene.distributions import EDGE

@@ -1,6 +1,6 @@
 """Posteriors are right on average: a small version of calibrate_fit.py."""
 
-from warpimpact.identification.reading import fit_from
+from warpimpact.identification.fit_file import fit_from
 
 from .calibrate_fit import FIT, HERE, calibrate
 

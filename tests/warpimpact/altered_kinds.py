@@ -89,10 +89,10 @@ COMMANDS: dict[str, Sequence[Sequence[str]]] = {
 
 def write_files(folder: Path) -> None:
     """Write a file of every kind, `KIND.nc`, and what the commands need beside it."""
-    from warpimpact.firing.reading import firing_test
-    from warpimpact.firing.simulate import simulate_test
+    from warpimpact.firing.plan_file import firing_test
+    from warpimpact.firing.repeated import simulate_test
+    from warpimpact.identification.fit_file import fit_from
     from warpimpact.identification.identify import identify_to_file
-    from warpimpact.identification.reading import fit_from
     from warpimpact.optimisation.design import design_from
     from warpimpact.optimisation.optimise import optimise
     from warpimpact.results import files

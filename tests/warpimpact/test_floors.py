@@ -50,7 +50,7 @@ def test_imports_go_down_only(installed: Path) -> None:
         ("kernels/status.py", "from warpimpact.scene import Plate", "warpimpact.kernels is not allowed to import"),
         ("statistics/intervals.py", "import xarray", "warpimpact.statistics is not allowed to import xarray"),
         ("results/files.py", "from warpimpact import run", "warpimpact.results is not allowed to import"),
-        ("plotting/cell.py", "import warpimpact.export.table", "warpimpact.plotting is not allowed to import"),
+        ("plotting/cell.py", "import warpimpact.export.spreadsheet", "warpimpact.plotting is not allowed to import"),
     ],
 )
 def test_an_import_upwards_is_found(installed: Path, file: str, line: str, sentence: str) -> None:

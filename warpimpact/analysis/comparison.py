@@ -24,11 +24,11 @@ from typing import NamedTuple
 import numpy as np
 import xarray
 
+from warpimpact.analysis.comparable import check_same_question, other_shots
 from warpimpact.analysis.comparison_text import Comparison, Contestant, Difference, Pair
 from warpimpact.analysis.effectiveness import Score, Scored, depth_note, measures_of, ratio_of_draws, scores
 from warpimpact.analysis.numbers import of_each
-from warpimpact.analysis.plate import solid_note, solid_plate
-from warpimpact.analysis.questions import check_same_question, other_shots
+from warpimpact.analysis.plate_text import solid_note, solid_plate
 from warpimpact.analysis.summary import breaks_promise, hits_at_two_levels, sampling_note
 from warpimpact.analysis.survival import draws_note, survival_of, why_not_by_draws
 from warpimpact.results import attributes as attr

@@ -16,7 +16,7 @@ import xarray
 
 from warpimpact.analysis.estimates import Evidence, by_hit_of, evidence
 from warpimpact.analysis.numbers import Ends, intervals_text
-from warpimpact.analysis.plate import plate_text, solid_note
+from warpimpact.analysis.plate_text import plate_text, solid_note
 from warpimpact.analysis.survival import by_draws, over_draws
 from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v

@@ -13,7 +13,7 @@ from warpimpact.analysis.bursts import bursts, bursts_view
 from warpimpact.analysis.effectiveness import effectiveness_view
 from warpimpact.analysis.estimates import estimated, means_of, slices, status_shares
 from warpimpact.analysis.numbers import ends_of, intervals_text
-from warpimpact.analysis.plate import plate_numbers
+from warpimpact.analysis.plate_text import plate_numbers
 from warpimpact.analysis.summary import (
     levels_note,
     numerics_note,

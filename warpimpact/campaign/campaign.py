@@ -44,9 +44,9 @@ from ..scene.symmetry import unsymmetric
 from ..scene.target import MOST_LAYERS
 from ..scene.units import Number, PositiveLength, Title
 from .catalogued import catalogue_of, with_materials, with_threat
+from .drawn import DrawnSampler, Posterior, read_posterior
 from .needs import lacking
 from .plausible import check_plausible, warn_of
-from .posterior import DrawnSampler, Posterior, read_posterior
 from .problems import sentence
 from .published import Published
 from .scatter_tables import with_scatter_apart

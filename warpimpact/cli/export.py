@@ -37,7 +37,7 @@ def add_export(commands: Commands) -> None:
 
 def _export(arguments: argparse.Namespace) -> None:
     from warpimpact.export.paraview import write_vtk
-    from warpimpact.export.table import write_csv
+    from warpimpact.export.spreadsheet import write_csv
     from warpimpact.results import files
     from warpimpact.results.checks import RESULT
     from warpimpact.results.replayed_hit import HISTORY

@@ -35,9 +35,9 @@ def _test(arguments: argparse.Namespace) -> None:
     from warpimpact.campaign.tested import summary_of_all
     from warpimpact.campaign.text import CampaignError
     from warpimpact.firing.firing_view import firing_view
-    from warpimpact.firing.reading import read_test
-    from warpimpact.firing.simulate import simulate_test
-    from warpimpact.firing.target import directions_of, response_of, target_campaign
+    from warpimpact.firing.known_target import directions_of, response_of, target_campaign
+    from warpimpact.firing.plan_file import read_test
+    from warpimpact.firing.repeated import simulate_test
     from warpimpact.plotting.firing import directions_figure, firing_figure
     from warpimpact.results import files
     from warpimpact.view.view import text_of

@@ -45,9 +45,9 @@ def add_identify(commands: Commands) -> None:
 
 
 def _identify(arguments: argparse.Namespace) -> int:
+    from warpimpact.identification.fit_file import read_fit
     from warpimpact.identification.identify import identify_to_file
     from warpimpact.identification.posterior_view import posterior_view
-    from warpimpact.identification.reading import read_fit
     from warpimpact.plotting.posterior import FIGURES
     from warpimpact.results import files, posterior_file
     from warpimpact.runs.choice import executor_for

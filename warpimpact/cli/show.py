@@ -147,7 +147,7 @@ def add_plate(commands: Commands) -> None:
 
 
 def _plate(arguments: argparse.Namespace) -> None:
-    from warpimpact.analysis.plate import plate_numbers
+    from warpimpact.analysis.plate_text import plate_numbers
     from warpimpact.campaign.campaign import Campaign
     from warpimpact.plotting import plate_figure
     from warpimpact.view.view import Section, labelled, text_of

@@ -136,9 +136,9 @@ def _schema_text(kind: str) -> str:
     import json
 
     from warpimpact.campaign.schema import campaign_schema
-    from warpimpact.firing.schema import firing_schema
-    from warpimpact.identification.schema import fit_schema
-    from warpimpact.optimisation.schema import design_schema
+    from warpimpact.firing.plan_schema import firing_schema
+    from warpimpact.identification.fit_schema import fit_schema
+    from warpimpact.optimisation.design_schema import design_schema
 
     made = {"campaign": campaign_schema, "fit": fit_schema, "test": firing_schema, "design": design_schema}[kind]
     return json.dumps(made(), indent=1, ensure_ascii=False) + "\n"

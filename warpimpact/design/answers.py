@@ -17,12 +17,12 @@ from warpimpact.campaign.campaign import Campaign
 from warpimpact.campaign.evidence import evidence_of
 from warpimpact.campaign.plausible import doubted
 from warpimpact.campaign.text import CampaignError
-from warpimpact.design.changes import choices
 from warpimpact.design.controls import groups
 from warpimpact.design.designs import FOLDER, Shelf, ValidDesign, stage_of
-from warpimpact.design.drawing import drawn
+from warpimpact.design.edits import choices
+from warpimpact.design.geometry import drawn
 from warpimpact.plotting.trajectory import FIGURES
-from warpimpact.report.hits import MOST_HITS, PIXELS, page_data, thinned, trajectory_data
+from warpimpact.report.hit_data import MOST_HITS, PIXELS, page_data, thinned, trajectory_data
 from warpimpact.report.report import report_page
 from warpimpact.report.words import compared, result_content
 from warpimpact.results import attributes as attr

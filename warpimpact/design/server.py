@@ -24,9 +24,9 @@ from starlette.routing import Mount, Route
 import warpimpact
 from warpimpact.campaign.text import CampaignError, parsed
 from warpimpact.design.answers import Answers, named
-from warpimpact.design.changes import changed
 from warpimpact.design.designs import Shelf, Tables, ValidDesign, as_json, stages
 from warpimpact.design.desk import Desk
+from warpimpact.design.edits import changed
 from warpimpact.design.guard import Guard
 from warpimpact.design.hasty import Hasty
 from warpimpact.results.files import ResultError

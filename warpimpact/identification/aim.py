@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from warpimpact.identification.fit import MeasuredShot, Sampling
-from warpimpact.identification.hits import CLASSES, HitPlace
+from warpimpact.identification.hit_places import CLASSES, HitPlace
 from warpimpact.scene import Core, Hits, Plate, Sampler, Shots, Symmetry, symmetries_used
 from warpimpact.scene.model import Array
 from warpimpact.scene.symmetry import irreducible_part

@@ -1,4 +1,4 @@
-"""Fit: measured shots, the scene they were fired in, and the priors of what is unknown of it (reading.py reads it)."""
+"""Fit: measured shots, the scene they were fired in, and the priors of what is unknown of it (fit_file.py reads it)."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from typing import Annotated, Any
 
 from pydantic import Field
 
-from warpimpact.identification.hits import HitPlace
+from warpimpact.identification.hit_places import HitPlace
 from warpimpact.identification.measured import Observation
 from warpimpact.identification.parameters import Parameter, as_read, put
 from warpimpact.results.measures import Measure

@@ -11,11 +11,11 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from warpimpact.identification.evaluate import evaluate
 from warpimpact.identification.fit import Fit, Sampling
-from warpimpact.identification.likelihood import Score
+from warpimpact.identification.likelihood import ShotScore
 from warpimpact.identification.parameters import FitError
 from warpimpact.identification.posterior import Sampled, to_datatree
+from warpimpact.identification.scoring import evaluate
 from warpimpact.results import attributes as attr
 from warpimpact.results.files import write_tree
 from warpimpact.runs.choice import opened
@@ -137,7 +137,7 @@ class _Scored:
     def __init__(self, fit: Fit, follow: Follow) -> None:
         self._fit, self._follow = fit, follow
         self._total = sum(rounds(fit.sampling)) // DISCREPANCIES
-        self._batches: list[list[Score]] = []
+        self._batches: list[list[ShotScore]] = []
         self.done = 0
         self._progress = FitProgress(0, self._total, 0, np.nan, np.nan, np.inf)
 
@@ -171,15 +171,15 @@ class _Scored:
         """The smallest misfit of a batch, over all shots."""
         return float(np.sum([arrays[f"misfit_{place}"] for place in range(len(self._fit.shots))], axis=0).min())
 
-    def _scores_in(self, arrays: Arrays) -> list[Score]:
+    def _scores_in(self, arrays: Arrays) -> list[ShotScore]:
         return [
-            Score(**{f.name: arrays[f"{f.name}_{place}"] for f in fields(Score)})
+            ShotScore(**{f.name: arrays[f"{f.name}_{place}"] for f in fields(ShotScore)})
             for place in range(len(self._fit.shots))
         ]
 
-    def scores(self) -> list[Score]:
+    def scores(self) -> list[ShotScore]:
         """One score per shot over all sets so far."""
-        return [Score.joined([batch[place] for batch in self._batches]) for place in range(len(self._fit.shots))]
+        return [ShotScore.joined([batch[place] for batch in self._batches]) for place in range(len(self._fit.shots))]
 
     def tell(self, effective: float, pareto_k: float) -> None:
         """Tell what the weights are worth after a round."""
@@ -190,10 +190,12 @@ class _Scored:
 def _batch_scored(fit: Fit, points: Array, number: int, *, worker: Worker, report: Callable[[float], object]) -> Arrays:
     """Scores of the sets of a batch; its number is the seed of the places of its hits."""
     scores = evaluate(fit, points, worker, seed=number)
-    return {f"{f.name}_{place}": getattr(score, f.name) for place, score in enumerate(scores) for f in fields(Score)}
+    return {
+        f"{f.name}_{place}": getattr(score, f.name) for place, score in enumerate(scores) for f in fields(ShotScore)
+    }
 
 
-def _check_reach(fit: Fit, scores: list[Score]) -> None:
+def _check_reach(fit: Fit, scores: list[ShotScore]) -> None:
     """Refuse priors of which no set comes near what was measured.
 
     Raises:

@@ -68,7 +68,7 @@ class Data:
 
 
 @dataclass(frozen=True)
-class Score:
+class ShotScore:
     """How one shot fits some sets of parameters; SI and radians.
 
     Attributes:
@@ -143,7 +143,7 @@ class Compared:
 
     def score(
         self, discrepancy: Mapping[str, Array], rng: np.random.Generator, of: NDArray[np.int64] | None = None
-    ) -> Score:
+    ) -> ShotScore:
         """Score the sets with scales of discrepancy.
 
         Args:
@@ -161,7 +161,7 @@ class Compared:
         hits = self.aim.hits
         fitted, ahead = _drawn(relative, rng), _drawn(self.counts[row], rng)
         errors = spread[:, None] * rng.standard_normal((len(row), KEPT, spread.shape[-1]))
-        return Score(
+        return ShotScore(
             log_likelihood=log_likelihood,
             noise=noise,
             misfit=misfits[row, nearest],
@@ -198,7 +198,7 @@ class Compared:
 
 def score(
     data: Data, aim: Aim, outcomes: Outcomes, discrepancy: Mapping[str, Array], rng: np.random.Generator
-) -> Score:
+) -> ShotScore:
     """Score sets of parameters against one measured shot; the arguments are those of `Compared`."""
     return Compared.of(data, aim, outcomes).score(discrepancy, rng)
 

@@ -12,11 +12,11 @@ import numpy as np
 import xarray
 from numpy.typing import NDArray
 
-from warpimpact.campaign.posterior import OF_THE_MATERIAL
-from warpimpact.identification.evaluate import data_of, discrepancies
+from warpimpact.campaign.drawn import OF_THE_MATERIAL
 from warpimpact.identification.fit import Fit
-from warpimpact.identification.likelihood import KEPT, Score
+from warpimpact.identification.likelihood import KEPT, ShotScore
 from warpimpact.identification.parameters import Parameter
+from warpimpact.identification.scoring import data_of, discrepancies
 from warpimpact.results import attributes as attr
 from warpimpact.results import posterior_file
 from warpimpact.results.variables import HIT_Y, HIT_Z
@@ -49,7 +49,7 @@ class Sampled:
     """
 
     points: Array
-    scores: list[Score]
+    scores: list[ShotScore]
     weights: Weights
     block: int = 1
 

@@ -19,7 +19,7 @@ from warpimpact.optimisation.limits import limits_level, limits_said
 from warpimpact.records.outcomes import Outcomes
 from warpimpact.results import variables as v
 from warpimpact.results.dataset import narrow_table
-from warpimpact.results.table import Table
+from warpimpact.results.table import HitTable
 from warpimpact.runs.compute import at_solid
 from warpimpact.runs.executor import Job
 from warpimpact.runs.questions import Arrays, Question, Round
@@ -179,7 +179,7 @@ def _marched(
     return [found[number] for number in range(len(scenes))], time.process_time() - begin
 
 
-def said_of(design: Design, table: Table) -> Array:
+def said_of(design: Design, table: HitTable) -> Array:
     """What every measure of a design file counts of the hits of a table, in the unit in which it is shown, shape
     [measures, hits]; NaN of one that the table lacks, as a solid plate has no base."""
     said = np.full((len(design.keys), table.sizes["hit"]), np.nan)

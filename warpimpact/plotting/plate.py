@@ -15,7 +15,7 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Circle, Patch, PathPatch, Rectangle
 from matplotlib.path import Path
 
-from warpimpact.analysis.plate import plate_numbers
+from warpimpact.analysis.plate_text import plate_numbers
 from warpimpact.plotting.dimensions import draw_dimensions
 from warpimpact.plotting.heading import add_heading
 from warpimpact.scene import NoPattern, Target

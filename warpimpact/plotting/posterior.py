@@ -10,9 +10,9 @@ import numpy as np
 import xarray
 from matplotlib.figure import Figure
 
+from warpimpact.identification.fit_file import fit_from
 from warpimpact.identification.posterior import learnt, parameters_of
 from warpimpact.identification.posterior_view import unit_of
-from warpimpact.identification.reading import fit_from
 from warpimpact.plotting.style import BLUE, VERMILION
 from warpimpact.results import attributes as attr
 from warpimpact.results import posterior_file

@@ -1,5 +1,5 @@
 "use strict";
-// Draws maps of hits and views of a core, on a page that has Plotly. All numbers come from `data` (report/hits.py).
+// Draws maps of hits and views of a core, on a page that has Plotly. All numbers come from `data` (report/hit_data.py).
 function hitMaps(data) {
   const config = { displaylogo: false, responsive: true, showSendToCloud: false, modeBarButtonsToRemove: ["select2d", "lasso2d"] };
   const STATUS = "status", MISSING = "#9e9e9e", CHOSEN = "#d55e00";

@@ -21,7 +21,7 @@ from jinja2 import Environment, PackageLoader, StrictUndefined
 from plotly.offline import get_plotlyjs
 
 import warpimpact
-from warpimpact.report.hits import MOST_HITS, page_data, thinned, trajectory_data, worst_and_spread
+from warpimpact.report.hit_data import MOST_HITS, page_data, thinned, trajectory_data, worst_and_spread
 from warpimpact.report.words import cell_drawings, compared, conclusion, result_content
 from warpimpact.results import variables as v
 from warpimpact.results.dataset import hit_numbers

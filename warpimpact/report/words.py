@@ -17,7 +17,7 @@ from warpimpact.analysis.effectiveness import depth_note, effectiveness, measure
 from warpimpact.analysis.estimates import estimated, means_of, slices, status_shares
 from warpimpact.analysis.inspection import verdict
 from warpimpact.analysis.numbers import ends_of, intervals_text
-from warpimpact.analysis.plate import solid_note
+from warpimpact.analysis.plate_text import solid_note
 from warpimpact.analysis.summary import numerics_note, numerics_sentence, promise_text, sampling_note
 from warpimpact.analysis.survival import draws_note
 from warpimpact.campaign.text import parsed

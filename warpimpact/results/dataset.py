@@ -18,7 +18,7 @@ from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
 from warpimpact.results.layers import faces, fields, own_columns, sections
 from warpimpact.results.outlines import in_memory, outlines_in
-from warpimpact.results.table import Table
+from warpimpact.results.table import HitTable
 
 if TYPE_CHECKING:
     import xarray
@@ -55,7 +55,7 @@ def to_table(
     double: bool = False,
     beside: Mapping[str, Any] | None = None,
     left_out: Collection[str] = (),
-) -> Table:
+) -> HitTable:
     """Gather shots and outcomes into the columns of the hit map.
 
     Hits are numbered from 0. The outlines of the holes are coordinates: no choice of hits spreads them over the hits.
@@ -94,14 +94,14 @@ def to_table(
     variables = (name for name in v.hit_variables() if name in values and name not in left_out)
     finer = [name for name, of_hits in v.FINER_VARIABLES.items() if of_hits in v.computed_variables()]
     single = () if double else {*v.computed_variables(), *v.SOLID_VARIABLES, *finer}
-    return Table.of(
+    return HitTable.of(
         stored_columns(variables, values, single),
         stored_columns((name for name in along if name in coordinates), coordinates, single),
         _ATTRIBUTES | attr.with_units(dict(attributes) | {attr.PLATE_PERIOD: np.array(period)}),
     )
 
 
-def narrow_table(scene: Scene, shots: Shots, outcomes: Outcomes, names: Collection[str]) -> Table:
+def narrow_table(scene: Scene, shots: Shots, outcomes: Outcomes, names: Collection[str]) -> HitTable:
     """Only some columns of `to_table`, as far as the outcomes have them, with stand-offs and the core: for who computes
     with many small results at once."""
     columns = own_columns(scene.target, shots)
@@ -111,7 +111,7 @@ def narrow_table(scene: Scene, shots: Shots, outcomes: Outcomes, names: Collecti
     kept = [name for name in (*v.hit_variables(), *v.LAYER_FACES) if name in names and name in values]
     coordinates: dict[Any, Any] = {v.HIT: np.arange(len(shots)), v.STANDOFF: np.array(scene.record.standoffs)}
     attributes = {attr.CORE: scene.core.model_dump_json()}
-    return Table.of(stored_columns(kept, values), stored_columns(coordinates, coordinates), attributes)
+    return HitTable.of(stored_columns(kept, values), stored_columns(coordinates, coordinates), attributes)
 
 
 def to_dataset(scene: Scene, shots: Shots, outcomes: Outcomes, **arguments: Any) -> xarray.Dataset:

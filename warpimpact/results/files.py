@@ -19,7 +19,7 @@ from warpimpact.results.interrupts import uninterrupted
 from warpimpact.results.kind import Kind
 from warpimpact.results.netcdf import write_table
 from warpimpact.results.outlines import in_a_file, in_memory
-from warpimpact.results.table import Table
+from warpimpact.results.table import HitTable
 from warpimpact.scene.input_files import check_file
 
 if TYPE_CHECKING:
@@ -41,7 +41,7 @@ def write(dataset: xarray.Dataset, path: Path) -> None:
         OutputError: The file cannot be written; what was there before is untouched.
     """
     with uninterrupted(), aside(path) as file:
-        write_table(in_a_file(Table.from_xarray(dataset)), file)
+        write_table(in_a_file(HitTable.from_xarray(dataset)), file)
 
 
 CHUNK = 2**15

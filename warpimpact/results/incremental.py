@@ -10,7 +10,7 @@ from typing import Any
 from warpimpact.results.files import CHUNK, aside, told_as
 from warpimpact.results.interrupts import uninterrupted
 from warpimpact.results.netcdf import append, open_to_append, write_table
-from warpimpact.results.table import Table, joined
+from warpimpact.results.table import HitTable, joined
 
 
 class IncrementalFile:
@@ -24,11 +24,11 @@ class IncrementalFile:
 
     def __init__(self, path: Path, written: Path, hits: int) -> None:
         self._path, self._written, self._chunk = path, written, min(hits, CHUNK)
-        self._waiting: list[Table] = []
+        self._waiting: list[HitTable] = []
         self._file: Any = None
         self._at = 0
 
-    def add(self, table: Table) -> None:
+    def add(self, table: HitTable) -> None:
         """Add the next hits. Few of them wait for others: every access to the file costs some time.
 
         Raises:

@@ -12,13 +12,13 @@ import netCDF4
 import numpy as np
 
 from warpimpact.results import variables as v
-from warpimpact.results.table import StoredColumn, Table
+from warpimpact.results.table import HitTable, StoredColumn
 
 _PACKED = {"zlib": True, "complevel": 1}
 
 
-def write_table(table: Table, file: Path, *, chunk: int | None = None, compressed: bool = True) -> None:
-    """Write a Table, with the coordinates that have a group of their own in it.
+def write_table(table: HitTable, file: Path, *, chunk: int | None = None, compressed: bool = True) -> None:
+    """Write a HitTable, with the coordinates that have a group of their own in it.
 
     Args:
         chunk: hits per chunk; "hit" is unlimited then.
@@ -79,15 +79,15 @@ def open_to_append(file: Path) -> Any:
     return target
 
 
-def append(table: Table, target: Any, first: int) -> None:
-    """Write what a Table has along "hit" behind the first so many hits of an open file."""
+def append(table: HitTable, target: Any, first: int) -> None:
+    """Write what a HitTable has along "hit" behind the first so many hits of an open file."""
     for name, column in table.variables.items():
         if v.HIT in column.dims and name in target.variables:
             target[name][first : first + column.shape[0]] = column.values
 
 
 @contextmanager
-def open_table(path: Path) -> Iterator[Table]:
+def open_table(path: Path) -> Iterator[HitTable]:
     """A file that `write_table` wrote, of which only what is used is read."""
     with netCDF4.Dataset(path) as source:
         source.set_auto_maskandscale(False)
@@ -103,10 +103,10 @@ def open_table(path: Path) -> Iterator[Table]:
         }
         named = {name for column in root.values() for name in column.attrs.pop("coordinates", "").split()}
         coords = {*named, *grouped, *(name for name in root if root[name].dims == (name,))}
-        yield Table(root | grouped, frozenset(coords), {name: source.getncattr(name) for name in source.ncattrs()})
+        yield HitTable(root | grouped, frozenset(coords), {name: source.getncattr(name) for name in source.ncattrs()})
 
 
-def read_table(path: Path) -> Table:
+def read_table(path: Path) -> HitTable:
     """The same, in memory."""
     with open_table(path) as table:
         return table.load()

@@ -20,10 +20,10 @@ if TYPE_CHECKING:
     import xarray
     from numpy.typing import NDArray
 
-    from warpimpact.results.table import Table
+    from warpimpact.results.table import HitTable
 
 
-def outlines(dataset: xarray.Dataset | Table, layer: int = 0) -> dict[str, NDArray[np.float64]]:
+def outlines(dataset: xarray.Dataset | HitTable, layer: int = 0) -> dict[str, NDArray[np.float64]]:
     """Outlines of the holes of a layer, 0 the plate, [m], each of shape (vertex,), by the axis "y" and "z", with a NaN
     between one and the next.
 
@@ -66,7 +66,7 @@ def in_memory(dataset: xarray.Dataset) -> xarray.Dataset:
     return bare.assign_attrs({str(name): values for name, values in stored.items()})
 
 
-def in_a_file(table: Table) -> Table:
+def in_a_file(table: HitTable) -> HitTable:
     """A map of hits with its outlines along "vertex"."""
     if v.HIT not in table.sizes or attr.PLATE_PERIOD not in table.attrs or attr.SWEEP in table.attrs:
         return table

@@ -1,8 +1,8 @@
 """A hit map as plain columns, with those methods of an xarray Dataset that a run needs.
 
 The first Dataset of a process takes xarray a good part of a second: it looks for pint, Dask and other kinds of arrays.
-So a run computes, gathers and writes a Table, and whoever asks for a Dataset gets it from `Table.to_xarray`. Functions
-that take a `Result` take either.
+So a run computes, gathers and writes a HitTable, and whoever asks for a Dataset gets it from `HitTable.to_xarray`.
+Functions that take a `Result` take either.
 """
 
 from __future__ import annotations
@@ -17,8 +17,8 @@ from numpy.typing import NDArray
 if TYPE_CHECKING:
     import xarray
 
-    Result: TypeAlias = "Table | xarray.Dataset"
-    AResult = TypeVar("AResult", "Table", "xarray.Dataset")
+    Result: TypeAlias = "HitTable | xarray.Dataset"
+    AResult = TypeVar("AResult", "HitTable", "xarray.Dataset")
     """Either, the same that was given."""
 
 _HIT = "hit"
@@ -63,7 +63,7 @@ class StoredColumn:
 
 
 @dataclass(frozen=True)
-class Table:
+class HitTable:
     """Variables, coordinates among them, and global attributes.
 
     Attributes:
@@ -79,12 +79,12 @@ class Table:
     @classmethod
     def of(
         cls, data: Mapping[str, tuple[Any, ...]], coordinates: Mapping[str, tuple[Any, ...]], attrs: Mapping[str, Any]
-    ) -> Table:
+    ) -> HitTable:
         """From dimensions, values and attributes of every variable, as xarray takes them."""
         return cls(_columns({**data, **coordinates}), frozenset(coordinates), dict(attrs))
 
     @classmethod
-    def from_xarray(cls, dataset: xarray.Dataset) -> Table:
+    def from_xarray(cls, dataset: xarray.Dataset) -> HitTable:
         """That of a Dataset, in memory."""
         columns = {str(name): (column.dims, column.values, column.attrs) for name, column in dataset.variables.items()}
         data = {name: column for name, column in columns.items() if name not in dataset.coords}
@@ -105,39 +105,39 @@ class Table:
     def __getitem__(self, name: str) -> StoredColumn: ...
 
     @overload
-    def __getitem__(self, name: list[str]) -> Table: ...
+    def __getitem__(self, name: list[str]) -> HitTable: ...
 
-    def __getitem__(self, name: str | list[str]) -> StoredColumn | Table:
+    def __getitem__(self, name: str | list[str]) -> StoredColumn | HitTable:
         """A column, or those of some names with all coordinates."""
         if isinstance(name, str):
             return self.variables[name]
         kept = {*name, *self.coords}
         return replace(self, variables={key: column for key, column in self.variables.items() if key in kept})
 
-    def isel(self, *, hit: slice | NDArray[np.int64]) -> Table:
+    def isel(self, *, hit: slice | NDArray[np.int64]) -> HitTable:
         """Some of the hits."""
         return replace(self, variables={name: column.part(hit) for name, column in self.variables.items()})
 
-    def load(self) -> Table:
+    def load(self) -> HitTable:
         """The same, in memory."""
         return self.assign(
             {name: (column.dims, column.values, column.attrs) for name, column in self.variables.items()}
         )
 
-    def assign(self, variables: Mapping[str, tuple[Any, ...]]) -> Table:
+    def assign(self, variables: Mapping[str, tuple[Any, ...]]) -> HitTable:
         """With other values of these variables; new ones are no coordinates."""
         return replace(self, variables={**self.variables, **_columns(variables)})
 
-    def assign_coords(self, variables: Mapping[str, tuple[Any, ...]]) -> Table:
+    def assign_coords(self, variables: Mapping[str, tuple[Any, ...]]) -> HitTable:
         """With these coordinates behind all others."""
         kept = self.drop_vars(variables)
         return replace(kept, variables={**kept.variables, **_columns(variables)}, coords=self.coords | {*variables})
 
-    def assign_attrs(self, attrs: Mapping[str, Any]) -> Table:
+    def assign_attrs(self, attrs: Mapping[str, Any]) -> HitTable:
         """With these global attributes over its own."""
         return replace(self, attrs=self.attrs | dict(attrs))
 
-    def drop_vars(self, names: Collection[str]) -> Table:
+    def drop_vars(self, names: Collection[str]) -> HitTable:
         """Without these variables, as far as they are there."""
         kept = {name: column for name, column in self.variables.items() if name not in names}
         return replace(self, variables=kept, coords=self.coords - {*names})
@@ -153,7 +153,7 @@ class Table:
         )
 
 
-def joined(tables: Iterable[Table]) -> Table:
+def joined(tables: Iterable[HitTable]) -> HitTable:
     """Tables of the same variables, one behind the other; what has no hits, and the attributes, from the first."""
     first, *others = tables
     columns = {

@@ -16,7 +16,7 @@ from warpimpact.campaign.campaign import Campaign
 from warpimpact.records.outcomes import Outcomes
 from warpimpact.results import attributes as attr
 from warpimpact.results.dataset import finer_columns, solid_columns
-from warpimpact.results.table import Table
+from warpimpact.results.table import HitTable
 from warpimpact.runs.describe import computed_by, described, found_attributes
 from warpimpact.runs.levels import excess_of_stop, seeks_measure, shifts_of
 from warpimpact.runs.task import Task
@@ -47,7 +47,7 @@ class HitMap:
     content: ClassVar[Mapping[str, str]] = {}
     measures: ClassVar[Sequence[str]] = ()
 
-    def compute(self, campaign: Campaign, task: Task, worker: Worker, progress: Progress | None = None) -> Table:
+    def compute(self, campaign: Campaign, task: Task, worker: Worker, progress: Progress | None = None) -> HitTable:
         """See `compute`."""
         return compute(campaign, task, worker, progress)
 
@@ -80,7 +80,7 @@ class HitMap:
 HIT_MAP = HitMap()
 
 
-def compute(campaign: Campaign, task: Task, worker: Worker, progress: Progress | None = None) -> Table:
+def compute(campaign: Campaign, task: Task, worker: Worker, progress: Progress | None = None) -> HitTable:
     """Compute some shots of a campaign. If it uses symmetry, only the first shot of each group of images is computed.
 
     Args:

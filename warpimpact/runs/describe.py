@@ -13,7 +13,7 @@ from warpimpact.records.outcomes import Outcomes
 from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
 from warpimpact.results.dataset import to_table
-from warpimpact.results.table import Table
+from warpimpact.results.table import HitTable
 from warpimpact.scene import Accuracy, Burst, Numerics, Shots
 from warpimpact.scene.quantities import QUANTITIES
 from warpimpact.solver.device import find_device
@@ -29,7 +29,7 @@ def described(
     numerics: Numerics,
     attributes: Mapping[str, Any],
     beside: Mapping[str, Any] | None = None,
-) -> Table:
+) -> HitTable:
     """The columns of some shots of a campaign.
 
     Args:

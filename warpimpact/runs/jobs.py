@@ -10,7 +10,7 @@ from warpimpact.campaign.campaign import Campaign
 from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
 from warpimpact.results.dataset import images, numbered
-from warpimpact.results.table import Table
+from warpimpact.results.table import HitTable
 from warpimpact.runs.executor import Executor
 from warpimpact.runs.shards import Shards
 from warpimpact.runs.task import Computation, Task
@@ -41,7 +41,7 @@ def pilot_job(
 
 def task_job(
     computation: Computation, campaign: Campaign, task: Task, *, worker: Worker, report: Callable[[int], object]
-) -> Table:
+) -> HitTable:
     """The columns of the shots of a task; it reports how many shots are done."""
 
     def progress(done: int, total: int) -> None:
@@ -83,7 +83,7 @@ def ranges(shards: Shards, total: int, shots: Callable[[], int]) -> Iterator[ran
         first = max(stop, first + 1)
 
 
-def split(table: Table, task: range, size: int) -> Iterator[tuple[int, Table]]:
+def split(table: HitTable, task: range, size: int) -> Iterator[tuple[int, HitTable]]:
     """The shards of a task, each with its share of the time and of what was computed; the first one of a campaign keeps
     what is said once."""
     hits, of_the_campaign = table.sizes["hit"], [name for names in v.GROUPS.values() for name in names]
@@ -95,6 +95,6 @@ def split(table: Table, task: range, size: int) -> Iterator[tuple[int, Table]]:
         yield index, shard.assign_attrs({attr.COMPUTE_TIME: time} | computed_hits(table, shard.sizes["hit"]))
 
 
-def computed_hits(table: Table, hits: int) -> dict[str, int]:
-    """How many of some hits of a Table were computed, if that is not all the same."""
+def computed_hits(table: HitTable, hits: int) -> dict[str, int]:
+    """How many of some hits of a HitTable were computed, if that is not all the same."""
     return {attr.COMPUTED_HITS: hits // images(table)} if attr.COMPUTED_HITS in table.attrs else {}

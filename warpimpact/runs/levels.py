@@ -9,7 +9,7 @@ from warpimpact.records.outcomes import Outcomes
 from warpimpact.results import attributes as attr
 from warpimpact.results.dataset import to_table
 from warpimpact.results.measures import Measure
-from warpimpact.results.table import Table
+from warpimpact.results.table import HitTable
 from warpimpact.results.tallies import shift_of
 from warpimpact.scene import Shots
 from warpimpact.solver.findings import HitErrors
@@ -55,7 +55,7 @@ def shifts_of(campaign: Campaign, pilot: Shots, found: HitErrors) -> dict[int, t
     return shifts
 
 
-def _table(campaign: Campaign, shots: Shots, outcomes: Outcomes) -> Table:
+def _table(campaign: Campaign, shots: Shots, outcomes: Outcomes) -> HitTable:
     """Outcomes of a pilot's shots as a result."""
     together = {attr.SHOTS_AT_A_PLATE: campaign.at_a_plate} if campaign.at_a_plate > 1 else {}
     period = campaign.hits.covered(campaign.plate)

@@ -14,7 +14,7 @@ from warpimpact.results import attributes as attr
 from warpimpact.results.dataset import failed, finer_pair, images
 from warpimpact.results.measures import Measure
 from warpimpact.results.outlines import in_memory
-from warpimpact.results.table import Table, joined
+from warpimpact.results.table import HitTable, joined
 from warpimpact.results.tallies import Tally, shift_of
 from warpimpact.runs.choice import executor_for, opened
 from warpimpact.runs.compute import HIT_MAP, numerics_of
@@ -202,7 +202,7 @@ class _Watch:
         self.end: _End | None = None
         self.found: Found | None = None
 
-    def add(self, index: int, shard: Table) -> None:
+    def add(self, index: int, shard: HitTable) -> None:
         """Take in a shard that is there; one that comes before its turn is loaded when that is."""
         self.done += shard.sizes["hit"]
         self.failed += int(failed(shard).sum())
@@ -216,7 +216,7 @@ class _Watch:
         """Hits per second of computing so far; 0 before the first shard."""
         return self._hits / self._time if self._time > 0.0 else 0.0
 
-    def _advance(self, shard: Table) -> None:
+    def _advance(self, shard: HitTable) -> None:
         self._next += 1
         self._hits += shard.sizes["hit"]
         self._time += shard.attrs[attr.COMPUTE_TIME]
@@ -268,7 +268,7 @@ class _Watch:
         return RunProgress(done, self._total, self.done, self.resumed, self.failed, estimates, found=self.found)
 
 
-def _attributes(table: Table, end: _End) -> dict[str, Any]:
+def _attributes(table: HitTable, end: _End) -> dict[str, Any]:
     """Global attributes of a complete result over those of its first shard."""
     return {
         attr.HISTORY: attr.history_line(table.attrs[attr.HISTORY].partition(" warpimpact ")[2]),

@@ -23,7 +23,7 @@ from warpimpact.results import files
 from warpimpact.results.files import OutputError
 from warpimpact.results.incremental import IncrementalFile
 from warpimpact.results.netcdf import read_table, write_table
-from warpimpact.results.table import Table
+from warpimpact.results.table import HitTable
 from warpimpact.runs.manifests import digest
 from warpimpact.runs.parts import Form, Parts
 
@@ -56,17 +56,17 @@ class Shards:
 
     def __init__(self, extent: int) -> None:
         self.extent = extent
-        self._held: dict[int, Table] = {}
+        self._held: dict[int, HitTable] = {}
 
     def there(self) -> Collection[int]:
         """Numbers of the shards that are there."""
         return self._held.keys()
 
-    def save(self, index: int, table: Table) -> None:
+    def save(self, index: int, table: HitTable) -> None:
         """Take in a shard."""
         self._held[index] = table
 
-    def shard(self, index: int) -> Table:
+    def shard(self, index: int) -> HitTable:
         """A shard that is there."""
         return self._held[index]
 
@@ -108,7 +108,7 @@ class ShardsOnDisk(Shards):
         """Numbers of the shards that are there."""
         return self._held.keys() | self.parts.saved.keys()
 
-    def save(self, index: int, table: Table) -> None:
+    def save(self, index: int, table: HitTable) -> None:
         """Take in a shard. It is on the disk after HELD seconds at most, if the run goes on.
 
         Raises:
@@ -145,7 +145,7 @@ class ShardsOnDisk(Shards):
             self.flush()
         return self.parts.kept()
 
-    def shard(self, index: int) -> Table:
+    def shard(self, index: int) -> HitTable:
         """A shard that is there.
 
         Raises:
@@ -170,7 +170,7 @@ class ShardsOnDisk(Shards):
         self._growing, self._grown = None, 0
         (self.parts.folder / _GROWING).unlink(missing_ok=True)
 
-    def finish(self, count: int, attributes: Callable[[Table], Mapping[str, Any]]) -> None:
+    def finish(self, count: int, attributes: Callable[[HitTable], Mapping[str, Any]]) -> None:
         """Join the first `count` shards into the result file, and remove them.
 
         Args:

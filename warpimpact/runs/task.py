@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Protocol
 
 from warpimpact.campaign.campaign import Campaign
-from warpimpact.results.table import Table
+from warpimpact.results.table import HitTable
 from warpimpact.scene import Shots
 from warpimpact.solver.findings import Found
 from warpimpact.solver.marching import Progress
@@ -51,7 +51,7 @@ class Computation(Protocol):
     def measures(self) -> Sequence[str]:
         """Whose running estimates are shown; those of a hit map where there are none."""
 
-    def compute(self, campaign: Campaign, task: Task, worker: Worker, progress: Progress | None = None) -> Table:
+    def compute(self, campaign: Campaign, task: Task, worker: Worker, progress: Progress | None = None) -> HitTable:
         """Compute a task: the columns of results/dataset.py, one entry per shot; they are a complete result."""
 
     def pilot(self, campaign: Campaign, worker: Worker, trying: Callable[[int], object]) -> Found | None:

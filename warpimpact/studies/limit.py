@@ -16,7 +16,7 @@ from warpimpact.campaign.text import CampaignError
 from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
 from warpimpact.results.measures import Measure
-from warpimpact.results.table import Table
+from warpimpact.results.table import HitTable
 from warpimpact.results.vocabulary import LIMIT_VELOCITY
 from warpimpact.runs.compute import at_solid, finer_hits, found_in, numerics_of, of_images, pilot_shots
 from warpimpact.runs.describe import computed_by, described, found_attributes
@@ -110,7 +110,7 @@ class LimitMap:
         """The running estimates: the mean limit."""
         return (f"mean({v.LIMITS[self.sought.quantity].value})",)
 
-    def compute(self, campaign: Campaign, task: Task, worker: Worker, progress: Progress | None = None) -> Table:
+    def compute(self, campaign: Campaign, task: Task, worker: Worker, progress: Progress | None = None) -> HitTable:
         """Search the limits of some shots. The Dataset is that of the shots as they just perforate, with their limits.
 
         Args:

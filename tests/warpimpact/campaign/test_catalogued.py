@@ -12,7 +12,7 @@ from warpimpact.campaign.evidence import evidence_of, limit_velocity_factors
 from warpimpact.campaign.schema import campaign_schema
 from warpimpact.campaign.tested import summary_of_all
 from warpimpact.campaign.text import CampaignError
-from warpimpact.identification.reading import fit_from
+from warpimpact.identification.fit_file import fit_from
 
 OWN = """
 [[material]]

@@ -13,9 +13,9 @@ from PIL import Image
 from warpimpact import Campaign, CampaignError, run, run_to_file
 from warpimpact.catalogue.catalogue import Catalogue
 from warpimpact.cli import main
-from warpimpact.export.table import write_csv
+from warpimpact.export.spreadsheet import write_csv
 from warpimpact.firing.response import Response, response_of_limits
-from warpimpact.identification.reading import read_fit
+from warpimpact.identification.fit_file import read_fit
 from warpimpact.optimisation.design import read_design
 from warpimpact.results import files
 from warpimpact.results.checks import RESULT

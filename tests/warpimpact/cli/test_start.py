@@ -11,9 +11,9 @@ from jsonschema import Draft202012Validator
 
 from warpimpact import Campaign
 from warpimpact.cli import main
-from warpimpact.firing.reading import read_test
-from warpimpact.identification.reading import read_fit
-from warpimpact.identification.schema import fit_schema
+from warpimpact.firing.plan_file import read_test
+from warpimpact.identification.fit_file import read_fit
+from warpimpact.identification.fit_schema import fit_schema
 from warpimpact.optimisation.design import read_design
 
 CAMPAIGNS = Path(__file__).parents[3] / "campaigns"

@@ -25,8 +25,8 @@ from warpimpact.catalogue.entries import Threat
 from warpimpact.cli import main
 from warpimpact.design import hasty
 from warpimpact.design.answers import Answers
-from warpimpact.design.changes import SHAPES, changed
 from warpimpact.design.designs import FILE_KEYS, shelf_of, stages
+from warpimpact.design.edits import SHAPES, changed
 from warpimpact.results import attributes as attr
 from warpimpact.results import files, front
 from warpimpact.scene.input_files import input_file

@@ -14,7 +14,7 @@ from warpimpact import Campaign, to_dataframe
 from warpimpact.analysis import estimates
 from warpimpact.cli import main
 from warpimpact.export.paraview import AROUND, write_vtk
-from warpimpact.export.table import write_csv
+from warpimpact.export.spreadsheet import write_csv
 from warpimpact.kernels.status import Status
 from warpimpact.results import files
 from warpimpact.results.variables import SHOT_VARIABLES

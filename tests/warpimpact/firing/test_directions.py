@@ -10,9 +10,9 @@ from warpimpact import Campaign
 from warpimpact.campaign.text import CampaignError
 from warpimpact.firing.directions import Directions, impact_azimuth, obliquity, protect, weighted_mean
 from warpimpact.firing.firing_view import firing_view
-from warpimpact.firing.reading import firing_test
+from warpimpact.firing.plan_file import firing_test
+from warpimpact.firing.repeated import simulate_test
 from warpimpact.firing.requirements import REQUIREMENTS, Requirement, requirement_line, threat_of, with_threat
-from warpimpact.firing.simulate import simulate_test
 from warpimpact.plotting.firing import directions_figure
 from warpimpact.runs.choice import executor_for
 from warpimpact.runs.questions import answered

@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from warpimpact.campaign.text import CampaignError
-from warpimpact.firing.reading import firing_test, read_test
+from warpimpact.firing.plan_file import firing_test, read_test
 
 TESTS = Path(__file__).parents[3] / "campaigns" / "firing"
 TARGET = 'title = "a"\n[target]\nmean = 800\ndeviation = 25\n'

@@ -9,9 +9,9 @@ import xarray
 
 from warpimpact.cli import main
 from warpimpact.firing.firing_view import firing_view, verdict
-from warpimpact.firing.reading import firing_test
+from warpimpact.firing.plan_file import firing_test
+from warpimpact.firing.repeated import simulate_test
 from warpimpact.firing.response import normal_response
-from warpimpact.firing.simulate import simulate_test
 from warpimpact.plotting.firing import firing_figure
 from warpimpact.results import files
 from warpimpact.results import firing as f

@@ -6,8 +6,8 @@ from pathlib import Path
 import pytest
 
 from warpimpact.identification.fit import Fit
+from warpimpact.identification.fit_file import fit_from
 from warpimpact.identification.identify import identify_to_file
-from warpimpact.identification.reading import fit_from
 
 TEXT = (Path(__file__).parents[2] / "validation" / "calibration.toml").read_text(encoding="utf-8")
 

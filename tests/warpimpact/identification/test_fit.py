@@ -6,10 +6,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from warpimpact.identification.evaluate import benches
 from warpimpact.identification.fit import Fit
 from warpimpact.identification.identify import sampled
 from warpimpact.identification.parameters import FitError
+from warpimpact.identification.scoring import benches
 from warpimpact.runs.choice import executor_for
 from warpimpact.runs.questions import answered
 

@@ -12,8 +12,8 @@ import xarray
 
 from warpimpact.cli import main
 from warpimpact.identification.fit import Fit
+from warpimpact.identification.fit_file import fit_from
 from warpimpact.identification.parameters import FitError
-from warpimpact.identification.reading import fit_from
 from warpimpact.results import posterior_file
 from warpimpact.results.files import ResultError, read_tree, write_tree
 

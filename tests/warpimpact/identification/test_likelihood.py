@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 
 from warpimpact.identification.aim import Aim, aim
-from warpimpact.identification.evaluate import benches, data_of, evaluate, runs
 from warpimpact.identification.fit import Fit
-from warpimpact.identification.hits import CLASSES
+from warpimpact.identification.hit_places import CLASSES
 from warpimpact.identification.likelihood import Data, holds, score
 from warpimpact.identification.measured import Observation
+from warpimpact.identification.scoring import benches, data_of, evaluate, runs
 from warpimpact.kernels.status import Status
 from warpimpact.records.exit import OUTCOME_VARIABLES
 from warpimpact.records.outcomes import Outcomes

@@ -17,7 +17,7 @@ import pytest
 from warpimpact.identification import identify
 from warpimpact.identification.fit import Fit
 from warpimpact.identification.identify import FitProgress
-from warpimpact.identification.likelihood import Score
+from warpimpact.identification.likelihood import ShotScore
 from warpimpact.identification.posterior import Sampled
 from warpimpact.runs import executor
 from warpimpact.runs.choice import executor_for
@@ -72,7 +72,7 @@ def test_a_killed_process_costs_nothing(fit: Fit) -> None:
 
 
 def test_what_a_process_cannot_compute_is_told_by_this_one(fit: Fit, monkeypatch: pytest.MonkeyPatch) -> None:
-    def fails(*_: object, **__: object) -> list[Score]:
+    def fails(*_: object, **__: object) -> list[ShotScore]:
         raise ValueError("of this process")
 
     monkeypatch.setattr(identify, "evaluate", fails)

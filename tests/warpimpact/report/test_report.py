@@ -22,7 +22,7 @@ from warpimpact.campaign.campaign import CampaignError
 from warpimpact.cli import main
 from warpimpact.kernels.status import Status
 from warpimpact.plotting.poses import poses_behind, poses_in_plate, silhouette
-from warpimpact.report import hits, report
+from warpimpact.report import hit_data, report
 from warpimpact.results import files
 from warpimpact.runs.replay import replay
 from warpimpact.runs.run import run
@@ -82,7 +82,7 @@ def test_page_holds_the_hits_of_each_result(folder: Path) -> None:
 
 def test_outlines_keep_the_shape_with_few_points(folder: Path) -> None:
     history = replay(files.read(folder / "narrow.nc"), 3, folder=folder)
-    drawn = hits.trajectory_data(history)
+    drawn = hit_data.trajectory_data(history)
     for part, poses in (("inside", poses_in_plate(history)), ("behind", poses_behind(history))):
         for core, pose in zip(drawn[part], poses.values(), strict=True):
             for view in "yz":
@@ -137,7 +137,7 @@ def test_page_says_what_was_compared_and_leads_to_its_parts(folder: Path) -> Non
 
 
 def test_a_page_of_many_hits_is_small(make_result: ResultMaker, tmp_path: Path) -> None:
-    files.write(make_result(hits.MOST_HITS), tmp_path / "a.nc")
+    files.write(make_result(hit_data.MOST_HITS), tmp_path / "a.nc")
     assert main(["report", str(tmp_path / "a.nc"), "--trajectories", "0"]) == 0
     assert (tmp_path / "a.html").stat().st_size < 3e6
 
@@ -182,27 +182,27 @@ def test_thinning_keeps_parts_of_no_sampling_out() -> None:
     # Every fifth hit of a grid with rows of five lies on one line.
     y, z = np.meshgrid(np.arange(5.0), np.arange(200.0))
     grid = xarray.Dataset({"y": ("hit", y.ravel()), "z": ("hit", z.ravel())})
-    kept = hits.thinned(grid, 200)
+    kept = hit_data.thinned(grid, 200)
     assert kept.sizes["hit"] == 200
     assert (kept["y"] == grid["y"][kept["hit"].values]).all()
     assert np.bincount(kept["y"].astype(int)).min() > 20
-    assert hits.thinned(grid, 1000)["hit"].values.tolist() == list(range(1000))
-    assert {3, 999} <= set(hits.thinned(grid, 10, keep=[3, 999])["hit"].values.tolist())
+    assert hit_data.thinned(grid, 1000)["hit"].values.tolist() == list(range(1000))
+    assert {3, 999} <= set(hit_data.thinned(grid, 10, keep=[3, 999])["hit"].values.tolist())
 
 
 def test_trajectories_are_of_the_worst_and_of_evenly_spread_hits(make_result: ResultMaker) -> None:
     dataset = make_result(np.where(np.arange(512) % 2, Status.PERFORATED, Status.ARRESTED))
-    chosen = hits.worst_and_spread(dataset, 16)
+    chosen = hit_data.worst_and_spread(dataset, 16)
     assert chosen[:4] == [511, 509, 507, 505]  # the velocity rises with the number
     assert len(set(chosen)) == 16
     points = np.stack([dataset["hit_y"], dataset["hit_z"]], axis=-1)
     offset = points[:, None] - points[chosen]
     offset -= dataset.attrs["plate_period"] * np.round(offset / dataset.attrs["plate_period"])
     assert np.linalg.norm(offset, axis=-1).min(axis=1).max() < 4e-3  # of a cell of 16 mm x 8 mm
-    assert len(hits.worst_and_spread(dataset.isel(hit=slice(5)), 16)) == 5
-    assert hits.worst_and_spread(dataset, 16, first=[7, 509])[:5] == [7, 509, 511, 507, 505]
+    assert len(hit_data.worst_and_spread(dataset.isel(hit=slice(5)), 16)) == 5
+    assert hit_data.worst_and_spread(dataset, 16, first=[7, 509])[:5] == [7, 509, 511, 507, 505]
     some = dataset.isel(hit=slice(7, None)).assign_coords(hit=np.arange(7, 512))
-    assert hits.worst_and_spread(some, 16, first=[7])[:5] == [7, 511, 509, 507, 505]
+    assert hit_data.worst_and_spread(some, 16, first=[7])[:5] == [7, 511, 509, 507, 505]
 
 
 @pytest.mark.parametrize("status", [Status.ARRESTED, Status.MISSED])

@@ -10,9 +10,9 @@ import xarray
 
 from warpimpact import Campaign
 from warpimpact.firing.directions import Directions, Sector
-from warpimpact.firing.reading import firing_test
+from warpimpact.firing.plan_file import firing_test
+from warpimpact.firing.repeated import simulate_test
 from warpimpact.firing.response import normal_response
-from warpimpact.firing.simulate import simulate_test
 from warpimpact.results import files
 from warpimpact.runs.run import run
 from warpimpact.statistics.intervals import Estimate

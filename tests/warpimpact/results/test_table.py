@@ -16,7 +16,7 @@ from warpimpact.results import variables as v
 from warpimpact.results.dataset import numbered
 from warpimpact.results.netcdf import open_table, read_table, write_table
 from warpimpact.results.outlines import in_memory
-from warpimpact.results.table import Table, joined
+from warpimpact.results.table import HitTable, joined
 from warpimpact.runs.compute import compute
 from warpimpact.runs.task import Task
 from warpimpact.scene import Numerics
@@ -26,7 +26,7 @@ CAMPAIGNS = Path(__file__).parents[3] / "campaigns"
 
 
 @pytest.fixture(scope="module", params=["slotted_plate", "layered_target", "burst_of_five"])
-def table(request: pytest.FixtureRequest) -> Table:
+def table(request: pytest.FixtureRequest) -> HitTable:
     """Some hits of a campaign, with the solid reference, which has a group of its own in the file."""
     campaign = Campaign.from_toml(CAMPAIGNS / f"{request.param}.toml")
     campaign = campaign.model_copy(update={"numerics": Numerics(level=0)})
@@ -67,7 +67,7 @@ def encoding_of(dataset: xarray.Dataset) -> dict[Any, Any]:
     }
 
 
-def test_the_file_is_that_of_xarray(table: Table, tmp_path: Path) -> None:
+def test_the_file_is_that_of_xarray(table: HitTable, tmp_path: Path) -> None:
     table = numbered(table, first=0)
     write_table(table, tmp_path / "table.nc")
     dataset, path = table.to_xarray(), tmp_path / "xarray.nc"
@@ -84,7 +84,7 @@ def test_the_file_is_that_of_xarray(table: Table, tmp_path: Path) -> None:
     assert files.read(tmp_path / "table.nc").identical(files.read(tmp_path / "again.nc"))
 
 
-def test_a_chunked_file_is_that_of_xarray(table: Table, tmp_path: Path) -> None:
+def test_a_chunked_file_is_that_of_xarray(table: HitTable, tmp_path: Path) -> None:
     table = table.drop_vars([name for names in v.GROUPS.values() for name in names])
     write_table(table, tmp_path / "table.nc", chunk=16, compressed=False)
     dataset, chunks = table.to_xarray(), {}
@@ -95,7 +95,7 @@ def test_a_chunked_file_is_that_of_xarray(table: Table, tmp_path: Path) -> None:
     assert content_of(tmp_path / "table.nc") == content_of(tmp_path / "xarray.nc")
 
 
-def test_what_was_written_is_read(table: Table, tmp_path: Path) -> None:
+def test_what_was_written_is_read(table: HitTable, tmp_path: Path) -> None:
     write_table(table, tmp_path / "a.nc")
     read = read_table(tmp_path / "a.nc")
     assert read.to_xarray().identical(table.to_xarray())
@@ -103,7 +103,7 @@ def test_what_was_written_is_read(table: Table, tmp_path: Path) -> None:
         assert set(plain.coords) == read.coords - {name for names in v.GROUPS.values() for name in names}
 
 
-def test_parts_of_an_open_file_are_parts_in_memory(table: Table, tmp_path: Path) -> None:
+def test_parts_of_an_open_file_are_parts_in_memory(table: HitTable, tmp_path: Path) -> None:
     write_table(table, tmp_path / "a.nc")
     with open_table(tmp_path / "a.nc") as read:
         inner = read.isel(hit=slice(10, 30)).isel(hit=slice(5, 100))
@@ -112,6 +112,6 @@ def test_parts_of_an_open_file_are_parts_in_memory(table: Table, tmp_path: Path)
         assert summary_text(read) == summary_text(table.to_xarray())
 
 
-def test_parts_join_to_the_whole(table: Table) -> None:
+def test_parts_join_to_the_whole(table: HitTable) -> None:
     parts = [table.isel(hit=slice(first, first + 15)) for first in range(0, 40, 15)]
     assert joined(parts).to_xarray().identical(table.to_xarray())

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from warpimpact.analysis.plate import plate_numbers
+from warpimpact.analysis.plate_text import plate_numbers
 from warpimpact.plotting.dimensions import Dimension, hole_dimensions, smallest_ligament
 from warpimpact.plotting.plate import drawn_extent
 from warpimpact.scene import NoPattern

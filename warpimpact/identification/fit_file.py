@@ -17,7 +17,7 @@ from warpimpact.campaign.problems import sentence
 from warpimpact.campaign.text import parsed, read_text
 from warpimpact.catalogue.catalogue import Catalogue
 from warpimpact.identification.fit import Fit, MeasuredShot, Sampling
-from warpimpact.identification.hits import CLASSES, read_hit
+from warpimpact.identification.hit_places import CLASSES, read_hit
 from warpimpact.identification.measured import read_measured
 from warpimpact.identification.parameters import (
     FitError,

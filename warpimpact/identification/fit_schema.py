@@ -6,7 +6,7 @@ from typing import Any
 
 from warpimpact.campaign.schema import campaign_schema
 from warpimpact.identification.fit import Sampling
-from warpimpact.identification.reading import DISCREPANCY
+from warpimpact.identification.fit_file import DISCREPANCY
 from warpimpact.scene import Record
 
 Schema = dict[str, Any]

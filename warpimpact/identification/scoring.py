@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 
 from warpimpact.identification.aim import Aim, aim
 from warpimpact.identification.fit import Fit, MeasuredShot
-from warpimpact.identification.hits import HitPlace
-from warpimpact.identification.likelihood import Compared, Data, Score
+from warpimpact.identification.hit_places import HitPlace
+from warpimpact.identification.likelihood import Compared, Data, ShotScore
 from warpimpact.records.outcomes import Outcomes
 from warpimpact.scene import Scene, Shots
 from warpimpact.solver.columns import COLUMNS, UNITS_OF_EXPOSURE, Path, columns_of
@@ -186,7 +186,7 @@ def discrepancies(fit: Fit, points: Array) -> dict[str, Array]:
     return found
 
 
-def evaluate(fit: Fit, points: Array, worker: Worker, *, seed: int) -> list[Score]:
+def evaluate(fit: Fit, points: Array, worker: Worker, *, seed: int) -> list[ShotScore]:
     """Score every shot of a fit at sets of parameters.
 
     Args:
@@ -197,7 +197,7 @@ def evaluate(fit: Fit, points: Array, worker: Worker, *, seed: int) -> list[Scor
         One score per shot, over the sets.
     """
     scales = discrepancies(fit, points)
-    scored: dict[int, list[tuple[NDArray[np.int64], Score]]] = {place: [] for place in range(len(fit.shots))}
+    scored: dict[int, list[tuple[NDArray[np.int64], ShotScore]]] = {place: [] for place in range(len(fit.shots))}
     rng = np.random.default_rng(np.random.SeedSequence(fit.sampling.seed, spawn_key=(1, seed)))
     for bench in benches(fit):
         for run in runs(fit, bench, points, worker, seed=seed):
@@ -214,7 +214,7 @@ def evaluate(fit: Fit, points: Array, worker: Worker, *, seed: int) -> list[Scor
 
 def _scored(
     compared: Compared, which: NDArray[np.int64], scales: Mapping[str, Array], rng: np.random.Generator
-) -> Iterator[tuple[NDArray[np.int64], Score]]:
+) -> Iterator[tuple[NDArray[np.int64], ShotScore]]:
     """Some sets of a run at a time, and their score.
 
     Args:
@@ -228,6 +228,6 @@ def _scored(
         yield some, compared.score(own, rng, np.arange(first, first + len(some)) // alike)
 
 
-def _in_order(parts: list[tuple[NDArray[np.int64], Score]]) -> Score:
+def _in_order(parts: list[tuple[NDArray[np.int64], ShotScore]]) -> ShotScore:
     order = np.argsort(np.concatenate([which for which, _ in parts]), kind="stable")
-    return Score.joined([one for _, one in parts])[order]
+    return ShotScore.joined([one for _, one in parts])[order]
