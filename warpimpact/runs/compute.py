@@ -194,7 +194,8 @@ def _outcomes(
 ) -> tuple[Outcomes, float]:
     """Outcomes of shots, and the time [s] that it took to prepare and to compute them, but not to build kernels."""
     begin = time.perf_counter()
-    memory = Memory(prepare(scene, shots, numerics), find_device(worker.device), worker.cancel)
+    prepared = prepare(scene, shots, numerics)
+    memory = Memory(prepared, find_device(worker.device), worker.cancel)
     building = memory.build()
     outcomes = marched(memory, worker, progress)
     return outcomes, time.perf_counter() - begin - building

@@ -112,6 +112,8 @@ def _grid(
     cells = spacing if nodal else min(spacing / FINER, own.length / FINEST)
     if shared:
         cells = 2.0 ** (math.floor(SHARED * math.log2(cells)) / SHARED)
+    taps = half_taps(0.0 if nodal else own.length, spacing)
+    planes = WHOLE if deep is None else _planes(own.depth, deep, resolution)
     tile = tile_of(plate, cells, sharp=nodal, double=resolution.double)
     if nodal:  # its nodes are the tile's cells, which fit the period
         spacing = min(tile.dy, tile.dz)
@@ -121,8 +123,8 @@ def _grid(
         period=plate.pattern.period,
         half_size=(0.5 * size_y, 0.5 * size_z),
         spacing=spacing,
-        taps=half_taps(0.0 if nodal else own.length, spacing),
-        planes=WHOLE if deep is None else _planes(own.depth, deep, resolution),
+        taps=taps,
+        planes=planes,
     )
 
 

@@ -55,7 +55,8 @@ def simulate_many(
                 if progress is not None:
                     progress(sum(done), total)
 
-        memory = Memory(prepare(*scenes[number], numerics), device, own.cancel)
+        prepared = prepare(*scenes[number], numerics)
+        memory = Memory(prepared, device, own.cancel)
         march = March(memory, 1, helpers)
         contact = march.march(told, own.cancel)
         return outcomes_of(march.memory, contact)

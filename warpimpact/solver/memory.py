@@ -18,7 +18,7 @@ from warpimpact.records.group import Returned
 from warpimpact.solver import earlier as earlier_hits
 from warpimpact.solver.device import SMALL, free_memory, load
 from warpimpact.solver.prepare import Prepared
-from warpimpact.solver.structs import Put, filled, inputs_of
+from warpimpact.solver.structs import Put, empty, filled, inputs_of
 from warpimpact.solver.windows import Cells
 from warpimpact.solver.worker import NEVER, Cancel
 
@@ -64,7 +64,7 @@ class Memory:
         layers, standoffs = self.free.shape
         recorded = count if variant.layered else 0
         sizes = (recorded,), (recorded, layers), (recorded, layers, standoffs)
-        self.passage = self.empty(self.stage.Passage, *sizes)
+        self.passage = empty(self.stage.Passage, device, *sizes)
 
     def build(self) -> float:
         """Compile the kernels, once per version and machine, and load them; returns how long that took [s]."""
@@ -80,17 +80,9 @@ class Memory:
         ways[-1] = way
         self.inputs.shots.longest_way = self.put(ways, wp.float64)
 
-    def empty(self, struct: Any, *shapes: tuple[int, ...]) -> Any:
-        """A struct of empty arrays; each has the shape with its number of dimensions."""
-        filled = struct()
-        for name, variable in struct.vars.items():
-            kind = variable.type
-            setattr(filled, name, wp.empty(shapes[kind.ndim - 1], dtype=kind.dtype, device=self.device))
-        return filled
-
     def outcomes(self) -> Any:
         """Room for the outcomes of all shots."""
-        return self.empty(self.stage.Outcomes, (len(self.prepared.shots),))
+        return empty(self.stage.Outcomes, self.device, (len(self.prepared.shots),))
 
     def firsts(self, cells: Cells) -> NDArray[np.int64]:
         """The first node of every layer's field among those of its slot."""
@@ -160,28 +152,28 @@ class Memory:
     def scratch(self, slots: int, cells: Cells) -> Any:
         """The Scratch of some slots."""
         stage, put, nodes = self.stage, self.put, self.prepared.nodes(cells)
-        empty = partial(wp.empty, dtype=self.variant.real, device=self.device)
+        room = partial(wp.empty, dtype=self.variant.real, device=self.device)
         fields, touches = stage.Fields(), stage.Touches()
         fields.nodes, fields.first = sum(nodes), put(self.firsts(cells), wp.int32)
         fields.cells_y, fields.cells_z = (put(column, wp.int32) for column in np.array(self.prepared.windows(cells)).T)
         for name in self.fields:
-            setattr(fields, name, empty(slots * fields.nodes))
+            setattr(fields, name, room(slots * fields.nodes))
         patches, rings = slots * self._patches, slots * self.rings
         members = ["area", "slope", "shift", "gain", "y", "z", "x" * self.variant.deep, "ahead" * self.variant.burst]
         for name in filter(None, members):
-            setattr(touches, name, empty(patches))
+            setattr(touches, name, room(patches))
         places = ["row", "column", "plane"] if self.variant.deep else []
         for name in filter(None, ["tile", "cell", "place" * self.variant.burst, *places]):
             setattr(touches, name, wp.empty(patches, dtype=wp.int32, device=self.device))
-        touches.ring_area = empty(rings)
+        touches.ring_area = room(rings)
         if self.variant.bends:
             touches.sums = wp.empty(rings, dtype=stage.Sums, device=self.device)
-            touches.total_area = empty(rings)
+            touches.total_area = room(rings)
         earlier = stage.Earlier()
         if self.variant.burst:
             windows = self.prepared.windows(cells)
             earlier = earlier_hits.scratch(self.prepared, stage, put, fields, slots, fields.nodes, windows)
-        stack = self.empty(stage.Stack, (slots * len(nodes) if self.variant.layered else 0,), (0, 0))
+        stack = empty(stage.Stack, self.device, (slots * len(nodes) if self.variant.layered else 0,), (0, 0))
         if self.variant.layered:
             stack.first_cells = put(self.prepared.windows_behind(self.prepared.first_cells), wp.int32)
         return filled(stage.Scratch, fields=fields, touches=touches, stack=stack, earlier=earlier)
@@ -202,7 +194,7 @@ class Memory:
         """Compute the free flight to the stand-offs; return all that the device knows of the shots."""
         scene, count = self.prepared.scene, len(self.prepared.shots)
         flight, standoffs = self.flight, np.array(scene.record.standoffs, dtype=np.float64)
-        report = self.empty(self.stage.Report, (count,), (count, len(standoffs)))
+        report = empty(self.stage.Report, self.device, (count,), (count, len(standoffs)))
         load(flight.kernel, self.device)
         ahead = scene.record.ahead(scene.core)
         inputs = [self.inputs.shots, self.inputs.target, contact, self.put(standoffs, wp.float64), ahead]

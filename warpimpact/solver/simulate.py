@@ -53,12 +53,14 @@ def simulate(
     """
     worker = Worker(device, threads, cancel)
     fixed = numerics_for(scene, shots, numerics or Numerics(), worker, len(shots))
-    return computed(prepare(scene, shots, fixed), worker, progress)
+    prepared = prepare(scene, shots, fixed)
+    return computed(prepared, worker, progress)
 
 
 def computed(prepared: Prepared, worker: Worker, progress: Progress | None = None) -> Outcomes:
     """Compute what was prepared; see `simulate`."""
-    return marched(Memory(prepared, find_device(worker.device), worker.cancel), worker, progress)
+    memory = Memory(prepared, find_device(worker.device), worker.cancel)
+    return marched(memory, worker, progress)
 
 
 def marched(memory: Memory, worker: Worker, progress: Progress | None = None) -> Outcomes:
@@ -97,7 +99,8 @@ def pilot_of(
     def outcomes_at(at: Numerics, some: Shots) -> Outcomes:
         assert at.level is not None
         trying(at.level)
-        memory = Memory(prepare(scene, some, at), find_device(worker.device), worker.cancel)
+        prepared = prepare(scene, some, at)
+        memory = Memory(prepared, find_device(worker.device), worker.cancel)
         memory.build()
         begin = time.perf_counter()
         outcomes = marched(memory, worker)

@@ -52,6 +52,15 @@ def filled(struct: Any, **members: Any) -> Any:
     return instance
 
 
+def empty(struct: Any, device: Any, *shapes: tuple[int, ...]) -> Any:
+    """A struct of empty arrays on a device; each has the shape with its number of dimensions."""
+    arrays = {name: variable.type for name, variable in struct.vars.items()}
+    return filled(
+        struct,
+        **{name: wp.empty(shapes[kind.ndim - 1], dtype=kind.dtype, device=device) for name, kind in arrays.items()},
+    )
+
+
 def inputs_of(stage: Any, prepared: Prepared, put: Put) -> tuple[Any, list[Any]]:
     """The Inputs of the march, and what has to be kept with them: an array of structs does not keep the arrays that its
     members point to.
