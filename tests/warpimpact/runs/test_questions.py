@@ -5,6 +5,7 @@ The list of questions is that of docs/contributing.md; each is a small file of i
 
 import re
 from collections.abc import Callable, Iterator
+from concurrent.futures import Future
 from pathlib import Path
 from typing import Any
 
@@ -14,6 +15,9 @@ import xarray
 
 from warpimpact.cli import main
 from warpimpact.results import attributes as attr
+from warpimpact.runs import choice, shards
+from warpimpact.runs.choice import executor_for
+from warpimpact.runs.executor import Executor, Job
 from warpimpact.runs.shards import ShardsOnDisk
 from warpimpact.runs.store import Store
 
@@ -36,11 +40,11 @@ HOLED = 'pattern = { shape = "circle", diameter = "5 mm", spacing = ["8 mm", "8 
 PLATE = '[plate]\nthickness = "4 mm"\nresistance = "2.6 GPa"\n'
 BASE = '[[layer]]\nthickness = "8 mm"\nresistance = "1 GPa"\n'
 HITS = '[hits]\nsampling = "sobol"\ncount = {}\n'
-CAMPAIGN = TARGET + PLATE + HOLED + HITS.format(600)
+CAMPAIGN = TARGET + PLATE + HOLED + HITS.format(160)
 QUESTIONS: dict[str, tuple[str, ...]] = {
     "run": ("run", CAMPAIGN),
-    "limit": ("limit", TARGET + PLATE + HOLED + HITS.format(600), "--tolerance", "60 m/s"),
-    "sweep": ("sweep", CAMPAIGN.replace("600", "300") + '[sweep]\nvelocity = ["700 m/s", "800 m/s"]\n'),
+    "limit": ("limit", TARGET + PLATE + HOLED + HITS.format(160), "--tolerance", "60 m/s"),
+    "sweep": ("sweep", CAMPAIGN.replace("160", "96") + '[sweep]\nvelocity = ["700 m/s", "800 m/s"]\n'),
     "directions": (
         "test",
         'title = "directions"\n[target]\ncampaign = "target.toml"\n[directions]\nvelocity = "825 m/s"\n'
@@ -66,23 +70,30 @@ QUESTIONS: dict[str, tuple[str, ...]] = {
 }
 """By name: the command, its file, and options."""
 OF_THE_CALL = {attr.HISTORY, attr.COMPUTE_TIME, attr.HITS_PER_SECOND}
-pytestmark = pytest.mark.usefixtures("small_shards")
 
 Answered = Callable[..., int]
 
 
-@pytest.fixture
-def asked(tmp_path: Path) -> Answered:
-    """A function that asks a question, and returns the exit code."""
-    (tmp_path / "target.toml").write_text(TARGET + PLATE + HOLED + BASE + HITS.format(64), encoding="utf-8")
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return tmp_path_factory.mktemp("questions")
+
+
+@pytest.fixture(scope="module")
+def asked(folder: Path) -> Iterator[Answered]:
+    """A function that asks a question, and returns the exit code. Runs have several shards."""
+    (folder / "target.toml").write_text(TARGET + PLATE + HOLED + BASE + HITS.format(64), encoding="utf-8")
 
     def asked(name: str, output: Path, *options: str) -> int:
         command, text, *own = QUESTIONS[name]
-        file = tmp_path / f"{name}.toml"
+        file = folder / f"{name}.toml"
         file.write_text(text, encoding="utf-8")
         return main([command, str(file), "-o", str(output), "--device", "cpu", "-q", *own, *options])
 
-    return asked
+    with pytest.MonkeyPatch.context() as patched:
+        patched.setattr(shards, "FEWEST", 64)
+        patched.setattr(shards, "HELD", 0.0)
+        yield asked
 
 
 def content(path: Path) -> dict[str, Any]:
@@ -108,6 +119,44 @@ def assert_alike(one: Path, other: Path) -> None:
         assert np.array_equal(value, second[name], equal_nan=np.asarray(value).dtype.kind == "f"), name
 
 
+@pytest.fixture(scope="module", params=QUESTIONS)
+def name(request: pytest.FixtureRequest) -> str:
+    """Of a question; the tests of one follow each other, as they share the straight answer."""
+    return str(request.param)
+
+
+@pytest.fixture(scope="module")
+def straight(name: str, asked: Answered, folder: Path) -> Path:
+    """The answer of threads that nothing disturbs."""
+    path = folder / f"{name}.nc"
+    assert asked(name, path) == 0
+    return path
+
+
+@pytest.fixture(scope="module")
+def two_processes() -> Iterator[Executor]:
+    """The executor of `--workers 2`: the same processes for all questions, as each imports for seconds."""
+    with executor_for("cpu", workers=2) as executor:
+        yield executor
+
+
+class Lent:
+    """An executor that stays open for the next command, and counts the jobs of this one."""
+
+    def __init__(self, executor: Executor) -> None:
+        self._executor, self.jobs = executor, 0
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._executor, name)
+
+    def submit(self, job: Job) -> Future[Any]:
+        self.jobs += 1
+        return self._executor.submit(job)
+
+    def close(self) -> None:
+        """Leave it open."""
+
+
 @pytest.fixture
 def interrupting(monkeypatch: pytest.MonkeyPatch) -> Callable[[int], Iterator[None]]:
     """A function after which Ctrl-C comes once so many results are on the disk."""
@@ -128,19 +177,27 @@ def interrupting(monkeypatch: pytest.MonkeyPatch) -> Callable[[int], Iterator[No
     return interrupting
 
 
-@pytest.mark.parametrize("name", QUESTIONS)
-def test_resumed_equals_undisturbed(name: str, asked: Answered, interrupting: Any, tmp_path: Path) -> None:
-    assert asked(name, tmp_path / "straight.nc") == 0
+def test_resumed_equals_undisturbed(
+    name: str, straight: Path, asked: Answered, interrupting: Any, tmp_path: Path
+) -> None:
     interrupting(2)
     output = tmp_path / "resumed.nc"
     assert asked(name, output) == 130
     assert not output.exists()
     assert asked(name, output, "--resume") == 0
-    assert_alike(output, tmp_path / "straight.nc")
+    assert_alike(output, straight)
 
 
-@pytest.mark.parametrize("name", QUESTIONS)
-def test_processes_give_the_bits_of_threads(name: str, asked: Answered, tmp_path: Path) -> None:
-    assert asked(name, tmp_path / "threads.nc") == 0
+def test_processes_give_the_bits_of_threads(
+    name: str,
+    straight: Path,
+    asked: Answered,
+    two_processes: Executor,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    processes = Lent(two_processes)
+    monkeypatch.setattr(choice, "Processes", lambda *_: processes)
     assert asked(name, tmp_path / "processes.nc", "--workers", "2") == 0
-    assert_alike(tmp_path / "processes.nc", tmp_path / "threads.nc")
+    assert processes.jobs
+    assert_alike(tmp_path / "processes.nc", straight)
