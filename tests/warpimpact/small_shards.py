@@ -5,3 +5,4 @@ from warpimpact.runs import shards
 SIZE = 256
 shards.FEWEST = SIZE
 shards.HELD = 0.0  # a test follows the shards on the disk
+shards.SHARDS = 2**12  # so that those of a very long run are small, too

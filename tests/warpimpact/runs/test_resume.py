@@ -29,7 +29,7 @@ from warpimpact.runs.run import RunProgress, run, run_to_file
 
 SameBits = Callable[[Path, Path], None]
 SLOTTED_PLATE = (Path(__file__).parents[3] / "campaigns" / "slotted_plate.toml").read_text(encoding="utf-8")
-DRAFT = SLOTTED_PLATE.replace('"standard"', '"draft"')
+COARSE = SLOTTED_PLATE.replace('fidelity = "standard"', "level = 0")  # the first shot is computed at once
 COUNT = 4000  # sixteen shards, the last one short
 KILLS = 4
 LONG = "count = 1000000"  # minutes of computing, of which a test sees the first shard
@@ -47,7 +47,7 @@ WARPIMPACT = (
 @pytest.fixture(scope="module")
 def campaign_file(tmp_path_factory: pytest.TempPathFactory, small_shards: None) -> Path:
     path = tmp_path_factory.mktemp("campaign") / "campaign.toml"
-    path.write_text(DRAFT.replace("count = 4096", f"count = {COUNT}"), encoding="utf-8")
+    path.write_text(COARSE.replace("count = 4096", f"count = {COUNT}"), encoding="utf-8")
     return path
 
 
@@ -129,7 +129,7 @@ def test_runs_killed_at_any_moment_end_with_the_same_bits(
 
 def test_a_second_run_on_the_same_result_is_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     path, output = tmp_path / "long.toml", tmp_path / "a.nc"
-    path.write_text(DRAFT.replace("count = 4096", LONG), encoding="utf-8")
+    path.write_text(COARSE.replace("count = 4096", LONG), encoding="utf-8")
     command = ["run", str(path), "-o", str(output), "--device", "cpu"]
     with subprocess.Popen(
         [*WARPIMPACT, *command], env=os.environ | {"PYTHONPATH": str(HERE)}, stderr=subprocess.DEVNULL
@@ -271,7 +271,7 @@ def test_another_campaign_is_refused_with_the_difference(
 
 
 def test_a_file_that_the_campaign_names_counts_by_its_contents(tmp_path: Path) -> None:
-    head, tail = DRAFT.split("[hits]")
+    head, tail = COARSE.split("[hits]")
     text = f'{head}[hits]\nsampling = "list"\nfile = "hits.csv"\n\n[numerics]{tail.split("[numerics]")[1]}'
     for folder, row in (("a", "0.001,0.002"), ("b", "0.001,0.002"), ("c", "0.001,0.003")):
         (tmp_path / folder).mkdir()
@@ -287,51 +287,56 @@ def _shards(output: Path) -> list[Path]:
     return sorted(folder_of(output).glob("hits_*.nc"))
 
 
-def _swap_two(shards: list[Path]) -> None:
-    first, second = (path.read_bytes() for path in shards[:2])
-    shards[0].write_bytes(second)
-    shards[1].write_bytes(first)
-
-
 def _swap_names(shards: list[Path]) -> None:
     """Each takes the other's place, and keeps its own checksum."""
-    (one, *own), (two, *other) = (path.name.rpartition("_") for path in shards[:2])
-    shards[0].rename(shards[0].with_name("".join((two, *own))))
-    shards[1].rename(shards[1].with_name("".join((one, *other))))
+    (first, *seal), (second, *other_seal) = (path.name.rpartition("_") for path in shards)
+    shards[0].rename(shards[0].with_name("".join((second, *seal))))
+    shards[1].rename(shards[1].with_name("".join((first, *other_seal))))
 
 
-def _flip_bits(shards: list[Path]) -> None:
-    data = bytearray(shards[0].read_bytes())
+def _flip_bits(shard: Path) -> None:
+    data = bytearray(shard.read_bytes())
     for place in range(0, len(data), 997):
         data[place] ^= 1 << place % 8
-    shards[0].write_bytes(data)
+    shard.write_bytes(data)
 
 
-def _cut(shards: list[Path]) -> None:
-    shards[0].write_bytes(shards[0].read_bytes()[:1000])
+def _cut(shard: Path) -> None:
+    shard.write_bytes(shard.read_bytes()[:1000])
 
 
-def _folder_instead(shards: list[Path]) -> None:
-    shards[0].unlink()
-    shards[0].mkdir()
-    (shards[0] / "something").touch()
+def _folder_instead(shard: Path) -> None:
+    shard.unlink()
+    shard.mkdir()
+    (shard / "something").touch()
 
 
-def _no_number(shards: list[Path]) -> None:
-    shards[0].rename(shards[0].with_name("hits_of_mine.nc"))
+def _no_number(shard: Path) -> None:
+    shard.rename(shard.with_name("hits_of_mine.nc"))
 
 
 @pytest.mark.filterwarnings("error")
-@pytest.mark.parametrize("harm", [_swap_two, _swap_names, _flip_bits, _cut, _folder_instead, _no_number])
-def test_a_shard_that_lies_is_computed_again_and_told(
-    harm: Callable[[list[Path]], None], broken_off: Path, finished: Callable[..., None]
+def test_shards_that_lie_are_computed_again_and_told(
+    campaign: Campaign, tmp_path: Path, finished: Callable[..., None]
 ) -> None:
-    harm(_shards(broken_off))
+    """Two swapped ones, two with swapped names, four that are damaged each in a way of its own; one is left alone."""
+    output = tmp_path / "a.nc"
+    with pytest.raises(Interrupted):
+        run_to_file(campaign, output, device="cpu", progress=stopped_after(9, KeyboardInterrupt()))
+    saved = _shards(output)
+    first, second = (path.read_bytes() for path in saved[:2])
+    saved[0].write_bytes(second)
+    saved[1].write_bytes(first)
+    _swap_names(saved[2:4])
+    for harm, shard in zip((_flip_bits, _cut, _folder_instead, _no_number), saved[4:], strict=False):
+        harm(shard)
     told: list[str] = []
-    finished(broken_off, tell=told.append)
+    standings: list[RunProgress] = []
+    finished(output, tell=told.append, progress=standings.append)
     assert len(told) == 1
-    assert "damaged, or not of this place or run; computed again" in told[0]
-    assert not folder_of(broken_off).exists()
+    assert "and 7 more: damaged, or not of this place or run; computed again" in told[0]
+    assert standings[0].resumed == min(256 * len(saved), COUNT) - 256 * 8
+    assert not folder_of(output).exists()
 
 
 def test_a_shard_of_another_campaign_is_computed_again(
@@ -391,7 +396,7 @@ def test_a_shard_that_is_damaged_during_the_run_ends_it_in_a_sentence(
 
     def harm(standing: RunProgress) -> None:
         if standing.done == standing.total and output.with_name("a.nc.parts").exists():
-            _cut(_shards(output))
+            _cut(_shards(output)[0])
 
     with pytest.raises(OutputError, match=r"this part is missing or damaged; 16 of 16 shards .* with --resume"):
         run_to_file(campaign, output, device="cpu", progress=harm)
@@ -462,7 +467,7 @@ def test_a_disk_that_is_full_at_once_leaves_nothing(size: int, saved: str, campa
 def test_ctrl_c_stops_cleanly_and_says_how_to_resume(by: signal.Signals, where: list[str], tmp_path: Path) -> None:
     """A terminal sends Ctrl-C to all processes of the group; a batch system ends the first one."""
     path, output = tmp_path / "long.toml", tmp_path / "a.nc"
-    path.write_text(DRAFT.replace("count = 4096", LONG), encoding="utf-8")
+    path.write_text(COARSE.replace("count = 4096", LONG), encoding="utf-8")
     # A shell's background job ignores Ctrl-C.
     listen = _after("signal.signal(signal.SIGINT, signal.SIG_DFL)")
     command = [*listen, *WARPIMPACT, "run", str(path), "-o", str(output), "--device", "cpu", *where]
@@ -502,13 +507,14 @@ command()
 """
 
 
-@pytest.mark.parametrize("name", ["pilot", "compute"])
-@pytest.mark.parametrize("by", [signal.SIGINT, signal.SIGTERM])
+@pytest.mark.parametrize(("name", "by"), [("pilot", signal.SIGINT), ("compute", signal.SIGTERM)])
 def test_a_first_signal_ends_a_run_that_is_at_work_on_the_host(
     name: str, by: signal.Signals, campaign_file: Path, tmp_path: Path
 ) -> None:
+    piloted = campaign_file.with_name("piloted.toml")
+    piloted.write_text(campaign_file.read_text(encoding="utf-8").replace("level = 0", 'fidelity = "draft"'))
     listen = _after("signal.signal(signal.SIGINT, signal.SIG_DFL)")
-    run_it = [sys.executable, "-c", HOST_WORK.format(name=name), "run", str(campaign_file)]
+    run_it = [sys.executable, "-c", HOST_WORK.format(name=name), "run", str(piloted)]
     with subprocess.Popen(
         [*listen, *run_it, "-o", str(tmp_path / "a.nc"), "--device", "cpu"],
         stdout=subprocess.PIPE,
