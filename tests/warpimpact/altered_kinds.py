@@ -120,14 +120,20 @@ def write_files(folder: Path) -> None:
 
 
 def failures(
-    kind: str, tries: int, seed: object = 0, only: Collection[str] = (), commands: int = 9
+    kind: str,
+    tries: int,
+    seed: object = 0,
+    only: Collection[str] = (),
+    commands: int = 9,
+    names: Collection[str] = (),
 ) -> Iterator[str | None]:
-    """Give altered files of a kind in the working folder to every command that takes one, or to so many of them; what
-    each failed with, None if it read or refused it in a sentence."""
+    """Give altered files of a kind in the working folder to every command that takes one, or to a number of them, or to
+    those of some names; what each failed with, None if it read or refused it in a sentence."""
+    given = [command for command in COMMANDS[kind] if not names or command[0] in names]
     first = None if kind == "firing" else COMMANDS[kind][0]  # no command reads a firing test
     draw = random.Random(kind)
     for alteration in altered_files(Path(f"{kind}.nc"), Path("altered.nc"), tries, seed, only):
-        for command in draw.sample(COMMANDS[kind], min(commands, len(COMMANDS[kind]))):
+        for command in draw.sample(given, min(commands, len(given))):
             shutil.rmtree("vtk", ignore_errors=True)
             said = io.StringIO()
             with contextlib.redirect_stderr(said), contextlib.redirect_stdout(io.StringIO()), warnings.catch_warnings():

@@ -55,15 +55,35 @@ def toml(browser: Any, tmp_path: Path) -> Path:
     return path
 
 
-@pytest.fixture
-def page(browser: Any, serve: Callable[..., str], small: Path) -> Any:
+@pytest.fixture(scope="module")
+def coarse(small: Path) -> Path:
+    """The slotted plate at a level that needs no pilot."""
+    path = small.with_name("coarse.toml")
+    path.write_text(small.read_text().replace('fidelity = "standard"', "level = 0"))
+    return path
+
+
+def opened(browser: Any, address: str) -> Any:
     browser.open("about:blank")
-    browser.open(serve(small), 1400)
+    browser.open(address, 1400)
     browser.wait(lambda: "Complete" in browser.text("#status"), 180.0)
     return browser
 
 
-def test_a_slider_moves_and_the_numbers_are_those_of_run(page: Any, tmp_path: Path) -> None:
+@pytest.fixture(scope="module")
+def address(serve: Callable[..., str], coarse: Path) -> str:
+    return serve(coarse)
+
+
+@pytest.fixture
+def page(browser: Any, address: str) -> Any:
+    return opened(browser, address)
+
+
+def test_a_slider_moves_and_the_numbers_are_those_of_run(
+    browser: Any, serve: Callable[..., str], small: Path, tmp_path: Path
+) -> None:
+    page = opened(browser, serve(small))
     move(page, "control-plate-pattern-width", 5.2)
     settled(page)
     campaign = toml(page, tmp_path)
@@ -108,10 +128,9 @@ def test_the_address_holds_the_design_and_undo_brings_it_back(page: Any) -> None
 
 
 def test_the_file_that_a_browser_is_opened_on_leads_to_the_page(
-    browser: Any, serve: Callable[..., str], small: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    browser: Any, address: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv("HOME", str(tmp_path))
-    address = serve(small)
     browser.open(_leading_to(address).as_uri())
     browser.wait(lambda: browser.driver.current_url.startswith(address), 60.0)
     browser.wait(lambda: "Complete" in browser.text("#status"), 180.0)
@@ -145,14 +164,14 @@ def test_a_click_on_the_map_shows_that_hit(page: Any) -> None:
     assert page.errors() == []
 
 
-def test_a_pinned_design_is_compared_shot_by_shot(page: Any, small: Path) -> None:
+def test_a_pinned_design_is_compared_shot_by_shot(page: Any, coarse: Path) -> None:
     page.press("#pin")
     move(page, "control-plate-thickness", 5.0)
     page.wait(lambda: "better than" in page.text("#answer") and "Complete" in page.text("#status"), 120.0)
-    tables = tomllib.loads(small.read_text())
+    tables = tomllib.loads(coarse.read_text())
     tables["plate"]["thickness"] = "5 mm"
-    thicker = Campaign.from_text(json.dumps(tables), name="thicker", folder=small.parent)
-    results = [run(one, device="cpu") for one in (thicker, Campaign.from_toml(small))]
+    thicker = Campaign.from_text(json.dumps(tables), name="thicker", folder=coarse.parent)
+    results = [run(one, device="cpu") for one in (thicker, Campaign.from_toml(coarse))]
     shown = page.text("#answer")
     for section in comparison_view(compare(results, ["this design", "pin A"])):
         assert all(part in shown for part in section.parts if isinstance(part, str))
@@ -172,8 +191,8 @@ def test_nothing_leaves_this_machine(page: Any) -> None:
     assert set(hosts) == {urlsplit(page.driver.current_url).netloc}
 
 
-def test_an_address_of_others_is_only_text(page: Any, small: Path) -> None:
-    others = tomllib.loads(small.read_text()) | {"title": "of others"}
+def test_an_address_of_others_is_only_text(page: Any, coarse: Path) -> None:
+    others = tomllib.loads(coarse.read_text()) | {"title": "of others"}
     script = {"name": "<img src=x onerror='document.title=1'>", "design": others}
     address = page.driver.current_url.partition("#")[0]
     for held, title in (
@@ -191,21 +210,18 @@ def test_an_address_of_others_is_only_text(page: Any, small: Path) -> None:
         assert page.errors() == []
 
 
-@pytest.mark.parametrize("width", [1400, 390])
-def test_text_of_others_is_text(
-    browser: Any, serve: Callable[..., str], small: Path, tmp_path: Path, width: int
-) -> None:
+def test_text_of_others_is_text(browser: Any, serve: Callable[..., str], coarse: Path, tmp_path: Path) -> None:
     hostile = '<img src=x onerror="document.title=1">"\'</script>${7*7}'
     path = tmp_path / "<b>x&.toml"
     path.write_text(
-        small.read_text().replace('title = "7.62 mm P80 core against a slotted plate"', f"title = '''{hostile}'''")
+        coarse.read_text().replace('title = "7.62 mm P80 core against a slotted plate"', f"title = '''{hostile}'''")
     )
-    browser.open(serve(path), width)
+    browser.open(serve(path), 390)
     browser.wait(lambda: "Complete" in browser.text("#status"), 180.0)
     assert browser.values("#title") == [hostile]
     assert browser.driver.title == f"{hostile} · warpimpact design"
     assert not browser.find("img[src=x]")
-    assert browser.driver.execute_script("return document.documentElement.scrollWidth") <= width
+    assert browser.driver.execute_script("return document.documentElement.scrollWidth") <= 390
     assert browser.errors() == []
 
 
