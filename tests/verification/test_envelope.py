@@ -1,22 +1,20 @@
-"""Stability at extremes (tests/verification/extremes.py)."""
+"""Stability at extremes (tests/verification/extremes.py); tests/benchmarks/envelope.py looks at thousands of scenes."""
 
 import numpy as np
 import pytest
-from hypothesis import HealthCheck, given, settings
-from hypothesis import strategies as st
 
 from warpimpact.kernels.status import Status
 
 from .extremes import MOST_RISE, MOST_STRETCH, drawn, found
 
-SHARES = st.lists(st.floats(0.0, 1.0), min_size=90, max_size=90)  # more than a scene of two hits takes
+SCENES = (0, 4, 7, 12, 15, 17, 18, 22, 27, 32)
+"""Of a seed: cores that pass, stop and ricochet within 154 to 6963 steps, at single plates and at layers, with and
+without friction, weakening, a depth, a rate and a rim, in both precisions."""
 
 
-# Later examples alter numbers beyond those that a scene takes.
-@settings(max_examples=11, deadline=None, derandomize=True, database=None, suppress_health_check=list(HealthCheck))
-@given(shares=SHARES)
-def test_extremes(shares: list[float]) -> None:
-    outcome = found(drawn(iter(shares).__next__, hits=2))
+@pytest.mark.parametrize("index", SCENES)
+def test_extremes(index: int) -> None:
+    outcome = found(drawn(np.random.default_rng([7, index]).random, hits=2))
     assert Status.NOT_FINITE not in outcome.statuses
     assert Status.GAINED_ENERGY not in outcome.statuses
     assert outcome.undefined == 0
