@@ -85,7 +85,9 @@ def bursts(dataset: Result) -> Bursts:
     velocity, *tilts = means_of((v.RESIDUAL_VELOCITY, v.TILT), dataset[v.STANDOFF].values.tolist())
     measures = (velocity, *tilts[-1:], Measure.parse("P(perforated)"))
     needed = dataset[[v.STATUS, v.RESIDUAL_VELOCITY, v.TILT, v.NEAREST_EARLIER_HIT]]
-    parts = [(part[v.NEAREST_EARLIER_HIT].values, *(one.values(part) for one in measures)) for part in slices(needed)]
+    parts = [
+        (part[v.NEAREST_EARLIER_HIT].values, *(measure.values(part) for measure in measures)) for part in slices(needed)
+    ]
     nearest, *columns = (np.concatenate(some).reshape(-1, members) for some in zip(*parts, strict=True))
     values, replicates = dict(zip(measures, columns, strict=True)), dealing(dataset)["replicates"]
     order = np.broadcast_to(np.arange(members), nearest.shape)
@@ -100,10 +102,15 @@ def bursts(dataset: Result) -> Bursts:
         return Group(
             name,
             (float(ends[0]), float(ends[1]), float(ends[2])),
-            {one: cluster_estimate(chosen[one], binary=one.is_binary, replicates=replicates) for one in measures},
             {
-                one: estimate_of("mean", cluster_numbers(chosen[one]) - cluster_numbers(alone[one]), **together)
-                for one in measures
+                measure: cluster_estimate(chosen[measure], binary=measure.is_binary, replicates=replicates)
+                for measure in measures
+            },
+            {
+                measure: estimate_of(
+                    "mean", cluster_numbers(chosen[measure]) - cluster_numbers(alone[measure]), **together
+                )
+                for measure in measures
             },
         )
 

@@ -54,9 +54,9 @@ from .stop import Stop
 from .text import CampaignError, parsed, read_text
 
 _MOST_LENGTHS = 1000
-"""Degradation lengths in the radius of a core: its surface has patches of about that length."""
+"""Most degradation lengths in the radius of a core, whose surface has patches of about that length."""
 _MOST_DEPTHS = 100
-"""Degradation depths in a thickness at most: each has its planes of every window in memory."""
+"""Most degradation depths in a thickness: each needs planes of every window in memory."""
 
 
 class Output(Record):
@@ -174,7 +174,7 @@ class Campaign(Model):
 
     @property
     def _values(self) -> tuple[Any, ...]:
-        """What two campaigns are compared by: not how their text is written."""
+        """Values by which two campaigns are compared; the form of their text does not count."""
         return tuple(getattr(self, name) for name in type(self).model_fields)
 
     @property
@@ -189,26 +189,26 @@ class Campaign(Model):
 
     @property
     def replicates(self) -> int:
-        """Independent scramblings that its shots are dealt out to in turn."""
+        """Number of independent scramblings to which its shots are dealt out in turn."""
         return self.hits.scramblings
 
     @property
     def symmetries(self) -> tuple[Symmetry, ...]:
-        """Those by which its hits are images of each other; the identity alone where none is asked for or there."""
+        """Symmetries by which its hits are images of each other; the identity alone if none is asked for or exists."""
         return symmetries_used(self.impact, self.hits, self.plate)
 
     def sampler(self) -> Sampler:
-        """Its shots."""
+        """The sampler of its shots."""
         sampled = (self.impact, self.hits, self.plate, self.scatter, self.replicates)
         if self.drawn is not None:
             return DrawnSampler(self.drawn, self.plate, self.hits.seed, len(self.symmetries), *sampled)
         if self.burst is not None:
-            own: dict[str, Any] = {"scatter": self.scatter, "replicates": self.replicates}
-            return BurstSampler(self.impact, self.hits, self.plate, self.burst, **own)
+            given: dict[str, Any] = {"scatter": self.scatter, "replicates": self.replicates}
+            return BurstSampler(self.impact, self.hits, self.plate, self.burst, **given)
         return Sampler(*sampled)
 
     def lacking(self, measure: Measure) -> str:
-        """The keys that it lacks for a measure of its hits; empty if it lacks none."""
+        """Keys that the campaign needs for a measure of its hits and does not have; empty if it lacks none."""
         breakable = self.core.strength is not None or "strength" in (self.hits.listed or {})
         return lacking(
             measure,
@@ -220,7 +220,7 @@ class Campaign(Model):
 
     @property
     def at_a_plate(self) -> int:
-        """Shots at one plate."""
+        """Number of shots at one plate."""
         return 1 if self.burst is None else self.burst.count
 
     @property
@@ -248,8 +248,8 @@ class Campaign(Model):
         drawn.check(self.plate, self.interaction)
         scattered = [name for name, layer in self.scatter.given if not layer]
         given = [name for name in scattered if ("plate", name) in drawn.values or name == "degradation"]
-        found = bool(given) and f"a distribution of plate.{given[0]}"
-        check_together({exclusions.POSTERIOR: True, exclusions.SCATTER_OF_MATERIAL: found})
+        scattered_name = bool(given) and f"a distribution of plate.{given[0]}"
+        check_together({exclusions.POSTERIOR: True, exclusions.SCATTER_OF_MATERIAL: scattered_name})
         return self
 
     @model_validator(mode="before")
@@ -273,7 +273,7 @@ class Campaign(Model):
 
     @model_validator(mode="after")
     def _goes_together(self) -> Self:
-        """All that scene/exclusions.py has rows for."""
+        """Check all options that exclude or need each other (scene/exclusions.py)."""
         stop, hits, numerics = self.stop, self.hits, self.numerics
         check_together(
             unsymmetric(self.scatter, self.layer)
@@ -376,8 +376,7 @@ class Campaign(Model):
 
 
 def _check_nose_first(largest: dict[str, float]) -> None:
-    """The axis is built from its projected angles, which flip at 90 degrees; each is at most the obliquity plus its
-    own."""
+    """Refuse shots that might not arrive nose first: the axis is built from projected angles, which flip at 90°."""
     for name in ("pitch", "yaw"):
         if largest[name] + largest["obliquity"] >= math.pi / 2:
             raise ValueError(
@@ -387,7 +386,7 @@ def _check_nose_first(largest: dict[str, float]) -> None:
 
 
 def _override_count(data: dict[str, Any], count: int) -> None:
-    """Replace the count of the file; for a stop rule this is the largest count."""
+    """Replace the number of hits of the file; with a stop rule this is the largest number."""
     stopped = isinstance(data.get("stop"), dict)
     if stopped:
         data["stop"]["max_count"] = count

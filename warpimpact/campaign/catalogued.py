@@ -38,7 +38,7 @@ def catalogue_of(data: Mapping[str, Any], name: str, folder: Path) -> Catalogue:
 
 
 def with_threat(data: _Table, catalogue: Catalogue, name: str) -> _Table:
-    """With the core of its threat and, unless the campaign has a velocity, with that of the threat.
+    """Tables with the core of their threat, and with its velocity unless they give one.
 
     Raises:
         CampaignError: the catalogue has no such threat, or not what is needed of it.
@@ -57,7 +57,7 @@ def with_threat(data: _Table, catalogue: Catalogue, name: str) -> _Table:
 
 
 def with_cores(data: _Table, catalogue: Catalogue, name: str) -> _Table:
-    """With the cores of the threats that a fit and its shots name; the velocities of shots are measured.
+    """Tables of a fit with the cores of the threats that it and its shots name; velocities of shots are measured.
 
     Raises:
         CampaignError: as `with_threat`.
@@ -90,21 +90,21 @@ def core_of(threat: Threat, given: Any, place: str) -> _Table:
     Raises:
         CampaignError: its core is not known, and no shape is given.
     """
-    own, base = dict(given), dict(threat.core or {})
-    if threat.core is None and "shape" not in own:
+    given_core, base = dict(given), dict(threat.core or {})
+    if threat.core is None and "shape" not in given_core:
         raise CampaignError(
             f'{place}.threat: the catalogue does not know the core of "{threat.name}", only its velocities; give shape '
             "and what belongs to it"
         )
-    if own.get("shape", base.get("shape")) != base.get("shape"):
+    if given_core.get("shape", base.get("shape")) != base.get("shape"):
         base = {key: value for key, value in base.items() if key in _OF_ANY_CORE}
-    if any(own.get(key) is not None for key in ("mass", "density")):
+    if any(given_core.get(key) is not None for key in ("mass", "density")):
         base = {key: value for key, value in base.items() if key not in ("mass", "density")}
-    return base | own
+    return base | given_core
 
 
 def _velocity(threat: Threat, standard: Any, place: str) -> Velocity:
-    known = {one.standard: one for one in threat.velocities}
+    known = {velocity.standard: velocity for velocity in threat.velocities}
     if not known:
         raise CampaignError(f'{place}: the catalogue has no velocity of "{threat.name}"; give impact.velocity')
     if standard is None:
@@ -125,27 +125,27 @@ def _shot(velocity: Velocity, core: Mapping[str, Any], place: str) -> Any:
 
 
 def with_materials(data: _Table, catalogue: Catalogue, name: str) -> _Table:
-    """With what the materials of plate and layers are known for, and with their law; no value is a distribution.
+    """Tables with the numbers of the materials of plate and layers, and with their law; no value is a distribution.
 
     Raises:
         CampaignError: the catalogue has no such material, or the laws of two materials differ.
     """
-    found, resolved = dict[str, Material](), dict(data)
+    materials, resolved = dict[str, Material](), dict(data)
     for place, key, number, table in _plates(data):
         try:
             material = catalogue.material(table["material"])
         except ValueError as error:
             raise CampaignError(f"{name}: {place}.material: {error}") from None
-        found[place] = material
-        own = plate_of(material, table, _resistance(data, material, table, catalogue))
+        materials[place] = material
+        filled = plate_of(material, table, _resistance(data, material, table, catalogue))
         if number is None:
-            resolved[key] = own
+            resolved[key] = filled
         else:
-            resolved[key] = [own if k == number else one for k, one in enumerate(resolved[key])]
+            resolved[key] = [filled if k == number else layer for k, layer in enumerate(resolved[key])]
     interaction = data.get("interaction", {})
-    if not found or not isinstance(interaction, dict):
+    if not materials or not isinstance(interaction, dict):
         return resolved
-    return resolved | {"interaction": _law(found, interaction, name) | interaction}
+    return resolved | {"interaction": _law(materials, interaction, name) | interaction}
 
 
 def _plates(data: Mapping[str, Any]) -> Iterator[tuple[str, str, int | None, _Table]]:
@@ -188,13 +188,13 @@ def calibres_of(core: Core, plate: Plate) -> float:
     return plate.thickness / (2.0 * core.max_radius)
 
 
-def _law(found: Mapping[str, Material], given: Mapping[str, Any], name: str) -> dict[str, float]:
-    """What the materials say of the law of resistance, which is one for the whole target."""
+def _law(materials: Mapping[str, Material], given: Mapping[str, Any], name: str) -> dict[str, float]:
+    """The law of resistance that the materials give; the whole target has one law."""
     law: dict[str, float] = {}
     for key in _LAW:
-        values = {getattr(material, key): place for place, material in found.items()}
+        values = {getattr(material, key): place for place, material in materials.items()}
         if len(values) > 1 and key not in given:
-            told = " and ".join(f"{value:g} ({place})" for value, place in values.items())
-            raise CampaignError(f"{name}: interaction.{key}: the materials were found with {told}; give one value")
+            places = " and ".join(f"{value:g} ({place})" for value, place in values.items())
+            raise CampaignError(f"{name}: interaction.{key}: the materials were found with {places}; give one value")
         law[key] = next(iter(values))
     return law

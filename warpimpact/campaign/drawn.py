@@ -25,12 +25,15 @@ from warpimpact.solver.columns import Path, columns_of
 
 Array = NDArray[np.float64]
 
-OF_THE_MATERIAL: tuple[Path, ...] = tuple((one.table, name) for name, one in QUANTITIES.items() if one.drawn)
-"""What a posterior gives; all else stays that of the campaign."""
+OF_THE_MATERIAL: tuple[Path, ...] = tuple(
+    (quantity.table, name) for name, quantity in QUANTITIES.items() if quantity.drawn
+)
+"""Quantities that a posterior may give; all others stay those of the campaign."""
 MOST_DRAWS = 64
-"""Draws that a run uses. Several hits of each tell what the parameters and what the hits scatter."""
+"""Number of draws that a run uses. Several hits of each separate the scatter of the parameters from that of the
+hits."""
 _COLUMN = 2**20
-"""Of the random numbers that choose the draws; those of quantities that scatter have small ones."""
+"""Column of the random numbers that choose the draws; scattered quantities have small column numbers."""
 
 
 @dataclass(frozen=True)
@@ -46,7 +49,7 @@ class Posterior:
 
     @property
     def draws(self) -> int:
-        """How many draws are used."""
+        """Number of draws that are used."""
         return min(MOST_DRAWS, len(next(iter(self.values.values()))))
 
     @property
@@ -55,15 +58,15 @@ class Posterior:
         return {unit: float(size) for unit, size in self.found_with.get("discrepancy", {}).items()}
 
     def check(self, plate: Plate, interaction: Interaction) -> None:
-        """Refuse a material that has other fixed values than that of the fit.
+        """Refuse a material whose fixed values differ from those of the fit.
 
         Raises:
             ValueError: names the first difference.
         """
-        own = {"plate": plate.model_dump(), "interaction": interaction.model_dump()}
+        given = {"plate": plate.model_dump(), "interaction": interaction.model_dump()}
         for table, key in OF_THE_MATERIAL:
             there = self.found_with[str(table)].get(str(key))
-            here = own[str(table)][str(key)]
+            here = given[str(table)][str(key)]
             if (table, key) in self.values:
                 if here is None:
                     raise ValueError(f"the posterior gives {table}.{key}, but the plate of the campaign has none")
@@ -76,9 +79,8 @@ class Posterior:
     def which(self, seed: int, first: int, count: int) -> NDArray[np.int64]:
         """Draws of shots from number `first` on: a function of the seed and the number of the shot.
 
-        The seed chooses the draws from all of the posterior. Every so many shots in a row have each of them once, in an
-        order of their own.
-        """
+        The seed chooses the draws from all of the posterior. Each block of as many consecutive shots has every draw
+        once, in an order of its own."""
 
         def ordered(key: int, size: int) -> NDArray[np.int64]:
             return np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(_COLUMN, key))).permutation(size)
@@ -126,7 +128,7 @@ def _read(path: FilePath, _changed: tuple[int, int] | None) -> Posterior:
         if at in OF_THE_MATERIAL:
             values[at] = array.values.ravel().astype(np.float64)
     if not values:
-        known = ", ".join(".".join(map(str, one)) for one in OF_THE_MATERIAL)
+        known = ", ".join(".".join(map(str, path)) for path in OF_THE_MATERIAL)
         raise ValueError(f"{path.name}: has none of the parameters that a run takes from a posterior: {known}")
     for (table, key), column in values.items():
         for value in (column.min(), column.max()):

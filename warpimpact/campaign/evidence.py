@@ -17,11 +17,11 @@ if TYPE_CHECKING:
     from .campaign import Campaign
 
 _CLOSE = 1e-6
-"""Relative difference of numbers that are the same."""
+"""Largest relative difference of numbers that count as equal."""
 
 
 def evidence_of(campaign: Campaign) -> list[str]:
-    """One line on what an answer rests on, a line for every name, and a sentence for all that was not measured."""
+    """Lines on what an answer rests on: a summary, a line for every name, and a sentence for each assumption."""
     catalogue = Catalogue.of(campaign.catalogue)
     standings = standings_of(campaign, catalogue.all(Material))
     lines = [summary_of(campaign, standings)]
@@ -58,8 +58,8 @@ def _of_threat(core: Core, catalogue: Catalogue) -> str:
     if threat is None:
         return f"core: {name}, which is not in the catalogue"
     entry = threat.shape
-    own = [] if entry is None else _differences(core, entry)
-    return f"core: {name}{_own(own)} ({threat.evidence})"
+    differences = [] if entry is None else _differences(core, entry)
+    return f"core: {name}{_own(differences)} ({threat.evidence})"
 
 
 def _differences(core: Core, entry: Core) -> list[str]:
@@ -83,9 +83,11 @@ def _of_material(campaign: Campaign, place: str, plate: Plate, catalogue: Catalo
         **{name: (getattr(campaign.interaction, name), getattr(material, name)) for name in ("linear", "quadratic")},
         "onset": (campaign.interaction.onset, material.onset),
     }
-    own = [name for name, pair in expected.items() if not _same(*pair)]
-    interval = "" if "resistance" in own or not known.deviation else _interval(*known.ends)
-    return f"{place}: {material.name}{_own(own)}, Y {plate.resistance / 1e9:.3g} GPa{interval} ({material.evidence})"
+    differing = [name for name, pair in expected.items() if not _same(*pair)]
+    interval = "" if "resistance" in differing or not known.deviation else _interval(*known.ends)
+    return (
+        f"{place}: {material.name}{_own(differing)}, Y {plate.resistance / 1e9:.3g} GPa{interval} ({material.evidence})"
+    )
 
 
 def _interval(low: float, high: float) -> str:
@@ -96,7 +98,7 @@ def _own(names: list[str]) -> str:
     return f" with another {', '.join(names).replace('_', ' ')}" if names else ""
 
 
-def _same(one: object, other: object) -> bool:
-    if isinstance(one, float) and isinstance(other, float):
-        return math.isclose(one, other, rel_tol=_CLOSE)
-    return one == other
+def _same(first: object, other: object) -> bool:
+    if isinstance(first, float) and isinstance(other, float):
+        return math.isclose(first, other, rel_tol=_CLOSE)
+    return first == other

@@ -14,7 +14,7 @@ from warpimpact.results.vocabulary import BASE, STRENGTH
 def lacking(
     measure: Measure, *, standoffs: Sequence[float] | None, layered: bool, bending: bool, breakable: bool
 ) -> str:
-    """The keys that a campaign lacks for a measure of its hits, or the stand-offs that it has; empty if it lacks none.
+    """Keys that a campaign needs for a measure of its hits and does not have; empty if it lacks none.
 
     Args:
         standoffs: of the campaign [m]; None where they are not known yet, but some are computed.

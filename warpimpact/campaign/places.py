@@ -15,7 +15,7 @@ from .campaign import Campaign
 from .text import CampaignError
 
 _TABLES: Mapping[str, Any] = {"impact": Impact, "plate": Plate, "interaction": Interaction}
-"""Tables whose keys need no table in front of them, as there is no other key of that name."""
+"""Tables whose keys may be given without the table, as their names are unique."""
 _WHOLE = ("core", "plate", "plate.pattern", "interaction")
 _WHOLE_OF_A_LAYER = re.compile(r"layer\.\d+(\.pattern)?")
 """Tables that may be given as a whole."""
@@ -101,12 +101,12 @@ def type_at(key: str, campaign: Campaign) -> Any:
     table, _, last = key.rpartition(".")
     if last == "areal_density":  # which a plate reads and has, but not as a field
         return PositiveArealDensity
-    found = getattr(type(value_at(table, campaign)), "model_fields", {}).get(last)
-    return None if found is None else typed(found)
+    field = getattr(type(value_at(table, campaign)), "model_fields", {}).get(last)
+    return None if field is None else typed(field)
 
 
 def value_at(key: str, campaign: Campaign) -> Any:
-    """What stands at a place of a campaign; None where there is nothing."""
+    """The value at a place of a campaign; None if there is none."""
     value: Any = campaign
     for part in _parts(key) if key else ():
         value = value[part] if isinstance(part, int) and isinstance(value, tuple) else getattr(value, str(part), None)

@@ -37,7 +37,7 @@ def check_plausible(core: Core, target: Target, record: Record, impact: Impact, 
 
 
 def doubted(scene: Scene, impact: Impact, hits: Hits) -> Iterator[str]:
-    """The sentences of `warn_of`."""
+    """Sentences about values that are possible but unusual."""
     plate = scene.target.layers[0]
     usual = USUAL | {"hits": hit_bounds(plate.sampled_cell, plate.size)}
     yield from implausible(_values(scene.core, scene.target, scene.record, impact, hits), usual)
@@ -46,7 +46,7 @@ def doubted(scene: Scene, impact: Impact, hits: Hits) -> Iterator[str]:
 def _values(
     core: Core, target: Target, record: Record, impact: Impact, hits: Hits | None
 ) -> Iterator[tuple[str, str, float]]:
-    """Place, kind and value of all that has bounds."""
+    """Place, kind and value of every bounded quantity."""
     yield "core: length", "core.length", core.length
     yield "core: largest diameter", "core.diameter", 2.0 * core.max_radius
     if core.density is not None:

@@ -9,12 +9,12 @@ from ..scene.units import brief, quoted
 
 _CHOICES = ("shape", "distribution", "name")
 _MOST = 8
-"""Problems of one file that a sentence names."""
+"""Most problems of a file that a sentence names."""
 
 
 def sentence(error: ValidationError, data: dict[str, Any]) -> str:
     """The first problems as a sentence, and how many more there are."""
-    problems = [one for one in error.errors(include_url=False) if not _follows(one, error)]
+    problems = [problem for problem in error.errors(include_url=False) if not _follows(problem, error)]
     described = [_described(problem, data) for problem in problems[:_MOST]]
     if (more := len(problems) - len(described)) > 0:
         described.append(f"{more} more problem{'s' if more > 1 else ''}")
@@ -22,7 +22,7 @@ def sentence(error: ValidationError, data: dict[str, Any]) -> str:
 
 
 def _follows(problem: ErrorDetails, error: ValidationError) -> bool:
-    """Whether a list is too short only because its items are wrong, which is told."""
+    """Whether a list is too short only because its items are wrong, which another problem says."""
     place = problem["loc"]
     inner = (other["loc"] for other in error.errors(include_url=False) if len(other["loc"]) > len(place))
     return problem["type"] == "too_short" and any(other[: len(place)] == place for other in inner)
@@ -48,7 +48,7 @@ def _place(problem: ErrorDetails, data: Any) -> str:
 
 
 def complaint(problem: ErrorDetails) -> str:
-    """What was got and what is allowed."""
+    """Sentence on what was found and what is allowed."""
     context = problem.get("ctx", {})
     match problem["type"]:
         case "missing" | "union_tag_not_found":

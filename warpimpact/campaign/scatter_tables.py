@@ -15,7 +15,7 @@ from .text import CampaignError
 
 
 def with_scatter_apart(data: dict[str, Any], name: str) -> dict[str, Any]:
-    """Distributions moved from the places of their values to `scatter`, their medians in the places."""
+    """Tables with distributions moved to `scatter`, and with their medians in the place of values."""
     data = {key: dict(table) if isinstance(table, dict) else table for key, table in data.items()}
     if isinstance(tables := data.get("layer"), list):
         data["layer"] = [dict(table) if isinstance(table, dict) else table for table in tables]
@@ -36,7 +36,7 @@ def _tables(data: dict[str, Any], field: str) -> Iterator[tuple[int, str, Any]]:
 
 
 def _taken(table: Any, field: str, place: str, layer: int) -> Distribution | None:
-    """The distribution of a quantity in a table, which keeps its median."""
+    """Take the distribution of a quantity out of a table, which keeps its median."""
     if not isinstance(table, dict):
         return None
     key, at = (field[:-2], "yz".index(field[-1])) if field.startswith("offset") else (field, None)

@@ -54,9 +54,9 @@ def completed_schema(model: type[BaseModel]) -> Schema:
 
 def _described(model: type[BaseModel]) -> Schema:
     schema: Schema = _tidied(model.model_json_schema(mode="validation"))
-    for one in _models():
-        if one.__name__ in schema["$defs"]:
-            _complete(schema["$defs"][one.__name__], one)
+    for kind in _models():
+        if kind.__name__ in schema["$defs"]:
+            _complete(schema["$defs"][kind.__name__], kind)
     _complete(schema, model)
     return schema
 
@@ -69,13 +69,13 @@ def _models(base: type[BaseModel] = Model) -> Iterator[type[BaseModel]]:
 
 
 def _tidied(part: Any) -> Any:
-    """Without what TOML lacks (null, infinity) and titles, and with the names of the standard for bounds."""
+    """The schema without titles and without what TOML lacks (null, infinity), with the bounds in standard names."""
     if isinstance(part, list):
-        return [_tidied(one) for one in part]
+        return [_tidied(entry) for entry in part]
     if not isinstance(part, dict):
         return part
     kept = {_BOUNDS.get(name, name): _tidied(value) for name, value in part.items() if _says_something(name, value)}
-    choices = [one for one in kept.get("anyOf", []) if one != {"type": "null"}]
+    choices = [choice for choice in kept.get("anyOf", []) if choice != {"type": "null"}]
     if len(choices) == 1:
         del kept["anyOf"]
         return choices[0] | kept
@@ -106,7 +106,7 @@ def _complete(definition: Schema, model: type[BaseModel]) -> None:
 
 
 def _in_a_file(text: str) -> str:
-    """What a docstring says of a field, as it holds for the key of a file: its unit is told apart."""
+    """The description of a field for the key of a file, without its unit, which the schema gives by itself."""
     return re.sub(r"\bNone\b", "not given", re.sub(r"(?:^|\s)\[[^]]*\]", "", text)).strip(" .") + "."
 
 
@@ -136,17 +136,17 @@ def _entries(text: str) -> dict[str, str]:
 def _take_weights(definitions: Schema) -> None:
     """A plate has a thickness or an areal density."""
     density = _tidied(TypeAdapter(PositiveArealDensity).json_schema())
-    for one in (definitions["Plate"], definitions["Layer"]):
-        one["properties"]["areal_density"] |= density
-        one["required"].remove("thickness")
-        one |= {"if": {"required": ["areal_density"]}, "then": {"properties": {"thickness": {"not": {}}}}}
-        one["else"] = {"required": ["thickness"]}
+    for table in (definitions["Plate"], definitions["Layer"]):
+        table["properties"]["areal_density"] |= density
+        table["required"].remove("thickness")
+        table |= {"if": {"required": ["areal_density"]}, "then": {"properties": {"thickness": {"not": {}}}}}
+        table["else"] = {"required": ["thickness"]}
 
 
 def _named(schema: Schema) -> Schema:
     """A schema in which a threat stands for the keys of a core and for the velocity, a material for a resistance."""
     definitions = schema["$defs"]
-    cores = [one["then"]["$ref"].rpartition("/")[2] for one in schema["properties"]["core"]["allOf"]]
+    cores = [choice["then"]["$ref"].rpartition("/")[2] for choice in schema["properties"]["core"]["allOf"]]
     for name in cores:
         required = definitions[name]["required"]
         definitions[name] |= {"required": ["shape"], "allOf": [_unless("threat", {"required": required})]}
@@ -163,7 +163,7 @@ def _named(schema: Schema) -> Schema:
 
 
 def _unless(key: str, rest: Schema) -> Schema:
-    """What holds of a table without a key."""
+    """A condition that applies to a table without a key."""
     return {"if": {"required": [key]}, "else": rest}
 
 
@@ -172,9 +172,9 @@ def _take_distributions(schema: Schema) -> None:
     definitions, kinds = schema["$defs"], [model.__name__ for model in _models(Distribution)]
     kinds = [name for name in kinds if name in definitions]
     for name in kinds:
-        for key, one in definitions[name]["properties"].items():
+        for key, key_schema in definitions[name]["properties"].items():
             if key not in PURE_NUMBERS:
-                one.get("items", one)["type"] = ["number", "string"]
+                key_schema.get("items", key_schema)["type"] = ["number", "string"]
     definitions["Distribution"] = {
         "description": "A distribution in the place of a value: each shot draws its own.",
         "oneOf": [{"$ref": f"#/$defs/{name}"} for name in kinds],
@@ -187,7 +187,7 @@ def _take_distributions(schema: Schema) -> None:
                 if name in definition["properties"]:
                     _let_scatter(definition["properties"], name)
     offset = definitions["Layer"]["properties"]["offset"]
-    offset["prefixItems"] = [{"anyOf": [one, {"$ref": "#/$defs/Distribution"}]} for one in offset["prefixItems"]]
+    offset["prefixItems"] = [{"anyOf": [item, {"$ref": "#/$defs/Distribution"}]} for item in offset["prefixItems"]]
 
 
 def _let_scatter(properties: Schema, name: str) -> None:
@@ -199,7 +199,7 @@ def _let_scatter(properties: Schema, name: str) -> None:
 
 def _referred(schema: Schema, part: Schema) -> list[Schema]:
     """The definitions that a part of the schema refers to."""
-    references = [one["$ref"] for one in (part, *part.get("oneOf", [])) if "$ref" in one]
+    references = [choice["$ref"] for choice in (part, *part.get("oneOf", [])) if "$ref" in choice]
     return [schema["$defs"][reference.rpartition("/")[2]] for reference in references]
 
 
@@ -224,16 +224,16 @@ def _take_plates(schema: Schema) -> None:
 
 
 def _decided(part: Any, definitions: Schema) -> Any:
-    """The same with choices that a kind of value or a key decides, in the place of anyOf and oneOf. An editor then
+    """The schema with conditions on the kind of a value or on a key, in the place of anyOf and oneOf. An editor then
     marks the key that is wrong; of several choices none of which fits, it would mark the whole table."""
     if isinstance(part, list):
-        return [_decided(one, definitions) for one in part]
+        return [_decided(entry, definitions) for entry in part]
     if not isinstance(part, dict):
         return part
-    rest = {name: _decided(one, definitions) for name, one in part.items() if name not in ("anyOf", "oneOf")}
+    rest = {name: _decided(inner, definitions) for name, inner in part.items() if name not in ("anyOf", "oneOf")}
     rest.pop("discriminator", None)
     if "oneOf" in part:
-        return rest | _by_key([one["$ref"] for one in part["oneOf"]], definitions)
+        return rest | _by_key([choice["$ref"] for choice in part["oneOf"]], definitions)
     if "anyOf" in part:
         return rest | _by_kind(_decided(part["anyOf"], definitions))
     return rest
@@ -242,20 +242,24 @@ def _decided(part: Any, definitions: Schema) -> Any:
 def _by_kind(choices: list[Schema]) -> Schema:
     """A choice that the kind of the value decides: keywords of a number, a string or a list say nothing of others."""
     merged: Schema = {"type": []}
-    for one in choices:
-        table = "$ref" in one or one["type"] == "object"
-        kinds = ["object"] if table else one["type"] if isinstance(one["type"], list) else [one["type"]]
+    for choice in choices:
+        table = "$ref" in choice or choice["type"] == "object"
+        kinds = ["object"] if table else choice["type"] if isinstance(choice["type"], list) else [choice["type"]]
         merged["type"] += kinds
-        merged |= {"if": {"type": "object"}, "then": one} if table else {k: v for k, v in one.items() if k != "type"}
+        merged |= (
+            {"if": {"type": "object"}, "then": choice} if table else {k: v for k, v in choice.items() if k != "type"}
+        )
     return merged
 
 
 def _by_key(references: list[str], definitions: Schema) -> Schema:
     """A choice between tables that one of their keys decides. Their keys stand here, too, for completion."""
     tables = [definitions[reference.rpartition("/")[2]] for reference in references]
-    key = next(name for name, one in tables[0]["properties"].items() if "const" in one)
-    names = [one["properties"][key]["const"] for one in tables]
-    meant = {name: one.get("description", "") for table in tables for name, one in table["properties"].items()}
+    key = next(name for name, table in tables[0]["properties"].items() if "const" in table)
+    names = [table["properties"][key]["const"] for table in tables]
+    meant = {
+        name: key_schema.get("description", "") for table in tables for name, key_schema in table["properties"].items()
+    }
     return {
         "type": "object",
         "required": [key],

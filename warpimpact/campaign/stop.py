@@ -48,5 +48,5 @@ class Stop(Model):
 
     @property
     def measure(self) -> Measure:
-        """The quantity."""
+        """The measure that the quantity names."""
         return Measure.parse(self.quantity)

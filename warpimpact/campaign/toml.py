@@ -21,9 +21,14 @@ def _lines(table: Mapping[str, Any], path: tuple[str, ...]) -> list[str]:
     for key, value in table.items():
         if isinstance(value, Mapping) and (not path or len(value) > 3):
             below += ["", f"[{_dotted((*path, key))}]", *_lines(value, (*path, key))]
-        elif isinstance(value, list | tuple) and value and all(isinstance(one, Mapping) for one in value) and not path:
-            for one in value:
-                below += ["", f"[[{_dotted((*path, key))}]]", *_lines(one, (*path, key))]
+        elif (
+            isinstance(value, list | tuple)
+            and value
+            and all(isinstance(entry, Mapping) for entry in value)
+            and not path
+        ):
+            for entry in value:
+                below += ["", f"[[{_dotted((*path, key))}]]", *_lines(entry, (*path, key))]
         elif value is not None:
             lines.append(f"{_key(key)} = {_value(value)}")
     return lines + below
@@ -31,7 +36,7 @@ def _lines(table: Mapping[str, Any], path: tuple[str, ...]) -> list[str]:
 
 def _value(value: Any) -> str:
     if isinstance(value, Mapping):
-        inside = ", ".join(f"{_key(key)} = {_value(one)}" for key, one in value.items() if one is not None)
+        inside = ", ".join(f"{_key(key)} = {_value(inner)}" for key, inner in value.items() if inner is not None)
         return f"{{ {inside} }}" if inside else "{}"
     if isinstance(value, list | tuple):
         return f"[{', '.join(map(_value, value))}]"

@@ -87,7 +87,7 @@ class Answers:
         if text not in self._results:
             campaign = Campaign.from_text(text, name="design", folder=FOLDER)
             self._results[text] = run(campaign, device=self._device, progress=lambda _: None, cancel=cancel)
-            while len(self._results) > 1 and sum(one.nbytes for one in self._results.values()) > _MOST_KEPT:
+            while len(self._results) > 1 and sum(result.nbytes for result in self._results.values()) > _MOST_KEPT:
                 self._results.popitem(last=False)
         self._results.move_to_end(text)
         return self._results[text]

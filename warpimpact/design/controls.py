@@ -61,12 +61,12 @@ def groups(design: ValidDesign) -> list[dict[str, Any]]:
     threat = campaign.core.threat
     shot = [*_choice("threat", ["core", "threat"], threat), *([] if threat else _of_core(campaign, tables))]
     shot += [_slider(campaign, tables, ["impact", name], "impact") for name in _SHOT]
-    found: list[dict[str, Any]] = [{"name": "Shot", "controls": shot}]
+    groups: list[dict[str, Any]] = [{"name": "Shot", "controls": shot}]
     for number, layer in enumerate(campaign.target.layers):
         table: Place = ["layer", number - 1] if number else ["plate"]
         name = f"Layer {number}" if number else "Plate"
-        found.append({"name": name, "layer": number, "controls": list(_of_plate(campaign, tables, table, layer))})
-    return found
+        groups.append({"name": name, "layer": number, "controls": list(_of_plate(campaign, tables, table, layer))})
+    return groups
 
 
 def _of_core(campaign: Campaign, tables: Tables) -> Iterator[dict[str, Any]]:
@@ -93,8 +93,8 @@ def _of_plate(campaign: Campaign, tables: Tables, table: Place, plate: Plate) ->
     if hasattr(pattern, "spacing"):
         if isinstance(_value(tables, [*place, "spacing"]), list):
             for axis, label in enumerate(_AXES):
-                own = _slider(campaign, tables, [*place, "spacing", axis], "pattern", "spacing")
-                yield own | {"label": f"spacing {label}"}
+                slider = _slider(campaign, tables, [*place, "spacing", axis], "pattern", "spacing")
+                yield slider | {"label": f"spacing {label}"}
         else:
             pitch = pattern.spacing[1] * _UNITS["m"][1]
             yield _slider(campaign, tables, [*place, "spacing"], "pattern", "spacing", pitch) | {"label": "pitch"}

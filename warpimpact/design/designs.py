@@ -130,8 +130,8 @@ def _texts_of_results(path: Path) -> Iterator[tuple[str, str]]:
         with opened(path) as dataset:
             yield path.stem, str(dataset.attrs.get(attr.CAMPAIGN, ""))
         return
-    found = files.read(path, front.FRONT)
-    for name, text in zip(found[front.FILE].values, found[front.CAMPAIGN].values, strict=True):
+    front_file = files.read(path, front.FRONT)
+    for name, text in zip(front_file[front.FILE].values, front_file[front.CAMPAIGN].values, strict=True):
         yield Path(str(name)).stem, str(text)
 
 
@@ -147,9 +147,9 @@ def _files_of(part: Any, place: str) -> Iterator[tuple[str, str]]:
 def _absolute(part: Any, folder: Path, key: str = "") -> Any:
     """Tables with absolute names of files, so that the campaign runs from any folder."""
     if isinstance(part, list):
-        return [_absolute(one, folder) for one in part]
+        return [_absolute(entry, folder) for entry in part]
     if isinstance(part, dict):
-        return {name: _absolute(one, folder, name) for name, one in part.items()}
+        return {name: _absolute(entry, folder, name) for name, entry in part.items()}
     return str((folder / part).absolute()) if key in FILE_KEYS and isinstance(part, str) else part
 
 
@@ -185,8 +185,12 @@ def stages(shelf: Shelf, design: ValidDesign, level: int) -> list[Stage]:
         first = _valid(shelf, whole)
     drafted = None if draft is None else _valid(shelf, _of_few_hits(design, SOME) | {"numerics": draft})
     before = {"first": first, "draft": drafted}
-    found = [Stage(name, one) for name, one in before.items() if one is not None and one.text != design.text]
-    return [*found, Stage("full", design)]
+    stages_before = [
+        Stage(name, stage_design)
+        for name, stage_design in before.items()
+        if stage_design is not None and stage_design.text != design.text
+    ]
+    return [*stages_before, Stage("full", design)]
 
 
 def _valid(shelf: Shelf, tables: Tables) -> ValidDesign | None:

@@ -97,6 +97,6 @@ class Desk:
 
 
 def _settle(tell: Callable[[Any], None], end: Any) -> None:
-    """Tell a future how its job ended; nobody waits for one that was cancelled."""
+    """Set the result or the error of a future; a cancelled future has nobody who waits for it."""
     with suppress(InvalidStateError):
         tell(end)

@@ -41,7 +41,7 @@ def _oblong(width: float, slender: float) -> dict[str, float]:
 def choices(design: Tables) -> dict[str, list[str]]:
     """Names that each choice offers; none of threats whose core is not known."""
     catalogue = catalogue_of(design, "design", FOLDER)
-    threats = [name for name, one in catalogue.all(Threat).items() if one.core is not None]
+    threats = [name for name, threat in catalogue.all(Threat).items() if threat.core is not None]
     return {"threat": threats, "material": list(catalogue.all(Material)), "shape": list(SHAPES)}
 
 
@@ -70,10 +70,10 @@ def changed(design: ValidDesign, shelf: Shelf, what: str, layer: int, value: str
             _take_shape(tables, design, shelf, layer, value)
         case "add layer":
             front = design.campaign.target.layers[-1]
-            own = {"material": front.material} if front.material else _own(front)
-            tables["layer"] = [*tables.get("layer", []), _BASE | own]
+            of_front = {"material": front.material} if front.material else _own(front)
+            tables["layer"] = [*tables.get("layer", []), _BASE | of_front]
         case "remove layer" if layer > 0:
-            tables["layer"] = [one for place, one in enumerate(tables["layer"]) if place != layer - 1]
+            tables["layer"] = [table for place, table in enumerate(tables["layer"]) if place != layer - 1]
             if not tables["layer"]:
                 del tables["layer"]
         case _:
@@ -89,7 +89,7 @@ def _plate(tables: Tables, layer: int) -> Tables:
 
 
 def _own(plate: Plate) -> dict[str, Any]:
-    """What a material is, in numbers."""
+    """The numbers of a material as keys of a plate."""
     return {
         "resistance": f"{plate.resistance / 1e6:.6g} MPa",
         "shear_coefficient": plate.shear_coefficient,
@@ -98,7 +98,7 @@ def _own(plate: Plate) -> dict[str, Any]:
 
 
 def _take_threat(tables: Tables, design: ValidDesign, name: str) -> None:
-    """The core of a threat, with its velocity if the catalogue has it; or the same core with keys of its own."""
+    """Take the core of a threat, and its velocity if the catalogue has one; an empty name keeps the core as numbers."""
     impact, core = tables.setdefault("impact", {}), design.campaign.core
     if name:
         tables["core"] = {"threat": name}
@@ -109,9 +109,9 @@ def _take_threat(tables: Tables, design: ValidDesign, name: str) -> None:
             impact["velocity"] = f"{design.campaign.impact.velocity:.6g} m/s"
         return
     labels = ("threat", "standard", "velocity_tolerance")
-    own = core.model_dump(mode="json", exclude_none=True, exclude=set(labels))
-    own |= {key: one for key, one in tables["core"].items() if key not in labels}
-    tables["core"] = own
+    shape = core.model_dump(mode="json", exclude_none=True, exclude=set(labels))
+    shape |= {key: table for key, table in tables["core"].items() if key not in labels}
+    tables["core"] = shape
     impact.setdefault("velocity", f"{design.campaign.impact.velocity:.6g} m/s")
 
 
@@ -126,7 +126,7 @@ def _take_material(table: Tables, plate: Plate, name: str) -> None:
 
 
 def _take_shape(tables: Tables, design: ValidDesign, shelf: Shelf, layer: int, shape: str) -> None:
-    """Holes of another shape and of the same area, or of the largest one that leaves ligaments."""
+    """Take holes of another shape with the same area, or with the largest area that leaves ligaments."""
     table, old = _plate(tables, layer), design.campaign.target.layers[layer].pattern
     if shape == "none":
         table.pop("pattern", None)
@@ -136,10 +136,12 @@ def _take_shape(tables: Tables, design: ValidDesign, shelf: Shelf, layer: int, s
     lattice = isinstance(old, LatticePattern)
     spacing = old.spacing if isinstance(old, LatticePattern) else _SPACING
     area = old.hole_area if isinstance(old, LatticePattern) else _OPEN * math.prod(_SPACING)
-    kept = {key: one for key, one in table.get("pattern", {}).items() if lattice and key in ("staggered", "rotation")}
+    kept = {
+        key: value for key, value in table.get("pattern", {}).items() if lattice and key in ("staggered", "rotation")
+    }
     for _ in range(_TRIES):
         sizes = {key: _mm(length) for key, length in _SIZES[shape](area).items()}
-        table["pattern"] = {"shape": shape, **sizes, "spacing": [_mm(one) for one in spacing], **kept}
+        table["pattern"] = {"shape": shape, **sizes, "spacing": [_mm(side) for side in spacing], **kept}
         try:
             shelf.checked(tables)
         except CampaignError:

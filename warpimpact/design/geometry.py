@@ -41,7 +41,7 @@ def drawn(campaign: Campaign) -> dict[str, Any]:
         "path": svg.path(rings),
         "cell": cell,
         "core": round(core.max_radius * _MM, _DIGITS),
-        "dimensions": [_line(one) for one in hole_dimensions(plate, ligament)],
+        "dimensions": [_line(hole_dimension) for hole_dimension in hole_dimensions(plate, ligament)],
         "ligament": None if ligament is None else _line(ligament),
         "handles": list(_handles(campaign)),
         "section": _section(target, half[1]),
@@ -66,7 +66,7 @@ def _handles(campaign: Campaign) -> Iterator[dict[str, Any]]:
     half = np.array(pattern.unit_cell) / 2
     rings = pattern.outlines((-half[0], half[0]), (-half[1], half[1]))
     place = np.zeros(2) if pattern.holes is None else np.array(pattern.holes[0][:2])
-    ring = min(rings, key=lambda one: float(np.linalg.norm(one.mean(axis=0) - place)), default=None)
+    ring = min(rings, key=lambda outline: float(np.linalg.norm(outline.mean(axis=0) - place)), default=None)
     for names, direction in ((_ACROSS, across), (_ALONG, along)):
         name = next((name for name in names if name in type(pattern).model_fields), None)
         if name is not None and ring is not None:

@@ -31,7 +31,7 @@ class Hasty(H11Protocol):
         super().connection_lost(exc)
 
     def _watch(self) -> None:
-        """Set the clock where the rest of a request is due; further bytes do not set it again."""
+        """Start the clock for the rest of a request; further bytes do not restart it."""
         if self.conn.their_state not in (h11.IDLE, h11.SEND_BODY):
             self._forget()
         elif self._closing is None:

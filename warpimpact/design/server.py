@@ -58,7 +58,7 @@ def _nothing() -> None:
 def application(
     shelf: Shelf, *, token: str, port: int, device: str = "auto", entered: Callable[[], object] = _nothing
 ) -> Guard:
-    """The page and all that it asks, as an ASGI application.
+    """The page and its requests as an ASGI application.
 
     Args:
         entered: called whenever a browser gets the page.
@@ -79,7 +79,7 @@ def application(
 
 
 class _Pages:
-    """What the paths of the page answer; it holds nothing of a single browser."""
+    """Handlers of the paths of the page. They keep no state of a single browser."""
 
     def __init__(self, answers: Answers, desk: Desk, entered: Callable[[], object]) -> None:
         self._answers, self._desk, self._shelf, self._entered = answers, desk, answers.shelf, entered
@@ -104,8 +104,8 @@ class _Pages:
 
         async def lines() -> AsyncIterator[str]:
             try:
-                async with aclosing(self._lines(design, others, level)) as found:
-                    async for line in found:
+                async with aclosing(self._lines(design, others, level)) as lines:
+                    async for line in lines:
                         yield await run_in_threadpool(as_json, line) + "\n"
             except Exception as error:
                 yield _refused(error)
@@ -117,11 +117,11 @@ class _Pages:
     ) -> AsyncGenerator[Any]:
         """The plate, and maps and numbers of each stage. The first map is computed while the plate is drawn."""
         total = design.campaign.hits.count or 0
-        every = [{stage.name: stage.design for stage in stages(self._shelf, one, level)} for _, one in others]
+        every = [{stage.name: stage.design for stage in stages(self._shelf, other, level)} for _, other in others]
         plate = True
-        for name, own in stages(self._shelf, design, level):
+        for name, stage_design in stages(self._shelf, design, level):
             at = [(label, one.get(name, one["full"])) for (label, _), one in zip(others, every, strict=True)]
-            designs = named(own, at)
+            designs = named(stage_design, at)
             maps = asyncio.ensure_future(
                 self._desk.do(_STAGES[name], partial(self._answers.maps, name, designs, total))
             )
@@ -262,7 +262,7 @@ def _sentence(error: Exception) -> str:
 
 
 def _whole(asked: Tables, key: str, least: int, most: int) -> int:
-    """A whole number of a request; the least one if it is not given."""
+    """A whole number in a request; `least` if it is not given."""
     value = asked.get(key, least)
     if not isinstance(value, int) or isinstance(value, bool) or not least <= value <= most:
         raise CampaignError(f"{key}: got {quoted(value)}, but it must be a whole number from {least} to {most}")
@@ -275,26 +275,26 @@ def _hit(asked: Tables) -> tuple[int, str, int]:
 
 
 def bound(port: int) -> socket.socket:
-    """A socket of this machine alone.
+    """A socket that only this machine can reach.
 
     Args:
-        port: 0 is any that is free.
+        port: 0 takes any free port.
 
     Raises:
         OSError: the port is taken.
     """
-    own = socket.socket(socket.AF_INET, socket.SOCK_STREAM)
-    own.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+    listening = socket.socket(socket.AF_INET, socket.SOCK_STREAM)
+    listening.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
     try:
-        own.bind(("127.0.0.1", port))
+        listening.bind(("127.0.0.1", port))
     except OSError:
-        own.close()
+        listening.close()
         raise
-    return own
+    return listening
 
 
 def server_of(app: Guard) -> uvicorn.Server:
-    """What serves the page."""
+    """The server of the page."""
     return uvicorn.Server(
         uvicorn.Config(
             app,
@@ -325,11 +325,11 @@ def serve(
     Raises:
         OSError: the port is taken.
     """
-    with bound(port) as own:
-        token, port = secrets.token_urlsafe(18), own.getsockname()[1]
+    with bound(port) as listening:
+        token, port = secrets.token_urlsafe(18), listening.getsockname()[1]
         server = server_of(application(shelf, token=token, port=port, device=device, entered=entered))
-        own.listen()
+        listening.listen()
         ready(f"http://127.0.0.1:{port}/{token}/")
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", Implausible)  # the page shows these
-            server.run(sockets=[own])
+            server.run(sockets=[listening])

@@ -50,8 +50,8 @@ class Directions(Model):
         first_count, max_count: hits in a direction: at first, and at most.
     """
 
-    azimuth: Angles = tuple(math.radians(one) for one in (-60, -40, -20, 0, 20, 40, 60))
-    elevation: Angles = tuple(math.radians(one) for one in (0, 15, 30))
+    azimuth: Angles = tuple(math.radians(degrees) for degrees in (-60, -40, -20, 0, 20, 40, 60))
+    elevation: Angles = tuple(math.radians(degrees) for degrees in (0, 15, 30))
     velocity: PositiveSpeed | None = None
     weight: Literal["solid_angle", "area"] = "area"
     half_width: Annotated[Number, Field(gt=0, lt=1)] = 0.05
@@ -88,7 +88,8 @@ class Directions(Model):
 
 
 def _edges(angles: tuple[float, ...]) -> Array:
-    """Where the stretch of each angle begins, and where the last one ends; a single angle has one of no matter."""
+    """Edges of the intervals that the angles stand for, one more than there are angles. The interval of a single angle
+    has an arbitrary width."""
     if len(angles) == 1:
         return np.array([angles[0] - 0.01, angles[0] + 0.01])
     middles = 0.5 * (np.array(angles[1:]) + np.array(angles[:-1]))
@@ -130,7 +131,7 @@ class Sector:
 
 
 def check_directions(campaign: Campaign) -> None:
-    """Refuse a campaign whose hits do not go on, or whose direction of fire is given otherwise.
+    """Refuse a campaign whose hits cannot be continued, or which gives the direction of fire itself.
 
     Raises:
         CampaignError: says why.
@@ -148,11 +149,11 @@ def protect(
 ) -> Question[Sector]:
     """Compute P(perforation) in all directions.
 
-    All directions have the same hits, as far as these go, so their errors are not independent. One pilot with hits from
-    all directions finds the resolution.
+    All directions take the first of the same hits, so their errors are not independent. One pilot with hits from all
+    directions finds the resolution.
 
     Args:
-        progress: called with the directions that are settled, and all.
+        progress: called with the number of directions that are settled and the number of all directions.
     """
     check_directions(campaign)
     if directions.velocity is not None:
@@ -183,7 +184,7 @@ def protect(
 
 
 def _piloted(campaign: Campaign, shots: Shots, *, worker: Worker, report: Callable[[float], object]) -> Arrays:
-    """The numerics, as JSON, that a pilot of some of the shots finds."""
+    """A pilot of some of the shots finds the numerics, which are returned as JSON."""
     return {"numerics": np.array(numerics_for(campaign.scene, shots, campaign.numerics, worker).model_dump_json())}
 
 
@@ -200,14 +201,14 @@ def _answers(
 def toward(shots: Shots, directions: Directions, cell: tuple[int, int]) -> Shots:
     """Shots that come from a direction."""
     azimuth, elevation = directions.azimuth[cell[0]], directions.elevation[cell[1]]
-    one = np.ones(len(shots))
+    ones = np.ones(len(shots))
     return replace(
-        shots, obliquity=obliquity(azimuth, elevation) * one, azimuth=impact_azimuth(azimuth, elevation) * one
+        shots, obliquity=obliquity(azimuth, elevation) * ones, azimuth=impact_azimuth(azimuth, elevation) * ones
     )
 
 
 def _wanted(campaign: Campaign, passed: Array, directions: Directions) -> bool:
-    """Whether more hits are wanted in a direction."""
+    """Whether the interval in a direction needs more hits."""
     if len(passed) >= directions.max_count:
         return False
     known = passed[~np.isnan(passed)]
@@ -221,7 +222,7 @@ def _estimate(campaign: Campaign, passed: Array) -> Estimate:
 
 
 def _told_from(settled: int, total: int, progress: Callable[[int, int], object]) -> Callable[[RoundProgress], object]:
-    """Tells of a round in which so many of all directions are settled."""
+    """Return a function that reports the progress of a round; `settled` of all directions need no more hits."""
     return lambda now: progress(settled + int(now.done), total)
 
 
@@ -229,7 +230,8 @@ def _sector(campaign: Campaign, directions: Directions, passed: dict[tuple[int, 
     shape = len(directions.azimuth), len(directions.elevation)
     estimates = [_estimate(campaign, answers) for answers in passed.values()]
     share, low, high = (
-        np.array([getattr(one, name) for one in estimates]).reshape(shape) for name in ("value", "low", "high")
+        np.array([getattr(estimate, name) for estimate in estimates]).reshape(shape)
+        for name in ("value", "low", "high")
     )
     hits = np.array([len(answers) for answers in passed.values()]).reshape(shape)
     failed = np.array([int(np.isnan(answers).sum()) for answers in passed.values()]).reshape(shape)
@@ -249,7 +251,8 @@ def weighted_mean(passed: list[Array], weights: Array, replicates: int) -> Estim
     """
     estimates = [estimate_of("share", answers, replicates=replicates) for answers in passed]
     value, low, high = (
-        float(weights @ np.array([getattr(one, name) for one in estimates])) for name in ("value", "low", "high")
+        float(weights @ np.array([getattr(estimate, name) for estimate in estimates]))
+        for name in ("value", "low", "high")
     )
     means = np.zeros(replicates)
     for weight, answers in zip(weights, passed, strict=True):

@@ -36,7 +36,7 @@ class Estimator(Model):
 
     @property
     def without_interval(self) -> Estimator:
-        """The same, for V50 and spread alone."""
+        """The same estimator without an interval, for V50 and spread alone."""
         return self.model_copy(update={"interval": "none"})
 
 
@@ -64,7 +64,7 @@ _LOGISTIC = np.pi / np.sqrt(3.0)
 
 
 def reported(firings: Firings, procedure: Procedure, estimator: Estimator) -> Reports:
-    """What every test reports."""
+    """Compute the report of every test."""
     velocity, perforated, used = firings.velocity, firings.perforated, firings.used
     name = estimator.name or ("mean" if isinstance(procedure, MilStd662F) else "probit")
     shots, none = used.sum(axis=1), np.full(len(velocity), np.nan)
@@ -76,8 +76,8 @@ def reported(firings: Firings, procedure: Procedure, estimator: Estimator) -> Re
         elif estimator.interval == "wald":
             ends = wald_interval(velocity, used, fit, confidence=confidence, link=name)
         return Reports(fit.location, fit.scale * (_LOGISTIC if name == "logit" else 1.0), *ends, shots)
-    found = _dixon_mood(firings) if name == "dixon_mood" else _means(firings, procedure)
-    return Reports(*found, none, none, shots)
+    guess = _dixon_mood(firings) if name == "dixon_mood" else _means(firings, procedure)
+    return Reports(*guess, none, none, shots)
 
 
 def _means(firings: Firings, procedure: Procedure) -> tuple[Array, Array]:

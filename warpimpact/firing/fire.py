@@ -28,7 +28,7 @@ class Answering(Protocol):
     """A target that answers shots, as `response.Response` does."""
 
     def perforates(self, place: NDArray[np.int64], velocity: Array) -> Flags:
-        """Whether shots perforate; any shape."""
+        """Whether shots perforate, in the shape of the arguments."""
 
 
 @dataclass(frozen=True)
@@ -60,7 +60,7 @@ class Firings:
 
 
 def uniform(seed: int, column: int, tests: int, most: int) -> Array:
-    """Independent numbers in [0, 1) of one kind for every shot, shape [tests, most]."""
+    """Independent uniform numbers in [0, 1) of one kind for every shot, shape [tests, most]."""
     return np.stack([stream(seed, (column, shot), 0, tests) for shot in range(most)], axis=1)
 
 
@@ -69,7 +69,7 @@ def fire(procedure: Procedure, response: Answering, places: NDArray[np.int64], e
 
     Args:
         places: which place of the response every shot hits, shape [tests, shots].
-        errors: differences of the velocities from those aimed at, shape [tests, shots], as `Gun.errors` gives them.
+        errors: velocity of each shot minus the velocity aimed at [m/s], shape [tests, shots], from `Gun.errors`.
     """
     tests, most = len(places), procedure.most
     aimed, velocity = np.zeros((2, tests, most))
@@ -96,18 +96,18 @@ def fire(procedure: Procedure, response: Answering, places: NDArray[np.int64], e
 
 
 def _aims(asked: Sequence[float | Optimal | Estimated], velocity: Array, perforated: Flags, used: Flags) -> Array:
-    """The velocities to aim at; those that are D-optimal are computed together."""
-    optimal = np.array([isinstance(one, Optimal) for one in asked])
-    aims = np.array([0.0 if isinstance(one, Optimal | Estimated) else one for one in asked])
+    """Velocities to aim at [m/s]; the D-optimal ones are computed together."""
+    optimal = np.array([isinstance(velocity, Optimal) for velocity in asked])
+    aims = np.array([0.0 if isinstance(velocity, Optimal | Estimated) else velocity for velocity in asked])
     if optimal.any():
-        guesses = [one for one in asked if isinstance(one, Optimal)]
-        location = np.array([np.nan if one.location is None else one.location for one in guesses])
-        scale = np.array([np.nan if one.scale is None else one.scale for one in guesses])
+        guesses = [velocity for velocity in asked if isinstance(velocity, Optimal)]
+        location = np.array([np.nan if guess.location is None else guess.location for guess in guesses])
+        scale = np.array([np.nan if guess.scale is None else guess.scale for guess in guesses])
         fired, answers, counts = velocity[optimal], perforated[optimal], used[optimal]
         fitted = np.isnan(location)
         if fitted.any():
-            found = fit_within(fired[fitted], answers[fitted], counts[fitted])
-            location[fitted], scale[fitted] = found
+            fit = fit_within(fired[fitted], answers[fitted], counts[fitted])
+            location[fitted], scale[fitted] = fit
         aims[optimal] = d_optimal(fired, counts, location, scale)
     return aims
 
@@ -126,8 +126,8 @@ def fit_within(velocity: Array, perforated: Flags, used: Flags) -> tuple[Array, 
 def _answer_estimates(
     procedures: Sequence[Steps], asked: dict[int, float | Optimal | Estimated], fired: tuple[Array, Flags, Flags]
 ) -> None:
-    """Send the fit so far to the tests that ask for it."""
-    asking = [test for test, one in asked.items() if isinstance(one, Estimated)]
+    """Send the current fit to the tests that ask for it."""
+    asking = [test for test, velocity in asked.items() if isinstance(velocity, Estimated)]
     if not asking:
         return
     velocity, used = fired[0][asking], fired[2][asking]

@@ -18,7 +18,7 @@ from warpimpact.view.view import Column, Section, Table, number
 
 @dataclass(frozen=True)
 class ProcedureVerdict:
-    """What the tests of a file are worth.
+    """How far tests of this procedure can be trusted.
 
     Attributes:
         known: share of the tests that report a V50.
@@ -40,7 +40,7 @@ class ProcedureVerdict:
 
 
 def verdict(dataset: xarray.Dataset, required: float | None = None, by: str = "v50") -> ProcedureVerdict | None:
-    """What the tests of a file are worth; None where no procedure was fired."""
+    """How far the tests of a file can be trusted; None if no procedure was fired."""
     if f.V50 not in dataset:
         return None
     v50, spread, low, high = (dataset[name].values for name in (f.V50, f.SPREAD, f.V50_LOW, f.V50_HIGH))
@@ -67,12 +67,12 @@ def share_text(estimate: Estimate) -> str:
 
 
 def firing_view(dataset: xarray.Dataset) -> list[Section]:
-    """The view of a firing test: what it is, its target, what the tests report, and the questions that were asked."""
-    told, test = dataset.attrs, json.loads(dataset.attrs[f.SETTINGS])
+    """The view of a firing test: its target, what the tests report, and the answers to its questions."""
+    attributes, test = dataset.attrs, json.loads(dataset.attrs[f.SETTINGS])
     required = test.get("required") or {}
     worth = verdict(dataset, required.get("v50"), required.get("by", "v50"))
     return [
-        Section([told[f.DISCLAIMER], *filter(None, [told[f.REQUIREMENT]])], str(told[attr.TITLE])),
+        Section([attributes[f.DISCLAIMER], *filter(None, [attributes[f.REQUIREMENT]])], str(attributes[attr.TITLE])),
         *([_target(dataset)] if f.SHARE in dataset else []),
         *([_reported(dataset, worth, test)] if worth is not None else []),
         *([Section([_size(dataset, test["precision"])])] if f.SIZE in dataset else []),
@@ -143,7 +143,7 @@ def _reported(dataset: xarray.Dataset, worth: ProcedureVerdict, test: dict[str, 
 
 
 def _size(dataset: xarray.Dataset, precision: dict[str, Any]) -> str:
-    """How many shots a test takes to be as exact as asked."""
+    """Number of shots that a test needs for the precision that was asked for."""
     within, share = float(precision["within"]), float(precision["share"])
     enough = np.flatnonzero(dataset[f.SIZE_WITHIN].values >= share)
     what = f"V50 within ± {within:g} m/s in {100 * share:g} % of the tests"
@@ -154,7 +154,7 @@ def _size(dataset: xarray.Dataset, precision: dict[str, Any]) -> str:
 
 
 def _proof(dataset: xarray.Dataset, proof: dict[str, Any]) -> Section:
-    """What the plan of a proof shows, and what this target does in it."""
+    """What a pass of the proof shows, and how often this target passes."""
     shots, allowed = int(dataset.attrs[f.PROOF_SHOTS]), int(dataset.attrs[f.PROOF_ALLOWED])
     velocity = float(dataset.attrs[f.PROOF_VELOCITY])
     stop, confidence = float(proof["stop_probability"]), float(proof["confidence"])

@@ -34,10 +34,10 @@ from warpimpact.studies.limit import LimitMap
 
 
 def known_target(test: FiringTest) -> Response | None:
-    """The response of a target that needs no search; None of a campaign.
+    """The response of a target that needs no search; None if the target is a campaign.
 
     Raises:
-        CampaignError: the file that the target names says no such thing.
+        CampaignError: the file that the target names gives no response.
         ResultError: it is no result.
     """
     target = test.target
@@ -56,7 +56,7 @@ def known_target(test: FiringTest) -> Response | None:
 
 @contextmanager
 def _told_of(path: Path) -> Iterator[None]:
-    """Tell that a file has no response as an error of it."""
+    """Raise an error that names the file if it has no response."""
     try:
         yield
     except files.ResultError:
@@ -66,7 +66,7 @@ def _told_of(path: Path) -> Iterator[None]:
 
 
 def target_campaign(test: FiringTest, count: int | None = None) -> Campaign:
-    """The campaign whose limits are searched: that of the target, with so many hits, up to the layer that must hold.
+    """The campaign whose limits are searched: that of the target, with `count` hits, up to the layer that must hold.
 
     Raises:
         CampaignError: it has no such layer, or its limits cannot be searched.
@@ -141,9 +141,8 @@ def directions_of(
     progress: Callable[[int, int], object] = lambda done, total: None,
     tell: Callable[[str], object] = warnings.warn,
 ) -> Iterator[Sector | None]:
-    """What is computed of the directions of a test; None where it asks for none.
-
-    What is computed is on the disk at once, in `output`.parts, until the block ends, which writes the output.
+    """Compute the directions of a test; None if it asks for none. Results are saved in `output`.parts as they come; the
+    caller writes the output before the block ends.
 
     Args:
         progress: as in `protect`.

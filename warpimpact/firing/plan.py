@@ -19,7 +19,7 @@ Share = Annotated[Number, Field(gt=0, lt=1)]
 
 
 class FiringTarget(Model):
-    """What is fired at: exactly one of campaign, limits, sweep, mean and velocities.
+    """The target is exactly one of campaign, limits, sweep, mean and velocities.
 
     Attributes:
         campaign: campaign file, whose limit velocities are searched.
@@ -66,11 +66,11 @@ class FiringTarget(Model):
 
 
 class Precision(Model):
-    """How many shots a precision takes.
+    """Asks how many shots a precision needs.
 
     Attributes:
         within: largest difference of the reported V50 from the true one [m/s].
-        share: of the tests that must be so exact.
+        share: of the tests that must be within that difference.
         sizes: numbers of shots that are tried.
     """
 
@@ -159,7 +159,7 @@ class FiringTest(Model):
 
     @property
     def needs_limits(self) -> bool:
-        """Whether the response of the target is asked for."""
+        """Whether the test needs the response of its target."""
         return self.procedure is not None or self.proof is not None or self.directions is None
 
     @model_validator(mode="after")

@@ -37,7 +37,7 @@ def simulate_test(
     attributes: dict[str, Any] | None = None,
     sector: Sector | None = None,
 ) -> xarray.Dataset:
-    """Fire a test at a target whose response is known.
+    """Fire a test many times at a target whose response is known.
 
     Args:
         response: None where the test asks for directions alone.
@@ -56,8 +56,8 @@ def simulate_test(
         f.REQUIREMENT: requirement_line(test),
         attr.WARPIMPACT_VERSION: attr.versions()[attr.WARPIMPACT_VERSION],
     }
-    for some, more in (_fired(test, response), _directions(test, sector)):
-        columns, told = columns | some, told | more
+    for more_columns, more in (_fired(test, response), _directions(test, sector)):
+        columns, told = columns | more_columns, told | more
     return dataset_of(columns, f.FIXED | told | (attributes or {}))
 
 
@@ -87,14 +87,14 @@ def _fired(test: FiringTest, response: Response | None) -> tuple[dict[Variable, 
     fair_places(test.fair_hit, response)
     velocity = _grid(response, test.proof)
     columns = _response(response, velocity)
-    told: dict[str, Any] = {
+    attributes: dict[str, Any] = {
         f.TRUE_V50: response.quantile(0.5),
         f.TRUE_SPREAD: response.spread,
         f.UNFAIR_YAW: 1.0 - len(fair_places(test.fair_hit, response)) / len(response),
         f.UNFAIR_VELOCITY: test.gun.unfair,
     }
     if response.cell is not None:
-        told[f.CELL] = np.array(response.cell)
+        attributes[f.CELL] = np.array(response.cell)
     if test.procedure is not None:
         firings = fired(test, test.procedure, response)
         columns |= _tests(firings, reported(firings, test.procedure, test.estimator))
@@ -102,9 +102,9 @@ def _fired(test: FiringTest, response: Response | None) -> tuple[dict[Variable, 
             columns |= _sizes(test, test.procedure, response)
     if test.proof is not None:
         columns |= _proof(test, test.proof, response, velocity)
-        told |= {f.PROOF_SHOTS: proof_shots(test.proof), f.PROOF_ALLOWED: test.proof.allowed}
-        told |= {f.PROOF_VELOCITY: test.proof.velocity}
-    return columns, told
+        attributes |= {f.PROOF_SHOTS: proof_shots(test.proof), f.PROOF_ALLOWED: test.proof.allowed}
+        attributes |= {f.PROOF_VELOCITY: test.proof.velocity}
+    return columns, attributes
 
 
 def fired(test: FiringTest, procedure: Procedure, response: Response) -> Firings:
@@ -123,24 +123,24 @@ def proof_shots(proof: Proof) -> int:
 def _grid(response: Response, proof: Proof | None) -> Array:
     """Velocities of the curves, from where nothing perforates to where all does; that of the proof is among them."""
     finite = response.changes[np.isfinite(response.changes)]
-    own = [] if proof is None or proof.velocity is None else [proof.velocity]
-    low, high = np.min([*finite, *own]), np.max([*finite, *own])
+    of_proof = [] if proof is None or proof.velocity is None else [proof.velocity]
+    low, high = np.min([*finite, *of_proof]), np.max([*finite, *of_proof])
     margin = 0.05 * max(high - low, 0.02 * high)
-    return np.unique([*np.linspace(max(1.0, low - margin), high + margin, _GRID), *own])
+    return np.unique([*np.linspace(max(1.0, low - margin), high + margin, _GRID), *of_proof])
 
 
 def _response(response: Response, velocity: Array) -> dict[Variable, Any]:
-    shares = [response.estimate(float(one)) for one in velocity]
+    shares = [response.estimate(float(speed)) for speed in velocity]
     quantiles = [response.quantile_estimate(share) for share in QUANTILES]
     columns: dict[Variable, Any] = {
         f.VELOCITY: velocity,
-        f.SHARE: [one.value for one in shares],
-        f.SHARE_LOW: [one.low if response.cell else np.nan for one in shares],
-        f.SHARE_HIGH: [one.high if response.cell else np.nan for one in shares],
+        f.SHARE: [share.value for share in shares],
+        f.SHARE_LOW: [share.low if response.cell else np.nan for share in shares],
+        f.SHARE_HIGH: [share.high if response.cell else np.nan for share in shares],
         f.QUANTILE: np.array(QUANTILES),
-        f.QUANTILE_VELOCITY: [one.value for one in quantiles],
-        f.QUANTILE_LOW: [one.low for one in quantiles],
-        f.QUANTILE_HIGH: [one.high for one in quantiles],
+        f.QUANTILE_VELOCITY: [quantile.value for quantile in quantiles],
+        f.QUANTILE_LOW: [quantile.low for quantile in quantiles],
+        f.QUANTILE_HIGH: [quantile.high for quantile in quantiles],
     }
     if response.cell is not None:
         columns |= {f.CHANGES: response.changes, f.HIT_Y: response.hit_y, f.HIT_Z: response.hit_z, f.YAW: response.yaw}
@@ -163,22 +163,22 @@ def _tests(firings: Firings, reports: Reports) -> dict[Variable, Any]:
 
 
 def _sizes(test: FiringTest, procedure: Procedure, response: Response) -> dict[Variable, Any]:
-    """How exact tests of other sizes are. A test without a V50 is not exact."""
+    """Share of exact tests for each size that was asked for. A test without a V50 is not exact."""
     precision, true = test.precision, response.quantile(0.5)
     assert precision is not None
     sizes = sorted(precision.sizes)
     longest = fired(test, procedure.of_size(sizes[-1]), response) if procedure.prefixes else None
-    found = []
+    rows = []
     for size in sizes:
-        own = procedure.of_size(size)
-        firings = fired(test, own, response) if longest is None else longest.first(size)
-        v50 = reported(firings, own, test.estimator.without_interval).v50
+        sized = procedure.of_size(size)
+        firings = fired(test, sized, response) if longest is None else longest.first(size)
+        v50 = reported(firings, sized, test.estimator.without_interval).v50
         known = v50[~np.isnan(v50)]
         mean, deviation = (float(known.mean()), float(known.std())) if len(known) else (np.nan, np.nan)
         within = float((np.abs(known - true) <= precision.within).sum()) / len(v50)
-        found.append((float(firings.used.sum(axis=1).mean()), within, mean - true, deviation))
+        rows.append((float(firings.used.sum(axis=1).mean()), within, mean - true, deviation))
     names = (f.SIZE_SHOTS, f.SIZE_WITHIN, f.SIZE_BIAS, f.SIZE_DEVIATION)
-    return {f.SIZE: np.array(sizes, dtype=np.int32), **dict(zip(names, zip(*found, strict=True), strict=True))}
+    return {f.SIZE: np.array(sizes, dtype=np.int32), **dict(zip(names, zip(*rows, strict=True), strict=True))}
 
 
 def _proof(test: FiringTest, proof: Proof, response: Response, velocity: Array) -> dict[Variable, Any]:

@@ -70,7 +70,7 @@ def named_requirement(name: str) -> Requirement:
     Raises:
         CampaignError: there is none of that name.
     """
-    known = {one.name: one for one in REQUIREMENTS}
+    known = {requirement.name: requirement for requirement in REQUIREMENTS}
     if name in known:
         return known[name]
     meant = get_close_matches(name, known, n=1)
@@ -119,8 +119,8 @@ def with_requirement(test: FiringTest) -> FiringTest:
         own = Directions() if test.directions is None else test.directions
         given = {name: getattr(own, name) for name in own.model_fields_set}
         angles = {
-            "azimuth": [f"{math.radians(one)!r} rad" for one in asked.azimuth],
-            "elevation": [f"{math.radians(one)!r} rad" for one in asked.elevation],
+            "azimuth": [f"{math.radians(angle)!r} rad" for angle in asked.azimuth],
+            "elevation": [f"{math.radians(angle)!r} rad" for angle in asked.elevation],
         }
         updates["directions"] = Directions.model_validate({"velocity": velocity.value} | angles | given)
     completed = test.model_copy(update=updates)

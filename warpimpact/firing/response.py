@@ -99,8 +99,8 @@ class Response:
             return (
                 float(low + (place - np.floor(place)) * (high - low)) if np.isfinite(high) and place > 0 else float(low)
             )
-        velocity, found = self._steps
-        reached = np.flatnonzero(found >= share - 1e-12)
+        velocity, answers = self._steps
+        reached = np.flatnonzero(answers >= share - 1e-12)
         return float(velocity[reached[0]]) if len(reached) else float("inf")
 
     @cached_property
@@ -118,9 +118,9 @@ class Response:
         if not self.unique or self.cell is None:
             return Estimate(value, np.nan, np.nan, len(self), np.nan)
         finite = np.minimum(self.changes[:, 0], 1e9)
-        found = estimate_of("quantile", finite, share=share, **self.dealt)
-        low, high = (end if end < 1e8 else np.inf for end in (found.low, found.high))
-        return Estimate(value, low, high, len(self), found.spread)
+        estimate = estimate_of("quantile", finite, share=share, **self.dealt)
+        low, high = (end if end < 1e8 else np.inf for end in (estimate.low, estimate.high))
+        return Estimate(value, low, high, len(self), estimate.spread)
 
     @property
     def spread(self) -> float:

@@ -122,7 +122,7 @@ def _on_panels(
     rng = np.random.Generator(np.random.Philox(np.random.SeedSequence(seed, spawn_key=(3, test))))
     half = 0.5 * np.array(rules.panel) - rules.edge
     cell, most = np.array(response.cell), rules.shots_per_panel or shots
-    found, points = np.empty(shots, dtype=np.int64), list[Array]()
+    hit_of, points = np.empty(shots, dtype=np.int64), list[Array]()
     for shot in range(shots):
         if len(points) == most:
             points.clear()
@@ -141,6 +141,6 @@ def _on_panels(
         else:
             raise ValueError("got rules of fair hits by which no place of the panel is fair")
         first = int(good.argmax())
-        found[shot] = places[first]
+        hit_of[shot] = places[first]
         points.append(at[first])
-    return found
+    return hit_of

@@ -28,7 +28,7 @@ class Aim:
         shots: with all images, those of one set after the other, shape [sets · points].
         group: symmetries, by which the images of a shot follow each other; `computed` are the first of each group.
         weight: 1 where a point is of the shot's class, else 0, shape [sets, points].
-        replicates: the computed shots of a set are dealt out to so many parts in turn.
+        replicates: number of parts that the computed shots of a set are dealt out to in turn.
         part: extent of the part of the unit cell that the computed points cover evenly [m], and of the whole cell, each
             along y and z; None where they do not, or differ in more than their place.
     """
@@ -49,7 +49,7 @@ class Aim:
         return np.stack([self.shots.hit_y, self.shots.hit_z], axis=-1).reshape(*self.weight.shape, 2)
 
     def of(self, hit: str | HitPlace, plate: Plate, core: Core) -> Aim:
-        """The same points for another class."""
+        """The same points, weighted for another class of hits."""
         inside = CLASSES[hit](plate, core, self.shots.hit_y, self.shots.hit_z) if isinstance(hit, str) else None
         weight = np.ones_like(self.weight) if inside is None else inside.reshape(self.weight.shape).astype(np.float64)
         return replace(self, weight=weight)
@@ -59,8 +59,8 @@ def aim(shot: MeasuredShot, plate: Plate, core: Core, sampling: Sampling, shifts
     """Points for a shot at some sets of parameters, spread over the cell of the plate.
 
     Args:
-        shifts: uniform numbers that move the points of each set, shape [sets, 2]. So the error that few points leave
-            differs from set to set, and the weights of the sets know it.
+        shifts: uniform numbers that move the points of each set, shape [sets, 2]. Thus the error of a finite number of
+            points differs from set to set, and the spread of the weights contains it.
     """
     placed = isinstance(shot.hit, HitPlace)
     turned = any(name != "velocity" for name, _ in shot.scatter.given)
@@ -80,8 +80,8 @@ def aim(shot: MeasuredShot, plate: Plate, core: Core, sampling: Sampling, shifts
         y, z = cell[0] * (low_y + (high_y - low_y) * shares[0]), cell[1] * (low_z + (high_z - low_z) * shares[1])
         images = np.array([symmetry.image(y, z, (cell[0], cell[1])) for symmetry in group])
         hit_y, hit_z = images.transpose(1, 2, 0).reshape(2, -1)
-    own = np.tile(np.repeat(np.arange(count), len(group)), len(shifts))
-    shots = replace(shots[own], hit_y=hit_y, hit_z=hit_z)
+    point_of = np.tile(np.repeat(np.arange(count), len(group)), len(shifts))
+    shots = replace(shots[point_of], hit_y=hit_y, hit_z=hit_z)
     even = not (placed or shot.scatter.given or plate.size is not None or alone)
     part = (np.array([high_y - low_y, high_z - low_z]) * cell, cell) if even else None
     weight = np.ones((len(shifts), count * len(group)))

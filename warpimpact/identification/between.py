@@ -1,4 +1,4 @@
-"""What lies between two hit points: numbers follow the plane through those of the nearest points."""
+"""Interpolation between hit points: numbers follow the plane through those of the nearest points."""
 
 from __future__ import annotations
 
@@ -14,13 +14,13 @@ from warpimpact.scene import Symmetry
 Array = NDArray[np.float64]
 
 NEAREST = 6
-"""Points about each one, images included, that the plane goes through, by least squares."""
+"""Number of neighbours, images included, through which the plane of a point is fitted by least squares."""
 
 
 def signs(observations: Sequence[Observation], group: Sequence[Symmetry]) -> Array:
     """How numbers change from a computed point to its images, shape [images, observations]."""
-    mirrors = [MEASURABLE[one.name].mirror for one in observations]
-    factors = [[1.0 if one is None else getattr(symmetry, one) for one in mirrors] for symmetry in group]
+    mirrors = [MEASURABLE[observation.name].mirror for observation in observations]
+    factors = [[1.0 if mirror is None else getattr(symmetry, mirror) for mirror in mirrors] for symmetry in group]
     return np.array(factors, dtype=np.float64).reshape(len(group), len(mirrors))
 
 
@@ -40,9 +40,9 @@ def changes(observations: Sequence[Observation], aim: Aim, computed: Array) -> A
         return np.zeros((sets, points // images, 2, numbers))
     part, cell = aim.part
     places, period = aim.hits / part, cell / part
-    each = [_slopes(observations, *own, period, images) for own in zip(places, computed, strict=True)]
+    slopes = [_slopes(observations, *set_numbers, period, images) for set_numbers in zip(places, computed, strict=True)]
     side = np.sqrt(images / points)  # of the square that a point stands for; its variance is a twelfth of its square
-    return np.asarray(np.stack(each) * (side / np.sqrt(12.0)))
+    return np.asarray(np.stack(slopes) * (side / np.sqrt(12.0)))
 
 
 def _slopes(observations: Sequence[Observation], places: Array, computed: Array, period: Array, images: int) -> Array:
@@ -55,8 +55,8 @@ def _slopes(observations: Sequence[Observation], places: Array, computed: Array,
     apart = places[near] - places[::images, None]
     apart -= period * np.round(apart / period)
     change = computed[near] - computed[::images, None]
-    for place, one in enumerate(observations):
-        change[..., place] = one.shortest(change[..., place])
+    for place, observation in enumerate(observations):
+        change[..., place] = observation.shortest(change[..., place])
     there = ~np.isnan(change).any(axis=-1)
     change, count = np.where(there[..., None], change, 0.0), there.sum(axis=1)
     weight = there / ((apart**2).sum(axis=-1) + 1e-12)

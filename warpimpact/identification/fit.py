@@ -97,7 +97,7 @@ class Fit:
 
     @property
     def scene_parameters(self) -> tuple[Parameter, ...]:
-        return tuple(one for one in self.parameters if one.path[0] != "discrepancy")
+        return tuple(parameter for parameter in self.parameters if parameter.path[0] != "discrepancy")
 
     @cached_property
     def observed(self) -> int:
@@ -111,9 +111,11 @@ class Fit:
             ValidationError: such a scene is not possible.
         """
         tables: Mapping[str, Any] = shot.tables
-        for one in self.scene_parameters:
-            if values is not None and one.path in values and one.path not in shot.own:
-                tables = put(tables, one.path, as_read(one, float(values[one.path])))
+        for scene_parameter in self.scene_parameters:
+            if values is not None and scene_parameter.path in values and scene_parameter.path not in shot.own:
+                tables = put(
+                    tables, scene_parameter.path, as_read(scene_parameter, float(values[scene_parameter.path]))
+                )
         return scene_from(tables, self.record, self.folder)
 
 

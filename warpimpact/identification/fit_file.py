@@ -124,19 +124,19 @@ def fit_from(text: str, name: str, folder: FilePath) -> Fit:
     parameters, record = read_priors(given.prior, given.tables, name), given.record
     tables = with_medians(given.tables, given.prior, parameters)
     shots = tuple(
-        _shot(one, tables, record, f"{name}: shot[{place}]", parameters, catalogue)
-        for place, one in enumerate(given.shot)
+        _shot(table, tables, record, f"{name}: shot[{place}]", parameters, catalogue)
+        for place, table in enumerate(given.shot)
     )
-    selection = tuple(_condition(one, record, f"{name}: selection") for one in given.selection)
-    if any(one.name == "bending_stress" for one in selection):
+    selection = tuple(_condition(text, record, f"{name}: selection") for text in given.selection)
+    if any(condition.name == "bending_stress" for condition in selection):
         record = record.model_copy(update={"bending": True})
-    kinds = {one.kind for shot in shots for one in shot.observations}
+    kinds = {observation.kind for shot in shots for observation in shot.observations}
     scales, fixed = _discrepancy(given.discrepancy, kinds, name)
     fit = Fit(
         title=given.title,
         text=text,
         folder=folder,
-        parameters=tuple(sorted((*parameters, *scales), key=lambda one: one.is_column)),
+        parameters=tuple(sorted((*parameters, *scales), key=lambda parameter: parameter.is_column)),
         discrepancy=fixed,
         selection=selection,
         record=record,
@@ -173,7 +173,7 @@ def _shot(
         median = float(read_distribution(read, value, f"{place}.impact.{key}").quantile(np.array(0.5)))
         impact[key] = read.as_read(median)
     observations, status = read_measured(given.measured, record.standoffs, f"{place}.measured")
-    limits = [one.value for one in observations if one.is_limit]
+    limits = [observation.value for observation in observations if observation.is_limit]
     if limits:  # at which its search begins
         impact.setdefault("velocity", limits[0])
     return MeasuredShot(
@@ -182,7 +182,7 @@ def _shot(
         impact=_model(Impact, impact, f"{place}.impact"),
         scatter=_model(Scatter, scattered, f"{place}.impact"),
         tables=_with_material(_merged(tables, given.tables), impact, catalogue, place),
-        own=frozenset(one.path for one in parameters if _gives(given.tables, one.path)),
+        own=frozenset(parameter.path for parameter in parameters if _gives(given.tables, parameter.path)),
         observations=observations,
         status=status,
     )
@@ -194,13 +194,13 @@ def _with_material(tables: _Table, impact: _Table, catalogue: Catalogue, place: 
     return {name: table for name, table in resolved.items() if name in tables}
 
 
-def _merged(tables: Any, own: Any) -> Any:
+def _merged(tables: Any, of_shot: Any) -> Any:
     """Tables with a shot's own values over those of the fit; a table with another shape replaces the fit's."""
-    if not (isinstance(tables, Mapping) and isinstance(own, Mapping)) or own.get("shape", tables.get("shape")) != (
-        tables.get("shape")
-    ):
-        return own
-    return {**tables, **{key: _merged(tables.get(key), value) for key, value in own.items()}}
+    if not (isinstance(tables, Mapping) and isinstance(of_shot, Mapping)) or of_shot.get(
+        "shape", tables.get("shape")
+    ) != (tables.get("shape")):
+        return of_shot
+    return {**tables, **{key: _merged(tables.get(key), value) for key, value in of_shot.items()}}
 
 
 def _gives(tables: Any, path: Path) -> bool:
@@ -286,7 +286,7 @@ def _check_scenes(fit: Fit, name: str) -> None:
         except ValueError as error:
             raise FitError(f"{where}: {_reason(error, shot)}") from None
         _check_hit(shot, scene, where)
-        has_limit = any(one.is_limit for one in shot.observations)
+        has_limit = any(observation.is_limit for observation in shot.observations)
         if has_limit and fit.record.bending:
             raise FitError(f"{where}: limit_velocity and a selection by bending_stress cannot be combined")
         key = repr(shot.tables), shot.own, has_limit  # what the scenes below follow from

@@ -38,7 +38,8 @@ def _on_an_edge(plate: Plate, core: Core, y: Array, z: Array) -> BoolArray:
     """Whether the core's largest circle about the hit crosses the edge of a hole."""
     angles = np.linspace(0.0, 2.0 * np.pi, _AROUND, endpoint=False)
     around = [
-        _in_a_hole(plate, core, y + core.max_radius * np.cos(one), z + core.max_radius * np.sin(one)) for one in angles
+        _in_a_hole(plate, core, y + core.max_radius * np.cos(angle), z + core.max_radius * np.sin(angle))
+        for angle in angles
     ]
     holes = np.sum([*around, _in_a_hole(plate, core, y, z)], axis=0)
     return np.asarray((holes > 0) & (holes < len(around) + 1))
@@ -77,7 +78,7 @@ class HitPlace:
 
 
 def read_hit(given: Any) -> str | HitPlace:
-    """A class, or the place of a hit.
+    """Read the class or the place of a hit.
 
     Raises:
         ValueError: says what is allowed.
@@ -86,7 +87,7 @@ def read_hit(given: Any) -> str | HitPlace:
         if given not in CLASSES:
             meant = get_close_matches(given, CLASSES, n=1)
             hint = f'; did you mean "{meant[0]}"?' if meant else ""
-            allowed = ", ".join(f'"{one}"' for one in CLASSES)
+            allowed = ", ".join(f'"{name}"' for name in CLASSES)
             raise ValueError(f"got {quoted(given)}, but it must be {allowed}, or a table with y and z{hint}")
         return given
     if not isinstance(given, dict) or set(given) != {"y", "z"}:

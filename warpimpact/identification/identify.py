@@ -1,4 +1,4 @@
-"""From a fit to its posterior: rounds of sets of parameters, kept on the disk as they come."""
+"""From a fit to its posterior: sets of parameters are computed in rounds and saved as they come."""
 
 from __future__ import annotations
 
@@ -34,9 +34,9 @@ GROWTH = 0.1
 DISCREPANCIES = 8
 """Scales of discrepancy per set of parameters: they need no runs of their own."""
 BATCH = 16
-"""Sets per file on the disk."""
+"""Sets per file."""
 FARTHEST = 5.0
-"""Standard deviations, discrepancy included, by which the best set of the prior may miss a number."""
+"""Largest miss of a number by the best set of the prior, in standard deviations including the discrepancy."""
 
 
 @dataclass(frozen=True)
@@ -117,13 +117,14 @@ def sampled(fit: Fit, progress: Follow | None = None) -> Question[Sampled]:
 
 
 def shared(fit: Fit) -> list[tuple[int, int]]:
-    """How many numbers blocks of draws share: those that make a scene of their own, then all that need runs."""
-    scenes = sum(not one.is_column for one in fit.parameters)
+    """How many of the numbers are shared within blocks of draws: first those that need a scene of their own, then all
+    that need runs."""
+    scenes = sum(not parameter.is_column for parameter in fit.parameters)
     return [(scenes, fit.sampling.shared * DISCREPANCIES), (len(fit.scene_parameters), DISCREPANCIES)]
 
 
 def rounds(plan: Sampling) -> list[int]:
-    """Draws of the first round, from the prior, and of the others; whole blocks."""
+    """Number of draws of each round; the first is drawn from the prior. Rounds are whole blocks."""
     blocks = plan.sets // plan.shared
     counts = [max(1, int(min(FIRST / plan.shared, FIRST_SHARE * blocks)))]
     while (left := blocks - sum(counts)) > 0:
@@ -132,7 +133,7 @@ def rounds(plan: Sampling) -> list[int]:
 
 
 class _Scored:
-    """Sets of parameters that are scored, in batches that are the jobs of rounds."""
+    """Scores sets of parameters in batches; a batch is a job of a round."""
 
     def __init__(self, fit: Fit, follow: Follow) -> None:
         self._fit, self._follow = fit, follow
@@ -142,7 +143,7 @@ class _Scored:
         self._progress = FitProgress(0, self._total, 0, np.nan, np.nan, np.inf)
 
     def round(self, points: Array) -> Question[Array]:
-        """Score the sets of one round; ln of their likelihood, shape [sets]."""
+        """Score the sets of one round; return the logarithm of their likelihood, shape [sets]."""
         size, first, before = BATCH * DISCREPANCIES, len(self._batches), self._progress
         batches = [points[place : place + size] for place in range(0, len(points), size)]
         sets = [len(batch) // DISCREPANCIES for batch in batches]
@@ -182,7 +183,7 @@ class _Scored:
         return [ShotScore.joined([batch[place] for batch in self._batches]) for place in range(len(self._fit.shots))]
 
     def tell(self, effective: float, pareto_k: float) -> None:
-        """Tell what the weights are worth after a round."""
+        """Report the effective size and Pareto k of the weights after a round."""
         self._progress = replace(self._progress, effective=effective, pareto_k=pareto_k)
         self._follow(self._progress)
 
@@ -196,7 +197,7 @@ def _batch_scored(fit: Fit, points: Array, number: int, *, worker: Worker, repor
 
 
 def _check_reach(fit: Fit, scores: list[ShotScore]) -> None:
-    """Refuse priors of which no set comes near what was measured.
+    """Refuse priors that are far from the measurements in every set.
 
     Raises:
         FitError: names the shot and how far the nearest set is.
@@ -211,13 +212,18 @@ def _check_reach(fit: Fit, scores: list[ShotScore]) -> None:
             continue
         nearest = int(score.misfit.argmin())
         largest = {kind: fit.discrepancy.get(kind, 0.0) for kind in ("velocity", "angle")} | {
-            str(one.path[1]): float(one.prior.quantile(np.array(0.99)))
-            for one in fit.parameters
-            if one.path[0] == "discrepancy"
+            str(parameter.path[1]): float(parameter.prior.quantile(np.array(0.99)))
+            for parameter in fit.parameters
+            if parameter.path[0] == "discrepancy"
         }
         missed = [
-            (abs(float(one.miss(score.best[nearest, place]))) / np.hypot(one.std, largest[one.kind]), one, place)
-            for place, one in enumerate(shot.observations)
+            (
+                abs(float(observation.miss(score.best[nearest, place])))
+                / np.hypot(observation.std, largest[observation.kind]),
+                observation,
+                place,
+            )
+            for place, observation in enumerate(shot.observations)
         ]
         worst, one, place = max(missed, key=lambda miss: miss[0])
         if worst > FARTHEST:

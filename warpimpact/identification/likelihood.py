@@ -31,7 +31,7 @@ from warpimpact.results.per_hit import place_of_standoff
 Array = NDArray[np.float64]
 
 KEPT = 4
-"""Hit points that are kept per set and shot, of the posterior and of the prediction."""
+"""Number of hit points that are kept per set and shot, for the posterior and for the prediction."""
 
 
 @dataclass(frozen=True)
@@ -51,20 +51,22 @@ class Data:
     @property
     def values(self) -> Array:
         """The measured numbers, shape [observations]."""
-        return np.array([one.value for one in self.observations])
+        return np.array([observation.value for observation in self.observations])
 
     def miss(self, computed: Array) -> Array:
         """Computed less measured along the last axis, of the same shape."""
         missed = np.empty_like(computed)
-        for place, one in enumerate(self.observations):
-            missed[..., place] = one.miss(computed[..., place])
+        for place, observation in enumerate(self.observations):
+            missed[..., place] = observation.miss(computed[..., place])
         return missed
 
     def spread(self, discrepancy: Mapping[str, Array]) -> Array:
         """√(σ² + δ²), shape [sets, observations]."""
         if not self.observations:
             return np.ones((1, 0))
-        return np.stack([np.hypot(one.std, discrepancy[one.kind]) for one in self.observations], axis=-1)
+        return np.stack(
+            [np.hypot(observation.std, discrepancy[observation.kind]) for observation in self.observations], axis=-1
+        )
 
 
 @dataclass(frozen=True)
@@ -93,7 +95,7 @@ class ShotScore:
 
     @classmethod
     def joined(cls, parts: Sequence[Self]) -> Self:
-        """One after the other along the sets."""
+        """Join scores along the sets."""
         return cls(**{f.name: np.concatenate([getattr(part, f.name) for part in parts]) for f in fields(cls)})
 
     def __getitem__(self, which: slice | NDArray[np.int64]) -> Self:
@@ -129,9 +131,9 @@ class Compared:
         """
         sets, points = aim.weight.shape
         computed = np.empty((sets, points, len(data.observations)))
-        for place, one in enumerate(data.observations):
-            computed[:, :, place] = one.of(outcomes).reshape(sets, points)
-            if one.is_limit:
+        for place, observation in enumerate(data.observations):
+            computed[:, :, place] = observation.of(outcomes).reshape(sets, points)
+            if observation.is_limit:
                 computed[:, :, place] = _median(computed[:, :, place], aim.weight)
         counts = aim.weight * _counted(data, outcomes).reshape(sets, points)
         missed = data.miss(computed)
@@ -149,13 +151,13 @@ class Compared:
         Args:
             discrepancy: by kind, each of shape [sets].
             rng: draws the hits that are kept.
-            of: the computed sets that these sets are, which differ from them in the scales alone; shape [sets].
+            of: index of the computed set that each set belongs to, shape [sets]; such sets differ in the scales alone.
         """
         row = np.arange(len(self.computed)) if of is None else of
         spread = np.broadcast_to(self.data.spread(discrepancy), (len(row), self.computed.shape[-1]))
         log = np.where(self.possible[row], self._log_density(spread, row), -np.inf)
         log_likelihood, noise, relative = _integrated(log, self.counts[row], self.aim)
-        stds = np.array([one.std for one in self.data.observations])
+        stds = np.array([observation.std for observation in self.data.observations])
         misfits = np.where(self.possible, self.missed**2 @ stds**-2.0, np.inf)
         nearest = misfits.argmin(axis=1)[row]
         hits = self.aim.hits
@@ -218,7 +220,7 @@ def holds(condition: Measure, outcomes: Outcomes, standoffs: Sequence[float]) ->
     values: Array = getattr(outcomes, condition.name)
     if condition.standoff is not None:
         values = values[:, place_of_standoff(standoffs, condition.standoff)]
-    (variable,) = (one for one in v.HIT_NUMBERS if one == condition.name)
+    (variable,) = (number for number in v.HIT_NUMBERS if number == condition.name)
     shown = np.degrees(values) if variable.units == "degree" else values
     return np.asarray(shown > condition.limit if condition.above else shown < condition.limit)
 
@@ -226,7 +228,7 @@ def holds(condition: Measure, outcomes: Outcomes, standoffs: Sequence[float]) ->
 def _median(values: Array, weight: Array) -> Array:
     """Median over the points of the class, shape [sets, 1]; NaN without such a point."""
     medians = [
-        np.median(own[inside]) if inside.any() else np.nan for own, inside in zip(values, weight > 0.0, strict=True)
+        np.median(value[inside]) if inside.any() else np.nan for value, inside in zip(values, weight > 0.0, strict=True)
     ]
     return np.array(medians)[:, None]
 

@@ -22,9 +22,10 @@ Array = NDArray[np.float64]
 KINDS = {"m s-1": ("velocity", Speed), "degree": ("angle", Angle)}
 """Kind of discrepancy and type of a number, by the units of its variable."""
 LIMIT_VELOCITY = v.Variable("limit_velocity", ("hit",), "m s-1", "impact velocity at which the core just perforates")
-"""It is a property of plate and core, not of one shot: of the hits of a class it is the median."""
+"""A property of plate and core, not of one shot. The median over the hits of a class is compared."""
 MEASURABLE = {
-    str(one): one for one in (v.RESIDUAL_VELOCITY, v.DEFLECTION, v.TILT, v.PITCH, v.YAW, v.TOTAL_YAW, LIMIT_VELOCITY)
+    str(variable): variable
+    for variable in (v.RESIDUAL_VELOCITY, v.DEFLECTION, v.TILT, v.PITCH, v.YAW, v.TOTAL_YAW, LIMIT_VELOCITY)
 }
 
 
@@ -52,12 +53,12 @@ class Observation:
 
     @property
     def label(self) -> str:
-        """Such as "yaw@50mm"."""
+        """Name with its stand-off, such as "yaw@50mm"."""
         return self.name if self.at is None else f"{self.name}@{self.at * 1e3:.10g}mm"
 
     @property
     def units(self) -> str:
-        """Those of the Dataset."""
+        """Units of the Dataset."""
         return MEASURABLE[self.name].units
 
     def shown(self, value: Any) -> Any:

@@ -79,10 +79,13 @@ def read_priors(prior: Mapping[str, Any], tables: Mapping[str, Any], name: str) 
         place = f"{name}: prior.{dotted(path)}"
         read = _reader(path, tables, place)
         parameters.append(Parameter(path, "", read.unit, read_distribution(read, given, place)))
-    names = [_short(one.path) for one in parameters]
-    full = ["_".join(map(str, one.path)) for one in parameters]
+    names = [_short(parameter.path) for parameter in parameters]
+    full = ["_".join(map(str, parameter.path)) for parameter in parameters]
     chosen = [short if names.count(short) == 1 else long for short, long in zip(names, full, strict=True)]
-    return [Parameter(one.path, own, one.unit, one.prior) for one, own in zip(parameters, chosen, strict=True)]
+    return [
+        Parameter(parameter.path, name, parameter.unit, parameter.prior)
+        for parameter, name in zip(parameters, chosen, strict=True)
+    ]
 
 
 def read_distribution(read: Any, given: Mapping[str, Any], place: str) -> Distribution:
@@ -96,9 +99,9 @@ def read_distribution(read: Any, given: Mapping[str, Any], place: str) -> Distri
     except ValidationError as error:
         problem = error.errors(include_url=False)[0]
         where = ".".join(str(part) for part in problem["loc"] if part != given.get("distribution"))
-        said = complaint(problem)
-        said = f"got {quoted(dict(given))}, but: {said}" if problem["type"] == "value_error" else said
-        raise FitError(f"{place}{'.' if where else ''}{where}: {said}") from None
+        words = complaint(problem)
+        words = f"got {quoted(dict(given))}, but: {words}" if problem["type"] == "value_error" else words
+        raise FitError(f"{place}{'.' if where else ''}{where}: {words}") from None
     except ValueError as error:
         raise FitError(f"{place}.{error}") from None
 
@@ -124,7 +127,7 @@ def _distributions(node: Any, path: Path, name: str) -> Iterator[tuple[Path, Map
 
 
 def dotted(path: Path) -> str:
-    """A path as a person writes it."""
+    """A path as it is written in a fit file."""
     return "".join(f"[{part}]" if isinstance(part, int) else f".{part}" for part in path).removeprefix(".")
 
 
@@ -153,17 +156,17 @@ def _reader(path: Path, tables: Mapping[str, Any], place: str) -> Any:
             raise FitError(f'{place}: got the unknown key "{part}"; {hint}')
         annotation = typed(fields[part])
         node = node.get(part, {}) if isinstance(node, Mapping) else {}
-    found = reader_in(annotation)
-    if found is None:
+    reader = reader_in(annotation)
+    if reader is None:
         raise FitError(f"{place}: is no number, but only a number can have a prior")
-    return found
+    return reader
 
 
 def _model(annotation: Any, node: Any) -> type[Model] | None:
-    """The model that a table is read as: of several shapes, the one that it names."""
+    """The model that reads a table; the table names its shape if there are several."""
     models = list(_models(annotation))
     shape = node.get("shape", "none") if isinstance(node, Mapping) else "none"
-    named = [one for one in models if getattr(one.model_fields.get("shape"), "default", None) == shape]
+    named = [model for model in models if getattr(model.model_fields.get("shape"), "default", None) == shape]
     return next(iter(named or models), None)
 
 
@@ -181,30 +184,32 @@ def _element(annotation: Any, index: int) -> Any:
         if len(inner) == 2 and inner[1] is Ellipsis:
             return inner[0]
         return inner[index] if index < len(inner) else None
-    return next((found for one in get_args(annotation) if (found := _element(one, index)) is not None), None)
+    return next((found for inner in get_args(annotation) if (found := _element(inner, index)) is not None), None)
 
 
 def with_medians(table: Any, prior: Any, parameters: Sequence[Parameter], path: Path = ()) -> Any:
     """Tables of the scene with the median of every prior in its place."""
     if is_distribution(prior):
-        (parameter,) = (one for one in parameters if one.path == path)
+        (parameter,) = (parameter for parameter in parameters if parameter.path == path)
         return as_read(parameter, float(parameter.prior.quantile(np.array(0.5))))
     if isinstance(prior, Mapping):
-        own = dict(table) if isinstance(table, Mapping) else {}
-        return own | {key: with_medians(own.get(key), inner, parameters, (*path, key)) for key, inner in prior.items()}
+        given = dict(table) if isinstance(table, Mapping) else {}
+        return given | {
+            key: with_medians(given.get(key), inner, parameters, (*path, key)) for key, inner in prior.items()
+        }
     if isinstance(prior, list):
         return [with_medians(None, inner, parameters, (*path, index)) for index, inner in enumerate(prior)]
     return prior
 
 
 def put(tables: Mapping[str, Any], path: Path, value: Any) -> dict[str, Any]:
-    """Tables with one value replaced; what lies beside it is shared."""
+    """Tables with one value replaced; the other values are shared with the given tables."""
 
     def inner(node: Any, rest: Path) -> Any:
         if not rest:
             return value
         if isinstance(rest[0], int):
-            return [inner(one, rest[1:]) if index == rest[0] else one for index, one in enumerate(node)]
+            return [inner(entry, rest[1:]) if index == rest[0] else entry for index, entry in enumerate(node)]
         return {**node, rest[0]: inner(node.get(rest[0], {}), rest[1:])}
 
     replaced: dict[str, Any] = inner(tables, path)
@@ -218,9 +223,9 @@ def as_read(parameter: Parameter, value: float) -> Any:
 
 def corners(parameters: Sequence[Parameter]) -> Iterator[dict[Path, float]]:
     """Extreme values of the parameters: each alone at its ends with all others at their medians, then all together."""
-    medians = {one.path: float(one.prior.quantile(np.array(0.5))) for one in parameters}
-    for one in parameters:
-        for end in one.ends:
-            yield {**medians, one.path: end}
+    medians = {parameter.path: float(parameter.prior.quantile(np.array(0.5))) for parameter in parameters}
+    for parameter in parameters:
+        for end in parameter.ends:
+            yield {**medians, parameter.path: end}
     for index in range(min(2 ** len(parameters), 256)):
-        yield {one.path: one.ends[index >> place & 1] for place, one in enumerate(parameters)}
+        yield {parameter.path: parameter.ends[index >> place & 1] for place, parameter in enumerate(parameters)}

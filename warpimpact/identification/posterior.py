@@ -1,4 +1,4 @@
-"""The posterior of a fit as a tree of Datasets, and numbers that say what it is worth."""
+"""The posterior of a fit as a tree of Datasets, and the numbers by which its accuracy is judged."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ ALIKE = 0.15
 WIDE = 0.6
 """Share of the prior within the posterior's 90 % interval (0.9 if nothing was learnt) above which little was learnt."""
 STRONG = 0.7
-"""Correlation above which two parameters are told of as a combination."""
+"""Correlation above which two parameters are reported as a combination."""
 _OF_PLATE = {path[1] for path in OF_THE_MATERIAL if path[0] == "plate"}
 _DENSITY_DRAWS = 400
 """Predicted rows whose probability is compared with that of the measured one."""
@@ -66,10 +66,10 @@ def to_datatree(fit: Fit, sampled: Sampled, made: Mapping[str, str]) -> xarray.D
     """
     rng = np.random.default_rng(np.random.SeedSequence(fit.sampling.seed, spawn_key=(2,)))
     which = resampled(sampled.weights.values, fit.sampling.draws, rng)
-    own = rng.integers(KEPT, size=len(which))
-    hits = np.stack([one.fitted_hit[which, own] for one in sampled.scores], axis=1)
-    likelihood = np.stack([one.log_likelihood for one in sampled.scores], axis=-1)
-    noise = np.sqrt(sum(one.noise[which] ** 2 for one in sampled.scores))
+    kept = rng.integers(KEPT, size=len(which))
+    hits = np.stack([score.fitted_hit[which, kept] for score in sampled.scores], axis=1)
+    likelihood = np.stack([score.log_likelihood for score in sampled.scores], axis=-1)
+    noise = np.sqrt(sum(score.noise[which] ** 2 for score in sampled.scores))
     groups: dict[str, xarray.Dataset] = {
         "posterior": _parameters(fit, sampled.points[which], "draw").assign(
             {name: (("draw", "shot"), hits[..., axis], _place(name)) for axis, name in enumerate(posterior_file.HITS)}
@@ -84,28 +84,30 @@ def to_datatree(fit: Fit, sampled: Sampled, made: Mapping[str, str]) -> xarray.D
         ),
         "log_likelihood": xarray.Dataset({posterior_file.MEASURED: (("draw", "shot"), likelihood[which])}),
         "observed_data": _observed(fit),
-        "posterior_predictive": _computed(fit, sampled, which, own),
+        "posterior_predictive": _computed(fit, sampled, which, kept),
     }
     with_chain = {"posterior", "prior", "sample_stats", "log_likelihood", "posterior_predictive"}
     groups = {
         name: (
-            one.expand_dims(chain=[0]).assign_coords(draw=np.arange(one.sizes["draw"])) if name in with_chain else one
+            group.expand_dims(chain=[0]).assign_coords(draw=np.arange(group.sizes["draw"]))
+            if name in with_chain
+            else group
         )
-        for name, one in groups.items()
+        for name, group in groups.items()
     }
     groups["sets"] = _parameters(fit, sampled.points, "set").assign(
         weight=("set", sampled.weights.values, {"long_name": "normalised importance weight"}),
         log_likelihood=(("set", "shot"), likelihood),
-        misfit=(("set", "shot"), np.stack([one.misfit for one in sampled.scores], axis=-1)),
+        misfit=(("set", "shot"), np.stack([score.misfit for score in sampled.scores], axis=-1)),
     )
     groups["best"] = _best(fit, sampled)
     shots = {"shot": _names(fit)}
-    groups = {name: one.assign_coords(shots) if "shot" in one.dims else one for name, one in groups.items()}
+    groups = {name: group.assign_coords(shots) if "shot" in group.dims else group for name, group in groups.items()}
     return xarray.DataTree.from_dict({"/": xarray.Dataset(attrs=_attributes(fit, sampled, made, noise)), **groups})
 
 
 def _names(fit: Fit) -> list[str]:
-    """Names of the shots, made different where they are not."""
+    """Names of the shots; equal names get a number."""
     names = [shot.name for shot in fit.shots]
     return [name if names.count(name) == 1 else f"{name} [{place}]" for place, name in enumerate(names)]
 
@@ -117,9 +119,13 @@ def _place(name: str) -> dict[str, str]:
 def _parameters(fit: Fit, points: Array, dim: str) -> xarray.Dataset:
     """Values of the parameters at standard normal numbers."""
     columns = {}
-    for column, one in enumerate(fit.parameters):
-        values = one.at(points[:, column])
-        columns[one.name] = (dim, np.degrees(values) if one.unit == "rad" else values, _described(one))
+    for column, parameter in enumerate(fit.parameters):
+        values = parameter.at(points[:, column])
+        columns[parameter.name] = (
+            dim,
+            np.degrees(values) if parameter.unit == "rad" else values,
+            _described(parameter),
+        )
     return xarray.Dataset(columns)
 
 
@@ -163,11 +169,11 @@ def _numbers(fit: Fit, of: Any) -> Array:
     return np.stack(columns, axis=-1) if columns else np.empty((*of(0).shape[:-1], 0))
 
 
-def _computed(fit: Fit, sampled: Sampled, which: NDArray[np.int64], own: NDArray[np.int64]) -> xarray.Dataset:
+def _computed(fit: Fit, sampled: Sampled, which: NDArray[np.int64], kept: NDArray[np.int64]) -> xarray.Dataset:
     """What another such shot would show, and what each draw computes at its hit."""
     scores, over = sampled.scores, ("draw", "observation")
-    predicted = _numbers(fit, lambda place: scores[place].predicted[which, own])
-    fitted = _numbers(fit, lambda place: scores[place].fitted[which, own])
+    predicted = _numbers(fit, lambda place: scores[place].predicted[which, kept])
+    fitted = _numbers(fit, lambda place: scores[place].fitted[which, kept])
     return xarray.Dataset(
         {
             posterior_file.MEASURED: (over, predicted, {"long_name": "of another such shot, measured"}),
@@ -179,10 +185,10 @@ def _computed(fit: Fit, sampled: Sampled, which: NDArray[np.int64], own: NDArray
 
 def _best(fit: Fit, sampled: Sampled) -> xarray.Dataset:
     """The set with the smallest sum of the shots' misfits at their best hits."""
-    misfit = np.stack([one.misfit for one in sampled.scores], axis=-1)
+    misfit = np.stack([score.misfit for score in sampled.scores], axis=-1)
     best = int(misfit.sum(axis=1).argmin())
     dataset = _parameters(fit, sampled.points[[best]], "set").isel(set=0)
-    hits = np.stack([one.best_hit[best] for one in sampled.scores])
+    hits = np.stack([score.best_hit[best] for score in sampled.scores])
     return dataset.assign(
         misfit=("shot", misfit[best], {"long_name": "sum of (computed − measured)² over the squared uncertainty"}),
         hit_y=("shot", hits[:, 0], _place("hit_y")),
@@ -220,8 +226,8 @@ def _attributes(fit: Fit, sampled: Sampled, made: Mapping[str, str], noise: Arra
 
 
 def _material(fit: Fit, sampled: Sampled) -> str:
-    found = discrepancies(fit, sampled.points)
-    sizes = {"m s-1": found.get("velocity"), "degree": found.get("angle")}
+    scales = discrepancies(fit, sampled.points)
+    sizes = {"m s-1": scales.get("velocity"), "degree": scales.get("angle")}
     missed = {unit: _median(size, sampled) for unit, size in sizes.items() if size is not None}
     missed |= {"degree": math.degrees(missed["degree"])} if "degree" in missed else {}
     scene = fit.scene_of(fit.shots[0])
@@ -230,7 +236,7 @@ def _material(fit: Fit, sampled: Sampled) -> str:
 
 
 def _median(values: Array, sampled: Sampled) -> float:
-    """Of the posterior."""
+    """Median of the posterior."""
     order = np.argsort(values)
     return float(values[order][np.searchsorted(np.cumsum(sampled.weights.values[order]), 0.5)])
 
@@ -242,7 +248,7 @@ def is_converged(fit: Fit, sampled: Sampled, noise: float) -> bool:
 
 
 def row_probability(fit: Fit, place: int, sampled: Sampled) -> float:
-    """Share of the rows that another such shot would show which are less probable than the measured one.
+    """Probability that another such shot shows a row that is less probable than the measured one.
 
     Their density is a mixture of normal distributions about the numbers that some sets predict, by their weights. A row
     of a core that did not pass the plate counts as less probable.
@@ -260,13 +266,13 @@ def row_probability(fit: Fit, place: int, sampled: Sampled) -> float:
 
     def density(row: Array) -> float:
         apart = centres - row
-        for index, one in enumerate(shot.observations):
-            apart[:, index] = one.miss(apart[:, index] + one.value)
+        for index, observation in enumerate(shot.observations):
+            apart[:, index] = observation.miss(apart[:, index] + observation.value)
         return float(np.mean(np.exp(-0.5 * ((apart / widths) ** 2).sum(axis=1)) / widths.prod(axis=1)))
 
     measured = density(data.values)
-    some = centres[:_DENSITY_DRAWS]
-    less = np.mean([density(row) <= measured for row in some])
+    others = centres[:_DENSITY_DRAWS]
+    less = np.mean([density(row) <= measured for row in others])
     return float(less * there.mean() + (1.0 - there.mean()))
 
 
@@ -295,20 +301,20 @@ class Learnt:
 def learnt(tree: xarray.DataTree) -> dict[str, Learnt]:
     """Prior and posterior compared, by parameter."""
     prior, posterior = (tree[name].to_dataset() for name in ("prior", "posterior"))
-    found = {}
+    by_name = {}
     for name in parameters_of(tree):
-        before, after = (np.sort(one[str(name)].values.ravel()) for one in (prior, posterior))
+        before, after = (np.sort(dataset[str(name)].values.ravel()) for dataset in (prior, posterior))
         grid = np.concatenate([before, after])
         shares = [np.searchsorted(of, grid, side="right") / len(of) for of in (before, after)]
         (low, middle, high), (first, half, last) = (np.quantile(of, [0.05, 0.5, 0.95]) for of in (after, before))
         kept = np.searchsorted(before, high, side="right") - np.searchsorted(before, low)
-        found[name] = Learnt(
+        by_name[name] = Learnt(
             float(np.abs(shares[0] - shares[1]).max()),
             float(kept / len(before)),
             (float(low), float(middle), float(high)),
             (float(first), float(half), float(last)),
         )
-    return found
+    return by_name
 
 
 def together(tree: xarray.DataTree) -> list[tuple[str, str, float]]:
@@ -317,11 +323,12 @@ def together(tree: xarray.DataTree) -> list[tuple[str, str, float]]:
     from scipy.stats import spearmanr
 
     posterior, names = tree["posterior"].to_dataset(), parameters_of(tree)
-    pairs = [(one, other) for place, one in enumerate(names) for other in names[place + 1 :]]
-    found = [
-        (one, other, spearmanr(posterior[one].values.ravel(), posterior[other].values.ravel())) for one, other in pairs
+    pairs = [(name, other) for place, name in enumerate(names) for other in names[place + 1 :]]
+    ranks = [
+        (first, other, spearmanr(posterior[first].values.ravel(), posterior[other].values.ravel()))
+        for first, other in pairs
     ]
-    return [(one, other, float(rank.statistic)) for one, other, rank in found if abs(rank.statistic) > STRONG]
+    return [(first, other, float(rank.statistic)) for first, other, rank in ranks if abs(rank.statistic) > STRONG]
 
 
 def parameters_of(tree: xarray.DataTree) -> Sequence[str]:

@@ -1,4 +1,4 @@
-"""The view of a posterior: parameters with their intervals, what the shots determine, what the numbers are worth."""
+"""The view of a posterior: parameters with their intervals, what the shots determine, accuracy of the numbers."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ def unit_of(array: xarray.DataArray | xarray.DataTree) -> tuple[str, float]:
 
 
 def posterior_view(tree: xarray.DataTree) -> list[Section]:
-    """The view of a posterior: its parameters, measured numbers beside computed ones, the best set, and its worth."""
+    """The view of a posterior: its parameters, measured and computed numbers, the best set, and its accuracy."""
     return [_parameters(tree), _measured(tree), _best(tree), Section(_worth(tree))]
 
 
@@ -40,8 +40,8 @@ def _parameters(tree: xarray.DataTree) -> Section:
         label = f"{name} [{unit}]" if unit else name
         rows.append((label, middle, f"{low:.3g} to {high:.3g}", prior, knowledge.verdict))
     correlations = [
-        f"{one} and {other} are determined together more than each alone: their correlation is {value:+.2f}"
-        for one, other, value in together(tree)
+        f"{first} and {other} are determined together more than each alone: their correlation is {value:+.2f}"
+        for first, other, value in together(tree)
     ]
     return Section([Table(columns, rows), *correlations], str(tree.attrs[attr.TITLE]))
 

@@ -23,17 +23,17 @@ from warpimpact.solver.worker import Worker
 Array = NDArray[np.float64]
 
 AT_A_TIME = 2**15
-"""Shots per computation at most, images not counted: what is kept of them fits into some ten megabytes."""
+"""Most shots of a computation, images not counted; their outcomes take some ten megabytes."""
 SCORED = 2**14
-"""Points, images counted, that are scored at a time: they fit into a cache."""
+"""Points, images counted, that are scored together, so that they fit into a cache."""
 
 
 @dataclass(frozen=True)
 class Bench:
-    """Measured shots that are alike but for what was measured and in which class they hit: they share their runs.
+    """Measured shots that differ only in what was measured and in the class of their hit. They share their runs.
 
     Attributes:
-        shot: any of them.
+        shot: one of them; they are alike in all that is used of it.
         which: their places in the fit.
     """
 
@@ -59,13 +59,13 @@ class Run:
 
 
 def benches(fit: Fit) -> list[Bench]:
-    """The shots of a fit by what they share."""
-    found: dict[str, list[int]] = {}
+    """Group the shots of a fit by the runs that they share."""
+    places_of: dict[str, list[int]] = {}
     for place, shot in enumerate(fit.shots):
         hit = shot.hit if isinstance(shot.hit, HitPlace) else "cell"
         key = repr((hit, shot.impact, shot.scatter, shot.tables, sorted(map(str, shot.own))))
-        found.setdefault(key, []).append(place)
-    return [Bench(fit.shots[places[0]], tuple(places)) for places in found.values()]
+        places_of.setdefault(key, []).append(place)
+    return [Bench(fit.shots[places[0]], tuple(places)) for places in places_of.values()]
 
 
 def runs(fit: Fit, bench: Bench, points: Array, worker: Worker, *, seed: int = 0) -> Iterator[Run]:
@@ -75,9 +75,15 @@ def runs(fit: Fit, bench: Bench, points: Array, worker: Worker, *, seed: int = 0
         points: standard normal numbers, one column per parameter of the fit, shape [sets, parameters].
         seed: of the places of the hits.
     """
-    alike = _alike(points[:, [one.path[0] != "discrepancy" for one in fit.parameters]])
-    values = {one.path: one.at(points[alike[:, 0], column]) for column, one in enumerate(fit.parameters)}
-    own = {one.path: values[one.path] for one in fit.scene_parameters if one.path not in bench.shot.own}
+    alike = _alike(points[:, [parameter.path[0] != "discrepancy" for parameter in fit.parameters]])
+    values = {
+        parameter.path: parameter.at(points[alike[:, 0], column]) for column, parameter in enumerate(fit.parameters)
+    }
+    own = {
+        scene_parameter.path: values[scene_parameter.path]
+        for scene_parameter in fit.scene_parameters
+        if scene_parameter.path not in bench.shot.own
+    }
     columns = _as_columns(fit, own)
     of_scene = {path: column for path, column in own.items() if path not in columns}
     shifts = np.random.default_rng(np.random.SeedSequence(fit.sampling.seed, spawn_key=(4, seed))).random(
@@ -89,12 +95,12 @@ def runs(fit: Fit, bench: Bench, points: Array, worker: Worker, *, seed: int = 0
         own_scene = own if len(rows) == 1 else of_scene  # a set alone needs no columns
         scene = fit.scene_of(bench.shot, {path: float(column[rows[0]]) for path, column in own_scene.items()})
         for first in range(0, len(rows), per_call):
-            some = rows[first : first + per_call]
-            targets = aim(bench.shot, scene.target.layers[0], scene.core, fit.sampling, shifts[some])
+            chosen = rows[first : first + per_call]
+            targets = aim(bench.shot, scene.target.layers[0], scene.core, fit.sampling, shifts[chosen])
             of_sets = columns_of(
-                {path: column[some] for path, column in own.items() if path not in own_scene}, scene.target.layers[0]
+                {path: column[chosen] for path, column in own.items() if path not in own_scene}, scene.target.layers[0]
             )
-            jobs.append(_Job(alike[some], scene, targets, with_own(targets.computed, of_sets)))
+            jobs.append(_Job(alike[chosen], scene, targets, with_own(targets.computed, of_sets)))
             if sum(len(job.shots) for job in jobs) >= AT_A_TIME:
                 yield from _run(fit, bench, jobs, worker)
                 jobs = []
@@ -102,7 +108,7 @@ def runs(fit: Fit, bench: Bench, points: Array, worker: Worker, *, seed: int = 0
 
 
 def _alike(points: Array) -> NDArray[np.int64]:
-    """Sets of equal numbers, shape [different sets, sets alike]; each on its own where they are not equally many."""
+    """Indices of equal sets, shape [different sets, equal sets]; every set is alone if the groups differ in size."""
     _, which, counts = np.unique(points, axis=0, return_inverse=True, return_counts=True)
     if (counts != counts[0]).any():
         return np.arange(len(points))[:, None]
@@ -127,63 +133,67 @@ def _run(fit: Fit, bench: Bench, jobs: Sequence[_Job], worker: Worker) -> Iterat
 def _outcomes(fit: Fit, bench: Bench, jobs: Sequence[_Job], worker: Worker) -> list[Outcomes]:
     """What the observations of a bench need: outcomes at impact velocity, limit velocities, or both."""
     measured = [fit.shots[place] for place in bench.which]
-    observations = [one for shot in measured for one in shot.observations]
-    limited = any(one.is_limit for one in observations)
-    other = fit.selection or any(shot.status for shot in measured) or not all(one.is_limit for one in observations)
+    observations = [observation for shot in measured for observation in shot.observations]
+    limited = any(observation.is_limit for observation in observations)
+    other = (
+        fit.selection
+        or any(shot.status for shot in measured)
+        or not all(observation.is_limit for observation in observations)
+    )
     scenes = [(job.scene, job.shots) for job in jobs]
     outcomes = simulate_many(scenes, fit.numerics, worker) if other or not limited else []
     if not limited:
         return outcomes
 
-    def limit(number: int, own: Worker, _: Any) -> Limits:
-        return limit_velocity(*scenes[number], numerics=fit.numerics, device=own.device, threads=own.threads)
+    def limit(number: int, share: Worker, _: Any) -> Limits:
+        return limit_velocity(*scenes[number], numerics=fit.numerics, device=share.device, threads=share.threads)
 
     limits = side_by_side(limit, len(scenes), worker)
     return [
-        one.assign(limit_velocity=found.value)
-        for one, found in zip(outcomes or [found.outcomes for found in limits], limits, strict=True)
+        result.assign(limit_velocity=limit.value)
+        for result, limit in zip(outcomes or [limit.outcomes for limit in limits], limits, strict=True)
     ]
 
 
-def _as_columns(fit: Fit, own: Mapping[Path, Array]) -> dict[Path, Array]:
-    """Parameters that may differ from shot to shot: the literal scheme counts steps, so its interval may not."""
+def _as_columns(fit: Fit, columns: Mapping[Path, Array]) -> dict[Path, Array]:
+    """Parameters that may differ from shot to shot. The literal scheme counts steps, so its interval may not."""
     nodal = fit.numerics.scheme == "nodal"
-    return {path: own[path] for path in own if path in COLUMNS or (path in UNITS_OF_EXPOSURE and not nodal)}
+    return {path: columns[path] for path in columns if path in COLUMNS or (path in UNITS_OF_EXPOSURE and not nodal)}
 
 
 def _of_one_scene(of_scene: Mapping[Path, Array], count: int) -> Iterator[NDArray[np.int64]]:
-    """Rows that share one scene."""
+    """Groups of rows that share one scene."""
     if not of_scene:
         yield np.arange(count)
         return
     _, which = np.unique(np.stack(list(of_scene.values()), axis=-1), axis=0, return_inverse=True)
     which = which.reshape(-1)
-    for one in dict.fromkeys(which.tolist()):
-        yield np.flatnonzero(which == one)
+    for scene_number in dict.fromkeys(which.tolist()):
+        yield np.flatnonzero(which == scene_number)
 
 
 def with_own(shots: Shots, columns: Mapping[str, Array]) -> Shots:
-    """Shots of some sets, equally many each and one set after the other, with the quantities of their sets.
+    """Give shots the quantities of their sets. All sets have the same number of shots, one set after the other.
 
     Args:
         columns: by the name of the quantity, each of shape [sets].
     """
-    own: dict[str, Any] = {name: np.repeat(column, len(shots) // len(column)) for name, column in columns.items()}
-    return replace(shots, **own)
+    of_shots: dict[str, Any] = {name: np.repeat(column, len(shots) // len(column)) for name, column in columns.items()}
+    return replace(shots, **of_shots)
 
 
 def data_of(fit: Fit, shot: MeasuredShot) -> Data:
-    """What was measured of a shot of a fit."""
+    """The measurements of a shot, with the condition under which it was measured."""
     return Data(shot.observations, shot.status, fit.selection, fit.record.standoffs)
 
 
 def discrepancies(fit: Fit, points: Array) -> dict[str, Array]:
     """Standard deviation of the discrepancy by kind at sets of parameters, each of shape [sets]."""
-    found = {kind: np.full(len(points), value) for kind, value in fit.discrepancy.items()}
-    for column, one in enumerate(fit.parameters):
-        if one.path[0] == "discrepancy":
-            found[str(one.path[1])] = one.at(points[:, column])
-    return found
+    scales = {kind: np.full(len(points), value) for kind, value in fit.discrepancy.items()}
+    for column, parameter in enumerate(fit.parameters):
+        if parameter.path[0] == "discrepancy":
+            scales[str(parameter.path[1])] = parameter.at(points[:, column])
+    return scales
 
 
 def evaluate(fit: Fit, points: Array, worker: Worker, *, seed: int) -> list[ShotScore]:
@@ -204,9 +214,12 @@ def evaluate(fit: Fit, points: Array, worker: Worker, *, seed: int) -> list[Shot
             changes = dict[tuple[Any, ...], Array]()
             for place in bench.which:
                 shot = fit.shots[place]
-                own = run.aim.of(shot.hit, run.scene.target.layers[0], run.scene.core)
-                numbers = tuple((one.name, one.standoff, one.is_limit and place) for one in shot.observations)
-                compared = Compared.of(data_of(fit, shot), own, run.outcomes, changes.get(numbers))
+                targets = run.aim.of(shot.hit, run.scene.target.layers[0], run.scene.core)
+                numbers = tuple(
+                    (observation.name, observation.standoff, observation.is_limit and place)
+                    for observation in shot.observations
+                )
+                compared = Compared.of(data_of(fit, shot), targets, run.outcomes, changes.get(numbers))
                 changes[numbers] = compared.changes
                 scored[place] += _scored(compared, run.which, scales, rng)
     return [_in_order(parts) for parts in scored.values()]
@@ -215,7 +228,7 @@ def evaluate(fit: Fit, points: Array, worker: Worker, *, seed: int) -> list[Shot
 def _scored(
     compared: Compared, which: NDArray[np.int64], scales: Mapping[str, Array], rng: np.random.Generator
 ) -> Iterator[tuple[NDArray[np.int64], ShotScore]]:
-    """Some sets of a run at a time, and their score.
+    """Score the sets of a run in parts that fit into a cache; yield their indices and their score.
 
     Args:
         which: as in `Run`.
@@ -223,11 +236,11 @@ def _scored(
     """
     alike, at_a_time = which.shape[1], max(1, SCORED // compared.counts.shape[1])
     for first in range(0, which.size, at_a_time):
-        some = which.reshape(-1)[first : first + at_a_time]
-        own = {kind: scale[some] for kind, scale in scales.items()}
-        yield some, compared.score(own, rng, np.arange(first, first + len(some)) // alike)
+        chosen = which.reshape(-1)[first : first + at_a_time]
+        chosen_scales = {kind: scale[chosen] for kind, scale in scales.items()}
+        yield chosen, compared.score(chosen_scales, rng, np.arange(first, first + len(chosen)) // alike)
 
 
 def _in_order(parts: list[tuple[NDArray[np.int64], ShotScore]]) -> ShotScore:
     order = np.argsort(np.concatenate([which for which, _ in parts]), kind="stable")
-    return ShotScore.joined([one for _, one in parts])[order]
+    return ShotScore.joined([score for _, score in parts])[order]

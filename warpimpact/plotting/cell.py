@@ -67,7 +67,7 @@ class Shown(NamedTuple):
 
 
 def shown(dataset: xarray.Dataset, variable: str, standoff: float | None = None, layer: int | None = None) -> Shown:
-    """One variable in shown units.
+    """A variable in the units in which it is shown.
 
     Args:
         dataset: the result of a campaign.
@@ -110,7 +110,7 @@ def _selected(dataset: xarray.Dataset, variable: str, standoff: float | None, la
 
 
 def struck(dataset: xarray.Dataset) -> str:
-    """What the shots of a result or a history go through, in a word."""
+    """What the shots are fired at, in a word: plate, or target if there are layers."""
     return "target" if v.LAYER_STATUS in dataset else "plate"
 
 
@@ -122,9 +122,9 @@ def shots_text(dataset: xarray.Dataset) -> str:
     """Number of hits and the share that passed, velocity and obliquity; whether the numerics break their promise."""
     velocity, obliquity = (range_text(dataset[name]) for name in (v.IMPACT_VELOCITY, v.OBLIQUITY))
     share = float(passed(dataset).mean())
-    some = "" if share == 1.0 else f" ({share:.1%} passed the {struck(dataset)})"
+    share_text = "" if share == 1.0 else f" ({share:.1%} passed the {struck(dataset)})"
     broken = "; numerics less exact than promised" if breaks_promise(dataset) else ""
-    return f"{dataset.sizes['hit']} hits{some}, {velocity}, obliquity {obliquity}{broken}"
+    return f"{dataset.sizes['hit']} hits{share_text}, {velocity}, obliquity {obliquity}{broken}"
 
 
 def range_text(array: xarray.DataArray) -> str:
@@ -169,16 +169,16 @@ def draw_values(
 
 
 def draw_status(axes: Axes, dataset: xarray.Dataset, layer: int | None = None) -> None:
-    """Draw how the shots ended, with the share of each status in the legend; of one layer, with the shares in the
-    title, as layers share a legend."""
+    """Draw how the shots ended. The shares stand in the legend; for one layer they stand in the title, as layers share
+    a legend."""
     status = dataset[v.STATUS].values if layer is None else dataset[v.LAYER_STATUS].values[:, layer]
     scale = Normalize(-0.5, len(STATUS_COLOURS) - 0.5)
     _paint(axes, dataset, status.astype(float), ListedColormap(STATUS_COLOURS), scale)
-    found = [code for code in Status if np.any(status == code)]
-    names = {code: words(code.name.lower()) for code in found}
-    told = {code: f"{names[code]} {np.mean(status == code):.1%}" for code in found}
+    codes = [code for code in Status if np.any(status == code)]
+    names = {code: words(code.name.lower()) for code in codes}
+    told = {code: f"{names[code]} {np.mean(status == code):.1%}" for code in codes}
     labels, shares = (told, "status") if layer is None else (names, f"layer {layer}\n{', '.join(told.values())}")
-    _furnish(axes, dataset, [Patch(facecolor=STATUS_COLOURS[code], label=labels[code]) for code in found], layer)
+    _furnish(axes, dataset, [Patch(facecolor=STATUS_COLOURS[code], label=labels[code]) for code in codes], layer)
     axes.set_title(shares, fontsize="medium")
 
 
@@ -265,8 +265,8 @@ def _paint(axes: Axes, dataset: xarray.Dataset, values: Array, colours: Colormap
 def _without_value(dataset: xarray.Dataset, exists: NDArray[np.bool_], layer: int | None) -> str:
     """Legend entry of the grey hits: their statuses."""
     status = dataset[v.STATUS].values if layer is None else dataset[v.LAYER_STATUS].values[:, layer]
-    found = set(status[~exists].tolist())
-    return fill(f"no value: {', '.join(words(code.name.lower()) for code in Status if code in found)}", 30)
+    statuses = set(status[~exists].tolist())
+    return fill(f"no value: {', '.join(words(code.name.lower()) for code in Status if code in statuses)}", 30)
 
 
 def _furnish(axes: Axes, dataset: xarray.Dataset, entries: Sequence[Artist], layer: int | None) -> None:

@@ -40,7 +40,7 @@ def comparison_figure(comparison: Comparison) -> Figure:
     Args:
         comparison: the result of `analysis.comparison.compare`.
     """
-    quantities = [list(some) for _, some in groupby(comparison.plates[0].measures, key=_quantity)]
+    quantities = [list(measures) for _, measures in groupby(comparison.plates[0].measures, key=_quantity)]
     pairs = {(pair.one, pair.other) for pair in comparison.differences}
     heights = [
         _MARGIN + _ROW * max(len(comparison.plates), len(pairs)) * (1.5 if len(measures) > 1 else 1.0)
@@ -52,7 +52,7 @@ def comparison_figure(comparison: Comparison) -> Figure:
         _draw_plates(left, comparison, measures)
         _draw_differences(right, comparison, measures)
     entries = [zip(*reversed(left.get_legend_handles_labels()), strict=True) for left in panels[:, 0]]
-    legend = {label: handle for some in entries for label, handle in some}  # each entry once
+    legend = {label: handle for entry in entries for label, handle in entry}  # each entry once
     figure.legend(legend.values(), legend.keys(), loc="outside lower center", ncols=4, frameon=False)
     used = "\n".join(hits_used(comparison))
     drawn = any(pair.parameters for pair in comparison.differences)
@@ -64,20 +64,20 @@ def comparison_figure(comparison: Comparison) -> Figure:
 
 
 def _quantity(score: Score) -> tuple[str, bool]:
-    """What one panel shows: a quantity, or shares of it."""
+    """Key of the panel of a measure: its quantity, and whether it is a share."""
     return score.measure.name, score.measure.is_binary
 
 
 def _draw_plates(axes: Axes, comparison: Comparison, measures: Sequence[Score]) -> None:
-    """Measures of one quantity, one line per plate."""
+    """Draw the measures of one quantity, a line per plate."""
     plates = comparison.plates
     for line, plate in enumerate(plates):
-        for told in (told for told in plate.measures if _quantity(told) == _quantity(measures[0])):
-            label, marker, colour, offset = _STYLES[told.measure.kind]
-            _draw_interval(axes, line + offset, told, (marker, colour), label=label)
-            if told.name == measures[0].name and not math.isnan(told.solid):
+        for alike in (measure for measure in plate.measures if _quantity(measure) == _quantity(measures[0])):
+            label, marker, colour, offset = _STYLES[alike.measure.kind]
+            _draw_interval(axes, line + offset, alike, (marker, colour), label=label)
+            if alike.name == measures[0].name and not math.isnan(alike.solid):
                 axes.plot(
-                    told.solid,
+                    alike.solid,
                     line + offset,
                     "D",
                     color=GREY,
@@ -90,7 +90,7 @@ def _draw_plates(axes: Axes, comparison: Comparison, measures: Sequence[Score]) 
 
 
 def _draw_differences(axes: Axes, comparison: Comparison, measures: Sequence[Score]) -> None:
-    """Differences in one quantity, one line per pair of plates."""
+    """Draw the differences in one quantity, a line per pair of plates."""
     names = {measure.name: measure for measure in measures}
     lines: dict[tuple[str, str], int] = {}
     for pair in comparison.differences:
@@ -104,7 +104,7 @@ def _draw_differences(axes: Axes, comparison: Comparison, measures: Sequence[Sco
         axes.set_title("not ranked", fontsize="medium", loc="left")
         return
     axes.axvline(0.0, color=GREY, linewidth=1.0)
-    _furnish(axes, [f"{one} − {other}" for one, other in lines])
+    _furnish(axes, [f"{first} − {other}" for first, other in lines])
     by_ratio = measures[0].name in (comparison.at_equal_weight or ())
     difference = "difference of the ratios to the solid plates;\n" if by_ratio else "difference; "
     better = measures[0].measure.higher_is_better
@@ -121,7 +121,7 @@ def _draw_interval(
     label: str | None = None,
     hollow: bool = False,
 ) -> None:
-    """Draw a number with its interval, or with both."""
+    """Draw a number with its interval by the hits and, if it has one, its interval by the parameters."""
     value, (marker, colour) = number.value, style
     if number.parameters is not None and not math.isnan(sum(number.parameters)):
         axes.plot(number.parameters, [line, line], color=colour, linewidth=7.0, alpha=0.3, solid_capstyle="butt")

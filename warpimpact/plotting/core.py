@@ -31,12 +31,12 @@ def core_figure(core: Core, title: str, evidence: str) -> Figure:
     axes = figure.subplots()
     outline_s, outline_r = np.concatenate([s, s[::-1]]), np.concatenate([r, -r[::-1]])
     axes.fill(outline_s * _MM, outline_r * _MM, facecolor="0.8", edgecolor="black", linewidth=1.0)
-    own = core.mass_properties
-    axes.plot(own.centre_of_mass * _MM, 0.0, "+", color="#D55E00", ms=12, mew=2)
+    properties = core.mass_properties
+    axes.plot(properties.centre_of_mass * _MM, 0.0, "+", color="#D55E00", ms=12, mew=2)
     axes.annotate(
-        "centre of mass", (own.centre_of_mass * _MM, 0.0), (10.0, 0.0), textcoords="offset points", va="center"
+        "centre of mass", (properties.centre_of_mass * _MM, 0.0), (10.0, 0.0), textcoords="offset points", va="center"
     )
     axes.set(aspect="equal", xlabel="behind the nose [mm]", ylabel="radius [mm]")
-    numbers = f"{core.length * _MM:.4g} mm, \u2300 {2 * core.max_radius * _MM:.4g} mm, {own.mass * _G:.4g} g"
+    numbers = f"{core.length * _MM:.4g} mm, \u2300 {2 * core.max_radius * _MM:.4g} mm, {properties.mass * _G:.4g} g"
     figure.suptitle("\n".join([f"{title}: {numbers}", *lines]), fontsize="medium")
     return figure

@@ -22,8 +22,8 @@ _MM = 1e3
 _NEAREST_HOLES = 40
 """Holes about the middle among which the smallest ligament is looked for."""
 _CLOSE = 1.01
-"""A ligament that is longer than the smallest by this factor is another one. Outlines are polygons, so its length is
-that of the plate's own number."""
+"""Ligaments up to this factor longer than the smallest count as equally small: outlines are polygons. The length that
+is written is the exact one of the plate."""
 _BESIDE, _BELOW = 0.1, 0.05
 """Distance of the dimensions of a hole from it, in periods."""
 _COLOUR = "#0072B2"
@@ -61,14 +61,14 @@ def smallest_ligament(plate: Plate) -> Dimension | None:
     pairs = list(combinations(_holes(plate), 2))
     if not pairs:
         return None
-    lengths = np.array([one.distance(other) for one, other in pairs])
+    lengths = np.array([first.distance(other) for first, other in pairs])
     if not lengths.min() > 0.0:
         return None
     lines = [shapely.shortest_line(*pairs[place]) for place in np.flatnonzero(lengths <= _CLOSE * lengths.min())]
     line = min(lines, key=lambda line: line.distance(shapely.Point(0.0, 0.0)))
     start, end = np.asarray(line.coords)
-    own = plate.ligament
-    return _dimension(start, end, own if lengths.min() <= _CLOSE * own else None)
+    smallest = plate.ligament
+    return _dimension(start, end, smallest if lengths.min() <= _CLOSE * smallest else None)
 
 
 def draw_dimensions(axes: Axes, plate: Plate) -> None:
@@ -83,7 +83,7 @@ def draw_dimensions(axes: Axes, plate: Plate) -> None:
 def _dimension(
     start: tuple[float, float] | Array, end: tuple[float, float] | Array, length: float | None = None
 ) -> Dimension:
-    """With its length [m] where that is known better than by the distance of its ends."""
+    """A dimension; `length` [m] replaces the distance of its ends if it is known better."""
     start, end = np.asarray(start), np.asarray(end)
     return Dimension(start, end, f"{(float(np.linalg.norm(end - start)) if length is None else length) * _MM:.3g}")
 

@@ -123,9 +123,9 @@ def draw_dispersion(axes: Axes, dataset: xarray.Dataset, standoff: float | None 
 
 
 def uncertainty(dataset: xarray.Dataset, variable: str, standoff: float | None = None) -> Figure:
-    """A map of the mean of the hits nearby, and half the width of its 95 % interval (`analysis.local.plane_fit`).
+    """A map of the mean of neighbouring hits, and of half the width of its 95 % interval (`analysis.local.plane_fit`).
 
-    Shots must scatter, so that two at one place differ. Where all arrive alike, hits nearby tell no uncertainty.
+    Shots must scatter, so that two shots at one place differ; otherwise neighbours say nothing about uncertainty.
 
     Args:
         dataset: a result whose hits cover the cell.
@@ -166,7 +166,7 @@ def is_drawn(dataset: xarray.Dataset) -> bool:
 
 
 def averaged(dataset: xarray.Dataset, column: Shown) -> Shown:
-    """A variable of a result whose hits draw their parameters: at every hit the mean of those nearby."""
+    """A variable averaged over neighbouring hits, for a result whose hits draw their parameters."""
     exists = np.isfinite(column.values)
     if not is_drawn(dataset) or exists.sum() < NEIGHBOURS:
         return column
@@ -185,7 +185,7 @@ def is_uncertain(dataset: xarray.Dataset) -> bool:
 
 
 def shots_scatter(dataset: xarray.Dataset) -> bool:
-    """Whether shots differ in more than where they hit: in their conditions, or in the hits before."""
+    """Whether shots differ in more than their hit point: in their conditions, or in earlier hits."""
     return v.BURST_ORDER in dataset or any(np.ptp(dataset[name].values) > 0.0 for name in v.shot_variables(dataset))
 
 
@@ -218,7 +218,7 @@ def _of_every_hit(dataset: xarray.Dataset, quantity: str) -> Array:
 
 
 def _covered(dataset: xarray.Dataset) -> NDArray[np.intp]:
-    """Index of the hit nearest to every pixel; refuses hits that do not cover the cell."""
+    """Index of the hit nearest to every pixel. Raises ValueError if the hits do not cover the cell."""
     nearest = nearest_hits(dataset, _FINE)
     if nearest is None:
         raise ValueError("the hits do not cover the cell, so there is no estimate between them; more hits are needed")

@@ -44,10 +44,10 @@ def firing_figure(dataset: xarray.Dataset) -> Figure:
     rows = -(-len(panels) // columns)
     figure = Figure(figsize=(6.1 * columns, 4.3 * rows + 0.8), layout="constrained")
     axes = np.ravel(figure.subplots(rows, columns, squeeze=False))
-    for draw, one in zip(panels, axes, strict=False):
-        draw(one, dataset, settings)
-    for one in axes[len(panels) :]:
-        one.set_axis_off()
+    for draw, panel in zip(panels, axes, strict=False):
+        draw(panel, dataset, settings)
+    for empty in axes[len(panels) :]:
+        empty.set_axis_off()
     figure.suptitle(f"{fill(str(dataset.attrs[attr.TITLE]), 100)}\n{dataset.attrs[f.DISCLAIMER]}", fontsize=11)
     return figure
 
@@ -108,10 +108,10 @@ def _draw_map(axes: Axes, dataset: xarray.Dataset, settings: _Settings) -> None:
 
 def _draw_reported(axes: Axes, dataset: xarray.Dataset, settings: _Settings) -> None:
     required = settings.get("required") or {}
-    found = verdict(dataset, required.get("v50"), required.get("by", "v50"))
+    answer = verdict(dataset, required.get("v50"), required.get("by", "v50"))
     v50, true = dataset[f.V50].values, float(dataset.attrs[f.TRUE_V50])
     known = v50[np.isfinite(v50)]
-    if not len(known) or found is None:
+    if not len(known) or answer is None:
         axes.text(0.5, 0.5, "no test reports a V50", ha="center", transform=axes.transAxes)
         return
     ends = np.quantile(known, [0.005, 0.995])
@@ -120,16 +120,16 @@ def _draw_reported(axes: Axes, dataset: xarray.Dataset, settings: _Settings) -> 
     if required:
         axes.axvline(required["v50"], color=VERMILION, linestyle="--", linewidth=1.5, label="required V50")
     lines = [
-        f"{found.bias:+.2g} m/s off, standard deviation {found.deviation:.3g} m/s",
-        f"reported spread {found.spread:.3g} m/s (median), true {float(dataset.attrs[f.TRUE_SPREAD]):.3g} m/s",
+        f"{answer.bias:+.2g} m/s off, standard deviation {answer.deviation:.3g} m/s",
+        f"reported spread {answer.spread:.3g} m/s (median), true {float(dataset.attrs[f.TRUE_SPREAD]):.3g} m/s",
     ]
-    if found.coverage is not None:
+    if answer.coverage is not None:
         confidence = 100 * float((settings.get("estimator") or {}).get("confidence", 0.95))
-        lines.append(f"reported {confidence:g} % intervals with the true V50: {100 * found.coverage.value:.3g} %")
-    if found.known.value < 1.0:
-        lines.append(f"tests without a V50: {100 * (1.0 - found.known.value):.3g} %")
-    if found.passed is not None:
-        lines.append(f"tests that report the required V50: {100 * found.passed.value:.3g} %")
+        lines.append(f"reported {confidence:g} % intervals with the true V50: {100 * answer.coverage.value:.3g} %")
+    if answer.known.value < 1.0:
+        lines.append(f"tests without a V50: {100 * (1.0 - answer.known.value):.3g} %")
+    if answer.passed is not None:
+        lines.append(f"tests that report the required V50: {100 * answer.passed.value:.3g} %")
     shots = dataset[f.SHOTS].values
     number = f"{shots.min()}" if np.ptp(shots) == 0 else f"{shots.min()} to {shots.max()}"
     title = f"{len(v50)} tests by {settings['procedure']['name']}, {number} shots each"

@@ -106,7 +106,9 @@ def _draw_front(axes: Axes, dataset: xarray.Dataset, names: dict[int, str]) -> N
     for place, letter in names.items():
         at = fresh[place, across], fresh[place, up]
         axes.annotate(letter, at, xytext=(6, 6), textcoords="offset points", weight="bold", zorder=6)
-    better = ["less is better" if dataset[f.SIGN].values[one] > 0 else "more is better" for one in (across, up)]
+    better = [
+        "less is better" if dataset[f.SIGN].values[objective] > 0 else "more is better" for objective in (across, up)
+    ]
     axes.set(xlabel=f"{labels[across]}, {better[0]}", ylabel=f"{labels[up]}, {better[1]}")
     axes.grid(color="0.92")
     hide_sides(axes, "top", "right")
@@ -119,11 +121,11 @@ def _draw_fresh(axes: Axes, dataset: xarray.Dataset, shown: tuple[int, int], thi
     fresh, leaders = dataset[f.FRESH].values, front_leaders(dataset)
     others = np.setdiff1d(np.arange(len(fresh)), leaders)
     ends = _bars(dataset, (f.FRESH, f.FRESH_LOW, f.FRESH_HIGH), up)
-    told = ((leaders, "o", "front, fresh hits, 95 %", BLUE), (others, "o", "not told from another design", "white"))
-    for some, mark, label, face in told:
-        if len(some):
+    groups = ((leaders, "o", "front, fresh hits, 95 %", BLUE), (others, "o", "not told from another design", "white"))
+    for which, mark, label, face in groups:
+        if len(which):
             style: dict[str, Any] = {"color": BLUE, "markerfacecolor": face, "markersize": 6, "capsize": 2, "zorder": 4}
-            axes.errorbar(fresh[some, across], fresh[some, up], yerr=ends[:, some], fmt=mark, label=label, **style)
+            axes.errorbar(fresh[which, across], fresh[which, up], yerr=ends[:, which], fmt=mark, label=label, **style)
     if third is not None:
         drawn = axes.scatter(fresh[:, across], fresh[:, up], c=fresh[:, third], s=36, zorder=5, cmap="viridis")
         axes.figure.colorbar(drawn, ax=axes, label=str(dataset[f.LABEL].values[third]))

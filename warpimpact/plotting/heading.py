@@ -14,9 +14,9 @@ if TYPE_CHECKING:
 
 _WIDTH = 80
 _BELOW_THE_TOP = 0.12
-"""Of a title [inch]."""
+"""Distance of a title from the top of the figure [inch]."""
 _LETTERS = 9.5
-"""In an inch of a title, on average."""
+"""Average number of letters in an inch of a title."""
 
 
 def add_heading(figure: Figure, title: str) -> None:

@@ -18,21 +18,21 @@ if TYPE_CHECKING:
 
 _MM, _US = 1e3, 1e6
 _MARGIN = 2.0
-"""About what the core weakened [mm]."""
+"""Margin about the part that the core weakened [mm]."""
 
 
 def layers(dataset: xarray.Dataset) -> Figure:
     """Resistance left in every layer behind the plate that weakens, a row each, seen from behind.
 
-    Each cell is shown as a share of its own before; white is a hole.
+    Each cell shows the share of its initial resistance; holes are white.
     """
-    found, times = fields_behind(dataset), dataset[v.SNAPSHOT].values
-    figure = Figure(figsize=(2.5 * len(times) + 1.6, 2.9 * len(found) + 0.9), layout="constrained")
+    fields, times = fields_behind(dataset), dataset[v.SNAPSHOT].values
+    figure = Figure(figsize=(2.5 * len(times) + 1.6, 2.9 * len(fields) + 0.9), layout="constrained")
     figure.suptitle(
         f"{heading(dataset)}\nhit {dataset.attrs[attr.HIT]}: resistance left in the layers, seen from behind"
     )
-    panels = figure.subplots(len(found), len(times), squeeze=False, sharex="row", sharey="row")
-    for row, layer in zip(panels, found, strict=True):
+    panels = figure.subplots(len(fields), len(times), squeeze=False, sharex="row", sharey="row")
+    for row, layer in zip(panels, fields, strict=True):
         extent = [*_edges(layer.cell_y), *_edges(layer.cell_z)]
         y, z = (_touched(layer, axis) for axis in (0, 1))
         for axes, share, time in zip(row, layer.share, times, strict=True):

@@ -65,8 +65,8 @@ def _inscribe(figure: Figure, dataset: xarray.Dataset) -> None:
 
 
 def _over_obliquity(dataset: xarray.Dataset, quantity: str) -> Figure:
-    """Limits of hits at one place, with the secant of the obliquity from the least oblique one on; where all have one
-    obliquity, against the inclination of the core."""
+    """Draw the limits of hits at one place against the obliquity, beside the secant law through the least oblique hit.
+    If all hits have one obliquity, draw them against the inclination of the core."""
     unit, factor = shown_unit(quantity)
     figure = Figure(figsize=(7.4, 5.2), layout="constrained")
     axes = figure.subplots()
@@ -97,17 +97,17 @@ def _over_obliquity(dataset: xarray.Dataset, quantity: str) -> Figure:
 
 
 def _draw_published(axes: Axes, dataset: xarray.Dataset) -> None:
-    """Published limits against the obliquity, rows of one label alike."""
+    """Draw published limits against the obliquity; rows with the same label share a marker."""
     rows = published_beside(dataset)
     for (label, marker), colour in zip(
         zip(dict.fromkeys(row.label for row in rows), "s^vP*", strict=False), _OTHERS, strict=False
     ):
-        some = [row.published for row in rows if row.label == label]
+        limits_of_label = [row.published for row in rows if row.label == label]
         axes.errorbar(
-            [math.degrees(one.obliquity) for one in some],
-            [one.velocity for one in some],
-            yerr=[one.standard_deviation or math.nan for one in some]
-            if any(one.standard_deviation for one in some)
+            [math.degrees(limit.obliquity) for limit in limits_of_label],
+            [limit.velocity for limit in limits_of_label],
+            yerr=[limit.standard_deviation or math.nan for limit in limits_of_label]
+            if any(limit.standard_deviation for limit in limits_of_label)
             else None,
             fmt=marker,
             color=colour,
@@ -118,7 +118,7 @@ def _draw_published(axes: Axes, dataset: xarray.Dataset) -> None:
 
 
 def _solid_label(dataset: xarray.Dataset, quantity: str) -> str:
-    """Of the solid plate; its thickness stands for the whole target, not for the layer that was searched."""
+    """Label of the solid plate. Its thickness replaces the whole target, not the layer that was searched."""
     several = ", mean" if dataset.sizes.get("solid_hit", 1) > 1 and quantity == "velocity" else ""
     if quantity == "velocity":
         return f"solid plate of equal areal density{several}"
@@ -126,8 +126,10 @@ def _solid_label(dataset: xarray.Dataset, quantity: str) -> str:
 
 
 def _mark_published(axes: Axes, dataset: xarray.Dataset) -> None:
-    """Published limits at the obliquity of the hits, as lines across the share of the hits."""
-    for row, colour in zip((one for one in published_beside(dataset) if not math.isnan(one.computed)), cycle(_OTHERS)):
+    """Draw published limits at the obliquity of the hits as vertical lines."""
+    for row, colour in zip(
+        (beside for beside in published_beside(dataset) if not math.isnan(beside.computed)), cycle(_OTHERS)
+    ):
         velocity, error = row.published.velocity, row.published.standard_deviation
         axes.axvline(velocity, color=colour, linewidth=1.2, linestyle=":", label=row.label)
         if error:
@@ -138,16 +140,16 @@ def _mark_published(axes: Axes, dataset: xarray.Dataset) -> None:
 
 
 def _draw_curve(axes: Axes, dataset: xarray.Dataset, quantity: str) -> None:
-    """The share of the limits up to every value; those beyond the largest value tried keep it below 1."""
+    """Draw the cumulative share of the limits. Limits beyond the largest value tried keep it below 1."""
     unit, factor = shown_unit(quantity)
-    found = dataset[v.LIMITS[quantity].value].values
-    found = np.sort(found[~np.isnan(found)])
-    share = np.arange(1, len(found) + 1) / len(found)
-    finite = np.isfinite(found)
+    limits_found = dataset[v.LIMITS[quantity].value].values
+    limits_found = np.sort(limits_found[~np.isnan(limits_found)])
+    share = np.arange(1, len(limits_found) + 1) / len(limits_found)
+    finite = np.isfinite(limits_found)
     if finite.any():
-        margin = 0.05 * max(np.ptp(found[finite]), 0.02 * found[finite].max())
-        ends = found[finite][0] - margin, found[finite][-1] + margin
-        steps = [ends[0], *found[finite], ends[1]], [0.0, *share[finite], share[finite][-1]]
+        margin = 0.05 * max(np.ptp(limits_found[finite]), 0.02 * limits_found[finite].max())
+        ends = limits_found[finite][0] - margin, limits_found[finite][-1] + margin
+        steps = [ends[0], *limits_found[finite], ends[1]], [0.0, *share[finite], share[finite][-1]]
         axes.step(factor * np.array(steps[0]), steps[1], where="post", color=BLUE, linewidth=1.5)
         axes.set_xlim(*(factor * np.array(ends)))
     for measure, estimate in estimated(dataset, measures_of(dataset)).items():

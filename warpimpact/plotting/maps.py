@@ -129,8 +129,8 @@ def overview(dataset: xarray.Dataset) -> Figure:
 
 
 def layers_figure(dataset: xarray.Dataset) -> Figure:
-    """Of every layer, a row each: how the cores ended in it, their velocity behind it, and their tilt there: at the
-    farthest stand-off behind it that flight is free to, or as they leave it. Of a layer that no core left, their depth.
+    """A row of maps for each layer: how the cores ended in it, their velocity behind it, and their tilt at the farthest
+    stand-off that they reach in free flight, or on leaving the layer. A layer that no core left shows their depth.
 
     Args:
         dataset: a result with layers behind the plate.
@@ -222,11 +222,11 @@ def _saved(figures: Mapping[str, Figure], folder: Path, stem: str, *, overwrite:
 
 
 def _sheet_of_one(dataset: xarray.Dataset, *, maps: int, columns: int, note: str = "") -> tuple[Figure, list[Axes]]:
-    """A sheet of several maps of one result, which says what it shows."""
+    """A sheet for several maps of one result, with title and note."""
     figure, panels = _sheet([dataset] * maps, columns=columns, lines=len(names(dataset, _NAMES)))
     folded = "; all hits of the bursts, folded into the cell" if is_folded(dataset) else ""
-    told = f"{shots_text(dataset)}; seen from behind the plate{note}{folded}"
-    _inscribe(figure, heading(dataset, _NAMES), told)
+    note_below = f"{shots_text(dataset)}; seen from behind the plate{note}{folded}"
+    _inscribe(figure, heading(dataset, _NAMES), note_below)
     return figure, panels
 
 

@@ -81,7 +81,7 @@ def drawn_extent(plate: Plate, core: Core | None) -> NDArray[np.float64]:
 
 
 def _draw_section(figure: Figure, plane: Axes, target: Target) -> None:
-    """The layers in the section y = 0, beside the view of the plate and as high: x to scale, z to another one."""
+    """Draw the layers in the section y = 0, beside the plate and equally high; x and z have different scales."""
     width, place = figure.get_figwidth(), plane.get_position()
     box = (1.0 - (_SECTION - 0.3) / width, place.y0, (_SECTION - 0.6) / width, place.height)
     axes = figure.add_axes(box, sharey=plane, facecolor="white", xlabel="x [mm]")

@@ -44,7 +44,7 @@ def pairs_figure(tree: xarray.DataTree) -> Figure:
     figure = Figure(figsize=(size + 1.2, size + 0.9), layout="constrained")
     figure.suptitle(f"{tree.attrs[attr.TITLE]}\nposterior (blue) and prior (grey); {_worth(tree)}")
     panels = figure.subplots(len(names), len(names), squeeze=False)
-    told = learnt(tree)
+    knowledge = learnt(tree)
     for row, below in enumerate(names):
         for column, across in enumerate(names):
             axes = panels[row, column]
@@ -56,12 +56,12 @@ def pairs_figure(tree: xarray.DataTree) -> Figure:
             prior = _values(tree, "prior", across)[0]
             if row == column:
                 _density(axes, prior, x)
-                axes.set_title(told[across].verdict.replace(" by these shots", ""), fontsize="x-small")
+                axes.set_title(knowledge[across].verdict.replace(" by these shots", ""), fontsize="x-small")
                 axes.set_yticks([])
             else:
-                some = slice(None, None, max(1, len(x) // _POINTS))
-                axes.scatter(prior[some], _values(tree, "prior", below)[0][some], s=2, color=_GREY, alpha=0.25, lw=0)
-                axes.scatter(x[some], y[some], s=4, color=BLUE, alpha=0.45, lw=0)
+                shown = slice(None, None, max(1, len(x) // _POINTS))
+                axes.scatter(prior[shown], _values(tree, "prior", below)[0][shown], s=2, color=_GREY, alpha=0.25, lw=0)
+                axes.scatter(x[shown], y[shown], s=4, color=BLUE, alpha=0.45, lw=0)
                 axes.set_ylim(_limits(_values(tree, "prior", below)[0], y))
             axes.set_xlim(_limits(prior, x))
             axes.tick_params(labelsize="x-small", labelbottom=row == len(names) - 1, labelleft=column == 0 and row > 0)
@@ -92,7 +92,7 @@ def measured_figure(tree: xarray.DataTree) -> Figure:
     """Every measured number with its uncertainty beside what is computed for it: 50 and 90 % intervals."""
     observed, computed = tree["observed_data"].to_dataset(), tree["posterior_predictive"].to_dataset()
     stored = observed[posterior_file.UNITS_OF].values if posterior_file.UNITS_OF in observed else ()
-    units = [str(one) for one in stored]
+    units = [str(unit) for unit in stored]
     kinds = list(dict.fromkeys(units)) or ["1"]
     counts = [max(1, units.count(kind)) for kind in kinds]
     figure = Figure(figsize=(10.0, 2.6 + 0.55 * sum(counts)), layout="constrained")
@@ -135,7 +135,11 @@ def hits_figure(tree: xarray.DataTree) -> Figure:
     """
     fit = fit_from(str(tree.attrs[posterior_file.FIT]), "the fit of this posterior", Path())
     posterior, best = tree["posterior"].to_dataset(), tree["best"].to_dataset()
-    medians = {one.path: float(np.median(posterior[one.name])) for one in fit.scene_parameters if one.unit != "rad"}
+    medians = {
+        scene_parameter.path: float(np.median(posterior[scene_parameter.name]))
+        for scene_parameter in fit.scene_parameters
+        if scene_parameter.unit != "rad"
+    }
     across = min(3, len(fit.shots))
     down = -(-len(fit.shots) // across)
     figure = Figure(figsize=(4.2 * across + 0.8, 5.2 * down + 1.0), layout="constrained")
@@ -148,7 +152,7 @@ def hits_figure(tree: xarray.DataTree) -> Figure:
         cell = [side * _MM for side in scene.target.layers[0].sampled_cell]
         far = [float(np.abs(at).max()) * 1.05 for at in (y, z)]
         half = [min(max(0.55 * side, most), _CELLS * side) for side, most in zip(cell, far, strict=True)]
-        ranges = [(-one / _MM, one / _MM) for one in half]
+        ranges = [(-side / _MM, side / _MM) for side in half]
         axes.set_facecolor("0.85")
         for outline in scene.target.layers[0].pattern.outlines(*ranges):
             axes.fill(*(_MM * outline.T), facecolor="white", edgecolor="black", lw=0.8)

@@ -84,7 +84,7 @@ def _draw(
 ) -> None:
     """Draw a line with its intervals, and write the share of the hits that a value counts beside it."""
     factor, estimates = measure.display.factor, [point.estimates[measure] for point in line]
-    value, low, high = factor * np.array([(one.value, one.low, one.high) for one in estimates]).T
+    value, low, high = factor * np.array([(estimate.value, estimate.low, estimate.high) for estimate in estimates]).T
     is_number = places.dtype.kind == "f"
     x = places.values * STORED[places.attrs["units"]].factor if is_number else np.arange(len(line))
     bars = np.clip(np.nan_to_num([value - low, high - value]), 0.0, None)

@@ -60,9 +60,11 @@ def weight_figure(comparison: Comparison) -> Figure | None:
 
 def _solid_plates(comparison: Comparison) -> list[str]:
     """What the solid plates are, a line for each material."""
-    told = [plate.solid.partition(" mm of ") for plate in comparison.plates if plate.solid]
-    thicknesses = {material: ", ".join(one for one, _, of in told if of == material) for _, _, material in told}
-    return [f"solid plates: {some} mm of {material}" for material, some in thicknesses.items()]
+    solids = [plate.solid.partition(" mm of ") for plate in comparison.plates if plate.solid]
+    thicknesses = {
+        material: ", ".join(thickness for thickness, _, of in solids if of == material) for _, _, material in solids
+    }
+    return [f"solid plates: {thickness} mm of {material}" for material, thickness in thicknesses.items()]
 
 
 def _draw_against_weight(axes: Axes, comparison: Comparison, name: str) -> None:
@@ -100,8 +102,8 @@ def _draw_needed(axes: Axes, comparison: Comparison, name: str) -> None:
 
 def _scores(plate: Contestant, name: str) -> dict[str, Score]:
     """The scores of a plate in a quantity, by the kinds of measures that have a style."""
-    found = {score.measure.kind: score for score in plate.measures if score.measure.name == name}
-    return {kind: found[kind] for kind in _STYLES if kind in found}
+    scores = {score.measure.kind: score for score in plate.measures if score.measure.name == name}
+    return {kind: scores[kind] for kind in _STYLES if kind in scores}
 
 
 def _first(plate: Contestant, name: str) -> Score:

@@ -49,7 +49,7 @@ def shifts_of(campaign: Campaign, pilot: Shots, found: HitErrors) -> dict[int, t
     measures = [Measure.parse(text) for text in ("mean(residual_velocity)", *tilts)]
     shifts: dict[int, tuple[float, ...]] = {}
     for errors, *outcomes in found.tried:
-        coarse, fine = (_table(campaign, pilot[: len(each)], each) for each in outcomes)
+        coarse, fine = (_table(campaign, pilot[: len(outcome)], outcome) for outcome in outcomes)
         assert errors.numerics.level is not None
         shifts[errors.numerics.level] = tuple(shift_of(measure, (coarse, fine)) or 0.0 for measure in measures)
     return shifts

@@ -95,8 +95,8 @@ def grids_of(
         shared: whether plates of other degradation lengths have the same tiles, in finer cells than they need.
     """
     return [
-        _grid(plate, resolution, own, own.length / lengths[0].length, material if deep else None, shared)
-        for plate, own, material in zip(layers, lengths, materials, strict=True)
+        _grid(plate, resolution, reach, reach.length / lengths[0].length, material if deep else None, shared)
+        for plate, reach, material in zip(layers, lengths, materials, strict=True)
     ]
 
 

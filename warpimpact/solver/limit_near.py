@@ -65,7 +65,7 @@ class Neighbours:
             return Guess.nothing(len(which))
         value, least = self._value[known], 1e-3 * self._tolerance
         slopes = _slopes(self._conditions[0][known], value)
-        trend = [each @ slopes for each in self._conditions]
+        trend = [condition @ slopes for condition in self._conditions]
         rest = np.concatenate([value - each[known] for each in trend])
         weights = np.abs(slopes) / (np.std(value) + least)
         some, best = spread_places(len(known), min(len(known), TRIED)), np.inf
@@ -78,8 +78,8 @@ class Neighbours:
                 scale = np.quantile(off / (sure + least), WITHIN)
         told, sure, who = nearest.told(self._places(which, weights, chosen, images=1), rest)
         linear, square = _curve(self._sums[:, known[who]].sum(axis=2))
-        errors = [np.append(each[np.isfinite(each)], first) for each, first in zip(self._errors, DOUBT, strict=True)]
-        doubt = np.array([np.clip(np.quantile(each, WITHIN), LEAST, MOST) for each in errors])
+        errors = [np.append(error[np.isfinite(error)], first) for error, first in zip(self._errors, DOUBT, strict=True)]
+        doubt = np.array([np.clip(np.quantile(error, WITHIN), LEAST, MOST) for error in errors])
         found = np.maximum(trend[0][which] + told, 0.1 * value.min())
         return Guess(found, np.minimum(scale * (sure + least), 0.5 * found), linear, square, doubt)
 

@@ -119,8 +119,8 @@ class Prepared:
         """Nodes of a shot in the windows of all layers, for the cells of the plate's window. Those of a laminate count
         in its first layer."""
         return [
-            max(grids[k].planes.number for grids in self.plates) * math.prod(own) if material.laminate == k else 0
-            for k, (material, own) in enumerate(zip(self.materials, self.windows(cells), strict=True))
+            max(grids[k].planes.number for grids in self.plates) * math.prod(window) if material.laminate == k else 0
+            for k, (material, window) in enumerate(zip(self.materials, self.windows(cells), strict=True))
         ]
 
     @property
@@ -144,12 +144,12 @@ class Prepared:
     def _passages(self) -> Iterator[tuple[float, float]]:
         """Of each layer, the steps of a passage and the nodes below the core's largest section."""
         core, shots = self.scene.core, self.shots
-        for own, grid, stretch in zip(self.materials, self.grids, self.stretch, strict=True):
+        for material, grid, stretch in zip(self.materials, self.grids, self.stretch, strict=True):
             way = stretch * self.conditions["time_step"] * shots.velocity * np.cos(shots.obliquity)
             across = (2.0 * core.max_radius / grid.spacing) ** 2
             yield (
-                float(np.mean((own.thickness + core.length) / way)),
-                grid.planes.number * across if own.weakens else 0.0,
+                float(np.mean((material.thickness + core.length) / way)),
+                grid.planes.number * across if material.weakens else 0.0,
             )
 
 
@@ -169,16 +169,16 @@ def prepare(scene: Scene, shots: Shots, numerics: Numerics) -> Prepared:
     if numerics.explicit is None:
         raise ValueError("got numerics with an accuracy, but this needs a resolution: give a level or single settings")
     materials = materials_of(scene, shots)
-    weakening = [one.weakens for one in materials]
+    weakening = [material.weakens for material in materials]
     lengths, which = _lengths(target.layers, shots)
-    resolutions = [resolve(scene, numerics, weakening, [own.length for own in layers]) for layers in lengths]
+    resolutions = [resolve(scene, numerics, weakening, [layer.length for layer in layers]) for layers in lengths]
     shared = "degradation_length" in shots.columns
     resolution, tabled = resolutions[0], any(name in shots.columns for name in OWN_LENGTHS)
     own_lengths = [np.array([layer.length for layer in layers])[which] for layers in zip(*lengths, strict=True)]
     time_steps = layer_steps(scene, shots, materials, resolution, own_lengths)
     conditions: dict[str, NDArray[Any]] = conditions_of(scene, shots, materials, time_steps)
     steps = int(steps_of(shots, conditions).max())
-    deep = any(one.deep.any() for one in materials)
+    deep = any(material.deep.any() for material in materials)
     plates, burst = list(enumerate(target.layers)), shots.burst_order is not None
     exclusions.check_together(
         {
@@ -187,7 +187,7 @@ def prepare(scene: Scene, shots: Shots, numerics: Numerics) -> Prepared:
             exclusions.DOUBLE: resolution.double,
             exclusions.BENDING: record.bending,
             exclusions.LAYERS: len(plates) > 1,
-            exclusions.BY_PATH: any(one.by_path for one in materials),
+            exclusions.BY_PATH: any(material.by_path for material in materials),
             exclusions.BURST: burst,
             exclusions.DEEP: deep,
         }
@@ -196,8 +196,8 @@ def prepare(scene: Scene, shots: Shots, numerics: Numerics) -> Prepared:
     deep |= not resolution.nodal and any(weakening[k] and shots.differs("thickness", k) for k, _ in plates)
     deep |= not resolution.nodal and weakening[0] and "degradation_depth" in shots.columns
     grids = [
-        grids_of(target.layers, materials, one, own, deep=deep, shared=shared)
-        for own, one in zip(lengths, resolutions, strict=True)
+        grids_of(target.layers, materials, resolution, length, deep=deep, shared=shared)
+        for length, resolution in zip(lengths, resolutions, strict=True)
     ]
     check_tiles({grid.tile: place for of in grids for grid, (place, _) in zip(of, target.named, strict=True)})
     first_cells = first_windows(core, shots, materials[0], grids, which, nodal=resolution.nodal)
@@ -218,13 +218,19 @@ def prepare(scene: Scene, shots: Shots, numerics: Numerics) -> Prepared:
         window=block_window(int(first_cells.max())) if resolution.block else 0,
     )
     rings = [
-        rings_of(core, one.patches_axial, one.patches_around, one.patch_width, discs=not one.nodal)
-        for one in resolutions
+        rings_of(
+            core,
+            resolution.patches_axial,
+            resolution.patches_around,
+            resolution.patch_width,
+            discs=not resolution.nodal,
+        )
+        for resolution in resolutions
     ]
-    around = {own: one.patches_around for own, one in zip(rings, resolutions, strict=True)}
+    around = {core_rings: resolution.patches_around for core_rings, resolution in zip(rings, resolutions, strict=True)}
     conditions |= {
         "plates": which,
-        "surface": np.array([list(around).index(own) for own in rings])[which],
+        "surface": np.array([list(around).index(core_rings) for core_rings in rings])[which],
     }
     return Prepared(
         scene=scene,

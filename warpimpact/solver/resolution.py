@@ -262,11 +262,11 @@ def layer_steps(
         resolution.step_at(
             shots.velocity,
             shots.obliquity,
-            resolution.passage(own.thickness, own.depth, weakens=own.weakens),
-            resolution.longest_time(own.decay_rate, layer, shots.velocity, mass, own.a0),
-            resolution.way_along(layer, length, weakens=own.weakens, behind=k > 0),
+            resolution.passage(material.thickness, material.depth, weakens=material.weakens),
+            resolution.longest_time(material.decay_rate, layer, shots.velocity, mass, material.a0),
+            resolution.way_along(layer, length, weakens=material.weakens, behind=k > 0),
         )
-        for k, (layer, own, length) in enumerate(zip(scene.target.layers, materials, lengths, strict=True))
+        for k, (layer, material, length) in enumerate(zip(scene.target.layers, materials, lengths, strict=True))
     ]
 
 

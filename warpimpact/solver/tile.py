@@ -188,12 +188,12 @@ def _blurred(pattern: Pattern, counts: tuple[int, int], sides: tuple[float, floa
     exactly, and one division."""
     inside, (rows, columns), beside = pattern.shares_in_holes(counts, sides, check), counts, BLUR // 2
     material = np.empty(counts, dtype=real)
-    for some in _bands(counts):
+    for band in _bands(counts):
         check()
-        around = inside[np.arange(some.start - beside, some.stop + beside) % rows]
+        around = inside[np.arange(band.start - beside, band.stop + beside) % rows]
         wide = (WHOLE_CELL - np.pad(around, ((0, 0), (beside, beside)), mode="wrap")).astype(real)
-        material[some] = _sums(_sums(wide, some.stop - some.start).T, columns).T
-        material[some] /= BLUR**2 * WHOLE_CELL
+        material[band] = _sums(_sums(wide, band.stop - band.start).T, columns).T
+        material[band] /= BLUR**2 * WHOLE_CELL
     return material
 
 
