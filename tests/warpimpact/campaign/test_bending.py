@@ -61,7 +61,7 @@ def test_from_a_campaign_to_its_result(tmp_path: Path, capsys: pytest.CaptureFix
 @pytest.mark.parametrize(
     ("tail", "changes", "sentence"),
     [
-        (STOP.replace("bending = true", ""), (), " needs output.bending = true: it is not recorded otherwise"),
+        (STOP.replace("bending = true", ""), (), " needs output.bending = true"),
         (
             "bending = true\n",
             (('mass = "4 g"', 'mass = "4 g"\ninertia_axial = 2e-8'),),

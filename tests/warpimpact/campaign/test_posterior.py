@@ -13,7 +13,7 @@ import xarray
 
 from warpimpact.analysis.inspect import inspect_text
 from warpimpact.analysis.summary import summary
-from warpimpact.campaign import posterior as drawing
+from warpimpact.campaign import drawn as drawing
 from warpimpact.campaign.campaign import Campaign
 from warpimpact.campaign.text import CampaignError
 from warpimpact.cli import main
