@@ -7,8 +7,8 @@ RUNNING = -1
 
 
 class Status(IntEnum):
-    """Outcome of one shot, or how its core ended in one layer. Codes from UNFINISHED to GAINED_ENERGY are failures of
-    the computation, not of the plate; only a layer can be NOT_REACHED."""
+    """Outcome of one shot, or how its core ended in one layer. Codes from UNFINISHED on are failures of the
+    computation, not of the plate, but for NOT_REACHED, which only a layer can be. The last two are the continuum's."""
 
     PERFORATED = 0
     ARRESTED = 1
@@ -19,6 +19,8 @@ class Status(IntEnum):
     NOT_FINITE = 6
     GAINED_ENERGY = 7
     NOT_REACHED = 8
+    UNBALANCED = 9
+    HOURGLASSED = 10
 
     @property
     def sentence(self) -> str:
@@ -28,7 +30,7 @@ class Status(IntEnum):
     @property
     def failed(self) -> bool:
         """Whether the computation failed, so that the end of the shot is unknown."""
-        return Status.UNFINISHED <= self < Status.NOT_REACHED
+        return self >= Status.UNFINISHED and self is not Status.NOT_REACHED
 
 
 _SENTENCES = {
@@ -41,6 +43,8 @@ _SENTENCES = {
     Status.NOT_FINITE: "The motion became infinite or undefined.",
     Status.GAINED_ENERGY: "The rounding errors of the precision added to the energy of the core.",
     Status.NOT_REACHED: "The core did not reach this layer.",
+    Status.UNBALANCED: "More of the energy that the core lost is missing, or too much, than finite elements may lose.",
+    Status.HOURGLASSED: "Hourglasses of the finite elements took more of the energy than they may.",
 }
 
 OF_SHOTS = tuple(status for status in Status if status is not Status.NOT_REACHED)

@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from .campaign.plates import read_plates
     from .campaign.stop import Stop
     from .campaign.text import CampaignError
+    from .continuum.strikes import simulate_continuum
     from .export.spreadsheet import to_dataframe
     from .optimisation.optimise import optimise, optimise_to_file
     from .records.outcomes import Outcomes
@@ -57,6 +58,7 @@ if TYPE_CHECKING:
         Wave,
         make_shots,
     )
+    from .scene.flow import Continuum, Flow
     from .solver.device import DeviceError
     from .solver.limit import limit_thickness, limit_velocity
     from .solver.simulate import simulate
@@ -71,9 +73,11 @@ __all__ = [
     "ClusterError",
     "Comparison",
     "ConeCore",
+    "Continuum",
     "Core",
     "DeviceError",
     "EllipsePattern",
+    "Flow",
     "HexagonPattern",
     "Hits",
     "Impact",
@@ -121,6 +125,7 @@ __all__ = [
     "run",
     "run_to_file",
     "simulate",
+    "simulate_continuum",
     "to_dataframe",
 ]
 
@@ -129,7 +134,9 @@ _HOMES = {
     "CampaignError": ".campaign.text",
     "ClusterError": ".runs.executor",
     "Comparison": ".analysis.comparison_text",
+    "Continuum": ".scene.flow",
     "DeviceError": ".solver.device",
+    "Flow": ".scene.flow",
     "Outcomes": ".records.outcomes",
     "Output": ".campaign.campaign",
     "OutputError": ".results.files",
@@ -150,6 +157,7 @@ _HOMES = {
     "run": ".runs.run",
     "run_to_file": ".runs.run",
     "simulate": ".solver.simulate",
+    "simulate_continuum": ".continuum.strikes",
     "to_dataframe": ".export.spreadsheet",
 }
 """Modules of the names that are not in `warpimpact.scene`."""

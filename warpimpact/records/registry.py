@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from warpimpact.records.bending_variables import BENDING_VARIABLES, BROKEN_VARIABLES
+from warpimpact.records.continuum_variables import CONTINUUM_VARIABLES
 from warpimpact.records.exit import EXIT_VARIABLES, OUTCOME_VARIABLES
 from warpimpact.records.group import VariableGroup
 from warpimpact.records.layer_variables import LAYER_STANDOFF_VARIABLES, LAYER_VARIABLES
@@ -17,6 +18,7 @@ RECORDS: tuple[VariableGroup, ...] = (
     LAYER_VARIABLES,
     LAYER_STANDOFF_VARIABLES,
     *LIMIT_RECORDS,
+    CONTINUUM_VARIABLES,
 )
 
 

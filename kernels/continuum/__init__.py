@@ -1,0 +1,6 @@
+"""Device code of the continuum: explicit Lagrangian finite elements of a target that a rigid core hits
+(docs/continuum.md).
+
+Change the element, the flow, the erosion or the contact here, each beside its equation; what becomes a mesh is in the
+room continuum. It imports Warp and the rigid body of the kernels.
+"""

@@ -1,0 +1,141 @@
+"""The structs of the continuum: material, mesh with its state, core, and how far a hit is.
+
+A sheet is the mesh of one layer of the target: a grid of nodes, along z, then along y, then through the thickness. The
+element of a number has the node of this number as its corner of least x, y and z. So an element's nodes, and a node's
+elements, lie at fixed distances in memory, and no table of neighbours is read.
+"""
+
+from functools import cache
+from types import SimpleNamespace
+
+import warp as wp
+
+from .. import structs
+from ..variant import Variant
+
+CORNERS, COMPONENTS = 8, 24
+"""Corners of an element, and components of the forces on them."""
+RIGID = Variant(double=True)
+"""The core moves in double precision whatever the elements have."""
+
+
+@cache
+def build(variant: Variant) -> SimpleNamespace:
+    """The structs for one variant."""
+    real, rigid = variant.real, structs.build(RIGID)
+
+    @wp.struct
+    class Sheet:
+        """One layer: distances in memory between neighbours along y and along x; its elastic and flow constants.
+
+        Moduli and stresses [Pa], density [kg/m³], speed of dilatational waves [m/s], rates [1/s]; `heating` is the
+        share of the range to melting that a unit of plastic work per volume heats through [1/Pa]; `fracture_work` [Pa];
+        `stiffness` of the contact with a node [N/m].
+        """
+
+        row: wp.int32
+        plane: wp.int32
+        density: real
+        bulk: real
+        shear: real
+        wave_speed: real
+        yield_stress: real
+        hardening: real
+        exponent: real
+        voce_stress: wp.types.vector(2, real)
+        voce_rate: wp.types.vector(2, real)
+        rate_exponent: real
+        reference_rate: real
+        heating: real
+        softening: real
+        fracture_work: real
+        stiffness: real
+
+    @wp.struct
+    class Cylinder:
+        """What holds the core: nodes outside of it are not touched. Centre [m], axis, half the length and the square
+        of the radius [m²]."""
+
+        centre: wp.types.vector(3, real)
+        axis: wp.types.vector(3, real)
+        half_length: real
+        square: real
+
+    @wp.struct
+    class Mesh:
+        """Nodes and elements of all sheets. Arrays of nodes and of elements have shape [size], of vectors [3 size] by
+        component, of symmetric tensors [6 size] in the order xx, yy, zz, xy, yz, zx.
+
+        Attributes:
+            runs: first number, number after the last, and sheet of each run of consecutive elements, shape [3 runs].
+            node_runs: the same of nodes.
+            cylinder: about the core.
+            next_step: between this step's velocities and the next ones [s].
+            position [m], velocity [m/s], inverse_mass [1/kg] (0 where a node is held or has no element), contact [N]
+            and contact_work [J] of nodes; `near` is 1 where the core may touch.
+            volume [m³] and length [m] of elements at rest; `alive` is 1 or 0.
+            stress [Pa], strain, damage, heat (share of the range to melting) of elements; work of stress and viscosity
+            [J], of the resistance against hourglasses [J].
+            crossing: time that a wave takes across an element [s].
+            force: of elements on their corners [N], shape [24 size]: by corner, then by component.
+        """
+
+        size: wp.int32
+        sheets: wp.array(dtype=Sheet)
+        runs: wp.array(dtype=wp.int32)
+        node_runs: wp.array(dtype=wp.int32)
+        cylinder: Cylinder
+        kick: real
+        position: wp.array(dtype=real)
+        velocity: wp.array(dtype=real)
+        inverse_mass: wp.array(dtype=real)
+        contact: wp.array(dtype=real)
+        contact_work: wp.array(dtype=real)
+        near: wp.array(dtype=real)
+        volume: wp.array(dtype=real)
+        length: wp.array(dtype=real)
+        alive: wp.array(dtype=real)
+        stress: wp.array(dtype=real)
+        strain: wp.array(dtype=real)
+        damage: wp.array(dtype=real)
+        heat: wp.array(dtype=real)
+        work: wp.array(dtype=real)
+        hourglass_work: wp.array(dtype=real)
+        crossing: wp.array(dtype=real)
+        force: wp.array(dtype=real)
+
+    @wp.struct
+    class Core:
+        """The rigid core: its mass, its length and centre of mass behind the nose [m], its largest radius [m], its
+        radii at even distances from nose to base [m], and the friction of its surface."""
+
+        body: rigid.Body
+        length: wp.float64
+        centre_of_mass: wp.float64
+        largest: wp.float64
+        radii: wp.array(dtype=wp.float64)
+        friction: wp.float64
+
+    @wp.struct
+    class Limits:
+        """When a hit ends: rear face of the target [m], the impact energy [J], and the longest time [s]."""
+
+        rear: wp.float64
+        impact_energy: wp.float64
+        longest: wp.float64
+
+    @wp.struct
+    class Flight:
+        """How far a hit is: state of the core, of its velocities half a step before; time, this step and the last one
+        [s]; first and last touch [s], negative before; status (kernels/status.py) and number of steps."""
+
+        state: rigid.State
+        time: wp.float64
+        step: wp.float64
+        before: wp.float64
+        first_touch: wp.float64
+        last_touch: wp.float64
+        status: wp.int32
+        steps: wp.int32
+
+    return SimpleNamespace(**locals())

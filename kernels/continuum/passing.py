@@ -1,0 +1,138 @@
+"""The march of one hit: contact, core, nodes and elements, step by step, until the core has passed, turned back or
+rests."""
+
+from functools import cache
+from types import SimpleNamespace
+
+import warp as wp
+
+from .. import constants, memory, rigid_body, structs
+from ..status import RUNNING, Status
+from ..variant import Variant
+from . import fields, hexahedra, nodes, penalty
+
+COURANT = 0.6
+"""Share of the shortest time of a wave across an element that a step takes."""
+GROWTH = 1.05
+"""Most that a step is longer than the one before."""
+BEHIND, QUIET = 3.0e-3, 2.0e-6
+"""How far behind the target [m], and how long after the last touch [s], a core is free."""
+
+
+@cache
+def build(variant: Variant) -> SimpleNamespace:
+    """The kernel that marches hits for one variant."""
+    struct, real, rigid = fields.build(variant), variant.real, structs.build(fields.RIGID)
+    read = memory.build(real).read
+    move, elements = rigid_body.build(fields.RIGID), hexahedra.build(variant)
+    mesh_nodes, contact = nodes.build(variant), penalty.build(variant)
+    vec3, zero, half = wp.types.vector(3, real), wp.float64(0.0), wp.float64(0.5)
+    courant, growth, behind, quiet = (wp.float64(value) for value in (COURANT, GROWTH, BEHIND, QUIET))
+    still = wp.float64(constants.STILL.value)
+    PERFORATED, ARRESTED = wp.constant(int(Status.PERFORATED)), wp.constant(int(Status.ARRESTED))
+    RICOCHETED, MISSED = wp.constant(int(Status.RICOCHETED)), wp.constant(int(Status.MISSED))
+    UNFINISHED, NOT_FINITE = wp.constant(int(Status.UNFINISHED)), wp.constant(int(Status.NOT_FINITE))
+    running = wp.constant(RUNNING)
+
+    @wp.func
+    def status_of(core: struct.Core, limits: struct.Limits, flight: struct.Flight):
+        """How a hit has ended; RUNNING if it has not."""
+        state = flight.state
+        rearmost, foremost = contact.ends_of(core, state)
+        energy = move.kinetic_energy(core.body, move.axis_of(state.attitude), state.velocity, state.angular_momentum)
+        untouched = flight.first_touch < zero
+        free = untouched or flight.time - flight.last_touch > quiet
+        status = running
+        if not (energy < wp.float64(2.0) * limits.impact_energy):  # what is no number, too
+            status = NOT_FINITE
+        elif rearmost > limits.rear and untouched:
+            status = MISSED
+        elif rearmost > limits.rear + behind and free:
+            status = PERFORATED
+        elif foremost < -behind and state.velocity[0] < zero and free:
+            status = wp.where(untouched, MISSED, RICOCHETED)
+        elif energy < still * limits.impact_energy:
+            status = ARRESTED
+        elif flight.time > limits.longest:
+            status = UNFINISHED
+        return status
+
+    @wp.func
+    def shortest_crossing(mesh: struct.Mesh):
+        """The shortest time that a wave takes across an element [s]."""
+        first, second, third, fourth = real(1.0), real(1.0), real(1.0), real(1.0)
+        for run in range(mesh.runs.shape[0] // 3):
+            element, last = wp.int32(mesh.runs[3 * run]), wp.int32(mesh.runs[3 * run + 1])
+            while element < last:
+                first = wp.min(first, read(mesh.crossing, element))
+                second = wp.min(second, read(mesh.crossing, element + 1))
+                third = wp.min(third, read(mesh.crossing, element + 2))
+                fourth = wp.min(fourth, read(mesh.crossing, element + 3))
+                element += 4
+        return wp.float64(wp.min(wp.min(first, second), wp.min(third, fourth)))
+
+    @wp.func
+    def cylinder_about(core: struct.Core, state: rigid.State):
+        """The cylinder about a core."""
+        axis = move.axis_of(state.attitude)
+        middle = state.position + (core.centre_of_mass - half * core.length) * axis
+        cylinder = struct.Cylinder()
+        cylinder.centre = vec3(real(middle[0]), real(middle[1]), real(middle[2]))
+        cylinder.axis = vec3(real(axis[0]), real(axis[1]), real(axis[2]))
+        cylinder.half_length = real(half * core.length)
+        cylinder.square = real(core.largest * core.largest)
+        return cylinder
+
+    def advance(
+        # inputs
+        core: struct.Core,
+        limits: struct.Limits,
+        steps: wp.int32,
+        mesh: struct.Mesh,
+        # outputs
+        flights: wp.array(dtype=struct.Flight),
+        left: wp.array2d(dtype=wp.float64),
+        rears: wp.array(dtype=wp.float64),
+    ):
+        """March one hit by some steps.
+
+        `left` is the state with which the core left each layer, shape [layers, 7]: velocity, axis, and time; NaN
+        before.
+        """
+        flight = flights[0]
+        for _ in range(steps):
+            if flight.status != running:
+                break
+            kick = half * (flight.before + flight.step)
+            dt = flight.step
+            load = contact.load_on(mesh, core, flight.state, dt)
+            if load.touching:
+                flight.last_touch = flight.time
+                if flight.first_touch < zero:
+                    flight.first_touch = flight.time
+            kicked = rigid.State()
+            kicked.position = flight.state.position
+            kicked.attitude = flight.state.attitude
+            kicked.velocity = flight.state.velocity + (kick / core.body.mass) * load.force
+            kicked.angular_momentum = flight.state.angular_momentum + kick * load.moment
+            flight.state = move.drift(core.body, kicked, dt)
+            mesh.kick = real(kick)
+            mesh.cylinder = cylinder_about(core, flight.state)
+            mesh_nodes.move_nodes(mesh, real(dt))
+            elements.deform_elements(mesh, real(dt))
+            flight.time += dt
+            flight.steps += 1
+            flight.before = dt
+            flight.step = wp.min(courant * shortest_crossing(mesh), growth * dt)
+            rearmost, _foremost = contact.ends_of(core, flight.state)
+            axis = move.axis_of(flight.state.attitude)
+            for layer in range(rears.shape[0]):
+                if rearmost > rears[layer] and wp.isnan(left[layer, 6]):
+                    for k in range(3):
+                        left[layer, k] = flight.state.velocity[k]
+                        left[layer, 3 + k] = axis[k]
+                    left[layer, 6] = flight.time
+            flight.status = status_of(core, limits, flight)
+        flights[0] = flight
+
+    return SimpleNamespace(kernel=variant.kernel(advance), **vars(struct))

@@ -1,0 +1,114 @@
+"""What the continuum refuses, and which of its hits are failures."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from warpimpact import Continuum, Plate, PolynomialCore, Record, Scene, Shots, simulate_continuum
+from warpimpact.catalogue.flow_entries import flow_entry, flow_names
+from warpimpact.continuum import strikes
+from warpimpact.continuum.one_hit import Energies
+from warpimpact.kernels.status import Status
+from warpimpact.scene.flow import FINENESS
+
+CORE = PolynomialCore(coefficients=(3.0e-4, 0.24, -5.29), length=27.86e-3, mass=4.0e-3)
+PLATE = Plate(thickness=4e-3, resistance=2.6e9)
+STEEL = flow_entry("ARMOX560T").flow
+SHOT = Shots(*(np.array([value]) for value in (0.0, 0.0, 825.0, 0.0, 0.0, 0.0, 0.0, 0.0)))
+COARSE = Continuum(flows=(STEEL,), spacing=2e-3)
+
+
+@pytest.mark.parametrize(
+    ("scene", "shots", "continuum", "sentence"),
+    [
+        (Scene(core=CORE, target=PLATE, record=Record(bending=True)), SHOT, COARSE, "leave out output.bending"),
+        (
+            Scene(core=CORE, target=PLATE),
+            SHOT,
+            Continuum(flows=(STEEL, STEEL)),
+            "got 2 materials, but the target has 1",
+        ),
+        (
+            Scene(core=CORE, target=PLATE),
+            replace(Shots.joined([SHOT, SHOT]), sample=np.zeros(2, dtype=int), burst_order=np.arange(2)),
+            COARSE,
+            r"leave out \[burst\]",
+        ),
+    ],
+)
+def test_what_is_not_computed_is_refused(scene: Scene, shots: Shots, continuum: Continuum, sentence: str) -> None:
+    with pytest.raises(ValueError, match=sentence):
+        simulate_continuum(scene, shots, continuum)
+
+
+@pytest.mark.parametrize(
+    ("energies", "status"),
+    [
+        (Energies(lost=100.0, given=99.0, kinetic=1.0, work=93.0, hourglass=5.0), Status.PERFORATED),
+        (Energies(lost=100.0, given=99.0, kinetic=1.0, work=90.0, hourglass=5.0), Status.UNBALANCED),
+        (Energies(lost=100.0, given=103.0, kinetic=1.0, work=97.0, hourglass=5.0), Status.UNBALANCED),
+        (Energies(lost=100.0, given=99.0, kinetic=1.0, work=85.0, hourglass=13.0), Status.HOURGLASSED),
+        (Energies(lost=100.0, given=float("nan"), kinetic=1.0, work=85.0, hourglass=13.0), Status.UNBALANCED),
+    ],
+)
+def test_a_hit_that_loses_energy_to_its_numerics_is_a_failure(energies: Energies, status: Status) -> None:
+    assert strikes.judged(Status.PERFORATED, energies) is status
+    assert strikes.judged(Status.NOT_FINITE, energies) is Status.NOT_FINITE
+
+
+def test_a_failed_hit_has_no_outcome_and_the_others_are_told() -> None:
+    """Two elements through the plate: their hourglasses take more than 12 %."""
+    told: list[tuple[int, int]] = []
+    outcomes = simulate_continuum(
+        Scene(core=CORE, target=PLATE, record=Record(standoffs=(0.05,))),
+        SHOT,
+        COARSE,
+        progress=lambda done, total: told.append((done, total)),
+    )
+    assert outcomes.status[0] == Status.HOURGLASSED
+    assert np.isnan(outcomes.residual_velocity[0])
+    assert np.isnan(outcomes.tilt).all()
+    assert outcomes.hourglass_share[0] > 0.12
+    assert told == [(1, 1)]
+
+
+def test_a_core_that_reaches_the_edge_of_the_mesh_has_left_it(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(strikes, "FINE", 0.5)
+    monkeypatch.setattr(strikes, "PATCH", 0.6)
+    narrow = Continuum(flows=(STEEL,), spacing=1e-3)
+    assert simulate_continuum(Scene(core=CORE, target=PLATE), SHOT, narrow).status[0] == Status.LEFT_WINDOW
+
+
+def test_elements_follow_core_thickness_and_ligament() -> None:
+    scene = Scene(core=CORE, target=PLATE)
+    draft = Continuum(flows=(STEEL,)).spacings(scene.core, scene.target)[0]
+    assert draft == pytest.approx(CORE.max_radius / 6.0)
+    thin = Scene(core=CORE, target=PLATE.model_copy(update={"thickness": 1e-3}))
+    assert Continuum(flows=(STEEL,)).spacings(thin.core, thin.target) == [0.25e-3]
+    for fidelity, share in FINENESS.items():
+        spacing = Continuum(flows=(STEEL,), fidelity=fidelity).spacings(scene.core, scene.target)[0]
+        assert spacing == pytest.approx(share * draft)
+
+
+@pytest.mark.parametrize("name", flow_names())
+def test_a_material_says_what_is_known_and_what_is_assumed(name: str) -> None:
+    entry = flow_entry(name)
+    assert entry.name == name
+    assert entry.assumed
+    assert 4000.0 < entry.wave_speed < 7000.0
+
+
+def test_an_unknown_material_names_what_is_meant() -> None:
+    with pytest.raises(ValueError, match='did you mean "ARMOX560T"'):
+        flow_entry("ARMOX560")
+
+
+def test_a_set_of_ones_own_is_a_table(tmp_path: Path) -> None:
+    file = tmp_path / "mine.toml"
+    file.write_text('name = "mine"\nyield_stress = "900 MPa"\nfracture_work = "400 MPa"\n', encoding="utf-8")
+    assert flow_entry(str(file)).flow.yield_stress == 900e6
+    file.write_text('name = "mine"\nyield_stress = "fast"\nfracture_work = "400 MPa"\n', encoding="utf-8")
+    with pytest.raises(ValueError, match=r"mine.toml: yield_stress: got \"fast\""):
+        flow_entry(str(file))

@@ -1,0 +1,77 @@
+"""Materials of the continuum by name, a file each in flows/, or of a user's file."""
+
+from __future__ import annotations
+
+import tomllib
+from difflib import get_close_matches
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+from pydantic import Field, ValidationError
+
+from warpimpact.catalogue.entries import Name, evidence, reason
+from warpimpact.scene.flow import Flow
+from warpimpact.scene.toml_text import parsed, read_text
+from warpimpact.scene.units import Title, quoted
+
+FOLDER = Path(__file__).parent / "flows"
+
+
+class FlowEntry(Flow):
+    """A material of the continuum.
+
+    Attributes:
+        name: by which `--material` finds it.
+        known, assumed: source, or assumption, by property.
+    """
+
+    name: Name
+    known: dict[str, Title] = Field(default_factory=dict)
+    assumed: dict[str, Title] = Field(default_factory=dict)
+
+    @property
+    def flow(self) -> Flow:
+        """Its constants."""
+        return Flow(**{name: getattr(self, name) for name in Flow.model_fields})
+
+    @property
+    def evidence(self) -> str:
+        """State of the evidence in words."""
+        return evidence(self.known, self.assumed)
+
+
+def flow_entry(name: str) -> FlowEntry:
+    """The material of a name, or of a TOML file.
+
+    Raises:
+        ValueError: there is no such entry, or the file has an invalid value.
+    """
+    if name.endswith(".toml"):
+        return _entry(parsed(read_text(Path(name)), name), name)
+    entries = _packaged()
+    if name not in entries:
+        meant = get_close_matches(name, entries, n=1, cutoff=0.4)
+        hint = f'did you mean "{meant[0]}"?' if meant else f"allowed are {', '.join(entries)}, or a TOML file"
+        raise ValueError(f"got {quoted(name)}, which is no material of the continuum; {hint}")
+    return entries[name]
+
+
+@cache
+def _packaged() -> dict[str, FlowEntry]:
+    tables = {path: tomllib.loads(path.read_text(encoding="utf-8")) for path in sorted(FOLDER.glob("*.toml"))}
+    return {table["name"]: FlowEntry.model_validate(table) for table in tables.values()}
+
+
+def flow_names() -> tuple[str, ...]:
+    """Names of the materials of the package."""
+    return tuple(_packaged())
+
+
+def _entry(table: dict[str, Any], place: str) -> FlowEntry:
+    try:
+        return FlowEntry.model_validate(table)
+    except ValidationError as error:
+        first = error.errors(include_url=False)[0]
+        where = ".".join(map(str, first["loc"]))
+        raise ValueError(f"{place}{f': {where}' if where else ''}: {reason(first)}") from None

@@ -1,0 +1,179 @@
+"""The mesh of a layer: columns in its plane about the hit, whose edges follow the holes, through its thickness."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warpimpact.scene import Plate
+
+Array = NDArray[np.float64]
+
+GROWTH, COARSEST = 1.3, 5.0
+"""By what a cell beyond the fine ones is wider than its neighbour, and the widest one, in fine cells."""
+SWEEPS = 20
+"""Sweeps that spread the moves of the nodes beside holes to their neighbours."""
+FARTHEST_MOVE = 0.7
+"""Most that a node is moved onto an edge, in cells; one farther from it stays where it is."""
+SLIVER = 0.15
+"""Share of the area of its cell below which a column is left out."""
+LANES = 8
+"""Elements of a run are a multiple of these, as many as a processor computes side by side."""
+
+
+class Extent(NamedTuple):
+    """What a mesh covers in the plane, along one axis [m]: its middle from the hit, half of its fine part, and half of
+    it all."""
+
+    middle: float
+    fine: float
+    half: float
+
+
+@dataclass(frozen=True)
+class SheetMesh:
+    """The mesh of one layer.
+
+    Attributes:
+        y, z: of the nodes of a plane, from the hit [m], shape [rows, columns].
+        solid: whether a column has material, shape [rows − 1, columns − 1].
+        x: of the planes of nodes [m].
+        spacing: of the fine cells [m].
+    """
+
+    y: Array
+    z: Array
+    solid: NDArray[np.bool_]
+    x: Array
+    spacing: float
+
+    @property
+    def row(self) -> int:
+        """Distance in memory between neighbours along y."""
+        return int(self.y.shape[1])
+
+    @property
+    def plane(self) -> int:
+        """Distance in memory between neighbours along x."""
+        return self.y.size
+
+    @property
+    def nodes(self) -> int:
+        """Nodes of all planes."""
+        return len(self.x) * self.plane
+
+    @property
+    def alive(self) -> NDArray[np.bool_]:
+        """Whether the element of each number exists, shape [nodes]."""
+        alive = np.zeros((len(self.x), *self.y.shape), dtype=bool)
+        alive[:-1, :-1, :-1] = self.solid
+        return alive.ravel()
+
+    @property
+    def held(self) -> NDArray[np.bool_]:
+        """Whether a node is at the outer edge of the mesh, shape [nodes]."""
+        held = np.zeros(self.y.shape, dtype=bool)
+        held[[0, -1], :] = held[:, [0, -1]] = True
+        return np.tile(held.ravel(), len(self.x))
+
+    @property
+    def positions(self) -> Array:
+        """Of the nodes [m], shape [3, nodes]."""
+        planes = np.ones((len(self.x), 1))
+        return np.stack(
+            [np.repeat(self.x, self.plane), (planes * self.y.ravel()).ravel(), (planes * self.z.ravel()).ravel()]
+        )
+
+
+def meshed(
+    plate: Plate, hit: tuple[float, float], front: float, spacing: float, extents: tuple[Extent, Extent]
+) -> SheetMesh:
+    """The mesh of a layer about a hit.
+
+    Args:
+        plate: the layer, with the thickness that it has for this shot.
+        hit: where the line of fire crosses the front face of the target, in the frame of the layer's pattern [m].
+        front: front face [m].
+        spacing: of the fine cells in the plane and, nearly, through the thickness [m].
+        extents: along y and z.
+    """
+    along_y, along_z = (_line(extent, spacing) for extent in extents)
+    y, z = np.meshgrid(along_y, along_z, indexing="ij")
+    centre_y, centre_z = (0.25 * (at[:-1, :-1] + at[1:, :-1] + at[:-1, 1:] + at[1:, 1:]) for at in (y, z))
+    solid = np.asarray(plate.is_solid(centre_y + hit[0], centre_z + hit[1]))
+    planes = max(2, round(plate.thickness / spacing))
+    if not solid.all():
+        y, z = _onto_edges(plate, hit, y, z, solid)
+        cells = np.outer(np.diff(along_y), np.diff(along_z))
+        solid = solid & (_areas(y, z) > SLIVER * cells)
+    return SheetMesh(y, z, solid, front + np.linspace(0.0, plate.thickness, planes + 1), spacing)
+
+
+def _line(extent: Extent, spacing: float) -> Array:
+    """Coordinates of nodes along one axis: even in the fine part, then wider from cell to cell."""
+    count = max(2, round(extent.fine / spacing))
+    cells = [spacing] * count
+    while sum(cells) < extent.half:
+        cells.append(min(GROWTH * cells[-1], COARSEST * spacing))
+    half = np.concatenate([[0.0], np.cumsum(cells)])
+    return np.asarray(extent.middle + np.concatenate([-half[:0:-1], half]))
+
+
+def _onto_edges(
+    plate: Plate, hit: tuple[float, float], y: Array, z: Array, solid: NDArray[np.bool_]
+) -> tuple[Array, Array]:
+    """Move the nodes between material and holes onto the edges; their neighbours follow."""
+    around = np.pad(solid, 1, mode="edge")
+    count = np.asarray(sum(around[i : i + y.shape[0], j : j + y.shape[1]].astype(int) for i in (0, 1) for j in (0, 1)))
+    between = (count > 0) & (count < 4)
+    reach = 1e-3 * np.ptp(y[:2, 0])
+
+    def distance(along_y: Array, along_z: Array) -> Array:
+        return np.asarray(plate.edge_distance(along_y + hit[0], along_z + hit[1]))
+
+    at_y, at_z = y[between], z[between]
+    for _ in range(2):  # the distance is exact, its gradient across a corner is not
+        apart = distance(at_y, at_z)
+        slope_y = (distance(at_y + reach, at_z) - distance(at_y - reach, at_z)) / (2.0 * reach)
+        slope_z = (distance(at_y, at_z + reach) - distance(at_y, at_z - reach)) / (2.0 * reach)
+        steep = np.maximum(slope_y**2 + slope_z**2, 0.25)
+        at_y, at_z = at_y - apart * slope_y / steep, at_z - apart * slope_z / steep
+    moves = np.zeros((2, *y.shape))
+    moves[0][between], moves[1][between] = at_y - y[between], at_z - z[between]
+    widest = FARTHEST_MOVE * np.minimum(np.gradient(y[:, 0])[:, None], np.gradient(z[0])[None, :])
+    moves = np.where(np.hypot(*moves) <= widest, moves, 0.0)
+    for _ in range(SWEEPS):
+        spread = np.zeros_like(moves)
+        spread[:, 1:-1, 1:-1] = 0.25 * (
+            moves[:, :-2, 1:-1] + moves[:, 2:, 1:-1] + moves[:, 1:-1, :-2] + moves[:, 1:-1, 2:]
+        )
+        moves = np.where(between, moves, spread)
+    return y + moves[0], z + moves[1]
+
+
+def _areas(y: Array, z: Array) -> Array:
+    """Of the columns [m²]; half the cross product of the diagonals."""
+    dy, dz = (at[1:, 1:] - at[:-1, :-1] for at in (y, z))
+    ey, ez = (at[:-1, 1:] - at[1:, :-1] for at in (y, z))
+    return np.asarray(0.5 * (dy * ez - dz * ey))
+
+
+def runs_of(present: NDArray[np.bool_], first: int, lanes: int = LANES) -> NDArray[np.int32]:
+    """Runs of consecutive numbers that hold all that are present, as multiples of the lanes, shape [runs, 2].
+
+    Args:
+        first: number of the first entry of `present`.
+    """
+    numbers = np.flatnonzero(present)
+    if not len(numbers):
+        return np.empty((0, 2), dtype=np.int32)
+    breaks = np.flatnonzero(np.diff(numbers) > 2 * lanes)
+    starts, stops = (
+        numbers[np.concatenate([[0], breaks + 1])],
+        numbers[np.concatenate([breaks, [len(numbers) - 1]])] + 1,
+    )
+    lengths = -(-(stops - starts) // lanes) * lanes
+    return np.asarray(first + np.stack([starts, starts + lengths], axis=1), dtype=np.int32)

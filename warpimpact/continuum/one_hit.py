@@ -1,0 +1,286 @@
+"""One hit on the CPU: its mesh and its core in arrays, the march, and what it took from whom."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import cache
+from typing import Any
+
+import numpy as np
+import warp as wp
+from numpy.typing import NDArray
+
+from warpimpact.continuum.meshing import SheetMesh, runs_of
+from warpimpact.kernels.continuum import fields, passing
+from warpimpact.kernels.status import RUNNING
+from warpimpact.kernels.variant import Variant
+from warpimpact.scene import Core
+from warpimpact.scene.flow import Flow
+from warpimpact.solver.device import find_device, load
+from warpimpact.solver.worker import NEVER, Cancel
+
+Array = NDArray[np.float64]
+
+STATIONS = 2049
+"""At which the radius of the core is tabulated."""
+STEPS = 100
+"""Of a launch: between two of them a computation can be broken off."""
+PENALTY = 0.5
+"""Share of the stiffness of an element that the contact has."""
+
+
+@dataclass(frozen=True)
+class Start:
+    """How the core of a hit begins: position from the hit [m], attitude, velocity [m/s], angular momentum [N m s]; its
+    mass [kg] and moments of inertia [kg m²]; and the friction of its surface."""
+
+    position: Array
+    attitude: Array
+    velocity: Array
+    angular_momentum: Array
+    mass: float
+    inertia_axial: float
+    inertia_transverse: float
+    friction: float
+
+
+@dataclass(frozen=True)
+class Energies:
+    """Where the kinetic energy that the core lost has gone [J].
+
+    Attributes:
+        lost: by the core.
+        given: to the nodes, by the contact.
+        kinetic, work, hourglass: of the nodes; of the stresses; of the resistance against hourglasses.
+    """
+
+    lost: float
+    given: float
+    kinetic: float
+    work: float
+    hourglass: float
+
+    @property
+    def contact(self) -> float:
+        """In the springs, the damping and the friction of the contact."""
+        return self.lost - self.given
+
+    @property
+    def imbalance(self) -> float:
+        """What is missing or too much, as a share of what was lost. A contact that gives energy counts, too."""
+        if self.lost <= 0.0:
+            return 0.0 if self.given == 0.0 else float("inf")
+        apart = abs(self.given - self.kinetic - self.work - self.hourglass)
+        return (apart + max(0.0, -self.contact)) / self.lost
+
+    @property
+    def hourglass_share(self) -> float:
+        """Of what was lost."""
+        return self.hourglass / self.lost if self.lost > 0.0 else 0.0
+
+
+@cache
+def built(double: bool) -> Any:
+    """The build of the march for a precision."""
+    return passing.build(Variant(double=double))
+
+
+class OneHit:
+    """A hit in memory.
+
+    Attributes:
+        flight: how far it is (kernels/continuum/fields.py).
+        left: state with which the core left each layer, shape [layers, 7].
+    """
+
+    def __init__(
+        self, core: Core, start: Start, sheets: list[SheetMesh], flows: list[Flow], double: bool = False
+    ) -> None:
+        self.device, self.stage = find_device("cpu"), built(double)
+        self.variant = Variant(double=double)
+        self.real, self.dtype = self.variant.real, np.dtype("f8" if double else "f4")
+        self.sheets, self.flows = sheets, flows
+        self.speed = float(np.linalg.norm(start.velocity))
+        self.mesh = self._mesh()
+        self.core = self._core(core, start)
+        rears = np.array([sheet.x[-1] for sheet in sheets])
+        self.limits = self.stage.Limits()
+        self.limits.rear, self.limits.longest = (
+            float(rears.max()),
+            30.0 * (float(rears.max()) + core.length) / self.speed,
+        )
+        self.rears = self._put(rears, wp.float64)
+        self.left = self._put(np.full((len(sheets), 7), np.nan), wp.float64)
+        self.flights = self._flights(start)
+        self.limits.impact_energy = self.core_energy
+
+    def _put(self, values: Any, dtype: Any) -> Any:
+        return wp.array(np.ascontiguousarray(values), dtype=dtype, device=self.device)
+
+    def _mesh(self) -> Any:
+        mesh, first, firsts = self.stage.Mesh(), 0, []
+        for sheet in self.sheets:
+            pad = sheet.plane + sheet.row + 32
+            firsts.append(first + pad)
+            first += 2 * pad + sheet.nodes
+        self.firsts = firsts
+        size = mesh.size = first
+        position, inverse_mass, alive = np.zeros((3, size)), np.zeros(size), np.zeros(size)
+        volume, length, runs, node_runs, masses = np.zeros(size), np.ones(size), [], [], []
+        for k, (sheet, at, flow) in enumerate(zip(self.sheets, firsts, self.flows, strict=True)):
+            inside = slice(at, at + sheet.nodes)
+            position[:, inside], present = sheet.positions, sheet.alive
+            alive[inside] = present
+            volume[inside], length[inside] = volumes_of(sheet)
+            mass = np.zeros(size)
+            masses.append(mass[inside])
+            for corner in (0, 1):
+                for offset in (0, sheet.row, sheet.plane, sheet.row + sheet.plane):
+                    mass[at + corner + offset : at + corner + offset + sheet.nodes] += (
+                        0.125 * flow.density * volume[inside] * present
+                    )
+            free = (mass[inside] > 0.0) & ~sheet.held
+            inverse_mass[inside] = np.divide(1.0, mass[inside], out=np.zeros(sheet.nodes), where=free)
+            runs += [(*run, k) for run in runs_of(present, at)]
+            node_runs += [(*run, k) for run in runs_of(mass[inside] > 0.0, at)]
+        self.inverse_mass, self._masses = inverse_mass, masses
+        mesh.sheets = wp.array(
+            [self._sheet(sheet, flow) for sheet, flow in zip(self.sheets, self.flows, strict=True)],
+            dtype=self.stage.Sheet,
+            device=self.device,
+        )
+        mesh.runs, mesh.node_runs = self._put(np.ravel(runs), wp.int32), self._put(np.ravel(node_runs), wp.int32)
+        given = {"position": position, "inverse_mass": inverse_mass, "alive": alive, "volume": volume, "length": length}
+        for name, values in given.items():
+            setattr(mesh, name, self._put(values.ravel().astype(self.dtype), self.real))
+        sizes = {"velocity": 3, "contact": 3, "contact_work": 1, "stress": 6, "strain": 1, "damage": 1, "heat": 1}
+        sizes |= {"work": 1, "hourglass_work": 1, "force": fields.COMPONENTS}
+        for name, count in sizes.items():
+            setattr(mesh, name, wp.zeros(count * size, dtype=self.real, device=self.device))
+        mesh.near = wp.full(size, 1.0, dtype=self.real, device=self.device)
+        mesh.crossing = wp.full(size, 1.0, dtype=self.real, device=self.device)
+        return mesh
+
+    def _sheet(self, sheet: SheetMesh, flow: Flow) -> Any:
+        filled = self.stage.Sheet()
+        filled.row, filled.plane = sheet.row, sheet.plane
+        filled.stiffness = PENALTY * flow.wave_modulus * sheet.spacing
+        for name, value in flow.constants.items():
+            setattr(filled, name, value)
+        return filled
+
+    def _core(self, core: Core, start: Start) -> Any:
+        filled = self.stage.Core()
+        filled.length, filled.centre_of_mass = core.length, core.mass_properties.centre_of_mass
+        radii = np.asarray(core.radius(np.linspace(0.0, core.length, STATIONS)))
+        filled.largest, filled.radii = float(radii.max()), self._put(radii, wp.float64)
+        filled.friction = start.friction
+        body = self.stage.rigid.Body()
+        body.mass, body.inertia_axial, body.inertia_transverse = (
+            start.mass,
+            start.inertia_axial,
+            start.inertia_transverse,
+        )
+        filled.body = body
+        self.start = start
+        return filled
+
+    def _flights(self, start: Start) -> Any:
+        state = self.stage.rigid.State()
+        state.position, state.velocity = wp.vec3d(*start.position), wp.vec3d(*start.velocity)
+        state.attitude, state.angular_momentum = wp.quatd(*start.attitude), wp.vec3d(*start.angular_momentum)
+        flight = self.stage.Flight()
+        flight.state, flight.first_touch, flight.last_touch, flight.status = state, -1.0, -1.0, RUNNING
+        shortest = min(
+            float((self.mesh.length.numpy()[at : at + sheet.nodes][sheet.alive]).min()) / flow.wave_speed
+            for sheet, at, flow in zip(self.sheets, self.firsts, self.flows, strict=True)
+        )
+        flight.step = flight.before = 0.5 * passing.COURANT * shortest
+        return wp.array([flight], dtype=self.stage.Flight, device=self.device)
+
+    @property
+    def flight(self) -> Any:
+        """How far the hit is, as a row of numpy."""
+        return self.flights.numpy()[0]
+
+    def advance(self, steps: int = STEPS) -> None:
+        """March by some steps."""
+        wp.launch(
+            self.stage.kernel,
+            1,
+            inputs=[self.core, self.limits, steps, self.mesh],
+            outputs=[self.flights, self.left, self.rears],
+            device=self.device,
+        )
+
+    def steps(self, cancel: Cancel = NEVER) -> Iterator[None]:
+        """March to the end; yields after every launch."""
+        load(self.stage.kernel, self.device)
+        while self.flight["status"] == RUNNING:
+            cancel.check()
+            self.advance()
+            yield
+
+    def mass_at(self, layer: int) -> Array:
+        """Of the nodes of a layer [kg], those that are held, too."""
+        return np.asarray(self._masses[layer])
+
+    @property
+    def touched(self) -> NDArray[np.bool_]:
+        """Whether the core touched each layer."""
+        work = self.mesh.contact_work.numpy()
+        return np.array([work[at : at + sheet.nodes].any() for sheet, at in zip(self.sheets, self.firsts, strict=True)])
+
+    @property
+    def core_energy(self) -> float:
+        """Of the core's translation and rotation [J]."""
+        state, start = self.flight["state"], self.start
+        x, y, z, w = (float(value) for value in state["attitude"])
+        axis = np.array([1 - 2 * (y * y + z * z), 2 * (x * y + z * w), 2 * (x * z - y * w)])
+        momentum, velocity = np.array(state["angular_momentum"]), np.array(state["velocity"])
+        along = float(momentum @ axis)
+        across = float(momentum @ momentum) - along**2
+        spin = along**2 / start.inertia_axial + max(0.0, across) / start.inertia_transverse
+        return 0.5 * (start.mass * float(velocity @ velocity) + spin)
+
+    @property
+    def energies(self) -> Energies:
+        """Where the energy has gone so far."""
+        mesh, size = self.mesh, self.mesh.size
+        velocity = mesh.velocity.numpy().astype(np.float64).reshape(3, size)
+        mass = np.divide(1.0, self.inverse_mass, out=np.zeros(size), where=self.inverse_mass > 0.0)
+        return Energies(
+            lost=self.limits.impact_energy - self.core_energy,
+            given=_total(mesh.contact_work),
+            kinetic=0.5 * float((mass * (velocity**2).sum(axis=0)).sum()),
+            work=_total(mesh.work),
+            hourglass=_total(mesh.hourglass_work),
+        )
+
+
+def volumes_of(sheet: SheetMesh) -> tuple[Array, Array]:
+    """Volume [m³] and length [m] of the elements at rest by one point of integration, shape [nodes] each; 0 and 1
+    beside the mesh."""
+    x = sheet.positions.reshape(3, len(sheet.x), *sheet.y.shape)
+    low, high = slice(None, -1), slice(1, None)
+    modes = []
+    for axis in range(3):
+        total = np.zeros((3, len(sheet.x) - 1, sheet.y.shape[0] - 1, sheet.y.shape[1] - 1))
+        for corner in np.ndindex(2, 2, 2):
+            sign = 1.0 if corner[axis] else -1.0
+            total += sign * x[(slice(None), *(high if at else low for at in corner))]
+        modes.append(total)
+    areas = [np.cross(modes[(k + 1) % 3], modes[(k + 2) % 3], axis=0) for k in range(3)]
+    volume = np.einsum("kabc,kabc->abc", modes[0], areas[0]) / 64.0
+    faces = np.max([np.sqrt((area**2).sum(axis=0)) for area in areas], axis=0)
+    shape = (len(sheet.x), *sheet.y.shape)
+    volumes, lengths = np.zeros(shape), np.ones(shape)
+    volumes[:-1, :-1, :-1] = np.where(sheet.solid, volume, 0.0)
+    lengths[:-1, :-1, :-1] = np.where(sheet.solid, 16.0 * volume / faces, 1.0)
+    return volumes.ravel(), lengths.ravel()
+
+
+def _total(values: Any) -> float:
+    """Sum of an array of the device."""
+    return float(values.numpy().astype(np.float64).sum())

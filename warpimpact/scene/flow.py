@@ -1,0 +1,116 @@
+"""What the continuum computes with: flow and failure of the materials, friction, and fineness (docs/continuum.md)."""
+
+import math
+from typing import Annotated, Literal
+
+from pydantic import Field
+
+from .core import Core
+from .model import Model
+from .target import Target
+from .units import NonNegativeNumber, NonNegativeStress, Number, PositiveDensity, PositiveLength, PositiveStress
+
+FINENESS = {"draft": 1.0, "standard": 2.0 / 3.0, "reference": 0.5}
+"""Size of an element over that of a draft, by fidelity."""
+OF_RADIUS, OF_THICKNESS, OF_LIGAMENT = 1.0 / 6.0, 1.0 / 4.0, 1.0 / 3.0
+"""Size of an element of a draft over the core's largest radius, the layer's thickness and its ligament, at most."""
+
+
+class Flow(Model):
+    """Constants of a material in the continuum: elastic, modified Johnson–Cook with two Voce terms, Cockcroft–Latham.
+
+    σ = (A + B ε^n + Σ Q (1 − e^(−C ε))) (1 + ε̇/ε̇₀)^c (1 − T*^m).
+
+    Attributes:
+        density: [kg/m³].
+        youngs_modulus: E [Pa].
+        poissons_ratio: ν.
+        yield_stress, hardening, exponent: A, B [Pa] and n.
+        voce_stress, voce_rate: Q [Pa] and C of the two terms.
+        rate_exponent, reference_rate: c, and ε̇₀ [1/s].
+        softening: m.
+        heat_capacity: [J/(kg K)].
+        melting_range: from the temperature before the shot to melting [K].
+        taylor_quinney: share of the plastic work that becomes heat.
+        fracture_work: W_cr, the integral of the largest principal stress over the plastic strain at fracture [Pa].
+    """
+
+    density: PositiveDensity = 7850.0
+    youngs_modulus: PositiveStress = 210.0e9
+    poissons_ratio: Annotated[Number, Field(ge=0.0, lt=0.5)] = 0.33
+    yield_stress: PositiveStress
+    hardening: NonNegativeStress = 0.0
+    exponent: NonNegativeNumber = 1.0
+    voce_stress: tuple[NonNegativeStress, NonNegativeStress] = (0.0, 0.0)
+    voce_rate: tuple[NonNegativeNumber, NonNegativeNumber] = (0.0, 0.0)
+    rate_exponent: NonNegativeNumber = 0.0
+    reference_rate: Annotated[Number, Field(gt=0.0)] = 5.0e-4
+    softening: Annotated[Number, Field(gt=0.0)] = 1.0
+    heat_capacity: Annotated[Number, Field(gt=0.0)] = 452.0
+    melting_range: Annotated[Number, Field(gt=0.0)] = 1507.0
+    taylor_quinney: Annotated[Number, Field(ge=0.0, le=1.0)] = 0.9
+    fracture_work: PositiveStress
+
+    @property
+    def shear_modulus(self) -> float:
+        """G [Pa]."""
+        return self.youngs_modulus / (2.0 * (1.0 + self.poissons_ratio))
+
+    @property
+    def bulk_modulus(self) -> float:
+        """K [Pa]."""
+        return self.youngs_modulus / (3.0 * (1.0 - 2.0 * self.poissons_ratio))
+
+    @property
+    def wave_modulus(self) -> float:
+        """K + 4G/3 [Pa]."""
+        return self.bulk_modulus + 4.0 / 3.0 * self.shear_modulus
+
+    @property
+    def wave_speed(self) -> float:
+        """Of dilatational waves [m/s]."""
+        return float((self.wave_modulus / self.density) ** 0.5)
+
+    @property
+    def constants(self) -> dict[str, float | tuple[float, float]]:
+        """Fields of a Sheet (kernels/continuum/fields.py)."""
+        given = ("density", "yield_stress", "hardening", "exponent", "voce_stress", "voce_rate", "rate_exponent")
+        return {name: getattr(self, name) for name in (*given, "reference_rate", "softening", "fracture_work")} | {
+            "bulk": self.bulk_modulus,
+            "shear": self.shear_modulus,
+            "wave_speed": self.wave_speed,
+            "heating": self.taylor_quinney / (self.density * self.heat_capacity * self.melting_range),
+        }
+
+
+class Continuum(Model):
+    """How hits are computed by finite elements.
+
+    Attributes:
+        flows: constants of the layers, the plate first; one set serves all.
+        friction: Coulomb's coefficient between core and target, which nobody has measured at these speeds.
+        fidelity: size of the elements: "draft" (half a millimetre for a core of 6 mm), "standard" or "reference".
+        spacing: size of the elements [m], in place of a fidelity.
+        double: double precision in place of single.
+    """
+
+    flows: Annotated[tuple[Flow, ...], Field(min_length=1)]
+    friction: NonNegativeNumber = 0.0
+    fidelity: Literal["draft", "standard", "reference"] = "draft"
+    spacing: PositiveLength | None = None
+    double: Annotated[bool, Field(strict=True)] = False
+
+    def flow(self, layer: int) -> Flow:
+        """Constants of a layer."""
+        return self.flows[min(layer, len(self.flows) - 1)]
+
+    def spacings(self, core: Core, target: Target) -> list[float]:
+        """Size of the elements of each layer [m]."""
+        if self.spacing is not None:
+            return [self.spacing] * len(target.layers)
+        share, radius = FINENESS[self.fidelity], OF_RADIUS * core.max_radius
+        ligaments = (layer.ligament if layer.ligament > 0.0 else math.inf for layer in target.layers)
+        return [
+            share * min(radius, OF_THICKNESS * layer.thickness, OF_LIGAMENT * ligament)
+            for layer, ligament in zip(target.layers, ligaments, strict=True)
+        ]
