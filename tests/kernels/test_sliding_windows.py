@@ -61,7 +61,7 @@ def test_a_window_that_follows_the_core_has_the_bits_of_a_wide_one(
     target: tuple[Plate, ...], impact: dict[str, float], device: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(windows, "SLACK", 0.2)  # narrow, so that they have to slide often
-    monkeypatch.setattr(windows, "DEEP", 0.1)
+    monkeypatch.setattr(windows, "WIDER_BEHIND", 0.1)
     wide, follows = (marched(target, impact, device, slide=slide) for slide in (False, True))
     for name, values in wide.outcomes.items():
         np.testing.assert_array_equal(follows.outcomes[name], values, err_msg=name)
@@ -71,7 +71,7 @@ def test_a_window_that_follows_the_core_has_the_bits_of_a_wide_one(
 
 def test_a_replay_keeps_all_that_the_core_has_passed(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(windows, "SLACK", 0.2)
-    monkeypatch.setattr(windows, "DEEP", 0.1)
+    monkeypatch.setattr(windows, "WIDER_BEHIND", 0.1)
     target, impact = (PLATE, behind(SOFT, 0.05)), {"obliquity": 45.0, "azimuth": 250.0}
     wide = marched(target, impact, "cpu", slide=False)
     scene = Scene(core=PAPER_CORE, target=Target(layers=target))

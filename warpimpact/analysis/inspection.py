@@ -21,7 +21,7 @@ from warpimpact.results.dataset import passed
 from warpimpact.results.outlines import outlines
 from warpimpact.view import svg
 
-_MOST = 2000
+_MOST_HITS = 2000
 """Hits that a drawing has."""
 _PASSED, _STOPPED, _FAILED, _EDGE = "#D55E00", "#56B4E9", "#000000", "#d8d8d8"
 
@@ -67,7 +67,7 @@ def _drawing(dataset: xarray.Dataset) -> str:
     if attr.PLATE_PERIOD not in dataset.attrs:
         return ""
     needed = [name for name in (v.STATUS, v.BURST_ORDER) if name in dataset]
-    some = dataset[needed].isel(hit=slice(_MOST)).load()
+    some = dataset[needed].isel(hit=slice(_MOST_HITS)).load()
     hits, status, came = hit_points(some), some[v.STATUS].values, passed(some)
     half = np.maximum(0.5 * np.asarray(dataset.attrs[attr.PLATE_PERIOD]), np.abs(hits).max(axis=0))
     holes = outlines(dataset)

@@ -20,7 +20,7 @@ from warpimpact.results.measures import Measure
 from warpimpact.statistics.intervals import Estimate
 from warpimpact.view.view import Column, Section, Table, number
 
-SHOWN = (f"mean({v.RESIDUAL_VELOCITY})", f"mean({v.DEFLECTION})", f"mean({v.TILT})", "P(perforated)")
+SHOWN_OF_SWEEPS = (f"mean({v.RESIDUAL_VELOCITY})", f"mean({v.DEFLECTION})", f"mean({v.TILT})", "P(perforated)")
 """Measures that are shown of a sweep unless others are asked for, as far as it has them."""
 
 
@@ -39,7 +39,8 @@ class Point(NamedTuple):
 
 
 def measures_of(sweep: xarray.Dataset, texts: Sequence[str] = ()) -> list[Measure]:
-    """The measures that are asked of a sweep, without a text those of `SHOWN`; of tilts the largest stand-off counts.
+    """The measures that are asked of a sweep, without a text those of `SHOWN_OF_SWEEPS`; of tilts the largest stand-off
+    counts.
 
     Raises:
         ResultError: a text is no measure, or the sweep lacks what it needs.
@@ -47,7 +48,7 @@ def measures_of(sweep: xarray.Dataset, texts: Sequence[str] = ()) -> list[Measur
     try:
         if texts:
             return [Measure.parse(text).of(sweep) for text in texts]
-        measures = [Measure.parse(text) for text in SHOWN]
+        measures = [Measure.parse(text) for text in SHOWN_OF_SWEEPS]
         return [measure.of(sweep) for measure in measures if not measure.quantity.lacking(sweep)]
     except ValueError as error:
         raise ResultError(f"measure: {error}") from None

@@ -8,14 +8,14 @@ from pydantic_core import ErrorDetails
 from ..scene.units import brief, quoted
 
 _CHOICES = ("shape", "distribution", "name")
-_MOST = 8
+_MOST_PROBLEMS = 8
 """Most problems of a file that a sentence names."""
 
 
 def sentence(error: ValidationError, data: dict[str, Any]) -> str:
     """The first problems as a sentence, and how many more there are."""
     problems = [problem for problem in error.errors(include_url=False) if not _follows(problem, error)]
-    described = [_described(problem, data) for problem in problems[:_MOST]]
+    described = [_described(problem, data) for problem in problems[:_MOST_PROBLEMS]]
     if (more := len(problems) - len(described)) > 0:
         described.append(f"{more} more problem{'s' if more > 1 else ''}")
     return "; also ".join(described)

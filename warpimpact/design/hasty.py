@@ -8,7 +8,7 @@ from typing import cast
 import h11
 from uvicorn.protocols.http.h11_impl import H11Protocol
 
-LIMIT = 10.0
+REQUEST_SECONDS = 10.0
 """Seconds for a request to arrive, from the opening of its connection or from its first byte on. Between two requests
 uvicorn itself closes a connection (`timeout_keep_alive`)."""
 
@@ -35,7 +35,7 @@ class Hasty(H11Protocol):
         if self.conn.their_state not in (h11.IDLE, h11.SEND_BODY):
             self._forget()
         elif self._closing is None:
-            self._closing = self.loop.call_later(LIMIT, self.transport.close)
+            self._closing = self.loop.call_later(REQUEST_SECONDS, self.transport.close)
 
     def _forget(self) -> None:
         if self._closing is not None:

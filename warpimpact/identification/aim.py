@@ -14,7 +14,7 @@ from warpimpact.scene.symmetry import irreducible_part
 
 REPLICATES = 8
 """Parts of the hit points, every eighth point each: their spread tells how well the hits are integrated out."""
-STEPS = 0.7548776662466927, 0.5698402909980532
+POINT_STEPS = 0.7548776662466927, 0.5698402909980532
 """From one point to the next along y and z, as shares of the part of the cell, modulo 1: the powers of the root of
 x³ = x + 1, whose points leave no wide gaps (M. Roberts, "The unreasonable effectiveness of quasirandom sequences",
 2018)."""
@@ -72,7 +72,7 @@ def aim(shot: MeasuredShot, plate: Plate, core: Core, sampling: Sampling, shifts
     group, cell = symmetries_used(shot.impact, alike, plate), np.array(plate.sampled_cell)
     numbers = alike.model_copy(update={"irreducible": False})  # of what scatters: images share them
     shots = Sampler(shot.impact, numbers, plate, shot.scatter).shots(0, count)
-    shares = np.mod(shifts[:, None] + np.arange(count)[:, None] * STEPS, 1.0).reshape(-1, 2).T
+    shares = np.mod(shifts[:, None] + np.arange(count)[:, None] * POINT_STEPS, 1.0).reshape(-1, 2).T
     if isinstance(shot.hit, HitPlace):
         hit_y, hit_z = shot.hit.at(*shares)
     else:

@@ -31,7 +31,7 @@ def sweep_figure(sweep: xarray.Dataset, texts: Sequence[str] = ()) -> Figure:
 
     Args:
         sweep: a Dataset of `studies.sweep.joined`.
-        texts: of measures; by default those of `analysis.swept.SHOWN`.
+        texts: of measures; by default those of `analysis.swept.SHOWN_OF_SWEEPS`.
 
     Raises:
         ResultError: as in `analysis.swept.measures_of`.

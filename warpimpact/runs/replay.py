@@ -19,7 +19,7 @@ from warpimpact.solver import replay as solver
 from warpimpact.solver.limit import short_steps, with_thickness, with_velocity
 from warpimpact.solver.unfold import image_of
 
-ROUNDING = {v.RESIDUAL_VELOCITY: 0.1, v.DEFLECTION: 0.5, v.TILT: 0.5}
+DEVICE_ROUNDING = {v.RESIDUAL_VELOCITY: 0.1, v.DEFLECTION: 0.5, v.TILT: 0.5}
 """Largest change of an outcome by the rounding of another device [m/s, degree]. Between single and double precision,
 6144 hits on the slotted plate (825, 300 and 200 m/s) differ by 0.012 m/s and 0.04 degrees at most."""
 _OF_A_MAP = (
@@ -138,7 +138,7 @@ def _agreement(end: xarray.Dataset, stored: xarray.Dataset) -> str:
         return "bit-identical"
     close = all(
         np.allclose(end[name], stored[name], rtol=0.0, atol=tolerance, equal_nan=True)
-        for name, tolerance in ROUNDING.items()
+        for name, tolerance in DEVICE_ROUNDING.items()
     )
     return "within rounding" if close and all(_alike(end[name], stored[name]) for name in names) else "different"
 

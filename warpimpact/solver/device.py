@@ -75,7 +75,7 @@ def _start_warp() -> None:
                     os.write(2, line)
 
 
-SMALL = 2**24
+SMALL_MEMORY = 2**24
 """Bytes that any machine has: whether so few are free is not asked, as the answer takes as long as some shots."""
 
 

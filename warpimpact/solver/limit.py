@@ -35,7 +35,7 @@ HIGHEST_VELOCITY = 3000.0
 """Largest impact velocity tried [m/s]."""
 THICKEST = 16.0
 """Largest thickness tried, in thicknesses of the plate."""
-STEPS = 6.0
+STEPS_OF_LIMITS = 6.0
 """How many times shorter than elsewhere a step is. It follows from the impact velocity, but near its limit a core is
 slow for a while, and touches by a small share of its speed. With the step of a hit map limit velocities in a slotted
 plate are off by 140 m/s of 210 m/s (90 % of the hits), with this one by 2 m/s."""
@@ -106,7 +106,7 @@ def limit_velocity(
 
     Args:
         shots: their own velocities are the first ones tried.
-        numerics: as in `simulate`; of an accuracy its `limit` counts. A level has short steps (STEPS).
+        numerics: as in `simulate`; of an accuracy its `limit` counts. A level has short steps (STEPS_OF_LIMITS).
         device, threads, progress: as in `simulate`; progress counts shots whose search has ended.
         tolerance: how far lower and upper may lie apart [m/s].
         highest: largest velocity tried [m/s].
@@ -296,10 +296,10 @@ def with_thickness(layer: int, shots: Shots, values: Array) -> Shots:
 
 
 def short_steps(numerics: Numerics) -> Numerics:
-    """Numerics as limits need them: a level has steps that are STEPS times shorter."""
+    """Numerics as limits need them: a level has steps that are STEPS_OF_LIMITS times shorter."""
     if numerics.level is None or numerics.travel is not None or numerics.explicit == "scheme" or numerics.time_step:
         return numerics
-    return numerics.model_copy(update={"travel": level_of(numerics).travel / STEPS})
+    return numerics.model_copy(update={"travel": level_of(numerics).travel / STEPS_OF_LIMITS})
 
 
 def check_arrests(scene: Scene, shots: Shots | None = None) -> None:

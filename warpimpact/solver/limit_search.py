@@ -27,7 +27,7 @@ STAGES = 3
 DOUBT = 0.35, 0.2, 0.12
 """How uncertain the limit is that one, two and three passages tell, as a share of its distance from the nearest one, as
 long as no other hits have shown it."""
-FAR = 5.0
+TELLING = 5.0
 """Tolerances, beyond which a passage shows how far off a limit was that it told."""
 BESIDE = 0.4
 """How far beside the expected limit a run is made that is to come close to it, in tolerances."""
@@ -200,7 +200,7 @@ class LimitSearch:
         nearest one, shape [STAGES, shots]; NaN where there were fewer or this one was within some tolerances."""
         with np.errstate(invalid="ignore", divide="ignore"):
             share = np.abs(self.foreseen - self.value()) / self.distance
-        return np.where(self.distance > FAR * self.tolerance, share, np.nan)
+        return np.where(self.distance > TELLING * self.tolerance, share, np.nan)
 
     def _drive(self, value: Array) -> Array:
         return value**2 if self.rising else value

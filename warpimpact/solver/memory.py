@@ -16,7 +16,7 @@ from warpimpact.kernels import free_flight, lanes, march
 from warpimpact.kernels.trace import WIDTH
 from warpimpact.records.group import Returned
 from warpimpact.solver import earlier as earlier_hits
-from warpimpact.solver.device import SMALL, free_memory, load
+from warpimpact.solver.device import SMALL_MEMORY, free_memory, load
 from warpimpact.solver.prepare import Prepared
 from warpimpact.solver.structs import Put, empty, filled, inputs_of
 from warpimpact.solver.windows import Cells
@@ -109,7 +109,7 @@ class Memory:
         count, nodes = self.at_a_plate, max(sum(self.prepared.nodes(cells)), self._pierced(cells))
         wanted = threads if self.device.is_cpu else min(CUDA_CHUNK, len(self.prepared.shots) // count)
         bytes_of_one = self.slot_bytes(cells)
-        fitting = wanted if wanted * bytes_of_one <= SMALL else int(MEMORY_SHARE * self._free / bytes_of_one)
+        fitting = wanted if wanted * bytes_of_one <= SMALL_MEMORY else int(MEMORY_SHARE * self._free / bytes_of_one)
         return min(wanted, fitting, (2**31 - 1) // (count * max(nodes, 1)))
 
     def too_large(self, cells: Cells) -> str:

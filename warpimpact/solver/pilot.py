@@ -2,14 +2,14 @@
 
 A pilot computes 64 of a run's shots on levels of LADDER, coarse to fine, and takes the coarsest level whose error is
 within the promise. The error of a level is its change to the level two finer, because neighbours err alike, times
-MARGIN for what the finer one errs by. Of the shots an order statistic counts that rarely lies below the promised
-percentile (changes.py). Where 64 shots leave the choice open, 128 and 256 are computed. Where the error is far beyond
-the promise, the next level is left out. The search ends where errors stall, where a level costs more than it is worth,
-and one level behind the first that nearly keeps the promise: with errors of slow cores weighed by their energy, because
-near the limit velocity those of speeds have no bound. If no level keeps the promise, the run takes the first that
-nearly does, else the coarsest whose errors are about the smallest, and tells its change to the finest level computed. A
-long run then takes coarser levels of single settings that keep the promise, too. Limits, of which a pilot has 16, and
-the measure of a stop rule choose their level in the same way, by errors of their own.
+ERROR_PER_CHANGE for what the finer one errs by. Of the shots an order statistic counts that rarely lies below the
+promised percentile (changes.py). Where 64 shots leave the choice open, 128 and 256 are computed. Where the error is far
+beyond the promise, the next level is left out. The search ends where errors stall, where a level costs more than it is
+worth, and one level behind the first that nearly keeps the promise: with errors of slow cores weighed by their energy,
+because near the limit velocity those of speeds have no bound. If no level keeps the promise, the run takes the first
+that nearly does, else the coarsest whose errors are about the smallest, and tells its change to the finest level
+computed. A long run then takes coarser levels of single settings that keep the promise, too. Limits, of which a pilot
+has 16, and the measure of a stop rule choose their level in the same way, by errors of their own.
 """
 
 from __future__ import annotations
@@ -47,10 +47,10 @@ OPEN, OPEN_MEASURE = (0.7, 1.5), (0.7, 3.0)
 of which four times as many shots leave half."""
 OPEN_STATUS = 2
 """Shots that end otherwise, up to which their share is too uncertain to break the promise."""
-MARGIN = {1: 2.0, 2: 1.4}
+ERROR_PER_CHANGE = {1: 2.0, 2: 1.4}
 """Error of a level over its change, by the number of levels to the finer one. In 40 random scenes 83 to 98 % of the
 estimates are then at least the 90th percentile that other hits show (tests/benchmarks/random_scenes.py)."""
-FAR = 4.0
+SKIPS_A_LEVEL = 4.0
 """Errors over what is allowed, above which the next level is left out: errors about halve from level to level."""
 STALLED = 0.7
 """Share of an error left two levels on, above which finer levels are of little use: a quarter is left where it
@@ -99,7 +99,12 @@ def climb(
             enough, last = level, min(last, level + beyond)
         if any(verdict.typical > STALLED * tried[coarser].typical for coarser in tried if coarser <= level - 2):
             last = level
-        far = verdict.excess > FAR and enough is None and level + 2 <= last and worth(level + 2, finer(level + 2))
+        far = (
+            verdict.excess > SKIPS_A_LEVEL
+            and enough is None
+            and level + 2 <= last
+            and worth(level + 2, finer(level + 2))
+        )
         level += 2 if far else 1
     smallest = min((verdict.excess for verdict in tried.values()), default=math.inf)
     alike = (level for level, verdict in tried.items() if STALLED * verdict.excess <= smallest)
@@ -244,7 +249,7 @@ class _Pilot:
     ) -> tuple[HitErrors, Verdict]:
         """`changes.compared` of this pilot's shots, with numerics of a level."""
         assert numerics.level is not None
-        margin, shots = MARGIN[min(2, len(LADDER) - 1 - numerics.level)], self.shots[: len(fine)]
+        margin, shots = ERROR_PER_CHANGE[min(2, len(LADDER) - 1 - numerics.level)], self.shots[: len(fine)]
         return compared(numerics, self.numerics.asked, (coarse, between, fine), margin, shots, self.free)
 
     def tell_to_finest(self, level: int) -> None:
@@ -308,7 +313,7 @@ def pilot_limits(limits_at: Callable[[int], Array], numerics: Numerics, quantity
 
     def judge(level: int, finer: int) -> Verdict:
         change, half, typical = limit_changes(limits(level), limits(finer), asked.share)
-        margin, allowed = MARGIN[finer - level], limit * typical
+        margin, allowed = ERROR_PER_CHANGE[finer - level], limit * typical
         kept, excess = margin * change <= allowed, margin * half / max(allowed, 1e-30)
         tried[level] = LimitErrors(at_level(level, numerics), kept, asked.share, margin * change, quantity, finer)
         return Verdict(kept, excess, excess, excess)

@@ -44,7 +44,7 @@ class Level:
 
 
 SLENDER = 1.0 / 7.0
-DEEP = 2.0
+ACTING_DEPTHS = 2.0
 """Of the degradation depth: a passage no longer than that leaves a step within the depth."""
 ALONG = 1.6
 """Way of a step in the plane of a plate, in degradation lengths and per unit of `travel`: contact that sweeps sideways
@@ -156,7 +156,7 @@ class Resolution:
 
     def passage(self, thickness: ArrayLike, depth: ArrayLike, *, weakens: bool) -> Array:
         """Way [m] on which a plate acts on a core, for some thicknesses and degradation depths [m], of their shape."""
-        acting = np.minimum(thickness, DEEP * np.asarray(depth)) if weakens else thickness
+        acting = np.minimum(thickness, ACTING_DEPTHS * np.asarray(depth)) if weakens else thickness
         return np.minimum(acting, self.slender)
 
     def way_along(self, plate: Plate, length: ArrayLike, *, weakens: bool, behind: bool) -> Array:

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from warpimpact.scene.patterns import WHOLE_CELL
 from warpimpact.scene.patterns.pattern import Check, no_end
-from warpimpact.solver.device import SMALL, free_memory
+from warpimpact.solver.device import SMALL_MEMORY, free_memory
 from warpimpact.solver.keys import Key
 
 if TYPE_CHECKING:
@@ -144,7 +144,7 @@ def check_tiles(tiles: Mapping[Tile, str]) -> None:
         tiles: with the places of their plates in a campaign.
     """
     needed, seconds = sum(tile.bytes for tile in tiles), sum(tile.seconds for tile in tiles)
-    if needed <= SMALL:
+    if needed <= SMALL_MEMORY:
         return
     free = free_memory() + sum(tile.bytes for tile in tiles if tile.built)
     if needed <= min(MOST_BYTES, free) and seconds <= MOST_SECONDS:

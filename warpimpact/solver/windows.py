@@ -23,7 +23,7 @@ shared memory that a block of every CUDA device has."""
 SLACK, NODAL_SLACK = 1.6, 1.2
 """Half the width of a first window for a straight shot, in radii of the core. It is smaller for the literal scheme: on
 its fine grid, large windows cost more time than the repetition of some shots."""
-DEEP = 0.6
+WIDER_BEHIND = 0.6
 """Half of what the first window of a layer behind the plate is wider than that of the plate, in largest distances of
 the core's surface from its centre of mass: the core arrives turned."""
 
@@ -73,7 +73,7 @@ def windows_behind(
         spacing = np.array([grids[k].spacing for grids in plates])[which]
         taps = np.array([len(grids[k].taps) for grids in plates])[which]
         thicker = np.maximum(0.0, material.together - materials[0].together)
-        half = 0.5 * own[0] * wide + DEEP * core.bounding_radius + thicker * steep
+        half = 0.5 * own[0] * wide + WIDER_BEHIND * core.bounding_radius + thicker * steep
         count = 2 * (np.ceil(half / spacing).astype(np.int64) + 2 * taps + 3)
         own.append(count if material.weakens or burst else np.zeros_like(own[0]))
     return np.stack([own[material.laminate] for material in materials])

@@ -91,7 +91,7 @@ def test_it_asks_for_its_token(address: str, token: str) -> None:
 
 
 def test_a_socket_that_sends_no_whole_request_is_closed(address: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(hasty, "LIMIT", 0.5)
+    monkeypatch.setattr(hasty, "REQUEST_SECONDS", 0.5)
     place = urlsplit(address)
     headers = f"Host: {place.netloc}\r\nOrigin: http://{place.netloc}\r\nContent-Length: 9\r\n"
     begun = ["", f"GET {place.path} HT", f"POST {place.path}compute HTTP/1.1\r\n{headers}\r\n{{"]
@@ -106,7 +106,7 @@ def test_a_socket_that_sends_no_whole_request_is_closed(address: str, monkeypatc
 
 
 def test_bytes_that_trickle_do_not_keep_a_socket(address: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(hasty, "LIMIT", 0.5)
+    monkeypatch.setattr(hasty, "REQUEST_SECONDS", 0.5)
     place = urlsplit(address)
     with socket.create_connection((place.hostname, place.port)) as one, suppress(ConnectionError):
         one.settimeout(0.05)

@@ -73,7 +73,7 @@ def test_shots_that_leave_the_window_of_their_block_are_computed_in_the_simple_l
 def test_shots_that_do_not_leave_theirs_keep_what_layers_and_histories_have_of_them(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    monkeypatch.setattr(windows, "DEEP", 0.2)  # so that a core leaves its window of the base if it is turned
+    monkeypatch.setattr(windows, "WIDER_BEHIND", 0.2)  # so that a core leaves its window of the base if it is turned
     slots = SlotPattern(length=12e-3, width=4e-3, spacing=(8e-3, 16e-3), staggered=True)
     base = Layer(**PLATE.model_dump(), gap=0.1)
     scene = Scene(core=CORE, target=Target(layers=(PLATE.model_copy(update={"pattern": slots}), base)))

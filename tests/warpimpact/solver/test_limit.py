@@ -12,7 +12,7 @@ from warpimpact.kernels.status import Status
 from warpimpact.records.outcomes import Outcomes
 from warpimpact.scene import CirclePattern, Layer, Numerics, OgiveCore, Plate, Scene, Shots, Target
 from warpimpact.solver import limit
-from warpimpact.solver.limit import STEPS, Sought, limit_thickness, limit_velocity, short_steps
+from warpimpact.solver.limit import STEPS_OF_LIMITS, Sought, limit_thickness, limit_velocity, short_steps
 from warpimpact.solver.limit_near import Neighbours
 from warpimpact.solver.limit_search import MOST_RUNS, Guess, LimitSearch
 from warpimpact.solver.prepare import Prepared
@@ -37,7 +37,7 @@ def shots(count: int, velocity: float = 800.0, **own: object) -> Shots:
 def test_short_steps_follow_from_the_level_of_the_step(coarser: dict[str, int], level: int) -> None:
     numerics = Numerics(level=4, coarser=coarser)
     short = short_steps(numerics)
-    assert short.travel == LADDER[level].travel / STEPS
+    assert short.travel == LADDER[level].travel / STEPS_OF_LIMITS
     assert short == numerics.model_copy(update={"travel": short.travel})  # patches and grid stay
     given = numerics.model_copy(update={"travel": 0.3})
     assert short_steps(given) == given

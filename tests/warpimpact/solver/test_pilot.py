@@ -19,9 +19,9 @@ from warpimpact.solver import pilot
 from warpimpact.solver.changes import Verdict, changes, ended_otherwise
 from warpimpact.solver.findings import HitErrors, LimitErrors, errors_text, upper_digits
 from warpimpact.solver.pilot import (
+    ERROR_PER_CHANGE,
     FINEST_LIMIT,
     LIMITS,
-    MARGIN,
     PART,
     ROOM,
     climb,
@@ -155,7 +155,7 @@ def test_a_promise_that_cannot_be_kept_ends_at_the_finest_level_that_may_be_take
     assert (found.kept, found.numerics) == (False, Numerics(level=level))
     coarse, fine = (simulate(SCENE, PILOT[:4], numerics=Numerics(level=k), device="cpu") for k in (level, finer))
     largest = np.abs(coarse.residual_velocity - fine.residual_velocity).max()
-    assert found.residual_velocity_error == pytest.approx(MARGIN[finer - level] * largest)
+    assert found.residual_velocity_error == pytest.approx(ERROR_PER_CHANGE[finer - level] * largest)
 
 
 def test_levels_that_do_not_fit_the_memory_end_the_search() -> None:
@@ -250,7 +250,7 @@ def test_errors_do_not_stall_where_it_is_the_status_that_gets_better(
         speed = stopping.layer_residual_velocity + 100.0 * (at.level % 4 < 2)
         return stopping.assign(layer_residual_velocity=speed, status=ends if at.level == 0 else stopping.status)
 
-    from_level(0, SHOTS=32, FAR=math.inf)
+    from_level(0, SHOTS=32, SKIPS_A_LEVEL=math.inf)
     pilot_hits(outcomes_at, PILOT, Numerics(), dear, (True, True))
     assert [level for level in sorted(set(seen)) if level + 2 in seen] == levels
 
@@ -274,7 +274,7 @@ def test_a_pilot_looks_at_levels_that_are_worth_their_time(
         seen.append(at.level)  # errors fall to half from level to level, and the fifth keeps the promise
         return known[:16].assign(residual_velocity=known[:16].residual_velocity + 40.0 * 0.5**at.level)
 
-    from_level(0, SHOTS=16, FURTHER=2, FAR=math.inf)
+    from_level(0, SHOTS=16, FURTHER=2, SKIPS_A_LEVEL=math.inf)
     found = pilot_hits(outcomes_at, PILOT[:16], Numerics(accuracy={"residual_velocity": 3.0}), price)
     assert sorted(level for level in set(seen) if level + 2 in seen) == tried
     assert found.kept == (tried[-1] == 4)
@@ -294,7 +294,7 @@ def test_errors_of_a_promise_that_is_not_kept_are_those_to_the_finest_level(
     asked = Numerics(accuracy={"residual_velocity": 1.0})
     found = pilot_hits(outcomes_at, PILOT[:count], asked, lambda level: price.get(level, 1.0))
     assert (found.kept, found.numerics.level) == (False, 0)
-    assert found.residual_velocity_error == pytest.approx(MARGIN[2] * 10.0 * to)
+    assert found.residual_velocity_error == pytest.approx(ERROR_PER_CHANGE[2] * 10.0 * to)
     assert found.tried[0].errors == found
     assert len(found.tried[0].coarse) == len(found.tried[0].fine) == count
 
@@ -345,7 +345,7 @@ def test_as_many_hits_of_a_coarser_level_do_not_tell_the_share_that_ends_otherwi
         status = np.where((np.arange(32) == 0) & (at.level == 1), other, stopping.status)
         return stopping.assign(layer_residual_velocity=behind, status=status)
 
-    from_level(0, SHOTS=32, FAR=math.inf)
+    from_level(0, SHOTS=32, SKIPS_A_LEVEL=math.inf)
     found = pilot_hits(outcomes_at, PILOT, Numerics(), dear, (True, True))
     assert [each.errors.status_error for each in found.tried] == [0.0, 1.0 / 32.0, 0.0]
     assert (found.kept, found.numerics.level) == (True, 2)
@@ -360,7 +360,7 @@ def test_a_pilot_doubles_its_hits_until_they_tell_enough(
     def outcomes_at(at: Numerics, some: Shots) -> Outcomes:
         counts.append(len(some))
         one = known[: len(some)]
-        return one.assign(residual_velocity=one.residual_velocity + error / MARGIN[2] * (at.level == 0))
+        return one.assign(residual_velocity=one.residual_velocity + error / ERROR_PER_CHANGE[2] * (at.level == 0))
 
     from_level(0, SHOTS=16, FURTHER=0)
     found = pilot_hits(outcomes_at, BOTH, Numerics(accuracy={"residual_velocity": 1.0}), dear)
@@ -478,7 +478,7 @@ def test_coarser_settings_are_tried_as_far_as_there_is_room(
 
     def compared(at: Numerics, asked: Accuracy, given: Any, margin: float, *rest: Any) -> tuple[HitErrors, Verdict]:
         name, finer = str(at.coarser or ""), min(level + 2, 9)
-        assert margin == MARGIN[finer - level]
+        assert margin == ERROR_PER_CHANGE[finer - level]
         for outcomes, of in zip(given, (name or f"level {level}", f"level {level}", f"level {finer}"), strict=True):
             np.testing.assert_array_equal(outcomes.residual_velocity, velocities[of])
         over = excess.get(name, 2.0)
@@ -519,13 +519,18 @@ def few(times: float) -> NDArray[np.float64]:
     [
         # Neighbours agree, and the limit lies 4 % away from the first ones.
         (lambda k: 104.0 if k < 2 else 100.0, True, 2, 0.0),
-        (lambda k: 100.0 + 1.0 / 2**k, True, 0, MARGIN[2] * 0.75),
+        (lambda k: 100.0 + 1.0 / 2**k, True, 0, ERROR_PER_CHANGE[2] * 0.75),
         # The finest level that is taken has one finer beside it.
-        (lambda k: 100.0 + 90.0 * 0.6**k, False, FINEST_LIMIT, MARGIN[1] * 90.0 * 0.4 * 0.6**FINEST_LIMIT),
+        (lambda k: 100.0 + 90.0 * 0.6**k, False, FINEST_LIMIT, ERROR_PER_CHANGE[1] * 90.0 * 0.4 * 0.6**FINEST_LIMIT),
         # Half are within the promise from the first level on. One in eight errs four times as much: these are within it
         # two levels on; with eight times as much they are not.
-        (lambda k: 100.0 + 90.0 * few(4.0) * SHARE / 2**k, True, 2, MARGIN[2] * 90.0 * 4.0 * SHARE * 0.75 / 4.0),
-        (lambda k: 100.0 + 90.0 * few(8.0) * SHARE / 2**k, False, 0, MARGIN[2] * 90.0 * 8.0 * SHARE * 0.75),
+        (
+            lambda k: 100.0 + 90.0 * few(4.0) * SHARE / 2**k,
+            True,
+            2,
+            ERROR_PER_CHANGE[2] * 90.0 * 4.0 * SHARE * 0.75 / 4.0,
+        ),
+        (lambda k: 100.0 + 90.0 * few(8.0) * SHARE / 2**k, False, 0, ERROR_PER_CHANGE[2] * 90.0 * 8.0 * SHARE * 0.75),
     ],
 )
 def test_the_level_of_limits(limit_at: Callable[[int], ArrayLike], kept: bool, level: int, error: float) -> None:
