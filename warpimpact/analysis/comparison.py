@@ -24,8 +24,9 @@ from typing import NamedTuple
 import numpy as np
 import xarray
 
+from warpimpact.analysis.assumptions import AS_GIVEN, moved_apart
 from warpimpact.analysis.comparable import check_same_question, other_shots
-from warpimpact.analysis.comparison_text import Comparison, Contestant, Difference, Pair
+from warpimpact.analysis.comparison_text import Comparison, Contestant, Difference, Pair, Verdict
 from warpimpact.analysis.effectiveness import Score, Scored, depth_note, measures_of, ratio_of_draws, scores
 from warpimpact.analysis.numbers import of_each
 from warpimpact.analysis.plate_text import solid_note, solid_plate
@@ -80,7 +81,7 @@ def compare(
     differ_in_weight, by_ratio = _differ_in_weight(datasets), set()
     each = confidence_of_each(confidence, len(pairs))
     of_plates: list[list[Score]] = [[] for _ in datasets]
-    differences = []
+    differences, verdicts = list[Difference](), list[Verdict]()
     for scored in zip(
         *(
             scores(dataset, [measure for measure in measures if measure.quantity.name in common])
@@ -109,6 +110,7 @@ def compare(
             why = why_not_by_draws(drawn, independent=pair.independent, by_ratio=is_ratio)
             survival = survival_of(both, drawn, interval, reason=why, confidence=(confidence, each))
             differences.append(Difference(measure.text, names[i], names[j], *interval, survival))
+            verdicts += _verdicts((scored[i], scored[j]), both, (names[i], names[j]), each, paired=paired)
     plates = tuple(
         Contestant(
             name,
@@ -122,7 +124,39 @@ def compare(
     )
     at_equal_weight = frozenset(by_ratio) if differ_in_weight else None
     notes = (*_notes(datasets, names), *_notes_of_bases(datasets, plates))
-    return Comparison(plates, tuple(differences), tuple(used), at_equal_weight, confidence, notes)
+    told = tuple(differences), tuple(used), at_equal_weight, confidence, notes, tuple(verdicts)
+    return Comparison(plates, *told)
+
+
+def _verdicts(
+    scored: tuple[Scored, Scored],
+    datasets: tuple[xarray.Dataset, xarray.Dataset],
+    names: tuple[str, str],
+    confidence: float,
+    *,
+    paired: bool,
+) -> Iterator[Verdict]:
+    """Which of two plates has the better value as given and under every assumption of either; nothing where neither has
+    assumptions, or where hits give no interval."""
+    measure, moves = scored[0].score.measure, [side.of.moves for side in scored]
+    if measure.higher_is_better is None or not any(moves):
+        return
+    one, other = (
+        _side(side, dataset, {**dealing(dataset), "confidence": confidence}, by_ratio=False)
+        for side, dataset in zip(scored, datasets, strict=True)
+    )
+    difference = _difference(one, other, {**dealing(datasets[0]), "confidence": confidence}, paired=paired)
+    value, low, high = _with_numerics(one.estimate, other.estimate, *difference)
+    if math.isnan(low + high):
+        return
+    half, sign = max(high - value, value - low), 1 if measure.higher_is_better else -1
+    moved = moved_apart(moves[0], moves[1], confidence)
+    under = {AS_GIVEN: (0.0, 0.0)} | moved
+    by = {
+        name: sign * int(np.sign(value + move)) if abs(value + move) > math.hypot(half, open_by) else 0
+        for name, (move, open_by) in under.items()
+    }
+    yield Verdict(measure.text, *names, by.pop(AS_GIVEN), by)
 
 
 def _with_numerics(one: Estimate, other: Estimate, value: float, low: float, high: float) -> tuple[float, float, float]:

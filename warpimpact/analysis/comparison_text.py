@@ -4,9 +4,10 @@ ranking with its differences."""
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
+from warpimpact.analysis.assumptions import AS_GIVEN
 from warpimpact.analysis.effectiveness import Score
 from warpimpact.analysis.numbers import Ends, intervals_text, number_text, of_each
 from warpimpact.analysis.survival import Survival, survival_text
@@ -53,6 +54,42 @@ class Difference:
 
 
 @dataclass(frozen=True)
+class Verdict:
+    """Which of two plates has the better value of a measure, whatever their weight: 1 the one, −1 the other, 0 where
+    that cannot be told.
+
+    Attributes:
+        given: as the campaigns have it.
+        under: if something that nobody measured is otherwise, by what that is.
+    """
+
+    measure: str
+    one: str
+    other: str
+    given: int
+    under: Mapping[str, int]
+
+    @property
+    def turned(self) -> list[str]:
+        """Assumptions that turn it over."""
+        return [name for name, verdict in self.under.items() if verdict == -self.given]
+
+    @property
+    def text(self) -> str:
+        """Such as "a is better than b in 9 of 12 assumptions; turned over by: β = 1"."""
+        if not self.given:
+            apart = [name for name, verdict in self.under.items() if verdict]
+            told = f"{self.one} and {self.other} cannot be told apart as given"
+            return told + f", but with: {', '.join(apart)}" * bool(apart)
+        better, worse = (self.one, self.other) if self.given > 0 else (self.other, self.one)
+        open_ = [name for name, verdict in self.under.items() if not verdict]
+        kept = len(self.under) - len(self.turned) - len(open_)
+        text = f"{better} is better than {worse} in {kept} of {len(self.under)} assumptions"
+        text += f"; turned over by: {', '.join(self.turned)}" * bool(self.turned)
+        return text + f"; not told apart with: {', '.join(open_)}" * bool(open_)
+
+
+@dataclass(frozen=True)
 class Pair:
     """How the hits of two plates were used.
 
@@ -79,6 +116,7 @@ class Comparison:
             to the solid plate; None where their weights are the same.
         confidence: at which the intervals of a measure's differences hold together.
         notes: what else there is to say, a sentence each.
+        verdicts: of every pair in every measure that assumptions move.
     """
 
     plates: tuple[Contestant, ...]
@@ -87,6 +125,7 @@ class Comparison:
     at_equal_weight: frozenset[str] | None
     confidence: float
     notes: tuple[str, ...]
+    verdicts: tuple[Verdict, ...] = ()
 
     def _repr_html_(self) -> str:
         """What a notebook shows."""
@@ -181,7 +220,8 @@ def best_rows(comparison: Comparison) -> list[tuple[str, str]]:
         first = [name for name, rank in comparison.ranks(measure.name).items() if rank == 1]
         told_apart = len(first) < len(comparison.plates)
         neither = "cannot be told apart" if is_ranked(comparison, measure.name) else "not ranked"
-        told = _listed(first) + _as_good(comparison, measure.name, first) + _doubt(comparison, measure.name)
+        doubts = _doubt(comparison, measure.name) + _turned(comparison, measure.name, first)
+        told = _listed(first) + _as_good(comparison, measure.name, first) + doubts
         rows.append((measure.measure.label, told if told_apart else neither))
     return rows
 
@@ -199,6 +239,21 @@ def _doubt(comparison: Comparison, measure: str) -> str:
     told = [pair.survival for pair in comparison.differences if pair.measure == measure and pair.told_apart]
     failing = any(survival is not None and not survival.survives for survival in told)
     return " (not certain under the uncertainty of the parameters)" if failing else ""
+
+
+def _turned(comparison: Comparison, measure: str, first: Sequence[str]) -> str:
+    """What to say of plates that are best where assumptions turn that over; mostly empty."""
+    if measure in (comparison.at_equal_weight or ()):
+        return ""  # verdicts are by value
+    about = [verdict for verdict in comparison.verdicts if verdict.measure == measure]
+    turned = dict.fromkeys(
+        name
+        for verdict in about
+        if verdict.given and {verdict.one, verdict.other} & {*first}
+        for name in verdict.turned
+    )
+    every = {name for verdict in about for name in verdict.under}
+    return f" (turned over by {len(turned)} of {len(every)} assumptions)" if turned else ""
 
 
 def is_ranked(comparison: Comparison, measure: str) -> bool:
@@ -228,8 +283,10 @@ def _ranking(comparison: Comparison, measure: Score) -> Section:
     )
     what = " in the ratio to the solid plate" if measure.name in (comparison.at_equal_weight or ()) else ""
     differences = [_in_words(pair, measure, what) for pair in comparison.differences if pair.measure == measure.name]
+    by_value = "by value alone, " if what else ""
+    verdicts = [by_value + verdict.text for verdict in comparison.verdicts if verdict.measure == measure.name]
     title = f"{measure.measure.title}; {measure.measure.better}{weighed(comparison, measure.name)}"
-    return Section([Table(columns, rows), *differences], title)
+    return Section([Table(columns, rows), *differences, *verdicts], title)
 
 
 def weighed(comparison: Comparison, measure: str) -> str:
@@ -264,3 +321,19 @@ def _in_words(pair: Difference, measure: Score, what: str) -> str:
 def _negative(interval: tuple[float, float]) -> tuple[float, float]:
     """The interval of the negative number."""
     return -interval[1], -interval[0]
+
+
+def assumptions_view(comparison: Comparison) -> list[Section]:
+    """Every measure of all plates under every assumption."""
+    sections = []
+    for score in _compared(comparison):
+        of_plates = [next(s for s in plate.measures if s.name == score.name) for plate in comparison.plates]
+        names = dict.fromkeys(name for of_plate in of_plates for name in of_plate.assumptions)
+        if names:
+            given = (AS_GIVEN, *(of_plate.value for of_plate in of_plates))
+            under = [(name, *(plate.assumptions.get(name, plate.value) for plate in of_plates)) for name in names]
+            columns = (Column("assumption"), *(number(plate.name) for plate in comparison.plates))
+            sections.append(
+                Section([Table(columns, [given, *under])], f"{score.measure.title}; {score.measure.better}")
+            )
+    return sections

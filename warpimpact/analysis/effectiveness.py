@@ -8,14 +8,14 @@ the solid plate those of statistics/comparisons.py.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 import xarray
 
 from warpimpact.analysis.estimates import Evidence, by_hit_of, evidence
-from warpimpact.analysis.numbers import Ends, intervals_text
+from warpimpact.analysis.numbers import Ends, ends_of, intervals_text
 from warpimpact.analysis.plate_text import plate_text, solid_note
 from warpimpact.analysis.survival import by_draws, over_draws
 from warpimpact.results import attributes as attr
@@ -63,6 +63,7 @@ class Score:
         parameters: its interval by the parameters, as in `Estimate`.
         ratio_parameters: that of the ratio.
         numerics: how far the numerics may shift the value; None or NaN where that is not known.
+        assumptions: the value under each assumption, as in `Estimate`.
     """
 
     measure: Measure
@@ -77,6 +78,7 @@ class Score:
     parameters: tuple[float, float] | None = None
     ratio_parameters: tuple[float, float] | None = None
     numerics: float | None = None
+    assumptions: Mapping[str, float] = field(default_factory=dict)
 
     @property
     def name(self) -> str:
@@ -86,7 +88,8 @@ class Score:
     @property
     def ends(self) -> Ends:
         """Its intervals."""
-        return Ends(self.low, self.high, self.parameters, self.numerics)
+        beside = self.parameters, self.numerics, self.assumptions
+        return ends_of(Estimate(self.value, self.low, self.high, 0, math.nan, *beside))
 
     @property
     def ratio_text(self) -> str:
@@ -180,6 +183,7 @@ def _scored(found: Evidence, dataset: xarray.Dataset, reference: xarray.Dataset 
         hit=None if found.worst_shot is None else int(dataset[v.HIT][found.worst_shot]),
         parameters=estimate.parameters,
         numerics=estimate.numerics,
+        assumptions=estimate.assumptions,
     )
     if found.numbers is not None and score.parameters and solid_drawn is not None:
         by_parameters = Estimate(against.value, math.nan, math.nan, 1, math.nan)

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from warpimpact.analysis.assumptions import Assumed, Moves
 from warpimpact.analysis.survival import by_draws, over_draws
 from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
@@ -35,12 +36,14 @@ class Evidence:
     Attributes:
         values: what the measure counts of each shot, NaN where it does not count, shape [hits].
         drawn: numbers whose mean over the shots of a draw of a posterior is the measure of the draw, shape [hits].
+        moves: what assumptions do to it; None where that is not known.
     """
 
     measure: Measure
     estimate: Estimate
     values: Array
     drawn: Array
+    moves: Moves | None = None
 
     @property
     def numbers(self) -> Array | None:
@@ -59,14 +62,15 @@ class Evidence:
     def shown(self) -> Evidence:
         """The same in the units in which the measure is shown."""
         factor = self.measure.display.factor
-        return Evidence(self.measure, self.estimate.times(factor), factor * self.values, factor * self.drawn)
+        estimate, moves = self.estimate.times(factor), self.moves and self.moves.times(factor)
+        return Evidence(self.measure, estimate, factor * self.values, factor * self.drawn, moves)
 
 
 def evidence(dataset: Result, measures: Sequence[Measure], confidence: float = 0.95) -> Iterator[Evidence]:
     """Measures one after the other; of an open file a slice is in memory at a time, and one number per hit."""
     needed = (v.STATUS, *v.GROUPS["finer"], *(name for measure in measures for name in measure.quantity.of))
     pair = finer_pair(dataset[[name for name in dict.fromkeys(needed) if name in dataset]])
-    dealt = dealing(dataset)
+    dealt, assumed = dealing(dataset), Assumed(dataset, measures)
     key, by_hit = None, np.empty(0)
     for measure in measures:
         if key != (key := (measure.quantity, measure.standoff)):
@@ -74,13 +78,15 @@ def evidence(dataset: Result, measures: Sequence[Measure], confidence: float = 0
         values = measure.counted(by_hit)
         estimate = estimate_from(measure, values, **dealt, confidence=confidence)
         estimate = replace(estimate, numerics=shift_of(measure, pair, confidence))
-        drawn = _drawn(dataset, measure, values)
+        drawn, moves = _drawn(dataset, measure, values), assumed.moves(measure)
         if measure.has_interval:
             units = "" if measure.name.startswith("limit_") else measure.units
-            estimate = over_draws(dataset, estimate, drawn, units=units).within(measure.least, measure.most)
+            under = {} if moves is None else {name: estimate.value + by for name, by in moves.by.items()}
+            estimate = replace(over_draws(dataset, estimate, drawn, units=units), assumptions=under)
+            estimate = estimate.within(measure.least, measure.most)
         if measure.kind == "quantile" and measure.name in _LIMITS:
             estimate = _beyond(estimate, dataset.attrs.get(attr.LIMIT_HIGHEST, math.inf))
-        yield Evidence(measure, estimate, values, drawn)
+        yield Evidence(measure, estimate, values, drawn, moves)
 
 
 def _beyond(estimate: Estimate, highest: float) -> Estimate:

@@ -14,6 +14,11 @@ def number_text(number: float) -> str:
     return "-" if math.isnan(number) else f"{number:#.4g}"
 
 
+def rough_text(number: float) -> str:
+    """With three digits, for what is not better known."""
+    return f"{float(f'{number:.3g}'):.10g}"
+
+
 def interval_text(low: float, high: float, text: Callable[[float], str] = number_text) -> str:
     """A confidence interval as text: a dash if there is none, one end if the shots give only one."""
     if math.isnan(low) and math.isnan(high):
@@ -25,17 +30,18 @@ def interval_text(low: float, high: float, text: Callable[[float], str] = number
 
 class Ends(NamedTuple):
     """Intervals of a number: by the hits, by the parameters where shots draw these from a posterior, and how far the
-    numerics may shift it, None or NaN where that is not known."""
+    numerics may shift it, None or NaN where that is not known, and between what numbers assumptions move it."""
 
     low: float
     high: float
     parameters: tuple[float, float] | None = None
     numerics: float | None = None
+    assumed: tuple[float, float] | None = None
 
 
 def ends_of(estimate: Estimate) -> Ends:
     """Those of an estimate."""
-    return Ends(estimate.low, estimate.high, estimate.parameters, estimate.numerics)
+    return Ends(estimate.low, estimate.high, estimate.parameters, estimate.numerics, estimate.assumed)
 
 
 def intervals_text(
@@ -49,9 +55,14 @@ def intervals_text(
     if ends.parameters is not None:
         unknown = math.isnan(ends.parameters[0])
         told = f"by hits {told}, by parameters {'not known' if unknown else interval_text(*ends.parameters, text)}"
-    if ends.numerics is None or math.isnan(ends.numerics) or told == "-":
+    if told == "-":
         return told
-    return f"{told}, numerics ± {shift(ends.numerics)}"
+    if ends.numerics is not None and not math.isnan(ends.numerics):
+        told += f", numerics ± {shift(ends.numerics)}"
+    if ends.assumed is not None:
+        low, high = map(rough_text, ends.assumed)
+        told += f", assumptions {low} to {high}" * (low != high)
+    return told
 
 
 def plus_minus(estimate: Estimate, number: str, half_width: str) -> str:

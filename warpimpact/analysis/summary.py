@@ -5,13 +5,14 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from warpimpact.analysis.assumptions_view import assumptions_lines
 from warpimpact.analysis.estimates import estimated, means_of, slices
-from warpimpact.analysis.numbers import Ends, interval_text, intervals_text
+from warpimpact.analysis.numbers import ends_of, interval_text, intervals_text
 from warpimpact.analysis.survival import draws_note
 from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
@@ -31,8 +32,8 @@ if TYPE_CHECKING:
 class Spread:
     """Mean and standard deviation over the ``count`` hits that have a quantity; NaN when there are none.
 
-    ``interval`` holds the mean at 95 %, and is NaN if the hits give none; ``parameters`` and ``numerics`` are those of
-    the mean's `Estimate`.
+    ``interval`` holds the mean at 95 %, and is NaN if the hits give none; ``parameters``, ``numerics`` and
+    ``assumptions`` are those of the mean's `Estimate`.
     """
 
     count: int
@@ -41,17 +42,32 @@ class Spread:
     interval: tuple[float, float] = (math.nan, math.nan)
     parameters: tuple[float, float] | None = None
     numerics: float | None = None
+    assumptions: Mapping[str, float] = field(default_factory=dict)
 
     @classmethod
     def of(cls, estimate: Estimate) -> Spread:
         """Of the values that exist; the standard deviation is that of the hits themselves (ddof = 0)."""
         interval = estimate.low, estimate.high
-        return cls(estimate.count, estimate.value, estimate.spread, interval, estimate.parameters, estimate.numerics)
+        beside = estimate.parameters, estimate.numerics, estimate.assumptions
+        return cls(estimate.count, estimate.value, estimate.spread, interval, *beside)
+
+    @property
+    def estimate(self) -> Estimate:
+        """The estimate of the mean."""
+        return Estimate(
+            value=self.mean,
+            low=self.interval[0],
+            high=self.interval[1],
+            count=self.count,
+            spread=self.standard_deviation,
+            parameters=self.parameters,
+            numerics=self.numerics,
+            assumptions=self.assumptions,
+        )
 
     def times(self, factor: float) -> Spread:
         """The same in another unit."""
-        ends = Estimate(self.mean, *self.interval, self.count, self.standard_deviation, self.parameters, self.numerics)
-        return Spread.of(ends.times(factor))
+        return Spread.of(self.estimate.times(factor))
 
 
 @dataclass(frozen=True)
@@ -188,7 +204,8 @@ def summary_text(dataset: Result) -> str:
         for name, unit, spread in spreads
     ]
     notes = (numerics_note(dataset), levels_note(dataset), draws_note(dataset))
-    return text_of([Section([shares, Table(columns, rows), *stop_lines(dataset), *filter(None, notes)])])
+    moved = assumptions_lines(dataset)
+    return text_of([Section([shares, Table(columns, rows), *moved, *stop_lines(dataset), *filter(None, notes)])])
 
 
 def _counted(count: int, hits: int) -> str:
@@ -275,4 +292,4 @@ def symmetry_text(dataset: Result) -> str:
 
 
 def _intervals(spread: Spread) -> str:
-    return intervals_text(Ends(*spread.interval, spread.parameters, spread.numerics), "{:.2f}".format)
+    return intervals_text(ends_of(spread.estimate), "{:.2f}".format)

@@ -43,6 +43,7 @@ from ..scene.shots import FARTHEST_HIT
 from ..scene.symmetry import unsymmetric
 from ..scene.target import MOST_LAYERS
 from ..scene.units import Number, PositiveLength, Title
+from .assumptions import Assumptions
 from .catalogued import catalogue_of, with_materials, with_threat
 from .drawn import DrawnSampler, Posterior, read_posterior
 from .needs import lacking
@@ -91,6 +92,7 @@ class Campaign(Model):
         scatter: distributions of values that scatter. A file has them in the places of the values.
         posterior: file of `warpimpact identify`; every shot draws the parameters of the material from it, jointly.
         catalogue: TOML file with threats and materials of your own, tables `[[threat]]` and `[[material]]`.
+        assumptions: what nobody measured, and what it may be instead.
         stop: when the run ends, instead of a count. Unless told otherwise, its hits are then those of the irreducible
             part of the cell, with their images.
         allow_implausible: compute also with values that no core or target has, such as a plate of 4 m: they are else
@@ -110,6 +112,7 @@ class Campaign(Model):
     scatter: Scatter = Scatter()
     posterior: InputFile | None = None
     catalogue: InputFile | None = None
+    assumptions: Assumptions = Assumptions()
     stop: Stop | None = None
     burst: Burst | None = None
     allow_implausible: Annotated[bool, Field(strict=True)] = False

@@ -2,7 +2,6 @@
 
 import argparse
 import sys
-from collections.abc import Mapping
 from contextlib import ExitStack
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -23,9 +22,7 @@ from .progress import show_run, warn
 from .run import failure_code
 
 if TYPE_CHECKING:
-    from xarray import Dataset
-
-    from warpimpact.campaign.campaign import Campaign
+    from warpimpact.analysis.comparison_text import Comparison
 
 
 def add_compare(commands: Commands) -> None:
@@ -56,8 +53,8 @@ def add_compare(commands: Commands) -> None:
     parser.add_argument(
         "--assumptions",
         action="store_true",
-        help="also say which verdicts survive what nobody measured: resistance, weakening, friction, onset, obliquity, "
-        "yaw; computes up to 1024 hits of each plate some twelve times",
+        help="also print every number under every assumption about what nobody measured: resistance, weakening, "
+        "friction, onset, obliquity, yaw, stand-off",
     )
     add_computing(parser)
     add_count(parser)
@@ -89,13 +86,12 @@ def _compare(arguments: argparse.Namespace) -> int:
         datasets = [stack.enter_context(files.opened(path)) for path in paths.values()]
         comparison = compare(datasets, list(paths), arguments.measure)
         evidence = evidence_of_all(dict(zip(paths, datasets, strict=True)))
-        campaigns = _campaigns(dict(zip(paths, datasets, strict=True)), paths) if arguments.assumptions else {}
         code = max(failure_code(dataset, path) for dataset, path in zip(datasets, paths.values(), strict=True))
     print(comparison_text(comparison))
     for line in evidence:
         print(line)
-    if campaigns:
-        print(_survival(campaigns, arguments))
+    if arguments.assumptions:
+        print(_under_assumptions(comparison))
     comparison_figure(comparison).savefig(figure, dpi=150)
     print(f"{figure}{replaced}")
     if (against_weight := weight_figure(comparison)) is not None:
@@ -104,27 +100,18 @@ def _compare(arguments: argparse.Namespace) -> int:
     return code
 
 
-def _campaigns(datasets: "Mapping[str, Dataset]", paths: "Mapping[str, Path]") -> "dict[str, Campaign]":
-    """The campaigns that results hold; files that they name are looked for beside the results."""
-    from warpimpact.results import attributes as attr
+def _under_assumptions(comparison: "Comparison") -> str:
+    """Every number under every assumption, as text."""
+    from warpimpact.analysis.comparison_text import assumptions_view
     from warpimpact.results.files import ResultError
-    from warpimpact.runs.replay import campaign_in
-
-    for name, dataset in datasets.items():
-        if attr.LIMIT in dataset.attrs:
-            raise ResultError(f"--assumptions: {name} is a search of limits, but it takes results of warpimpact run")
-    return {name: campaign_in(dataset, paths[name].parent) for name, dataset in datasets.items()}
-
-
-def _survival(campaigns: "Mapping[str, Campaign]", arguments: argparse.Namespace) -> str:
-    """Which verdicts survive what nobody measured."""
-    from warpimpact.studies.assumptions import judged, judged_view
     from warpimpact.view.view import text_of
 
-    def tell(assumption: str) -> None:
-        print(f"assumption: {assumption}", file=sys.stderr)
-
-    return text_of(judged_view(judged(campaigns, arguments.measure, device=arguments.device, tell=tell)))
+    if not (sections := assumptions_view(comparison)):
+        raise ResultError(
+            "--assumptions: these results have no hits under assumptions; [assumptions] compute = true in a campaign "
+            "has them computed"
+        )
+    return text_of(sections)
 
 
 def _plates_run(arguments: argparse.Namespace, folder: Path) -> dict[str, Path]:

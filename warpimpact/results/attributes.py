@@ -106,6 +106,11 @@ MATERIAL = _declared("material", "table", _SI)
 EVIDENCE = _declared("evidence")
 """What a result rests on, names of threat and materials with the state of their evidence, and what was not measured: a
 line each."""
+ASSUMPTIONS = _declared("assumptions", "table")
+"""JSON of the numbers of the assumptions under which some hits were computed, too, by their names."""
+ASSUMED_TIME = _declared("assumed_time", "number", "s")
+WOULD_BREAK = _declared("would_break", "table")
+"""JSON of the share of cores that would break, by the strength that they might have."""
 RESTS_ON, NOT_TESTED = "evidence: ", "not tested: "
 """Begin the first line of the evidence, and those of what was not measured."""
 EFFECTIVE = "effective_sample_size"

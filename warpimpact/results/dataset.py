@@ -83,7 +83,8 @@ def to_table(
         coordinates[v.LAYER_STANDOFF] = np.array(scene.record.layer_standoffs)
     coordinates |= beside or {}
     coordinates |= outlines_in(scene.target.layers[0], *((-0.5 * side, 0.5 * side) for side in period))
-    along = (*v.COORDINATES, *v.OUTLINE_VARIABLES, *v.LAYER_COORDINATES, *v.GROUPS["solid"], *v.GROUPS["finer"])
+    beside_the_hits = (name for group in ("solid", "finer", "assumed") for name in v.GROUPS[group])
+    along = (*v.COORDINATES, *v.OUTLINE_VARIABLES, *v.LAYER_COORDINATES, *beside_the_hits)
     values: dict[str, Any] = {variable: getattr(shots, variable.field) for variable in v.SHOT_VARIABLES}
     columns = own_columns(scene.target, shots)
     values |= {name: columns[name] for name in v.OPTIONAL_SHOT_VARIABLES if name in columns}
@@ -92,8 +93,7 @@ def to_table(
     zero = np.zeros(len(shots))
     values[v.EXIT_POSITION] = outcomes.exit_position + np.stack([zero, shots.hit_y, shots.hit_z], axis=-1)
     variables = (name for name in v.hit_variables() if name in values and name not in left_out)
-    finer = [name for name, of_hits in v.FINER_VARIABLES.items() if of_hits in v.computed_variables()]
-    single = () if double else {*v.computed_variables(), *v.SOLID_VARIABLES, *finer}
+    single = () if double else _computed()
     return HitTable.of(
         stored_columns(variables, values, single),
         stored_columns((name for name in along if name in coordinates), coordinates, single),
@@ -130,25 +130,65 @@ def finer_columns(outcomes: Outcomes, numbers: NDArray[np.int64]) -> dict[str, A
     return {v.FINER_HIT: numbers.astype(np.int32)} | {name: getattr(outcomes, stored[name]) for name in stored}
 
 
+def assumed_columns(outcomes: Outcomes, numbers: NDArray[np.int64], assumptions: NDArray[np.int64]) -> dict[str, Any]:
+    """What is stored of hits under assumptions, by the numbers of both; SI and radians."""
+    told = {v.ASSUMED_HIT: numbers.astype(np.int32), v.ASSUMPTION: assumptions.astype(np.int8)}
+    stored = {name: of_hits for name, of_hits in v.ASSUMED_VARIABLES.items() if of_hits in outcomes}
+    return told | {name: getattr(outcomes, of_hits) for name, of_hits in stored.items()}
+
+
+def assumed_table(columns: Mapping[str, Any], attributes: Mapping[str, Any], *, double: bool) -> HitTable:
+    """Columns of hits under assumptions as `to_table` stores them, to be joined to those of the hits."""
+    stored = (name for name in v.GROUPS["assumed"] if name in columns)
+    return HitTable.of({}, stored_columns(stored, columns, () if double else _computed()), attr.with_units(attributes))
+
+
+def _computed() -> set[v.Variable]:
+    """What is stored in single precision unless it was computed in double precision, of other shots, too."""
+    computed = {*v.computed_variables(), *v.SOLID_VARIABLES}
+    of_hits = v.FINER_VARIABLES | v.ASSUMED_VARIABLES
+    return computed | {name for name, variable in of_hits.items() if variable in computed}
+
+
 def finer_pair(dataset: Result) -> tuple[Any, Any] | None:
     """The hits of a result that were computed at a finer level, too, in memory: as they are in the result, and at that
     level. None if there are none."""
-    if v.FINER_HIT not in dataset or v.HIT not in dataset.sizes:
+    pair = _pair(dataset, v.FINER_HIT, v.FINER_VARIABLES)
+    return None if pair is None else pair[:2]
+
+
+def assumed_pair(dataset: Result) -> tuple[Any, Any, NDArray[np.int64]] | None:
+    """The hits of a result under assumptions, one assumption after another, in memory: as they are in the result, under
+    the assumption, and its number, shape [hits]. None if there are none."""
+    if v.ASSUMPTION not in dataset:
         return None
-    stored = {name: of_hits for name, of_hits in v.FINER_VARIABLES.items() if of_hits in dataset}
-    if any(name not in dataset or dataset[name].dims != name.dims for name in (v.FINER_HIT, *stored)):
+    pair = _pair(dataset, v.ASSUMED_HIT, v.ASSUMED_VARIABLES)
+    return None if pair is None else (*pair[:2], np.asarray(dataset[v.ASSUMPTION].values)[pair[2]])
+
+
+def _pair(
+    dataset: Result, of_number: v.Variable, variables: Mapping[v.Variable, v.Variable]
+) -> tuple[Any, Any, NDArray[np.int64]] | None:
+    """Hits of a result that were computed otherwise, too: as they are in the result, otherwise, and their places among
+    those that were."""
+    if of_number not in dataset or v.HIT not in dataset.sizes:
+        return None
+    stored = {name: of_hits for name, of_hits in variables.items() if name in dataset and of_hits in dataset}
+    if any(dataset[name].dims != name.dims for name in (of_number, *stored)) or v.STATUS not in stored.values():
         return None  # results that were joined have several; altered ones lack some
-    numbers, hits = dataset[v.FINER_HIT].values, hit_numbers(dataset)
-    shared, places, those = np.intersect1d(hits, numbers, return_indices=True)
-    if not len(shared) or v.STATUS not in stored.values() or np.isin(hits, shared).sum() > len(shared):
+    numbers, hits = dataset[of_number].values, hit_numbers(dataset)
+    order = np.argsort(hits, kind="stable")
+    places = order[np.minimum(np.searchsorted(hits, numbers, sorter=order), len(order) - 1)]
+    there = np.flatnonzero(hits[places] == numbers)
+    known = np.unique(numbers[there])
+    if not len(there) or np.isin(hits, known).sum() > len(known):
         return None
-    order = np.argsort(those)
-    coarse = dataset.isel(hit=places[order]).load()
-    at_finer: dict[str, Any] = {
-        of_hits: (of_hits.dims, dataset[name].values[those[order]], dict(dataset[of_hits].attrs))
+    given = dataset.isel(hit=places[there]).load()
+    changed: dict[str, Any] = {
+        of_hits: (of_hits.dims, dataset[name].values[there], dict(dataset[of_hits].attrs))
         for name, of_hits in stored.items()
     }
-    return coarse, coarse.assign(at_finer)
+    return given, given.assign(changed), there
 
 
 def numbered(dataset: AResult, first: int = 0) -> AResult:

@@ -137,6 +137,11 @@ class HitTable:
         """With these global attributes over its own."""
         return replace(self, attrs=self.attrs | dict(attrs))
 
+    def beside(self, other: HitTable) -> HitTable:
+        """With the variables and attributes of another one, which has other dimensions."""
+        variables, coords = {**self.variables, **other.variables}, self.coords | other.coords
+        return replace(self, variables=variables, coords=coords, attrs=self.attrs | other.attrs)
+
     def drop_vars(self, names: Collection[str]) -> HitTable:
         """Without these variables, as far as they are there."""
         kept = {name: column for name, column in self.variables.items() if name not in names}

@@ -100,6 +100,15 @@ FINER_VARIABLES = {
 """Outcomes of some hits at a finer level of resolution, each with the variable of the hits that it corresponds to.
 Present where a pilot found the resolution."""
 
+ASSUMED_HIT = Variable("assumed_hit", ("assumed",), "1", "number of a hit that was computed under an assumption, too")
+ASSUMPTION = Variable("assumption", ("assumed",), "1", "number of the assumption, from 0, in the attribute assumptions")
+ASSUMED_COORDINATES = (ASSUMED_HIT, ASSUMPTION)
+ASSUMED_VARIABLES = {
+    _beside(variable, "assumed", "assumed", "under an assumption"): variable for variable in FINER_VARIABLES.values()
+}
+"""Outcomes of some hits with something otherwise that nobody measured (campaign/alternatives.py), each with the
+variable of the hits that it corresponds to."""
+
 OUTLINE_Y = Variable("outline_y", ("vertex",), "m", "hole outlines in the unit cell, y, separated by NaN")
 OUTLINE_Z = Variable("outline_z", ("vertex",), "m", "hole outlines in the unit cell, z, separated by NaN")
 
@@ -109,6 +118,7 @@ GROUPS = {
     "plate": OUTLINE_VARIABLES,
     "solid": (*SOLID_VARIABLES, *SOLID_LIMIT_VARIABLES),
     "finer": (*FINER_COORDINATES, *FINER_VARIABLES),
+    "assumed": (*ASSUMED_COORDINATES, *ASSUMED_VARIABLES),
 }
 """What is not along "hit" stands in groups of the file. In memory those of other shots are coordinates, which no choice
 of hits spreads over the hits; outlines.py says what becomes of the outlines."""

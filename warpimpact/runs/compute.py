@@ -10,32 +10,30 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 
 from warpimpact.campaign.campaign import Campaign
 from warpimpact.records.outcomes import Outcomes
 from warpimpact.results import attributes as attr
 from warpimpact.results.dataset import finer_columns, solid_columns
 from warpimpact.results.table import HitTable
+from warpimpact.runs.assumed import assumed
 from warpimpact.runs.describe import computed_by, described, found_attributes
 from warpimpact.runs.levels import excess_of_stop, seeks_measure, shifts_of
+from warpimpact.runs.pilot_hits import pilot_most, pilot_places, pilot_shots
 from warpimpact.runs.task import Task
 from warpimpact.scene import Numerics, Scene, Shots
 from warpimpact.scene.quantities import BY_LAYER
 from warpimpact.solver.device import find_device
 from warpimpact.solver.findings import Found, HitErrors
+from warpimpact.solver.many import simulate_many
 from warpimpact.solver.marching import Progress
 from warpimpact.solver.memory import Memory
-from warpimpact.solver.pilot import pilot_size
 from warpimpact.solver.prepare import prepare
-from warpimpact.solver.simulate import marched, pilot_of, spread_places
+from warpimpact.solver.simulate import marched, pilot_of
 from warpimpact.solver.worker import Worker
 
 if TYPE_CHECKING:
     from warpimpact.results.table import Result
-
-_FEWEST_BURSTS = 8
-"""Of a pilot, however many shots they have."""
 
 
 @dataclass(frozen=True)
@@ -50,6 +48,10 @@ class HitMap:
     def compute(self, campaign: Campaign, task: Task, worker: Worker, progress: Progress | None = None) -> HitTable:
         """See `compute`."""
         return compute(campaign, task, worker, progress)
+
+    def assumed(self, campaign: Campaign, found: Found | None, worker: Worker) -> HitTable:
+        """See `Computation.assumed`."""
+        return assumed(campaign, lambda scenes: simulate_many(scenes, numerics_of(campaign, found), worker))
 
     def pilot(
         self, campaign: Campaign, worker: Worker, trying: Callable[[int], object] = lambda level: None
@@ -114,7 +116,7 @@ def finer_hits(campaign: Campaign, found: Found | None, most: int) -> dict[str, 
         return {}
     group = len(campaign.symmetries) * campaign.at_a_plate
     groups = len(found.finer) // campaign.at_a_plate
-    numbers = _pilot_places(campaign, most)[:groups, None] * group + np.arange(group)
+    numbers = pilot_places(campaign, most)[:groups, None] * group + np.arange(group)
     return finer_columns(found.finer.unfolded(campaign.symmetries), numbers.reshape(-1))
 
 
@@ -161,32 +163,6 @@ def at_solid(campaign: Campaign, shots: Shots) -> tuple[Scene, Shots]:
             thickness = thickness + share * shots.own_of(target, "thickness", k)
         own["thickness"] = np.broadcast_to(thickness, len(shots)).copy()
     return campaign.scene.model_copy(update={"target": target.solid}), replace(shots, **own)
-
-
-def pilot_shots(campaign: Campaign, most: int) -> Shots:
-    """Some of the hits of a campaign, no two of them images of each other; of bursts, whole ones.
-
-    They depend on the campaign alone: the first hits of a Sobol or random sampling, hits at even distances of a grid or
-    a list. Bursts are whole, as a later hit meets what the earlier ones left.
-    """
-    sampler, images = campaign.sampler(), len(campaign.symmetries)
-    group, places = images * campaign.at_a_plate, _pilot_places(campaign, most)
-    if campaign.hits.sampling in ("sobol", "random"):
-        return sampler.shots(0, len(places) * group)[::images]
-    return Shots.joined([sampler.shots(int(place) * group, group)[::images] for place in places])
-
-
-def pilot_most(campaign: Campaign) -> int:
-    """Shots of a pilot of a campaign, at most."""
-    return pilot_size(campaign.numerics.asked, len(campaign.sampler()) // len(campaign.symmetries))
-
-
-def _pilot_places(campaign: Campaign, most: int) -> NDArray[np.int64]:
-    """Which groups of images, or bursts with their images, `pilot_shots` takes."""
-    at_a_plate = campaign.at_a_plate
-    groups = len(campaign.sampler()) // (len(campaign.symmetries) * at_a_plate)
-    count = min(most if at_a_plate == 1 else max(-(-most // at_a_plate), _FEWEST_BURSTS), groups)
-    return np.arange(count) if campaign.hits.sampling in ("sobol", "random") else spread_places(groups, count)
 
 
 def _outcomes(

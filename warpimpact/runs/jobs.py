@@ -39,6 +39,18 @@ def pilot_job(
     return computation.pilot(campaign, worker, report)
 
 
+def assumed_job(
+    computation: Computation,
+    campaign: Campaign,
+    found: Found | None,
+    *,
+    worker: Worker,
+    report: Callable[[int], object],
+) -> HitTable:
+    """Some hits of a campaign under assumptions; it reports nothing."""
+    return computation.assumed(campaign, found, worker)
+
+
 def task_job(
     computation: Computation, campaign: Campaign, task: Task, *, worker: Worker, report: Callable[[int], object]
 ) -> HitTable:

@@ -16,11 +16,13 @@ from warpimpact.results.measures import Measure
 from warpimpact.results.outlines import in_memory
 from warpimpact.results.table import HitTable, joined
 from warpimpact.results.tallies import Tally, shift_of
+from warpimpact.runs.assumed import has_assumptions
 from warpimpact.runs.choice import executor_for, opened
 from warpimpact.runs.compute import HIT_MAP, numerics_of
 from warpimpact.runs.executor import Executor, Job, completed, result_of
 from warpimpact.runs.foreseen import Cost
 from warpimpact.runs.jobs import (
+    assumed_job,
     computed_hits,
     pilot_job,
     ranges,
@@ -157,21 +159,39 @@ def _fill(campaign: Campaign, computation: Computation, shards: Shards, executor
         watch.found = result_of(executor, pilot_job, computation, campaign, tick=piloting)
     cost.tell(numerics_of(campaign, watch.found))
 
-    def jobs() -> Iterator[tuple[range, Job]]:
+    asks = 0 not in there and has_assumptions(campaign)
+    told = None if watch.found is None else watch.found.told
+
+    def jobs() -> Iterator[tuple[range | None, Job]]:
+        if asks:
+            yield None, Job(assumed_job, (computation, campaign, told))
         most = lambda: task_size(executor, 0.0 if campaign.stop else watch.rate)  # noqa: E731
         for task in ranges(shards, len(sampler), most):
             shots = sampler.shots(task.start * shards.extent, len(task) * shards.extent)
             first = shots[: shards.extent] if task.start == 0 else None
             solid = None if first is None else solid_shots(campaign, first, computation.most_solid)
-            found = watch.found if task.start == 0 or watch.found is None else watch.found.told
+            found = watch.found if task.start == 0 else told
             yield task, Job(task_job, (computation, campaign, Task(shots, solid, found)))
 
+    def take(index: int, shard: HitTable) -> None:
+        shards.save(index, shard)
+        watch.add(index, shard)
+
     with closing(completed(executor, jobs(), lambda: follow(watch.progress(sum(executor.reports()))))) as tables:
+        first = assumed = None  # the first shard holds the assumptions, and waits for them
         while watch.end is None:
             task, table = next(tables)
-            for index, shard in split(table, task, shards.extent):
-                shards.save(index, shard)
-                watch.add(index, shard)
+            if task is None:
+                assumed = table
+            else:
+                for index, shard in split(table, task, shards.extent):
+                    if index == 0 and asks:
+                        first = shard
+                    else:
+                        take(index, shard)
+            if first is not None and assumed is not None:
+                take(0, first.beside(assumed))
+                first = None
     follow(watch.progress(0))
     return watch.end
 

@@ -54,6 +54,13 @@ class Computation(Protocol):
     def compute(self, campaign: Campaign, task: Task, worker: Worker, progress: Progress | None = None) -> HitTable:
         """Compute a task: the columns of results/dataset.py, one entry per shot; they are a complete result."""
 
+    def assumed(self, campaign: Campaign, found: Found | None, worker: Worker) -> HitTable:
+        """Some hits of the campaign under assumptions, as `runs.assumed.assumed` has them.
+
+        Args:
+            found: as in a task.
+        """
+
     def pilot(self, campaign: Campaign, worker: Worker, trying: Callable[[int], object]) -> Found | None:
         """What a pilot of the campaign's own hits finds; None if the campaign fixes the resolution itself.
 

@@ -9,8 +9,8 @@ the results of the replicates is used (A. B. Owen, Monte Carlo theory, methods a
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from statistics import NormalDist
 from typing import Self, TypedDict, Unpack
 
@@ -32,6 +32,8 @@ class Estimate:
         parameters: interval of the number over the draws of a posterior; None if shots draw no parameters, NaN if the
             hits are too few. `low` and `high` are the interval by the sample of hits alone.
         numerics: largest shift of the number by the numerics, to either side; None or NaN if it is not known.
+        assumptions: the number if something that nobody measured is otherwise, by what that is; empty if that is not
+            known.
     """
 
     value: float
@@ -41,6 +43,7 @@ class Estimate:
     spread: float
     parameters: tuple[float, float] | None = None
     numerics: float | None = None
+    assumptions: Mapping[str, float] = field(default_factory=dict)
 
     @property
     def half_width(self) -> float:
@@ -52,13 +55,23 @@ class Estimate:
         value, low, high, spread = (factor * number for number in (self.value, self.low, self.high, self.spread))
         parameters = self.parameters and (factor * self.parameters[0], factor * self.parameters[1])
         numerics = None if self.numerics is None else factor * self.numerics
-        return replace(self, value=value, low=low, high=high, spread=spread, parameters=parameters, numerics=numerics)
+        assumptions = {name: factor * number for name, number in self.assumptions.items()}
+        own = replace(self, parameters=parameters, numerics=numerics, assumptions=assumptions)
+        return replace(own, value=value, low=low, high=high, spread=spread)
 
     def within(self, least: float, most: float = math.inf) -> Self:
         """The estimate with the ends of its intervals limited to a range."""
         ends = (self.low, self.high, *(self.parameters or ()))
         low, high, *more = (end if math.isnan(end) else min(max(end, least), most) for end in ends)
-        return replace(self, low=low, high=high, parameters=(more[0], more[1]) if more else None)
+        assumptions = {name: min(max(number, least), most) for name, number in self.assumptions.items()}
+        parameters = (more[0], more[1]) if more else None
+        return replace(self, low=low, high=high, parameters=parameters, assumptions=assumptions)
+
+    @property
+    def assumed(self) -> tuple[float, float] | None:
+        """The smallest and the largest number under any assumption, as given among them; None if that is not known."""
+        numbers = [self.value, *self.assumptions.values()]
+        return (min(numbers), max(numbers)) if self.assumptions else None
 
 
 class Dealing(TypedDict, total=False):

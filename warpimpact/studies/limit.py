@@ -13,17 +13,20 @@ from numpy.typing import NDArray
 from warpimpact.campaign.campaign import Campaign
 from warpimpact.campaign.evidence import limit_velocity_factors
 from warpimpact.campaign.text import CampaignError
+from warpimpact.records.outcomes import Outcomes
 from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
 from warpimpact.results.measures import Measure
 from warpimpact.results.table import HitTable
 from warpimpact.results.vocabulary import LIMIT_VELOCITY
-from warpimpact.runs.compute import at_solid, finer_hits, found_in, numerics_of, of_images, pilot_shots
+from warpimpact.runs.assumed import assumed
+from warpimpact.runs.compute import at_solid, finer_hits, found_in, numerics_of, of_images
 from warpimpact.runs.describe import computed_by, described, found_attributes
+from warpimpact.runs.pilot_hits import pilot_shots
 from warpimpact.runs.shards import extent
 from warpimpact.runs.task import Task
-from warpimpact.scene import Numerics, Shots, Target, exclusions
-from warpimpact.solver.findings import LimitErrors
+from warpimpact.scene import Numerics, Scene, Shots, Target, exclusions
+from warpimpact.solver.findings import Found, LimitErrors
 from warpimpact.solver.limit import (
     HIGHEST_VELOCITY,
     THICKNESS_TOLERANCE,
@@ -38,7 +41,8 @@ from warpimpact.solver.limit import (
     with_thickness,
     with_velocity,
 )
-from warpimpact.solver.marching import Progress
+from warpimpact.solver.many import side_by_side
+from warpimpact.solver.marching import Helpers, Progress
 from warpimpact.solver.pilot import limits_pilot_size
 from warpimpact.solver.worker import Worker
 
@@ -158,6 +162,20 @@ class LimitMap:
             attr.SOLID_LIMIT_HIGHEST: sought.highest,
         }
 
+    def assumed(self, campaign: Campaign, found: Found | None, worker: Worker) -> HitTable:
+        """See `Computation.assumed`."""
+        sought, numerics = self.sought, numerics_of(campaign, found)
+
+        def searched(scenes: list[tuple[Scene, Shots]]) -> list[Outcomes]:
+            def of_scene(number: int, own: Worker, _: Helpers | None) -> Outcomes:
+                scene, shots = scenes[number]
+                by_path = _by_path(scene, campaign.impact.velocity)
+                return limits(by_path, shots, sought, numerics, own).recorded(sought.quantity)
+
+            return side_by_side(of_scene, len(scenes), worker)
+
+        return assumed(campaign, searched, limits=True)
+
     def pilot(
         self, campaign: Campaign, worker: Worker, trying: Callable[[int], object] = lambda level: None
     ) -> LimitErrors | None:
@@ -189,6 +207,23 @@ class LimitMap:
             return with_velocity(shots, np.repeat(limits.shots.velocity, images))
         tried = limits.shots.own_of(campaign.target, "thickness", self.sought.layer)
         return with_thickness(self.sought.layer, shots, np.repeat(tried, images))
+
+
+def _by_path(scene: Scene, velocity: float) -> Scene:
+    """A scene whose plates weaken by the path in place of the time, alike at this velocity: what weakens by time has no
+    limit."""
+    layers = scene.target.layers
+    if all(layer.degradation_interval is None or layer.degradation == 1.0 for layer in layers):
+        return scene
+    changed = (
+        layer.model_copy(
+            update={"degradation_interval": None, "degradation_distance": velocity * layer.degradation_interval}
+        )
+        if layer.degradation_interval is not None and layer.degradation < 1.0
+        else layer
+        for layer in layers
+    )
+    return scene.model_copy(update={"target": Target(layers=tuple(changed))})
 
 
 def warning_of(campaign: Campaign, quantity: str) -> str | None:

@@ -1,0 +1,112 @@
+"""How far numbers of a result move if something that nobody measured is otherwise: hits under assumptions, read."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warpimpact.results import attributes as attr
+from warpimpact.results import variables as v
+from warpimpact.results.dataset import assumed_pair, hit_numbers
+from warpimpact.results.measures import Measure
+from warpimpact.results.per_hit import Array
+from warpimpact.results.tallies import estimate_from
+from warpimpact.statistics.student import student_quantile
+
+if TYPE_CHECKING:
+    from warpimpact.results.table import Result
+
+
+AS_GIVEN = "as given"
+
+
+@dataclass(frozen=True)
+class Moves:
+    """What assumptions do to the numbers of a measure.
+
+    Attributes:
+        by: how far each assumption moves the measure, by its name; none that leaves no hit that counts.
+        hits: numbers of the hits that tell it, shape [hits].
+        of_hits: how far each assumption moves the number of each hit, shape [hits] each.
+    """
+
+    by: Mapping[str, float]
+    hits: NDArray[np.int64]
+    of_hits: Mapping[str, Array]
+
+    def times(self, factor: float) -> Moves:
+        """The moves in another unit."""
+        by = {name: factor * move for name, move in self.by.items()}
+        return Moves(by, self.hits, {name: factor * moves for name, moves in self.of_hits.items()})
+
+
+class Assumed:
+    """The hits of a result that were computed under assumptions, too; empty where there are none."""
+
+    def __init__(self, dataset: Result, measures: Sequence[Measure]) -> None:
+        names: dict[str, int] = json.loads(dataset.attrs.get(attr.ASSUMPTIONS, "{}"))
+        of_measures = (name for measure in measures for name in measure.quantity.of)
+        needed = dict.fromkeys((v.STATUS, *v.GROUPS["assumed"], *of_measures))
+        pair = assumed_pair(dataset[[name for name in needed if name in dataset]]) if names else None
+        self._given: Any = None
+        self._names: dict[str, NDArray[np.int64]] = {}
+        if pair is not None:
+            self._given, self._changed, which = pair
+            self._names = {name: np.flatnonzero(which == number) for name, number in names.items()}
+        self._key: Any = None
+        self._by_hit: tuple[Array, Array] = np.empty(0), np.empty(0)
+
+    def moves(self, measure: Measure) -> Moves | None:
+        """What assumptions do to a measure; None where that is not known."""
+        if self._given is None or not measure.has_interval:
+            return None
+        if self._key != (key := (measure.quantity, measure.standoff)):
+            self._key, self._by_hit = key, (measure.by_hit(self._given), measure.by_hit(self._changed))
+        given, changed = (measure.counted(values) for values in self._by_hit)
+        by, of_hits, hits = {}, {}, np.empty(0, dtype=np.int64)
+        for name, places in self._names.items():
+            before, after = (estimate_from(measure, values[places]).value for values in (given, changed))
+            if len(places) and math.isfinite(after - before):
+                by[name] = after - before
+                hits = hit_numbers(self._given)[places]
+                if measure.kind != "quantile":
+                    of_hits[name] = measure.averaged(changed[places]) - measure.averaged(given[places])
+        return Moves(by, hits, of_hits) if by else None
+
+
+def moved_apart(one: Moves | None, other: Moves | None, confidence: float) -> dict[str, tuple[float, float]]:
+    """By how much each assumption moves the difference of two plates, and the half width that the hits leave open.
+
+    A plate that has no such assumption stays where it is. Both plates take the same hits, where they have them.
+    """
+    of_plates = [moves or Moves({}, np.empty(0, dtype=np.int64), {}) for moves in (one, other)]
+    apart = {}
+    for name in dict.fromkeys(name for moves in of_plates for name in moves.by):
+        move = of_plates[0].by.get(name, 0.0) - of_plates[1].by.get(name, 0.0)
+        signed = [
+            sign * moves.of_hits.get(name, np.empty(0)) for sign, moves in zip((1.0, -1.0), of_plates, strict=True)
+        ]
+        same = len(signed[0]) == len(signed[1]) and np.array_equal(of_plates[0].hits, of_plates[1].hits)
+        samples = [signed[0] + signed[1]] if same else signed
+        apart[name] = (move, math.hypot(*(_half_width(sample, confidence) for sample in samples)))
+    return apart
+
+
+def _half_width(numbers: Array, confidence: float) -> float:
+    """Half width of Student's interval of a mean; 0 of no numbers."""
+    known = numbers[~np.isnan(numbers)]
+    if len(known) < 2:
+        return 0.0
+    spread = float(np.std(known, ddof=1)) / math.sqrt(len(known))
+    return spread * student_quantile(0.5 * (1.0 + confidence), len(known) - 1)
+
+
+def would_break(dataset: Result) -> Iterator[tuple[str, float]]:
+    """Cores that may break, and the share of hits that would break them."""
+    yield from json.loads(dataset.attrs.get(attr.WOULD_BREAK, "{}")).items()

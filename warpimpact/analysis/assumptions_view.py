@@ -1,0 +1,87 @@
+"""What nobody measured, and how far it moves the numbers of a result, as people read it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from typing import TYPE_CHECKING
+
+from warpimpact.analysis.assumptions import would_break
+from warpimpact.analysis.estimates import estimated, means_of
+from warpimpact.analysis.numbers import rough_text
+from warpimpact.results import attributes as attr
+from warpimpact.results import variables as v
+from warpimpact.results.measures import Measure
+from warpimpact.statistics.intervals import Estimate
+from warpimpact.view.view import Column, Section, Table
+
+if TYPE_CHECKING:
+    from warpimpact.results.table import Result
+
+LARGEST = 3
+"""Assumptions that are named beside a number: those that move it most."""
+_NO_MOVE = 1e-3
+"""Moves below this share of the number, or of the largest move, are none."""
+
+
+def assumptions_view(dataset: Result, measures: Sequence[Measure] = ()) -> Section:
+    """How far each number may be off if one thing that nobody measured is otherwise, and what moves it most.
+
+    Args:
+        measures: whose numbers are shown; by default those that a person looks at first.
+    """
+    estimates = estimated(dataset, measures or _first(dataset))
+    columns = [Column(header, write=rough_text, right=True) for header in ("as given", "lowest", "highest")]
+    rows = [
+        (measure.title, shown.value, *shown.assumed, largest_text(shown) or "nothing moves it")
+        for measure, estimate in estimates.items()
+        for shown in [estimate.times(measure.display.factor)]
+        if shown.assumed is not None
+    ]
+    table = Table((Column(), *columns, Column("moved most by")), rows)
+    return Section([*([table] if rows else []), *notes_of(dataset, known=bool(rows))], "what nobody measured")
+
+
+def _first(dataset: Result) -> list[Measure]:
+    """The limit of a search of limits; else means behind the target, and the shares of what may happen."""
+    if attr.LIMIT in dataset.attrs:
+        return [Measure.parse(f"quantile({v.LIMITS[dataset.attrs[attr.LIMIT]].value}, 0.5)")]
+    standoffs = dataset[v.STANDOFF].values.tolist()[-1:]
+    events = [Measure.parse(f"P({event})") for event in ("perforated", "base_perforated")]
+    means = means_of([name for name in (v.RESIDUAL_VELOCITY, v.TILT) if name in dataset], standoffs)
+    return [*means, *(event.of(dataset) for event in events if not event.quantity.lacking(dataset))]
+
+
+def largest_text(estimate: Estimate) -> str:
+    """The assumptions that move a number most, with what it is then; empty where none moves it visibly."""
+    by_move = sorted(estimate.assumptions.items(), key=lambda under: -abs(under[1] - estimate.value))
+    shown = [
+        f"{name}: {rough_text(value)}" for name, value in by_move if rough_text(value) != rough_text(estimate.value)
+    ]
+    return ", ".join(shown[:LARGEST])
+
+
+def notes_of(dataset: Result, *, known: bool = True) -> Iterator[str]:
+    """What else there is to say of assumptions: how they were computed, and which cores would break."""
+    if not known:
+        yield f"how far assumptions move these numbers is not known: {_why_not(dataset)}"
+        return
+    for name, share in would_break(dataset):
+        yield f"the core is taken to be unbreakable; {name} bending strength would break in {share:.0%} of these hits"
+    count = dataset.sizes["assumed"] // max(int(dataset[v.ASSUMPTION].values.max()) + 1, 1)
+    took = dataset.attrs.get(attr.ASSUMED_TIME)
+    yield f"each assumption alone, on {count} of the hits" + ("" if took is None else f"; took {took:.2g} s")
+
+
+def _why_not(dataset: Result) -> str:
+    if v.ASSUMPTION in dataset:
+        return "none of these hits was computed under them"
+    return "no hits were computed under them; [assumptions] compute = true does that where a resolution is given"
+
+
+def assumptions_lines(dataset: Result) -> list[str]:
+    """The same in a sentence for each number that a person looks at first; nothing where that is not known."""
+    lines = []
+    for measure, estimate in estimated(dataset, _first(dataset)).items():
+        if moved := largest_text(estimate.times(measure.display.factor)):
+            lines.append(f"if wrong, these move the {measure.title} most: {moved}")
+    return [*lines, *notes_of(dataset)] if lines else []

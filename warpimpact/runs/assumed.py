@@ -1,0 +1,95 @@
+"""Some hits of a campaign with what nobody measured chosen otherwise: how far every number of a result may be off.
+
+The hits are those of a pilot, at the resolution of the run, so that what they have in common drops out of the
+difference to the hits as given.
+"""
+
+from __future__ import annotations
+
+import json
+import time
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warpimpact.campaign.alternatives import Alternative, alternatives
+from warpimpact.campaign.campaign import Campaign
+from warpimpact.records.outcomes import Outcomes
+from warpimpact.results import attributes as attr
+from warpimpact.results.dataset import assumed_columns, assumed_table
+from warpimpact.results.table import HitTable
+from warpimpact.runs.describe import is_double
+from warpimpact.runs.pilot_hits import places_of, shots_at
+from warpimpact.scene import Scene, Shots
+
+SHARE = 1.0 / 128.0
+"""Hits of an alternative over those of a run: some twelve alternatives cost a run a tenth, those whose plates have
+finer grids included about 15 %."""
+FEWEST, MOST = 64, 256
+"""Hits of an alternative unless the campaign tells how many."""
+FEWEST_LIMITS = 8
+"""The same of limits at least, each of which takes several runs."""
+FEWEST_GROUPS = 8
+"""Hits or bursts of an alternative that are no images of each other, at least."""
+
+Computed = Callable[[list[tuple[Scene, Shots]]], list[Outcomes]]
+
+
+def has_assumptions(campaign: Campaign) -> bool:
+    """Whether alternatives of a campaign are computed: unless it tells, where a pilot finds the resolution."""
+    asked = campaign.assumptions.compute
+    return campaign.numerics.explicit is None if asked is None else asked
+
+
+def assumed(campaign: Campaign, compute: Computed, *, limits: bool = False) -> HitTable:
+    """Hits under assumptions, with their attributes; empty of a campaign that has no alternative.
+
+    Args:
+        compute: the outcomes of the shots of scenes.
+        limits: whether it computes limits: few, which depend on no stand-off, and not which cores would break.
+    """
+    begin = time.perf_counter()
+    images, group = len(campaign.symmetries), len(campaign.symmetries) * campaign.at_a_plate
+    places = places_of(campaign, _groups(campaign, FEWEST_LIMITS if limits else FEWEST))
+    shots = shots_at(campaign, places)
+    possible = [one for one in alternatives(campaign) if one.is_possible(shots)]
+    possible = [one for one in possible if not limits or one.moves_limits]
+    if not possible:
+        return HitTable.of({}, {}, {})
+    # What turns a shot leaves no image of it.
+    scenes = [(one.scene, one.shots(shots if one.turned else shots[::images])) for one in possible]
+    outcomes = [
+        found if one.turned else found.unfolded(campaign.symmetries)
+        for one, found in zip(possible, compute(scenes), strict=True)
+    ]
+    numbers = (places[:, None] * group + np.arange(group)).reshape(-1)
+    columns = _columns(possible, outcomes, numbers)
+    attributes = _attributes(possible, outcomes) | {attr.ASSUMED_TIME: time.perf_counter() - begin}
+    return assumed_table(columns, attributes, double=is_double(campaign))
+
+
+def _groups(campaign: Campaign, fewest: int) -> int:
+    """How many hits or bursts that are no images of each other each alternative has."""
+    group, total = len(campaign.symmetries) * campaign.at_a_plate, len(campaign.sampler())
+    hits = campaign.assumptions.hits or min(max(fewest, int(SHARE * total)), MOST)
+    return min(max(FEWEST_GROUPS, hits // group), total // group)
+
+
+def _columns(possible: list[Alternative], outcomes: list[Outcomes], numbers: NDArray[np.int64]) -> dict[str, Any]:
+    moving = [found for one, found in zip(possible, outcomes, strict=True) if not one.breaks]
+    if not moving:
+        return {}
+    which = np.repeat(np.arange(len(moving)), len(numbers))
+    return assumed_columns(Outcomes.joined(moving), np.tile(numbers, len(moving)), which)
+
+
+def _attributes(possible: list[Alternative], outcomes: list[Outcomes]) -> dict[str, Any]:
+    """Numbers of the alternatives by name, and the share of cores that would break by their strength."""
+    names = [one.name for one in possible if not one.breaks]
+    broken = {
+        one.name: float(np.mean(found.broken)) for one, found in zip(possible, outcomes, strict=True) if one.breaks
+    }
+    told = {attr.ASSUMPTIONS: {name: number for number, name in enumerate(names)}, attr.WOULD_BREAK: broken}
+    return {name: json.dumps(value, ensure_ascii=False) for name, value in told.items() if value}

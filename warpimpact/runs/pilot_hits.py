@@ -1,0 +1,52 @@
+"""Which hits of a campaign stand for all of them: those of a pilot, and those under assumptions."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warpimpact.campaign.campaign import Campaign
+from warpimpact.scene import Shots
+from warpimpact.solver.pilot import pilot_size
+from warpimpact.solver.simulate import spread_places
+
+_FEWEST_BURSTS = 8
+"""Of a pilot, however many shots they have."""
+
+
+def pilot_shots(campaign: Campaign, most: int) -> Shots:
+    """Some of the hits of a campaign, no two of them images of each other; of bursts, whole ones."""
+    return shots_at(campaign, pilot_places(campaign, most))[:: len(campaign.symmetries)]
+
+
+def pilot_most(campaign: Campaign) -> int:
+    """Shots of a pilot of a campaign, at most."""
+    return pilot_size(campaign.numerics.asked, len(campaign.sampler()) // len(campaign.symmetries))
+
+
+def pilot_places(campaign: Campaign, most: int) -> NDArray[np.int64]:
+    """Which groups of images, or bursts with their images, `pilot_shots` takes."""
+    at_a_plate = campaign.at_a_plate
+    return places_of(campaign, most if at_a_plate == 1 else max(-(-most // at_a_plate), _FEWEST_BURSTS))
+
+
+def places_of(campaign: Campaign, most: int) -> NDArray[np.int64]:
+    """Groups of images, or bursts with their images, that stand for all of them.
+
+    They depend on the campaign alone: the first ones of a Sobol or random sampling, those at even distances of a grid
+    or a list.
+
+    Args:
+        most: groups, at most.
+    """
+    groups = len(campaign.sampler()) // (len(campaign.symmetries) * campaign.at_a_plate)
+    count = min(most, groups)
+    return np.arange(count) if campaign.hits.sampling in ("sobol", "random") else spread_places(groups, count)
+
+
+def shots_at(campaign: Campaign, places: NDArray[np.int64]) -> Shots:
+    """The shots of groups, with their images. Bursts are whole, as a later hit meets what the earlier ones left."""
+    sampler, group = campaign.sampler(), len(campaign.symmetries) * campaign.at_a_plate
+    if campaign.hits.sampling in ("sobol", "random"):
+        return sampler.shots(0, len(places) * group)
+    return Shots.joined([sampler.shots(int(place) * group, group) for place in places])
