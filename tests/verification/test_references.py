@@ -78,23 +78,15 @@ def test_nonlocal_degradation_meets_a_cartesian_grid(
     assert references.nonlocal_degradation_residual(**case, resolution=4) == pytest.approx(residual, abs=0.02)
 
 
-# The gap falls as ℓ without friction and as √ℓ with it, once √(ℓ/|c2|) is short against the plate; at these
-# lengths it only begins to. Degradation as a whole makes 40 and 120 m/s here.
-@pytest.mark.parametrize(
-    ("shot", "shear_coefficient", "gap"),
-    [(PAPER_SHOT, 0.0, 0.15), (THICK_SHOT, 0.05, 0.75)],
-    ids=["paper", "thick with friction"],
-)
-def test_nonlocal_degradation_tends_to_the_local_limit(
-    shot: dict[str, float], shear_coefficient: float, gap: float
-) -> None:
-    case = {**shot, **DEGRADING, "shear_coefficient": shear_coefficient}
+def test_nonlocal_degradation_tends_to_the_local_limit() -> None:
+    # The gap falls as ℓ without friction. Degradation as a whole makes 40 m/s here.
+    case = {**PAPER_SHOT, **DEGRADING, "shear_coefficient": 0.0}
     limit = references.local_degradation_residual(**case)
     wide, narrow = (
         abs(references.nonlocal_degradation_residual(**case, degradation_length=length, resolution=4) - limit)
         for length in (0.5e-3, 0.0625e-3)
     )
-    assert narrow < gap
+    assert narrow < 0.15
     assert narrow < 0.85 * wide
 
 
@@ -115,8 +107,8 @@ def test_tent_over_disc_meets_brute_force(radius: float) -> None:
 
 
 def test_arrest_is_an_error_of_the_residual_velocity() -> None:
-    # The work of 298 J is the energy of 386 m/s.
-    shot = {**PAPER_SHOT, "velocity": 380.0, "shear_coefficient": 0.0}
+    # The work of 298 J is the energy of 386 m/s. The slower a core is, the fewer steps it takes to its rest.
+    shot = {**PAPER_SHOT, "velocity": 200.0, "shear_coefficient": 0.0}
     with pytest.raises(ValueError, match="arrested"):
         references.solid_plate_residual(**shot)
     with pytest.raises(ValueError, match="arrested"):

@@ -34,14 +34,20 @@ def test_an_import_is_quick() -> None:
     assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
 
 
+TYPED = ("numpy", "xarray", "pydantic", "pydantic_core", "annotated_types", "typing_extensions.py", "typing_inspection")
+"""Packages whose types public names have. Others have none where no stubs are installed, which a user need not have."""
+
+
 @pytest.fixture(scope="module")
 def environment(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """An environment of a user: this one's packages, and the package by its path, as make installs it."""
+    """An environment of a user: packages with types, and this one by its path, as make installs it."""
     folder = tmp_path_factory.mktemp("environment")
     venv.create(folder, with_pip=False)
     (site,) = folder.glob("lib/*/site-packages")
-    paths = [path for path in sys.path if path.endswith("site-packages")]
-    (site / "packages.pth").write_text("\n".join([str(CHECKOUT), *paths]), encoding="utf-8")
+    for name in TYPED:
+        here = next(Path(path, name) for path in sys.path if Path(path, name).exists())
+        (site / name).symlink_to(here)
+    (site / "warpimpact.pth").write_text(str(CHECKOUT), encoding="utf-8")
     return folder
 
 

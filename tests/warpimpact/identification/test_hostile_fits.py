@@ -10,7 +10,6 @@ from typing import Any
 import pytest
 import xarray
 
-from warpimpact.cli import main
 from warpimpact.identification.fit import Fit
 from warpimpact.identification.fit_file import fit_from
 from warpimpact.identification.parameters import FitError
@@ -95,16 +94,13 @@ ALTERATIONS: dict[str, tuple[str, Callable[[xarray.Dataset], xarray.Dataset]]] =
 
 
 @pytest.mark.parametrize("case", ALTERATIONS)
-def test_an_altered_posterior_is_refused_in_a_sentence(
-    case: str, posterior: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_an_altered_posterior_is_refused_in_a_sentence(case: str, posterior: Path, tmp_path: Path) -> None:
     group, change = ALTERATIONS[case]
     tree = read_tree(posterior, posterior_file.POSTERIOR)
     groups = {name: tree[name].to_dataset() for name in ("/", *tree.children)}
     groups[group] = change(groups[group])
     path = tmp_path / "altered.nc"
     write_tree(xarray.DataTree.from_dict(groups), path)
-    with pytest.raises(ResultError, match="not a posterior of warpimpact"):
+    with pytest.raises(ResultError, match="not a posterior of warpimpact") as caught:
         read_tree(path, posterior_file.POSTERIOR)
-    assert main(["report", str(path), "-o", str(tmp_path / "a.html")]) == 2
-    assert capsys.readouterr().err.count("\n") == 1
+    assert "\n" not in str(caught.value)

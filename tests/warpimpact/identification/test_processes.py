@@ -46,18 +46,6 @@ def check_equal(one: Sampled, other: Sampled) -> None:
             np.testing.assert_array_equal(getattr(a, name), getattr(b, name), err_msg=name)
 
 
-def test_scores_of_processes_are_those_of_threads(fit: Fit) -> None:
-    most = 0
-
-    def count(_: FitProgress) -> None:
-        nonlocal most
-        most = max(most, len(multiprocessing.active_children()))
-
-    together = sample(fit, 2, count)
-    assert most == 2
-    check_equal(together, sample(fit))
-
-
 def test_a_killed_process_costs_nothing(fit: Fit) -> None:
     killed = set[int]()
 

@@ -43,7 +43,7 @@ resistance = "3 GPa"
 [impact]
 velocity = "500 m/s"
 [hits]
-count = 72
+count = 36
 [numerics]
 fidelity = "draft"
 """
@@ -130,7 +130,7 @@ def test_limits_on_workers_are_those_of_a_local_search(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, assert_same_bits: Callable[[Path, Path], None]
 ) -> None:
     # Workers search their shards apart. The promise of the pilot goes to all of them.
-    monkeypatch.setattr("warpimpact.runs.shards.FEWEST", 32)
+    monkeypatch.setattr("warpimpact.runs.shards.FEWEST", 16)
     path, output, local = tmp_path / "campaign.toml", tmp_path / "a.nc", tmp_path / "local.nc"
     path.write_text(LAYERED_LIMIT, encoding="utf-8")
     command = ["limit", str(path), "--quantity", "thickness", "--layer", "1", "--device", "cpu"]

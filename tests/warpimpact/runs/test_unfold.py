@@ -178,7 +178,7 @@ def test_the_command_tells_what_was_computed(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.chdir(tmp_path)
-    text = SLOTTED_PLATE.read_text().replace('"standard"', '"draft"')
+    text = SLOTTED_PLATE.read_text().replace('fidelity = "standard"', "level = 0")
     text = text.replace("seed = 1", "seed = 1\nirreducible = true")
     for impact, sentence in (
         ('"825 m/s"', "8 of 64 hits computed, the others are their images by (y, z), (y, z) + centring, (y, -z), "),

@@ -61,8 +61,9 @@ DAMAGES: list[Callable[[Path], object]] = [
 ]
 
 
-@pytest.mark.parametrize("suffix", [".o", ".meta"])
-@pytest.mark.parametrize("damage", DAMAGES)
+@pytest.mark.parametrize(
+    ("damage", "suffix"), [*((damage, ".o") for damage in DAMAGES), (_flip, ".meta"), (Path.unlink, ".meta")]
+)
 def test_a_damaged_cache_is_compiled_again(
     damage: Callable[[Path], object], suffix: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -48,6 +48,7 @@ fidelity = "draft"
 """
 MEAN = Measure.parse("mean(limit_velocity)")
 V50, V05 = Measure.parse("V50"), Measure.parse("V05")
+PROMISED = '[numerics]\nfidelity = "draft"\n'
 GIVEN = '[numerics]\npatches_axial = 14\npatches_around = 16\ntime_step = "0.5 us"\n'
 
 
@@ -129,7 +130,7 @@ class StopsAfter:
 
 def test_another_quantity_is_not_resumed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("warpimpact.runs.shards.FEWEST", 16)
-    text = TEXT.replace('[numerics]\nfidelity = "draft"\n', GIVEN)
+    text = TEXT.replace(PROMISED, GIVEN)
     with pytest.raises(Interrupted):
         search(campaign(text), tmp_path / "broken.nc", progress=StopsAfter(16))
     with pytest.raises(OSError, match=r"limit was .*velocity.* and is .*thickness"):
@@ -137,7 +138,7 @@ def test_another_quantity_is_not_resumed(tmp_path: Path, monkeypatch: pytest.Mon
 
 
 def test_images_share_the_limit_of_their_hit(tmp_path: Path) -> None:
-    folded = campaign(TEXT.replace("count = 64", "count = 64\nirreducible = true"))
+    folded = campaign(TEXT.replace("count = 64", "count = 64\nirreducible = true").replace(PROMISED, GIVEN))
     found = search(folded, tmp_path / "folded.nc")
     groups = found["limit_velocity"].values.reshape(-1, len(folded.symmetries))
     assert groups.shape[1] > 1
@@ -166,7 +167,7 @@ shear_coefficient = 0.05
 
 
 def test_thickness_of_the_base_behind_a_perforated_plate(tmp_path: Path) -> None:
-    given = TEXT.replace("count = 64", "count = 4").replace('[numerics]\nfidelity = "draft"\n', GIVEN)
+    given = TEXT.replace("count = 64", "count = 4").replace(PROMISED, GIVEN)
     behind = campaign(given + LAYER)
     job = LimitMap.of(behind, "thickness", layer=1)
     run_to_file(behind, tmp_path / "base.nc", device="cpu", computation=job)
@@ -278,11 +279,11 @@ OF = ["shots", "[1]"]
 
 @pytest.mark.parametrize("quantity", ["velocity", "thickness"])
 def test_limits_do_not_depend_on_the_tasks(quantity: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(shards, "FEWEST", 16)
+    monkeypatch.setattr(shards, "FEWEST", 8)
     of = campaign(TEXT.replace('fidelity = "draft"', "level = 0"))
-    job, shots = LimitMap.of(of, quantity), of.sampler().shots(0, 64)
+    job, shots = LimitMap.of(of, quantity), of.sampler().shots(0, 32)
     whole = job.compute(of, Task(shots), Worker("cpu"))
-    parts = [job.compute(of, Task(shots[first:end]), Worker("cpu")) for first, end in ((0, 16), (16, 64))]
+    parts = [job.compute(of, Task(shots[first:end]), Worker("cpu")) for first, end in ((0, 8), (8, 32))]
     for name in v.LIMITS[quantity]:
         values = [part[name].values for part in parts]
         np.testing.assert_array_equal(np.concatenate(values), whole[name].values)
