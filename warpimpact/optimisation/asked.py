@@ -8,9 +8,9 @@ from typing import Any, Literal
 
 from pydantic import field_validator, model_validator
 
-from warpimpact.results import variables as v
+from warpimpact.campaign.needs import lacking
 from warpimpact.results.measures import Measure
-from warpimpact.results.vocabulary import BASE, CORE, QUANTITIES, STRENGTH
+from warpimpact.results.vocabulary import QUANTITIES
 from warpimpact.scene.model import Model
 from warpimpact.scene.units import Number, quoted
 
@@ -45,8 +45,8 @@ class _Asked(Model):
 
     Attributes:
         measure: such as `mean(residual_energy_density@130mm)`, `worst_tenth(base_depth)`, `P(base_perforated)`,
-            `P(inclination@130mm > 30 deg)`, `mean(limit_thickness@layer 1)` or `areal_density`; without a stand-off the
-            largest one counts.
+            `P(inclination@130mm > 30 deg)`, `V50`, `mean(limit_thickness@layer 1)` or `areal_density`; without a
+            stand-off the largest one counts.
         threats: over several threats the "worst" one counts, or their weighted "mean".
     """
 
@@ -66,9 +66,10 @@ class _Asked(Model):
     @field_validator("measure")
     @classmethod
     def _can_be_sought(cls, text: str) -> str:
-        if Measure.parse(text).kind in ("quantile", "worst_point"):
+        if Measure.parse(text).kind == "worst_point":
             raise ValueError(
-                f"got {quoted(text)}, but a search takes a mean, a worst tenth, a probability or areal_density"
+                f"got {quoted(text)}, but a search takes a mean, a worst tenth, a quantile, a probability or "
+                "areal_density"
             )
         return text
 
@@ -138,15 +139,9 @@ def check_needs(asked: Mapping[str, Objective | Bound], output: Mapping[str, Any
     Raises:
         ValueError: names the measure, and what it needs.
     """
-    bends = output.get("bending") is True
-    given: dict[str, bool] = {BASE.name: layered, STRENGTH.name: bends, **dict.fromkeys(v.BENDING_VARIABLES, bends)}
-    given |= dict.fromkeys((CORE.name, *v.OUTCOME_VARIABLES), True)
-    for place, one in asked.items():
-        quantity, lacking = one.asked.quantity, ""
-        if quantity.has_standoff and output.get("standoffs") == []:
-            lacking = "output.standoffs"
-        elif quantity.need is not None and not one.asked.is_limit and not given.get(quantity.need.name, False):
-            bending = "output.bending = true" if quantity.need.name in v.BENDING_VARIABLES else ""
-            lacking = quantity.need.keys or bending or "what a search does not compute"
-        if lacking:
-            raise ValueError(f'{place}.measure = "{one.measure}" needs {lacking}')
+    bends, none = output.get("bending") is True, output.get("standoffs") == []
+    for place, goal in asked.items():
+        measure = goal.asked
+        keys = lacking(measure, standoffs=[] if none else None, layered=layered, bending=bends, breakable=True)
+        if keys:
+            raise ValueError(f'{place}.measure = "{goal.measure}" needs {keys}')

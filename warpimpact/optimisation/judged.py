@@ -17,9 +17,11 @@ from numpy.typing import NDArray
 
 from warpimpact.optimisation.asked import Bound, Objective
 from warpimpact.optimisation.design import Design
+from warpimpact.results.measures import Measure
 from warpimpact.statistics.comparisons import ROUNDED
 from warpimpact.statistics.intervals import Estimate, estimate_of
 from warpimpact.statistics.student import student_quantile
+from warpimpact.statistics.tails import pseudo_values, quantile_weights
 
 Array = NDArray[np.float64]
 
@@ -85,12 +87,20 @@ def numbers_of(design: Design, record: Record, goal: Objective | Bound, hits: in
         return np.full(hits, record.areal_density)
     by_threat = record.said[:, design.keys.index(measure.column), :hits]
     if not measure.is_binary:
-        by_threat = np.array([measure.averaged(measure.counted(numbers)) for numbers in by_threat])
+        by_threat = np.array([_averaged(measure, numbers) for numbers in by_threat])
     if goal.threats == "mean":
         weights = np.array([threat.weight for threat in design.threats])
         return np.asarray(weights @ by_threat / weights.sum())
     means_by_threat = goal.sign * np.array([_mean(numbers) for numbers in by_threat])
     return np.asarray(by_threat[int(np.argmax(np.nan_to_num(means_by_threat, nan=np.inf)))])
+
+
+def _averaged(measure: Measure, numbers: Array) -> Array:
+    """Numbers of hits whose mean is a measure, shape [hits]. A quantile is that of Harrell and Davis, a smooth function
+    of the hits, so that a small change of a design changes it little (statistics/tails.py)."""
+    if measure.kind == "quantile":
+        return pseudo_values(numbers, np.zeros(len(numbers)), quantile_weights(measure.share))
+    return measure.averaged(measure.counted(numbers))
 
 
 def estimate(design: Design, record: Record, goal: Objective | Bound) -> Estimate:

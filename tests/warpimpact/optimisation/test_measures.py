@@ -35,9 +35,12 @@ def test_all_statistics_of_a_quantity_share_its_column(make) -> None:
     [
         ('"base_depht"', "did you mean mean(base_depth)?"),
         ('"mean(tilt)"', "neither is better"),
-        ('"V50"', "a search takes a mean, a worst tenth, a probability or areal_density"),
+        (
+            '"worst_point(base_depth)"',
+            "a search takes a mean, a worst tenth, a quantile, a probability or areal_density",
+        ),
         ('"mean(bending_stress)"\ngoal = "minimise"', "needs output.bending = true"),
-        ('"mean(broken_time)"\ngoal = "minimise"', "needs what a search does not compute"),
+        ('"mean(broken_time)"\ngoal = "minimise"', "needs output.bending = true and core.strength"),
         ('"P(stopped)"\nangle = "30 deg"', 'got the unknown key "angle"'),
     ],
 )
