@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.stats import multivariate_normal
 
-from warpimpact.identification.aim import STEPS, Aim
+from warpimpact.identification.aim import POINT_STEPS, Aim
 from warpimpact.identification.between import changes
 from warpimpact.identification.likelihood import Compared, Data
 from warpimpact.identification.measured import Observation
@@ -24,7 +24,7 @@ PITCH = Observation("pitch", 0, 0.05, np.radians(-4.0), np.radians(3.0))
 def aim_of(count: int, shift: float = 0.3) -> Aim:
     """Points of a quarter of the cell with their mirror images."""
     part = 0.5 * CELL
-    places = np.mod(np.arange(count)[:, None] * STEPS + shift, 1.0) * part
+    places = np.mod(np.arange(count)[:, None] * POINT_STEPS + shift, 1.0) * part
     hits = (places[:, None] * [[one.along_y, one.along_z] for one in MIRRORED]).reshape(-1, 2)
     zeros = np.zeros(len(hits))
     shots = Shots(
