@@ -16,6 +16,7 @@ from warpimpact.results.interrupts import terminated_as_interrupted
 
 from .catalogue import add_catalogue
 from .compare import add_compare
+from .continuum import add_continuum
 from .design import add_design
 from .export import add_export, add_report
 from .firing import add_test
@@ -37,6 +38,7 @@ _COMMANDS = (
     add_new,
     add_catalogue,
     add_run,
+    add_continuum,
     add_limit,
     add_sweep,
     add_inspect,

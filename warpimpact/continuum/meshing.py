@@ -42,6 +42,7 @@ class SheetMesh:
         solid: whether a column has material, shape [rows − 1, columns − 1].
         x: of the planes of nodes [m].
         spacing: of the fine cells [m].
+        edges: coordinates along y and z before nodes were moved [m].
     """
 
     y: Array
@@ -49,6 +50,7 @@ class SheetMesh:
     solid: NDArray[np.bool_]
     x: Array
     spacing: float
+    edges: tuple[Array, Array] = (np.empty(0), np.empty(0))
 
     @property
     def row(self) -> int:
@@ -109,7 +111,7 @@ def meshed(
         y, z = _onto_edges(plate, hit, y, z, solid)
         cells = np.outer(np.diff(along_y), np.diff(along_z))
         solid = solid & (_areas(y, z) > SLIVER * cells)
-    return SheetMesh(y, z, solid, front + np.linspace(0.0, plate.thickness, planes + 1), spacing)
+    return SheetMesh(y, z, solid, front + np.linspace(0.0, plate.thickness, planes + 1), spacing, (along_y, along_z))
 
 
 def _line(extent: Extent, spacing: float) -> Array:

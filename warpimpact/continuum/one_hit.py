@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
+import threading
 from collections.abc import Iterator
 from dataclasses import dataclass
-from functools import cache
 from typing import Any
 
 import numpy as np
@@ -80,10 +80,15 @@ class Energies:
         return self.hourglass / self.lost if self.lost > 0.0 else 0.0
 
 
-@cache
+_BUILDING = threading.Lock()
+
+
 def built(double: bool) -> Any:
-    """The build of the march for a precision."""
-    return passing.build(Variant(double=double))
+    """The build of the march for a precision: one, whichever threads ask for it, and compiled."""
+    with _BUILDING:
+        stage = passing.build(Variant(double=double))
+        load(stage.kernel, find_device("cpu"))
+        return stage
 
 
 class OneHit:
@@ -214,12 +219,11 @@ class OneHit:
             device=self.device,
         )
 
-    def steps(self, cancel: Cancel = NEVER) -> Iterator[None]:
-        """March to the end; yields after every launch."""
-        load(self.stage.kernel, self.device)
+    def steps(self, every: int = STEPS, cancel: Cancel = NEVER) -> Iterator[None]:
+        """March to the end; yields after so many steps again and again."""
         while self.flight["status"] == RUNNING:
             cancel.check()
-            self.advance()
+            self.advance(every)
             yield
 
     def mass_at(self, layer: int) -> Array:

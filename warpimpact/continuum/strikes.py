@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from typing import Any
@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpimpact.continuum.meshing import Extent, SheetMesh, meshed
-from warpimpact.continuum.one_hit import Energies, OneHit, Start
+from warpimpact.continuum.one_hit import STEPS, Energies, OneHit, Start
 from warpimpact.kernels.status import Status
 from warpimpact.records.continuum_variables import ENERGY_IMBALANCE, ERODED_ELEMENTS, HOURGLASS_SHARE
 from warpimpact.records.outcomes import Outcomes
@@ -101,17 +101,31 @@ def struck(
 ) -> Outcomes:
     """Compute the shots by the threads of a worker; see `simulate_continuum`."""
     check_continuum(scene, shots, continuum)
-    prepared = prepare(scene, shots, Numerics(level=0, precision="double"))
-    memory = Memory(prepared, find_device("cpu"), worker.cancel)
+    memory = memory_of(scene, shots, worker)
+    conditions = memory.prepared.conditions
     hits: list[Struck] = []
-    with ThreadPoolExecutor(worker.threads or cores()) as pool:
-        results = pool.map(
-            lambda k: march_of(scene, shots, k, continuum, prepared.conditions).ended(worker.cancel), range(len(shots))
-        )
-        for hit in results:
-            hits.append(hit)
-            progress(len(hits), len(shots))
-    return _outcomes(memory, hits)
+    for hit in _in_threads(
+        lambda k: march_of(scene, shots, k, continuum, conditions).ended(worker.cancel),
+        len(shots),
+        worker.threads or cores(),
+    ):
+        hits.append(hit)
+        progress(len(hits), len(shots))
+    return outcomes_of(memory, hits)
+
+
+def memory_of(scene: Scene, shots: Shots, worker: Worker) -> Memory:
+    """What the free flight behind the target needs of some shots, on the CPU."""
+    return Memory(prepare(scene, shots, Numerics(level=0, precision="double")), find_device("cpu"), worker.cancel)
+
+
+def _in_threads(compute: Callable[[int], Struck], count: int, threads: int) -> Iterator[Struck]:
+    """Results in their order; one thread is that of the caller."""
+    if threads == 1:
+        yield from map(compute, range(count))
+        return
+    with ThreadPoolExecutor(threads) as pool:
+        yield from pool.map(compute, range(count))
 
 
 class March:
@@ -122,10 +136,13 @@ class March:
         held = [sheet.held & (hit.mass_at(k) > 0.0) for k, sheet in enumerate(sheets)]
         self._held = np.concatenate([at + np.flatnonzero(there) for at, there in zip(hit.firsts, held, strict=True)])
 
-    def ended(self, cancel: Cancel = NEVER) -> Struck:
-        """March to the end."""
+    def ended(
+        self, cancel: Cancel = NEVER, *, every: int = STEPS, follow: Callable[[OneHit], object] = lambda hit: None
+    ) -> Struck:
+        """March to the end; `follow` is called after so many steps again and again."""
         status = None
-        for _ in self.hit.steps(cancel):
+        for _ in self.hit.steps(every, cancel):
+            follow(self.hit)
             if self.hit.mesh.near.numpy()[self._held].any():
                 status = Status.LEFT_WINDOW
                 break
@@ -218,7 +235,7 @@ def start_of(scene: Scene, shots: Shots, number: int, friction: float, condition
     )
 
 
-def _outcomes(memory: Memory, hits: list[Struck]) -> Outcomes:
+def outcomes_of(memory: Memory, hits: list[Struck]) -> Outcomes:
     """The outcomes of some hits: their flight to the stand-offs is that of the fast law's cores."""
     contact, count = memory.outcomes(), len(hits)
     columns: dict[str, list[Any]] = {name: [] for name in contact._cls.vars}

@@ -75,6 +75,8 @@ LEVEL_FOR = _declared("level_for")
 LEVEL_SHIFTS = _declared("level_shifts", "table")
 """JSON of what the numerics may shift the mean residual velocity [m s-1] and the mean last tilt [degree] by, at every
 level that the pilot tried."""
+CONTINUUM = _declared("continuum", "table", _SI)
+"""JSON of the settings and the materials of a result by finite elements, which has no other numerics."""
 FINGERPRINT = _declared("fingerprint")
 COMPUTE_TIME = _declared("compute_time", "number", "s")
 HITS_PER_SECOND = _declared("hits_per_second", "number", "s-1")

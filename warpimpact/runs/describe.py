@@ -39,16 +39,34 @@ def described(
         attributes: those of how they were computed (`computed_by`), and of what is not the same in any campaign.
         beside: columns of other shots, as in `to_table`.
     """
-    told = _campaign(campaign)
-    told |= _numerics(campaign, resolve(campaign.scene, numerics, weakens(campaign.target, shots)))
+    told = _numerics(campaign, resolve(campaign.scene, numerics, weakens(campaign.target, shots)))
     told |= {attr.EVIDENCE: "\n".join(lines)} if (lines := evidence_of(campaign)) else {}
+    unfolded = outcomes.unfolded(campaign.symmetries)
+    return described_as(campaign, shots, unfolded, {**told, **attributes}, beside, double=is_double(campaign))
+
+
+def described_as(
+    campaign: Campaign,
+    shots: Shots,
+    outcomes: Outcomes,
+    attributes: Mapping[str, Any],
+    beside: Mapping[str, Any] | None,
+    *,
+    double: bool,
+) -> HitTable:
+    """The columns of shots of a campaign and of the outcomes of all of them.
+
+    Args:
+        attributes: those that do not follow from the campaign alone.
+        beside, double: as in `to_table`.
+    """
     return to_table(
         campaign.scene,
         shots,
-        outcomes.unfolded(campaign.symmetries),
+        outcomes,
         period=campaign.hits.covered(campaign.plate),
-        attributes={**told, **attributes},
-        double=is_double(campaign),
+        attributes={**_campaign(campaign), **attributes},
+        double=double,
         beside=beside,
         left_out=() if campaign.output.exit_state else v.EXIT_VARIABLES,
     )

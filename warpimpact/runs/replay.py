@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 
 import numpy as np
 import xarray
 
 from warpimpact.campaign.campaign import Campaign
+from warpimpact.continuum.hit_history import replay_continuum
 from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
 from warpimpact.results.dataset import history_dataset, hit_numbers, numbered, to_dataset
@@ -15,6 +17,7 @@ from warpimpact.results.files import ResultError
 from warpimpact.results.layers import values_of
 from warpimpact.runs.describe import is_double
 from warpimpact.scene import Numerics, Scene, Shots
+from warpimpact.scene.flow import Continuum
 from warpimpact.solver import replay as solver
 from warpimpact.solver.limit import short_steps, with_thickness, with_velocity
 from warpimpact.solver.unfold import image_of
@@ -23,7 +26,7 @@ DEVICE_ROUNDING = {v.RESIDUAL_VELOCITY: 0.1, v.DEFLECTION: 0.5, v.TILT: 0.5}
 """Largest change of an outcome by the rounding of another device [m/s, degree]. Between single and double precision,
 6144 hits on the slotted plate (825, 300 and 200 m/s) differ by 0.012 m/s and 0.04 degrees at most."""
 _OF_A_MAP = (
-    *(attr.COUNT, attr.COMPUTE_TIME, attr.HITS_PER_SECOND, attr.COMPUTED_HITS, attr.IMAGES),
+    *(attr.COUNT, attr.COMPUTE_TIME, attr.CONTINUUM, attr.HITS_PER_SECOND, attr.COMPUTED_HITS, attr.IMAGES),
     attr.SHOTS_AT_A_PLATE,
     attr.BURST,
     *v.OUTLINE_VARIABLES,
@@ -66,10 +69,16 @@ def replay(result: xarray.Dataset, hit: int, *, folder: str | Path = ".", snapsh
     drawn = sampler.shots(hit - image - before, len(group) + before)
     images = _at_their_limit(scene, drawn, result, place)
     computed, shot = images[: 1 + before], images[image + before :][:1]
-    again = solver.replay(scene, computed, numerics=_numerics(campaign, result), snapshots=snapshots)
+    if attr.CONTINUUM in result.attrs:
+        settings = json.loads(result.attrs[attr.CONTINUUM])
+        continuum = Continuum.model_validate({name: value for name, value in settings.items() if name != "materials"})
+        again = replay_continuum(scene, computed, continuum, snapshots)
+    else:
+        again = solver.replay(scene, computed, numerics=_numerics(campaign, result), snapshots=snapshots)
     home, away = ((float(at.hit_y[-1]), float(at.hit_z[-1])) for at in (computed, shot))
     again = image_of(again, group[image], home=home, image=away)
-    period, double = campaign.hits.covered(campaign.plate), is_double(campaign)
+    period = campaign.hits.covered(campaign.plate)
+    double = is_double(campaign) or attr.CONTINUUM in result.attrs
     ended = to_dataset(scene, shot, again.outcomes, period=period, attributes={}, double=double)
     end = numbered(ended, hit).isel(hit=0)
     stored = result.isel(hit=place)

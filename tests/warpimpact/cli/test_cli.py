@@ -26,6 +26,7 @@ SLOTTED_PLATE = Path(__file__).parents[3] / "campaigns" / "slotted_plate.toml"
         ["compare"],
         ["plate"],
         ["identify"],
+        ["continuum"],
         ["catalogue"],
         ["test"],
         ["optimise"],

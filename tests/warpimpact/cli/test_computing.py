@@ -29,7 +29,7 @@ def rows() -> dict[str, dict[str, str]]:
     return found
 
 
-@pytest.mark.parametrize("command", ["run", "limit", "sweep", "compare", "test", "identify", "optimise"])
+@pytest.mark.parametrize("command", ["run", "limit", "sweep", "compare", "test", "identify", "optimise", "continuum"])
 def test_the_table_says_which_options_a_command_takes(command: str) -> None:
     taken, told = options_of(command), rows()[command]
     assert {name: told[name] == "yes" for name in OPTIONS} == {

@@ -1,0 +1,147 @@
+"""Hits by finite elements as a result: all of a campaign or some of a map, resumed, replayed, refused."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from warpimpact import Campaign, replay
+from warpimpact.cli import main
+from warpimpact.continuum import strikes
+from warpimpact.results import attributes as attr
+from warpimpact.results import files
+from warpimpact.runs.choice import executor_for
+from warpimpact.runs.finite_elements import FiniteElements, continuum_to_file
+
+ELEMENTS = FiniteElements(("ARMOX560T",), spacing=1e-3)
+CAMPAIGN = """
+title = "slots"
+[core]
+shape = "polynomial"
+coefficients = [3.0e-4, 0.24, -5.29]
+length = "27.86 mm"
+mass = "4 g"
+[plate]
+thickness = "4 mm"
+resistance = "2600 MPa"
+[plate.pattern]
+shape = "slot"
+length = "12 mm"
+width = "4 mm"
+spacing = ["8 mm", "16 mm"]
+staggered = true
+[impact]
+velocity = "825 m/s"
+[hits]
+count = 4
+seed = 1
+[numerics]
+level = 0
+"""
+
+
+@pytest.fixture(autouse=True)
+def coarse(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Elements of 1 mm, whose hourglasses take much, are enough here."""
+    monkeypatch.setattr(strikes, "LARGEST_HOURGLASS_SHARE", 1.0)
+
+
+@pytest.fixture
+def campaign_file(tmp_path: Path) -> Path:
+    path = tmp_path / "slots.toml"
+    path.write_text(CAMPAIGN, encoding="utf-8")
+    return path
+
+
+def computed(path: Path, campaign: Path, hits: tuple[int, ...] | None = None, *, resume: bool = False) -> Path:
+    with executor_for("cpu", apart=True) as executor:
+        continuum_to_file(
+            Campaign.from_toml(campaign), replace(ELEMENTS, hits=hits), path, device=executor, resume=resume
+        )
+    return path
+
+
+def test_hits_chosen_from_a_campaign_are_those_of_all(campaign_file: Path, tmp_path: Path) -> None:
+    whole = files.read(computed(tmp_path / "all.nc", campaign_file))
+    some = files.read(computed(tmp_path / "some.nc", campaign_file, (1, 3)))
+    assert whole.sizes["hit"] == 4
+    assert some["hit"].values.tolist() == [1, 3]
+    for name in ("residual_velocity", "tilt", "energy_imbalance", "hourglass_share", "eroded_elements", "status"):
+        assert np.array_equal(whole[name].values[[1, 3]], some[name].values, equal_nan=True), name
+    assert (whole["energy_imbalance"].values < 0.02).all()
+    assert "finite elements, 1 mm, friction 0, ARMOX560T" in whole.attrs[attr.NUMERICS]
+    assert "solid_residual_velocity" in whole
+
+
+def test_a_hit_that_is_there_is_not_computed_again(
+    campaign_file: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    output, straight = tmp_path / "cut.nc", files.read(computed(tmp_path / "straight.nc", campaign_file))
+    march, calls = strikes.March.ended, []
+
+    def broken_off(self: strikes.March, *arguments: object, **more: object) -> strikes.Struck:
+        calls.append(self)
+        if len(calls) == 3:
+            raise KeyboardInterrupt
+        return march(self, *arguments, **more)  # type: ignore[arg-type]
+
+    monkeypatch.setattr(strikes.March, "ended", broken_off)
+    with pytest.raises(KeyboardInterrupt, match="saved"), executor_for("cpu", apart=False) as executor:
+        continuum_to_file(Campaign.from_toml(campaign_file), ELEMENTS, output, device=executor)
+    calls[:] = [None] * 3
+    computed(output, campaign_file, resume=True)
+    assert 3 < len(calls) < 3 + 5  # of four hits and the solid plate
+    for name in ("residual_velocity", "tilt", "hourglass_share"):
+        assert np.array_equal(files.read(output)[name].values, straight[name].values, equal_nan=True), name
+
+
+def test_a_hit_is_replayed_bit_by_bit(campaign_file: Path, tmp_path: Path) -> None:
+    result = files.read(computed(tmp_path / "all.nc", campaign_file))
+    hit = int(result["eroded_elements"].values.argmax())
+    assert result["eroded_elements"][hit] > 0
+    history = replay(result, hit, snapshots=3)
+    assert history.attrs[attr.AGREEMENT] == "bit-identical"
+    left = history["resistance_share"].values
+    assert left.shape[0] == 3
+    assert (left[0] == left[0].round()).all()
+    assert left[-1].sum() < left[0].sum()
+    assert float(history["translational_energy"][-1]) < float(history["translational_energy"][0])
+
+
+def test_the_command_computes_hits_of_a_result(
+    campaign_file: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert main(["run", str(campaign_file), "-o", "map.nc", "-q"]) == 0
+    command = ["continuum", "map.nc", "--hits", "2", "--material", "ARMOX560T", "--element", "1 mm", "-q"]
+    assert main(command) == 0
+    assert files.read(tmp_path / "map_continuum.nc").sizes["hit"] == 2
+    assert "ARMOX560T: assumed" in capsys.readouterr().out
+    assert main(command) == 2
+    assert "exists already" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("arguments", "sentence"),
+    [
+        ([], "the continuum needs a material: give --material with one of AA6082-T6"),
+        (["--material", "ARMOX"], 'did you mean "ARMOX560T"'),
+        (["--material", "ARMOX560T", "--friction", "2"], "--friction: got 2, but it must be from 0 to 1"),
+        (["--material", "ARMOX560T", "--element", "1 s"], "--element: got"),
+        (["--material", "ARMOX560T", "--hit", "3"], "--hit and --hits are for a result"),
+        (["--material", "ARMOX560T", "--material", "HARDOX400"], "got 2 materials, but the target has 1 layers"),
+    ],
+)
+def test_bad_input_gets_a_sentence_and_writes_nothing(
+    arguments: list[str],
+    sentence: str,
+    campaign_file: Path,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert main(["continuum", str(campaign_file), *arguments, "-q"]) == 2
+    assert sentence in capsys.readouterr().err
+    assert [path.name for path in tmp_path.iterdir()] == ["slots.toml"]

@@ -1,0 +1,169 @@
+"""The command continuum: hits by finite elements, of a campaign or of a result."""
+
+import argparse
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from .mistakes import memory_told
+from .options import (
+    Commands,
+    add_command,
+    add_count,
+    add_output,
+    add_overwrite,
+    at_least,
+    read_option,
+)
+from .paths import check_place, check_suffix
+from .progress import Step, show_progress, warn
+from .run import failure_code
+
+if TYPE_CHECKING:
+    from warpimpact.campaign.campaign import Campaign
+    from warpimpact.runs.finite_elements import FiniteElements
+
+
+def add_continuum(commands: Commands) -> None:
+    parser = add_command(
+        commands,
+        "continuum",
+        _continuum,
+        summary="compute hits by finite elements",
+        description="Compute hits of a campaign, or some of those of a result, by explicit finite elements of the "
+        "target, which take seconds to minutes of a core each, and write a result as run does. It stands beside the "
+        "fast law: compare takes both. Its materials have constants of their own (docs/continuum.md).",
+        example="continuum campaigns/slotted_plate.toml --count 4 --material ARMOX560T -o continuum.nc",
+    )
+    parser.add_argument("file", type=Path, metavar="FILE", help="a campaign, or a result of warpimpact run")
+    add_output(parser, "RESULT.nc", "result file (default: the file's name with _continuum, in this folder)")
+    add_count(parser)
+    chosen = parser.add_mutually_exclusive_group()
+    chosen.add_argument(
+        "--hit",
+        type=at_least(0),
+        action="append",
+        metavar="N",
+        help="of a result: this hit; may be given several times",
+    )
+    chosen.add_argument("--hits", type=at_least(1), metavar="N", help="of a result: so many hits, spread over the map")
+    parser.add_argument(
+        "--material",
+        action="append",
+        default=[],
+        metavar="NAME",
+        help="material of the continuum, or a TOML file with its constants; given again for each layer behind "
+        "(default: plate.material)",
+    )
+    parser.add_argument(
+        "--friction", type=float, default=0.0, metavar="MU", help="between core and target (default: 0)"
+    )
+    parser.add_argument(
+        "--fidelity", choices=("draft", "standard", "reference"), default="draft", help="size of the elements"
+    )
+    parser.add_argument(
+        "--element", metavar="LENGTH", help='size of the elements, such as "0.5 mm", in place of a fidelity'
+    )
+    where = parser.add_mutually_exclusive_group()
+    where.add_argument("--scheduler", metavar="ADDRESS", help="compute on the workers of this Dask scheduler")
+    where.add_argument("--workers", type=at_least(1), metavar="N", help="compute in N processes on this machine")
+    parser.add_argument(
+        "--resume", action="store_true", help="continue an interrupted computation; start a new one if there is none"
+    )
+    add_overwrite(parser, "an existing result or an interrupted computation")
+
+
+def _continuum(arguments: argparse.Namespace) -> int:
+    from warpimpact.analysis.evidence_lines import evidence_lines
+    from warpimpact.analysis.summary import summary_text
+    from warpimpact.campaign.text import CampaignError
+    from warpimpact.results import attributes as attr
+    from warpimpact.results.netcdf import open_table
+    from warpimpact.runs.choice import executor_for
+    from warpimpact.runs.finite_elements import continuum_to_file
+
+    campaign, hits = _asked(arguments)
+    output = arguments.output or Path(f"{arguments.file.stem}_continuum.nc")
+    check_place(output)
+    check_suffix(output, "a result", ".nc")
+    elements = _elements(arguments, campaign, hits)
+    computing = executor_for("cpu", workers=arguments.workers, scheduler=arguments.scheduler, apart=True)
+    with memory_told(arguments.file), show_progress() as show, computing as executor:
+        try:
+            continuum_to_file(
+                campaign,
+                elements,
+                output,
+                device=executor,
+                resume=arguments.resume,
+                overwrite=arguments.overwrite,
+                progress=lambda now, total: show(Step(min(len(now.results), total), total, min(now.resumed, total))),
+                tell=warn,
+            )
+        except ValueError as error:
+            raise CampaignError(f"{arguments.file}: {error}") from None
+    with open_table(output) as dataset:
+        print(summary_text(dataset))
+        for line in evidence_lines(dataset, file=str(output)):
+            print(line)
+        print(f"{dataset.attrs[attr.COMPUTE_TIME]:.4g} s of a core")
+        print(f"written to {output}")
+        return failure_code(dataset, output)
+
+
+def _asked(arguments: argparse.Namespace) -> "tuple[Campaign, tuple[int, ...] | None]":
+    """The campaign, and the numbers of the hits; None is all of them."""
+    from warpimpact.campaign.campaign import Campaign
+    from warpimpact.campaign.text import CampaignError
+    from warpimpact.results import attributes as attr
+    from warpimpact.results import files
+    from warpimpact.results.dataset import hit_numbers
+    from warpimpact.runs.replay import campaign_in
+    from warpimpact.solver.simulate import spread_places
+
+    if arguments.file.suffix == ".toml":
+        if arguments.hit or arguments.hits:
+            raise CampaignError(f"{arguments.file}: --hit and --hits are for a result; --count is for a campaign")
+        return Campaign.from_toml(arguments.file, count=arguments.count), None
+    result = files.read(arguments.file)
+    if arguments.count is not None:
+        raise files.ResultError(f"{arguments.file}: --count is for a campaign; --hits is for a result")
+    if attr.LIMIT in result.attrs:
+        raise files.ResultError(f"{arguments.file}: is a search of limits, but continuum takes a result of run")
+    numbers = hit_numbers(result)
+    if arguments.hit:
+        for hit in arguments.hit:
+            if hit not in numbers:
+                raise files.ResultError(
+                    f"--hit: got {hit}, but {arguments.file} has hits {numbers[0]} to {numbers[-1]}"
+                )
+        chosen = tuple(sorted(set(arguments.hit)))
+    else:
+        places = spread_places(len(numbers), min(len(numbers), arguments.hits or len(numbers)))
+        chosen = tuple(sorted(int(number) for number in numbers[places]))
+    return campaign_in(result, arguments.file.parent), chosen
+
+
+def _elements(arguments: argparse.Namespace, campaign: "Campaign", hits: "tuple[int, ...] | None") -> "FiniteElements":
+    """How the hits are computed."""
+    from warpimpact.campaign.text import CampaignError
+    from warpimpact.catalogue.flow_entries import flow_names
+    from warpimpact.runs.finite_elements import FiniteElements
+    from warpimpact.scene.units import PositiveLength
+
+    materials = tuple(arguments.material) or ((campaign.plate.material,) if campaign.plate.material else ())
+    if not materials:
+        raise CampaignError(
+            f"{arguments.file}: the continuum needs a material: give --material with one of {', '.join(flow_names())}, "
+            "or a TOML file"
+        )
+    if not 0.0 <= arguments.friction <= 1.0:
+        raise CampaignError(f"--friction: got {arguments.friction:g}, but it must be from 0 to 1")
+    spacing = None
+    if arguments.element is not None:
+        spacing = read_option("--element", PositiveLength, arguments.element, CampaignError)
+    elements = FiniteElements(materials, arguments.friction, arguments.fidelity, spacing, hits)
+    try:
+        _ = elements.entries
+    except ValueError as error:
+        raise CampaignError(f"--material: {error}") from None
+    return elements

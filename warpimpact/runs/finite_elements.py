@@ -1,0 +1,181 @@
+"""Hits by finite elements: those of a campaign, or some of a result, one job each, to a result as others are."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import time
+import warnings
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from warpimpact.campaign.campaign import Campaign
+from warpimpact.catalogue.flow_entries import FlowEntry, flow_entry
+from warpimpact.continuum.strikes import check_continuum, struck
+from warpimpact.records.outcomes import Outcomes
+from warpimpact.results import attributes as attr
+from warpimpact.results import files
+from warpimpact.results import variables as v
+from warpimpact.results.dataset import solid_columns, stored_columns
+from warpimpact.results.outlines import in_memory
+from warpimpact.runs.compute import at_solid
+from warpimpact.runs.describe import computed_by, described_as
+from warpimpact.runs.executor import Executor, Job
+from warpimpact.runs.jobs import solid_shots, with_ligament
+from warpimpact.runs.questions import Arrays, Question, Round, RoundProgress, answered
+from warpimpact.runs.shards import manifest
+from warpimpact.runs.store import stored
+from warpimpact.scene import Scene, Shots
+from warpimpact.scene.flow import Continuum
+from warpimpact.solver.worker import Worker
+
+if TYPE_CHECKING:
+    import xarray
+
+SECONDS = "seconds"
+"""In the result of a job: what it took [s]."""
+
+
+@dataclass(frozen=True)
+class FiniteElements:
+    """How hits are computed: names or files of the materials of the layers, and the settings of `Continuum`; and which,
+    by their numbers in the campaign. None is all of them, of which images are not computed."""
+
+    materials: tuple[str, ...]
+    friction: float = 0.0
+    fidelity: str = "draft"
+    spacing: float | None = None
+    hits: tuple[int, ...] | None = None
+
+    @property
+    def entries(self) -> list[FlowEntry]:
+        """Of the materials.
+
+        Raises:
+            ValueError: there is no such material.
+        """
+        return [flow_entry(name) for name in self.materials]
+
+    @property
+    def continuum(self) -> Continuum:
+        """What the solver takes."""
+        given: dict[str, Any] = {"friction": self.friction, "fidelity": self.fidelity, "spacing": self.spacing}
+        return Continuum(flows=tuple(entry.flow for entry in self.entries), **given)
+
+    @property
+    def words(self) -> str:
+        """The settings in words."""
+        size = self.fidelity if self.spacing is None else f"{1e3 * self.spacing:.4g} mm"
+        return f"finite elements, {size}, friction {self.friction:g}, {', '.join(e.name for e in self.entries)}"
+
+
+def continuum_to_file(
+    campaign: Campaign,
+    elements: FiniteElements,
+    output: Path,
+    *,
+    device: Executor,
+    resume: bool = False,
+    overwrite: bool = False,
+    progress: Callable[[RoundProgress, int], object] = lambda now, total: None,
+    tell: Callable[[str], object] = warnings.warn,
+) -> None:
+    """Compute hits of a campaign by finite elements into a result file; each is on the disk when it has ended.
+
+    Args:
+        progress: called with the progress of the hits and their number.
+
+    Raises:
+        ValueError: the continuum does not compute this campaign.
+        OutputError, Interrupted: as in `run_to_file`.
+    """
+    numbers = range(len(campaign.sampler())) if elements.hits is None else elements.hits
+    content = manifest(campaign, device.made_by) | {
+        "continuum": json.loads(elements.continuum.model_dump_json()),
+        "numbers": elements.hits and list(elements.hits),
+    }
+    check_continuum(campaign.scene, campaign.sampler().shots(0, campaign.at_a_plate), elements.continuum)
+    with stored(output, content, "continuum", resume=resume, overwrite=overwrite, tell=tell) as store:
+        if store is None:
+            return
+        question = _computed(campaign, elements, numbers, lambda now: progress(now, len(numbers)))
+        dataset = answered(question, device, store)
+        dataset.attrs[attr.FINGERPRINT] = store.parts.fingerprint
+        files.write(dataset, output)
+
+
+def _computed(
+    campaign: Campaign,
+    elements: FiniteElements,
+    numbers: Sequence[int],
+    tell: Callable[[RoundProgress], object],
+) -> Question[xarray.Dataset]:
+    """The result of the hits of some numbers; where they are all, the first one of each group of images is computed."""
+    sampler, continuum, images = campaign.sampler(), elements.continuum, elements.hits is None
+    group = len(campaign.symmetries) if images else 1
+    shots = Shots.joined([sampler.shots(int(number), 1) for number in numbers])
+    computed = shots[::group]
+    asked = [(campaign.scene, computed[k : k + 1], continuum) for k in range(len(computed))]
+    solid = solid_shots(campaign, shots[:1], 1)
+    if solid is not None:
+        scene, alone = at_solid(campaign, solid)
+        asked.append((scene, alone, continuum.model_copy(update={"flows": continuum.flows[:1]})))
+    results = yield Round([Job(_hit, one) for one in asked], [_key(*one) for one in asked], tell)
+    outcomes = [Outcomes(**{name: values for name, values in row.items() if name != SECONDS}) for row in results]
+    beside = {} if solid is None else solid_columns(outcomes.pop())
+    elapsed = float(sum(float(row[SECONDS][0]) for row in results))
+    told = (
+        computed_by(campaign, "cpu", len(computed), elapsed) if images else _computed_alone(campaign, computed, elapsed)
+    )
+    told |= {
+        attr.CONTINUUM: json.dumps(
+            {"materials": [entry.name for entry in elements.entries], **json.loads(continuum.model_dump_json())}
+        ),
+        attr.NUMERICS: elements.words,
+        attr.PRECISION: "single",
+        attr.EVIDENCE: "\n".join([f"{attr.RESTS_ON}{elements.words}", *_evidence(elements)]),
+    }
+    table = described_as(
+        with_ligament(campaign, worker=Worker("cpu"), report=lambda now: None),
+        shots,
+        Outcomes.joined(outcomes).unfolded(campaign.symmetries if images else campaign.symmetries[:1]),
+        told,
+        beside,
+        double=True,
+    )
+    if not images:
+        table = table.assign_coords(stored_columns((v.HIT,), {v.HIT: np.array(numbers, dtype=np.int32)}))
+    return in_memory(table.to_xarray())
+
+
+def _evidence(elements: FiniteElements) -> list[str]:
+    return [f"{entry.name}: {entry.evidence}" for entry in elements.entries]
+
+
+def _computed_alone(campaign: Campaign, shots: Shots, elapsed: float) -> dict[str, Any]:
+    """Who computed hits of which none is an image of another."""
+    told = computed_by(campaign, "cpu", len(shots), elapsed)
+    return {
+        name: value for name, value in told.items() if name not in (attr.SYMMETRIES, attr.IMAGES, attr.COMPUTED_HITS)
+    }
+
+
+def _key(scene: Scene, shots: Shots, continuum: Continuum) -> str:
+    """What decides the result of a job."""
+    told = scene.model_dump_json() + continuum.model_dump_json()
+    columns = "".join(f"{name} {values.tolist()}" for name, values in shots.columns.items())
+    return hashlib.sha256((told + columns).encode()).hexdigest()
+
+
+def _hit(
+    scene: Scene, shots: Shots, continuum: Continuum, *, worker: Worker, report: Callable[[float], object]
+) -> Arrays:
+    """The outcomes of one hit."""
+    begin = time.thread_time()
+    single = Worker("cpu", 1, worker.cancel)
+    outcomes = struck(scene, shots, continuum, single)
+    return {SECONDS: np.array([time.thread_time() - begin]), **vars(outcomes)}
