@@ -5,6 +5,7 @@ import shutil
 import subprocess
 import sys
 import tomllib
+from collections import Counter
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -97,6 +98,15 @@ def test_a_long_file_gives_its_reason(file: Path) -> None:
     if len(text.splitlines()) > MOST_LINES:
         told = ast.get_docstring(ast.parse(text)) or ""
         assert "Long because" in told, f"{file} has more than {MOST_LINES} lines"
+
+
+def test_a_file_name_occurs_once() -> None:
+    """A command, its figure and its kernel share a name, as they are the same thing."""
+    names = Counter(
+        file.name for file in SOURCES if not {"cli", "plotting", "kernels"} & {*file.relative_to(CHECKOUT).parts}
+    )
+    twice = {name for name, count in names.items() if count > 1} - {"__init__.py"}
+    assert twice <= {"assumptions.py", "limit.py", "limits.py", "replay.py"}
 
 
 def signatures(file: Path) -> Iterator[tuple[str, int]]:

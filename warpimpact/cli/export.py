@@ -103,7 +103,7 @@ def add_report(commands: Commands) -> None:
 
 
 def _report(arguments: argparse.Namespace) -> None:
-    from warpimpact.report.front import write_front_report
+    from warpimpact.report.front_page import write_front_report
     from warpimpact.report.one_file import is_shown, write_file_report
     from warpimpact.report.report import write_report
     from warpimpact.results import files, front

@@ -21,7 +21,7 @@ from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
 from warpimpact.results.limits import solid_limits
 from warpimpact.studies.limit_view import measures_of, promise_line, shown_unit
-from warpimpact.studies.published import published_beside
+from warpimpact.studies.published_limits import published_beside
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

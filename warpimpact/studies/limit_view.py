@@ -25,7 +25,7 @@ from warpimpact.scene.quantities import QUANTITIES
 from warpimpact.scene.units import quantity as reader_of
 from warpimpact.solver.findings import hits_text, limit_error_text
 from warpimpact.solver.limit_search import MOST_RUNS
-from warpimpact.studies.published import published_view
+from warpimpact.studies.published_limits import published_view
 from warpimpact.view.view import Column, Section, Table, number
 
 _MOST_LISTED = 12
