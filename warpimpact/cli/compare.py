@@ -66,8 +66,10 @@ def _compare(arguments: argparse.Namespace) -> int:
     from warpimpact.analysis.comparison import compare
     from warpimpact.analysis.comparison_text import comparison_text
     from warpimpact.analysis.evidence_lines import evidence_of_all
+    from warpimpact.analysis.shot_by_shot import shot_by_shot
     from warpimpact.plotting import comparison_figure, weight_figure
     from warpimpact.results import files
+    from warpimpact.view.view import text_of
 
     is_campaign = arguments.files[0].suffix == ".toml"
     default = arguments.files[0].stem if is_campaign else "comparison"
@@ -85,9 +87,12 @@ def _compare(arguments: argparse.Namespace) -> int:
     with ExitStack() as stack:
         datasets = [stack.enter_context(files.opened(path)) for path in paths.values()]
         comparison = compare(datasets, list(paths), arguments.measure)
+        differing = text_of(shot_by_shot(dict(zip(paths, datasets, strict=True))))
         evidence = evidence_of_all(dict(zip(paths, datasets, strict=True)))
         code = max(failure_code(dataset, path) for dataset, path in zip(datasets, paths.values(), strict=True))
     print(comparison_text(comparison))
+    if differing:
+        print(f"\n{differing}\n")
     for line in evidence:
         print(line)
     if arguments.assumptions:

@@ -1,0 +1,56 @@
+"""Two results of the same shots, hit by hit."""
+
+import numpy as np
+import pytest
+import xarray
+
+from warpimpact.analysis.shot_by_shot import rank_correlation, shot_by_shot
+from warpimpact.kernels.status import Status
+from warpimpact.results import attributes as attr
+from warpimpact.view.view import text_of
+
+
+def result(hits: list[int], velocity: list[float], status: list[int], attributes: dict[str, str]) -> xarray.Dataset:
+    count = len(hits)
+    along = 1e-3 * np.array(hits, dtype=float)
+    return xarray.Dataset(
+        {
+            "status": ("hit", np.array(status, dtype=np.int8)),
+            "residual_velocity": ("hit", np.array(velocity)),
+            "deflection": ("hit", np.zeros(count)),
+            "tilt": (("hit", "standoff"), np.array(velocity)[:, None] / 10.0),
+        },
+        {"hit": hits, "hit_y": ("hit", along), "hit_z": ("hit", along), "standoff": [0.05]},
+        attributes,
+    )
+
+
+def test_bias_rms_ranks_and_the_worst_hits_are_those_of_the_shared_sound_hits() -> None:
+    fast = result([0, 1, 2, 3, 4], [700.0, 710.0, 720.0, 730.0, 740.0], [0] * 5, {})
+    slow = result(
+        [1, 2, 3, 4], [700.0, 724.0, 726.0, np.nan], [0, 0, 0, int(Status.HOURGLASSED)], {attr.CONTINUUM: "{}"}
+    )
+    (section,) = shot_by_shot({"fast": fast, "slow": slow})
+    row = section.parts[1].rows[0]  # type: ignore[union-attr]
+    apart = np.array([10.0, -4.0, 4.0])
+    assert row[1:5] == pytest.approx((3, apart.mean(), np.sqrt((apart**2).mean()), 1.0))
+    assert row[5].startswith("1 (+10)")
+    assert "1 of them failed" in text_of([section])
+    assert "tilt at 50 mm" in text_of([section])
+
+
+def test_results_by_the_same_law_or_of_other_hits_are_not_compared_so() -> None:
+    fast, moved = result([0, 1], [700.0, 710.0], [0, 0], {}), result([0, 1], [1.0, 2.0], [0, 0], {attr.CONTINUUM: "{}"})
+    moved = moved.assign_coords(hit_y=moved["hit_y"] + 1e-3)
+    assert not shot_by_shot({"a": fast, "b": fast})
+    assert not shot_by_shot({"a": fast, "b": moved})
+
+
+def test_ranks_are_correlated_as_spearman_does() -> None:
+    from scipy.stats import spearmanr
+
+    rng = np.random.default_rng(3)
+    one, other = rng.normal(size=(2, 30)).round(1)
+    assert rank_correlation(one, other) == pytest.approx(float(spearmanr(one, other).statistic))
+    assert np.isnan(rank_correlation(one[:2], other[:2]))
+    assert np.isnan(rank_correlation(np.ones(5), other[:5]))
