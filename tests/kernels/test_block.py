@@ -136,6 +136,13 @@ def scene_of(name: str, count: int) -> tuple[Scene, Shots]:
     return scene, shots_of(count, case.at_a_plate, **case.impact)
 
 
+def by_one_thread(scene: Scene, shots: Shots) -> Any:
+    """Outcomes of the simple layout, which runs no blocks on a CPU."""
+    with pytest.MonkeyPatch.context() as patched:
+        patched.setattr(wp.config, "enable_cpu_blocks", False)
+        return simulate.simulate(scene, shots, numerics=SIMPLE, device="cpu")
+
+
 def assert_same(outcomes: Any, expected: Any) -> None:
     """Nearly all equal to the rounding of single precision; no status differs, and no outcome by much."""
     for name in {"status", "layer_status", "stopped_in"} & vars(expected).keys():
@@ -171,8 +178,8 @@ def test_lanes_that_run_one_after_another_compute_what_one_thread_computes(
     name: str, in_blocks: pytest.MonkeyPatch
 ) -> None:
     scene, shots = scene_of(name, 12)
-    simple, by_block = (simulate.simulate(scene, shots, numerics=n, device="cpu") for n in (SIMPLE, BLOCK))
-    assert_same(by_block, simple)
+    by_block = simulate.simulate(scene, shots, numerics=BLOCK, device="cpu")
+    assert_same(by_block, by_one_thread(scene, shots))
     again = simulate.simulate(scene, shots, numerics=BLOCK, device="cpu")
     for column, values in vars(by_block).items():
         np.testing.assert_array_equal(getattr(again, column), values, err_msg=column)
@@ -190,7 +197,7 @@ def test_order_of_the_lanes_changes_no_outcome(in_blocks: pytest.MonkeyPatch) ->
 @IN_RELEASE
 def test_lanes_that_do_not_wait_are_found(in_blocks: pytest.MonkeyPatch) -> None:
     scene, shots = scene_of("slots", 12)
-    simple = simulate.simulate(scene, shots, numerics=SIMPLE, device="cpu")
+    simple = by_one_thread(scene, shots)
     in_blocks.setattr(lanes, "WAIT", "")
     in_blocks.setattr(windows, "SIZES", (2144,))
     without = simulate.simulate(scene, shots, numerics=BLOCK, device="cpu")

@@ -32,7 +32,7 @@ CONE = ConeCore(diameter=6.0e-3, length=20.0e-3, cone_length=12.0e-3, mass=3.0e-
 SOLID = Plate(thickness=4e-3, resistance=2.6e9, shear_coefficient=0.05, degradation=0.8, degradation_interval=1e-6)
 HARD = SOLID.model_copy(update={"resistance": 1e11})
 HOLES = SOLID.model_copy(update={"pattern": CirclePattern(diameter=12e-3, spacing=(20e-3, 20e-3))})
-WEIGHTLESS = Plate(thickness=4e-3, resistance=0.0)
+WEIGHTLESS = Plate(thickness=4e-3, resistance=0.0, shear_coefficient=0.05, degradation=0.8)
 DRAFT = Numerics(level=0)
 
 

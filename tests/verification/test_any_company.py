@@ -35,8 +35,9 @@ CASES = {
     "double": Case(numerics={"precision": "double"}),
     "fixed step": Case(numerics={"time_step": 0.7e-6}),
     "nodal": Case(paper_plate(degradation_depth=10e-3), numerics={"scheme": "nodal", "grid_spacing": 1e-4}),
-    "rate": Case(interaction=Interaction(static=0.9, linear=0.3, quadratic=0.2)),
-    "rim": Case(paper_plate(size=(24e-3, 30e-3))),
+    "rate and rim": Case(
+        paper_plate(size=(24e-3, 30e-3)), interaction=Interaction(static=0.9, linear=0.3, quadratic=0.2)
+    ),
     "bending": Case(bending=True),
     "layers": Case(behind=(BASE,)),
     "burst": Case(at_a_plate=AT_A_PLATE),

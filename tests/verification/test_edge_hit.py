@@ -10,6 +10,8 @@ from warpimpact.scene import ConeCore, ProfileCore
 from .scenes import Array, shots_at, simulate, solid_plate
 
 VELOCITY, THICKNESS, HALF_SIZE = 825.0, 4e-3, 10e-3
+LASTING = {"degradation": 0.5, "degradation_interval": 1e3}
+"""Nothing weakens within microseconds. So all plates here need one build of the kernels."""
 WEAK = 2.6e4  # [Pa]: the core turns by 1e-5 of what it does in the paper's plate
 CONE_LENGTH, RADIUS = 15e-3, 3e-3
 CONE = ConeCore(diameter=2 * RADIUS, length=25e-3, cone_length=CONE_LENGTH, mass=4e-3)
@@ -37,13 +39,11 @@ def impulse(shear_coefficient: float) -> tuple[float, float]:
 
 # Rings and sectors are finite, and the edge is spread over half a cell of the grid. Measured: 3.4e-3 of the force,
 # 3.5e-3 of the moment.
-@pytest.mark.parametrize("shear_coefficient", [0.0, 0.3])
 @pytest.mark.parametrize(("along", "turning"), [("y", [0.0, 0.0, 1.0]), ("z", [0.0, -1.0, 0.0])])
-def test_half_a_cone_on_an_edge_receives_its_impulse(
-    shear_coefficient: float, along: str, turning: list[float], device: str
-) -> None:
+def test_half_a_cone_on_an_edge_receives_its_impulse(along: str, turning: list[float], device: str) -> None:
+    shear_coefficient = 0.3
     plate = solid_plate(
-        size=(2 * HALF_SIZE, 2 * HALF_SIZE), resistance=WEAK, shear_coefficient=shear_coefficient, degradation=1.0
+        size=(2 * HALF_SIZE, 2 * HALF_SIZE), resistance=WEAK, shear_coefficient=shear_coefficient, **LASTING
     )
     shots = shots_at(**{f"hit_{along}": HALF_SIZE})
     outcomes = simulate(plate, shots, core=CONE, precision="double", device=device)
@@ -79,7 +79,7 @@ def rod_impulse(points_per_length: int = 40) -> tuple[float, float]:
 # Rings of 0.2 mm and cells of ℓ/4, which spread the edge. Measured: 0.5 % and 1 % less; 5 % less if holes add exposure,
 # too. Degradation takes 81 % of the impulse.
 def test_exposure_is_gained_from_material_alone(device: str) -> None:
-    plate = solid_plate(size=(2 * HALF_SIZE, 2 * HALF_SIZE), resistance=WEAK, shear_coefficient=0.0, **WEAKENING)
+    plate = solid_plate(size=(2 * HALF_SIZE, 2 * HALF_SIZE), resistance=WEAK, shear_coefficient=1e-9, **WEAKENING)
     outcomes = simulate(
         plate,
         shots_at(HALF_SIZE),

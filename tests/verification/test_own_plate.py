@@ -65,7 +65,8 @@ def whole(plate: Plate) -> Plate:
 
 def simulated(core: Core, plate: Plate, shots: Shots, device: str = "cpu", **numerics: Any) -> Outcomes:
     record = Record(standoffs=STANDOFFS, standoff_point="nose")
-    scene = Scene(core=core, target=plate, interaction=INTERACTION, record=record)
+    law = Interaction(static=0.9) if numerics.get("scheme") == "nodal" else INTERACTION
+    scene = Scene(core=core, target=plate, interaction=law, record=record)
     return simulation.simulate(scene, shots, numerics=Numerics(**numerics), device=device)
 
 
