@@ -88,7 +88,7 @@ def bursts(dataset: Result) -> Bursts:
     parts = [
         (part[v.NEAREST_EARLIER_HIT].values, *(measure.values(part) for measure in measures)) for part in slices(needed)
     ]
-    nearest, *columns = (np.concatenate(some).reshape(-1, members) for some in zip(*parts, strict=True))
+    nearest, *columns = (np.concatenate(column).reshape(-1, members) for column in zip(*parts, strict=True))
     values, replicates = dict(zip(measures, columns, strict=True)), dealing(dataset)["replicates"]
     order = np.broadcast_to(np.arange(members), nearest.shape)
     later = _bins(nearest[:, 1:])
@@ -96,8 +96,8 @@ def bursts(dataset: Result) -> Bursts:
     def group(name: str, which: np.ndarray) -> Group:
         distances = nearest[which & ~np.isnan(nearest)]
         ends = (distances.min(), distances.mean(), distances.max()) if len(distances) else (math.nan,) * 3
-        chosen = {one: np.where(which, column, np.nan) for one, column in values.items()}
-        alone = {one: np.where(order == 0, column, np.nan) for one, column in values.items()}
+        chosen = {measure: np.where(which, column, np.nan) for measure, column in values.items()}
+        alone = {measure: np.where(order == 0, column, np.nan) for measure, column in values.items()}
         together: Estimating = {"replicates": replicates, "confidence": confidence_of_each(0.95, len(later))}
         return Group(
             name,
@@ -123,9 +123,9 @@ def bursts(dataset: Result) -> Bursts:
 
 def _bins(distances: Array) -> list[tuple[float, float]]:
     """Ends of the bins, both included: single distances if there are few."""
-    found = np.unique(np.round(distances, 9))
-    if len(found) <= BINS:
-        return [(float(at) - 1e-9, float(at) + 1e-9) for at in found]
+    distinct = np.unique(np.round(distances, 9))
+    if len(distinct) <= BINS:
+        return [(float(at) - 1e-9, float(at) + 1e-9) for at in distinct]
     parts = np.array_split(np.sort(distances.ravel()), BINS)
     return [(float(part[0]), float(part[-1])) for part in parts]
 

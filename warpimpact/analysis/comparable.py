@@ -34,15 +34,15 @@ def check_same_question(one: xarray.Dataset, name: str, other: xarray.Dataset, o
 
 def _question(dataset: xarray.Dataset, name: str) -> dict[str, Any]:
     """What must be the same for plates to be compared."""
-    told = dataset.attrs
-    if not {attr.CORE, attr.IMPACT} <= told.keys():
+    attributes = dataset.attrs
+    if not {attr.CORE, attr.IMPACT} <= attributes.keys():
         raise ResultError(f"{name}: has no description of its core and impact, which a comparison needs; run it again")
-    output = {"standoffs": dataset[v.STANDOFF].values.tolist(), "standoff_point": told[attr.STANDOFF_POINT]}
-    told_of = {"burst": json.loads(told[attr.BURST])} if attr.BURST in told else {}
-    told_of |= {"limit": told[attr.LIMIT]} if attr.LIMIT in told else {}
+    output = {"standoffs": dataset[v.STANDOFF].values.tolist(), "standoff_point": attributes[attr.STANDOFF_POINT]}
+    told_of = {"burst": json.loads(attributes[attr.BURST])} if attr.BURST in attributes else {}
+    told_of |= {"limit": attributes[attr.LIMIT]} if attr.LIMIT in attributes else {}
     return told_of | {
-        "core": json.loads(told[attr.CORE]),
-        "impact": _in_degrees(json.loads(told[attr.IMPACT])),
+        "core": json.loads(attributes[attr.CORE]),
+        "impact": _in_degrees(json.loads(attributes[attr.IMPACT])),
         "output": output,
     }
 

@@ -79,7 +79,7 @@ def compare(
     asked = [measures_of(dataset, texts) for dataset in datasets]
     common = set.intersection(*({measure.quantity.name for measure in measures} for measures in asked))
     differ_in_weight, by_ratio = _differ_in_weight(datasets), set()
-    each = confidence_of_each(confidence, len(pairs))
+    of_each_pair = confidence_of_each(confidence, len(pairs))
     of_plates: list[list[Score]] = [[] for _ in datasets]
     differences, verdicts = list[Difference](), list[Verdict]()
     for scored in zip(
@@ -100,17 +100,17 @@ def compare(
         for (i, j), pair in zip(pairs, used, strict=True):
             both, is_ratio = (datasets[i], datasets[j]), measure.text in by_ratio
             one, other = (
-                _side(scored[k], datasets[k], {**dealing(datasets[k]), "confidence": each}, by_ratio=is_ratio)
+                _side(scored[k], datasets[k], {**dealing(datasets[k]), "confidence": of_each_pair}, by_ratio=is_ratio)
                 for k in (i, j)
             )
             paired = not pair.independent and measure.kind != "quantile"
-            difference = _difference(one, other, {**dealing(datasets[i]), "confidence": each}, paired=paired)
+            difference = _difference(one, other, {**dealing(datasets[i]), "confidence": of_each_pair}, paired=paired)
             interval = _with_numerics(one.estimate, other.estimate, *difference)
             drawn = one.drawn, other.drawn
             why = why_not_by_draws(drawn, independent=pair.independent, by_ratio=is_ratio)
-            survival = survival_of(both, drawn, interval, reason=why, confidence=(confidence, each))
+            survival = survival_of(both, drawn, interval, reason=why, confidence=(confidence, of_each_pair))
             differences.append(Difference(measure.text, names[i], names[j], *interval, survival))
-            verdicts += _verdicts((scored[i], scored[j]), both, (names[i], names[j]), each, paired=paired)
+            verdicts += _verdicts((scored[i], scored[j]), both, (names[i], names[j]), of_each_pair, paired=paired)
     plates = tuple(
         Contestant(
             name,
@@ -220,11 +220,13 @@ class _Side(NamedTuple):
 def _sought_to(dataset: xarray.Dataset, measure: Measure) -> float:
     """How far a limit of a result may lie from the one that is told, as the measure is shown; 0 of other results, and
     of a share, for which it is not known."""
-    told = dataset.attrs
+    attributes = dataset.attrs
     if measure.is_binary:
         return 0.0
-    factor = told.get(attr.LIMIT_DENSITY, 0.0) if measure.name == "limit_areal_density" else measure.display.factor
-    return float(told.get(attr.LIMIT_TOLERANCE, 0.0) * factor)
+    factor = (
+        attributes.get(attr.LIMIT_DENSITY, 0.0) if measure.name == "limit_areal_density" else measure.display.factor
+    )
+    return float(attributes.get(attr.LIMIT_TOLERANCE, 0.0) * factor)
 
 
 def _side(scored: Scored, dataset: xarray.Dataset, dealt: Estimating, *, by_ratio: bool) -> _Side:
@@ -273,7 +275,7 @@ def _notes(datasets: Sequence[xarray.Dataset], names: Sequence[str]) -> Iterator
         yield f"The plates differ in material, which no ranking allows for: {differences}."
     texts = [dataset.attrs[attr.NUMERICS_GIVEN] for dataset in datasets if attr.NUMERICS_GIVEN in dataset.attrs]
     asked = [json.loads(text) for text in texts]
-    differing = (first_difference(one, other) for one, other in pairwise(asked))
+    differing = (first_difference(first, other) for first, other in pairwise(asked))
     if (found := next(filter(None, differing), None)) is not None:
         yield "The plates were computed with different numerics: {} is {} and {}.".format(*found)
     if broken := [name for name, dataset in zip(names, datasets, strict=True) if breaks_promise(dataset)]:
@@ -288,13 +290,13 @@ def _notes(datasets: Sequence[xarray.Dataset], names: Sequence[str]) -> Iterator
 
 def _materials(datasets: Sequence[xarray.Dataset], names: Sequence[str]) -> Iterator[str]:
     """Quantities in which the materials differ, with that of every plate that tells it."""
-    told = {
+    materials = {
         name: json.loads(d.attrs[attr.MATERIAL])
         for name, d in zip(names, datasets, strict=True)
         if attr.MATERIAL in d.attrs
     }
-    for quantity in dict.fromkeys(key for material in told.values() for key in material):
-        values = {name: material.get(quantity) for name, material in told.items()}
+    for quantity in dict.fromkeys(key for material in materials.values() for key in material):
+        values = {name: material.get(quantity) for name, material in materials.items()}
         if len(set(values.values())) > 1:
             read = reader_of(QUANTITIES[quantity].type)
             shown = ["not given" if value is None else read.text(value) for value in values.values()]

@@ -79,8 +79,8 @@ class Verdict:
         """Such as "a is better than b in 9 of 12 assumptions; turned over by: β = 1"."""
         if not self.given:
             apart = [name for name, verdict in self.under.items() if verdict]
-            told = f"{self.one} and {self.other} cannot be told apart as given"
-            return told + f", but with: {', '.join(apart)}" * bool(apart)
+            sentence = f"{self.one} and {self.other} cannot be told apart as given"
+            return sentence + f", but with: {', '.join(apart)}" * bool(apart)
         better, worse = (self.one, self.other) if self.given > 0 else (self.other, self.one)
         open_ = [name for name, verdict in self.under.items() if not verdict]
         kept = len(self.under) - len(self.turned) - len(open_)
@@ -134,11 +134,11 @@ class Comparison:
     def ranks(self, measure: str) -> dict[str, int]:
         """Name of each plate → its rank, by value. Plates that share a rank are a group in which no two are told apart;
         the rank of a group is one more than the number of plates before it."""
-        told = {(pair.one, pair.other) for pair in self.differences if pair.measure == measure and pair.told_apart}
+        distinct = {(pair.one, pair.other) for pair in self.differences if pair.measure == measure and pair.told_apart}
         group: list[str] = []
         ranks: dict[str, int] = {}
         for place, name in enumerate(self.ordered(measure), start=1):
-            if not group or any({(name, other), (other, name)} & told for other in group):
+            if not group or any({(name, other), (other, name)} & distinct for other in group):
                 group, rank = [], place
             group.append(name)
             ranks[name] = rank
@@ -149,7 +149,7 @@ class Comparison:
         by_ratio = measure in (self.at_equal_weight or ())
 
         def worse(plate: Contestant) -> float:
-            (told,) = (told for told in plate.measures if told.name == measure)
+            (told,) = (score for score in plate.measures if score.name == measure)
             value = told.ratio if by_ratio else told.value
             return math.inf if math.isnan(value) else -value if told.measure.higher_is_better else value
 
@@ -221,8 +221,8 @@ def best_rows(comparison: Comparison) -> list[tuple[str, str]]:
         told_apart = len(first) < len(comparison.plates)
         neither = "cannot be told apart" if is_ranked(comparison, measure.name) else "not ranked"
         doubts = _doubt(comparison, measure.name) + _turned(comparison, measure.name, first)
-        told = _listed(first) + _as_good(comparison, measure.name, first) + doubts
-        rows.append((measure.measure.label, told if told_apart else neither))
+        sentence = _listed(first) + _as_good(comparison, measure.name, first) + doubts
+        rows.append((measure.measure.label, sentence if told_apart else neither))
     return rows
 
 
@@ -230,14 +230,14 @@ def _as_good(comparison: Comparison, measure: str, first: Sequence[str]) -> str:
     """What to say of plates behind the best that no difference tells from all of these; mostly empty."""
     apart = [{pair.one, pair.other} for pair in comparison.differences if pair.measure == measure and pair.told_apart]
     others = [plate.name for plate in comparison.plates if plate.name not in first]
-    open_ = [name for name in others if not all({name, one} in apart for one in first)]
+    open_ = [name for name in others if not all({name, leader} in apart for leader in first)]
     return f" (not told apart for certain from {_listed(open_)})" if open_ else ""
 
 
 def _doubt(comparison: Comparison, measure: str) -> str:
     """What to say of plates that are best: whether a verdict about the measure does not survive; mostly empty."""
-    told = [pair.survival for pair in comparison.differences if pair.measure == measure and pair.told_apart]
-    failing = any(survival is not None and not survival.survives for survival in told)
+    survivals = [pair.survival for pair in comparison.differences if pair.measure == measure and pair.told_apart]
+    failing = any(survival is not None and not survival.survives for survival in survivals)
     return " (not certain under the uncertainty of the parameters)" if failing else ""
 
 
@@ -301,8 +301,8 @@ def weighed(comparison: Comparison, measure: str) -> str:
 def _in_words(pair: Difference, measure: Score, what: str) -> str:
     """Such as "a better than b by 0.1 (0.05 to 0.15)"; `what` follows the difference."""
     if math.isnan(pair.low):
-        told = f"difference{what} {number_text(pair.value)}"
-        return f"{pair.one} and {pair.other}: {told}, of which these hits give no interval"
+        text = f"difference{what} {number_text(pair.value)}"
+        return f"{pair.one} and {pair.other}: {text}, of which these hits give no interval"
     if not pair.told_apart:
         interval = intervals_text(Ends(pair.low, pair.high, pair.parameters))
         difference = f"difference{what} {number_text(pair.value)} ({interval})"

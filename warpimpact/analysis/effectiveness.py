@@ -129,7 +129,9 @@ def measures_of(dataset: xarray.Dataset, texts: Sequence[str] = ()) -> list[Meas
     except ValueError as error:
         raise ResultError(f"measure: {error}") from None
     pierced = Measure.parse(_PIERCED)  # tells whether depths are lower bounds
-    return [*asked, pierced] if any(one.name == "base_depth" for one in asked) and pierced not in asked else asked
+    return (
+        [*asked, pierced] if any(measure.name == "base_depth" for measure in asked) and pierced not in asked else asked
+    )
 
 
 def effectiveness(dataset: xarray.Dataset, texts: Sequence[str] = ()) -> list[Score]:

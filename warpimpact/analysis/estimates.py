@@ -112,7 +112,10 @@ def _drawn(dataset: Result, measure: Measure, values: Array) -> Array:
 
 def estimated(dataset: Result, measures: Sequence[Measure], confidence: float = 0.95) -> dict[Measure, Estimate]:
     """Measures of a result with their intervals, in the units of the Dataset."""
-    return {found.measure: found.estimate for found in evidence(dataset, measures, confidence)}
+    return {
+        estimated_measure.measure: estimated_measure.estimate
+        for estimated_measure in evidence(dataset, measures, confidence)
+    }
 
 
 def status_shares(dataset: Result) -> dict[str, Estimate]:

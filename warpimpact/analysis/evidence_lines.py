@@ -18,10 +18,10 @@ def evidence_lines(dataset: Result, *, file: str | None = None) -> list[str]:
         file: of the result, whose `inspect` tells more.
     """
     lines = str(dataset.attrs.get(attr.EVIDENCE, "")).splitlines()
-    told = [line for line in lines if not line.startswith(attr.NOT_TESTED)]
-    if len(told) < len(lines) and file is not None:
-        told[0] += f" (warpimpact inspect {file} says by how much)"
-    return told
+    shown = [line for line in lines if not line.startswith(attr.NOT_TESTED)]
+    if len(shown) < len(lines) and file is not None:
+        shown[0] += f" (warpimpact inspect {file} says by how much)"
+    return shown
 
 
 def evidence_of_all(datasets: Mapping[str, Result]) -> list[str]:

@@ -55,28 +55,32 @@ def inspect_view(dataset: xarray.Dataset) -> list[Section]:
 
 
 def _origin(dataset: xarray.Dataset) -> Section:
-    told = dataset.attrs
+    attributes = dataset.attrs
     hits = f"{dataset.sizes['hit']} hits"
-    if attr.SAMPLING in told:
-        hits += f", {told[attr.SAMPLING]} sampling, seed {told[attr.SEED]}"
-        hits += f", {told[attr.REPLICATES]} replicates" if told[attr.REPLICATES] > 1 else ""
+    if attr.SAMPLING in attributes:
+        hits += f", {attributes[attr.SAMPLING]} sampling, seed {attributes[attr.SEED]}"
+        hits += f", {attributes[attr.REPLICATES]} replicates" if attributes[attr.REPLICATES] > 1 else ""
     rows = [("hits", hits)]
-    if attr.SYMMETRIES in told:
+    if attr.SYMMETRIES in attributes:
         rows.append(("symmetry", symmetry_text(dataset)))
-    if attr.AREAL_DENSITY in told:
-        numbers = plate_numbers(told[attr.OPEN_AREA], told.get(attr.LIGAMENT, math.inf), told[attr.AREAL_DENSITY])
+    if attr.AREAL_DENSITY in attributes:
+        numbers = plate_numbers(
+            attributes[attr.OPEN_AREA], attributes.get(attr.LIGAMENT, math.inf), attributes[attr.AREAL_DENSITY]
+        )
         whole = " of the whole target" if v.LAYER_STATUS in dataset else ""
         rows.append(("plate", f"{', '.join(f'{label} {number}' for label, number in numbers.items())}{whole}"))
     if (promise := promise_text(dataset)) is not None:
         rows.append(("accuracy", promise))
-    rows += [(name, str(told[name])) for name in (attr.NUMERICS, attr.DEVICE, attr.HISTORY) if name in told]
-    if attr.WARPIMPACT_VERSION in told:
-        rows.append(("made by", f"warpimpact {told[attr.WARPIMPACT_VERSION]}, Warp {told[attr.WARP_VERSION]}"))
-    if attr.COMPUTE_TIME in told:
-        rate = f"{told[attr.HITS_PER_SECOND]:.4g} hits per second"
-        rows.append(("took", f"{told[attr.COMPUTE_TIME]:.4g} s of computing, {rate}"))
-    evidence = told.get(attr.EVIDENCE, "").splitlines()
-    return Section([labelled(rows), *evidence], told.get(attr.TITLE, "untitled"))
+    rows += [(name, str(attributes[name])) for name in (attr.NUMERICS, attr.DEVICE, attr.HISTORY) if name in attributes]
+    if attr.WARPIMPACT_VERSION in attributes:
+        rows.append(
+            ("made by", f"warpimpact {attributes[attr.WARPIMPACT_VERSION]}, Warp {attributes[attr.WARP_VERSION]}")
+        )
+    if attr.COMPUTE_TIME in attributes:
+        rate = f"{attributes[attr.HITS_PER_SECOND]:.4g} hits per second"
+        rows.append(("took", f"{attributes[attr.COMPUTE_TIME]:.4g} s of computing, {rate}"))
+    evidence = attributes.get(attr.EVIDENCE, "").splitlines()
+    return Section([labelled(rows), *evidence], attributes.get(attr.TITLE, "untitled"))
 
 
 def _statuses(dataset: xarray.Dataset) -> Section:

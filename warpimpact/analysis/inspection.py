@@ -67,8 +67,8 @@ def _drawing(dataset: xarray.Dataset) -> str:
     if attr.PLATE_PERIOD not in dataset.attrs:
         return ""
     needed = [name for name in (v.STATUS, v.BURST_ORDER) if name in dataset]
-    some = dataset[needed].isel(hit=slice(_MOST_HITS)).load()
-    hits, status, came = hit_points(some), some[v.STATUS].values, passed(some)
+    first_hits = dataset[needed].isel(hit=slice(_MOST_HITS)).load()
+    hits, status, came = hit_points(first_hits), first_hits[v.STATUS].values, passed(first_hits)
     half = np.maximum(0.5 * np.asarray(dataset.attrs[attr.PLATE_PERIOD]), np.abs(hits).max(axis=0))
     holes = outlines(dataset)
     mark = 0.006 * half.max() * np.array([(-1, -1), (1, -1), (1, 1), (-1, 1)])

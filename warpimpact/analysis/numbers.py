@@ -51,18 +51,20 @@ def intervals_text(
     by, or the format of the ends if only that is given."""
     shift = shift or text or "{:.2g}".format
     text = text or number_text
-    told = interval_text(ends.low, ends.high, text)
+    text_of_ends = interval_text(ends.low, ends.high, text)
     if ends.parameters is not None:
         unknown = math.isnan(ends.parameters[0])
-        told = f"by hits {told}, by parameters {'not known' if unknown else interval_text(*ends.parameters, text)}"
-    if told == "-":
-        return told
+        text_of_ends = (
+            f"by hits {text_of_ends}, by parameters {'not known' if unknown else interval_text(*ends.parameters, text)}"
+        )
+    if text_of_ends == "-":
+        return text_of_ends
     if ends.numerics is not None and not math.isnan(ends.numerics):
-        told += f", numerics ± {shift(ends.numerics)}"
+        text_of_ends += f", numerics ± {shift(ends.numerics)}"
     if ends.assumed is not None:
         low, high = map(rough_text, ends.assumed)
-        told += f", assumptions {low} to {high}" * (low != high)
-    return told
+        text_of_ends += f", assumptions {low} to {high}" * (low != high)
+    return text_of_ends
 
 
 def plus_minus(estimate: Estimate, number: str, half_width: str) -> str:

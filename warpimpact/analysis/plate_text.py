@@ -32,19 +32,19 @@ def plate_numbers(open_area: float, ligament: float, areal_density: float, resol
 
 def plate_text(dataset: Result) -> str:
     """Areal density and open area, where a result carries them."""
-    told = dataset.attrs
-    if attr.AREAL_DENSITY not in told:
+    attributes = dataset.attrs
+    if attr.AREAL_DENSITY not in attributes:
         return ""
-    return f", {told[attr.AREAL_DENSITY]:.4g} kg/m², {told[attr.OPEN_AREA]:.1%} open"
+    return f", {attributes[attr.AREAL_DENSITY]:.4g} kg/m², {attributes[attr.OPEN_AREA]:.1%} open"
 
 
 def solid_plate(dataset: Result) -> str:
     """Thickness and material of the solid plate of equal areal density, as a phrase; empty where that is not told."""
-    told = dataset.attrs
-    material = json.loads(told.get(attr.MATERIAL, "{}"))
-    if not {"resistance", "density"} <= material.keys() or attr.AREAL_DENSITY not in told:
+    attributes = dataset.attrs
+    material = json.loads(attributes.get(attr.MATERIAL, "{}"))
+    if not {"resistance", "density"} <= material.keys() or attr.AREAL_DENSITY not in attributes:
         return ""
-    thickness = 1e3 * float(told[attr.AREAL_DENSITY]) / material["density"]
+    thickness = 1e3 * float(attributes[attr.AREAL_DENSITY]) / material["density"]
     return f"{thickness:.3g} mm of {1e-9 * material['resistance']:.3g} GPa, {_weakens(material)}"
 
 

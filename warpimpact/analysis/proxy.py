@@ -33,12 +33,12 @@ class Proxy(NamedTuple):
 
 def proxy(dataset: xarray.Dataset) -> Proxy | None:
     """The proxy for hits whose limit thickness was searched; None where the target is not one solid plate."""
-    told = dataset.attrs
+    attributes = dataset.attrs
     needed = {attr.CORE, attr.MATERIAL, attr.OPEN_AREA}
-    if not needed <= told.keys() or told[attr.OPEN_AREA] > 0.0 or v.LAYER_STATUS in dataset:
+    if not needed <= attributes.keys() or attributes[attr.OPEN_AREA] > 0.0 or v.LAYER_STATUS in dataset:
         return None
-    core: Core = TypeAdapter[Core](AnyCore).validate_json(told[attr.CORE])
-    resistance = dataset.get(v.RESISTANCE, json.loads(told[attr.MATERIAL])["resistance"])
+    core: Core = TypeAdapter[Core](AnyCore).validate_json(attributes[attr.CORE])
+    resistance = dataset.get(v.RESISTANCE, json.loads(attributes[attr.MATERIAL])["resistance"])
     mass = dataset.get(v.MASS, core.mass_properties.mass)
     tilt = inclination(dataset)
     energy = 0.5 * np.asarray(mass) * dataset[v.IMPACT_VELOCITY].values ** 2
@@ -51,8 +51,8 @@ def inclination(dataset: xarray.Dataset) -> Array:
     names = (v.OBLIQUITY, v.AZIMUTH, v.IMPACT_PITCH, v.IMPACT_YAW)
     obliquity, azimuth, pitch, yaw = (np.radians(dataset[name].values) for name in names)
     along_y, along_z = np.tan(obliquity) * np.cos(azimuth), np.tan(obliquity) * np.sin(azimuth)
-    one = np.ones_like(obliquity)
-    flight = np.stack([one, along_y, along_z], axis=-1)
-    axis = np.stack([one, np.tan(np.arctan(along_y) + yaw), np.tan(np.arctan(along_z) + pitch)], axis=-1)
+    ones = np.ones_like(obliquity)
+    flight = np.stack([ones, along_y, along_z], axis=-1)
+    axis = np.stack([ones, np.tan(np.arctan(along_y) + yaw), np.tan(np.arctan(along_z) + pitch)], axis=-1)
     across = np.linalg.norm(np.cross(axis, flight), axis=-1)
     return np.asarray(np.arctan2(across, (axis * flight).sum(axis=-1)))

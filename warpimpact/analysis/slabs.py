@@ -48,11 +48,11 @@ class LayerField(NamedTuple):
 
 def fields_behind(history: xarray.Dataset) -> list[LayerField]:
     """Those of the layers behind the plate that weaken and that the core reached."""
-    found = []
+    slabs = []
     for number in range(history.sizes["layer"]) if v.LAYER_RESISTANCE_SHARE in history else ():
         y, z = (history[name].values[number] for name in (v.LAYER_CELL_Y, v.LAYER_CELL_Z))
         rows, columns = (int((cells == cells).sum()) for cells in (y, z))  # NaN fills up
         if rows:
             share = history[v.LAYER_RESISTANCE_SHARE].values[:, number, :rows, :columns]
-            found.append(LayerField(number, y[:rows], z[:columns], share))
-    return found
+            slabs.append(LayerField(number, y[:rows], z[:columns], share))
+    return slabs

@@ -89,23 +89,23 @@ class Summary:
 
 def promise_text(dataset: Result) -> str | None:
     """What the errors of the numerics are, and whether the fidelity keeps its promise; None of an older result."""
-    told = dataset.attrs
-    if attr.NUMERICS_GIVEN not in told or attr.LIMIT in told:
+    attributes = dataset.attrs
+    if attr.NUMERICS_GIVEN not in attributes or attr.LIMIT in attributes:
         return None
-    given = json.loads(told[attr.NUMERICS_GIVEN])
-    if attr.RESIDUAL_VELOCITY_ERROR not in told:
-        return f"promises nothing, as {_fixed_by(told)} is given"
-    if attr.LEVEL_FOR in told:
-        return _level_for(told)
-    asked = json.loads(told[attr.ACCURACY])
-    stated = accuracy_text(asked, layered=attr.STATUS_ERROR in told)
-    velocity, tilt = told[attr.RESIDUAL_VELOCITY_ERROR], told[attr.TILT_ERROR]
-    depth, status = (told.get(name, math.nan) for name in (attr.DEPTH_ERROR, attr.STATUS_ERROR))
-    found = f"estimated errors: {errors_text(velocity, tilt, depth, status)}"
+    given = json.loads(attributes[attr.NUMERICS_GIVEN])
+    if attr.RESIDUAL_VELOCITY_ERROR not in attributes:
+        return f"promises nothing, as {_fixed_by(attributes)} is given"
+    if attr.LEVEL_FOR in attributes:
+        return _level_for(attributes)
+    asked = json.loads(attributes[attr.ACCURACY])
+    stated = accuracy_text(asked, layered=attr.STATUS_ERROR in attributes)
+    velocity, tilt = attributes[attr.RESIDUAL_VELOCITY_ERROR], attributes[attr.TILT_ERROR]
+    depth, status = (attributes.get(name, math.nan) for name in (attr.DEPTH_ERROR, attr.STATUS_ERROR))
+    errors = f"estimated errors: {errors_text(velocity, tilt, depth, status)}"
     name = "the campaign" if given.get("accuracy") else given["fidelity"]
-    if told[attr.PROMISE_KEPT]:
-        return f"{name} keeps its promise ({stated}); {found}"
-    return f"{name} does not keep its promise ({stated}) at the level that it may use; {found}"
+    if attributes[attr.PROMISE_KEPT]:
+        return f"{name} keeps its promise ({stated}); {errors}"
+    return f"{name} does not keep its promise ({stated}) at the level that it may use; {errors}"
 
 
 def numerics_sentence(dataset: Result) -> str:
@@ -169,13 +169,13 @@ _SAMPLINGS = {
 
 def sampling_note(dataset: Result) -> str:
     """What there is to say of the intervals of a result because of its sampling, if anything."""
-    told = dataset.attrs
+    attributes = dataset.attrs
     if is_choice(dataset):
         return (
             f"These are {dataset.sizes['hit']} chosen hits of a larger result. All numbers describe them alone, and "
             "intervals are those of independent shots."
         )
-    return _SAMPLINGS.get(told.get(attr.SAMPLING, ""), "") if told.get(attr.REPLICATES, 1) == 1 else ""
+    return _SAMPLINGS.get(attributes.get(attr.SAMPLING, ""), "") if attributes.get(attr.REPLICATES, 1) == 1 else ""
 
 
 def summary_text(dataset: Result) -> str:
@@ -237,13 +237,13 @@ def _why_not_known(dataset: Result) -> str:
 
 def levels_note(dataset: Result) -> str:
     """Whether the means of a result ask for another level than its single hits do; empty where they do not."""
-    told = dataset.attrs
-    if attr.LEVEL_SHIFTS not in told or attr.RESOLUTION not in told or attr.LEVEL_FOR in told:
+    attributes = dataset.attrs
+    if attr.LEVEL_SHIFTS not in attributes or attr.RESOLUTION not in attributes or attr.LEVEL_FOR in attributes:
         return ""
     standoffs = dataset[v.STANDOFF].values.tolist()[-1:]
     means = estimated(dataset, means_of((v.RESIDUAL_VELOCITY, v.TILT), standoffs)).values()
     open_by = [estimate.half_width for estimate in means]
-    level, shifts = json.loads(told[attr.RESOLUTION])["level"], json.loads(told[attr.LEVEL_SHIFTS])
+    level, shifts = json.loads(attributes[attr.RESOLUTION])["level"], json.loads(attributes[attr.LEVEL_SHIFTS])
     enough = [int(at) for at, by in shifts.items() if all(a <= 0.5 * b for a, b in zip(by, open_by, strict=False))]
     if enough and min(enough) < level:
         by = _shifts_text(shifts[str(min(enough))])
@@ -270,16 +270,17 @@ _STOPPED = {
 
 def stop_lines(dataset: Result) -> list[str]:
     """What the stop rule asked for, if there was one."""
-    told = dataset.attrs
-    if attr.STOP_QUANTITY not in told:
+    attributes = dataset.attrs
+    if attr.STOP_QUANTITY not in attributes:
         return []
-    (low, high), unit = told[attr.ESTIMATE_INTERVAL], STORED[told[attr.ESTIMATE_UNITS]]
+    (low, high), unit = attributes[attr.ESTIMATE_INTERVAL], STORED[attributes[attr.ESTIMATE_UNITS]]
     interval = interval_text(unit.factor * low, unit.factor * high, "{:.6g}".format)
-    shift = told.get(attr.ESTIMATE_NUMERICS, math.nan)
+    shift = attributes.get(attr.ESTIMATE_NUMERICS, math.nan)
     numerics = "not known" if math.isnan(shift) else f"{unit.factor * shift:.2g}{unit.suffix}"
     return [
-        f"{told[attr.STOP_QUANTITY]} = {unit.text(told[attr.ESTIMATE], '.6g')}, {told[attr.CONFIDENCE]:.4g} interval "
-        f"{interval}{unit.suffix}, numerics ± {numerics}; {_STOPPED[told[attr.STOP_REASON]]}"
+        f"{attributes[attr.STOP_QUANTITY]} = {unit.text(attributes[attr.ESTIMATE], '.6g')}, "
+        f"{attributes[attr.CONFIDENCE]:.4g} interval {interval}{unit.suffix}, numerics ± {numerics}; "
+        f"{_STOPPED[attributes[attr.STOP_REASON]]}"
     ]
 
 

@@ -97,13 +97,13 @@ def draws_note(dataset: Result) -> str:
         return ""
     shown = {"m s-1": " m/s", "degree": "°"}
     sizes = json.loads(dataset.attrs.get(attr.DISCREPANCY, "{}"))
-    told = " and ".join(f"{size:.2g}{shown[unit]}" for unit, size in sizes.items())
+    sizes_text = " and ".join(f"{size:.2g}{shown[unit]}" for unit, size in sizes.items())
     counts = "counts in them" if dataset.attrs.get(attr.DISCREPANCY_COUNTS) else "does not count in them"
-    found = f"that the fit found, {told}, {counts}" if told else "of the fit is not known"
-    asking = " (warpimpact inspect --discrepancy counts it)" if told and "not" in counts else ""
+    discrepancy = f"that the fit found, {sizes_text}, {counts}" if sizes_text else "of the fit is not known"
+    asking = " (warpimpact inspect --discrepancy counts it)" if sizes_text and "not" in counts else ""
     return (
         "Intervals by hits are of the mean over all draws of the posterior; those by parameters contain the number for "
-        f"95 % of the draws, of which the true material is one. The discrepancy {found}{asking}."
+        f"95 % of the draws, of which the true material is one. The discrepancy {discrepancy}{asking}."
     )
 
 
@@ -135,13 +135,13 @@ def survival_of(
         return Survival(math.nan, math.nan, confidence[0], reason)
     apart = numbers[0][:common] - numbers[1][:common]
     images, draws = dealing(datasets[0])["images"], drawn[0][:common]
-    found = positive_share(math.copysign(1.0, by_hits[0]) * apart, draws, images=images, confidence=confidence[0])
-    if found is None:
+    positive = positive_share(math.copysign(1.0, by_hits[0]) * apart, draws, images=images, confidence=confidence[0])
+    if positive is None:
         return Survival(
             math.nan, math.nan, confidence[0], f"fewer than {FEWEST_GROUPS} draws have the shots that it takes"
         )
     interval = interval_of_means(apart, draws, images=images, confidence=confidence[1])
-    return Survival(found.share, found.at_least, confidence[0], interval=_no_less(interval, by_hits[1:]))
+    return Survival(positive.share, positive.at_least, confidence[0], interval=_no_less(interval, by_hits[1:]))
 
 
 def why_not_by_draws(numbers: tuple[Array, Array], *, independent: str, by_ratio: bool) -> str:

@@ -75,8 +75,10 @@ def sweep_view(sweep: xarray.Dataset, texts: Sequence[str] = ()) -> list[Section
     measures = measures_of(sweep, texts)
     every = list(points(sweep, measures))
     title = str(sweep.attrs.get(attr.TITLE, "untitled"))
-    told = f"{len(every)} combinations of {', '.join(inputs_of(sweep))}, with at most {sweep.sizes[v.HIT]} hits each"
-    return [Section([told], title), *(Section([_table(every, measure)], measure.title) for measure in measures)]
+    sentence = (
+        f"{len(every)} combinations of {', '.join(inputs_of(sweep))}, with at most {sweep.sizes[v.HIT]} hits each"
+    )
+    return [Section([sentence], title), *(Section([_table(every, measure)], measure.title) for measure in measures)]
 
 
 def _table(every: Sequence[Point], measure: Measure) -> Table:

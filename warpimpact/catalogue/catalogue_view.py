@@ -88,16 +88,16 @@ def drawn(core: Core) -> list[str]:
 
 
 def _core(threat: Threat, core: Core) -> Iterator[tuple[str, str]]:
-    own = core.mass_properties
+    properties = core.mass_properties
     published = "" if threat.core_mass is None else f"; published {_G * threat.core_mass:.4g} g"
     if threat.core_density is not None:
         by_volume = core.model_copy(update={"mass": None, "density": threat.core_density}).mass_properties.mass
         volume = f"; its volume at {threat.core_density:g} kg/m³ weighs {_G * by_volume:.4g} g"
     else:
         volume = ""
-    yield "core mass", f"{_G * own.mass:.4g} g{published}{volume}"
-    yield "centre of mass", f"{_MM * own.centre_of_mass:.4g} mm behind the nose"
-    inertia = f"axial {own.inertia_axial:.4g} kg m², transverse {own.inertia_transverse:.4g} kg m²"
+    yield "core mass", f"{_G * properties.mass:.4g} g{published}{volume}"
+    yield "centre of mass", f"{_MM * properties.centre_of_mass:.4g} mm behind the nose"
+    inertia = f"axial {properties.inertia_axial:.4g} kg m², transverse {properties.inertia_transverse:.4g} kg m²"
     yield "moments of inertia", inertia
 
 
@@ -127,8 +127,8 @@ def _predicted(material: Material) -> Iterator[tuple[str, str]]:
 def _rows(material: Material) -> Iterator[tuple[str, str]]:
     if not material.rows:
         return
-    told = ", ".join(f"{count} of {name}" for name, count in material.rows.items())
-    yield "limit velocities", f"{material.count}: {told}"
+    rows = ", ".join(f"{count} of {name}" for name, count in material.rows.items())
+    yield "limit velocities", f"{material.count}: {rows}"
     calibres = f"{material.calibres_low:.3g} to {material.calibres_high or 0.0:.3g} calibres"
     thickness = f"{_MM * material.thickness_low:.4g} to {_MM * (material.thickness_high or 0.0):.4g} mm, {calibres}"
     low, high = math.degrees(material.obliquity_low), math.degrees(material.obliquity_high or 0.0)

@@ -41,8 +41,8 @@ def _catalogue(arguments: argparse.Namespace) -> None:
     if entry is None:
         print(text_of(catalogue_view(catalogue)))
     else:
-        own = isinstance(entry, Material) and catalogue.is_own(entry)
-        view = threat_view(entry) if isinstance(entry, Threat) else material_view(entry, is_own=own)
+        is_own = isinstance(entry, Material) and catalogue.is_own(entry)
+        view = threat_view(entry) if isinstance(entry, Threat) else material_view(entry, is_own=is_own)
         print(text_of(view))
     if arguments.output and core is not None and entry is not None:
         from warpimpact.plotting.core import core_figure

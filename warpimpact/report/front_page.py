@@ -104,8 +104,8 @@ class _Chart:
     def drawn(self) -> dict[str, Any]:
         """What the page draws beside the front."""
         dataset, labels = self._dataset, self._dataset[f.LABEL].values
-        found, solid = dataset[f.FOUND].values[:, self._shown], dataset[f.SOLID].values[:, self._shown]
-        every = (self._place(design) for design in found if np.isfinite(design).all())
+        searched, solid = dataset[f.FOUND].values[:, self._shown], dataset[f.SOLID].values[:, self._shown]
+        every = (self._place(design) for design in searched if np.isfinite(design).all())
         line = [self._place(plate) for plate in solid[np.argsort(solid[:, 0])] if np.isfinite(plate).all()]
         ticks = [
             [tick for tick in at if low <= tick <= high]

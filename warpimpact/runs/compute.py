@@ -61,21 +61,21 @@ class HitMap:
             return None
         pilot = pilot_shots(campaign, pilot_most(campaign))
         hits = len(campaign.sampler()) // len(campaign.symmetries)
-        found = pilot_of(campaign.scene, pilot, campaign.numerics, worker, trying, excess_of_stop(campaign), hits)
-        return replace(found, shifts=shifts_of(campaign, pilot, found), tried=())
+        errors = pilot_of(campaign.scene, pilot, campaign.numerics, worker, trying, excess_of_stop(campaign), hits)
+        return replace(errors, shifts=shifts_of(campaign, pilot, errors), tried=())
 
     def found_in(self, result: Result) -> HitErrors | None:
         """What the pilot of a result found; None if its campaign fixed the resolution."""
-        told = result.attrs
-        if attr.RESOLUTION not in told:
+        attributes = result.attrs
+        if attr.RESOLUTION not in attributes:
             return None
         return HitErrors(
             *found_in(result),
-            residual_velocity_error=float(told[attr.RESIDUAL_VELOCITY_ERROR]),
-            tilt_error=math.radians(float(told[attr.TILT_ERROR])),
-            depth_error=float(told.get(attr.DEPTH_ERROR, math.nan)),
-            status_error=float(told.get(attr.STATUS_ERROR, math.nan)),
-            shifts={int(level): tuple(at) for level, at in json.loads(told.get(attr.LEVEL_SHIFTS, "{}")).items()},
+            residual_velocity_error=float(attributes[attr.RESIDUAL_VELOCITY_ERROR]),
+            tilt_error=math.radians(float(attributes[attr.TILT_ERROR])),
+            depth_error=float(attributes.get(attr.DEPTH_ERROR, math.nan)),
+            status_error=float(attributes.get(attr.STATUS_ERROR, math.nan)),
+            shifts={int(level): tuple(at) for level, at in json.loads(attributes.get(attr.LEVEL_SHIFTS, "{}")).items()},
         )
 
 
@@ -132,37 +132,39 @@ def of_images(progress: Progress | None, images: int) -> Progress | None:
 
 def found_in(result: Result) -> tuple[Numerics, bool, float]:
     """The values of `Found` that a result tells."""
-    told = result.attrs
-    numerics = Numerics.model_validate_json(told[attr.RESOLUTION])
-    return numerics, bool(told[attr.PROMISE_KEPT]), float(json.loads(told[attr.ACCURACY])["share"])
+    attributes = result.attrs
+    numerics = Numerics.model_validate_json(attributes[attr.RESOLUTION])
+    return numerics, bool(attributes[attr.PROMISE_KEPT]), float(json.loads(attributes[attr.ACCURACY])["share"])
 
 
 def _errors(found: Found | None) -> dict[str, Any]:
     """The errors that a pilot of a hit map found, as attributes."""
     if not isinstance(found, HitErrors):
         return {}
-    told = {
+    errors = {
         attr.RESIDUAL_VELOCITY_ERROR: found.residual_velocity_error,
         attr.TILT_ERROR: math.degrees(found.tilt_error),
         attr.DEPTH_ERROR: found.depth_error,
         attr.STATUS_ERROR: found.status_error,
     }
     shifts = {attr.LEVEL_SHIFTS: json.dumps(found.shifts)} if found.shifts else {}
-    return {name: error for name, error in told.items() if not math.isnan(error)} | shifts
+    return {name: error for name, error in errors.items() if not math.isnan(error)} | shifts
 
 
 def at_solid(campaign: Campaign, shots: Shots) -> tuple[Scene, Shots]:
     """The solid plate of equal areal density in place of the target, and shots at it: it is as heavy as the target of
     each shot."""
     target, plate = campaign.target, campaign.plate
-    own: dict[str, Any] = {name: shots.columns[name][:, :1] if shots.differs(name, 0) else None for name in BY_LAYER}
+    of_plate: dict[str, Any] = {
+        name: shots.columns[name][:, :1] if shots.differs(name, 0) else None for name in BY_LAYER
+    }
     if shots.thickness is not None:
         thickness = shots.own_of(target, "thickness", 0) * (plate.solid.thickness / plate.thickness)
         for k, layer in enumerate(target.layers[1:], start=1):
             share = layer.areal_density / layer.thickness / plate.density
             thickness = thickness + share * shots.own_of(target, "thickness", k)
-        own["thickness"] = np.broadcast_to(thickness, len(shots)).copy()
-    return campaign.scene.model_copy(update={"target": target.solid}), replace(shots, **own)
+        of_plate["thickness"] = np.broadcast_to(thickness, len(shots)).copy()
+    return campaign.scene.model_copy(update={"target": target.solid}), replace(shots, **of_plate)
 
 
 def _outcomes(

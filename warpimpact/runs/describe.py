@@ -80,7 +80,7 @@ def is_double(campaign: Campaign) -> bool:
 def computed_by(campaign: Campaign, device: str, computed: int, elapsed: float) -> dict[str, Any]:
     """Who computed so many shots, and in what time [s]."""
     chosen, group = find_device(device), campaign.symmetries
-    told = {
+    attributes = {
         **attr.versions(),
         **attr.machine(),
         attr.DEVICE: f"{chosen.alias} ({chosen.name})",
@@ -88,8 +88,12 @@ def computed_by(campaign: Campaign, device: str, computed: int, elapsed: float) 
         attr.HITS_PER_SECOND: computed / elapsed,
     }
     if campaign.hits.irreducible:
-        told |= {attr.SYMMETRIES: ", ".join(map(str, group)), attr.IMAGES: len(group), attr.COMPUTED_HITS: computed}
-    return told
+        attributes |= {
+            attr.SYMMETRIES: ", ".join(map(str, group)),
+            attr.IMAGES: len(group),
+            attr.COMPUTED_HITS: computed,
+        }
+    return attributes
 
 
 def found_attributes(campaign: Campaign, found: Found | None) -> dict[str, Any]:
@@ -113,7 +117,7 @@ def made_by(device: str) -> dict[str, str]:
 
 def _campaign(campaign: Campaign) -> dict[str, Any]:
     ligament = campaign.plate.ligament
-    told = {
+    attributes = {
         attr.TITLE: campaign.title,
         attr.HISTORY: attr.history_line("run"),
         attr.CAMPAIGN: campaign.text,
@@ -129,11 +133,11 @@ def _campaign(campaign: Campaign) -> dict[str, Any]:
         attr.MATERIAL: _material(campaign),
         attr.FAILED_SHARE: campaign.output.failed_share,
     }
-    told |= {} if campaign.hits.count is None else {attr.COUNT: campaign.hits.count}
-    told |= {attr.LAYERS: _layers(campaign)} if campaign.layer else {}
-    told |= {attr.LIGAMENT: ligament} if math.isfinite(ligament) else {}
-    told |= {} if campaign.drawn is None else {attr.DISCREPANCY: json.dumps(campaign.drawn.discrepancy)}
-    return told | ({} if campaign.burst is None else _burst(campaign.burst))
+    attributes |= {} if campaign.hits.count is None else {attr.COUNT: campaign.hits.count}
+    attributes |= {attr.LAYERS: _layers(campaign)} if campaign.layer else {}
+    attributes |= {attr.LIGAMENT: ligament} if math.isfinite(ligament) else {}
+    attributes |= {} if campaign.drawn is None else {attr.DISCREPANCY: json.dumps(campaign.drawn.discrepancy)}
+    return attributes | ({} if campaign.burst is None else _burst(campaign.burst))
 
 
 def _impact(campaign: Campaign) -> str:

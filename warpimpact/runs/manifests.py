@@ -22,8 +22,8 @@ def fingerprint(content: Mapping[str, Any]) -> str:
 
 def difference(begun: Any, now: Any) -> str | None:
     """The first difference between two manifests as a phrase, None if there is none."""
-    found = first_difference(begun, now)
-    return found and "{} was {} and is {}".format(*found)
+    where = first_difference(begun, now)
+    return where and "{} was {} and is {}".format(*where)
 
 
 def first_difference(one: Any, other: Any, place: str = "") -> tuple[str, str, str] | None:

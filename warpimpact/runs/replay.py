@@ -109,8 +109,8 @@ def _at_their_limit(scene: Scene, shots: Shots, result: xarray.Dataset, place: i
 
 def _numerics(campaign: Campaign, result: xarray.Dataset) -> Numerics:
     """What the hits were computed with."""
-    found = attr.RESOLUTION in result.attrs
-    numerics = Numerics.model_validate_json(result.attrs[attr.RESOLUTION]) if found else campaign.numerics
+    has_pilot = attr.RESOLUTION in result.attrs
+    numerics = Numerics.model_validate_json(result.attrs[attr.RESOLUTION]) if has_pilot else campaign.numerics
     return short_steps(numerics) if attr.LIMIT in result.attrs else numerics
 
 

@@ -160,17 +160,17 @@ def _fill(campaign: Campaign, computation: Computation, shards: Shards, executor
     cost.tell(numerics_of(campaign, watch.found))
 
     asks = 0 not in there and has_assumptions(campaign)
-    told = None if watch.found is None else watch.found.told
+    found_alone = None if watch.found is None else watch.found.told
 
     def jobs() -> Iterator[tuple[range | None, Job]]:
         if asks:
-            yield None, Job(assumed_job, (computation, campaign, told))
+            yield None, Job(assumed_job, (computation, campaign, found_alone))
         most = lambda: task_size(executor, 0.0 if campaign.stop else watch.rate)  # noqa: E731
         for task in ranges(shards, len(sampler), most):
             shots = sampler.shots(task.start * shards.extent, len(task) * shards.extent)
             first = shots[: shards.extent] if task.start == 0 else None
             solid = None if first is None else solid_shots(campaign, first, computation.most_solid)
-            found = watch.found if task.start == 0 else told
+            found = watch.found if task.start == 0 else found_alone
             yield task, Job(task_job, (computation, campaign, Task(shots, solid, found)))
 
     def take(index: int, shard: HitTable) -> None:

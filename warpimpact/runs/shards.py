@@ -179,10 +179,10 @@ class ShardsOnDisk(Shards):
         Raises:
             OutputError: the file cannot be written, or a shard is damaged meanwhile; the others are still there.
         """
-        told = {**attributes(self.shard(0)), attr.FINGERPRINT: self.parts.fingerprint}
+        complete = {**attributes(self.shard(0)), attr.FINGERPRINT: self.parts.fingerprint}
         self._grow(count)
         assert self._growing is not None  # there are hits
-        self._growing.complete(told)
+        self._growing.complete(complete)
         self._held.clear()
         _logger.info("%d shards joined into %s", count, self.parts.output)
         self.parts.discard()

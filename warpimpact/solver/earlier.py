@@ -60,10 +60,10 @@ def scratch(
     pierced, through = channel_nodes(prepared, windows), planes(prepared)
     earlier.count, earlier.nodes, earlier.layers = count, nodes, layers
     earlier.channel_nodes, earlier.planes = sum(pierced), sum(through)
-    earlier.first, earlier.first_plane = (put(np.cumsum([0, *each[:-1]]), wp.int32) for each in (pierced, through))
+    earlier.first, earlier.first_plane = (put(np.cumsum([0, *counts[:-1]]), wp.int32) for counts in (pierced, through))
     earlier.apart = put(_apart(prepared), wp.float64)
-    each, kept = slots * count * layers, nodes if prepared.variant.degrades else 0
-    sizes = dict.fromkeys(("y", "z", "open", "box", "through"), each) | {
+    boxes, kept = slots * count * layers, nodes if prepared.variant.degrades else 0
+    sizes = dict.fromkeys(("y", "z", "open", "box", "through"), boxes) | {
         "exposure": slots * count * kept,
         "inside": slots * count * sum(pierced),
         "sections": slots * sum(through),

@@ -66,7 +66,7 @@ class Neighbours:
         value, least = self._value[known], 1e-3 * self._tolerance
         slopes = _slopes(self._conditions[0][known], value)
         trend = [condition @ slopes for condition in self._conditions]
-        rest = np.concatenate([value - each[known] for each in trend])
+        rest = np.concatenate([value - column[known] for column in trend])
         weights = np.abs(slopes) / (np.std(value) + least)
         some, best = spread_places(len(known), min(len(known), TRIED)), np.inf
         for place in PLACES:
@@ -120,12 +120,12 @@ class _Near:
         if own is not None:
             distance = np.where(near % self._count == own[:, None], np.inf, distance)
             order = np.argsort(distance, axis=1)[:, :NEAREST]
-            distance, near = (np.take_along_axis(each, order, axis=1) for each in (distance, near))
+            distance, near = (np.take_along_axis(array, order, axis=1) for array in (distance, near))
         weight = 1.0 / (distance + 1e-9 + 0.1 * distance[:, -1:]) ** 2
         weight /= weight.sum(axis=1, keepdims=True)
-        told = (weight * values[near]).sum(axis=1)
-        spread = np.sqrt((weight * (values[near] - told[:, None]) ** 2).sum(axis=1))
-        return told, spread + 0.3 * np.median(spread), near % self._count
+        predicted = (weight * values[near]).sum(axis=1)
+        spread = np.sqrt((weight * (values[near] - predicted[:, None]) ** 2).sum(axis=1))
+        return predicted, spread + 0.3 * np.median(spread), near % self._count
 
 
 def _coordinates(shots: Shots, sought: tuple[str, int]) -> tuple[Array, Array, Array]:
@@ -156,8 +156,8 @@ def _symmetries(scene: Scene, signed: Array) -> list[Symmetry]:
     if any(layer.open_area > 0.0 or layer.size is not None for layer in scene.target.layers[1:]):
         return [IDENTITY]
     alike = np.ptp(signed, axis=0) <= 1e-9 * np.abs(signed).max(axis=0)
-    kept = [each for each in SYMMETRIES if each == IDENTITY or of_plate(each, scene.target.layers[0])]
-    return [each for each in kept if not (alike & (_signs(each) < 0.0) & (np.abs(signed[0]) > 1e-9)).any()]
+    kept = [symmetry for symmetry in SYMMETRIES if symmetry == IDENTITY or of_plate(symmetry, scene.target.layers[0])]
+    return [symmetry for symmetry in kept if not (alike & (_signs(symmetry) < 0.0) & (np.abs(signed[0]) > 1e-9)).any()]
 
 
 def _slopes(conditions: Array, value: Array) -> Array:

@@ -118,12 +118,12 @@ def _material(
         shots.own_of(scene.target, name, layer)
         for name in ("resistance", "shear_coefficient", "degradation", "offset_y", "offset_z")
     )
-    interaction, own = scene.interaction, layer == 0
+    interaction, is_plate = scene.interaction, layer == 0
     static, linear, quadratic = (
         shots.own(name, getattr(interaction, name)) for name in ("static", "linear", "quadratic")
     )
     a0, a1, a2 = coefficients(static, linear, quadratic, resistance, plate.density)
-    depth = shots.own("degradation_depth", plate.degradation_depth) if own else np.array([plate.degradation_depth])
+    depth = shots.own("degradation_depth", plate.degradation_depth) if is_plate else np.array([plate.degradation_depth])
     return Materials(
         front=front,
         thickness=thickness,

@@ -143,9 +143,9 @@ class Memory:
         per_ring: int = size + (wp.types.type_size_in_bytes(self.stage.Sums) if self.variant.bends else 0)
         earlier = 0
         if self.variant.burst:
-            each = count * layers * wp.types.type_size_in_bytes(self.stage.Box) + count * layers * 18
+            boxes = count * layers * wp.types.type_size_in_bytes(self.stage.Box) + count * layers * 18
             sections = sum(earlier_hits.planes(self.prepared)) * wp.types.type_size_in_bytes(self.stage.Section)
-            earlier = (count * nodes + (1 + count) * self._pierced(cells)) * size + each + sections
+            earlier = (count * nodes + (1 + count) * self._pierced(cells)) * size + boxes + sections
         patches = self._patches * (8 * size + 3 * 4)
         return int(len(self.fields) * nodes * size + earlier + patches + self.rings * per_ring)
 

@@ -157,7 +157,7 @@ def pilot_hits(
         pilot.tell_to_finest(level)
     if excess_of is None and hits >= PART * len(pilot.tried[level].coarse):
         pilot.ease(level)
-    tried = tuple(pilot.tried[each] for each in sorted(pilot.tried))
+    tried = tuple(pilot.tried[level] for level in sorted(pilot.tried))
     return replace(pilot.tried[level].errors, tried=tried)
 
 
@@ -209,8 +209,8 @@ class _Pilot:
     def at(self, level: int, count: int) -> Outcomes:
         """Outcomes of the first `count` shots at a level."""
         if new := self.missing(level, count):
-            some = self.outcomes_at(at_level(level, self.numerics), self.shots[count - new : count])
-            self.known[level] = Outcomes.joined([self.known[level], some]) if level in self.known else some
+            more = self.outcomes_at(at_level(level, self.numerics), self.shots[count - new : count])
+            self.known[level] = Outcomes.joined([self.known[level], more]) if level in self.known else more
         return self.known[level][:count]
 
     def judge(self, level: int, finer: int) -> Verdict:
@@ -233,7 +233,11 @@ class _Pilot:
         coarse, fine = self.at(level, count), self.at(finer, count)
         errors, verdict = self.compared(at_level(level, self.numerics), coarse, fine, coarse)
         # Finer levels end no more shots otherwise than a coarser one, of which more shots tell.
-        coarser = [each.errors.status_error for at, each in self.tried.items() if at < level and len(each.fine) > count]
+        coarser = [
+            level_tried.errors.status_error
+            for at, level_tried in self.tried.items()
+            if at < level and len(level_tried.fine) > count
+        ]
         if errors.status_error > min(coarser, default=1.0):
             kept = verdict.excess <= 1.0 and min(coarser) <= self.numerics.asked.status_share
             errors = replace(errors, status_error=min(coarser), kept=kept)

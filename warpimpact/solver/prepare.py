@@ -205,11 +205,11 @@ def prepare(scene: Scene, shots: Shots, numerics: Numerics) -> Prepared:
         double=resolution.double,
         nodal=resolution.nodal,
         degrades=any(weakening),
-        rubs=any(one.shear_coefficient > 0.0 or shots.differs("shear_coefficient", k) for k, one in plates),
+        rubs=any(plate.shear_coefficient > 0.0 or shots.differs("shear_coefficient", k) for k, plate in plates),
         rate_dependent=any(
             getattr(interaction, name) > 0.0 or name in shots.columns for name in ("linear", "quadratic")
         ),
-        rimmed=any(one.size is not None for _, one in plates),
+        rimmed=any(plate.size is not None for _, plate in plates),
         bends=record.bending,
         layered=len(plates) > 1,
         deep=deep,
@@ -238,8 +238,8 @@ def prepare(scene: Scene, shots: Shots, numerics: Numerics) -> Prepared:
         resolution=resolution,
         variant=variant,
         surfaces=[
-            Surface(own, azimuths_of(count), sections_of(core, own) if record.bending else None)
-            for own, count in around.items()
+            Surface(core_rings, azimuths_of(count), sections_of(core, core_rings) if record.bending else None)
+            for core_rings, count in around.items()
         ],
         plates=grids,
         materials=materials,
@@ -257,5 +257,5 @@ def _lengths(layers: Sequence[Plate], shots: Shots) -> tuple[list[list[Lengths]]
     if not any(name in shots.columns for name in OWN_LENGTHS):
         return [[front, *behind]], np.zeros(1, dtype=np.int64)
     columns = [np.broadcast_to(shots.own(name, at), len(shots)) for name, at in zip(OWN_LENGTHS, front, strict=True)]
-    own, which = np.unique(np.stack(columns, axis=1), axis=0, return_inverse=True)
-    return [[Lengths(*row), *behind] for row in own.tolist()], np.asarray(which.reshape(-1), dtype=np.int64)
+    different, which = np.unique(np.stack(columns, axis=1), axis=0, return_inverse=True)
+    return [[Lengths(*row), *behind] for row in different.tolist()], np.asarray(which.reshape(-1), dtype=np.int64)

@@ -199,8 +199,8 @@ def _blurred(pattern: Pattern, counts: tuple[int, int], sides: tuple[float, floa
 
 def _bands(counts: tuple[int, int]) -> Iterator[slice]:
     """Slices of the rows of a tile, of about AT_ONCE cells each."""
-    rows, some = counts[0], max(1, AT_ONCE // counts[1])
-    return (slice(first, min(first + some, rows)) for first in range(0, rows, some))
+    rows, at_once = counts[0], max(1, AT_ONCE // counts[1])
+    return (slice(first, min(first + at_once, rows)) for first in range(0, rows, at_once))
 
 
 def _sums(values: Floats, count: int) -> Floats:

@@ -67,16 +67,16 @@ def windows_behind(
         plates, which: as in `first_windows`.
         plate: nodes of the plate's windows in each direction, shape [1] or [shots].
     """
-    steep, own = np.tan(shots.obliquity), [np.broadcast_to(plate, len(shots))]
+    steep, counts = np.tan(shots.obliquity), [np.broadcast_to(plate, len(shots))]
     wide = np.array([grids[0].spacing for grids in plates])[which]
     for k, material in enumerate(materials[1:], start=1):
         spacing = np.array([grids[k].spacing for grids in plates])[which]
         taps = np.array([len(grids[k].taps) for grids in plates])[which]
         thicker = np.maximum(0.0, material.together - materials[0].together)
-        half = 0.5 * own[0] * wide + WIDER_BEHIND * core.bounding_radius + thicker * steep
+        half = 0.5 * counts[0] * wide + WIDER_BEHIND * core.bounding_radius + thicker * steep
         count = 2 * (np.ceil(half / spacing).astype(np.int64) + 2 * taps + 3)
-        own.append(count if material.weakens or burst else np.zeros_like(own[0]))
-    return np.stack([own[material.laminate] for material in materials])
+        counts.append(count if material.weakens or burst else np.zeros_like(counts[0]))
+    return np.stack([counts[material.laminate] for material in materials])
 
 
 def block_window(cells: int) -> int:
