@@ -31,6 +31,8 @@ def test_counts_every_status(mixed):
         "left_window": 0,
         "not_finite": 0,
         "gained_energy": 0,
+        "unbalanced": 0,
+        "hourglassed": 0,
     }
 
 
