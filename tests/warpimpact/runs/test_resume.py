@@ -424,7 +424,7 @@ def _with_files_up_to(size: int, *command: str) -> subprocess.CompletedProcess[s
     )
     return subprocess.run(
         [*_after(limit), *WARPIMPACT, *command],
-        env=os.environ | {"PYTHONPATH": str(HERE)},
+        env=os.environ | {"PYTHONPATH": str(HERE), "PYTHONDONTWRITEBYTECODE": "1"},  # it would be cut, and kept
         capture_output=True,
         text=True,
         check=False,
