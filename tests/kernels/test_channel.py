@@ -62,6 +62,7 @@ def test_the_wall_of_a_channel_is_a_twentieth_of_a_cell_wide(device: str) -> Non
     found = []
     for outside in OUTSIDE:
         fields, touches = poisoned_fields(Fields, SLOTS, CELLS_Y, CELLS_Z, device), Touches()
+        fields.channel_nodes = 2 * NODES
         fields.channel = wp.full(2 * SLOTS * NODES, -outside * CELL, dtype=real, device=device)
         for name in ("area", "slope", "gain"):
             setattr(touches, name, wp.ones(1, dtype=real, device=device))
