@@ -2,6 +2,7 @@
 
     python tests/benchmarks/continuum_trade.py rows ROWS.csv [--hits 24] [--plates slotted,thin]
     python tests/benchmarks/continuum_trade.py table ROWS.csv
+    python tests/benchmarks/continuum_trade.py refine ROWS.csv FINER_ROWS.csv
 
 `rows` appends what is not in the file, hit by hit, so that it may be ended at any time. `table` prints, by plate and
 measure, bias, rms and rank correlation of the fast law at the paper's parameters, and at those that fit the first half
@@ -88,8 +89,9 @@ def written(path: Path) -> list[dict[str, str]]:
 
 
 def rows_of(
-    name: str, case: Case, hits: int, friction: float, done: set[tuple[str, ...]]
+    name: str, hits: int, settings: dict[str, float | str], done: set[tuple[str, ...]]
 ) -> Iterator[dict[str, object]]:
+    case, friction = CASES[name], settings["friction"]
     shots = case.shots(hits)
     for model in ("fast", "continuum"):
         for k in range(hits):
@@ -99,7 +101,7 @@ def rows_of(
             if model == "fast":
                 outcome = simulate(case.scene, shot, numerics=Numerics(fidelity="standard"), device="cpu", threads=1)
             else:
-                continuum = Continuum(flows=tuple(flow_entry(name).flow for name in case.flows), friction=friction)
+                continuum = Continuum(flows=tuple(flow_entry(name).flow for name in case.flows), **settings)
                 outcome = simulate_continuum(case.scene, shot, continuum, threads=1)
             tilts = np.degrees(outcome.tilt[0])
             yield {
@@ -117,10 +119,10 @@ def rows_of(
             }
 
 
-def write_rows(path: Path, plates: list[str], hits: int, friction: float) -> None:
+def write_rows(path: Path, plates: list[str], hits: int, settings: dict[str, float | str]) -> None:
     for name in plates:
         done = {(row["plate"], row["friction"], row["model"], row["hit"]) for row in written(path)}
-        for row in rows_of(name, CASES[name], hits, friction, done):
+        for row in rows_of(name, hits, settings, done):
             new = not path.exists()
             with path.open("a", newline="", encoding="utf-8") as file:
                 writer = csv.DictWriter(file, FIELDS)
@@ -129,12 +131,128 @@ def write_rows(path: Path, plates: list[str], hits: int, friction: float) -> Non
                 writer.writerow(row)
 
 
+MEASURES = {"velocity": "m/s", "tilt_50": "°", "tilt_130": "°"}
+SCALES = np.array([5.0, 5.0, 10.0])
+"""What the continuum's own numerics leave open of each measure, about: misfits count in these."""
+FEWEST = 8
+"""Sound hits of a plate for a row of the table."""
+LEVEL = Numerics(level=2)
+SHARES = np.arange(0.4, 1.45, 0.1)
+FRICTIONS, WEAKENINGS = (0.0, 0.03, 0.05, 0.08, 0.12), (0.7, 0.8, 0.9, 1.0)
+"""Shares of the resistance, shear coefficients and degradations that a fit tries."""
+SHOTS = {"through a hole": (714.0, 24.3, 83.2), "between holes": (753.0, 16.0, 32.2)}
+"""The paper's two shots: residual velocity, spatial tilt at 50 and 130 mm."""
+
+
+def measured(rows: list[dict[str, str]], plate: str, model: str) -> dict[int, np.ndarray]:
+    """The measures of the sound hits of a plate by their numbers."""
+    chosen = (row for row in rows if row["plate"] == plate and row["model"] == model and row["status"] == "0")
+    return {int(row["hit"]): np.array([float(row[name]) for name in MEASURES]) for row in chosen}
+
+
+def fast_law(case: Case, shots: Shots, share: float, friction: float, degradation: float) -> np.ndarray:
+    """Measures of the fast law with other parameters, shape [hits, 3]."""
+    layers = tuple(
+        layer.model_copy(
+            update={
+                "resistance": share * layer.resistance,
+                "shear_coefficient": friction,
+                "degradation": degradation if layer.degradation < 1.0 else 1.0,
+            }
+        )
+        for layer in case.layers
+    )
+    scene = Scene(core=CORE, target=layers, record=Record(standoffs=(0.05, 0.13)))
+    outcomes = simulate(scene, shots, numerics=LEVEL, device="cpu", threads=1)
+    return np.column_stack([outcomes.residual_velocity, np.degrees(outcomes.tilt)])
+
+
+def fitted(case: Case, shots: Shots, truth: np.ndarray) -> tuple[float, float, float]:
+    """Share of the resistance, shear coefficient and degradation that miss the continuum least."""
+    weakenings = WEAKENINGS if case.layers[0].degradation < 1.0 else (1.0,)
+    tried = [(share, eta, beta) for share in SHARES for eta in FRICTIONS for beta in weakenings]
+    misfits = [float(np.nanmean(((fast_law(case, shots, *one) - truth) / SCALES) ** 2)) for one in tried]
+    return tried[int(np.argmin(misfits))]
+
+
+def ranked(one: np.ndarray, other: np.ndarray) -> float:
+    """Spearman's correlation."""
+    ranks = [np.argsort(np.argsort(values)) for values in (one, other)]
+    return float(np.corrcoef(*ranks)[0, 1])
+
+
+def print_table(path: Path) -> None:
+    rows = written(path)
+    print("| plate | hits | fast law | measure | bias | rms | rank correlation |\n|---|---|---|---|---|---|---|")
+    for plate, case in CASES.items():
+        truth, fast = measured(rows, plate, "continuum"), measured(rows, plate, "fast")
+        hits = sorted({*truth} & {*fast})
+        if len(hits) < FEWEST:
+            continue
+        shots = case.shots(max(hits) + 1)
+        told = [("paper" if case.layers[0].degradation < 1.0 else "given", hits, np.array([fast[k] for k in hits]))]
+        inside, outside = hits[::2], hits[1::2]
+        one = fitted(case, shots[np.array(inside)], np.array([truth[k] for k in inside]))
+        words = f"{one[0] * case.layers[0].resistance / 1e9:.2g} GPa, η {one[1]:g}, β {one[2]:g}"
+        for name, those in (("in the fit", inside), ("out of it", outside)):
+            told.append((f"{words}, {name}", those, fast_law(case, shots[np.array(those)], *one)))
+        for name, those, values in told:
+            apart = values - np.array([truth[k] for k in those])
+            for k, (measure, unit) in enumerate(MEASURES.items()):
+                known = ~np.isnan(apart[:, k])
+                rank = ranked(values[known, k], np.array([truth[h][k] for h in those])[known])
+                bias, rms = apart[known, k].mean(), np.sqrt((apart[known, k] ** 2).mean())
+                head = f"| {plate} | {known.sum()} | {name} | {measure.replace('_', ' at ')}"
+                print(f"{head}, {unit} | {bias:+.3g} | {rms:.3g} | {rank:.2f} |")
+    print("\n| plate | hits | failed | seconds of a core per hit |\n|---|---|---|---|")
+    for plate in CASES:
+        chosen = [row for row in rows if row["plate"] == plate and row["model"] == "continuum"]
+        if chosen:
+            failed = sum(row["status"] not in ("0", "1", "2", "3") for row in chosen)
+            seconds = np.median([float(row["seconds"]) for row in chosen])
+            print(f"| {plate} | {len(chosen)} | {failed} | {seconds:.3g} |")
+    print("\n| shot | model | nearest hit (mm) | m/s | ° at 50 mm | ° at 130 mm |\n|---|---|---|---|---|---|")
+    for shot, values in SHOTS.items():
+        for model in ("continuum", "fast"):
+            found = measured(rows, "slotted", model)
+            if not found:
+                continue
+            best = min(found, key=lambda k: float((((found[k] - values) / SCALES) ** 2).sum()))
+            place = next(row for row in rows if row["plate"] == "slotted" and row["hit"] == str(best))
+            at = f"({1e3 * float(place['hit_y']):.2f}, {1e3 * float(place['hit_z']):.2f})"
+            print(f"| {shot} | {model} | {at} | " + " | ".join(f"{value:.0f}" for value in found[best]) + " |")
+
+
+def print_refinement(coarse: Path, fine: Path) -> None:
+    """What hits of one file differ by from the same hits of another, by plate: root mean squares."""
+    print("| plate | hits | velocity, m/s | tilt at 50 mm, ° | tilt at 130 mm, ° | seconds of a core per hit |")
+    print("|---|---|---|---|---|---|")
+    rows = written(coarse), written(fine)
+    for plate in CASES:
+        one, other = (measured(of, plate, "continuum") for of in rows)
+        hits = sorted({*one} & {*other})
+        if hits:
+            apart = np.array([one[k] - other[k] for k in hits])
+            seconds = [
+                float(row["seconds"]) for row in rows[1] if row["plate"] == plate and row["model"] == "continuum"
+            ]
+            words = " | ".join(f"{value:.2g}" for value in np.sqrt((apart**2).mean(axis=0)))
+            print(f"| {plate} | {len(hits)} | {words} | {np.median(seconds):.3g} |")
+
+
 if __name__ == "__main__":
     parser = argparse.ArgumentParser()
-    parser.add_argument("what", choices=("rows",))
-    parser.add_argument("file", type=Path)
+    parser.add_argument("what", choices=("rows", "table", "refine"))
+    parser.add_argument("file", type=Path, nargs="+")
     parser.add_argument("--hits", type=int, default=24)
     parser.add_argument("--friction", type=float, default=0.0)
+    parser.add_argument("--fidelity", default="draft")
     parser.add_argument("--plates", default=",".join(CASES))
     arguments = parser.parse_args()
-    write_rows(arguments.file, arguments.plates.split(","), arguments.hits, arguments.friction)
+    if arguments.what == "rows":
+        chosen = {"friction": arguments.friction, "fidelity": arguments.fidelity}
+        write_rows(arguments.file[0], arguments.plates.split(","), arguments.hits, chosen)
+    elif arguments.what == "table":
+        print_table(arguments.file[0])
+    else:
+        print_refinement(*arguments.file)

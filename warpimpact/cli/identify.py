@@ -34,7 +34,11 @@ def add_identify(commands: Commands) -> None:
         example="identify campaigns/fits/paper_fit.toml -o paper_fit.nc",
     )
     parser.add_argument(
-        "fit", type=Path, metavar="FIT.toml", help="fit file: scene, measured shots, and priors of what is unknown"
+        "fit",
+        type=Path,
+        metavar="FIT",
+        help="fit file: scene, measured shots, and priors of what is unknown; or a result of warpimpact continuum, "
+        "whose hits then count as measured shots",
     )
     add_output(parser, "POSTERIOR.nc", "file of the posterior (default: the fit's name, in this folder)")
     add_computing(parser)
@@ -45,6 +49,7 @@ def add_identify(commands: Commands) -> None:
 
 
 def _identify(arguments: argparse.Namespace) -> int:
+    from warpimpact.identification.computed_shots import fit_of_result
     from warpimpact.identification.fit_file import read_fit
     from warpimpact.identification.identify import identify_to_file
     from warpimpact.identification.posterior_view import posterior_view
@@ -54,8 +59,9 @@ def _identify(arguments: argparse.Namespace) -> int:
     from warpimpact.solver.device import cores, find_device
     from warpimpact.view.view import text_of
 
-    fit = read_fit(arguments.fit)
-    output = arguments.output or Path(arguments.fit.stem + ".nc")
+    by_elements = arguments.fit.suffix == ".nc"
+    fit = fit_of_result(arguments.fit) if by_elements else read_fit(arguments.fit)
+    output = arguments.output or Path(f"{arguments.fit.stem}_fit.nc" if by_elements else f"{arguments.fit.stem}.nc")
     check_place(output)
     check_suffix(output, "a posterior", ".nc")
     pictures = {output.with_name(f"{output.stem}_{name}.png"): draw for name, draw in FIGURES.items()}
