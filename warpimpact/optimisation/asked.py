@@ -48,10 +48,13 @@ class _Asked(Model):
             `P(inclination@130mm > 30 deg)`, `V50`, `mean(limit_thickness@layer 1)` or `areal_density`; without a
             stand-off the largest one counts.
         threats: over several threats the "worst" one counts, or their weighted "mean".
+        assumptions: of what nobody measured, what the campaign says counts ("given"), or over all assumptions the
+            "worst" or the "mean".
     """
 
     measure: str
     threats: Literal["worst", "mean"] = "worst"
+    assumptions: Literal["given", "worst", "mean"] = "given"
 
     @model_validator(mode="before")
     @classmethod

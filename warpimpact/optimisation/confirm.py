@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import Any
 
@@ -11,9 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpimpact.campaign.text import CampaignError
-from warpimpact.optimisation.design import Design
+from warpimpact.optimisation.design import Design, alternatives_of
 from warpimpact.optimisation.evaluate import HitJob, Told, campaign_of, hits_asked, levels_asked
-from warpimpact.optimisation.judged import Record, excesses, interval, means, numbers_of, objectives
+from warpimpact.optimisation.judged import Record, excesses, interval, means, numbers_of, objectives, values
 from warpimpact.optimisation.search import Searched
 from warpimpact.optimisation.searcher import front_of
 from warpimpact.runs.questions import Question
@@ -42,6 +42,9 @@ class Confirmed:
         kept: whether fresh hits leave a design on the front and within the bounds.
         groups: number of the first design than which each is not certainly better.
         references: targets to compare with.
+        assumptions: names of what is otherwise.
+        under: objectives and bounds of the front, then of the references, under every assumption, shape [front +
+            references, assumptions, asked].
         survival: of each design, per objective and bound, the share of the draws of a posterior for which it differs
             from the next one of another group in the same direction as over all hits, and the lower end of the
             interval of that share, shape [front, asked, 2]; NaN where it is not known.
@@ -55,6 +58,8 @@ class Confirmed:
     groups: NDArray[np.int64]
     references: tuple[Record, ...]
     survival: Array
+    assumptions: tuple[str, ...]
+    under: Array
 
 
 Follow = Callable[[int, int, str], object]
@@ -69,6 +74,7 @@ def confirm(design: Design, found: Searched, follow: Follow) -> Question[Confirm
     records, places, draws = yield from _fresh(design, [*chosen, *others], follow)
     front = records[: len(chosen)]
     solids = yield from _solids(design, front, follow)
+    names, under = yield from _under_assumptions(design, records, follow)
     kept, leaders = _kept(design, front), groups(design, front)
     return Confirmed(
         numbers=numbers,
@@ -79,6 +85,8 @@ def confirm(design: Design, found: Searched, follow: Follow) -> Question[Confirm
         groups=leaders,
         references=tuple(records[len(chosen) :]),
         survival=survival(design, front, draws, kept & (leaders == np.arange(len(front)))),
+        assumptions=names,
+        under=under,
     )
 
 
@@ -129,36 +137,66 @@ def _fresh(
 ) -> Question[tuple[list[Record], Array, list[Array]]]:
     """Targets with fresh hits, where these lie, and the draws of a posterior that they took."""
     seed, count = fresh_seed(design), design.search.confirm_hits if design.keys else 1
-    threats = range(len(design.threats))
+    threats, situations = range(len(design.threats)), design.situations
     asked = [HitJob(one.tables, threat, 0, count, FIDELITY, seed) for one in targets for threat in threats]
     if not design.keys:
-        empty = np.zeros((len(threats), 0, count))
+        empty = np.zeros((len(situations), 0, count))
         found = [Record(one.values, one.tables, one.areal_density, ("",) * len(threats), empty) for one in targets]
         return found, np.zeros((len(targets), 2, 0)), [np.zeros(0)] * len(targets)
     whose = "the front and references" if design.references else "the front"
     piloting = _telling(follow, len(targets), len(asked), f"pilots for fresh hits of {whose}")
     levels = yield from levels_asked(design, asked, piloting)
-    jobs = [HitJob(*_of(job), level, seed) for job, level in zip(asked, levels, strict=True)]
+    of_targets = [tuple(levels[first : first + len(threats)]) for first in range(0, len(levels), len(threats))]
+    jobs = [
+        HitJob(target.tables, threat, 0, count, of_target[threat], seed, assumption=name)
+        for target, of_target in zip(targets, of_targets, strict=True)
+        for threat, name in situations
+    ]
     said = yield from hits_asked(design, jobs, _telling(follow, len(targets), len(jobs), f"fresh hits of {whose}"))
     records = []
     for number, one in enumerate(targets):
-        own = slice(number * len(threats), (number + 1) * len(threats))
+        own = slice(number * len(situations), (number + 1) * len(situations))
         records.append(
             Record(
                 values=one.values,
                 tables=one.tables,
                 areal_density=one.areal_density,
-                levels=tuple(levels[own]),
+                levels=of_targets[number],
                 said=np.array([part.values for part in said[own]]),
                 seconds=sum(part.seconds for part in said[own]),
             )
         )
-    of_first = said[:: len(threats)]
+    of_first = said[:: len(situations)]
     return records, np.array([one.places for one in of_first]), [one.draws for one in of_first]
 
 
-def _of(job: HitJob) -> tuple[Any, int, int, int]:
-    return job.tables, job.threat, job.first, job.count
+def _under_assumptions(
+    design: Design, targets: Sequence[Record], follow: Follow
+) -> Question[tuple[tuple[str, ...], Array]]:
+    """Names of the assumptions that a target can have, and objectives and bounds of all targets under them: as given,
+    moved by what the first hits tell."""
+    count = min(design.search.assumed_hits, design.search.confirm_hits)
+    if not count or not design.keys:
+        return (), np.zeros((len(targets), 0, len(design.asked)))
+    of_targets = [alternatives_of(campaign_of(design, target.tables, design.threats[0])) for target in targets]
+    names = tuple(dict.fromkeys(name for of_target in of_targets for name in of_target))
+    jobs = [
+        HitJob(target.tables, threat, 0, count, level, fresh_seed(design), assumption=name)
+        for target, of_target in zip(targets, of_targets, strict=True)
+        for name in of_target
+        for threat, level in enumerate(target.levels)
+    ]
+    what = "assumptions of the front and references" if design.references else "assumptions of the front"
+    said = iter((yield from hits_asked(design, jobs, _telling(follow, len(targets), len(jobs), what))))
+    threats, under = len(design.threats), np.zeros((len(targets), len(names), len(design.asked)))
+    for number, (target, of_target) in enumerate(zip(targets, of_targets, strict=True)):
+        alone = replace(target, said=target.said[:threats], means={}, known={})
+        given = replace(alone, said=alone.said[:, :, :count], means={}, known={})
+        under[number] = values(design, alone)
+        for name in of_target:
+            moved = replace(given, said=np.array([next(said).values for _ in range(threats)]), means={}, known={})
+            under[number, names.index(name)] += values(design, moved) - values(design, given)
+    return names, under
 
 
 def _solids(design: Design, front: Sequence[Record], follow: Follow) -> Question[list[Record]]:

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from contextlib import suppress
+from dataclasses import dataclass, field, replace
 from functools import lru_cache
 from pathlib import Path
 from typing import Annotated, Any
@@ -13,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field, ValidationError, model_validator
 
+from warpimpact.campaign.alternatives import Alternative, alternatives
 from warpimpact.campaign.campaign import Campaign
 from warpimpact.campaign.problems import sentence
 from warpimpact.campaign.text import CampaignError, parsed, read_text
@@ -29,6 +31,10 @@ from warpimpact.scene.units import (
 )
 
 Array = NDArray[np.float64]
+SCRAMBLINGS = 16
+"""Of the hits of a search: hit k belongs to scrambling k modulo their number."""
+_TRIED = 64
+"""Points of a space whose assumptions stand for all."""
 _Table = dict[str, Any]
 _Name = Annotated[Title, Field(min_length=1, max_length=80)]
 
@@ -98,6 +104,7 @@ class Search(Model):
         most_hits: computed of a design while the paired difference to the front does not decide.
         confirmed: designs of the front that are computed again with fresh hits, at most.
         confirm_hits: hits of each of these.
+        assumed_hits: hits of each of these, and of the references, under every assumption; 0 for none.
     """
 
     designs: Annotated[int, Field(strict=True, ge=1, le=1_000_000)] = 1000
@@ -107,6 +114,7 @@ class Search(Model):
     most_hits: Annotated[int, Field(strict=True, ge=16, le=2**20)] = 1024
     confirmed: Annotated[int, Field(strict=True, ge=1, le=200)] = 20
     confirm_hits: Annotated[int, Field(strict=True, ge=64, le=2**22)] = 1024
+    assumed_hits: Annotated[int, Field(strict=True, ge=0, le=2**16)] = 256
 
     @model_validator(mode="after")
     def _grows(self) -> Search:
@@ -147,6 +155,8 @@ class Design:
         objectives, bounds, threats, references, constraints, search: as in the file; without threats there is that of
             the campaign, without a name.
         keys: what is computed of every hit: the columns of the measures that are asked for.
+        assumed: assumptions under which a search computes every hit, too: none unless an objective or a bound is over
+            them.
     """
 
     title: str
@@ -162,11 +172,17 @@ class Design:
     constraints: Constraints
     search: Search
     keys: tuple[Measure, ...] = field(default=())
+    assumed: tuple[str, ...] = field(default=())
 
     @property
     def asked(self) -> tuple[Objective | Bound, ...]:
         """Objectives and bounds."""
         return (*self.objectives, *self.bounds)
+
+    @property
+    def situations(self) -> list[tuple[int, str]]:
+        """Under what every hit is computed: by each threat as given, then by each under every assumption."""
+        return [(threat, name) for name in ("", *self.assumed) for threat in range(len(self.threats))]
 
     def tables(self, values: Array) -> dict[str, Any]:
         """The tables of the campaign of a point of the space."""
@@ -233,7 +249,7 @@ def design_from(text: str, name: str, folder: Path) -> Design:
         raise CampaignError(f"{name}: {error}") from None
     asked = (one.asked for one in (*asking.objectives, *asking.bounds))
     keys = dict.fromkeys(measure.column for measure in asked if measure.kind != "target")
-    return Design(
+    design = Design(
         title=str(data.get("title", "")),
         text=text,
         name=name,
@@ -248,3 +264,20 @@ def design_from(text: str, name: str, folder: Path) -> Design:
         search=asking.search,
         keys=tuple(keys),
     )
+    over = any(goal.assumptions != "given" and goal.asked.kind != "target" for goal in design.asked)
+    return replace(design, assumed=_assumptions(design)) if over else design
+
+
+def _assumptions(design: Design) -> tuple[str, ...]:
+    """Names of the assumptions that some of a few points of the space can have."""
+    names: dict[str, None] = {}
+    for values in design.space.some(_TRIED, design.search.seed):
+        with suppress(CampaignError):
+            tables = design.tables(values) | {"hits": {"count": 1}}
+            names |= dict.fromkeys(alternatives_of(design.campaign(tables, design.threats[0])))
+    return tuple(names)
+
+
+def alternatives_of(campaign: Campaign) -> dict[str, Alternative]:
+    """The alternatives of a campaign that move its hits, by name."""
+    return {one.name: one for one in alternatives(campaign) if not one.breaks}

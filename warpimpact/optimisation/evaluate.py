@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpimpact.campaign.campaign import Campaign
-from warpimpact.optimisation.design import Design, Threat
+from warpimpact.optimisation.design import SCRAMBLINGS, Design, Threat, alternatives_of
 from warpimpact.optimisation.limits import limits_level, limits_said
 from warpimpact.records.outcomes import Outcomes
 from warpimpact.results import variables as v
@@ -24,6 +24,7 @@ from warpimpact.runs.compute import at_solid
 from warpimpact.runs.executor import Job
 from warpimpact.runs.questions import Arrays, Question, Round
 from warpimpact.scene import Numerics, Scene, Shots
+from warpimpact.solver.limit import weakening_by_path
 from warpimpact.solver.many import side_by_side, simulate_many
 from warpimpact.solver.pilot import pilot_size
 from warpimpact.solver.simulate import pilot_of
@@ -49,6 +50,7 @@ class HitJob:
         level: numerics as JSON.
         seed: of the hits.
         solid: whether the solid plate of equal areal density takes the place of the target.
+        assumption: what is otherwise; as given if it is empty, and for a target that has no such alternative.
     """
 
     tables: Mapping[str, Any]
@@ -58,6 +60,7 @@ class HitJob:
     level: str
     seed: int
     solid: bool = False
+    assumption: str = ""
 
 
 class Said(NamedTuple):
@@ -98,10 +101,17 @@ def is_even(tables: Mapping[str, Any]) -> bool:
     return not holed and not any(isinstance(impact.get(name), dict) for name in _TURNING)
 
 
-def hits_of(campaign: Campaign, first: int, count: int) -> Shots:
-    """Hits of a campaign that are computed: none is an image of another."""
+def hits_of(campaign: Campaign, first: int, count: int, *, turned: bool = False) -> Shots:
+    """Hits of a campaign that are computed: none is an image of another.
+
+    Args:
+        turned: whether shots will be turned, so that images differ: each hit is then another one of its images, in
+            turn within every scrambling.
+    """
     sampler = campaign.sampler()
-    return sampler.shots(first * sampler.images, count * sampler.images)[:: sampler.images]
+    shots, hits = sampler.shots(first * sampler.images, count * sampler.images), np.arange(count)
+    image = (first + hits) // SCRAMBLINGS % sampler.images if turned else 0
+    return shots[hits * sampler.images + image]
 
 
 Told = Callable[[float, bool], object]
@@ -152,8 +162,15 @@ def said_by(design: Design, jobs: Sequence[HitJob], worker: Worker, told: Share 
 
 def _scene_of(design: Design, job: HitJob) -> tuple[Campaign, Scene, Shots]:
     campaign = campaign_of(design, job.tables, design.threats[job.threat], job.seed)
-    shots = hits_of(campaign, job.first, job.count)
-    return (campaign, *at_solid(campaign, shots)) if job.solid else (campaign, campaign.scene, shots)
+    other = alternatives_of(campaign).get(job.assumption) if job.assumption else None
+    shots = hits_of(campaign, job.first, job.count, turned=other is not None and bool(other.turned))
+    if job.solid:
+        return (campaign, *at_solid(campaign, shots))
+    if other is None:
+        return campaign, campaign.scene, shots
+    seeks_limits = any(key.is_limit for key in design.keys)
+    scene = weakening_by_path(other.scene, campaign.impact.velocity) if seeks_limits else other.scene
+    return campaign, scene, other.shots(shots)
 
 
 def _marched(

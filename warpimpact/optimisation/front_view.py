@@ -15,6 +15,10 @@ from warpimpact.view.view import Column, Section, Table, number
 if TYPE_CHECKING:
     import xarray
 
+_ROUNDED = 1e-6
+"""Relative difference of objectives that are the same."""
+_NAMED = 3
+"""Assumptions that are named where they turn over that a design is better."""
 NEEDED = 0.95
 """Share of the draws of a posterior from which a difference survives."""
 
@@ -37,7 +41,88 @@ def front_view(dataset: xarray.Dataset) -> list[Section]:
         Section([_front_table(dataset)]),
         Section([_variables_table(dataset)] if confirmed else []),
         *([Section([*references, *notes])] if references or notes else []),
+        *_assumptions(dataset),
     ]
+
+
+def _assumptions(dataset: xarray.Dataset) -> Iterator[Section]:
+    """In how many assumptions a design stays on the front and is better than each reference, and what moves it most."""
+    if f.ASSUMPTION not in dataset:
+        return
+    stays, names = stays_on_front(dataset), [str(name) for name in dataset[f.ASSUMPTION].values]
+    goals = [place for place in _goals(dataset) if not is_weight(dataset, place)]
+    columns = [Column("design"), Column("on the front")]
+    columns += [Column(f"better than {name}") for name in dataset[f.REFERENCE].values]
+    columns += [Column(f"{label_and_unit(dataset[f.LABEL].values[place])[0]}, moved most by") for place in goals]
+    rows = []
+    for place, file in enumerate(dataset[f.FILE].values):
+        over = [_better_text(dataset, place, reference) for reference in range(dataset.sizes["reference"])]
+        moved = [_moved_text(dataset, place, goal, names) for goal in goals]
+        rows.append((file, f"{int(stays[place].sum())} of {len(names)}", *over, *moved))
+    note = (
+        "Each assumption alone, at all targets. A design is on the front if it keeps the bounds and none of these "
+        "beats it; it is better than a reference if it is no worse in all objectives and better in one."
+    )
+    yield Section([Table(columns, rows), note], "what nobody measured: the front under other assumptions")
+
+
+def stays_on_front(dataset: xarray.Dataset) -> np.ndarray[Any, np.dtype[np.bool_]]:
+    """Whether each design keeps the bounds and is beaten by no other one of the front under each assumption, shape
+    [front, assumptions]."""
+    goals, bounds = _goals(dataset), _bounds(dataset)
+    signs, limits = dataset[f.SIGN].values, dataset[f.LIMIT].values
+    signed = signs * dataset[f.UNDER].values
+    kept = (signed[:, :, bounds] <= signs[bounds] * limits[bounds] + _ROUNDED * np.abs(limits[bounds])).all(axis=-1)
+    beaten = np.zeros(kept.shape, dtype=bool)
+    for rival, within in zip(signed[:, :, goals], kept, strict=True):
+        beaten |= within & _beats(rival, signed[:, :, goals])
+    return np.asarray(kept & ~beaten)
+
+
+def _beats(one: Any, others: Any) -> Any:
+    """Whether objectives to minimise are no worse than others in all and better in one."""
+    close = _ROUNDED * np.abs(others)
+    return (one <= others + close).all(axis=-1) & (one < others - close).any(axis=-1)
+
+
+def _better_text(dataset: xarray.Dataset, place: int, reference: int) -> str:
+    """Such as "4 of 14", and which assumptions turn it over where it is better as given."""
+    goals = _goals(dataset)
+    signs = dataset[f.SIGN].values[goals]
+    places = (place, f.UNDER, f.FRESH), (reference, f.REFERENCE_UNDER, f.REFERENCE_FOUND)
+    under = [signs * dataset[name].values[number][:, goals] for number, name, _ in places]
+    given = [signs * dataset[name].values[number][goals] for number, _, name in places]
+    better = _beats(*under)
+    if not bool(_beats(*given)):
+        return f"not as given; in {int(better.sum())} of {len(better)}"
+    lost = [str(name) for name in dataset[f.ASSUMPTION].values[~better]]
+    return (
+        f"{int(better.sum())} of {len(better)}"
+        + f"; not with {', '.join(lost[:_NAMED])}" * bool(lost)
+        + (f" and {len(lost) - _NAMED} more" * (len(lost) > _NAMED))
+    )
+
+
+def _moved_text(dataset: xarray.Dataset, place: int, goal: int, names: list[str]) -> str:
+    """The value as given, and under the assumption that moves it most."""
+    given, under = float(dataset[f.FRESH].values[place, goal]), dataset[f.UNDER].values[place, :, goal]
+    moves = np.abs(np.nan_to_num(under - given))
+    most = int(np.argmax(moves))
+    return f"{given:.3g}; {names[most]}: {under[most]:.3g}" if moves[most] > 0.0 else f"{given:.3g}"
+
+
+def _goals(dataset: xarray.Dataset) -> list[int]:
+    """Places of the objectives among what is asked."""
+    return np.flatnonzero(np.isnan(dataset[f.LIMIT].values)).tolist()
+
+
+def _bounds(dataset: xarray.Dataset) -> list[int]:
+    return np.flatnonzero(~np.isnan(dataset[f.LIMIT].values)).tolist()
+
+
+def is_weight(dataset: xarray.Dataset, place: int) -> bool:
+    """Whether what is asked is the weight of the target, which no assumption moves."""
+    return str(dataset[f.ASKED].values[place]).startswith("areal_density")
 
 
 def _front_table(dataset: xarray.Dataset) -> Table:

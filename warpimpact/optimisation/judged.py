@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpimpact.optimisation.asked import Bound, Objective
-from warpimpact.optimisation.design import Design
+from warpimpact.optimisation.design import SCRAMBLINGS, Design
 from warpimpact.results.measures import Measure
 from warpimpact.statistics.comparisons import ROUNDED
 from warpimpact.statistics.intervals import Estimate, estimate_of
@@ -26,7 +26,6 @@ from warpimpact.statistics.tails import pseudo_values, quantile_weights
 Array = NDArray[np.float64]
 
 CONFIDENCE = 0.95
-SCRAMBLINGS = 16
 
 
 @dataclass(frozen=True)
@@ -38,7 +37,7 @@ class Record:
         tables: of its campaign.
         areal_density: [kg/m²].
         levels: numerics for every threat, as JSON.
-        said: columns of `Design.keys` by each threat, shape [threats, columns, hits].
+        said: columns of `Design.keys` in each of `Design.situations`, shape [situations, columns, hits].
         seconds: processor time of its hits.
         means, known: results of `means` and `values`, kept by the number of hits.
     """
@@ -80,19 +79,29 @@ def values(design: Design, record: Record, hits: int | None = None) -> Array:
 
 
 def numbers_of(design: Design, record: Record, goal: Objective | Bound, hits: int) -> Array:
-    """Numbers of the first hits whose mean is an objective or a bound, shape [hits]; of the worst threat, or weighted
-    over the threats."""
+    """Numbers of the first hits whose mean is an objective or a bound, shape [hits]: of the worst threat and
+    assumption, or averaged over them, as the goal asks."""
     measure = goal.asked
     if measure.kind == "target":
         return np.full(hits, record.areal_density)
-    by_threat = record.said[:, design.keys.index(measure.column), :hits]
+    numbers = record.said[:, design.keys.index(measure.column), :hits]
     if not measure.is_binary:
-        by_threat = np.array([_averaged(measure, numbers) for numbers in by_threat])
-    if goal.threats == "mean":
-        weights = np.array([threat.weight for threat in design.threats])
-        return np.asarray(weights @ by_threat / weights.sum())
-    means_by_threat = goal.sign * np.array([_mean(numbers) for numbers in by_threat])
-    return np.asarray(by_threat[int(np.argmax(np.nan_to_num(means_by_threat, nan=np.inf)))])
+        numbers = np.array([_averaged(measure, of_hits) for of_hits in numbers])
+    weights = np.array([threat.weight for threat in design.threats])
+    under = numbers.reshape(-1, len(weights), hits)
+    if goal.assumptions == "given":
+        under = under[:1]
+    of_each = [
+        weights @ by_threat / weights.sum() if goal.threats == "mean" else _worst(goal, by_threat)
+        for by_threat in under
+    ]
+    return np.asarray(np.mean(of_each, axis=0) if goal.assumptions == "mean" else _worst(goal, np.array(of_each)))
+
+
+def _worst(goal: Objective | Bound, numbers: Array) -> Array:
+    """The row whose mean is worst, of numbers of shape [rows, hits]."""
+    signed = goal.sign * np.array([_mean(row) for row in numbers])
+    return np.asarray(numbers[int(np.argmax(np.nan_to_num(signed, nan=np.inf)))])
 
 
 def _averaged(measure: Measure, numbers: Array) -> Array:
@@ -108,7 +117,8 @@ def estimate(design: Design, record: Record, goal: Objective | Bound) -> Estimat
     if goal.asked.kind == "target":
         return Estimate(record.areal_density, record.areal_density, record.areal_density, record.hits, 0.0)
     numbers = numbers_of(design, record, goal, record.hits)
-    is_share = goal.asked.is_binary and (goal.threats == "worst" or len(design.threats) == 1)
+    averaged = goal.assumptions == "mean" or (goal.threats == "mean" and len(design.threats) > 1)
+    is_share = goal.asked.is_binary and not averaged
     return estimate_of("share" if is_share else "mean", numbers, replicates=SCRAMBLINGS)
 
 

@@ -75,6 +75,10 @@ def to_dataset(design: Design, found: Searched, confirmed: Confirmed, made_by: M
         f.COMPUTED: found.history[:, 0].astype(np.int64),
         f.VOLUME: found.history[:, 1],
     }
+    if confirmed.assumptions:
+        columns[f.ASSUMPTION] = _texts(confirmed.assumptions)
+        of_front, of_references = np.split(confirmed.under, [len(confirmed.records)])
+        columns |= {f.UNDER: of_front, f.REFERENCE_UNDER: of_references}
     for records, names in (
         (found.records, (f.FOUND, f.FOUND_LOW, f.FOUND_HIGH)),
         (confirmed.records, (f.FRESH, f.FRESH_LOW, f.FRESH_HIGH)),

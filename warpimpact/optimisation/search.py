@@ -182,7 +182,7 @@ class _State:
         if found.violations or found.campaign is None:
             self.refused[key] = found
             return
-        nothing = np.zeros((len(self.design.threats), len(self.design.keys), 0))
+        nothing = np.zeros((len(self.design.situations), len(self.design.keys), 0))
         self.drafts[key] = Record(values, tables, found.campaign.target.areal_density, (), nothing)
 
     def _compute(self, new: dict[bytes, Record]) -> Question[None]:
@@ -208,13 +208,13 @@ class _State:
         """Designs with their hits up to so many."""
         design = self.design
         if not design.keys:
-            return [one.more(np.zeros((len(design.threats), 0, stop)), 0.0) for one in records]
+            return [one.more(np.zeros((len(design.situations), 0, stop)), 0.0) for one in records]
         jobs = [
-            HitJob(one.tables, threat, first, stop - first, level, design.search.seed)
+            HitJob(one.tables, threat, first, stop - first, one.levels[threat], design.search.seed, assumption=name)
             for one in records
-            for threat, level in enumerate(one.levels)
+            for threat, name in design.situations
         ]
-        what, threats = f"{len(records)} designs at {stop} hits", len(design.threats)
+        what, each = f"{len(records)} designs at {stop} hits", len(design.situations)
 
         def tell(done: float, is_resumed: bool) -> None:
             if done >= len(jobs):
@@ -224,7 +224,7 @@ class _State:
         said = yield from hits_asked(design, jobs, tell)
         found = []
         for number, one in enumerate(records):
-            own = said[number * threats : (number + 1) * threats]
+            own = said[number * each : (number + 1) * each]
             found.append(one.more(np.array([part.values for part in own]), sum(part.seconds for part in own)))
         return found
 

@@ -112,6 +112,12 @@ class Space:
                 seen.add(values.tobytes())
                 yield values
 
+    def some(self, count: int, seed: int) -> Iterator[Array]:
+        """Random points, so many."""
+        random = np.random.default_rng(seed)
+        for _ in range(count):
+            yield self.at([random.random() * (1.0 if one.count is None else one.count) for one in self.variables])
+
     def tables(self, base: Mapping[str, Any], values: Array, name: str) -> dict[str, Any]:
         """The tables of the campaign of a point.
 

@@ -68,6 +68,12 @@ REFERENCE_LOW = Variable("reference_found_low", _BY_REFERENCE, "1", _LOW)
 REFERENCE_HIGH = Variable("reference_found_high", _BY_REFERENCE, "1", _HIGH)
 REFERENCE_CAMPAIGN = Variable("reference_campaign", ("reference",), "1", "campaign of the first threat, as TOML")
 
+ASSUMPTION = Variable("assumption_name", ("assumption",), "1", "what nobody measured, chosen otherwise")
+UNDER = Variable("front_under", ("front", "assumption", "asked"), "1", "objective or bound under the assumption")
+REFERENCE_UNDER = Variable(
+    "reference_under", ("reference", "assumption", "asked"), "1", "objective or bound under the assumption"
+)
+
 COMPUTED = Variable("computed", ("generation",), "1", "designs that were computed so far")
 VOLUME = Variable(
     "hypervolume",
@@ -94,7 +100,7 @@ VARIABLES = (
         FRESH_LEVELS,
     ),
     *(HIT_Y, HIT_Z, HIT_VALUE, REFERENCE, REFERENCE_FOUND, REFERENCE_LOW, REFERENCE_HIGH, REFERENCE_CAMPAIGN),
-    *(COMPUTED, VOLUME),
+    *(ASSUMPTION, UNDER, REFERENCE_UNDER, COMPUTED, VOLUME),
 )
 DESIGN = attr.DESIGN_FILE
 OUTCOME, FEASIBLE, NONE_FEASIBLE = "outcome", "front", "no design within the bounds"
@@ -125,11 +131,13 @@ def _more(dataset: xarray.Dataset) -> str | None:
     return None
 
 
-_TEXTS = (NAME, UNIT, ASKED, LABEL, LEVELS, CAMPAIGN, FILE, FRESH_LEVELS, REFERENCE, REFERENCE_CAMPAIGN)
+_OF_ASSUMPTIONS = (ASSUMPTION, UNDER, REFERENCE_UNDER)
+"""Files of earlier versions have none."""
+_TEXTS = (ASSUMPTION, NAME, UNIT, ASKED, LABEL, LEVELS, CAMPAIGN, FILE, FRESH_LEVELS, REFERENCE, REFERENCE_CAMPAIGN)
 _DECLARED = Declaration(
     {variable: variable.dims for variable in VARIABLES},
-    optional=(HIT_Y, HIT_Z, HIT_VALUE),
-    whole=((HIT_Y, HIT_Z, HIT_VALUE),),
+    optional=(HIT_Y, HIT_Z, HIT_VALUE, *_OF_ASSUMPTIONS),
+    whole=((HIT_Y, HIT_Z, HIT_VALUE), _OF_ASSUMPTIONS),
     rules={
         **dict.fromkeys(_TEXTS, texts),
         **dict.fromkeys((HIT_Y, HIT_Z), finite),

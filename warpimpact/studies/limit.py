@@ -38,6 +38,7 @@ from warpimpact.solver.limit import (
     pilot_of_limits,
     short_steps,
     thickest,
+    weakening_by_path,
     with_thickness,
     with_velocity,
 )
@@ -169,7 +170,7 @@ class LimitMap:
         def searched(scenes: list[tuple[Scene, Shots]]) -> list[Outcomes]:
             def of_scene(number: int, own: Worker, _: Helpers | None) -> Outcomes:
                 scene, shots = scenes[number]
-                by_path = _by_path(scene, campaign.impact.velocity)
+                by_path = weakening_by_path(scene, campaign.impact.velocity)
                 return limits(by_path, shots, sought, numerics, own).recorded(sought.quantity)
 
             return side_by_side(of_scene, len(scenes), worker)
@@ -207,23 +208,6 @@ class LimitMap:
             return with_velocity(shots, np.repeat(limits.shots.velocity, images))
         tried = limits.shots.own_of(campaign.target, "thickness", self.sought.layer)
         return with_thickness(self.sought.layer, shots, np.repeat(tried, images))
-
-
-def _by_path(scene: Scene, velocity: float) -> Scene:
-    """A scene whose plates weaken by the path in place of the time, alike at this velocity: what weakens by time has no
-    limit."""
-    layers = scene.target.layers
-    if all(layer.degradation_interval is None or layer.degradation == 1.0 for layer in layers):
-        return scene
-    changed = (
-        layer.model_copy(
-            update={"degradation_interval": None, "degradation_distance": velocity * layer.degradation_interval}
-        )
-        if layer.degradation_interval is not None and layer.degradation < 1.0
-        else layer
-        for layer in layers
-    )
-    return scene.model_copy(update={"target": Target(layers=tuple(changed))})
 
 
 def warning_of(campaign: Campaign, quantity: str) -> str | None:
