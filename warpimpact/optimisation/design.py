@@ -104,6 +104,8 @@ class Search(Model):
         most_hits: computed of a design while the paired difference to the front does not decide.
         confirmed: designs of the front that are computed again with fresh hits, at most.
         confirm_hits: hits of each of these.
+        allow_untested: whether a design may have holes, thicknesses or resistances that no published test had
+            (campaign/tested.py).
         assumed_hits: hits of each of these, and of the references, under every assumption; 0 for none.
     """
 
@@ -114,6 +116,7 @@ class Search(Model):
     most_hits: Annotated[int, Field(strict=True, ge=16, le=2**20)] = 1024
     confirmed: Annotated[int, Field(strict=True, ge=1, le=200)] = 20
     confirm_hits: Annotated[int, Field(strict=True, ge=64, le=2**22)] = 1024
+    allow_untested: Annotated[bool, Field(strict=True)] = False
     assumed_hits: Annotated[int, Field(strict=True, ge=0, le=2**16)] = 256
 
     @model_validator(mode="after")

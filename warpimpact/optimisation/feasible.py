@@ -9,7 +9,10 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from warpimpact.campaign.campaign import Campaign
+from warpimpact.campaign.tested import Standing, standings_of
 from warpimpact.campaign.text import CampaignError
+from warpimpact.catalogue.catalogue import Catalogue
+from warpimpact.catalogue.entries import Material
 from warpimpact.optimisation.design import Design
 from warpimpact.optimisation.evaluate import campaign_of
 from warpimpact.scene import EllipsePattern, Plate
@@ -17,6 +20,11 @@ from warpimpact.scene.patterns.lattice import LatticePattern
 from warpimpact.solver.limit import check_arrests
 
 INVALID = "a campaign that is valid"
+UNTESTED = "within what was tested, as search.allow_untested is not true"
+
+
+_OF_PLATES = ("holes", "thickness", "resistance", "the kind of material")
+"""Subjects of what a design decides."""
 
 
 class Violation(NamedTuple):
@@ -70,10 +78,18 @@ def _violations(design: Design, campaign: Campaign) -> Iterator[Violation]:
     density = target.areal_density
     yield from _least("smallest_areal_density", density, limits.smallest_areal_density, "areal density", "kg/m²")
     yield from _most("largest_areal_density", density, limits.largest_areal_density, "areal density", "kg/m²")
+    if not design.search.allow_untested:
+        yield from (Violation(UNTESTED, 1.0, standing.sentence) for standing in untested(campaign))
     for name, plate in target.named:
         if plate.open_area > 0.0:
             for one in _of_holes(design, plate):
                 yield one._replace(text=f"{name}: {one.text}")
+
+
+def untested(campaign: Campaign) -> list[Standing]:
+    """What of the plates of a campaign lies beyond every published test."""
+    standings = standings_of(campaign, Catalogue.of(campaign.catalogue).all(Material))
+    return [standing for standing in standings if standing.subject in _OF_PLATES]
 
 
 def _of_holes(design: Design, plate: Plate) -> Iterator[Violation]:

@@ -18,6 +18,7 @@ from warpimpact.optimisation.asked import Bound
 from warpimpact.optimisation.confirm import Confirmed
 from warpimpact.optimisation.design import Design, Threat
 from warpimpact.optimisation.evaluate import campaign_of
+from warpimpact.optimisation.feasible import untested
 from warpimpact.optimisation.judged import Record, estimate
 from warpimpact.optimisation.search import Searched
 from warpimpact.results import attributes as attr
@@ -75,6 +76,7 @@ def to_dataset(design: Design, found: Searched, confirmed: Confirmed, made_by: M
         f.COMPUTED: found.history[:, 0].astype(np.int64),
         f.VOLUME: found.history[:, 1],
     }
+    columns[f.UNTESTED] = _texts(_untested(design, record) for record in confirmed.records)
     if confirmed.assumptions:
         columns[f.ASSUMPTION] = _texts(confirmed.assumptions)
         of_front, of_references = np.split(confirmed.under, [len(confirmed.records)])
@@ -90,6 +92,12 @@ def to_dataset(design: Design, found: Searched, confirmed: Confirmed, made_by: M
         columns |= {f.HIT_Y: confirmed.places[:, 0], f.HIT_Z: confirmed.places[:, 1]}
         columns[f.HIT_VALUE] = np.array([one.said[0] for one in confirmed.records])
     return dataset_of(columns, {attr.REFERENCES: f.REFERENCES, **_attributes(design, found, made_by)})
+
+
+def _untested(design: Design, record: Record) -> str:
+    """Subjects in which the plates of a design lie beyond every published test."""
+    standings = untested(campaign_of(design, record.tables, design.threats[0]))
+    return ", ".join(dict.fromkeys(standing.subject for standing in standings))
 
 
 def _texts(texts: Any) -> Any:

@@ -26,6 +26,8 @@ if TYPE_CHECKING:
 
 DRAWN = 6
 """Plates that are drawn, at most."""
+_LONGEST_LABEL = 60
+"""Characters of a line that stands upright beside the axes."""
 _THUMBNAIL = 30.0
 """Side of the drawn part of a plate [mm]."""
 _LETTERS = "ABCDEFGHIJ"
@@ -110,7 +112,7 @@ def _draw_front(axes: Axes, dataset: xarray.Dataset, names: dict[int, str]) -> N
         "less is better" if dataset[f.SIGN].values[objective] > 0 else "more is better" for objective in (across, up)
     ]
     _draw_assumptions(axes, dataset, across, up)
-    axes.set(xlabel=f"{labels[across]}, {better[0]}", ylabel=f"{labels[up]}, {better[1]}")
+    axes.set(xlabel=f"{labels[across]}, {better[0]}", ylabel=fill(f"{labels[up]}, {better[1]}", _LONGEST_LABEL))
     axes.grid(color="0.92")
     hide_sides(axes, "top", "right")
     axes.legend(frameon=False, fontsize="small")

@@ -74,6 +74,8 @@ REFERENCE_UNDER = Variable(
     "reference_under", ("reference", "assumption", "asked"), "1", "objective or bound under the assumption"
 )
 
+UNTESTED = Variable("front_untested", ("front",), "1", "what of its plates lies beyond every published test")
+
 COMPUTED = Variable("computed", ("generation",), "1", "designs that were computed so far")
 VOLUME = Variable(
     "hypervolume",
@@ -100,7 +102,7 @@ VARIABLES = (
         FRESH_LEVELS,
     ),
     *(HIT_Y, HIT_Z, HIT_VALUE, REFERENCE, REFERENCE_FOUND, REFERENCE_LOW, REFERENCE_HIGH, REFERENCE_CAMPAIGN),
-    *(ASSUMPTION, UNDER, REFERENCE_UNDER, COMPUTED, VOLUME),
+    *(UNTESTED, ASSUMPTION, UNDER, REFERENCE_UNDER, COMPUTED, VOLUME),
 )
 DESIGN = attr.DESIGN_FILE
 OUTCOME, FEASIBLE, NONE_FEASIBLE = "outcome", "front", "no design within the bounds"
@@ -133,10 +135,23 @@ def _more(dataset: xarray.Dataset) -> str | None:
 
 _OF_ASSUMPTIONS = (ASSUMPTION, UNDER, REFERENCE_UNDER)
 """Files of earlier versions have none."""
-_TEXTS = (ASSUMPTION, NAME, UNIT, ASKED, LABEL, LEVELS, CAMPAIGN, FILE, FRESH_LEVELS, REFERENCE, REFERENCE_CAMPAIGN)
+_TEXTS = (
+    UNTESTED,
+    ASSUMPTION,
+    NAME,
+    UNIT,
+    ASKED,
+    LABEL,
+    LEVELS,
+    CAMPAIGN,
+    FILE,
+    FRESH_LEVELS,
+    REFERENCE,
+    REFERENCE_CAMPAIGN,
+)
 _DECLARED = Declaration(
     {variable: variable.dims for variable in VARIABLES},
-    optional=(HIT_Y, HIT_Z, HIT_VALUE, *_OF_ASSUMPTIONS),
+    optional=(HIT_Y, HIT_Z, HIT_VALUE, UNTESTED, *_OF_ASSUMPTIONS),
     whole=((HIT_Y, HIT_Z, HIT_VALUE), _OF_ASSUMPTIONS),
     rules={
         **dict.fromkeys(_TEXTS, texts),

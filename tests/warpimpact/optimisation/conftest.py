@@ -36,7 +36,7 @@ measure = "areal_density"
 [[objectives]]
 measure = "mean(residual_energy_fraction)"
 """
-SEARCH = "[search]\ndesigns = 12\npopulation = 6\nhits = 16\nmost_hits = 64\nconfirm_hits = 64\n"
+SEARCH = "[search]\nallow_untested = true\ndesigns = 12\npopulation = 6\nhits = 16\nmost_hits = 64\nconfirm_hits = 64\n"
 
 
 def design(*parts: str, folder: Path = Path()) -> Design:

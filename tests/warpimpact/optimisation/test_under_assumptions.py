@@ -93,3 +93,16 @@ def test_turned_shots_take_every_image_of_a_hit_in_turn() -> None:
     distance = [np.sort(np.abs(np.stack([shots.hit_y, shots.hit_z])), axis=0) for shots in (straight, turned)]
     assert distance[0] == pytest.approx(distance[1], abs=1e-12)  # images of the same hits
     assert len({(bool(y > 0.0), bool(z > 0.0)) for y, z in zip(turned.hit_y, turned.hit_z, strict=True)}) == 4
+
+
+def test_a_search_stays_within_what_was_tested_unless_told() -> None:
+    strict = FEW.replace("allow_untested = true", "allow_untested = false")
+    thin = '[variables]\nthickness = ["0.2 mm", "4 mm"]\n'
+    found = optimise(design(thin, WEIGHT_AND_ENERGY, strict))
+    assert found[f.VALUE].values[:, 0].tolist() == [1.0]  # the second of the list
+    assert found[f.UNTESTED].values.tolist() == [""]
+    lifted = optimise(design(thin, WEIGHT_AND_ENERGY, FEW))
+    assert sorted(lifted[f.UNTESTED].values.tolist()) == ["", "thickness"]
+    assert "untested: thickness" in text_of(front_view(lifted))
+    with pytest.raises(CampaignError, match=r"search\.allow_untested is not true; the nearest has thickness"):
+        optimise(design('[variables]\nthickness = ["0.1 mm", "0.2 mm"]\n', WEIGHT_AND_ENERGY, strict))

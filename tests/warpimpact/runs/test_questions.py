@@ -65,7 +65,8 @@ QUESTIONS: dict[str, tuple[str, ...]] = {
         + PLATE
         + '[variables]\nthickness = { low = "2 mm", high = "7 mm", step = "1 mm" }\n'
         + '[[objectives]]\nmeasure = "areal_density"\n[[objectives]]\nmeasure = "mean(residual_energy_fraction)"\n'
-        + "[search]\ndesigns = 6\npopulation = 6\nhits = 16\nmost_hits = 64\nconfirm_hits = 64\n",
+        + "[search]\nallow_untested = true\n"
+        + "designs = 6\npopulation = 6\nhits = 16\nmost_hits = 64\nconfirm_hits = 64\n",
     ),
 }
 """By name: the command, its file, and options."""
