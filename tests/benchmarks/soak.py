@@ -138,7 +138,7 @@ def search(draw: random.Random) -> str:
     plan = (
         f"seed = {draw.randrange(10**6)}\ndesigns = {draw.choice((40, 80))}\npopulation = 20\nhits = 16\nmost_hits = 64"
     )
-    return f"{text}[search]\n{plan}\nconfirmed = 6\nconfirm_hits = 64\n"
+    return f"{text}[search]\nallow_untested = true\n{plan}\nconfirmed = 6\nconfirm_hits = 64\n"
 
 
 def fit(draw: random.Random) -> str:

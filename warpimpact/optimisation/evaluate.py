@@ -24,7 +24,6 @@ from warpimpact.runs.compute import at_solid
 from warpimpact.runs.executor import Job
 from warpimpact.runs.questions import Arrays, Question, Round
 from warpimpact.scene import Numerics, Scene, Shots
-from warpimpact.solver.limit import weakening_by_path
 from warpimpact.solver.many import side_by_side, simulate_many
 from warpimpact.solver.pilot import pilot_size
 from warpimpact.solver.simulate import pilot_of
@@ -168,8 +167,10 @@ def _scene_of(design: Design, job: HitJob) -> tuple[Campaign, Scene, Shots]:
         return (campaign, *at_solid(campaign, shots))
     if other is None:
         return campaign, campaign.scene, shots
-    seeks_limits = any(key.is_limit for key in design.keys)
-    scene = weakening_by_path(other.scene, campaign.impact.velocity) if seeks_limits else other.scene
+    target = other.scene.target
+    if any(key.is_limit for key in design.keys):
+        target = target.by_path(campaign.impact.velocity)
+    scene = other.scene.model_copy(update={"target": target})
     return campaign, scene, other.shots(shots)
 
 

@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 from itertools import accumulate
-from typing import Annotated
+from typing import Annotated, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -58,6 +58,18 @@ class Target(Model):
     def gaps(self) -> tuple[float, ...]:
         """Air in front of each layer [m]."""
         return tuple(layer.gap if isinstance(layer, Layer) else 0.0 for layer in self.layers)
+
+    def by_path(self, velocity: float) -> Self:
+        """The target with layers that weaken by the path where they weakened by the time, alike at this velocity [m/s]:
+        what weakens by the time has no limit velocity."""
+
+        def changed(layer: Plate) -> Plate:
+            if layer.degradation == 1.0 or layer.degradation_interval is None:
+                return layer
+            by_path = {"degradation_interval": None, "degradation_distance": velocity * layer.degradation_interval}
+            return layer.model_copy(update=by_path)
+
+        return self.model_copy(update={"layers": tuple(map(changed, self.layers))})
 
     def value(self, name: str, layer: int) -> float:
         """A quantity of a layer by its name in `Scatter`."""

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from warpimpact.records.group import failures
 from warpimpact.records.limit_variables import LIMITS
 from warpimpact.records.outcomes import Outcomes
-from warpimpact.scene import Numerics, Plate, Scene, Shots, Target
+from warpimpact.scene import Numerics, Plate, Scene, Shots
 from warpimpact.solver.findings import LimitErrors
 from warpimpact.solver.limit_near import Neighbours
 from warpimpact.solver.limit_search import Guess, LimitSearch
@@ -184,23 +184,6 @@ def pilot_of_limits(
     if errors.finer_level is None:
         return errors
     return replace(errors, finer=known[errors.finer_level].recorded(sought.quantity))
-
-
-def weakening_by_path(scene: Scene, velocity: float) -> Scene:
-    """A scene whose plates weaken by the path in place of the time, alike at this velocity: what weakens by time has no
-    limit."""
-    layers = scene.target.layers
-    if all(layer.degradation_interval is None or layer.degradation == 1.0 for layer in layers):
-        return scene
-    changed = (
-        layer.model_copy(
-            update={"degradation_interval": None, "degradation_distance": velocity * layer.degradation_interval}
-        )
-        if layer.degradation_interval is not None and layer.degradation < 1.0
-        else layer
-        for layer in layers
-    )
-    return scene.model_copy(update={"target": Target(layers=tuple(changed))})
 
 
 def limits(

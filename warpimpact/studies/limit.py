@@ -38,7 +38,6 @@ from warpimpact.solver.limit import (
     pilot_of_limits,
     short_steps,
     thickest,
-    weakening_by_path,
     with_thickness,
     with_velocity,
 )
@@ -170,7 +169,7 @@ class LimitMap:
         def searched(scenes: list[tuple[Scene, Shots]]) -> list[Outcomes]:
             def of_scene(number: int, own: Worker, _: Helpers | None) -> Outcomes:
                 scene, shots = scenes[number]
-                by_path = weakening_by_path(scene, campaign.impact.velocity)
+                by_path = scene.model_copy(update={"target": scene.target.by_path(campaign.impact.velocity)})
                 return limits(by_path, shots, sought, numerics, own).recorded(sought.quantity)
 
             return side_by_side(of_scene, len(scenes), worker)
