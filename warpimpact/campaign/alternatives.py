@@ -71,7 +71,7 @@ class Alternative:
         shots = self.shots(shots)
         flight = np.tan(shots.obliquity)
         along = flight * np.cos(shots.azimuth), flight * np.sin(shots.azimuth)
-        steep = [np.abs(np.arctan(of) + own).max() for of, own in zip(along, (shots.yaw, shots.pitch), strict=True)]
+        steep = [np.abs(np.arctan(of) + angle).max() for of, angle in zip(along, (shots.yaw, shots.pitch), strict=True)]
         return bool(max(shots.obliquity.max(), *steep) < _STEEPEST)
 
 

@@ -123,7 +123,7 @@ class Bound(_Asked):
 
     @property
     def limit(self) -> float:
-        return float(next(one for one in (self.at_most, self.at_least) if one is not None))
+        return float(next(limit for limit in (self.at_most, self.at_least) if limit is not None))
 
     @property
     def sign(self) -> float:

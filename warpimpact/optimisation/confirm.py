@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from warpimpact.campaign.text import CampaignError
 from warpimpact.optimisation.design import Design, alternatives_of
 from warpimpact.optimisation.evaluate import HitJob, Told, campaign_of, hits_asked, levels_asked
-from warpimpact.optimisation.judged import Record, excesses, interval, means, numbers_of, objectives, values
+from warpimpact.optimisation.judged import DesignRecord, excesses, interval, means, numbers_of, objectives, values
 from warpimpact.optimisation.search import Searched
 from warpimpact.optimisation.searcher import front_of
 from warpimpact.runs.questions import Question
@@ -51,12 +51,12 @@ class Confirmed:
     """
 
     numbers: NDArray[np.int64]
-    records: tuple[Record, ...]
+    records: tuple[DesignRecord, ...]
     places: Array
-    solids: tuple[Record, ...]
+    solids: tuple[DesignRecord, ...]
     kept: NDArray[np.bool_]
     groups: NDArray[np.int64]
-    references: tuple[Record, ...]
+    references: tuple[DesignRecord, ...]
     survival: Array
     assumptions: tuple[str, ...]
     under: Array
@@ -103,18 +103,18 @@ def fresh_seed(design: Design) -> int:
     return int(np.random.SeedSequence(design.search.seed, spawn_key=(24,)).generate_state(1)[0] >> 1)
 
 
-def _reference(design: Design, place: int) -> Record:
+def _reference(design: Design, place: int) -> DesignRecord:
     """The record of a reference target, without hits."""
     given = design.references[place]
     tables: dict[str, Any] = dict(design.base) | {"plate": dict(given.plate)}
     if given.layer is not None:
-        tables["layer"] = [dict(one) for one in given.layer]
+        tables["layer"] = [dict(layer) for layer in given.layer]
     try:
         campaign = campaign_of(design, tables, design.threats[0])
     except CampaignError as error:
         text = str(error).removeprefix(f"{design.name}: ")
         raise CampaignError(f'{design.name}: references[{place}] "{given.name}": {text}') from None
-    return Record(np.zeros(0), tables, campaign.target.areal_density, (), np.zeros((0, 0, 0)))
+    return DesignRecord(np.zeros(0), tables, campaign.target.areal_density, (), np.zeros((0, 0, 0)))
 
 
 def check_references(design: Design) -> None:
@@ -133,15 +133,18 @@ def _telling(follow: Follow, targets: int, jobs: int, what: str) -> Told:
 
 
 def _fresh(
-    design: Design, targets: Sequence[Record], follow: Follow
-) -> Question[tuple[list[Record], Array, list[Array]]]:
+    design: Design, targets: Sequence[DesignRecord], follow: Follow
+) -> Question[tuple[list[DesignRecord], Array, list[Array]]]:
     """Targets with fresh hits, where these lie, and the draws of a posterior that they took."""
     seed, count = fresh_seed(design), design.search.confirm_hits if design.keys else 1
     threats, situations = range(len(design.threats)), design.situations
-    asked = [HitJob(one.tables, threat, 0, count, FIDELITY, seed) for one in targets for threat in threats]
+    asked = [HitJob(target.tables, threat, 0, count, FIDELITY, seed) for target in targets for threat in threats]
     if not design.keys:
         empty = np.zeros((len(situations), 0, count))
-        found = [Record(one.values, one.tables, one.areal_density, ("",) * len(threats), empty) for one in targets]
+        found = [
+            DesignRecord(target.values, target.tables, target.areal_density, ("",) * len(threats), empty)
+            for target in targets
+        ]
         return found, np.zeros((len(targets), 2, 0)), [np.zeros(0)] * len(targets)
     whose = "the front and references" if design.references else "the front"
     piloting = _telling(follow, len(targets), len(asked), f"pilots for fresh hits of {whose}")
@@ -154,24 +157,24 @@ def _fresh(
     ]
     said = yield from hits_asked(design, jobs, _telling(follow, len(targets), len(jobs), f"fresh hits of {whose}"))
     records = []
-    for number, one in enumerate(targets):
+    for number, target in enumerate(targets):
         own = slice(number * len(situations), (number + 1) * len(situations))
         records.append(
-            Record(
-                values=one.values,
-                tables=one.tables,
-                areal_density=one.areal_density,
+            DesignRecord(
+                values=target.values,
+                tables=target.tables,
+                areal_density=target.areal_density,
                 levels=of_targets[number],
                 said=np.array([part.values for part in said[own]]),
                 seconds=sum(part.seconds for part in said[own]),
             )
         )
     of_first = said[:: len(situations)]
-    return records, np.array([one.places for one in of_first]), [one.draws for one in of_first]
+    return records, np.array([one.places for one in of_first]), [first.draws for first in of_first]
 
 
 def _under_assumptions(
-    design: Design, targets: Sequence[Record], follow: Follow
+    design: Design, targets: Sequence[DesignRecord], follow: Follow
 ) -> Question[tuple[tuple[str, ...], Array]]:
     """Names of the assumptions that a target can have, and objectives and bounds of all targets under them: as given,
     moved by what the first hits tell."""
@@ -199,33 +202,33 @@ def _under_assumptions(
     return names, under
 
 
-def _solids(design: Design, front: Sequence[Record], follow: Follow) -> Question[list[Record]]:
+def _solids(design: Design, front: Sequence[DesignRecord], follow: Follow) -> Question[list[DesignRecord]]:
     """The solid plate of the areal density of every design of the front."""
     if not design.keys or not front:
         return list(front)
     jobs = [
-        HitJob(one.tables, threat, 0, SOLID_HITS, level, fresh_seed(design), solid=True)
-        for one in front
-        for threat, level in enumerate(one.levels)
+        HitJob(record.tables, threat, 0, SOLID_HITS, level, fresh_seed(design), solid=True)
+        for record in front
+        for threat, level in enumerate(record.levels)
     ]
     telling = _telling(follow, len(front), len(jobs), "solid plates of the same weight")
     said = yield from hits_asked(design, jobs, telling)
     threats = len(design.threats)
     return [
-        Record(
-            values=one.values,
-            tables=one.tables,
-            areal_density=one.areal_density,
-            levels=one.levels,
+        DesignRecord(
+            values=record.values,
+            tables=record.tables,
+            areal_density=record.areal_density,
+            levels=record.levels,
             said=np.array([part.values for part in said[number * threats : (number + 1) * threats]]),
         )
-        for number, one in enumerate(front)
+        for number, record in enumerate(front)
     ]
 
 
-def _kept(design: Design, front: Sequence[Record]) -> NDArray[np.bool_]:
+def _kept(design: Design, front: Sequence[DesignRecord]) -> NDArray[np.bool_]:
     """Whether each design is within the bounds, and no other one that is dominates it."""
-    kept = np.array([not excesses(design, one).any() for one in front], dtype=bool)
+    kept = np.array([not excesses(design, record).any() for record in front], dtype=bool)
     within = np.flatnonzero(kept)
     points = np.array([objectives(design, front[int(number)]) for number in within])
     kept[:] = False
@@ -233,16 +236,16 @@ def _kept(design: Design, front: Sequence[Record]) -> NDArray[np.bool_]:
     return kept
 
 
-def groups(design: Design, front: Sequence[Record]) -> NDArray[np.int64]:
+def groups(design: Design, front: Sequence[DesignRecord]) -> NDArray[np.int64]:
     """Number of the first design of the front than which each is not certainly better in any objective."""
     found = np.arange(len(front))
-    for number, one in enumerate(front):
+    for number, record in enumerate(front):
         leaders = [lead for lead in range(number) if found[lead] == lead]
-        found[number] = next((lead for lead in leaders if not is_better(design, one, front[lead])), number)
+        found[number] = next((lead for lead in leaders if not is_better(design, record, front[lead])), number)
     return found
 
 
-def is_better(design: Design, one: Record, other: Record) -> bool:
+def is_better(design: Design, one: DesignRecord, other: DesignRecord) -> bool:
     """Whether some objective tells at 95 %, by the same hits of both, that one design is better than another."""
     count = len(design.objectives)
     signs = np.array([asked.sign for asked in design.objectives])[:, None]
@@ -252,7 +255,7 @@ def is_better(design: Design, one: Record, other: Record) -> bool:
     return bool((low > np.array(same) * np.nan_to_num(np.abs(theirs)).max(axis=1)).any())
 
 
-def survival(design: Design, front: Sequence[Record], draws: Sequence[Array], leads: NDArray[np.bool_]) -> Array:
+def survival(design: Design, front: Sequence[DesignRecord], draws: Sequence[Array], leads: NDArray[np.bool_]) -> Array:
     """Whether the order of neighbours on the front survives the uncertainty of the parameters: the array of
     `Confirmed.survival`. Hit k of every design takes the same draw."""
     found = np.full((len(front), len(design.asked), 2), np.nan)

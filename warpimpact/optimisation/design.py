@@ -42,7 +42,7 @@ OWN = ("variables", "objectives", "bounds", "threats", "constraints", "search", 
 """Tables that a design file has beside those of a campaign."""
 
 
-class Threat(Model):
+class FacedThreat(Model):
     """A threat: what it replaces of the campaign.
 
     Attributes:
@@ -139,7 +139,7 @@ class Asking(Model):
 
     objectives: Annotated[tuple[Objective, ...], Field(min_length=1, max_length=3)]
     bounds: Annotated[tuple[Bound, ...], Field(max_length=16)] = ()
-    threats: Annotated[tuple[Threat, ...], Field(max_length=16)] = ()
+    threats: Annotated[tuple[FacedThreat, ...], Field(max_length=16)] = ()
     references: Annotated[tuple[Reference, ...], Field(max_length=16)] = ()
     constraints: Constraints = Constraints()
     search: Search = Search()
@@ -170,7 +170,7 @@ class Design:
     space: Space
     objectives: tuple[Objective, ...]
     bounds: tuple[Bound, ...]
-    threats: tuple[Threat, ...]
+    threats: tuple[FacedThreat, ...]
     references: tuple[Reference, ...]
     constraints: Constraints
     search: Search
@@ -191,7 +191,7 @@ class Design:
         """The tables of the campaign of a point of the space."""
         return self.space.tables(self.base, values, self.name)
 
-    def campaign(self, tables: Mapping[str, Any], threat: Threat, **replaced: Any) -> Campaign:
+    def campaign(self, tables: Mapping[str, Any], threat: FacedThreat, **replaced: Any) -> Campaign:
         """The campaign of a target and a threat.
 
         Args:
@@ -238,19 +238,19 @@ def design_from(text: str, name: str, folder: Path) -> Design:
         asking = Asking.model_validate(own)
     except ValidationError as error:
         raise CampaignError(f"{name}: {sentence(error, own)}") from None
-    threats = asking.threats or (Threat(name="threat"),)
-    names = [one.name for one in threats] + [one.name for one in asking.references]
-    if twice := next((one for one in names if names.count(one) > 1), None):
+    threats = asking.threats or (FacedThreat(name="threat"),)
+    names = [threat.name for threat in threats] + [reference.name for reference in asking.references]
+    if twice := next((name for name in names if names.count(name) > 1), None):
         raise CampaignError(f'{name}: got the name "{twice}" twice, but each threat and reference needs its own')
     layered = "layer" in data or any(variable.place == "layer" for variable in space.variables)
     places = {
-        f"{table}[{k}]": one for table in ("objectives", "bounds") for k, one in enumerate(getattr(asking, table))
+        f"{table}[{k}]": goal for table in ("objectives", "bounds") for k, goal in enumerate(getattr(asking, table))
     }
     try:
         check_needs(places, data.get("output", {}), layered=layered)
     except ValueError as error:
         raise CampaignError(f"{name}: {error}") from None
-    asked = (one.asked for one in (*asking.objectives, *asking.bounds))
+    asked = (goal.asked for goal in (*asking.objectives, *asking.bounds))
     keys = dict.fromkeys(measure.column for measure in asked if measure.kind != "target")
     design = Design(
         title=str(data.get("title", "")),
@@ -283,4 +283,4 @@ def _assumptions(design: Design) -> tuple[str, ...]:
 
 def alternatives_of(campaign: Campaign) -> dict[str, Alternative]:
     """The alternatives of a campaign that move its hits, by name."""
-    return {one.name: one for one in alternatives(campaign) if not one.breaks}
+    return {alternative.name: alternative for alternative in alternatives(campaign) if not alternative.breaks}

@@ -29,7 +29,7 @@ def design_schema() -> Schema:
     return campaign | {
         "title": "warpimpact design",
         "description": "A search for designs: a campaign, what is free in it, and what is sought.",
-        "properties": {key: one for key, one in campaign["properties"].items() if key not in left_out}
+        "properties": {key: key_schema for key, key_schema in campaign["properties"].items() if key not in left_out}
         | asking["properties"],
         "$defs": campaign["$defs"] | asking["$defs"],
         "required": [*(key for key in campaign.get("required", ()) if key != "hits"), "objectives"],

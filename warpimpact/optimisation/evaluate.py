@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpimpact.campaign.campaign import Campaign
-from warpimpact.optimisation.design import SCRAMBLINGS, Design, Threat, alternatives_of
+from warpimpact.optimisation.design import SCRAMBLINGS, Design, FacedThreat, alternatives_of
 from warpimpact.optimisation.limits import limits_level, limits_said
 from warpimpact.records.outcomes import Outcomes
 from warpimpact.results import variables as v
@@ -78,7 +78,7 @@ class Said(NamedTuple):
     seconds: float
 
 
-def campaign_of(design: Design, tables: Mapping[str, Any], threat: Threat, seed: int | None = None) -> Campaign:
+def campaign_of(design: Design, tables: Mapping[str, Any], threat: FacedThreat, seed: int | None = None) -> Campaign:
     """The campaign whose hits a search computes: those of the irreducible part of the cell, where it has one.
 
     Args:
@@ -140,8 +140,8 @@ def said_by(design: Design, jobs: Sequence[HitJob], worker: Worker, told: Share 
     )
     said = []
     needed = {v.STATUS, v.STOPPED_IN, *(name for measure in design.keys for name in measure.quantity.of)}
-    for one, (_, scene, shots) in zip(outcomes, scenes, strict=True):
-        table = narrow_table(scene, shots, one, needed)
+    for outcome, (_, scene, shots) in zip(outcomes, scenes, strict=True):
+        table = narrow_table(scene, shots, outcome, needed)
         draws = np.zeros(0) if shots.posterior_draw is None else shots.posterior_draw
         places = np.array([shots.hit_y, shots.hit_z])
         said.append(Said(said_of(design, table), places, draws, seconds / len(jobs)))
@@ -186,7 +186,7 @@ def _marched(
     begin, total = time.process_time(), sum(len(shots) for *_, shots in scenes)
     for level in dict.fromkeys(levels):
         numerics = Numerics.model_validate_json(level)
-        same = [number for number, one in enumerate(levels) if one == level]
+        same = [number for number, each_level in enumerate(levels) if each_level == level]
         before = sum(len(scenes[number][2]) for number in found)
 
         def progress(done: int, _: int, before: int = before) -> None:
@@ -225,7 +225,7 @@ def level_of(design: Design, job: HitJob, worker: Worker) -> str:
     ]
     if len(found) < len(design.keys):
         found.append(pilot_of(campaign.scene, shots, asked, worker).numerics)
-    return max(found, key=lambda one: one.level or 0).model_dump_json()
+    return max(found, key=lambda numerics: numerics.level or 0).model_dump_json()
 
 
 def hits_asked(design: Design, jobs: Sequence[HitJob], tell: Told) -> Question[list[Said]]:
@@ -249,7 +249,11 @@ def _hits_computed(
     design: Design, jobs: Sequence[HitJob], *, worker: Worker, report: Callable[[float], object]
 ) -> Arrays:
     said = said_by(design, jobs, worker, lambda done: report(done / len(jobs)))
-    return {f"{name}_{k}": np.asarray(part) for k, one in enumerate(said) for name, part in one._asdict().items()}
+    return {
+        f"{name}_{k}": np.asarray(part)
+        for k, hits_said in enumerate(said)
+        for name, part in hits_said._asdict().items()
+    }
 
 
 def levels_asked(design: Design, jobs: Sequence[HitJob], tell: Told) -> Question[list[str]]:

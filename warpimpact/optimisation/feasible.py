@@ -55,7 +55,7 @@ class Checked(NamedTuple):
     @property
     def excess(self) -> float:
         """Sum of what is violated; 0 of a feasible design."""
-        return sum(one.share for one in self.violations)
+        return sum(violation.share for violation in self.violations)
 
 
 def checked(design: Design, tables: Mapping[str, Any]) -> Checked:
@@ -82,8 +82,8 @@ def _violations(design: Design, campaign: Campaign) -> Iterator[Violation]:
         yield from (Violation(UNTESTED, 1.0, standing.sentence) for standing in untested(campaign))
     for name, plate in target.named:
         if plate.open_area > 0.0:
-            for one in _of_holes(design, plate):
-                yield one._replace(text=f"{name}: {one.text}")
+            for of_hole in _of_holes(design, plate):
+                yield of_hole._replace(text=f"{name}: {of_hole.text}")
 
 
 def untested(campaign: Campaign) -> list[Standing]:

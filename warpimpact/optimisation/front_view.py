@@ -271,9 +271,9 @@ def _nearest(dataset: xarray.Dataset) -> Iterator[str]:
     )
     nearest = int(np.nanargmin(over.sum(axis=1))) if len(bounds) and np.isfinite(over).any() else 0
     asked = [
-        f"{dataset[f.LABEL].values[one]!s} {'<' if signs[one] > 0 else '>'}= {limits[one]:.4g}"
-        f" (nearest: {number_text(float(found[nearest, one]))})"
-        for one in bounds
+        f"{dataset[f.LABEL].values[bound]!s} {'<' if signs[bound] > 0 else '>'}= {limits[bound]:.4g}"
+        f" (nearest: {number_text(float(found[nearest, bound]))})"
+        for bound in bounds
     ]
     yield f"no design keeps the bounds: {'; '.join(asked) or 'no hit of any design could be computed'}"
     yield f"the nearest: {design_text(dataset, nearest)}"

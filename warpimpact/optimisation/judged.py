@@ -29,7 +29,7 @@ CONFIDENCE = 0.95
 
 
 @dataclass(frozen=True)
-class Record:
+class DesignRecord:
     """A target with the numbers of its hits so far.
 
     Attributes:
@@ -56,13 +56,13 @@ class Record:
         """Hits by each threat."""
         return int(self.said.shape[2])
 
-    def more(self, said: Array, seconds: float) -> Record:
+    def more(self, said: Array, seconds: float) -> DesignRecord:
         """With further hits."""
         joined = np.concatenate([self.said, said], axis=2)
         return replace(self, said=joined, seconds=self.seconds + seconds, means={}, known={})
 
 
-def means(design: Design, record: Record, hits: int) -> Array:
+def means(design: Design, record: DesignRecord, hits: int) -> Array:
     """Objectives and bounds over the first hits by scrambling, shape [asked, SCRAMBLINGS]."""
     if hits not in record.means:
         rows = [_by_scrambling(numbers_of(design, record, goal, hits)) for goal in design.asked]
@@ -70,7 +70,7 @@ def means(design: Design, record: Record, hits: int) -> Array:
     return record.means[hits]
 
 
-def values(design: Design, record: Record, hits: int | None = None) -> Array:
+def values(design: Design, record: DesignRecord, hits: int | None = None) -> Array:
     """Objectives and bounds over the first hits, shape [asked]; NaN where no hit counts."""
     hits = record.hits if hits is None else hits
     if hits not in record.known:
@@ -78,7 +78,7 @@ def values(design: Design, record: Record, hits: int | None = None) -> Array:
     return record.known[hits]
 
 
-def numbers_of(design: Design, record: Record, goal: Objective | Bound, hits: int) -> Array:
+def numbers_of(design: Design, record: DesignRecord, goal: Objective | Bound, hits: int) -> Array:
     """Numbers of the first hits whose mean is an objective or a bound, shape [hits]: of the worst threat and
     assumption, or averaged over them, as the goal asks."""
     measure = goal.asked
@@ -112,7 +112,7 @@ def _averaged(measure: Measure, numbers: Array) -> Array:
     return measure.averaged(measure.counted(numbers))
 
 
-def estimate(design: Design, record: Record, goal: Objective | Bound) -> Estimate:
+def estimate(design: Design, record: DesignRecord, goal: Objective | Bound) -> Estimate:
     """An objective or a bound with its interval, by all hits."""
     if goal.asked.kind == "target":
         return Estimate(record.areal_density, record.areal_density, record.areal_density, record.hits, 0.0)
@@ -122,14 +122,14 @@ def estimate(design: Design, record: Record, goal: Objective | Bound) -> Estimat
     return estimate_of("share" if is_share else "mean", numbers, replicates=SCRAMBLINGS)
 
 
-def objectives(design: Design, record: Record, hits: int | None = None) -> Array:
+def objectives(design: Design, record: DesignRecord, hits: int | None = None) -> Array:
     """Objectives with signs that make them quantities to minimise, shape [objectives]; infinite where no hit counts."""
     signs = np.array([objective.sign for objective in design.objectives])
     signed = signs * values(design, record, hits)[: len(signs)]
     return np.asarray(np.nan_to_num(signed, nan=np.inf, posinf=np.inf, neginf=-np.inf))
 
 
-def excesses(design: Design, record: Record, hits: int | None = None) -> Array:
+def excesses(design: Design, record: DesignRecord, hits: int | None = None) -> Array:
     """Violation of each bound as a share of its limit, shape [bounds]; 0 where the bound is kept to rounding, 1 where
     no hit counts."""
     bounded = values(design, record, hits)[len(design.objectives) :]
@@ -141,7 +141,9 @@ def excesses(design: Design, record: Record, hits: int | None = None) -> Array:
     return np.where(shares > ROUNDED, shares, 0.0)
 
 
-def undecided(design: Design, candidates: Sequence[Record], rivals: Sequence[Record], hits: int) -> list[bool]:
+def undecided(
+    design: Design, candidates: Sequence[DesignRecord], rivals: Sequence[DesignRecord], hits: int
+) -> list[bool]:
     """Whether the first hits leave open that each candidate is on the front: no bound is certainly broken, and no rival
     is certainly better. A difference within rounding decides nothing."""
     signs = np.array([goal.sign for goal in design.asked])[:, None]

@@ -16,10 +16,10 @@ from warpimpact.campaign.places import relocated
 from warpimpact.campaign.toml import toml_text
 from warpimpact.optimisation.asked import Bound
 from warpimpact.optimisation.confirm import Confirmed
-from warpimpact.optimisation.design import Design, Threat
+from warpimpact.optimisation.design import Design, FacedThreat
 from warpimpact.optimisation.evaluate import campaign_of
 from warpimpact.optimisation.feasible import untested
-from warpimpact.optimisation.judged import Record, estimate
+from warpimpact.optimisation.judged import DesignRecord, estimate
 from warpimpact.optimisation.search import Searched
 from warpimpact.results import attributes as attr
 from warpimpact.results import front as f
@@ -56,10 +56,10 @@ def to_dataset(design: Design, found: Searched, confirmed: Confirmed, made_by: M
         f.LABEL: _texts(goal.asked.title for goal in asked),
         f.SIGN: [int(goal.sign) for goal in asked],
         f.LIMIT: [goal.limit if isinstance(goal, Bound) else np.nan for goal in asked],
-        f.VALUE: np.array([one.values for one in found.records]).reshape(len(found.records), len(variables)),
-        f.HITS: [one.hits for one in found.records],
-        f.LEVELS: _texts(_levels(one) for one in found.records),
-        f.COST: [one.seconds for one in found.records],
+        f.VALUE: np.array([record.values for record in found.records]).reshape(len(found.records), len(variables)),
+        f.HITS: [record.hits for record in found.records],
+        f.LEVELS: _texts(_levels(record) for record in found.records),
+        f.COST: [record.seconds for record in found.records],
         f.ON_FRONT: on_front,
         f.NUMBER: confirmed.numbers,
         f.KEPT: confirmed.kept.astype(np.int8),
@@ -67,11 +67,12 @@ def to_dataset(design: Design, found: Searched, confirmed: Confirmed, made_by: M
         f.SURVIVAL: confirmed.survival[..., 0],
         f.SURVIVAL_AT_LEAST: confirmed.survival[..., 1],
         f.CAMPAIGN: _texts(
-            toml_text(campaign_tables(design, one.tables, one.values, design.threats[0])) for one in confirmed.records
+            toml_text(campaign_tables(design, record.tables, record.values, design.threats[0]))
+            for record in confirmed.records
         ),
         f.FILE: _texts(f"design_{number:0{width}d}.toml" for number in range(len(confirmed.records))),
-        f.FRESH_LEVELS: _texts(_levels(one) for one in confirmed.records),
-        f.REFERENCE: _texts(one.name for one in design.references),
+        f.FRESH_LEVELS: _texts(_levels(record) for record in confirmed.records),
+        f.REFERENCE: _texts(reference.name for reference in design.references),
         f.REFERENCE_CAMPAIGN: _texts(_campaign(design, record) for record in confirmed.references),
         f.COMPUTED: found.history[:, 0].astype(np.int64),
         f.VOLUME: found.history[:, 1],
@@ -90,11 +91,11 @@ def to_dataset(design: Design, found: Searched, confirmed: Confirmed, made_by: M
         columns |= dict(zip(names, _estimates(design, records), strict=False))
     if design.keys and len(confirmed.records):
         columns |= {f.HIT_Y: confirmed.places[:, 0], f.HIT_Z: confirmed.places[:, 1]}
-        columns[f.HIT_VALUE] = np.array([one.said[0] for one in confirmed.records])
+        columns[f.HIT_VALUE] = np.array([record.said[0] for record in confirmed.records])
     return dataset_of(columns, {attr.REFERENCES: f.REFERENCES, **_attributes(design, found, made_by)})
 
 
-def _untested(design: Design, record: Record) -> str:
+def _untested(design: Design, record: DesignRecord) -> str:
     """Subjects in which the plates of a design lie beyond every published test."""
     standings = untested(campaign_of(design, record.tables, design.threats[0]))
     return ", ".join(dict.fromkeys(standing.subject for standing in standings))
@@ -104,11 +105,11 @@ def _texts(texts: Any) -> Any:
     return np.array(list(texts), dtype=object)
 
 
-def _levels(record: Record) -> str:
+def _levels(record: DesignRecord) -> str:
     return json.dumps([json.loads(level) for level in record.levels if level])
 
 
-def _estimates(design: Design, records: Sequence[Record]) -> Array:
+def _estimates(design: Design, records: Sequence[DesignRecord]) -> Array:
     """Values and both ends of their intervals, shape [3, records, asked]."""
     rows = [[estimate(design, record, goal) for goal in design.asked] for record in records]
     ends = [[[number.value, number.low, number.high] for number in row] for row in rows]
@@ -129,12 +130,12 @@ def _attributes(design: Design, found: Searched, made_by: Mapping[str, str]) -> 
     }
 
 
-def _campaign(design: Design, record: Record) -> str:
+def _campaign(design: Design, record: DesignRecord) -> str:
     """The campaign of a target and the first threat, as TOML."""
     return toml_text(campaign_tables(design, record.tables, record.values, design.threats[0]))
 
 
-def campaign_tables(design: Design, tables: Mapping[str, Any], values: Array, threat: Threat) -> dict[str, Any]:
+def campaign_tables(design: Design, tables: Mapping[str, Any], values: Array, threat: FacedThreat) -> dict[str, Any]:
     """The tables of the campaign of a target and a threat, which `warpimpact run` takes.
 
     Args:
@@ -226,7 +227,7 @@ def _write_campaign(path: Path, text: str, tell: Tell | None) -> None:
         file.write_text(text, encoding="utf-8")
 
 
-def endings(threats: Sequence[Threat]) -> list[str]:
+def endings(threats: Sequence[FacedThreat]) -> list[str]:
     """Endings of the names of campaign files, by threat, each its own; none where there is one threat."""
     if len(threats) == 1:
         return [""]

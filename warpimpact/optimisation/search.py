@@ -13,7 +13,7 @@ from warpimpact.campaign.text import CampaignError
 from warpimpact.optimisation.design import Design
 from warpimpact.optimisation.evaluate import HitJob, hits_asked, levels_asked
 from warpimpact.optimisation.feasible import Checked, checked
-from warpimpact.optimisation.judged import Record, excesses, objectives, undecided
+from warpimpact.optimisation.judged import DesignRecord, excesses, objectives, undecided
 from warpimpact.optimisation.searcher import Searcher, front_of, hypervolume
 from warpimpact.runs.questions import Question
 
@@ -69,7 +69,7 @@ class Searched:
         pilots: that were run.
     """
 
-    records: tuple[Record, ...]
+    records: tuple[DesignRecord, ...]
     front: NDArray[np.int64]
     refused: int
     history: Array
@@ -111,7 +111,7 @@ def _generations(design: Design) -> Iterator[tuple[list[Array], Tell]]:
     space, plan = design.space, design.search
     searcher = Searcher(space, len(design.objectives), 1 + len(design.bounds), plan.population, plan.seed)
     while asked := searcher.ask():
-        yield [space.at(one) for one in asked], searcher.tell
+        yield [space.at(point) for point in asked], searcher.tell
 
 
 @dataclass
@@ -128,9 +128,9 @@ class _State:
 
     design: Design
     follow: Follow
-    records: dict[bytes, Record] = field(default_factory=dict)
-    front: list[Record] = field(default_factory=list)
-    drafts: dict[bytes, Record] = field(default_factory=dict)
+    records: dict[bytes, DesignRecord] = field(default_factory=dict)
+    front: list[DesignRecord] = field(default_factory=list)
+    drafts: dict[bytes, DesignRecord] = field(default_factory=dict)
     refused: dict[bytes, Checked] = field(default_factory=dict)
     pilots: list[tuple[Array, int, str]] = field(default_factory=list)
     history: list[tuple[int, float]] = field(default_factory=list)
@@ -149,7 +149,7 @@ class _State:
 
     def generation(self, points: Sequence[Array]) -> Question[None]:
         """Compute those points that are new and keep the constraints."""
-        new: dict[bytes, Record] = {}
+        new: dict[bytes, DesignRecord] = {}
         for values in points:
             key = values.tobytes()
             if key in self.records or key in new:
@@ -183,14 +183,14 @@ class _State:
             self.refused[key] = found
             return
         nothing = np.zeros((len(self.design.situations), len(self.design.keys), 0))
-        self.drafts[key] = Record(values, tables, found.campaign.target.areal_density, (), nothing)
+        self.drafts[key] = DesignRecord(values, tables, found.campaign.target.areal_density, (), nothing)
 
-    def _compute(self, new: dict[bytes, Record]) -> Question[None]:
+    def _compute(self, new: dict[bytes, DesignRecord]) -> Question[None]:
         """Hits of designs, from rung to rung for those that may be on the front."""
         levels = yield from self._levels(list(new.values()))
         for key, of_threats in zip(list(new), levels, strict=True):
             one = new[key]
-            new[key] = Record(one.values, one.tables, one.areal_density, of_threats, one.said)
+            new[key] = DesignRecord(one.values, one.tables, one.areal_density, of_threats, one.said)
         going, before = list(new), 0
         for hits in self.design.search.rungs if self.design.keys else [self.design.search.hits]:
             with_more = yield from self._more([new[key] for key in going], before, hits)
@@ -204,14 +204,16 @@ class _State:
         self._admit(list(new.values()))
         self.records |= new
 
-    def _more(self, records: Sequence[Record], first: int, stop: int) -> Question[list[Record]]:
+    def _more(self, records: Sequence[DesignRecord], first: int, stop: int) -> Question[list[DesignRecord]]:
         """Designs with their hits up to so many."""
         design = self.design
         if not design.keys:
-            return [one.more(np.zeros((len(design.situations), 0, stop)), 0.0) for one in records]
+            return [record.more(np.zeros((len(design.situations), 0, stop)), 0.0) for record in records]
         jobs = [
-            HitJob(one.tables, threat, first, stop - first, one.levels[threat], design.search.seed, assumption=name)
-            for one in records
+            HitJob(
+                record.tables, threat, first, stop - first, record.levels[threat], design.search.seed, assumption=name
+            )
+            for record in records
             for threat, name in design.situations
         ]
         what, each = f"{len(records)} designs at {stop} hits", len(design.situations)
@@ -223,23 +225,23 @@ class _State:
 
         said = yield from hits_asked(design, jobs, tell)
         found = []
-        for number, one in enumerate(records):
+        for number, record in enumerate(records):
             own = said[number * each : (number + 1) * each]
-            found.append(one.more(np.array([part.values for part in own]), sum(part.seconds for part in own)))
+            found.append(record.more(np.array([part.values for part in own]), sum(part.seconds for part in own)))
         return found
 
-    def _levels(self, records: Sequence[Record]) -> Question[list[tuple[str, ...]]]:
+    def _levels(self, records: Sequence[DesignRecord]) -> Question[list[tuple[str, ...]]]:
         """Numerics of designs for every threat: those of the pilot of a neighbour, or of their own."""
-        places = [self._place(one.values) for one in records]
+        places = [self._place(record.values) for record in records]
         if not self.design.keys:
             return [("",) * len(self.design.threats) for _ in records]
         centres: list[tuple[Array, int]] = [(place, threat) for place, threat, _ in self.pilots]
         jobs = []
-        for one, place in zip(records, places, strict=True):
+        for record, place in zip(records, places, strict=True):
             for threat in range(len(self.design.threats)):
                 if not any(of == threat and _near(place, centre) for centre, of in centres):
                     centres.append((place, threat))
-                    jobs.append(HitJob(one.tables, threat, 0, 0, FIDELITY, self.design.search.seed))
+                    jobs.append(HitJob(record.tables, threat, 0, 0, FIDELITY, self.design.search.seed))
         tell = lambda done, _: self.tell(f"{done:.0f} of {len(jobs)} pilots")  # noqa: E731
         found = yield from levels_asked(self.design, jobs, tell)
         self.pilots += [(*centre, level) for centre, level in zip(centres[len(self.pilots) :], found, strict=True)]
@@ -247,31 +249,32 @@ class _State:
 
     def _nearest(self, place: Array, threat: int) -> str:
         near = [(_apart(place, centre), level) for centre, of, level in self.pilots if of == threat]
-        return min(near, key=lambda one: one[0])[1]
+        return min(near, key=lambda pair: pair[0])[1]
 
     def _place(self, values: Array) -> Array:
         """Shares of the ranges; numbers of choices, and what does not count, lie far apart if they differ."""
         shares = [
-            1e6 * value if one.labels else (value - one.low) / ((one.high - one.low) or 1.0)
-            for one, value in zip(self.design.space.variables, values, strict=True)
+            1e6 * value if variable.labels else (value - variable.low) / ((variable.high - variable.low) or 1.0)
+            for variable, value in zip(self.design.space.variables, values, strict=True)
         ]
         return np.asarray(np.nan_to_num(np.array(shares), nan=-1e6))
 
-    def _admit(self, new: Sequence[Record]) -> None:
+    def _admit(self, new: Sequence[DesignRecord]) -> None:
         """Those of some designs to the front that keep the bounds, have all the hits that they may have, and are
         dominated by none."""
         most = self.design.search.most_hits if self.design.keys else self.design.search.hits
-        full = [one for one in new if one.hits >= most and not excesses(self.design, one).any()]
-        may = [*self.front, *(one for one in full if np.isfinite(objectives(self.design, one)).all())]
-        points = np.array([objectives(self.design, one) for one in may]).reshape(len(may), len(self.design.objectives))
+        full = [record for record in new if record.hits >= most and not excesses(self.design, record).any()]
+        may = [*self.front, *(record for record in full if np.isfinite(objectives(self.design, record)).all())]
+        shape = len(may), len(self.design.objectives)
+        points = np.array([objectives(self.design, record) for record in may]).reshape(shape)
         self.front = [may[number] for number in front_of(points)]
 
     def _measure(self) -> None:
         """Note the hypervolume, in the box of the first generation in which some design keeps the bounds."""
         if self.box is None:
-            kept = [one for one in self.records.values() if not excesses(self.design, one).any()]
-            every = [objectives(self.design, one) for one in kept]
-            if finite := [one for one in every if np.isfinite(one).all()]:
+            kept = [record for record in self.records.values() if not excesses(self.design, record).any()]
+            every = [objectives(self.design, record) for record in kept]
+            if finite := [signed for signed in every if np.isfinite(signed).all()]:
                 low, high = np.min(finite, axis=0), np.max(finite, axis=0)
                 self.box = high, np.where(high > low, high - low, np.maximum(np.abs(high), 1.0))
         self.history.append((self.done, self._volume()))
@@ -281,7 +284,7 @@ class _State:
         if self.box is None or not self.front:
             return 0.0
         reference, scale = self.box
-        points = np.array([objectives(self.design, one) for one in self.front])
+        points = np.array([objectives(self.design, record) for record in self.front])
         return hypervolume((points - reference) / scale, np.full(len(scale), MARGIN))
 
     def told(self, points: Sequence[Array]) -> tuple[Array, Array]:
@@ -309,13 +312,13 @@ class _State:
         """Which constraint rules out all designs that were tried."""
         tried = list(self.refused.values())
         broken: dict[str, list[float]] = {}
-        for one in tried:
-            for violation in one.violations:
+        for attempt in tried:
+            for violation in attempt.violations:
                 broken.setdefault(violation.constraint, []).append(violation.share)
         by_all = [name for name, shares in broken.items() if len(shares) == len(tried)]
         name = by_all[0] if by_all else max(broken, key=lambda key: len(broken[key]))
         nearest = min(
-            (violation for one in tried for violation in one.violations if violation.constraint == name),
+            (violation for attempt in tried for violation in attempt.violations if violation.constraint == name),
             key=lambda violation: violation.share,
         )
         others = ", ".join(sorted({*broken} - {name}))
@@ -324,8 +327,8 @@ class _State:
 
     def searched(self) -> Searched:
         records = list(self.records.values())
-        on_front = {id(one) for one in self.front}
-        front = [number for number, one in enumerate(records) if id(one) in on_front]
+        on_front = {id(record) for record in self.front}
+        front = [number for number, record in enumerate(records) if id(record) in on_front]
         front.sort(key=lambda number: tuple(objectives(self.design, records[number])))
         reference, scale = self.box or (np.zeros(0), np.zeros(0))
         return Searched(

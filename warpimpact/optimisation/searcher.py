@@ -45,7 +45,7 @@ class Searcher:
         from pymoo.core.termination import NoTermination
 
         self._names = [f"{number:03d}" for number in range(len(space.variables))]
-        kinds = {name: _kind(one) for name, one in zip(self._names, space.variables, strict=True)}
+        kinds = {name: _kind(variable) for name, variable in zip(self._names, space.variables, strict=True)}
         self._problem = Problem(vars=kinds, n_obj=objectives, n_ieq_constr=constraints)
         again = MixedVariableDuplicateElimination()
         self._algorithm = NSGA2(

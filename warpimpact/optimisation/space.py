@@ -92,21 +92,21 @@ class Space:
     def size(self) -> float:
         """Number of its points; infinite for a continuous space. Points that differ only in variables that do not
         count are counted, too."""
-        counts = [one.count for one in self.variables]
+        counts = [variable.count for variable in self.variables]
         return math.inf if None in counts else float(math.prod(count for count in counts if count is not None))
 
     def at(self, coordinates: Sequence[float]) -> Array:
         """Values at coordinates of `DesignVariable.at`, shape [variables]; NaN for variables that do not count."""
         values = np.full(len(self.variables), math.nan)
-        for number, (one, coordinate) in enumerate(zip(self.variables, coordinates, strict=True)):
-            if one.under is None or values[one.under[0]] == one.under[1]:
-                values[number] = one.at(coordinate)
+        for number, (variable, coordinate) in enumerate(zip(self.variables, coordinates, strict=True)):
+            if variable.under is None or values[variable.under[0]] == variable.under[1]:
+                values[number] = variable.at(coordinate)
         return values
 
     def points(self) -> Iterator[Array]:
         """All points of a space that is not continuous, each once."""
         seen = set()
-        for numbers in np.ndindex(*(one.count or 0 for one in self.variables)):
+        for numbers in np.ndindex(*(variable.count or 0 for variable in self.variables)):
             values = self.at([float(number) for number in numbers])
             if values.tobytes() not in seen:
                 seen.add(values.tobytes())
@@ -116,7 +116,9 @@ class Space:
         """Random points, so many."""
         random = np.random.default_rng(seed)
         for _ in range(count):
-            yield self.at([random.random() * (1.0 if one.count is None else one.count) for one in self.variables])
+            yield self.at(
+                [random.random() * (1.0 if variable.count is None else variable.count) for variable in self.variables]
+            )
 
     def tables(self, base: Mapping[str, Any], values: Array, name: str) -> dict[str, Any]:
         """The tables of the campaign of a point.
@@ -126,15 +128,22 @@ class Space:
             name: what errors call it.
         """
         data = json.loads(json.dumps(base, default=str))
-        for one, value in zip(self.variables, values, strict=True):
+        for variable, value in zip(self.variables, values, strict=True):
             if not math.isnan(value):
-                put(data, one.place, json.loads(json.dumps(one.written(value), default=str)), f"{name}: variables")
+                put(
+                    data,
+                    variable.place,
+                    json.loads(json.dumps(variable.written(value), default=str)),
+                    f"{name}: variables",
+                )
         return dict(data)
 
     def text(self, values: Array) -> str:
         """A point for a person."""
         told = zip(self.variables, values, strict=True)
-        return ", ".join(f"{one.name} = {one.text(value)}" for one, value in told if not math.isnan(value))
+        return ", ".join(
+            f"{variable.name} = {variable.text(value)}" for variable, value in told if not math.isnan(value)
+        )
 
 
 def read_space(given: Any, name: str) -> Space:
@@ -153,7 +162,7 @@ def read_space(given: Any, name: str) -> Space:
         _read(found, key, resolved(key, f"{name}: variables"), value, f"{name}: variables.{key}")
     if len(found) > MOST_VARIABLES:
         raise CampaignError(f"{name}: variables: got {len(found)}, but at most {MOST_VARIABLES} are searched")
-    places = [one.place for one in found if one.under is None]
+    places = [variable.place for variable in found if variable.under is None]
     if twice := next((place for place in places if places.count(place) > 1), None):
         raise CampaignError(f"{name}: variables: got two variables for {twice}")
     return Space(tuple(found))
@@ -209,13 +218,14 @@ def _number(value: float | str) -> float:
 
 def _read_choice(found: list[DesignVariable], name: str, place: str, given: list[Any], where: str, under: Any) -> None:
     """A list of values, or of tables with names; ranges and lists in a table are variables below it."""
-    whole = is_table(place) or place == "layer" or all(isinstance(one, dict) for one in given)
-    if whole and not all(isinstance(one, dict) and isinstance(one.get("name"), str) for one in given):
+    whole = is_table(place) or place == "layer" or all(isinstance(option, dict) for option in given)
+    if whole and not all(isinstance(option, dict) and isinstance(option.get("name"), str) for option in given):
         raise CampaignError(f"{where}: must be a list of tables, each with a name")
-    if not whole and any(isinstance(one, dict | list) for one in given):
+    if not whole and any(isinstance(option, dict | list) for option in given):
         raise CampaignError(f"{where}: got {quoted(given)}, but it must be a list of values")
     labels = tuple(
-        one["name"] if whole else one if isinstance(one, str) else json.dumps(one, default=str) for one in given
+        option["name"] if whole else option if isinstance(option, str) else json.dumps(option, default=str)
+        for option in given
     )
     if wrong := next((label for label in labels if not label.isprintable()), None):
         raise CampaignError(f"{where}: got {quoted(wrong)}, but it must be one line without control characters")
@@ -245,9 +255,9 @@ def _read_choice(found: list[DesignVariable], name: str, place: str, given: list
 def _free(inside: Any, path: str = "") -> Iterator[tuple[str, Any]]:
     """The ranges in a table, with their places in it."""
     entries = inside.items() if isinstance(inside, dict) else enumerate(inside) if isinstance(inside, list) else ()
-    for key, one in entries:
+    for key, entry in entries:
         place = f"{path}.{key}" if path else str(key)
-        if isinstance(one, dict) and "low" in one:
-            yield place, one
+        if isinstance(entry, dict) and "low" in entry:
+            yield place, entry
         else:
-            yield from _free(one, place)
+            yield from _free(entry, place)

@@ -263,7 +263,7 @@ def history_dataset(
     cells = (replay.cell_y, replay.cell_z)
     behind = fields(scene, replay.behind)
     values |= sections(scene, hit, section) | behind
-    values |= outlines_in(plate, *((float(some.min()), float(some.max())) for some in cells))
+    values |= outlines_in(plate, *((float(column.min()), float(column.max())) for column in cells))
     coordinates: dict[str, Any] = {
         v.TIME: history.time,
         v.QUATERNION: ["x", "y", "z", "w"],

@@ -54,15 +54,18 @@ def assumed(campaign: Campaign, compute: Computed, *, limits: bool = False) -> H
     images, group = len(campaign.symmetries), len(campaign.symmetries) * campaign.at_a_plate
     places = places_of(campaign, _groups(campaign, FEWEST_LIMITS if limits else FEWEST))
     shots = shots_at(campaign, places)
-    possible = [one for one in alternatives(campaign) if one.is_possible(shots)]
-    possible = [one for one in possible if not limits or one.moves_limits]
+    possible = [alternative for alternative in alternatives(campaign) if alternative.is_possible(shots)]
+    possible = [alternative for alternative in possible if not limits or alternative.moves_limits]
     if not possible:
         return HitTable.of({}, {}, {})
     # What turns a shot leaves no image of it.
-    scenes = [(one.scene, one.shots(shots if one.turned else shots[::images])) for one in possible]
+    scenes = [
+        (alternative.scene, alternative.shots(shots if alternative.turned else shots[::images]))
+        for alternative in possible
+    ]
     outcomes = [
-        found if one.turned else found.unfolded(campaign.symmetries)
-        for one, found in zip(possible, compute(scenes), strict=True)
+        found if alternative.turned else found.unfolded(campaign.symmetries)
+        for alternative, found in zip(possible, compute(scenes), strict=True)
     ]
     numbers = (places[:, None] * group + np.arange(group)).reshape(-1)
     columns = _columns(possible, outcomes, numbers)
@@ -78,7 +81,7 @@ def _groups(campaign: Campaign, fewest: int) -> int:
 
 
 def _columns(possible: list[Alternative], outcomes: list[Outcomes], numbers: NDArray[np.int64]) -> dict[str, Any]:
-    moving = [found for one, found in zip(possible, outcomes, strict=True) if not one.breaks]
+    moving = [outcome for alternative, outcome in zip(possible, outcomes, strict=True) if not alternative.breaks]
     if not moving:
         return {}
     which = np.repeat(np.arange(len(moving)), len(numbers))
@@ -87,9 +90,11 @@ def _columns(possible: list[Alternative], outcomes: list[Outcomes], numbers: NDA
 
 def _attributes(possible: list[Alternative], outcomes: list[Outcomes]) -> dict[str, Any]:
     """Numbers of the alternatives by name, and the share of cores that would break by their strength."""
-    names = [one.name for one in possible if not one.breaks]
+    names = [alternative.name for alternative in possible if not alternative.breaks]
     broken = {
-        one.name: float(np.mean(found.broken)) for one, found in zip(possible, outcomes, strict=True) if one.breaks
+        alternative.name: float(np.mean(outcome.broken))
+        for alternative, outcome in zip(possible, outcomes, strict=True)
+        if alternative.breaks
     }
     told = {attr.ASSUMPTIONS: {name: number for number, name in enumerate(names)}, attr.WOULD_BREAK: broken}
     return {name: json.dumps(value, ensure_ascii=False) for name, value in told.items() if value}

@@ -46,7 +46,7 @@ def published_beside(dataset: xarray.Dataset) -> list[Beside]:
     data = parsed(dataset.attrs[attr.CAMPAIGN], attr.CAMPAIGN)
     given = data.get("published", [])
     try:
-        rows = [Published.model_validate(one) for one in (given if isinstance(given, list) else [given])]
+        rows = [Published.model_validate(row) for row in (given if isinstance(given, list) else [given])]
     except ValidationError as error:
         raise CampaignError(f"published: {sentence(error, data)}") from None
     return [Beside(row, _computed(dataset, math.degrees(row.obliquity))) for row in rows]

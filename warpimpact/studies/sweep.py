@@ -63,7 +63,7 @@ class Input:
         last = self.key.rpartition(".")[2]
         if self.key.startswith("layer."):
             return self.key.replace(".", "_")
-        return next((str(one) for one in v.SHOT_VARIABLES if one.field == last), last)
+        return next((str(variable) for variable in v.SHOT_VARIABLES if variable.field == last), last)
 
 
 @dataclass(frozen=True)
@@ -85,7 +85,7 @@ class Sweep:
     @property
     def shape(self) -> tuple[int, ...]:
         """Number of values of every input."""
-        return tuple(len(one.values) for one in self.inputs)
+        return tuple(len(swept.values) for swept in self.inputs)
 
     def check(self, texts: Sequence[str]) -> None:
         """Refuse measures that a point will not have.
@@ -125,18 +125,18 @@ def read_sweep(path: str | Path, *, count: int | None = None) -> Sweep:
     if not isinstance(swept, dict) or not swept:
         raise CampaignError(f'{path}: sweep: needs a table [sweep] of lists, as obliquity = ["0 deg", "15 deg"]')
     inputs = tuple(_input(key, values, str(path)) for key, values in swept.items())
-    if len({one.name for one in inputs}) < len(inputs):
+    if len({swept.name for swept in inputs}) < len(inputs):
         raise CampaignError(f"{path}: sweep: got two lists for one input")
-    points = math.prod(len(one.values) for one in inputs)
+    points = math.prod(len(swept.values) for swept in inputs)
     if points > _MOST:
         raise CampaignError(f"{path}: sweep: got {points} combinations, but at most {_MOST} are computed")
     campaigns = {}
-    every = itertools.product(*(zip(one.labels, one.values, strict=True) for one in inputs))
+    every = itertools.product(*(zip(swept.labels, swept.values, strict=True) for swept in inputs))
     for number, combination in enumerate(every):
         data, labels = json.loads(json.dumps(shared, default=str)), [label for label, _ in combination]
-        for one, (_, value) in zip(inputs, combination, strict=True):
-            put(data, one.key, value, f"{path}: sweep")
-        inputs_text = ", ".join(f"{one.name} = {label}" for one, label in zip(inputs, labels, strict=True))
+        for swept, (_, value) in zip(inputs, combination, strict=True):
+            put(data, swept.key, value, f"{path}: sweep")
+        inputs_text = ", ".join(f"{swept.name} = {label}" for swept, label in zip(inputs, labels, strict=True))
         if isinstance(data.get("title"), str):
             data["title"] = f"{data['title']}: {inputs_text}"[:200]
         content = json.dumps(data, indent=1, ensure_ascii=False)
@@ -156,7 +156,7 @@ def _input(key: str, values: Any, path: str) -> Input:
         if not all(isinstance(value, dict) and isinstance(value.get("name"), str) for value in values):
             raise CampaignError(f"{path}: sweep.{key}: must be a list of tables, each with a name")
         labels = tuple(value["name"] for value in values)
-        given = tuple({name: one for name, one in value.items() if name != "name"} for value in values)
+        given = tuple({name: part for name, part in value.items() if name != "name"} for value in values)
     if wrong := next((label for label in labels if not label.isprintable()), None):
         raise CampaignError(
             f"{path}: sweep.{key}: got {quoted(wrong)}, but it must be one line without control characters"
@@ -231,11 +231,11 @@ def joined(sweep: Sweep, points: Sequence[xarray.Dataset]) -> xarray.Dataset:
         if all(along in point.coords for point in points):
             every[along] = np.unique(np.concatenate([point[along].values for point in points]))
     same = [_with(every, point) for point in points]
-    names = tuple(one.name for one in sweep.inputs)
+    names = tuple(swept.name for swept in sweep.inputs)
     first = same[0]
     outcomes = {str(name) for name in v.outcome_variables(first)}
     data: dict[str, Any] = {}
-    coordinates: dict[str, Any] = {one.name: _coordinate(one, sweep) for one in sweep.inputs}
+    coordinates: dict[str, Any] = {swept.name: _coordinate(swept, sweep) for swept in sweep.inputs}
     for name, array in first.variables.items():
         if str(name) in names or str(name) in _IN_GROUPS:
             continue
@@ -286,5 +286,5 @@ def _attributes(sweep: Sweep, points: Sequence[xarray.Dataset]) -> dict[str, Any
         attr.TITLE: sweep.title,
         attr.HISTORY: attr.history_line("sweep"),
         attr.CAMPAIGN: sweep.text,
-        attr.SWEEP: json.dumps({one.name: list(one.labels) for one in sweep.inputs}),
+        attr.SWEEP: json.dumps({swept.name: list(swept.labels) for swept in sweep.inputs}),
     }

@@ -17,7 +17,7 @@ from warpimpact.optimisation import evaluate, search, searcher
 from warpimpact.optimisation.confirm import fresh_seed, is_better
 from warpimpact.optimisation.design import design_from, read_design
 from warpimpact.optimisation.front_view import front_view
-from warpimpact.optimisation.judged import Record, excesses, objectives, undecided
+from warpimpact.optimisation.judged import DesignRecord, excesses, objectives, undecided
 from warpimpact.optimisation.optimise import folder_of, optimise, optimise_to_file
 from warpimpact.optimisation.search import SearchProgress
 from warpimpact.optimisation.searcher import Searcher, front_of, hypervolume
@@ -147,8 +147,8 @@ def test_rounding_decides_nothing() -> None:
     plan = design(THICKNESS, WEIGHT_AND_ENERGY, bound, SEARCH)
     energies = np.linspace(0.5, 0.9, 64)
 
-    def record(density: float, less: float = 0.0) -> Record:
-        return Record(np.zeros(1), {}, density, (), (energies - less)[None, None])
+    def record(density: float, less: float = 0.0) -> DesignRecord:
+        return DesignRecord(np.zeros(1), {}, density, (), (energies - less)[None, None])
 
     heavier, lighter, better = record(30.0 * (1 + 1e-9)), record(30.0 * (1 - 1e-9)), record(30.0 * (1 + 1e-9), 0.1)
     nearly = record(30.0 * (1 - 1e-9), 1e-9)
@@ -256,8 +256,8 @@ def test_the_front_has_designs_that_keep_the_bounds_with_all_their_hits() -> Non
     bound = '[[bounds]]\nmeasure = "residual_energy_fraction"\nat_most = 0.5\n'
     plan = design(THICKNESS, WEIGHT_AND_ENERGY, bound, SEARCH)
 
-    def planted(density: float, fraction: float, hits: int = 64) -> Record:
-        return Record(np.zeros(1), {}, density, ("",), np.full((1, len(plan.keys), hits), fraction))
+    def planted(density: float, fraction: float, hits: int = 64) -> DesignRecord:
+        return DesignRecord(np.zeros(1), {}, density, ("",), np.full((1, len(plan.keys), hits), fraction))
 
     state = search._State(plan, lambda now: None)
     light, strong = planted(20.0, 0.4), planted(30.0, 0.2)
