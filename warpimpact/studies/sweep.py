@@ -28,7 +28,7 @@ from warpimpact.runs.executor import Executor
 from warpimpact.runs.run import run_to_file
 from warpimpact.scene.units import quoted, reader_in
 
-_IN_GROUPS = {str(name) for group in v.GROUPS.values() for name in group}
+_OF_POINTS = {str(name) for group in ("plate", "solid") for name in v.GROUPS[group]}
 """Holes and shots at the solid plate, which only the results of the points hold."""
 _MOST = 10_000
 """Points of a sweep."""
@@ -237,7 +237,7 @@ def joined(sweep: Sweep, points: Sequence[xarray.Dataset]) -> xarray.Dataset:
     data: dict[str, Any] = {}
     coordinates: dict[str, Any] = {swept.name: _coordinate(swept, sweep) for swept in sweep.inputs}
     for name, array in first.variables.items():
-        if str(name) in names or str(name) in _IN_GROUPS:
+        if str(name) in names or str(name) in _OF_POINTS:
             continue
         columns = [point.variables[name] for point in same if name in point.variables]
         if len(columns) < len(same) or len({column.shape for column in columns}) > 1:
