@@ -9,8 +9,9 @@ export PYTHONDONTWRITEBYTECODE :=
 .PHONY: demo gallery docs test types suite benchmark clean
 
 demo: $(INSTALLED)
-	$(VENV)/bin/warpimpact run campaigns/slotted_plate.toml -o slotted.nc --overwrite
+	$(VENV)/bin/warpimpact run campaigns/fitted_plate.toml -o slotted.nc --overwrite
 	$(VENV)/bin/warpimpact plot slotted.nc --overwrite
+	$(VENV)/bin/warpimpact validate slotted.nc
 
 gallery: $(INSTALLED)
 	$(VENV)/bin/python campaigns/gallery.py

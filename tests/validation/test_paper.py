@@ -8,7 +8,7 @@ import pytest
 import xarray
 
 from warpimpact import Campaign, run
-from warpimpact.analysis.paper import PUBLISHED, check_scene, computed_row, validation_table
+from warpimpact.analysis.paper import PUBLISHED, check_scene, closest_table, computed_row, validation_table
 from warpimpact.campaign.campaign import CampaignError
 from warpimpact.cli import main
 
@@ -70,3 +70,13 @@ def test_what_the_paper_does_not_publish_may_differ() -> None:
 def test_another_campaign_computes_nothing(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["validate", str(CAMPAIGNS / "slotted_plate.toml")]) == 2
     assert "slotted_plate.toml: is not the paper's scene" in capsys.readouterr().err
+
+
+def test_the_closest_hits_of_a_map_stand_beside_the_measured_shots() -> None:
+    misfits = {}
+    for name in ("slotted_plate", "fitted_plate"):
+        text = closest_table(run(Campaign.from_toml(CAMPAIGNS / f"{name}.toml", count=1024), device="cpu"))
+        misfits[name] = [float(told) for told in re.findall(r"misfit ([\d.]+)", text)]
+        assert len(misfits[name]) == 2
+        assert re.search(r"through a hole +experiment +714.0 +24.3 +83.2", text)  # tan² tilt = tan² pitch + tan² yaw
+    assert sum(misfits["fitted_plate"]) < 0.5 * sum(misfits["slotted_plate"])

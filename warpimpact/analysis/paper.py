@@ -6,11 +6,13 @@ from importlib.resources import files
 from pathlib import Path
 from typing import Any, NamedTuple
 
+import numpy as np
 import xarray
 
 from warpimpact.campaign.campaign import Campaign
 from warpimpact.campaign.text import CampaignError
 from warpimpact.results import variables as v
+from warpimpact.results.files import ResultError
 from warpimpact.runs.manifests import first_difference
 from warpimpact.view.view import Column, Section, Table, number, text_of
 
@@ -40,6 +42,9 @@ PUBLISHED = {
 """Shot → source → row."""
 
 STANDOFFS = (0.05, 0.13)
+UNCERTAIN = (8.0, 3.0, 5.0)
+"""Of a residual velocity [m/s], and of a tilt at both stand-offs [degree]: scales of the misfit without signs
+(docs/identification.md)."""
 
 NOTE = """\
 Spacing and hit points are not published: those used here were found by search (campaigns/paper_shots.toml).
@@ -109,3 +114,40 @@ def validation_table(dataset: xarray.Dataset) -> str:
         rows += [(shot, source, *row) for source, row in published.items()]
         rows += [(shot, "warpimpact", *computed), (shot, "warpimpact less the paper's model", *off)]
     return text_of([Section([Table(columns, rows)]), Section(NOTE.splitlines())])
+
+
+def closest_table(dataset: xarray.Dataset) -> str:
+    """Experiment and LS-DYNA beside the hit of a map that comes closest to each measured shot, by velocity and tilts.
+
+    Raises:
+        ResultError: the map has other stand-offs than the paper, or no core passed the plate.
+    """
+    standoffs = dataset[v.STANDOFF].values
+    if not np.isclose(standoffs[:, None], STANDOFFS, atol=1e-6).any(axis=0).all():
+        raise ResultError(f"it has stand-offs at {standoffs.tolist()} m, but the shots were measured at {STANDOFFS} m")
+    tilts = dataset[v.TILT].sel(standoff=list(STANDOFFS), method="nearest").values
+    hits = np.column_stack([dataset[v.RESIDUAL_VELOCITY].values, tilts])
+    if not np.isfinite(hits).all(axis=1).any():
+        raise ResultError("no core passed the plate, but those of the published shots did")
+    names = ("velocity", "tilt 50", "tilt 130")
+    columns = [Column("shot"), Column("source"), *(number(name, digits=".1f") for name in names), Column("")]
+    rows: list[tuple[Any, ...]] = []
+    for shot, published in PUBLISHED.items():
+        rows += [(shot, source, *_with_tilts(published[source]), "") for source in ("experiment", "LS-DYNA")]
+        misfit = (((hits - _with_tilts(published["experiment"])) / UNCERTAIN) ** 2).sum(axis=1)
+        best = int(np.nanargmin(misfit))
+        y, z = (1e3 * float(dataset[name][best]) for name in (v.HIT_Y, v.HIT_Z))
+        where = f"hit {int(dataset[v.HIT][best])} at {y:.2f}, {z:.2f} mm; misfit {misfit[best]:.1f}"
+        rows.append((shot, "closest hit of the map", *hits[best], where))
+    note = (
+        "Where the two shots hit is not published, so the closest of many hits says little for the model. Misfit: sum of "
+        "squares over 8 m/s, 3° and 5°."
+    )
+    return text_of([Section([Table(columns, rows), note])])
+
+
+def _with_tilts(row: Row) -> tuple[float, float, float]:
+    """Residual velocity [m/s], and the tilt [degree] of pitch and yaw at both stand-offs (docs/model.md §1.3)."""
+    angles = np.radians(row[1:]).reshape(2, 2)
+    tilt = np.degrees(np.arctan(np.hypot(*np.tan(angles.T))))
+    return row.residual_velocity, float(tilt[0]), float(tilt[1])
