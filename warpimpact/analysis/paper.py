@@ -140,8 +140,8 @@ def closest_table(dataset: xarray.Dataset) -> str:
         where = f"hit {int(dataset[v.HIT][best])} at {y:.2f}, {z:.2f} mm; misfit {misfit[best]:.1f}"
         rows.append((shot, "closest hit of the map", *hits[best], where))
     note = (
-        "Where the two shots hit is not published, so the closest of many hits says little for the model. Misfit: sum of "
-        "squares over 8 m/s, 3° and 5°."
+        "Where the two shots hit is not published, so the closest of many hits says little for the model. Misfit: sum "
+        "of squares over 8 m/s, 3° and 5°."
     )
     return text_of([Section([Table(columns, rows), note])])
 

@@ -148,8 +148,8 @@ def _of_shot(campaign: Campaign, figures: Figures) -> Iterator[Standing]:
         if impact.obliquity > _STRAIGHT:
             yield Standing(
                 "weakening at an angle",
-                "with β below 1 an oblique plate is weaker than a straight one: with the paper's core the limit velocity "
-                "at 30° is 0.90 to 0.92 of that at 0°, and published ones of 20 mm of aluminium are 1.16 of it",
+                "with β below 1 an oblique plate is weaker than a straight one: with the paper's core the limit "
+                "velocity at 30° is 0.90 to 0.92 of that at 0°, where published ones of aluminium are 1.16 of it",
             )
     holed = [layer for layer in layers if layer.open_area]
     if holed and impact.obliquity > _STRAIGHT:
