@@ -26,8 +26,8 @@ OLD_WORDS = {
 
 
 def in_new_words(name: str, angle: object = "30 deg", standoff: object = "", layer: object = 0) -> str:
-    """The text of a measure by its name of an earlier version, with its place beside it: numbers of angles are degrees,
-    those of stand-offs metres. Other texts stay as they are."""
+    """The text of a measure that is given by its name in an earlier version, with its place in keys of its own: angles
+    are in degrees, stand-offs in metres. Other texts stay unchanged."""
     angle = f"{angle} deg" if isinstance(angle, int | float) else angle
     at = f"@{standoff} m" if isinstance(standoff, int | float) else f"@{standoff}" if standoff else ""
     if name in OLD_WORDS:

@@ -1,4 +1,4 @@
-"""The front once more with fresh hits: searching picks lucky numbers, and what it picked is not what it reports."""
+"""The front computed again with fresh hits: a search selects lucky hits, so its own numbers are biased."""
 
 from __future__ import annotations
 
@@ -23,9 +23,9 @@ from warpimpact.statistics.random_effects import positive_share
 Array = NDArray[np.float64]
 
 FIDELITY = "standard"
-"""Of the pilots of the designs of the front, where the campaign does not fix a resolution."""
+"""Fidelity of the pilots of the designs of the front, unless the campaign fixes a resolution."""
 SOLID_HITS = 64
-"""Hits of a solid plate: they differ only in what scatters."""
+"""Number of hits of a solid plate, which differ only in scattered quantities."""
 SAME_WEIGHT = 0.01
 """Areal densities that differ by less than this share are the same weight."""
 
@@ -67,7 +67,7 @@ Follow = Callable[[int, int, str], object]
 
 
 def confirm(design: Design, found: Searched, follow: Follow) -> Question[Confirmed]:
-    """Compute the front, its solid plates and the references with fresh hits at standard."""
+    """Compute the front, its solid plates and the references with fresh hits at the standard fidelity."""
     numbers = spread(found.front, design.search.confirmed)
     chosen = [found.records[int(number)] for number in numbers]
     others = [_reference(design, place) for place in range(len(design.references))]
@@ -91,7 +91,7 @@ def confirm(design: Design, found: Searched, follow: Follow) -> Question[Confirm
 
 
 def spread(front: NDArray[np.int64], most: int) -> NDArray[np.int64]:
-    """At most this number of designs, at even distances along a front and with both ends."""
+    """At most `most` designs at even distances along a front, with both ends."""
     if len(front) <= most:
         return front
     places = np.unique(np.round(np.linspace(0, len(front) - 1, most)).astype(np.int64))
@@ -99,7 +99,7 @@ def spread(front: NDArray[np.int64], most: int) -> NDArray[np.int64]:
 
 
 def fresh_seed(design: Design) -> int:
-    """Seed of hits that no search has computed."""
+    """Seed of hits that the search has not computed."""
     return int(np.random.SeedSequence(design.search.seed, spawn_key=(24,)).generate_state(1)[0] >> 1)
 
 
@@ -128,7 +128,7 @@ def check_references(design: Design) -> None:
 
 
 def _telling(follow: Follow, targets: int, jobs: int, what: str) -> Told:
-    """Follows jobs, of which every target has the same number, by the number of targets that are done."""
+    """Return a function that follows jobs by the number of targets done; all targets have equally many jobs."""
     return lambda done, _: follow(int(targets * done / jobs), targets, what)
 
 
@@ -237,7 +237,7 @@ def _kept(design: Design, front: Sequence[DesignRecord]) -> NDArray[np.bool_]:
 
 
 def groups(design: Design, front: Sequence[DesignRecord]) -> NDArray[np.int64]:
-    """Number of the first design of the front than which each is not certainly better in any objective."""
+    """For each design the number of the first design of the front from which no objective tells it apart as better."""
     found = np.arange(len(front))
     for number, record in enumerate(front):
         leaders = [lead for lead in range(number) if found[lead] == lead]

@@ -32,9 +32,9 @@ from warpimpact.scene.units import (
 
 Array = NDArray[np.float64]
 SCRAMBLINGS = 16
-"""Of the hits of a search: hit k belongs to scrambling k modulo their number."""
+"""Number of scramblings of the hits of a search: hit k belongs to scrambling k modulo this number."""
 _TRIED = 64
-"""Points of a space whose assumptions stand for all."""
+"""Number of points of a space that are asked which assumptions they can have."""
 _Table = dict[str, Any]
 _Name = Annotated[Title, Field(min_length=1, max_length=80)]
 
@@ -127,7 +127,7 @@ class Search(Model):
 
     @property
     def rungs(self) -> list[int]:
-        """Hits of a design, from the first to the most, each four times as many."""
+        """Numbers of hits of a design, from the first to the largest, each four times the one before."""
         rungs = [self.hits]
         while rungs[-1] < self.most_hits:
             rungs.append(min(4 * rungs[-1], self.most_hits))
@@ -184,7 +184,8 @@ class Design:
 
     @property
     def situations(self) -> list[tuple[int, str]]:
-        """Under what every hit is computed: by each threat as given, then by each under every assumption."""
+        """The situations in which every hit is computed: each threat as given, then each threat under every
+        assumption."""
         return [(threat, name) for name in ("", *self.assumed) for threat in range(len(self.threats))]
 
     def tables(self, values: Array) -> dict[str, Any]:

@@ -1,4 +1,4 @@
-"""Designs in, what their hits say out: the one place of a search that computes."""
+"""Designs in, the measured numbers of their hits out: the one place of a search that computes."""
 
 from __future__ import annotations
 
@@ -32,9 +32,9 @@ from warpimpact.solver.worker import Worker
 Array = NDArray[np.float64]
 
 MOST_HITS = 2**20
-"""Images of hits that a sampler of a search has, far more than are computed."""
+"""Number of hits, images counted, of the sampler of a search; far fewer are computed."""
 TOGETHER = 16
-"""Jobs that are computed side by side by a worker at a time, and saved together."""
+"""Number of jobs that a worker computes side by side and saves together."""
 _TURNING = ("obliquity", "azimuth", "pitch", "yaw", "spin")
 
 
@@ -94,7 +94,7 @@ def campaign_of(design: Design, tables: Mapping[str, Any], threat: FacedThreat, 
 
 
 def is_even(tables: Mapping[str, Any]) -> bool:
-    """Whether nothing but plate and shot decides the symmetries of a target."""
+    """Whether plate and shot alone decide the symmetries of a target."""
     layers, impact = tables.get("layer", ()), tables.get("impact", {})
     holed = any({"pattern", "size"} & {*layer} for layer in layers)
     return not holed and not any(isinstance(impact.get(name), dict) for name in _TURNING)
@@ -118,11 +118,11 @@ Told = Callable[[float, bool], object]
 
 
 Share = Callable[[float], object]
-"""Called with how much is done, by any thread."""
+"""Called with the share that is done, by any thread."""
 
 
 def said_by(design: Design, jobs: Sequence[HitJob], worker: Worker, told: Share = lambda done: None) -> list[Said]:
-    """Compute jobs side by side; what one says depends on nothing but the job.
+    """Compute jobs side by side. The result of a job depends on the job alone.
 
     Raises:
         DeviceError: the device is absent.

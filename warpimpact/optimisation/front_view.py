@@ -16,9 +16,9 @@ if TYPE_CHECKING:
     import xarray
 
 _ROUNDED = 1e-6
-"""Relative difference of objectives that are the same."""
+"""Largest relative difference of objectives that count as equal."""
 _NAMED = 3
-"""Assumptions that are named where they turn over that a design is better."""
+"""Most assumptions that are named as turning a comparison over."""
 NEEDED = 0.95
 """Share of the draws of a posterior from which a difference survives."""
 
@@ -86,7 +86,8 @@ def _beats(one: Any, others: Any) -> Any:
 
 
 def _better_text(dataset: xarray.Dataset, place: int, reference: int) -> str:
-    """Such as "4 of 14", and which assumptions turn it over where it is better as given."""
+    """Text such as "4 of 14", with the assumptions that turn the comparison over where the design is better as
+    given."""
     goals = _goals(dataset)
     signs = dataset[f.SIGN].values[goals]
     places = (place, f.UNDER, f.FRESH), (reference, f.REFERENCE_UNDER, f.REFERENCE_FOUND)
@@ -112,7 +113,7 @@ def _moved_text(dataset: xarray.Dataset, place: int, goal: int, names: list[str]
 
 
 def _goals(dataset: xarray.Dataset) -> list[int]:
-    """Places of the objectives among what is asked."""
+    """Indices of the objectives among all that is asked."""
     return np.flatnonzero(np.isnan(dataset[f.LIMIT].values)).tolist()
 
 
@@ -151,7 +152,7 @@ _OF_REFERENCE = (f.REFERENCE_FOUND, f.REFERENCE_LOW, f.REFERENCE_HIGH)
 
 
 def _cells(dataset: xarray.Dataset, names: tuple[str, str, str], place: int) -> Iterator[Any]:
-    """Value and interval of everything asked of a design."""
+    """Cells with value and interval of each objective and bound of a design."""
     for value, low, high in zip(*(dataset[name].values[place] for name in names), strict=True):
         yield from (value, "" if low == high else interval_text(low, high, "{:.4g}".format))
 
@@ -220,7 +221,7 @@ def _numbers(dataset: xarray.Dataset, names: tuple[str, str, str], place: int) -
 
 
 def label_and_unit(label: str) -> tuple[str, str]:
-    """What was asked, without and with its unit: "thickness [mm]" → "thickness", "mm"."""
+    """Label and unit of an objective or bound: "thickness [mm]" → "thickness", "mm"."""
     name, _, unit = str(label).removesuffix("]").partition(" [")
     return name, unit
 
@@ -245,7 +246,7 @@ def _values(dataset: xarray.Dataset, design: int) -> Iterator[tuple[str, str, st
 
 
 def _shrinkage(dataset: xarray.Dataset) -> Iterator[str]:
-    """By how much fresh hits are worse than the search had it."""
+    """How much worse the fresh hits are than the hits of the search."""
     searched, fresh = dataset[f.FOUND].values[dataset[f.NUMBER].values], dataset[f.FRESH].values
     for place, (label, sign, limit) in enumerate(
         zip(dataset[f.LABEL].values, dataset[f.SIGN].values, dataset[f.LIMIT].values, strict=True)
@@ -263,7 +264,7 @@ def _shrinkage(dataset: xarray.Dataset) -> Iterator[str]:
 
 
 def _nearest(dataset: xarray.Dataset) -> Iterator[str]:
-    """Which design comes nearest to the bounds where none keeps them."""
+    """The design that comes nearest to the bounds, if none keeps them."""
     limits, signs, found = dataset[f.LIMIT].values, dataset[f.SIGN].values, dataset[f.FOUND].values
     bounds = np.flatnonzero(~np.isnan(limits))
     over = np.maximum(

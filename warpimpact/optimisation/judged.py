@@ -53,11 +53,11 @@ class DesignRecord:
 
     @property
     def hits(self) -> int:
-        """Hits by each threat."""
+        """Number of hits by each threat."""
         return int(self.said.shape[2])
 
     def more(self, said: Array, seconds: float) -> DesignRecord:
-        """With further hits."""
+        """The record with further hits."""
         joined = np.concatenate([self.said, said], axis=2)
         return replace(self, said=joined, seconds=self.seconds + seconds, means={}, known={})
 

@@ -1,4 +1,4 @@
-"""Limits of the hits of a design: what they say where a search asks for a limit velocity or a limit thickness."""
+"""Limits of the hits of a design, for searches that ask for a limit velocity or a limit thickness."""
 
 from __future__ import annotations
 

@@ -85,7 +85,7 @@ def optimise_to_file(
 
 
 def folder_of(output: Path) -> Path:
-    """Where the campaigns of the designs of a front are."""
+    """Folder of the campaigns of the designs of a front."""
     return output.with_name(f"{output.stem}_designs")
 
 

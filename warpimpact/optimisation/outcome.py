@@ -33,11 +33,11 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 _LONGEST_ENDING = 80
-"""Bytes of a threat's name in the name of a file, which may have 255."""
+"""Most bytes of a threat's name in the name of a file; file systems allow 255 in all."""
 
 
 def key_of(design: Design, place: int) -> str:
-    """Name of an objective or bound in the file, each its own."""
+    """Unique name of an objective or bound in the file."""
     names = [goal.measure for goal in design.asked]
     return names[place] if names.count(names[place]) == 1 else f"{names[place]}_{place}"
 
@@ -218,7 +218,7 @@ Tell = Callable[[str], object]
 
 
 def _write_campaign(path: Path, text: str, tell: Tell | None) -> None:
-    """Write a campaign; one that is there and differs is kept and told where there is `tell`."""
+    """Write a campaign. An existing file with another content is kept and reported if `tell` is given."""
     if tell is not None and path.exists():
         if not path.is_file() or path.read_bytes() != text.encode():
             tell(f"{path}: differs from the design of the front and is kept; --overwrite replaces it")
@@ -228,7 +228,7 @@ def _write_campaign(path: Path, text: str, tell: Tell | None) -> None:
 
 
 def endings(threats: Sequence[FacedThreat]) -> list[str]:
-    """Endings of the names of campaign files, by threat, each its own; none where there is one threat."""
+    """Unique endings of the names of campaign files, by threat; empty for a single threat."""
     if len(threats) == 1:
         return [""]
     words = ["".join(c if c.isalnum() else "_" for c in threat.name) for threat in threats]

@@ -1,4 +1,4 @@
-"""The search: points that the optimiser asks for, few hits first, more where the paired difference does not decide."""
+"""The search: few hits of the points that the optimiser asks for, more where the paired difference does not decide."""
 
 from __future__ import annotations
 
@@ -20,9 +20,9 @@ from warpimpact.runs.questions import Question
 Array = NDArray[np.float64]
 
 IDLE = 25
-"""Generations without a design that is new and keeps the constraints, after which a search ends."""
+"""Number of generations without a new design that keeps the constraints, after which a search ends."""
 FIDELITY = "draft"
-"""Of the pilots of a search, where the campaign does not fix a resolution."""
+"""Fidelity of the pilots of a search, unless the campaign fixes a resolution."""
 MARGIN = 0.1
 """Share of the box of the first generation by which the reference of the hypervolume lies beyond it."""
 NEIGHBOURHOOD = 0.5
@@ -148,7 +148,7 @@ class _State:
         return len(self.records)
 
     def generation(self, points: Sequence[Array]) -> Question[None]:
-        """Compute those points that are new and keep the constraints."""
+        """Compute the points that are new and keep the constraints."""
         new: dict[bytes, DesignRecord] = {}
         for values in points:
             key = values.tobytes()
@@ -166,7 +166,7 @@ class _State:
             self._measure()
 
     def feasible(self, points: Iterable[Array]) -> list[Array]:
-        """Those points that keep the constraints."""
+        """The points that keep the constraints."""
         found = []
         for values in points:
             key = values.tobytes()
@@ -186,7 +186,7 @@ class _State:
         self.drafts[key] = DesignRecord(values, tables, found.campaign.target.areal_density, (), nothing)
 
     def _compute(self, new: dict[bytes, DesignRecord]) -> Question[None]:
-        """Hits of designs, from rung to rung for those that may be on the front."""
+        """Compute the hits of designs; designs that may be on the front get the hits of the next rung."""
         levels = yield from self._levels(list(new.values()))
         for key, of_threats in zip(list(new), levels, strict=True):
             one = new[key]
@@ -205,7 +205,7 @@ class _State:
         self.records |= new
 
     def _more(self, records: Sequence[DesignRecord], first: int, stop: int) -> Question[list[DesignRecord]]:
-        """Designs with their hits up to so many."""
+        """The designs with hits `first` to `stop` added."""
         design = self.design
         if not design.keys:
             return [record.more(np.zeros((len(design.situations), 0, stop)), 0.0) for record in records]
@@ -231,7 +231,7 @@ class _State:
         return found
 
     def _levels(self, records: Sequence[DesignRecord]) -> Question[list[tuple[str, ...]]]:
-        """Numerics of designs for every threat: those of the pilot of a neighbour, or of their own."""
+        """Numerics of designs for every threat, from the pilot of a neighbour or from their own."""
         places = [self._place(record.values) for record in records]
         if not self.design.keys:
             return [("",) * len(self.design.threats) for _ in records]
@@ -252,7 +252,8 @@ class _State:
         return min(near, key=lambda pair: pair[0])[1]
 
     def _place(self, values: Array) -> Array:
-        """Shares of the ranges; numbers of choices, and what does not count, lie far apart if they differ."""
+        """Coordinates in shares of the ranges. Different choices lie far apart, as do variables of which only one
+        counts."""
         shares = [
             1e6 * value if variable.labels else (value - variable.low) / ((variable.high - variable.low) or 1.0)
             for variable, value in zip(self.design.space.variables, values, strict=True)
@@ -260,8 +261,7 @@ class _State:
         return np.asarray(np.nan_to_num(np.array(shares), nan=-1e6))
 
     def _admit(self, new: Sequence[DesignRecord]) -> None:
-        """Those of some designs to the front that keep the bounds, have all the hits that they may have, and are
-        dominated by none."""
+        """Admit to the front the designs that keep the bounds, have all their hits, and are dominated by none."""
         most = self.design.search.most_hits if self.design.keys else self.design.search.hits
         full = [record for record in new if record.hits >= most and not excesses(self.design, record).any()]
         may = [*self.front, *(record for record in full if np.isfinite(objectives(self.design, record)).all())]
@@ -303,7 +303,7 @@ class _State:
         return told[:, :count], told[:, count:]
 
     def tell(self, what: str) -> None:
-        """Say how far the search is, and what is computed."""
+        """Report how far the search is, and what is computed."""
         volume = self.history[-1][1] if self.history else math.nan
         told = (self.done, self.total, self.certain, self.resumed, len(self.front), volume)
         self.follow(SearchProgress(*told, what))

@@ -31,7 +31,7 @@ def check_installed() -> None:
 
 
 class Searcher:
-    """Points of a space, a generation at a time. They depend on the seed and on what was told alone.
+    """Points of a space, a generation at a time. They depend on the seed and on the results of earlier points alone.
 
     Args:
         objectives, constraints: how many.

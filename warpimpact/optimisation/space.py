@@ -51,7 +51,7 @@ class DesignVariable:
 
     @property
     def count(self) -> int | None:
-        """How many values it has; None of a continuous one."""
+        """Number of values; None of a continuous variable."""
         if self.labels:
             return len(self.labels)
         if self.low == self.high:
@@ -71,14 +71,14 @@ class DesignVariable:
         return min(max(round(value, digits), self.low), self.high)
 
     def written(self, value: float) -> Any:
-        """A value as it stands in a campaign."""
+        """A value in the form of a campaign."""
         if self.labels:
             return self.values[int(value)]
         number = int(value) if not self.unit and value == int(value) and self.step is not None else value
         return f"{value:.12g} {self.unit}" if self.unit else number
 
     def text(self, value: float) -> str:
-        """A value for a person."""
+        """A value as text for people."""
         return self.labels[int(value)] if self.labels else f"{value:.6g} {self.unit}".strip()
 
 
@@ -113,7 +113,7 @@ class Space:
                 yield values
 
     def some(self, count: int, seed: int) -> Iterator[Array]:
-        """Random points, so many."""
+        """The given number of random points."""
         random = np.random.default_rng(seed)
         for _ in range(count):
             yield self.at(
@@ -139,7 +139,7 @@ class Space:
         return dict(data)
 
     def text(self, values: Array) -> str:
-        """A point for a person."""
+        """A point as text for people."""
         told = zip(self.variables, values, strict=True)
         return ", ".join(
             f"{variable.name} = {variable.text(value)}" for variable, value in told if not math.isnan(value)
