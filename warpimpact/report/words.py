@@ -11,6 +11,7 @@ import numpy as np
 import xarray
 from markupsafe import Markup
 
+from warpimpact.analysis.assumptions_view import assumptions_view
 from warpimpact.analysis.comparison import compare
 from warpimpact.analysis.comparison_text import Comparison, best_rows, comparison_view
 from warpimpact.analysis.effectiveness import depth_note, effectiveness, measures_table
@@ -70,6 +71,7 @@ def result_content(name: str, dataset: xarray.Dataset) -> dict[str, Any]:
         "measures": measures,
         "through": Markup(table_html(_through(dataset), means_over)),
         "protects": Markup(table_html(measures_table(measures), against_solid)),
+        "assumed": Markup(html_of([assumptions_view(dataset)])),
         "provenance": {words(key): str(attributes[key]) for key in _PROVENANCE if key in attributes},
         "speed": float(f"{attributes.get(attr.HITS_PER_SECOND, 0.0):.2g}"),
     }
