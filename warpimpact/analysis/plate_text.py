@@ -45,6 +45,8 @@ def solid_plate(dataset: Result) -> str:
     if not {"resistance", "density"} <= material.keys() or attr.AREAL_DENSITY not in attributes:
         return ""
     thickness = 1e3 * float(attributes[attr.AREAL_DENSITY]) / material["density"]
+    if attr.CONTINUUM in attributes:
+        return f"{thickness:.3g} mm of {json.loads(attributes[attr.CONTINUUM])['materials'][0]} by finite elements"
     return f"{thickness:.3g} mm of {1e-9 * material['resistance']:.3g} GPa, {_weakens(material)}"
 
 
@@ -69,6 +71,8 @@ def solid_note(dataset: Result) -> str:
         return ""
     note = f"The solid plate is {plate}, the material of the plate in front."
     material = json.loads(dataset.attrs[attr.MATERIAL])
+    if attr.CONTINUUM in dataset.attrs:
+        return note
     if not material.get("degradation", 1.0) < 1.0 or material.get("degradation_depth") is not None:
         return note
     note += " A thick plate that weakens as a whole holds less than a real one, so a ratio to it flatters the target."

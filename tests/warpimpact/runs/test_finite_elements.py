@@ -118,6 +118,8 @@ def test_the_command_computes_hits_of_a_result(
     assert main(command) == 0
     assert files.read(tmp_path / "map_continuum.nc").sizes["hit"] == 2
     assert "ARMOX560T: assumed" in capsys.readouterr().out
+    assert main(["inspect", "map_continuum.nc"]) == 0
+    assert "The solid plate is 2.61 mm of ARMOX560T by finite elements" in capsys.readouterr().out
     assert main(command) == 2
     assert "exists already" in capsys.readouterr().err
 
