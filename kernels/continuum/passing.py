@@ -28,7 +28,7 @@ def build(variant: Variant) -> SimpleNamespace:
     mesh_nodes, contact = nodes.build(variant), penalty.build(variant)
     vec3, zero, half = wp.types.vector(3, real), wp.float64(0.0), wp.float64(0.5)
     courant, growth, behind, quiet = (wp.float64(value) for value in (COURANT, GROWTH, BEHIND, QUIET))
-    still = wp.float64(constants.STILL.value)
+    still, spent = wp.float64(constants.STILL.value), wp.float64(constants.SPENT.value)
     PERFORATED, ARRESTED = wp.constant(int(Status.PERFORATED)), wp.constant(int(Status.ARRESTED))
     RICOCHETED, MISSED = wp.constant(int(Status.RICOCHETED)), wp.constant(int(Status.MISSED))
     UNFINISHED, NOT_FINITE = wp.constant(int(Status.UNFINISHED)), wp.constant(int(Status.NOT_FINITE))
@@ -42,6 +42,7 @@ def build(variant: Variant) -> SimpleNamespace:
         energy = move.kinetic_energy(core.body, move.axis_of(state.attitude), state.velocity, state.angular_momentum)
         untouched = flight.first_touch < zero
         free = untouched or flight.time - flight.last_touch > quiet
+        swings = state.velocity[0] <= zero and energy < spent * limits.impact_energy  # on, in its hole
         status = running
         if not (energy < wp.float64(2.0) * limits.impact_energy):  # what is no number, too
             status = NOT_FINITE
@@ -51,7 +52,7 @@ def build(variant: Variant) -> SimpleNamespace:
             status = PERFORATED
         elif foremost < -behind and state.velocity[0] < zero and free:
             status = wp.where(untouched, MISSED, RICOCHETED)
-        elif energy < still * limits.impact_energy:
+        elif swings or energy < still * limits.impact_energy:
             status = ARRESTED
         elif flight.time > limits.longest:
             status = UNFINISHED
