@@ -183,7 +183,9 @@ def ranked(one: np.ndarray, other: np.ndarray) -> float:
 
 def print_table(path: Path) -> None:
     rows = written(path)
-    print("| plate | hits | fast law | measure | bias | rms | rank correlation |\n|---|---|---|---|---|---|---|")
+    heads = " | ".join(f"{name.replace('_', ' at ')}, {unit}" for name, unit in MEASURES.items())
+    print(f"Bias, root mean square and rank correlation:\n\n| plate | hits | fast law | {heads} |")
+    print("|---|---|---|---|---|---|")
     for plate, case in CASES.items():
         truth, fast = measured(rows, plate, "continuum"), measured(rows, plate, "fast")
         hits = sorted({*truth} & {*fast})
@@ -198,12 +200,13 @@ def print_table(path: Path) -> None:
             told.append((f"{words}, {name}", those, fast_law(case, shots[np.array(those)], *one)))
         for name, those, values in told:
             apart = values - np.array([truth[k] for k in those])
-            for k, (measure, unit) in enumerate(MEASURES.items()):
+            cells = []
+            for k in range(len(MEASURES)):
                 known = ~np.isnan(apart[:, k])
                 rank = ranked(values[known, k], np.array([truth[h][k] for h in those])[known])
                 bias, rms = apart[known, k].mean(), np.sqrt((apart[known, k] ** 2).mean())
-                head = f"| {plate} | {known.sum()} | {name} | {measure.replace('_', ' at ')}"
-                print(f"{head}, {unit} | {bias:+.3g} | {rms:.3g} | {rank:.2f} |")
+                cells.append(f"{bias:+.2g}, {rms:.2g}, {rank:.2f}")
+            print(f"| {plate} | {len(those)} | {name} | {' | '.join(cells)} |")
     print("\n| plate | hits | failed | seconds of a core per hit |\n|---|---|---|---|")
     for plate in CASES:
         chosen = [row for row in rows if row["plate"] == plate and row["model"] == "continuum"]
