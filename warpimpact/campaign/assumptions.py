@@ -23,7 +23,7 @@ class Assumptions(Model):
     Attributes:
         compute: whether alternatives are computed; unless told, where a pilot finds the resolution.
         hits: of each alternative, at most; unless told, so many that all of them cost a run of 16,384 hits some 15 %,
-            but 64 to 256.
+            but 64 to 256, and fewer where a hit takes long.
         resistance: factors of the resistance Y of all layers. Unless told, they are the ends of the catalogue's 90 %
             interval where Y is the catalogue's, and 0.7 and 1.3 where it is yours.
         degradation: β of the layers that weaken; unless told, 1. Plates with holes that do not weaken get 0.8 in 1 µs,

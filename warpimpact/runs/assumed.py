@@ -22,7 +22,8 @@ from warpimpact.results.dataset import assumed_columns, assumed_table
 from warpimpact.results.table import HitTable
 from warpimpact.runs.describe import is_double
 from warpimpact.runs.pilot_hits import places_of, shots_at
-from warpimpact.scene import Scene, Shots
+from warpimpact.scene import Numerics, Scene, Shots
+from warpimpact.solver.prepare import prepare
 
 SHARE = 1.0 / 128.0
 """Hits of an alternative over those of a run: some twelve alternatives cost a run a tenth, those whose plates have
@@ -31,6 +32,9 @@ FEWEST, MOST = 64, 256
 """Hits of an alternative unless the campaign tells how many."""
 FEWEST_LIMITS = 8
 """The same of limits at least, each of which takes several runs."""
+SECONDS = 5.0
+"""Of a core that all alternatives may take where that is more than their share of the run: fewer hits are taken of what
+takes long, but FEWEST_GROUPS."""
 FEWEST_GROUPS = 8
 """Hits or bursts of an alternative that are no images of each other, at least."""
 
@@ -43,19 +47,20 @@ def has_assumptions(campaign: Campaign) -> bool:
     return campaign.numerics.explicit is None if asked is None else asked
 
 
-def assumed(campaign: Campaign, compute: Computed, *, limits: bool = False) -> HitTable:
+def assumed(campaign: Campaign, numerics: Numerics, compute: Computed, *, limits: bool = False) -> HitTable:
     """Hits under assumptions, with their attributes; empty of a campaign that has no alternative.
 
     Args:
+        numerics: of the run, which fix a resolution.
         compute: the outcomes of the shots of scenes.
         limits: whether it computes limits: few, which depend on no stand-off, and not which cores would break.
     """
     begin = time.perf_counter()
     images, group = len(campaign.symmetries), len(campaign.symmetries) * campaign.at_a_plate
-    places = places_of(campaign, _groups(campaign, FEWEST_LIMITS if limits else FEWEST))
+    others = [alternative for alternative in alternatives(campaign) if not limits or alternative.moves_limits]
+    places = places_of(campaign, _groups(campaign, numerics, len(others), FEWEST_LIMITS if limits else FEWEST))
     shots = shots_at(campaign, places)
-    possible = [alternative for alternative in alternatives(campaign) if alternative.is_possible(shots)]
-    possible = [alternative for alternative in possible if not limits or alternative.moves_limits]
+    possible = [alternative for alternative in others if alternative.is_possible(shots)]
     if not possible:
         return HitTable.of({}, {}, {})
     # What turns a shot leaves no image of it.
@@ -73,10 +78,15 @@ def assumed(campaign: Campaign, compute: Computed, *, limits: bool = False) -> H
     return assumed_table(columns, attributes, double=is_double(campaign))
 
 
-def _groups(campaign: Campaign, fewest: int) -> int:
-    """How many hits or bursts that are no images of each other each alternative has."""
+def _groups(campaign: Campaign, numerics: Numerics, others: int, fewest: int) -> int:
+    """How many hits or bursts that are no images of each other each alternative has. The speed of the machine does not
+    count."""
     group, total = len(campaign.symmetries) * campaign.at_a_plate, len(campaign.sampler())
-    hits = campaign.assumptions.hits or min(max(fewest, int(SHARE * total)), MOST)
+    hits = campaign.assumptions.hits
+    if hits is None:
+        first = shots_at(campaign, places_of(campaign, 1))
+        in_time = int(SECONDS / (max(others, 1) * prepare(campaign.scene, first, numerics).seconds))
+        hits = min(max(min(fewest, in_time), int(SHARE * total)), MOST)
     return min(max(FEWEST_GROUPS, hits // group), total // group)
 
 

@@ -51,7 +51,8 @@ class HitMap:
 
     def assumed(self, campaign: Campaign, found: Found | None, worker: Worker) -> HitTable:
         """See `Computation.assumed`."""
-        return assumed(campaign, lambda scenes: simulate_many(scenes, numerics_of(campaign, found), worker))
+        numerics = numerics_of(campaign, found)
+        return assumed(campaign, numerics, lambda scenes: simulate_many(scenes, numerics, worker))
 
     def pilot(
         self, campaign: Campaign, worker: Worker, trying: Callable[[int], object] = lambda level: None

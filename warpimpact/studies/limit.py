@@ -174,7 +174,7 @@ class LimitMap:
 
             return side_by_side(of_scene, len(scenes), worker)
 
-        return assumed(campaign, searched, limits=True)
+        return assumed(campaign, numerics, searched, limits=True)
 
     def pilot(
         self, campaign: Campaign, worker: Worker, trying: Callable[[int], object] = lambda level: None

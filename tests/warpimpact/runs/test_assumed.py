@@ -22,6 +22,7 @@ from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
 from warpimpact.results.files import write
 from warpimpact.results.measures import Measure
+from warpimpact.runs import assumed
 from warpimpact.scene import PolynomialCore
 from warpimpact.view.view import text_of
 
@@ -205,6 +206,14 @@ def test_a_pilot_has_assumptions_and_a_given_resolution_has_none_unless_told() -
     assert "not known: no hits were computed under them; [assumptions] compute = true" in note
 
 
+def test_fewer_hits_are_taken_of_what_takes_long(monkeypatch: pytest.MonkeyPatch) -> None:
+    many = {"compute": True}
+    assert run(assumptions=many).sizes["assumed"] == 14 * 64
+    monkeypatch.setattr(assumed, "SECONDS", 1e-9)
+    assert run(assumptions=many).sizes["assumed"] == 14 * 8
+    assert run(assumptions=ON).sizes["assumed"] == 14 * 16  # as the campaign asks
+
+
 def test_numbers_move_by_what_the_same_hits_tell() -> None:
     found = run()
     tilt = Measure.parse("mean(tilt@130mm)")
@@ -231,9 +240,9 @@ def test_a_limit_moves_with_what_the_catalogue_leaves_open() -> None:
     file = Path("limit.toml")
     file.write_text(text, encoding="utf-8")
     assert main(["limit", str(file), "-o", "limit.nc", "--device", "cpu", "-q"]) == 0
-    with xarray.open_dataset("limit.nc", group="assumed") as assumed, xarray.open_dataset("limit.nc") as hits:
+    with xarray.open_dataset("limit.nc", group="assumed") as otherwise, xarray.open_dataset("limit.nc") as hits:
         names = json.loads(hits.attrs[attr.ASSUMPTIONS])
-        shares = assumed["assumed_limit_velocity"].values / hits["limit_velocity"].values[0]
+        shares = otherwise["assumed_limit_velocity"].values / hits["limit_velocity"].values[0]
     limits = dict(zip(names, shares, strict=True))
     known = campaign(**named)
     y = {one.name: one.layers["resistance", 0] for one in alternatives(known) if "Y at its" in one.name}
@@ -247,9 +256,9 @@ def test_a_limit_of_a_plate_that_might_weaken_weakens_by_path() -> None:
     named = PLATE | {"degradation": 1.0, "degradation_length": "1 mm", "degradation_depth": "8 mm"}
     Path("limit.toml").write_text(json.dumps(TABLES | {"plate": named, "hits": {"count": 1}}), encoding="utf-8")
     assert main(["limit", "limit.toml", "-o", "limit.nc", "--device", "cpu", "-q"]) == 0
-    with xarray.open_dataset("limit.nc", group="assumed") as assumed, xarray.open_dataset("limit.nc") as hits:
+    with xarray.open_dataset("limit.nc", group="assumed") as otherwise, xarray.open_dataset("limit.nc") as hits:
         place = json.loads(hits.attrs[attr.ASSUMPTIONS])["weakening (β = 0.8 in 1 µs)"]
-        assert assumed["assumed_limit_velocity"].values[place] < 0.9 * hits["limit_velocity"].values[0]
+        assert otherwise["assumed_limit_velocity"].values[place] < 0.9 * hits["limit_velocity"].values[0]
 
 
 def test_verdicts_are_counted_and_what_turns_them_over_is_named() -> None:
