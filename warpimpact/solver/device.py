@@ -10,8 +10,8 @@ import tempfile
 import threading
 import time
 import zlib
-from collections.abc import Callable
-from contextlib import suppress
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, nullcontext, suppress
 from functools import cache
 from pathlib import Path
 from typing import Any, TypeVar
@@ -137,16 +137,32 @@ def _load(kernel: Any, device: Any) -> None:
     if loaded is not None and loaded.module_hash == module.get_module_hash(block):
         return
     folder = Path(wp.config.kernel_cache_dir, module.get_module_identifier(block))
-    if not _is_whole(folder):
-        _remove(folder)
-    try:
-        module.load(device, block)
-    except Exception:  # another process has removed it meanwhile; a kernel that cannot be compiled fails again
-        _remove(folder)
-        module.load(device, block)
-    if not _is_whole(folder):
-        _seal(folder)
+    with nullcontext() if _is_whole(folder) else _alone(folder):
+        if not _is_whole(folder):
+            _remove(folder)
+        try:
+            module.load(device, block)
+        except Exception:  # another process has removed it meanwhile; a kernel that cannot be compiled fails again
+            _remove(folder)
+            module.load(device, block)
+        if not _is_whole(folder):
+            _seal(folder)
     _logger.debug("%s on %s: loaded in %.2f s", kernel.key, device, time.perf_counter() - begin)
+
+
+@contextmanager
+def _alone(folder: Path) -> Iterator[None]:
+    """Wait until no other process compiles the module of a folder: processes that begin together would compile it once
+    each. Where no lock can be had, they do."""
+    from filelock import FileLock  # takes longer to import than some shots, and only who compiles needs it
+
+    lock = FileLock(folder.with_name(f"{folder.name}.lock"))
+    with suppress(OSError, NotImplementedError):
+        lock.acquire()
+    try:
+        yield
+    finally:
+        lock.release()
 
 
 def _sums(folder: Path) -> dict[str, int]:

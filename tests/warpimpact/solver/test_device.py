@@ -3,11 +3,13 @@
 import json
 import os
 import shutil
+import threading
 from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 import warp as wp
+from filelock import FileLock
 
 from warpimpact.kernels.variant import Variant
 from warpimpact.solver.device import DeviceError, find_device, load
@@ -89,6 +91,29 @@ def test_a_damaged_cache_is_compiled_again(
     before = file.stat().st_mtime_ns
     assert twos() == [2.0, 2.0]
     assert file.stat().st_mtime_ns == before  # what is whole is not compiled again
+
+
+def test_what_another_process_compiles_is_waited_for(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def four(values: wp.array(dtype=wp.float32)) -> None:
+        values[wp.tid()] = 4.0
+
+    kernel, device = Variant().kernel(four), find_device("cpu")
+    monkeypatch.setattr(wp.config, "kernel_cache_dir", str(tmp_path / "cache"))
+    (tmp_path / "cache").mkdir()
+    load(kernel, device)
+    kernel.module.unload()
+    (folder,) = (path for path in (tmp_path / "cache").iterdir() if path.is_dir())
+    folder.rename(tmp_path / "compiled")
+    with FileLock(folder.with_name(f"{folder.name}.lock")):  # as another process that compiles it
+        waiting = threading.Thread(target=load, args=(kernel, device))
+        waiting.start()
+        waiting.join(0.5)
+        assert waiting.is_alive()
+        assert not folder.exists()
+        (tmp_path / "compiled").rename(folder)
+        before = (folder / "checksums.json").stat().st_mtime_ns
+    waiting.join()
+    assert (folder / "checksums.json").stat().st_mtime_ns == before  # and was not compiled again
 
 
 def test_a_damaged_cache_that_cannot_be_removed_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
