@@ -31,6 +31,7 @@ SMALLER = {
 FEWER = {
     "run": ["--count", "128"],
     "compare": ["--count", "128"],
+    "continuum": ["--hits", "1"],
     "report": ["--trajectories", "1"],
 }
 
