@@ -129,7 +129,7 @@ def test_a_result_is_named_where_a_text_is_taken(
     files.write(make_result(20), Path("a.nc"))
     files.write(make_result(20), Path("b.toml"))
     told = RESULT.told("", "a TOML file").removeprefix(": ")
-    for command in ("run", "plate", "sweep", "optimise", "identify", "test", "limit"):
+    for command in ("run", "plate", "sweep", "optimise", "test", "limit"):
         assert _said([command, "a.nc"], capsys) == f"a.nc: {told}"
     assert _said(["export", "b.toml"], capsys) == f"b.toml: {told}"
     for read in (run, read_design, read_fit):
