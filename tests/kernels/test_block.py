@@ -177,7 +177,7 @@ def test_block_computes_what_one_thread_computes(name: str, device: str) -> None
 def test_lanes_that_run_one_after_another_compute_what_one_thread_computes(
     name: str, in_blocks: pytest.MonkeyPatch
 ) -> None:
-    scene, shots = scene_of(name, 12)
+    scene, shots = scene_of(name, 6 if wp.config.mode == "debug" else 12)  # a lane at a time, and every place checked
     by_block = simulate.simulate(scene, shots, numerics=BLOCK, device="cpu")
     assert_same(by_block, by_one_thread(scene, shots))
     again = simulate.simulate(scene, shots, numerics=BLOCK, device="cpu")

@@ -150,6 +150,7 @@ def test_shot_without_an_end_is_given_up(monkeypatch: pytest.MonkeyPatch, device
     assert np.isnan(outcomes.residual_velocity[0])
 
 
+@pytest.mark.skipif("config.getoption('warp_mode') == 'debug'", reason="others read and write these arrays")
 def test_load_too_small_for_its_energy_leaves_the_motion_finite(device: str) -> None:
     # β takes all but 2^-126 of the resistance. The energy of such a kick is a number whose inverse is infinite.
     cone = ConeCore(length=26e-3, diameter=1.3e-3, mass=1e-5)
