@@ -136,10 +136,10 @@ def _verdicts(
     *,
     paired: bool,
 ) -> Iterator[Verdict]:
-    """Which of two plates has the better value as given and under every assumption of either; nothing where neither has
-    assumptions, or where hits give no interval."""
+    """Which of two plates has the better value as given and under every assumption of either; nothing where one has no
+    hits under assumptions, or where hits give no interval."""
     measure, moves = scored[0].score.measure, [side.of.moves for side in scored]
-    if measure.higher_is_better is None or not any(moves):
+    if measure.higher_is_better is None or not all(moves):
         return
     one, other = (
         _side(side, dataset, {**dealing(dataset), "confidence": confidence}, by_ratio=False)
