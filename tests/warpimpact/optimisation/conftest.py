@@ -36,7 +36,15 @@ measure = "areal_density"
 [[objectives]]
 measure = "mean(residual_energy_fraction)"
 """
-SEARCH = "[search]\nallow_untested = true\ndesigns = 12\npopulation = 6\nhits = 16\nmost_hits = 64\nconfirm_hits = 64\n"
+SEARCH = """[search]
+allow_untested = true
+designs = 12
+population = 6
+hits = 16
+most_hits = 64
+confirm_hits = 64
+assumed_hits = 0
+"""
 
 
 def design(*parts: str, folder: Path = Path()) -> Design:

@@ -196,7 +196,8 @@ def test_cores_that_would_break_are_those_of_a_campaign_with_that_strength() -> 
     assert 0.0 < share < 1.0
 
 
-def test_a_pilot_has_assumptions_and_a_given_resolution_has_none_unless_told() -> None:
+def test_a_pilot_has_assumptions_and_a_given_resolution_has_none_unless_told(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(warpimpact.runs.run, "has_assumptions", assumed.has_assumptions)
     by_default = TABLES | {"assumptions": {}}
     assert v.ASSUMPTION not in run(**by_default)
     piloted = run(**by_default | {"numerics": {"fidelity": "draft"}})
