@@ -83,5 +83,5 @@ def assumptions_lines(dataset: Result) -> list[str]:
     lines = []
     for measure, estimate in estimated(dataset, _first(dataset)).items():
         if moved := largest_text(estimate.times(measure.display.factor)):
-            lines.append(f"if wrong, these move the {measure.title} most: {moved}")
+            lines.append(f"{measure.title} under other assumptions: {moved}")
     return [*lines, *notes_of(dataset)] if lines else []
