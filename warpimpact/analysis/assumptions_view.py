@@ -75,7 +75,7 @@ def notes_of(dataset: Result, *, known: bool = True) -> Iterator[str]:
 def _why_not(dataset: Result) -> str:
     if v.ASSUMPTION in dataset:
         return "none of these hits was computed under them"
-    return "no hits were computed under them; [assumptions] compute = true does that where a resolution is given"
+    return "no hits were computed under them; [assumptions] compute = true has them computed"
 
 
 def assumptions_lines(dataset: Result) -> list[str]:
