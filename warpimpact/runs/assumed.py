@@ -33,8 +33,9 @@ FEWEST, MOST = 64, 256
 FEWEST_LIMITS = 8
 """The same of limits at least, each of which takes several runs."""
 SECONDS = 2.0
-"""Of a core, for passages that nothing hinders, that all alternatives may take where that is more than their share of the
-run: fewer hits are taken of what takes long, but FEWEST_GROUPS. Cores that slide and stop take several times as long."""
+"""Of a core, for passages that nothing hinders, that all alternatives may take where that is more than their share of
+the run: of what takes long fewer hits are taken, but FEWEST_GROUPS. Cores that slide and stop take several times as
+long."""
 FEWEST_GROUPS = 8
 """Hits or bursts of an alternative that are no images of each other, at least."""
 
