@@ -7,7 +7,7 @@ import xarray
 from warpimpact.analysis.shot_by_shot import rank_correlation, shot_by_shot
 from warpimpact.kernels.status import Status
 from warpimpact.results import attributes as attr
-from warpimpact.view.view import text_of
+from warpimpact.view.view import Table, text_of
 
 
 def result(hits: list[int], velocity: list[float], status: list[int], attributes: dict[str, str]) -> xarray.Dataset:
@@ -31,7 +31,9 @@ def test_bias_rms_ranks_and_the_worst_hits_are_those_of_the_shared_sound_hits() 
         [1, 2, 3, 4], [700.0, 724.0, 726.0, np.nan], [0, 0, 0, int(Status.HOURGLASSED)], {attr.CONTINUUM: "{}"}
     )
     (section,) = shot_by_shot({"fast": fast, "slow": slow})
-    row = section.parts[1].rows[0]  # type: ignore[union-attr]
+    table = section.parts[1]
+    assert isinstance(table, Table)
+    row = table.rows[0]
     apart = np.array([10.0, -4.0, 4.0])
     assert row[1:5] == pytest.approx((3, apart.mean(), np.sqrt((apart**2).mean()), 1.0))
     assert row[5].startswith("1 (+10)")

@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -80,11 +81,11 @@ def test_a_hit_that_is_there_is_not_computed_again(
     output, straight = tmp_path / "cut.nc", files.read(computed(tmp_path / "straight.nc", campaign_file))
     march, calls = strikes.March.ended, []
 
-    def broken_off(self: strikes.March, *arguments: object, **more: object) -> strikes.Struck:
+    def broken_off(self: strikes.March, *arguments: Any, **more: Any) -> strikes.Struck:
         calls.append(self)
         if len(calls) == 3:
             raise KeyboardInterrupt
-        return march(self, *arguments, **more)  # type: ignore[arg-type]
+        return march(self, *arguments, **more)
 
     monkeypatch.setattr(strikes.March, "ended", broken_off)
     with pytest.raises(KeyboardInterrupt, match="saved"), executor_for("cpu", apart=False) as executor:
