@@ -284,6 +284,12 @@ def test_verdicts_are_counted_and_what_turns_them_over_is_named() -> None:
     assert clear.text in comparison_text(comparison)
 
 
+def test_what_the_hits_leave_open_gives_no_verdict() -> None:
+    datasets = [run(hits={"count": 64, "seed": seed}) for seed in (1, 2)]  # one plate, hit elsewhere
+    (verdict,) = compare(datasets, ["one", "other"], ["mean(residual_velocity)"]).verdicts
+    assert (verdict.given, {*verdict.under.values()}) == (0, {0})
+
+
 def test_the_command_prints_every_number_under_every_assumption(capsys: pytest.CaptureFixture[str]) -> None:
     plates = [{"name": "thick"} | PLATE, {"name": "thin"} | PLATE | {"thickness": "2 mm"}]
     Path("plates.toml").write_text(json.dumps(TABLES | {"plate": plates}), encoding="utf-8")
