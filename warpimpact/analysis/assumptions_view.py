@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING
 
 from warpimpact.analysis.assumptions import would_break
@@ -30,15 +30,22 @@ def assumptions_view(dataset: Result, measures: Sequence[Measure] = ()) -> Secti
         measures: whose numbers are shown; by default those that a person looks at first.
     """
     estimates = estimated(dataset, measures or _first(dataset))
+    table = assumptions_table(
+        {measure.title: estimate.times(measure.display.factor) for measure, estimate in estimates.items()}
+    )
+    notes = notes_of(dataset, known=bool(table.rows))
+    return Section([*([table] if table.rows else []), *notes], "what nobody measured")
+
+
+def assumptions_table(estimates: Mapping[str, Estimate]) -> Table:
+    """Between what values assumptions move numbers, and what moves them most; a row for each that is known, by name."""
     columns = [Column(header, write=rough_text, right=True) for header in ("as given", "lowest", "highest")]
     rows = [
-        (measure.title, shown.value, *shown.assumed, largest_text(shown) or "nothing moves it")
-        for measure, estimate in estimates.items()
-        for shown in [estimate.times(measure.display.factor)]
-        if shown.assumed is not None
+        (name, estimate.value, *estimate.assumed, largest_text(estimate) or "nothing moves it")
+        for name, estimate in estimates.items()
+        if estimate.assumed is not None
     ]
-    table = Table((Column(), *columns, Column("moved most by")), rows)
-    return Section([*([table] if rows else []), *notes_of(dataset, known=bool(rows))], "what nobody measured")
+    return Table((Column(), *columns, Column("moved most by")), rows)
 
 
 def _first(dataset: Result) -> list[Measure]:

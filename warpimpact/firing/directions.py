@@ -16,13 +16,15 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field, model_validator
 
+from warpimpact.campaign.alternatives import alternatives
 from warpimpact.campaign.campaign import Campaign
 from warpimpact.campaign.text import CampaignError
 from warpimpact.kernels.status import Status
 from warpimpact.records.group import failures
+from warpimpact.runs.assumed import has_assumptions
 from warpimpact.runs.executor import Job
 from warpimpact.runs.questions import Arrays, Question, Round, RoundProgress
-from warpimpact.scene import Numerics, Shots
+from warpimpact.scene import Numerics, Scene, Shots
 from warpimpact.scene.model import Model
 from warpimpact.scene.units import Angle, Number, PositiveSpeed
 from warpimpact.solver.prepare import prepare
@@ -35,6 +37,8 @@ Array = NDArray[np.float64]
 Angles = Annotated[tuple[Angle, ...], Field(min_length=1, max_length=64)]
 
 _STEEPEST = math.radians(89.0)
+ASSUMED_HITS = 64
+"""Hits under each assumption, over all directions, unless the campaign tells how many."""
 
 
 class Directions(Model):
@@ -119,7 +123,8 @@ class Sector:
         share, low, high: P(perforation) and its 95 % interval.
         hits: how many were computed.
         failed: how many of these failed.
-        mean: the weighted mean of P(perforation) with its 95 % interval.
+        mean: the weighted mean of P(perforation) with its 95 % interval, and under assumptions.
+        assumed_hits: hits that were computed under each assumption.
     """
 
     share: Array
@@ -128,6 +133,7 @@ class Sector:
     hits: NDArray[np.int64]
     failed: NDArray[np.int64]
     mean: Estimate
+    assumed_hits: int
 
 
 def check_directions(campaign: Campaign) -> None:
@@ -172,7 +178,7 @@ def protect(
         known = len(passed[open_[0]])
         more = sampler.shots(known, count - known)
         results = yield Round(
-            [Job(_answers, (campaign, toward(more, directions, cell), numerics)) for cell in open_],
+            [Job(_answers, (campaign.scene, toward(more, directions, cell), numerics)) for cell in open_],
             [f"{directions.azimuth[row]} {directions.elevation[column]} up to {count}" for row, column in open_],
             _told_from(len(cells) - len(open_), len(cells), progress),
         )
@@ -180,7 +186,47 @@ def protect(
             passed[cell] = np.concatenate([passed[cell], answers["passed"]])
         open_ = [cell for cell in open_ if _wanted(campaign, passed[cell], directions)]
         count = min(2 * count, directions.max_count)
-    return _sector(campaign, directions, passed)
+    sector = _sector(campaign, directions, passed)
+    return (yield from _under_assumptions(campaign, directions, sector, first, numerics, passed))
+
+
+def _under_assumptions(
+    campaign: Campaign,
+    directions: Directions,
+    sector: Sector,
+    first: Shots,
+    numerics: str,
+    passed: dict[tuple[int, int], Array],
+) -> Question[Sector]:
+    """The mean over directions under each assumption, by some of the hits: a direction has a share of them that is its
+    weight, so that their plain mean is the weighted one.
+
+    Args:
+        first: the hits that every direction has.
+        passed: answers in every direction.
+    """
+    if not has_assumptions(campaign):
+        return sector
+    count = campaign.assumptions.hits or ASSUMED_HITS
+    edges = np.cumsum(directions.weights().ravel())
+    which = np.minimum(np.searchsorted(edges, (np.arange(count) + 0.5) / count), len(edges) - 1)
+    numbers, cells = np.arange(count) % len(first), list(passed)
+    shots = Shots.joined(
+        [toward(first[numbers[which == place]], directions, cells[place]) for place in np.unique(which)]
+    )
+    given = np.concatenate([passed[cells[place]][numbers[which == place]] for place in np.unique(which)])
+    possible = [one for one in alternatives(campaign) if one.moves_limits and one.is_possible(shots)]
+    results = yield Round(
+        [Job(_answers, (alternative.scene, alternative.shots(shots), numerics)) for alternative in possible],
+        [f"assumption {alternative.name}" for alternative in possible],
+    )
+    moves = {
+        alternative.name: float(np.nanmean(answers["passed"] - given))
+        for alternative, answers in zip(possible, results, strict=True)
+        if not np.isnan(answers["passed"] - given).all()
+    }
+    under = {name: sector.mean.value + move for name, move in moves.items()}
+    return replace(sector, mean=replace(sector.mean, assumptions=under).within(0.0, 1.0), assumed_hits=count)
 
 
 def _piloted(campaign: Campaign, shots: Shots, *, worker: Worker, report: Callable[[float], object]) -> Arrays:
@@ -188,11 +234,9 @@ def _piloted(campaign: Campaign, shots: Shots, *, worker: Worker, report: Callab
     return {"numerics": np.array(numerics_for(campaign.scene, shots, campaign.numerics, worker).model_dump_json())}
 
 
-def _answers(
-    campaign: Campaign, shots: Shots, numerics: str, *, worker: Worker, report: Callable[[float], object]
-) -> Arrays:
+def _answers(scene: Scene, shots: Shots, numerics: str, *, worker: Worker, report: Callable[[float], object]) -> Arrays:
     """1 for a shot that perforates, 0 for one that is stopped, NaN for one that failed."""
-    prepared = prepare(campaign.scene, shots, Numerics.model_validate_json(numerics))
+    prepared = prepare(scene, shots, Numerics.model_validate_json(numerics))
     status = computed(prepared, worker).status
     answers = np.isin(status, (Status.PERFORATED, Status.MISSED)).astype(float)
     return {"passed": np.where(failures(status), np.nan, answers)}
@@ -236,7 +280,7 @@ def _sector(campaign: Campaign, directions: Directions, passed: dict[tuple[int, 
     hits = np.array([len(answers) for answers in passed.values()]).reshape(shape)
     failed = np.array([int(np.isnan(answers).sum()) for answers in passed.values()]).reshape(shape)
     mean = weighted_mean(list(passed.values()), directions.weights().ravel(), campaign.replicates)
-    return Sector(share, low, high, hits, failed, mean)
+    return Sector(share, low, high, hits, failed, mean, 0)
 
 
 def weighted_mean(passed: list[Array], weights: Array, replicates: int) -> Estimate:

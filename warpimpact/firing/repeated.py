@@ -8,26 +8,26 @@ import numpy as np
 import xarray
 from numpy.typing import NDArray
 
+from warpimpact.firing.assumed_answers import assumed
 from warpimpact.firing.directions import Sector
 from warpimpact.firing.estimators import Reports, reported
-from warpimpact.firing.fire import Firings, fire, uniform
+from warpimpact.firing.fire import Firings
+from warpimpact.firing.fired_shots import fired, perforation, proof_shots
 from warpimpact.firing.plan import FiringTest, Proof
 from warpimpact.firing.procedures import Procedure
 from warpimpact.firing.requirements import requirement_line
 from warpimpact.firing.response import Response
-from warpimpact.firing.rules import drawn_places, fair_places
+from warpimpact.firing.rules import fair_places
 from warpimpact.records.variable import Variable
 from warpimpact.results import attributes as attr
 from warpimpact.results import firing as f
 from warpimpact.results.dataset import dataset_of
-from warpimpact.statistics.acceptance import acceptance, fewest_shots
+from warpimpact.statistics.acceptance import acceptance
 
 Array = NDArray[np.float64]
 
 QUANTILES = (0.5, 0.05, 0.01)
 """Shares of perforations whose velocities are given: V50, V05, V01."""
-_PLACES, _VELOCITIES, _NODES = 1, 2, 64
-"""Kinds of numbers that are drawn; equally probable velocities of a shot in a proof."""
 _GRID = 81
 
 
@@ -56,7 +56,7 @@ def simulate_test(
         f.REQUIREMENT: requirement_line(test),
         attr.WARPIMPACT_VERSION: attr.versions()[attr.WARPIMPACT_VERSION],
     }
-    for more_columns, more in (_fired(test, response), _directions(test, sector)):
+    for more_columns, more in (_fired(test, response), _directions(test, sector), assumed(test, response, sector)):
         columns, told = columns | more_columns, told | more
     return dataset_of(columns, f.FIXED | told | (attributes or {}))
 
@@ -105,19 +105,6 @@ def _fired(test: FiringTest, response: Response | None) -> tuple[dict[Variable, 
         attributes |= {f.PROOF_SHOTS: proof_shots(test.proof), f.PROOF_ALLOWED: test.proof.allowed}
         attributes |= {f.PROOF_VELOCITY: test.proof.velocity}
     return columns, attributes
-
-
-def fired(test: FiringTest, procedure: Procedure, response: Response) -> Firings:
-    """The shots of all tests."""
-    tests, most = test.tests, procedure.most
-    places = drawn_places(test.fair_hit, response, uniform(test.seed, _PLACES, tests, most), test.seed)
-    errors = test.gun.errors(uniform(test.seed, _VELOCITIES, tests, most))
-    return fire(procedure, response, places, errors)
-
-
-def proof_shots(proof: Proof) -> int:
-    """Shots of a proof: those given, or the fewest that show what a pass is to show."""
-    return proof.shots or fewest_shots(proof.allowed, proof.stop_probability, proof.confidence)
 
 
 def _grid(response: Response, proof: Proof | None) -> Array:
@@ -184,9 +171,7 @@ def _sizes(test: FiringTest, procedure: Procedure, response: Response) -> dict[V
 def _proof(test: FiringTest, proof: Proof, response: Response, velocity: Array) -> dict[Variable, Any]:
     """The operating characteristic of a plan at this target, and that of shots that all hit the same place."""
     shots, allowed = proof_shots(proof), proof.allowed
-    fair = fair_places(test.fair_hit, response)
-    errors = test.gun.errors((np.arange(_NODES) + 0.5) / _NODES)
-    by_place = response.by_place(velocity, errors)[:, fair]
+    by_place = perforation(test, response, velocity)
     return {
         f.PROOF_PERFORATION: by_place.mean(axis=1),
         f.PASS: acceptance(shots, allowed, by_place.mean(axis=1)),
