@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from .campaign.plates import read_plates
     from .campaign.stop import Stop
     from .campaign.text import CampaignError
+    from .catalogue.by_name import Layer, Plate, material, threat
     from .continuum.strikes import simulate_continuum
     from .export.spreadsheet import to_dataframe
     from .optimisation.optimise import optimise, optimise_to_file
@@ -35,12 +36,10 @@ if TYPE_CHECKING:
         Hits,
         Impact,
         Interaction,
-        Layer,
         LevelSetPattern,
         NoPattern,
         Numerics,
         OgiveCore,
-        Plate,
         PolygonsPattern,
         PolynomialCore,
         ProfileCore,
@@ -117,6 +116,7 @@ __all__ = [
     "limit_thickness",
     "limit_velocity",
     "make_shots",
+    "material",
     "open_result",
     "optimise",
     "optimise_to_file",
@@ -126,6 +126,7 @@ __all__ = [
     "run_to_file",
     "simulate",
     "simulate_continuum",
+    "threat",
     "to_dataframe",
 ]
 
@@ -137,15 +138,18 @@ _HOMES = {
     "Continuum": ".scene.flow",
     "DeviceError": ".solver.device",
     "Flow": ".scene.flow",
+    "Layer": ".catalogue.by_name",
     "Outcomes": ".records.outcomes",
     "Output": ".campaign.campaign",
     "OutputError": ".results.files",
+    "Plate": ".catalogue.by_name",
     "ResultError": ".results.files",
     "Stop": ".campaign.stop",
     "executor_for": ".runs.choice",
     "compare": ".analysis.comparison",
     "limit_thickness": ".solver.limit",
     "limit_velocity": ".solver.limit",
+    "material": ".catalogue.by_name",
     "open_result": ".results.files",
     "read_plates": ".campaign.plates",
     "replay": ".runs.replay",
@@ -158,6 +162,7 @@ _HOMES = {
     "run_to_file": ".runs.run",
     "simulate": ".solver.simulate",
     "simulate_continuum": ".continuum.strikes",
+    "threat": ".catalogue.by_name",
     "to_dataframe": ".export.spreadsheet",
 }
 """Modules of the names that are not in `warpimpact.scene`."""

@@ -125,23 +125,29 @@ class Campaign(Model):
         return self._source or self.model_dump_json()
 
     @classmethod
-    def from_toml(cls, path: str | Path, *, count: int | None = None, posterior: Path | None = None) -> Self:
+    def from_toml(
+        cls, path: str | Path, *, count: int | None = None, posterior: Path | None = None, needs_velocity: bool = True
+    ) -> Self:
         """Read a campaign file; file names in it count from its folder.
 
         Args:
             path: the TOML file.
             count: number of hits, in place of the file's.
             posterior: file of `warpimpact identify`, beside what the file says; its text then names it.
+            needs_velocity: whether the shots have a velocity. Where it is searched, a threat without one will do.
 
         Raises:
             CampaignError: the file is missing, is not TOML, or has a value that is not allowed.
         """
         path = Path(path)
         named = "" if posterior is None else f"posterior = {json.dumps(str(posterior.absolute()))}\n"
-        return cls.from_text(named + read_text(path), name=str(path), folder=path.parent, count=count)
+        text = named + read_text(path)
+        return cls.from_text(text, name=str(path), folder=path.parent, count=count, needs_velocity=needs_velocity)
 
     @classmethod
-    def from_text(cls, text: str, *, name: str, folder: Path, count: int | None = None) -> Self:
+    def from_text(
+        cls, text: str, *, name: str, folder: Path, count: int | None = None, needs_velocity: bool = True
+    ) -> Self:
         """Read what `text` gave.
 
         Args:
@@ -149,6 +155,7 @@ class Campaign(Model):
             name: what errors call it.
             folder: where the files are that it names.
             count: number of hits, in place of the text's.
+            needs_velocity: as in `from_toml`.
 
         Raises:
             CampaignError: the text is not TOML, or has a value that is not allowed.
@@ -166,7 +173,8 @@ class Campaign(Model):
         if count is not None:
             _override_count(data, count)
         catalogue = catalogue_of(data, name, folder)
-        data = with_scatter_apart(with_threat(data, catalogue, name), name)
+        data = with_threat(data, catalogue, name, needs_velocity=needs_velocity)
+        data = with_scatter_apart(data, name)
         data = with_materials(data, catalogue, name)
         try:
             campaign = cls.model_validate(data, context={"folder": folder})

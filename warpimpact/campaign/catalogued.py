@@ -18,6 +18,8 @@ _Table = dict[str, Any]
 _CORE: TypeAdapter[Core] = TypeAdapter(AnyCore)
 _OBLIQUITY: TypeAdapter[float] = TypeAdapter(Obliquity)
 _OF_ANY_CORE = set(Core.model_fields)
+SEARCHED_FROM = 800.0
+"""Impact velocity at which a search of limit velocities begins where the threat has none [m/s]."""
 _LAW = ("linear", "quadratic", "onset")
 """Keys of [interaction] that belong to a material."""
 
@@ -37,8 +39,11 @@ def catalogue_of(data: Mapping[str, Any], name: str, folder: Path) -> Catalogue:
         raise CampaignError(f"{name}: catalogue: {error}") from None
 
 
-def with_threat(data: _Table, catalogue: Catalogue, name: str) -> _Table:
+def with_threat(data: _Table, catalogue: Catalogue, name: str, *, needs_velocity: bool = True) -> _Table:
     """Tables with the core of their threat, and with its velocity unless they give one.
+
+    Args:
+        needs_velocity: whether a threat without a velocity is refused; else the shot gets `SEARCHED_FROM`.
 
     Raises:
         CampaignError: the catalogue has no such threat, or not what is needed of it.
@@ -52,6 +57,8 @@ def with_threat(data: _Table, catalogue: Catalogue, name: str) -> _Table:
     impact = data.get("impact", {})
     if not isinstance(impact, dict) or "velocity" in impact:
         return resolved
+    if not needs_velocity and not threat.velocities and core.get("standard") is None:
+        return resolved | {"impact": {"velocity": SEARCHED_FROM} | impact}
     velocity = _velocity(threat, core.get("standard"), f"{name}: core.standard")
     return resolved | {"impact": {"velocity": _shot(velocity, core, f"{name}: core.velocity_tolerance")} | impact}
 
@@ -90,8 +97,9 @@ def core_of(threat: Threat, given: Any, place: str) -> _Table:
     Raises:
         CampaignError: its core is not known, and no shape is given.
     """
-    given_core, base = dict(given), dict(threat.core or {})
-    if threat.core is None and "shape" not in given_core:
+    given_core = dict(given) | {"threat": threat.name}
+    base = {} if threat.shape is None else threat.shape.model_dump(exclude_unset=True)
+    if threat.shape is None and "shape" not in given_core:
         raise CampaignError(
             f'{place}.threat: the catalogue does not know the core of "{threat.name}", only its velocities; give shape '
             "and what belongs to it"
@@ -137,7 +145,7 @@ def with_materials(data: _Table, catalogue: Catalogue, name: str) -> _Table:
         except ValueError as error:
             raise CampaignError(f"{name}: {place}.material: {error}") from None
         materials[place] = material
-        filled = plate_of(material, table, _resistance(data, material, table, catalogue))
+        filled = material.table(table, _resistance(data, material, table, catalogue))
         if number is None:
             resolved[key] = filled
         else:
@@ -156,16 +164,6 @@ def _plates(data: Mapping[str, Any]) -> Iterator[tuple[str, str, int | None, _Ta
     for k, layer in enumerate(layers if isinstance(layers, list) else []):
         if isinstance(layer, dict) and isinstance(layer.get("material"), str):
             yield f"layer[{k}]", "layer", k, layer
-
-
-def plate_of(material: Material, given: Mapping[str, Any], resistance: float) -> _Table:
-    """The table of a plate of a material, under the keys that are given."""
-    base = {
-        "resistance": resistance,
-        "shear_coefficient": material.shear_coefficient,
-        "density": material.density,
-    }
-    return base | dict(given)
 
 
 def _resistance(data: Mapping[str, Any], material: Material, plate: Mapping[str, Any], catalogue: Catalogue) -> float:

@@ -6,14 +6,14 @@ import re
 import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from difflib import get_close_matches
 from functools import cache
 from pathlib import Path
-from typing import Any, NoReturn, TypeVar
+from typing import Any, TypeVar
 
 from pydantic import ValidationError
 
 from warpimpact.catalogue.entries import Material, Threat, reason
+from warpimpact.catalogue.spelling import the_entry
 from warpimpact.catalogue.strength import Resistance, resistance_of
 from warpimpact.scene import Core
 from warpimpact.scene.toml_text import parsed, read_text
@@ -52,20 +52,20 @@ class Catalogue:
         return cls({kind: _entries(kind, data.get(key, []), f"{path.name}: {key}") for kind, key in kinds.items()})
 
     def threat(self, name: str) -> Threat:
-        """The threat of this name.
+        """The threat of this name or alias.
 
         Raises:
-            ValueError: there is none.
+            ValueError: there is none, or an alias stands for several.
         """
-        return self._named(Threat, name)
+        return self.named(Threat, name)
 
     def material(self, name: str) -> Material:
-        """The material of this name.
+        """The material of this name or alias.
 
         Raises:
-            ValueError: there is none.
+            ValueError: there is none, or an alias stands for several.
         """
-        return self._named(Material, name)
+        return self.named(Material, name)
 
     def resistance(self, material: Material, core: Core, thickness: float, obliquity: float) -> Resistance:
         """What is known of the resistance of a plate of a material against a core.
@@ -85,13 +85,13 @@ class Catalogue:
         return material.name in self.of_user.get(Material, {})
 
     def entry(self, name: str) -> Threat | Material:
-        """The threat or the material of this name.
+        """The threat or the material of this name or alias.
 
         Raises:
-            ValueError: there is none.
+            ValueError: there is none, or an alias stands for several.
         """
         entries: dict[str, Threat | Material] = {**self.all(Material), **self.all(Threat)}
-        return entries[name] if name in entries else self._refuse(name, [*self.all(Threat), *self.all(Material)])
+        return entries[the_entry(name, _spellings(entries))]
 
     def all(self, kind: type[Entry]) -> dict[str, Entry]:
         """All threats or all materials by name, those of the user first."""
@@ -99,20 +99,21 @@ class Catalogue:
         packaged: list[Entry] = [_read(kind, path) for path in sorted(FOLDERS[kind].glob("*.toml"))]
         return {**of_user, **{entry.name: entry for entry in packaged if entry.name not in of_user}}
 
-    def _named(self, kind: type[Entry], name: str) -> Entry:
-        """One entry; of the package, only its file is read."""
+    def named(self, kind: type[Entry], name: str) -> Entry:
+        """The entry of this name or alias; of a name of the package, only its file is read."""
         of_user: Mapping[str, Entry] = self.of_user.get(kind, {})
         if name in of_user:
             return of_user[name]
         path = FOLDERS[kind] / f"{file_name(name)}.toml"
         entry: Entry | None = _read(kind, path) if path.is_file() else None
-        return entry if entry is not None and entry.name == name else self._refuse(name, list(self.all(kind)))
+        if entry is not None and entry.name == name:
+            return entry
+        entries = self.all(kind)
+        return entries[the_entry(name, _spellings(entries))]
 
-    @staticmethod
-    def _refuse(name: str, known: list[str]) -> NoReturn:
-        meant = get_close_matches(name, known, n=1, cutoff=0.4)
-        hint = f'did you mean "{meant[0]}"?' if meant else f"allowed are {', '.join(known)}"
-        raise ValueError(f"got {quoted(name)}, which is not in the catalogue; {hint}")
+
+def _spellings(entries: Mapping[str, Any]) -> dict[str, tuple[str, ...]]:
+    return {name: entry.aliases for name, entry in entries.items()}
 
 
 def file_name(name: str) -> str:

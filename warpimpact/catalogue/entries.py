@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import math
-from functools import cached_property
-from typing import Annotated, Any, Self
+from collections.abc import Mapping
+from typing import Annotated, Any
 
-from pydantic import Field, TypeAdapter, ValidationError, model_validator
+from pydantic import Field, TypeAdapter, ValidationError, ValidationInfo, field_validator
 
 from warpimpact.catalogue.strength import NINETY, Resistance
 from warpimpact.scene import AnyCore, Core
@@ -52,7 +52,8 @@ class Threat(Model):
 
     Attributes:
         name: as `[core] threat` gives it.
-        core: the table `[core]` that it stands for; None where the core is not known.
+        aliases: other names of it; one that several entries have lists them.
+        shape: the core, which a file gives as the table `core`; None where it is not known.
         core_density: of the material of the core [kg/m³]; the mass that it gives is shown beside the published one.
         core_mass: published [kg].
         core_material, core_hardness: in words.
@@ -63,7 +64,8 @@ class Threat(Model):
     """
 
     name: Name
-    core: dict[str, Any] | None = None
+    aliases: tuple[Name, ...] = ()
+    shape: AnyCore | None = Field(None, alias="core")
     core_density: PositiveDensity | None = None
     core_mass: PositiveMass | None = None
     core_material: Title = ""
@@ -73,25 +75,48 @@ class Threat(Model):
     known: dict[str, Title]
     assumed: dict[str, Title] = Field(default_factory=dict)
 
-    @model_validator(mode="after")
-    def _has_a_core(self) -> Self:
+    @field_validator("shape", mode="before")
+    @classmethod
+    def _reads_its_core(cls, core: Any, info: ValidationInfo) -> Any:
+        if not isinstance(core, dict):
+            return core
         try:
-            _ = self.shape
+            return _CORE.validate_python(core | {"threat": info.data.get("name")})
         except ValidationError as error:
             problem = error.errors(include_url=False)[0]
-            place = ".".join(map(str, ("core", *problem["loc"][1:])))
-            raise ValueError(f"{place}: {reason(problem)}") from None
-        return self
+            place = ".".join(map(str, problem["loc"][1:]))
+            raise ValueError(f"{place}: {reason(problem)}" if place else reason(problem)) from None
 
-    @cached_property
-    def shape(self) -> Core | None:
-        """The core, if its shape is known or assumed."""
-        return None if self.core is None else _CORE.validate_python(self.core)
+    @classmethod
+    def _keys(cls) -> list[str]:
+        return [field.alias or name for name, field in cls.model_fields.items()]
+
+    @property
+    def core(self) -> AnyCore:
+        """The core.
+
+        Raises:
+            ValueError: it is not known.
+        """
+        if self.shape is None:
+            raise ValueError(f'the catalogue does not know the core of "{self.name}": give a core of your own')
+        return self.shape
+
+    @property
+    def velocity(self) -> float:
+        """Impact velocity of the first standard [m/s].
+
+        Raises:
+            ValueError: none is known.
+        """
+        if not self.velocities:
+            raise ValueError(f'the catalogue has no velocity of "{self.name}"; give one')
+        return self.velocities[0].value
 
     @property
     def evidence(self) -> str:
         """State of the evidence in words, behind the name."""
-        return ("" if self.core else "core not known; ") + evidence(self.known, self.assumed)
+        return ("" if self.shape else "core not known; ") + evidence(self.known, self.assumed)
 
 
 class Material(Model):
@@ -103,6 +128,7 @@ class Material(Model):
 
     Attributes:
         name: as `[plate] material` gives it.
+        aliases: as in `Threat`.
         density: [kg/m³].
         resistance: Y of a plate as thick as the core is wide [Pa].
         resistance_low, resistance_high: ends of its 90 % interval [Pa].
@@ -119,6 +145,7 @@ class Material(Model):
     """
 
     name: Name
+    aliases: tuple[Name, ...] = ()
     density: PositiveDensity
     resistance: PositiveStress
     resistance_low: PositiveStress | None = None
@@ -149,6 +176,11 @@ class Material(Model):
         if self.resistance_low is None or self.resistance_high is None:
             return Resistance(median)
         return Resistance(median, math.log(self.resistance_high / self.resistance_low) / (2.0 * NINETY))
+
+    def table(self, given: Mapping[str, Any], resistance: float) -> dict[str, Any]:
+        """The table of a plate of the material and of this resistance [Pa], under the keys that are given."""
+        base = {"resistance": resistance, "shear_coefficient": self.shear_coefficient, "density": self.density}
+        return base | dict(given) | {"material": self.name}
 
     @property
     def count(self) -> int:

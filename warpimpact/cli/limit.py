@@ -55,7 +55,10 @@ def _limit(arguments: argparse.Namespace) -> int:
     from warpimpact.studies.limit_view import limit_view
     from warpimpact.view.view import text_of
 
-    campaign = Campaign.from_toml(arguments.campaign, count=arguments.count, posterior=arguments.posterior)
+    is_sought = arguments.quantity == "velocity"
+    campaign = Campaign.from_toml(
+        arguments.campaign, count=arguments.count, posterior=arguments.posterior, needs_velocity=not is_sought
+    )
     output = arguments.output or Path(arguments.campaign.stem + "_limit.nc")
     picture = output.with_suffix(".png")
     check_place(output)

@@ -41,7 +41,7 @@ def _oblong(width: float, slender: float) -> dict[str, float]:
 def choices(design: Tables) -> dict[str, list[str]]:
     """Names that each choice offers; none of threats whose core is not known."""
     catalogue = catalogue_of(design, "design", FOLDER)
-    threats = [name for name, threat in catalogue.all(Threat).items() if threat.core is not None]
+    threats = [name for name, threat in catalogue.all(Threat).items() if threat.shape is not None]
     return {"threat": threats, "material": list(catalogue.all(Material)), "shape": list(SHAPES)}
 
 

@@ -128,7 +128,10 @@ def campaign_in(result: xarray.Dataset, folder: Path) -> Campaign:
         raise ResultError("the result does not contain its campaign")
     count = int(result.attrs[attr.COUNT]) if attr.COUNT in result.attrs else None  # a list of hits has none
     name = "the campaign in the result"
-    campaign = Campaign.from_text(result.attrs[attr.CAMPAIGN], name=name, folder=folder, count=count)
+    is_sought = result.attrs.get(attr.LIMIT) == "velocity"
+    campaign = Campaign.from_text(
+        result.attrs[attr.CAMPAIGN], name=name, folder=folder, count=count, needs_velocity=not is_sought
+    )
     dealt = int(result.attrs[attr.REPLICATES])
     if campaign.replicates == dealt:
         return campaign

@@ -1,6 +1,7 @@
 """Plate: a thickness of resisting material with holes (docs/model.md §3, §4)."""
 
-from typing import Annotated, Any, Self
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Self
 
 import numpy as np
 from pydantic import BaseModel, Field, ModelWrapValidatorHandler, ValidationInfo, field_validator, model_validator
@@ -45,7 +46,8 @@ class Plate(Model):
             that is not thicker weakens as a whole, as in the paper. All depths of a thicker plate lose the same share.
         density: of the material [kg/m³].
         material: name in the catalogue. In a file it gives resistance, shear_coefficient and density, and the law of
-            [interaction]; a key beside it overrides its value.
+            [interaction]; a key beside it overrides its value. In Python it gives them for a `threat` (a name, or a
+            core) at an `obliquity`, on which Y depends, too; a copy with another thickness keeps its Y.
         size: extent along y and z of a finite plate centred on the origin [m]; without it the plate is unbounded.
         margin: width of a band along the rim without holes [m]; holes that reach into it are left out. Without a margin
             the rim cuts holes.
@@ -53,7 +55,12 @@ class Plate(Model):
     """
 
     thickness: PositiveLength
-    resistance: NonNegativeStress
+    if TYPE_CHECKING:  # a material gives the resistance; the other two are taken, but are no fields
+        resistance: NonNegativeStress = 0.0
+        threat: Any = None
+        obliquity: float | str | None = None
+    else:
+        resistance: NonNegativeStress
     shear_coefficient: NonNegativeNumber = 0.0
     degradation: Annotated[Number, Field(ge=0, le=1)] = 1.0
     degradation_interval: PositiveTime | None = None
@@ -65,6 +72,8 @@ class Plate(Model):
     size: tuple[PositiveLength, PositiveLength] | None = None
     margin: PositiveLength | None = None
     pattern: AnyPattern = NoPattern()
+    of_material: ClassVar[Callable[[type["Plate"], dict[str, Any]], dict[str, Any]] | None] = None
+    """What turns the keys `material`, `threat` and `obliquity` into the other fields; the catalogue sets it."""
 
     @model_validator(mode="wrap")
     @classmethod
@@ -78,9 +87,19 @@ class Plate(Model):
         object.__setattr__(plate, "thickness", weight / plate.areal_density)  # which was that of 1 m
         return plate
 
+    @model_validator(mode="wrap")
+    @classmethod
+    def _has_its_material(cls, values: Any, read: ModelWrapValidatorHandler[Self]) -> Self:
+        if cls.of_material is None or not isinstance(values, dict) or not isinstance(values.get("material"), str):
+            return read(values)
+        if "resistance" in values and not {"threat", "obliquity"} & values.keys():
+            return read(values)
+        return read(cls.of_material(cls, values))
+
     @classmethod
     def _keys(cls) -> list[str]:
-        return [*super()._keys(), "areal_density"]
+        of_material = () if cls.of_material is None else ("threat", "obliquity")
+        return [*super()._keys(), "areal_density", *of_material]
 
     @field_validator("pattern")
     @classmethod

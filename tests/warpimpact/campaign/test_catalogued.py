@@ -8,6 +8,7 @@ import jsonschema
 import pytest
 
 from warpimpact import Campaign
+from warpimpact.campaign.catalogued import SEARCHED_FROM
 from warpimpact.campaign.evidence import evidence_of, limit_velocity_factors
 from warpimpact.campaign.schema import campaign_schema
 from warpimpact.campaign.tested import summary_of_all
@@ -118,6 +119,14 @@ def test_the_tolerance_of_a_standard_scatters(folder: Path) -> None:
 def test_what_the_catalogue_does_not_know(folder: Path, changes: dict[str, Any], said: str) -> None:
     with pytest.raises(CampaignError, match=said):
         read(folder, **changes)
+
+
+def test_a_threat_needs_no_velocity_where_it_is_searched(folder: Path) -> None:
+    text = json.dumps(TABLES | {"core": {"threat": ".50 AP M2"}})
+    campaign = Campaign.from_text(text, name="named.toml", folder=folder, needs_velocity=False)
+    assert campaign.impact.velocity == SEARCHED_FROM
+    text = json.dumps(TABLES)
+    assert Campaign.from_text(text, name="named.toml", folder=folder, needs_velocity=False) == read(folder)
 
 
 def test_evidence_is_told_with_what_leaves_it(folder: Path) -> None:

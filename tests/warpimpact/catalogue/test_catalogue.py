@@ -7,11 +7,12 @@ import pytest
 from warpimpact.catalogue.catalogue import FOLDERS, Catalogue, file_name
 from warpimpact.catalogue.catalogue_view import catalogue_view, drawn, material_view, threat_view
 from warpimpact.catalogue.entries import Material, Threat
+from warpimpact.catalogue.spelling import key as key_of
 from warpimpact.scene import ConeCore
 from warpimpact.view.view import text_of
 
 THREATS = Catalogue().all(Threat)
-CORES = [name for name, threat in THREATS.items() if threat.core is not None]
+CORES = [name for name, threat in THREATS.items() if threat.shape is not None]
 OWN = """
 [[threat]]
 name = "steel cone"
@@ -68,7 +69,7 @@ def test_what_is_open_is_called_assumed(name: str) -> None:
         assert key.replace("_", " ") in threat.evidence.partition("assumed")[2]
         assert any(line.startswith("assumed") and key.replace("_", " ") in line for line in text.splitlines())
     shaped = {"core", "nose", "length"} & {*threat.known, *threat.assumed}
-    assert shaped or threat.core is None  # no shape without a word on where it comes from
+    assert shaped or threat.shape is None  # no shape without a word on where it comes from
 
 
 def test_a_profile_is_drawn_to_scale() -> None:
@@ -92,7 +93,7 @@ def test_own_entries(own: Path) -> None:
     ("old", "new", "said"),
     [
         ("[[material]]", "[[materials]]", r"unknown key .materials.; allowed are threat, material"),
-        ('diameter = "6 mm", ', "", r"threat\[0\]: core.diameter: is missing, but must be given"),
+        ('diameter = "6 mm", ', "", r"threat\[0\].core: diameter: is missing, but must be given"),
         ('"2 GPa"', '"2 mm"', r"material\[0\].resistance: got .2 mm."),
         ("misfit", "misfits", r'material\[0\]: got the unknown key .misfits.; did you mean "misfit"'),
         ("[[threat]]", "threat", "is not valid TOML"),
@@ -104,6 +105,47 @@ def test_own_entries_that_are_wrong(own: Path, old: str, new: str, said: str) ->
         Catalogue.of(own)
 
 
-def test_an_unknown_name_suggests_one() -> None:
-    with pytest.raises(ValueError, match=r'did you mean "\.30 AP M2"'):
-        Catalogue().entry("30 AP M2")
+@pytest.mark.parametrize(
+    ("spelling", "name"),
+    [
+        ("7.62 mm APM2", ".30 AP M2"),
+        ("7.62 AP M2", ".30 AP M2"),
+        ("hha class 1", "HHA Class 1"),
+        ("Armox 500T", "ARMOX500"),
+        ("7.62×39 BZ", "7.62x39 API BZ"),
+        ("EN AW-6061 T651", "AA6061-T651"),
+    ],
+)
+def test_names_match_in_any_case_and_by_aliases(spelling: str, name: str) -> None:
+    assert Catalogue().entry(spelling).name == name
+
+
+@pytest.mark.parametrize(
+    ("spelling", "said"),
+    [
+        ("RHA", r'several entries .*: "ARMOX370 Class 1", "BIS RHA300" or "BIS RHA360"; name one'),
+        ("MIL-DTL-46100", r'several entries .*"ARMOX500", "ATI 500-MIL", "BIS HHA" or "HHA Class 1"; name one'),
+        ("AP M2", r'several entries .*: "\.30 AP M2" or "\.50 AP M2"; name one'),
+        ("Armox", r'did you mean "ARMOX370 Class 1", .* or "ARMOX ADVANCE"\?'),
+        ("30 AP M2", r'did you mean "\.30 AP M2"\?'),
+        ("armx500", r'did you mean "ARMOX500"\?'),
+        # Another calibre, another temper and another steel are not meant.
+        ("30 mm AP M2", "in the catalogue; warpimpact catalogue lists all"),
+        ("7.62x51 AP M2", "in the catalogue; warpimpact catalogue lists all"),
+        ("AA2139-T6", "in the catalogue; warpimpact catalogue lists all"),
+        ("MARS500", "in the catalogue; warpimpact catalogue lists all"),
+    ],
+)
+def test_of_an_unclear_name_those_it_may_mean_are_listed(spelling: str, said: str) -> None:
+    with pytest.raises(ValueError, match=said):
+        Catalogue().entry(spelling)
+
+
+@pytest.mark.parametrize("kind", [Threat, Material])
+def test_no_alias_is_a_name_or_says_nothing_new(kind: type) -> None:
+    entries = Catalogue().all(kind)
+    names = {key_of(name) for name in entries}
+    for entry in entries.values():
+        aliases = [key_of(alias) for alias in entry.aliases]
+        assert len({*aliases}) == len(aliases)
+        assert not names & {*aliases}

@@ -72,7 +72,7 @@ def test_the_command_lists_shows_and_draws(tmp_path: Path, capsys: pytest.Captur
     assert "STANAG 4569 level 4" in capsys.readouterr().out
     assert (tmp_path / "core.png").stat().st_size > 10_000
     assert main(["catalogue", "7.62x39 API BZ", "-o", str(tmp_path / "no.png")]) == 2
-    assert main(["catalogue", "P80"]) == 2
+    assert main(["catalogue", "P81"]) == 2
 
 
 def test_limit_tells_where_a_test_is_expected(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -1,0 +1,94 @@
+"""The catalogue in Python: threats and materials by name, and plates of a material.
+
+Importing it gives `Plate` the catalogue of the package: `Plate(material="HHA Class 1", ...)`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from typing import Any, Generic
+
+from pydantic import TypeAdapter
+
+from warpimpact.catalogue.catalogue import Catalogue, Entry
+from warpimpact.catalogue.entries import Material, Threat
+from warpimpact.scene import Core, Layer, Plate
+from warpimpact.scene.units import Obliquity
+
+__all__ = ["Layer", "Plate", "material", "threat"]
+_OBLIQUITY: TypeAdapter[float] = TypeAdapter(Obliquity)
+
+
+class Entries(Mapping[str, Entry], Generic[Entry]):
+    """Entries of the catalogue of the package by name or alias: `threat(".30 AP M2")`.
+
+    `list(threat)` lists the names, showing it lists them with their evidence, and a notebook completes `threat["`.
+    """
+
+    def __init__(self, kind: type[Entry]) -> None:
+        """Take the entries of a kind."""
+        self.kind: type[Entry] = kind
+
+    def __call__(self, name: str) -> Entry:
+        """The entry of this name or alias, in any case.
+
+        Raises:
+            ValueError: there is none, or an alias stands for several; the message lists whom it may mean.
+        """
+        entry: Entry = Catalogue().named(self.kind, name)
+        return entry
+
+    def __getitem__(self, name: str) -> Entry:
+        """As calling it."""
+        try:
+            return self(name)
+        except ValueError as error:
+            raise KeyError(str(error)) from None
+
+    def __iter__(self) -> Iterator[str]:
+        """All names."""
+        return iter(Catalogue().all(self.kind))
+
+    def __len__(self) -> int:
+        """Number of entries."""
+        return len(Catalogue().all(self.kind))
+
+    def __repr__(self) -> str:
+        """A line per entry, with the state of its evidence."""
+        return "\n".join(f"{name}: {entry.evidence}" for name, entry in self.items())
+
+    def _ipython_key_completions_(self) -> list[str]:
+        return list(self)
+
+
+threat = Entries(Threat)
+material = Entries(Material)
+
+
+def _filled(model: type[Plate], given: dict[str, Any]) -> dict[str, Any]:
+    """The keys of a plate with the numbers of its material against a threat.
+
+    Raises:
+        ValueError: threat or obliquity is missing or unknown.
+    """
+    steel = material(given["material"])
+    keys = {key: value for key, value in given.items() if key not in ("threat", "obliquity")}
+    if "resistance" in keys:
+        raise ValueError("got threat or obliquity beside resistance, but they only choose the resistance of a material")
+    if missing := [key for key in ("threat", "obliquity") if given.get(key) is None]:
+        raise ValueError(
+            f"{' and '.join(missing)} must be given: the resistance of {steel.name} depends on threat, thickness and "
+            'angle; give threat = ".30 AP M2" or a core, and obliquity, or else resistance'
+        )
+    core, obliquity = _core(given["threat"]), _OBLIQUITY.validate_python(given["obliquity"])
+    thickness = model.model_validate(steel.table(keys, resistance=1.0)).thickness
+    return steel.table(keys, Catalogue().resistance(steel, core, thickness, obliquity).median)
+
+
+def _core(given: Any) -> Core:
+    if isinstance(given, Core):
+        return given
+    return (given if isinstance(given, Threat) else threat(str(given))).core
+
+
+Plate.of_material = staticmethod(_filled)
