@@ -6,7 +6,7 @@ The hits stay in their places, so that what they have in common drops out of the
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Collection, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
@@ -14,12 +14,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from pydantic import ValidationError
 
-from ..catalogue.catalogue import Catalogue
-from ..catalogue.entries import Material
-from ..catalogue.strength import Resistance
 from ..scene import Core, Plate, Scene, Shots, Target
+from .resistances import catalogue_resistance, is_drawn
 
 if TYPE_CHECKING:
+    from ..catalogue.strength import Resistance
     from .campaign import Campaign
 
 UNKNOWN = 0.3
@@ -103,14 +102,9 @@ def _end_of_resistance(campaign: Campaign, plate: Plate, end: int) -> float:
 
 
 def _in_catalogue(campaign: Campaign, plate: Plate) -> Resistance | None:
-    """What the catalogue knows of the Y of a plate; None where Y is the user's."""
-    catalogue = Catalogue.of(campaign.catalogue)
-    material = catalogue.all(Material).get(str(plate.material))
-    if material is None:
-        return None
-    known = catalogue.resistance(material, campaign.core, plate.thickness, campaign.impact.obliquity)
-    same = known.deviation and math.isclose(known.median, plate.resistance, rel_tol=_DIFFERENT)
-    return known if same else None
+    """The catalogue's Y of a plate with what is not known of it; None where Y is the user's, or nothing tells that."""
+    known = catalogue_resistance(campaign, plate)
+    return known if known is not None and known.deviation else None
 
 
 def _refitted(campaign: Campaign, friction: float | None = None, onset: float | None = None) -> Values:
@@ -145,7 +139,7 @@ def _degradations(campaign: Campaign) -> Iterator[Alternative]:
         name = "no weakening (β = 1)" if value == 1.0 else f"β = {value:g}"
         yield from _of_layers(campaign, name, "degradation", dict.fromkeys(weak, value))
     strong = {k for k, plate in enumerate(campaign.target.layers) if plate.open_area and k not in weak}
-    if strong and campaign.assumptions.degradation and not _is_drawn(campaign, "degradation", strong):
+    if strong and campaign.assumptions.degradation and not is_drawn(campaign, "degradation", strong):
         paper = {"degradation": WEAK, "degradation_interval": SOON, "degradation_distance": None}
         changed = _changed(campaign, lambda k, plate: paper if k in strong else {})
         yield Alternative(f"weakening (β = {WEAK:g} in 1 µs)", changed)
@@ -162,7 +156,7 @@ def _rates(campaign: Campaign) -> Iterator[Alternative]:
 def _reaches(campaign: Campaign) -> Iterator[Alternative]:
     """Other lengths and depths over which plates weaken. A posterior may draw them."""
     weak = {k for k, plate in enumerate(campaign.target.layers) if plate.degradation < 1.0}
-    if not weak or _is_drawn(campaign, "degradation_length", weak) or _is_drawn(campaign, "degradation_depth", weak):
+    if not weak or is_drawn(campaign, "degradation_length", weak) or is_drawn(campaign, "degradation_depth", weak):
         return
     for factor in campaign.assumptions.reach:
 
@@ -185,7 +179,7 @@ def _frictions(campaign: Campaign) -> Iterator[Alternative]:
 def _onsets(campaign: Campaign) -> Iterator[Alternative]:
     law = campaign.interaction
     for value in campaign.assumptions.onset:
-        if not math.isclose(law.onset, value) and not _is_drawn(campaign, "onset"):
+        if not math.isclose(law.onset, value) and not is_drawn(campaign, "onset"):
             scene = campaign.scene.model_copy(update={"interaction": law.model_copy(update={"onset": value})})
             changed = Alternative(f"onset κ = {value:g}", scene)
             yield _with_refitted(campaign, changed, _refitted(campaign, onset=value))
@@ -193,7 +187,7 @@ def _onsets(campaign: Campaign) -> Iterator[Alternative]:
 
 def _with_refitted(campaign: Campaign, changed: Alternative, refitted: Values) -> Alternative:
     """An alternative with Y as a fit with it would have it, where Y comes from a fit."""
-    if not refitted or _is_drawn(campaign, "resistance", [k for _, k in refitted]):
+    if not refitted or is_drawn(campaign, "resistance", [k for _, k in refitted]):
         return changed
     return replace(changed, name=f"{changed.name}, Y fitted with it", layers={**changed.layers, **refitted})
 
@@ -221,7 +215,7 @@ def _standoffs(campaign: Campaign) -> Iterator[Alternative]:
 def _breaks(campaign: Campaign) -> Iterator[Alternative]:
     """A core that may break, where the campaign takes it to be unbreakable and its scheme knows bending."""
     core = campaign.core
-    if core.strength is not None or _is_drawn(campaign, "strength") or campaign.numerics.scheme == "nodal":
+    if core.strength is not None or is_drawn(campaign, "strength") or campaign.numerics.scheme == "nodal":
         return
     for strength in campaign.assumptions.strength:
         record = campaign.scene.record.model_copy(update={"bending": True})
@@ -236,16 +230,8 @@ def _of_layers(campaign: Campaign, name: str, quantity: str, changed: Mapping[in
     differ = any(
         not math.isclose(value, getattr(layers[k], quantity), rel_tol=_DIFFERENT) for k, value in changed.items()
     )
-    if differ and not _is_drawn(campaign, quantity, changed):
+    if differ and not is_drawn(campaign, quantity, changed):
         yield Alternative(name, campaign.scene, {(quantity, k): value for k, value in changed.items()})
-
-
-def _is_drawn(campaign: Campaign, quantity: str, layers: Collection[int] = (0,)) -> bool:
-    """Whether shots have values of their own of a quantity, by a distribution, a list of hits or a posterior."""
-    scattered = any(name == quantity and k in layers for name, k in campaign.scatter.given)
-    listed = campaign.hits.listed is not None and quantity in campaign.hits.listed
-    drawn = campaign.drawn is not None and any(str(path[1]).startswith(quantity) for path in campaign.drawn.values)
-    return scattered or listed or drawn
 
 
 def _changed(campaign: Campaign, change: Callable[[int, Plate], Mapping[str, Any]]) -> Scene:

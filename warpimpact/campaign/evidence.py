@@ -11,6 +11,7 @@ from ..catalogue.entries import Material, Threat
 from ..catalogue.strength import NINETY
 from ..results.attributes import NOT_TESTED
 from ..scene import Core, Plate
+from .resistances import catalogue_resistance
 from .tested import standings_of, summary_of
 
 if TYPE_CHECKING:
@@ -39,13 +40,12 @@ def limit_velocity_factors(campaign: Campaign) -> tuple[float, float] | None:
     It holds where the limit velocity goes with the root of Y: a solid plate of a material, which does not weaken, and
     whose resistance does not depend on the velocity. None elsewhere.
     """
-    plate, law, catalogue = campaign.plate, campaign.interaction, Catalogue.of(campaign.catalogue)
-    material = catalogue.all(Material).get(str(plate.material))
+    plate, law = campaign.plate, campaign.interaction
     alone = not campaign.layer and plate == plate.solid and plate.degradation == 1.0
-    if material is None or not alone or law.linear or law.quadratic:
+    if not alone or law.linear or law.quadratic:
         return None
-    known = catalogue.resistance(material, campaign.core, plate.thickness, campaign.impact.obliquity)
-    if not known.deviation or not _same(plate.resistance, known.median):
+    known = catalogue_resistance(campaign, plate)
+    if known is None or not known.deviation:
         return None
     factor = math.exp(0.5 * NINETY * math.hypot(known.deviation, known.test))
     return 1.0 / factor, factor

@@ -150,7 +150,7 @@ def said_by(design: Design, jobs: Sequence[HitJob], worker: Worker, told: Share 
     def limit(which: int, share: Worker, _: Any) -> Array:
         number, row = limits[which]
         numerics = Numerics.model_validate_json(jobs[number].level)
-        values = limits_said(*scenes[number][1:], design.keys[row], numerics, share)
+        values = limits_said(*scenes[number], design.keys[row], numerics, share)
         told((1 + next(ended)) * len(jobs) / steps)
         return values
 
@@ -218,11 +218,7 @@ def level_of(design: Design, job: HitJob, worker: Worker) -> str:
         return campaign.numerics.model_dump_json()
     asked = campaign.numerics.model_copy(update={"fidelity": job.level, "accuracy": None})
     shots = hits_of(campaign, 0, pilot_size(asked.asked))
-    found = [
-        limits_level(campaign.scene, shots, key, asked, worker, lambda level: None)
-        for key in design.keys
-        if key.is_limit
-    ]
+    found = [limits_level(campaign, shots, key, asked, worker) for key in design.keys if key.is_limit]
     if len(found) < len(design.keys):
         found.append(pilot_of(campaign.scene, shots, asked, worker).numerics)
     return max(found, key=lambda numerics: numerics.level or 0).model_dump_json()

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-
 import numpy as np
 from numpy.typing import NDArray
 
+from warpimpact.campaign.campaign import Campaign
+from warpimpact.campaign.resistances import resistance_by_thickness
 from warpimpact.records.group import failures
 from warpimpact.results.measures import Measure
 from warpimpact.scene import Numerics, Scene, Shots
@@ -25,18 +25,22 @@ from warpimpact.solver.worker import Worker
 Array = NDArray[np.float64]
 
 
-def sought_by(scene: Scene, key: Measure) -> Sought:
+def sought_by(campaign: Campaign, scene: Scene, key: Measure) -> Sought:
     """The limit that a measure is made of, with the tolerance of `warpimpact limit`."""
     if key.name == "limit_velocity":
         return Sought("velocity", VELOCITY_TOLERANCE, HIGHEST_VELOCITY)
     layer = key.layer or 0
-    return Sought("thickness", THICKNESS_TOLERANCE, thickest(scene, layer), layer)
+    highest = thickest(scene, layer)
+    curve = resistance_by_thickness(campaign, layer, highest)
+    return Sought("thickness", THICKNESS_TOLERANCE, highest, layer, curve)
 
 
-def limits_said(scene: Scene, shots: Shots, key: Measure, numerics: Numerics, worker: Worker) -> Array:
+def limits_said(
+    campaign: Campaign, scene: Scene, shots: Shots, key: Measure, numerics: Numerics, worker: Worker
+) -> Array:
     """The values of a measure of limits, in the unit in which it is shown, shape [shots]; NaN where the computation
     failed."""
-    sought = sought_by(scene, key)
+    sought = sought_by(campaign, scene, key)
     found = limits(scene, shots, sought, numerics, worker)
     value = np.minimum(found.value, sought.highest)
     value = np.where(failures(found.outcomes.status), np.nan, value)
@@ -46,9 +50,8 @@ def limits_said(scene: Scene, shots: Shots, key: Measure, numerics: Numerics, wo
     return np.asarray(key.display.factor * key.counted(value))
 
 
-def limits_level(
-    scene: Scene, shots: Shots, key: Measure, numerics: Numerics, worker: Worker, trying: Callable[[int], object]
-) -> Numerics:
-    """The numerics that a pilot finds for a limit; `trying` is as in `pilot_of`."""
+def limits_level(campaign: Campaign, shots: Shots, key: Measure, numerics: Numerics, worker: Worker) -> Numerics:
+    """The numerics that a pilot finds for a limit."""
     some = shots[: limits_pilot_size(numerics.asked)]
-    return pilot_of_limits(scene, some, sought_by(scene, key), numerics, worker, trying).numerics
+    sought = sought_by(campaign, campaign.scene, key)
+    return pilot_of_limits(campaign.scene, some, sought, numerics, worker).numerics

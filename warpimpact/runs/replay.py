@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -19,7 +20,7 @@ from warpimpact.runs.describe import is_double
 from warpimpact.scene import Numerics, Scene, Shots
 from warpimpact.scene.flow import Continuum
 from warpimpact.solver import replay as solver
-from warpimpact.solver.limit import short_steps, with_thickness, with_velocity
+from warpimpact.solver.limit import short_steps
 from warpimpact.solver.unfold import image_of
 
 DEVICE_ROUNDING = {v.RESIDUAL_VELOCITY: 0.1, v.DEFLECTION: 0.5, v.TILT: 0.5}
@@ -102,9 +103,13 @@ def _at_their_limit(scene: Scene, shots: Shots, result: xarray.Dataset, place: i
         return shots
     layer = int(result.attrs[attr.LIMIT_LAYER])
     if result.attrs[attr.LIMIT] == "velocity":
-        return with_velocity(shots, np.full(len(shots), float(result[v.IMPACT_VELOCITY][place])))
-    stored = values_of(scene.target, result.isel(hit=place), "thickness")[layer]
-    return with_thickness(layer, shots, np.full(len(shots), stored))
+        return replace(shots, velocity=np.full(len(shots), float(result[v.IMPACT_VELOCITY][place])))
+    hit = result.isel(hit=place)
+    own = {name: values_of(scene.target, hit, name)[layer] for name in ("thickness", "resistance")}
+    given = scene.target.value("resistance", layer)
+    if own["resistance"] == given:  # none of its own
+        del own["resistance"]
+    return shots.with_own({name: np.full(len(shots), value) for name, value in own.items()}, layer)
 
 
 def _numerics(campaign: Campaign, result: xarray.Dataset) -> Numerics:

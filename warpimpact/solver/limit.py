@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,7 +15,7 @@ from numpy.typing import NDArray
 from warpimpact.records.group import failures
 from warpimpact.records.limit_variables import LIMITS
 from warpimpact.records.outcomes import Outcomes
-from warpimpact.scene import Numerics, Plate, Scene, Shots
+from warpimpact.scene import Numerics, Plate, Scene, Shots, Target
 from warpimpact.solver.findings import LimitErrors
 from warpimpact.solver.limit_near import Neighbours
 from warpimpact.solver.limit_search import Guess, LimitSearch
@@ -83,12 +82,26 @@ class Sought:
         tolerance: how far lower and upper may lie apart [m/s] or [m].
         highest: largest value tried [m/s] or [m].
         layer: whose thickness it is; 0 is the plate, 1 the first layer behind it.
+        by_thickness: thicknesses of the layer, ascending [m], and its resistance there, as a share of that of the shot;
+            linear in ln h between them. None where the resistance does not depend on the thickness.
     """
 
     quantity: str
     tolerance: float
     highest: float
     layer: int = 0
+    by_thickness: tuple[tuple[float, ...], tuple[float, ...]] | None = None
+
+    def put(self, target: Target, shots: Shots, values: Array) -> Shots:
+        """Shots with values of their own that are tried, shape [shots]: velocities [m/s], or thicknesses [m]."""
+        if self.quantity == "velocity":
+            return replace(shots, velocity=values)
+        own = {"thickness": values}
+        if self.by_thickness is not None:
+            thickness, share = self.by_thickness
+            there = np.interp(np.log(np.maximum(values, thickness[0])), np.log(thickness), share)
+            own["resistance"] = shots.own_of(target, "resistance", self.layer) * there
+        return shots.with_own(own, self.layer)
 
 
 def limit_velocity(
@@ -132,8 +145,8 @@ def limit_thickness(
 ) -> Limits:
     """Find the thickness of a plate with which each shot just perforates the target, within MOST_RUNS runs of a shot.
 
-    It is at most THICKEST times the thickness in the scene. A lower end of 0 was not computed: where the rest of the
-    target stops a core, no thickness is found above 0.
+    It is at most THICKEST times the thickness in the scene, and all thicknesses have one resistance. A lower end of 0
+    was not computed: where the rest of the target stops a core, no thickness is found above 0.
 
     Args:
         shots: their own thicknesses, or the scene's, are the first ones tried.
@@ -247,19 +260,19 @@ def _searched(
     progress: Callable[[int], object],
 ) -> tuple[LimitSearch, Limits]:
     """The limits of some shots of which something is known, one run of each at a time, and their search."""
-    search, put = _begun(scene, shots, sought, guess)
+    search, target = _begun(scene, shots, sought, guess), scene.target
     total = len(shots)
     kept, failing = _Kept(total), _Kept(total)
     while len(which := search.pending):
         tried = search.trial(which)
-        ended = computed(prepare(scene, put(shots[which], tried), numerics), worker)
+        ended = computed(prepare(scene, sought.put(target, shots[which], tried), numerics), worker)
         kept.take(search.learn(which, tried, ended), which, tried, ended)
         failing.take(np.flatnonzero(failures(ended.status)), which, tried, ended)
         progress(total - len(search.pending))
     failed = np.flatnonzero(search.failed)
     if len(failed):
         kept.take(failed, np.arange(total), failing.values, failing.outcomes)
-    shots, outcomes = put(shots, kept.values), kept.outcomes
+    shots, outcomes = sought.put(target, shots, kept.values), kept.outcomes
     return search, Limits(search.value(), *search.ends(), search.runs, search.converged, shots, outcomes)
 
 
@@ -273,26 +286,13 @@ def _joined(parts: list[Limits], order: NDArray[np.int64]) -> Limits:
     )
 
 
-def _begun(
-    scene: Scene, shots: Shots, sought: Sought, guess: Guess
-) -> tuple[LimitSearch, Callable[[Shots, Array], Shots]]:
-    """A search of limits, and what gives shots the values that are tried."""
-    tolerance, highest, layer = sought.tolerance, sought.highest, sought.layer
+def _begun(scene: Scene, shots: Shots, sought: Sought, guess: Guess) -> LimitSearch:
+    """A search of limits."""
+    tolerance, highest = sought.tolerance, sought.highest
     if sought.quantity == "velocity":
-        return LimitSearch(shots.velocity, np.inf, np.zeros(len(shots)), tolerance, highest, guess), with_velocity
-    start = np.broadcast_to(shots.own_of(scene.target, "thickness", layer), len(shots))
-    search = LimitSearch(start, 0.0, shots.velocity, tolerance, highest, guess)
-    return search, partial(with_thickness, layer)
-
-
-def with_velocity(shots: Shots, values: Array) -> Shots:
-    """Shots with impact velocities of their own [m/s], shape [shots]."""
-    return replace(shots, velocity=values)
-
-
-def with_thickness(layer: int, shots: Shots, values: Array) -> Shots:
-    """Shots with thicknesses of a layer of their own [m], shape [shots]; layer 0 is the plate."""
-    return shots.with_own({"thickness": values}, layer)
+        return LimitSearch(shots.velocity, np.inf, np.zeros(len(shots)), tolerance, highest, guess)
+    start = np.broadcast_to(shots.own_of(scene.target, "thickness", sought.layer), len(shots))
+    return LimitSearch(start, 0.0, shots.velocity, tolerance, highest, guess)
 
 
 def short_steps(numerics: Numerics) -> Numerics:

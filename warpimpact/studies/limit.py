@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from warpimpact.campaign.campaign import Campaign
 from warpimpact.campaign.evidence import limit_velocity_factors
+from warpimpact.campaign.resistances import resistance_by_thickness
 from warpimpact.campaign.text import CampaignError
 from warpimpact.records.outcomes import Outcomes
 from warpimpact.results import attributes as attr
@@ -38,8 +39,6 @@ from warpimpact.solver.limit import (
     pilot_of_limits,
     short_steps,
     thickest,
-    with_thickness,
-    with_velocity,
 )
 from warpimpact.solver.many import side_by_side
 from warpimpact.solver.marching import Helpers, Progress
@@ -83,7 +82,9 @@ class LimitMap:
         plates = campaign.target.layers
         if layer >= len(plates):
             raise CampaignError(f"got layer {layer}, but the target has layers 0 (the plate) to {len(plates) - 1}")
-        return cls(Sought(quantity, tolerance or THICKNESS_TOLERANCE, thickest(campaign.scene, layer), layer))
+        highest = thickest(campaign.scene, layer)
+        curve = resistance_by_thickness(campaign, layer, highest)
+        return cls(Sought(quantity, tolerance or THICKNESS_TOLERANCE, highest, layer, curve))
 
     def check(self, texts: Sequence[str]) -> None:
         """Refuse measures that this search does not tell.
@@ -107,7 +108,8 @@ class LimitMap:
         """What decides the bits beside the campaign."""
         sought = self.sought
         of_layer = f" of layer {sought.layer}" if sought.layer else ""
-        return {"limit": f"{sought.quantity}{of_layer} within {sought.tolerance:g}, at most {sought.highest:g}"}
+        curve = ", with the resistance of each thickness" if sought.by_thickness else ""
+        return {"limit": f"{sought.quantity}{of_layer} within {sought.tolerance:g}, at most {sought.highest:g}{curve}"}
 
     @property
     def measures(self) -> tuple[str, ...]:
@@ -153,7 +155,8 @@ class LimitMap:
         """Column and attributes of the limits of some shots at the solid plate that is as heavy as the whole target."""
         (scene, shots), sought = at_solid(campaign, shots), replace(self.sought, layer=0)
         if sought.quantity == "thickness":
-            sought = replace(sought, highest=thickest(scene, 0))
+            highest = thickest(scene, 0)
+            sought = replace(sought, highest=highest, by_thickness=resistance_by_thickness(campaign, 0, highest))
         begin = time.perf_counter()
         searched = limits(scene, shots, sought, numerics, worker)
         return {v.SOLID_LIMITS[sought.quantity]: searched.value}, {
@@ -203,10 +206,10 @@ class LimitMap:
 
     def _put(self, campaign: Campaign, shots: Shots, limits: Limits, images: int) -> Shots:
         """Shots, with their images, as they just perforate."""
-        if self.sought.quantity == "velocity":
-            return with_velocity(shots, np.repeat(limits.shots.velocity, images))
-        tried = limits.shots.own_of(campaign.target, "thickness", self.sought.layer)
-        return with_thickness(self.sought.layer, shots, np.repeat(tried, images))
+        target, layer = campaign.target, self.sought.layer
+        of_velocity = self.sought.quantity == "velocity"
+        tried = limits.shots.velocity if of_velocity else limits.shots.own_of(target, "thickness", layer)
+        return self.sought.put(target, shots, np.repeat(tried, images))
 
 
 def warning_of(campaign: Campaign, quantity: str) -> str | None:

@@ -157,6 +157,26 @@ def test_thickness_of_a_campaign(tmp_path: Path) -> None:
     assert "mm" in text_of(limit_view(found))
 
 
+@pytest.mark.parametrize("layers", ["", '[[layer]]\ngap = "50 mm"\nthickness = "1 mm"\nresistance = "1 GPa"\n'])
+def test_the_resistance_of_the_catalogue_follows_the_thickness(tmp_path: Path, layers: str) -> None:
+    """The limit thickness is the same from whatever thickness of the campaign it is searched."""
+    text = TEXT.partition("core = ")[0] + 'core = { threat = ".30 AP M2" }\n' + layers
+    text += (
+        '[impact]\nvelocity = "800 m/s"\n[hits]\ncount = 1\n[numerics]\nlevel = 0\n[output]\nstandoffs = ["0.5 m"]\n'
+    )
+    found = [
+        search(
+            campaign(f'{text}[plate]\nmaterial = "HHA Class 1"\nthickness = "{thickness} mm"\n'),
+            tmp_path / f"{thickness}.nc",
+            quantity="thickness",
+        )
+        for thickness in (5, 10)
+    ]
+    thin, thick = (float(limit["limit_thickness"][0]) for limit in found)
+    assert thin == pytest.approx(thick, abs=2e-5)
+    assert replay(found[0], 0, folder=Path()).attrs["agreement"] == "bit-identical"
+
+
 LAYER = """
 [[layer]]
 gap = "100 mm"

@@ -1,0 +1,62 @@
+"""What the catalogue says of the resistance of the plates of a campaign, also of thicknesses that it does not have."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Collection
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ..catalogue.catalogue import Catalogue
+from ..catalogue.entries import Material
+from ..scene import Plate
+
+if TYPE_CHECKING:
+    from ..catalogue.strength import Resistance
+    from .campaign import Campaign
+
+Curve = tuple[tuple[float, ...], tuple[float, ...]]
+
+_SAME = 1e-6
+"""Relative difference of a resistance from that of the catalogue, up to which it is the catalogue's."""
+_THINNEST, _POINTS = 1e-3, 128
+"""Of a curve: its least thickness, as a share of the largest, and its points. They are closer than a tenth of what the
+fit takes to be nearly one thickness (`catalogue.strength.SAME_THICKNESS`, as logarithms) is wide; what is linear
+between them is off by 0.1 % at most."""
+
+
+def catalogue_resistance(campaign: Campaign, plate: Plate, thickness: float | None = None) -> Resistance | None:
+    """What the catalogue knows of the Y of a plate; None where Y is the user's.
+
+    Args:
+        thickness: of the plate, if it had another one [m].
+    """
+    catalogue = Catalogue.of(campaign.catalogue)
+    material = catalogue.all(Material).get(str(plate.material))
+    if material is None:
+        return None
+    obliquity = campaign.impact.obliquity
+    known = catalogue.resistance(material, campaign.core, plate.thickness, obliquity)
+    if not math.isclose(known.median, plate.resistance, rel_tol=_SAME):
+        return None
+    return known if thickness is None else catalogue.resistance(material, campaign.core, thickness, obliquity)
+
+
+def resistance_by_thickness(campaign: Campaign, layer: int, thickest: float) -> Curve | None:
+    """Thicknesses of a layer, ascending [m], and its resistance there, as a share of that in the campaign, where the
+    catalogue gives it; None elsewhere."""
+    plate = campaign.target.layers[layer]
+    if is_drawn(campaign, "resistance", [layer]) or (known := catalogue_resistance(campaign, plate)) is None:
+        return None
+    thicknesses = np.geomspace(_THINNEST * thickest, thickest, _POINTS).tolist()
+    others = (catalogue_resistance(campaign, plate, thickness) for thickness in thicknesses)
+    return tuple(thicknesses), tuple(other.median / known.median for other in others if other is not None)
+
+
+def is_drawn(campaign: Campaign, quantity: str, layers: Collection[int] = (0,)) -> bool:
+    """Whether shots have values of their own of a quantity, by a distribution, a list of hits or a posterior."""
+    scattered = any(name == quantity and k in layers for name, k in campaign.scatter.given)
+    listed = campaign.hits.listed is not None and quantity in campaign.hits.listed
+    drawn = campaign.drawn is not None and any(str(path[1]).startswith(quantity) for path in campaign.drawn.values)
+    return scattered or listed or drawn
