@@ -1,4 +1,4 @@
-"""Directives of the benchmark page: its table follows from tests/benchmarks/results."""
+"""Directives whose tables follow from tests/benchmarks/results: of the benchmarks, and of the continuum."""
 
 from __future__ import annotations
 
@@ -25,6 +25,21 @@ class BenchmarkTable(FromTheCode):
         yield from (f"- {sentence}" for sentence in page.machines(found))
 
 
+class ContinuumTable(FromTheCode):
+    """A table of the continuum beside the fast law; its argument is the name of one in continuum_tables.py."""
+
+    required_arguments = 1
+
+    def lines(self) -> Iterator[str]:
+        import continuum_tables
+
+        for file in continuum_tables.RESULTS.glob("continuum_*.csv"):
+            self.env.note_dependency(str(file))
+        head, rows = continuum_tables.TABLES[self.arguments[0]]()
+        yield from table(head, rows)
+
+
 def setup(app: Sphinx) -> dict[str, bool]:
     app.add_directive("benchmark-table", BenchmarkTable)
+    app.add_directive("continuum-table", ContinuumTable)
     return {"parallel_read_safe": True, "parallel_write_safe": True}

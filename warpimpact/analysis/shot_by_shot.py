@@ -2,55 +2,79 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 import numpy as np
 import xarray
 from numpy.typing import NDArray
 
 from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
-from warpimpact.results.dataset import failed, hit_numbers
+from warpimpact.results.dataset import failed, hit_numbers, passed
 from warpimpact.view.view import Column, Section, Table, number
 
 Array = NDArray[np.float64]
 
+MOST_NAMED = 12
+"""Hits that are named as those that end otherwise."""
 MOST_WORST = 3
 """Hits that are named as those of the largest differences."""
 FEWEST_RANKED = 3
 """Hits below which no ranks are correlated."""
 
 
-def shot_by_shot(datasets: dict[str, xarray.Dataset]) -> list[Section]:
-    """Where one of two results is by finite elements, and both have the same hits: how they differ, hit by hit.
+def shared_hits(datasets: Mapping[str, xarray.Dataset]) -> dict[str, xarray.Dataset] | None:
+    """The hits that both results have, in memory, the one by finite elements last; None unless there are two results,
+    one of them by finite elements, of the same shots.
 
     Args:
         datasets: results by their names.
-
-    Returns:
-        A section with bias, root mean square, correlation of ranks and the worst hits by quantity; empty where there is
-        nothing to compare so. Hits of which either failed are left out, and counted.
     """
     by_elements = [name for name, dataset in datasets.items() if attr.CONTINUUM in dataset.attrs]
     if len(datasets) != 2 or len(by_elements) != 1:
-        return []
+        return None
     (reference,) = by_elements
     (name,) = {*datasets} - {reference}
-    shared, places, others = np.intersect1d(
+    numbers, places, others = np.intersect1d(
         hit_numbers(datasets[name]), hit_numbers(datasets[reference]), return_indices=True
     )
-    one, other = datasets[name].isel(hit=places).load(), datasets[reference].isel(hit=others).load()
-    if not len(shared) or not all(np.allclose(one[at], other[at], atol=1e-9) for at in (v.HIT_Y, v.HIT_Z)):
-        return []
-    sound = ~(failed(one) | failed(other))
-    rows = [row for label, unit, a, b in _pairs(one, other) if (row := _row(label, unit, a, b, shared, sound))]
+    fast, slow = datasets[name].isel(hit=places).load(), datasets[reference].isel(hit=others).load()
+    shots = (v.HIT_Y, v.HIT_Z, *v.SHOT_VARIABLES)
+    if not len(numbers) or not all(np.allclose(fast[at], slow[at], atol=1e-9) for at in shots if at in fast):
+        return None
+    return {name: fast, reference: slow}
+
+
+def shot_by_shot(shared: Mapping[str, xarray.Dataset]) -> Section:
+    """How two results differ, hit by hit: bias, root mean square, correlation of ranks and the worst hits by quantity.
+    The numbers describe these hits and have no intervals. Hits of which either failed are left out, and counted.
+
+    Args:
+        shared: as `shared_hits` gives them.
+    """
+    (name, one), (reference, other) = shared.items()
+    numbers, sound = hit_numbers(one), ~(failed(one) | failed(other))
+    rows = [row for label, unit, a, b in _pairs(one, other) if (row := _row(label, unit, a, b, numbers, sound))]
     left_out = int((~sound).sum())
-    sentence = f"{name} less {reference}, of the {len(shared)} hits that both have" + (
+    sentence = f"{name} less {reference}, of the {len(numbers)} hits that both have" + (
         f"; {left_out} of them failed and count nowhere" if left_out else ""
     )
     columns = (
         *(Column("quantity"), number("hits", digits=".0f"), number("bias", digits=".3g"), number("rms", digits=".3g")),
         *(number("rank correlation", digits=".2f"), Column("largest differences at hits")),
     )
-    return [Section([sentence, Table(columns, rows)], "shot by shot")] if rows else []
+    ended = (
+        [f"{name} and {reference} end otherwise at hits {_text_of(numbers[differs])}"]
+        if (differs := sound & (passed(one) != passed(other))).any()
+        else []
+    )
+    return Section([sentence, *ended, *([Table(columns, rows)] if rows else [])], "shot by shot")
+
+
+def _text_of(numbers: NDArray[np.int64]) -> str:
+    """The first hits, and how many more there are."""
+    named = ", ".join(str(number) for number in numbers[:MOST_NAMED])
+    return named + (f" and {len(numbers) - MOST_NAMED} more" if len(numbers) > MOST_NAMED else "")
 
 
 def _pairs(one: xarray.Dataset, other: xarray.Dataset) -> list[tuple[str, str, Array, Array]]:

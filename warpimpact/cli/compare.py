@@ -2,6 +2,7 @@
 
 import argparse
 import sys
+from collections.abc import Sequence
 from contextlib import ExitStack
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -22,6 +23,8 @@ from .progress import show_run, warn
 from .run import failure_code
 
 if TYPE_CHECKING:
+    from xarray import Dataset
+
     from warpimpact.analysis.comparison_text import Comparison
 
 
@@ -33,6 +36,7 @@ def add_compare(commands: Commands) -> None:
         summary="compare plates: which protects better",
         description="Compare plates under the same shots: rankings, differences with their intervals, and a figure. Of "
         "targets with layers, and of limits, a second figure, FIGURE_weight.png, shows them against their weight. A "
+        "map and a result of continuum of the same shots are compared hit by hit, with their maps side by side. A "
         "campaign with several plates is run first: each plate gives NAME.nc in the folder of the figure. A plate "
         "whose result exists is not run again.",
         example="compare campaigns/two_plates.toml, or: warpimpact compare slotted.nc round.nc",
@@ -66,17 +70,17 @@ def _compare(arguments: argparse.Namespace) -> int:
     from warpimpact.analysis.comparison import compare
     from warpimpact.analysis.comparison_text import comparison_text
     from warpimpact.analysis.evidence_lines import evidence_of_all
-    from warpimpact.analysis.shot_by_shot import shot_by_shot
+    from warpimpact.analysis.shot_by_shot import shared_hits
     from warpimpact.plotting import comparison_figure, weight_figure
     from warpimpact.results import files
-    from warpimpact.view.view import text_of
 
     is_campaign = arguments.files[0].suffix == ".toml"
     default = arguments.files[0].stem if is_campaign else "comparison"
     figure = arguments.output or Path(f"{default}.png")
     # The figure of a campaign belongs to it as its results do.
     beside = figure.with_stem(f"{figure.stem}_weight")
-    for picture in (figure, beside):
+    tilts = figure.with_stem(f"{figure.stem}_tilt")
+    for picture in (figure, beside, tilts):
         check_picture(picture, overwrite=arguments.overwrite or (is_campaign and arguments.output is None))
     replaced = " (replaced)" if figure.exists() else ""
     paths = _plates_run(arguments, figure.parent) if is_campaign else named(arguments.files)
@@ -86,13 +90,13 @@ def _compare(arguments: argparse.Namespace) -> int:
         )
     with ExitStack() as stack:
         datasets = [stack.enter_context(files.opened(path)) for path in paths.values()]
-        comparison = compare(datasets, list(paths), arguments.measure)
-        differing = text_of(shot_by_shot(dict(zip(paths, datasets, strict=True))))
-        evidence = evidence_of_all(dict(zip(paths, datasets, strict=True)))
         code = max(failure_code(dataset, path) for dataset, path in zip(datasets, paths.values(), strict=True))
+        evidence = evidence_of_all(dict(zip(paths, datasets, strict=True)))
+        if shared := shared_hits(dict(zip(paths, datasets, strict=True))):
+            _print_models(arguments, shared, evidence, (figure, tilts))
+            return code
+        comparison = compare(datasets, list(paths), arguments.measure)
     print(comparison_text(comparison))
-    if differing:
-        print(f"\n{differing}\n")
     for line in evidence:
         print(line)
     if arguments.assumptions:
@@ -103,6 +107,30 @@ def _compare(arguments: argparse.Namespace) -> int:
         against_weight.savefig(beside, dpi=150)
         print(beside)
     return code
+
+
+def _print_models(
+    arguments: argparse.Namespace, shared: "dict[str, Dataset]", evidence: Sequence[str], figures: tuple[Path, Path]
+) -> None:
+    """Print how a map and a result by finite elements differ at the same shots; draw their maps of velocity and tilt
+    side by side."""
+    from warpimpact.analysis.shot_by_shot import shot_by_shot
+    from warpimpact.plotting import variable_maps
+    from warpimpact.results import files
+    from warpimpact.results import variables as v
+    from warpimpact.view.view import text_of
+
+    if arguments.measure or arguments.assumptions:
+        raise files.ResultError(
+            f"{arguments.files[0]}: --measure and --assumptions are for plates, but these are the same shots at one "
+            "plate by two models, which are compared hit by hit"
+        )
+    print(text_of([shot_by_shot(shared)]))
+    for line in evidence:
+        print(line)
+    for path, variable in zip(figures, (v.RESIDUAL_VELOCITY, v.TILT), strict=True):
+        variable_maps(shared, variable).savefig(path, dpi=150)
+        print(path)
 
 
 def _under_assumptions(comparison: "Comparison") -> str:

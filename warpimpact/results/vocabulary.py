@@ -249,6 +249,7 @@ def _recorded() -> Iterator[PerHit]:
             has_standoff="standoff" in variable.dims,
             need=Need(variable, f"the variable {variable}", ""),
             least=-math.inf if variable in (v.PITCH, v.YAW, v.BROKEN_X) else 0.0,
+            most=180.0 if variable.units == "degree" else math.inf,
         )
 
 

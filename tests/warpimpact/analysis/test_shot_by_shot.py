@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 import xarray
 
-from warpimpact.analysis.shot_by_shot import rank_correlation, shot_by_shot
+from warpimpact.analysis.shot_by_shot import rank_correlation, shared_hits, shot_by_shot
 from warpimpact.kernels.status import Status
 from warpimpact.results import attributes as attr
 from warpimpact.view.view import Table, text_of
@@ -30,7 +30,9 @@ def test_bias_rms_ranks_and_the_worst_hits_are_those_of_the_shared_sound_hits() 
     slow = result(
         [1, 2, 3, 4], [700.0, 724.0, 726.0, np.nan], [0, 0, 0, int(Status.HOURGLASSED)], {attr.CONTINUUM: "{}"}
     )
-    (section,) = shot_by_shot({"fast": fast, "slow": slow})
+    shared = shared_hits({"slow": slow, "fast": fast})
+    assert shared is not None
+    section = shot_by_shot(shared)
     table = section.parts[1]
     assert isinstance(table, Table)
     row = table.rows[0]
@@ -44,8 +46,16 @@ def test_bias_rms_ranks_and_the_worst_hits_are_those_of_the_shared_sound_hits() 
 def test_results_by_the_same_law_or_of_other_hits_are_not_compared_so() -> None:
     fast, moved = result([0, 1], [700.0, 710.0], [0, 0], {}), result([0, 1], [1.0, 2.0], [0, 0], {attr.CONTINUUM: "{}"})
     moved = moved.assign_coords(hit_y=moved["hit_y"] + 1e-3)
-    assert not shot_by_shot({"a": fast, "b": fast})
-    assert not shot_by_shot({"a": fast, "b": moved})
+    assert shared_hits({"a": fast, "b": fast}) is None
+    assert shared_hits({"a": fast, "b": moved}) is None
+
+
+def test_hits_that_end_otherwise_are_named() -> None:
+    fast = result([4, 7], [700.0, np.nan], [0, int(Status.ARRESTED)], {})
+    slow = result([4, 7], [705.0, 90.0], [0, 0], {attr.CONTINUUM: "{}"})
+    shared = shared_hits({"fast": fast, "slow": slow})
+    assert shared is not None
+    assert "fast and slow end otherwise at hits 7" in text_of([shot_by_shot(shared)])
 
 
 def test_ranks_are_correlated_as_spearman_does() -> None:

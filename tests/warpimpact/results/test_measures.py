@@ -42,6 +42,13 @@ def test_intervals_of_independent_shots_hold_as_often_as_they_say(text: str) -> 
     assert held >= LEAST
 
 
+def test_an_interval_of_a_tilt_ends_where_tilts_do() -> None:
+    """Student's interval of two tilts that lie far apart is wider than all tilts there are."""
+    tally = Tally(Measure.parse("mean(tilt@130mm)"))
+    tally.add(shard_of(np.array([20.0, 160.0])))
+    assert (tally.estimate().low, tally.estimate().high) == (0.0, 180.0)
+
+
 def test_what_failed_or_stayed_counts_where_it_says() -> None:
     mixed = xarray.concat(
         [

@@ -123,6 +123,13 @@ def test_the_command_computes_hits_of_a_result(
     assert "The solid plate is 2.61 mm of ARMOX560T by finite elements" in capsys.readouterr().out
     assert main(command) == 2
     assert "exists already" in capsys.readouterr().err
+    assert main(["compare", "map.nc", "map_continuum.nc", "-o", "both.png"]) == 0
+    told = capsys.readouterr().out
+    assert "of the 2 hits that both have" in told
+    assert "interval" not in told
+    assert {path.name for path in tmp_path.glob("*.png")} == {"both.png", "both_tilt.png"}
+    assert main(["compare", "map.nc", "map_continuum.nc", "--measure", "stopped", "-o", "other.png"]) == 2
+    assert "compared hit by hit" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(

@@ -1,0 +1,143 @@
+"""The plates on which the fast law stands beside the continuum."""
+
+from __future__ import annotations
+
+import csv
+import math
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+from warpimpact import (
+    CirclePattern,
+    Hits,
+    Impact,
+    Layer,
+    OgiveCore,
+    Plate,
+    PolynomialCore,
+    Record,
+    Scatter,
+    Scene,
+    Shots,
+    SlotPattern,
+    make_shots,
+)
+from warpimpact.scene.distributions import Normal, Uniform
+
+CORE = PolynomialCore(coefficients=(3.0e-4, 0.24, -5.29), length=27.86e-3, mass=4.0e-3)
+BULLET_CORE = OgiveCore(diameter=6.248e-3, crh=3.0, length=27.5e-3, mass=5.3e-3)
+"""Core of the .30 AP M2, with which limit velocities of solid plates are published."""
+PAPER = {"resistance": 2.6e9, "shear_coefficient": 0.05, "degradation": 0.8, "degradation_interval": 1e-6}
+ALUMINIUM = {"resistance": 1.1e9, "shear_coefficient": 0.05, "density": 2700.0}
+SLOTS = SlotPattern(length=12e-3, width=4e-3, spacing=(8e-3, 16e-3), staggered=True)
+STEEL = "ARMOX560T"
+YAWED = Normal(mean=0.0, std=math.radians(1.5))
+"""Pitch and yaw of the hits of a solid plate."""
+
+
+def round_holes(diameter: float, pitch: float) -> CirclePattern:
+    """On a hexagonal lattice."""
+    return CirclePattern(diameter=diameter, spacing=(0.5 * pitch * 3**0.5, pitch), staggered=True)
+
+
+class Case(NamedTuple):
+    """A target, the materials of its layers, the core and how it arrives.
+
+    Attributes:
+        title: what it is, for a table.
+        layers: with the parameters of the fast law.
+        flows: materials of the continuum, by layer.
+        velocities: limits of the velocity, which differs from hit to hit at a solid plate [m/s].
+    """
+
+    title: str
+    layers: tuple[Plate | Layer, ...]
+    flows: tuple[str, ...]
+    impact: Impact = Impact(velocity=825.0)
+    core: PolynomialCore | OgiveCore = CORE
+    velocities: tuple[float, float] | None = None
+
+    @property
+    def scene(self) -> Scene:
+        return Scene(core=self.core, target=self.layers, record=Record(standoffs=(0.05, 0.13)))
+
+    def shots(self, count: int) -> Shots:
+        """The first hits; more of them begin with the same ones."""
+        scatter = None
+        if self.velocities is not None:
+            low, high = self.velocities
+            scatter = Scatter(velocity=Uniform(low=low, high=high), pitch=YAWED, yaw=YAWED)
+        return make_shots(self.impact, Hits(count=count, seed=1), self.layers[0], scatter)
+
+
+def solid(
+    title: str, thickness: float, resistance: float, friction: float, flow: str, velocities: tuple[float, float]
+) -> Case:
+    """A solid plate that the core of the .30 AP M2 hits, with what the catalogue fits to its published limits."""
+    density = 2700.0 if flow.startswith("AA") else 7850.0
+    plate = Plate(thickness=thickness, resistance=resistance, shear_coefficient=friction, density=density)
+    return Case(title, (plate,), (flow,), core=BULLET_CORE, velocities=velocities)
+
+
+THIN = Plate(thickness=1.25e-3, pattern=round_holes(5.75e-3, 7.25e-3), **PAPER)
+CASES = {
+    "slotted": Case(
+        "4 mm, slots of 4 × 12 mm (the paper's)", (Plate(thickness=4e-3, pattern=SLOTS, **PAPER),), (STEEL,)
+    ),
+    "thin": Case("1.25 mm, holes of 5.75 mm at 7.25 mm", (THIN,), (STEEL,)),
+    "thick": Case(
+        "6 mm, holes of 5 mm at 8 mm", (Plate(thickness=6e-3, pattern=round_holes(5e-3, 8e-3), **PAPER),), (STEEL,)
+    ),
+    "oblique": Case(
+        "the paper's at 30°",
+        (Plate(thickness=4e-3, pattern=SLOTS, **PAPER),),
+        (STEEL,),
+        Impact(velocity=825.0, obliquity=30.0),
+    ),
+    "based": Case(
+        "thin, 50 mm before 6 mm of AA6082-T6",
+        (THIN, Layer(thickness=6e-3, gap=50e-3, **ALUMINIUM)),
+        (STEEL, "AA6082-T6"),
+    ),
+    "aluminium": Case(
+        "8 mm of AA6082-T6, holes of 5 mm at 8 mm",
+        (Plate(thickness=8e-3, pattern=round_holes(5e-3, 8e-3), **ALUMINIUM),),
+        ("AA6082-T6",),
+    ),
+    "solid_6.5": solid("6.5 mm of HARDOX400, solid", 6.5e-3, 3.146e9, 0.039, "HARDOX400", (650.0, 850.0)),
+    "solid_12": solid("12 mm of ARMOX560T, solid", 12e-3, 4.041e9, 0.039, STEEL, (900.0, 1100.0)),
+    "solid_20": solid("20 mm of AA6082-T6, solid", 20e-3, 0.935e9, 0.05, "AA6082-T6", (600.0, 800.0)),
+}
+
+
+class Published(NamedTuple):
+    """A published limit velocity [m/s], of which projectile and material, and its key in the ballistic limit database
+    of Ryan and others (Mendeley Data, 10.17632/4f92y6jzzh.2)."""
+
+    velocity: float
+    projectile: str
+    material: str
+    source: str
+
+
+PUBLISHED = {
+    "solid_6.5": Published(525.0, "complete bullet", "SECURE400, 405 HV", "kaiser_11_isb"),
+    "solid_12": Published(871.0, "complete bullet", "ARMOX560, 560 HV", "borvik_09_ijie"),
+    "solid_20": Published(514.0, "bare core", "AA6082-T6", "forrestal_14_expmech"),
+}
+
+MEASURES = {"velocity": "m/s", "tilt_50": "°", "tilt_130": "°"}
+"""Columns of the rows, and their units."""
+
+
+def written(path: Path) -> list[dict[str, str]]:
+    """The rows of a table; none if there is no file."""
+    return list(csv.DictReader(path.open(encoding="utf-8"))) if path.exists() else []
+
+
+def measured(rows: list[dict[str, str]], plate: str, model: str) -> dict[int, np.ndarray]:
+    """The measures of the hits of a plate that perforated it, by their numbers."""
+    chosen = (row for row in rows if row["plate"] == plate and row["model"] == model and row["status"] == "0")
+    return {int(row["hit"]): np.array([float(row[name]) for name in MEASURES]) for row in chosen}
