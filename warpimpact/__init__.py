@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from .campaign.stop import Stop
     from .campaign.text import CampaignError
     from .catalogue.by_name import Layer, Plate, material, threat
-    from .continuum.strikes import simulate_continuum
+    from .continuum.strikes import simulate
     from .export.spreadsheet import to_dataframe
     from .optimisation.optimise import optimise, optimise_to_file
     from .records.outcomes import Outcomes
@@ -60,7 +60,6 @@ if TYPE_CHECKING:
     from .scene.flow import Continuum, Flow
     from .solver.device import DeviceError
     from .solver.limit import limit_thickness, limit_velocity
-    from .solver.simulate import simulate
 
     __version__: str
 
@@ -125,7 +124,6 @@ __all__ = [
     "run",
     "run_to_file",
     "simulate",
-    "simulate_continuum",
     "threat",
     "to_dataframe",
 ]
@@ -160,8 +158,7 @@ _HOMES = {
     "inspect": ".analysis.inspection",
     "run": ".runs.run",
     "run_to_file": ".runs.run",
-    "simulate": ".solver.simulate",
-    "simulate_continuum": ".continuum.strikes",
+    "simulate": ".continuum.strikes",
     "threat": ".catalogue.by_name",
     "to_dataframe": ".export.spreadsheet",
 }

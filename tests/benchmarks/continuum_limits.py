@@ -18,7 +18,7 @@ from typing import NamedTuple
 import numpy as np
 from continuum_cases import CASES, PUBLISHED
 
-from warpimpact import Continuum, Impact, Shots, simulate_continuum
+from warpimpact import Continuum, Impact, Shots, simulate
 from warpimpact.catalogue.flow_entries import flow_entry
 from warpimpact.kernels.status import Status
 
@@ -61,7 +61,7 @@ def shot_at(plate: str, friction: float, fidelity: str, velocity: float) -> Shot
     shots = Shots(hit_y=np.zeros(1), hit_z=np.zeros(1), **columns)
     flows = tuple(flow_entry(name).flow for name in case.flows)
     continuum = Continuum(flows=flows, friction=friction, fidelity=fidelity)
-    outcome = simulate_continuum(case.scene, shots, continuum, threads=1)
+    outcome = simulate(case.scene, shots, numerics=continuum, threads=1)
     return Shot(velocity, Status(int(outcome.status[0])), float(outcome.residual_velocity[0]))
 
 

@@ -25,7 +25,7 @@ from unittest import mock
 import numpy as np
 from continuum_cases import CASES, MEASURES, Case, measured, written
 
-from warpimpact import Continuum, Numerics, Record, Scene, Shots, simulate, simulate_continuum
+from warpimpact import Continuum, Numerics, Record, Scene, Shots, simulate
 from warpimpact.catalogue.flow_entries import flow_entry
 from warpimpact.continuum import one_hit, strikes
 from warpimpact.kernels.continuum import hexahedra, passing
@@ -88,7 +88,7 @@ def computed(compute: Callable[[Shots], Any], shots: Shots, hit: int) -> dict[st
 def by_elements(case: Case, **settings: Any) -> Callable[[Shots], Any]:
     """The solver of the continuum for a plate."""
     continuum = Continuum(flows=tuple(flow_entry(name).flow for name in case.flows), **settings)
-    return partial(simulate_continuum, case.scene, continuum=continuum, threads=1)
+    return partial(simulate, case.scene, numerics=continuum, threads=1)
 
 
 def write_rows(path: Path, plates: list[str], hits: int, settings: dict[str, float | str]) -> None:

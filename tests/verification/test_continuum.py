@@ -20,7 +20,6 @@ from warpimpact import (
     Scene,
     Shots,
     simulate,
-    simulate_continuum,
 )
 from warpimpact.continuum import strikes
 from warpimpact.continuum.meshing import SheetMesh
@@ -191,7 +190,7 @@ SOLID = Plate(thickness=4e-3, resistance=2.6e9, pattern=NoPattern())
 
 def computed(plate: Plate, shots: Shots, **settings: Any) -> Outcomes:
     chosen = {"flows": (STEEL,), "spacing": COARSE} | settings
-    return simulate_continuum(scene_of(plate), shots, Continuum(**chosen))
+    return simulate(scene_of(plate), shots, numerics=Continuum(**chosen))
 
 
 @pytest.fixture
@@ -222,7 +221,7 @@ def test_energy_is_kept(centred: Outcomes) -> None:
 
 def test_a_result_has_the_same_bits_however_many_threads_compute_it(centred: Outcomes) -> None:
     shots = shots_at((0.0, 0.0), (4.5e-3, 4.5e-3))
-    again = simulate_continuum(scene_of(HOLES), shots, Continuum(flows=(STEEL,), spacing=COARSE), threads=1)
+    again = simulate(scene_of(HOLES), shots, numerics=Continuum(flows=(STEEL,), spacing=COARSE), threads=1)
     for name, values in vars(centred).items():
         assert np.array_equal(values, getattr(again, name), equal_nan=True), name
 
@@ -291,10 +290,10 @@ def test_a_slow_core_comes_to_rest_or_is_thrown_back(coarse: float) -> None:
 
 def test_layers_apart_are_the_chain_of_their_plates(coarse: float) -> None:
     """The first of two plates takes what it takes alone; the second one meets the core that the first one left."""
-    first = simulate_continuum(scene_of(SOLID), shots_at((0.0, 0.0)), Continuum(flows=(STEEL,), spacing=coarse))
+    first = computed(SOLID, shots_at((0.0, 0.0)), spacing=coarse)
     behind = {"thickness": 4e-3, "resistance": 2.6e9, "gap": 40e-3}
     target = Scene(core=CORE, target=(SOLID, Layer(**behind)), record=Record(standoffs=(0.05,)))
-    both = simulate_continuum(target, shots_at((0.0, 0.0)), Continuum(flows=(STEEL,), spacing=coarse))
+    both = simulate(target, shots_at((0.0, 0.0)), numerics=Continuum(flows=(STEEL,), spacing=coarse))
     assert both.layer_status[0].tolist() == [Status.PERFORATED] * 2
     assert both.layer_residual_velocity[0, 0] == pytest.approx(first.residual_velocity[0], abs=0.5)
     assert both.residual_velocity[0] < both.layer_residual_velocity[0, 0] - 50.0

@@ -45,6 +45,7 @@ from ..scene.target import MOST_LAYERS
 from ..scene.units import Number, PositiveLength, Title
 from .assumptions import Assumptions
 from .catalogued import catalogue_of, with_materials, with_threat
+from .continuum_settings import FiniteElements
 from .drawn import DrawnSampler, Posterior, read_posterior
 from .needs import lacking
 from .plausible import check_plausible, warn_of
@@ -97,6 +98,7 @@ class Campaign(Model):
             part of the cell, with their images.
         allow_implausible: compute also with values that no core or target has, such as a plate of 4 m: they are else
             refused, as a slip of units.
+        continuum: how `warpimpact continuum` computes its hits.
         published: published limits, which `warpimpact limit` puts beside its own: a table `[[published]]` each.
     """
 
@@ -116,6 +118,7 @@ class Campaign(Model):
     stop: Stop | None = None
     burst: Burst | None = None
     allow_implausible: Annotated[bool, Field(strict=True)] = False
+    continuum: FiniteElements = FiniteElements()
     published: Annotated[tuple[Published, ...], Field(fail_fast=True, max_length=1000)] = ()
     _source: str = PrivateAttr("")
 

@@ -2,7 +2,7 @@
 
 import argparse
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from .mistakes import memory_told
 from .options import (
@@ -12,7 +12,6 @@ from .options import (
     add_output,
     add_overwrite,
     at_least,
-    read_option,
 )
 from .paths import check_place, check_suffix
 from .progress import Step, show_progress, warn
@@ -20,7 +19,7 @@ from .run import failure_code
 
 if TYPE_CHECKING:
     from warpimpact.campaign.campaign import Campaign
-    from warpimpact.runs.finite_elements import FiniteElements
+    from warpimpact.campaign.continuum_settings import FiniteElements
 
 
 def add_continuum(commands: Commands) -> None:
@@ -31,7 +30,8 @@ def add_continuum(commands: Commands) -> None:
         summary="compute hits by finite elements",
         description="Compute hits of a campaign, or some of those of a result, by explicit finite elements of the "
         "target, which take seconds to minutes of a core each, and write a result as run does. It stands beside the "
-        "fast law: compare takes both. Its materials have constants of their own (docs/continuum.md).",
+        "fast law: compare takes both. Its materials have constants of their own (docs/continuum.md). Options come "
+        "before the campaign's table [continuum].",
         example="continuum campaigns/slotted_plate.toml --count 4 --material ARMOX560T -o continuum.nc",
     )
     parser.add_argument("file", type=Path, metavar="FILE", help="a campaign, or a result of warpimpact run")
@@ -49,16 +49,20 @@ def add_continuum(commands: Commands) -> None:
     parser.add_argument(
         "--material",
         action="append",
-        default=[],
         metavar="NAME",
         help="material of the continuum, or a TOML file with its constants; given again for each layer behind "
-        "(default: plate.material)",
+        "(default: continuum.materials, or plate.material)",
     )
     parser.add_argument(
-        "--friction", type=float, default=0.0, metavar="MU", help="between core and target (default: 0)"
+        "--friction",
+        type=float,
+        metavar="MU",
+        help="between core and target (default: continuum.friction, which is 0 by default)",
     )
     parser.add_argument(
-        "--fidelity", choices=("draft", "standard", "reference"), default="draft", help="size of the elements"
+        "--fidelity",
+        choices=("draft", "standard", "reference"),
+        help="size of the elements (default: continuum.fidelity, which is draft by default)",
     )
     parser.add_argument(
         "--element", metavar="LENGTH", help='size of the elements, such as "0.5 mm", in place of a fidelity'
@@ -85,14 +89,14 @@ def _continuum(arguments: argparse.Namespace) -> int:
     output = arguments.output or Path(f"{arguments.file.stem}_continuum.nc")
     check_place(output)
     check_suffix(output, "a result", ".nc")
-    elements = _elements(arguments, campaign, hits)
+    campaign = campaign.model_copy(update={"continuum": _elements(arguments, campaign)})
     computing = executor_for("cpu", workers=arguments.workers, scheduler=arguments.scheduler, apart=True)
     with memory_told(arguments.file), show_progress() as show, computing as executor:
         try:
             continuum_to_file(
                 campaign,
-                elements,
                 output,
+                hits=hits,
                 device=executor,
                 resume=arguments.resume,
                 overwrite=arguments.overwrite,
@@ -143,27 +147,26 @@ def _asked(arguments: argparse.Namespace) -> "tuple[Campaign, tuple[int, ...] | 
     return campaign_in(result, arguments.file.parent), chosen
 
 
-def _elements(arguments: argparse.Namespace, campaign: "Campaign", hits: "tuple[int, ...] | None") -> "FiniteElements":
-    """How the hits are computed."""
-    from warpimpact.campaign.text import CampaignError
-    from warpimpact.catalogue.flow_entries import flow_names
-    from warpimpact.runs.finite_elements import FiniteElements
-    from warpimpact.scene.units import PositiveLength
+def _elements(arguments: argparse.Namespace, campaign: "Campaign") -> "FiniteElements":
+    """How the hits are computed: as the campaign says, unless an option says otherwise."""
+    from pydantic import ValidationError
 
-    materials = tuple(arguments.material) or ((campaign.plate.material,) if campaign.plate.material else ())
-    if not materials:
-        raise CampaignError(
-            f"{arguments.file}: the continuum needs a material: give --material with one of {', '.join(flow_names())}, "
-            "or a TOML file"
-        )
-    if not 0.0 <= arguments.friction <= 1.0:
-        raise CampaignError(f"--friction: got {arguments.friction:g}, but it must be from 0 to 1")
-    spacing = None
-    if arguments.element is not None:
-        spacing = read_option("--element", PositiveLength, arguments.element, CampaignError)
-    elements = FiniteElements(materials, arguments.friction, arguments.fidelity, spacing, hits)
+    from warpimpact.campaign.continuum_settings import FiniteElements
+    from warpimpact.campaign.problems import complaint
+    from warpimpact.campaign.text import CampaignError
+
+    named = campaign.plate.material
+    given: dict[str, Any] = {"materials": (named,)} if named and not campaign.continuum.materials else {}
+    options = {"materials": "material", "friction": "friction", "fidelity": "fidelity", "spacing": "element"}
+    told = {field: value for field, option in options.items() if (value := getattr(arguments, option)) is not None}
+    if "fidelity" in told:
+        told.setdefault("spacing", None)
     try:
+        elements = FiniteElements.model_validate(campaign.continuum.model_dump() | given | told)
         _ = elements.entries
+    except ValidationError as error:
+        problem = error.errors(include_url=False)[0]
+        raise CampaignError(f"--{options[str(problem['loc'][0])]}: {complaint(problem)}") from None
     except ValueError as error:
-        raise CampaignError(f"--material: {error}") from None
+        raise CampaignError(f"{arguments.file}: {error}") from None
     return elements

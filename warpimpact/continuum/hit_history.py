@@ -26,7 +26,7 @@ def replay_continuum(scene: Scene, shots: Shots, continuum: Continuum, snapshots
     has the share of its elements that are left, seen along the thickness.
 
     Raises:
-        ValueError: as in `simulate_continuum`.
+        ValueError: as in `check_continuum`.
     """
     check_continuum(scene, shots, continuum)
     memory = memory_of(scene, shots, Worker("cpu", 1))

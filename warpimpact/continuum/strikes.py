@@ -19,8 +19,10 @@ from warpimpact.records.outcomes import Outcomes
 from warpimpact.scene import Numerics, Scene, Shots
 from warpimpact.scene.flow import Continuum
 from warpimpact.solver.device import cores, find_device
+from warpimpact.solver.marching import Progress
 from warpimpact.solver.memory import Memory
 from warpimpact.solver.prepare import prepare
+from warpimpact.solver.simulate import simulate as by_fast_law
 from warpimpact.solver.worker import NEVER, Cancel, Worker
 
 Array = NDArray[np.float64]
@@ -52,30 +54,42 @@ class Struck:
     eroded: int
 
 
-def simulate_continuum(
+def simulate(
     scene: Scene,
     shots: Shots,
-    continuum: Continuum,
     *,
+    numerics: Numerics | Continuum | None = None,
+    device: str = "auto",
     threads: int | None = None,
-    progress: Callable[[int, int], object] = lambda done, total: None,
+    progress: Progress | None = None,
     cancel: Cancel = NEVER,
 ) -> Outcomes:
-    """Compute every shot by finite elements, each at a target of its own: the rigid core of the scene against layers
-    that flow and fracture (docs/continuum.md). The stress of the scene's fast law does not count.
+    """Compute every shot by the fast law, on its own copy of the target (docs/model.md §§1–5), or those of a sample one
+    after another on one copy (`Shots.sample`, docs/model.md §8); or by finite elements (docs/continuum.md).
 
     Args:
-        threads: hits at a time; one per core by default.
-        progress: called with (shots done, all shots) as they end.
+        numerics: as in a campaign. None is the standard fidelity: a pilot on some of the shots finds the resolution. A
+            level or a single setting, such as Numerics(level=2), needs no pilot. A Continuum has every shot computed by
+            finite elements; the stress of the scene's fast law does not count then.
+        device: a name of Warp, such as "cpu" or "cuda:0"; finite elements are computed on the CPU.
+        threads: on a CPU; one per core by default. A thread computes one hit of the continuum at a time.
+        progress: called repeatedly with (shots done, all shots).
+        cancel: can be told from elsewhere to break off.
 
     Returns:
-        The outcomes, as those of `simulate`, with `energy_imbalance`, `hourglass_share` and `eroded_elements`.
+        The outcomes, with what the scene records (records/registry.py), and, by finite elements, `energy_imbalance`,
+        `hourglass_share` and `eroded_elements`.
 
     Raises:
-        ValueError: the scene records the bending moment, or several shots hit one plate, which the continuum does not
-            compute; or there are more sets of constants than layers.
+        DeviceError: the device is absent.
+        ValueError, MemoryError: as in `prepare`; or the continuum does not compute this (`check_continuum`).
     """
-    return struck(scene, shots, continuum, Worker("cpu", threads, cancel), progress)
+    if not isinstance(numerics, Continuum):
+        given: dict[str, Any] = {"device": device, "threads": threads, "progress": progress, "cancel": cancel}
+        return by_fast_law(scene, shots, numerics=numerics, **given)
+    if device not in ("auto", "cpu"):
+        raise ValueError(f'device: got "{device}", but finite elements are computed on the CPU')
+    return struck(scene, shots, numerics, Worker("cpu", threads, cancel), progress)
 
 
 def check_continuum(scene: Scene, shots: Shots, continuum: Continuum) -> None:
@@ -97,9 +111,9 @@ def struck(
     shots: Shots,
     continuum: Continuum,
     worker: Worker,
-    progress: Callable[[int, int], object] = lambda done, total: None,
+    progress: Progress | None = None,
 ) -> Outcomes:
-    """Compute the shots by the threads of a worker; see `simulate_continuum`."""
+    """Compute the shots by finite elements, in the threads of a worker; see `simulate`."""
     check_continuum(scene, shots, continuum)
     memory = memory_of(scene, shots, worker)
     conditions = memory.prepared.conditions
@@ -110,7 +124,8 @@ def struck(
         worker.threads or cores(),
     ):
         hits.append(hit)
-        progress(len(hits), len(shots))
+        if progress:
+            progress(len(hits), len(shots))
     return outcomes_of(memory, hits)
 
 

@@ -6,15 +6,14 @@ import hashlib
 import json
 import time
 import warnings
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from warpimpact.campaign.campaign import Campaign
-from warpimpact.catalogue.flow_entries import FlowEntry, flow_entry
+from warpimpact.campaign.continuum_settings import FiniteElements
 from warpimpact.continuum.strikes import check_continuum, struck
 from warpimpact.records.outcomes import Outcomes
 from warpimpact.results import attributes as attr
@@ -40,82 +39,50 @@ SECONDS = "seconds"
 """In the result of a job: what it took [s]."""
 
 
-@dataclass(frozen=True)
-class FiniteElements:
-    """How hits are computed: names or files of the materials of the layers, and the settings of `Continuum`; and which,
-    by their numbers in the campaign. None is all of them, of which images are not computed."""
-
-    materials: tuple[str, ...]
-    friction: float = 0.0
-    fidelity: str = "draft"
-    spacing: float | None = None
-    hits: tuple[int, ...] | None = None
-
-    @property
-    def entries(self) -> list[FlowEntry]:
-        """Of the materials.
-
-        Raises:
-            ValueError: there is no such material.
-        """
-        return [flow_entry(name) for name in self.materials]
-
-    @property
-    def continuum(self) -> Continuum:
-        """What the solver takes."""
-        given: dict[str, Any] = {"friction": self.friction, "fidelity": self.fidelity, "spacing": self.spacing}
-        return Continuum(flows=tuple(entry.flow for entry in self.entries), **given)
-
-    @property
-    def words(self) -> str:
-        """The settings in words."""
-        size = self.fidelity if self.spacing is None else f"{1e3 * self.spacing:.4g} mm"
-        return f"finite elements, {size}, friction {self.friction:g}, {', '.join(e.name for e in self.entries)}"
-
-
 def continuum_to_file(
     campaign: Campaign,
-    elements: FiniteElements,
     output: Path,
     *,
+    hits: tuple[int, ...] | None = None,
     device: Executor,
     resume: bool = False,
     overwrite: bool = False,
     progress: Callable[[RoundProgress, int], object] = lambda now, total: None,
     tell: Callable[[str], object] = warnings.warn,
 ) -> None:
-    """Compute hits of a campaign by finite elements into a result file; each is on the disk when it has ended.
+    """Compute hits of a campaign by finite elements (`Campaign.continuum`) into a result file; each is on the disk when
+    it has ended.
 
     Args:
+        hits: by their numbers in the campaign; None is all of them, of which images are not computed.
         progress: called with the progress of the hits and their number.
 
     Raises:
         ValueError: the continuum does not compute this campaign.
         OutputError, Interrupted: as in `run_to_file`.
     """
-    numbers = range(len(campaign.sampler())) if elements.hits is None else elements.hits
+    solver = campaign.continuum.solver
     content = manifest(campaign, device.made_by) | {
-        "continuum": json.loads(elements.continuum.model_dump_json()),
-        "numbers": elements.hits and list(elements.hits),
+        "continuum": json.loads(solver.model_dump_json()),
+        "numbers": hits and list(hits),
     }
-    check_continuum(campaign.scene, campaign.sampler().shots(0, campaign.at_a_plate), elements.continuum)
+    check_continuum(campaign.scene, campaign.sampler().shots(0, campaign.at_a_plate), solver)
     with stored(output, content, "continuum", resume=resume, overwrite=overwrite, tell=tell) as store:
         if store is None:
             return
-        question = _computed(campaign, elements, numbers, lambda now: progress(now, len(numbers)))
+        count = len(campaign.sampler() if hits is None else hits)
+        question = _computed(campaign, hits, lambda now: progress(now, count))
         dataset = answered(question, device, store)
         dataset.attrs[attr.FINGERPRINT] = store.parts.fingerprint
         files.write(dataset, output)
 
 
 def _computed(
-    campaign: Campaign,
-    elements: FiniteElements,
-    numbers: Sequence[int],
-    tell: Callable[[RoundProgress], object],
+    campaign: Campaign, hits: tuple[int, ...] | None, tell: Callable[[RoundProgress], object]
 ) -> Question[xarray.Dataset]:
     """The result of the hits of some numbers; where they are all, the first one of each group of images is computed."""
-    sampler, continuum, images = campaign.sampler(), elements.continuum, elements.hits is None
+    sampler, elements, images = campaign.sampler(), campaign.continuum, hits is None
+    continuum, numbers = elements.solver, range(len(sampler)) if hits is None else hits
     group = len(campaign.symmetries) if images else 1
     shots = Shots.joined([sampler.shots(int(number), 1) for number in numbers])
     computed = shots[::group]

@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from warpimpact import Continuum, Plate, PolynomialCore, Record, Scene, Shots, simulate_continuum
+from warpimpact import Continuum, Plate, PolynomialCore, Record, Scene, Shots, simulate
 from warpimpact.catalogue.flow_entries import flow_entry, flow_names
 from warpimpact.continuum import strikes
 from warpimpact.continuum.one_hit import Energies
@@ -40,7 +40,7 @@ COARSE = Continuum(flows=(STEEL,), spacing=2e-3)
 )
 def test_what_is_not_computed_is_refused(scene: Scene, shots: Shots, continuum: Continuum, sentence: str) -> None:
     with pytest.raises(ValueError, match=sentence):
-        simulate_continuum(scene, shots, continuum)
+        simulate(scene, shots, numerics=continuum)
 
 
 @pytest.mark.parametrize(
@@ -58,13 +58,18 @@ def test_a_hit_that_loses_energy_to_its_numerics_is_a_failure(energies: Energies
     assert strikes.judged(Status.NOT_FINITE, energies) is Status.NOT_FINITE
 
 
+def test_finite_elements_on_another_device_are_refused() -> None:
+    with pytest.raises(ValueError, match='got "cuda:0", but finite elements are computed on the CPU'):
+        simulate(Scene(core=CORE, target=PLATE), SHOT, numerics=COARSE, device="cuda:0")
+
+
 def test_a_failed_hit_has_no_outcome_and_the_others_are_told() -> None:
     """Two elements through the plate: their hourglasses take more than 12 %."""
     told: list[tuple[int, int]] = []
-    outcomes = simulate_continuum(
+    outcomes = simulate(
         Scene(core=CORE, target=PLATE, record=Record(standoffs=(0.05,))),
         SHOT,
-        COARSE,
+        numerics=COARSE,
         progress=lambda done, total: told.append((done, total)),
     )
     assert outcomes.status[0] == Status.HOURGLASSED
@@ -78,7 +83,7 @@ def test_a_core_that_reaches_the_edge_of_the_mesh_has_left_it(monkeypatch: pytes
     monkeypatch.setattr(strikes, "FINE", 0.5)
     monkeypatch.setattr(strikes, "PATCH", 0.6)
     narrow = Continuum(flows=(STEEL,), spacing=1e-3)
-    assert simulate_continuum(Scene(core=CORE, target=PLATE), SHOT, narrow).status[0] == Status.LEFT_WINDOW
+    assert simulate(Scene(core=CORE, target=PLATE), SHOT, numerics=narrow).status[0] == Status.LEFT_WINDOW
 
 
 def test_elements_follow_core_thickness_and_ligament() -> None:

@@ -1,21 +1,20 @@
 """Hits by finite elements as a result: all of a campaign or some of a map, resumed, replayed, refused."""
 
-from dataclasses import replace
+import re
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
-from warpimpact import Campaign, replay
+from warpimpact import Campaign, CampaignError, replay, simulate
 from warpimpact.cli import main
 from warpimpact.continuum import strikes
 from warpimpact.results import attributes as attr
 from warpimpact.results import files
 from warpimpact.runs.choice import executor_for
-from warpimpact.runs.finite_elements import FiniteElements, continuum_to_file
+from warpimpact.runs.finite_elements import continuum_to_file
 
-ELEMENTS = FiniteElements(("ARMOX560T",), spacing=1e-3)
 CAMPAIGN = """
 title = "slots"
 [core]
@@ -39,6 +38,9 @@ count = 4
 seed = 1
 [numerics]
 level = 0
+[continuum]
+materials = ["ARMOX560T"]
+spacing = "1 mm"
 """
 
 
@@ -57,9 +59,7 @@ def campaign_file(tmp_path: Path) -> Path:
 
 def computed(path: Path, campaign: Path, hits: tuple[int, ...] | None = None, *, resume: bool = False) -> Path:
     with executor_for("cpu", apart=True) as executor:
-        continuum_to_file(
-            Campaign.from_toml(campaign), replace(ELEMENTS, hits=hits), path, device=executor, resume=resume
-        )
+        continuum_to_file(Campaign.from_toml(campaign), path, hits=hits, device=executor, resume=resume)
     return path
 
 
@@ -89,7 +89,7 @@ def test_a_hit_that_is_there_is_not_computed_again(
 
     monkeypatch.setattr(strikes.March, "ended", broken_off)
     with pytest.raises(KeyboardInterrupt, match="saved"), executor_for("cpu", apart=False) as executor:
-        continuum_to_file(Campaign.from_toml(campaign_file), ELEMENTS, output, device=executor)
+        continuum_to_file(Campaign.from_toml(campaign_file), output, device=executor)
     calls[:] = [None] * 3
     computed(output, campaign_file, resume=True)
     assert 3 < len(calls) < 3 + 5  # of four hits and the solid plate
@@ -115,9 +115,11 @@ def test_the_command_computes_hits_of_a_result(
 ) -> None:
     monkeypatch.chdir(tmp_path)
     assert main(["run", str(campaign_file), "-o", "map.nc", "-q"]) == 0
-    command = ["continuum", "map.nc", "--hits", "2", "--material", "ARMOX560T", "--element", "1 mm", "-q"]
+    command = ["continuum", "map.nc", "--hits", "2", "--friction", "0.03", "-q"]
     assert main(command) == 0
-    assert files.read(tmp_path / "map_continuum.nc").sizes["hit"] == 2
+    result = files.read(tmp_path / "map_continuum.nc")
+    assert result.sizes["hit"] == 2
+    assert result.attrs[attr.NUMERICS] == "finite elements, 1 mm, friction 0.03, ARMOX560T"
     assert "ARMOX560T: assumed" in capsys.readouterr().out
     assert main(["inspect", "map_continuum.nc"]) == 0
     assert "The solid plate is 2.61 mm of ARMOX560T by finite elements" in capsys.readouterr().out
@@ -135,9 +137,9 @@ def test_the_command_computes_hits_of_a_result(
 @pytest.mark.parametrize(
     ("arguments", "sentence"),
     [
-        ([], "the continuum needs a material: give --material with one of AA6082-T6"),
+        ([], "the continuum needs a material: give continuum.materials or --material with one of AA6082-T6"),
         (["--material", "ARMOX"], 'did you mean "ARMOX560T"'),
-        (["--material", "ARMOX560T", "--friction", "2"], "--friction: got 2, but it must be from 0 to 1"),
+        (["--material", "ARMOX560T", "--friction", "2"], "--friction: got 2.0, but it must be less than or equal to 1"),
         (["--material", "ARMOX560T", "--element", "1 s"], "--element: got"),
         (["--material", "ARMOX560T", "--hit", "3"], "--hit and --hits are for a result"),
         (["--material", "ARMOX560T", "--material", "HARDOX400"], "got 2 materials, but the target has 1 layers"),
@@ -152,6 +154,33 @@ def test_bad_input_gets_a_sentence_and_writes_nothing(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
     monkeypatch.chdir(tmp_path)
+    campaign_file.write_text(CAMPAIGN[: CAMPAIGN.index("[continuum]")], encoding="utf-8")
     assert main(["continuum", str(campaign_file), *arguments, "-q"]) == 2
     assert sentence in capsys.readouterr().err
     assert [path.name for path in tmp_path.iterdir()] == ["slots.toml"]
+
+
+@pytest.mark.parametrize(
+    ("value", "sentence"),
+    [
+        (
+            'materials = ["ARMOX"]',
+            'continuum.materials: got "ARMOX", which is no material of the continuum; did you mean',
+        ),
+        ('materials = ["mine.toml"]', 'continuum.materials: got "mine.toml", but there is no file'),
+        ("friction = 2", "continuum.friction: got 2, but it must be less than or equal to 1"),
+        ('fidelity = "fine"', "continuum.fidelity: got"),
+    ],
+)
+def test_the_table_of_a_campaign_is_checked_when_it_is_read(tmp_path: Path, value: str, sentence: str) -> None:
+    path = tmp_path / "slots.toml"
+    path.write_text(CAMPAIGN[: CAMPAIGN.index("materials")] + value, encoding="utf-8")
+    with pytest.raises(CampaignError, match=re.escape(sentence)):
+        Campaign.from_toml(path)
+
+
+def test_python_computes_what_the_table_says(campaign_file: Path, tmp_path: Path) -> None:
+    campaign = Campaign.from_toml(campaign_file)
+    result = files.read(computed(tmp_path / "one.nc", campaign_file, (2,)))
+    outcomes = simulate(campaign.scene, campaign.sampler().shots(2, 1), numerics=campaign.continuum.solver)
+    assert outcomes.residual_velocity == result["residual_velocity"].values
