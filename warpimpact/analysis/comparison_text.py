@@ -117,6 +117,7 @@ class Comparison:
         confidence: at which the intervals of a measure's differences hold together.
         notes: what else there is to say, a sentence each.
         verdicts: of every pair in every measure that assumptions move.
+        cautions: what differs between the plates, or is not known of them, that ranks do not allow for, in few words.
     """
 
     plates: tuple[Contestant, ...]
@@ -126,6 +127,7 @@ class Comparison:
     confidence: float
     notes: tuple[str, ...]
     verdicts: tuple[Verdict, ...] = ()
+    cautions: tuple[str, ...] = ()
 
     def _repr_html_(self) -> str:
         """What a notebook shows."""
@@ -164,7 +166,7 @@ def comparison_text(comparison: Comparison) -> str:
 def comparison_view(comparison: Comparison) -> list[Section]:
     """What was compared, who is best at what, then every measure as a ranking with differences in words."""
     best = Table((Column("best at"), Column("plate")), best_rows(comparison))
-    rankings = (_ranking(comparison, measure) for measure in _compared(comparison))
+    rankings = (_ranking(comparison, measure) for measure in compared_scores(comparison))
     return [Section(conditions(comparison)), Section([best]), *rankings]
 
 
@@ -207,21 +209,22 @@ def hits_used(comparison: Comparison) -> list[str]:
     return lines
 
 
-def _compared(comparison: Comparison) -> list[Score]:
+def compared_scores(comparison: Comparison) -> list[Score]:
+    """The measures of the first plate in which plates are compared; a worst hit has no interval."""
     return [score for score in comparison.plates[0].measures if score.measure.kind != "worst_point"]
 
 
 def best_rows(comparison: Comparison) -> list[tuple[str, str]]:
     """Every measure and who is best at it."""
     rows = []
-    for measure in _compared(comparison):
+    for measure in compared_scores(comparison):
         if measure.measure.higher_is_better is None:
             continue
         first = [name for name, rank in comparison.ranks(measure.name).items() if rank == 1]
         told_apart = len(first) < len(comparison.plates)
         neither = "cannot be told apart" if is_ranked(comparison, measure.name) else "not ranked"
         doubts = _doubt(comparison, measure.name) + _turned(comparison, measure.name, first)
-        sentence = _listed(first) + _as_good(comparison, measure.name, first) + doubts
+        sentence = listed(first) + _as_good(comparison, measure.name, first) + doubts
         rows.append((measure.measure.label, sentence if told_apart else neither))
     return rows
 
@@ -231,7 +234,7 @@ def _as_good(comparison: Comparison, measure: str, first: Sequence[str]) -> str:
     apart = [{pair.one, pair.other} for pair in comparison.differences if pair.measure == measure and pair.told_apart]
     others = [plate.name for plate in comparison.plates if plate.name not in first]
     open_ = [name for name in others if not all({name, leader} in apart for leader in first)]
-    return f" (not told apart for certain from {_listed(open_)})" if open_ else ""
+    return f" (not told apart for certain from {listed(open_)})" if open_ else ""
 
 
 def _doubt(comparison: Comparison, measure: str) -> str:
@@ -261,7 +264,7 @@ def is_ranked(comparison: Comparison, measure: str) -> bool:
     return any(pair.measure == measure and not math.isnan(pair.low) for pair in comparison.differences)
 
 
-def _listed(names: Sequence[str]) -> str:
+def listed(names: Sequence[str]) -> str:
     """Such as "a, b and c"."""
     return " and ".join([", ".join(names[:-1]), names[-1]] if len(names) > 1 else names)
 
@@ -311,14 +314,14 @@ def _in_words(pair: Difference, measure: Score, what: str) -> str:
     names = [pair.one, pair.other] if (pair.value > 0.0) == (better is not False) else [pair.other, pair.one]
     by_hits, by_parameters = (pair.low, pair.high), pair.parameters
     if pair.value < 0.0:
-        by_hits, by_parameters = _negative(by_hits), by_parameters and _negative(by_parameters)
+        by_hits, by_parameters = negative(by_hits), by_parameters and negative(by_parameters)
     interval = intervals_text(Ends(*by_hits, by_parameters))
     than = f"{'higher' if better is None else 'better'} than"
     verdict = f"{names[0]} {than} {names[1]} by {number_text(abs(pair.value))}{what} ({interval})"
     return verdict + survival_text(pair.survival)
 
 
-def _negative(interval: tuple[float, float]) -> tuple[float, float]:
+def negative(interval: tuple[float, float]) -> tuple[float, float]:
     """The interval of the negative number."""
     return -interval[1], -interval[0]
 
@@ -326,7 +329,7 @@ def _negative(interval: tuple[float, float]) -> tuple[float, float]:
 def assumptions_view(comparison: Comparison) -> list[Section]:
     """Every measure of all plates under every assumption."""
     sections = []
-    for score in _compared(comparison):
+    for score in compared_scores(comparison):
         of_plates = [next(s for s in plate.measures if s.name == score.name) for plate in comparison.plates]
         names = dict.fromkeys(name for of_plate in of_plates for name in of_plate.assumptions)
         if names:
