@@ -370,7 +370,8 @@ class KernelReference(FromTheCode):
     """Functions and structures of the device code, from their source: Warp replaces them when it builds them."""
 
     def lines(self) -> Iterator[str]:
-        for path in sorted((CHECKOUT / "kernels").glob("*.py")):
+        kernels = CHECKOUT / "kernels"
+        for path in (*sorted(kernels.glob("*.py")), *sorted(kernels.glob("continuum/*.py"))):
             tree = ast.parse(path.read_text(encoding="utf-8"))
             if path.stem == "__init__":
                 continue
@@ -395,9 +396,10 @@ class ConstantReference(FromTheCode):
 
     def lines(self) -> Iterator[str]:
         from warpimpact.kernels import constants
+        from warpimpact.kernels.continuum import choices
 
         yield from ["| constant | value | unit | reason | § | test |", "|---|---|---|---|---|---|"]
-        for name, row in vars(constants).items():
+        for name, row in (*vars(constants).items(), *vars(choices).items()):
             if isinstance(row, constants.Constant):
                 test = f"`{row.test}`" if row.test else ""
                 yield f"| `{name}` | {row.value:.6g} | {row.unit} | {row.reason} | {row.section} | {test} |"

@@ -12,16 +12,8 @@ import warp as wp
 
 from .. import memory
 from ..variant import Variant
-from . import fields, plasticity
+from . import choices, fields, plasticity
 from .side_by_side import in_lanes
-
-QUADRATIC, LINEAR = 1.2, 0.06
-"""Coefficients of the bulk viscosity in compression."""
-HOURGLASS = 0.02
-"""Coefficient of the viscous resistance against hourglasses: 0.05 takes half as much energy again, and is farther from
-what finer meshes give (docs/continuum.md)."""
-THINNEST, WIDEST = 0.2, 4.0
-"""Share of its length, and multiple of its volume at rest, at which an element fails."""
 
 
 @cache
@@ -33,8 +25,9 @@ def build(variant: Variant) -> SimpleNamespace:
     vec3, vec6 = wp.types.vector(3, real), wp.types.vector(6, real)
     zero, half, one, two, three = (real(value) for value in (0.0, 0.5, 1.0, 2.0, 3.0))
     third, eighth, of_volume, of_force = (real(value) for value in (1 / 3, 1 / 8, 1 / 64, 1 / 64))
-    quadratic, linear, hourglass = real(QUADRATIC), real(LINEAR), real(HOURGLASS / 4.0)
-    thinnest, widest, tiny = real(THINNEST), real(WIDEST), real(1.0e-30)
+    quadratic, linear = real(choices.QUADRATIC.value), real(choices.LINEAR.value)
+    hourglass, tiny = real(choices.HOURGLASS.value / 4.0), real(choices.NOTHING.value)
+    thinnest, widest, least = (real(share.value) for share in (choices.THINNEST, choices.WIDEST, choices.LEAST_VOLUME))
 
     @wp.struct
     class Modes:
@@ -211,7 +204,7 @@ def build(variant: Variant) -> SimpleNamespace:
             wp.max(damage - one, heat - one), wp.max(thinnest * rest_length - length, volume - widest * rest_volume)
         )
         live = wp.max(fails, half - alive) < zero
-        density = sheet.density * rest_volume / wp.max(volume, real(1.0e-3) * rest_volume)
+        density = sheet.density * rest_volume / wp.max(volume, least * rest_volume)
         closing = wp.min(expansion, zero)
         speeds = linear * sheet.wave_speed - quadratic * length * closing
         viscous = density * length * closing * -speeds

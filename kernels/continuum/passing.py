@@ -9,14 +9,7 @@ import warp as wp
 from .. import constants, memory, rigid_body, structs
 from ..status import RUNNING, Status
 from ..variant import Variant
-from . import fields, hexahedra, nodes, penalty
-
-COURANT = 0.6
-"""Share of the shortest time of a wave across an element that a step takes."""
-GROWTH = 1.05
-"""Most that a step is longer than the one before."""
-BEHIND, QUIET = 3.0e-3, 2.0e-6
-"""How far behind the target [m], and how long after the last touch [s], a core is free."""
+from . import choices, fields, hexahedra, nodes, penalty
 
 
 @cache
@@ -27,7 +20,10 @@ def build(variant: Variant) -> SimpleNamespace:
     move, elements = rigid_body.build(fields.RIGID), hexahedra.build(variant)
     mesh_nodes, contact = nodes.build(variant), penalty.build(variant)
     vec3, zero, half = wp.types.vector(3, real), wp.float64(0.0), wp.float64(0.5)
-    courant, growth, behind, quiet = (wp.float64(value) for value in (COURANT, GROWTH, BEHIND, QUIET))
+    courant, growth, behind, quiet, unbounded = (
+        wp.float64(constant.value)
+        for constant in (choices.COURANT, choices.GROWTH, choices.BEHIND, choices.QUIET, choices.UNBOUNDED)
+    )
     still, spent = wp.float64(constants.STILL.value), wp.float64(constants.SPENT.value)
     PERFORATED, ARRESTED = wp.constant(int(Status.PERFORATED)), wp.constant(int(Status.ARRESTED))
     RICOCHETED, MISSED = wp.constant(int(Status.RICOCHETED)), wp.constant(int(Status.MISSED))
@@ -44,7 +40,7 @@ def build(variant: Variant) -> SimpleNamespace:
         free = untouched or flight.time - flight.last_touch > quiet
         swings = state.velocity[0] <= zero and energy < spent * limits.impact_energy  # on, in its hole
         status = running
-        if not (energy < wp.float64(2.0) * limits.impact_energy):  # what is no number, too
+        if not (energy < unbounded * limits.impact_energy):  # what is no number, too
             status = NOT_FINITE
         elif rearmost > limits.rear and untouched:
             status = MISSED

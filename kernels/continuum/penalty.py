@@ -7,14 +7,10 @@ import warp as wp
 
 from .. import memory, rigid_body, structs
 from ..variant import Variant
-from . import fields, nodes
+from . import choices, fields, nodes
 
-DAMPING = 0.1
-"""Share of the critical damping of a node on its penalty spring."""
 ENDS = 32
 """Of its tabulated radii, every such one counts for where the core ends along x."""
-SLOW = 5.0
-"""Sliding speed below which friction sets in gradually [m/s]."""
 
 
 @cache
@@ -25,7 +21,10 @@ def build(variant: Variant) -> SimpleNamespace:
     read, write = access.read, access.write
     move, use = rigid_body.build(fields.RIGID), nodes.build(variant)
     zero, one, half = wp.float64(0.0), wp.float64(1.0), wp.float64(0.5)
-    damping, slow, tiny = wp.float64(2.0 * DAMPING), wp.float64(SLOW), wp.float64(1.0e-12)
+    damping, slow, tiny = (
+        wp.float64(value) for value in (2.0 * choices.DAMPING.value, choices.SLOW.value, choices.ON_AXIS.value)
+    )
+    outside = wp.float64(choices.OUTSIDE.value)
 
     @wp.struct
     class Touch:
@@ -121,7 +120,7 @@ def build(variant: Variant) -> SimpleNamespace:
         """The rearmost and the foremost x of the core [m]."""
         axis = move.axis_of(state.attitude)
         wide = wp.sqrt(wp.max(zero, one - axis[0] * axis[0]))
-        rearmost, foremost = wp.float64(1.0e3), wp.float64(-1.0e3)
+        rearmost, foremost = wp.float64(outside), wp.float64(-outside)
         pieces = core.radii.shape[0] - 1
         for k in range(0, pieces + 1, ENDS):
             station = core.length * wp.float64(k) / wp.float64(pieces)

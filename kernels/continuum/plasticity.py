@@ -6,13 +6,7 @@ from types import SimpleNamespace
 import warp as wp
 
 from ..variant import Variant
-from . import fields, transcendental
-
-WIDEST_STRAIN = 1.0e-6
-"""Least plastic strain at which the slope of a power law is taken: at 0 it is infinite."""
-COOLEST = 1.0e-6
-"""Least heat that is raised to a power."""
-
+from . import choices, fields, transcendental
 
 THIRD = (0.50000121, 0.57725813, -0.10994401, 0.0477970946, -0.0193042401, 0.00419274174)
 """Polynomial for cos(θ/3) of t = cos(θ/2), by Chebyshev's nodes."""
@@ -25,9 +19,9 @@ def build(variant: Variant) -> SimpleNamespace:
     exp, log = transcendental.build(real).exp, transcendental.build(real).log
     vec6 = wp.types.vector(6, real)
     zero, half, one, two, three = (real(value) for value in (0.0, 0.5, 1.0, 2.0, 3.0))
-    third, tiny = real(1.0 / 3.0), real(1.0e-20)
+    third, tiny = real(1.0 / 3.0), real(choices.UNSTRESSED.value)
     c0, c1, c2, c3, c4, c5 = (real(value) for value in THIRD)
-    least_strain, least_heat = real(WIDEST_STRAIN), real(COOLEST)
+    least_strain, least_heat = real(choices.LEAST_STRAIN.value), real(choices.COOLEST.value)
 
     @wp.func
     def flow_stress(sheet: struct.Sheet, strain: real, rate: real, heat: real):

@@ -1,6 +1,6 @@
 """Limit velocities of solid plates by the continuum: bisection between shots that pass and shots that are held.
 
-    python tests/benchmarks/continuum_limits.py ROWS.csv [--plates solid_12,solid_20] [--friction 0,0.03]
+    python tests/benchmarks/continuum_limits.py ROWS.csv [--plates solid_12,solid_20] [--spacing 0.65e-3]
 
 Every shot is a row, appended when it has ended, so that a search may be ended at any time and continued. All shots hit
 at normal incidence without yaw. The first one has the published velocity; while every shot has passed, the next one has
@@ -22,8 +22,8 @@ from warpimpact import Continuum, Impact, Shots, simulate
 from warpimpact.catalogue.flow_entries import flow_entry
 from warpimpact.kernels.status import Status
 
-FIELDS = ("plate", "friction", "fidelity", "velocity", "status", "residual", "seconds")
-WIDTH, SHOTS, STEP = 0.015, 6, 1.04
+FIELDS = ("plate", "friction", "spacing", "velocity", "status", "residual", "seconds")
+WIDTH, SHOTS, STEP = 0.025, 6, 1.04
 """A search ends at a bracket of this share of the velocity, or after so many shots; and the step from one that is held
 or has failed to the next, while none has passed."""
 
@@ -53,23 +53,23 @@ def next_velocity(shots: list[Shot], published: float) -> float | None:
     return 0.5 * (held + slowest.velocity) if held else by_energy
 
 
-def shot_at(plate: str, friction: float, fidelity: str, velocity: float) -> Shot:
-    """Compute one shot at a hole's centre, or anywhere in a solid plate."""
+def shot_at(plate: str, friction: float, spacing: float | None, velocity: float) -> Shot:
+    """Compute one shot; without a spacing the elements are those of a draft."""
     case = CASES[plate]
     impact = Impact(velocity=velocity)
     columns = {name: np.array([getattr(impact, name)]) for name in Impact.model_fields}
     shots = Shots(hit_y=np.zeros(1), hit_z=np.zeros(1), **columns)
     flows = tuple(flow_entry(name).flow for name in case.flows)
-    continuum = Continuum(flows=flows, friction=friction, fidelity=fidelity)
+    continuum = Continuum(flows=flows, friction=friction, spacing=spacing)
     outcome = simulate(case.scene, shots, numerics=continuum, threads=1)
     return Shot(velocity, Status(int(outcome.status[0])), float(outcome.residual_velocity[0]))
 
 
-def search(path: Path, plate: str, friction: float, fidelity: str) -> None:
+def search(path: Path, plate: str, friction: float, spacing: float | None) -> None:
     """Continue a search; its rows are in the file."""
     while True:
         rows = list(csv.DictReader(path.open(encoding="utf-8"))) if path.exists() else []
-        here = {"plate": plate, "friction": f"{friction:g}", "fidelity": fidelity}
+        here = {"plate": plate, "friction": f"{friction:g}", "spacing": "draft" if spacing is None else f"{spacing:g}"}
         shots = [
             Shot(float(row["velocity"]), Status(int(row["status"])), float(row["residual"]))
             for row in rows
@@ -79,7 +79,7 @@ def search(path: Path, plate: str, friction: float, fidelity: str) -> None:
         if velocity is None:
             return
         begin = time.process_time()
-        shot = shot_at(plate, friction, fidelity, round(velocity, 1))
+        shot = shot_at(plate, friction, spacing, round(velocity, 1))
         row = {"velocity": shot.velocity, "status": int(shot.status), "residual": f"{shot.residual:.2f}"}
         with path.open("a", newline="", encoding="utf-8") as file:
             writer = csv.DictWriter(file, FIELDS)
@@ -93,8 +93,8 @@ if __name__ == "__main__":
     parser.add_argument("file", type=Path)
     parser.add_argument("--plates", default=",".join(PUBLISHED))
     parser.add_argument("--friction", default="0,0.03")
-    parser.add_argument("--fidelity", default="draft")
+    parser.add_argument("--spacing", type=float, help="size of the elements [m], in place of a draft's")
     arguments = parser.parse_args()
     for friction in map(float, arguments.friction.split(",")):
         for plate in arguments.plates.split(","):
-            search(arguments.file, plate, friction, arguments.fidelity)
+            search(arguments.file, plate, friction, arguments.spacing)

@@ -28,7 +28,7 @@ from continuum_cases import CASES, MEASURES, Case, measured, written
 from warpimpact import Continuum, Numerics, Record, Scene, Shots, simulate
 from warpimpact.catalogue.flow_entries import flow_entry
 from warpimpact.continuum import one_hit, strikes
-from warpimpact.kernels.continuum import hexahedra, passing
+from warpimpact.kernels.continuum import choices, hexahedra, passing
 
 FIELDS = ("plate", "friction", "model", "hit", "hit_y", "hit_z", "status", "velocity", "tilt_50", "tilt_130", "seconds")
 SCALES = np.array([5.0, 5.0, 10.0])
@@ -42,7 +42,7 @@ FRICTIONS, WEAKENINGS = (0.0, 0.03, 0.06, 0.1, 0.15), (0.6, 0.7, 0.8, 0.9, 1.0)
 TIMED = 1024
 """Hits of a plate of which the time of one by the fast law is taken."""
 
-Changes = tuple[tuple[Any, str, float], ...]
+Changes = tuple[tuple[Any, str, Any], ...]
 EFFECTS: dict[str, Changes] = {
     "as it is": (),
     "patch of 10 radii for 7": ((strikes, "PATCH", 10.0),),
@@ -50,10 +50,10 @@ EFFECTS: dict[str, Changes] = {
     "fine part of 3.5 radii for 2.5": ((strikes, "FINE", 3.5),),
     "contact four times as stiff": ((one_hit, "PENALTY", 2.0),),
     "contact a quarter as stiff": ((one_hit, "PENALTY", 0.125),),
-    "hourglass coefficient 0.05 for 0.02": ((hexahedra, "HOURGLASS", 0.05),),
-    "elements fail below 0.1 of their length for 0.2": ((hexahedra, "THINNEST", 0.1),),
-    "elements fail at 8 times their volume for 4": ((hexahedra, "WIDEST", 8.0),),
-    "steps of 0.4 for 0.6 of a crossing": ((passing, "COURANT", 0.4),),
+    "hourglass coefficient 0.05 for 0.02": ((choices, "HOURGLASS", choices.HOURGLASS._replace(value=0.05)),),
+    "elements fail below 0.1 of their length for 0.2": ((choices, "THINNEST", choices.THINNEST._replace(value=0.1)),),
+    "elements fail at 8 times their volume for 4": ((choices, "WIDEST", choices.WIDEST._replace(value=8.0)),),
+    "steps of 0.4 for 0.6 of a crossing": ((choices, "COURANT", choices.COURANT._replace(value=0.4)),),
 }
 """What is changed in the solver, by its words: module, name and value of a constant."""
 

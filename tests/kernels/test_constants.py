@@ -9,13 +9,21 @@ import pytest
 import warp as wp
 
 from warpimpact.kernels import constants, exposure, lanes, structs
+from warpimpact.kernels.continuum import choices
 from warpimpact.kernels.variant import Variant
 
 CHECKOUT = Path(__file__).parents[2]
-TABLE = {name: value for name, value in vars(constants).items() if isinstance(value, constants.Constant)}
-PLAIN = {0.0, 0.25, 0.5, 1.0, 2.0, 4.0, 6.0, 12.0, 20.0, 30.0, 42.0}
+TABLE = {
+    f"{home.__name__.rsplit('.', 1)[1]}.{name}": value
+    for home in (constants, choices)
+    for name, value in vars(home).items()
+    if isinstance(value, constants.Constant)
+}
+PLAIN = {0.0, 0.25, 0.5, 1.0, 1.5, 2.0, 4.0, 6.0, 12.0, 16.0, 20.0, 30.0, 42.0, 64.0}
 """Numbers of formulas in `real(…)`: fractions, factors and those of the series of sine and cosine."""
-FILES = sorted(path for path in (CHECKOUT / "kernels").glob("*.py") if path.stem != "constants")
+FILES = sorted(
+    path for path in (CHECKOUT / "kernels").rglob("*.py") if path.stem not in ("constants", "choices", "__init__")
+)
 
 
 @pytest.mark.parametrize("name", TABLE)
@@ -34,7 +42,7 @@ def test_a_constant_names_a_test_and_a_section_that_exist(name: str) -> None:
 
 @pytest.mark.parametrize("name", TABLE)
 def test_a_constant_is_used(name: str) -> None:
-    assert any(f"constants.{name}" in path.read_text(encoding="utf-8") for path in FILES)
+    assert any(name in path.read_text(encoding="utf-8") for path in FILES)
 
 
 def chosen(tree: ast.AST) -> list[float]:

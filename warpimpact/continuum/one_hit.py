@@ -12,7 +12,7 @@ import warp as wp
 from numpy.typing import NDArray
 
 from warpimpact.continuum.meshing import SheetMesh, runs_of
-from warpimpact.kernels.continuum import fields, passing
+from warpimpact.kernels.continuum import choices, fields, passing
 from warpimpact.kernels.status import RUNNING
 from warpimpact.kernels.variant import Variant
 from warpimpact.scene import Core
@@ -201,7 +201,7 @@ class OneHit:
             float((self.mesh.length.numpy()[at : at + sheet.nodes][sheet.alive]).min()) / flow.wave_speed
             for sheet, at, flow in zip(self.sheets, self.firsts, self.flows, strict=True)
         )
-        flight.step = flight.before = 0.5 * passing.COURANT * shortest
+        flight.step = flight.before = 0.5 * choices.COURANT.value * shortest
         return wp.array([flight], dtype=self.stage.Flight, device=self.device)
 
     @property

@@ -1,0 +1,67 @@
+"""The constants of the continuum, of its scheme and of its erosion (docs/continuum.md), as in kernels/constants.py."""
+
+from ..constants import Constant
+
+# The element (hexahedra.py)
+QUADRATIC = Constant(
+    1.2,
+    "density × (length × rate of compression)²",
+    "Bulk viscosity of von Neumann and Richtmyer: a shock is some elements wide.",
+)
+LINEAR = Constant(
+    0.06,
+    "density × speed of sound × length × rate of compression",
+    "Bulk viscosity that damps what rings behind a shock.",
+)
+HOURGLASS = Constant(
+    0.02,
+    "density × speed of sound × area",
+    "Viscous resistance against hourglasses: 0.05 takes half as much energy again, and is farther from what finer "
+    "meshes give.",
+    test="verification/test_continuum.py::test_an_hourglass_is_braked_at_the_rate_of_its_resistance",
+)
+THINNEST = Constant(
+    0.2,
+    "length at rest",
+    "An element that is thinner fails: its step would hold up all others.",
+    test="verification/test_continuum.py::test_an_element_fails_where_it_is_too_thin_or_too_wide",
+)
+WIDEST = Constant(
+    4.0,
+    "volume at rest",
+    "An element that is larger fails: no metal is.",
+    test="verification/test_continuum.py::test_an_element_fails_where_it_is_too_thin_or_too_wide",
+)
+LEAST_VOLUME = Constant(1.0e-3, "volume at rest", "Below, the density of an element that has failed grows no more.")
+NOTHING = Constant(1.0e-30, "m³ or m⁴", "Keeps a division by the volume or the faces of no element finite.")
+
+# The flow (plasticity.py)
+LEAST_STRAIN = Constant(
+    1.0e-6, "1", "Plastic strain below which a power law has the slope of here: it is infinite at 0."
+)
+COOLEST = Constant(
+    1.0e-6, "range to melting", "Heat below which it counts as this in its power, whose logarithm is taken."
+)
+UNSTRESSED = Constant(1.0e-20, "Pa²", "Keeps the angle of a stress without a deviator finite.")
+
+# The contact (penalty.py)
+DAMPING = Constant(
+    0.1,
+    "critical damping",
+    "Of a node on its penalty spring. More drags on nodes that leave.",
+)
+SLOW = Constant(5.0, "m/s", "Sliding speed below which friction sets in gradually, so that it does not chatter.")
+ON_AXIS = Constant(1.0e-12, "m", "Keeps the normal at a point on the core's axis finite.")
+OUTSIDE = Constant(1.0e3, "m", "Farther away than any core, where a search for its ends begins.")
+
+# The march (passing.py)
+COURANT = Constant(
+    0.6,
+    "shortest time of a wave across an element",
+    "Length of a step. Hourglasses and contact take what is left to 1.",
+    test="verification/test_continuum.py::test_a_bar_swings_with_the_speed_of_sound",
+)
+GROWTH = Constant(1.05, "step before", "The longest that a step may be: the scheme is of second order at even steps.")
+BEHIND = Constant(3.0e-3, "m", "So far behind the target or in front of it a core is free.")
+QUIET = Constant(2.0e-6, "s", "So long after the last touch a core is free.")
+UNBOUNDED = Constant(2.0, "impact energy", "A core that has more is no core any more: its motion has blown up.")
