@@ -51,3 +51,13 @@ def is_pierced(dataset: Result) -> Array:
     [hits]. NaN as in `base_depth`."""
     depth = base_depth(dataset)
     return np.where(np.isnan(depth), np.nan, depth >= base_thickness(dataset) if has_base(dataset) else np.nan)
+
+
+def piercing_margin(dataset: Result) -> Array:
+    """How far behind the rear face of the base every core comes [m], negative before it; shape [hits]. Infinite for a
+    core that passes the base, or rests before it; NaN as in `base_depth`."""
+    if not has_base(dataset):
+        return np.full(dataset.sizes["hit"], np.nan)
+    rests = dataset[v.STOPPED_IN].values == dataset.sizes["layer"] - 1
+    beyond = np.where(rests, dataset[v.DEPTH].values - base_thickness(dataset), -np.inf)
+    return np.where(failed(dataset), np.nan, np.where(passed(dataset), np.inf, beyond))

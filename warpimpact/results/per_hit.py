@@ -61,6 +61,8 @@ class PerHit:
         need: what a result must have; None where every result has it.
         or_else: what makes a number infinite, as text behind a probability.
         least, most: ends of what the numbers can be.
+        margin: of an event, a number of every hit that is positive where it happens, negative where it does not, and
+            steady at 0; None without one.
     """
 
     name: str
@@ -77,6 +79,7 @@ class PerHit:
     or_else: str = ""
     least: float = 0.0
     most: float = math.inf
+    margin: Callable[[Result], Array] | None = None
 
     def lacking(self, dataset: Result) -> str:
         """What a result lacks of what is needed; empty where it has all."""

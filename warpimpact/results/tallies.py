@@ -75,7 +75,10 @@ def shift_of(measure: Measure, levels: tuple[Result, Result] | None, confidence:
         case "probability":
             return shift_of_share(measure.margin(coarse), measure.margin(fine), **dealt)
         case "share":
-            return shift_of_yes(coarse, fine, **dealt)
+            margin = measure.quantity.margin
+            if margin is None:
+                return shift_of_yes(coarse, fine, **dealt)
+            return shift_of_share(margin(levels[0]), margin(levels[1]), **dealt)
     averaged = (measure.averaged(measure.counted(numbers)) for numbers in (coarse, fine))
     return shift_of_mean(*averaged, **dealt)
 

@@ -178,6 +178,7 @@ EVENTS: Mapping[str, PerHit] = {
             values=lambda part, _: bases.is_pierced(part),
             of=bases.NEEDED,
             need=BASE,
+            margin=bases.piercing_margin,
         ),
         PerHit(
             name="stopped",

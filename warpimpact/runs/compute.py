@@ -18,7 +18,7 @@ from warpimpact.results.dataset import finer_columns, solid_columns
 from warpimpact.results.table import HitTable
 from warpimpact.runs.assumed import assumed
 from warpimpact.runs.describe import computed_by, described, found_attributes
-from warpimpact.runs.levels import excess_of_stop, seeks_measure, shifts_of
+from warpimpact.runs.levels import aim_of, level_for, shifts_of
 from warpimpact.runs.pilot_hits import pilot_most, pilot_places, pilot_shots
 from warpimpact.runs.task import Task
 from warpimpact.scene import Numerics, Scene, Shots
@@ -62,7 +62,7 @@ class HitMap:
             return None
         pilot = pilot_shots(campaign, pilot_most(campaign))
         hits = len(campaign.sampler()) // len(campaign.symmetries)
-        errors = pilot_of(campaign.scene, pilot, campaign.numerics, worker, trying, excess_of_stop(campaign), hits)
+        errors = pilot_of(campaign.scene, pilot, campaign.numerics, worker, trying, aim_of(campaign), hits)
         return replace(errors, shifts=shifts_of(campaign, pilot, errors), tried=())
 
     def found_in(self, result: Result) -> HitErrors | None:
@@ -103,7 +103,7 @@ def compute(campaign: Campaign, task: Task, worker: Worker, progress: Progress |
         beside |= solid_columns(_outcomes(*at_solid(campaign, task.solid), numerics, worker)[0])
     attributes = computed_by(campaign, worker.device, len(outcomes), elapsed)
     attributes |= found_attributes(campaign, task.found) | _errors(task.found)
-    attributes |= {attr.LEVEL_FOR: campaign.stop.quantity} if campaign.stop and seeks_measure(campaign) else {}
+    attributes |= {attr.LEVEL_FOR: what} if (what := level_for(campaign)) else {}
     return described(campaign, task.shots, outcomes, numerics, attributes, beside)
 
 

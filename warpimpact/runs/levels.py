@@ -4,7 +4,11 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
+from numpy.typing import NDArray
+
 from warpimpact.campaign.campaign import Campaign
+from warpimpact.campaign.stop import Stop
 from warpimpact.records.outcomes import Outcomes
 from warpimpact.results import attributes as attr
 from warpimpact.results.dataset import to_table
@@ -13,25 +17,42 @@ from warpimpact.results.table import HitTable
 from warpimpact.results.tallies import shift_of
 from warpimpact.scene import Shots
 from warpimpact.solver.findings import HitErrors
-from warpimpact.solver.pilot import Excess
+from warpimpact.solver.pilot import MOST, Aim, Excess
+from warpimpact.statistics.shifts import SHIFT_MARGIN
+
+Array = NDArray[np.float64]
 
 OF_THE_NUMERICS = 0.5
 """Share of an interval's half width that the numerics may take."""
+MEASURES = "the measures"
+"""What the level is looked for at several layers."""
+LAYERED = ("mean(residual_velocity)", "P(perforated)", "mean(base_depth)")
+"""Measures that choose the level at several layers, beside the mean tilt at the last stand-off."""
 
 
-def seeks_measure(campaign: Campaign) -> bool:
-    """Whether a pilot looks for the level that the quantity of a stop rule needs: where nothing is asked of single
-    hits."""
-    asked = {"fidelity", "accuracy"} & campaign.numerics.model_fields_set
-    return campaign.stop is not None and not asked and campaign.numerics.explicit is None
+def level_for(campaign: Campaign) -> str:
+    """What a pilot looks for the level of, where that is no accuracy of single hits: the quantity of a stop rule, or
+    the measures of a target of several layers. Empty where the campaign asks for an accuracy or fixes the level."""
+    if {"fidelity", "accuracy"} & campaign.numerics.model_fields_set or campaign.numerics.explicit is not None:
+        return ""
+    if campaign.stop is not None:
+        return campaign.stop.quantity
+    return MEASURES if len(campaign.target.layers) > 1 else ""
 
 
-def excess_of_stop(campaign: Campaign) -> Excess | None:
-    """What the numerics may shift the quantity of a stop rule by, over what they may; None where the level is not
-    looked for by that."""
-    rule = campaign.stop
-    if rule is None or not seeks_measure(campaign):
+def aim_of(campaign: Campaign) -> Aim | None:
+    """Measures that a level is looked for, by what the numerics shift them by over what they may; None where it is not
+    looked for by that. At several layers a level that keeps the accuracy will do, too, and all hits of a pilot judge a
+    level: few tell little of what ends otherwise."""
+    if not level_for(campaign):
         return None
+    if campaign.stop is not None:
+        return Aim(_excess_of_stop(campaign, campaign.stop))
+    return Aim(_excess_of_layers(campaign), alone=False, first=MOST)
+
+
+def _excess_of_stop(campaign: Campaign, rule: Stop) -> Excess:
+    """By the quantity of a stop rule: what the numerics may shift it by, over what they may take of its interval."""
     measure, allowed = rule.measure, OF_THE_NUMERICS * rule.measure.shown(rule.half_width)
 
     def excess(coarse: Outcomes, fine: Outcomes, shots: Shots) -> float:
@@ -42,17 +63,46 @@ def excess_of_stop(campaign: Campaign) -> Excess | None:
     return excess
 
 
+def _excess_of_layers(campaign: Campaign) -> Excess:
+    """By the measures of a target of several layers: the shift that the pilot's hits show, over what the hits of the
+    run leave open. What the pilot's few hits leave open of the shift would ask for dearer levels."""
+    measures = [Measure.parse(text) for text in (*LAYERED, *_last_tilts(campaign))]
+    hits = len(campaign.sampler()) // len(campaign.symmetries)
+
+    def excess(coarse: Outcomes, fine: Outcomes, shots: Shots) -> float:
+        levels = [_table(campaign, shots, outcomes) for outcomes in (coarse, fine)]
+        shares = [_open_share(*(measure.values(level) for level in levels), hits) for measure in measures]
+        return max(shares)
+
+    return excess
+
+
+def _open_share(coarse: Array, fine: Array, hits: int) -> float:
+    """Shift of a mean between two levels by the same shots, with the margin for the finer one, over half the
+    95 % interval by a number of independent hits; 0 where fewer than two shots count."""
+    counts = ~np.isnan(coarse) & ~np.isnan(fine)
+    if counts.sum() < 2:
+        return 0.0
+    shift = SHIFT_MARGIN * abs(float(np.mean(fine[counts] - coarse[counts])))
+    counted = max(float(counts.mean()) * hits, 2.0)
+    left_open = max(1.96 * float(np.std(fine[counts])) / math.sqrt(counted), 1.0 / counted)
+    return shift / left_open
+
+
 def shifts_of(campaign: Campaign, pilot: Shots, found: HitErrors) -> dict[int, tuple[float, ...]]:
     """What the numerics may shift the mean residual velocity [m/s] and the mean last tilt [degree] by, at every level
     that a pilot tried."""
-    tilts = [f"mean(tilt@{at!r}m)" for at in campaign.output.standoffs[-1:]]
-    measures = [Measure.parse(text) for text in ("mean(residual_velocity)", *tilts)]
+    measures = [Measure.parse(text) for text in ("mean(residual_velocity)", *_last_tilts(campaign))]
     shifts: dict[int, tuple[float, ...]] = {}
     for errors, *outcomes in found.tried:
         coarse, fine = (_table(campaign, pilot[: len(outcome)], outcome) for outcome in outcomes)
         assert errors.numerics.level is not None
         shifts[errors.numerics.level] = tuple(shift_of(measure, (coarse, fine)) or 0.0 for measure in measures)
     return shifts
+
+
+def _last_tilts(campaign: Campaign) -> list[str]:
+    return [f"mean(tilt@{at!r}m)" for at in campaign.output.standoffs[-1:]]
 
 
 def _table(campaign: Campaign, shots: Shots, outcomes: Outcomes) -> HitTable:

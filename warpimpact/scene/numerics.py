@@ -96,7 +96,8 @@ class Numerics(_AsGiven):
 
     Attributes:
         fidelity: the name of an accuracy: 90 % of the hits are within 5 m/s and 5° ("draft"), 1 m/s and 1°
-            ("standard"), or 0.2 m/s and 0.2° ("reference").
+            ("standard"), or 0.2 m/s and 0.2° ("reference"). A campaign with several layers that gives neither this nor
+            an accuracy takes the level that its measures need.
         accuracy: errors in numbers, in place of a fidelity.
         level: of the ladder of resolutions, 0 (coarse) to 9, in place of an accuracy: no pilot runs, and no accuracy is
             promised. A single setting below has the same effect; the other settings are then those of the level, or of

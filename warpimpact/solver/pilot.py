@@ -19,7 +19,7 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cache
-from typing import TypeAlias
+from typing import NamedTuple, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -65,6 +65,20 @@ a run of 16,384 hits. Within these seconds it looks at levels beyond FURTHER, to
 SETTINGS, ROOM = ("step", "grid", "around", "along"), 0.9
 """Settings that may have coarser levels, the one that saves most first; and errors over what is allowed, up to which
 one is taken. The rest makes up for the choice: trials pass whose errors on the pilot's shots happen to be small."""
+
+
+class Aim(NamedTuple):
+    """Measures that a level is looked for, beside an accuracy of single hits.
+
+    Attributes:
+        excess: error of measures over what is allowed.
+        alone: whether it chooses the level alone; else a level that keeps the accuracy will do, too.
+        first: shots by which a level is judged first; 0 for as many as with an accuracy.
+    """
+
+    excess: Excess
+    alone: bool = True
+    first: int = 0
 
 
 def climb(
@@ -127,7 +141,7 @@ def pilot_hits(
     numerics: Numerics,
     price: Callable[[int], float],
     free: Sequence[bool] = (True,),
-    excess_of: Excess | None = None,
+    aim: Aim | None = None,
     hits: int = 0,
 ) -> HitErrors:
     """Find the resolution whose outcomes have the accuracy that is asked for.
@@ -139,7 +153,7 @@ def pilot_hits(
         price: seconds that a shot takes at a level.
         free: of each layer of the target, whether a core flies free behind it (`Scene.free_behind`). Residual
             velocities behind other layers count in no error.
-        excess_of: measures errors in place of the accuracy, from level 0 on.
+        aim: measures in place of the accuracy or beside it, from level 0 on.
         hits: of the run, which may have coarser settings where it is long; 0 if that is not known.
 
     Raises:
@@ -148,14 +162,14 @@ def pilot_hits(
     accuracy = numerics.asked
     if math.isinf(accuracy.residual_velocity) and math.isinf(accuracy.tilt):
         raise ValueError("accuracy: needs residual_velocity or tilt; a limit alone is for a search of limits")
-    first = coarsest_level(accuracy.strictness) if excess_of is None else 0
-    pilot = _Pilot(outcomes_at, shots, numerics, price, free, excess_of)
+    first = coarsest_level(accuracy.strictness) if aim is None else 0
+    pilot = _Pilot(outcomes_at, shots, numerics, price, free, aim)
     level = climb(pilot.judge, range(first, len(LADDER) - 1), 1, pilot.worth)
     if level is None:
         return HitErrors(at_level(first, numerics), False, accuracy.share, math.inf, math.inf)
     if not pilot.tried[level].errors.kept:
         pilot.tell_to_finest(level)
-    if excess_of is None and hits >= PART * len(pilot.tried[level].coarse):
+    if aim is None and hits >= PART * len(pilot.tried[level].coarse):
         pilot.ease(level)
     tried = tuple(pilot.tried[level] for level in sorted(pilot.tried))
     return replace(pilot.tried[level].errors, tried=tried)
@@ -175,7 +189,7 @@ class _Pilot:
     numerics: Numerics
     price: Callable[[int], float]
     free: Sequence[bool]
-    excess_of: Excess | None
+    aim: Aim | None
     known: dict[int, Outcomes] = field(default_factory=dict)
     tried: dict[int, Tried] = field(default_factory=dict)
 
@@ -183,7 +197,8 @@ class _Pilot:
     def counts(self) -> list[int]:
         """Numbers of shots that may judge a level: twice as many each time, of whole plates."""
         most, at_a_plate = len(self.shots), self.shots.at_a_plate
-        counts = [min(most, -(-_first_shots(self.numerics.asked) // at_a_plate) * at_a_plate)]
+        first = (self.aim and self.aim.first) or _first_shots(self.numerics.asked)
+        counts = [min(most, -(-first // at_a_plate) * at_a_plate)]
         while counts[-1] < most:
             counts.append(min(most, 2 * counts[-1]))
         return counts
@@ -224,7 +239,7 @@ class _Pilot:
 
     def decided(self, level: int, verdict: Verdict) -> bool:
         """Whether more shots would hardly tell otherwise."""
-        (low, high), (errors, coarse, _) = OPEN if self.excess_of is None else OPEN_MEASURE, self.tried[level]
+        (low, high), (errors, coarse, _) = OPEN if self.aim is None else OPEN_MEASURE, self.tried[level]
         few = self.numerics.asked.status_share < errors.status_error <= OPEN_STATUS / len(coarse)
         return not low < verdict.excess < high and not (few and verdict.excess <= low)
 
@@ -241,9 +256,11 @@ class _Pilot:
         if errors.status_error > min(coarser, default=1.0):
             kept = verdict.excess <= 1.0 and min(coarser) <= self.numerics.asked.status_share
             errors = replace(errors, status_error=min(coarser), kept=kept)
-        if self.excess_of is not None:
-            excess = self.excess_of(coarse, fine, self.shots[:count])
-            errors, verdict = replace(errors, kept=excess <= 1.0), Verdict(excess <= 1.0, excess, excess, math.inf)
+        if self.aim is not None:
+            excess = self.aim.excess(coarse, fine, self.shots[:count])
+            by_aim = Verdict(excess <= 1.0, excess, excess, math.inf)
+            verdict = by_aim if self.aim.alone or excess < verdict.excess or not errors.kept else verdict
+            errors = replace(errors, kept=verdict.kept)
         _logger.info("pilot: %d shots at level %d err by %s, kept: %s", count, level, errors.errors, errors.kept)
         self.tried[level] = Tried(errors, coarse, fine)
         return verdict._replace(kept=errors.kept)

@@ -17,7 +17,7 @@ from warpimpact.solver.device import find_device
 from warpimpact.solver.findings import HitErrors, LevelCost
 from warpimpact.solver.marching import March, Progress
 from warpimpact.solver.memory import Memory
-from warpimpact.solver.pilot import Excess, pilot_hits, pilot_size
+from warpimpact.solver.pilot import Aim, pilot_hits, pilot_size
 from warpimpact.solver.prepare import Prepared, prepare
 from warpimpact.solver.resolution import at_level
 from warpimpact.solver.worker import NEVER, Cancel, Worker
@@ -84,7 +84,7 @@ def pilot_of(
     numerics: Numerics,
     worker: Worker,
     trying: Callable[[int], object] = lambda level: None,
-    excess_of: Excess | None = None,
+    aim: Aim | None = None,
     hits: int = 0,
 ) -> HitErrors:
     """Find the resolution for an accuracy (solver/pilot.py).
@@ -92,7 +92,7 @@ def pilot_of(
     Args:
         pilot: some of the shots.
         trying: called with every level that is computed.
-        excess_of, hits: as in `pilot_hits`.
+        aim, hits: as in `pilot_hits`.
     """
     seconds: dict[Numerics, float] = {}
 
@@ -111,7 +111,7 @@ def pilot_of(
     def price(level: int) -> float:
         return prepare(scene, pilot[: pilot.at_a_plate], at_level(level, numerics)).seconds
 
-    errors = pilot_hits(outcomes_at, pilot, numerics, price, scene.free_behind, excess_of, hits)
+    errors = pilot_hits(outcomes_at, pilot, numerics, price, scene.free_behind, aim, hits)
     if not errors.tried:
         return errors
     first = errors.tried[0].errors

@@ -17,6 +17,7 @@ from warpimpact.campaign.campaign import Campaign
 from warpimpact.campaign.plates import read_plates
 from warpimpact.kernels.status import Status
 from warpimpact.plotting import comparison_figure, weight_figure
+from warpimpact.results.bases import is_pierced, piercing_margin
 from warpimpact.results.dataset import stored_columns
 from warpimpact.results.files import ResultError
 from warpimpact.results.variables import LIMITS, STATUS
@@ -65,6 +66,12 @@ def mixed(make_plate_result) -> xarray.Dataset:
     depth = np.array([nan, 6e-3, 17e-3, 25e-3, nan, nan])
     result["status"].attrs, result["deflection"] = STATUS.attributes, result["residual_velocity"]
     return layered(result, np.array([-1, 1, 1, 0, -1, -1]), depth)
+
+
+def test_the_margin_of_piercing_has_the_sign_of_the_event(mixed) -> None:
+    margin, pierced = piercing_margin(mixed), is_pierced(mixed)
+    np.testing.assert_allclose(margin, [np.inf, -4e-3, 7e-3, -np.inf, -np.inf, np.nan])
+    np.testing.assert_array_equal(np.where(np.isnan(margin), np.nan, margin > 0.0), pierced)
 
 
 def test_what_counts_in_the_base(mixed) -> None:

@@ -10,12 +10,13 @@ import pytest
 from warpimpact import Campaign, Numerics
 from warpimpact.analysis.comparison import compare
 from warpimpact.analysis.effectiveness import effectiveness
-from warpimpact.analysis.summary import estimated, summary_text
+from warpimpact.analysis.summary import estimated, numerics_sentence, summary_text
 from warpimpact.results import attributes as attr
 from warpimpact.results import files
 from warpimpact.results import variables as v
 from warpimpact.results.dataset import finer_pair
 from warpimpact.results.measures import Measure
+from warpimpact.runs.levels import LAYERED, MEASURES, level_for
 from warpimpact.runs.run import run, run_to_file
 from warpimpact.solver.pilot import SHOTS
 from warpimpact.solver.resolution import LADDER, SLENDER
@@ -154,3 +155,24 @@ def test_a_stop_rule_takes_the_level_and_the_hits_that_its_interval_needs() -> N
     asked = ran("1.2 deg", **{'fidelity = "standard"': 'fidelity = "draft"'})
     assert attr.LEVEL_FOR not in asked
     assert asked[attr.STOP_REASON] == "numerics"
+
+
+def test_at_several_layers_the_level_is_that_of_the_measures_unless_an_accuracy_is_asked_for() -> None:
+    layer = '[[layer]]\ngap = "20 mm"\nthickness = "9 mm"\nresistance = "4000 MPa"\n\n[impact]'
+    behind = campaign({"[impact]": layer, 'fidelity = "standard"': "", "825 m/s": "790 m/s"})
+    told, truth = (
+        run(behind.model_copy(update={"numerics": numerics}), device="cpu")
+        for numerics in (Numerics(), Numerics(level=6))
+    )
+    assert level_for(behind) == told.attrs[attr.LEVEL_FOR] == MEASURES
+    assert level_for(behind.model_copy(update={"numerics": Numerics(fidelity="standard")})) == ""
+    level = json.loads(told.attrs[attr.RESOLUTION])["level"]
+    assert level <= 4  # standard takes level 7 here
+    assert f"level {level} found for the measures; single hits may err by " in numerics_sentence(told)
+    asked = [Measure.parse(text) for text in (*LAYERED, "mean(tilt@130mm)", "P(base_pierced)")]
+    found, exact = estimated(told, asked), estimated(truth, asked)
+    for measure in asked:
+        shift = found[measure].numerics
+        assert shift is not None
+        assert abs(found[measure].value - exact[measure].value) <= shift, measure
+    assert 0.1 < exact[asked[1]].value < 0.9

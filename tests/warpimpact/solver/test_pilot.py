@@ -24,6 +24,7 @@ from warpimpact.solver.pilot import (
     LIMITS,
     PART,
     ROOM,
+    Aim,
     climb,
     limits_pilot_size,
     pilot_hits,
@@ -390,7 +391,7 @@ def test_more_hits_tell_more_of_what_a_measure_shifts_by(
         return excess[len(shots) // 32]
 
     from_level(1, SHOTS=16, FURTHER=0)
-    found = pilot_hits(outcomes_at, PILOT, Numerics(), dear, excess_of=excess_of)
+    found = pilot_hits(outcomes_at, PILOT, Numerics(), dear, aim=Aim(excess_of))
     assert (counts, found.numerics.level, found.kept) == ([16] * computed, 0, kept)
 
 
@@ -406,7 +407,7 @@ def test_errors_of_the_first_hits_tell_how_they_fall_from_level_to_level(
         return excess[int(coarse.residual_velocity[0])][len(shots) // 32]
 
     from_level(0, SHOTS=16)
-    found = pilot_hits(outcomes_at, PILOT, Numerics(), dear, excess_of=excess_of)
+    found = pilot_hits(outcomes_at, PILOT, Numerics(), dear, aim=Aim(excess_of))
     assert (found.kept, found.numerics.level) == (True, 3)
 
 
