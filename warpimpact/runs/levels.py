@@ -71,8 +71,7 @@ def _excess_of_layers(campaign: Campaign) -> Excess:
 
     def excess(coarse: Outcomes, fine: Outcomes, shots: Shots) -> float:
         levels = [_table(campaign, shots, outcomes) for outcomes in (coarse, fine)]
-        shares = [_open_share(*(measure.values(level) for level in levels), hits) for measure in measures]
-        return max(shares)
+        return max(_open_share(measure.values(levels[0]), measure.values(levels[1]), hits) for measure in measures)
 
     return excess
 
