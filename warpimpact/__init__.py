@@ -8,6 +8,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from . import plotting
     from .analysis.comparison import compare
     from .analysis.comparison_text import Comparison
     from .analysis.hit_map import hit_map
@@ -119,6 +120,7 @@ __all__ = [
     "open_result",
     "optimise",
     "optimise_to_file",
+    "plotting",
     "read_plates",
     "replay",
     "run",
@@ -170,6 +172,8 @@ def __getattr__(name: str) -> Any:
         from importlib.metadata import version
 
         return version("warpimpact")
+    if name == "plotting":
+        return import_module(".plotting", __name__)
     if name in __all__:
         return getattr(import_module(_HOMES.get(name, ".scene"), __name__), name)
     raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

@@ -33,6 +33,7 @@ from warpimpact.statistics.intervals import Estimate
 from warpimpact.view.view import Column, Section, Table, labelled, number, text_of
 
 _QUANTILES = (0.05, 0.5, 0.95)
+_ARRESTED = "Other cores count in none of these numbers; in the file an arrested core has a residual velocity of 0."
 
 
 def inspect_text(dataset: xarray.Dataset) -> str:
@@ -108,7 +109,14 @@ def _numbers(dataset: xarray.Dataset) -> Section:
         rows += [_row(measure, estimate) for measure, estimate in estimates if estimate.count]
     columns = Column(), Column(), number(digits=".2f"), Column("95 % interval"), number("spread", digits=".2f")
     table = [Table(columns, rows)] if rows else []
-    notes = (sampling_note(dataset), numerics_note(dataset), levels_note(dataset), draws_note(dataset))
+    some_passed = 0 < count < dataset.sizes["hit"]
+    notes = (
+        _ARRESTED if some_passed else None,
+        sampling_note(dataset),
+        numerics_note(dataset),
+        levels_note(dataset),
+        draws_note(dataset),
+    )
     return Section([*table, *filter(None, notes), *stop_lines(dataset)], title)
 
 

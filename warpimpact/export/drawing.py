@@ -16,13 +16,17 @@ if TYPE_CHECKING:
 
 SUFFIXES = (".svg", ".dxf")
 _MM = 1e3
+_CORNERS = 12
+"""Points of an outline up to which it may be a regular polygon."""
+_ROUND = 1e-6
+"""Spread of the distances from the middle up to which a hole is round, as a share of its radius."""
 
 
 def write_drawing(plate: Plate, output: Path) -> None:
     """Write the holes of a plate, or of one period of an unbounded one, with the rim of that.
 
-    In an SVG drawing filled shapes are holes. A DXF drawing has closed polylines in the layers
-    HOLES and RIM.
+    In an SVG drawing filled shapes are holes. A DXF drawing has closed polylines in the layers HOLES and RIM, and a
+    circle for each round hole.
 
     Raises:
         OutputError: the plate has no holes, or ezdxf is not installed.
@@ -57,5 +61,18 @@ def _write_dxf(holes: list[NDArray[np.float64]], half: NDArray[np.float64], file
     for layer, outlines in (("HOLES", holes), ("RIM", [half * [(-1, -1), (1, -1), (1, 1), (-1, 1)]])):
         drawing.layers.add(layer)
         for outline in outlines:
+            if circle := _circle(outline):
+                space.add_circle(*circle, dxfattribs={"layer": layer})
+                continue
             space.add_lwpolyline([tuple(point) for point in outline], close=True, dxfattribs={"layer": layer})
     drawing.saveas(file)
+
+
+def _circle(outline: NDArray[np.float64]) -> tuple[tuple[float, float], float] | None:
+    """Centre and radius [mm] of an outline that is a round hole; None of any other."""
+    low, high = outline.min(axis=0), outline.max(axis=0)
+    centre = 0.5 * (low + high)
+    distances = np.linalg.norm(outline - centre, axis=1)
+    radius = float(distances.max())
+    is_round = len(outline) > _CORNERS and np.ptp(distances) < _ROUND * radius
+    return ((float(centre[0]), float(centre[1])), radius) if is_round else None

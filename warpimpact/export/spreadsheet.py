@@ -6,6 +6,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pandas as pd
 import xarray
 
@@ -14,17 +15,30 @@ from warpimpact.results import variables as v
 from warpimpact.results.dataset import hit_numbers, status_codes
 from warpimpact.results.files import aside
 
+_DIGITS = 10
+"""Digits behind the point of an angle that somebody gave in degrees."""
+
 
 def to_dataframe(dataset: xarray.Dataset) -> pd.DataFrame:
     """One row per hit, in the units of the Dataset.
 
     A variable with stand-offs, axes or layers gets one column for each: ``tilt_130mm``, ``angular_velocity_x``,
-    ``layer_tilt_0``, ``layer_standoff_tilt_0_50mm``. ``status`` is a word.
+    ``layer_tilt_0``, ``layer_standoff_tilt_0_50mm``. ``status`` is a word. An angle that was given as 30° is 30.
     """
-    columns: dict[str, Any] = {name: array.values for name, array in _columns(dataset)}
+    columns: dict[str, Any] = {name: _as_given(array) for name, array in _columns(dataset)}
     words = {code: word for word, code in status_codes(dataset).items()}
-    columns[v.STATUS] = pd.Categorical.from_codes(columns[v.STATUS].astype(int), categories=pd.Index(words.values()))
+    columns[v.STATUS] = [words[code] for code in columns[v.STATUS].tolist()]
     return pd.DataFrame(columns, index=pd.Index(hit_numbers(dataset), name=v.HIT))
+
+
+def _as_given(array: xarray.DataArray) -> np.ndarray[Any, Any]:
+    """Values of a column. A file has degrees that were radians: where a short number of degrees becomes the same value
+    on that way, it is the one that was given."""
+    values: np.ndarray[Any, Any] = array.values
+    if array.attrs.get("units") != "degree" or values.dtype != np.float64:
+        return values
+    short = np.round(values, _DIGITS)
+    return np.where(np.degrees(np.radians(short)) == values, short, values)
 
 
 def _columns(dataset: xarray.Dataset) -> Iterator[tuple[str, xarray.DataArray]]:
@@ -66,7 +80,7 @@ def write_csv(dataset: xarray.Dataset, path: Path) -> None:
     with aside(path) as file:
         for part in slices(dataset):
             frame = to_dataframe(part)
-            frame[v.STATUS] = frame[v.STATUS].cat.rename_categories(_no_formula)
+            frame[v.STATUS] = frame[v.STATUS].map(_no_formula)
             header = [_no_formula(_header(name, unit)) for name, unit in _units(part).items()] if is_first else False
             frame.to_csv(file, mode="w" if is_first else "a", header=header)
             is_first = False

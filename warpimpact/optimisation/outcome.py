@@ -92,7 +92,8 @@ def to_dataset(design: Design, found: Searched, confirmed: Confirmed, made_by: M
     if design.keys and len(confirmed.records):
         columns |= {f.HIT_Y: confirmed.places[:, 0], f.HIT_Z: confirmed.places[:, 1]}
         columns[f.HIT_VALUE] = np.array([record.said[0] for record in confirmed.records])
-    return dataset_of(columns, {attr.REFERENCES: f.REFERENCES, **_attributes(design, found, made_by)})
+    dataset = dataset_of(columns, {attr.REFERENCES: f.REFERENCES, **_attributes(design, found, made_by)})
+    return dataset.set_coords([f.UNIT, f.LABEL])  # a value that is picked out keeps its unit and its label beside it
 
 
 def _untested(design: Design, record: DesignRecord) -> str:

@@ -50,3 +50,7 @@ __all__ = [
     "variable_maps",
     "weight_figure",
 ]
+
+
+def __dir__() -> list[str]:
+    return __all__

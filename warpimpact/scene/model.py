@@ -1,5 +1,6 @@
 """The base class of the models of a scene."""
 
+import inspect
 from collections.abc import Mapping
 from copy import deepcopy
 from difflib import get_close_matches
@@ -19,6 +20,14 @@ class Model(BaseModel):
     """A validated, immutable value. A misspelt field is an error, and its message suggests the right name."""
 
     model_config = ConfigDict(frozen=True, extra="forbid")
+
+    @classmethod
+    def __pydantic_init_subclass__(cls, **kwargs: Any) -> None:
+        """Give the class a signature of names and defaults: types of fields would fill the first screen of `help`."""
+        super().__pydantic_init_subclass__(**kwargs)
+        fields = inspect.signature(cls).parameters.values()
+        short = [inspect.Parameter(field.name, field.kind, default=field.default) for field in fields]
+        cls.__signature__ = inspect.Signature(short)
 
     @model_validator(mode="before")
     @classmethod

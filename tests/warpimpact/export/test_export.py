@@ -1,8 +1,10 @@
 """Exports hold what the result holds: tables read back, and VTK files that VTK itself reads."""
 
 import sys
+import warnings
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 from xml.etree import ElementTree
 
 import numpy as np
@@ -13,6 +15,7 @@ import xarray
 from warpimpact import Campaign, to_dataframe
 from warpimpact.analysis import estimates
 from warpimpact.cli import main
+from warpimpact.export.drawing import write_drawing
 from warpimpact.export.paraview import AROUND, write_vtk
 from warpimpact.export.spreadsheet import write_csv
 from warpimpact.kernels.status import Status
@@ -20,7 +23,7 @@ from warpimpact.results import files
 from warpimpact.results.variables import SHOT_VARIABLES
 from warpimpact.runs.replay import replay
 from warpimpact.runs.run import run
-from warpimpact.scene import Hits
+from warpimpact.scene import Hits, Plate
 from warpimpact.scene.shots import EXPORTED
 
 SLOTTED_PLATE = Path(__file__).parents[3] / "campaigns" / "slotted_plate.toml"
@@ -40,6 +43,14 @@ def test_table_has_a_row_per_hit_and_a_column_per_standoff_and_axis(make_result:
         dataset[name].size // 20 for name in {*dataset.data_vars, "hit_y", "hit_z"} if "hit" in dataset[name].dims
     )
     assert frame.shape == (20, per_hit)
+    with warnings.catch_warnings(action="error"):
+        assert set(frame.groupby("status").size().index) == {"perforated", "arrested", "ricocheted", "missed"}
+    given = np.concatenate([np.full(10, 30.0), np.linspace(0.1, 50.0, 10)])
+    stored = np.degrees(np.radians(given))
+    assert stored[0] != 30.0
+    angles = to_dataframe(dataset.assign(obliquity=("hit", stored, {"units": "degree"})))["obliquity"]
+    np.testing.assert_array_equal(angles[:10], 30.0)
+    np.testing.assert_array_equal(np.degrees(np.radians(angles)), stored)
 
 
 def test_csv_holds_every_bit_whatever_the_slices(
@@ -77,6 +88,19 @@ def test_an_exported_result_is_a_list_of_hits(tmp_path: Path) -> None:
     np.testing.assert_allclose(again["tilt"], result["tilt"][[3, 5, 7]], atol=3.0)  # of another resolution
     for variable in SHOT_VARIABLES:
         assert EXPORTED.get(variable, variable) == variable.field
+
+
+@pytest.mark.parametrize(("pattern", "kind"), [("circle", "CIRCLE"), ("hexagon", "LWPOLYLINE")])
+def test_round_holes_are_circles_of_a_dxf(pattern: str, kind: str, tmp_path: Path) -> None:
+    import ezdxf
+
+    size = {"diameter": 9e-3} if pattern == "circle" else {"width": 9e-3}
+    holes: Any = {"shape": pattern, "spacing": (12e-3, 12e-3), **size}
+    write_drawing(Plate(thickness=4e-3, resistance=1e9, pattern=holes), tmp_path / "a.dxf")
+    drawn = ezdxf.readfile(tmp_path / "a.dxf").modelspace().query('*[layer=="HOLES"]')
+    assert {shape.dxftype() for shape in drawn} == {kind}
+    if kind == "CIRCLE":
+        assert {round(shape.dxf.radius, 9) for shape in drawn} == {4.5}
 
 
 def test_units_in_the_header_of_a_list_count(tmp_path: Path) -> None:
