@@ -5,19 +5,20 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from warpimpact.analysis.assumptions import AS_GIVEN
 from warpimpact.analysis.effectiveness import Score
 from warpimpact.analysis.numbers import Ends, intervals_text, number_text, of_each
+from warpimpact.analysis.plate_text import common_name
 from warpimpact.analysis.survival import Survival, survival_text
 from warpimpact.view.view import Column, Section, Table, html_of, number, text_of
 
 
 @dataclass(frozen=True)
 class Contestant:
-    """A plate and how well it protects; areal density [kg/m²], open area as a share, and what the solid plate of equal
-    areal density is."""
+    """A plate and how well it protects; areal density of the whole target [kg/m²], open area as a share, what its solid
+    reference is and is called, and `Target.weights`."""
 
     name: str
     hits: int
@@ -25,6 +26,8 @@ class Contestant:
     open_area: float
     measures: tuple[Score, ...]
     solid: str = ""
+    reference: str = "solid plate"
+    weights: Mapping[str, float] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -117,7 +120,6 @@ class Comparison:
         confidence: at which the intervals of a measure's differences hold together.
         notes: what else there is to say, a sentence each.
         verdicts: of every pair in every measure that assumptions move.
-        cautions: what differs between the plates, or is not known of them, that ranks do not allow for, in few words.
     """
 
     plates: tuple[Contestant, ...]
@@ -127,11 +129,15 @@ class Comparison:
     confidence: float
     notes: tuple[str, ...]
     verdicts: tuple[Verdict, ...] = ()
-    cautions: tuple[str, ...] = ()
 
     def _repr_html_(self) -> str:
         """What a notebook shows."""
         return html_of(comparison_view(self))
+
+    @property
+    def reference(self) -> str:
+        """What the solid references are called."""
+        return common_name(plate.reference for plate in self.plates)
 
     def ranks(self, measure: str) -> dict[str, int]:
         """Name of each plate → its rank, by value. Plates that share a rank are a group in which no two are told apart;
@@ -166,7 +172,7 @@ def comparison_text(comparison: Comparison) -> str:
 def comparison_view(comparison: Comparison) -> list[Section]:
     """What was compared, who is best at what, then every measure as a ranking with differences in words."""
     best = Table((Column("best at"), Column("plate")), best_rows(comparison))
-    rankings = (_ranking(comparison, measure) for measure in compared_scores(comparison))
+    rankings = (_ranking(comparison, measure) for measure in _compared(comparison))
     return [Section(conditions(comparison)), Section([best]), *rankings]
 
 
@@ -209,22 +215,21 @@ def hits_used(comparison: Comparison) -> list[str]:
     return lines
 
 
-def compared_scores(comparison: Comparison) -> list[Score]:
-    """The measures of the first plate in which plates are compared; a worst hit has no interval."""
+def _compared(comparison: Comparison) -> list[Score]:
     return [score for score in comparison.plates[0].measures if score.measure.kind != "worst_point"]
 
 
 def best_rows(comparison: Comparison) -> list[tuple[str, str]]:
     """Every measure and who is best at it."""
     rows = []
-    for measure in compared_scores(comparison):
+    for measure in _compared(comparison):
         if measure.measure.higher_is_better is None:
             continue
         first = [name for name, rank in comparison.ranks(measure.name).items() if rank == 1]
         told_apart = len(first) < len(comparison.plates)
         neither = "cannot be told apart" if is_ranked(comparison, measure.name) else "not ranked"
         doubts = _doubt(comparison, measure.name) + _turned(comparison, measure.name, first)
-        sentence = listed(first) + _as_good(comparison, measure.name, first) + doubts
+        sentence = _listed(first) + _as_good(comparison, measure.name, first) + doubts
         rows.append((measure.measure.label, sentence if told_apart else neither))
     return rows
 
@@ -234,7 +239,7 @@ def _as_good(comparison: Comparison, measure: str, first: Sequence[str]) -> str:
     apart = [{pair.one, pair.other} for pair in comparison.differences if pair.measure == measure and pair.told_apart]
     others = [plate.name for plate in comparison.plates if plate.name not in first]
     open_ = [name for name in others if not all({name, leader} in apart for leader in first)]
-    return f" (not told apart for certain from {listed(open_)})" if open_ else ""
+    return f" (not told apart for certain from {_listed(open_)})" if open_ else ""
 
 
 def _doubt(comparison: Comparison, measure: str) -> str:
@@ -264,7 +269,7 @@ def is_ranked(comparison: Comparison, measure: str) -> bool:
     return any(pair.measure == measure and not math.isnan(pair.low) for pair in comparison.differences)
 
 
-def listed(names: Sequence[str]) -> str:
+def _listed(names: Sequence[str]) -> str:
     """Such as "a, b and c"."""
     return " and ".join([", ".join(names[:-1]), names[-1]] if len(names) > 1 else names)
 
@@ -275,16 +280,18 @@ def _ranking(comparison: Comparison, measure: Score) -> Section:
     ranks = comparison.ranks(measure.name)
     ranked = is_ranked(comparison, measure.name)
     plates = {plate.name: plate for plate in comparison.plates}
+    reference, parted = comparison.reference, all("add-on" in plate.weights for plate in comparison.plates)
     rows = []
     for name, rank in ranks.items():
         plate, shown = plates[name], plates[name].measures[place]
-        value = (plate.areal_density, shown.value, intervals_text(shown.ends))
-        rows.append((rank if ranked else "-", name, *value, shown.ratio, shown.ratio_text))
-    columns = (
-        *(number("rank", digits="d"), Column("plate"), number("kg/m²", digits=".2f")),
-        *(number("value"), Column("95 % interval"), number("ratio to the solid plate"), Column("95 % interval")),
-    )
-    what = " in the ratio to the solid plate" if measure.name in (comparison.at_equal_weight or ()) else ""
+        value = (plate.areal_density, shown.value, intervals_text(shown.ends), shown.ratio, shown.ratio_text)
+        rows.append((rank if ranked else "-", name, *value, plate.weights.get("add-on"), shown.alone)[: 7 + 2 * parted])
+    columns = [
+        *(number("rank", digits="d"), Column("plate"), number("whole kg/m²" if parted else "kg/m²", digits=".2f")),
+        *(number("value"), Column("95 % interval"), number(f"ratio to the {reference}"), Column("95 % interval")),
+    ]
+    columns += [number("add-on kg/m²", digits=".2f"), number("base alone")] if parted else []
+    what = f" in the ratio to the {reference}" if measure.name in (comparison.at_equal_weight or ()) else ""
     differences = [_in_words(pair, measure, what) for pair in comparison.differences if pair.measure == measure.name]
     by_value = "by value alone, " if what else ""
     verdicts = [by_value + verdict.text for verdict in comparison.verdicts if verdict.measure == measure.name]
@@ -298,7 +305,7 @@ def weighed(comparison: Comparison, measure: str) -> str:
     if comparison.at_equal_weight is None:
         return ""
     by_ratio = measure in comparison.at_equal_weight
-    return "; ranked by the ratio to the solid plate" if by_ratio else "; ranked without regard to weight"
+    return f"; ranked by the ratio to the {comparison.reference}" if by_ratio else "; ranked without regard to weight"
 
 
 def _in_words(pair: Difference, measure: Score, what: str) -> str:
@@ -314,14 +321,14 @@ def _in_words(pair: Difference, measure: Score, what: str) -> str:
     names = [pair.one, pair.other] if (pair.value > 0.0) == (better is not False) else [pair.other, pair.one]
     by_hits, by_parameters = (pair.low, pair.high), pair.parameters
     if pair.value < 0.0:
-        by_hits, by_parameters = negative(by_hits), by_parameters and negative(by_parameters)
+        by_hits, by_parameters = _negative(by_hits), by_parameters and _negative(by_parameters)
     interval = intervals_text(Ends(*by_hits, by_parameters))
     than = f"{'higher' if better is None else 'better'} than"
     verdict = f"{names[0]} {than} {names[1]} by {number_text(abs(pair.value))}{what} ({interval})"
     return verdict + survival_text(pair.survival)
 
 
-def negative(interval: tuple[float, float]) -> tuple[float, float]:
+def _negative(interval: tuple[float, float]) -> tuple[float, float]:
     """The interval of the negative number."""
     return -interval[1], -interval[0]
 
@@ -329,7 +336,7 @@ def negative(interval: tuple[float, float]) -> tuple[float, float]:
 def assumptions_view(comparison: Comparison) -> list[Section]:
     """Every measure of all plates under every assumption."""
     sections = []
-    for score in compared_scores(comparison):
+    for score in _compared(comparison):
         of_plates = [next(s for s in plate.measures if s.name == score.name) for plate in comparison.plates]
         names = dict.fromkeys(name for of_plate in of_plates for name in of_plate.assumptions)
         if names:

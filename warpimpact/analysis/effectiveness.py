@@ -16,15 +16,15 @@ import xarray
 
 from warpimpact.analysis.estimates import Evidence, by_hit_of, evidence
 from warpimpact.analysis.numbers import Ends, ends_of, intervals_text
-from warpimpact.analysis.plate_text import plate_text, solid_note
+from warpimpact.analysis.plate_text import plate_text, reference_name, solid_note
 from warpimpact.analysis.survival import by_draws, over_draws
 from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
-from warpimpact.results.dataset import solid_reference
 from warpimpact.results.files import ResultError
 from warpimpact.results.limits import solid_limits
 from warpimpact.results.measures import Measure
 from warpimpact.results.per_hit import Array
+from warpimpact.results.solid_reference import base_alone, solid_reference
 from warpimpact.results.tallies import dealing, estimate_from
 from warpimpact.statistics.comparisons import Ratio, ratio_numbers
 from warpimpact.statistics.intervals import Estimate
@@ -57,12 +57,13 @@ class Score:
         measure: what it is.
         value: the number.
         low, high: its confidence interval by the hits; none of a worst point: what lies between the hits may be worse.
-        solid: the same of the solid plate of equal areal density.
+        solid: the same of the solid reference: a plate of equal areal density, or an add-on before the same base.
         ratio, ratio_low, ratio_high: the value as a multiple of that.
         hit: number of the hit that is the worst point; None of anything else.
         parameters: its interval by the parameters, as in `Estimate`.
         ratio_parameters: that of the ratio.
         numerics: how far the numerics may shift the value; None or NaN where that is not known.
+        alone: the same of the base alone.
         assumptions: the value under each assumption, as in `Estimate`.
     """
 
@@ -78,6 +79,7 @@ class Score:
     parameters: tuple[float, float] | None = None
     ratio_parameters: tuple[float, float] | None = None
     numerics: float | None = None
+    alone: float = math.nan
     assumptions: Mapping[str, float] = field(default_factory=dict)
 
     @property
@@ -150,17 +152,30 @@ def effectiveness(dataset: xarray.Dataset, texts: Sequence[str] = ()) -> list[Sc
 def scores(dataset: xarray.Dataset, measures: Sequence[Measure], confidence: float = 0.95) -> Iterator[Scored]:
     """Measures one after the other, beside those of the solid plate, with the numbers that they are made of."""
     reference = solid_limits(dataset) if attr.LIMIT in dataset.attrs else solid_reference(dataset)
+    alone = base_alone(dataset)
     for found in evidence(dataset, measures, confidence):
         comparable = reference is not None and _is_comparable(found.measure, dataset, reference)
-        yield _scored(found.shown(), dataset, reference if comparable else None, confidence)
+        scored = _scored(found.shown(), dataset, reference if comparable else None, confidence)
+        yield replace(scored, score=replace(scored.score, alone=_value_of(alone, found.measure)))
+
+
+def _value_of(reference: xarray.Dataset | None, measure: Measure) -> float:
+    """The measure of a reference; NaN where it has none."""
+    if reference is None or measure.kind == "target":
+        return math.nan
+    values = _averaged_of_solid(measure, measure.display.factor * measure.counted(by_hit_of(reference, measure)))
+    return float(np.nanmean(values)) if np.isfinite(values).any() else math.nan
 
 
 def _is_comparable(measure: Measure, dataset: xarray.Dataset, reference: xarray.Dataset) -> bool:
-    """Whether the solid plate has what is measured: in the place of a whole target it has no thickness of one layer."""
+    """Whether the reference has what is measured: a thickness counts where all else is as heavy."""
     if measure.kind == "target":
         return False
-    same = (dataset.attrs.get(name) == reference.attrs.get(name) for name in (attr.LIMIT_LAYER, attr.LIMIT_ELSEWHERE))
-    return measure.name != "limit_thickness" or all(same)
+    if measure.name != "limit_thickness":
+        return True
+    elsewhere = [float(of.attrs.get(attr.LIMIT_ELSEWHERE, 0.0)) for of in (dataset, reference)]
+    same_layer = dataset.attrs.get(attr.LIMIT_LAYER) == reference.attrs.get(attr.LIMIT_LAYER)
+    return same_layer and math.isclose(*elsewhere, rel_tol=1e-9)
 
 
 def _scored(found: Evidence, dataset: xarray.Dataset, reference: xarray.Dataset | None, confidence: float) -> Scored:
@@ -223,15 +238,16 @@ def effectiveness_view(dataset: xarray.Dataset, texts: Sequence[str] = ()) -> Se
             "There is no solid plate to compare with: the result has no shots at one. They are computed unless "
             'output.solid_reference is false, and stand in the group "solid" of the file.'
         )
-    table = measures_table(measures, with_solid=with_solid)
+    table = measures_table(measures, reference_name(dataset) if with_solid else None)
     return Section([table, *filter(None, notes)], f"effectiveness{plate_text(dataset)}")
 
 
-def measures_table(measures: Sequence[Score], *, with_solid: bool = True) -> Table:
-    """Measures with their intervals, and beside the solid plate where that is wanted."""
+def measures_table(measures: Sequence[Score], reference: str | None = "solid plate") -> Table:
+    """Measures with their intervals, and beside the references: a solid one of this name, and the base alone."""
     columns = [Column(), number("value"), Column("95 % interval")]
-    if with_solid:
-        columns += [number("solid plate"), number("ratio to it"), Column("95 % interval")]
+    if reference is not None:
+        columns += [number(reference), number("ratio to it"), Column("95 % interval")]
+        columns += [number("base alone")] if any(not math.isnan(measure.alone) for measure in measures) else []
     rows = [
         (
             measure.measure.title,
@@ -240,6 +256,7 @@ def measures_table(measures: Sequence[Score], *, with_solid: bool = True) -> Tab
             measure.solid,
             measure.ratio,
             measure.ratio_text,
+            measure.alone,
         )[: len(columns)]
         for measure in measures
     ]

@@ -14,7 +14,7 @@ from warpimpact.analysis.bursts import bursts, bursts_view
 from warpimpact.analysis.effectiveness import effectiveness_view
 from warpimpact.analysis.estimates import estimated, means_of, slices, status_shares
 from warpimpact.analysis.numbers import ends_of, intervals_text
-from warpimpact.analysis.plate_text import plate_numbers
+from warpimpact.analysis.plate_text import plate_numbers, weights_of
 from warpimpact.analysis.summary import (
     levels_note,
     numerics_note,
@@ -65,11 +65,9 @@ def _origin(dataset: xarray.Dataset) -> Section:
     if attr.SYMMETRIES in attributes:
         rows.append(("symmetry", symmetry_text(dataset)))
     if attr.AREAL_DENSITY in attributes:
-        numbers = plate_numbers(
-            attributes[attr.OPEN_AREA], attributes.get(attr.LIGAMENT, math.inf), attributes[attr.AREAL_DENSITY]
-        )
-        whole = " of the whole target" if v.LAYER_STATUS in dataset else ""
-        rows.append(("plate", f"{', '.join(f'{label} {number}' for label, number in numbers.items())}{whole}"))
+        ligament = attributes.get(attr.LIGAMENT, math.inf)
+        numbers = plate_numbers(attributes[attr.OPEN_AREA], ligament, weights_of(dataset))
+        rows.append(("plate", ", ".join(f"{label} {number}" for label, number in numbers.items())))
     if (promise := promise_text(dataset)) is not None:
         rows.append(("accuracy", promise))
     rows += [(name, str(attributes[name])) for name in (attr.NUMERICS, attr.DEVICE, attr.HISTORY) if name in attributes]

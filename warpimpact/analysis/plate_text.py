@@ -1,4 +1,4 @@
-"""A plate in numbers, and the solid plate that has the areal density of its whole target, as text."""
+"""A plate in numbers, the weights of its target, and the solid reference, as text."""
 
 from __future__ import annotations
 
@@ -10,16 +10,20 @@ from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
 
 if TYPE_CHECKING:
+    from collections.abc import Iterable, Mapping
+
     from warpimpact.results.table import Result
 
 
-def plate_numbers(open_area: float, ligament: float, areal_density: float, resolution: float = 0.0) -> dict[str, str]:
+def plate_numbers(
+    open_area: float, ligament: float, weights: Mapping[str, float], resolution: float = 0.0
+) -> dict[str, str]:
     """Numbers of a plate as text with units, by name.
 
     Args:
         open_area: share of holes.
         ligament: the smallest one [m]; inf if there is none, and then it is left out.
-        areal_density: [kg/m²].
+        weights: as `Target.weights`.
         resolution: resolution of the ligament [m]; 0 if it is exact.
     """
     numbers = {"open area": f"{open_area:.1%}"}
@@ -27,30 +31,69 @@ def plate_numbers(open_area: float, ligament: float, areal_density: float, resol
         numbers["smallest ligament"] = f"{1e3 * ligament:.2f} mm"
         if resolution:
             numbers["smallest ligament"] += f" (resolved to {1e3 * resolution:g} mm)"
-    return numbers | {"areal density": f"{areal_density:.1f} kg/m²"}
+    return numbers | {name: f"{weight:.1f} kg/m²" for name, weight in weights.items()}
+
+
+def weights_of(dataset: Result) -> dict[str, float]:
+    """What `Target.weights` says of the target of a result; of a file that does not part add-on and base, the whole."""
+    whole = float(dataset.attrs[attr.AREAL_DENSITY])
+    if attr.ADD_ON_DENSITY not in dataset.attrs:
+        return {"whole target" if v.LAYER_STATUS in dataset else "areal density": whole}
+    add_on = float(dataset.attrs[attr.ADD_ON_DENSITY])
+    return {"add-on": add_on, "base": whole - add_on, "whole target": whole}
+
+
+def weights_text(weights: Mapping[str, float]) -> str:
+    """Weights as one phrase."""
+    return ", ".join(f"{name} {weight:.1f} kg/m²" for name, weight in weights.items())
 
 
 def plate_text(dataset: Result) -> str:
-    """Areal density and open area, where a result carries them."""
-    attributes = dataset.attrs
-    if attr.AREAL_DENSITY not in attributes:
+    """Weights and open area, where a result carries them."""
+    if attr.AREAL_DENSITY not in dataset.attrs:
         return ""
-    return f", {attributes[attr.AREAL_DENSITY]:.4g} kg/m², {attributes[attr.OPEN_AREA]:.1%} open"
+    weights = ", ".join(f"{name} {weight:.4g} kg/m²" for name, weight in weights_of(dataset).items())
+    return f", {weights.removeprefix('areal density ')}, {dataset.attrs[attr.OPEN_AREA]:.1%} open"
+
+
+def reference_name(dataset: Result) -> str:
+    """What a target is compared with."""
+    return "solid add-on" if attr.ADD_ON_DENSITY in dataset.attrs else "solid plate"
+
+
+def common_name(references: Iterable[str]) -> str:
+    """The name of several references: theirs, if it is one."""
+    names = {*references}
+    return names.pop() if len(names) == 1 else "solid reference"
 
 
 def solid_plate(dataset: Result) -> str:
-    """Thickness and material of the solid plate of equal areal density, as a phrase; empty where that is not told."""
+    """Thickness and material of the solid reference as a phrase; empty where that is not told."""
     attributes = dataset.attrs
-    material = json.loads(attributes.get(attr.MATERIAL, "{}"))
-    if not {"resistance", "density"} <= material.keys() or attr.AREAL_DENSITY not in attributes:
-        return ""
-    thickness = 1e3 * float(attributes[attr.AREAL_DENSITY]) / material["density"]
+    plates = json.loads(attributes.get(attr.SOLID_ADD_ON, "[]")) or _whole(dataset)
     if attr.CONTINUUM in attributes:
-        return f"{thickness:.3g} mm of {json.loads(attributes[attr.CONTINUUM])['materials'][0]} by finite elements"
-    return f"{thickness:.3g} mm of {1e-9 * material['resistance']:.3g} GPa, {_weakens(material)}"
+        materials = json.loads(attributes[attr.CONTINUUM])["materials"]
+        pairs = zip(plates, materials, strict=False)
+        return " and ".join(f"{1e3 * plate['thickness']:.3g} mm of {name} by finite elements" for plate, name in pairs)
+    return " and ".join(
+        f"{1e3 * plate['thickness']:.3g} mm of {_named(plate)}{1e-9 * plate['resistance']:.3g} GPa, {_weakens(plate)}"
+        for plate in plates
+    )
 
 
-def _weakens(material: dict[str, Any]) -> str:
+def _named(plate: Mapping[str, Any]) -> str:
+    return f"{plate['material']}, " if plate.get("material") else ""
+
+
+def _whole(dataset: Result) -> list[dict[str, Any]]:
+    """One solid plate in the place of the whole target, as files of earlier versions have it."""
+    material = json.loads(dataset.attrs.get(attr.MATERIAL, "{}"))
+    if not {"resistance", "density"} <= material.keys() or attr.AREAL_DENSITY not in dataset.attrs:
+        return []
+    return [material | {"thickness": float(dataset.attrs[attr.AREAL_DENSITY]) / material["density"]}]
+
+
+def _weakens(material: Mapping[str, Any]) -> str:
     if not (share := material.get("degradation", 1.0)) < 1.0:
         return "which does not weaken"
     by_path = material.get("degradation_distance") is not None
@@ -69,7 +112,10 @@ def solid_note(dataset: Result) -> str:
     plate = solid_plate(dataset)
     if not plate or not {*v.SOLID_VARIABLES, *v.SOLID_LIMIT_VARIABLES} & dataset.variables.keys():
         return ""
-    note = f"The solid plate is {plate}, the material of the plate in front."
+    what = "the material of the plate in front"
+    if attr.ADD_ON_DENSITY in dataset.attrs:
+        what = f"as heavy as the add-on ({dataset.attrs[attr.ADD_ON_DENSITY]:.4g} kg/m²), before the same base"
+    note = f"The {reference_name(dataset)} is {plate}, {what}."
     material = json.loads(dataset.attrs[attr.MATERIAL])
     if attr.CONTINUUM in dataset.attrs:
         return note

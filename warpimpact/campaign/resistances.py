@@ -43,11 +43,16 @@ def catalogue_resistance(campaign: Campaign, plate: Plate, thickness: float | No
     return known if thickness is None else catalogue.resistance(material, campaign.core, thickness, obliquity)
 
 
-def resistance_by_thickness(campaign: Campaign, layer: int, thickest: float) -> Curve | None:
-    """Thicknesses of a layer, ascending [m], and its resistance there, as a share of that in the campaign, where the
-    catalogue gives it; None elsewhere."""
+def resistance_by_thickness(campaign: Campaign, layer: int, thickest: float, unit: float | None = None) -> Curve | None:
+    """Thicknesses of a layer, ascending [m], and its resistance there, where the catalogue gives it; None elsewhere.
+
+    Args:
+        thickest: the largest thickness [m].
+        unit: thickness whose resistance is 1 [m]; that of the layer in the campaign if None.
+    """
     plate = campaign.target.layers[layer]
-    if is_drawn(campaign, "resistance", [layer]) or (known := catalogue_resistance(campaign, plate)) is None:
+    known = None if is_drawn(campaign, "resistance", [layer]) else catalogue_resistance(campaign, plate, unit)
+    if known is None:
         return None
     thicknesses = np.geomspace(_THINNEST * thickest, thickest, _POINTS).tolist()
     others = (catalogue_resistance(campaign, plate, thickness) for thickness in thicknesses)

@@ -158,11 +158,9 @@ def _plate(arguments: argparse.Namespace) -> None:
     plate = campaign.plate
     plate_figure(campaign.target, campaign.core, campaign.title).savefig(output, dpi=150)
     rows = [("thickness", f"{1e3 * plate.thickness:g} mm")]
-    rows += plate_numbers(plate.open_area, plate.ligament, plate.areal_density, plate.pattern.resolution).items()
+    rows += plate_numbers(plate.open_area, plate.ligament, campaign.target.weights, plate.pattern.resolution).items()
     for place, layer in enumerate(campaign.layer, start=1):
         behind = f"{1e3 * layer.gap:g} mm behind the one before"
         rows.append((f"layer {place}", f"{1e3 * layer.thickness:g} mm, {behind}, {layer.open_area:.1%} open"))
-    if campaign.layer:
-        rows.append(("whole target", f"{campaign.target.areal_density:.1f} kg/m²"))
     print(text_of([Section([labelled(rows)], campaign.title)]))
     print(output)

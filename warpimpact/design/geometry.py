@@ -45,7 +45,7 @@ def drawn(campaign: Campaign) -> dict[str, Any]:
         "ligament": None if ligament is None else _line(ligament),
         "handles": list(_handles(campaign)),
         "section": _section(target, half[1]),
-        "numbers": plate_numbers(plate.open_area, plate.ligament, target.areal_density, plate.pattern.resolution),
+        "numbers": plate_numbers(plate.open_area, plate.ligament, target.weights, plate.pattern.resolution),
         "thickness": f"{plate.thickness * _MM:.4g} mm",
     }
 

@@ -14,13 +14,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpimpact.campaign.campaign import Campaign
+from warpimpact.campaign.references import at_solid
 from warpimpact.optimisation.design import SCRAMBLINGS, Design, FacedThreat, alternatives_of
 from warpimpact.optimisation.limits import limits_level, limits_said
 from warpimpact.records.outcomes import Outcomes
 from warpimpact.results import variables as v
 from warpimpact.results.dataset import narrow_table
 from warpimpact.results.table import HitTable
-from warpimpact.runs.compute import at_solid
 from warpimpact.runs.executor import Job
 from warpimpact.runs.questions import Arrays, Question, Round
 from warpimpact.scene import Numerics, Scene, Shots

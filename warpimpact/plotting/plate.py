@@ -55,7 +55,7 @@ def plate_figure(plate: Plate | Target, core: Core | None = None, title: str = "
         axes.add_patch(patch)
     draw_dimensions(axes, plate)
     steel = Patch(facecolor=_STEEL, edgecolor="black", label=f"plate, {plate.thickness * _MM:g} mm thick")
-    numbers = plate_numbers(plate.open_area, plate.ligament, plate.areal_density, plate.pattern.resolution)
+    numbers = plate_numbers(plate.open_area, plate.ligament, target.weights, plate.pattern.resolution)
     parts = (f"{name} {number}".replace(" ", "\u00a0") for name, number in numbers.items())  # no break within a part
     axes.set_title(fill(", ".join(parts), 70), fontsize="medium")
     inch = 1.0 / figure.get_figheight()

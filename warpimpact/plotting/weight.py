@@ -1,5 +1,5 @@
-"""Figure of targets against their weight: what the base behind the plate takes, beside the solid plate that would
-replace the whole target."""
+"""Figure of targets against their weight: what the base behind the plate takes, beside the solid reference of
+the same weight."""
 
 from __future__ import annotations
 
@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Any
 from matplotlib.figure import Figure
 
 from warpimpact.analysis.effectiveness import depth_note
-from warpimpact.plotting.heading import add_heading, legend_below
 from warpimpact.plotting.style import BLUE, GREY, VERMILION, bars, hide_sides
 
 if TYPE_CHECKING:
@@ -35,8 +34,8 @@ def weight_figure(comparison: Comparison) -> Figure | None:
     """Measures of the base, or limits, against the areal density of the whole target, with their 95 % intervals; None
     if the plates have none of them.
 
-    A limit thickness stands over the areal density that the target then has. A hollow diamond is the solid plate of the
-    same areal density; a line is what a solid plate needs.
+    A limit thickness stands over the areal density that the target then has. A hollow diamond is the solid reference
+    of the same areal density; a line is what the target with it needs.
 
     Args:
         comparison: the result of `analysis.comparison.compare`.
@@ -53,8 +52,9 @@ def weight_figure(comparison: Comparison) -> Figure | None:
     labels: dict[str, Artist] = {}
     for axes in figure.axes:
         labels |= {label: handle for handle, label in zip(*axes.get_legend_handles_labels(), strict=True)}
-    legend_below(figure, list(labels.values()), list(labels), 4)
-    add_heading(figure, "Targets against their weight; 95 % intervals", *_solid_plates(comparison))
+    figure.legend(list(labels.values()), list(labels), loc="outside lower center", ncols=4, frameon=False)
+    title = "\n".join(["Targets against their weight; 95 % intervals", *_solid_plates(comparison)])
+    figure.suptitle(title, fontsize="medium")
     return figure
 
 
@@ -64,13 +64,12 @@ def _solid_plates(comparison: Comparison) -> list[str]:
     thicknesses = {
         material: ", ".join(thickness for thickness, _, of in solids if of == material) for _, _, material in solids
     }
-    return [f"solid plates: {thickness} mm of {material}" for material, thickness in thicknesses.items()]
+    return [f"{comparison.reference}s: {thickness} mm of {material}" for material, thickness in thicknesses.items()]
 
 
 def _draw_against_weight(axes: Axes, comparison: Comparison, name: str) -> None:
     """One effect of every target, over its areal density."""
     middle = _middle([plate.areal_density for plate in comparison.plates])
-    places: dict[tuple[str, str], list[tuple[Contestant, float]]] = {}  # plates that a figure shows at one place
     for plate in comparison.plates:
         scores = _scores(plate, name)
         for kind, score in scores.items():
@@ -78,11 +77,8 @@ def _draw_against_weight(axes: Axes, comparison: Comparison, name: str) -> None:
         first = next(iter(scores.values()))
         if not math.isnan(first.solid):
             solid: dict[str, Any] = {"color": GREY, "fillstyle": "none", "markersize": 11.0, "linestyle": "none"}
-            axes.plot(plate.areal_density, first.solid, "D", label="solid plate of the same weight", **solid)
-        places.setdefault((f"{plate.areal_density:.3g}", f"{first.value:.2g}"), []).append((plate, first.value))
-    for alike in places.values():
-        plate, value = alike[0]
-        _name(axes, ", ".join(plate.name for plate, _ in alike), (plate.areal_density, value), middle)
+            axes.plot(plate.areal_density, first.solid, "D", label=f"{plate.reference} of the same weight", **solid)
+        _name(axes, plate.name, (plate.areal_density, first.value), middle)
     _furnish(axes, _first(comparison.plates[0], name), "areal density of the whole target [kg/m²]")
     if name == "base_depth" and any(depth_note(plate.measures) for plate in comparison.plates):
         axes.set_title("lower bounds: cores pierce a base, and count with its thickness", fontsize="medium", loc="left")
@@ -100,7 +96,7 @@ def _draw_needed(axes: Axes, comparison: Comparison, name: str) -> None:
         _name(axes, plate.name, (_first(plate, _NEEDED).value, _first(plate, name).value), middle)
     needed = {_first(plate, _NEEDED).solid for plate in comparison.plates}
     for solid in filter(math.isfinite, needed):
-        axes.axvline(solid, color=GREY, linestyle="--", label="what a solid plate in place of the target needs")
+        axes.axvline(solid, color=GREY, linestyle="--", label=f"what the {comparison.reference} needs")
     _furnish(axes, _first(comparison.plates[0], name), "areal density that the target needs [kg/m²]")
 
 

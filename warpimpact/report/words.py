@@ -13,14 +13,12 @@ from markupsafe import Markup
 
 from warpimpact.analysis.assumptions_view import assumptions_view
 from warpimpact.analysis.comparison import compare
-from warpimpact.analysis.comparison_short import short_view, verdict_of
-from warpimpact.analysis.comparison_text import Comparison, comparison_view
+from warpimpact.analysis.comparison_text import Comparison, best_rows, comparison_view
 from warpimpact.analysis.effectiveness import depth_note, effectiveness, measures_table
 from warpimpact.analysis.estimates import estimated, means_of, slices, status_shares
-from warpimpact.analysis.evidence_lines import evidence_of_all
 from warpimpact.analysis.inspection import verdict
 from warpimpact.analysis.numbers import ends_of, intervals_text
-from warpimpact.analysis.plate_text import solid_note
+from warpimpact.analysis.plate_text import reference_name, solid_note, weights_of, weights_text
 from warpimpact.analysis.summary import numerics_note, numerics_sentence, promise_text, sampling_note
 from warpimpact.analysis.survival import draws_note
 from warpimpact.campaign.text import parsed
@@ -58,7 +56,7 @@ def result_content(name: str, dataset: xarray.Dataset) -> dict[str, Any]:
     attributes, measures = dataset.attrs, effectiveness(dataset)
     hits, came_through = dataset.sizes["hit"], sum(int(passed(part).sum()) for part in slices(dataset[[v.STATUS]]))
     means_over = f"{name}: with 95 % intervals; means are over the {came_through} of {hits} cores that passed"
-    against_solid = f"{name}: with 95 % intervals, compared with the solid plate of equal areal density"
+    against_solid = f"{name}: with 95 % intervals, compared with the {reference_name(dataset)} of equal areal density"
     return {
         "name": name,
         "title": attributes.get(attr.TITLE, "untitled"),
@@ -72,7 +70,7 @@ def result_content(name: str, dataset: xarray.Dataset) -> dict[str, Any]:
         "tables": _tables(dataset),
         "measures": measures,
         "through": Markup(table_html(_through(dataset), means_over)),
-        "protects": Markup(table_html(measures_table(measures), against_solid)),
+        "protects": Markup(table_html(measures_table(measures, reference_name(dataset)), against_solid)),
         "assumed": Markup(html_of([assumptions_view(dataset)])),
         "provenance": {words(key): str(attributes[key]) for key in _PROVENANCE if key in attributes},
         "speed": float(f"{attributes.get(attr.HITS_PER_SECOND, 0.0):.2g}"),
@@ -80,16 +78,15 @@ def result_content(name: str, dataset: xarray.Dataset) -> dict[str, Any]:
 
 
 def compared(datasets: Mapping[str, xarray.Dataset], *, picture: bool = True) -> dict[str, Any]:
-    """The comparison of plates as HTML, the measure that decides apart from all others, and a picture, if one is
-    wanted; if there is no comparison, a sentence gives the reason."""
+    """The comparison of plates as HTML and a picture, if one is wanted; if there is no comparison, a sentence gives the
+    reason."""
     try:
         comparison = compare(list(datasets.values()), list(datasets))
     except ResultError as error:
-        return {"view": Markup(html_of([Section([str(error)])])), "every": "", "verdict": [], "picture": ""}
+        return {"view": Markup(html_of([Section([str(error)])])), "best": [], "picture": ""}
     return {
-        "view": Markup(html_of([short_view(comparison, evidence_of_all(datasets))])),
-        "every": Markup(html_of(comparison_view(comparison))),
-        "verdict": verdict_of(comparison),
+        "view": Markup(html_of(comparison_view(comparison))),
+        "best": best_rows(comparison),
         "picture": _picture(comparison) if picture else "",
     }
 
@@ -102,10 +99,9 @@ def _picture(comparison: Comparison) -> str:
 
 
 def conclusion(results: Sequence[Mapping[str, Any]], comparison: Mapping[str, Any] | None) -> list[str]:
-    """What a reader wants first, a sentence each: which plate is best by the measure that decides, and what passes of
-    every plate."""
-    verdict = [] if comparison is None else comparison["verdict"]
-    return [*verdict, *(f"{result['name']}: {result['verdict']}" for result in results)]
+    """What a reader wants first, a sentence each: what passes of every plate, and which plate is best at what."""
+    best = [] if comparison is None else [f"Best at {label}: {who}." for label, who in comparison["best"]]
+    return [*(f"{result['name']}: {result['verdict']}" for result in results), *best]
 
 
 def _asked(dataset: xarray.Dataset) -> str:
@@ -117,10 +113,7 @@ def _asked(dataset: xarray.Dataset) -> str:
         f"{dataset.sizes['hit']} hits{sampling}, over a cell of {y} × {z} mm, at {velocity} and obliquity {obliquity}."
     )
     if attr.AREAL_DENSITY in dataset.attrs:
-        attributes = dataset.attrs
-        weighs = "the whole target weighs" if v.LAYER_STATUS in dataset else "weighs"
-        density = f"{attributes[attr.AREAL_DENSITY]:.3g} kg/m²"
-        text += f" The plate has {attributes[attr.OPEN_AREA]:.1%} open area and {weighs} {density}."
+        text += f" The plate has {dataset.attrs[attr.OPEN_AREA]:.1%} open area; {weights_text(weights_of(dataset))}."
     return text
 
 

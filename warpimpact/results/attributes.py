@@ -126,6 +126,12 @@ LAYERS = _declared("layers", "table")
 STANDOFF_POINT = _declared("standoff_point")
 OPEN_AREA = _declared("open_area", "number", "1")
 AREAL_DENSITY = _declared("areal_density", "number", "kg m-2")
+"""Of the whole target."""
+ADD_ON_DENSITY = _declared("add_on_areal_density", "number", "kg m-2")
+"""Of the layers in front of the base; only with a base. A file of layers without it is of a version whose solid plate
+was one plate in the place of the whole target."""
+SOLID_ADD_ON = _declared("solid_add_on")
+"""JSON of the plates that make the solid reference of the plate, or of the layers in front of the base."""
 LIGAMENT = _declared("ligament", "number", "m")
 PLATE_PERIOD = _declared("plate_period", "pair", "m")
 PLATE_THICKNESS = _declared("plate_thickness", "number", "m")
@@ -157,6 +163,9 @@ LIMIT_ELSEWHERE = _declared("limit_elsewhere", "number", "kg m-2")
 SOLID_LIMIT_TIME = _declared("solid_limit_time", "number", "s")
 """Time that the search at the solid plate took [s]."""
 SOLID_LIMIT_DENSITY = _declared("solid_limit_density", "number", "kg m-3")
+SOLID_LIMIT_ELSEWHERE = _declared("solid_limit_elsewhere", "number", "kg m-2")
+"""As `LIMIT_DENSITY` and `LIMIT_ELSEWHERE`, of the solid reference. A file without the second one is of a version that
+put one solid plate in the place of the whole target."""
 SOLID_LIMIT_HIGHEST = _declared("solid_limit_highest", "number")
 """Mass per volume of the solid plate that replaces the whole target, and the largest value tried."""
 LIMIT_TOLERANCE = _declared("limit_tolerance", "number")

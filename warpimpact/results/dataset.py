@@ -120,8 +120,14 @@ def to_dataset(scene: Scene, shots: Shots, outcomes: Outcomes, **arguments: Any)
 
 
 def solid_columns(outcomes: Outcomes) -> dict[str, Any]:
-    """What is stored of the first shots at the solid plate of equal areal density, SI and radians."""
-    return {name: getattr(outcomes, of_hits) for name, of_hits in v.SOLID_VARIABLES.items()}
+    """What is stored of the first shots at the solid reference, SI and radians."""
+    stored = (v.SOLID_VARIABLES | v.SOLID_DEPTHS).items()
+    return {name: getattr(outcomes, of_hits) for name, of_hits in stored if of_hits in outcomes}
+
+
+def base_alone_columns(outcomes: Outcomes) -> dict[str, Any]:
+    """What is stored of the same shots at the base alone, SI and radians."""
+    return {name: getattr(outcomes, of_hits) for name, of_hits in v.BASE_ALONE_VARIABLES.items()}
 
 
 def finer_columns(outcomes: Outcomes, numbers: NDArray[np.int64]) -> dict[str, Any]:
@@ -145,7 +151,7 @@ def assumed_table(columns: Mapping[str, Any], attributes: Mapping[str, Any], *, 
 
 def _computed() -> set[v.Variable]:
     """What is stored in single precision unless it was computed in double precision, of other shots, too."""
-    computed = {*v.computed_variables(), *v.SOLID_VARIABLES}
+    computed = {*v.computed_variables(), *v.SOLID_VARIABLES, *v.SOLID_DEPTHS, *v.BASE_ALONE_VARIABLES}
     of_hits = v.FINER_VARIABLES | v.ASSUMED_VARIABLES
     return computed | {name for name, variable in of_hits.items() if variable in computed}
 
@@ -213,26 +219,6 @@ def is_choice(dataset: Result) -> bool:
         for first in range(0, hits, _SLICE)
         for numbers in [np.arange(first, min(first + _SLICE, hits))]
     )
-
-
-def solid_reference(dataset: xarray.Dataset) -> xarray.Dataset | None:
-    """Shots and outcomes of the solid plate, with the names of a hit map and along "hit"; None if there are none.
-
-    Its hits are the first ones of the Dataset, or one where one shot tells of all. A solid plate that stands alone is
-    its own reference.
-    """
-    if dataset.attrs.get(attr.OPEN_AREA) == 0.0 and v.LAYER_STATUS not in dataset.variables:
-        return dataset
-    if any(name not in dataset.variables or dataset[name].dims != name.dims for name in v.SOLID_VARIABLES):
-        return None  # results of different plates that were joined have several
-    shots = dataset.sizes["solid_hit"]
-    numbers = np.zeros(1, dtype=int) if shots == 1 else hit_numbers(dataset[[v.HIT]].isel(hit=slice(shots)))
-    numbers = numbers[: np.argmax(np.append(numbers, shots) >= shots)]  # the first hits, as far as they have one
-    if not len(numbers):
-        return None
-    solid = dataset[list(v.SOLID_VARIABLES)].reset_coords(list(v.SOLID_VARIABLES)).isel(solid_hit=numbers).load()
-    first = dataset[v.shot_variables(dataset)].isel(hit=slice(len(numbers))).load()
-    return first.assign({of_hits: solid[name].rename(solid_hit="hit") for name, of_hits in v.SOLID_VARIABLES.items()})
 
 
 def history_dataset(

@@ -33,9 +33,9 @@ def solid_limits(dataset: xarray.Dataset) -> xarray.Dataset | None:
     status = np.where(np.isnan(values), Status.UNFINISHED, Status.PERFORATED).astype(np.int8)
     attributes = {
         attr.LIMIT: quantity,
-        attr.LIMIT_LAYER: 0,
+        attr.LIMIT_LAYER: dataset.attrs[attr.LIMIT_LAYER] if attr.SOLID_LIMIT_ELSEWHERE in dataset.attrs else 0,
         attr.LIMIT_HIGHEST: dataset.attrs[attr.SOLID_LIMIT_HIGHEST],
-        attr.LIMIT_ELSEWHERE: 0.0,
+        attr.LIMIT_ELSEWHERE: dataset.attrs.get(attr.SOLID_LIMIT_ELSEWHERE, 0.0),
         attr.LIMIT_DENSITY: dataset.attrs[attr.SOLID_LIMIT_DENSITY],
     }
     names = v.LIMITS[quantity].value, v.STATUS

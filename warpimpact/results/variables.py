@@ -73,14 +73,22 @@ def _beside(variable: Variable, kind: str, along: str, what: str) -> Variable:
 
 
 def _solid(variable: Variable) -> Variable:
-    """The same variable for the solid plate of equal areal density."""
+    """The same variable for the solid plate of equal areal density, or the solid add-on before the same base."""
     return _beside(variable, "solid", "solid_hit", "solid plate of equal areal density")
 
 
 SOLID_VARIABLES = {_solid(variable): variable for variable in (STATUS, RESIDUAL_VELOCITY, TILT)}
 """Outcomes of the first shots against the solid plate of equal areal density, each with the variable of the hits that
-it corresponds to. There is one shot if the shots differ only in their hit points. Present only for a perforated plate
-and with `output.solid_reference`."""
+it corresponds to; of layers, against the solid add-on of equal areal density before the same base. There is one shot if
+the shots differ only in their hit points. Present only for a perforated plate or layers, and with
+`output.solid_reference`."""
+SOLID_DEPTHS = {_solid(variable): variable for variable in (STOPPED_IN, DEPTH)}
+"""The same of layers, which say how deep the cores go into the base."""
+BASE_ALONE_VARIABLES = {
+    _beside(variable, "base_alone", "solid_hit", "base without the layers in front"): variable
+    for variable in SOLID_VARIABLES.values()
+}
+"""Outcomes of the same shots against the base alone. Present with layers and `output.solid_reference`."""
 
 SOLID_LIMITS = {quantity: _solid(limit.value) for quantity, limit in LIMITS.items()}
 """Limits of the first shots at the solid plate of equal areal density, by the quantity of the search; one if all shots
@@ -116,7 +124,7 @@ OUTLINE_VARIABLES = (OUTLINE_Y, OUTLINE_Z)
 
 GROUPS = {
     "plate": OUTLINE_VARIABLES,
-    "solid": (*SOLID_VARIABLES, *SOLID_LIMIT_VARIABLES),
+    "solid": (*SOLID_VARIABLES, *SOLID_DEPTHS, *BASE_ALONE_VARIABLES, *SOLID_LIMIT_VARIABLES),
     "finer": (*FINER_COORDINATES, *FINER_VARIABLES),
     "assumed": (*ASSUMED_COORDINATES, *ASSUMED_VARIABLES),
 }
@@ -230,4 +238,4 @@ def hit_variables() -> tuple[Variable, ...]:
 def whole_groups() -> list[tuple[Variable, ...]]:
     """Variables of which a result has all or none."""
     of_records = [(*group, *group.beside) for group in registry.RECORDS if group.whole]
-    return [*of_records, OUTLINE_VARIABLES, tuple(SOLID_VARIABLES)]
+    return [*of_records, OUTLINE_VARIABLES, *map(tuple, (SOLID_VARIABLES, SOLID_DEPTHS, BASE_ALONE_VARIABLES))]

@@ -12,9 +12,10 @@ from typing import TYPE_CHECKING, Any, ClassVar
 import numpy as np
 
 from warpimpact.campaign.campaign import Campaign
+from warpimpact.campaign.references import at_base_alone, at_solid
 from warpimpact.records.outcomes import Outcomes
 from warpimpact.results import attributes as attr
-from warpimpact.results.dataset import finer_columns, solid_columns
+from warpimpact.results.dataset import base_alone_columns, finer_columns, solid_columns
 from warpimpact.results.table import HitTable
 from warpimpact.runs.assumed import assumed
 from warpimpact.runs.describe import computed_by, described, found_attributes
@@ -22,7 +23,6 @@ from warpimpact.runs.levels import aim_of, level_for, shifts_of
 from warpimpact.runs.pilot_hits import pilot_most, pilot_places, pilot_shots
 from warpimpact.runs.task import Task
 from warpimpact.scene import Numerics, Scene, Shots
-from warpimpact.scene.quantities import BY_LAYER
 from warpimpact.solver.device import find_device
 from warpimpact.solver.findings import Found, HitErrors
 from warpimpact.solver.many import simulate_many
@@ -101,6 +101,8 @@ def compute(campaign: Campaign, task: Task, worker: Worker, progress: Progress |
     beside = finer_hits(campaign, task.found, pilot_most(campaign))
     if task.solid is not None:
         beside |= solid_columns(_outcomes(*at_solid(campaign, task.solid), numerics, worker)[0])
+        if campaign.layer:
+            beside |= base_alone_columns(_outcomes(*at_base_alone(campaign, task.solid), numerics, worker)[0])
     attributes = computed_by(campaign, worker.device, len(outcomes), elapsed)
     attributes |= found_attributes(campaign, task.found) | _errors(task.found)
     attributes |= {attr.LEVEL_FOR: what} if (what := level_for(campaign)) else {}
@@ -150,22 +152,6 @@ def _errors(found: Found | None) -> dict[str, Any]:
     }
     shifts = {attr.LEVEL_SHIFTS: json.dumps(found.shifts)} if found.shifts else {}
     return {name: error for name, error in errors.items() if not math.isnan(error)} | shifts
-
-
-def at_solid(campaign: Campaign, shots: Shots) -> tuple[Scene, Shots]:
-    """The solid plate of equal areal density in place of the target, and shots at it: it is as heavy as the target of
-    each shot."""
-    target, plate = campaign.target, campaign.plate
-    of_plate: dict[str, Any] = {
-        name: shots.columns[name][:, :1] if shots.differs(name, 0) else None for name in BY_LAYER
-    }
-    if shots.thickness is not None:
-        thickness = shots.own_of(target, "thickness", 0) * (plate.solid.thickness / plate.thickness)
-        for k, layer in enumerate(target.layers[1:], start=1):
-            share = layer.areal_density / layer.thickness / plate.density
-            thickness = thickness + share * shots.own_of(target, "thickness", k)
-        of_plate["thickness"] = np.broadcast_to(thickness, len(shots)).copy()
-    return campaign.scene.model_copy(update={"target": target.solid}), replace(shots, **of_plate)
 
 
 def _outcomes(

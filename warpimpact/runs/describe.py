@@ -9,6 +9,7 @@ from typing import Any
 
 from warpimpact.campaign.campaign import Campaign
 from warpimpact.campaign.evidence import evidence_of
+from warpimpact.campaign.references import has_solid, solid_target
 from warpimpact.records.outcomes import Outcomes
 from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
@@ -134,7 +135,12 @@ def _campaign(campaign: Campaign) -> dict[str, Any]:
         attr.FAILED_SHARE: campaign.output.failed_share,
     }
     attributes |= {} if campaign.hits.count is None else {attr.COUNT: campaign.hits.count}
-    attributes |= {attr.LAYERS: _layers(campaign)} if campaign.layer else {}
+    if campaign.layer:
+        attributes[attr.LAYERS] = _layers(campaign)
+        attributes[attr.ADD_ON_DENSITY] = campaign.target.weights["add-on"]
+    if campaign.output.solid_reference and has_solid(campaign):
+        solid = solid_target(campaign).add_on
+        attributes[attr.SOLID_ADD_ON] = json.dumps([plate.model_dump(mode="json") for plate in solid])
     attributes |= {attr.LIGAMENT: ligament} if math.isfinite(ligament) else {}
     attributes |= {} if campaign.drawn is None else {attr.DISCREPANCY: json.dumps(campaign.drawn.discrepancy)}
     return attributes | ({} if campaign.burst is None else _burst(campaign.burst))

@@ -14,6 +14,7 @@ import numpy as np
 
 from warpimpact.campaign.campaign import Campaign
 from warpimpact.campaign.continuum_settings import FiniteElements
+from warpimpact.campaign.references import at_solid
 from warpimpact.continuum.strikes import check_continuum, struck
 from warpimpact.records.outcomes import Outcomes
 from warpimpact.results import attributes as attr
@@ -21,7 +22,6 @@ from warpimpact.results import files
 from warpimpact.results import variables as v
 from warpimpact.results.dataset import solid_columns, stored_columns
 from warpimpact.results.outlines import in_memory
-from warpimpact.runs.compute import at_solid
 from warpimpact.runs.describe import computed_by, described_as
 from warpimpact.runs.executor import Executor, Job
 from warpimpact.runs.jobs import solid_shots, with_ligament
@@ -90,7 +90,7 @@ def _computed(
     solid = solid_shots(campaign, shots[:1], 1)
     if solid is not None:
         scene, alone = at_solid(campaign, solid)
-        asked.append((scene, alone, continuum.model_copy(update={"flows": continuum.flows[:1]})))
+        asked.append((scene, alone, continuum))
     results = yield Round([Job(_hit, one) for one in asked], [_key(*one) for one in asked], tell)
     outcomes = [Outcomes(**{name: values for name, values in row.items() if name != SECONDS}) for row in results]
     beside = {} if solid is None else solid_columns(outcomes.pop())

@@ -7,6 +7,7 @@ from collections.abc import Callable, Iterator
 import numpy as np
 
 from warpimpact.campaign.campaign import Campaign
+from warpimpact.campaign.references import has_solid
 from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
 from warpimpact.results.dataset import images, numbered
@@ -70,14 +71,14 @@ def task_size(executor: Executor, rate: float) -> int:
 
 
 def solid_shots(campaign: Campaign, shots: Shots, most: int) -> Shots | None:
-    """Those of the first shard's shots that the solid plate of equal areal density takes: one tells of all where no two
-    differ but in where they hit."""
-    plate = campaign.plate
-    if not campaign.output.solid_reference or campaign.target.solid == plate:
+    """Those of the first shard's shots that the references take: one tells of all where no two differ but in where they
+    hit, and the base has no holes."""
+    if not campaign.output.solid_reference or not has_solid(campaign):
         return None
     elsewhere = (v.HIT_Y, v.HIT_Z, "offset_y", "offset_z")
     conditions = [values for name, values in shots.columns.items() if name not in elsewhere]
-    alike = plate.size is None and not any(np.nan_to_num(np.ptp(values, axis=0)).any() for values in conditions)
+    unbounded = all(layer == layer.solid and layer.size is None for layer in campaign.target.solid.layers)
+    alike = unbounded and not any(np.nan_to_num(np.ptp(values, axis=0)).any() for values in conditions)
     if alike and campaign.burst is None:
         return shots[:1]
     return shots[: max(1, most // campaign.at_a_plate) * campaign.at_a_plate]

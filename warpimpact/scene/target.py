@@ -101,8 +101,27 @@ class Target(Model):
         return sum(layer.areal_density for layer in self.layers)
 
     @property
-    def solid(self) -> Plate:
-        """One plate without holes, with the material of the first layer and the areal density of all layers."""
-        solid = self.layers[0].solid
-        behind = sum(layer.areal_density for layer in self.layers[1:])
-        return solid.model_copy(update={"thickness": solid.thickness + behind / solid.density}) if behind else solid
+    def add_on(self) -> tuple[Plate, ...]:
+        """The layers in front of the base, which is the last of several; of a plate alone the plate."""
+        return self.layers[:-1] or self.layers
+
+    @property
+    def weights(self) -> dict[str, float]:
+        """Mass per area [kg/m²] of what every text and figure tells apart, by its name there."""
+        if len(self.layers) == 1:
+            return {"areal density": self.areal_density}
+        add_on = sum(layer.areal_density for layer in self.add_on)
+        return {"add-on": add_on, "base": self.layers[-1].areal_density, "whole target": self.areal_density}
+
+    @property
+    def solid(self) -> Self:
+        """The target with an add-on, or a plate alone, that has no holes, the same materials and the same weight."""
+        solid = tuple(layer.solid for layer in self.add_on)
+        return self.model_copy(update={"layers": (*solid, *self.layers[len(solid) :])})
+
+    @property
+    def base_alone(self) -> Self:
+        """The last layer as it stands without the others: the target without its add-on."""
+        base = self.layers[-1]
+        front = base.model_copy(update={"gap": 0.0, "offset": (0.0, 0.0)}) if isinstance(base, Layer) else base
+        return self.model_copy(update={"layers": (front,)})

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from warpimpact.campaign.campaign import Campaign
 from warpimpact.campaign.evidence import limit_velocity_factors
+from warpimpact.campaign.references import at_solid
 from warpimpact.campaign.resistances import resistance_by_thickness
 from warpimpact.campaign.text import CampaignError
 from warpimpact.records.outcomes import Outcomes
@@ -21,7 +22,7 @@ from warpimpact.results.measures import Measure
 from warpimpact.results.table import HitTable
 from warpimpact.results.vocabulary import LIMIT_VELOCITY
 from warpimpact.runs.assumed import assumed
-from warpimpact.runs.compute import at_solid, finer_hits, found_in, numerics_of, of_images
+from warpimpact.runs.compute import finer_hits, found_in, numerics_of, of_images
 from warpimpact.runs.describe import computed_by, described, found_attributes
 from warpimpact.runs.pilot_hits import pilot_shots
 from warpimpact.runs.shards import extent
@@ -152,16 +153,19 @@ class LimitMap:
     def _at_solid(
         self, campaign: Campaign, shots: Shots, numerics: Numerics, worker: Worker
     ) -> tuple[dict[str, Array], dict[str, float]]:
-        """Column and attributes of the limits of some shots at the solid plate that is as heavy as the whole target."""
-        (scene, shots), sought = at_solid(campaign, shots), replace(self.sought, layer=0)
+        """Column and attributes of the limits of some shots at the solid reference of the target."""
+        (scene, shots), sought = at_solid(campaign, shots), self.sought
+        layer = scene.target.layers[sought.layer]
         if sought.quantity == "thickness":
-            highest = thickest(scene, 0)
-            sought = replace(sought, highest=highest, by_thickness=resistance_by_thickness(campaign, 0, highest))
+            highest = thickest(scene, sought.layer)
+            curve = resistance_by_thickness(campaign, sought.layer, highest, layer.thickness)
+            sought = replace(sought, highest=highest, by_thickness=curve)
         begin = time.perf_counter()
         searched = limits(scene, shots, sought, numerics, worker)
         return {v.SOLID_LIMITS[sought.quantity]: searched.value}, {
             attr.SOLID_LIMIT_TIME: time.perf_counter() - begin,
-            attr.SOLID_LIMIT_DENSITY: scene.target.layers[0].density,
+            attr.SOLID_LIMIT_DENSITY: layer.areal_density / layer.thickness,
+            attr.SOLID_LIMIT_ELSEWHERE: scene.target.areal_density - layer.areal_density,
             attr.SOLID_LIMIT_HIGHEST: sought.highest,
         }
 

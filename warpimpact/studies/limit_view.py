@@ -12,6 +12,7 @@ from warpimpact.analysis.assumptions import Assumed
 from warpimpact.analysis.assumptions_view import assumptions_lines
 from warpimpact.analysis.estimates import estimated
 from warpimpact.analysis.numbers import ends_of, intervals_text, rough_text
+from warpimpact.analysis.plate_text import reference_name
 from warpimpact.analysis.proxy import proxy
 from warpimpact.analysis.summary import numerics_note
 from warpimpact.analysis.survival import draws_note
@@ -21,6 +22,7 @@ from warpimpact.results.dataset import hit_numbers
 from warpimpact.results.files import ResultError
 from warpimpact.results.limits import solid_limits
 from warpimpact.results.measures import NAMES, Measure
+from warpimpact.results.per_hit import needed_density
 from warpimpact.scene.quantities import QUANTITIES
 from warpimpact.scene.units import quantity as reader_of
 from warpimpact.solver.findings import hits_text, limit_error_text
@@ -142,7 +144,7 @@ def _costs(dataset: xarray.Dataset) -> Iterator[str]:
 
 
 def _solid(dataset: xarray.Dataset) -> Iterator[str]:
-    """The solid plate that replaces the whole target, and what its search cost; nothing without one."""
+    """The limit of the solid reference, and what its search cost; nothing without one."""
     reference = solid_limits(dataset)
     if reference is None:
         return
@@ -152,13 +154,16 @@ def _solid(dataset: xarray.Dataset) -> Iterator[str]:
     limit = f"{factor * float(np.nanmean(value)):.5g} {unit}" + (", mean" if len(value) > 1 else "")
     density = float(dataset.attrs[attr.AREAL_DENSITY])
     if quantity == "thickness":
-        limit += f", {float(np.nanmean(value)) * reference.attrs[attr.LIMIT_DENSITY]:.4g} kg/m²"
+        needed = needed_density(reference, 0.0)
+        limit += f", {float(np.nanmean(needed)):.4g} kg/m²"
         limit += f" (the target as given has {density:.4g} kg/m²)"
     else:
         limit += f", of {density:.4g} kg/m² as the target"
     hits = f"{len(value)} hit{'s' if len(value) > 1 else ''}"
     seconds = float(dataset.attrs[attr.SOLID_LIMIT_TIME])
-    yield f"solid plate in place of the whole target: limit {quantity} {limit}; {hits} searched in {seconds:.2g} s"
+    whole = attr.LAYERS in dataset.attrs and attr.ADD_ON_DENSITY not in dataset.attrs
+    name = reference_name(dataset) + (" in place of the whole target" if whole else "")
+    yield f"{name}: limit {quantity} {limit}; {hits} searched in {seconds:.2g} s"
 
 
 def _proxies(dataset: xarray.Dataset) -> list[Section]:

@@ -2,14 +2,17 @@
 
 import json
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
 import xarray
 
 from warpimpact import Campaign, run
+from warpimpact import Plate as NamedPlate
+from warpimpact.analysis.effectiveness import effectiveness
+from warpimpact.analysis.inspect import inspect_text
 from warpimpact.campaign.plates import read_plates
+from warpimpact.campaign.references import at_base_alone, at_solid, solid_target
 from warpimpact.campaign.text import CampaignError
 from warpimpact.kernels.status import Status
 from warpimpact.runs.replay import replay
@@ -75,8 +78,7 @@ def test_layers_stand_behind_the_plate_in_order() -> None:
     assert target.gaps == (0.0, 0.05, 0.005)
     assert (target.value("offset_y", 1), target.value("offset_z", 1)) == (2e-3, 0.0)
     np.testing.assert_allclose(target.faces, [[0.0, 4e-3], [54e-3, 57e-3], [62e-3, 70e-3]])
-    solid, steel = target.solid, 7850.0
-    assert solid.areal_density == pytest.approx(target.areal_density, rel=1e-12)
+    steel = 7850.0
     holed = steel * 3e-3 * (1 - np.pi * 4 / 81)
     assert target.areal_density == pytest.approx(target.layers[0].areal_density + holed + steel * 8e-3, rel=1e-9)
 
@@ -146,16 +148,46 @@ def test_layers_scatter_and_say_so(result: xarray.Dataset) -> None:
     np.testing.assert_array_equal(every.shots(5, 4).offset_y, every.shots(0, 16).offset_y[5:9])
 
 
-def test_solid_reference_is_as_heavy_as_all_layers(monkeypatch: pytest.MonkeyPatch) -> None:
-    from warpimpact.runs import compute
+def test_the_references_are_a_solid_add_on_before_the_same_base_and_the_base_alone() -> None:
+    made = campaign(thickness=ABOUT)
+    shots = made.sampler().shots(0, 4)
+    (solid, of_solid), (alone, of_base) = at_solid(made, shots), at_base_alone(made, shots)
+    given = made.target
+    assert all(layer.open_area == 0.0 for layer in solid.target.layers)
+    assert solid.target.weights == pytest.approx(given.weights, rel=1e-12)
+    assert solid.target.gaps == given.gaps
+    assert solid.target.layers[2] == given.layers[2]
+    np.testing.assert_array_equal(of_solid.own_of(solid.target, "thickness", 2), shots.own_of(given, "thickness", 2))
+    assert alone.target.layers == (given.layers[2].model_copy(update={"gap": 0.0}),)
+    np.testing.assert_array_equal(of_base.own_of(alone.target, "thickness", 0), shots.own_of(given, "thickness", 2))
 
-    seen: list[Any] = []
-    prepare = compute.prepare
-    monkeypatch.setattr(compute, "prepare", lambda scene, *rest: seen.append(scene) or prepare(scene, *rest))
-    made = campaign()
-    run(made, device="cpu")
-    (reference,) = [scene for scene in seen if len(scene.target.layers) == 1]
-    assert reference.target.areal_density == pytest.approx(made.target.areal_density, rel=1e-12)
+
+def test_a_solid_add_on_of_the_catalogue_has_the_resistance_of_its_thickness() -> None:
+    named = {"plate": PLATE.replace('resistance = "2600 MPa"', 'material = "HHA Class 1"')}
+    made = campaign(**named)
+    plate, solid = made.plate, solid_target(made).layers[0]
+    thin = made.plate.model_dump(include={"material"}) | {"thickness": solid.thickness, "obliquity": 0.0}
+    assert solid.resistance == pytest.approx(NamedPlate(**thin, threat=made.core).resistance)
+    assert solid.resistance < 0.97 * plate.resistance
+    scattered = campaign(plate=PLATE.replace('"2600 MPa"', '{ distribution = "uniform", low = 2e9, high = 3e9 }'))
+    shots = scattered.sampler().shots(0, 4)
+    np.testing.assert_array_equal(at_solid(scattered, shots)[1].resistance, shots.resistance)
+
+
+def test_a_result_holds_its_references_and_tells_the_weights_apart(result: xarray.Dataset) -> None:
+    assert result.sizes["solid_hit"] == result.sizes["hit"]  # the base scatters
+    assert (result["base_alone_status"] == Status.ARRESTED).all()
+    scores = {score.name: score for score in effectiveness(result)}
+    assert scores["P(base_perforated)"].alone == 0.0
+    assert np.isfinite(scores["mean(base_depth)"].solid)
+    weights = campaign().target.weights
+    text = inspect_text(result)
+    assert ", ".join(f"{name} {weight:.1f} kg/m²" for name, weight in weights.items()) in text
+    assert weights["add-on"] + weights["base"] == pytest.approx(weights["whole target"])
+    assert f"as heavy as the add-on ({weights['add-on']:.4g} kg/m²), before the same base" in text
+    (head,) = [line for line in text.splitlines() if "ratio to it" in line]
+    assert head.split("ratio to it")[0].endswith("solid add-on   ")
+    assert head.endswith("base alone")
 
 
 @pytest.mark.parametrize("hit", [0, 7])

@@ -91,7 +91,7 @@ def test_more_hits_are_computed_where_the_share_is_between_0_and_1() -> None:
     text = text_of(firing_view(dataset))
     assert "\nmean, weighted by area: " in text
     assert re.search(r"P\(perforation\), mean over directions +0\.\d+ .*Y × 0\.001: ", text)
-    assert "mean by area" in directions_figure(dataset).get_supxlabel()
+    assert "mean by area" in str(directions_figure(dataset).get_suptitle())
 
 
 @pytest.mark.parametrize(

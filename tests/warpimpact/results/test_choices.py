@@ -13,8 +13,9 @@ from warpimpact.analysis.effectiveness import effectiveness
 from warpimpact.cli import main
 from warpimpact.results import files, posterior_file
 from warpimpact.results import variables as v
-from warpimpact.results.dataset import is_choice, solid_reference
+from warpimpact.results.dataset import is_choice
 from warpimpact.results.outlines import outlines
+from warpimpact.results.solid_reference import solid_reference
 from warpimpact.results.tallies import dealing
 from warpimpact.runs.run import run
 

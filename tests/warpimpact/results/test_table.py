@@ -35,12 +35,12 @@ def table(request: pytest.FixtureRequest) -> HitTable:
 
 
 def content(group: Any, name: str = "") -> Iterator[tuple[Any, ...]]:
-    """All that a netCDF file holds, in its order."""
+    """All that a netCDF file holds, in its order; HDF5 keeps none of attributes."""
     for dimension in group.dimensions.values():
         yield name, dimension.name, dimension.size, dimension.isunlimited()
     told = [(group, name), *((variable, f"{name}/{variable.name}") for variable in group.variables.values())]
     for one, place in told:
-        for key in one.ncattrs():
+        for key in sorted(one.ncattrs()):
             value = one.getncattr(key)
             yield place, key, type(value), np.asarray(value).dtype.str, np.asarray(value).tobytes(), str(value)
     for variable in group.variables.values():

@@ -132,8 +132,8 @@ def test_a_report_tells_every_layer(result: xarray.Dataset) -> None:
 
 def test_figures_say_what_lies_behind(result: xarray.Dataset) -> None:
     weight = result.attrs["areal_density"]
-    assert f"areal density {weight:.1f} kg/m² of the whole target" in inspect_text(result)
-    assert f"the whole target weighs {weight:.3g} kg/m²" in result_content("a", result)["asked"]
+    assert f"whole target {weight:.1f} kg/m²" in inspect_text(result)
+    assert f"whole target {weight:.1f} kg/m²" in result_content("a", result)["asked"]
     assert shown(result, "tilt").title.startswith("tilt, 50 mm behind the target")
     assert "on impact and behind the target" in trajectory.flight(replay(result, 3, snapshots=0)).get_suptitle()
 

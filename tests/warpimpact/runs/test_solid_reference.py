@@ -10,7 +10,7 @@ import xarray
 from warpimpact import Campaign
 from warpimpact.kernels.status import Status
 from warpimpact.results import files
-from warpimpact.results.dataset import solid_reference
+from warpimpact.results.solid_reference import solid_reference
 from warpimpact.runs.compute import HitMap
 from warpimpact.runs.run import run, run_to_file
 
