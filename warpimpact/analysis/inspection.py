@@ -13,6 +13,7 @@ from warpimpact.analysis.estimates import slices
 from warpimpact.analysis.hit_map import hit_points
 from warpimpact.analysis.inspect import inspect_text
 from warpimpact.analysis.numbers import intervals_text, number_text
+from warpimpact.analysis.plate_text import reference_name
 from warpimpact.analysis.summary import numerics_sentence
 from warpimpact.records.group import failures
 from warpimpact.results import attributes as attr
@@ -58,7 +59,7 @@ def verdict(dataset: xarray.Dataset, first: Score) -> str:
     count, interval = sum(int(passed(part).sum()) for part in slices(dataset[[v.STATUS]])), intervals_text(first.ends)
     protection = f"{first.measure.title} {number_text(first.value)}"
     protection += "" if interval == "-" else f" ({interval})"
-    protection += "" if np.isnan(first.ratio) else f", {number_text(first.ratio)} of the solid plate's"
+    protection += "" if np.isnan(first.ratio) else f", {number_text(first.ratio)} of the {reference_name(dataset)}'s"
     return f"{count} of {dataset.sizes['hit']} cores pass. {protection}. {numerics_sentence(dataset)}"
 
 

@@ -66,7 +66,8 @@ class Output(Record):
 
     Attributes:
         failed_share: share of shots whose computation may fail; a run with more ends with exit code 3.
-        solid_reference: compute the solid plate that is as heavy as the whole target, too; of limits, its limit.
+        solid_reference: compute the solid plate of the same weight, too; of layers the solid add-on of the same weight
+            before the same base, and the base alone. Of limits, its limit.
         exit_state: store velocity, axis and position of every core at the end of contact.
     """
 

@@ -18,8 +18,8 @@ def add_limit(commands: Commands) -> None:
         summary="find the limit velocity of every hit of a campaign, V50 and V05",
         description="Find for every hit the impact velocity at which the core just perforates, with at most 14 runs of "
         "a hit. Write a netCDF file and a figure: the map of the limits, and the share of the hits that perforate "
-        "against velocity, with V50 and V05. Also find the limit of the solid plate that is as heavy as the whole "
-        "target. The plate must not weaken by time: give degradation_distance.",
+        "against velocity, with V50 and V05. Also find the limit of the solid plate, or add-on, that is as "
+        "heavy. The plate must not weaken by time: give degradation_distance.",
         example="limit campaigns/limit_velocity.toml -o limit.nc",
     )
     add_campaign(parser)
