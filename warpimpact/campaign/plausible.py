@@ -23,6 +23,11 @@ _OF_A_PLATE = (
     "density",
 )
 
+_MOST_OPEN = 0.6
+"""Open area of a plate beyond which its hits are told to meet little."""
+_THIN = 0.25
+"""Ligament over thickness below which a web is told to be thin: a beam four times as deep as wide."""
+
 
 def warn_of(scene: Scene, impact: Impact, hits: Hits) -> None:
     """Warn (`Implausible`) of every value of a campaign that is possible, but far from what such campaigns have."""
@@ -41,6 +46,22 @@ def doubted(scene: Scene, impact: Impact, hits: Hits) -> Iterator[str]:
     plate = scene.target.layers[0]
     usual = USUAL | {"hits": hit_bounds(plate.sampled_cell, plate.size)}
     yield from implausible(_values(scene.core, scene.target, scene.record, impact, hits), usual)
+
+
+def doubted_holes(target: Target) -> Iterator[str]:
+    """Sentences about plates with little between their holes. Finding a ligament may take a while."""
+    for place, plate in target.named:
+        if plate.open_area > _MOST_OPEN:
+            yield (
+                f"{place}: open area of {plate.open_area:.0%}, where the plate of the two published shots has some "
+                "35 %: most hits meet one web or none"
+            )
+        if plate.open_area > 0.0 and plate.ligament < _THIN * plate.thickness:
+            yield (
+                f"{place}: ligaments of {1e3 * plate.ligament:.2g} mm, {plate.ligament / plate.thickness:.2g} of the "
+                "thickness: such webs bend and tear, which the model does not know; those of the two published shots "
+                "were 4 mm wide and thick"
+            )
 
 
 def _values(

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import math
+import time
 from base64 import b64encode
 from collections import OrderedDict
 from collections.abc import Mapping, Sequence
@@ -15,10 +17,10 @@ from jinja2 import ChoiceLoader, Environment, PackageLoader, StrictUndefined
 from warpimpact.analysis.summary import breaks_promise, numerics_sentence
 from warpimpact.campaign.campaign import Campaign
 from warpimpact.campaign.evidence import evidence_of
-from warpimpact.campaign.plausible import doubted
+from warpimpact.campaign.plausible import doubted, doubted_holes
 from warpimpact.campaign.text import CampaignError
 from warpimpact.design.controls import groups
-from warpimpact.design.designs import FOLDER, Shelf, ValidDesign, stage_of
+from warpimpact.design.designs import FOLDER, Shelf, ValidDesign, stage_of, work
 from warpimpact.design.edits import choices
 from warpimpact.design.geometry import drawn
 from warpimpact.plotting.trajectory import FIGURES
@@ -27,8 +29,10 @@ from warpimpact.report.report import report_page
 from warpimpact.report.words import compared, result_content
 from warpimpact.results import attributes as attr
 from warpimpact.results.replayed_hit import hit_view
+from warpimpact.runs.assumed import has_assumptions
 from warpimpact.runs.replay import replay
-from warpimpact.runs.run import run
+from warpimpact.runs.run import run, with_assumptions
+from warpimpact.solver.resolution import at_level
 from warpimpact.solver.worker import Cancel
 from warpimpact.view.view import text_of
 
@@ -37,6 +41,9 @@ _MOST_KEPT = 256 * 2**20
 _MOST_HISTORIES = 4
 _COARSE = 96
 """Pixels along the longer side of a first map, which has few hits."""
+PACE, BESIDE = 1.5, 1.0
+"""Time of a complete map over what it takes a core, before that is measured; and what it takes beside its hits, by
+`work`: a pilot and the tables [s]."""
 _FIRST = "The error of the numerics is not known."
 OWN = "this design"
 """Name of the design that is on the page; those it is compared with have names of their own."""
@@ -52,6 +59,7 @@ class Answers:
 
     def __init__(self, shelf: Shelf, device: str = "auto") -> None:
         self.shelf, self._device = shelf, device
+        self._pace = PACE
         self._results: OrderedDict[str, xarray.Dataset] = OrderedDict()
         self._histories: OrderedDict[tuple[str, int], xarray.Dataset] = OrderedDict()
         self._environment = Environment(
@@ -75,44 +83,68 @@ class Answers:
             "choices": choices(design.tables),
             "toml": design.text,
             "title": campaign.title,
-            "notes": [*doubted(campaign.scene, campaign.impact, campaign.hits), *evidence_of(campaign)],
+            "notes": [*doubted(campaign.scene, campaign.impact, campaign.hits), *doubted_holes(campaign.target)],
+            "evidence": evidence_of(campaign),
         }
 
     def result(self, text: str, cancel: Cancel) -> xarray.Dataset:
-        """The hit map of a campaign.
+        """The hit map of a campaign; its hits under assumptions come by `assume`.
 
         Raises:
             Cancelled: by `cancel`.
         """
         if text not in self._results:
             campaign = Campaign.from_text(text, name="design", folder=FOLDER)
-            self._results[text] = run(campaign, device=self._device, progress=lambda _: None, cancel=cancel)
+            none = campaign.assumptions.model_copy(update={"compute": False})
+            alone = campaign.model_copy(update={"assumptions": none})
+            self._results[text] = run(alone, device=self._device, progress=lambda _: None, cancel=cancel)
             while len(self._results) > 1 and sum(result.nbytes for result in self._results.values()) > _MOST_KEPT:
                 self._results.popitem(last=False)
         self._results.move_to_end(text)
         return self._results[text]
 
-    def maps(self, name: str, designs: Mapping[str, ValidDesign], total: int, cancel: Cancel) -> dict[str, Any]:
+    def assume(self, designs: Mapping[str, ValidDesign], cancel: Cancel) -> None:
+        """Compute the hits of designs under assumptions, where these are asked for and there are none.
+
+        Raises:
+            Cancelled: by `cancel`.
+        """
+        for design in designs.values():
+            dataset = self.result(design.text, cancel)
+            if has_assumptions(design.campaign) and attr.ASSUMED_TIME not in dataset.attrs:
+                told = with_assumptions(dataset, design.campaign, device=self._device, cancel=cancel)
+                self._results[design.text] = told
+
+    def maps(
+        self, name: str, designs: Mapping[str, ValidDesign], full: Mapping[str, ValidDesign], level: int, cancel: Cancel
+    ) -> dict[str, Any]:
         """The maps of a design and of those that it is compared with, at one stage.
 
         Args:
             name: of the stage.
             designs: as they are computed at it, by their names; the design of the page is the first.
-            total: hits of the design at its last stage.
+            full: the same at their last stage.
+            level: at which the hits will be, as far as that is known.
 
         Raises:
             Cancelled: by `cancel`.
         """
+        new, begin = [design for design in designs.values() if design.text not in self._results], time.perf_counter()
         datasets = {label: self.result(design.text, cancel) for label, design in designs.items()}
         cancel.check()
         own = datasets[OWN]
+        foreseen = sum(BESIDE + _work(design.campaign, level) for design in (new if name == "full" else full.values()))
+        if name == "full" and 0.0 < foreseen < math.inf:
+            self._pace = (time.perf_counter() - begin) / foreseen
+        ahead = 0.0 if name == "full" else self._pace * foreseen
         most = MOST_HITS // len(datasets)
         resolution = json.loads(own.attrs[attr.RESOLUTION]) if attr.RESOLUTION in own.attrs else {}
         return {
             "kind": "maps",
             "stage": name,
             "hits": own.sizes["hit"],
-            "total": total,
+            "total": full[OWN].campaign.hits.count or 0,
+            "ahead": ahead if math.isfinite(ahead) else 0.0,
             "numerics": _FIRST if name == "first" else numerics_sentence(own),
             "kept": not breaks_promise(own),
             "level": resolution.get("level"),
@@ -121,8 +153,12 @@ class Answers:
             ),
         }
 
-    def numbers(self, designs: Mapping[str, ValidDesign], cancel: Cancel) -> dict[str, Any]:
-        """The tables of the same designs as HTML."""
+    def numbers(self, designs: Mapping[str, ValidDesign], assumed: bool, cancel: Cancel) -> dict[str, Any]:
+        """The tables of the same designs as HTML.
+
+        Args:
+            assumed: whether their hits under assumptions are computed, as far as they ever are.
+        """
         datasets = {label: self.result(design.text, cancel) for label, design in designs.items()}
         results = []
         for label, dataset in datasets.items():
@@ -130,7 +166,9 @@ class Answers:
             results.append(result_content(label, dataset))
         cancel.check()
         comparison = compared(datasets, picture=False) if len(datasets) > 1 else None
-        html = self._environment.get_template("answer.html").render(results=results, comparison=comparison)
+        html = self._environment.get_template("answer.html").render(
+            results=results, comparison=comparison, assumed=assumed
+        )
         return {"kind": "numbers", "html": html}
 
     def trajectory(self, design: ValidDesign, level: int, stage: str, hit: int, cancel: Cancel) -> dict[str, Any]:
@@ -176,10 +214,17 @@ class Answers:
         Raises:
             Cancelled: by `cancel`.
         """
+        self.assume(designs, cancel)
         datasets = {name: self.result(design.text, cancel) for name, design in designs.items()}
         return report_page(
             datasets, folders=dict.fromkeys(datasets, FOLDER), progress=lambda done, total: cancel.check()
         )
+
+
+def _work(campaign: Campaign, level: int) -> float:
+    """`work` of a campaign at a level where it fixes no resolution."""
+    numerics = campaign.numerics
+    return work(campaign, at_level(level, numerics) if numerics.explicit is None else numerics)
 
 
 def named(design: ValidDesign, others: Sequence[tuple[str, ValidDesign]]) -> dict[str, ValidDesign]:

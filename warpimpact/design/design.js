@@ -4,9 +4,10 @@
   const at = (id) => document.getElementById(id);
   const PATIENCE = 400;  // [ms] for a map of an older design, which then is given up
   const SLOW = 3000;  // [ms] without a map, after which the page says why
+  const MOST_CHANGES = 4;  // that the title names
   const SETTLED = 350;  // [ms] without a change, after which a design can be undone
   const narrow = matchMedia("(max-width: 45rem)");
-  const state = { design: {}, pins: [], variable: "residual velocity" };
+  const state = { design: {}, pins: [], variable: "residual velocity", origin: {} };
   const done = { undo: [], redo: [], last: "" };
   let level = 0, running = null, waiting = false, changedAt = 0, shown = null, settling = 0, chosen = null, followed = null, toml = "";
 
@@ -54,7 +55,33 @@
       refuse(lost(error));
     }
   }
+  const copied = (value) => JSON.parse(JSON.stringify(value));
+  // The title says what has changed since a design was opened, until somebody writes one.
+  function begin(design) {
+    state.design = design;
+    state.origin = { title: String(design.title ?? ""), design: copied(design) };
+  }
+  const leaves = (part, path = []) => (part !== null && typeof part === "object"
+    ? Object.entries(part).flatMap(([key, inner]) => leaves(inner, [...path, key]))
+    : [[path, part]]);
+  function follow() {
+    const { title, design } = state.origin;
+    if (title === undefined) return;
+    const before = new Map(leaves(design).map(([path, value]) => [path.join("."), value]));
+    const changes = leaves(state.design).filter(([path, value]) => path[0] !== "title" && before.get(path.join(".")) !== value);
+    const words = changes.map(([path, value]) => {
+      const layer = path[0] === "layer" ? `layer ${Number(path[1]) + 1} ` : "";
+      return `${layer}${path.findLast((part) => Number.isNaN(Number(part))).replaceAll("_", " ")} ${value}`;
+    });
+    const more = words.length > MOST_CHANGES ? [`${words.length - MOST_CHANGES} more`] : [];
+    state.design.title = [title, ...words.slice(0, MOST_CHANGES), ...more].join(", ").slice(0, 200);
+  }
+  function fitTitle() {
+    at("title").style.height = "auto";
+    at("title").style.height = `${at("title").scrollHeight}px`;
+  }
   function touched() {
+    follow();
     changedAt = performance.now();
     clearTimeout(settling);
     settling = setTimeout(settle, SETTLED);
@@ -156,6 +183,7 @@
       showPlate(line);
     } else if (line.kind === "numbers") {
       at("answer").innerHTML = line.html;
+      headed(at("answer"));
       at("answer").classList.remove("stale");
     } else {
       accept();
@@ -173,10 +201,11 @@
   const viewOf = plateView(at("plate"), at("section"), (path, value) => set(path, `${value} mm`));
   const controls = controlsOf(at("controls"), { set, change });
 
-  function showPlate({ plate, groups, choices, toml: file, title, notes }) {
+  function showPlate({ plate, groups, choices, toml: file, title, notes, evidence }) {
     toml = file;
     at("save").disabled = false;
     if (document.activeElement !== at("title")) at("title").value = title;
+    fitTitle();
     document.title = `${title} · warpimpact design`;
     controls(groups, choices);
     const lengths = groups.flatMap(({ controls: all }) => all).filter(({ unit }) => unit === "mm");
@@ -190,14 +219,31 @@
       element.className = kind;
       return element;
     }));
+    const [summary, ...details] = evidence;
+    at("evidence").firstElementChild.textContent = summary;
+    at("evidence").lastElementChild.replaceChildren(...details.map((words) => {
+      const element = document.createElement("li");
+      element.textContent = words;
+      return element;
+    }));
   }
 
+  // On a narrow page a table is a list, whose entries have the heads of their columns.
+  function headed(place) {
+    for (const table of place.querySelectorAll("table")) {
+      const heads = [...table.querySelectorAll("th")].map(({ textContent }) => textContent);
+      for (const row of table.rows) [...row.cells].forEach((cell, k) => { if (k && heads[k]) cell.dataset.head = heads[k]; });
+    }
+  }
+  // A time as people say it, no more exact than it is known.
+  const about = (seconds) => (seconds < 90 ? `${Number(seconds.toPrecision(seconds < 10 ? 1 : 2))} s` : `${Math.round(seconds / 60)} min`);
   const NAMES = { first: "First look", draft: "Draft", full: "Complete" };
   async function show(line) {
     const same = shown && shown.stage === line.stage && JSON.stringify(shown.design) === JSON.stringify(line.design);
     shown = line;
     if (!same) chosen = null;
-    const status = document.createElement("strong"), more = line.stage === "full" ? "" : " The map gets finer while nothing moves.";
+    const status = document.createElement("strong"), soon = line.ahead >= 1 ? `: complete in about ${about(line.ahead)}` : "";
+    const more = line.stage === "full" ? "" : ` The map gets finer while nothing moves${soon}.`;
     status.textContent = NAMES[line.stage];
     const of = line.stage !== "full" && line.total > line.hits ? `${line.hits} of ${line.total}` : line.hits;
     at("status").replaceChildren(status, `: ${of} hits. ${line.numerics}${more}`);
@@ -231,7 +277,10 @@
       at(`name-${k}`).hidden = names.length === 1;
       at(`name-${k}`).firstChild.textContent = name;
       const marked = chosen && chosen.result === k ? { chosen: chosen.hit } : {};
-      const place = await maps.drawMap(at(`map-${k}`), data.results[k], at("variable").value, { ...marked, tallest: narrow.matches ? 0.34 * innerHeight : 520 });
+      const place = await maps.drawMap(at(`map-${k}`), data.results[k], at("variable").value, { ...marked, tallest: narrow.matches ? 0.24 * innerHeight : 520, tight: narrow.matches });
+      const grey = maps.missing(data.results[k], at("variable").value);
+      at(`grey-${k}`).hidden = !grey;
+      at(`grey-${k}`).lastChild.textContent = ` ${grey}`;
       if (!place.dataset.clicks) {
         place.dataset.clicks = "yes";
         place.on("plotly_click", ({ points }) => {
@@ -254,7 +303,12 @@
     }
     map.id = `map-${k}`;
     map.className = "map";
-    place.append(name, map);
+    const grey = document.createElement("p"), swatch = document.createElement("span");
+    swatch.className = "swatch";
+    grey.id = `grey-${k}`;
+    grey.className = "soft";
+    grey.append(swatch, "");
+    place.append(name, map, grey);
     return place;
   }
 
@@ -328,7 +382,7 @@
   }
   function load(design) {
     settle();
-    state.design = design;
+    begin(design);
     touched();
   }
   async function open(file) {
@@ -353,7 +407,12 @@
   });
   at("open").addEventListener("click", () => at("file").click());
   at("file").addEventListener("change", () => { if (at("file").files.length) open(at("file").files[0]); at("file").value = ""; });
-  at("title").addEventListener("input", () => set(["title"], at("title").value));
+  at("title").addEventListener("input", () => {
+    at("title").value = at("title").value.replaceAll("\n", " ");
+    fitTitle();
+    state.origin = {};
+    set(["title"], at("title").value);
+  });
   at("variable").addEventListener("change", () => { state.variable = at("variable").value; drawMaps(); settle(); });
   at("hit-number").addEventListener("change", () => {
     const place = shown?.data.results[0].number.indexOf(Number(at("hit-number").value));
@@ -371,6 +430,7 @@
     }
   });
   const redraw = () => {
+    fitTitle();
     if (shown) drawMaps();
     if (followed) hitMaps(shown.data).drawTrajectory([at("passage"), at("flight")], followed);
   };
@@ -385,7 +445,11 @@
       const held = await address.unpacked(location.hash.slice(1));
       if (typeof held.design !== "object") return false;
       const pins = (Array.isArray(held.pins) ? held.pins : []).filter((one) => typeof one?.design === "object");
-      state.design = held.design;
+      const origin = held.origin ?? {};
+      leaves([held.design, origin]);  // which refuses what is nested too deep
+      begin(held.design);
+      if (typeof origin.design === "object") state.origin = { title: String(origin.title), design: origin.design };
+      else if (held.origin) state.origin = {};
       state.pins = pins.map(({ name, design }) => ({ name: String(name).slice(0, 80), design }));
       state.variable = String(held.variable ?? state.variable);
       return true;
@@ -396,8 +460,8 @@
   const { designs } = await (await fetch("start")).json(), names = Object.keys(designs);
   at("designs").replaceChildren(...names.map((name) => new Option(name, name)));
   at("designs-label").hidden = names.length < 2;
-  at("designs").addEventListener("change", () => load(JSON.parse(JSON.stringify(designs[at("designs").value]))));
+  at("designs").addEventListener("change", () => load(copied(designs[at("designs").value])));
   addEventListener("hashchange", async () => { if (await opened()) { settle(); touched(); } });
-  if (!(location.hash.length > 1 && await opened())) state.design = JSON.parse(JSON.stringify(designs[names[0]]));
+  if (!(location.hash.length > 1 && await opened())) begin(copied(designs[names[0]]));
   touched();
 })();

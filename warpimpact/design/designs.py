@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 import zlib
 from base64 import urlsafe_b64decode
 from collections.abc import Iterator, Mapping
@@ -17,15 +18,21 @@ from warpimpact.campaign.toml import toml_text
 from warpimpact.results import attributes as attr
 from warpimpact.results import files, front
 from warpimpact.results.files import kind_of, opened
+from warpimpact.scene import Numerics
 from warpimpact.scene.units import quoted
+from warpimpact.solver.prepare import prepare
+from warpimpact.solver.resolution import TooManySteps
 
 Tables = dict[str, Any]
 
 FILE_KEYS = ("file", "posterior", "catalogue")
 """Keys of a campaign that name files."""
-FEW, SOME = 256, 1024
+FEW, SOME, _IMAGES = 256, 1024, 4
 """Hits at most of the first map after a change, and of the draft. A first map has as many as the draft where
 at least four of them are images of each other."""
+FIRST_WORK, FEWEST = 0.08, 64
+"""Seconds of a core that the hits of a first map may take, roughly, so that it is there in 0.3 s on two cores; and its
+fewest hits. A lower level comes before fewer hits."""
 _MOST_ADDRESS = 2**20
 """Characters of a design in an address, unpacked."""
 FOLDER = Path("/")
@@ -171,26 +178,64 @@ def stages(shelf: Shelf, design: ValidDesign, level: int) -> list[Stage]:
     many hits for a part of the time.
 
     Args:
-        level: resolution of the first stage, as the last draft has found it.
+        level: resolution of the first stage at most, as the last draft has found it.
     """
-    campaign, numerics = design.campaign, dict(design.tables.get("numerics", {}))
-    coarse, draft = numerics, None
-    if campaign.numerics.explicit is None:
-        kept = {key: numerics[key] for key in ("scheme", "precision", "layout") if key in numerics}
-        coarse, draft = kept | {"level": level}, kept | {"fidelity": "draft"}
-    whole = _of_few_hits(design, FEW) | {"numerics": coarse}
-    part = _of_few_hits(design, SOME, irreducible=True) | {"numerics": coarse}
-    first = _valid(shelf, part)
-    if first is None or FEW * len(first.campaign.symmetries) < SOME:
-        first = _valid(shelf, whole)
-    drafted = None if draft is None else _valid(shelf, _of_few_hits(design, SOME) | {"numerics": draft})
-    before = {"first": first, "draft": drafted}
+    draft = None
+    if design.campaign.numerics.explicit is None:
+        draft = _valid(shelf, _of_few_hits(design, SOME) | {"numerics": _kept(design) | {"fidelity": "draft"}})
+    before = {"first": _first(shelf, design, level), "draft": draft}
     stages_before = [
         Stage(name, stage_design)
         for name, stage_design in before.items()
         if stage_design is not None and stage_design.text != design.text
     ]
     return [*stages_before, Stage("full", design)]
+
+
+def _first(shelf: Shelf, design: ValidDesign, level: int) -> ValidDesign | None:
+    """A design as its first map is computed: as fine as FIRST_WORK allows; None where it cannot have one."""
+    first = _of_first_hits(shelf, design, level, FEW)
+    if first is None:
+        return None
+    free = design.campaign.numerics.explicit is None
+    at, seconds = level, work(first.campaign)
+    while free and at > 0 and seconds > FIRST_WORK:
+        at -= 1
+        seconds = work(first.campaign, first.campaign.numerics.model_copy(update={"level": at}))
+    few = FEW if seconds <= FIRST_WORK else max(FEWEST, int(FEW * FIRST_WORK / seconds) // FEWEST * FEWEST)
+    return first if (at, few) == (level, FEW) else _of_first_hits(shelf, design, at, few)
+
+
+def _of_first_hits(shelf: Shelf, design: ValidDesign, level: int, few: int) -> ValidDesign | None:
+    """A design of few hits at a level, or of four times as many where at least four are images of each other."""
+    numerics = design.tables.get("numerics", {})
+    if design.campaign.numerics.explicit is None:
+        numerics = _kept(design) | {"level": level}
+    part = _valid(shelf, _of_few_hits(design, _IMAGES * few, irreducible=True) | {"numerics": numerics})
+    if part is not None and len(part.campaign.symmetries) >= _IMAGES:
+        return part
+    return _valid(shelf, _of_few_hits(design, few) | {"numerics": numerics})
+
+
+def _kept(design: ValidDesign) -> Tables:
+    """Keys of the numerics that hold at any resolution."""
+    numerics = design.tables.get("numerics", {})
+    return {key: numerics[key] for key in ("scheme", "precision", "layout") if key in numerics}
+
+
+def work(campaign: Campaign, numerics: Numerics | None = None) -> float:
+    """Seconds of a core that the hits of a campaign take, roughly and on every machine the same; infinite where they
+    cannot be computed.
+
+    Args:
+        numerics: which fix a resolution; by default those of the campaign.
+    """
+    sampler, images = campaign.sampler(), len(campaign.symmetries)
+    try:
+        first = prepare(campaign.scene, sampler.shots(0, campaign.at_a_plate), numerics or campaign.numerics)
+        return first.seconds * len(sampler) / images
+    except (ValueError, TooManySteps, MemoryError):
+        return math.inf
 
 
 def _valid(shelf: Shelf, tables: Tables) -> ValidDesign | None:
@@ -202,8 +247,10 @@ def _valid(shelf: Shelf, tables: Tables) -> ValidDesign | None:
 
 
 def _of_few_hits(design: ValidDesign, most: int, *, irreducible: bool = False) -> Tables:
-    """Tables of a design with so many hits at most, without a stop rule; a list has the hits of its file."""
-    tables = {key: value for key, value in design.tables.items() if key != "stop"}
+    """Tables of a design with a number of hits at most, without a stop rule and assumptions; a list has the hits of its
+    file."""
+    tables = {key: value for key, value in design.tables.items() if key not in ("stop", "assumptions")}
+    tables["assumptions"] = {"compute": False}
     count, together = design.campaign.hits.count, design.campaign.at_a_plate
     if count is None:
         return tables

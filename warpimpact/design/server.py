@@ -30,6 +30,7 @@ from warpimpact.design.edits import changed
 from warpimpact.design.guard import Guard
 from warpimpact.design.hasty import Hasty
 from warpimpact.results.files import ResultError
+from warpimpact.runs.assumed import has_assumptions
 from warpimpact.scene.bounds import Implausible
 from warpimpact.scene.units import quoted
 from warpimpact.solver.device import DeviceError
@@ -115,24 +116,33 @@ class _Pages:
     async def _lines(
         self, design: ValidDesign, others: list[tuple[str, ValidDesign]], level: int
     ) -> AsyncGenerator[Any]:
-        """The plate, and maps and numbers of each stage. The first map is computed while the plate is drawn."""
-        total = design.campaign.hits.count or 0
+        """The plate, and maps and numbers of each stage; then the numbers with what assumptions do to them. The first
+        map is computed while the plate is drawn."""
+        full = named(design, others)
         every = [{stage.name: stage.design for stage in stages(self._shelf, other, level)} for _, other in others]
         plate = True
         for name, stage_design in stages(self._shelf, design, level):
             at = [(label, one.get(name, one["full"])) for (label, _), one in zip(others, every, strict=True)]
             designs = named(stage_design, at)
             maps = asyncio.ensure_future(
-                self._desk.do(_STAGES[name], partial(self._answers.maps, name, designs, total))
+                self._desk.do(_STAGES[name], partial(self._answers.maps, name, designs, full, level))
             )
             try:
                 if plate:
                     yield await run_in_threadpool(self._answers.plate, design)
                     plate = False
-                yield await maps
+                told = await maps
+                level = level if told["level"] is None else told["level"]
+                yield told
             finally:
                 maps.cancel()
-            yield await self._desk.do(_STAGES[name], partial(self._answers.numbers, designs))
+            asks = name == "full" and any(has_assumptions(one.campaign) for one in designs.values())
+            yield await self._desk.do(
+                _STAGES[name], partial(self._answers.numbers, designs, name == "full" and not asks)
+            )
+        if asks:
+            await self._desk.do(_LAST, partial(self._answers.assume, full))
+            yield await self._desk.do(_LAST, partial(self._answers.numbers, full, True))
 
     async def change(self, request: Request) -> Response:
         async def answer(asked: Tables) -> Any:

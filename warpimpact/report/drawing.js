@@ -82,8 +82,8 @@ function hitMaps(data) {
 
   const passive = { hoverinfo: "skip", showlegend: false };
 
-  // `chosen` is a hit with a ring; `replayed` are hits with a dot.
-  function drawMap(place, result, variable, { chosen = null, replayed = [], tallest: most = 480 } = {}) {
+  // `chosen` is a hit with a ring; `replayed` are hits with a dot. `tight` leaves out the names of the axes.
+  function drawMap(place, result, variable, { chosen = null, replayed = [], tallest: most = 480, tight = false } = {}) {
     const values = valuesOf(result, variable), scale = colours(variable);
     const [y, z] = result.outline;
     const traces = [
@@ -104,19 +104,19 @@ function hitMaps(data) {
     // One scale of length for all maps: the widest fills its place, and the tallest stays on a screen.
     const spans = data.results.map(({ limits }) => limits.map(([low, high]) => high - low));
     const [widest, tallest] = [0, 1].map((axis) => Math.max(...spans.map((span) => span[axis])));
-    const bar = 90, perMm = Math.min((place.clientWidth - 60 - bar) / widest, most / tallest);
+    const bar = 90, above = tight ? 8 : 30, below = tight ? 22 : 45, perMm = Math.min((place.clientWidth - 60 - bar) / widest, most / tallest);
     const [wide, tall] = spans[data.results.indexOf(result)];
     const layout = {
-      ...sheet, margin: { l: 50, r: 10 + bar, t: 30, b: 45 }, width: wide * perMm + 60 + bar,
-      height: tall * perMm + 75, autosize: false,
+      ...sheet, margin: { l: 50, r: 10 + bar, t: above, b: below }, width: wide * perMm + 60 + bar,
+      height: tall * perMm + above + below, autosize: false,
       plot_bgcolor: MISSING, hoverlabel: { align: "left", bgcolor: "white", font: { color: "black" } },
-      xaxis: { title: { text: "hit y [mm]" }, range: result.limits[0], constrain: "domain", zeroline: false, showgrid: false },
+      xaxis: { title: { text: tight ? "" : "hit y [mm]" }, range: result.limits[0], constrain: "domain", zeroline: false, showgrid: false },
       yaxis: {
-        title: { text: "hit z [mm]" }, range: result.limits[1], constrain: "domain", zeroline: false, showgrid: false,
+        title: { text: tight ? "" : "hit z [mm]" }, range: result.limits[1], constrain: "domain", zeroline: false, showgrid: false,
         scaleanchor: "x",
       },
     };
-    return Plotly.react(place, traces, layout, config);
+    return Plotly.react(place, traces, layout, { ...config, displayModeBar: tight ? false : "hover" });
   }
 
   function distance(result, one, other) {
@@ -176,5 +176,14 @@ function hitMaps(data) {
     return result.nearest[row][column];
   }
 
-  return { distance, drawMap, drawTrajectory, hitOf, number, told };
+  // What grey says: how the hits ended that have no value; empty where all have one.
+  function missing(result, variable) {
+    if (variable === STATUS) return "";
+    const without = result.status.filter((_, hit) => result.columns[variable][hit] === null);
+    const counts = data.statuses.map(({ code, label }) => [without.filter((one) => one === code).length, label]);
+    const told = counts.filter(([count]) => count).map(([count, label]) => `${label} ${count}`);
+    return told.length ? `no value: ${told.join(", ")} of ${result.status.length} hits` : "";
+  }
+
+  return { distance, drawMap, drawTrajectory, hitOf, missing, number, told };
 }

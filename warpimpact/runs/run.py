@@ -78,6 +78,21 @@ def run(
     return in_memory(table.assign_attrs(_attributes(table, end)).to_xarray())
 
 
+def with_assumptions(
+    dataset: xarray.Dataset, campaign: Campaign, *, device: str = "auto", cancel: Cancel | None = None
+) -> xarray.Dataset:
+    """A result of a campaign that left out its assumptions, with the hits under them that `run` computes of it.
+
+    Args:
+        device, cancel: as in `run`.
+    """
+    found = HIT_MAP.found_in(dataset)
+    with executor_for(device, cancel=cancel) as executor:
+        table = result_of(executor, assumed_job, HIT_MAP, campaign, None if found is None else found.told)
+    assumed = in_memory(table.to_xarray())
+    return dataset.assign(assumed.variables).assign_attrs(assumed.attrs)
+
+
 def run_to_file(
     campaign: Campaign | str | Path,
     output: str | Path,

@@ -8,6 +8,7 @@ import pytest
 
 from warpimpact import Campaign
 from warpimpact.campaign.plates import read_plates
+from warpimpact.campaign.plausible import doubted_holes
 from warpimpact.campaign.text import CampaignError
 from warpimpact.cli import main
 from warpimpact.scene.bounds import USUAL, Implausible
@@ -116,6 +117,19 @@ def test_listed_velocities_in_kilometres_per_second_are_refused(folder: Path) ->
     (folder / "hits.csv").write_text("hit_y,hit_z,velocity\n0.001,0.002,0.82\n0.03,0,0.81\n")
     with pytest.raises(CampaignError, match=r"hits.file, column velocity: read as 0.82 m/s, but 1 to 10000 m/s is"):
         warned(TEXT, folder)
+
+
+def test_thin_webs_and_large_holes_get_a_word(folder: Path) -> None:
+    def told(change: tuple[str, str]) -> list[str]:
+        campaign = Campaign.from_text(TEXT.replace(*change), name="text", folder=folder)
+        return [sentence.split(",")[0].split(":", 2)[1] for sentence in doubted_holes(campaign.target)]
+
+    assert told(("", "")) == []
+    assert told(('diameter = "5 mm"', 'diameter = "7.9 mm"')) == [
+        " open area of 77%",
+        " ligaments of 0.1 mm",
+    ]
+    assert told(('thickness = "4 mm"', 'thickness = "13 mm"')) == [" ligaments of 3 mm"]
 
 
 @pytest.mark.parametrize("kind", USUAL)

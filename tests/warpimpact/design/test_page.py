@@ -12,6 +12,7 @@ from urllib.parse import urlsplit
 import numpy as np
 import pytest
 
+from warpimpact.analysis.assumptions_view import assumptions_view
 from warpimpact.analysis.comparison import compare
 from warpimpact.analysis.comparison_text import comparison_view
 from warpimpact.analysis.effectiveness import effectiveness
@@ -98,6 +99,12 @@ def test_a_slider_moves_and_the_numbers_are_those_of_run(
     velocities = page.driver.execute_script("return document.getElementById('map-0').data[0].z.flat()")
     assert set(velocities) <= {float(f"{value:.5g}") for value in dataset["residual_velocity"].values.tolist()}
     assert len(set(velocities)) > 500
+    page.wait(lambda: "moved most by" in page.text("#answer"), 120.0)
+    for section in assumptions_view(dataset).parts:
+        if not isinstance(section, str):
+            assert all(cell in page.text("#assumed") for row in section.cells for cell in row)
+    assert f"evidence: {page.text('#evidence').removeprefix('evidence: ')}" in page.text("#assumed")
+    assert page.values("#title") == ["7.62 mm P80 core against a slotted plate, width 5.2 mm"]
     assert page.errors() == []
 
 
@@ -119,11 +126,15 @@ def test_the_address_holds_the_design_and_undo_brings_it_back(page: Any) -> None
     move(page, thickness.removeprefix("#"), 5.0)
     page.wait(lambda: page.driver.current_url != before)
     address = page.driver.current_url
+    assert page.values("#title")[0].endswith("a slotted plate, thickness 5 mm")
     page.press("#undo")
     page.wait(lambda: page.values(thickness) == ["4"])
+    assert page.values("#title")[0].endswith("a slotted plate")
     page.open("about:blank")
     page.open(address)
     page.wait(lambda: page.values(thickness) == ["5"])
+    move(page, "control-impact-obliquity", 7)
+    page.wait(lambda: page.values("#title")[0].endswith("a slotted plate, thickness 5 mm, obliquity 7 deg"))
     assert page.errors() == []
 
 
@@ -222,7 +233,23 @@ def test_text_of_others_is_text(browser: Any, serve: Callable[..., str], coarse:
     assert browser.driver.title == f"{hostile} · warpimpact design"
     assert not browser.find("img[src=x]")
     assert browser.driver.execute_script("return document.documentElement.scrollWidth") <= 390
+    browser.wait(lambda: browser.find("#answer table"), 60.0)
+    cut = "return [...document.querySelectorAll('#title, #answer .wide')].map((e) => [e.scrollWidth - e.clientWidth, "
+    cut += "e.scrollHeight - e.clientHeight]).flat().filter((rest) => rest > 1)"
+    assert browser.driver.execute_script(cut) == []
+    assert browser.driver.execute_script("return document.getElementById('maps').offsetHeight / innerHeight") < 1 / 3
     assert browser.errors() == []
+
+
+def test_grey_has_a_legend(page: Any) -> None:
+    data = "{ statuses: [{ code: 1, label: 'perforated' }, { code: 2, label: 'arrested' }], main: [], variables: [] }"
+    hits = "{ status: [1, 2, 2], columns: { speed: [5, null, null] } }"
+    told = [
+        page.driver.execute_script(f"return hitMaps({data}).missing({hits}, '{variable}')")
+        for variable in ("speed", "status")
+    ]
+    assert told == ["no value: arrested 2 of 3 hits", ""]
+    assert not page.find("#grey-0")[0].is_displayed()  # all cores pass
 
 
 def test_many_changes_leave_no_error(page: Any) -> None:

@@ -25,7 +25,7 @@ from warpimpact.catalogue.entries import Threat
 from warpimpact.cli import main
 from warpimpact.design import hasty
 from warpimpact.design.answers import Answers
-from warpimpact.design.designs import FILE_KEYS, shelf_of, stages
+from warpimpact.design.designs import FEWEST, FILE_KEYS, FIRST_WORK, shelf_of, stages, work
 from warpimpact.design.edits import SHAPES, changed
 from warpimpact.results import attributes as attr
 from warpimpact.results import files, front
@@ -212,9 +212,15 @@ def test_a_page_reads_the_files_of_its_campaigns(small: Path, tmp_path: Path) ->
 
 
 def test_stages_go_from_few_hits_to_the_campaign(address: str, small: Path) -> None:
+    """What assumptions do to the numbers comes behind the last map."""
     plate, *lines = compute(address, tables_of(small))
-    assert [line["kind"] for line in lines] == ["maps", "numbers"] * 3
-    computed = lines[::2]
+    assert [line["kind"] for line in lines] == [*["maps", "numbers"] * 3, "numbers"]
+    computed = lines[:-1:2]
+    assert ["moved most by" in line["html"] for line in lines[1::2]] + ["moved most by" in lines[-1]["html"]] == [
+        *[False] * 3,
+        True,
+    ]
+    assert [line["ahead"] > 0.0 for line in computed] == [True, True, False]
     assert plate["plate"]["numbers"]["open area"] == "34.8%"
     assert [(line["stage"], line["hits"]) for line in computed] == [("first", 1024), ("draft", 1024), ("full", 1500)]
     assert [line["numerics"][:26] for line in computed[1:]] == [
@@ -222,6 +228,22 @@ def test_stages_go_from_few_hits_to_the_campaign(address: str, small: Path) -> N
         "Numerics: standard keeps i",
     ]
     assert "is not known" in computed[0]["numerics"]
+
+
+def test_a_first_map_takes_little(small: Path) -> None:
+    """A level that the last draft has found is left where it would take long; then there are fewer hits, too."""
+    tables = tables_of(small)
+    shelf, first = shelf_of([small]), []
+    for thickness, velocity, obliquity in (("4 mm", "825 m/s", 0), ("8 mm", "825 m/s", 30), ("40 mm", "400 m/s", 60)):
+        tables["plate"]["thickness"] = thickness
+        tables["impact"] |= {"velocity": velocity, "obliquity": f"{obliquity} deg"}
+        campaign = stages(shelf, shelf.checked(tables), 4)[0].design.campaign
+        first.append((campaign.numerics.level, campaign.hits.count, work(campaign)))
+    (straight, all_hits, _), (oblique, half, seconds), (last, few, _) = first
+    assert (straight, all_hits, half) == (4, 1024, 1024)
+    assert 0 <= oblique < 4
+    assert seconds < FIRST_WORK
+    assert (last, few) == (0, 4 * FEWEST)
 
 
 def test_who_leaves_ends_the_work(address: str, small: Path, monkeypatch: pytest.MonkeyPatch) -> None:
