@@ -14,7 +14,6 @@ from warpimpact.catalogue.strength import limit_fit
 
 from .limit_catalogue import entries, figures
 from .limit_model import CHOSEN, METALS, Fit, Law, Model, coefficients, fit, names, plates_of
-from .limit_posterior import posterior
 from .limit_report import PAGE, tables, with_tables
 from .limit_rows import PUBLISHED, Rows, computed, log_unit, published, unit
 from .limit_splits import LAW, RIVALS, left_out, predictions, questions
@@ -209,19 +208,6 @@ def test_rows_that_cannot_be_predicted(tmp_path: Path, old: str, new: str, said:
     (tmp_path / "rows.csv").write_text(f"{head}\n{first.replace(old, new)}\n", encoding="utf-8")
     with pytest.raises(ValueError, match=said):
         published(tmp_path / "rows.csv")
-
-
-def test_arviz_opens_the_posterior(rows: Rows, tmp_path: Path) -> None:
-    arviz = pytest.importorskip("arviz_base")
-    some = rows[np.isin(rows.material, ["AA6055-T651", "AA2060-T8", "AA7085-T711"])]
-    tree = posterior(some, fit(some, CHOSEN), steps=80, burnt=30, draws=50)
-    assert tree["posterior"].attrs["r_hat"] < 1.2
-    assert tree["posterior"].attrs["effective_sample_size"] > 20.0
-    tree.to_netcdf(tmp_path / "posterior.nc")
-    read = arviz.convert_to_datatree(str(tmp_path / "posterior.nc"))
-    assert arviz.extract(read)["friction"].sizes == {"sample": 100}
-    predicted = read["posterior_predictive"]["limit_velocity"].mean(("chain", "draw"))
-    assert predicted.values == pytest.approx(some.velocity, rel=0.08)
 
 
 def test_every_published_row_has_its_source() -> None:
