@@ -11,6 +11,7 @@ import numpy as np
 import xarray
 
 from warpimpact.analysis.estimates import estimated
+from warpimpact.analysis.evidence_lines import evidence_lines
 from warpimpact.analysis.numbers import ends_of, intervals_text
 from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
@@ -78,7 +79,8 @@ def sweep_view(sweep: xarray.Dataset, texts: Sequence[str] = ()) -> list[Section
     sentence = (
         f"{len(every)} combinations of {', '.join(inputs_of(sweep))}, with at most {sweep.sizes[v.HIT]} hits each"
     )
-    return [Section([sentence], title), *(Section([_table(every, measure)], measure.title) for measure in measures)]
+    tables = [Section([_table(every, measure)], measure.title) for measure in measures]
+    return [Section([sentence], title), *tables, Section(evidence_lines(sweep))]
 
 
 def _table(every: Sequence[Point], measure: Measure) -> Table:

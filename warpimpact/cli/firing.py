@@ -32,10 +32,9 @@ def add_test(commands: Commands) -> None:
 
 
 def _test(arguments: argparse.Namespace) -> None:
-    from warpimpact.campaign.tested import summary_of_all
     from warpimpact.campaign.text import CampaignError
     from warpimpact.firing.firing_view import firing_view
-    from warpimpact.firing.known_target import directions_of, response_of, target_campaign
+    from warpimpact.firing.known_target import directions_of, response_of
     from warpimpact.firing.plan_file import read_test
     from warpimpact.firing.repeated import simulate_test
     from warpimpact.plotting.firing import directions_figure, firing_figure
@@ -82,8 +81,6 @@ def _test(arguments: argparse.Namespace) -> None:
                 raise CampaignError(f"{arguments.test}: {error}") from None
             files.write(dataset, output)
     print(text_of(firing_view(dataset)))
-    if test.target.campaign is not None:
-        print(summary_of_all([target_campaign(test)], "targets"))
     figures = {picture: firing_figure} if test.needs_limits else {}
     if test.directions is not None:
         figures[polar] = directions_figure

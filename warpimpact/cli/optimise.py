@@ -41,11 +41,9 @@ def add_optimise(commands: Commands) -> None:
 
 
 def _optimise(arguments: argparse.Namespace) -> int:
-    from warpimpact.campaign.tested import summary_of_all
     from warpimpact.optimisation.design import read_design
     from warpimpact.optimisation.front_view import front_view
     from warpimpact.optimisation.optimise import folder_of, optimise_to_file
-    from warpimpact.optimisation.outcome import campaigns_of
     from warpimpact.plotting.front import front_figure
     from warpimpact.results import files, front
     from warpimpact.view.view import text_of
@@ -75,8 +73,6 @@ def _optimise(arguments: argparse.Namespace) -> int:
         )
     dataset = files.read(output, front.FRONT)
     print(text_of(front_view(dataset)))
-    if len(numbers := dataset[front.NUMBER].values):
-        print(summary_of_all(campaigns_of(design, dataset[front.VALUE].values[numbers]), "designs"))
     front_figure(dataset, design.folder).savefig(picture, dpi=150)
     beside = f", campaigns in {folder_of(output)}" if campaigns else ""
     print(f"written to {output}, figure in {picture}{beside}")

@@ -43,7 +43,6 @@ def add_sweep(commands: Commands) -> None:
 
 def _sweep(arguments: argparse.Namespace) -> None:
     from warpimpact.analysis.swept import sweep_view
-    from warpimpact.campaign.tested import summary_of_all
     from warpimpact.plotting.sweep import sweep_figure
     from warpimpact.results import files
     from warpimpact.results.checks import SWEEP
@@ -75,7 +74,6 @@ def _sweep(arguments: argparse.Namespace) -> None:
         )
     dataset = files.read(output, SWEEP)
     print(text_of(sweep_view(dataset, arguments.measure)))
-    print(summary_of_all(sweep.campaigns.values(), "points"))
     sweep_figure(dataset, arguments.measure).savefig(picture, dpi=150)
     for written in (output, folder_of(output), picture):
         print(written)

@@ -18,6 +18,7 @@ from pydantic import Field, model_validator
 
 from warpimpact.campaign.alternatives import alternatives
 from warpimpact.campaign.campaign import Campaign
+from warpimpact.campaign.evidence import evidence_of
 from warpimpact.campaign.text import CampaignError
 from warpimpact.kernels.status import Status
 from warpimpact.records.group import failures
@@ -125,6 +126,7 @@ class Sector:
         failed: how many of these failed.
         mean: the weighted mean of P(perforation) with its 95 % interval, and under assumptions.
         assumed_hits: hits that were computed under each assumption.
+        evidence: as in `Response`.
     """
 
     share: Array
@@ -134,6 +136,7 @@ class Sector:
     failed: NDArray[np.int64]
     mean: Estimate
     assumed_hits: int
+    evidence: str
 
 
 def check_directions(campaign: Campaign) -> None:
@@ -280,7 +283,7 @@ def _sector(campaign: Campaign, directions: Directions, passed: dict[tuple[int, 
     hits = np.array([len(answers) for answers in passed.values()]).reshape(shape)
     failed = np.array([int(np.isnan(answers).sum()) for answers in passed.values()]).reshape(shape)
     mean = weighted_mean(list(passed.values()), directions.weights().ravel(), campaign.replicates)
-    return Sector(share, low, high, hits, failed, mean, 0)
+    return Sector(share, low, high, hits, failed, mean, 0, "\n".join(evidence_of(campaign)))
 
 
 def weighted_mean(passed: list[Array], weights: Array, replicates: int) -> Estimate:

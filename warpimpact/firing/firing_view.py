@@ -11,6 +11,7 @@ import xarray
 from numpy.typing import NDArray
 
 from warpimpact.analysis.assumptions_view import assumptions_table
+from warpimpact.analysis.evidence_lines import evidence_lines
 from warpimpact.results import attributes as attr
 from warpimpact.results import firing as f
 from warpimpact.statistics.acceptance import acceptance, shown_stop_probability
@@ -91,6 +92,7 @@ def firing_view(dataset: xarray.Dataset) -> list[Section]:
         *([_proof(dataset, test["proof"])] if f.PASS in dataset else []),
         *([_directions(dataset)] if f.DIRECTION_SHARE in dataset else []),
         *([_assumptions(dataset)] if f.ASSUMPTIONS_NOTE in attributes else []),
+        Section(evidence_lines(dataset)),
     ]
 
 

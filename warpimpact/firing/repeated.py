@@ -56,6 +56,8 @@ def simulate_test(
         f.REQUIREMENT: requirement_line(test),
         attr.WARPIMPACT_VERSION: attr.versions()[attr.WARPIMPACT_VERSION],
     }
+    if evidence := next((known.evidence for known in (response, sector) if known is not None and known.evidence), ""):
+        told[attr.EVIDENCE] = evidence
     for more_columns, more in (_fired(test, response), _directions(test, sector), assumed(test, response, sector)):
         columns, told = columns | more_columns, told | more
     return dataset_of(columns, f.FIXED | told | (attributes or {}))

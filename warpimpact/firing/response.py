@@ -51,6 +51,7 @@ class Response:
         outline: outlines of the holes in the cell, y and z [m], separated by NaN.
         under: `changes` if something that nobody measured is otherwise, by what that is.
         under_note: how these were computed, or why they are not known.
+        evidence: what the limits rest on, a line each, the summary first; empty of a target that is known.
     """
 
     changes: Array
@@ -62,6 +63,7 @@ class Response:
     outline: tuple[Array, Array] = (np.empty(0), np.empty(0))
     under: Mapping[str, Array] = field(default_factory=dict)
     under_note: str = ""
+    evidence: str = ""
 
     def __len__(self) -> int:
         return len(self.changes)
@@ -246,5 +248,5 @@ def _with_places(dataset: xarray.Dataset, changes: Array, sound: Flags) -> Respo
     outline = holes["y"], holes["z"]
     note = "How far assumptions move these numbers is not known of a sweep; target.limits tells it."
     place = (float(cell[0]), float(cell[1])), dealing(dataset), outline
-    response = Response(changes, *columns, *place, under_note=note)
+    response = Response(changes, *columns, *place, under_note=note, evidence=dataset.attrs.get(attr.EVIDENCE, ""))
     return response if sound.all() else response.only(sound)

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from warpimpact.analysis.evidence_lines import evidence_lines
 from warpimpact.analysis.numbers import interval_text, number_text
 from warpimpact.results import front as f
 from warpimpact.view.view import Column, Section, Table, number
@@ -42,6 +43,7 @@ def front_view(dataset: xarray.Dataset) -> list[Section]:
         Section([_variables_table(dataset)] if confirmed else []),
         *([Section([*references, *notes])] if references or notes else []),
         *_assumptions(dataset),
+        Section(evidence_lines(dataset)),
     ]
 
 

@@ -4,15 +4,15 @@ from __future__ import annotations
 
 import json
 import warnings
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from warpimpact.campaign.campaign import Campaign
 from warpimpact.campaign.places import relocated
+from warpimpact.campaign.tested import summary_of_all
 from warpimpact.campaign.toml import toml_text
 from warpimpact.optimisation.asked import Bound
 from warpimpact.optimisation.confirm import Confirmed
@@ -93,6 +93,9 @@ def to_dataset(design: Design, found: Searched, confirmed: Confirmed, made_by: M
         columns |= {f.HIT_Y: confirmed.places[:, 0], f.HIT_Z: confirmed.places[:, 1]}
         columns[f.HIT_VALUE] = np.array([record.said[0] for record in confirmed.records])
     dataset = dataset_of(columns, {attr.REFERENCES: f.REFERENCES, **_attributes(design, found, made_by)})
+    if confirmed.records:
+        targets = [campaign_of(design, one.tables, threat) for one in confirmed.records for threat in design.threats]
+        dataset = dataset.assign_attrs({attr.EVIDENCE: summary_of_all(targets, "designs")})
     return dataset.set_coords([f.UNIT, f.LABEL])  # a value that is picked out keeps its unit and its label beside it
 
 
@@ -202,17 +205,6 @@ def write_campaigns(
     for path, text in texts.items():
         _write_campaign(path, text, tell if not overwrite else None)
     return list(texts)
-
-
-def campaigns_of(design: Design, values: NDArray[np.float64]) -> Iterator[Campaign]:
-    """The campaigns of designs under every threat.
-
-    Args:
-        values: of the variables, shape [designs, variables].
-    """
-    for row in values:
-        for threat in design.threats:
-            yield campaign_of(design, design.tables(row), threat)
 
 
 Tell = Callable[[str], object]

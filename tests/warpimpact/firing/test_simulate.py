@@ -144,6 +144,7 @@ yaw = []
     text = text_of(firing_view(of_limits))
     assert re.search(r"tests that pass the proof +1 +0 +1 +Y × 0\.7: 0", text)
     assert "each assumption alone, on 8 of the hits" in text
+    assert "\nevidence: limit velocities; beyond them: " in text
 
 
 def test_a_place_moves_as_far_as_the_quantile_at_its_limit() -> None:

@@ -1,5 +1,7 @@
 """A front under what nobody measured: which designs stay on it, and a search over assumptions."""
 
+import re
+
 import numpy as np
 import pytest
 
@@ -104,5 +106,6 @@ def test_a_search_stays_within_what_was_tested_unless_told() -> None:
     lifted = optimise(design(thin, WEIGHT_AND_ENERGY, FEW))
     assert sorted(lifted[f.UNTESTED].values.tolist()) == ["", "thickness"]
     assert "untested: thickness" in text_of(front_view(lifted))
+    assert re.search(r"\nevidence: .*thickness \(1 of 2 designs\)", text_of(front_view(lifted)))
     with pytest.raises(CampaignError, match=r"search\.allow_untested is not true; the nearest has thickness"):
         optimise(design('[variables]\nthickness = ["0.1 mm", "0.2 mm"]\n', WEIGHT_AND_ENERGY, strict))
