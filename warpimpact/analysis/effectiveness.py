@@ -235,8 +235,8 @@ def effectiveness_view(dataset: xarray.Dataset, texts: Sequence[str] = ()) -> Se
     notes = [depth_note(measures), solid_note(dataset)]
     if not with_solid and attr.OPEN_AREA in dataset.attrs and attr.LIMIT not in dataset.attrs:
         notes.append(
-            "There is no solid plate or add-on to compare with: the result has no shots at one. They are computed unless "
-            'output.solid_reference is false, and stand in the group "solid" of the file.'
+            "There is no solid plate or add-on to compare with: the result has no shots at one. They are computed "
+            'unless output.solid_reference is false, and stand in the group "solid" of the file.'
         )
     table = measures_table(measures, reference_name(dataset) if with_solid else None)
     return Section([table, *filter(None, notes)], f"effectiveness{plate_text(dataset)}")
