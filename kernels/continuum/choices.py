@@ -7,11 +7,13 @@ QUADRATIC = Constant(
     1.2,
     "density × (length × rate of compression)²",
     "Bulk viscosity of von Neumann and Richtmyer: a shock is some elements wide.",
+    test="verification/test_continuum.py::test_a_compression_meets_its_viscosity",
 )
 LINEAR = Constant(
     0.06,
     "density × speed of sound × length × rate of compression",
     "Bulk viscosity that damps what rings behind a shock.",
+    test="verification/test_continuum.py::test_a_compression_meets_its_viscosity",
 )
 HOURGLASS = Constant(
     0.02,

@@ -2,23 +2,29 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 from numpy.typing import NDArray
 
 from warpimpact.continuum.meshing import SheetMesh
 from warpimpact.continuum.one_hit import OneHit
-from warpimpact.continuum.strikes import check_continuum, march_of, memory_of, outcomes_of
+from warpimpact.continuum.strikes import March, check_continuum, march_of, memory_of, outcomes_of
 from warpimpact.kernels.trace import WIDTH
 from warpimpact.scene import Scene, Shots
 from warpimpact.scene.flow import Continuum
 from warpimpact.solver.history import History
-from warpimpact.solver.replay import Replay
+from warpimpact.solver.replay import Deformed, Replay
 from warpimpact.solver.worker import Worker
 
 Array = NDArray[np.float64]
 
 STRIDE = 20
 """Steps between two rows of a history."""
+MOST_FRAMES = 64
+"""Frames of a mesh that are kept until the end of the hit is known; then they are thinned to every other one."""
+CORNERS = ((0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0), (0, 0, 1), (1, 0, 1), (1, 1, 1), (0, 1, 1))
+"""Corners of an element along x, y and z, in the order of VTK."""
 
 
 def replay_continuum(scene: Scene, shots: Shots, continuum: Continuum, snapshots: int = 6) -> Replay:
@@ -31,12 +37,12 @@ def replay_continuum(scene: Scene, shots: Shots, continuum: Continuum, snapshots
     check_continuum(scene, shots, continuum)
     memory = memory_of(scene, shots, Worker("cpu", 1))
     march = march_of(scene, shots, 0, continuum, memory.prepared.conditions)
-    rows, left, places = list[Array](), list[Array](), cells_of(march.sheets[0])
+    rows, frames = list[Array](), Frames(march)
 
     def follow(hit: OneHit) -> None:
         rows.append(_row(hit, rows[-1] if rows else None))
         if snapshots:
-            left.append(_left(hit, march.sheets[0])[places])
+            frames.see(len(rows) - 1)
 
     follow(march.hit)
     struck = march.ended(every=STRIDE, follow=follow)
@@ -45,22 +51,77 @@ def replay_continuum(scene: Scene, shots: Shots, continuum: Continuum, snapshots
         mass=start.mass, inertia_axial=start.inertia_axial, inertia_transverse=start.inertia_transverse
     )
     history = History.from_trace(np.array([*rows[1:], _unloaded(rows[-1])]), body)
-    shown = (
-        np.unique(np.linspace(0, len(rows) - 1, snapshots).round().astype(int)) if snapshots else np.empty(0, dtype=int)
-    )
-    y, z = (0.5 * (edges[1:] + edges[:-1]) for edges in march.sheets[0].edges)
+    sheet = march.sheets[0]
+    places = cells_of(sheet)
+    shown = frames.spread(len(rows) - 1, snapshots) if snapshots else []
+    share = [_left(frame.alive, sheet, march.hit.firsts[0])[places] for _, frame in shown]
+    y, z = (0.5 * (edges[1:] + edges[:-1]) for edges in sheet.edges)
     home = float(shots.hit_y[0]), float(shots.hit_z[0])
-    share = np.array([left[row] for row in shown]).reshape(-1, len(places[0]), places[1].shape[1])
     cell_y, cell_z = home[0] + y[places[0][:, 0]], home[1] + z[places[1][0]]
     return Replay(
         outcomes=outcomes_of(memory, [struck]),
         history=history,
-        plate_time=np.array([rows[row][0] for row in shown]),
-        resistance_share=share,
+        plate_time=np.array([rows[row][0] for row, _ in shown]),
+        resistance_share=np.array(share).reshape(-1, len(cell_y), len(cell_z)),
         cell_y=cell_y,
         cell_z=cell_z,
         behind={},
+        deformed=frames.deformed([frame for _, frame in shown]) if shown else None,
     )
+
+
+class Frame(NamedTuple):
+    """A mesh at an instant, in the memory of the solver: places of nodes [m], what is left, plastic strain."""
+
+    position: NDArray[np.float32]
+    alive: NDArray[np.float32]
+    strain: NDArray[np.float32]
+
+
+class Frames:
+    """Frames of a hit, evenly spread over its rows so far, and few."""
+
+    def __init__(self, march: March) -> None:
+        self._march, self._kept, self._every = march, dict[int, Frame](), 1
+        self._last: tuple[int, Frame] | None = None
+
+    def see(self, row: int) -> None:
+        """Keep the mesh as it is at a row of the history."""
+        mesh = self._march.hit.mesh
+        names = ("position", "alive", "strain")
+        self._last = row, Frame(*(getattr(mesh, name).numpy().astype(np.float32) for name in names))
+        if row % self._every == 0:
+            self._kept[row] = self._last[1]
+        if len(self._kept) > MOST_FRAMES:
+            self._every *= 2
+            self._kept = {row: frame for row, frame in self._kept.items() if row % self._every == 0}
+
+    def spread(self, rows: int, count: int) -> list[tuple[int, Frame]]:
+        """So many frames from the first row to the last one, with their rows."""
+        assert self._last is not None
+        there = self._kept | dict([self._last])
+        numbers = np.array(sorted(there))
+        wanted = np.linspace(0, rows, count)
+        nearest = np.unique([numbers[np.abs(numbers - row).argmin()] for row in wanted])
+        return [(int(row), there[int(row)]) for row in nearest]
+
+    def deformed(self, frames: list[Frame]) -> Deformed:
+        """The elements that there were at the beginning, and their nodes."""
+        hit, sheets = self._march.hit, self._march.sheets
+        elements, corners = list[NDArray[np.intp]](), list[NDArray[np.intp]]()
+        for sheet, first in zip(sheets, hit.firsts, strict=True):
+            present = first + np.flatnonzero(sheet.alive)
+            offsets = [x * sheet.plane + y * sheet.row + z for x, y, z in CORNERS]
+            elements.append(present)
+            corners.append(present[:, None] + np.array(offsets))
+        numbers, chosen = np.concatenate(elements), np.concatenate(corners)
+        nodes, renumbered = np.unique(chosen, return_inverse=True)
+        return Deformed(
+            corners=renumbered.reshape(chosen.shape).astype(np.int32),
+            position=np.array([frame.position.reshape(3, -1)[:, nodes].T for frame in frames]),
+            left=np.array([frame.alive[numbers] > 0.0 for frame in frames]),
+            strain=np.array([frame.strain[numbers] for frame in frames]),
+        )
 
 
 def cells_of(sheet: SheetMesh) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
@@ -72,10 +133,9 @@ def cells_of(sheet: SheetMesh) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
     return np.asarray(rows), np.asarray(columns)
 
 
-def _left(hit: OneHit, sheet: SheetMesh) -> Array:
+def _left(alive: NDArray[np.float32], sheet: SheetMesh, first: int) -> Array:
     """Share of the elements of each column that are left."""
-    alive = hit.mesh.alive.numpy()[hit.firsts[0] : hit.firsts[0] + sheet.nodes]
-    planes = alive.reshape(len(sheet.x), *sheet.y.shape)[:-1, :-1, :-1]
+    planes = alive[first : first + sheet.nodes].reshape(len(sheet.x), *sheet.y.shape)[:-1, :-1, :-1]
     return np.asarray(planes.mean(axis=0), dtype=np.float64)
 
 

@@ -1,8 +1,9 @@
 """The history of a hit as VTK files for ParaView: the moving surface of the core, and the plate as it weakens.
 
 It needs PyVista (`pip install 'warpimpact[vtk]'`). The folder contains ``core.pvd`` and ``plate.pvd``, which list the
-other files with their times, and ``layer_1.pvd``, … of the layers behind the plate that weaken. Lengths are in metres
-in the frame of the plate, times in seconds.
+other files with their times, and ``layer_1.pvd``, … of the layers behind the plate that weaken; of a hit by finite
+elements, ``plate.pvd`` has the deformed elements of all layers. Lengths are in metres in the frame of the plate, times
+in seconds.
 """
 
 from __future__ import annotations
@@ -51,10 +52,11 @@ def write_vtk(history: xarray.Dataset, folder: Path) -> list[Path]:
             pieces = Path(aside) / "vtk"
             pieces.mkdir()
             _write_series(pieces, "core", "vtp", history[v.TIME].values, cores(history))
-            _write_series(pieces, "plate", "vti", history[v.SNAPSHOT].values, plates(history))
+            kind, meshes = ("vtu", deformed(history)) if v.NODE_POSITION in history else ("vti", plates(history))
+            _write_series(pieces, "plate", kind, history[v.SNAPSHOT].values, meshes)
             for field in fields_behind(history):
-                meshes = layers_of(history, field)
-                _write_series(pieces, f"layer_{field.number}", "vti", history[v.SNAPSHOT].values, meshes)
+                layers = layers_of(history, field)
+                _write_series(pieces, f"layer_{field.number}", "vti", history[v.SNAPSHOT].values, layers)
             pieces.rename(folder)
     except OSError as error:
         raise OutputError(f"{folder}: cannot be written ({error})") from error
@@ -98,6 +100,19 @@ def plates(history: xarray.Dataset) -> Iterator[pyvista.ImageData]:
     """The plate within reach of the core at every snapshot: a layer of cells with the share of the resistance left."""
     cells = history[v.CELL_Y].values, history[v.CELL_Z].values
     return _slices(cells, 0.0, history.attrs[attr.PLATE_THICKNESS], history[v.RESISTANCE_SHARE].values)
+
+
+def deformed(history: xarray.Dataset) -> Iterator[pyvista.DataSet]:
+    """The elements that are left of all layers at every snapshot, with their plastic strain."""
+    import pyvista
+
+    corners, hexahedron = history[v.ELEMENT_CORNER].values, pyvista.CellType.HEXAHEDRON
+    for place, left, strain in zip(
+        *(history[name].values for name in (v.NODE_POSITION, v.ELEMENT_LEFT, v.ELEMENT_STRAIN)), strict=True
+    ):
+        mesh = pyvista.UnstructuredGrid({hexahedron: corners[left > 0]}, place)
+        mesh.cell_data[v.ELEMENT_STRAIN] = strain[left > 0]
+        yield mesh
 
 
 def layers_of(history: xarray.Dataset, field: LayerField) -> Iterator[pyvista.ImageData]:

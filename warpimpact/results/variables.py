@@ -193,6 +193,14 @@ the window of one whose window is smaller than that of another. Layer 0 has its 
 LAYER_SECTIONS = (LAYER_SOLID_ALONG_Y, LAYER_SOLID_ALONG_Z)
 """Present only with layers behind the plate, as LAYER_FACES, which are those of the hit here."""
 
+ELEMENT_CORNER = Variable("element_corner", ("element", "corner"), "1", "node at a corner, in the order of VTK")
+NODE_POSITION = Variable("node_position", ("snapshot", "node", "axis"), "m", "place of a node in the plate frame")
+ELEMENT_LEFT = Variable("element_left", ("snapshot", "element"), "1", "1 where the element has not failed, else 0")
+ELEMENT_STRAIN = Variable("element_strain", ("snapshot", "element"), "1", "plastic strain of the element")
+
+MESH_VARIABLES = (ELEMENT_CORNER, NODE_POSITION, ELEMENT_LEFT, ELEMENT_STRAIN)
+"""Present only in the history of a hit by finite elements: the deformed layers."""
+
 HISTORY_VARIABLES = (
     *(POSITION, PLATE_POSITION, ATTITUDE, CORE_AXIS, VELOCITY, MARCHED_ANGULAR_VELOCITY, FORCE, MOMENT),
     *(TRANSLATIONAL_ENERGY, ROTATIONAL_ENERGY, RESISTANCE_SHARE, CORE_RADIUS, SOLID_ALONG_Y, SOLID_ALONG_Z),

@@ -13,7 +13,7 @@ from warpimpact.campaign.campaign import Campaign
 from warpimpact.continuum.hit_history import replay_continuum
 from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
-from warpimpact.results.dataset import history_dataset, hit_numbers, numbered, to_dataset
+from warpimpact.results.dataset import history_dataset, hit_numbers, numbered, stored_columns, to_dataset
 from warpimpact.results.files import ResultError
 from warpimpact.results.layers import values_of
 from warpimpact.runs.describe import is_double
@@ -94,7 +94,20 @@ def replay(result: xarray.Dataset, hit: int, *, folder: str | Path = ".", snapsh
         **attr.versions(),
         attr.DEVICE: "cpu",
     }
-    return history_dataset(scene, end, again, attributes=attributes)
+    history = history_dataset(scene, end, again, attributes=attributes)
+    return history if again.deformed is None else _with_mesh(history, again.deformed)
+
+
+def _with_mesh(history: xarray.Dataset, deformed: solver.Deformed) -> xarray.Dataset:
+    """The history with the finite elements of the layers as they deform, in the plate frame."""
+    home = np.array([0.0, float(history[v.HIT_Y]), float(history[v.HIT_Z])], dtype=np.float32)
+    columns = {
+        v.ELEMENT_CORNER: deformed.corners,
+        v.NODE_POSITION: deformed.position + home,
+        v.ELEMENT_LEFT: deformed.left,
+        v.ELEMENT_STRAIN: deformed.strain,
+    }
+    return history.assign(stored_columns(v.MESH_VARIABLES, columns))
 
 
 def _at_their_limit(scene: Scene, shots: Shots, result: xarray.Dataset, place: int) -> Shots:

@@ -62,6 +62,22 @@ class Weakened(NamedTuple):
     share: Array
 
 
+class Deformed(NamedTuple):
+    """The finite elements of all layers as they deform.
+
+    Attributes:
+        corners: numbers of the nodes at the corners of each element, in the order of VTK, shape [elements, 8].
+        position: of the nodes from the hit point [m], shape [snapshots, nodes, 3].
+        left: whether an element has not failed, shape [snapshots, elements].
+        strain: plastic strain, same shape.
+    """
+
+    corners: NDArray[np.int32]
+    position: NDArray[np.float32]
+    left: NDArray[np.bool_]
+    strain: NDArray[np.float32]
+
+
 @dataclass(frozen=True)
 class Replay:
     """One shot with its full history: SI, float64.
@@ -75,6 +91,7 @@ class Replay:
         cell_y, cell_z: centres of those cells in the plate [m], shapes [cells_y] and [cells_z].
         behind: the same of every layer behind the plate that weakens and is reached, by its number, with `share` of
             shape [snapshots, cells_y, cells_z].
+        deformed: the layers of a hit by finite elements.
     """
 
     outcomes: Outcomes
@@ -84,6 +101,7 @@ class Replay:
     cell_y: Array
     cell_z: Array
     behind: dict[int, Weakened]
+    deformed: Deformed | None = None
 
 
 def trace(scene: Scene, shots: Shots, *, numerics: Numerics) -> list[Array]:

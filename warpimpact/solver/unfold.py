@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpimpact.scene import Symmetry
-from warpimpact.solver.replay import Replay, Weakened
+from warpimpact.solver.replay import Deformed, Replay, Weakened
 
 Array = NDArray[np.float64]
 
@@ -52,4 +52,14 @@ def image_of(replay: Replay, symmetry: Symmetry, *, home: tuple[float, float], i
         cell_y=cells[0],
         cell_z=cells[1],
         behind={number: turned(layer) for number, layer in replay.behind.items()},
+        deformed=replay.deformed and _mirrored(replay.deformed, symmetry),
+    )
+
+
+def _mirrored(deformed: Deformed, symmetry: Symmetry) -> Deformed:
+    """Finite elements at the places of an image; a reflection exchanges their lower and upper corners."""
+    reflects = float(np.prod(symmetry.polar)) < 0.0
+    return deformed._replace(
+        position=(deformed.position * symmetry.polar).astype(np.float32),
+        corners=deformed.corners[:, [4, 5, 6, 7, 0, 1, 2, 3]] if reflects else deformed.corners,
     )

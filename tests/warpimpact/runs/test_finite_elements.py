@@ -1,6 +1,7 @@
 """Hits by finite elements as a result: all of a campaign or some of a map, resumed, replayed, refused."""
 
 import re
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
@@ -10,6 +11,7 @@ import pytest
 from warpimpact import Campaign, CampaignError, replay, simulate
 from warpimpact.cli import main
 from warpimpact.continuum import strikes
+from warpimpact.export.paraview import write_vtk
 from warpimpact.results import attributes as attr
 from warpimpact.results import files
 from warpimpact.runs.choice import executor_for
@@ -108,6 +110,31 @@ def test_a_hit_is_replayed_bit_by_bit(campaign_file: Path, tmp_path: Path) -> No
     assert (left[0] == left[0].round()).all()
     assert left[-1].sum() < left[0].sum()
     assert float(history["translational_energy"][-1]) < float(history["translational_energy"][0])
+    failed = (history["element_left"][0] - history["element_left"][-1]).values.sum()
+    assert failed == result["eroded_elements"].values[hit]
+    assert float(history["element_strain"][0].max()) == 0.0 < float(history["element_strain"][-1].max())
+    corner = history["element_corner"].values
+    before, after = (history["node_position"].values[k] for k in (0, -1))
+    first, x, y, z = (before[corner[:, k]] for k in (0, 1, 3, 4))
+    upright = np.einsum("ij,ij->i", np.cross(x - first, y - first), z - first) > 0.0
+    assert upright.mean() > 0.95  # beside a hole a corner may be concave
+    assert before[:, 0].min() == pytest.approx(0.0, abs=1e-7)
+    assert before[:, 0].max() == pytest.approx(4e-3, abs=1e-7)
+    columns = before[corner].mean(axis=1)
+    hit_y, hit_z = float(history["hit_y"]), float(history["hit_z"])
+    assert Campaign.from_toml(campaign_file).plate.is_solid(columns[:, 1], columns[:, 2]).mean() > 0.98
+    assert np.abs(columns[:, 1] - hit_y).min() < 1e-3
+    assert np.abs(columns[:, 2] - hit_z).min() < 1e-3
+    assert np.abs(after - before).max() > 1e-3
+    if find_spec("pyvista"):
+        import pyvista
+
+        files_written = write_vtk(history, tmp_path / "vtk")
+        assert [file.name for file in files_written] == ["core.pvd", "plate.pvd"]
+        meshes = [pyvista.read(path) for path in sorted((tmp_path / "vtk").glob("plate_*.vtu"))]
+        assert [mesh.n_cells for mesh in meshes] == history["element_left"].values.sum(axis=1).tolist()
+        assert meshes[0].volume > 0.0
+        assert meshes[-1]["element_strain"].max() > 0.1
 
 
 def test_the_command_computes_hits_of_a_result(
