@@ -51,6 +51,7 @@ DAMPING = Constant(
     0.1,
     "critical damping",
     "Of a node on its penalty spring. More drags on nodes that leave.",
+    test="verification/test_continuum.py::test_a_contact_damps_a_tenth_of_what_is_critical",
 )
 SLOW = Constant(5.0, "m/s", "Sliding speed below which friction sets in gradually, so that it does not chatter.")
 ON_AXIS = Constant(1.0e-12, "m", "Keeps the normal at a point on the core's axis finite.")

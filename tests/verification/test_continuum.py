@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
 
 from warpimpact import (
     CirclePattern,
@@ -358,6 +359,27 @@ def test_a_result_has_the_same_bits_however_many_threads_compute_it(centred: Out
         assert np.array_equal(values, getattr(again, name), equal_nan=True), name
 
 
+def test_a_free_core_precesses_about_its_angular_momentum() -> None:
+    """By the angle |L| t / I across the axis: Euler's equations of a symmetric top."""
+    momentum, transverse = np.array([2.0e-4, 0.0, 3.0e-4]), 1.65e-7
+    start = Start(
+        np.array([-1.0, 0.0, 0.0]),
+        np.array([0.0, 0.0, 0.0, 1.0]),
+        np.array([1.0, 0.0, 0.0]),
+        momentum,
+        4e-3,
+        1.5e-8,
+        transverse,
+        0.0,
+    )
+    hit = OneHit(CORE, start, [box((1, 1, 1))], [ELASTIC], double=True)
+    hit.advance(4000)
+    turned = Rotation.from_quat(np.array(hit.flight["state"]["attitude"])).apply([1.0, 0.0, 0.0])
+    precession = Rotation.from_rotvec(momentum * float(hit.flight["time"]) / transverse)
+    assert np.linalg.norm(precession.as_rotvec()) > 0.1
+    assert turned == pytest.approx(precession.apply([1.0, 0.0, 0.0]), abs=1e-6)
+
+
 def test_momentum_of_a_free_plate_is_that_which_the_core_lost() -> None:
     """Nothing is held: the sum of m Δv of all nodes is that of the core, with its sign changed."""
     sheet = box((2, 12, 12))
@@ -388,8 +410,12 @@ def test_momentum_of_a_free_plate_is_that_which_the_core_lost() -> None:
     assert momentum == pytest.approx(before - spun, abs=1e-3 * np.abs(momentum).max())
 
 
-def pressed(friction: float, *, eroded: bool = False) -> Array:
-    """Velocity that a core of which the side lies in a held element gains in a step of the kick [m/s]."""
+def pressed(friction: float, *, eroded: bool = False, approach: float | None = None) -> tuple[Array, OneHit]:
+    """Velocity that a core gains in the first kick of an element in which its side lies [m/s], and the hit.
+
+    Args:
+        approach: velocity of the element towards the core [m/s]; its nodes are held without one.
+    """
     core = OgiveCore(diameter=6e-3, length=20e-3, crh=3.0, mass=4e-3)
     sheet = box((1, 1, 1), 1.0e-4)
     beside = SheetMesh(sheet.y + 2.99e-3, sheet.z - 5.0e-5, sheet.solid, sheet.x - 5.0e-3, sheet.spacing)
@@ -404,15 +430,19 @@ def pressed(friction: float, *, eroded: bool = False) -> Array:
         friction,
     )
     hit = OneHit(core, start, [beside], [ELASTIC], double=True)
-    nodal(hit, "inverse_mass")[:] = 0.0
+    if approach is None:
+        nodal(hit, "inverse_mass")[:] = 0.0
+    else:
+        nodal(hit, "inverse_mass")[:] = np.where(hit.mass_at(0) > 0.0, 1.0 / hit.mass_at(0), 0.0)
+        nodal(hit, "velocity")[1] = -approach
     if eroded:
         nodal(hit, "alive")[:] = 0.0
     hit.advance(1)
-    return np.array(hit.flight["state"]["velocity"]) - start.velocity
+    return np.array(hit.flight["state"]["velocity"]) - start.velocity, hit
 
 
 def test_friction_is_a_share_of_the_pressure_against_the_motion() -> None:
-    smooth, rough = pressed(0.0), pressed(0.1)
+    (smooth, _), (rough, _) = pressed(0.0), pressed(0.1)
     assert smooth[1] < 0.0
     assert smooth[0] == pytest.approx(0.0, abs=1e-9)
     assert rough[1] == pytest.approx(smooth[1], rel=1e-3)
@@ -420,7 +450,16 @@ def test_friction_is_a_share_of_the_pressure_against_the_motion() -> None:
 
 
 def test_nodes_that_no_element_holds_press_no_core() -> None:
-    assert (pressed(0.1, eroded=True) == 0.0).all()
+    assert (pressed(0.1, eroded=True)[0] == 0.0).all()
+
+
+def test_a_contact_damps_a_tenth_of_what_is_critical() -> None:
+    """Four nodes of the mass m = ρ l³ / 8 that come with v press by 4 · 0.1 · 2 √(k m) v more, k = (K + 4G/3) l / 2, or
+    m / dt² where that is softer."""
+    (slow, hit), (fast, _) = pressed(0.0, approach=0.0), pressed(0.0, approach=10.0)
+    mass, step = ELASTIC.density * 1.0e-12 / 8.0, float(hit.flight["before"])
+    stiffness = min(0.5 * ELASTIC.wave_modulus * 1.0e-4, mass / step**2)
+    assert 4e-3 * (slow[1] - fast[1]) == pytest.approx(0.8 * math.sqrt(stiffness * mass) * 10.0 * step, rel=0.01)
 
 
 def test_a_plate_turned_with_its_shot_gives_the_turned_outcome(coarse: float) -> None:
@@ -442,6 +481,7 @@ def test_a_core_that_touches_nothing_flies_on_as_by_the_fast_law() -> None:
     assert fast.status[0] == slow.status[0] == Status.MISSED
     assert slow.residual_velocity == pytest.approx(fast.residual_velocity, rel=1e-6)
     assert slow.tilt == pytest.approx(fast.tilt, abs=1e-6)
+    assert slow.angular_velocity == pytest.approx(fast.angular_velocity, rel=1e-6, abs=1e-3)
     assert slow.energy_loss[0] == 0.0
 
 

@@ -202,6 +202,12 @@ class Campaign(Model):
         """The plate and the layers behind it."""
         return Target(layers=(self.plate, *self.layer))
 
+    def computed_by(self, elements: FiniteElements) -> Self:
+        """The same campaign, with the text that it was read from, whose hits by finite elements are computed so."""
+        changed = self.model_copy(update={"continuum": elements})
+        changed._source = self._source
+        return changed
+
     @property
     def replicates(self) -> int:
         """Number of independent scramblings to which its shots are dealt out in turn."""

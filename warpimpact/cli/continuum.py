@@ -89,7 +89,7 @@ def _continuum(arguments: argparse.Namespace) -> int:
     output = arguments.output or Path(f"{arguments.file.stem}_continuum.nc")
     check_place(output)
     check_suffix(output, "a result", ".nc")
-    campaign = campaign.model_copy(update={"continuum": _elements(arguments, campaign)})
+    campaign = campaign.computed_by(_elements(arguments, campaign))
     computing = executor_for("cpu", workers=arguments.workers, scheduler=arguments.scheduler, apart=True)
     with memory_told(arguments.file), show_progress() as show, computing as executor:
         try:

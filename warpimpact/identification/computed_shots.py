@@ -40,7 +40,7 @@ def fit_of_result(path: Path) -> Fit:
             f"{path}: is a map of hits of the fast law; a fit takes one of warpimpact continuum, or a fit file"
         )
     tables = parsed(result.attrs[attr.CAMPAIGN], f"the campaign in {path}")
-    if "layer" in tables:
+    if tables.get("layer"):
         raise FitError(f"{path}: has layers behind its plate, but a fit is of one plate")
     plate = {key: value for key, value in tables["plate"].items() if key not in (*PRIORS, "material")}
     given: dict[str, Any] = {key: tables[key] for key in ("core", "interaction", "catalogue") if key in tables}

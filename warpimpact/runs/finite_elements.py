@@ -50,8 +50,8 @@ def continuum_to_file(
     progress: Callable[[RoundProgress, int], object] = lambda now, total: None,
     tell: Callable[[str], object] = warnings.warn,
 ) -> None:
-    """Compute hits of a campaign by finite elements (`Campaign.continuum`) into a result file; each is on the disk when
-    it has ended.
+    """Compute hits of a campaign by finite elements, as its table [continuum] says, into a result file; each is on the
+    disk when it has ended.
 
     Args:
         hits: by their numbers in the campaign; None is all of them, of which images are not computed.
