@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import xarray
@@ -101,7 +102,7 @@ def replay(result: xarray.Dataset, hit: int, *, folder: str | Path = ".", snapsh
 def _with_mesh(history: xarray.Dataset, deformed: solver.Deformed) -> xarray.Dataset:
     """The history with the finite elements of the layers as they deform, in the plate frame."""
     home = np.array([0.0, float(history[v.HIT_Y]), float(history[v.HIT_Z])], dtype=np.float32)
-    columns = {
+    columns: dict[str, Any] = {
         v.ELEMENT_CORNER: deformed.corners,
         v.NODE_POSITION: deformed.position + home,
         v.ELEMENT_LEFT: deformed.left,
