@@ -1,6 +1,8 @@
 VENV := .venv
 PYTHON ?= python3
 INSTALLED := $(VENV)/.installed
+DEVELOPED := $(VENV)/.developed
+PIP := PYTHONWARNINGS='ignore:Editable installation' $(VENV)/bin/pip install --quiet --disable-pip-version-check --no-compile
 PARALLEL := --numprocesses auto --dist worksteal
 THREADS := 'tests/verification/test_any_company.py::test_threads_and_chunks_change_no_bit[2-5-single]'
 
@@ -13,31 +15,31 @@ demo: $(INSTALLED)
 	$(VENV)/bin/warpimpact plot slotted.nc --overwrite
 	$(VENV)/bin/warpimpact validate slotted.nc
 
-gallery: $(INSTALLED)
+gallery: $(DEVELOPED)
 	$(VENV)/bin/python campaigns/gallery.py
 	$(VENV)/bin/python tests/benchmarks/design_film.py
 
 # Figures of docs/benchmarks.md; on a quiet machine, some 13 minutes on two cores.
-benchmark: $(INSTALLED)
-	$(VENV)/bin/pip install --quiet --editable '.[bench]'
+benchmark: $(DEVELOPED)
+	$(PIP) --editable '.[bench]'
 	$(VENV)/bin/python tests/benchmarks/page.py all
 
 # Pages in build/docs/index.html; tutorials are executed. A warning is an error. The tests check the examples in pages.
-docs: $(INSTALLED)
+docs: $(DEVELOPED)
 	$(VENV)/bin/sphinx-build -q -W --keep-going -j auto -b html -d build/doctrees docs build/docs
 
 # The kernel tests and one run on several threads are repeated in Warp's debug mode, which checks array bounds. Types are
 # checked beside the tests, as that takes one core only.
-test: $(INSTALLED)
+test: $(DEVELOPED)
 	$(VENV)/bin/ruff check .
 	$(VENV)/bin/ruff format --check .
 	$(MAKE) --no-print-directory --jobs=2 types suite
 	$(VENV)/bin/pytest $(PARALLEL) tests/kernels $(THREADS) --warp-mode debug
 
-types: $(INSTALLED)
+types: $(DEVELOPED)
 	$(VENV)/bin/mypy
 
-suite: $(INSTALLED)
+suite: $(DEVELOPED)
 	$(VENV)/bin/pytest $(PARALLEL) --durations=40
 
 clean:
@@ -48,8 +50,13 @@ clean:
 # where a module is first imported, whatever the environment says: that of all 15,000 modules takes 45 s of a core, and
 # most are never imported.
 $(INSTALLED): pyproject.toml Makefile
-	$(PYTHON) -m venv $(VENV)
-	$(VENV)/bin/pip install --quiet --no-compile --upgrade pip
-	PYTHONWARNINGS='ignore:Editable installation' $(VENV)/bin/pip install --quiet --no-compile --editable '.[dev]'
-	echo "$(CURDIR)" > "$$($(VENV)/bin/python -c 'import sysconfig; print(sysconfig.get_path("purelib"))')/warpimpact.pth"
+	@echo "installing warpimpact into $(VENV): a minute, and the time that downloads take"
+	@$(PYTHON) -m venv $(VENV)
+	@$(PIP) --editable .
+	@echo "$(CURDIR)" > "$$($(VENV)/bin/python -c 'import sysconfig; print(sysconfig.get_path("purelib"))')/warpimpact.pth"
+	@touch $@
+
+# What tests, documentation and figures need beside it.
+$(DEVELOPED): $(INSTALLED)
+	$(PIP) --editable '.[dev]'
 	touch $@

@@ -12,7 +12,7 @@ import xarray
 
 from warpimpact.analysis.estimates import estimated
 from warpimpact.analysis.evidence_lines import evidence_lines
-from warpimpact.analysis.numbers import ends_of, intervals_text
+from warpimpact.analysis.numbers import ends_of, interval_text, intervals_text, number_text
 from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
 from warpimpact.results.dataset import failed
@@ -23,6 +23,8 @@ from warpimpact.view.view import Column, Section, Table, number
 
 SHOWN_OF_SWEEPS = (f"mean({v.RESIDUAL_VELOCITY})", f"mean({v.DEFLECTION})", f"mean({v.TILT})", "P(perforated)")
 """Measures that are shown of a sweep unless others are asked for, as far as it has them."""
+
+_MORE = "means are over the cores that passed; --measure TEXT tells how far numerics and assumptions may shift it"
 
 
 class Point(NamedTuple):
@@ -72,20 +74,41 @@ def points(sweep: xarray.Dataset, measures: Sequence[Measure]) -> Iterator[Point
 
 
 def sweep_view(sweep: xarray.Dataset, texts: Sequence[str] = ()) -> list[Section]:
-    """The view of a sweep: a table for every measure, with a row for every combination."""
+    """The view of a sweep: one table with a row for every combination and its measures. With measures that are asked
+    for, a table for each of them, with what the numerics and assumptions may shift it by, and the hits that count."""
     measures = measures_of(sweep, texts)
     every = list(points(sweep, measures))
     title = str(sweep.attrs.get(attr.TITLE, "untitled"))
     sentence = (
         f"{len(every)} combinations of {', '.join(inputs_of(sweep))}, with at most {sweep.sizes[v.HIT]} hits each"
     )
+    if not texts:
+        short = Section([f"{sentence}; 95 % intervals", _short(every, measures), _MORE], title)
+        return [short, Section(evidence_lines(sweep))]
     tables = [Section([_table(every, measure)], measure.title) for measure in measures]
     return [Section([sentence], title), *tables, Section(evidence_lines(sweep))]
 
 
+def _inputs(point: Point) -> list[Column]:
+    return [Column(name.replace("_", " "), right=True) for name in point.labels]
+
+
+def _short(every: Sequence[Point], measures: Sequence[Measure]) -> Table:
+    """A row for every combination, with its measures and their intervals by the hits."""
+    columns = [*_inputs(every[0]), *(Column(measure.title, right=True) for measure in measures)]
+    rows = []
+    for point in every:
+        shown = [point.estimates[measure].times(measure.display.factor) for measure in measures]
+        texts = (f"{number_text(estimate.value)} ({interval_text(estimate.low, estimate.high)})" for estimate in shown)
+        rows.append((*point.labels.values(), *texts))
+    return Table(columns, rows)
+
+
 def _table(every: Sequence[Point], measure: Measure) -> Table:
-    columns = [Column(name.replace("_", " "), right=True) for name in every[0].labels]
-    columns += [number("value"), Column("95 % interval"), Column("hits that count", write="{:.1%}".format, right=True)]
+    columns = [
+        *(*_inputs(every[0]), number("value"), Column("95 % interval")),
+        Column("hits that count", write="{:.1%}".format, right=True),
+    ]
     rows = []
     for point in every:
         estimate = point.estimates[measure].times(measure.display.factor)

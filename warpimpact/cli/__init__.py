@@ -33,29 +33,19 @@ from .start import add_examples, add_new, add_schema
 from .sweep import add_sweep
 from .validate import add_validate
 
-_COMMANDS = (
-    add_examples,
-    add_new,
-    add_catalogue,
-    add_run,
-    add_continuum,
-    add_limit,
-    add_sweep,
-    add_inspect,
-    add_plot,
-    add_compare,
-    add_plate,
-    add_design,
-    add_replay,
-    add_export,
-    add_report,
-    add_validate,
-    add_identify,
-    add_optimise,
-    add_test,
-    add_schema,
+_DAILY = (
+    *(add_catalogue, add_new, add_design, add_run),
+    *(add_compare, add_limit, add_optimise, add_report),
 )
-"""In the order of the help."""
+_EXPERT = (
+    *(add_examples, add_plate, add_inspect, add_plot, add_sweep, add_test),
+    *(add_replay, add_export, add_continuum, add_identify, add_validate, add_schema),
+)
+"""Commands in the order of the help: those of a task from names to a report, and those for experts."""
+
+_EXAMPLE = """\
+warpimpact COMMAND --help explains a command. An example:
+    warpimpact new slotted_plate -o my.toml && warpimpact run my.toml && warpimpact report my.nc"""
 
 
 def command() -> NoReturn:
@@ -109,10 +99,17 @@ def parser() -> argparse.ArgumentParser:
     program = argparse.ArgumentParser(
         prog="warpimpact",
         description="Hit maps of hard bullet cores against perforated armour plates.",
-        epilog="example: warpimpact run campaigns/slotted_plate.toml && warpimpact plot slotted_plate.nc",
+        usage="warpimpact [-h] [--version] COMMAND ...",
+        formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     program.add_argument("--version", action="version", version=f"warpimpact {__version__}")
-    commands = program.add_subparsers(metavar="COMMAND", required=True)
-    for add in _COMMANDS:
-        add(commands)
+    commands = program.add_subparsers(metavar="COMMAND", required=True, help=argparse.SUPPRESS)
+    groups = []
+    for title, adding in (("from names to a report", _DAILY), ("for experts", _EXPERT)):
+        before = len(commands.choices)
+        for add in adding:
+            add(commands)
+        summaries = [(name, str(parser.get_default("summary"))) for name, parser in commands.choices.items()][before:]
+        groups.append("\n".join([f"{title}:", *(f"    {name:<10} {summary}" for name, summary in summaries)]))
+    program.epilog = "\n\n".join([*groups, _EXAMPLE])
     return program

@@ -22,8 +22,8 @@ def add_command(
         summary: the line of the command in `warpimpact --help`.
         example: a command line, without the program's name.
     """
-    parser = commands.add_parser(name, help=summary, description=description, epilog=f"example: warpimpact {example}")
-    parser.set_defaults(command=command)
+    parser = commands.add_parser(name, description=description, epilog=f"example: warpimpact {example}")
+    parser.set_defaults(command=command, summary=summary)
     volume = parser.add_mutually_exclusive_group()
     volume.add_argument("-v", "--verbose", action="count", default=0, help="show what is done; -vv shows more")
     volume.add_argument("-q", "--quiet", action="store_true", help="show no progress")

@@ -31,11 +31,12 @@ _LIGAMENT_COLOUR = "#CC79A7"
 
 
 class Dimension(NamedTuple):
-    """A length between two points (y, z) [m]."""
+    """A length between two points (y, z) [m]; the text of an upright one stands on its right, or on its left."""
 
     start: Array
     end: Array
     text: str
+    on_left: bool = False
 
 
 def hole_dimensions(plate: Plate, ligament: Dimension | None) -> list[Dimension]:
@@ -52,7 +53,7 @@ def hole_dimensions(plate: Plate, ligament: Dimension | None) -> list[Dimension]
         _dimension((low_y, below), (high_y, below)),
         _dimension((beside, low_z), (beside, high_z)),
         _dimension((-period_y / 2, period_z / 2), (period_y / 2, period_z / 2)),
-        _dimension((-period_y / 2, -period_z / 2), (-period_y / 2, period_z / 2)),
+        _dimension((-period_y / 2, -period_z / 2), (-period_y / 2, period_z / 2))._replace(on_left=True),
     ]
 
 
@@ -107,9 +108,9 @@ def _draw(axes: Axes, dimension: Dimension, colour: str) -> None:
     axes.annotate(
         dimension.text,
         tuple(middle),
-        (4.0, 0.0) if along_z else (0.0, 3.0),
+        ((-4.0, 0.0) if dimension.on_left else (4.0, 0.0)) if along_z else (0.0, 3.0),
         textcoords="offset points",
-        ha="left" if along_z else "center",
+        ha=("right" if dimension.on_left else "left") if along_z else "center",
         va="center" if along_z else "bottom",
         color=colour,
         fontsize="small",

@@ -21,6 +21,7 @@ from jinja2 import Environment, PackageLoader, StrictUndefined
 from plotly.offline import get_plotlyjs
 
 import warpimpact
+from warpimpact.plotting.cell import words
 from warpimpact.report.hit_data import MOST_HITS, page_data, thinned, trajectory_data, worst_and_spread
 from warpimpact.report.words import cell_drawings, compared, conclusion, result_content
 from warpimpact.results import variables as v
@@ -134,6 +135,12 @@ def _packed(text: str) -> str:
     return b64encode(gzip.compress(text.encode(), mtime=0)).decode()
 
 
+def _first(keys: Sequence[str]) -> str:
+    """The variable that the maps show first: a limit where there is one."""
+    wanted = [*(words(names.value) for names in v.LIMITS.values()), words(v.RESIDUAL_VELOCITY)]
+    return next((key for key in wanted if key in keys), keys[0])
+
+
 def _page(*, results: Sequence[dict[str, Any]], data: dict[str, Any], **content: Any) -> str:
     """Fill in page.html."""
     environment = Environment(
@@ -144,6 +151,7 @@ def _page(*, results: Sequence[dict[str, Any]], data: dict[str, Any], **content:
         plotly=_packed(_without_addresses(get_plotlyjs())),
         packed=_packed(json.dumps(data, separators=(",", ":"), allow_nan=False)),
         variables=data["variables"],
+        first=_first([variable["key"] for variable in data["variables"]]),
         made=f"{datetime.now(UTC):%Y-%m-%d %H:%M} UTC",
         version=warpimpact.__version__,
         **content,

@@ -29,6 +29,7 @@ from warpimpact.results import variables as v
 from warpimpact.results.dataset import passed
 from warpimpact.results.files import ResultError
 from warpimpact.results.outlines import outlines
+from warpimpact.studies.limit_view import in_short, limit_view
 from warpimpact.view import svg
 from warpimpact.view.view import Column, Section, Table, html_of, table_html
 
@@ -54,6 +55,7 @@ _PROVENANCE = (
 def result_content(name: str, dataset: xarray.Dataset) -> dict[str, Any]:
     """Text, tables and drawing of a result for the page; of an open file, one slice at a time is in memory."""
     attributes, measures = dataset.attrs, effectiveness(dataset)
+    is_limit = attr.LIMIT in attributes
     hits, came_through = dataset.sizes["hit"], sum(int(passed(part).sum()) for part in slices(dataset[[v.STATUS]]))
     means_over = f"{name}: with 95 % intervals; means are over the {came_through} of {hits} cores that passed"
     against_solid = f"{name}: with 95 % intervals, compared with the {reference_name(dataset)} of equal areal density"
@@ -61,7 +63,8 @@ def result_content(name: str, dataset: xarray.Dataset) -> dict[str, Any]:
         "name": name,
         "title": attributes.get(attr.TITLE, "untitled"),
         "hits": hits,
-        "verdict": verdict(dataset, measures[0]),
+        "verdict": f"{in_short(dataset)}." if is_limit else verdict(dataset, measures[0]),
+        "is_limit": is_limit,
         "asked": _asked(dataset),
         "evidence": attributes.get(attr.EVIDENCE, "").splitlines(),
         "campaign": attributes.get(attr.CAMPAIGN, ""),
@@ -69,7 +72,7 @@ def result_content(name: str, dataset: xarray.Dataset) -> dict[str, Any]:
         "caveats": [*_caveats(dataset), *filter(None, [depth_note(measures), solid_note(dataset)])],
         "tables": _tables(dataset),
         "measures": measures,
-        "through": Markup(table_html(_through(dataset), means_over)),
+        "through": Markup(html_of(limit_view(dataset)) if is_limit else table_html(_through(dataset), means_over)),
         "protects": Markup(table_html(measures_table(measures, reference_name(dataset)), against_solid)),
         "assumed": Markup(html_of([assumptions_view(dataset)])),
         "provenance": {words(key): str(attributes[key]) for key in _PROVENANCE if key in attributes},

@@ -11,7 +11,7 @@ import xarray
 from warpimpact.analysis.assumptions import Assumed
 from warpimpact.analysis.assumptions_view import assumptions_lines
 from warpimpact.analysis.estimates import estimated
-from warpimpact.analysis.numbers import ends_of, intervals_text, rough_text
+from warpimpact.analysis.numbers import ends_of, interval_text, intervals_text, rough_text
 from warpimpact.analysis.plate_text import reference_name
 from warpimpact.analysis.proxy import proxy
 from warpimpact.analysis.summary import numerics_note
@@ -67,6 +67,22 @@ def limit_view(dataset: xarray.Dataset, texts: Sequence[str] = ()) -> list[Secti
         Section([*_left_out(dataset), *assumptions_lines(dataset), *_expected(dataset), *_solid(dataset)]),
         Section(list(_costs(dataset))),
     ]
+
+
+def in_short(dataset: xarray.Dataset) -> str:
+    """V50 and V05, or H50 and H05, with their intervals in a sentence; of a short list the range of its limits."""
+    quantity = dataset.attrs[attr.LIMIT]
+    unit, factor = shown_unit(quantity)
+    values = factor * dataset[v.LIMITS[quantity].value].values
+    known = values[np.isfinite(values)]
+    if len(values) <= _MOST_LISTED:
+        ends = f"{known.min():.5g} to {known.max():.5g} {unit}" if len(known) else "not found"
+        return f"limit {quantity} of {len(values)} hits: {ends}"
+    parts = []
+    for measure, estimate in estimated(dataset, measures_of(dataset)).items():
+        interval = interval_text(factor * estimate.low, factor * estimate.high, "{:.5g}".format)
+        parts.append(f"{measure.text} {factor * estimate.value:.5g} {unit} ({interval})")
+    return ", ".join(parts)
 
 
 def _hits(dataset: xarray.Dataset) -> Table:

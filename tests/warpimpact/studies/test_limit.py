@@ -13,6 +13,7 @@ from warpimpact.campaign.text import CampaignError
 from warpimpact.cli import main
 from warpimpact.kernels.status import Status
 from warpimpact.plotting.limit import limit_figure
+from warpimpact.report.report import report_page
 from warpimpact.results import files
 from warpimpact.results import variables as v
 from warpimpact.results.measures import Measure
@@ -106,6 +107,12 @@ def test_v50_and_v05_are_quantiles_over_the_hits(result: xarray.Dataset) -> None
     assert v50.low < v50.value < v50.high
     line = next(line for line in text_of(limit_view(result)).splitlines() if line.startswith("V50 "))
     assert line.split()[1] == f"{v50.value:.5g}"
+    page = report_page({"limit": result}, folders={"limit": Path()}, trajectories=0)
+    assert page.index(f"<li>limit: V50 {v50.value:.5g} m/s") < page.index('<h2 id="asked">')
+    assert '<option value="limit velocity" selected>' in page
+    assert "residual velocity, mean" not in page.split('<h2 id="through">')[1].split("</section>")[0]
+    (named,) = [text for text in limit_figure(result).axes[1].texts if "V05" in text.get_text()]
+    assert named.get_position()[1] > 0.0  # above its point, not on the axis below
 
 
 def test_a_limit_beyond_reach_makes_a_quantile_infinite_and_no_mean(result: xarray.Dataset) -> None:

@@ -108,6 +108,11 @@ def test_a_point_is_a_result_and_a_sweep_says_that_it_is_one(folder: Path, capsy
     assert "is a sweep, as warpimpact sweep writes, not a map of hits; warpimpact insp" in capsys.readouterr().err
     files.read(folder / "a.nc", SWEEP).isel(obliquity=1, width=0).to_netcdf(folder / "chosen.nc")
     assert main(["inspect", str(folder / "chosen.nc")]) == 0
+    capsys.readouterr()
+    assert main(["inspect", str(folder / "a.nc")]) == 0
+    table = capsys.readouterr().out.splitlines()
+    assert sum(line.strip().startswith(("0 deg", "30 deg")) for line in table) == 6  # one table, a row for each point
+    assert len(table) <= 14
     assert main(["run", str(folder / "a.toml")]) == 2
     assert "this takes one combination of inputs; warpimpact sweep" in capsys.readouterr().err
 
