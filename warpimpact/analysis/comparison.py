@@ -26,7 +26,8 @@ import xarray
 
 from warpimpact.analysis.assumptions import AS_GIVEN, moved_apart
 from warpimpact.analysis.comparable import check_same_question, other_shots
-from warpimpact.analysis.comparison_text import Comparison, Contestant, Difference, Pair, Verdict
+from warpimpact.analysis.comparison_text import Comparison
+from warpimpact.analysis.contestants import Contestant, Difference, Pair, Verdict
 from warpimpact.analysis.effectiveness import Score, Scored, depth_note, measures_of, ratio_of_draws, scores
 from warpimpact.analysis.numbers import of_each
 from warpimpact.analysis.plate_text import common_name, plate_text, reference_name, solid_note, solid_plate, weights_of
@@ -125,9 +126,13 @@ def compare(
         for name, dataset, plate in zip(names, datasets, of_plates, strict=True)
     )
     at_equal_weight = frozenset(by_ratio) if differ_in_weight else None
-    notes = (*_notes(datasets, names), *_notes_of_bases(datasets, plates))
+    cautions = dict(_cautions(datasets, names))
+    notes = (
+        *(*_weights(datasets, names), *cautions.values()),
+        *(*_notes(datasets, names), *_notes_of_bases(datasets, plates)),
+    )
     told = tuple(differences), tuple(used), at_equal_weight, confidence, notes, tuple(verdicts)
-    return Comparison(plates, *told)
+    return Comparison(plates, *told, tuple(cautions))
 
 
 def _verdicts(
@@ -263,7 +268,7 @@ def _difference(one: _Side, other: _Side, dealt: Estimating, *, paired: bool) ->
     return estimate.value, estimate.low, estimate.high
 
 
-def _notes(datasets: Sequence[xarray.Dataset], names: Sequence[str]) -> Iterator[str]:
+def _weights(datasets: Sequence[xarray.Dataset], names: Sequence[str]) -> Iterator[str]:
     if _differ_in_weight(datasets):
         weights = of_each(names, [plate_text(dataset).removeprefix(", ").rpartition(",")[0] for dataset in datasets])
         reference = common_name(map(reference_name, datasets))
@@ -271,19 +276,28 @@ def _notes(datasets: Sequence[xarray.Dataset], names: Sequence[str]) -> Iterator
             f"The plates differ in weight ({weights}). They are ranked by the ratio to the {reference} of the same "
             "areal density; a measure without that ratio says so."
         )
+
+
+def _cautions(datasets: Sequence[xarray.Dataset], names: Sequence[str]) -> Iterator[tuple[str, str]]:
+    """What ranks do not allow for, in a few words and in a sentence."""
     if len({d.attrs.get(attr.LAYERS, "") for d in datasets}) > 1:
-        yield "The targets differ in the layers behind the plate."
+        yield "layers", "The targets differ in the layers behind the plate."
     if differences := "; ".join(_materials(datasets, names)):
-        yield f"The plates differ in material, which no ranking allows for: {differences}."
+        yield "material", f"The plates differ in material, which no ranking allows for: {differences}."
     texts = [dataset.attrs[attr.NUMERICS_GIVEN] for dataset in datasets if attr.NUMERICS_GIVEN in dataset.attrs]
     asked = [json.loads(text) for text in texts]
     differing = (first_difference(first, other) for first, other in pairwise(asked))
     if (found := next(filter(None, differing), None)) is not None:
-        yield "The plates were computed with different numerics: {} is {} and {}.".format(*found)
+        yield "different numerics", "The plates were computed with different numerics: {} is {} and {}.".format(*found)
     if broken := [name for name, dataset in zip(names, datasets, strict=True) if breaks_promise(dataset)]:
-        yield f"The numerics are less exact than promised: {', '.join(broken)} (warpimpact inspect)."
+        sentence = f"The numerics are less exact than promised: {', '.join(broken)} (warpimpact inspect)."
+        yield "numerics less exact than promised", sentence
     if unknown := [name for name, dataset in zip(names, datasets, strict=True) if not hits_at_two_levels(dataset)]:
-        yield f"numerics ± is not known of {', '.join(unknown)}: intervals are by the hits alone (warpimpact inspect)."
+        sentence = f"numerics ± is not known of {', '.join(unknown)}: intervals are by the hits alone"
+        yield "the error of the numerics", f"{sentence} (warpimpact inspect)."
+
+
+def _notes(datasets: Sequence[xarray.Dataset], names: Sequence[str]) -> Iterator[str]:
     solid = {name: solid_note(dataset) for name, dataset in zip(names, datasets, strict=True)}
     alike = len(set(solid.values())) == 1
     yield from dict.fromkeys(note if alike else f"{name}: {note}" for name, note in solid.items() if note)

@@ -4,107 +4,16 @@ ranking with its differences."""
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Sequence
+from dataclasses import dataclass
 
 from warpimpact.analysis.assumptions import AS_GIVEN
+from warpimpact.analysis.contestants import Contestant, Difference, Pair, Verdict
 from warpimpact.analysis.effectiveness import Score
 from warpimpact.analysis.numbers import Ends, intervals_text, number_text, of_each
 from warpimpact.analysis.plate_text import common_name
-from warpimpact.analysis.survival import Survival, survival_text
+from warpimpact.analysis.survival import survival_text
 from warpimpact.view.view import Column, Section, Table, html_of, number, text_of
-
-
-@dataclass(frozen=True)
-class Contestant:
-    """A plate and how well it protects; areal density of the whole target [kg/m²], open area as a share, what its solid
-    reference is and is called, and `Target.weights`."""
-
-    name: str
-    hits: int
-    areal_density: float
-    open_area: float
-    measures: tuple[Score, ...]
-    solid: str = ""
-    reference: str = "solid plate"
-    weights: Mapping[str, float] = field(default_factory=dict)
-
-
-@dataclass(frozen=True)
-class Difference:
-    """By how much a measure of one plate exceeds that of another, with its interval; NaN where there is none.
-
-    `survival` tells whether its sign holds for the true parameters, too; None without a posterior.
-    """
-
-    measure: str
-    one: str
-    other: str
-    value: float
-    low: float
-    high: float
-    survival: Survival | None = None
-
-    @property
-    def parameters(self) -> tuple[float, float] | None:
-        """Its interval by the parameters, as in `Estimate`."""
-        return None if self.survival is None else self.survival.interval
-
-    @property
-    def told_apart(self) -> bool:
-        """Whether the interval leaves out 0."""
-        return self.low > 0.0 or self.high < 0.0
-
-
-@dataclass(frozen=True)
-class Verdict:
-    """Which of two plates has the better value of a measure, whatever their weight: 1 the one, −1 the other, 0 where
-    that cannot be told.
-
-    Attributes:
-        given: as the campaigns have it.
-        under: if something that nobody measured is otherwise, by what that is.
-    """
-
-    measure: str
-    one: str
-    other: str
-    given: int
-    under: Mapping[str, int]
-
-    @property
-    def turned(self) -> list[str]:
-        """Assumptions that turn it over."""
-        return [name for name, verdict in self.under.items() if verdict == -self.given]
-
-    @property
-    def text(self) -> str:
-        """Such as "a is better than b in 9 of 12 assumptions; turned over by: β = 1"."""
-        if not self.given:
-            apart = [name for name, verdict in self.under.items() if verdict]
-            sentence = f"{self.one} and {self.other} cannot be told apart as given"
-            return sentence + f", but with: {', '.join(apart)}" * bool(apart)
-        better, worse = (self.one, self.other) if self.given > 0 else (self.other, self.one)
-        open_ = [name for name, verdict in self.under.items() if not verdict]
-        kept = len(self.under) - len(self.turned) - len(open_)
-        text = f"{better} is better than {worse} in {kept} of {len(self.under)} assumptions"
-        text += f"; turned over by: {', '.join(self.turned)}" * bool(self.turned)
-        return text + f"; not told apart with: {', '.join(open_)}" * bool(open_)
-
-
-@dataclass(frozen=True)
-class Pair:
-    """How the hits of two plates were used.
-
-    Attributes:
-        paired: number of first hits that are the same shots at both plates, which are compared shot by shot.
-        independent: why the plates were compared as independent; empty where they were hit by the same shots.
-    """
-
-    one: str
-    other: str
-    paired: int
-    independent: str
 
 
 @dataclass(frozen=True)
@@ -120,6 +29,7 @@ class Comparison:
         confidence: at which the intervals of a measure's differences hold together.
         notes: what else there is to say, a sentence each.
         verdicts: of every pair in every measure that assumptions move.
+        cautions: what differs between the plates, or is not known of them, that ranks do not allow for, in few words.
     """
 
     plates: tuple[Contestant, ...]
@@ -129,6 +39,7 @@ class Comparison:
     confidence: float
     notes: tuple[str, ...]
     verdicts: tuple[Verdict, ...] = ()
+    cautions: tuple[str, ...] = ()
 
     def _repr_html_(self) -> str:
         """What a notebook shows."""
@@ -172,7 +83,7 @@ def comparison_text(comparison: Comparison) -> str:
 def comparison_view(comparison: Comparison) -> list[Section]:
     """What was compared, who is best at what, then every measure as a ranking with differences in words."""
     best = Table((Column("best at"), Column("plate")), best_rows(comparison))
-    rankings = (_ranking(comparison, measure) for measure in _compared(comparison))
+    rankings = (_ranking(comparison, measure) for measure in compared_scores(comparison))
     return [Section(conditions(comparison)), Section([best]), *rankings]
 
 
@@ -215,21 +126,22 @@ def hits_used(comparison: Comparison) -> list[str]:
     return lines
 
 
-def _compared(comparison: Comparison) -> list[Score]:
+def compared_scores(comparison: Comparison) -> list[Score]:
+    """The measures of the first plate in which plates are compared; a worst hit has no interval."""
     return [score for score in comparison.plates[0].measures if score.measure.kind != "worst_point"]
 
 
 def best_rows(comparison: Comparison) -> list[tuple[str, str]]:
     """Every measure and who is best at it."""
     rows = []
-    for measure in _compared(comparison):
+    for measure in compared_scores(comparison):
         if measure.measure.higher_is_better is None:
             continue
         first = [name for name, rank in comparison.ranks(measure.name).items() if rank == 1]
         told_apart = len(first) < len(comparison.plates)
         neither = "cannot be told apart" if is_ranked(comparison, measure.name) else "not ranked"
         doubts = _doubt(comparison, measure.name) + _turned(comparison, measure.name, first)
-        sentence = _listed(first) + _as_good(comparison, measure.name, first) + doubts
+        sentence = listed(first) + _as_good(comparison, measure.name, first) + doubts
         rows.append((measure.measure.label, sentence if told_apart else neither))
     return rows
 
@@ -239,7 +151,7 @@ def _as_good(comparison: Comparison, measure: str, first: Sequence[str]) -> str:
     apart = [{pair.one, pair.other} for pair in comparison.differences if pair.measure == measure and pair.told_apart]
     others = [plate.name for plate in comparison.plates if plate.name not in first]
     open_ = [name for name in others if not all({name, leader} in apart for leader in first)]
-    return f" (not told apart for certain from {_listed(open_)})" if open_ else ""
+    return f" (not told apart for certain from {listed(open_)})" if open_ else ""
 
 
 def _doubt(comparison: Comparison, measure: str) -> str:
@@ -269,7 +181,7 @@ def is_ranked(comparison: Comparison, measure: str) -> bool:
     return any(pair.measure == measure and not math.isnan(pair.low) for pair in comparison.differences)
 
 
-def _listed(names: Sequence[str]) -> str:
+def listed(names: Sequence[str]) -> str:
     """Such as "a, b and c"."""
     return " and ".join([", ".join(names[:-1]), names[-1]] if len(names) > 1 else names)
 
@@ -321,14 +233,14 @@ def _in_words(pair: Difference, measure: Score, what: str) -> str:
     names = [pair.one, pair.other] if (pair.value > 0.0) == (better is not False) else [pair.other, pair.one]
     by_hits, by_parameters = (pair.low, pair.high), pair.parameters
     if pair.value < 0.0:
-        by_hits, by_parameters = _negative(by_hits), by_parameters and _negative(by_parameters)
+        by_hits, by_parameters = negative(by_hits), by_parameters and negative(by_parameters)
     interval = intervals_text(Ends(*by_hits, by_parameters))
     than = f"{'higher' if better is None else 'better'} than"
     verdict = f"{names[0]} {than} {names[1]} by {number_text(abs(pair.value))}{what} ({interval})"
     return verdict + survival_text(pair.survival)
 
 
-def _negative(interval: tuple[float, float]) -> tuple[float, float]:
+def negative(interval: tuple[float, float]) -> tuple[float, float]:
     """The interval of the negative number."""
     return -interval[1], -interval[0]
 
@@ -336,7 +248,7 @@ def _negative(interval: tuple[float, float]) -> tuple[float, float]:
 def assumptions_view(comparison: Comparison) -> list[Section]:
     """Every measure of all plates under every assumption."""
     sections = []
-    for score in _compared(comparison):
+    for score in compared_scores(comparison):
         of_plates = [next(s for s in plate.measures if s.name == score.name) for plate in comparison.plates]
         names = dict.fromkeys(name for of_plate in of_plates for name in of_plate.assumptions)
         if names:

@@ -138,7 +138,7 @@ def _rows(material: Material) -> Iterator[tuple[str, str]]:
 
 def _sources(known: dict[str, str], assumed: dict[str, str]) -> Iterator[tuple[str, str]]:
     for name, source in known.items():
-        mark = "assumed, as second-hand" if "second-hand" in source else "known"
+        mark = "quoted at second hand" if "second-hand" in source else "known"
         yield mark, f"{name.replace('_', ' ')}: {source}"
     for name, stand_in in assumed.items():
         yield "assumed", f"{name.replace('_', ' ')}: {stand_in}"

@@ -208,6 +208,6 @@ def reason(problem: Any) -> str:
 def evidence(known: dict[str, str], assumed: dict[str, str]) -> str:
     """Names of the properties of an entry that are assumed, or known second-hand only."""
     second_hand = [name for name, source in known.items() if "second-hand" in source]
-    groups = {"assumed": list(assumed), "assumed, as second-hand": second_hand}
+    groups = {"assumed": list(assumed), "quoted at second hand": second_hand}
     parts = [f"{how}: {', '.join(names).replace('_', ' ')}" for how, names in groups.items() if names]
     return "; ".join(parts) or "nothing assumed"

@@ -34,11 +34,11 @@ def add_compare(commands: Commands) -> None:
         "compare",
         _compare,
         summary="compare plates: which protects better",
-        description="Compare plates under the same shots: rankings, differences with their intervals, and a figure. Of "
-        "targets with layers, and of limits, a second figure, FIGURE_weight.png, shows them against their weight. A "
-        "map and a result of continuum of the same shots are compared hit by hit, with their maps side by side. A "
-        "campaign with several plates is run first: each plate gives NAME.nc in the folder of the figure. A plate "
-        "whose result exists is not run again.",
+        description="Compare plates under the same shots: the measure that decides, ranks, differences with their "
+        "intervals, and a figure; every other measure with --all. Of targets with layers, and of limits, a second "
+        "figure, FIGURE_weight.png, shows them against their weight. A map and a result of continuum of the same shots "
+        "are compared hit by hit, with their maps side by side. A campaign with several plates is run first: each "
+        "plate gives NAME.nc in the folder of the figure. A plate whose result exists is not run again.",
         example="compare campaigns/two_plates.toml, or: warpimpact compare slotted.nc round.nc",
     )
     parser.add_argument(
@@ -55,6 +55,12 @@ def add_compare(commands: Commands) -> None:
     )
     add_measures(parser)
     parser.add_argument(
+        "--all",
+        action="store_true",
+        dest="every",
+        help="print and draw every measure, every pair of plates, and what was compared how",
+    )
+    parser.add_argument(
         "--assumptions",
         action="store_true",
         help="also print every number under every assumption about what nobody measured: resistance, weakening, "
@@ -68,11 +74,13 @@ def add_compare(commands: Commands) -> None:
 
 def _compare(arguments: argparse.Namespace) -> int:
     from warpimpact.analysis.comparison import compare
-    from warpimpact.analysis.comparison_text import comparison_text
+    from warpimpact.analysis.comparison_short import short_view
+    from warpimpact.analysis.comparison_text import comparison_view
     from warpimpact.analysis.evidence_lines import evidence_of_all
     from warpimpact.analysis.shot_by_shot import shared_hits
     from warpimpact.plotting import comparison_figure, weight_figure
     from warpimpact.results import files
+    from warpimpact.view.view import Section, text_of
 
     is_campaign = arguments.files[0].suffix == ".toml"
     default = arguments.files[0].stem if is_campaign else "comparison"
@@ -96,13 +104,14 @@ def _compare(arguments: argparse.Namespace) -> int:
             _print_models(arguments, shared, evidence, (figure, tilts))
             return code
         comparison = compare(datasets, list(paths), arguments.measure)
-    print(comparison_text(comparison))
-    for line in evidence:
-        print(line)
+    if arguments.every:
+        print(text_of([*comparison_view(comparison), Section(evidence)]))
+    else:
+        print(text_of([short_view(comparison, evidence)]))
     if arguments.assumptions:
         print(_under_assumptions(comparison))
-    comparison_figure(comparison).savefig(figure, dpi=150)
-    print(f"{figure}{replaced}")
+    comparison_figure(comparison, every=arguments.every).savefig(figure, dpi=150)
+    print(f"{figure}{replaced}" + ("" if arguments.every else "; every measure with --all"))
     if (against_weight := weight_figure(comparison)) is not None:
         against_weight.savefig(beside, dpi=150)
         print(beside)

@@ -12,6 +12,7 @@ from matplotlib.patches import Polygon
 
 from warpimpact.plotting.poses import Pose, pose_at_step, silhouette
 from warpimpact.plotting.trajectory import two_views
+from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
 from warpimpact.results.files import OutputError
 
@@ -35,13 +36,13 @@ def animation(dataset: xarray.Dataset) -> FuncAnimation:
     for view, axes in panels.items():
         axes.add_patch(cores[view])
         axes.plot(*np.array([pose.position[[0, "xyz".index(view)]] for pose in poses]).T * _MM, "k--", lw=0.8)
-    title = figure.get_suptitle().rstrip(": ")
+    title = f"hit {dataset.attrs[attr.HIT]}"
 
     def show(frame: int) -> list[Polygon]:
         for view, core in cores.items():
             core.set_xy(silhouette(dataset, poses[frame], view) * _MM)
         tilt = np.degrees(np.arccos(np.clip(poses[frame].axis @ _line_of_fire(dataset), -1.0, 1.0)))
-        figure.suptitle(f"{title}\n{times[frame] * _US:5.1f} µs, {speeds[frame]:.0f} m/s, tilt {tilt:.1f}°")
+        figure.suptitle(f"{title}: {times[frame] * _US:5.1f} µs, {speeds[frame]:.0f} m/s, tilt {tilt:.1f}°")
         return list(cores.values())
 
     show(0)

@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 
 from warpimpact.analysis.bursts import PASSED_ALONE, Bursts, bursts
 from warpimpact.plotting.cell import shots_text
-from warpimpact.plotting.heading import heading
+from warpimpact.plotting.heading import inscribe
 from warpimpact.plotting.style import BLUE, GREY, VERMILION, hide_sides
 
 if TYPE_CHECKING:
@@ -46,8 +46,7 @@ def bursts_figure(dataset: xarray.Dataset) -> Figure:
     below_left.set_xticks(range(1, len(result.orders) + 1))
     below_left.margins(x=0.1)
     below_right.set_xlabel("distance to the nearest earlier hit [mm]")
-    figure.suptitle(heading(dataset))
-    figure.supxlabel(f"{shots_text(dataset)}; 95 % intervals; {PASSED_ALONE}", fontsize="small", color="0.3")
+    inscribe(figure, dataset, f"{shots_text(dataset)}; 95 % intervals; {PASSED_ALONE}")
     return figure
 
 

@@ -9,8 +9,10 @@ from typing import TYPE_CHECKING
 from matplotlib.figure import Figure
 from matplotlib.layout_engine import ConstrainedLayoutEngine
 
-from warpimpact.analysis.comparison_text import hits_used
+from warpimpact.analysis.comparison_short import deciding, from_best
+from warpimpact.analysis.comparison_text import hits_used, is_ranked
 from warpimpact.analysis.plate_text import weights_text
+from warpimpact.plotting.heading import add_heading, legend_below
 from warpimpact.plotting.style import BLUE, GREY, VERMILION, bars, hide_sides
 
 if TYPE_CHECKING:
@@ -18,7 +20,8 @@ if TYPE_CHECKING:
 
     from matplotlib.axes import Axes
 
-    from warpimpact.analysis.comparison_text import Comparison, Difference
+    from warpimpact.analysis.comparison_text import Comparison
+    from warpimpact.analysis.contestants import Difference
 from warpimpact.analysis.effectiveness import Score
 
 # Markers differ for a print in grey.
@@ -33,35 +36,48 @@ _ROW, _MARGIN = 0.42, 0.75
 """Height of a line, and of the margin of a panel [inch]."""
 
 
-def comparison_figure(comparison: Comparison) -> Figure:
-    """Measures of every plate on the left, differences between plates on the right, with their intervals.
+def comparison_figure(comparison: Comparison, *, every: bool = False) -> Figure:
+    """The measure that decides: of every plate on the left, and by how much each differs from the best one on the
+    right, with intervals.
 
     A hollow marker means that the interval of a difference contains 0: the plates cannot be told apart.
 
     Args:
         comparison: the result of `analysis.comparison.compare`.
+        every: whether to draw every measure, and the differences of all pairs.
     """
+    decides = deciding(comparison)
     quantities = [list(measures) for _, measures in groupby(comparison.plates[0].measures, key=_quantity)]
-    pairs = {(pair.one, pair.other) for pair in comparison.differences}
+    if decides is not None and not every:
+        quantities = [measures for measures in quantities if _quantity(measures[0]) == _quantity(decides)]
+    differences = [
+        list(comparison.differences) if every or decides is None else _from_best(comparison, measures)
+        for measures in quantities
+    ]
+    pairs = max((len({(pair.one, pair.other) for pair in shown}) for shown in differences), default=0)
     heights = [
-        _MARGIN + _ROW * max(len(comparison.plates), len(pairs)) * (1.5 if len(measures) > 1 else 1.0)
+        _MARGIN + _ROW * max(len(comparison.plates), pairs) * (1.5 if len(measures) > 1 else 1.0)
         for measures in quantities
     ]
     figure = Figure(figsize=(12.0, sum(heights) + 1.1), layout=ConstrainedLayoutEngine(h_pad=0.12))
     panels = figure.subplots(len(quantities), 2, squeeze=False, height_ratios=heights)
-    for measures, (left, right) in zip(quantities, panels, strict=True):
+    for measures, shown, (left, right) in zip(quantities, differences, panels, strict=True):
         _draw_plates(left, comparison, measures)
-        _draw_differences(right, comparison, measures)
+        _draw_differences(right, comparison, measures, shown)
     entries = [zip(*reversed(left.get_legend_handles_labels()), strict=True) for left in panels[:, 0]]
     legend = {label: handle for entry in entries for label, handle in entry}  # each entry once
-    figure.legend(legend.values(), legend.keys(), loc="outside lower center", ncols=4, frameon=False)
-    used = "\n".join(hits_used(comparison))
+    legend_below(figure, list(legend.values()), list(legend), 4)
     drawn = any(pair.parameters for pair in comparison.differences)
-    both = "by hits (thin lines) and by parameters (broad ones)" if drawn else ""
-    figure.suptitle(
-        f"{used}\n95 % intervals {both}".rstrip() + "; hollow marker: cannot be told apart", fontsize="medium"
-    )
+    both = " by hits (thin lines) and by parameters (broad ones)" if drawn else ""
+    title = "Plates compared" if decides is None or every else f"Plates by {decides.measure.label}"
+    add_heading(figure, title, f"95 % intervals{both}; hollow marker: cannot be told apart", *hits_used(comparison))
     return figure
+
+
+def _from_best(comparison: Comparison, measures: Sequence[Score]) -> list[Difference]:
+    """Differences from the best plate in each of some measures that rank plates."""
+    names = [measure.name for measure in measures if is_ranked(comparison, measure.name)]
+    return [pair for name in names for pair in from_best(comparison, name)]
 
 
 def _quantity(score: Score) -> tuple[str, bool]:
@@ -90,11 +106,13 @@ def _draw_plates(axes: Axes, comparison: Comparison, measures: Sequence[Score]) 
     axes.set_title(_title(measures[0]), fontsize="medium", loc="left")
 
 
-def _draw_differences(axes: Axes, comparison: Comparison, measures: Sequence[Score]) -> None:
+def _draw_differences(
+    axes: Axes, comparison: Comparison, measures: Sequence[Score], differences: Sequence[Difference]
+) -> None:
     """Draw the differences in one quantity, a line per pair of plates."""
     names = {measure.name: measure for measure in measures}
     lines: dict[tuple[str, str], int] = {}
-    for pair in comparison.differences:
+    for pair in differences:
         if pair.measure in names:
             line = lines.setdefault((pair.one, pair.other), len(lines))
             _, marker, colour, offset = _STYLES[names[pair.measure].measure.kind]

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from textwrap import wrap
 from typing import TYPE_CHECKING
 
 import numpy as np
 from matplotlib.figure import Figure
+
+from warpimpact.plotting.heading import add_heading, note_lines
 
 if TYPE_CHECKING:
     from warpimpact.scene import Core
@@ -21,9 +22,9 @@ def core_figure(core: Core, title: str, evidence: str) -> Figure:
 
     Args:
         title: its name.
-        evidence: stands below the title.
+        evidence: stands below the figure.
     """
-    lines = wrap(evidence, 85)
+    lines = note_lines(_WIDTH, "", [evidence])
     s = np.linspace(0.0, core.length, _STATIONS)
     r = core.radius(s)
     height = 0.95 * _WIDTH * 2.0 * core.max_radius / core.length + 1.1 + 0.2 * len(lines)
@@ -38,5 +39,5 @@ def core_figure(core: Core, title: str, evidence: str) -> Figure:
     )
     axes.set(aspect="equal", xlabel="behind the nose [mm]", ylabel="radius [mm]")
     numbers = f"{core.length * _MM:.4g} mm, \u2300 {2 * core.max_radius * _MM:.4g} mm, {properties.mass * _G:.4g} g"
-    figure.suptitle("\n".join([f"{title}: {numbers}", *lines]), fontsize="medium")
+    add_heading(figure, f"{title}: {numbers}", evidence)
     return figure

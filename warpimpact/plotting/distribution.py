@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import xarray
 from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator
 
 from warpimpact.analysis.hit_map import hit_points
 from warpimpact.analysis.local import NEIGHBOURS, plane_fit, share_of
@@ -25,7 +26,7 @@ from warpimpact.plotting.cell import (
     struck,
     tree_of,
 )
-from warpimpact.plotting.heading import heading
+from warpimpact.plotting.heading import LINE, inscribe, names, note_lines
 from warpimpact.plotting.style import BLUE, VERMILION
 from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
@@ -43,6 +44,7 @@ _MM = 1e3
 _LONGER_SIDE = 4.2  # of a map on paper [inch]
 _BANDS = {"5 to 95 %": (0.05, 0.95, 0.2), "25 to 75 %": (0.25, 0.75, 0.4)}  # two quantiles and the opacity
 _PER_STRIP, _MOST_STRIPS = 50, 48  # fewest hits of a strip; most strips along an axis
+_NARROW = 16  # characters of a label along 1.2 inch
 _FINE = 100  # pixels along the longer side of a smoothed map
 _MOST_POINTS = 4000  # more are drawn as a density
 
@@ -55,9 +57,12 @@ def marginals(dataset: xarray.Dataset, variable: str, standoff: float | None = N
     """
     column = shown(dataset, variable, standoff)
     size = _map_size(dataset)
-    figure = Figure(figsize=(size[0] + 4.6, size[1] + 2.9), layout="constrained")
-    figure.suptitle(f"{heading(dataset)}\n{column.title}")
-    centre = figure.subplots()
+    notes = column.title, f"{shots_text(dataset)}; seen from behind the plate"
+    left, width = 0.95, size[0] + 4.8
+    below = 1.25 + LINE * len(note_lines(width, "", [*notes, *names(dataset)]))
+    height = below + size[1] + 1.9
+    figure = Figure(figsize=(width, height))  # a layout engine does not find a place for insets of fixed size
+    centre = figure.add_axes((left / width, below / height, size[0] / width, size[1] / height))
     artist = draw_values(centre, dataset, column.values, scale_of([column.values], signed=column.signed))
     exists = np.isfinite(column.values)
     if exists.any():
@@ -69,22 +74,22 @@ def marginals(dataset: xarray.Dataset, variable: str, standoff: float | None = N
         values, points = column.values[exists], hit_points(dataset)[exists] * _MM
         _draw_strips(above, points[:, 0], values, upright=False)
         _draw_strips(beside, points[:, 1], values, upright=True)
-        above.set_ylabel(column.label)
-        beside.set_xlabel(column.label)
+        above.set_ylabel(fill(column.label, _NARROW))
+        beside.set_xlabel(fill(column.label, _NARROW))
+        beside.xaxis.set_major_locator(MaxNLocator(2, prune="both"))  # its numbers stay apart from those of the map
         figure.colorbar(artist, cax=bar).set_ticks([])
         histogram.hist(values, bins=min(40, 4 + len(values) // 20), orientation="horizontal", color=BLUE, alpha=0.5)
         histogram.axhline(np.median(values), color="black", lw=1.2)
         histogram.set(ylim=artist.get_clim() if np.ptp(values) else None, xlabel="hits", ylabel=column.label)
         histogram.yaxis.tick_right()
         histogram.yaxis.set_label_position("right")
-    figure.supxlabel(f"{shots_text(dataset)}; seen from behind the plate", fontsize="small", color="0.3")
+    inscribe(figure, dataset, *notes)
     return figure
 
 
 def dispersion(dataset: xarray.Dataset, standoff: float | None = None) -> Figure:
     """Residual velocity against tilt at a stand-off (None: the largest), with the distribution of each."""
     figure = Figure(figsize=(7.5, 6.5), layout="constrained")
-    figure.suptitle(f"{heading(dataset)}\ncores that passed the {struck(dataset)}")
     grid = {"width_ratios": [5.0, 1.2], "height_ratios": [1.2, 5.0]}
     (above, corner), (centre, beside) = figure.subplots(2, 2, sharex="col", sharey="row", gridspec_kw=grid)
     corner.remove()
@@ -97,7 +102,7 @@ def dispersion(dataset: xarray.Dataset, standoff: float | None = None) -> Figure
         axes.label_outer()
     above.set_ylabel("hits")
     beside.set_xlabel("hits")
-    figure.supxlabel(shots_text(dataset), fontsize="small", color="0.3")
+    inscribe(figure, dataset, f"cores that passed the {struck(dataset)}; {shots_text(dataset)}")
     return figure
 
 
@@ -230,14 +235,13 @@ def _local_maps(dataset: xarray.Dataset, images: Array, labels: Sequence[str], t
     a probability is that of all of them."""
     width, height = _map_size(dataset)
     figure = Figure(figsize=(len(images) * (width + 2.0) + (len(images) < 2), height + 1.9), layout="constrained")
-    figure.suptitle(f"{heading(dataset)}\n{title}")
     panels = figure.subplots(1, len(images), sharex=True, sharey=True, squeeze=False)[0]
     for axes, image, label in zip(panels, images, labels, strict=True):
         scale = scale_of([np.array([0.0, 1.0])] if label.startswith("P(") else [image.ravel()])
         figure.colorbar(paint_pixels(axes, dataset, image, scale), ax=axes, label=label)
         draw_holes(axes, dataset)
     note = f"{method.format(NEIGHBOURS)}; {shots_text(dataset)}; seen from behind the plate"
-    figure.supxlabel(fill(note, int(15 * figure.get_figwidth())), fontsize="small", color="0.3")
+    inscribe(figure, dataset, title, note)
     return figure
 
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Mapping
-from textwrap import fill
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -13,6 +12,7 @@ from matplotlib.figure import Figure
 from matplotlib.layout_engine import ConstrainedLayoutEngine
 
 from warpimpact.firing.firing_view import verdict
+from warpimpact.plotting.heading import add_heading
 from warpimpact.plotting.style import BLUE, GREEN, VERMILION
 from warpimpact.results import attributes as attr
 from warpimpact.results import firing as f
@@ -48,7 +48,7 @@ def firing_figure(dataset: xarray.Dataset) -> Figure:
         draw(panel, dataset, settings)
     for empty in axes[len(panels) :]:
         empty.set_axis_off()
-    figure.suptitle(f"{fill(str(dataset.attrs[attr.TITLE]), 100)}\n{dataset.attrs[f.DISCLAIMER]}", fontsize=11)
+    add_heading(figure, str(dataset.attrs[attr.TITLE]), str(dataset.attrs[f.DISCLAIMER]))
     return figure
 
 
@@ -208,6 +208,5 @@ def directions_figure(dataset: xarray.Dataset) -> Figure:
     low, high = dataset.attrs[f.MEAN_INTERVAL]
     weight = json.loads(dataset.attrs[f.SETTINGS])["directions"]["weight"].replace("_", " ")
     mean = f"mean by {weight}: {float(dataset.attrs[f.MEAN]):.3g} ({low:.3g} to {high:.3g}); larger dots: more hits"
-    figure.suptitle(f"{fill(str(dataset.attrs[attr.TITLE]), 75)}\n{mean}", fontsize=11)
-    figure.supxlabel(dataset.attrs[f.DISCLAIMER], fontsize="medium")
+    add_heading(figure, str(dataset.attrs[attr.TITLE]), mean, str(dataset.attrs[f.DISCLAIMER]))
     return figure

@@ -12,9 +12,9 @@ from matplotlib.figure import Figure
 
 from warpimpact.campaign.campaign import Campaign
 from warpimpact.campaign.text import CampaignError
+from warpimpact.plotting.heading import inscribe
 from warpimpact.plotting.plate import hole_patches
 from warpimpact.plotting.style import BLUE, GREEN, GREY, VERMILION, hide_sides
-from warpimpact.results import attributes as attr
 from warpimpact.results import front as f
 
 if TYPE_CHECKING:
@@ -52,7 +52,15 @@ def front_figure(dataset: xarray.Dataset, folder: Path = Path()) -> Figure:
     left, right = rows[-1].subfigures(1, 2, width_ratios=(1.7, 1.0))
     _draw_front(left.subplots(), dataset, names)
     _draw_variables(right, dataset, leaders)
-    figure.suptitle(fill(str(dataset.attrs[attr.TITLE]), 110))
+    notes = [f"of each plate {_THUMBNAIL:g} mm × {_THUMBNAIL:g} mm"] if names else []
+    searched = np.isfinite(dataset[f.FOUND].values).all(axis=1)
+    searched[dataset[f.NUMBER].values] = False
+    if hidden := int((searched & ~holding(dataset)).sum()):
+        notes.append(
+            f"left out: {hidden} of {dataset.sizes['design']} designs, beyond the front by the few hits of the search "
+            "alone"
+        )
+    inscribe(figure, dataset, "; ".join(notes))
     return figure
 
 
@@ -61,6 +69,19 @@ def front_leaders(dataset: xarray.Dataset) -> np.ndarray[Any, np.dtype[np.int64]
     group, kept = dataset[f.GROUP].values, dataset[f.KEPT].values
     leads = (group == np.arange(len(group))) & (kept == 1)
     return np.flatnonzero(leads)
+
+
+def holding(dataset: xarray.Dataset) -> np.ndarray[Any, np.dtype[np.bool_]]:
+    """Designs that a leader of the front equals or beats in every objective, or that break a bound, shape [designs].
+
+    The others lie beyond the front by the few hits of the search only: among many designs the luckiest are the best.
+    """
+    goals, sign = np.isnan(dataset[f.LIMIT].values), dataset[f.SIGN].values
+    limits, searched = sign * dataset[f.LIMIT].values, sign * dataset[f.FOUND].values
+    front = (sign * dataset[f.FRESH].values)[front_leaders(dataset)][:, goals]
+    breaks = (searched[:, ~goals] > limits[~goals]).any(axis=1)
+    beaten = (front[None] <= searched[:, None, goals]).all(axis=-1).any(axis=1)
+    return np.asarray(breaks | beaten | (len(front) == 0))
 
 
 def _draw_plates(figure: SubFigure, dataset: xarray.Dataset, names: dict[int, str], folder: Path) -> None:
@@ -76,7 +97,6 @@ def _draw_plates(figure: SubFigure, dataset: xarray.Dataset, names: dict[int, st
         for patch in hole_patches(plate, axes):
             axes.add_patch(patch)
         axes.set_title(f"{letter}: {1e3 * plate.thickness:.3g} mm, {plate.open_area:.0%} open", fontsize="medium")
-    panels[0].set_xlabel(f"{_THUMBNAIL:g} mm × {_THUMBNAIL:g} mm", fontsize="small", color="0.3")
 
 
 def _plate(text: str, folder: Path) -> Plate | None:
@@ -92,7 +112,8 @@ def _draw_front(axes: Axes, dataset: xarray.Dataset, names: dict[int, str]) -> N
     goals = [place for place in range(len(labels)) if np.isnan(limits[place])]
     across, up = goals[0], goals[min(1, len(goals) - 1)]
     every, fresh = dataset[f.FOUND].values, dataset[f.FRESH].values
-    axes.plot(every[:, across], every[:, up], ".", color="0.82", markersize=3, zorder=1, label="computed designs")
+    shown = holding(dataset)
+    axes.plot(every[shown, across], every[shown, up], ".", color="0.82", markersize=3, zorder=1, label="other designs")
     if len(fresh):
         _draw_fresh(axes, dataset, (across, up), goals[2] if len(goals) == 3 else None)
         solid = dataset[f.SOLID].values
@@ -105,9 +126,9 @@ def _draw_front(axes: Axes, dataset: xarray.Dataset, names: dict[int, str]) -> N
         ends = _bars(dataset, (f.REFERENCE_FOUND, f.REFERENCE_LOW, f.REFERENCE_HIGH), up)[:, place : place + 1]
         point: dict[str, Any] = {"color": VERMILION, "markersize": 11, "zorder": 5}
         axes.errorbar(at[across], at[up], yerr=ends, fmt=mark, label=str(name), **point)
-    for place, letter in names.items():
-        at = fresh[place, across], fresh[place, up]
-        axes.annotate(letter, at, xytext=(6, 6), textcoords="offset points", weight="bold", zorder=6)
+    for number, (place, letter) in enumerate(names.items()):
+        at, above = (fresh[place, across], fresh[place, up]), number % 2 == 0  # neighbours may lie close together
+        axes.annotate(letter, at, xytext=(6, 6 if above else -15), textcoords="offset points", weight="bold", zorder=6)
     better = [
         "less is better" if dataset[f.SIGN].values[objective] > 0 else "more is better" for objective in (across, up)
     ]

@@ -1,44 +1,89 @@
-"""What stands over a figure: the title, broken into lines where it is wider than the figure, and the names of the
-catalogue with their evidence."""
+"""What stands over and under a figure: its title in one line, and below the figure notes on what it shows, with the
+names of the catalogue and their evidence."""
 
 from __future__ import annotations
 
-from textwrap import fill, wrap
+from textwrap import wrap
 from typing import TYPE_CHECKING
+
+from matplotlib.font_manager import FontProperties
 
 from warpimpact.results import attributes as attr
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     import xarray
+    from matplotlib.artist import Artist
     from matplotlib.figure import Figure
 
-_WIDTH = 80
-_BELOW_THE_TOP = 0.12
-"""Distance of a title from the top of the figure [inch]."""
-_LETTERS = 9.5
-"""Average number of letters in an inch of a title."""
+_FROM_EDGE = 0.12
+"""Distance of title and notes from the edge of a figure without layout engine [inch]."""
+_TITLE_SIZE, _SMALLEST_TITLE = 12.0, 9.0
+"""Font sizes of a title [pt]: as it is, and where it is long."""
+_TITLE_LETTERS, _NOTE_LETTERS = 9.0, 15
+"""Average number of letters in an inch of a title of the first size, and of a note."""
+LINE = 0.15
+"""Height of a line of a note [inch]."""
 
 
-def add_heading(figure: Figure, title: str) -> None:
-    """Write a title at the top of a figure.
+def add_heading(figure: Figure, title: str, *notes: str) -> None:
+    """Write a title in one line at the top of a figure, and each note from a line of its own below the figure.
 
-    Where matplotlib breaks lines, it measures what stands between two dollars as a formula, also where text is no
-    formula; it fails there if that is none. Lines with a dollar are broken by their letters.
+    A long title is written smaller. What still is wider than the figure is cut, and stands whole before the notes.
     """
-    inch, formula = 1.0 / figure.get_figheight(), "$" in title
-    if formula:
-        letters = int(_LETTERS * figure.get_figwidth())
-        title = "\n".join(fill(line, letters) for line in title.split("\n"))
-    figure.suptitle(title, y=1.0 - _BELOW_THE_TOP * inch, va="top", wrap=not formula)
+    line, size = _in_one_line(title, figure.get_figwidth())
+    placed = figure.get_layout_engine() is None
+    top = {"y": 1.0 - _FROM_EDGE / figure.get_figheight(), "va": "top"} if placed else {}
+    figure.suptitle(line, fontsize=size, **top)
+    lines = note_lines(figure.get_figwidth(), title, notes)
+    if lines:
+        _write_notes(figure, "\n".join(lines))
 
 
-def heading(dataset: xarray.Dataset, width: int = _WIDTH) -> str:
-    """The title of a result; below it a line of at most `width` characters, or several, for every name."""
-    return "\n".join([dataset.attrs.get(attr.TITLE, ""), *names(dataset, width)])
+def inscribe(figure: Figure, dataset: xarray.Dataset, *notes: str, title: str = "") -> None:
+    """Write the title of a result over a figure, or another one; below it the notes and the names of the catalogue."""
+    own = str(dataset.attrs.get(attr.TITLE, ""))
+    add_heading(figure, title or own, *([own] if title else []), *notes, *names(dataset))
 
 
-def names(dataset: xarray.Dataset, width: int = _WIDTH) -> list[str]:
-    """Lines of the names of the catalogue that a result has, each with the state of its evidence."""
+def legend_below(figure: Figure, handles: Sequence[Artist], labels: Sequence[str], columns: int) -> None:
+    """Add the legend of a figure with a layout engine below its panels; notes that the figure has become its title, as
+    nothing else keeps both apart."""
+    figure.legend(handles, labels, loc="outside lower center", ncols=columns, frameon=False)
+    if notes := figure.get_supxlabel():
+        figure.supxlabel("")
+        _write_notes(figure, notes)
+
+
+def note_lines(width: float, title: str, notes: Sequence[str]) -> list[str]:
+    """Lines below a figure of a width [inch]."""
+    cut = [title] if _in_one_line(title, width)[0] != title else []
+    return [line for note in [*cut, *notes] for line in wrap(note, int(_NOTE_LETTERS * width))]
+
+
+def names(dataset: xarray.Dataset) -> list[str]:
+    """A sentence for every name of the catalogue that a result has, with the state of its evidence."""
     lines = dataset.attrs.get(attr.EVIDENCE, "").splitlines()
-    named = [line for line in lines if not line.startswith((attr.RESTS_ON, attr.NOT_TESTED))]
-    return [part for line in named for part in wrap(line, width)]
+    return [line for line in lines if not line.startswith((attr.RESTS_ON, attr.NOT_TESTED))]
+
+
+def _in_one_line(title: str, width: float) -> tuple[str, float]:
+    """A title that fits into a width [inch], and its font size [pt]."""
+    line, letters = " ".join(title.split()), _TITLE_LETTERS * width
+    size = max(_SMALLEST_TITLE, min(_TITLE_SIZE, _TITLE_SIZE * letters / max(len(line), 1)))
+    most = int(letters * _TITLE_SIZE / size)
+    return (line if len(line) <= most else line[: most - 1].rstrip() + "…"), size
+
+
+def _write_notes(figure: Figure, text: str) -> None:
+    """Below all else; over the legend where a layout engine has placed one there."""
+    if figure.get_layout_engine() is None:
+        place = {"y": _FROM_EDGE / figure.get_figheight(), "va": "bottom"}
+        figure.supxlabel(text, fontsize="small", color="0.3", **place)
+    elif figure.legends:
+        (legend,) = figure.legends
+        legend.set_title(text, prop=FontProperties(size="small"))
+        legend.get_title().set_color("0.3")
+    else:
+        figure.supxlabel(text, fontsize="small", color="0.3")

@@ -9,7 +9,7 @@ import xarray
 from matplotlib.figure import Figure
 
 from warpimpact.analysis.slabs import LayerField, fields_behind
-from warpimpact.plotting.heading import heading
+from warpimpact.plotting.heading import inscribe
 from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
 
@@ -28,9 +28,7 @@ def layers(dataset: xarray.Dataset) -> Figure:
     """
     fields, times = fields_behind(dataset), dataset[v.SNAPSHOT].values
     figure = Figure(figsize=(2.5 * len(times) + 1.6, 2.9 * len(fields) + 0.9), layout="constrained")
-    figure.suptitle(
-        f"{heading(dataset)}\nhit {dataset.attrs[attr.HIT]}: resistance left in the layers, seen from behind"
-    )
+    inscribe(figure, dataset, title=f"hit {dataset.attrs[attr.HIT]}: resistance left in the layers, seen from behind")
     panels = figure.subplots(len(fields), len(times), squeeze=False, sharex="row", sharey="row")
     for row, layer in zip(panels, fields, strict=True):
         extent = [*_edges(layer.cell_y), *_edges(layer.cell_z)]

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from itertools import cycle
-from textwrap import fill
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -16,7 +15,7 @@ from warpimpact.analysis.hit_map import hit_points
 from warpimpact.analysis.plate_text import reference_name
 from warpimpact.analysis.proxy import inclination
 from warpimpact.plotting.cell import draw_values, limits, scale_of, shown
-from warpimpact.plotting.heading import heading
+from warpimpact.plotting.heading import inscribe
 from warpimpact.plotting.style import BLUE, GREY, VERMILION
 from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
@@ -33,6 +32,8 @@ _CURVE = {
     "thickness": ("thickness of {}", "share of the hits whose limit is thinner"),
 }
 _LONGER_SIDE = 4.2  # of the map on paper [inch]
+_LOW_SHARE = 0.15
+"""Shares up to this have their name above the point."""
 
 
 def limit_figure(dataset: xarray.Dataset) -> Figure:
@@ -59,10 +60,9 @@ def limit_figure(dataset: xarray.Dataset) -> Figure:
 
 
 def _inscribe(figure: Figure, dataset: xarray.Dataset) -> None:
-    note = fill(f"{dataset.sizes['hit']} hits, {promise_line(dataset)}", 110)
-    figure.suptitle(f"{heading(dataset)}\n{note}", fontsize=10)
-    if sources := dict.fromkeys(row.published.source for row in published_beside(dataset)):
-        figure.supxlabel(fill("published: " + "; ".join(sources), 110), fontsize=8)
+    sources = "; ".join(dict.fromkeys(row.published.source for row in published_beside(dataset)))
+    published = [f"published: {sources}"] if sources else []
+    inscribe(figure, dataset, f"{dataset.sizes['hit']} hits, {promise_line(dataset)}", *published)
 
 
 def _over_obliquity(dataset: xarray.Dataset, quantity: str) -> Figure:
@@ -160,7 +160,8 @@ def _draw_curve(axes: Axes, dataset: xarray.Dataset, quantity: str) -> None:
             axes.plot([low, high], [level, level], color=VERMILION, linewidth=4, alpha=0.4, solid_capstyle="butt")
             axes.plot(factor * estimate.value, level, "o", color=VERMILION, markersize=5)
             text = f" {measure.text} = {factor * estimate.value:.4g} {unit}"
-            axes.annotate(text, (factor * estimate.value, level), xytext=(8, -12), textcoords="offset points")
+            beside = (8, -12) if level > _LOW_SHARE else (8, 5)  # a low one would sit on the axis below
+            axes.annotate(text, (factor * estimate.value, level), xytext=beside, textcoords="offset points")
     reference = solid_limits(dataset)
     if reference is not None:
         mean = factor * float(np.nanmean(reference[v.LIMITS[quantity].value].values))

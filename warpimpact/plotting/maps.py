@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from textwrap import fill
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -24,7 +23,8 @@ from warpimpact.plotting.distribution import (
     probability_map,
     uncertainty,
 )
-from warpimpact.plotting.heading import add_heading, heading, names
+from warpimpact.plotting.heading import LINE, add_heading, names, note_lines
+from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
 from warpimpact.results.dataset import passed, status_codes
 from warpimpact.results.files import OutputError
@@ -43,10 +43,8 @@ _LONGER_SIDE = 4.2
 _LEFT, _RIGHT, _ABOVE, _BELOW = 0.75, 1.15, 0.55, 1.2
 _NARROWEST_PANEL = 5.4  # holds the legend
 _HEAD, _FOOT = 0.5, 0.3
-_LINE, _NAMES = 0.2, 60  # of the names: height, and the most characters
 _BELOW_NO_LEGEND, _FOOT_WITH_LEGEND = 0.65, 0.85
 _MOST_COLUMNS = 3
-_LETTERS = 15  # of a note in an inch
 
 
 def variable_map(dataset: xarray.Dataset, variable: str, standoff: float | None = None) -> Figure:
@@ -87,15 +85,15 @@ def variable_maps(datasets: Mapping[str, xarray.Dataset], variable: str, standof
     Args:
         datasets: results by the names that their maps get; the others as in `variable_map`.
     """
-    figure, panels = _sheet(list(datasets.values()), columns=min(_MOST_COLUMNS, len(datasets)))
     columns = [averaged(dataset, shown(dataset, variable, standoff)) for dataset in datasets.values()]
     scale = scale_of([column.values for column in columns], signed=columns[0].signed)
+    title, *_ = columns[0].title.splitlines()
+    notes = ("seen from behind the plates; colours and lengths to the same scale",)
+    figure, panels = _sheet(list(datasets.values()), min(_MOST_COLUMNS, len(datasets)), title, notes)
     last = len(panels) - 1
     for place, (axes, (name, dataset), column) in enumerate(zip(panels, datasets.items(), columns, strict=True)):
         _draw(axes, dataset, column._replace(title=f"{name}\n{shots_text(dataset)}"), scale, bar=place == last)
     _share_legend(figure, panels)
-    title, *_ = columns[0].title.splitlines()
-    _inscribe(figure, title, "seen from behind the plates; colours and lengths to the same scale")
     return figure
 
 
@@ -223,15 +221,15 @@ def _saved(figures: Mapping[str, Figure], folder: Path, stem: str, *, overwrite:
 
 def _sheet_of_one(dataset: xarray.Dataset, *, maps: int, columns: int, note: str = "") -> tuple[Figure, list[Axes]]:
     """A sheet for several maps of one result, with title and note."""
-    figure, panels = _sheet([dataset] * maps, columns=columns, lines=len(names(dataset, _NAMES)))
     folded = "; all hits of the bursts, folded into the cell" if is_folded(dataset) else ""
-    note_below = f"{shots_text(dataset)}; seen from behind the plate{note}{folded}"
-    _inscribe(figure, heading(dataset, _NAMES), note_below)
-    return figure, panels
+    notes = f"{shots_text(dataset)}; seen from behind the plate{note}{folded}", *names(dataset)
+    return _sheet([dataset] * maps, columns, str(dataset.attrs.get(attr.TITLE, "")), notes)
 
 
-def _sheet(datasets: Sequence[xarray.Dataset], *, columns: int, lines: int = 0) -> tuple[Figure, list[Axes]]:
-    """Figure with a place for a map of each result, row by row, all to one scale; `lines` of text follow the title.
+def _sheet(
+    datasets: Sequence[xarray.Dataset], columns: int, title: str, notes: Sequence[str]
+) -> tuple[Figure, list[Axes]]:
+    """Figure with a place for a map of each result, row by row, all to one scale, with its title and notes.
 
     The maps show the whole cell and every hit. Their size follows from that extent; the room round them is
     the same on every figure, so that maps of one plate can be laid side by side.
@@ -242,9 +240,11 @@ def _sheet(datasets: Sequence[xarray.Dataset], *, columns: int, lines: int = 0) 
     rows, (widest, tallest) = -(-len(datasets) // columns), sizes.max(axis=0)
     panel_width = max(_LEFT + widest + _RIGHT, _NARROWEST_PANEL)
     panel_height = _ABOVE + tallest + below
-    head = _HEAD + _LINE * lines
-    width, height = columns * panel_width, head + rows * panel_height + foot
+    width = columns * panel_width
+    foot += LINE * max(0, len(note_lines(width, title, notes)) - 1)
+    height = _HEAD + rows * panel_height + foot
     figure = Figure(figsize=(width, height))
+    add_heading(figure, title, *notes)
     panels = []
     for number, (map_width, map_height) in enumerate(sizes):
         row, column = divmod(number, columns)
@@ -252,13 +252,6 @@ def _sheet(datasets: Sequence[xarray.Dataset], *, columns: int, lines: int = 0) 
         bottom = foot + (rows - 1 - row) * panel_height + below + (tallest - map_height) / 2
         panels.append(figure.add_axes((left / width, bottom / height, map_width / width, map_height / height)))
     return figure, panels
-
-
-def _inscribe(figure: Figure, title: str, note: str) -> None:
-    height = figure.get_figheight()
-    add_heading(figure, title)
-    lines = fill(note, int(_LETTERS * figure.get_figwidth()))
-    figure.supxlabel(lines, y=0.12 / height, va="bottom", fontsize="small", color="0.3")
 
 
 def _share_legend(figure: Figure, panels: Sequence[Axes]) -> None:
@@ -269,7 +262,7 @@ def _share_legend(figure: Figure, panels: Sequence[Axes]) -> None:
         entries |= {label: handle for label, handle in zip(labels, legend.legend_handles, strict=True) if handle}
         legend.remove()
     if entries:
-        place = (0.5, 0.3 / figure.get_figheight())
+        place = (0.5, (0.3 + LINE * figure.get_supxlabel().count("\n")) / figure.get_figheight())
         figure.legend(
             entries.values(), entries, loc="lower center", bbox_to_anchor=place, ncols=len(entries), frameon=False
         )

@@ -13,6 +13,7 @@ from matplotlib.figure import Figure
 from warpimpact.identification.fit_file import fit_from
 from warpimpact.identification.posterior import learnt, parameters_of
 from warpimpact.identification.posterior_view import unit_of
+from warpimpact.plotting.heading import add_heading, legend_below
 from warpimpact.plotting.style import BLUE, VERMILION
 from warpimpact.results import attributes as attr
 from warpimpact.results import posterior_file
@@ -42,7 +43,6 @@ def pairs_figure(tree: xarray.DataTree) -> Figure:
     names = parameters_of(tree)
     size = max(4.5, 1.75 * len(names))
     figure = Figure(figsize=(size + 1.2, size + 0.9), layout="constrained")
-    figure.suptitle(f"{tree.attrs[attr.TITLE]}\nposterior (blue) and prior (grey); {_worth(tree)}")
     panels = figure.subplots(len(names), len(names), squeeze=False)
     knowledge = learnt(tree)
     for row, below in enumerate(names):
@@ -69,6 +69,7 @@ def pairs_figure(tree: xarray.DataTree) -> Figure:
                 axes.set_xlabel(label_x.replace(" [", "\n["), fontsize="small")
             if column == 0 and row > 0:
                 axes.set_ylabel(label_y.replace(" [", "\n["), fontsize="small")
+    add_heading(figure, str(tree.attrs[attr.TITLE]), f"posterior (blue) and prior (grey); {_worth(tree)}")
     return figure
 
 
@@ -96,7 +97,6 @@ def measured_figure(tree: xarray.DataTree) -> Figure:
     kinds = list(dict.fromkeys(units)) or ["1"]
     counts = [max(1, units.count(kind)) for kind in kinds]
     figure = Figure(figsize=(10.0, 2.6 + 0.55 * sum(counts)), layout="constrained")
-    figure.suptitle(f"{tree.attrs[attr.TITLE]}\nmeasured and computed, {_worth(tree)}")
     panels = figure.subplots(len(kinds), 1, squeeze=False, gridspec_kw={"height_ratios": counts})[:, 0]
     for axes, kind in zip(panels, kinds, strict=True):
         rows = [place for place, unit in enumerate(units) if unit == kind]
@@ -118,7 +118,8 @@ def measured_figure(tree: xarray.DataTree) -> Figure:
         axes.set_axisbelow(True)
     handles = [_line(VERMILION, "measured, ±1 standard uncertainty", "o"), _line(BLUE, "computed at its hit")]
     handles.append(_line(_GREY, "another such shot, measured"))
-    figure.legend(handles=handles, loc="outside lower center", ncols=3, frameon=False)
+    legend_below(figure, handles, [str(handle.get_label()) for handle in handles], 3)
+    add_heading(figure, str(tree.attrs[attr.TITLE]), f"measured and computed, {_worth(tree)}")
     return figure
 
 
@@ -143,7 +144,6 @@ def hits_figure(tree: xarray.DataTree) -> Figure:
     across = min(3, len(fit.shots))
     down = -(-len(fit.shots) // across)
     figure = Figure(figsize=(4.2 * across + 0.8, 5.2 * down + 1.0), layout="constrained")
-    figure.suptitle(f"{tree.attrs[attr.TITLE]}\nwhere the shots hit, {_worth(tree)}")
     panels = figure.subplots(down, across, squeeze=False).ravel()
     for place, shot in enumerate(fit.shots):
         axes = panels[place]
@@ -164,7 +164,8 @@ def hits_figure(tree: xarray.DataTree) -> Figure:
     for axes in panels[len(fit.shots) :]:
         axes.remove()
     handles, labels = panels[0].get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside lower center", ncols=2, frameon=False)
+    legend_below(figure, handles, labels, 2)
+    add_heading(figure, str(tree.attrs[attr.TITLE]), f"where the shots hit, {_worth(tree)}")
     return figure
 
 

@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
 from warpimpact.analysis.surface import AROUND, largest_in_plate, pressed
-from warpimpact.plotting.heading import heading
+from warpimpact.plotting.heading import inscribe
 from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
 
@@ -28,10 +28,8 @@ def pressure(dataset: xarray.Dataset) -> Figure:
     step = largest_in_plate(dataset)
     surface = pressed(dataset, step)
     figure = Figure(figsize=(9.0, 6.0), layout="constrained")
-    figure.suptitle(
-        f"{heading(dataset)}\nhit {dataset.attrs[attr.HIT]}: "
-        f"normal stress under the largest force, at {float(dataset[v.TIME][step]) * _US:.1f} µs"
-    )
+    when = f"at {float(dataset[v.TIME][step]) * _US:.1f} µs"
+    inscribe(figure, dataset, title=f"hit {dataset.attrs[attr.HIT]}: normal stress under the largest force, {when}")
     axes = figure.add_subplot(projection="3d")
     x, y, z = np.moveaxis(np.concatenate([surface.point, surface.point[:, :1]], axis=1) * _MM, -1, 0)
     axes.plot_wireframe(x, y, z, rcount=24, ccount=AROUND // _SPOKES, color="0.75", linewidth=0.5)

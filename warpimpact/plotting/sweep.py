@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 
 from warpimpact.analysis.swept import Point, inputs_of, measures_of, points
 from warpimpact.plotting.cell import words
-from warpimpact.plotting.heading import heading
+from warpimpact.plotting.heading import inscribe, legend_below
 from warpimpact.results.measures import Measure
 from warpimpact.scene.display import STORED
 
@@ -56,12 +56,12 @@ def sweep_figure(sweep: xarray.Dataset, texts: Sequence[str] = ()) -> Figure:
         axes.set_xlabel(_axis_label(sweep[along]))
     if len(inputs) > 1:
         handles, labels = panels[0, 0].get_legend_handles_labels()
-        figure.legend(handles, labels, loc="outside lower center", ncols=3, frameon=False)
+        legend_below(figure, handles, labels, 3)
     counted = "; beside a value: the share of the hits that it counts, where that is not all"
     left_out = len(lines) - _MOST_LINES
     note = f"; {left_out} more combinations are not shown" if left_out > 0 else ""
     hits = f"{sweep.sizes['hit']} hits at every point, 95 % intervals"
-    figure.suptitle(f"{heading(sweep)}\n{hits}{counted}{note}")
+    inscribe(figure, sweep, f"{hits}{counted}{note}")
     return figure
 
 

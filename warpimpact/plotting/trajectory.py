@@ -20,7 +20,7 @@ from matplotlib.patheffects import Normal, Stroke
 from warpimpact.analysis.slabs import depth_of, slabs
 from warpimpact.analysis.surface import pressed
 from warpimpact.plotting.cell import struck, words
-from warpimpact.plotting.heading import heading
+from warpimpact.plotting.heading import inscribe, legend_below
 from warpimpact.plotting.layers import layers
 from warpimpact.plotting.poses import Pose, pose_at_step, poses_behind, poses_in_plate, silhouette
 from warpimpact.plotting.pressure import pressure
@@ -40,6 +40,7 @@ _COMPONENTS = {"x": "black", "y": BLUE, "z": VERMILION}
 # Blue and green as in the paper's fig. 5, but light, because the core is dark.
 _LOADS = {v.FORCE: ("#56B4E9", "kN", 1e-3), v.MOMENT: ("#009E73", "N m", 1.0)}
 _STEEL = "0.8"
+_NEAR_FRAME = 0.2  # share of the width in which a text would cross the frame
 _ARROW = 12.0  # length of the arrow of a force that lies in the view [mm]
 _ARC, _ARC_RADIUS = 300.0, 4.5  # angle [degree] and radius [mm] of the arc of a moment across the view
 
@@ -69,14 +70,19 @@ def flight(dataset: xarray.Dataset) -> Figure:
             axes.add_patch(Polygon(outline, facecolor=GREY, edgecolor="black"))
             angle = np.degrees(np.arctan2(pose.axis["xyz".index(view)], pose.axis[0]))
             angle = round(float(angle), 1) + 0.0  # no "-0.0"
-            axes.text(
-                outline[:, 0].mean(),
-                outline[:, 1].max() + 1.0,
-                f"{label}: {_ANGLES[view]} {angle:.1f}°".replace("-", "−"),
-                ha="center",
-                va="bottom",
-            )
+            text = f"{label}: {_ANGLES[view]} {angle:.1f}°".replace("-", "−")
+            x, side = _within(axes, outline[:, 0])
+            axes.text(x, outline[:, 1].max() + 1.0, text, ha=side, va="bottom")
     return figure
+
+
+def _within(axes: Axes, across: np.ndarray) -> tuple[float, str]:
+    """Where a text above a core stands, and which of its sides is there: near the frame it goes on away from that."""
+    low, high = axes.get_xlim()
+    middle = (across.mean() - low) / (high - low)
+    if middle < _NEAR_FRAME:
+        return float(across.min()), "left"
+    return (float(across.max()), "right") if middle > 1.0 - _NEAR_FRAME else (float(across.mean()), "center")
 
 
 def largest_load(dataset: xarray.Dataset) -> Figure:
@@ -136,7 +142,7 @@ def _draw_moment(axes: Axes, dataset: xarray.Dataset, step: int, view: str) -> N
 def course(dataset: xarray.Dataset) -> Figure:
     """Velocity, attitude, loads and energy against time."""
     figure = Figure(figsize=(10.0, 9.0), layout="constrained")
-    figure.suptitle(_title(dataset, f"course through the {struck(dataset)}"))
+    inscribe(figure, dataset, title=_title(dataset, f"course through the {struck(dataset)}"))
     panels = figure.subplots(3, 2, sharex=True)
     time, axis = dataset[v.TIME] * _US, dataset[v.CORE_AXIS]
     velocity = dataset[v.VELOCITY]
@@ -168,7 +174,7 @@ def plate(dataset: xarray.Dataset) -> Figure:
     limits = _touched(dataset)
     tall = np.ptp(limits["z"]) / np.ptp(limits["y"])
     figure = Figure(figsize=(3.3 * columns + 1.2, (3.1 * tall + 0.5) * rows + 0.7), layout="constrained")
-    figure.suptitle(_title(dataset, "resistance left in the plate, seen from behind"))
+    inscribe(figure, dataset, title=_title(dataset, "resistance left in the plate, seen from behind"))
     panels = figure.subplots(rows, columns, sharex=True, sharey=True, squeeze=False)
     y, z = (_cell_edges(dataset[v.CELL[axis]]) for axis in "yz")
     for panel, snapshot in zip(panels.flat, (share / share[0]).where(share[0] >= 0.5), strict=False):
@@ -206,7 +212,7 @@ def save_figures(dataset: xarray.Dataset, folder: Path, stem: str) -> list[Path]
 
 
 def _title(dataset: xarray.Dataset, what: str) -> str:
-    return f"{heading(dataset)}\nhit {dataset.attrs[attr.HIT]}: {what}"
+    return f"hit {dataset.attrs[attr.HIT]}: {what}"
 
 
 def two_views(
@@ -224,7 +230,7 @@ def two_views(
     width = corners["y"][1][0] - corners["y"][0][0]
     inch = min(9.0 / width, 8.0 / sum(heights))  # per mm
     figure = Figure(figsize=(inch * width + 1.0, inch * sum(heights) + 2.0), layout="constrained")
-    figure.suptitle(_title(dataset, what))
+    inscribe(figure, dataset, title=_title(dataset, what))
     panels = figure.subplots(2, 1, height_ratios=heights)
     for axes, (view, (low, high)) in zip(panels, corners.items(), strict=True):
         axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), aspect="equal")
@@ -240,7 +246,7 @@ def two_views(
 
 def _add_legend(figure: Figure, axes: Axes) -> None:
     handles, labels = axes.get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside lower center", ncols=len(handles), frameon=False)
+    legend_below(figure, handles, labels, len(handles))
 
 
 def _draw_components(axes: Axes, time: xarray.DataArray, values: xarray.DataArray, label: str) -> None:

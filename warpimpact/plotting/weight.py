@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 from matplotlib.figure import Figure
 
 from warpimpact.analysis.effectiveness import depth_note
+from warpimpact.plotting.heading import add_heading, legend_below
 from warpimpact.plotting.style import BLUE, GREY, VERMILION, bars, hide_sides
 
 if TYPE_CHECKING:
@@ -17,7 +18,8 @@ if TYPE_CHECKING:
     from matplotlib.artist import Artist
     from matplotlib.axes import Axes
 
-    from warpimpact.analysis.comparison_text import Comparison, Contestant
+    from warpimpact.analysis.comparison_text import Comparison
+    from warpimpact.analysis.contestants import Contestant
 from warpimpact.analysis.effectiveness import Score
 
 _STYLES = {
@@ -52,9 +54,8 @@ def weight_figure(comparison: Comparison) -> Figure | None:
     labels: dict[str, Artist] = {}
     for axes in figure.axes:
         labels |= {label: handle for handle, label in zip(*axes.get_legend_handles_labels(), strict=True)}
-    figure.legend(list(labels.values()), list(labels), loc="outside lower center", ncols=4, frameon=False)
-    title = "\n".join(["Targets against their weight; 95 % intervals", *_solid_plates(comparison)])
-    figure.suptitle(title, fontsize="medium")
+    legend_below(figure, list(labels.values()), list(labels), 4)
+    add_heading(figure, "Targets against their weight; 95 % intervals", *_solid_plates(comparison))
     return figure
 
 
@@ -70,6 +71,7 @@ def _solid_plates(comparison: Comparison) -> list[str]:
 def _draw_against_weight(axes: Axes, comparison: Comparison, name: str) -> None:
     """One effect of every target, over its areal density."""
     middle = _middle([plate.areal_density for plate in comparison.plates])
+    places: dict[tuple[str, str], list[tuple[Contestant, float]]] = {}  # plates that a figure shows at one place
     for plate in comparison.plates:
         scores = _scores(plate, name)
         for kind, score in scores.items():
@@ -78,7 +80,10 @@ def _draw_against_weight(axes: Axes, comparison: Comparison, name: str) -> None:
         if not math.isnan(first.solid):
             solid: dict[str, Any] = {"color": GREY, "fillstyle": "none", "markersize": 11.0, "linestyle": "none"}
             axes.plot(plate.areal_density, first.solid, "D", label=f"{plate.reference} of the same weight", **solid)
-        _name(axes, plate.name, (plate.areal_density, first.value), middle)
+        places.setdefault((f"{plate.areal_density:.3g}", f"{first.value:.2g}"), []).append((plate, first.value))
+    for alike in places.values():
+        plate, value = alike[0]
+        _name(axes, ", ".join(plate.name for plate, _ in alike), (plate.areal_density, value), middle)
     _furnish(axes, _first(comparison.plates[0], name), "areal density of the whole target [kg/m²]")
     if name == "base_depth" and any(depth_note(plate.measures) for plate in comparison.plates):
         axes.set_title("lower bounds: cores pierce a base, and count with its thickness", fontsize="medium", loc="left")

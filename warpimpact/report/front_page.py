@@ -18,7 +18,7 @@ from warpimpact.campaign.campaign import Campaign
 from warpimpact.campaign.text import CampaignError, parsed
 from warpimpact.optimisation.evaluate import is_even
 from warpimpact.optimisation.front_view import design_text, front_view, numbers_of_front, numbers_of_reference
-from warpimpact.plotting.front import front_figure, front_leaders
+from warpimpact.plotting.front import front_figure, front_leaders, holding
 from warpimpact.results import attributes as attr
 from warpimpact.results import front as f
 from warpimpact.results.files import aside
@@ -105,7 +105,8 @@ class _Chart:
         """What the page draws beside the front."""
         dataset, labels = self._dataset, self._dataset[f.LABEL].values
         searched, solid = dataset[f.FOUND].values[:, self._shown], dataset[f.SOLID].values[:, self._shown]
-        every = (self._place(design) for design in searched if np.isfinite(design).all())
+        shown = searched[holding(dataset)]
+        every = (self._place(design) for design in shown if np.isfinite(design).all())
         line = [self._place(plate) for plate in solid[np.argsort(solid[:, 0])] if np.isfinite(plate).all()]
         ticks = [
             [tick for tick in at if low <= tick <= high]

@@ -13,9 +13,11 @@ from markupsafe import Markup
 
 from warpimpact.analysis.assumptions_view import assumptions_view
 from warpimpact.analysis.comparison import compare
-from warpimpact.analysis.comparison_text import Comparison, best_rows, comparison_view
+from warpimpact.analysis.comparison_short import short_view, verdict_of
+from warpimpact.analysis.comparison_text import Comparison, comparison_view
 from warpimpact.analysis.effectiveness import depth_note, effectiveness, measures_table
 from warpimpact.analysis.estimates import estimated, means_of, slices, status_shares
+from warpimpact.analysis.evidence_lines import evidence_of_all
 from warpimpact.analysis.inspection import verdict
 from warpimpact.analysis.numbers import ends_of, intervals_text
 from warpimpact.analysis.plate_text import reference_name, solid_note, weights_of, weights_text
@@ -81,15 +83,16 @@ def result_content(name: str, dataset: xarray.Dataset) -> dict[str, Any]:
 
 
 def compared(datasets: Mapping[str, xarray.Dataset], *, picture: bool = True) -> dict[str, Any]:
-    """The comparison of plates as HTML and a picture, if one is wanted; if there is no comparison, a sentence gives the
-    reason."""
+    """The comparison of plates as HTML, the measure that decides apart from all others, and a picture, if one is
+    wanted; if there is no comparison, a sentence gives the reason."""
     try:
         comparison = compare(list(datasets.values()), list(datasets))
     except ResultError as error:
-        return {"view": Markup(html_of([Section([str(error)])])), "best": [], "picture": ""}
+        return {"view": Markup(html_of([Section([str(error)])])), "every": "", "verdict": [], "picture": ""}
     return {
-        "view": Markup(html_of(comparison_view(comparison))),
-        "best": best_rows(comparison),
+        "view": Markup(html_of([short_view(comparison, evidence_of_all(datasets))])),
+        "every": Markup(html_of(comparison_view(comparison))),
+        "verdict": verdict_of(comparison),
         "picture": _picture(comparison) if picture else "",
     }
 
@@ -102,9 +105,10 @@ def _picture(comparison: Comparison) -> str:
 
 
 def conclusion(results: Sequence[Mapping[str, Any]], comparison: Mapping[str, Any] | None) -> list[str]:
-    """What a reader wants first, a sentence each: what passes of every plate, and which plate is best at what."""
-    best = [] if comparison is None else [f"Best at {label}: {who}." for label, who in comparison["best"]]
-    return [*(f"{result['name']}: {result['verdict']}" for result in results), *best]
+    """What a reader wants first, a sentence each: which plate is best by the measure that decides, and what passes of
+    every plate."""
+    verdict = [] if comparison is None else comparison["verdict"]
+    return [*verdict, *(f"{result['name']}: {result['verdict']}" for result in results)]
 
 
 def _asked(dataset: xarray.Dataset) -> str:

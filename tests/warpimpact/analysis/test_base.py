@@ -143,7 +143,7 @@ def test_targets_are_ranked_by_the_depth_in_bases_that_hold(make_plate_result) -
     assert dict(best_rows(comparison))["depth in the base, mean"] == "not ranked"
     assert dict(best_rows(comparison))["P(base pierced)"] == "good"
     assert "depths are not ranked" in comparison_text(comparison)
-    assert "not ranked" in {axes.get_title(loc="left") for axes in comparison_figure(comparison).axes}
+    assert "not ranked" in {axes.get_title(loc="left") for axes in comparison_figure(comparison, every=True).axes}
 
 
 def test_a_base_that_stands_elsewhere_is_as_thick(make_plate_result) -> None:
@@ -232,7 +232,8 @@ def test_what_the_solid_plate_is_stands_beside_the_ratios(make_plate_result) -> 
     assert f"{plate}{whole} mm of path" in by_path
     assert never not in by_path
     assert f"{plate}does not weaken" in effectiveness_text(of(degradation=1.0))
-    title = weight_figure(compare([by_time, by_time], ["a", "b"])).get_suptitle()
+    (legend,) = weight_figure(compare([by_time, by_time], ["a", "b"])).legends
+    title = legend.get_title().get_text()
     assert "solid plates: 3, 3 mm of 2.6 GPa, which weakens, through" in title
 
 

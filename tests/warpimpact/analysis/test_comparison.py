@@ -13,7 +13,8 @@ import xarray
 
 from warpimpact import Campaign
 from warpimpact.analysis.comparison import compare
-from warpimpact.analysis.comparison_text import Comparison, Difference, best_rows, comparison_text
+from warpimpact.analysis.comparison_text import Comparison, best_rows, comparison_text
+from warpimpact.analysis.contestants import Difference
 from warpimpact.analysis.effectiveness import effectiveness
 from warpimpact.campaign.campaign import CampaignError
 from warpimpact.campaign.plates import read_plates
@@ -329,8 +330,13 @@ def test_what_makes_a_comparison_less_than_fair_is_said(make_plate_result) -> No
 def test_the_figure_shows_every_measure_and_every_pair(make_plate_result) -> None:
     plate = make_plate_result(velocities(np.linspace(0.5, 1.0, 500)), np.linspace(0.0, 90.0, 500))
     better = make_plate_result(velocities(np.linspace(0.4, 0.9, 500)), np.linspace(0.0, 90.0, 500))
-    figure = comparison_figure(compare([plate, better, plate], ["a", "b", "c"]))
+    comparison = compare([plate, better, plate], ["a", "b", "c"])
+    short = comparison_figure(comparison)
+    assert [axes.get_title(loc="left").split(";")[0] for axes in short.axes[::2]] == ["residual energy fraction"]
+    assert [label.get_text() for label in short.axes[1].get_yticklabels()] == ["a − b", "c − b"]
+    figure = comparison_figure(comparison, every=True)
     figure.savefig("/dev/null", format="png")
+    assert short.get_figheight() < 0.4 * figure.get_figheight()
     left, right = figure.axes[::2], figure.axes[1::2]
     assert [axes.get_title(loc="left").split(";")[0] for axes in left] == [
         "residual energy fraction",
@@ -361,8 +367,13 @@ def test_a_campaign_with_plates_is_run_compared_and_not_run_again(
     command = ["compare", "two.toml", "--count", "256", "--device", "cpu"]
     assert main(command) == 0
     shown = capsys.readouterr().out
-    assert shown.startswith("256 hits of each plate: the same shots at every plate, compared shot by shot.\n")
-    assert "round holes better than slots by" in shown
+    assert len(shown.splitlines()) <= 10
+    assert shown.startswith(
+        "proxy: energy per presented area at 130 mm, mean [J/mm²], lower is better (residual energy"
+    )
+    assert "\n   1   round holes   " in shown
+    assert "\n256 hits of each plate, the same shots\n" in shown
+    assert "evidence: " in shown
     assert sorted(path.name for path in folder.iterdir()) == ["round holes.nc", "slots.nc", "two.png", "two.toml"]
     before = Path("slots.nc").stat()
     assert main([*command, "-o", "two.svg", "--measure", "P(inclination@50mm > 45 deg)"]) == 0
@@ -370,6 +381,10 @@ def test_a_campaign_with_plates_is_run_compared_and_not_run_again(
     assert Path("slots.nc").stat() == before
     assert main(["compare", "slots.nc", "round holes.nc"]) == 0
     assert capsys.readouterr().out == shown.replace("two.png", "comparison.png")
+    assert main(["compare", "slots.nc", "round holes.nc", "--all", "-o", "all.svg"]) == 0
+    every = capsys.readouterr().out
+    assert every.startswith("256 hits of each plate: the same shots at every plate, compared shot by shot.\n")
+    assert "round holes better than slots by" in every
     stored = files.read(Path("slots.nc"))
     assert stored.attrs["title"].endswith(": slots")
     assert replay(stored, 3, folder=folder).attrs["agreement"] == "bit-identical"
@@ -404,7 +419,7 @@ def test_a_comparison_that_was_broken_off_goes_on(
     before = Path("slots.nc").stat()
     assert main([*command, "--resume"]) == 0
     assert Path("slots.nc").stat() == before
-    assert capsys.readouterr().out.startswith("512 hits of each plate: the same shots at every plate")
+    assert capsys.readouterr().out.splitlines()[5].startswith("512 hits of each plate, the same shots")
 
 
 def test_the_plates_of_a_file_share_all_else() -> None:

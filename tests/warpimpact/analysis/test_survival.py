@@ -8,7 +8,8 @@ import pytest
 import xarray
 
 from warpimpact.analysis.comparison import compare
-from warpimpact.analysis.comparison_text import Comparison, Difference, comparison_text
+from warpimpact.analysis.comparison_text import Comparison, comparison_text
+from warpimpact.analysis.contestants import Difference
 
 MEAN = "mean(residual_energy_fraction)"
 DRAWS, HITS = 50, 2000

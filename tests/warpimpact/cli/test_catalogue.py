@@ -6,6 +6,7 @@ import pytest
 
 from warpimpact.cli import main
 from warpimpact.plotting import variable_map
+from warpimpact.plotting.heading import names
 from warpimpact.results import attributes as attr
 from warpimpact.results import files
 
@@ -28,7 +29,7 @@ thickness_high = "10 mm"
 """
 LINES = (
     "evidence: limit velocities; beyond them: thickness",
-    "core: 7.62x51 P80 AP (assumed, as second-hand: bullet mass, velocity)",
+    "core: 7.62x51 P80 AP (quoted at second hand: bullet mass, velocity)",
     "plate: own steel, Y 1 GPa (3 limit velocities; nothing assumed)",
     "not tested: thickness (plate): 20 mm, but limit velocities of own steel are of 0 to 10 mm",
 )
@@ -54,8 +55,10 @@ def test_names_are_carried_along(
     assert capsys.readouterr().out.splitlines().count(LINES[0]) == 1
     dataset = files.read(Path("named.nc"))
     assert dataset.attrs[attr.EVIDENCE].splitlines() == list(LINES)
-    over = variable_map(dataset, "residual_velocity").get_suptitle().splitlines()
-    assert over[:2] == ["named", "core: 7.62x51 P80 AP (assumed, as second-hand: bullet mass,"]
+    figure = variable_map(dataset, "residual_velocity")
+    assert figure.get_suptitle() == "named"
+    below = " ".join(figure.get_supxlabel().split())
+    assert all(line in below for line in names(dataset))
     assert main(["report", "named.nc", "-o", "named.html"]) == 0
     page = Path("named.html").read_text(encoding="utf-8")
     assert all(line in page for line in LINES)

@@ -92,7 +92,7 @@ def test_more_hits_are_computed_where_the_share_is_between_0_and_1() -> None:
     assert "\nmean, weighted by area: " in text
     assert "\nevidence: two shots at one slotted plate" in text
     assert re.search(r"P\(perforation\), mean over directions +0\.\d+ .*Y × 0\.001: ", text)
-    assert "mean by area" in str(directions_figure(dataset).get_suptitle())
+    assert "mean by area" in directions_figure(dataset).get_supxlabel()
 
 
 @pytest.mark.parametrize(

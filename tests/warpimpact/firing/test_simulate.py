@@ -82,7 +82,7 @@ def test_the_text_and_the_figure_say_what_it_is(dataset: xarray.Dataset) -> None
     assert any("within ± 10 m/s in 90 % of the tests" in line for line in lines)
     figure = firing_figure(dataset)
     assert len([axes for axes in figure.axes if axes.axison]) == 4
-    assert f.SENTENCE in str(figure.get_suptitle())
+    assert f.SENTENCE in " ".join(figure.get_supxlabel().split())
 
 
 def test_the_command_writes_a_file_with_cf_attributes(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

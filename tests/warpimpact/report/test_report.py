@@ -15,8 +15,10 @@ import xarray
 
 from warpimpact import Campaign
 from warpimpact.analysis.comparison import compare
-from warpimpact.analysis.comparison_text import best_rows, comparison_view
+from warpimpact.analysis.comparison_short import short_view, verdict_of
+from warpimpact.analysis.comparison_text import comparison_view
 from warpimpact.analysis.effectiveness import effectiveness
+from warpimpact.analysis.evidence_lines import evidence_of_all
 from warpimpact.analysis.numbers import number_text
 from warpimpact.campaign.campaign import CampaignError
 from warpimpact.cli import main
@@ -111,11 +113,13 @@ def test_page_compares_the_plates(folder: Path, make_result: ResultMaker, tmp_pa
     text = html.unescape((folder / "a.html").read_text())
     names = ["narrow", "<b>wide"]
     with files.opened(folder / "narrow.nc") as narrow, files.opened(folder / "<b>wide.nc") as wide:
-        comparison = compare([narrow, wide], names)
+        stored = dict(zip(names, [narrow, wide], strict=True))
+        comparison = compare(list(stored.values()), names)
     short = text[: text.index('id="asked"', text.index("<main>"))]
     assert "narrow: 400 of 400 cores pass. residual energy fraction, mean " in short
-    for label, who in best_rows(comparison):
-        assert f"<li>Best at {label}: {who}.</li>" in short
+    for sentence in verdict_of(comparison):
+        assert f"<li>{sentence}</li>" in short
+    assert html.unescape(html_of([short_view(comparison, evidence_of_all(stored))])) in text
     assert html.unescape(html_of(comparison_view(comparison))) in text
     assert text.count('<img src="data:image/png;base64,') == 1
     files.write(make_result(100), tmp_path / "other.nc")

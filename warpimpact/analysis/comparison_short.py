@@ -1,0 +1,170 @@
+"""The short answer of a comparison: the measure that decides, the plates in its order with their differences from the
+best one, and what the hits leave open. `comparison_text` has every measure."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+
+from warpimpact.analysis.comparison_text import (
+    Comparison,
+    compared_scores,
+    hits_used,
+    is_ranked,
+    listed,
+    negative,
+    weighed,
+)
+from warpimpact.analysis.contestants import Difference
+from warpimpact.analysis.effectiveness import Score
+from warpimpact.analysis.numbers import Ends, intervals_text
+from warpimpact.view.view import Column, Section, Table, number
+
+
+def deciding(comparison: Comparison) -> Score | None:
+    """The measure that decides, as the first plate has it: the first one by which hits tell two plates apart, or else
+    the first one that ranks plates; None where there is none.
+
+    Measures come in the order in which they were asked for, by default that of `effectiveness.SHOWN`: what reaches the
+    base comes before what flies behind the target.
+    """
+    ranked = _ranking_scores(comparison)
+    apart = {pair.measure for pair in comparison.differences if pair.told_apart}
+    return next((score for score in ranked if score.name in apart), ranked[0] if ranked else None)
+
+
+def _ranking_scores(comparison: Comparison) -> list[Score]:
+    """Measures with a better direction and with intervals."""
+    return [
+        score
+        for score in compared_scores(comparison)
+        if score.measure.higher_is_better is not None and is_ranked(comparison, score.name)
+    ]
+
+
+def from_best(comparison: Comparison, measure: str) -> list[Difference]:
+    """By how much every plate but the best exceeds the best one, in the order of the ranks."""
+    best, *others = comparison.ordered(measure)
+    pairs = {(pair.one, pair.other): pair for pair in comparison.differences if pair.measure == measure}
+    return [pairs[name, best] if (name, best) in pairs else _reversed(pairs[best, name]) for name in others]
+
+
+def _reversed(pair: Difference) -> Difference:
+    """The difference of the other plate from the one."""
+    survival = pair.survival and replace(pair.survival, interval=negative(pair.survival.interval))
+    low, high = negative((pair.low, pair.high))
+    return Difference(pair.measure, pair.other, pair.one, 0.0 - pair.value, low, high, survival)
+
+
+def short_view(comparison: Comparison, evidence: Sequence[str] = ()) -> Section:
+    """The measure that decides with its ranks and differences, what is not told apart, and on what the answer rests.
+
+    Args:
+        evidence: lines on what the results rest on (`evidence_lines.evidence_of_all`).
+    """
+    score = deciding(comparison)
+    if score is None:
+        return Section([*hits_used(comparison), "no measure ranks these plates", *evidence])
+    notes = (_open(comparison, score), _used(comparison), _assumptions(comparison, score), *evidence)
+    return Section([_ranks(comparison, score), *filter(None, notes)], _title(comparison, score))
+
+
+def verdict_of(comparison: Comparison) -> list[str]:
+    """Who is best by the measure that decides, and what is not told apart, in sentences; empty where none decides."""
+    score = deciding(comparison)
+    if score is None:
+        return []
+    ranks = comparison.ranks(score.name)
+    best = [name for name, rank in ranks.items() if rank == 1]
+    first = "no two plates are told apart" if len(best) == len(ranks) else f"{listed(best)} first"
+    return [f"{_title(comparison, score)}: {first}", *filter(None, [_open(comparison, score)])]
+
+
+def _title(comparison: Comparison, score: Score) -> str:
+    """The measure that decides, which way is better, and which measures before it tell no plates apart."""
+    before = []
+    for other in _ranking_scores(comparison):
+        if other.name == score.name:
+            break
+        before.append(other.measure.label)
+    tell = "tells" if len(before) == 1 else "tell"
+    undecided = f" ({listed(before)} {tell} no two plates apart)" if before else ""
+    return f"{score.measure.title}, {score.measure.better}{weighed(comparison, score.name)}{undecided}"
+
+
+def _ranks(comparison: Comparison, score: Score) -> Table:
+    place = [other.name for other in comparison.plates[0].measures].index(score.name)
+    plates = {plate.name: plate for plate in comparison.plates}
+    differences = {pair.one: pair for pair in from_best(comparison, score.name)}
+    by_ratio = score.name in (comparison.at_equal_weight or ())
+    rows = []
+    for name, rank in comparison.ranks(score.name).items():
+        plate, shown = plates[name], plates[name].measures[place]
+        value = (shown.value, intervals_text(Ends(shown.low, shown.high)))
+        ratio = (shown.ratio,) if by_ratio else ()
+        pair = differences.get(name)
+        apart = (None, "") if pair is None else (pair.value, intervals_text(Ends(pair.low, pair.high, pair.parameters)))
+        rows.append((rank, name, plate.areal_density, *value, *ratio, *apart))
+    best = comparison.ordered(score.name)[0]
+    columns = (
+        *(number("rank", digits="d"), Column("plate"), number("kg/m²", digits=".2f")),
+        *(
+            number("value"),
+            Column("95 % interval"),
+            *([number(f"ratio to {comparison.reference}")] if by_ratio else []),
+        ),
+        *(
+            number(f"{'ratio' if by_ratio else 'value'} less {best}", digits="+#.3g"),
+            Column(f"{comparison.confidence:.0%} interval"),
+        ),
+    )
+    return Table(columns, rows)
+
+
+def _open(comparison: Comparison, score: Score) -> str:
+    """Pairs that the measure does not tell apart, and other measures at which another plate is best."""
+    pairs = [pair for pair in comparison.differences if pair.measure == score.name and not pair.told_apart]
+    total = sum(pair.measure == score.name for pair in comparison.differences)
+    alike = "; ".join(f"{pair.one} and {pair.other}" for pair in pairs)
+    sentences = [f"not told apart: {'no two of them' if len(pairs) == total else alike or 'none'}"]
+    best = {name for name, rank in comparison.ranks(score.name).items() if rank == 1}
+    for other in _ranking_scores(comparison):
+        ranks = comparison.ranks(other.name)
+        first = [name for name, rank in ranks.items() if rank == 1]
+        if len(first) < len(ranks) and not best & {*first}:
+            sentences.append(f"by {other.measure.label}: {listed(first)} first")
+    return "; ".join(sentences)
+
+
+def _used(comparison: Comparison) -> str:
+    """How many hits were compared, and what the ranks do not allow for."""
+    hits = {plate.hits for plate in comparison.plates}
+    count = f"{min(hits)}" if len(hits) == 1 else f"{min(hits)} to {max(hits)}"
+    same = "" if any(pair.independent for pair in comparison.pairs) else ", the same shots"
+    left_open = f"; not allowed for: {', '.join(comparison.cautions)}" if comparison.cautions else ""
+    return f"{count} hits of each plate{same}{left_open}"
+
+
+def _assumptions(comparison: Comparison, score: Score) -> str:
+    """Whether the best plate stays so if something that nobody measured is otherwise."""
+    best = comparison.ordered(score.name)[0]
+    about = [each for each in comparison.verdicts if each.measure == score.name and best in (each.one, each.other)]
+    told = [verdict for verdict in about if verdict.given and (verdict.given > 0) == (verdict.one == best)]
+    if not about:
+        return "" if math.isnan(score.value) else "assumptions: how far they move this is not known"
+    by_value = ", by value alone" if score.name in (comparison.at_equal_weight or ()) else ""
+    if not told:
+        return f"assumptions{by_value}: {best} is not told to be best as given"
+    every = list(dict.fromkeys(name for verdict in told for name in verdict.under))
+    turned = list(dict.fromkeys(name for verdict in told for name in verdict.turned))
+    open_ = [name for name in every if name not in turned and any(not verdict.under.get(name) for verdict in told)]
+    kept = len(every) - len(turned) - len(open_)
+    return f"assumptions{by_value}: {best} stays ahead in {kept} of {len(every)}" + "".join(_named(turned, open_))
+
+
+def _named(turned: Sequence[str], open_: Sequence[str]) -> Iterator[str]:
+    if turned:
+        yield f"; turned over by {', '.join(turned)}"
+    if open_:
+        yield f"; open in {len(open_)}"
