@@ -222,15 +222,21 @@ def friction() -> Table:
 
 
 def limits() -> Table:
-    """Limit velocities by search beside the published ones."""
+    """Limit velocities by search beside the published ones: the fastest core that was held and the slowest one that
+    passed; and what the energy of that one asks for."""
     rows, shots = [], rows_of("limits")
     for plate, published in PUBLISHED.items():
         cells = []
         for mu in ("0", "0.03"):
             here = [row for row in shots if row["plate"] == plate and row["friction"] == mu]
-            passed = [float(row["velocity"]) for row in here if row["status"] == "0"]
+            passed = [(float(row["velocity"]), float(row["residual"])) for row in here if row["status"] == "0"]
             held = [float(row["velocity"]) for row in here if row["status"] in ("1", "2")]
-            cells.append(f"{max(held):.0f} to {min(passed):.0f}" if passed and held else "")
+            if not passed:
+                cells.append("")
+                continue
+            slowest, left = min(passed)
+            bracket = f"{max(held):.0f} to {slowest:.0f}" if held else f"below {slowest:.0f}"
+            cells.append(f"{bracket}, {np.sqrt(slowest**2 - left**2):.0f}")
         if any(cells):
             words = f"{published.velocity:.0f} ({published.projectile}, {published.material})"
             rows.append((CASES[plate].title, *cells, words))

@@ -28,6 +28,7 @@ RUNS: Mapping[str, Sequence[str]] = {
     "loops": ("loops.py",),
     "many": ("many.py",),
     "overheads": ("overheads.py",),
+    "continuum_speed": ("continuum_speed.py",),
     "design_page": ("design_page.py",),
     "statistics_cost": (
         "statistics_cost.py",
@@ -81,6 +82,7 @@ def rows(found: Mapping[str, Any]) -> Iterator[Row]:
         ("loops", _loops),
         ("many", _many),
         ("overheads", _overheads),
+        ("continuum_speed", _continuum),
         ("design_page", _design_page),
         ("statistics_cost", _statistics),
         ("gpu", _gpu),
@@ -237,6 +239,31 @@ def _overheads(values: Mapping[str, Any]) -> Iterator[Row]:
             "wall time of the command",
             "one run",
         )
+
+
+def _continuum(values: Mapping[str, Any]) -> Iterator[Row]:
+    scene, sample = "slotted plate, elements of 0.5 mm", f"median of {values['rounds']} hits at the same place"
+    yield Row(
+        "a hit by finite elements",
+        scene,
+        f"{values['seconds']:.2g} s, {values['nanoseconds']:.3g} ns per element and step",
+        f"{values['elements']:,} elements, {values['steps']:,} steps, single precision; processor time of one core",
+        sample,
+    )
+    yield Row(
+        "a hit by finite elements, times one of the fast law",
+        scene,
+        f"{_rounded(values['ratio'])}",
+        f"{1e3 * values['fast']:.2g} ms at level {values['level']}; processor time of one core",
+        sample,
+    )
+    yield Row(
+        "hits by finite elements on all cores",
+        scene,
+        f"{values['scaling']:.0%} of {values['cores']} times the rate of one",
+        "wall time; it means something on a quiet machine only",
+        f"{values['together']} hits",
+    )
 
 
 def _design_page(values: Mapping[str, Any]) -> Iterator[Row]:

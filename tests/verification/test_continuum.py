@@ -343,6 +343,9 @@ def test_a_symmetric_hit_leaves_straight(centred: Outcomes) -> None:
     assert (centred.status == Status.PERFORATED).all()
     assert np.degrees(centred.tilt).max() < 0.005
     assert (centred.residual_velocity < 820.0).all()
+    way = SOLID.thickness + CORE.length  # from the first touch of the nose to the last one, at most of the base
+    assert (centred.contact_duration > SOLID.thickness / 825.0).all()
+    assert (centred.contact_duration < way / 700.0).all()
 
 
 def test_energy_is_kept(centred: Outcomes) -> None:
@@ -510,3 +513,4 @@ def test_layers_apart_are_the_chain_of_their_plates(coarse: float) -> None:
     assert both.layer_status[0].tolist() == [Status.PERFORATED] * 2
     assert both.layer_residual_velocity[0, 0] == pytest.approx(first.residual_velocity[0], abs=0.5)
     assert both.residual_velocity[0] < both.layer_residual_velocity[0, 0] - 50.0
+    assert both.layer_residual_velocity[0, 1] == pytest.approx(both.residual_velocity[0], abs=1.0)

@@ -6,12 +6,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from warpimpact import Continuum, Plate, PolynomialCore, Record, Scene, Shots, simulate
+from warpimpact import CirclePattern, Continuum, Layer, Plate, PolynomialCore, Record, Scene, Shots, simulate
 from warpimpact.catalogue.flow_entries import flow_entry, flow_names
 from warpimpact.continuum import strikes
 from warpimpact.continuum.one_hit import Energies
 from warpimpact.kernels.status import Status
 from warpimpact.scene.flow import FINENESS
+from warpimpact.solver.worker import Worker
 
 CORE = PolynomialCore(coefficients=(3.0e-4, 0.24, -5.29), length=27.86e-3, mass=4.0e-3)
 PLATE = Plate(thickness=4e-3, resistance=2.6e9)
@@ -77,6 +78,27 @@ def test_a_failed_hit_has_no_outcome_and_the_others_are_told() -> None:
     assert np.isnan(outcomes.tilt).all()
     assert outcomes.hourglass_share[0] > 0.12
     assert told == [(1, 1)]
+
+
+def test_a_march_has_what_belongs_to_its_shot_and_its_layers() -> None:
+    """Thickness and offset of the shot, friction and materials of the settings; nothing is computed."""
+    holes = PLATE.model_copy(update={"pattern": CirclePattern(diameter=8e-3, spacing=(60e-3, 60e-3))})
+    scene = Scene(core=CORE, target=(holes, Layer(thickness=2e-3, gap=10e-3, resistance=1e9)))
+    shot = SHOT.with_own({"thickness": np.array([3e-3]), "offset_y": np.array([6e-3])})
+    soft = flow_entry("AA6082-T6").flow
+    continuum = Continuum(flows=(STEEL, soft), spacing=1e-3, friction=0.07)
+    conditions = strikes.memory_of(scene, shot, Worker("cpu", 1)).prepared.conditions
+    march = strikes.march_of(scene, shot, 0, continuum, conditions)
+    assert march.hit.start.friction == 0.07
+    assert march.hit.flows == [STEEL, soft]
+    first, second = march.sheets
+    assert first.x[[0, -1]] == pytest.approx([0.0, 3e-3])
+    assert second.x[[0, -1]] == pytest.approx([13e-3, 15e-3])
+    assert not first.solid.all()
+    middles = [0.25 * (at[:-1, :-1] + at[1:, :-1] + at[:-1, 1:] + at[1:, 1:]) for at in (first.y, first.z)]
+    hole = ~first.solid & (np.hypot(*middles) < 12e-3)
+    along = middles[0][hole]
+    assert 0.5 * (along.min() + along.max()) == pytest.approx(6e-3, abs=0.7e-3)  # its pattern moved by 6 mm
 
 
 def test_a_core_that_reaches_the_edge_of_the_mesh_has_left_it(monkeypatch: pytest.MonkeyPatch) -> None:

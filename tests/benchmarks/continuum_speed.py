@@ -1,0 +1,71 @@
+"""Cost of a hit by finite elements: per element and step, beside the fast law, and on all cores.
+
+python tests/benchmarks/continuum_speed.py          # writes results/continuum_speed.json
+"""
+
+from __future__ import annotations
+
+import time
+from functools import partial
+from statistics import median
+from typing import Any
+
+import numpy as np
+from bench import cores, machine, store
+from continuum_cases import CASES
+
+from warpimpact import Continuum, Numerics, Shots, simulate
+from warpimpact.catalogue.flow_entries import flow_entry
+from warpimpact.continuum.strikes import march_of, memory_of
+from warpimpact.solver.worker import Worker
+
+CASE = CASES["slotted"]
+ROUNDS, FAST_HITS, LEVEL = 3, 1024, 2
+
+
+def main() -> None:
+    """Measure, print, store."""
+    continuum = Continuum(flows=(flow_entry(CASE.flows[0]).flow,), spacing=0.5e-3)
+    shots = CASE.shots(FAST_HITS)
+    conditions = memory_of(CASE.scene, shots[:1], Worker("cpu", 1)).prepared.conditions
+    times, elements, steps = [], 0, 0
+    for _ in range(ROUNDS):
+        march = march_of(CASE.scene, shots[:1], 0, continuum, conditions)
+        elements = sum(int(sheet.alive.sum()) for sheet in march.sheets)
+        begin = time.process_time()
+        steps = int(march.ended().flight["steps"])
+        times.append(time.process_time() - begin)
+    fast = partial(simulate, CASE.scene, numerics=Numerics(level=LEVEL), device="cpu", threads=1)
+    fast(shots[:1])
+    begin = time.process_time()
+    fast(shots)
+    per_fast = (time.process_time() - begin) / FAST_HITS
+    together = 2 * cores()
+    walls = [wall_time(continuum, shots[np.zeros(together, dtype=int)], threads) for threads in (1, cores())]
+    values: dict[str, Any] = {
+        "machine": machine(),
+        "rounds": ROUNDS,
+        "level": LEVEL,
+        "elements": elements,
+        "steps": steps,
+        "seconds": median(times),
+        "nanoseconds": 1e9 * median(times) / elements / steps,
+        "fast": per_fast,
+        "ratio": median(times) / per_fast,
+        "cores": cores(),
+        "together": together,
+        "scaling": walls[0] / walls[1] / cores(),
+    }
+    print(values)
+    store("continuum_speed", values)
+
+
+def wall_time(continuum: Continuum, shots: Shots, threads: int) -> float:
+    """Of some hits by some threads [s]."""
+    begin = time.perf_counter()
+    simulate(CASE.scene, shots, numerics=continuum, threads=threads)
+    return time.perf_counter() - begin
+
+
+if __name__ == "__main__":
+    main()
