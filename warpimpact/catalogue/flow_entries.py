@@ -24,11 +24,13 @@ class FlowEntry(Flow):
     Attributes:
         name: by which `--material` finds it.
         known, assumed: source, or assumption, by property.
+        tested: what the continuum gives for a plate test that somebody published, and what was measured, by the plate.
     """
 
     name: Name
     known: dict[str, Title] = Field(default_factory=dict)
     assumed: dict[str, Title] = Field(default_factory=dict)
+    tested: dict[str, Title] = Field(default_factory=dict)
 
     @property
     def flow(self) -> Flow:
@@ -38,7 +40,8 @@ class FlowEntry(Flow):
     @property
     def evidence(self) -> str:
         """State of the evidence in words."""
-        return evidence(self.known, self.assumed)
+        tests = "; ".join(f"{plate}: {words}" for plate, words in self.tested.items())
+        return evidence(self.known, self.assumed) + (f"; beside a plate test: {tests}" if tests else "")
 
 
 def flow_entry(name: str) -> FlowEntry:

@@ -50,7 +50,7 @@ def replay_continuum(scene: Scene, shots: Shots, continuum: Continuum, snapshots
     body = scene.core.mass_properties._replace(
         mass=start.mass, inertia_axial=start.inertia_axial, inertia_transverse=start.inertia_transverse
     )
-    history = History.from_trace(np.array([*rows[1:], _unloaded(rows[-1])]), body)
+    history = History.from_trace(_trace(rows), body)
     sheet = march.sheets[0]
     places = cells_of(sheet)
     shown = frames.spread(len(rows) - 1, snapshots) if snapshots else []
@@ -152,8 +152,8 @@ def _row(hit: OneHit, before: Array | None) -> Array:
     return row
 
 
-def _unloaded(row: Array) -> Array:
-    """The last row again, without load."""
-    last = row.copy()
-    last[14:21] = 0.0
-    return last
+def _trace(rows: list[Array]) -> Array:
+    """The rows with the load that follows each, as a trace has it; the last one has none."""
+    trace = np.array(rows)
+    trace[:-1, 14:21], trace[-1, 14:21] = trace[1:, 14:21], 0.0
+    return trace

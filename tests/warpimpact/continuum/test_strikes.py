@@ -124,6 +124,7 @@ def test_a_material_says_what_is_known_and_what_is_assumed(name: str) -> None:
     entry = flow_entry(name)
     assert entry.name == name
     assert entry.assumed
+    assert ("beside a plate test" in entry.evidence) == bool(entry.tested)
     assert 4000.0 < entry.wave_speed < 7000.0
 
 

@@ -105,6 +105,8 @@ def test_a_hit_is_replayed_bit_by_bit(campaign_file: Path, tmp_path: Path) -> No
     assert result["eroded_elements"][hit] > 0
     history = replay(result, hit, snapshots=3)
     assert history.attrs[attr.AGREEMENT] == "bit-identical"
+    assert (np.diff(history["time"].values) > 0.0).all()
+    assert np.abs(history["force"].values[-1]).max() == 0.0 < np.abs(history["force"].values[0]).max()
     left = history["resistance_share"].values
     assert left.shape[0] == 3
     assert (left[0] == left[0].round()).all()
