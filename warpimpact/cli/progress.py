@@ -76,7 +76,7 @@ class Step(NamedTuple):
         resumed: how many of those an earlier computation had done, which tell nothing of the rate.
         text: what else there is to say.
         before: what is under way before the first one is computed; its time does not count in the rate.
-        certain: whether `total` will be computed; else it is the most, and the time that is left is not known.
+        certain: whether `total` will be computed; else it is the most, and so is the time that is left.
         now: which part is under way, from the start on.
     """
 
@@ -164,7 +164,7 @@ class _Log:
             return f"{line}; {step.now}".removesuffix("; ")
         if elapsed <= 0.0:
             return f"{line}; {step.words}".removesuffix("; ")
-        left = f", {(step.total - step.done) * elapsed / fresh:.0f} s left" if step.certain else ""
+        left = f", {most}{(step.total - step.done) * elapsed / fresh:.0f} s left"
         return f"{line}, {fresh / elapsed:.4g} {self._unit}s/s{left}; {step.words}".removesuffix("; ")
 
 

@@ -121,7 +121,9 @@ def test_a_log_says_what_a_pilot_tries_and_counts_no_time_of_it(
     assert lines[-1].startswith("400 of 1000 hits, 100 hits/s, 6 s left; ")
 
 
-def test_what_may_end_early_tells_no_time_that_is_left(capsys: pytest.CaptureFixture[str], clock: list[float]) -> None:
+def test_what_may_end_early_tells_the_most_time_that_is_left(
+    capsys: pytest.CaptureFixture[str], clock: list[float]
+) -> None:
     with show_progress("design") as show:
         show(Step(0, 6, certain=False, text="0 on the front", now="2 of 3 pilots"))
         clock[0] += 10.0
@@ -133,7 +135,7 @@ def test_what_may_end_early_tells_no_time_that_is_left(capsys: pytest.CaptureFix
         show(Step(1, 2, now="solid plates"))
     assert capsys.readouterr().err.splitlines() == [
         "0 of at most 6 designs; 2 of 3 pilots",
-        "2 of at most 6 designs, 0.2 designs/s; 1 on the front, 6 designs at 64 hits",
+        "2 of at most 6 designs, 0.2 designs/s, at most 20 s left; 1 on the front, 6 designs at 64 hits",
         "2 of 2 designs; 1 on the front",
         "0 of 2 designs; solid plates",
         "1 of 2 designs, 0.2 designs/s, 5 s left; solid plates",
