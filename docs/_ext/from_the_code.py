@@ -333,9 +333,14 @@ class PublicReference(FromTheCode):
         import warpimpact
 
         named = {name: getattr(warpimpact, name) for name in warpimpact.__all__ if not name.startswith("_")}
-        kinds: dict[str, list[str]] = {"Functions": [], "Models": [], "Results and values": [], "Errors": []}
+        titles = ("Functions", "Catalogue", "Models", "Results and values", "Errors")
+        kinds: dict[str, list[str]] = {title: [] for title in titles}
         for name, one in named.items():
-            if inspect.isfunction(one):
+            if inspect.ismodule(one):  # the page has its figures
+                continue
+            if not inspect.isroutine(one) and not inspect.isclass(one):
+                kinds["Catalogue"].append(name)
+            elif inspect.isfunction(one):
                 kinds["Functions"].append(name)
             elif issubclass(one, Exception):
                 kinds["Errors"].append(name)
@@ -343,8 +348,18 @@ class PublicReference(FromTheCode):
                 kinds["Models" if issubclass(one, BaseModel) else "Results and values"].append(name)
         for title, names in kinds.items():
             yield from [f"## {title}", "", "```{eval-rst}"]
+            special = {"Functions": "autofunction", "Errors": "autoexception"}
             for name in names:
-                kind = "autofunction" if title == "Functions" else "autoexception" if title == "Errors" else "autoclass"
+                if title == "Catalogue":
+                    text = inspect.cleandoc(type(named[name]).__doc__ or "")
+                    yield from [
+                        f".. py:data:: warpimpact.{name}",
+                        "",
+                        *(f"   {line}" for line in text.splitlines()),
+                        "",
+                    ]
+                    continue
+                kind = special.get(title, "autoclass")
                 yield from [f".. {kind}:: warpimpact.{name}", ""]
                 if title in ("Models", "Results and values"):
                     yield from ["   :members:", "   :exclude-members: model_copy, model_config, model_post_init", ""]
