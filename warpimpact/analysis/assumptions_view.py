@@ -53,7 +53,7 @@ def _first(dataset: Result) -> list[Measure]:
     if attr.LIMIT in dataset.attrs:
         return [Measure.parse(f"quantile({v.LIMITS[dataset.attrs[attr.LIMIT]].value}, 0.5)")]
     standoffs = dataset[v.STANDOFF].values.tolist()[-1:]
-    events = [Measure.parse(f"P({event})") for event in ("perforated", "base_perforated")]
+    events = [Measure.parse(f"P({event})") for event in ("perforated", "base_perforated", "base_pierced")]
     means = means_of([name for name in (v.RESIDUAL_VELOCITY, v.TILT) if name in dataset], standoffs)
     return [*means, *(event.of(dataset) for event in events if not event.quantity.lacking(dataset))]
 
