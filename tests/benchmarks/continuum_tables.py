@@ -27,6 +27,8 @@ DRAWN = "slotted"
 """The plate of the figure."""
 FEWEST = 3
 """Hits of a class, or of both meshes, for a row."""
+FEWEST_RANKED = 6
+"""Hits for a rank correlation."""
 EDGE = 0.25 * CORE.max_radius
 """A hit point nearer to an edge than this is one at the edge [m]."""
 STEEP = 30.0
@@ -87,8 +89,8 @@ def error_cells(fast: Array, truth: Array) -> Iterator[str]:
     """Bias, root mean square and rank correlation of each measure."""
     for one, other in zip(fast.T, truth.T, strict=True):
         apart = one - other
-        rank = float(spearmanr(one, other).statistic)
-        yield f"{apart.mean():+.2g}, {np.sqrt((apart**2).mean()):.2g}, {rank:.2f}"
+        rank = f"{float(spearmanr(one, other).statistic):.2f}" if len(one) >= FEWEST_RANKED else "–"
+        yield f"{apart.mean():+.2g}, {np.sqrt((apart**2).mean()):.2g}, {rank}"
 
 
 def classes() -> Table:
