@@ -11,6 +11,7 @@ from pydantic import TypeAdapter, ValidationError
 from ..catalogue.catalogue import Catalogue
 from ..catalogue.entries import Material, Threat, Velocity
 from ..scene import AnyCore, Core, Layer, Plate
+from ..scene.target import layer_name
 from ..scene.units import Obliquity, quoted
 from .text import CampaignError
 
@@ -163,7 +164,7 @@ def _plates(data: Mapping[str, Any]) -> Iterator[tuple[str, str, int | None, _Ta
         yield "plate", "plate", None, plate
     for k, layer in enumerate(layers if isinstance(layers, list) else []):
         if isinstance(layer, dict) and isinstance(layer.get("material"), str):
-            yield f"layer[{k}]", "layer", k, layer
+            yield layer_name(k + 1), "layer", k, layer
 
 
 def _resistance(data: Mapping[str, Any], material: Material, plate: Mapping[str, Any], catalogue: Catalogue) -> float:

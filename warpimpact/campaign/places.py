@@ -1,5 +1,5 @@
-"""Dotted places of a campaign, such as "plate.pattern.width" or "layer.0.gap": resolved, filled and read; the files
-that its tables name."""
+"""Dotted places of a campaign, such as "plate.pattern.width" or "layer 1.gap": resolved, filled and read; the files
+that its tables name. Layer 0 is the plate, and layer 1 the first table [[layer]]."""
 
 from __future__ import annotations
 
@@ -17,8 +17,10 @@ from .text import CampaignError
 _TABLES: Mapping[str, Any] = {"impact": Impact, "plate": Plate, "interaction": Interaction}
 """Tables whose keys may be given without the table, as their names are unique."""
 _WHOLE = ("core", "plate", "plate.pattern", "interaction")
-_WHOLE_OF_A_LAYER = re.compile(r"layer\.\d+(\.pattern)?")
+_WHOLE_OF_A_LAYER = re.compile(r"layer \d+(\.pattern)?")
 """Tables that may be given as a whole."""
+_LAYER, _BEFORE = re.compile(r"layer (\d{1,3})"), re.compile(r"layer\.(\d{1,3})(.*)")
+"""The number of a layer in a place; how earlier versions wrote it, which counted the tables [[layer]] from 0."""
 _NAMES_A_FILE = ("file", "posterior", "catalogue")
 
 
@@ -36,7 +38,15 @@ def resolved(key: str, name: str) -> str:
     Raises:
         CampaignError: there is no such key.
     """
-    if "." in key or key in _WHOLE:
+    if before := _BEFORE.fullmatch(key):
+        now = f"layer {int(before[1]) + 1}{before[2]}"
+        raise CampaignError(
+            f"{name}: got {quoted(key)}, as earlier versions counted; layer 0 is the plate, so write {quoted(now)} for "
+            f"table {int(before[1]) + 1} of [[layer]]"
+        )
+    if re.match(r"layer 0(\.|$)", key):
+        return f"plate{key.removeprefix('layer 0')}"
+    if "." in key or key in _WHOLE or is_table(key):
         return key
     for table, model in _TABLES.items():
         if key in model._keys():
@@ -70,7 +80,10 @@ def put(data: dict[str, Any], key: str, value: Any, name: str) -> None:
 
 def _parts(key: str) -> list[str | int]:
     """The parts of a dotted place; a number is that of an entry of a list."""
-    return [int(part) if part.isdecimal() else part for part in key.split(".")]
+    first, *rest = key.split(".")
+    layer = _LAYER.fullmatch(first)
+    parts = ["layer", int(layer[1]) - 1] if layer else [first]
+    return [*parts, *(int(part) if part.isdecimal() else part for part in rest)]
 
 
 def files_in(tables: Any, key: str = "") -> Iterator[str]:

@@ -12,6 +12,7 @@ import numpy as np
 from ..scene import Core, Hits, Impact, Record, Scene, Target
 from ..scene.bounds import USUAL, Implausible, hit_bounds, implausible, impossible
 from ..scene.quantities import SCATTERED
+from ..scene.target import layer_name
 
 _OF_A_PLATE = (
     "thickness",
@@ -84,8 +85,8 @@ def _values(
         if plate.open_area > 0.0:
             for side in plate.pattern.unit_cell:
                 yield f"{place}.pattern: cell", "plate.pattern.cell", side
-    for k, gap in enumerate(target.gaps[1:]):
-        yield f"layer[{k}].gap", "layer.gap", gap
+    for k, gap in enumerate(target.gaps[1:], start=1):
+        yield f"{layer_name(k)}.gap", "layer.gap", gap
     for name, value in impact:
         yield f"impact.{name}", f"impact.{name}", value
     for name in ("standoffs", "layer_standoffs"):

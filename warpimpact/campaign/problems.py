@@ -34,12 +34,14 @@ def _described(problem: ErrorDetails, data: dict[str, Any]) -> str:
 
 
 def _place(problem: ErrorDetails, data: Any) -> str:
-    """Dotted TOML key of a problem, without what a key of _CHOICES chooses, which pydantic counts as a key."""
+    """Dotted TOML key of a problem, without what a key of _CHOICES chooses, which pydantic counts as a key. The first
+    table [[layer]] is "layer 1", as the plate is layer 0."""
     place = ""
     for part in problem["loc"]:
         if isinstance(data, dict) and part not in data and part in map(data.get, _CHOICES):
             continue
-        place += f"[{part}]" if isinstance(part, int) else f".{part}"
+        number = f" {part + 1}" if place == ".layer" and isinstance(part, int) else f"[{part}]"
+        place += number if isinstance(part, int) else f".{part}"
         inner = isinstance(data, list) and isinstance(part, int) and part < len(data)
         data = data[part] if inner else data.get(part) if isinstance(data, dict) else None
     if problem["type"].startswith("union_tag"):

@@ -9,6 +9,7 @@ from pydantic import ValidationError
 from ..scene import Scatter
 from ..scene.distributions import Distribution
 from ..scene.quantities import SCATTERED
+from ..scene.target import layer_name
 from ..scene.units import quantity
 from .problems import sentence
 from .text import CampaignError
@@ -32,7 +33,7 @@ def _tables(data: dict[str, Any], field: str) -> Iterator[tuple[int, str, Any]]:
     known, behind = SCATTERED[field], data.get("layer")
     yield 0, known.table, data.get(known.table)
     if known.by_layer and isinstance(behind, list):
-        yield from ((k, f"layer[{k - 1}]", table) for k, table in enumerate(behind, start=1))
+        yield from ((k, layer_name(k), table) for k, table in enumerate(behind, start=1))
 
 
 def _taken(table: Any, field: str, place: str, layer: int) -> Distribution | None:

@@ -156,7 +156,7 @@ def _plate(arguments: argparse.Namespace) -> None:
     check_picture(output, overwrite=arguments.overwrite)
     campaign = Campaign.from_toml(arguments.campaign)
     plate = campaign.plate
-    plate_figure(campaign.target, campaign.core, campaign.title).savefig(output, dpi=150)
+    plate_figure(campaign.target, campaign.core, campaign.title, campaign.impact).savefig(output, dpi=150)
     rows = [("thickness", f"{1e3 * plate.thickness:g} mm")]
     rows += plate_numbers(plate.open_area, plate.ligament, campaign.target.weights, plate.pattern.resolution).items()
     for place, layer in enumerate(campaign.layer, start=1):

@@ -23,12 +23,20 @@ def to_dataframe(dataset: xarray.Dataset) -> pd.DataFrame:
     """One row per hit, in the units of the Dataset.
 
     A variable with stand-offs, axes or layers gets one column for each: ``tilt_130mm``, ``angular_velocity_x``,
-    ``layer_tilt_0``, ``layer_standoff_tilt_0_50mm``. ``status`` is a word. An angle that was given as 30° is 30.
+    ``layer_tilt_0``, ``layer_standoff_tilt_0_50mm``. ``status`` and
+    ``layer_status_0`` are words. An angle that was given as 30° is 30.
     """
     columns: dict[str, Any] = {name: _as_given(array) for name, array in _columns(dataset)}
-    words = {code: word for word, code in status_codes(dataset).items()}
-    columns[v.STATUS] = [words[code] for code in columns[v.STATUS].tolist()]
+    for name, variable in _statuses(dataset).items():
+        words = {code: word for word, code in status_codes(dataset, variable).items()}
+        columns[name] = [words[code] for code in columns[name].tolist()]
     return pd.DataFrame(columns, index=pd.Index(hit_numbers(dataset), name=v.HIT))
+
+
+def _statuses(dataset: xarray.Dataset) -> dict[str, v.Variable]:
+    """Columns that tell how a core ended, in the target and in each layer, with their variables."""
+    layers = dataset.sizes["layer"] if v.LAYER_STATUS in dataset else 0
+    return {v.STATUS: v.STATUS} | {f"{v.LAYER_STATUS}_{layer}": v.LAYER_STATUS for layer in range(layers)}
 
 
 def _as_given(array: xarray.DataArray) -> np.ndarray[Any, Any]:
@@ -64,7 +72,8 @@ def _columns(dataset: xarray.Dataset) -> Iterator[tuple[str, xarray.DataArray]]:
 
 def _units(dataset: xarray.Dataset) -> dict[str, str]:
     """Units of the columns; a status is a word."""
-    return {name: "1" if name == v.STATUS else str(array.attrs["units"]) for name, array in _columns(dataset)}
+    words = _statuses(dataset)
+    return {name: "1" if name in words else str(array.attrs["units"]) for name, array in _columns(dataset)}
 
 
 def write_csv(dataset: xarray.Dataset, path: Path) -> None:
@@ -80,7 +89,8 @@ def write_csv(dataset: xarray.Dataset, path: Path) -> None:
     with aside(path) as file:
         for part in slices(dataset):
             frame = to_dataframe(part)
-            frame[v.STATUS] = frame[v.STATUS].map(_no_formula)
+            for name in _statuses(part):
+                frame[name] = frame[name].map(_no_formula)
             header = [_no_formula(_header(name, unit)) for name, unit in _units(part).items()] if is_first else False
             frame.to_csv(file, mode="w" if is_first else "a", header=header)
             is_first = False

@@ -9,7 +9,7 @@ from typing import Any, Literal
 from pydantic import field_validator, model_validator
 
 from warpimpact.campaign.needs import lacking
-from warpimpact.results.measures import Measure
+from warpimpact.results.measures import WEIGHTS, Measure
 from warpimpact.results.vocabulary import QUANTITIES
 from warpimpact.scene.model import Model
 from warpimpact.scene.units import Number, quoted
@@ -72,7 +72,7 @@ class _Asked(Model):
         if Measure.parse(text).kind == "worst_point":
             raise ValueError(
                 f"got {quoted(text)}, but a search takes a mean, a worst tenth, a quantile, a probability or "
-                "areal_density"
+                f"{' or '.join(WEIGHTS)}"
             )
         return text
 

@@ -13,7 +13,16 @@ from numpy.typing import NDArray
 from warpimpact.campaign.text import CampaignError
 from warpimpact.optimisation.design import Design, alternatives_of
 from warpimpact.optimisation.evaluate import HitJob, Told, campaign_of, hits_asked, levels_asked
-from warpimpact.optimisation.judged import DesignRecord, excesses, interval, means, numbers_of, objectives, values
+from warpimpact.optimisation.judged import (
+    DesignRecord,
+    excesses,
+    interval,
+    means,
+    numbers_of,
+    objectives,
+    values,
+    weights_of,
+)
 from warpimpact.optimisation.search import Searched
 from warpimpact.optimisation.searcher import front_of
 from warpimpact.runs.questions import Question
@@ -114,7 +123,7 @@ def _reference(design: Design, place: int) -> DesignRecord:
     except CampaignError as error:
         text = str(error).removeprefix(f"{design.name}: ")
         raise CampaignError(f'{design.name}: references[{place}] "{given.name}": {text}') from None
-    return DesignRecord(np.zeros(0), tables, campaign.target.areal_density, (), np.zeros((0, 0, 0)))
+    return DesignRecord(np.zeros(0), tables, weights_of(campaign.target), (), np.zeros((0, 0, 0)))
 
 
 def check_references(design: Design) -> None:
@@ -142,7 +151,7 @@ def _fresh(
     if not design.keys:
         empty = np.zeros((len(situations), 0, count))
         found = [
-            DesignRecord(target.values, target.tables, target.areal_density, ("",) * len(threats), empty)
+            DesignRecord(target.values, target.tables, target.weights, ("",) * len(threats), empty)
             for target in targets
         ]
         return found, np.zeros((len(targets), 2, 0)), [np.zeros(0)] * len(targets)
@@ -163,7 +172,7 @@ def _fresh(
             DesignRecord(
                 values=target.values,
                 tables=target.tables,
-                areal_density=target.areal_density,
+                weights=target.weights,
                 levels=of_targets[number],
                 said=np.array([part.values for part in said[own]]),
                 seconds=sum(part.seconds for part in said[own]),
@@ -218,7 +227,7 @@ def _solids(design: Design, front: Sequence[DesignRecord], follow: Follow) -> Qu
         DesignRecord(
             values=record.values,
             tables=record.tables,
-            areal_density=record.areal_density,
+            weights=record.weights,
             levels=record.levels,
             said=np.array([part.values for part in said[number * threats : (number + 1) * threats]]),
         )

@@ -81,6 +81,8 @@ class Constraints(Model):
         smallest_corner_radius: least radius of the corners of a hole [m]; that of a slot is half its width.
         smallest_open_area, largest_open_area: share of holes.
         smallest_areal_density, largest_areal_density: of the whole target [kg/m²].
+        smallest_add_on_areal_density, largest_add_on_areal_density: of the layers in front of the base, or of a plate
+            alone [kg/m²].
     """
 
     smallest_ligament: PositiveLength | None = None
@@ -91,6 +93,8 @@ class Constraints(Model):
     largest_open_area: Annotated[Number, Field(gt=0, le=1)] | None = None
     smallest_areal_density: PositiveArealDensity | None = None
     largest_areal_density: PositiveArealDensity | None = None
+    smallest_add_on_areal_density: PositiveArealDensity | None = None
+    largest_add_on_areal_density: PositiveArealDensity | None = None
 
 
 class Search(Model):

@@ -15,6 +15,8 @@ from warpimpact.catalogue.catalogue import Catalogue
 from warpimpact.catalogue.entries import Material
 from warpimpact.optimisation.design import Design
 from warpimpact.optimisation.evaluate import campaign_of
+from warpimpact.optimisation.judged import weights_of
+from warpimpact.results.measures import WEIGHTS
 from warpimpact.scene import EllipsePattern, Plate
 from warpimpact.scene.patterns.lattice import LatticePattern
 from warpimpact.solver.limit import check_arrests
@@ -75,9 +77,11 @@ def checked(design: Design, tables: Mapping[str, Any]) -> Checked:
 
 def _violations(design: Design, campaign: Campaign) -> Iterator[Violation]:
     limits, target = design.constraints, campaign.target
-    density = target.areal_density
-    yield from _least("smallest_areal_density", density, limits.smallest_areal_density, "areal density", "kg/m²")
-    yield from _most("largest_areal_density", density, limits.largest_areal_density, "areal density", "kg/m²")
+    for measure, density in weights_of(target).items():
+        what = WEIGHTS[measure].label
+        smallest, largest = (f"{end}_{measure}" for end in ("smallest", "largest"))
+        yield from _least(smallest, density, getattr(limits, smallest), what, "kg/m²")
+        yield from _most(largest, density, getattr(limits, largest), what, "kg/m²")
     if not design.search.allow_untested:
         yield from (Violation(UNTESTED, 1.0, standing.sentence) for standing in untested(campaign))
     for name, plate in target.named:

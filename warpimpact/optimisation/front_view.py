@@ -11,6 +11,7 @@ import numpy as np
 from warpimpact.analysis.evidence_lines import evidence_lines
 from warpimpact.analysis.numbers import interval_text, number_text
 from warpimpact.results import front as f
+from warpimpact.results.measures import WEIGHTS
 from warpimpact.view.view import Column, Section, Table, number
 
 if TYPE_CHECKING:
@@ -125,7 +126,7 @@ def _bounds(dataset: xarray.Dataset) -> list[int]:
 
 def is_weight(dataset: xarray.Dataset, place: int) -> bool:
     """Whether what is asked is the weight of the target, which no assumption moves."""
-    return str(dataset[f.ASKED].values[place]).startswith("areal_density")
+    return str(dataset[f.ASKED].values[place]).startswith(tuple(WEIGHTS))
 
 
 def _front_table(dataset: xarray.Dataset) -> Table:
@@ -253,7 +254,7 @@ def _shrinkage(dataset: xarray.Dataset) -> Iterator[str]:
     for place, (label, sign, limit) in enumerate(
         zip(dataset[f.LABEL].values, dataset[f.SIGN].values, dataset[f.LIMIT].values, strict=True)
     ):
-        if not np.isnan(limit) or not len(fresh) or str(dataset[f.ASKED].values[place]).startswith("areal_density"):
+        if not np.isnan(limit) or not len(fresh) or str(dataset[f.ASKED].values[place]).startswith(tuple(WEIGHTS)):
             continue
         worse = float(np.mean(sign * (fresh[:, place] - searched[:, place])))
         before = float(np.mean(searched[:, place]))

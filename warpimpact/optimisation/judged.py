@@ -8,7 +8,7 @@ of two designs is the mean of their differences by scrambling, with Student's in
 from __future__ import annotations
 
 import warnings
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -17,7 +17,9 @@ from numpy.typing import NDArray
 
 from warpimpact.optimisation.asked import Bound, Objective
 from warpimpact.optimisation.design import SCRAMBLINGS, Design
+from warpimpact.results import attributes as attr
 from warpimpact.results.measures import Measure
+from warpimpact.scene import Target
 from warpimpact.statistics.comparisons import ROUNDED
 from warpimpact.statistics.intervals import Estimate, estimate_of
 from warpimpact.statistics.student import student_quantile
@@ -35,7 +37,7 @@ class DesignRecord:
     Attributes:
         values: of its variables, shape [variables].
         tables: of its campaign.
-        areal_density: [kg/m²].
+        weights: masses per area [kg/m²], by the measures that ask for them (results/measures.py).
         levels: numerics for every threat, as JSON.
         said: columns of `Design.keys` in each of `Design.situations`, shape [situations, columns, hits].
         seconds: processor time of its hits.
@@ -44,7 +46,7 @@ class DesignRecord:
 
     values: Array
     tables: dict[str, Any]
-    areal_density: float
+    weights: Mapping[str, float]
     levels: tuple[str, ...]
     said: Array
     seconds: float = 0.0
@@ -60,6 +62,12 @@ class DesignRecord:
         """The record with further hits."""
         joined = np.concatenate([self.said, said], axis=2)
         return replace(self, said=joined, seconds=self.seconds + seconds, means={}, known={})
+
+
+def weights_of(target: Target) -> dict[str, float]:
+    """What a record has of the weights of its target."""
+    weights = target.weights
+    return {attr.AREAL_DENSITY: target.areal_density, attr.ADD_ON_DENSITY: weights.get("add-on", target.areal_density)}
 
 
 def means(design: Design, record: DesignRecord, hits: int) -> Array:
@@ -83,7 +91,7 @@ def numbers_of(design: Design, record: DesignRecord, goal: Objective | Bound, hi
     assumption, or averaged over them, as the goal asks."""
     measure = goal.asked
     if measure.kind == "target":
-        return np.full(hits, record.areal_density)
+        return np.full(hits, record.weights[measure.name])
     numbers = record.said[:, design.keys.index(measure.column), :hits]
     if not measure.is_binary:
         numbers = np.array([_averaged(measure, of_hits) for of_hits in numbers])
@@ -115,7 +123,8 @@ def _averaged(measure: Measure, numbers: Array) -> Array:
 def estimate(design: Design, record: DesignRecord, goal: Objective | Bound) -> Estimate:
     """An objective or a bound with its interval, by all hits."""
     if goal.asked.kind == "target":
-        return Estimate(record.areal_density, record.areal_density, record.areal_density, record.hits, 0.0)
+        weight = record.weights[goal.asked.name]
+        return Estimate(weight, weight, weight, record.hits, 0.0)
     numbers = numbers_of(design, record, goal, record.hits)
     averaged = goal.assumptions == "mean" or (goal.threats == "mean" and len(design.threats) > 1)
     is_share = goal.asked.is_binary and not averaged

@@ -13,7 +13,7 @@ from warpimpact.campaign.text import CampaignError
 from warpimpact.optimisation.design import Design
 from warpimpact.optimisation.evaluate import HitJob, hits_asked, levels_asked
 from warpimpact.optimisation.feasible import Checked, checked
-from warpimpact.optimisation.judged import DesignRecord, excesses, objectives, undecided
+from warpimpact.optimisation.judged import DesignRecord, excesses, objectives, undecided, weights_of
 from warpimpact.optimisation.searcher import Searcher, front_of, hypervolume
 from warpimpact.runs.questions import Question
 
@@ -183,14 +183,14 @@ class _State:
             self.refused[key] = found
             return
         nothing = np.zeros((len(self.design.situations), len(self.design.keys), 0))
-        self.drafts[key] = DesignRecord(values, tables, found.campaign.target.areal_density, (), nothing)
+        self.drafts[key] = DesignRecord(values, tables, weights_of(found.campaign.target), (), nothing)
 
     def _compute(self, new: dict[bytes, DesignRecord]) -> Question[None]:
         """Compute the hits of designs; designs that may be on the front get the hits of the next rung."""
         levels = yield from self._levels(list(new.values()))
         for key, of_threats in zip(list(new), levels, strict=True):
             one = new[key]
-            new[key] = DesignRecord(one.values, one.tables, one.areal_density, of_threats, one.said)
+            new[key] = DesignRecord(one.values, one.tables, one.weights, of_threats, one.said)
         going, before = list(new), 0
         for hits in self.design.search.rungs if self.design.keys else [self.design.search.hits]:
             with_more = yield from self._more([new[key] for key in going], before, hits)

@@ -17,6 +17,7 @@ from matplotlib.path import Path
 
 from warpimpact.analysis.plate_text import plate_numbers
 from warpimpact.plotting.dimensions import draw_dimensions
+from warpimpact.plotting.fire import draw_fire
 from warpimpact.plotting.heading import add_heading
 from warpimpact.scene import NoPattern, Target
 
@@ -24,7 +25,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from numpy.typing import NDArray
 
-    from warpimpact.scene import Core, Plate
+    from warpimpact.scene import Core, Impact, Plate
 
 _MM = 1e3
 _CELLS = 3  # of an unbounded plate, along each side
@@ -36,7 +37,9 @@ _SECTION_POINTS = 2001
 _STEEL, _CORE = "0.72", "#D55E00"
 
 
-def plate_figure(plate: Plate | Target, core: Core | None = None, title: str = "") -> Figure:
+def plate_figure(
+    plate: Plate | Target, core: Core | None = None, title: str = "", impact: Impact | None = None
+) -> Figure:
     """Draw a finite plate as a whole, another one as three by three cells, with its numbers; beside it a section of the
     target, if layers stand behind the plate.
 
@@ -44,6 +47,7 @@ def plate_figure(plate: Plate | Target, core: Core | None = None, title: str = "
         plate: the plate, or the target whose first layer it is.
         core: its largest section is drawn in the middle of the plate.
         title: title of the figure.
+        impact: its direction of fire is drawn.
     """
     target = plate if isinstance(plate, Target) else Target(layers=(plate,))
     plate, layered = target.layers[0], len(target.layers) > 1
@@ -54,6 +58,8 @@ def plate_figure(plate: Plate | Target, core: Core | None = None, title: str = "
     for patch in patches:
         axes.add_patch(patch)
     draw_dimensions(axes, plate)
+    if impact is not None:
+        draw_fire(axes, impact.obliquity, impact.azimuth)
     steel = Patch(facecolor=_STEEL, edgecolor="black", label=f"plate, {plate.thickness * _MM:g} mm thick")
     numbers = plate_numbers(plate.open_area, plate.ligament, target.weights, plate.pattern.resolution)
     parts = (f"{name} {number}".replace(" ", "\u00a0") for name, number in numbers.items())  # no break within a part

@@ -58,6 +58,10 @@ LAYER_FRONT = Variable("layer_front", ("layer",), "m", "front face of the layer,
 LAYER_REAR = Variable("layer_rear", ("layer",), "m", "rear face of the layer, from the front face of the target")
 LAYER_FACES = (LAYER_FRONT, LAYER_REAR)
 """Means over the shots if thicknesses scatter."""
+LAYER = Variable("layer", ("layer",), "1", "number of the layer; the plate is layer 0")
+LAYER_NAME = Variable("layer_name", ("layer",), "1", "name of the layer")
+LAYER_MATERIAL = Variable("layer_material", ("layer",), "1", "material of the layer in the catalogue, or empty")
+LAYER_LABELS = (LAYER_NAME, LAYER_MATERIAL)
 LAYER_STANDOFF = Variable("layer_standoff", ("layer_standoff",), "m", "distance behind the rear face of a layer")
 LAYER_COORDINATES = (LAYER_STANDOFF,)
 

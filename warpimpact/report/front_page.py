@@ -22,6 +22,7 @@ from warpimpact.plotting.front import front_figure, front_leaders, holding
 from warpimpact.results import attributes as attr
 from warpimpact.results import front as f
 from warpimpact.results.files import aside
+from warpimpact.results.measures import WEIGHTS
 from warpimpact.scene.symmetry import IDENTITY, symmetries
 from warpimpact.view import svg
 from warpimpact.view.view import html_of
@@ -184,7 +185,7 @@ def _map(dataset: xarray.Dataset, place: int, campaign: Campaign, text: str) -> 
     effects = [
         str(label)
         for label, name in zip(dataset[f.LABEL].values, dataset[f.ASKED].values, strict=True)
-        if not str(name).startswith("areal_density")
+        if not str(name).startswith(tuple(WEIGHTS))
     ]
     return {
         "drawing": Markup(svg.drawing([holes], -half, half, label, scale=0.36 / max(cell), image=image)),

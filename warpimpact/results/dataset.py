@@ -16,7 +16,7 @@ from warpimpact.kernels.status import Status
 from warpimpact.records.group import failures
 from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
-from warpimpact.results.layers import faces, fields, own_columns, sections
+from warpimpact.results.layers import faces, fields, labels, own_columns, sections
 from warpimpact.results.outlines import in_memory, outlines_in
 from warpimpact.results.table import HitTable
 
@@ -84,7 +84,9 @@ def to_table(
     coordinates |= beside or {}
     coordinates |= outlines_in(scene.target.layers[0], *((-0.5 * side, 0.5 * side) for side in period))
     beside_the_hits = (name for group in ("solid", "finer", "assumed") for name in v.GROUPS[group])
-    along = (*v.COORDINATES, *v.OUTLINE_VARIABLES, *v.LAYER_COORDINATES, *beside_the_hits)
+    coordinates |= labels(scene.target)
+    of_layers = (v.LAYER, *v.LAYER_LABELS, *v.LAYER_COORDINATES)
+    along = (*v.COORDINATES, *v.OUTLINE_VARIABLES, *of_layers, *beside_the_hits)
     values: dict[str, Any] = {variable: getattr(shots, variable.field) for variable in v.SHOT_VARIABLES}
     columns = own_columns(scene.target, shots)
     values |= {name: columns[name] for name in v.OPTIONAL_SHOT_VARIABLES if name in columns}
@@ -309,9 +311,9 @@ def _stored(variable: v.Variable, values: Any, single: bool) -> Any:
     return shown.astype(np.float32) if single and shown.dtype.kind == "f" else shown
 
 
-def status_codes(dataset: Result) -> dict[str, int]:
-    """Meaning → code of ``status``, in the order of the codes."""
-    attributes = dataset[v.STATUS].attrs
+def status_codes(dataset: Result, variable: v.Variable = v.STATUS) -> dict[str, int]:
+    """Meaning → code of ``status``, or of ``layer_status``, in the order of the codes."""
+    attributes = dataset[variable].attrs
     return dict(zip(attributes["flag_meanings"].split(), attributes["flag_values"].tolist(), strict=True))
 
 

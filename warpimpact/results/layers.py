@@ -44,6 +44,15 @@ def faces(target: Target) -> dict[str, NDArray[np.float64]]:
     return dict(zip(v.LAYER_FACES, target.faces.T, strict=True)) if len(target.layers) > 1 else {}
 
 
+def labels(target: Target) -> dict[str, Any]:
+    """Number, name and material of the layers; empty if the plate stands alone."""
+    if len(target.layers) == 1:
+        return {}
+    names = [name for name, _ in target.named]
+    materials = [layer.material or "" for layer in target.layers]
+    return {v.LAYER: np.arange(len(names), dtype=np.int8), v.LAYER_NAME: names, v.LAYER_MATERIAL: materials}
+
+
 def sections(scene: Scene, hit: xarray.Dataset, section: NDArray[np.float64]) -> dict[str, NDArray[Any]]:
     """Faces of the layers for one hit, and where each is solid along y and z through the hit point; empty if the plate
     stands alone."""

@@ -40,16 +40,30 @@ _KINDS: dict[str, Any] = {
 """Types of the quantities that have these units in the Dataset."""
 
 STATUSES = {status.name.lower(): status for status in OF_SHOTS if not status.failed}
-AREAL_DENSITY = "areal_density"
-_AREAL_DENSITY = PerHit(
-    name=AREAL_DENSITY,
-    label="areal density",
-    units="kg m-2",
-    definition="Mass per area of the whole target.",
-    source="mass of what is solid over the area of the cell",
-    higher_is_better=False,
-    values=lambda part, _: np.full(part.sizes["hit"], part.attrs.get(attr.AREAL_DENSITY, np.nan)),
-)
+
+
+def _weight(name: str, label: str, of: str) -> PerHit:
+    def values(part: Result, _: float) -> Array:
+        return np.full(part.sizes["hit"], part.attrs.get(name, part.attrs.get(attr.AREAL_DENSITY, np.nan)))
+
+    return PerHit(
+        name=name,
+        label=label,
+        units="kg m-2",
+        definition=f"Mass per area of {of}.",
+        source="mass of what is solid over the area of the cell",
+        higher_is_better=False,
+        values=values,
+    )
+
+
+WEIGHTS = {
+    attr.AREAL_DENSITY: _weight(attr.AREAL_DENSITY, "areal density", "the whole target"),
+    attr.ADD_ON_DENSITY: _weight(
+        attr.ADD_ON_DENSITY, "areal density of the add-on", "the layers in front of the base, or of a plate alone"
+    ),
+}
+"""Measures of the target itself, by their text."""
 NAMES = {"V50": "quantile(limit_velocity, 0.5)", "V05": "quantile(limit_velocity, 0.05)"}
 NAMES |= {"H50": "quantile(limit_thickness, 0.5)", "H05": "quantile(limit_thickness, 0.05)"}
 """Measures that have a name of their own."""
@@ -108,7 +122,7 @@ class Measure:
             ValueError: says what was found, what is allowed and, where it is clear, what was meant.
         """
         text = text.strip()
-        if text == AREAL_DENSITY:
+        if text in WEIGHTS:
             return cls(text, "target", text)
         match = _FORM.fullmatch(NAMES.get(text, text))
         statistic = match["statistic"] if match else None
@@ -116,7 +130,7 @@ class Measure:
             raise ValueError(
                 f"got {quoted(text)}, but it must be of the form mean(residual_velocity), worst_tenth(base_depth), "
                 "worst_point(base_depth), quantile(residual_velocity, 0.05), P(tilt@130mm > 30 deg) or P(perforated), "
-                f"or be one of {AREAL_DENSITY}, {', '.join(NAMES)}{_meant(text)}"
+                f"or be one of {', '.join((*WEIGHTS, *NAMES))}{_meant(text)}"
             )
         parts = match.groupdict()
         if statistic == "P" and parts["relation"] is None:
@@ -152,8 +166,8 @@ class Measure:
     @property
     def quantity(self) -> PerHit:
         """The quantity or the event."""
-        if self.name == AREAL_DENSITY:
-            return _AREAL_DENSITY
+        if self.kind == "target":
+            return WEIGHTS[self.name]
         return (EVENTS if self.kind == "share" else QUANTITIES)[self.name]
 
     @property
@@ -330,7 +344,7 @@ def _known(name: str, allowed: Mapping[str, PerHit]) -> str:
 
 def _meant(text: str) -> str:
     """What was probably meant, as the end of a sentence; empty where nothing is close."""
-    match = get_close_matches(text, (*NAMES, AREAL_DENSITY, *QUANTITIES, *EVENTS), n=1, cutoff=0.75)
+    match = get_close_matches(text, (*NAMES, *WEIGHTS, *QUANTITIES, *EVENTS), n=1, cutoff=0.75)
     if not match:
         return ""
     form = f"P({match[0]})" if match[0] in EVENTS else f"mean({match[0]})" if match[0] in QUANTITIES else match[0]

@@ -12,7 +12,7 @@ from .model import Array
 from .plate import Plate
 from .scatter import Scatter
 from .shots import Hits, Impact
-from .target import Layer
+from .target import Layer, layer_name
 
 _ROUNDING = 1e-12
 """Components of the unit vector along the line of flight, and angles [rad], count as 0 below it: cos 90° is 6e-17."""
@@ -73,7 +73,7 @@ def unsymmetric(scatter: Scatter, layers: Sequence[Layer] = ()) -> dict[str, str
     holed = [k for k, layer in enumerate(layers) if layer.open_area > 0.0 or layer.size is not None]
     return {
         TURNED: bool(turned) and f"a distribution of impact.{turned[0]}",
-        HOLED_LAYERS: bool(holed) and f"layer[{holed[0]}] with a pattern or a rim",
+        HOLED_LAYERS: bool(holed) and f"{layer_name(holed[0] + 1)} with a pattern or a rim",
     }
 
 

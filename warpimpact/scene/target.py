@@ -18,6 +18,11 @@ MOST_LAYERS = 64
 """Largest number of layers behind the plate."""
 
 
+def layer_name(number: int) -> str:
+    """What a layer is called: the plate is number 0, the first table [[layer]] is "layer 1"."""
+    return f"layer {number}" if number else "plate"
+
+
 class Layer(Plate):
     """A plate behind another one: a base armour, a second perforated plate, a liner.
 
@@ -51,8 +56,8 @@ class Target(Model):
 
     @property
     def named(self) -> list[tuple[str, Plate]]:
-        """The layers in order, each with its place in a campaign."""
-        return [(f"layer[{k - 1}]" if k else "plate", layer) for k, layer in enumerate(self.layers)]
+        """The layers in order, each with its name."""
+        return [(layer_name(k), layer) for k, layer in enumerate(self.layers)]
 
     @property
     def gaps(self) -> tuple[float, ...]:

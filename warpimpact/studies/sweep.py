@@ -60,10 +60,10 @@ class Input:
     @property
     def name(self) -> str:
         """Name of the dimension: that of the variable of a hit map that holds the input, else the last part of the
-        key; of a layer the whole key, as "layer_0_thickness"."""
+        key; of a layer the whole key, as "layer_1_thickness"."""
         last = self.key.rpartition(".")[2]
-        if self.key.startswith("layer."):
-            return self.key.replace(".", "_")
+        if self.key.startswith("layer "):
+            return self.key.replace(" ", "_").replace(".", "_")
         return next((str(variable) for variable in v.SHOT_VARIABLES if variable.field == last), last)
 
 

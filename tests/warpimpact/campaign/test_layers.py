@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 import xarray
 
-from warpimpact import Campaign, run
+from warpimpact import Campaign, run, to_dataframe
 from warpimpact import Plate as NamedPlate
 from warpimpact.analysis.effectiveness import effectiveness
 from warpimpact.analysis.inspect import inspect_text
@@ -86,12 +86,12 @@ def test_layers_stand_behind_the_plate_in_order() -> None:
 @pytest.mark.parametrize(
     ("old", "new", "message"),
     [
-        ('gap = "5 mm"', 'gap = "-5 mm"', r"layer\[1\].gap: got \"-5 mm\", but it must be greater than or equal to 0"),
-        ('gap = "5 mm"', 'gapp = "5 mm"', r'layer\[1\]: got the unknown key "gapp"; did you mean "gap"\?'),
-        ('gap = "5 mm"', 'gap = "50 m"', r"layer\[1\].gap: got \"50 m\", but it must be less than or equal to 10"),
-        ('"8 mm"', "{ distribution = 'normal', mean = '1 mm', std = '1 mm' }", r"layer\[1\].thickness: got a normal"),
-        ('["2 mm", "0 mm"]', '"2 mm"', r"layer\[0\].offset: got \"2 mm\", but it must be a list"),
-        ('["2 mm", "0 mm"]', '["2 mm", {distribution = "x"}]', r"layer\[0\].offset\[1\]"),
+        ('gap = "5 mm"', 'gap = "-5 mm"', r"layer 2.gap: got \"-5 mm\", but it must be greater than or equal to 0"),
+        ('gap = "5 mm"', 'gapp = "5 mm"', r'layer 2: got the unknown key "gapp"; did you mean "gap"\?'),
+        ('gap = "5 mm"', 'gap = "50 m"', r"layer 2.gap: got \"50 m\", but it must be less than or equal to 10"),
+        ('"8 mm"', "{ distribution = 'normal', mean = '1 mm', std = '1 mm' }", r"layer 2.thickness: got a normal"),
+        ('["2 mm", "0 mm"]', '"2 mm"', r"layer 1.offset: got \"2 mm\", but it must be a list"),
+        ('["2 mm", "0 mm"]', '["2 mm", {distribution = "x"}]', r"layer 1.offset\[1\]"),
         (
             "patches_axial = 14",
             'scheme = "nodal"',
@@ -100,7 +100,7 @@ def test_layers_stand_behind_the_plate_in_order() -> None:
         (
             "replicates = 8",
             "irreducible = true",
-            r"hits.irreducible = true cannot be combined with layer\[0\] with a pattern",
+            r"hits.irreducible = true cannot be combined with layer 1 with a pattern",
         ),
     ],
 )
@@ -172,6 +172,16 @@ def test_a_solid_add_on_of_the_catalogue_has_the_resistance_of_its_thickness() -
     scattered = campaign(plate=PLATE.replace('"2600 MPa"', '{ distribution = "uniform", low = 2e9, high = 3e9 }'))
     shots = scattered.sampler().shots(0, 4)
     np.testing.assert_array_equal(at_solid(scattered, shots)[1].resistance, shots.resistance)
+
+
+def test_layers_of_a_result_have_names_and_their_status_is_a_word(result: xarray.Dataset) -> None:
+    assert result["layer"].values.tolist() == [0, 1, 2]
+    assert result["layer_name"].values.tolist() == [name for name, _ in campaign().target.named]
+    assert result["layer_name"].values.tolist() == ["plate", "layer 1", "layer 2"]
+    assert result["layer_material"].values.tolist() == ["", "", ""]
+    frame = to_dataframe(result)
+    codes = result["layer_status"].values[:, 2].tolist()
+    assert frame["layer_status_2"].tolist() == [Status(code).name.lower() for code in codes]
 
 
 def test_a_result_holds_its_references_and_tells_the_weights_apart(result: xarray.Dataset) -> None:

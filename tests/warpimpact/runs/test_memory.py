@@ -115,7 +115,7 @@ def test_windows_that_do_not_fit_are_refused(campaign: Campaign, monkeypatch: py
     scene = campaign.scene.model_copy(update={"target": Target(layers=(campaign.plate, base))})
     monkeypatch.setattr("warpimpact.solver.memory.free_memory", lambda: 2**20)
     monkeypatch.setattr("warpimpact.solver.memory.SMALL_MEMORY", 0)
-    with pytest.raises(MemoryError, match=r"needs .* GiB in .* nodes .*layer\[0\]: \d+ × \d+ nodes in \d+ planes"):
+    with pytest.raises(MemoryError, match=r"needs .* GiB in .* nodes .*layer 1: \d+ × \d+ nodes in \d+ planes"):
         simulate.simulate(scene, campaign.sampler().shots(0, 1), numerics=Numerics(level=0), device="cpu")
 
 

@@ -84,7 +84,7 @@ def test_the_plate_is_layer_0() -> None:
     behind = Layer(thickness="8 mm", resistance="1 GPa", gap="1 cm")
     target = Scene(core=CORE, target=(PLATE, PLATE, behind)).target
     assert target.gaps == (0.0, 0.0, 0.01)
-    assert [place for place, _ in target.named] == ["plate", "layer[0]", "layer[1]"]
+    assert [place for place, _ in target.named] == ["plate", "layer 1", "layer 2"]
     with pytest.raises(ValueError, match=r"gap = 0.01 m .* of the first layer"):
         Target(layers=(behind,))
 

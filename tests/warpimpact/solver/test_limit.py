@@ -122,7 +122,7 @@ def test_the_limit_velocity_of_a_target_of_layers_adds_their_work() -> None:
 
 def test_a_layer_that_weakens_by_time_is_refused() -> None:
     base = Layer(thickness=3e-3, resistance=1e9, degradation=0.8, gap=0.1)
-    with pytest.raises(ValueError, match=r"layer\[0\]: got a plate that weakens by time"):
+    with pytest.raises(ValueError, match=r"layer 1: got a plate that weakens by time"):
         limit_velocity(Scene(core=CORE, target=Target(layers=(PLATE, base))), shots(1))
 
 

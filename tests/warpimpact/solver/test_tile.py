@@ -214,15 +214,15 @@ def test_a_tile_is_built_in_small_parts_that_may_end_it(
 
 def test_tiles_of_a_target_have_a_budget_of_memory_and_time(monkeypatch: pytest.MonkeyPatch) -> None:
     one, other = (tile_of(PLATE.model_copy(update={"pattern": pattern}), 2e-6) for pattern in PATTERNS[:2])
-    check_tiles({one: "plate", other: "layer[0]"})
+    check_tiles({one: "plate", other: "layer 1"})
     monkeypatch.setattr("warpimpact.solver.tile.MOST_SECONDS", one.seconds + other.seconds - 1e-6)
     with pytest.raises(MemoryError, match=r"^plate.pattern: got a period of 0.016 m x 0.016 m, .* s are allowed; give"):
-        check_tiles({one: "plate", other: "layer[0]"})
+        check_tiles({one: "plate", other: "layer 1"})
     check_tiles({one: "plate"})
     monkeypatch.undo()
     monkeypatch.setattr("warpimpact.solver.tile.MOST_BYTES", one.bytes + other.bytes - 1)
     with pytest.raises(MemoryError, match=r"but .* GiB and 20 s are allowed"):
-        check_tiles({one: "plate", other: "layer[0]"})
+        check_tiles({one: "plate", other: "layer 1"})
 
 
 def test_tiles_are_kept_as_far_as_they_fit(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -9,6 +9,7 @@ import xarray
 from warpimpact import Campaign
 from warpimpact.analysis.estimates import estimated
 from warpimpact.campaign.campaign import CampaignError
+from warpimpact.campaign.places import resolved
 from warpimpact.cli import main
 from warpimpact.plotting.sweep import sweep_figure
 from warpimpact.results import files
@@ -51,17 +52,21 @@ def test_every_point_is_what_its_campaign_gives(folder: Path) -> None:
 
 def test_a_layer_is_swept_by_its_number(tmp_path: Path) -> None:
     layers = '[[layer]]\nthickness = "2 mm"\nresistance = "1 GPa"\n' * 2
-    given = '[sweep]\n"layer.1.thickness" = ["3 mm", "5 mm"]\n"layer.0.pattern" = [{ name = "a", shape = "none" }]\n'
+    given = '[sweep]\n"layer 2.thickness" = ["3 mm", "5 mm"]\n"layer 1.pattern" = [{ name = "a", shape = "none" }]\n'
     (tmp_path / "a.toml").write_text(TEXT.replace("[hits]", f"{layers}[hits]") + given, encoding="utf-8")
     sweep = read_sweep(tmp_path / "a.toml")
-    assert [one.name for one in sweep.inputs] == ["layer_1_thickness", "layer_0_pattern"]
+    assert [one.name for one in sweep.inputs] == ["layer_2_thickness", "layer_1_pattern"]
     assert [one.layer[1].thickness for one in sweep.campaigns.values()] == [3e-3, 5e-3]
     found = joined(sweep, [run(one, device="cpu") for one in sweep.campaigns.values()])
-    assert found["layer_1_thickness"].values.tolist() == [3e-3, 5e-3]
-    assert found["layer_1_thickness"].attrs == {"units": "m", "long_name": "layer.1.thickness"}
+    assert found["layer_2_thickness"].values.tolist() == [3e-3, 5e-3]
+    assert found["layer_2_thickness"].attrs == {"units": "m", "long_name": "layer 2.thickness"}
     (tmp_path / "a.toml").write_text(TEXT + given, encoding="utf-8")
-    with pytest.raises(CampaignError, match=r'got "layer.1.thickness", but the campaign has no \[\[layer\]\]'):
+    with pytest.raises(CampaignError, match=r'got "layer 2.thickness", but the campaign has no \[\[layer\]\]'):
         read_sweep(tmp_path / "a.toml")
+    (tmp_path / "a.toml").write_text(TEXT + given.replace("layer 2.", "layer.1."), encoding="utf-8")
+    with pytest.raises(CampaignError, match=r'layer 0 is the plate, so write "layer 2.thickness" for table 2 of'):
+        read_sweep(tmp_path / "a.toml")
+    assert resolved("layer 0.thickness", "a.toml") == "plate.thickness"
 
 
 def test_a_point_keeps_its_hits_at_two_levels_and_under_assumptions(tmp_path: Path) -> None:
