@@ -9,8 +9,8 @@ from typing import Any, Literal
 from pydantic import field_validator, model_validator
 
 from warpimpact.campaign.needs import lacking
-from warpimpact.results.measures import WEIGHTS, Measure
-from warpimpact.results.vocabulary import QUANTITIES
+from warpimpact.results.measures import Measure
+from warpimpact.results.vocabulary import QUANTITIES, WEIGHTS
 from warpimpact.scene.model import Model
 from warpimpact.scene.units import Number, quoted
 

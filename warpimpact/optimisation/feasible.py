@@ -16,7 +16,7 @@ from warpimpact.catalogue.entries import Material
 from warpimpact.optimisation.design import Design
 from warpimpact.optimisation.evaluate import campaign_of
 from warpimpact.optimisation.judged import weights_of
-from warpimpact.results.measures import WEIGHTS
+from warpimpact.results.vocabulary import WEIGHTS
 from warpimpact.scene import EllipsePattern, Plate
 from warpimpact.scene.patterns.lattice import LatticePattern
 from warpimpact.solver.limit import check_arrests

@@ -11,7 +11,7 @@ import numpy as np
 from warpimpact.analysis.evidence_lines import evidence_lines
 from warpimpact.analysis.numbers import interval_text, number_text
 from warpimpact.results import front as f
-from warpimpact.results.measures import WEIGHTS
+from warpimpact.results.vocabulary import WEIGHTS
 from warpimpact.view.view import Column, Section, Table, number
 
 if TYPE_CHECKING:

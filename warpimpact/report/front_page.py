@@ -22,7 +22,7 @@ from warpimpact.plotting.front import front_figure, front_leaders, holding
 from warpimpact.results import attributes as attr
 from warpimpact.results import front as f
 from warpimpact.results.files import aside
-from warpimpact.results.measures import WEIGHTS
+from warpimpact.results.vocabulary import WEIGHTS
 from warpimpact.scene.symmetry import IDENTITY, symmetries
 from warpimpact.view import svg
 from warpimpact.view.view import html_of

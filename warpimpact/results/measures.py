@@ -21,7 +21,7 @@ from warpimpact.kernels.status import OF_SHOTS
 from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
 from warpimpact.results.per_hit import Array, PerHit, place_of_standoff
-from warpimpact.results.vocabulary import EVENTS, LIMIT_THICKNESS, LIMIT_VELOCITY, OTHER_LAYERS, QUANTITIES
+from warpimpact.results.vocabulary import EVENTS, LIMIT_THICKNESS, LIMIT_VELOCITY, OTHER_LAYERS, QUANTITIES, WEIGHTS
 from warpimpact.scene import units
 from warpimpact.scene.display import STORED, Unit
 from warpimpact.scene.units import quantity, quoted
@@ -40,30 +40,6 @@ _KINDS: dict[str, Any] = {
 """Types of the quantities that have these units in the Dataset."""
 
 STATUSES = {status.name.lower(): status for status in OF_SHOTS if not status.failed}
-
-
-def _weight(name: str, label: str, of: str) -> PerHit:
-    def values(part: Result, _: float) -> Array:
-        return np.full(part.sizes["hit"], part.attrs.get(name, part.attrs.get(attr.AREAL_DENSITY, np.nan)))
-
-    return PerHit(
-        name=name,
-        label=label,
-        units="kg m-2",
-        definition=f"Mass per area of {of}.",
-        source="mass of what is solid over the area of the cell",
-        higher_is_better=False,
-        values=values,
-    )
-
-
-WEIGHTS = {
-    attr.AREAL_DENSITY: _weight(attr.AREAL_DENSITY, "areal density", "the whole target"),
-    attr.ADD_ON_DENSITY: _weight(
-        attr.ADD_ON_DENSITY, "areal density of the add-on", "the layers in front of the base, or of a plate alone"
-    ),
-}
-"""Measures of the target itself, by their text."""
 NAMES = {"V50": "quantile(limit_velocity, 0.5)", "V05": "quantile(limit_velocity, 0.05)"}
 NAMES |= {"H50": "quantile(limit_thickness, 0.5)", "H05": "quantile(limit_thickness, 0.05)"}
 """Measures that have a name of their own."""

@@ -256,3 +256,27 @@ def _recorded() -> Iterator[PerHit]:
 
 QUANTITIES: Mapping[str, PerHit] = {quantity.name: quantity for quantity in (*_DERIVED, *_recorded())}
 """All numbers that a hit may have, by name."""
+
+
+def _weight(name: str, label: str, of: str) -> PerHit:
+    def values(part: Result, _: float) -> Array:
+        return np.full(part.sizes["hit"], part.attrs.get(name, part.attrs.get(attr.AREAL_DENSITY, np.nan)))
+
+    return PerHit(
+        name=name,
+        label=label,
+        units="kg m-2",
+        definition=f"Mass per area of {of}.",
+        source="mass of what is solid over the area of the cell",
+        higher_is_better=False,
+        values=values,
+    )
+
+
+WEIGHTS = {
+    attr.AREAL_DENSITY: _weight(attr.AREAL_DENSITY, "areal density", "the whole target"),
+    attr.ADD_ON_DENSITY: _weight(
+        attr.ADD_ON_DENSITY, "areal density of the add-on", "the layers in front of the base, or of a plate alone"
+    ),
+}
+"""Measures of the target itself, by their text."""
