@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from itertools import groupby
+from textwrap import fill
 from typing import TYPE_CHECKING
 
 from matplotlib.figure import Figure
@@ -32,6 +33,8 @@ _STYLES = {  # by the kind of a measure; the last number is the distance from th
     "worst_tenth": ("worst tenth", "s", VERMILION, 0.12),
     "worst_point": ("worst hit", "x", "#000000", 0.12),
 }
+_WIDE = 34
+"""Characters in a line of the weights of a plate."""
 _ROW, _MARGIN = 0.42, 0.75
 """Height of a line, and of the margin of a panel [inch]."""
 
@@ -102,7 +105,7 @@ def _draw_plates(axes: Axes, comparison: Comparison, measures: Sequence[Score]) 
                     markersize=10.0,
                     label=f"{comparison.reference} of equal weight",
                 )
-    _furnish(axes, [f"{plate.name}\n{weights_text(plate.weights)}" for plate in plates])
+    _furnish(axes, [f"{plate.name}\n{fill(weights_text(plate.weights), _WIDE)}" for plate in plates])
     axes.set_title(_title(measures[0]), fontsize="medium", loc="left")
 
 

@@ -173,6 +173,7 @@ def test_a_campaign_of_the_front_runs_as_it_is(tmp_path: Path) -> None:
     found = files.read(tmp_path / "front.nc", f.FRONT)
     assert [path.name for path in campaigns] == list(found[f.FILE].values)
     assert campaigns[0].parent == folder_of(tmp_path / "front.nc")
+    assert str(found[f.VALUE].sel(variable="thickness")[f.UNIT].item()) == "mm"  # a value keeps its unit
     for path, density in zip(campaigns, found[f.FRESH].values[:, 0], strict=True):
         assert Campaign.from_toml(path).target.areal_density == pytest.approx(density, rel=1e-9)
     assert "shrinkage" in text_of(front_view(found))
