@@ -58,7 +58,7 @@ def test_each_line_works_after_those_above_it(
     made = {path.name for path in tmp_path.iterdir()}
     assert {"slotted.toml", "slotted.nc", "slotted.csv", "slots.nc", "slots.html", "slotted_hit34.nc"} <= made
     (code,) = re.findall(r"```python\n(.*?)```", README, re.DOTALL)
-    few_hits = code.replace('run("slotted.toml")', 'run(Campaign.from_toml("slotted.toml", count=128))')
+    few_hits = code.replace('run("addon.toml")', 'run(Campaign.from_toml("addon.toml", count=128))')
     assert few_hits != code
     capsys.readouterr()
     exec(few_hits, {"Campaign": Campaign})
