@@ -195,6 +195,7 @@ def history_line(command: str) -> str:
     return f"{datetime.now(UTC):%Y-%m-%dT%H:%M:%SZ} warpimpact {command}"
 
 
+@cache
 def versions() -> dict[str, str]:
     """The attributes that say which versions computed a result and decide its bits."""
     import warp  # a second to import
