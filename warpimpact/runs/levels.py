@@ -17,7 +17,7 @@ from warpimpact.results.table import HitTable
 from warpimpact.results.tallies import shift_of
 from warpimpact.scene import Shots
 from warpimpact.solver.findings import HitErrors
-from warpimpact.solver.pilot import MOST, Aim, Excess
+from warpimpact.solver.pilot import Aim, Excess
 from warpimpact.statistics.shifts import SHIFT_MARGIN
 
 Array = NDArray[np.float64]
@@ -42,13 +42,12 @@ def level_for(campaign: Campaign) -> str:
 
 def aim_of(campaign: Campaign) -> Aim | None:
     """Measures that a level is looked for, by what the numerics shift them by over what they may; None where it is not
-    looked for by that. At several layers a level that keeps the accuracy will do, too, and all hits of a pilot judge a
-    level: few tell little of what ends otherwise."""
+    looked for by that. At several layers a level that keeps the accuracy will do, too."""
     if not level_for(campaign):
         return None
     if campaign.stop is not None:
         return Aim(_excess_of_stop(campaign, campaign.stop))
-    return Aim(_excess_of_layers(campaign), alone=False, first=MOST)
+    return Aim(_excess_of_layers(campaign), alone=False)
 
 
 def _excess_of_stop(campaign: Campaign, rule: Stop) -> Excess:

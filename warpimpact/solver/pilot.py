@@ -72,13 +72,12 @@ class Aim(NamedTuple):
 
     Attributes:
         excess: error of measures over what is allowed.
-        alone: whether it chooses the level alone; else a level that keeps the accuracy will do, too.
-        first: shots by which a level is judged first; 0 for as many as with an accuracy.
+        alone: whether it chooses the level alone; else a level that keeps the accuracy will do, too, and the accuracy
+            tells whether finer levels are of use: the shift of a mean may be small by chance.
     """
 
     excess: Excess
     alone: bool = True
-    first: int = 0
 
 
 def climb(
@@ -167,6 +166,8 @@ def pilot_hits(
     level = climb(pilot.judge, range(first, len(LADDER) - 1), 1, pilot.worth)
     if level is None:
         return HitErrors(at_level(first, numerics), False, accuracy.share, math.inf, math.inf)
+    if aim is not None and not aim.alone:
+        pilot.compare_all(level, hits)
     if not pilot.tried[level].errors.kept:
         pilot.tell_to_finest(level)
     if aim is None and hits >= PART * len(pilot.tried[level].coarse):
@@ -182,6 +183,7 @@ class _Pilot:
     Attributes:
         known: outcomes of the first shots at levels.
         tried: levels that were judged.
+        shifts: of measures at these levels, over what is allowed.
     """
 
     outcomes_at: Callable[[Numerics, Shots], Outcomes]
@@ -192,13 +194,13 @@ class _Pilot:
     aim: Aim | None
     known: dict[int, Outcomes] = field(default_factory=dict)
     tried: dict[int, Tried] = field(default_factory=dict)
+    shifts: dict[int, float] = field(default_factory=dict)
 
     @property
     def counts(self) -> list[int]:
         """Numbers of shots that may judge a level: twice as many each time, of whole plates."""
         most, at_a_plate = len(self.shots), self.shots.at_a_plate
-        first = (self.aim and self.aim.first) or _first_shots(self.numerics.asked)
-        counts = [min(most, -(-first // at_a_plate) * at_a_plate)]
+        counts = [min(most, -(-_first_shots(self.numerics.asked) // at_a_plate) * at_a_plate)]
         while counts[-1] < most:
             counts.append(min(most, 2 * counts[-1]))
         return counts
@@ -239,7 +241,10 @@ class _Pilot:
 
     def decided(self, level: int, verdict: Verdict) -> bool:
         """Whether more shots would hardly tell otherwise."""
-        (low, high), (errors, coarse, _) = OPEN if self.aim is None else OPEN_MEASURE, self.tried[level]
+        if self.aim is not None:
+            low, high = OPEN_MEASURE
+            return not low < self.shifts[level] < high
+        (low, high), (errors, coarse, _) = OPEN, self.tried[level]
         few = self.numerics.asked.status_share < errors.status_error <= OPEN_STATUS / len(coarse)
         return not low < verdict.excess < high and not (few and verdict.excess <= low)
 
@@ -257,9 +262,9 @@ class _Pilot:
             kept = verdict.excess <= 1.0 and min(coarser) <= self.numerics.asked.status_share
             errors = replace(errors, status_error=min(coarser), kept=kept)
         if self.aim is not None:
-            excess = self.aim.excess(coarse, fine, self.shots[:count])
+            excess = self.shifts[level] = self.aim.excess(coarse, fine, self.shots[:count])
             by_aim = Verdict(excess <= 1.0, excess, excess, math.inf)
-            verdict = by_aim if self.aim.alone or excess < verdict.excess or not errors.kept else verdict
+            verdict = by_aim if self.aim.alone else verdict._replace(kept=errors.kept or by_aim.kept)
             errors = replace(errors, kept=verdict.kept)
         _logger.info("pilot: %d shots at level %d err by %s, kept: %s", count, level, errors.errors, errors.kept)
         self.tried[level] = Tried(errors, coarse, fine)
@@ -272,6 +277,16 @@ class _Pilot:
         assert numerics.level is not None
         margin, shots = ERROR_PER_CHANGE[min(2, len(LADDER) - 1 - numerics.level)], self.shots[: len(fine)]
         return compared(numerics, self.numerics.asked, (coarse, between, fine), margin, shots, self.free)
+
+    def compare_all(self, level: int, hits: int) -> None:
+        """Compare all shots at the level that is taken, where this takes no longer than the run of some hits: few tell
+        little of what ends otherwise."""
+        count, kept = len(self.shots), self.tried[level].errors.kept
+        finer = min(level + 2, len(LADDER) - 1)
+        if sum(self.missing(at, count) * self.price(at) for at in (level, finer)) <= hits * self.price(level):
+            self.judged(level, finer, count)
+            tried = self.tried[level]
+            self.tried[level] = tried._replace(errors=replace(tried.errors, kept=kept))
 
     def tell_to_finest(self, level: int) -> None:
         """Tell the errors of a level that breaks the promise by its change to the finest level that as many shots are
