@@ -10,6 +10,7 @@ from warpimpact.results.interrupts import terminated_as_interrupted
 from .mistakes import memory_told
 from .options import Commands, add_command, add_computing, add_output, add_overwrite, executor_of
 from .paths import check_picture, check_place, check_suffix, replaces
+from .plain import say
 from .progress import Step, show_progress, warn
 
 if TYPE_CHECKING:
@@ -54,6 +55,7 @@ def _optimise(arguments: argparse.Namespace) -> int:
     check_place(output)
     picture = output.with_suffix(".png")
     check_picture(picture, overwrite=replaces(arguments, output))
+    say(design.search.extent)
     with (
         memory_told(arguments.design),
         terminated_as_interrupted(),

@@ -130,6 +130,16 @@ class Search(Model):
         return self
 
     @property
+    def extent(self) -> str:
+        """How much is computed at most, for people who wait."""
+        assumed = f" and {self.assumed_hits} under every assumption" if self.assumed_hits else ""
+        fresh = f"{self.confirm_hits} fresh hits{assumed}"
+        return (
+            f"searches at most {self.designs} designs with {self.hits} to {self.most_hits} hits each, then up to "
+            f"{self.confirmed} of the front with {fresh}: minutes, or longer"
+        )
+
+    @property
     def rungs(self) -> list[int]:
         """Numbers of hits of a design, from the first to the largest, each four times the one before."""
         rungs = [self.hits]

@@ -120,7 +120,7 @@ def _draw_front(axes: Axes, dataset: xarray.Dataset, names: dict[int, str]) -> N
         if across != up and np.isfinite(solid[:, up]).any():
             order = np.argsort(solid[:, across])
             style: dict[str, Any] = {"color": GREY, "linestyle": "--", "marker": "D", "fillstyle": "none"}
-            axes.plot(solid[order, across], solid[order, up], **style, label="solid plate of the same weight", zorder=2)
+            axes.plot(solid[order, across], solid[order, up], **style, label="solid, of the same weight", zorder=2)
     for place, (name, mark) in enumerate(zip(dataset[f.REFERENCE].values, 4 * _MARKS, strict=False)):
         at = dataset[f.REFERENCE_FOUND].values[place]
         ends = _bars(dataset, (f.REFERENCE_FOUND, f.REFERENCE_LOW, f.REFERENCE_HIGH), up)[:, place : place + 1]

@@ -213,12 +213,13 @@ def test_threats_of_like_names_have_files_of_their_own(tmp_path: Path) -> None:
     assert [Campaign.from_toml(path).impact.velocity for path in campaigns] == list(velocities)
 
 
-def test_a_complete_search_is_resumed_to_its_campaigns(tmp_path: Path) -> None:
+def test_a_complete_search_is_resumed_to_its_campaigns(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """As after a death between the result and its campaigns; a campaign that was changed is kept."""
     file, output = tmp_path / "d.toml", tmp_path / "front.nc"
     file.write_text("\n".join([CORE, *SEARCHED, SEARCH]))
     command = ["optimise", str(file), "-o", str(output), "-q", "--resume"]
     assert main(command) == 0
+    assert "searches at most" in capsys.readouterr().err  # before it starts
     changed, *others = sorted(folder_of(output).iterdir())
     before = [path.read_text() for path in others]
     for path in (*others, output.with_suffix(".png")):

@@ -9,6 +9,7 @@ import pytest
 from warpimpact.campaign.text import CampaignError
 from warpimpact.campaign.toml import toml_text
 from warpimpact.optimisation.feasible import checked, corner_radius, hole_sizes
+from warpimpact.optimisation.judged import weights_of
 from warpimpact.scene import CirclePattern, EllipsePattern, Plate, SlotPattern, SquarePattern
 
 from .conftest import HOLES, WEIGHT_AND_ENERGY, design
@@ -114,6 +115,28 @@ def test_constraints_are_checked_before_anything_is_computed(constraint: str, br
     one = design(HOLES, WEIGHT_AND_ENERGY, "[constraints]", constraint)
     found = checked(one, one.tables(one.space.at([])))
     assert [broken in violation.text for violation in found.violations] == ([True] if broken else [])
+
+
+@pytest.mark.parametrize(
+    ("constraint", "broken"),
+    [
+        ('largest_add_on_areal_density = "21 kg/m^2"', "areal density of the add-on of 21.77 kg/m²"),
+        ('smallest_add_on_areal_density = "22 kg/m^2"', "areal density of the add-on of 21.77 kg/m²"),
+        ('largest_add_on_areal_density = "22 kg/m^2"', ""),
+    ],
+)
+def test_the_weight_of_the_add_on_alone_is_bounded_and_sought(constraint: str, broken: str) -> None:
+    base = '[[layer]]\nthickness = "10 mm"\nresistance = "1 GPa"\n'
+    sought = WEIGHT_AND_ENERGY.replace('"areal_density"', '"add_on_areal_density"')
+    assert sought != WEIGHT_AND_ENERGY
+    one = design(HOLES, sought, base, "[constraints]", constraint)
+    found = checked(one, one.tables(one.space.at([])))
+    texts = [violation.text for violation in found.violations if violation.text.startswith("areal density")]
+    assert [text.startswith(broken) for text in texts] == ([True] if broken else [])
+    assert found.campaign is not None
+    weights = weights_of(found.campaign.target)
+    assert weights["add_on_areal_density"] == pytest.approx(weights["areal_density"] - 78.5)
+    assert one.objectives[0].asked.quantity.label == "areal density of the add-on"
 
 
 def test_holes_that_overlap_are_no_campaign() -> None:
