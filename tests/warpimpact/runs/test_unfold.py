@@ -1,6 +1,7 @@
 """Hits of the irreducible part unfolded over the cell are those that a run of every hit gives."""
 
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -14,6 +15,7 @@ from warpimpact.analysis.summary import estimated
 from warpimpact.campaign.campaign import Output
 from warpimpact.campaign.stop import Stop
 from warpimpact.cli import main
+from warpimpact.continuum.hit_history import CORNERS
 from warpimpact.records.outcomes import Outcomes
 from warpimpact.results import files
 from warpimpact.results.measures import Measure
@@ -24,11 +26,12 @@ from warpimpact.runs import shards
 from warpimpact.runs.parts import Interrupted
 from warpimpact.runs.replay import replay
 from warpimpact.runs.run import RunProgress, run_to_file
-from warpimpact.scene import Scatter, TrianglePattern, make_shots, symmetries_used
+from warpimpact.scene import Scatter, Symmetry, TrianglePattern, make_shots, symmetries_used
 from warpimpact.solver import replay as replaying
 from warpimpact.solver import simulate as simulation
 from warpimpact.solver.history import History
 from warpimpact.solver.memory import Memory
+from warpimpact.solver.replay import Deformed
 from warpimpact.solver.unfold import image_of
 
 SLOTTED_PLATE = Path(__file__).parents[3] / "campaigns" / "slotted_plate.toml"
@@ -163,6 +166,22 @@ def test_the_history_of_an_image_is_that_of_its_own_shot(impact: Impact) -> None
         ]
         np.testing.assert_allclose(*shares, rtol=0.0, atol=1e-9)
         assert (shares[0] != shares[0][:, ::-1]).any()
+
+
+@pytest.mark.parametrize("signs", [(1, 1), (-1, 1), (-1, -1)])
+def test_an_element_of_an_image_keeps_its_orientation(signs: tuple[int, int]) -> None:
+    asked = campaign(count=4)
+    alone = replaying.replay(
+        asked.scene, make_shots(asked.impact, asked.hits, asked.plate)[:1], numerics=asked.numerics
+    )
+    corners = np.array([[x, y, z] for x, y, z in CORNERS], dtype=np.float32)
+    cube = Deformed(np.arange(8)[None, :], corners[None], np.ones((1, 1), dtype=bool), np.zeros((1, 1)))
+    symmetry = Symmetry(*signs, False)
+    folded = image_of(replace(alone, deformed=cube), symmetry, home=(0.0, 0.0), image=(0.0, 0.0)).deformed
+    assert folded is not None
+    places = folded.position[0][folded.corners[0]]
+    assert np.linalg.det(places[[1, 3, 4]] - places[0]) == pytest.approx(1.0)
+    assert folded.position[0] == pytest.approx(corners * [1, *signs])
 
 
 def common(one: np.ndarray, other: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
