@@ -135,7 +135,7 @@ def cost() -> Table:
 
 def ranking() -> Table:
     """Which plate ranks first by either model, of those that the paper's core hits."""
-    plates = [name for name, case in CASES.items() if case.core is CORE and len(both(name)[0]) >= FEWEST]
+    plates = [name for name, case in CASES.items() if case.core is CORE and len(both(name)[0]) >= FEWEST_RANKED]
     if not plates:
         return ("measure",), []
     numbers: dict[str, Callable[[Array], float]] = {
