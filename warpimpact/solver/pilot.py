@@ -10,6 +10,8 @@ because near the limit velocity those of speeds have no bound. If no level keeps
 that nearly does, else the coarsest whose errors are about the smallest, and tells its change to the finest level
 computed. A long run then takes coarser levels of single settings that keep the promise, too. Limits, of which a pilot
 has 16, and the measure of a stop rule choose their level in the same way, by errors of their own.
+
+Long because the ways to choose a level share the same comparison of outcomes at three levels.
 """
 
 from __future__ import annotations
