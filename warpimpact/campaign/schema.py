@@ -96,7 +96,8 @@ def _complete(definition: Schema, model: type[BaseModel]) -> None:
         if name in properties:
             properties[name]["description"] = _in_a_file(text)
     if issubclass(model, Model):
-        for name in [key for key in model._keys() if key not in properties]:  # read into other keys, as a file is
+        of_files = [key for key in model._keys() if key not in (*properties, *model.in_python)]
+        for name in of_files:  # read into other keys, as a file is
             properties[name] = {"description": _in_a_file(meanings.get(name, ""))}
             if name == "file":
                 definition.pop("required", None)

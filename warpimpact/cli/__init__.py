@@ -103,7 +103,7 @@ def parser() -> argparse.ArgumentParser:
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     program.add_argument("--version", action="version", version=f"warpimpact {__version__}")
-    commands = program.add_subparsers(metavar="COMMAND", required=True, help=argparse.SUPPRESS)
+    commands = program.add_subparsers(metavar="COMMAND", required=True, prog="warpimpact", help=argparse.SUPPRESS)
     groups = []
     for title, adding in (("from names to a report", _DAILY), ("for experts", _EXPERT)):
         before = len(commands.choices)

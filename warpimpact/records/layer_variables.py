@@ -61,7 +61,7 @@ LAYER_FACES = (LAYER_FRONT, LAYER_REAR)
 LAYER = Variable("layer", ("layer",), "1", "number of the layer; the plate is layer 0")
 LAYER_NAME = Variable("layer_name", ("layer",), "1", "name of the layer")
 LAYER_MATERIAL = Variable("layer_material", ("layer",), "1", "material of the layer in the catalogue, or empty")
-LAYER_LABELS = (LAYER_NAME, LAYER_MATERIAL)
+LAYER_LABELS = (LAYER, LAYER_NAME, LAYER_MATERIAL)
 LAYER_STANDOFF = Variable("layer_standoff", ("layer_standoff",), "m", "distance behind the rear face of a layer")
 LAYER_COORDINATES = (LAYER_STANDOFF,)
 

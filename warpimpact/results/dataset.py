@@ -85,7 +85,7 @@ def to_table(
     coordinates |= outlines_in(scene.target.layers[0], *((-0.5 * side, 0.5 * side) for side in period))
     beside_the_hits = (name for group in ("solid", "finer", "assumed") for name in v.GROUPS[group])
     coordinates |= labels(scene.target)
-    of_layers = (v.LAYER, *v.LAYER_LABELS, *v.LAYER_COORDINATES)
+    of_layers = (*v.LAYER_LABELS, *v.LAYER_COORDINATES)
     along = (*v.COORDINATES, *v.OUTLINE_VARIABLES, *of_layers, *beside_the_hits)
     values: dict[str, Any] = {variable: getattr(shots, variable.field) for variable in v.SHOT_VARIABLES}
     columns = own_columns(scene.target, shots)

@@ -4,7 +4,7 @@ import inspect
 from collections.abc import Mapping
 from copy import deepcopy
 from difflib import get_close_matches
-from typing import Any, Self
+from typing import Any, ClassVar, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,6 +20,8 @@ class Model(BaseModel):
     """A validated, immutable value. A misspelt field is an error, and its message suggests the right name."""
 
     model_config = ConfigDict(frozen=True, extra="forbid")
+    in_python: ClassVar[tuple[str, ...]] = ()
+    """Keys that files do not have."""
 
     @classmethod
     def __pydantic_init_subclass__(cls, **kwargs: Any) -> None:

@@ -72,6 +72,7 @@ class Plate(Model):
     size: tuple[PositiveLength, PositiveLength] | None = None
     margin: PositiveLength | None = None
     pattern: AnyPattern = NoPattern()
+    in_python: ClassVar[tuple[str, ...]] = ("threat", "obliquity")
     of_material: ClassVar[Callable[[type["Plate"], dict[str, Any]], dict[str, Any]] | None] = None
     """What turns the keys `material`, `threat` and `obliquity` into the other fields; the catalogue sets it."""
 
@@ -98,8 +99,7 @@ class Plate(Model):
 
     @classmethod
     def _keys(cls) -> list[str]:
-        of_material = () if cls.of_material is None else ("threat", "obliquity")
-        return [*super()._keys(), "areal_density", *of_material]
+        return [*super()._keys(), "areal_density", *(() if cls.of_material is None else cls.in_python)]
 
     @field_validator("pattern")
     @classmethod

@@ -65,9 +65,10 @@ def test_what_is_open_is_called_assumed(name: str) -> None:
     threat = THREATS[name]
     text = text_of(threat_view(threat))
     second_hand = [key for key, source in threat.known.items() if "second-hand" in source]
-    for key in [*threat.assumed, *second_hand]:
-        assert key.replace("_", " ") in threat.evidence.partition("assumed")[2]
-        assert any(line.startswith("assumed") and key.replace("_", " ") in line for line in text.splitlines())
+    for mark, keys in (("assumed", threat.assumed), ("quoted at second hand", second_hand)):
+        for key in keys:
+            assert key.replace("_", " ") in threat.evidence.partition(mark)[2].partition(";")[0]
+            assert any(line.startswith(mark) and key.replace("_", " ") in line for line in text.splitlines())
     shaped = {"core", "nose", "length"} & {*threat.known, *threat.assumed}
     assert shaped or threat.shape is None  # no shape without a word on where it comes from
 

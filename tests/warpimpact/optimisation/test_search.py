@@ -24,6 +24,7 @@ from warpimpact.optimisation.searcher import Searcher, front_of, hypervolume
 from warpimpact.optimisation.space import DesignVariable, Space
 from warpimpact.results import files
 from warpimpact.results import front as f
+from warpimpact.results.attributes import AREAL_DENSITY
 from warpimpact.results.files import OutputError, read
 from warpimpact.runs.parts import Interrupted
 from warpimpact.view.view import text_of
@@ -148,7 +149,7 @@ def test_rounding_decides_nothing() -> None:
     energies = np.linspace(0.5, 0.9, 64)
 
     def record(density: float, less: float = 0.0) -> DesignRecord:
-        return DesignRecord(np.zeros(1), {}, density, (), (energies - less)[None, None])
+        return DesignRecord(np.zeros(1), {}, {AREAL_DENSITY: density}, (), (energies - less)[None, None])
 
     heavier, lighter, better = record(30.0 * (1 + 1e-9)), record(30.0 * (1 - 1e-9)), record(30.0 * (1 + 1e-9), 0.1)
     nearly = record(30.0 * (1 - 1e-9), 1e-9)
@@ -259,7 +260,9 @@ def test_the_front_has_designs_that_keep_the_bounds_with_all_their_hits() -> Non
     plan = design(THICKNESS, WEIGHT_AND_ENERGY, bound, SEARCH)
 
     def planted(density: float, fraction: float, hits: int = 64) -> DesignRecord:
-        return DesignRecord(np.zeros(1), {}, density, ("",), np.full((1, len(plan.keys), hits), fraction))
+        return DesignRecord(
+            np.zeros(1), {}, {AREAL_DENSITY: density}, ("",), np.full((1, len(plan.keys), hits), fraction)
+        )
 
     state = search._State(plan, lambda now: None)
     light, strong = planted(20.0, 0.4), planted(30.0, 0.2)

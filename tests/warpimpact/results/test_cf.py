@@ -44,7 +44,16 @@ def test_a_hit_map_complies(result: xarray.Dataset, tmp_path: Path) -> None:
 def test_a_firing_test_with_directions_complies(tmp_path: Path) -> None:
     directions = Directions(azimuth=(0.0, 0.5), elevation=(0.0,))
     cells = np.full((2, 1), 0.5)
-    sector = Sector(cells, cells, cells, cells.astype(int), cells.astype(int), Estimate(0.5, 0.4, 0.6, 64, 0.5))
+    sector = Sector(
+        cells,
+        cells,
+        cells,
+        cells.astype(int),
+        cells.astype(int),
+        Estimate(0.5, 0.4, 0.6, 64, 0.5),
+        64,
+        "evidence: none",
+    )
     test = firing_test(KNOWN_TARGET.replace("tests = 1000", "tests = 20"), "a", tmp_path)
     target = {"campaign": Path(__file__)}
     asked = test.model_copy(update={"directions": directions, "target": target})

@@ -296,7 +296,7 @@ def test_the_command_prints_every_number_under_every_assumption(capsys: pytest.C
     text = ["--measure", "mean(residual_velocity)", "--assumptions"]
     assert main(["compare", "plates.toml", "--device", "cpu", *text]) == 0
     told = capsys.readouterr().out
-    assert "thick is better than thin in" in told
+    assert "assumptions: thick stays ahead in " in told
     assert "5° more oblique" in told[told.index("\nassumption ") :]
     without = run(assumptions={"compute": False})
     for name in ("a.nc", "b.nc"):
