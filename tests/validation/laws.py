@@ -383,6 +383,7 @@ def main() -> None:
     parser.add_argument("--plates", default="slotted,thin,thick,oblique,solid_12")
     parser.add_argument("--check", action="store_true", help="compare the march with the package, and fit nothing")
     given = parser.parse_args()
+    wp.config.quiet = True
     rows = written(BENCHMARKS / "results" / "continuum_trade.csv")
     plates = [Plate(name, rows) for name in given.plates.split(",")]
     if given.check:

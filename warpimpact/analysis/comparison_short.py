@@ -116,7 +116,7 @@ def _ranks(comparison: Comparison, score: Score) -> Table:
         ),
         *(
             number(f"{'ratio' if by_ratio else 'value'} less {best}", digits="+#.3g"),
-            Column(f"{comparison.confidence:.0%} interval"),
+            Column(f"{100.0 * comparison.confidence:g} % interval"),
         ),
     )
     return Table(columns, rows)
