@@ -20,6 +20,8 @@ from warpimpact.plotting import comparison_figure, weight_figure
 from warpimpact.results.bases import is_pierced, piercing_margin
 from warpimpact.results.dataset import stored_columns
 from warpimpact.results.files import ResultError
+from warpimpact.results.measures import Measure
+from warpimpact.results.tallies import shift_of
 from warpimpact.results.variables import LIMITS, STATUS
 from warpimpact.runs.task import Task
 from warpimpact.scene import Numerics
@@ -72,6 +74,19 @@ def test_the_margin_of_piercing_has_the_sign_of_the_event(mixed) -> None:
     margin, pierced = piercing_margin(mixed), is_pierced(mixed)
     np.testing.assert_allclose(margin, [np.inf, -4e-3, 7e-3, -np.inf, -np.inf, np.nan])
     np.testing.assert_array_equal(np.where(np.isnan(margin), np.nan, margin > 0.0), pierced)
+
+
+def test_the_numerics_of_piercing_follow_from_the_depths_where_no_core_changes_side(make_plate_result) -> None:
+    depth = np.linspace(6e-3, 14e-3, 64)  # no core within 0.06 mm of the rear face at 10 mm
+    levels = []
+    for change in (0.0, 0.02e-3):
+        result = make_plate_result(np.zeros(64), 0.0, np.full(64, Status.ARRESTED))
+        levels.append(layered(result, np.ones(64, dtype=int), depth + change))
+    # Of depths spread over 8 mm 0.02 mm move the share by 0.0025; the finer level leaves as much again. By the cores
+    # that change side it would be 0.06.
+    shift = shift_of(Measure.parse("P(base_pierced)"), (levels[0], levels[1]))
+    assert shift is not None
+    assert 0.005 <= shift <= 0.01
 
 
 def test_what_counts_in_the_base(mixed) -> None:
