@@ -395,6 +395,22 @@ def test_more_hits_tell_more_of_what_a_measure_shifts_by(
     assert (counts, found.numerics.level, found.kept) == ([16] * computed, 0, kept)
 
 
+@pytest.mark.parametrize(("hits", "parts"), [(31, [16, 16]), (32, [16, 16, 16, 16])])
+def test_beside_an_accuracy_all_hits_are_compared_where_that_is_cheaper_than_the_run(
+    hits: int, parts: list[int], known: Outcomes, from_level: Callable[..., None]
+) -> None:
+    counts = []
+
+    def outcomes_at(at: Numerics, some: Shots) -> Outcomes:
+        counts.append(len(some))
+        return known[: len(some)].assign(residual_velocity=np.full(len(some), 9.0 * (at.level or 0)))
+
+    from_level(0, SHOTS=16)
+    found = pilot_hits(outcomes_at, PILOT, Numerics(), dear, aim=Aim(lambda *_: 0.1, alone=False), hits=hits)
+    assert (counts, found.numerics.level, found.kept) == (parts, 0, True)  # by the measures, not by the accuracy
+    assert found.residual_velocity_error > 1.0
+
+
 def test_errors_of_the_first_hits_tell_how_they_fall_from_level_to_level(
     known: Outcomes, from_level: Callable[..., None]
 ) -> None:
