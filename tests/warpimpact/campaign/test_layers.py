@@ -178,6 +178,7 @@ def test_layers_of_a_result_have_names_and_their_status_is_a_word(result: xarray
     assert result["layer"].values.tolist() == [0, 1, 2]
     assert result["layer_name"].values.tolist() == [name for name, _ in campaign().target.named]
     assert result["layer_name"].values.tolist() == ["plate", "layer 1", "layer 2"]
+    assert result["layer"].values.tolist() == [0, 1, 2]
     assert result["layer_material"].values.tolist() == ["", "", ""]
     frame = to_dataframe(result)
     codes = result["layer_status"].values[:, 2].tolist()
