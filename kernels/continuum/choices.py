@@ -65,6 +65,10 @@ COURANT = Constant(
     test="verification/test_continuum.py::test_a_bar_swings_with_the_speed_of_sound",
 )
 GROWTH = Constant(1.05, "step before", "The longest that a step may be: the scheme is of second order at even steps.")
-BEHIND = Constant(3.0e-3, "m", "So far behind the target or in front of it a core is free.")
-QUIET = Constant(2.0e-6, "s", "So long after the last touch a core is free.")
+BEHIND = Constant(
+    3.0e-3,
+    "m",
+    "A core this far behind the target or in front of it is free, and a layer this far from the core is not marched.",
+)
+QUIET = Constant(2.0e-6, "s", "A core is free this long after its last touch.")
 UNBOUNDED = Constant(2.0, "impact energy", "A core that has more is no core any more: its motion has blown up.")

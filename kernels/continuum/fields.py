@@ -26,7 +26,8 @@ def build(variant: Variant) -> SimpleNamespace:
 
     @wp.struct
     class Sheet:
-        """One layer: distances in memory between neighbours along y and along x; its elastic and flow constants.
+        """One layer: distances in memory between neighbours along y and along x; its front and rear face [m]; its
+        elastic and flow constants.
 
         Moduli and stresses [Pa], density [kg/m³], speed of dilatational waves [m/s], rates [1/s]; `heating` is the
         share of the range to melting that a unit of plastic work per volume heats through [1/Pa]; `fracture_work` [Pa];
@@ -35,6 +36,8 @@ def build(variant: Variant) -> SimpleNamespace:
 
         row: wp.int32
         plane: wp.int32
+        front: wp.float64
+        rear: wp.float64
         density: real
         bulk: real
         shear: real
@@ -69,6 +72,8 @@ def build(variant: Variant) -> SimpleNamespace:
         Attributes:
             runs: first number, number after the last, and sheet of each run of consecutive elements, shape [3 runs].
             node_runs: the same of nodes.
+            awake: 1 for a sheet that is marched, 0 for one that the core has not reached or has left, shape [sheets].
+            touched: time of the last touch of each sheet [s], negative before.
             cylinder: about the core.
             next_step: between this step's velocities and the next ones [s].
             position [m], velocity [m/s], inverse_mass [1/kg] (0 where a node is held or has no element), contact [N]
@@ -84,6 +89,8 @@ def build(variant: Variant) -> SimpleNamespace:
         sheets: wp.array(dtype=Sheet)
         runs: wp.array(dtype=wp.int32)
         node_runs: wp.array(dtype=wp.int32)
+        awake: wp.array(dtype=wp.int32)
+        touched: wp.array(dtype=wp.float64)
         cylinder: Cylinder
         kick: real
         position: wp.array(dtype=real)

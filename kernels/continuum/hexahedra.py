@@ -279,12 +279,13 @@ def build(variant: Variant) -> SimpleNamespace:
 
     @wp.func
     def deform_elements(mesh: struct.Mesh, dt: real):
-        """`deform` all elements, run by run."""
+        """`deform` the elements of the sheets that are awake, run by run."""
         for run in range(mesh.runs.shape[0] // 3):
-            first, last = mesh.runs[3 * run], mesh.runs[3 * run + 1]
-            sheet = mesh.sheets[mesh.runs[3 * run + 2]]
+            first, last, layer = mesh.runs[3 * run], mesh.runs[3 * run + 1], mesh.runs[3 * run + 2]
+            sheet = mesh.sheets[layer]
             if last < first:  # never: it names the function, so that it is compiled before the loop that calls it
                 deform(mesh, sheet, first, dt)
-            deform_all(mesh, sheet, first, last, dt)
+            if mesh.awake[layer] != 0:
+                deform_all(mesh, sheet, first, last, dt)
 
     return SimpleNamespace(**locals())

@@ -83,12 +83,13 @@ def build(variant: Variant) -> SimpleNamespace:
 
     @wp.func
     def move_nodes(mesh: struct.Mesh, dt: real):
-        """`move` all nodes, run by run."""
+        """`move` the nodes of the sheets that are awake, run by run."""
         for run in range(mesh.node_runs.shape[0] // 3):
-            first, last = mesh.node_runs[3 * run], mesh.node_runs[3 * run + 1]
-            sheet = mesh.sheets[mesh.node_runs[3 * run + 2]]
+            first, last, layer = mesh.node_runs[3 * run], mesh.node_runs[3 * run + 1], mesh.node_runs[3 * run + 2]
+            sheet = mesh.sheets[layer]
             if last < first:  # never: it names the function, so that it is compiled before the loop that calls it
                 move(mesh, sheet, first, dt)
-            move_all(mesh, sheet, first, last, dt)
+            if mesh.awake[layer] != 0:
+                move_all(mesh, sheet, first, last, dt)
 
     return SimpleNamespace(**locals())

@@ -19,7 +19,8 @@ def build(variant: Variant) -> SimpleNamespace:
     read = memory.build(real).read
     move, elements = rigid_body.build(fields.RIGID), hexahedra.build(variant)
     mesh_nodes, contact = nodes.build(variant), penalty.build(variant)
-    vec3, zero, half = wp.types.vector(3, real), wp.float64(0.0), wp.float64(0.5)
+    vec3 = wp.types.vector(3, real)
+    zero, half, one = wp.float64(0.0), wp.float64(0.5), wp.float64(1.0)
     courant, growth, behind, quiet, unbounded = (
         wp.float64(constant.value)
         for constant in (choices.COURANT, choices.GROWTH, choices.BEHIND, choices.QUIET, choices.UNBOUNDED)
@@ -56,11 +57,12 @@ def build(variant: Variant) -> SimpleNamespace:
 
     @wp.func
     def shortest_crossing(mesh: struct.Mesh):
-        """The shortest time that a wave takes across an element [s]."""
+        """The shortest time that a wave takes across an element of the sheets that are awake [s]; 1 s if there is
+        none."""
         first, second, third, fourth = real(1.0), real(1.0), real(1.0), real(1.0)
         for run in range(mesh.runs.shape[0] // 3):
             element, last = wp.int32(mesh.runs[3 * run]), wp.int32(mesh.runs[3 * run + 1])
-            while element < last:
+            while element < last and mesh.awake[mesh.runs[3 * run + 2]] != 0:
                 first = wp.min(first, read(mesh.crossing, element))
                 second = wp.min(second, read(mesh.crossing, element + 1))
                 third = wp.min(third, read(mesh.crossing, element + 2))
@@ -89,9 +91,9 @@ def build(variant: Variant) -> SimpleNamespace:
         # outputs
         flights: wp.array(dtype=struct.Flight),
         left: wp.array2d(dtype=wp.float64),
-        rears: wp.array(dtype=wp.float64),
     ):
-        """March one hit by some steps.
+        """March one hit by some steps. A layer is marched while the core is within reach of it: before, it is at rest;
+        afterwards it stays as the core left it. In a gap the steps keep their length.
 
         `left` is the state with which the core left each layer, shape [layers, 7]: velocity, axis, and time; NaN
         before.
@@ -102,7 +104,7 @@ def build(variant: Variant) -> SimpleNamespace:
                 break
             kick = half * (flight.before + flight.step)
             dt = flight.step
-            load = contact.load_on(mesh, core, flight.state, dt)
+            load = contact.load_on(mesh, core, flight.state, flight.time, dt)
             if load.touching:
                 flight.last_touch = flight.time
                 if flight.first_touch < zero:
@@ -120,11 +122,15 @@ def build(variant: Variant) -> SimpleNamespace:
             flight.time += dt
             flight.steps += 1
             flight.before = dt
-            flight.step = wp.min(courant * shortest_crossing(mesh), growth * dt)
-            rearmost, _foremost = contact.ends_of(core, flight.state)
+            crossing = shortest_crossing(mesh)
+            flight.step = wp.where(crossing < one, wp.min(courant * crossing, growth * dt), dt)
+            rearmost, foremost = contact.ends_of(core, flight.state)
             axis = move.axis_of(flight.state.attitude)
-            for layer in range(rears.shape[0]):
-                if rearmost > rears[layer] and wp.isnan(left[layer, 6]):
+            for layer in range(mesh.sheets.shape[0]):
+                sheet = mesh.sheets[layer]
+                passed = rearmost > sheet.rear + behind and flight.time - mesh.touched[layer] > quiet
+                mesh.awake[layer] = wp.where(foremost > sheet.front - behind and not passed, 1, 0)
+                if rearmost > sheet.rear and wp.isnan(left[layer, 6]):
                     for k in range(3):
                         left[layer, k] = flight.state.velocity[k]
                         left[layer, 3 + k] = axis[k]

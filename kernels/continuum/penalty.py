@@ -99,19 +99,22 @@ def build(variant: Variant) -> SimpleNamespace:
         return force, away
 
     @wp.func
-    def load_on(mesh: struct.Mesh, core: struct.Core, state: rigid.State, dt: wp.float64):
+    def load_on(mesh: struct.Mesh, core: struct.Core, state: rigid.State, time: wp.float64, dt: wp.float64):
         """Force of all nodes on the core [N], and its moment about the centre of mass [N m], in the plate frame and in
-        the order of the nodes."""
+        the order of the nodes; notes the time at each sheet that touches."""
         load = rigid.Load()
         for run in range(mesh.node_runs.shape[0] // 3):
             node, last = wp.int32(mesh.node_runs[3 * run]), wp.int32(mesh.node_runs[3 * run + 1])
-            sheet = mesh.sheets[mesh.node_runs[3 * run + 2]]
-            while node < last:
+            layer = mesh.node_runs[3 * run + 2]
+            sheet = mesh.sheets[layer]
+            while node < last and mesh.awake[layer] != 0:
                 if read(mesh.near, node) > real(0.0):
                     force, away = press(mesh, sheet, core, state, node, dt)
                     load.force -= force
                     load.moment -= wp.cross(away, force)
-                    load.touching = load.touching or wp.dot(force, force) > zero
+                    if wp.dot(force, force) > zero:
+                        load.touching = True
+                        mesh.touched[layer] = time
                 node += 1
         return load
 

@@ -46,9 +46,9 @@ def box(counts: tuple[int, int, int], spacing: float = 1.0e-3) -> SheetMesh:
 
 
 def alone(sheet: SheetMesh, flow: Flow, *, free: bool) -> OneHit:
-    """A mesh that no core touches, in double precision; its nodes have masses, or move as they are told."""
+    """A mesh that a core passes aside, in double precision; its nodes have masses, or move as they are told."""
     start = Start(
-        np.array([-1.0, 0.0, 0.0]),
+        np.array([0.0, -1.0, 0.0]),
         np.array([0.0, 0.0, 0.0, 1.0]),
         np.array([1.0, 0.0, 0.0]),
         np.zeros(3),
@@ -514,3 +514,31 @@ def test_layers_apart_are_the_chain_of_their_plates(coarse: float) -> None:
     assert both.layer_residual_velocity[0, 0] == pytest.approx(first.residual_velocity[0], abs=0.5)
     assert both.residual_velocity[0] < both.layer_residual_velocity[0, 0] - 50.0
     assert both.layer_residual_velocity[0, 1] == pytest.approx(both.residual_velocity[0], abs=1.0)
+
+
+def test_a_layer_is_marched_only_while_the_core_is_within_reach() -> None:
+    """Before, it is at rest and nobody feels it; in a gap the steps keep their length; then it stays as it was left."""
+    sheet = box((2, 12, 12))
+    near = SheetMesh(sheet.y - 6e-3, sheet.z - 6e-3, sheet.solid, sheet.x, sheet.spacing)
+    far = SheetMesh(near.y, near.z, near.solid, near.x + 50e-3, near.spacing)
+    upright, still = np.array([0.0, 0.0, 0.0, 1.0]), np.zeros(3)
+    start = Start(np.array([-18.1e-3, 1e-3, 0.0]), upright, np.array([825.0, 0.0, 0.0]), still, 4e-3, 1e-8, 1e-7, 0.0)
+    alone, both = (OneHit(CORE, start, sheets, [STEEL] * len(sheets), double=True) for sheets in ([near], [near, far]))
+    for _ in alone.steps(50):
+        both.advance(50)
+    both.advance(1)  # past the end of the hit that has one layer
+    behind = slice(both.firsts[1], both.firsts[1] + far.nodes)
+    assert alone.flight["status"] == Status.PERFORATED
+    assert np.array_equal(alone.left.numpy()[0], both.left.numpy()[0])
+    assert np.array_equal(nodal(alone, "position"), nodal(both, "position"))
+    assert both.mesh.awake.numpy().tolist() == [0, 0]
+    assert (both.mesh.crossing.numpy()[behind] == 1.0).all()  # never computed
+    step, left = step_of(both), nodal(both, "position").copy()
+    both.advance(100)
+    assert both.mesh.awake.numpy().tolist() == [0, 0]
+    assert step_of(both) == step
+    while not both.touched[1]:
+        both.advance(20)
+    assert both.mesh.awake.numpy().tolist() == [0, 1]
+    assert np.array_equal(nodal(both, "position"), left)
+    assert both.energies.imbalance < 0.01

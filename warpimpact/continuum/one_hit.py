@@ -109,13 +109,8 @@ class OneHit:
         self.speed = float(np.linalg.norm(start.velocity))
         self.mesh = self._mesh()
         self.core = self._core(core, start)
-        rears = np.array([sheet.x[-1] for sheet in sheets])
-        self.limits = self.stage.Limits()
-        self.limits.rear, self.limits.longest = (
-            float(rears.max()),
-            30.0 * (float(rears.max()) + core.length) / self.speed,
-        )
-        self.rears = self._put(rears, wp.float64)
+        self.limits, rear = self.stage.Limits(), max(float(sheet.x[-1]) for sheet in sheets)
+        self.limits.rear, self.limits.longest = rear, 30.0 * (rear + core.length) / self.speed
         self.left = self._put(np.full((len(sheets), 7), np.nan), wp.float64)
         self.flights = self._flights(start)
         self.limits.impact_energy = self.core_energy
@@ -163,13 +158,19 @@ class OneHit:
         sizes |= {"work": 1, "hourglass_work": 1, "force": fields.COMPONENTS}
         for name, count in sizes.items():
             setattr(mesh, name, wp.zeros(count * size, dtype=self.real, device=self.device))
-        mesh.near = wp.full(size, 1.0, dtype=self.real, device=self.device)
+        awake = np.array([sheet.x[0] < choices.BEHIND.value for sheet in self.sheets])
+        mesh.awake, mesh.touched = self._put(awake, wp.int32), self._put(np.full(len(awake), -1.0), wp.float64)
+        near = np.zeros(size)
+        for sheet, at, reached in zip(self.sheets, firsts, awake, strict=True):
+            near[at : at + sheet.nodes] = reached
+        mesh.near = self._put(near.astype(self.dtype), self.real)
         mesh.crossing = wp.full(size, 1.0, dtype=self.real, device=self.device)
         return mesh
 
     def _sheet(self, sheet: SheetMesh, flow: Flow) -> Any:
         filled = self.stage.Sheet()
         filled.row, filled.plane = sheet.row, sheet.plane
+        filled.front, filled.rear = float(sheet.x[0]), float(sheet.x[-1])
         filled.stiffness = PENALTY * flow.wave_modulus * sheet.spacing
         for name, value in flow.constants.items():
             setattr(filled, name, value)
@@ -199,7 +200,10 @@ class OneHit:
         flight.state, flight.first_touch, flight.last_touch, flight.status = state, -1.0, -1.0, RUNNING
         shortest = min(
             float((self.mesh.length.numpy()[at : at + sheet.nodes][sheet.alive]).min()) / flow.wave_speed
-            for sheet, at, flow in zip(self.sheets, self.firsts, self.flows, strict=True)
+            for sheet, at, flow, awake in zip(
+                self.sheets, self.firsts, self.flows, self.mesh.awake.numpy(), strict=True
+            )
+            if awake
         )
         flight.step = flight.before = 0.5 * choices.COURANT.value * shortest
         return wp.array([flight], dtype=self.stage.Flight, device=self.device)
@@ -215,7 +219,7 @@ class OneHit:
             self.stage.kernel,
             1,
             inputs=[self.core, self.limits, steps, self.mesh],
-            outputs=[self.flights, self.left, self.rears],
+            outputs=[self.flights, self.left],
             device=self.device,
         )
 
