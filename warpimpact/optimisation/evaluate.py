@@ -22,6 +22,7 @@ from warpimpact.results import variables as v
 from warpimpact.results.dataset import narrow_table
 from warpimpact.results.table import HitTable
 from warpimpact.runs.executor import Job
+from warpimpact.runs.levels import aim_of
 from warpimpact.runs.questions import Arrays, Question, Round
 from warpimpact.scene import Numerics, Scene, Shots
 from warpimpact.solver.many import side_by_side, simulate_many
@@ -210,8 +211,11 @@ def said_of(design: Design, table: HitTable) -> Array:
 def level_of(design: Design, job: HitJob, worker: Worker) -> str:
     """The numerics, as JSON, that a pilot finds for a job; those of the campaign where it fixes a resolution.
 
+    At several layers the level is what the measures need, as in a run (runs/levels.py).
+
     Args:
-        job: its `level` is the fidelity that is asked for, where the campaign does not fix a resolution.
+        job: its `level` is the fidelity that is asked for, where the campaign does not fix a resolution; its `count`
+            the hits that will be computed.
     """
     campaign = campaign_of(design, job.tables, design.threats[job.threat], job.seed)
     if campaign.numerics.explicit is not None:
@@ -220,7 +224,7 @@ def level_of(design: Design, job: HitJob, worker: Worker) -> str:
     shots = hits_of(campaign, 0, pilot_size(asked.asked))
     found = [limits_level(campaign, shots, key, asked, worker) for key in design.keys if key.is_limit]
     if len(found) < len(design.keys):
-        found.append(pilot_of(campaign.scene, shots, asked, worker).numerics)
+        found.append(pilot_of(campaign.scene, shots, asked, worker, aim=aim_of(campaign, job.count)).numerics)
     return max(found, key=lambda numerics: numerics.level or 0).model_dump_json()
 
 

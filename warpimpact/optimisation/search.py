@@ -236,12 +236,12 @@ class _State:
         if not self.design.keys:
             return [("",) * len(self.design.threats) for _ in records]
         centres: list[tuple[Array, int]] = [(place, threat) for place, threat, _ in self.pilots]
-        jobs = []
+        jobs, count = [], self.design.search.most_hits
         for record, place in zip(records, places, strict=True):
             for threat in range(len(self.design.threats)):
                 if not any(of == threat and _near(place, centre) for centre, of in centres):
                     centres.append((place, threat))
-                    jobs.append(HitJob(record.tables, threat, 0, 0, FIDELITY, self.design.search.seed))
+                    jobs.append(HitJob(record.tables, threat, 0, count, FIDELITY, self.design.search.seed))
         tell = lambda done, _: self.tell(f"{done:.0f} of {len(jobs)} pilots")  # noqa: E731
         found = yield from levels_asked(self.design, jobs, tell)
         self.pilots += [(*centre, level) for centre, level in zip(centres[len(self.pilots) :], found, strict=True)]

@@ -62,7 +62,7 @@ class HitMap:
             return None
         pilot = pilot_shots(campaign, pilot_most(campaign))
         hits = len(campaign.sampler()) // len(campaign.symmetries)
-        errors = pilot_of(campaign.scene, pilot, campaign.numerics, worker, trying, aim_of(campaign), hits)
+        errors = pilot_of(campaign.scene, pilot, campaign.numerics, worker, trying, aim_of(campaign, hits), hits)
         return replace(errors, shifts=shifts_of(campaign, pilot, errors), tried=())
 
     def found_in(self, result: Result) -> HitErrors | None:

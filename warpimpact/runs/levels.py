@@ -40,14 +40,18 @@ def level_for(campaign: Campaign) -> str:
     return MEASURES if len(campaign.target.layers) > 1 else ""
 
 
-def aim_of(campaign: Campaign) -> Aim | None:
+def aim_of(campaign: Campaign, hits: int) -> Aim | None:
     """Measures that a level is looked for, by what the numerics shift them by over what they may; None where it is not
-    looked for by that. At several layers a level that keeps the accuracy will do, too."""
+    looked for by that. At several layers a level that keeps the accuracy will do, too.
+
+    Args:
+        hits: that will be computed of the campaign, images not counted.
+    """
     if not level_for(campaign):
         return None
     if campaign.stop is not None:
         return Aim(_excess_of_stop(campaign, campaign.stop))
-    return Aim(_excess_of_layers(campaign), alone=False)
+    return Aim(_excess_of_layers(campaign, hits), alone=False)
 
 
 def _excess_of_stop(campaign: Campaign, rule: Stop) -> Excess:
@@ -62,11 +66,10 @@ def _excess_of_stop(campaign: Campaign, rule: Stop) -> Excess:
     return excess
 
 
-def _excess_of_layers(campaign: Campaign) -> Excess:
+def _excess_of_layers(campaign: Campaign, hits: int) -> Excess:
     """By the measures of a target of several layers: the shift that the pilot's hits show, over what the hits of the
     run leave open. What the pilot's few hits leave open of the shift would ask for dearer levels."""
     measures = [Measure.parse(text) for text in (*LAYERED, *_last_tilts(campaign))]
-    hits = len(campaign.sampler()) // len(campaign.symmetries)
 
     def excess(coarse: Outcomes, fine: Outcomes, shots: Shots) -> float:
         levels = [_table(campaign, shots, outcomes) for outcomes in (coarse, fine)]
