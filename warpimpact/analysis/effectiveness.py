@@ -21,7 +21,7 @@ from warpimpact.analysis.survival import by_draws, over_draws
 from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
 from warpimpact.results.files import ResultError
-from warpimpact.results.limits import solid_limits
+from warpimpact.results.limits import base_alone_limits, solid_limits
 from warpimpact.results.measures import Measure
 from warpimpact.results.per_hit import Array
 from warpimpact.results.solid_reference import base_alone, solid_reference
@@ -151,8 +151,9 @@ def effectiveness(dataset: xarray.Dataset, texts: Sequence[str] = ()) -> list[Sc
 
 def scores(dataset: xarray.Dataset, measures: Sequence[Measure], confidence: float = 0.95) -> Iterator[Scored]:
     """Measures one after the other, beside those of the solid plate, with the numbers that they are made of."""
-    reference = solid_limits(dataset) if attr.LIMIT in dataset.attrs else solid_reference(dataset)
-    alone = base_alone(dataset)
+    of_limits = attr.LIMIT in dataset.attrs
+    reference = solid_limits(dataset) if of_limits else solid_reference(dataset)
+    alone = base_alone_limits(dataset) if of_limits else base_alone(dataset)
     for found in evidence(dataset, measures, confidence):
         comparable = reference is not None and _is_comparable(found.measure, dataset, reference)
         scored = _scored(found.shown(), dataset, reference if comparable else None, confidence)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from itertools import cycle
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import xarray
@@ -19,7 +19,7 @@ from warpimpact.plotting.heading import inscribe
 from warpimpact.plotting.style import BLUE, GREY, VERMILION
 from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
-from warpimpact.results.limits import solid_limits
+from warpimpact.results.limits import base_alone_limits, solid_limits
 from warpimpact.studies.limit_view import measures_of, promise_line, shown_unit
 from warpimpact.studies.published_limits import published_beside
 
@@ -137,7 +137,24 @@ def _mark_published(axes: Axes, dataset: xarray.Dataset) -> None:
             axes.axvspan(velocity - error, velocity + error, color=colour, alpha=0.12)
         low, high = axes.get_xlim()
         axes.set_xlim(min(low, velocity - 0.03 * (high - low)), max(high, velocity + 0.03 * (high - low)))
-        axes.legend(loc="lower right", frameon=False, fontsize="small")
+
+
+def _mark_measures(axes: Axes, dataset: xarray.Dataset, factor: float, unit: str) -> None:
+    """Draw the measures with their intervals on the curve, their names above it or, where there is no room, below."""
+    low, high = axes.get_xlim()
+    for measure, estimate in estimated(dataset, measures_of(dataset)).items():
+        level, value = measure.share, factor * estimate.value
+        if not np.isfinite(value):
+            continue
+        ends = factor * np.array([estimate.low, estimate.high])
+        axes.plot(ends, [level, level], color=VERMILION, linewidth=4, alpha=0.4, solid_capstyle="butt")
+        axes.plot(value, level, "o", color=VERMILION, markersize=5)
+        in_left_half = value < 0.5 * (low + high)
+        beside = (8, -12) if in_left_half and level > _LOW_SHARE else (8, 5) if in_left_half else (-8, 5)
+        style: dict[str, Any] = {"xytext": beside, "textcoords": "offset points"}
+        axes.annotate(
+            f"{measure.text} = {value:.4g} {unit}", (value, level), ha="left" if in_left_half else "right", **style
+        )
 
 
 def _draw_curve(axes: Axes, dataset: xarray.Dataset, quantity: str) -> None:
@@ -153,25 +170,21 @@ def _draw_curve(axes: Axes, dataset: xarray.Dataset, quantity: str) -> None:
         steps = [ends[0], *limits_found[finite], ends[1]], [0.0, *share[finite], share[finite][-1]]
         axes.step(factor * np.array(steps[0]), steps[1], where="post", color=BLUE, linewidth=1.5)
         axes.set_xlim(*(factor * np.array(ends)))
-    for measure, estimate in estimated(dataset, measures_of(dataset)).items():
-        level = measure.share
-        if np.isfinite(estimate.value):
-            low, high = factor * np.array([estimate.low, estimate.high])
-            axes.plot([low, high], [level, level], color=VERMILION, linewidth=4, alpha=0.4, solid_capstyle="butt")
-            axes.plot(factor * estimate.value, level, "o", color=VERMILION, markersize=5)
-            text = f" {measure.text} = {factor * estimate.value:.4g} {unit}"
-            beside = (8, -12) if level > _LOW_SHARE else (8, 5)  # a low one would sit on the axis below
-            axes.annotate(text, (factor * estimate.value, level), xytext=beside, textcoords="offset points")
-    reference = solid_limits(dataset)
-    if reference is not None:
-        mean = factor * float(np.nanmean(reference[v.LIMITS[quantity].value].values))
+    references = (
+        (solid_limits(dataset), _solid_label(dataset, quantity), "--"),
+        (base_alone_limits(dataset), "base alone", "-."),
+    )
+    for reference, label, style in references:
+        mean = math.nan if reference is None else factor * float(np.nanmean(reference[v.LIMITS[quantity].value].values))
         if np.isfinite(mean):
-            axes.axvline(mean, color=GREY, linewidth=1.2, linestyle="--", label=_solid_label(dataset, quantity))
+            axes.axvline(mean, color=GREY, linewidth=1.2, linestyle=style, label=label)
             low, high = axes.get_xlim()
             margin = 0.03 * (high - low)
             axes.set_xlim(min(low, mean - margin), max(high, mean + margin))
-            axes.legend(loc="lower right", frameon=False, fontsize="small")
     _mark_published(axes, dataset)
+    _mark_measures(axes, dataset, factor, unit)
+    if axes.get_legend_handles_labels()[0]:
+        axes.legend(loc="upper left", fontsize="small", framealpha=1.0, edgecolor="none")
     layer = int(dataset.attrs[attr.LIMIT_LAYER])
     whose, share_label = _CURVE[quantity]
     label = whose.format(f"layer {layer}" if layer else "the plate")

@@ -1,8 +1,10 @@
-"""What a Dataset tells of a search of limits, and of the same search at the solid plate of equal areal density."""
+"""What a Dataset tells of a search of limits, at the solid plate of equal areal density, and at the base
+alone."""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -18,25 +20,44 @@ if TYPE_CHECKING:
 def solid_limits(dataset: xarray.Dataset) -> xarray.Dataset | None:
     """The limits at the solid plate as a result of limits: along "hit", with the attributes of that plate. None if the
     result has none. One shot tells of all hits; else they are those of the first hits."""
+    attributes = dataset.attrs
+    if not {attr.LIMIT, attr.SOLID_LIMIT_DENSITY, attr.SOLID_LIMIT_HIGHEST} <= attributes.keys():
+        return None
+    of_solid = {
+        attr.LIMIT_LAYER: attributes[attr.LIMIT_LAYER] if attr.SOLID_LIMIT_ELSEWHERE in attributes else 0,
+        attr.LIMIT_HIGHEST: attributes[attr.SOLID_LIMIT_HIGHEST],
+        attr.LIMIT_ELSEWHERE: attributes.get(attr.SOLID_LIMIT_ELSEWHERE, 0.0),
+        attr.LIMIT_DENSITY: attributes[attr.SOLID_LIMIT_DENSITY],
+    }
+    return _limits_in(dataset, v.SOLID_LIMITS, of_solid)
+
+
+def base_alone_limits(dataset: xarray.Dataset) -> xarray.Dataset | None:
+    """The limits at the base alone, as `solid_limits`."""
+    attributes = dataset.attrs
+    if attr.LIMIT not in attributes:
+        return None
+    of_base = {attr.LIMIT_LAYER: 0, attr.LIMIT_ELSEWHERE: 0.0, attr.LIMIT_HIGHEST: attributes[attr.LIMIT_HIGHEST]}
+    if attr.LIMIT_DENSITY in attributes:
+        of_base[attr.LIMIT_DENSITY] = attributes[attr.LIMIT_DENSITY]
+    return _limits_in(dataset, v.BASE_ALONE_LIMITS, of_base)
+
+
+def _limits_in(
+    dataset: xarray.Dataset, variables: Mapping[str, v.Variable], attributes: Mapping[str, Any]
+) -> xarray.Dataset | None:
+    """The limits at a reference, whose variables are given by the quantity of the search."""
     import xarray
 
-    quantity = dataset.attrs.get(attr.LIMIT)
-    if quantity is None or (name := v.SOLID_LIMITS[quantity]) not in dataset.variables:
+    quantity = dataset.attrs[attr.LIMIT]
+    if (name := variables[quantity]) not in dataset.variables:
         return None
     if dataset[name].dims != name.dims:  # of results of different plates that were joined
-        return None
-    if not {attr.SOLID_LIMIT_DENSITY, attr.SOLID_LIMIT_HIGHEST} <= dataset.attrs.keys():
         return None
     values = dataset[name].values
     if len(values) > 1 and not np.array_equal(hit_numbers(dataset[[v.HIT]])[: len(values)], np.arange(len(values))):
         return None  # a choice of hits that are not the first ones
     status = np.where(np.isnan(values), Status.UNFINISHED, Status.PERFORATED).astype(np.int8)
-    attributes = {
-        attr.LIMIT: quantity,
-        attr.LIMIT_LAYER: dataset.attrs[attr.LIMIT_LAYER] if attr.SOLID_LIMIT_ELSEWHERE in dataset.attrs else 0,
-        attr.LIMIT_HIGHEST: dataset.attrs[attr.SOLID_LIMIT_HIGHEST],
-        attr.LIMIT_ELSEWHERE: dataset.attrs.get(attr.SOLID_LIMIT_ELSEWHERE, 0.0),
-        attr.LIMIT_DENSITY: dataset.attrs[attr.SOLID_LIMIT_DENSITY],
-    }
     names = v.LIMITS[quantity].value, v.STATUS
-    return xarray.Dataset(stored_columns(names, dict(zip(names, (values, status), strict=True))), attrs=attributes)
+    columns = stored_columns(names, dict(zip(names, (values, status), strict=True)))
+    return xarray.Dataset(columns, attrs={attr.LIMIT: quantity, **attributes})

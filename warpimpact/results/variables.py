@@ -94,6 +94,12 @@ SOLID_LIMITS = {quantity: _solid(limit.value) for quantity, limit in LIMITS.item
 """Limits of the first shots at the solid plate of equal areal density, by the quantity of the search; one if all shots
 are alike. Present only in a result of `warpimpact limit` with `output.solid_reference`."""
 SOLID_LIMIT_VARIABLES = tuple(SOLID_LIMITS.values())
+BASE_ALONE_LIMITS = {
+    quantity: _beside(limit.value, "base_alone", "solid_hit", "base without the layers in front")
+    for quantity, limit in LIMITS.items()
+}
+"""Limits of the same shots at the base alone. Present with layers and `output.solid_reference`, unless the thickness of
+another layer was searched."""
 
 _RECORDED = dict.fromkeys(
     variable for group in registry.RECORDS if group.measured and not group.exact for variable in group
@@ -124,7 +130,13 @@ OUTLINE_VARIABLES = (OUTLINE_Y, OUTLINE_Z)
 
 GROUPS = {
     "plate": OUTLINE_VARIABLES,
-    "solid": (*SOLID_VARIABLES, *SOLID_DEPTHS, *BASE_ALONE_VARIABLES, *SOLID_LIMIT_VARIABLES),
+    "solid": (
+        *SOLID_VARIABLES,
+        *SOLID_DEPTHS,
+        *BASE_ALONE_VARIABLES,
+        *SOLID_LIMIT_VARIABLES,
+        *BASE_ALONE_LIMITS.values(),
+    ),
     "finer": (*FINER_COORDINATES, *FINER_VARIABLES),
     "assumed": (*ASSUMED_COORDINATES, *ASSUMED_VARIABLES),
 }

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from warpimpact.campaign.campaign import Campaign
 from warpimpact.campaign.evidence import limit_velocity_factors
-from warpimpact.campaign.references import at_solid
+from warpimpact.campaign.references import at_base_alone, at_solid
 from warpimpact.campaign.resistances import resistance_by_thickness
 from warpimpact.campaign.text import CampaignError
 from warpimpact.records.outcomes import Outcomes
@@ -146,7 +146,7 @@ class LimitMap:
         if task.solid is not None:
             solid, of_solid = self._at_solid(campaign, task.solid, numerics, worker)
             attributes |= of_solid
-            beside |= solid
+            beside |= solid | self._at_base_alone(campaign, task.solid, numerics, worker)
         put, outcomes = self._put(campaign, task.shots, searched, images), searched.recorded(sought.quantity)
         return described(campaign, put, outcomes, short_steps(numerics), attributes, beside)
 
@@ -168,6 +168,15 @@ class LimitMap:
             attr.SOLID_LIMIT_ELSEWHERE: scene.target.areal_density - layer.areal_density,
             attr.SOLID_LIMIT_HIGHEST: sought.highest,
         }
+
+    def _at_base_alone(self, campaign: Campaign, shots: Shots, numerics: Numerics, worker: Worker) -> dict[str, Array]:
+        """Column of the limits of some shots at the base alone; nothing where there is no base, or the thickness of a
+        layer in front of it is searched."""
+        sought, base = self.sought, len(campaign.target.layers) - 1
+        if not base or (sought.quantity == "thickness" and sought.layer != base):
+            return {}
+        searched = limits(*at_base_alone(campaign, shots), replace(sought, layer=0), numerics, worker)
+        return {v.BASE_ALONE_LIMITS[sought.quantity]: searched.value}
 
     def assumed(self, campaign: Campaign, found: Found | None, worker: Worker) -> HitTable:
         """See `Computation.assumed`."""

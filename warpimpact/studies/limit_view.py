@@ -20,7 +20,7 @@ from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
 from warpimpact.results.dataset import hit_numbers
 from warpimpact.results.files import ResultError
-from warpimpact.results.limits import solid_limits
+from warpimpact.results.limits import base_alone_limits, solid_limits
 from warpimpact.results.measures import NAMES, Measure
 from warpimpact.results.per_hit import needed_density
 from warpimpact.scene.quantities import QUANTITIES
@@ -64,7 +64,7 @@ def limit_view(dataset: xarray.Dataset, texts: Sequence[str] = ()) -> list[Secti
         *([Section([_hits(dataset)]), *_proxies(dataset)] if short else []),
         *([] if short and not texts else [Section([_estimates(dataset, texts)])]),
         *published_view(dataset),
-        Section([*_left_out(dataset), *assumptions_lines(dataset), *_expected(dataset), *_solid(dataset)]),
+        Section([*_left_out(dataset), *assumptions_lines(dataset), *_expected(dataset), *_references(dataset)]),
         Section(list(_costs(dataset))),
     ]
 
@@ -159,15 +159,26 @@ def _costs(dataset: xarray.Dataset) -> Iterator[str]:
     yield from filter(None, [numerics_note(dataset), draws_note(dataset)])
 
 
-def _solid(dataset: xarray.Dataset) -> Iterator[str]:
-    """The limit of the solid reference, and what its search cost; nothing without one."""
-    reference = solid_limits(dataset)
-    if reference is None:
-        return
-    quantity = dataset.attrs[attr.LIMIT]
+def _references(dataset: xarray.Dataset) -> Iterator[str]:
+    """The limits of the solid reference and of the base alone; nothing without them."""
+    if (solid := solid_limits(dataset)) is not None:
+        yield _of_solid(dataset, solid)
+    if (alone := base_alone_limits(dataset)) is not None:
+        quantity = dataset.attrs[attr.LIMIT]
+        yield f"base alone: limit {quantity} {_mean_text(alone, quantity)}"
+
+
+def _mean_text(reference: xarray.Dataset, quantity: str) -> str:
+    """The mean limit of a reference."""
     unit, factor = shown_unit(quantity)
     value = reference[v.LIMITS[quantity].value].values
-    limit = f"{factor * float(np.nanmean(value)):.5g} {unit}" + (", mean" if len(value) > 1 else "")
+    return f"{factor * float(np.nanmean(value)):.5g} {unit}" + (", mean" if len(value) > 1 else "")
+
+
+def _of_solid(dataset: xarray.Dataset, reference: xarray.Dataset) -> str:
+    """The limit of the solid reference, and what its search cost."""
+    quantity, hit_count = dataset.attrs[attr.LIMIT], reference.sizes["hit"]
+    limit = _mean_text(reference, quantity)
     density = float(dataset.attrs[attr.AREAL_DENSITY])
     if quantity == "thickness":
         needed = needed_density(reference, 0.0)
@@ -175,11 +186,11 @@ def _solid(dataset: xarray.Dataset) -> Iterator[str]:
         limit += f" (the target as given has {density:.4g} kg/m²)"
     else:
         limit += f", of {density:.4g} kg/m² as the target"
-    hits = f"{len(value)} hit{'s' if len(value) > 1 else ''}"
+    hits = f"{hit_count} hit{'s' if hit_count > 1 else ''}"
     seconds = float(dataset.attrs[attr.SOLID_LIMIT_TIME])
     whole = attr.LAYERS in dataset.attrs and attr.ADD_ON_DENSITY not in dataset.attrs
     name = reference_name(dataset) + (" in place of the whole target" if whole else "")
-    yield f"{name}: limit {quantity} {limit}; {hits} searched in {seconds:.2g} s"
+    return f"{name}: limit {quantity} {limit}; {hits} searched in {seconds:.2g} s"
 
 
 def _proxies(dataset: xarray.Dataset) -> list[Section]:

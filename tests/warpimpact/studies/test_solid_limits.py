@@ -74,6 +74,23 @@ def test_it_is_the_search_of_a_solid_plate_that_is_as_heavy(velocity: xarray.Dat
     assert velocity.sizes["solid_hit"] == 1  # the hits differ in their places alone
 
 
+@pytest.mark.parametrize("quantity", ["velocity", "thickness"])
+def test_the_base_alone_is_a_plate_of_its_own(quantity: str, tmp_path: Path, request: pytest.FixtureRequest) -> None:
+    name = f"base_alone_limit_{quantity}"
+    if quantity == "thickness":
+        with_base = request.getfixturevalue("thickness")
+    else:
+        with_base = search(tmp_path / "a.nc", layer=LAYER)
+    text = TEXT.format(pattern=NONE, layer="", solid="true").replace('"4 mm"', '"2 mm"')
+    base = Campaign.from_text(text.replace("shear_coefficient = 0.05", ""), name="text", folder=Path(), count=1)
+    run_to_file(base, tmp_path / "b.nc", device="cpu", computation=LimitMap.of(base, quantity))
+    expected = files.read(tmp_path / "b.nc")[f"limit_{quantity}"].values
+    assert with_base[name].values == pytest.approx(expected, abs=1.0 if quantity == "velocity" else 1e-5)
+    (measure,) = [one for one in effectiveness(with_base) if one.name == f"mean(limit_{quantity})"]
+    assert measure.alone == pytest.approx(expected.item() * measure.measure.display.factor, rel=2e-3)
+    assert "base alone: limit" in text_of(limit_view(with_base))
+
+
 def test_it_changes_no_bit_of_the_hits(velocity: xarray.Dataset, tmp_path: Path) -> None:
     without = search(tmp_path / "without.nc", solid="false")
     assert "solid_limit_velocity" not in without.variables
