@@ -10,6 +10,7 @@ import numpy as np
 
 from warpimpact.analysis.plate_text import plate_numbers
 from warpimpact.plotting.dimensions import Dimension, hole_dimensions, smallest_ligament
+from warpimpact.plotting.fire import fire_of
 from warpimpact.plotting.plate import drawn_extent
 from warpimpact.scene import NoPattern
 from warpimpact.scene.patterns.lattice import LatticePattern
@@ -43,6 +44,7 @@ def drawn(campaign: Campaign) -> dict[str, Any]:
         "core": round(core.max_radius * _MM, _DIGITS),
         "dimensions": [_line(hole_dimension) for hole_dimension in hole_dimensions(plate, ligament)],
         "ligament": None if ligament is None else _line(ligament),
+        "fire": fire_of(campaign.impact.obliquity, campaign.impact.azimuth)._asdict(),
         "handles": list(_handles(campaign)),
         "section": _section(target, half[1]),
         "numbers": plate_numbers(plate.open_area, plate.ligament, target.weights, plate.pattern.resolution),

@@ -88,7 +88,19 @@ function plateView(plate, section, drag) {
     return group;
   }
 
-  function drawPlate({ extent, path, cell, core, dimensions, ligament, handles }) {
+  // Where the shots fly, in the lower right corner: an arrow with its angle, or words where they fly at the reader.
+  function fireArrow({ along: [y, z], text }, [wide, tall], size) {
+    const at = [wide / 2 - 3.2 * size, -tall / 2 + 1.2 * size], parts = [label(text, at, size)];
+    if (y || z) {
+      const middle = [at[0], at[1] + 2.6 * size], place = (along, across) =>
+        [middle[0] + size * (along * y - across * z), -(middle[1] + size * (along * z + across * y))].join(" ");
+      const line = `M${place(-1.6, 0)} L${place(1, 0)} M${place(1.6, 0)} L${place(0.8, 0.4)} L${place(0.8, -0.4)} Z`;
+      parts.push(make("path", { class: "fire", d: line, "stroke-width": 0.2 * size }));
+    }
+    return parts;
+  }
+
+  function drawPlate({ extent, path, cell, core, dimensions, ligament, fire, handles }) {
     const [wide, tall] = extent, size = 0.032 * Math.max(wide, tall), { drawn } = views.get(plate);
     frame(plate, [-wide / 2, -tall / 2, wide, tall]);
     const parts = [make("path", { class: "hole", d: path, "fill-rule": "evenodd", "stroke-width": 0.06 * size })];
@@ -102,6 +114,7 @@ function plateView(plate, section, drag) {
     parts.push(make("circle", { class: "core", r: core, "stroke-width": 0.12 * size }));
     parts.push(...dimensions.map((one) => dimension(one, "line", size)));
     if (ligament) parts.push(dimension(ligament, "ligament", size));
+    parts.push(...fireArrow(fire, extent, size));
     drawn.replaceChildren(...parts);
     place(plate, handles, 0.5 * size);
   }

@@ -23,7 +23,7 @@ from scipy.spatial import KDTree
 from warpimpact.analysis.hit_map import chosen, hit_points
 from warpimpact.analysis.summary import breaks_promise
 from warpimpact.kernels.status import Status
-from warpimpact.plotting.fire import direction_of, draw_fire
+from warpimpact.plotting.fire import common_fire, draw_fire
 from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
 from warpimpact.results.dataset import passed
@@ -276,8 +276,8 @@ def _without_value(dataset: xarray.Dataset, exists: NDArray[np.bool_], layer: in
 def _furnish(axes: Axes, dataset: xarray.Dataset, entries: Sequence[Artist], layer: int | None) -> None:
     """Add the holes, the direction of fire, and a legend below the axes."""
     entries = [*entries, *draw_holes(axes, dataset, layer)]
-    if (direction := direction_of(dataset)) is not None:
-        draw_fire(axes, *direction)
+    if (fire := common_fire(dataset)) is not None:
+        draw_fire(axes, fire)
     if entries:
         below = axes.transAxes + ScaledTranslation(0.0, -0.5, axes.figure.dpi_scale_trans)
         axes.legend(

@@ -17,7 +17,7 @@ from matplotlib.path import Path
 
 from warpimpact.analysis.plate_text import plate_numbers
 from warpimpact.plotting.dimensions import draw_dimensions
-from warpimpact.plotting.fire import draw_fire
+from warpimpact.plotting.fire import draw_fire, fire_of
 from warpimpact.plotting.heading import add_heading
 from warpimpact.scene import NoPattern, Target
 
@@ -59,7 +59,7 @@ def plate_figure(
         axes.add_patch(patch)
     draw_dimensions(axes, plate)
     if impact is not None:
-        draw_fire(axes, impact.obliquity, impact.azimuth)
+        draw_fire(axes, fire_of(impact.obliquity, impact.azimuth))
     steel = Patch(facecolor=_STEEL, edgecolor="black", label=f"plate, {plate.thickness * _MM:g} mm thick")
     numbers = plate_numbers(plate.open_area, plate.ligament, target.weights, plate.pattern.resolution)
     parts = (f"{name} {number}".replace(" ", "\u00a0") for name, number in numbers.items())  # no break within a part

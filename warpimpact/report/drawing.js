@@ -80,6 +80,16 @@ function hitMaps(data) {
     };
   }
 
+  // Where the shots fly: an arrow with its angle, or words where they fly at the reader.
+  function fireNotes(fire) {
+    if (!fire) return [];
+    const [along, up] = fire.along, corner = { xref: "x domain", yref: "y domain", x: 0.97, y: 0.04, font: { color: "black", size: 12 } };
+    const text = { ...corner, text: fire.text, showarrow: false, xanchor: "right", yanchor: "bottom", bgcolor: "rgba(255,255,255,0.8)" };
+    if (!along && !up) return [text];
+    const head = { xshift: 20 * along - 25, yshift: 20 * up + 45, ax: -40 * along, ay: 40 * up };
+    return [text, { ...corner, ...head, text: "", showarrow: true, arrowhead: 2, arrowwidth: 2, arrowcolor: "black" }];
+  }
+
   const passive = { hoverinfo: "skip", showlegend: false };
 
   // `chosen` is a hit with a ring; `replayed` are hits with a dot. `tight` leaves out the names of the axes.
@@ -109,7 +119,7 @@ function hitMaps(data) {
     const layout = {
       ...sheet, margin: { l: 50, r: 10 + bar, t: above, b: below }, width: wide * perMm + 60 + bar,
       height: tall * perMm + above + below, autosize: false,
-      plot_bgcolor: MISSING, hoverlabel: { align: "left", bgcolor: "white", font: { color: "black" } },
+      plot_bgcolor: MISSING, annotations: fireNotes(result.fire), hoverlabel: { align: "left", bgcolor: "white", font: { color: "black" } },
       xaxis: { title: { text: tight ? "" : "hit y [mm]" }, range: result.limits[0], constrain: "domain", zeroline: false, showgrid: false },
       yaxis: {
         title: { text: tight ? "" : "hit z [mm]" }, range: result.limits[1], constrain: "domain", zeroline: false, showgrid: false,

@@ -15,6 +15,7 @@ from warpimpact.analysis.hit_map import hit_points
 from warpimpact.analysis.slabs import slabs
 from warpimpact.kernels.status import Status
 from warpimpact.plotting.cell import STATUS_COLOURS, Shown, limits, nearest_hits, shown, words
+from warpimpact.plotting.fire import common_fire
 from warpimpact.plotting.poses import Pose, poses_behind, poses_in_plate, silhouette
 from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
@@ -127,6 +128,7 @@ def _map_data(dataset: xarray.Dataset, columns: dict[str, Array], pixels: int) -
     return {
         "period": _rounded(np.asarray(dataset.attrs[attr.PLATE_PERIOD]) * _MM),
         "limits": limits(dataset).tolist(),
+        "fire": None if (fire := common_fire(dataset)) is None else fire._asdict(),
         "outline": [_rounded(outline * _MM) for outline in outlines(dataset).values()],
         "number": hit_numbers(dataset).tolist(),
         "y": _rounded(y),

@@ -252,6 +252,19 @@ def test_grey_has_a_legend(page: Any) -> None:
     assert not page.find("#grey-0")[0].is_displayed()  # all cores pass
 
 
+def test_plate_and_map_show_the_direction_of_fire(page: Any) -> None:
+    assert "⊙ fire" in page.text("#plate")
+    assert not page.find("#plate .fire")
+    move(page, "control-impact-obliquity", 20)
+    settled(page)
+    assert all("fire 20°" in page.text(place) for place in ("#plate", "#map-0 .annotation-text"))
+    arrow = page.driver.execute_script(
+        "return document.getElementById('map-0').layout.annotations.filter((one) => one.showarrow)[0]"
+    )
+    assert (arrow["ax"] < 0.0, arrow["ay"]) == (True, 0.0)  # towards +y, to the right
+    assert len(page.find("#plate .fire")) == 1
+
+
 def test_many_changes_leave_no_error(page: Any) -> None:
     random = np.random.default_rng(1)
     sliders = page.driver.execute_script(

@@ -319,6 +319,7 @@ def test_browser_changes_the_map_and_keeps_one_scale(browser: Any, folder: Path)
             assert scales[0][1] == pytest.approx(largest, rel=1e-4)
         if key == "pitch at 50 mm":
             assert scales[0][0] == -scales[0][1]
+    assert "⊙ fire" in browser.text("#map-0 .annotation-text")
     assert browser.errors() == []
 
 
