@@ -26,7 +26,8 @@ import xarray
 
 from warpimpact.analysis.assumptions import AS_GIVEN, moved_apart
 from warpimpact.analysis.comparable import check_same_question, other_shots
-from warpimpact.analysis.comparison_text import Comparison
+from warpimpact.analysis.comparison_short import short_view
+from warpimpact.analysis.comparison_text import ComparedPlates, comparison_view
 from warpimpact.analysis.contestants import Contestant, Difference, Pair, Verdict
 from warpimpact.analysis.effectiveness import Score, Scored, depth_note, measures_of, ratio_of_draws, scores
 from warpimpact.analysis.numbers import of_each
@@ -49,9 +50,20 @@ from warpimpact.statistics.comparisons import (
     ratio_numbers,
 )
 from warpimpact.statistics.intervals import Array, Estimate, Estimating, estimate_of
+from warpimpact.view.view import html_of
 
 _SAME_WEIGHT = 1.01
 """Plates whose areal densities differ by less than this factor weigh the same."""
+
+
+class Comparison(ComparedPlates):
+    """Plates side by side, by their measures, with what the hits tell apart. A notebook shows the short answer, and
+    every measure behind it."""
+
+    def _repr_html_(self) -> str:
+        """What a notebook shows."""
+        every = html_of(comparison_view(self))
+        return f"{html_of([short_view(self)])}<details><summary>Every measure</summary>{every}</details>"
 
 
 def compare(

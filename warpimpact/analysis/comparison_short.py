@@ -8,7 +8,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 from warpimpact.analysis.comparison_text import (
-    Comparison,
+    ComparedPlates,
     compared_scores,
     hits_used,
     is_ranked,
@@ -22,7 +22,7 @@ from warpimpact.analysis.numbers import Ends, intervals_text
 from warpimpact.view.view import Column, Section, Table, number
 
 
-def deciding(comparison: Comparison) -> Score | None:
+def deciding(comparison: ComparedPlates) -> Score | None:
     """The measure that decides, as the first plate has it: the first one by which hits tell two plates apart, or else
     the first one that ranks plates; None where there is none.
 
@@ -34,7 +34,7 @@ def deciding(comparison: Comparison) -> Score | None:
     return next((score for score in ranked if score.name in apart), ranked[0] if ranked else None)
 
 
-def _ranking_scores(comparison: Comparison) -> list[Score]:
+def _ranking_scores(comparison: ComparedPlates) -> list[Score]:
     """Measures with a better direction and with intervals."""
     return [
         score
@@ -43,7 +43,7 @@ def _ranking_scores(comparison: Comparison) -> list[Score]:
     ]
 
 
-def from_best(comparison: Comparison, measure: str) -> list[Difference]:
+def from_best(comparison: ComparedPlates, measure: str) -> list[Difference]:
     """By how much every plate but the best exceeds the best one, in the order of the ranks."""
     best, *others = comparison.ordered(measure)
     pairs = {(pair.one, pair.other): pair for pair in comparison.differences if pair.measure == measure}
@@ -57,7 +57,7 @@ def _reversed(pair: Difference) -> Difference:
     return Difference(pair.measure, pair.other, pair.one, 0.0 - pair.value, low, high, survival)
 
 
-def short_view(comparison: Comparison, evidence: Sequence[str] = ()) -> Section:
+def short_view(comparison: ComparedPlates, evidence: Sequence[str] = ()) -> Section:
     """The measure that decides with its ranks and differences, what is not told apart, and on what the answer rests.
 
     Args:
@@ -70,7 +70,7 @@ def short_view(comparison: Comparison, evidence: Sequence[str] = ()) -> Section:
     return Section([_ranks(comparison, score), *filter(None, notes)], _title(comparison, score))
 
 
-def verdict_of(comparison: Comparison) -> list[str]:
+def verdict_of(comparison: ComparedPlates) -> list[str]:
     """Who is best by the measure that decides, and what is not told apart, in sentences; empty where none decides."""
     score = deciding(comparison)
     if score is None:
@@ -81,7 +81,7 @@ def verdict_of(comparison: Comparison) -> list[str]:
     return [f"{_title(comparison, score)}: {first}", *filter(None, [_open(comparison, score)])]
 
 
-def _title(comparison: Comparison, score: Score) -> str:
+def _title(comparison: ComparedPlates, score: Score) -> str:
     """The measure that decides, which way is better, and which measures before it tell no plates apart."""
     before = []
     for other in _ranking_scores(comparison):
@@ -93,7 +93,7 @@ def _title(comparison: Comparison, score: Score) -> str:
     return f"{score.measure.title}, {score.measure.better}{weighed(comparison, score.name)}{undecided}"
 
 
-def _ranks(comparison: Comparison, score: Score) -> Table:
+def _ranks(comparison: ComparedPlates, score: Score) -> Table:
     place = [other.name for other in comparison.plates[0].measures].index(score.name)
     plates = {plate.name: plate for plate in comparison.plates}
     differences = {pair.one: pair for pair in from_best(comparison, score.name)}
@@ -122,7 +122,7 @@ def _ranks(comparison: Comparison, score: Score) -> Table:
     return Table(columns, rows)
 
 
-def _open(comparison: Comparison, score: Score) -> str:
+def _open(comparison: ComparedPlates, score: Score) -> str:
     """Pairs that the measure does not tell apart, and other measures at which another plate is best."""
     pairs = [pair for pair in comparison.differences if pair.measure == score.name and not pair.told_apart]
     total = sum(pair.measure == score.name for pair in comparison.differences)
@@ -137,7 +137,7 @@ def _open(comparison: Comparison, score: Score) -> str:
     return "; ".join(sentences)
 
 
-def _used(comparison: Comparison) -> str:
+def _used(comparison: ComparedPlates) -> str:
     """How many hits were compared, and what the ranks do not allow for."""
     hits = {plate.hits for plate in comparison.plates}
     count = f"{min(hits)}" if len(hits) == 1 else f"{min(hits)} to {max(hits)}"
@@ -146,7 +146,7 @@ def _used(comparison: Comparison) -> str:
     return f"{count} hits of each plate{same}{left_open}"
 
 
-def _assumptions(comparison: Comparison, score: Score) -> str:
+def _assumptions(comparison: ComparedPlates, score: Score) -> str:
     """Whether the best plate stays so if something that nobody measured is otherwise."""
     best = comparison.ordered(score.name)[0]
     about = [each for each in comparison.verdicts if each.measure == score.name and best in (each.one, each.other)]

@@ -13,11 +13,11 @@ from warpimpact.analysis.effectiveness import Score
 from warpimpact.analysis.numbers import Ends, intervals_text, number_text, of_each
 from warpimpact.analysis.plate_text import common_name
 from warpimpact.analysis.survival import survival_text
-from warpimpact.view.view import Column, Section, Table, html_of, number, text_of
+from warpimpact.view.view import Column, Section, Table, number, text_of
 
 
 @dataclass(frozen=True)
-class Comparison:
+class ComparedPlates:
     """Plates side by side.
 
     Attributes:
@@ -40,10 +40,6 @@ class Comparison:
     notes: tuple[str, ...]
     verdicts: tuple[Verdict, ...] = ()
     cautions: tuple[str, ...] = ()
-
-    def _repr_html_(self) -> str:
-        """What a notebook shows."""
-        return html_of(comparison_view(self))
 
     @property
     def reference(self) -> str:
@@ -75,26 +71,26 @@ class Comparison:
         return [plate.name for plate in sorted(self.plates, key=worse)]
 
 
-def comparison_text(comparison: Comparison) -> str:
+def comparison_text(comparison: ComparedPlates) -> str:
     """The view of a comparison as text."""
     return text_of(comparison_view(comparison))
 
 
-def comparison_view(comparison: Comparison) -> list[Section]:
+def comparison_view(comparison: ComparedPlates) -> list[Section]:
     """What was compared, who is best at what, then every measure as a ranking with differences in words."""
     best = Table((Column("best at"), Column("plate")), best_rows(comparison))
     rankings = (_ranking(comparison, measure) for measure in compared_scores(comparison))
     return [Section(conditions(comparison)), Section([best]), *rankings]
 
 
-def conditions(comparison: Comparison) -> list[str]:
+def conditions(comparison: ComparedPlates) -> list[str]:
     """What was compared and how, a sentence each."""
     together = f"Differences of a measure hold together at {comparison.confidence:.0%} (Bonferroni over the pairs)."
     chance = "The intervals describe the hits that were drawn, not what the model leaves out."
     return [*hits_used(comparison), together, chance, *_drawn(comparison), *comparison.notes]
 
 
-def _drawn(comparison: Comparison) -> list[str]:
+def _drawn(comparison: ComparedPlates) -> list[str]:
     """How verdicts are weighed against the uncertainty of the parameters, where that is known."""
     if all(pair.survival is None for pair in comparison.differences):
         return []
@@ -105,7 +101,7 @@ def _drawn(comparison: Comparison) -> list[str]:
     ]
 
 
-def hits_used(comparison: Comparison) -> list[str]:
+def hits_used(comparison: ComparedPlates) -> list[str]:
     """How many hits were compared and how, a sentence each."""
     hits = {plate.name: plate.hits for plate in comparison.plates}
     one, *others = dict.fromkeys(hits.values())
@@ -126,12 +122,12 @@ def hits_used(comparison: Comparison) -> list[str]:
     return lines
 
 
-def compared_scores(comparison: Comparison) -> list[Score]:
+def compared_scores(comparison: ComparedPlates) -> list[Score]:
     """The measures of the first plate in which plates are compared; a worst hit has no interval."""
     return [score for score in comparison.plates[0].measures if score.measure.kind != "worst_point"]
 
 
-def best_rows(comparison: Comparison) -> list[tuple[str, str]]:
+def best_rows(comparison: ComparedPlates) -> list[tuple[str, str]]:
     """Every measure and who is best at it."""
     rows = []
     for measure in compared_scores(comparison):
@@ -146,7 +142,7 @@ def best_rows(comparison: Comparison) -> list[tuple[str, str]]:
     return rows
 
 
-def _as_good(comparison: Comparison, measure: str, first: Sequence[str]) -> str:
+def _as_good(comparison: ComparedPlates, measure: str, first: Sequence[str]) -> str:
     """What to say of plates behind the best that no difference tells from all of these; mostly empty."""
     apart = [{pair.one, pair.other} for pair in comparison.differences if pair.measure == measure and pair.told_apart]
     others = [plate.name for plate in comparison.plates if plate.name not in first]
@@ -154,14 +150,14 @@ def _as_good(comparison: Comparison, measure: str, first: Sequence[str]) -> str:
     return f" (not told apart for certain from {listed(open_)})" if open_ else ""
 
 
-def _doubt(comparison: Comparison, measure: str) -> str:
+def _doubt(comparison: ComparedPlates, measure: str) -> str:
     """What to say of plates that are best: whether a verdict about the measure does not survive; mostly empty."""
     survivals = [pair.survival for pair in comparison.differences if pair.measure == measure and pair.told_apart]
     failing = any(survival is not None and not survival.survives for survival in survivals)
     return " (not certain under the uncertainty of the parameters)" if failing else ""
 
 
-def _turned(comparison: Comparison, measure: str, first: Sequence[str]) -> str:
+def _turned(comparison: ComparedPlates, measure: str, first: Sequence[str]) -> str:
     """What to say of plates that are best where assumptions turn that over; mostly empty."""
     if measure in (comparison.at_equal_weight or ()):
         return ""  # verdicts are by value
@@ -176,7 +172,7 @@ def _turned(comparison: Comparison, measure: str, first: Sequence[str]) -> str:
     return f" (turned over by {len(turned)} of {len(every)} assumptions)" if turned else ""
 
 
-def is_ranked(comparison: Comparison, measure: str) -> bool:
+def is_ranked(comparison: ComparedPlates, measure: str) -> bool:
     """Whether the plates are compared in a measure; if not, the notes or the missing interval say why."""
     return any(pair.measure == measure and not math.isnan(pair.low) for pair in comparison.differences)
 
@@ -186,7 +182,7 @@ def listed(names: Sequence[str]) -> str:
     return " and ".join([", ".join(names[:-1]), names[-1]] if len(names) > 1 else names)
 
 
-def _ranking(comparison: Comparison, measure: Score) -> Section:
+def _ranking(comparison: ComparedPlates, measure: Score) -> Section:
     """One measure of all plates, the best first, and a sentence for every pair."""
     place = comparison.plates[0].measures.index(measure)
     ranks = comparison.ranks(measure.name)
@@ -211,7 +207,7 @@ def _ranking(comparison: Comparison, measure: Score) -> Section:
     return Section([Table(columns, rows), *differences, *verdicts], title)
 
 
-def weighed(comparison: Comparison, measure: str) -> str:
+def weighed(comparison: ComparedPlates, measure: str) -> str:
     """By what plates of different weight are ranked in a measure, to follow its name; empty where weights are the
     same."""
     if comparison.at_equal_weight is None:
@@ -245,7 +241,7 @@ def negative(interval: tuple[float, float]) -> tuple[float, float]:
     return -interval[1], -interval[0]
 
 
-def assumptions_view(comparison: Comparison) -> list[Section]:
+def assumptions_view(comparison: ComparedPlates) -> list[Section]:
     """Every measure of all plates under every assumption."""
     sections = []
     for score in compared_scores(comparison):

@@ -25,7 +25,7 @@ from .run import failure_code
 if TYPE_CHECKING:
     from xarray import Dataset
 
-    from warpimpact.analysis.comparison_text import Comparison
+    from warpimpact.analysis.comparison import Comparison
 
 
 def add_compare(commands: Commands) -> None:

@@ -182,7 +182,9 @@
     } else if (line.kind === "plate") {
       showPlate(line);
     } else if (line.kind === "numbers") {
+      const open = at("every")?.open;
       at("answer").innerHTML = line.html;
+      if (open && at("every")) at("every").open = true;
       headed(at("answer"));
       at("answer").classList.remove("stale");
     } else {

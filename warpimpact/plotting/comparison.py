@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
     from matplotlib.axes import Axes
 
-    from warpimpact.analysis.comparison_text import Comparison
+    from warpimpact.analysis.comparison import Comparison
     from warpimpact.analysis.contestants import Difference
 from warpimpact.analysis.effectiveness import Score
 

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from matplotlib.artist import Artist
     from matplotlib.axes import Axes
 
-    from warpimpact.analysis.comparison_text import Comparison
+    from warpimpact.analysis.comparison import Comparison
     from warpimpact.analysis.contestants import Contestant
 from warpimpact.analysis.effectiveness import Score
 

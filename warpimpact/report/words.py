@@ -12,9 +12,9 @@ import xarray
 from markupsafe import Markup
 
 from warpimpact.analysis.assumptions_view import assumptions_view
-from warpimpact.analysis.comparison import compare
+from warpimpact.analysis.comparison import Comparison, compare
 from warpimpact.analysis.comparison_short import short_view, verdict_of
-from warpimpact.analysis.comparison_text import Comparison, comparison_view
+from warpimpact.analysis.comparison_text import comparison_view
 from warpimpact.analysis.effectiveness import depth_note, effectiveness, measures_table
 from warpimpact.analysis.estimates import estimated, means_of, slices, status_shares
 from warpimpact.analysis.evidence_lines import evidence_of_all

@@ -13,9 +13,9 @@ import pytest
 import xarray
 
 from warpimpact import Campaign
-from warpimpact.analysis.comparison import compare
+from warpimpact.analysis.comparison import Comparison, compare
 from warpimpact.analysis.comparison_short import short_view
-from warpimpact.analysis.comparison_text import Comparison, best_rows, comparison_text
+from warpimpact.analysis.comparison_text import best_rows, comparison_text
 from warpimpact.analysis.contestants import Difference, Verdict
 from warpimpact.analysis.effectiveness import effectiveness
 from warpimpact.campaign.campaign import CampaignError
@@ -67,7 +67,8 @@ def test_identical_plates_cannot_be_told_apart(make_plate_result) -> None:
     text = comparison_text(comparison)
     assert text.count("a and b cannot be told apart: difference 0.000 (") == 6
     assert "better than" not in text
-    assert "<p>500 hits of each plate: " in comparison._repr_html_()
+    page = comparison._repr_html_()
+    assert page.index("<table>") < page.index("<summary>Every measure") < page.index("<p>500 hits of each plate: ")
 
 
 def test_any_measure_may_be_compared(make_plate_result) -> None:

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 import xarray
 
-from warpimpact.analysis.comparison import compare
-from warpimpact.analysis.comparison_text import Comparison, comparison_text
+from warpimpact.analysis.comparison import Comparison, compare
+from warpimpact.analysis.comparison_text import comparison_text
 from warpimpact.analysis.contestants import Difference
 
 MEAN = "mean(residual_energy_fraction)"
