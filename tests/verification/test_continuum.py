@@ -1,7 +1,7 @@
-"""The continuum against closed forms and invariants: element, flow, waves, energy, symmetry (docs/continuum.md)."""
+"""Elements of the continuum against closed forms and invariants: flow, waves, energy, contact (docs/continuum.md)."""
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -10,21 +10,10 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from warpimpact import (
-    CirclePattern,
-    Continuum,
     Flow,
-    Layer,
-    NoPattern,
     OgiveCore,
-    Outcomes,
-    Plate,
     PolynomialCore,
-    Record,
-    Scene,
-    Shots,
-    simulate,
 )
-from warpimpact.continuum import strikes
 from warpimpact.continuum.meshing import SheetMesh
 from warpimpact.continuum.one_hit import OneHit, Start
 from warpimpact.kernels.status import Status
@@ -34,8 +23,6 @@ Array = NDArray[np.float64]
 CORE = PolynomialCore(coefficients=(3.0e-4, 0.24, -5.29), length=27.86e-3, mass=4.0e-3)
 STEEL = Flow(yield_stress=2.03e9, hardening=568e6, rate_exponent=0.001, fracture_work=2.31e9)
 ELASTIC = Flow(yield_stress=1.0e15, fracture_work=1.0e20)
-COARSE = 0.667e-3
-"""Elements of a hit [m]: six through the plate."""
 
 
 def box(counts: tuple[int, int, int], spacing: float = 1.0e-3) -> SheetMesh:
@@ -293,75 +280,6 @@ def test_an_element_fails_where_it_is_too_thin_or_too_wide(rate: float, share: f
     assert np.ptp(nodal(hit, "position")[0]) == pytest.approx(share * 1.0e-3, rel=0.03)
 
 
-def shots_at(*hits: tuple[float, float], velocity: float = 825.0, **own: float) -> Shots:
-    """Shots at some hit points [m], along the normal unless told otherwise."""
-    count = len(hits)
-    values = {"velocity": velocity, "obliquity": 0.0, "azimuth": 0.0, "pitch": 0.0, "yaw": 0.0, "spin": 0.0} | own
-    return Shots(
-        hit_y=np.array([y for y, _ in hits]),
-        hit_z=np.array([z for _, z in hits]),
-        **{name: np.full(count, value) for name, value in values.items()},
-    )
-
-
-def scene_of(plate: Plate) -> Scene:
-    return Scene(core=CORE, target=plate, record=Record(standoffs=(0.05, 0.13)))
-
-
-HOLES = Plate(thickness=4e-3, resistance=2.6e9, pattern=CirclePattern(diameter=5e-3, spacing=(9e-3, 9e-3)))
-SOLID = Plate(thickness=4e-3, resistance=2.6e9, pattern=NoPattern())
-
-
-def computed(plate: Plate, shots: Shots, **settings: Any) -> Outcomes:
-    chosen = {"flows": (STEEL,), "spacing": COARSE} | settings
-    return simulate(scene_of(plate), shots, numerics=Continuum(**chosen))
-
-
-@pytest.fixture(scope="module", autouse=True)
-def _small_patch() -> Iterator[None]:
-    """Patches that are too small for a result: what these tests show does not depend on that, and they take half."""
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(strikes, "FINE", 1.7)
-        patch.setattr(strikes, "PATCH", 4.0)
-        yield
-
-
-@pytest.fixture
-def coarse(monkeypatch: pytest.MonkeyPatch) -> float:
-    """Elements that are too coarse for a result [m], whose hourglasses take much; what they show does not depend on
-    that."""
-    monkeypatch.setattr(strikes, "LARGEST_HOURGLASS_SHARE", 1.0)
-    return 1.0e-3
-
-
-@pytest.fixture(scope="module")
-def centred() -> Outcomes:
-    return computed(HOLES, shots_at((0.0, 0.0), (4.5e-3, 4.5e-3)))
-
-
-def test_a_symmetric_hit_leaves_straight(centred: Outcomes) -> None:
-    assert (centred.status == Status.PERFORATED).all()
-    assert np.degrees(centred.tilt).max() < 0.005
-    assert (centred.residual_velocity < 820.0).all()
-    way = SOLID.thickness + CORE.length  # from the first touch of the nose to the last one, at most of the base
-    assert (centred.contact_duration > SOLID.thickness / 825.0).all()
-    assert (centred.contact_duration < way / 700.0).all()
-
-
-def test_energy_is_kept(centred: Outcomes) -> None:
-    """What the core lost is in motion, stress, viscosity and contact: a scheme about the middles of steps keeps
-    that."""
-    assert (centred.energy_imbalance < 1e-3).all()
-    assert (centred.hourglass_share < 0.12).all()
-
-
-def test_a_result_has_the_same_bits_however_many_threads_compute_it(centred: Outcomes) -> None:
-    shots = shots_at((0.0, 0.0), (4.5e-3, 4.5e-3))
-    again = simulate(scene_of(HOLES), shots, numerics=Continuum(flows=(STEEL,), spacing=COARSE), threads=1)
-    for name, values in vars(centred).items():
-        assert np.array_equal(values, getattr(again, name), equal_nan=True), name
-
-
 def test_a_free_core_precesses_about_its_angular_momentum() -> None:
     """By the angle |L| t / I across the axis: Euler's equations of a symmetric top."""
     momentum, transverse = np.array([2.0e-4, 0.0, 3.0e-4]), 1.65e-7
@@ -463,57 +381,6 @@ def test_a_contact_damps_a_tenth_of_what_is_critical() -> None:
     mass, step = ELASTIC.density * 1.0e-12 / 8.0, float(hit.flight["before"])
     stiffness = min(0.5 * ELASTIC.wave_modulus * 1.0e-4, mass / step**2)
     assert 4e-3 * (slow[1] - fast[1]) == pytest.approx(0.8 * math.sqrt(stiffness * mass) * 10.0 * step, rel=0.01)
-
-
-def test_a_plate_turned_with_its_shot_gives_the_turned_outcome(coarse: float) -> None:
-    """y → z, z → −y, for a shot that is oblique, yawed and spins. In double precision no element fails otherwise."""
-    own, numerics = {"obliquity": 0.3, "spin": 1.7e4}, {"double": True, "spacing": coarse}
-    one = computed(HOLES, shots_at((1.5e-3, 0.5e-3), azimuth=0.2, yaw=0.03, **own), **numerics)
-    turned = computed(HOLES, shots_at((-0.5e-3, 1.5e-3), azimuth=0.2 + 0.5 * math.pi, pitch=0.03, **own), **numerics)
-    assert one.status[0] == turned.status[0] == Status.PERFORATED
-    assert turned.residual_velocity == pytest.approx(one.residual_velocity, abs=0.02)
-    velocity = one.exit_velocity[0]
-    assert turned.exit_velocity[0] == pytest.approx([velocity[0], -velocity[2], velocity[1]], abs=0.05)
-    assert np.degrees(turned.tilt) == pytest.approx(np.degrees(one.tilt), abs=0.05)
-
-
-def test_a_core_that_touches_nothing_flies_on_as_by_the_fast_law() -> None:
-    plate = Plate(thickness=4e-3, resistance=2.6e9, pattern=CirclePattern(diameter=12e-3, spacing=(16e-3, 16e-3)))
-    shots = shots_at((0.0, 0.0), spin=1.7e4, obliquity=0.1)
-    fast, slow = simulate(scene_of(plate), shots), computed(plate, shots)
-    assert fast.status[0] == slow.status[0] == Status.MISSED
-    assert slow.residual_velocity == pytest.approx(fast.residual_velocity, rel=1e-6)
-    assert slow.tilt == pytest.approx(fast.tilt, abs=1e-6)
-    assert slow.angular_velocity == pytest.approx(fast.angular_velocity, rel=1e-6, abs=1e-3)
-    assert slow.energy_loss[0] == 0.0
-
-
-def test_two_meshes_agree_on_a_solid_plate() -> None:
-    """The scheme is of second order but for erosion: from 0.8 to 0.57 mm the velocity moves by less than 5 % of its
-    loss."""
-    coarse, finer = (computed(SOLID, shots_at((0.0, 0.0)), spacing=spacing) for spacing in (0.8e-3, 0.57e-3))
-    lost = 825.0 - finer.residual_velocity[0]
-    assert 50.0 < lost < 250.0
-    assert coarse.residual_velocity[0] == pytest.approx(finer.residual_velocity[0], abs=0.05 * lost)
-
-
-def test_a_slow_core_comes_to_rest_or_is_thrown_back(coarse: float) -> None:
-    thick = SOLID.model_copy(update={"thickness": 12e-3})
-    outcomes = computed(thick, shots_at((0.0, 0.0), velocity=250.0), spacing=coarse)
-    assert outcomes.status[0] in (Status.ARRESTED, Status.RICOCHETED)
-    assert outcomes.energy_loss[0] > 0.9 * 0.5 * 4e-3 * 250.0**2
-
-
-def test_layers_apart_are_the_chain_of_their_plates(coarse: float) -> None:
-    """The first of two plates takes what it takes alone; the second one meets the core that the first one left."""
-    first = computed(SOLID, shots_at((0.0, 0.0)), spacing=coarse)
-    behind = {"thickness": 4e-3, "resistance": 2.6e9, "gap": 40e-3}
-    target = Scene(core=CORE, target=(SOLID, Layer(**behind)), record=Record(standoffs=(0.05,)))
-    both = simulate(target, shots_at((0.0, 0.0)), numerics=Continuum(flows=(STEEL,), spacing=coarse))
-    assert both.layer_status[0].tolist() == [Status.PERFORATED] * 2
-    assert both.layer_residual_velocity[0, 0] == pytest.approx(first.residual_velocity[0], abs=0.5)
-    assert both.residual_velocity[0] < both.layer_residual_velocity[0, 0] - 50.0
-    assert both.layer_residual_velocity[0, 1] == pytest.approx(both.residual_velocity[0], abs=1.0)
 
 
 def test_a_layer_is_marched_only_while_the_core_is_within_reach() -> None:
