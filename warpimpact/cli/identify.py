@@ -10,6 +10,7 @@ from warpimpact.results.interrupts import terminated_as_interrupted
 from .mistakes import memory_told
 from .options import Commands, add_command, add_computing, add_output, add_overwrite
 from .paths import check_picture, check_place, check_suffix, replaces
+from .plain import say
 from .progress import Step, show_progress, warn
 
 if TYPE_CHECKING:
@@ -50,6 +51,7 @@ def add_identify(commands: Commands) -> None:
 
 def _identify(arguments: argparse.Namespace) -> int:
     from warpimpact.identification.computed_shots import fit_of_result
+    from warpimpact.identification.extent import extent_of
     from warpimpact.identification.fit_file import read_fit
     from warpimpact.identification.identify import identify_to_file
     from warpimpact.identification.posterior_view import posterior_view
@@ -71,8 +73,10 @@ def _identify(arguments: argparse.Namespace) -> int:
         warn(sentence)
     device, workers, scheduler = arguments.device, arguments.workers, arguments.scheduler
     after = 0.0
-    if workers is None and scheduler is None and find_device(device).is_cpu:
+    on_cpu = scheduler is None and find_device(device).is_cpu
+    if workers is None and on_cpu:
         workers, after = min(cores(), PROCESSES), WORTHWHILE
+    say(extent_of(fit, min(workers or 1, cores()) if on_cpu else None))
     with (
         memory_told(arguments.fit),
         terminated_as_interrupted(),

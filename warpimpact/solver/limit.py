@@ -30,6 +30,9 @@ Array = NDArray[np.float64]
 
 VELOCITY_TOLERANCE, THICKNESS_TOLERANCE = 1.0, 1.0e-5
 """Of a limit velocity [m/s] and of a limit thickness [m]."""
+PASSAGES = 35
+"""Time of a search of one limit over that of a passage: some five shots, slow near the limit. It was 34 to 65 for
+campaigns/limit_velocity.toml."""
 HIGHEST_VELOCITY = 3000.0
 """Largest impact velocity tried [m/s]."""
 THICKEST = 16.0

@@ -31,6 +31,7 @@ from warpimpact.scene import Numerics, Scene, Shots, Target, exclusions
 from warpimpact.solver.findings import Found, LimitErrors
 from warpimpact.solver.limit import (
     HIGHEST_VELOCITY,
+    PASSAGES,
     THICKNESS_TOLERANCE,
     VELOCITY_TOLERANCE,
     Limits,
@@ -61,7 +62,7 @@ class LimitMap:
 
     sought: Sought
     most_solid: ClassVar[int] = 256
-    passages: ClassVar[int] = 35  # 34 to 65 of campaigns/limit_velocity.toml: some five shots, slow near the limit
+    passages: ClassVar[int] = PASSAGES
 
     @classmethod
     def of(

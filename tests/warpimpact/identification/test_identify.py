@@ -1,5 +1,6 @@
 """From a fit file to a posterior file: groups, resume, figures, and the command."""
 
+import re
 from collections.abc import Callable
 from pathlib import Path
 
@@ -96,6 +97,8 @@ def test_the_command(
     assert main(["identify", "fit.toml", "--device", "cpu"]) == 0
     shown = capsys.readouterr()
     assert "written to fit.nc" in shown.out
+    assert shown.err.startswith("warpimpact: computes at most 128 sets of parameters, ")
+    assert re.search(r"roughly [\d.]+ (s|min) on \d+ core", shown.err.splitlines()[0])
     assert "of 128 sets, " in shown.err
     assert sorted(path.name for path in tmp_path.glob("*.png")) == ["fit_hits.png", "fit_measured.png", "fit_pairs.png"]
     assert main(["report", "fit.nc"]) == 0
