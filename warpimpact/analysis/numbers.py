@@ -8,10 +8,13 @@ from typing import NamedTuple
 
 from warpimpact.statistics.intervals import Estimate
 
+ROUNDING = 1e-5
+"""Numbers up to this are shown as 0. In the units that people see, they are rounding of the computation."""
+
 
 def number_text(number: float) -> str:
     """With four digits; a dash for what does not exist."""
-    return "-" if math.isnan(number) else f"{number:#.4g}"
+    return "-" if math.isnan(number) else f"{0.0 if abs(number) < ROUNDING else number:#.4g}"
 
 
 def rough_text(number: float) -> str:

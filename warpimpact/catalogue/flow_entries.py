@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import tomllib
-from difflib import get_close_matches
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -11,9 +10,10 @@ from typing import Any
 from pydantic import Field, ValidationError
 
 from warpimpact.catalogue.entries import Name, evidence, reason
+from warpimpact.catalogue.spelling import the_entry
 from warpimpact.scene.flow import Flow
 from warpimpact.scene.toml_text import parsed, read_text
-from warpimpact.scene.units import Title, quoted
+from warpimpact.scene.units import Title
 
 FOLDER = Path(__file__).parent / "flows"
 
@@ -53,11 +53,10 @@ def flow_entry(name: str) -> FlowEntry:
     if name.endswith(".toml"):
         return _entry(parsed(read_text(Path(name)), name), name)
     entries = _packaged()
-    if name not in entries:
-        meant = get_close_matches(name, entries, n=1, cutoff=0.4)
-        hint = f'did you mean "{meant[0]}"?' if meant else f"allowed are {', '.join(entries)}, or a TOML file"
-        raise ValueError(f"got {quoted(name)}, which is no material of the continuum; {hint}")
-    return entries[name]
+    try:
+        return entries[the_entry(name, dict.fromkeys(entries, ()))]
+    except ValueError as error:
+        raise ValueError(f"{error} (or a TOML file)") from None
 
 
 @cache

@@ -22,3 +22,4 @@ def test_a_mean_without_an_interval_stands_alone() -> None:
     assert plus_minus(Estimate(731.25, 730.5, 732.0, 9, 10.0), ".5g", ".2g") == "731.25 ± 0.75"
     assert plus_minus(Estimate(731.25, NAN, NAN, 1, 0.0), ".5g", ".2g") == "731.25"
     assert number_text(NAN) == "-"
+    assert [number_text(number) for number in (9e-6, -9e-6, 2e-5)] == ["0.000", "0.000", "2.000e-05"]
