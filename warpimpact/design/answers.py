@@ -15,12 +15,11 @@ import xarray
 from jinja2 import ChoiceLoader, Environment, PackageLoader, StrictUndefined
 
 from warpimpact.analysis.summary import breaks_promise, numerics_sentence
-from warpimpact.campaign.campaign import Campaign
 from warpimpact.campaign.evidence import evidence_of
 from warpimpact.campaign.plausible import doubted, doubted_holes
 from warpimpact.campaign.text import CampaignError
 from warpimpact.design.controls import groups
-from warpimpact.design.designs import FOLDER, Shelf, ValidDesign, stage_of, work
+from warpimpact.design.designs import FOLDER, Shelf, ValidDesign, stage_of, work_ahead
 from warpimpact.design.edits import choices
 from warpimpact.design.geometry import drawn
 from warpimpact.plotting.trajectory import FIGURES
@@ -32,7 +31,6 @@ from warpimpact.results.replayed_hit import hit_view
 from warpimpact.runs.assumed import has_assumptions
 from warpimpact.runs.replay import replay
 from warpimpact.runs.run import run, with_assumptions
-from warpimpact.solver.resolution import at_level
 from warpimpact.solver.worker import Cancel
 from warpimpact.view.view import text_of
 
@@ -41,9 +39,9 @@ _MOST_KEPT = 256 * 2**20
 _MOST_HISTORIES = 4
 _COARSE = 96
 """Pixels along the longer side of a first map, which has few hits."""
-PACE, BESIDE = 1.5, 1.0
-"""Time of a complete map over what it takes a core, before that is measured; and what it takes beside its hits, by
-`work`: a pilot and the tables [s]."""
+PACE, BESIDE = 1.2, 0.3
+"""Time of a complete map over what it takes a core, before that is measured; and what it takes beside pilot and hits,
+by `work_ahead`: references and tables [s]."""
 _FIRST = "The error of the numerics is not known."
 OWN = "this design"
 """Name of the design that is on the page; those it is compared with have names of their own."""
@@ -87,14 +85,14 @@ class Answers:
             "evidence": evidence_of(campaign),
         }
 
-    def result(self, text: str, cancel: Cancel) -> xarray.Dataset:
-        """The hit map of a campaign; its hits under assumptions come by `assume`.
+    def result(self, design: ValidDesign, cancel: Cancel) -> xarray.Dataset:
+        """The hit map of a design; its hits under assumptions come by `assume`.
 
         Raises:
             Cancelled: by `cancel`.
         """
+        text, campaign = design.text, design.campaign
         if text not in self._results:
-            campaign = Campaign.from_text(text, name="design", folder=FOLDER)
             none = campaign.assumptions.model_copy(update={"compute": False})
             alone = campaign.model_copy(update={"assumptions": none})
             self._results[text] = run(alone, device=self._device, progress=lambda _: None, cancel=cancel)
@@ -110,7 +108,7 @@ class Answers:
             Cancelled: by `cancel`.
         """
         for design in designs.values():
-            dataset = self.result(design.text, cancel)
+            dataset = self.result(design, cancel)
             if has_assumptions(design.campaign) and attr.ASSUMED_TIME not in dataset.attrs:
                 told = with_assumptions(dataset, design.campaign, device=self._device, cancel=cancel)
                 self._results[design.text] = told
@@ -130,10 +128,12 @@ class Answers:
             Cancelled: by `cancel`.
         """
         new, begin = [design for design in designs.values() if design.text not in self._results], time.perf_counter()
-        datasets = {label: self.result(design.text, cancel) for label, design in designs.items()}
+        datasets = {label: self.result(design, cancel) for label, design in designs.items()}
         cancel.check()
         own = datasets[OWN]
-        foreseen = sum(BESIDE + _work(design.campaign, level) for design in (new if name == "full" else full.values()))
+        foreseen = sum(
+            BESIDE + work_ahead(design.campaign, level) for design in (new if name == "full" else full.values())
+        )
         if name == "full" and 0.0 < foreseen < math.inf:
             self._pace = (time.perf_counter() - begin) / foreseen
         ahead = 0.0 if name == "full" else self._pace * foreseen
@@ -159,7 +159,7 @@ class Answers:
         Args:
             assumed: whether their hits under assumptions are computed, as far as they ever are.
         """
-        datasets = {label: self.result(design.text, cancel) for label, design in designs.items()}
+        datasets = {label: self.result(design, cancel) for label, design in designs.items()}
         results = []
         for label, dataset in datasets.items():
             cancel.check()
@@ -177,7 +177,7 @@ class Answers:
         Raises:
             ResultError: there is no such hit.
         """
-        history = self._history(stage_of(self.shelf, design, level, stage).text, hit, cancel)
+        history = self._history(stage_of(self.shelf, design, level, stage), hit, cancel)
         return {
             "hit": hit,
             "text": text_of(hit_view(history)),
@@ -196,14 +196,14 @@ class Answers:
         draw = next((draw for draw in FIGURES if draw.__name__.replace("_", " ") == name), None)
         if draw is None:
             raise CampaignError(f'got the figure "{name[:80]}", which replay does not draw')
-        history, buffer = self._history(stage_of(self.shelf, design, level, stage).text, hit, cancel), BytesIO()
+        history, buffer = self._history(stage_of(self.shelf, design, level, stage), hit, cancel), BytesIO()
         draw(history).savefig(buffer, format="png", dpi=110)
         return {"image": f"data:image/png;base64,{b64encode(buffer.getvalue()).decode()}"}
 
-    def _history(self, text: str, hit: int, cancel: Cancel) -> xarray.Dataset:
-        key = (text, hit)
+    def _history(self, design: ValidDesign, hit: int, cancel: Cancel) -> xarray.Dataset:
+        key = (design.text, hit)
         if key not in self._histories:
-            self._histories[key] = replay(self.result(text, cancel), hit)
+            self._histories[key] = replay(self.result(design, cancel), hit)
             while len(self._histories) > _MOST_HISTORIES:
                 self._histories.popitem(last=False)
         return self._histories[key]
@@ -215,16 +215,10 @@ class Answers:
             Cancelled: by `cancel`.
         """
         self.assume(designs, cancel)
-        datasets = {name: self.result(design.text, cancel) for name, design in designs.items()}
+        datasets = {name: self.result(design, cancel) for name, design in designs.items()}
         return report_page(
             datasets, folders=dict.fromkeys(datasets, FOLDER), progress=lambda done, total: cancel.check()
         )
-
-
-def _work(campaign: Campaign, level: int) -> float:
-    """`work` of a campaign at a level where it fixes no resolution."""
-    numerics = campaign.numerics
-    return work(campaign, at_level(level, numerics) if numerics.explicit is None else numerics)
 
 
 def named(design: ValidDesign, others: Sequence[tuple[str, ValidDesign]]) -> dict[str, ValidDesign]:

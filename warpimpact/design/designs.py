@@ -18,10 +18,12 @@ from warpimpact.campaign.toml import toml_text
 from warpimpact.results import attributes as attr
 from warpimpact.results import files, front
 from warpimpact.results.files import kind_of, opened
+from warpimpact.runs.levels import MEASURES, level_for
+from warpimpact.runs.pilot_hits import pilot_most
 from warpimpact.scene import Numerics
 from warpimpact.scene.units import quoted
 from warpimpact.solver.prepare import prepare
-from warpimpact.solver.resolution import TooManySteps
+from warpimpact.solver.resolution import LADDER, TooManySteps, at_level, coarsest_level
 
 Tables = dict[str, Any]
 
@@ -170,9 +172,10 @@ def _null_in(part: Any, place: str) -> str | None:
     return None
 
 
-def stages(shelf: Shelf, design: ValidDesign, level: int) -> list[Stage]:
+def stages(shelf: Shelf, design: ValidDesign, level: int) -> Iterator[Stage]:
     """The stages in which a design is computed: few hits at one level of resolution, which need no pilot; more hits at
-    draft; and the campaign as it is. A stage that the campaign cannot have is left out.
+    draft; and the campaign as it is. A stage that the campaign cannot have is left out, and a draft of several layers
+    that has as many hits as the campaign: measures need a lower level there than single hits at draft.
 
     The hits of the first stage are those of the irreducible part of the cell with their images, where there is one: as
     many hits for a part of the time.
@@ -180,16 +183,24 @@ def stages(shelf: Shelf, design: ValidDesign, level: int) -> list[Stage]:
     Args:
         level: resolution of the first stage at most, as the last draft has found it.
     """
-    draft = None
-    if design.campaign.numerics.explicit is None:
-        draft = _valid(shelf, _of_few_hits(design, SOME) | {"numerics": _kept(design) | {"fidelity": "draft"}})
-    before = {"first": _first(shelf, design, level), "draft": draft}
-    stages_before = [
-        Stage(name, stage_design)
-        for name, stage_design in before.items()
-        if stage_design is not None and stage_design.text != design.text
-    ]
-    return [*stages_before, Stage("full", design)]
+    if (first := _first(shelf, design, level)) is not None and first.text != design.text:
+        yield Stage("first", first)
+    if (draft := _draft(shelf, design)) is not None and draft.text != design.text:
+        yield Stage("draft", draft)
+    yield Stage("full", design)
+
+
+def _draft(shelf: Shelf, design: ValidDesign) -> ValidDesign | None:
+    """A design as its draft is computed; None where it has none."""
+    campaign = design.campaign
+    if campaign.numerics.explicit is not None:
+        return None
+    fidelity = {"fidelity": "draft"}
+    if level_for(campaign) == MEASURES:
+        if (campaign.hits.count or 0) <= SOME:
+            return None
+        fidelity = {}
+    return _valid(shelf, _of_few_hits(design, SOME) | {"numerics": _kept(design) | fidelity})
 
 
 def _first(shelf: Shelf, design: ValidDesign, level: int) -> ValidDesign | None:
@@ -236,6 +247,22 @@ def work(campaign: Campaign, numerics: Numerics | None = None) -> float:
         return first.seconds * len(sampler) / images
     except (ValueError, TooManySteps, MemoryError):
         return math.inf
+
+
+def work_ahead(campaign: Campaign, level: int) -> float:
+    """Seconds of a core that a campaign takes, its pilot included, as `work`: of a pilot that ends at its first level,
+    or at a finer one.
+
+    Args:
+        level: at which its hits will be, as far as that is known.
+    """
+    if campaign.numerics.explicit is not None:
+        return work(campaign)
+    first = 0 if level_for(campaign) else coarsest_level(campaign.numerics.asked.strictness)
+    last = max(first, level)
+    hits = len(campaign.sampler()) / len(campaign.symmetries)
+    of_levels = [work(campaign, at_level(at, campaign.numerics)) for at in range(first, last + 3) if at < len(LADDER)]
+    return of_levels[last - first] + pilot_most(campaign) / hits * sum(of_levels)
 
 
 def _valid(shelf: Shelf, tables: Tables) -> ValidDesign | None:

@@ -237,7 +237,7 @@ def test_a_first_map_takes_little(small: Path) -> None:
     for thickness, velocity, obliquity in (("4 mm", "825 m/s", 0), ("8 mm", "825 m/s", 30), ("40 mm", "400 m/s", 60)):
         tables["plate"]["thickness"] = thickness
         tables["impact"] |= {"velocity": velocity, "obliquity": f"{obliquity} deg"}
-        campaign = stages(shelf, shelf.checked(tables), 4)[0].design.campaign
+        campaign = next(stages(shelf, shelf.checked(tables), 4)).design.campaign
         first.append((campaign.numerics.level, campaign.hits.count, work(campaign)))
     (straight, all_hits, _), (oblique, half, seconds), (last, few, _) = first
     assert (straight, all_hits, half) == (4, 1024, 1024)
