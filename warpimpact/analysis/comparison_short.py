@@ -98,6 +98,7 @@ def _ranks(comparison: ComparedPlates, score: Score) -> Table:
     plates = {plate.name: plate for plate in comparison.plates}
     differences = {pair.one: pair for pair in from_best(comparison, score.name)}
     by_ratio = score.name in (comparison.at_equal_weight or ())
+    parted = all("add-on" in plate.weights for plate in comparison.plates)
     rows = []
     for name, rank in comparison.ranks(score.name).items():
         plate, shown = plates[name], plates[name].measures[place]
@@ -105,10 +106,13 @@ def _ranks(comparison: ComparedPlates, score: Score) -> Table:
         ratio = (shown.ratio,) if by_ratio else ()
         pair = differences.get(name)
         apart = (None, "") if pair is None else (pair.value, intervals_text(Ends(pair.low, pair.high, pair.parameters)))
-        rows.append((rank, name, plate.areal_density, *value, *ratio, *apart))
+        add_on = (plate.weights["add-on"],) if parted else ()
+        rows.append((rank, name, *add_on, plate.areal_density, *value, *ratio, *apart))
     best = comparison.ordered(score.name)[0]
     columns = (
-        *(number("rank", digits="d"), Column("plate"), number("kg/m²", digits=".2f")),
+        *(number("rank", digits="d"), Column("plate")),
+        *([number("add-on kg/m²", digits=".2f")] if parted else []),
+        number("whole kg/m²" if parted else "kg/m²", digits=".2f"),
         *(
             number("value"),
             Column("95 % interval"),

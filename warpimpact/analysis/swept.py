@@ -79,9 +79,8 @@ def sweep_view(sweep: xarray.Dataset, texts: Sequence[str] = ()) -> list[Section
     measures = measures_of(sweep, texts)
     every = list(points(sweep, measures))
     title = str(sweep.attrs.get(attr.TITLE, "untitled"))
-    sentence = (
-        f"{len(every)} combinations of {', '.join(inputs_of(sweep))}, with at most {sweep.sizes[v.HIT]} hits each"
-    )
+    inputs = ", ".join(inputs_of(sweep)).replace("_", " ")
+    sentence = f"{len(every)} combinations of {inputs}, with at most {sweep.sizes[v.HIT]} hits each"
     if not texts:
         short = Section([f"{sentence}; 95 % intervals", _short(every, measures), _MORE], title)
         return [short, Section(evidence_lines(sweep))]

@@ -33,10 +33,10 @@ _STYLES = {  # by the kind of a measure; the last number is the distance from th
     "worst_tenth": ("worst tenth", "s", VERMILION, 0.12),
     "worst_point": ("worst hit", "x", "#000000", 0.12),
 }
-_WIDE = 34
+_WIDE = 40
 """Characters in a line of the weights of a plate."""
-_ROW, _MARGIN = 0.42, 0.75
-"""Height of a line, and of the margin of a panel [inch]."""
+_ROW, _MARGIN, _LINE = 0.42, 0.75, 0.15
+"""Height of a row, of the margin of a panel, and of a line of the label of a row [inch]."""
 
 
 def comparison_figure(comparison: Comparison, *, every: bool = False) -> Figure:
@@ -58,14 +58,17 @@ def comparison_figure(comparison: Comparison, *, every: bool = False) -> Figure:
         for measures in quantities
     ]
     pairs = max((len({(pair.one, pair.other) for pair in shown}) for shown in differences), default=0)
+    labels = [f"{plate.name}\n{fill(weights_text(plate.weights), _WIDE)}" for plate in comparison.plates]
+    label_height = _LINE * (1 + max(label.count("\n") + 1 for label in labels))
     heights = [
-        _MARGIN + _ROW * max(len(comparison.plates), pairs) * (1.5 if len(measures) > 1 else 1.0)
-        for measures in quantities
+        _MARGIN + max(len(labels) * max(row, label_height), pairs * row)
+        for row in (_ROW * (1.5 if len(measures) > 1 else 1.0) for measures in quantities)
     ]
     figure = Figure(figsize=(12.0, sum(heights) + 1.1), layout=ConstrainedLayoutEngine(h_pad=0.12))
     panels = figure.subplots(len(quantities), 2, squeeze=False, height_ratios=heights)
     for measures, shown, (left, right) in zip(quantities, differences, panels, strict=True):
         _draw_plates(left, comparison, measures)
+        _furnish(left, labels)
         _draw_differences(right, comparison, measures, shown)
     entries = [zip(*reversed(left.get_legend_handles_labels()), strict=True) for left in panels[:, 0]]
     legend = {label: handle for entry in entries for label, handle in entry}  # each entry once
@@ -90,8 +93,7 @@ def _quantity(score: Score) -> tuple[str, bool]:
 
 def _draw_plates(axes: Axes, comparison: Comparison, measures: Sequence[Score]) -> None:
     """Draw the measures of one quantity, a line per plate."""
-    plates = comparison.plates
-    for line, plate in enumerate(plates):
+    for line, plate in enumerate(comparison.plates):
         for alike in (measure for measure in plate.measures if _quantity(measure) == _quantity(measures[0])):
             label, marker, colour, offset = _STYLES[alike.measure.kind]
             _draw_interval(axes, line + offset, alike, (marker, colour), label=label)
@@ -105,7 +107,6 @@ def _draw_plates(axes: Axes, comparison: Comparison, measures: Sequence[Score]) 
                     markersize=10.0,
                     label=f"{comparison.reference} of equal weight",
                 )
-    _furnish(axes, [f"{plate.name}\n{fill(weights_text(plate.weights), _WIDE)}" for plate in plates])
     axes.set_title(_title(measures[0]), fontsize="medium", loc="left")
 
 
@@ -162,7 +163,7 @@ def _draw_interval(
 
 
 def _furnish(axes: Axes, lines: Sequence[str]) -> None:
-    axes.set_yticks(range(len(lines)), lines)
+    axes.set_yticks(range(len(lines)), lines, fontsize="small")
     axes.set_ylim(len(lines) - 0.5, -0.5)
     axes.grid(axis="x", color="0.9")
     axes.margins(x=0.08)

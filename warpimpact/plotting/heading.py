@@ -21,7 +21,7 @@ _FROM_EDGE = 0.12
 """Distance of title and notes from the edge of a figure without layout engine [inch]."""
 _TITLE_SIZE, _SMALLEST_TITLE = 12.0, 9.0
 """Font sizes of a title [pt]: as it is, and where it is long."""
-_TITLE_LETTERS, _NOTE_LETTERS = 9.0, 15
+_TITLE_LETTERS, _NOTE_LETTERS = 10.0, 15
 """Average number of letters in an inch of a title of the first size, and of a note."""
 LINE = 0.15
 """Height of a line of a note [inch]."""

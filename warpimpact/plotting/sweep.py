@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from textwrap import fill
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 import xarray
@@ -45,7 +45,8 @@ def sweep_figure(sweep: xarray.Dataset, texts: Sequence[str] = ()) -> Figure:
     panels = figure.subplots(rows, columns, sharex=True, squeeze=False)
     for axes, measure in zip(panels.flat, measures, strict=False):
         for number, (label, line) in enumerate(list(lines.items())[:_MOST_LINES]):
-            _draw(axes, measure, sweep[along], line, _COLOURS[number % len(_COLOURS)], label)
+            style = {"color": _COLOURS[number % len(_COLOURS)], "label": label}
+            _draw(axes, measure, sweep[along], line, style, below=number % 2 == 1)
         axes.set_ylabel(fill(measure.title, 45))
         axes.grid(color="0.9")
         if measure.is_binary:
@@ -80,18 +81,28 @@ def _lines(sweep: xarray.Dataset, measures: Sequence[Measure], along: str) -> di
 
 
 def _draw(
-    axes: Axes, measure: Measure, places: xarray.DataArray, line: Sequence[Point], colour: str, label: str
+    axes: Axes, measure: Measure, places: xarray.DataArray, line: Sequence[Point], style: dict[str, str], *, below: bool
 ) -> None:
-    """Draw a line with its intervals, and write the share of the hits that a value counts beside it."""
+    """Draw a line with its intervals, and write the share of the hits that a value counts beside it, above or below
+    the line, and left of the last place."""
     factor, estimates = measure.display.factor, [point.estimates[measure] for point in line]
     value, low, high = factor * np.array([(estimate.value, estimate.low, estimate.high) for estimate in estimates]).T
     is_number = places.dtype.kind == "f"
     x = places.values * STORED[places.attrs["units"]].factor if is_number else np.arange(len(line))
     bars = np.clip(np.nan_to_num([value - low, high - value]), 0.0, None)
-    axes.errorbar(x, value, yerr=bars, fmt="o-", color=colour, capsize=3.0, label=label)
+    axes.errorbar(x, value, yerr=bars, fmt="o-", capsize=3.0, **style)  # type: ignore[arg-type]
     if not is_number:
         axes.set_xticks(x, places.values)
-    style: dict[str, Any] = {"fontsize": "x-small", "color": colour, "textcoords": "offset points"}
     for at, height, point, estimate in zip(x, value, line, estimates, strict=True):
         if 0 < estimate.count < point.hits:
-            axes.annotate(f"{estimate.count / point.hits:.0%}", (at, height), (5.0, 4.0), **style)
+            last = len(x) > 1 and at == x.max()
+            axes.annotate(
+                f"{estimate.count / point.hits:.0%}",
+                (at, height),
+                (-6.0 if last else 6.0, -5.0 if below else 5.0),
+                textcoords="offset points",
+                fontsize="x-small",
+                color=style["color"],
+                ha="right" if last else "left",
+                va="top" if below else "bottom",
+            )

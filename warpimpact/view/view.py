@@ -100,7 +100,9 @@ def _lines(section: Section) -> Iterable[str]:
 
 def _table_lines(table: Table) -> list[str]:
     widths = [max(map(len, column)) for column in zip(*table.cells, strict=True)] or [0] * len(table.columns)
-    heads = [wrap(head, max(width, _HEAD)) for head, width in zip(table.heads, widths, strict=False)]
+    heads = [
+        wrap(head, max(width, _HEAD), break_long_words=False) for head, width in zip(table.heads, widths, strict=False)
+    ]
     tallest = max(map(len, heads), default=0)
     rows = zip(*([""] * (tallest - len(head)) + head for head in heads), strict=True)
     lines = [*map(list, rows), *table.cells]

@@ -1,6 +1,7 @@
 """Plates side by side: rankings with known answers, intervals that contain the answer as often as they claim, one
 sentence for what cannot be compared."""
 
+import itertools
 import json
 import math
 from collections.abc import Callable, Iterator
@@ -22,6 +23,7 @@ from warpimpact.campaign.campaign import CampaignError
 from warpimpact.campaign.plates import read_plates
 from warpimpact.cli import main
 from warpimpact.plotting import comparison_figure
+from warpimpact.results import attributes as attr
 from warpimpact.results import files
 from warpimpact.results.files import ResultError
 from warpimpact.runs.replay import replay
@@ -361,6 +363,18 @@ def test_the_figure_shows_every_measure_and_every_pair(make_plate_result) -> Non
         assert [label.get_text() for label in axes.get_yticklabels()] == ["a − b", "a − c", "b − c"]
     hollow = [line.get_markerfacecolor() == "white" for line in right[0].lines if line.get_marker() == "o"]
     assert hollow == [False, True, False]
+
+
+def test_the_weights_of_add_ons_have_their_names_and_do_not_lie_on_each_other(make_plate_result) -> None:
+    plate = make_plate_result(velocities(np.linspace(0.5, 1.0, 500)), np.linspace(0.0, 90.0, 500))
+    plates = [plate.assign_attrs({attr.AREAL_DENSITY: 100.42, attr.ADD_ON_DENSITY: 33.92})] * 4
+    compared = compare(plates, ["addon", "thin", "small holes", "large holes"])
+    assert "add-on kg/m²   whole kg/m²" in text_of([short_view(compared)])
+    figure = comparison_figure(compared)
+    figure.canvas.draw()
+    for axes in figure.axes:
+        boxes = [label.get_window_extent() for label in axes.get_yticklabels()]
+        assert all(upper.y0 > lower.y1 for upper, lower in itertools.pairwise(boxes))
 
 
 @pytest.fixture

@@ -40,6 +40,7 @@ def test_a_new_kind_is_its_declaration(capsys: pytest.CaptureFixture[str], monke
     assert main(["report", "marks.nc"]) == 0
     page = Path("marks.html").read_text(encoding="utf-8")
     assert "<h1>marks</h1><h2>a&lt;b</h2>" in page
+    assert "<meta name='viewport' content='width=device-width" in page  # a phone shows it at the width of its screen
     files.write(dataset.assign({DEPTH: dataset[DEPTH] * np.nan}), Path("marks.nc"))
     for command in ("inspect", "report"):
         assert main([command, "marks.nc", *(["--overwrite"] if command == "report" else [])]) == 2

@@ -177,6 +177,10 @@ def test_the_figure_shows_means_against_the_input(folder: Path) -> None:
     status[{"hit": slice(None, None, 2)}] = 1
     some = sweep_figure(sweep.assign(status=status)).axes[0]
     assert {text.get_text() for text in some.texts} == {"50%"}
+    some.figure.canvas.draw()
+    boxes = [text.get_window_extent() for text in some.texts]
+    assert all(some.bbox.x0 < box.x0 and box.x1 < some.bbox.x1 for box in boxes)  # none on the frame
+    assert len({text.get_va() for text in some.texts}) == 2  # those of two lines at one place stand apart
 
 
 def test_a_sweep_is_asked_in_the_language_of_measures(

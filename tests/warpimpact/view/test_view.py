@@ -49,3 +49,5 @@ def test_a_head_wider_than_its_column_goes_on_in_the_next_line() -> None:
         "area at 130 mm [J/mm²]   design",
         "                 1.000   a.toml",
     ]
+    long_word = Table((number("plate.pattern[round].diameter", "mm"), Column("design")), [(8.0, "a.toml")])
+    assert text_of([Section([long_word])]).splitlines()[0] == "plate.pattern[round].diameter"
