@@ -5,6 +5,7 @@ DEVELOPED := $(VENV)/.developed
 PIP := PYTHONWARNINGS='ignore:Editable installation' $(VENV)/bin/pip install --quiet --disable-pip-version-check --no-compile
 PARALLEL := --numprocesses auto --dist worksteal
 THREADS := 'tests/verification/test_any_company.py::test_threads_and_chunks_change_no_bit[2-5-single]'
+ELEMENTS := tests/verification/test_continuum.py
 
 export PYTHONDONTWRITEBYTECODE :=
 
@@ -28,13 +29,13 @@ benchmark: $(DEVELOPED)
 docs: $(DEVELOPED)
 	$(VENV)/bin/sphinx-build -q -W --keep-going -j auto -b html -d build/doctrees docs build/docs
 
-# The kernel tests and one run on several threads are repeated in Warp's debug mode, which checks array bounds. Types are
-# checked beside the tests, as that takes one core only.
+# The kernel tests, the elements of the continuum and one run on several threads are repeated in Warp's debug mode, which
+# checks array bounds. Types are checked beside the tests, as that takes one core only.
 test: $(DEVELOPED)
 	$(VENV)/bin/ruff check .
 	$(VENV)/bin/ruff format --check .
 	$(MAKE) --no-print-directory --jobs=2 types suite
-	$(VENV)/bin/pytest $(PARALLEL) tests/kernels $(THREADS) --warp-mode debug
+	$(VENV)/bin/pytest $(PARALLEL) tests/kernels $(ELEMENTS) $(THREADS) --warp-mode debug
 
 types: $(DEVELOPED)
 	$(VENV)/bin/mypy

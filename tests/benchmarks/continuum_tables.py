@@ -8,6 +8,7 @@ The tables are made when the pages are built. A file that is missing leaves its 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -28,7 +29,11 @@ DRAWN = "slotted"
 FEWEST = 3
 """Hits of a class, or of both meshes, for a row."""
 FEWEST_RANKED = 6
-"""Hits for a rank correlation."""
+"""Hits for a rank correlation or a percentile."""
+HEAD = tuple(f"{name.replace('_', ' at ')}, {unit}" for name, unit in MEASURES.items())
+"""Columns of the measures."""
+MESHES = {"draft": "trade", "standard": "standard", "reference": "reference"}
+"""Files of the hits by their mesh, from coarse to fine."""
 EDGE = 0.25 * CORE.max_radius
 """A hit point nearer to an edge than this is one at the edge [m]."""
 STEEP = 30.0
@@ -63,7 +68,7 @@ def both(plate: str, fitted: list[dict[str, str]] | None = None) -> tuple[list[i
 
 def errors() -> Table:
     """Bias, root mean square and rank correlation of the fast law, by plate and measure."""
-    rows, head = [], tuple(f"{name.replace('_', ' at ')}, {unit}" for name, unit in MEASURES.items())
+    rows = []
     for plate in CASES:
         fitted = [row for row in rows_of("fitted") if row["plate"] == plate]
         given = "given" if CASES[plate].velocities else "paper's"
@@ -73,7 +78,7 @@ def errors() -> Table:
             hits, fast, truth = both(plate, chosen)
             if len(hits) >= FEWEST:
                 rows.append((plate, str(len(hits)), words, *error_cells(fast, truth)))
-    return ("plate", "hits", "fast law", *head), rows
+    return ("plate", "hits", "fast law", *HEAD), rows
 
 
 def fit_words(fitted: list[dict[str, str]], part: str) -> str:
@@ -95,7 +100,7 @@ def error_cells(fast: Array, truth: Array) -> Iterator[str]:
 
 def classes() -> Table:
     """The same by where a hit lies: in a hole, at an edge, in the web between holes."""
-    rows, head = [], tuple(f"{name.replace('_', ' at ')}, {unit}" for name, unit in MEASURES.items())
+    rows = []
     for plate, case in CASES.items():
         if case.velocities is not None:
             continue
@@ -110,7 +115,7 @@ def classes() -> Table:
             if chosen.sum() >= FEWEST:
                 cells = error_cells(fast[chosen], truth[chosen])
                 rows.append((plate, words, str(int(chosen.sum())), *cells))
-    return ("plate", "class", "hits", *head), rows
+    return ("plate", "class", "hits", *HEAD), rows
 
 
 def cost() -> Table:
@@ -165,25 +170,41 @@ def ranking() -> Table:
 
 
 def refinement() -> Table:
-    """What the hits of the draft mesh differ by from those of the standard one: root mean squares."""
-    rows, fine = [], rows_of("standard")
-    for plate in CASES:
-        one, other = measured(rows_of("trade"), plate, "continuum"), measured(fine, plate, "continuum")
-        hits = sorted({*one} & {*other})
-        if hits:
-            apart = np.array([one[hit] - other[hit] for hit in hits])
-            failed = [
-                sum(
-                    Status(int(row["status"])).failed for row in of if row["plate"] == plate and int(row["hit"]) in seen
-                )
-                for of, seen in ((rows_of("trade"), tried(fine, plate)), (fine, tried(fine, plate)))
-            ]
-            cells = (f"{value:.2g}" for value in np.sqrt((apart**2).mean(axis=0)))
-            means = (f"{value:+.2g}" for value in apart.mean(axis=0))
-            both_cells = (f"{mean}, {rms}" for mean, rms in zip(means, cells, strict=True))
-            rows.append((plate, str(len(hits)), *both_cells, f"{failed[0]}, {failed[1]}"))
-    head = tuple(f"{name.replace('_', ' at ')}, {unit}" for name, unit in MEASURES.items())
-    return ("plate", "hits", *head, "failed of the same hits: draft, standard"), rows
+    """What the hits of one mesh differ by from those of the next finer one, by plate and of all."""
+    rows = []
+    for coarse, fine in pairwise(MESHES):
+        of, than, every, failures = rows_of(MESHES[coarse]), rows_of(MESHES[fine]), [], np.zeros(2, dtype=int)
+        meshes = f"{coarse} less {fine}"
+        for plate in CASES:
+            apart = differences(of, than, plate)
+            failed = np.array([failures_of(mesh, plate, tried(than, plate)) for mesh in (of, than)])
+            if len(apart):
+                rows.append((plate, meshes, str(len(apart)), *difference_cells(apart), "{}, {}".format(*failed)))
+            every.append(apart)
+            failures += failed
+        apart = np.concatenate(every)
+        if len(apart):
+            rows.append(("all", meshes, str(len(apart)), *difference_cells(apart), "{}, {}".format(*failures)))
+    return ("plate", "meshes", "hits", *HEAD, "failed of the same hits"), rows
+
+
+def differences(of: list[dict[str, str]], than: list[dict[str, str]], plate: str) -> Array:
+    """Measures of the hits of a plate by the continuum, less those of the same hits elsewhere, shape [hits, 3]."""
+    one, other = measured(of, plate, "continuum"), measured(than, plate, "continuum")
+    return np.array([one[hit] - other[hit] for hit in sorted({*one} & {*other})]).reshape(-1, len(MEASURES))
+
+
+def difference_cells(apart: Array) -> Iterator[str]:
+    """Bias, root mean square and 90th percentile of what the measures differ by; no percentile of few hits."""
+    for column in apart.T:
+        most = f"{np.percentile(np.abs(column), 90):.2g}" if len(apart) >= FEWEST_RANKED else "–"
+        yield f"{column.mean():+.2g}, {np.sqrt((column**2).mean()):.2g}, {most}"
+
+
+def failures_of(rows: list[dict[str, str]], plate: str, hits: set[int]) -> int:
+    """How many of these hits of a plate failed by the continuum."""
+    chosen = (row for row in rows if row["plate"] == plate and row["model"] == "continuum")
+    return sum(Status(int(row["status"])).failed for row in chosen if int(row["hit"]) in hits)
 
 
 def tried(rows: list[dict[str, str]], plate: str) -> set[int]:
@@ -192,7 +213,7 @@ def tried(rows: list[dict[str, str]], plate: str) -> set[int]:
 
 
 def effects() -> Table:
-    """What each choice of the solver does at some hits of the slotted plate: bias and root mean square."""
+    """What each choice of the solver does at some hits of the slotted plate."""
     rows: dict[str, dict[str, Array]] = {}
     for row in rows_of("effects"):
         if row["status"] == "0":
@@ -202,25 +223,18 @@ def effects() -> Table:
         hits = sorted({*values} & {*given})
         if hits:
             apart = np.array([values[hit] - given[hit] for hit in hits])
-            means, squares = apart.mean(axis=0), np.sqrt((apart**2).mean(axis=0))
-            cells.append((words, str(len(hits)), *(f"{a:+.2g}, {b:.2g}" for a, b in zip(means, squares, strict=True))))
-    head = tuple(f"{name.replace('_', ' at ')}, {unit}" for name, unit in MEASURES.items())
-    return ("change", "hits", *head), cells
+            cells.append((words, str(len(hits)), *difference_cells(apart)))
+    return ("change", "hits", *HEAD), cells
 
 
 def friction() -> Table:
-    """What a friction of 0.03 does: bias and root mean square."""
+    """What a friction of 0.03 does."""
     rows = []
     for plate in CASES:
-        one = measured(rows_of("trade"), plate, "continuum")
-        other = measured(rows_of("trade_friction"), plate, "continuum")
-        hits = sorted({*one} & {*other})
-        if hits:
-            apart = np.array([other[hit] - one[hit] for hit in hits])
-            means, squares = apart.mean(axis=0), np.sqrt((apart**2).mean(axis=0))
-            rows.append((plate, str(len(hits)), *(f"{a:+.2g}, {b:.2g}" for a, b in zip(means, squares, strict=True))))
-    head = tuple(f"{name.replace('_', ' at ')}, {unit}" for name, unit in MEASURES.items())
-    return ("plate", "hits", *head), rows
+        apart = differences(rows_of("trade_friction"), rows_of("trade"), plate)
+        if len(apart):
+            rows.append((plate, str(len(apart)), *difference_cells(apart)))
+    return ("plate", "hits", *HEAD), rows
 
 
 def limits() -> Table:

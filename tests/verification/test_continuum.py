@@ -228,6 +228,9 @@ def test_a_hole_grows_by_the_work_of_its_cavity() -> None:
     assert hit.energies.work == pytest.approx(work, rel=0.01)
 
 
+@pytest.mark.skipif(
+    "config.getoption('warp_mode') == 'debug'", reason="half of all steps, and others read the same arrays"
+)
 def test_a_bar_that_hits_a_wall_is_as_short_as_taylor_bars_are() -> None:
     """Wilkins and Guinan (J Appl Phys 44 (1973) 1200) found l / l₀ = 0.88 exp(−ρ v² / 2 σ) + 0.12 in tests of six
     metals."""
