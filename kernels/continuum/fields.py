@@ -76,8 +76,9 @@ def build(variant: Variant) -> SimpleNamespace:
             touched: time of the last touch of each sheet [s], negative before.
             cylinder: about the core.
             next_step: between this step's velocities and the next ones [s].
-            position [m], velocity [m/s], inverse_mass [1/kg] (0 where a node is held or has no element), contact [N]
-            and contact_work [J] of nodes; `near` is 1 where the core may touch.
+            position [m], velocity [m/s], inverse_mass [1/kg] (0 where a node has no element), contact [N] and
+            contact_work [J] of nodes; `near` is 1 where the core may touch.
+            impedance [N s/m] of the material beyond the outer edge, of nodes by component; radiated [J] into it.
             volume [m³] and length [m] of elements at rest; `alive` is 1 or 0.
             stress [Pa], strain, damage, heat (share of the range to melting) of elements; work of stress and viscosity
             [J], of the resistance against hourglasses [J].
@@ -96,6 +97,8 @@ def build(variant: Variant) -> SimpleNamespace:
         position: wp.array(dtype=real)
         velocity: wp.array(dtype=real)
         inverse_mass: wp.array(dtype=real)
+        impedance: wp.array(dtype=real)
+        radiated: wp.array(dtype=real)
         contact: wp.array(dtype=real)
         contact_work: wp.array(dtype=real)
         near: wp.array(dtype=real)

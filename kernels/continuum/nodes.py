@@ -1,4 +1,9 @@
-"""Motion of the nodes: the forces of the elements about each, in a fixed order, and of the core; kick and drift."""
+"""Motion of the nodes: the forces of the elements about each, in a fixed order, of the core, and of the material beyond
+the outer edge; kick and drift.
+
+The edge is that of Lysmer and Kuhlemeyer (J Eng Mech Div ASCE 95 (1969) 859): it resists a velocity by ρ c per area, so
+that waves that arrive upright leave.
+"""
 
 from functools import cache
 from types import SimpleNamespace
@@ -56,9 +61,12 @@ def build(variant: Variant) -> SimpleNamespace:
         touch = vec3(read(mesh.contact, node), read(mesh.contact, y), read(mesh.contact, z))
         before = vec3(read(mesh.velocity, node), read(mesh.velocity, y), read(mesh.velocity, z))
         force = internal_force(mesh, sheet, node) + touch
-        velocity = before + (mesh.kick * read(mesh.inverse_mass, node)) * force
+        lightness = mesh.kick * read(mesh.inverse_mass, node)
+        beyond = vec3(read(mesh.impedance, node), read(mesh.impedance, y), read(mesh.impedance, z))
+        velocity = wp.cw_div(before + lightness * force, vec3(one, one, one) + lightness * beyond)
         position = vec3(read(mesh.position, node), read(mesh.position, y), read(mesh.position, z)) + dt * velocity
         pressed = half * mesh.kick * wp.dot(touch, before + velocity)
+        radiated = half * mesh.kick * wp.dot(wp.cw_mul(beyond, velocity), before + velocity)
         away = position - mesh.cylinder.centre
         along = wp.dot(away, mesh.cylinder.axis)
         outside = wp.max(
@@ -71,6 +79,7 @@ def build(variant: Variant) -> SimpleNamespace:
         write(mesh.position, y, position[1])
         write(mesh.position, z, position[2])
         write(mesh.contact_work, node, read(mesh.contact_work, node) + pressed)
+        write(mesh.radiated, node, read(mesh.radiated, node) + radiated)
         write(mesh.contact, node, zero)
         write(mesh.contact, y, zero)
         write(mesh.contact, z, zero)

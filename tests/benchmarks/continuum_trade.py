@@ -27,7 +27,7 @@ from continuum_cases import CASES, MEASURES, Case, measured, written
 
 from warpimpact import Continuum, Numerics, Record, Scene, Shots, simulate
 from warpimpact.catalogue.flow_entries import flow_entry
-from warpimpact.continuum import one_hit, strikes
+from warpimpact.continuum import meshing, one_hit, strikes
 from warpimpact.kernels.continuum import choices, hexahedra, passing
 
 FIELDS = ("plate", "friction", "model", "hit", "hit_y", "hit_z", "status", "velocity", "tilt_50", "tilt_130", "seconds")
@@ -42,11 +42,18 @@ FRICTIONS, WEAKENINGS = (0.0, 0.03, 0.06, 0.1, 0.15), (0.6, 0.7, 0.8, 0.9, 1.0)
 TIMED = 1024
 """Hits of a plate of which the time of one by the fast law is taken."""
 
+SHARED = meshing._shared
+
 Changes = tuple[tuple[Any, str, Any], ...]
 EFFECTS: dict[str, Changes] = {
     "as it is": (),
-    "patch of 10 radii for 7": ((strikes, "PATCH", 10.0),),
-    "patch of 5 radii for 7": ((strikes, "PATCH", 5.0),),
+    "patch of 10 radii for 5": ((strikes, "PATCH", 10.0),),
+    "patch of 4 radii for 5": ((strikes, "PATCH", 4.0),),
+    "edge held": ((meshing, "_shared", lambda lengths: 1.0e6 * SHARED(lengths)),),
+    "edge held, patch of 7 radii": (
+        (meshing, "_shared", lambda lengths: 1.0e6 * SHARED(lengths)),
+        (strikes, "PATCH", 7.0),
+    ),
     "fine part of 3.5 radii for 2.5": ((strikes, "FINE", 3.5),),
     "contact four times as stiff": ((one_hit, "PENALTY", 2.0),),
     "contact a quarter as stiff": ((one_hit, "PENALTY", 0.125),),

@@ -75,11 +75,13 @@ class SheetMesh:
         return alive.ravel()
 
     @property
-    def held(self) -> NDArray[np.bool_]:
-        """Whether a node is at the outer edge of the mesh, shape [nodes]."""
-        held = np.zeros(self.y.shape, dtype=bool)
-        held[[0, -1], :] = held[:, [0, -1]] = True
-        return np.tile(held.ravel(), len(self.x))
+    def outer_faces(self) -> Array:
+        """Area of the outer edge of the mesh about each node, where it faces y and z [m²], shape [2, nodes]."""
+        faces, depth = np.zeros((2, len(self.x), *self.y.shape)), _shared(np.diff(self.x))
+        for side in (0, -1):
+            faces[0, :, side] += np.outer(depth, _shared(np.abs(np.diff(self.z[side])) * self.solid[side]))
+            faces[1, :, :, side] += np.outer(depth, _shared(np.abs(np.diff(self.y[:, side])) * self.solid[:, side]))
+        return faces.reshape(2, -1)
 
     @property
     def positions(self) -> Array:
@@ -154,6 +156,11 @@ def _onto_edges(
         )
         moves = np.where(between, moves, spread)
     return y + moves[0], z + moves[1]
+
+
+def _shared(lengths: Array) -> Array:
+    """Half of each length for the nodes at either end of it."""
+    return np.asarray(0.5 * (np.pad(lengths, (1, 0)) + np.pad(lengths, (0, 1))))
 
 
 def _areas(y: Array, z: Array) -> Array:

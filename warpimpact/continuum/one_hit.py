@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import threading
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -53,6 +54,7 @@ class Energies:
         lost: by the core.
         given: to the nodes, by the contact.
         kinetic, work, hourglass: of the nodes; of the stresses; of the resistance against hourglasses.
+        radiated: through the outer edge.
     """
 
     lost: float
@@ -60,6 +62,7 @@ class Energies:
     kinetic: float
     work: float
     hourglass: float
+    radiated: float = 0.0
 
     @property
     def contact(self) -> float:
@@ -71,7 +74,7 @@ class Energies:
         """What is missing or too much, as a share of what was lost. A contact that gives energy counts, too."""
         if self.lost <= 0.0:
             return 0.0 if self.given == 0.0 else float("inf")
-        apart = abs(self.given - self.kinetic - self.work - self.hourglass)
+        apart = abs(self.given - self.kinetic - self.work - self.hourglass - self.radiated)
         return (apart + max(0.0, -self.contact)) / self.lost
 
     @property
@@ -127,6 +130,7 @@ class OneHit:
         self.firsts = firsts
         size = mesh.size = first
         position, inverse_mass, alive = np.zeros((3, size)), np.zeros(size), np.zeros(size)
+        impedance = np.zeros((3, size))
         volume, length, runs, node_runs, masses = np.zeros(size), np.ones(size), [], [], []
         for k, (sheet, at, flow) in enumerate(zip(self.sheets, firsts, self.flows, strict=True)):
             inside = slice(at, at + sheet.nodes)
@@ -140,8 +144,9 @@ class OneHit:
                     mass[at + corner + offset : at + corner + offset + sheet.nodes] += (
                         0.125 * flow.density * volume[inside] * present
                     )
-            free = (mass[inside] > 0.0) & ~sheet.held
-            inverse_mass[inside] = np.divide(1.0, mass[inside], out=np.zeros(sheet.nodes), where=free)
+            inverse_mass[inside] = np.divide(1.0, mass[inside], out=np.zeros(sheet.nodes), where=mass[inside] > 0.0)
+            upright, along = flow.density * flow.wave_speed, math.sqrt(flow.density * flow.shear_modulus)
+            impedance[:, inside] = np.array([[along, along], [upright, along], [along, upright]]) @ sheet.outer_faces
             runs += [(*run, k) for run in runs_of(present, at)]
             node_runs += [(*run, k) for run in runs_of(mass[inside] > 0.0, at)]
         self.inverse_mass, self._masses = inverse_mass, masses
@@ -152,10 +157,11 @@ class OneHit:
         )
         mesh.runs, mesh.node_runs = self._put(np.ravel(runs), wp.int32), self._put(np.ravel(node_runs), wp.int32)
         given = {"position": position, "inverse_mass": inverse_mass, "alive": alive, "volume": volume, "length": length}
+        given["impedance"] = impedance
         for name, values in given.items():
             setattr(mesh, name, self._put(values.ravel().astype(self.dtype), self.real))
         sizes = {"velocity": 3, "contact": 3, "contact_work": 1, "stress": 6, "strain": 1, "damage": 1, "heat": 1}
-        sizes |= {"work": 1, "hourglass_work": 1, "force": fields.COMPONENTS}
+        sizes |= {"work": 1, "hourglass_work": 1, "radiated": 1, "force": fields.COMPONENTS}
         for name, count in sizes.items():
             setattr(mesh, name, wp.zeros(count * size, dtype=self.real, device=self.device))
         awake = np.array([sheet.x[0] < choices.BEHIND.value for sheet in self.sheets])
@@ -231,7 +237,7 @@ class OneHit:
             yield
 
     def mass_at(self, layer: int) -> Array:
-        """Of the nodes of a layer [kg], those that are held, too."""
+        """Of the nodes of a layer [kg]."""
         return np.asarray(self._masses[layer])
 
     @property
@@ -264,6 +270,7 @@ class OneHit:
             kinetic=0.5 * float((mass * (velocity**2).sum(axis=0)).sum()),
             work=_total(mesh.work),
             hourglass=_total(mesh.hourglass_work),
+            radiated=_total(mesh.radiated),
         )
 
 

@@ -27,8 +27,9 @@ from warpimpact.solver.worker import NEVER, Cancel, Worker
 
 Array = NDArray[np.float64]
 
-FINE, PATCH = 2.5, 7.0
-"""Half of the fine part of a mesh, and half of it all, in radii of the core."""
+FINE, PATCH, BEHIND = 2.5, 5.0, 7.0
+"""Half of the fine part of a mesh, half of it all, and half of a layer behind the first, which a core may reach turned;
+in radii of the core."""
 LARGEST_IMBALANCE, LARGEST_HOURGLASS_SHARE = 0.02, 0.12
 """Of the energy that the core lost: a hit beyond is a failure of the computation."""
 
@@ -148,8 +149,8 @@ class March:
 
     def __init__(self, hit: OneHit, sheets: list[SheetMesh]) -> None:
         self.hit, self.sheets = hit, sheets
-        held = [sheet.held & (hit.mass_at(k) > 0.0) for k, sheet in enumerate(sheets)]
-        self._held = np.concatenate([at + np.flatnonzero(there) for at, there in zip(hit.firsts, held, strict=True)])
+        edges = [np.flatnonzero(sheet.outer_faces.any(axis=0)) for sheet in sheets]
+        self._edge = np.concatenate([at + edge for at, edge in zip(hit.firsts, edges, strict=True)])
 
     def ended(
         self, cancel: Cancel = NEVER, *, every: int = STEPS, follow: Callable[[OneHit], object] = lambda hit: None
@@ -158,7 +159,7 @@ class March:
         status = None
         for _ in self.hit.steps(every, cancel):
             follow(self.hit)
-            if self.hit.mesh.near.numpy()[self._held].any():
+            if self.hit.mesh.near.numpy()[self._edge].any():
                 status = Status.LEFT_WINDOW
                 break
         flight, energies = self.hit.flight, self.hit.energies
@@ -196,7 +197,8 @@ def march_of(
     home = float(shots.hit_y[number]), float(shots.hit_z[number])
     for k, (layer, spacing) in enumerate(zip(target.layers, continuum.spacings(core, target), strict=True)):
         thickness, front = own["thickness"][k], float(fronts[k])
-        extents = [_extent(core.max_radius, flight, axis, front, thickness) for axis in (1, 2)]
+        half = (BEHIND if k else PATCH) * core.max_radius
+        extents = [_extent(core.max_radius, half, flight, axis, front, thickness) for axis in (1, 2)]
         place = home[0] - own["offset_y"][k], home[1] - own["offset_z"][k]
         plate = layer.model_copy(update={"thickness": thickness})
         sheets.append(meshed(plate, place, front, spacing, (extents[0], extents[1])))
@@ -204,11 +206,11 @@ def march_of(
     return March(OneHit(core, start, sheets, flows, continuum.double), sheets)
 
 
-def _extent(radius: float, flight: Array, axis: int, front: float, thickness: float) -> Extent:
+def _extent(radius: float, half: float, flight: Array, axis: int, front: float, thickness: float) -> Extent:
     """What the mesh of a layer covers along one axis: where the line of fire crosses it, and about it."""
     drift = float(flight[axis] / flight[0])
     middle, way = drift * (front + 0.5 * thickness), 0.5 * abs(drift) * thickness
-    return Extent(middle, FINE * radius + way, PATCH * radius + way)
+    return Extent(middle, FINE * radius + way, half + way)
 
 
 def start_of(scene: Scene, shots: Shots, number: int, friction: float, conditions: dict[str, NDArray[Any]]) -> Start:

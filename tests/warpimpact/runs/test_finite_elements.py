@@ -128,8 +128,8 @@ def test_a_hit_is_replayed_bit_by_bit(campaign_file: Path, tmp_path: Path) -> No
     assert np.abs(columns[:, 1] - hit_y).min() < 1e-3
     assert np.abs(columns[:, 2] - hit_z).min() < 1e-3
     assert np.abs(after - before).max() > 1e-3
-    for axis in (1, 2):  # the outer edge is held
-        assert np.ptp(after[:, axis]) == np.ptp(before[:, axis])
+    for axis in (1, 2):  # the outer edge moves little
+        assert np.ptp(after[:, axis]) == pytest.approx(np.ptp(before[:, axis]), abs=5e-4)
     if find_spec("pyvista"):
         import pyvista
 
