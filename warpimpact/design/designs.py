@@ -19,9 +19,9 @@ from warpimpact.results import attributes as attr
 from warpimpact.results import files, front
 from warpimpact.results.files import kind_of, opened
 from warpimpact.runs.levels import MEASURES, level_for
-from warpimpact.runs.pilot_hits import pilot_most
 from warpimpact.scene import Numerics
 from warpimpact.scene.units import quoted
+from warpimpact.solver.pilot import COMPARED, pilot_size
 from warpimpact.solver.prepare import prepare
 from warpimpact.solver.resolution import LADDER, TooManySteps, at_level, coarsest_level
 
@@ -262,7 +262,9 @@ def work_ahead(campaign: Campaign, level: int) -> float:
     last = max(first, level)
     hits = len(campaign.sampler()) / len(campaign.symmetries)
     of_levels = [work(campaign, at_level(at, campaign.numerics)) for at in range(first, last + 3) if at < len(LADDER)]
-    return of_levels[last - first] + pilot_most(campaign) / hits * sum(of_levels)
+    compared = COMPARED * of_levels[last - first] if level_for(campaign) == MEASURES else 0.0
+    pilot = pilot_size(campaign.numerics.asked, int(hits)) / hits * sum(of_levels)
+    return of_levels[last - first] + pilot + compared
 
 
 def _valid(shelf: Shelf, tables: Tables) -> ValidDesign | None:

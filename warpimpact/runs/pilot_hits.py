@@ -13,8 +13,8 @@ from warpimpact.solver.simulate import spread_places
 
 _FEWEST_BURSTS = 8
 """Of a pilot, however many shots they have."""
-_MORE = 4
-"""Times the usual share of a run's hits: a quarter in place of a sixteenth."""
+_MOST_OF_LAYERS = 1024
+"""Shots of a pilot of several layers, at most."""
 
 
 def pilot_shots(campaign: Campaign, most: int) -> Shots:
@@ -23,10 +23,11 @@ def pilot_shots(campaign: Campaign, most: int) -> Shots:
 
 
 def pilot_most(campaign: Campaign) -> int:
-    """Shots of a pilot of a campaign, at most. Of several layers, whose measures it is for, it takes more of a short
+    """Shots of a pilot of a campaign, at most. Of several layers, whose measures it is for, it may take all of a short
     run: of hits that end otherwise, few tell little."""
-    hits = len(campaign.sampler()) // len(campaign.symmetries)
-    return pilot_size(campaign.numerics.asked, hits * _MORE if level_for(campaign) == MEASURES else hits)
+    hits, usual = len(campaign.sampler()) // len(campaign.symmetries), campaign.numerics.asked
+    fewest = pilot_size(usual, hits)
+    return max(fewest, min(hits, _MOST_OF_LAYERS)) if level_for(campaign) == MEASURES else fewest
 
 
 def pilot_places(campaign: Campaign, most: int) -> NDArray[np.int64]:

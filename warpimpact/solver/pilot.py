@@ -41,7 +41,10 @@ _logger = logging.getLogger(__name__)
 SHOTS, SHOTS_OF_FINE, FINE = 64, 32, 4
 """First shots of a pilot; and of one that begins at level FINE, where shots are dear."""
 MOST, PART = 256, 16
-"""Shots of a pilot at most; and the run's shots for each of them, also where single settings are tried."""
+"""Shots that choose a level at most; and the run's shots for each of them, also where single settings are tried."""
+COMPARED = 4.0
+"""Time of the shots beyond these that are compared at the level taken for measures of layers, over that of the run, as
+it is foreseen; it takes about half as long."""
 LIMITS, FINEST_LIMIT = 16, 6
 """Limits of a pilot; and the last level that is taken for limits. A finer one is only compared with."""
 OPEN, OPEN_MEASURE = (0.7, 1.5), (0.7, 3.0)
@@ -149,7 +152,7 @@ def pilot_hits(
 
     Args:
         outcomes_at: computes shots with numerics of a level.
-        shots: of the pilot, at most `pilot_size` of them; the first of them are spread like all.
+        shots: of the pilot; the first of them are spread like all. The first `MOST` of them choose a level.
         numerics: the accuracy, precision and layout; other settings would promise nothing.
         price: seconds that a shot takes at a level.
         free: of each layer of the target, whether a core flies free behind it (`Scene.free_behind`). Residual
@@ -169,7 +172,7 @@ def pilot_hits(
     if level is None:
         return HitErrors(at_level(first, numerics), False, accuracy.share, math.inf, math.inf)
     if aim is not None and not aim.alone:
-        pilot.compare_all(level, hits)
+        pilot.compare_more(level, hits)
     if not pilot.tried[level].errors.kept:
         pilot.tell_to_finest(level)
     if aim is None and hits >= PART * len(pilot.tried[level].coarse):
@@ -201,7 +204,7 @@ class _Pilot:
     @property
     def counts(self) -> list[int]:
         """Numbers of shots that may judge a level: twice as many each time, of whole plates."""
-        most, at_a_plate = len(self.shots), self.shots.at_a_plate
+        most, at_a_plate = min(MOST, len(self.shots)), self.shots.at_a_plate
         counts = [min(most, -(-_first_shots(self.numerics.asked) // at_a_plate) * at_a_plate)]
         while counts[-1] < most:
             counts.append(min(most, 2 * counts[-1]))
@@ -280,12 +283,14 @@ class _Pilot:
         margin, shots = ERROR_PER_CHANGE[min(2, len(LADDER) - 1 - numerics.level)], self.shots[: len(fine)]
         return compared(numerics, self.numerics.asked, (coarse, between, fine), margin, shots, self.free)
 
-    def compare_all(self, level: int, hits: int) -> None:
-        """Compare all shots at the level that is taken, where this takes no longer than the run of some hits: few tell
-        little of what ends otherwise."""
-        count, kept = len(self.shots), self.tried[level].errors.kept
-        finer = min(level + 2, len(LADDER) - 1)
-        if sum(self.missing(at, count) * self.price(at) for at in (level, finer)) <= hits * self.price(level):
+    def compare_more(self, level: int, hits: int) -> None:
+        """Compare more shots at the level that is taken, as many as take COMPARED times the run of some hits: of shots
+        that end otherwise, few tell little."""
+        kept, finer = self.tried[level].errors.kept, min(level + 2, len(LADDER) - 1)
+        known = min(len(self.known[level]), len(self.known[finer]))
+        room = COMPARED * hits * self.price(level) / (self.price(level) + self.price(finer))
+        plates = min(len(self.shots), known + int(room)) // self.shots.at_a_plate
+        if (count := plates * self.shots.at_a_plate) > len(self.tried[level].coarse):
             self.judged(level, finer, count)
             tried = self.tried[level]
             self.tried[level] = tried._replace(errors=replace(tried.errors, kept=kept))

@@ -395,8 +395,11 @@ def test_more_hits_tell_more_of_what_a_measure_shifts_by(
     assert (counts, found.numerics.level, found.kept) == ([16] * computed, 0, kept)
 
 
-@pytest.mark.parametrize(("hits", "parts"), [(31, [16, 16]), (32, [16, 16, 16, 16])])
-def test_beside_an_accuracy_all_hits_are_compared_where_that_is_cheaper_than_the_run(
+@pytest.mark.parametrize(
+    ("hits", "parts"),  # both levels cost the same, so twice as many as the run has are compared
+    [(0, [16, 16]), (4, [16, 16, 8, 8]), (8, [16, 16, 16, 16]), (1000, [16, 16, 16, 16])],
+)
+def test_beside_an_accuracy_more_hits_are_compared_as_far_as_the_run_is_worth_it(
     hits: int, parts: list[int], known: Outcomes, from_level: Callable[..., None]
 ) -> None:
     counts = []
