@@ -134,11 +134,13 @@ def _schema(arguments: argparse.Namespace) -> None:
 
 def _schema_text(kind: str) -> str:
     import json
+    from importlib import import_module
 
-    from warpimpact.campaign.schema import campaign_schema
-    from warpimpact.firing.plan_schema import firing_schema
-    from warpimpact.identification.fit_schema import fit_schema
-    from warpimpact.optimisation.design_schema import design_schema
-
-    made = {"campaign": campaign_schema, "fit": fit_schema, "test": firing_schema, "design": design_schema}[kind]
+    room, name = {
+        "campaign": ("campaign.schema", "campaign_schema"),
+        "fit": ("identification.fit_schema", "fit_schema"),
+        "test": ("firing.plan_schema", "firing_schema"),
+        "design": ("optimisation.design_schema", "design_schema"),
+    }[kind]  # the others would take seconds to import
+    made = getattr(import_module(f"warpimpact.{room}"), name)
     return json.dumps(made(), indent=1, ensure_ascii=False) + "\n"

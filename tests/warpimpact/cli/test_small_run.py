@@ -35,3 +35,14 @@ print(sorted({HEAVY!r} & set(sys.modules)))
 """
     done = subprocess.run([sys.executable, "-c", code], cwd=tmp_path, capture_output=True, text=True, check=True)
     assert done.stdout.splitlines()[-1] == "[]"
+
+
+def test_a_new_campaign_loads_no_solver(tmp_path: Path) -> None:
+    code = f"""
+import sys
+from warpimpact.cli import main
+assert main(["new", "addon"]) == 0
+print(sorted(({HEAVY!r} | {{"warp"}}) & set(sys.modules)))
+"""
+    done = subprocess.run([sys.executable, "-c", code], cwd=tmp_path, capture_output=True, text=True, check=True)
+    assert done.stdout.splitlines()[-1] == "[]"
