@@ -161,14 +161,16 @@ def _cells(dataset: xarray.Dataset, names: tuple[str, str, str], place: int) -> 
 
 
 def _variables_table(dataset: xarray.Dataset) -> Table:
-    """The values of the variables on the front."""
-    names = zip(dataset[f.NAME].values, dataset[f.UNIT].values, strict=True)
-    columns = [Column("design"), *(Column(str(name), str(unit), right=True) for name, unit in names)]
-    rows = [
-        (file, *(value for _, value, _ in _values(dataset, int(design))))
-        for file, design in zip(dataset[f.FILE].values, dataset[f.NUMBER].values, strict=True)
-    ]
-    return Table(columns, rows)
+    """The values of the variables on the front; not of those that count nowhere on it."""
+    designs = dataset[f.NUMBER].values
+    used = np.flatnonzero(np.isfinite(dataset[f.VALUE].values[designs]).any(axis=0))
+    names, units = dataset[f.NAME].values[used], dataset[f.UNIT].values[used]
+    columns = [Column(str(name), str(unit), right=True) for name, unit in zip(names, units, strict=True)]
+    rows = []
+    for file, design in zip(dataset[f.FILE].values, designs, strict=True):
+        values = [value for _, value, _ in _values(dataset, int(design))]
+        rows.append((file, *(values[place] for place in used)))
+    return Table([Column("design"), *columns], rows)
 
 
 def _survival(dataset: xarray.Dataset) -> Iterator[str]:

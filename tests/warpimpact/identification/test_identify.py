@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 import xarray
 
+from warpimpact.campaigns import gallery
 from warpimpact.cli import main
 from warpimpact.identification import identify
 from warpimpact.identification.fit import Fit
@@ -69,6 +70,7 @@ def test_figures_are_drawn(posterior: Path) -> None:
     assert len(pairs_figure(tree).axes) == 10
     assert len(measured_figure(tree).axes) == 2
     assert len(hits_figure(tree).axes) == 2
+    assert [len(figure.axes) for _, figure, _ in gallery.pictures_of_fit(posterior)] == [2, 10]
 
 
 def test_rounds_are_whole_blocks(make_fit: FitMaker, small: tuple[str, str]) -> None:
