@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from html import escape
+from pathlib import Path
 
 import numpy as np
 import xarray
@@ -17,6 +18,7 @@ from warpimpact.analysis.plate_text import reference_name
 from warpimpact.analysis.summary import numerics_sentence
 from warpimpact.records.group import failures
 from warpimpact.results import attributes as attr
+from warpimpact.results import files
 from warpimpact.results import variables as v
 from warpimpact.results.dataset import passed
 from warpimpact.results.outlines import outlines
@@ -49,8 +51,15 @@ class Inspection:
         return f"<div><p><b>{escape(self.verdict)}</b></p>{self.drawing}<pre>{escape(self.text)}</pre></div>"
 
 
-def inspect(dataset: xarray.Dataset) -> Inspection:
-    """A result as text, with a verdict and a map; of an open file only a part is in memory at a time."""
+def inspect(dataset: xarray.Dataset | str | Path) -> Inspection:
+    """A result, or its file, as text, with a verdict and a map; of a file only a part is in memory at a time.
+
+    Raises:
+        ResultError: the file is missing or damaged, or is no map of hits.
+    """
+    if isinstance(dataset, str | Path):
+        with files.opened(Path(dataset)) as result:
+            return inspect(result)
     return Inspection(inspect_text(dataset), verdict(dataset, effectiveness(dataset)[0]), _drawing(dataset))
 
 

@@ -115,7 +115,8 @@ def core_of(threat: Threat, given: Any, place: str) -> _Table:
 def _velocity(threat: Threat, standard: Any, place: str) -> Velocity:
     known = {velocity.standard: velocity for velocity in threat.velocities}
     if not known:
-        raise CampaignError(f'{place}: the catalogue has no velocity of "{threat.name}"; give impact.velocity')
+        key = f"{place.removesuffix('standard')}threat"
+        raise CampaignError(f'{key}: the catalogue has no velocity of "{threat.name}"; give impact.velocity')
     if standard is None:
         return threat.velocities[0]
     if standard not in known:

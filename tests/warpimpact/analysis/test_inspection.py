@@ -2,6 +2,7 @@
 
 import re
 import sys
+from pathlib import Path
 from types import SimpleNamespace
 from xml.etree import ElementTree
 
@@ -10,6 +11,8 @@ import pytest
 
 from warpimpact import Campaign, ConeCore, Hits, Impact, Layer, Numerics, Plate, SquarePattern, inspect, run
 from warpimpact.analysis.comparison import compare
+from warpimpact.results import files
+from warpimpact.results.files import ResultError
 from warpimpact.scene import Target
 
 HOLES = SquarePattern(side="4 mm", spacing="8 mm")
@@ -62,6 +65,14 @@ def test_a_notebook_shows_a_result_with_its_verdict(make_result, make_plate_resu
     text = compare(plates, ["a", "b"])._repr_html_()
     rows = dict(re.findall(r"<tr><td>([^<]*)</td><td>([^<]*)</td></tr>", text))
     assert rows["residual energy fraction, mean"] == "a"
+
+
+def test_a_file_is_inspected_as_its_result(tmp_path: Path) -> None:
+    dataset = run(CAMPAIGN, device="cpu")
+    files.write(dataset, tmp_path / "a.nc")
+    assert inspect(str(tmp_path / "a.nc")) == inspect(tmp_path / "a.nc") == inspect(dataset)
+    with pytest.raises(ResultError, match="it is not there"):
+        inspect(tmp_path / "b.nc")
 
 
 @pytest.mark.parametrize(("shell", "shown"), [("ZMQInteractiveShell", True), ("TerminalInteractiveShell", False)])
