@@ -309,7 +309,7 @@ def draw_maps(plate: str) -> None:
             drawn = axes.scatter(y, z, c=values, cmap=scale[0], vmin=scale[1], vmax=scale[2], edgecolors="0.3", s=45)
             axes.set(title=title, aspect="equal", xlabel="y, mm", ylabel="z, mm")
             figure.colorbar(drawn, ax=axes, shrink=0.8, label=words)
-    figure.savefig(FIGURE, dpi=90)
+    figure.savefig(FIGURE, dpi=90, bbox_inches="tight")
 
 
 if __name__ == "__main__":

@@ -36,7 +36,7 @@ SCALES = np.array([5.0, 5.0, 10.0])
 FEWEST = 8
 """Sound hits of a plate for a fit."""
 LEVEL = Numerics(level=2)
-SHARES = np.arange(0.4, 2.05, 0.1)
+SHARES = np.arange(0.2, 2.65, 0.1)
 FRICTIONS, WEAKENINGS = (0.0, 0.03, 0.06, 0.1, 0.15), (0.6, 0.7, 0.8, 0.9, 1.0)
 """Shares of the resistance, shear coefficients and degradations that a fit tries."""
 TIMED = 1024

@@ -404,8 +404,8 @@ def test_a_contact_damps_a_tenth_of_what_is_critical() -> None:
 
 def test_a_layer_is_marched_only_while_the_core_is_within_reach() -> None:
     """Before, it is at rest and nobody feels it; in a gap the steps keep their length; then it stays as it was left."""
-    sheet = box((2, 12, 12))
-    near = SheetMesh(sheet.y - 6e-3, sheet.z - 6e-3, sheet.solid, sheet.x, sheet.spacing)
+    sheet = box((2, 8, 8))
+    near = SheetMesh(sheet.y - 4e-3, sheet.z - 4e-3, sheet.solid, sheet.x, sheet.spacing)
     far = SheetMesh(near.y, near.z, near.solid, near.x + 50e-3, near.spacing)
     upright, still = np.array([0.0, 0.0, 0.0, 1.0]), np.zeros(3)
     start = Start(np.array([-18.1e-3, 1e-3, 0.0]), upright, np.array([825.0, 0.0, 0.0]), still, 4e-3, 1e-8, 1e-7, 0.0)
