@@ -149,6 +149,7 @@ def add_plate(commands: Commands) -> None:
 def _plate(arguments: argparse.Namespace) -> None:
     from warpimpact.analysis.plate_text import plate_numbers
     from warpimpact.campaign.campaign import Campaign
+    from warpimpact.campaign.plausible import doubted_holes
     from warpimpact.plotting import plate_figure
     from warpimpact.view.view import Section, labelled, text_of
 
@@ -162,5 +163,5 @@ def _plate(arguments: argparse.Namespace) -> None:
     for place, layer in enumerate(campaign.layer, start=1):
         behind = f"{1e3 * layer.gap:g} mm behind the one before"
         rows.append((f"layer {place}", f"{1e3 * layer.thickness:g} mm, {behind}, {layer.open_area:.1%} open"))
-    print(text_of([Section([labelled(rows)], campaign.title)]))
+    print(text_of([Section([labelled(rows), *doubted_holes(campaign.target)], campaign.title)]))
     print(output)

@@ -136,7 +136,7 @@ class Search(Model):
         fresh = f"{self.confirm_hits} fresh hits{assumed}"
         return (
             f"searches at most {self.designs} designs with {self.hits} to {self.most_hits} hits each, then up to "
-            f"{self.confirmed} of the front with {fresh}: minutes, or longer"
+            f"{self.confirmed} of the front with {fresh}; how long that takes is told as it runs"
         )
 
     @property

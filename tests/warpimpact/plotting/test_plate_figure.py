@@ -158,6 +158,18 @@ def test_plates_of_the_library_have_the_ligaments_that_they_say(
     assert plt.imread(picture).shape[2] == 4
 
 
+def test_webs_that_hardly_hold_get_a_word(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    text = (CAMPAIGNS / "slotted_plate.toml").read_text(encoding="utf-8")
+    (tmp_path / "a.toml").write_text(text.replace('width = "4 mm"', 'width = "7.9 mm"'), encoding="utf-8")
+    assert main(["plate", "a.toml"]) == 0
+    told = capsys.readouterr().out
+    assert "plate: open area of 6" in told
+    assert "of the thickness: such webs bend and tear" in told
+
+
 def test_every_campaign_of_the_library_can_be_read_and_says_its_question() -> None:
     for path in CAMPAIGNS.glob("*.toml"):
         text = path.read_text(encoding="utf-8")
