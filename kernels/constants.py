@@ -86,6 +86,15 @@ SMALLEST_ONSET = Constant(
     "kernels/test_interaction.py::test_onset_follows_the_step_and_a_core_that_slows_down",
 )
 
+# Material ahead of a patch (kernels/free_edges.py)
+LEAST_RADIAL = Constant(
+    0.02,
+    "share of the normal that is outwards",
+    "A disc has none: its patches have their own azimuths then, and not one that rounding gives to a straight core.",
+    "4.9",
+    "verification/test_free_surface.py::test_a_disc_looks_outwards",
+)
+
 # Patches in the slab (kernels/core_surface.py)
 NARROWEST = Constant(
     0.02,

@@ -19,6 +19,7 @@ from . import (
     core_surface,
     damping,
     exposure,
+    free_edges,
     grip,
     interaction,
     lanes,
@@ -35,7 +36,7 @@ def build(variant: Variant) -> SimpleNamespace:
     struct = structs.build(variant)
     real, vec2, vec3 = variant.real, variant.vec2, variant.vec3
     zero, half, one = real(0.0), real(0.5), real(1.0)
-    use = variant.use(channel, core_surface, damping, exposure, grip, interaction, lanes, plate_grid)
+    use = variant.use(channel, core_surface, damping, exposure, free_edges, grip, interaction, lanes, plate_grid)
     far = constants.FAR_NODES.value
     ring_of, patch_at = use.core_surface.ring_of, use.core_surface.patch_at
     read, write = memory.build(real).read, memory.build(real).write
@@ -83,11 +84,19 @@ def build(variant: Variant) -> SimpleNamespace:
                 write_index(touches.place, base + j, place)
                 write(touches.ahead, base + j, ahead)
             j += use.lanes.count()
+        if wp.static(variant.free_surface):
+            use.free_edges.restrict(context, slab, base, begin, end)
 
     @wp.func
     def meet(plate: struct.Plate, touches: struct.Touches, first: wp.int32, count: wp.int32):
         """Restrict touches to material, from index `first` on; return the area that presses on it [m²]."""
-        return use.plate_grid.meet(touches.area, touches.slope, touches.gain, touches.tile, plate.tile, first, count)
+        if wp.static(variant.free_surface):
+            area = use.free_edges.sum_of(touches.area, first, count)
+        else:
+            area = use.plate_grid.meet(
+                touches.area, touches.slope, touches.gain, touches.tile, plate.tile, first, count
+            )
+        return area
 
     @wp.func
     def expose(context: struct.Context, window: struct.Window, first: wp.int32):
@@ -196,7 +205,7 @@ def build(variant: Variant) -> SimpleNamespace:
                         exposed = wp.max(zero, exposed + read(touches.x, base + j) * (ahead - exposed))
                     left = use.interaction.remaining(law, exposed)
                 area = left * read(touches.area, base + j)
-                stress = use.interaction.normal_stress(law, face.closing)
+                stress = use.interaction.normal_stress(law, face.closing, ring.radius)
                 slope = left * read(touches.slope, base + j) * stress
                 if wp.static(variant.rate_dependent):
                     slope += area * use.interaction.stress_slope(law, face.closing)

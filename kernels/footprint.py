@@ -96,20 +96,29 @@ def build(variant: Variant) -> SimpleNamespace:
         return footprint
 
     @wp.func
+    def pushes(surface: struct.Surface):
+        """How far ahead of material a core presses on what it has pushed there, at most [m]."""
+        far = zero
+        if wp.static(variant.free_surface):
+            far = surface.max_radius
+        return far
+
+    @wp.func
     def clearance_at(plate: struct.Plate, window: struct.Window, y: real, z: real):
         """A lower bound of a point's distance from material: in a hole, or beside a finite plate [m]."""
         beside = wp.max(wp.max(window.low_y - y, y - window.high_y), wp.max(window.low_z - z, z - window.high_z))
         return wp.max(beside, plate.clear[use.plate_grid.tile_at(plate, window, y, z)])
 
     @wp.func
-    def is_clear(plate: struct.Plate, window: struct.Window, footprint: struct.Footprint):
-        """Whether there is no material at the nodes around the rings in the slab, with a node to spare."""
+    def is_clear(plate: struct.Plate, window: struct.Window, footprint: struct.Footprint, pushed: real):
+        """Whether there is no material at the nodes around the rings in the slab, or `pushed` away from them [m], with
+        a node to spare."""
         y = half * real(footprint.box.y_low + footprint.box.y_high - 2 * window.home_y) * plate.spacing
         z = half * real(footprint.box.z_low + footprint.box.z_high - 2 * window.home_z) * plate.spacing
         wide = half * real(footprint.box.y_high - footprint.box.y_low) + one
         long = half * real(footprint.box.z_high - footprint.box.z_low) + one
         reach = wp.sqrt(wide * wide + long * long) * plate.spacing
-        return clearance_at(plate, window, y, z) > reach
+        return clearance_at(plate, window, y, z) > reach + pushed
 
     @wp.func
     def is_beside(window: struct.Window, footprint: struct.Footprint, cells: wp.int32):

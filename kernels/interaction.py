@@ -8,6 +8,27 @@ import warp as wp
 from . import constants, structs
 from .variant import Variant
 
+EXPONENTIAL = """
+    const auto exponential = [](auto x) {
+        if constexpr (sizeof(x) == 4) {
+    #if defined(__CUDA_ARCH__)
+            return expf(x);
+    #else
+            float t = x * 1.44269504f;
+            t = t < -126.0f ? -126.0f : (t > 126.0f ? 126.0f : t);
+            const float whole = __builtin_floorf(t + 0.5f);
+            const float f = t - whole;
+            const float p = 1.0f + f * (0.693147181f + f * (0.240226507f + f * (0.0555041087f
+                          + f * (0.00961812911f + f * (0.00133335581f + f * 0.000154035304f)))));
+            const int bits = ((int)whole + 127) << 23;
+            return p * __builtin_bit_cast(float, bits);
+    #endif
+        } else return exp(x);
+    };
+"""
+"""Native code that defines the function `exponential`: wp.exp's bits but for 2 ulp in float32. The library's own is a
+call that no compiler vectorises."""
+
 
 @cache
 def build(variant: Variant) -> SimpleNamespace:
@@ -64,14 +85,6 @@ def build(variant: Variant) -> SimpleNamespace:
         return wp.where(closing < law.steadied, share / wp.max(closing, tiny), slope)
 
     @wp.func
-    def normal_stress(law: struct.Law, closing: real):
-        """Normal stress [Pa] of undamaged material at closing speed v_n."""
-        stress = law.a0
-        if wp.static(variant.rate_dependent):
-            stress += closing * (law.a1 + law.a2 * closing)
-        return stress
-
-    @wp.func
     def stress_slope(law: struct.Law, closing: real):
         """Derivative of the normal stress by the closing speed [Pa s/m]."""
         return law.a1 + real(2.0) * law.a2 * closing
@@ -81,28 +94,40 @@ def build(variant: Variant) -> SimpleNamespace:
         """Friction over normal stress and sliding speed [s/m]: η / |v_t|, finite where nothing slides."""
         return law.friction / wp.max(sliding, at_rest * speed)
 
-    # Native, because the library's exponential is a call that no compiler vectorises; wp.exp's bits but for 2 ulp.
-    @wp.func_native("""
-    #if defined(__CUDA_ARCH__)
-        return expf(x);
-    #else
-        float t = x * 1.44269504f;
-        t = t < -126.0f ? -126.0f : (t > 126.0f ? 126.0f : t);
-        const float whole = __builtin_floorf(t + 0.5f);
-        const float f = t - whole;
-        const float p = 1.0f + f * (0.693147181f + f * (0.240226507f + f * (0.0555041087f
-                      + f * (0.00961812911f + f * (0.00133335581f + f * 0.000154035304f)))));
-        const int bits = ((int)whole + 127) << 23;
-        float scale;
-        __builtin_memcpy(&scale, &bits, 4);
-        return p * scale;
-    #endif
-    """)
+    @wp.func_native(EXPONENTIAL + "return exponential(x);")
     def exp_single(x: wp.float32) -> wp.float32:
         """e^x between 2^-126 and 2^126, NaN for NaN."""
         ...
 
     exponential = wp.exp if variant.double else exp_single
+
+    @wp.func_native("""
+    #if defined(__CUDA_ARCH__)
+        return logf(x);
+    #else
+        const int bits = __builtin_bit_cast(int, x) - 0x3f3504f3;
+        const int exponent = bits >> 23;
+        const float m = __builtin_bit_cast(float, (bits & 0x7fffff) + 0x3f3504f3);
+        const float z = (m - 1.0f) / (m + 1.0f), zz = z * z;
+        return exponent * 0.693147181f
+             + z * (2.0f + zz * (0.666666667f + zz * (0.4f + zz * (0.285714286f + zz * 0.222222222f))));
+    #endif
+    """)
+    def log_single(x: wp.float32) -> wp.float32:
+        """ln x of a normal number, as exact as float32 is."""
+        ...
+
+    logarithm = wp.log if variant.double else log_single
+
+    @wp.func
+    def normal_stress(law: struct.Law, closing: real, radius: real):
+        """Normal stress [Pa] of undamaged material at closing speed v_n, where the core has some radius [m]."""
+        stress = law.a0
+        if wp.static(variant.free_surface):
+            stress /= one + exponential(law.power * logarithm(radius * law.per_reach))
+        if wp.static(variant.rate_dependent):
+            stress += closing * (law.a1 + law.a2 * closing)
+        return stress
 
     @wp.func
     def exposure_in(law: struct.Law, dt: real, velocity: real):

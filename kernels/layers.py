@@ -175,14 +175,14 @@ def build(variant: Variant) -> SimpleNamespace:
             touch = use.footprint.footprint_of(surface, plate, stack.window[here], seen, dt)
         window = stack.window[here]
         beside = use.footprint.clearance_at(plate, window, seen.position[1], seen.position[2])
-        if touch.last_ring >= 0 and use.footprint.is_clear(plate, window, touch):
+        if touch.last_ring >= 0 and use.footprint.is_clear(plate, window, touch, use.footprint.pushes(surface)):
             touch.last_ring = -1
             touch.inside = True
         if wp.static(slides):
             if target.slide and target.weakens[layer] and not touch.inside:
                 if slide(context, layer, touch):
                     touch = use.footprint.footprint_of(surface, plate, stack.window[here], seen, dt)
-        return touch, wp.max(zero, beside - surface.bounding_radius)
+        return touch, wp.max(zero, beside - surface.bounding_radius - use.footprint.pushes(surface))
 
     @wp.func
     def find_reach(

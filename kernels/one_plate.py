@@ -55,7 +55,7 @@ def build(variant: Variant) -> SimpleNamespace:
         reach.window = use.target.open_window(context, 0, vec3())
         plate = use.target.plate_of(context.target, 0)
         clear = plate.clear[use.plate_grid.tile_at(plate, reach.window, zero, zero)]  # at the hit
-        off = farthest_off(context.surface, reach.window.thickness, state)
+        off = farthest_off(context.surface, reach.window.thickness, state) + use.footprint.pushes(context.surface)
         return reach, wp.where(clear > off, Status.MISSED, RUNNING)
 
     @wp.func

@@ -173,6 +173,11 @@ def _build(double: bool, many_plates: bool) -> SimpleNamespace:
         of the exposure's grid [m]. `taps` is half of the tent filter on this grid, and `reach` is its reach in nodes,
         at least 1. A window has `planes` of the grid through the thickness, `per_plane` of them per metre, of which a
         contact weakens those up to `plane_reach` planes away; one plane stands for the whole thickness.
+
+        `cover` has the material along a normal [m] (kernels/free_edges.py), shape [(directions + 1) × (cover_y + 1) ×
+        (cover_z + 1)]: directions, of which the last is the first, and the nodes of a period and the first ones of the
+        next. `cover_per_y` and `cover_per_z` are nodes per metre, `cover_per_row` and `cover_per_column` nodes
+        per cell of the tile.
         """
 
         tile: wp.array(dtype=real)
@@ -189,6 +194,14 @@ def _build(double: bool, many_plates: bool) -> SimpleNamespace:
         planes: wp.int32
         per_plane: real
         plane_reach: wp.int32
+        cover: wp.array(dtype=real)
+        cover_y: wp.int32
+        cover_z: wp.int32
+        directions: wp.int32
+        cover_per_y: real
+        cover_per_z: real
+        cover_per_row: real
+        cover_per_column: real
 
     @wp.struct
     class Window:
@@ -276,6 +289,9 @@ def _build(double: bool, many_plates: bool) -> SimpleNamespace:
         `onset_share` of the core's velocity; or, where the step needs a wider one, a multiple, `onset_jump` [m/s²], of
         the time step, and at most the share `onset_limit` of the core's velocity. `steadied` is the closing speed
         [m/s] below which contact damps by its chord (`steady_slope`).
+
+        Near a free surface a0 is less by 1 + (r · `per_reach`)^`power` [1/m], r the radius of the core, and a patch
+        presses by 1 − exp(−`cover` · b / r), b the length of material ahead of it.
         """
 
         a0: real
@@ -290,6 +306,9 @@ def _build(double: bool, many_plates: bool) -> SimpleNamespace:
         onset_limit: real
         onset: real
         steadied: real
+        per_reach: real
+        power: real
+        cover: real
 
     # A single plate comes by value, because CUDA does not know where a pointer leads that lies in memory.
     Plates = wp.array(dtype=Plate) if many_plates else Plate
@@ -336,6 +355,7 @@ def _build(double: bool, many_plates: bool) -> SimpleNamespace:
         decay_rate: wp.array2d(dtype=real)
         onset_jump: wp.array2d(dtype=real)
         most_jump: wp.array2d(dtype=real)
+        per_reach: wp.array2d(dtype=real)
         stretch: wp.array2d(dtype=real)
 
     # --- The shots ---
@@ -551,7 +571,9 @@ def _build(double: bool, many_plates: bool) -> SimpleNamespace:
         planes. There `row`, `column` and `plane` are those of the cell, too. `ring_area` is the area of all patches of
         a ring. `sums` is what the second pass sums over a ring, if the bending moment is recorded. Then
         `total_area` is the area of a ring in all layers of the target. `place` and `ahead` are the patch's place in the
-        channels of earlier hits (kernels/channel.py).
+        channels of earlier hits (kernels/channel.py). `cover` is the index of the node and direction before the patch
+        in the table of the cover, `cover_y`, `cover_z` and `cover_turn` the shares of the way to the next ones, and
+        `cover_decay` the negative exponent per cover [1/m].
         """
 
         area: wp.array(dtype=real)
@@ -571,6 +593,11 @@ def _build(double: bool, many_plates: bool) -> SimpleNamespace:
         plane: wp.array(dtype=wp.int32)
         place: wp.array(dtype=wp.int32)
         ahead: wp.array(dtype=real)
+        cover: wp.array(dtype=wp.int32)
+        cover_y: wp.array(dtype=real)
+        cover_z: wp.array(dtype=real)
+        cover_turn: wp.array(dtype=real)
+        cover_decay: wp.array(dtype=real)
 
     @wp.struct
     class Stack:

@@ -52,6 +52,7 @@ def build(variant: Variant) -> SimpleNamespace:
         law.degradation = layer_value(target.degradation, layer, shot)
         law.decay_rate = layer_value(target.decay_rate, layer, shot)
         law.onset_jump = layer_value(target.onset_jump, layer, shot)
+        law.per_reach = layer_value(target.per_reach, layer, shot)
         return law
 
     @wp.func

@@ -27,6 +27,7 @@ class Variant:
         degrades: the plate weakens (β < 1).
         rubs: there is friction (η > 0).
         rate_dependent: the normal stress depends on the normal velocity (a1 or a2 > 0).
+        free_surface: a surface element resists less near a face or an edge.
         rimmed: the plate is finite.
         bends: the core's largest bending moment is recorded.
         layered: the target has several layers.
@@ -42,6 +43,7 @@ class Variant:
     degrades: bool = True
     rubs: bool = True
     rate_dependent: bool = False
+    free_surface: bool = False
     rimmed: bool = False
     bends: bool = False
     layered: bool = False

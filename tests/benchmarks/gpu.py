@@ -76,6 +76,7 @@ SCENES = {
     .replace("degradation = 0.8", "degradation = 1")
     .replace("shear_coefficient = 0.05\n", ""),
     "stress that depends on the rate": ROADS[SLOTS] + "[interaction]\nquadratic = 0.5\n",
+    "near a free surface": ROADS[SLOTS] + "[interaction.free_surface]\n",
     "a rim": ROADS[SLOTS].replace("[plate]", '[plate]\nsize = ["20 mm", "30 mm"]'),
     "lengths of their own": ROADS[SLOTS],
     "a base that weakens": ROADS[SLOTS] + WEAK,

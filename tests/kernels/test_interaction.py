@@ -47,7 +47,7 @@ def law(
     touching = closing[i] + found.shift * variation[i] * variation[i]
     found.slope = use.interaction.steady_slope(law, found.share, found.slope, touching)
     contacts[i] = found
-    stresses[i] = use.interaction.normal_stress(law, closing[i])
+    stresses[i] = use.interaction.normal_stress(law, closing[i], real(1.0))
     slopes[i] = use.interaction.stress_slope(law, closing[i])
     frictions[i] = use.interaction.friction_per_speed(law, sliding[i], speed[i])
     remaining[i] = use.interaction.remaining(law, exposures[i])
@@ -55,7 +55,7 @@ def law(
 
 def static_law(law: StaticLaw, closing: wp.array(dtype=real), stresses: wp.array(dtype=real)) -> None:
     i = wp.tid()
-    stresses[i] = static.interaction.normal_stress(law, closing[i])
+    stresses[i] = static.interaction.normal_stress(law, closing[i], real(1.0))
 
 
 def onset(law: Law, dt: real, velocity: wp.array(dtype=real), impact: real, onsets: wp.array(dtype=real)) -> None:

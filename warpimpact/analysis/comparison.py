@@ -326,6 +326,6 @@ def _materials(datasets: Sequence[xarray.Dataset], names: Sequence[str]) -> Iter
     for quantity in dict.fromkeys(key for material in materials.values() for key in material):
         values = {name: material.get(quantity) for name, material in materials.items()}
         if len(set(values.values())) > 1:
-            read = reader_of(QUANTITIES[quantity].type)
-            shown = ["not given" if value is None else read.text(value) for value in values.values()]
+            read = reader_of(QUANTITIES[quantity].type).text if quantity in QUANTITIES else "{:g}".format
+            shown = ["not given" if value is None else read(value) for value in values.values()]
             yield f"{quantity} ({of_each(list(values), shown)})"

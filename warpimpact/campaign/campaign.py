@@ -311,6 +311,7 @@ class Campaign(Model):
                 exclusions.BENDING: self.output.bending,
                 exclusions.STRENGTH: self.core.strength is not None or "strength" in (hits.listed or {}),
                 exclusions.NODAL: numerics.scheme == "nodal",
+                exclusions.FREE_SURFACE: self.interaction.free_surface is not None,
                 exclusions.BLOCK: numerics.layout == "block",
                 exclusions.DOUBLE: numerics.precision == "double",
             }

@@ -64,6 +64,12 @@ class Posterior:
             ValueError: names the first difference.
         """
         given = {"plate": plate.model_dump(), "interaction": interaction.model_dump()}
+        there, here = self.found_with["interaction"].get("free_surface"), given["interaction"]["free_surface"]
+        if here != there:
+            raise ValueError(
+                f"the posterior was found with interaction.free_surface = {there}, but the campaign has {here}; its "
+                "draws are valid only with that of the fit"
+            )
         for table, key in OF_THE_MATERIAL:
             there = self.found_with[str(table)].get(str(key))
             here = given[str(table)][str(key)]

@@ -42,6 +42,8 @@ def material_entry(path: Path) -> str:
         raise FitError(
             f"{path}: was found with interaction.static = {law.static:g}, which a catalogue's material lacks"
         )
+    if law.free_surface is not None:
+        raise FitError(f"{path}: was found with interaction.free_surface, which a catalogue's material lacks")
     calibres = plate.thickness / (2.0 * scene.core.max_radius)
     angles = [shot.impact.obliquity for shot in fit.shots]
     low, _, high = quantiles.get(("plate", "resistance"), (plate.resistance,) * 3)

@@ -156,7 +156,10 @@ def _impact(campaign: Campaign) -> str:
 def _material(campaign: Campaign) -> str:
     """What the plate resists with, as JSON: of its material, and of the law of its stress."""
     of_plate = campaign.plate.model_dump(exclude={"thickness", "size", "margin", "pattern"})
-    return json.dumps(of_plate | campaign.interaction.model_dump())
+    law = campaign.interaction.model_dump(exclude={"free_surface"})
+    free = campaign.interaction.free_surface
+    of_surfaces = {} if free is None else {f"free_surface.{key}": value for key, value in free.model_dump().items()}
+    return json.dumps(of_plate | law | of_surfaces)
 
 
 def _plate(campaign: Campaign) -> str:

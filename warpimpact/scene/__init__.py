@@ -6,7 +6,7 @@ imports view for drawings, and no other room: neither a kernel nor a Dataset.
 
 from .burst import Burst, BurstSampler
 from .core import AnyCore, ConeCore, Core, MassProperties, OgiveCore, PolynomialCore, ProfileCore
-from .interaction import Interaction
+from .interaction import FreeSurface, Interaction
 from .numerics import PRESETS, Accuracy, Coarser, Numerics
 from .patterns import (
     AnyPattern,

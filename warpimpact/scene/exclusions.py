@@ -25,6 +25,7 @@ BY_TIME, STAGGERED, HOLES = "plate.degradation_interval", "staggered", "holes"
 CELLS = 'shape = "supershape", "level_set" or "polygons"'
 THICKNESS, AREAL_DENSITY = "thickness", "areal_density"
 SPACING, OFFSETS, HIT_SCATTER = "burst.spacing", "burst.offsets", "burst.scatter"
+FREE_SURFACE = "interaction.free_surface"
 LIMIT = "warpimpact limit"
 
 
@@ -57,6 +58,8 @@ EXCLUDED = (
     Rule(BY_PATH, NODAL, "the nodal scheme weakens the plate once per time step"),
     Rule(BENDING, NODAL, "the nodal scheme has no bending moment"),
     Rule(DEEP, NODAL, "the nodal scheme weakens the whole thickness at once, so the depth must be no less"),
+    Rule(FREE_SURFACE, NODAL, "the nodal scheme has the same stress everywhere"),
+    Rule(FREE_SURFACE, BURST, "it does not know the channels of earlier hits"),
     Rule(BENDING, MASS_PROPERTIES, "it needs the mass of every slice, which follows from the shape alone"),
     *(Rule(BLOCK, other, _BY_BLOCK) for other in (NODAL, DOUBLE, BENDING)),
     Rule(IMAGES, TURNED, "a symmetry must hold for every shot; of the impact quantities only velocity may scatter"),

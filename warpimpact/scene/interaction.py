@@ -5,7 +5,27 @@ from typing import Any
 import numpy as np
 
 from .model import Model
-from .units import NonNegativeNumber
+from .units import NonNegativeNumber, PositiveNumber
+
+
+class FreeSurface(Model):
+    """How material near a face or an edge resists less (docs/model.md §4.9). r is the radius of the core at a surface
+    element, H the thickness of the layer.
+
+    Attributes:
+        reach: λ; A·Y is divided by 1 + (r / λH)^q.
+        power: q, of r / λH.
+        cover: k; the element presses by 1 − exp(−k b / r), b the length of material ahead of it along its normal in the
+            plane of the layer.
+        carried: s; of the material behind the element, which the core pushes ahead of itself, this share adds to b.
+        gap: t; of the distance from there to an element in a hole, this share is taken off.
+    """
+
+    reach: PositiveNumber = 1.0
+    power: PositiveNumber = 2.0
+    cover: PositiveNumber = 2.0
+    carried: NonNegativeNumber = 0.2
+    gap: NonNegativeNumber = 0.05
 
 
 class Interaction(Model):
@@ -21,12 +41,14 @@ class Interaction(Model):
         onset: κ, closing speed over which contact sets in, as a share of the speed v of the centre of mass. Normal
             stress, friction and exposure are multiplied by min(1, v_n / (κ v)). With 0 contact sets in at once; the
             outcome of a wall with friction that slides along itself, such as a shank, then depends on the numerics.
+        free_surface: how material near faces and edges resists less; without it, it does not.
     """
 
     static: NonNegativeNumber = 1.0
     linear: NonNegativeNumber = 0.0
     quadratic: NonNegativeNumber = 0.0
     onset: NonNegativeNumber = 0.005
+    free_surface: FreeSurface | None = None
 
 
 def coefficients(static: Any, linear: Any, quadratic: Any, resistance: Any, density: float) -> tuple[Any, Any, Any]:

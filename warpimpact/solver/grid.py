@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from warpimpact.solver.cover import Cover, Pushed, cover_of
 from warpimpact.solver.materials import ROUNDING
 from warpimpact.solver.tile import Tile, tile_of
 
@@ -63,6 +64,7 @@ class Grid:
         spacing: of the window's grid [m].
         taps: the tent's filter from its middle on, and one 0.
         planes: of the window's grid through the thickness.
+        cover: material along a normal, where a free surface counts.
     """
 
     tile: Tile
@@ -71,6 +73,12 @@ class Grid:
     spacing: float
     taps: Array
     planes: Planes = WHOLE
+    cover: Cover | None = None
+
+    @property
+    def tiles(self) -> list[Tile]:
+        """What is computed before the first shot."""
+        return [self.tile] if self.cover is None else [self.tile, self.cover]
 
     @property
     def reach(self) -> int:
@@ -86,6 +94,7 @@ def grids_of(
     *,
     deep: bool,
     shared: bool,
+    cover: Pushed | None,
 ) -> list[Grid]:
     """The grids of some layers, whose cells are as wide as their degradation lengths have it.
 
@@ -93,15 +102,22 @@ def grids_of(
         lengths: over which the layers weaken, in the place of their own.
         deep: whether windows have planes through the thickness.
         shared: whether plates of other degradation lengths have the same tiles, in finer cells than they need.
+        cover: what their covers depend on; None without a free surface.
     """
     return [
-        _grid(plate, resolution, reach, reach.length / lengths[0].length, material if deep else None, shared)
+        _grid(plate, resolution, reach, reach.length / lengths[0].length, material if deep else None, shared, cover)
         for plate, reach, material in zip(layers, lengths, materials, strict=True)
     ]
 
 
 def _grid(
-    plate: Plate, resolution: Resolution, own: Lengths, wider: float, deep: Materials | None, shared: bool
+    plate: Plate,
+    resolution: Resolution,
+    own: Lengths,
+    wider: float,
+    deep: Materials | None,
+    shared: bool,
+    cover: Pushed | None,
 ) -> Grid:
     """The grid of a layer with some degradation lengths. Its cells are `wider` times as wide as those of the plate.
 
@@ -125,6 +141,7 @@ def _grid(
         spacing=spacing,
         taps=taps,
         planes=planes,
+        cover=None if cover is None else cover_of(plate, cells, cover, double=resolution.double),
     )
 
 

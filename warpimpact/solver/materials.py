@@ -42,6 +42,7 @@ class Materials:
         a0, a1, a2, friction, degradation, decay_rate: of the law (kernels/interaction.py).
         onset_jump: of the law if the core touches this layer alone; all the layers that it touches add theirs.
         most_jump: that of a layer of this material as thick as the core is long, which is the most that all can add.
+        per_reach: 1 / λH of a free surface [1/m]; 0 without one.
         by_path: whether exposure counts the path of the core, not the time.
         laminate: the first layer of those with which it shares the memory of contact.
         weakens: whether it keeps such a memory.
@@ -62,6 +63,7 @@ class Materials:
     decay_rate: Array
     onset_jump: Array
     most_jump: Array
+    per_reach: Array
     by_path: bool
     laminate: int
     weakens: bool
@@ -119,6 +121,7 @@ def _material(
         for name in ("resistance", "shear_coefficient", "degradation", "offset_y", "offset_z")
     )
     interaction, is_plate = scene.interaction, layer == 0
+    free = interaction.free_surface
     static, linear, quadratic = (
         shots.own(name, getattr(interaction, name)) for name in ("static", "linear", "quadratic")
     )
@@ -140,6 +143,7 @@ def _material(
         decay_rate=decay_rate(degradation, plate.degradation_unit),
         onset_jump=onset_jump(core, thickness, mass, a0),
         most_jump=onset_jump(core, np.array([core.length]), mass, a0),
+        per_reach=np.zeros(1) if free is None else 1.0 / (free.reach * thickness),
         by_path=plate.degradation_distance is not None,
         laminate=laminate,
         weakens=weakens,

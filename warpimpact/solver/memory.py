@@ -160,10 +160,12 @@ class Memory:
             setattr(fields, name, room(slots * fields.nodes))
         patches, rings = slots * self._patches, slots * self.rings
         members = ["area", "slope", "shift", "gain", "y", "z", "x" * self.variant.deep, "ahead" * self.variant.burst]
+        free = self.variant.free_surface
+        members += [f"cover_{name}" * free for name in ("y", "z", "turn", "decay")]
         for name in filter(None, members):
             setattr(touches, name, room(patches))
         places = ["row", "column", "plane"] if self.variant.deep else []
-        for name in filter(None, ["tile", "cell", "place" * self.variant.burst, *places]):
+        for name in filter(None, ["tile", "cell", "place" * self.variant.burst, "cover" * free, *places]):
             setattr(touches, name, wp.empty(patches, dtype=wp.int32, device=self.device))
         touches.ring_area = room(rings)
         if self.variant.bends:

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from warpimpact.kernels.variant import Variant
 from warpimpact.scene import exclusions
+from warpimpact.solver.cover import Pushed
 from warpimpact.solver.grid import Grid, Lengths, grids_of
 from warpimpact.solver.materials import OWN_LENGTHS, Materials, materials_of
 from warpimpact.solver.resolution import Resolution, conditions_of, layer_steps, resolve, steps_of
@@ -96,7 +97,7 @@ class Prepared:
     @property
     def tiles(self) -> set[Tile]:
         """Those of all plates."""
-        return {grid.tile for grids in self.plates for grid in grids}
+        return {tile for grids in self.plates for grid in grids for tile in grid.tiles}
 
     @property
     def cells(self) -> int:
@@ -190,16 +191,20 @@ def prepare(scene: Scene, shots: Shots, numerics: Numerics) -> Prepared:
             exclusions.BY_PATH: any(material.by_path for material in materials),
             exclusions.BURST: burst,
             exclusions.DEEP: deep,
+            exclusions.FREE_SURFACE: interaction.free_surface is not None,
         }
     )
     # A shot is computed by the same build in any company: what counts is which quantities may differ, not the values.
     deep |= not resolution.nodal and any(weakening[k] and shots.differs("thickness", k) for k, _ in plates)
     deep |= not resolution.nodal and weakening[0] and "degradation_depth" in shots.columns
+    cover = None if interaction.free_surface is None else Pushed.of(interaction.free_surface, core)
     grids = [
-        grids_of(target.layers, materials, resolution, length, deep=deep, shared=shared)
+        grids_of(target.layers, materials, resolution, length, deep=deep, shared=shared, cover=cover)
         for length, resolution in zip(lengths, resolutions, strict=True)
     ]
-    check_tiles({grid.tile: place for of in grids for grid, (place, _) in zip(of, target.named, strict=True)})
+    check_tiles(
+        {tile: place for of in grids for grid, (place, _) in zip(of, target.named, strict=True) for tile in grid.tiles}
+    )
     first_cells = first_windows(core, shots, materials[0], grids, which, nodal=resolution.nodal)
     variant = Variant(
         double=resolution.double,
@@ -209,6 +214,7 @@ def prepare(scene: Scene, shots: Shots, numerics: Numerics) -> Prepared:
         rate_dependent=any(
             getattr(interaction, name) > 0.0 or name in shots.columns for name in ("linear", "quadratic")
         ),
+        free_surface=interaction.free_surface is not None,
         rimmed=any(plate.size is not None for _, plate in plates),
         bends=record.bending,
         layered=len(plates) > 1,

@@ -16,6 +16,7 @@ from warpimpact.solver.keys import Key
 
 if TYPE_CHECKING:
     from warpimpact.scene import Core
+    from warpimpact.solver.cover import Cover
     from warpimpact.solver.grid import Grid
     from warpimpact.solver.prepare import Prepared
     from warpimpact.solver.rings import Rings
@@ -86,11 +87,16 @@ def inputs_of(stage: Any, prepared: Prepared, put: Put) -> tuple[Any, list[Any]]
         surfaces=table_of(stage.Surface, surfaces if variant.tabled else [], put, **most),
         all_sections=table_of(stage.Sections, sections if variant.tabled else [], put),
         target=target,
-        law=filled(stage.Law, onset_limit=LARGEST_ONSET),
+        law=filled(stage.Law, onset_limit=LARGEST_ONSET, **_free_surface(prepared)),
         shots=filled(stage.Shots, **shots),
         rows=prepared.rows,
     )
     return inputs, [surfaces, sections, plates]
+
+
+def _free_surface(prepared: Prepared) -> dict[str, float]:
+    free = prepared.scene.interaction.free_surface
+    return {} if free is None else {"power": free.power, "cover": free.cover}
 
 
 def _target_of(stage: Any, prepared: Prepared, put: Put) -> tuple[Any, Any]:
@@ -201,10 +207,26 @@ def plate_of(struct: Any, grid: Grid, put: Put) -> Any:
     plate.spacing = grid.spacing
     plate.taps, plate.reach = put(grid.taps, aligned=True), grid.reach
     plate.planes, plate.per_plane, plate.plane_reach = grid.planes.number, 1.0 / grid.planes.spacing, grid.planes.reach
+    if grid.cover is not None:
+        plate.cover = _cover_on_device(grid.cover, put)
+        plate.cover_y, plate.cover_z = grid.cover.shape
+        plate.directions = grid.cover.directions
+        plate.cover_per_y, plate.cover_per_z = 1.0 / grid.cover.dy, 1.0 / grid.cover.dz
+        plate.cover_per_row, plate.cover_per_column = (
+            count / cells for count, cells in zip(grid.cover.shape, grid.tile.shape, strict=True)
+        )
     return plate
 
 
-_ON_DEVICE: WeakKeyDictionary[Tile, dict[Put, tuple[Any, Any]]] = WeakKeyDictionary()
+_ON_DEVICE: WeakKeyDictionary[Tile, dict[Put, tuple[Any, ...]]] = WeakKeyDictionary()
+
+
+def _cover_on_device(cover: Cover, put: Put) -> Any:
+    """The table of a cover, kept as that of a tile."""
+    kept = _ON_DEVICE.setdefault(cover, {})
+    if put not in kept:
+        kept[put] = (put(cover.material.reshape(-1)),)
+    return kept[put][0]
 
 
 def _on_device(tile: Tile, put: Put) -> tuple[Any, Any]:

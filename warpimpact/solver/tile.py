@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property, partial
 from threading import Lock
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,6 +25,7 @@ Array = NDArray[np.float64]
 Floats = NDArray[np.floating[Any]]
 Counts = NDArray[np.int16]
 Real = type[np.floating[Any]]
+Kept = TypeVar("Kept", bound="Tile")
 
 BLUR = 3
 """Cells of the tile over which its material is averaged, in each direction: a patch then crosses an edge gradually.
@@ -109,16 +110,21 @@ def tile_of(plate: Plate, spacing: float, *, sharp: bool = False, double: bool =
     cell's centre alone, as the literal scheme does, and `double` has them in float64.
     """
     key: Key[Pattern] = Key(plate.pattern)
-    asked = (key, spacing, sharp, np.float64 if double else np.float32)
+    real: Real = np.float64 if double else np.float32
+    return kept((key, spacing, sharp, real), lambda: _planned(key, spacing, sharp, real))
+
+
+def kept(asked: Any, planned: Callable[[], Kept]) -> Kept:
+    """The tile that was planned for what is asked, now or before."""
     with _KEEPING:
-        tile = _KEPT.pop(asked, None) or _planned(*asked)
+        tile: Kept = _KEPT.pop(asked, None) or planned()
         _KEPT[asked] = tile
         if len(_KEPT) > MOST_KEPT:
             _KEPT.popitem(last=False)
     return tile
 
 
-_KEPT: OrderedDict[Any, Tile] = OrderedDict()
+_KEPT: OrderedDict[Any, Any] = OrderedDict()
 _KEEPING = Lock()
 
 
