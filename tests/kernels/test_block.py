@@ -20,6 +20,7 @@ from warpimpact.kernels.variant import Variant
 from warpimpact.scene import (
     CirclePattern,
     Core,
+    FreeSurface,
     Impact,
     Interaction,
     Layer,
@@ -62,7 +63,7 @@ class Case(NamedTuple):
     core: Core = CORE
     plate: Plate = SLOTTED
     impact: dict[str, float] = NORMAL
-    interaction: dict[str, float] = NORMAL
+    interaction: dict[str, Any] = NORMAL
     behind: tuple[Layer, ...] = ()
     at_a_plate: int = 1
 
@@ -86,12 +87,13 @@ SCENES = {
         plate=SLOTTED.model_copy(update={"thickness": 6e-3}),
         behind=(WEAK.model_copy(update={"thickness": 8e-3}), LAMINATE.model_copy(update={"gap": 5e-3})),
     ),
+    "near a free surface": Case(plate=SOUND, impact=OBLIQUE, interaction={"free_surface": FreeSurface()}),
     "a burst": Case(plate=SOUND, at_a_plate=3),
     "a burst at layers": Case(impact={"obliquity": 0.2}, behind=(WEAK,), at_a_plate=3),
 }
 ON_CUDA = ("no degradation", "a burst")
 """Scenes that differ from others in what is left out of a build, which takes 10 s of a core to compile on a CPU."""
-CHECKED = ("slots", "thick layers", "a burst at layers")
+CHECKED = ("slots", "thick layers", "near a free surface", "a burst at layers")
 """Those that together read and write all arrays, whose bounds the debug mode checks."""
 IN_RELEASE = pytest.mark.skipif("config.getoption('warp_mode') == 'debug'", reason="others read and write these arrays")
 ROUNDING = {"residual_velocity": 0.1, "tilt": np.radians(0.5)}
