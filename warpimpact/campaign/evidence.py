@@ -42,7 +42,7 @@ def limit_velocity_factors(campaign: Campaign) -> tuple[float, float] | None:
     """
     plate, law = campaign.plate, campaign.interaction
     alone = not campaign.layer and plate == plate.solid and plate.degradation == 1.0
-    if not alone or law.linear or law.quadratic:
+    if not alone or law.linear or law.quadratic or law.free_surface:
         return None
     known = catalogue_resistance(campaign, plate)
     if known is None or not known.deviation:
@@ -82,6 +82,7 @@ def _of_material(campaign: Campaign, place: str, plate: Plate, catalogue: Catalo
         "density": (plate.density, material.density),
         **{name: (getattr(campaign.interaction, name), getattr(material, name)) for name in ("linear", "quadratic")},
         "onset": (campaign.interaction.onset, material.onset),
+        "free_surface": (campaign.interaction.free_surface, None),
     }
     differing = [name for name, pair in expected.items() if not _same(*pair)]
     interval = "" if "resistance" in differing or not known.deviation else _interval(*known.ends)

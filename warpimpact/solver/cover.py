@@ -35,7 +35,7 @@ FAR = 4.0
 """Radii of the core up to which edges are searched."""
 SOLID = 1.0e3
 """Length ahead in a plate without holes [m]: nothing is left of an exponential of it."""
-PER_LENGTH = 2.5e-7
+PER_LENGTH = 1.3e-7
 """Seconds of a core per node and direction."""
 
 

@@ -288,6 +288,7 @@ def test_resistance_is_of_material_threat_thickness_and_angle(folder: Path) -> N
         {"plate": {"material": "HHA Class 1", "thickness": "6 mm", "degradation": 0.9}},
         {"layer": [{"material": "HHA Class 1", "thickness": "6 mm"}]},
         {"interaction": {"quadratic": 0.5}},
+        {"interaction": {"free_surface": {}}},
         {"plate": {"thickness": "6 mm", "resistance": "4 GPa"}},
         {"plate": {"material": "plate B", "thickness": "6 mm"}},  # whose interval is not known
     ],

@@ -243,6 +243,10 @@ def test_shots_of_all_draws_are_computed_together(tmp_path: Path, name: str, siz
             ("[impact]", "[interaction]\nonset = 0.01\n[impact]"),
             "interaction.onset = 0.005, but the campaign has 0.01",
         ),
+        (
+            ("[impact]", "[interaction.free_surface]\n[impact]"),
+            "found with interaction.free_surface = None, but the campaign has",
+        ),
         (("degradation = 0.8", 'degradation = 0.8\ndegradation_distance = "1 mm"'), "gives plate.degradation_interval"),
         (
             ('resistance = "1 GPa"', 'resistance = { distribution = "uniform", low = "1 GPa", high = "2 GPa" }'),
