@@ -1,11 +1,10 @@
 """A bench of contact laws: a law is fitted to the continuum's hits of some plates, and predicts those of others.
 
-    python -m tests.validation.laws [LAW …] [--fit slotted,thin] [--plates slotted,thin,thick,oblique,solid_12]
+    python -m tests.validation.laws [LAW …] [--fit slotted,thin,solid_12] [--plates slotted,thin,…,kept_a] [--every 2]
 
-A law gives the normal stress of a surface element from what is near: faces and edges, along the normal and at all, and
-its closing speed. `march` is a small rigid body that has nothing but the law, friction and a narrow onset: no
-weakening. So a law takes some lines, and a hit a few milliseconds. With a constant stress it agrees with the package at
-β = 1 (`--check`). The rows are those of tests/benchmarks/continuum_trade.py; what was found is in
+A law gives the normal stress of a surface element from what is near: faces and edges, along the normal and at all, what
+the core has pushed ahead, and the closing speed (law_march.py). With a constant stress the march agrees with the
+package at β = 1 (`--check`). The rows are those of tests/benchmarks/continuum_trade.py; what was found is in
 tests/benchmarks/NOTES.md.
 """
 
@@ -19,210 +18,36 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import warp as wp
-from numpy.typing import NDArray
 from scipy.optimize import minimize
 
 BENCHMARKS = Path(__file__).resolve().parents[1] / "benchmarks"
 sys.path.insert(0, str(BENCHMARKS))
 
 from bench import launch_state, tilt_behind  # noqa: E402
-from continuum_cases import CASES, measured, written  # noqa: E402
+from continuum_cases import CASES, KEPT, measured, written  # noqa: E402
 
-from warpimpact import Core, Numerics, Scene, simulate  # noqa: E402
+from warpimpact import Numerics, Scene, simulate  # noqa: E402
 
-Array = NDArray[np.float64]
-real = wp.float64
-FAR = 0.02
-"""Where no edge is nearer along the normal [m]."""
-ONSET, STEADY = 0.01, 0.5
-"""Onset of contact as a share of the speed; and of what a wall of 2 GPa does to the core in a step."""
-EDGE, SPACING = 5e-5, 5e-5
-"""Over which a hole's edge is blurred, and the spacing of the distances to it [m]."""
+from .law_march import FAR, Array, Near, built, real, rings_of  # noqa: E402
+
+STEADY = 0.5
+"""What a wall of 2 GPa may do to the core in a step, as a share of its speed across the onset."""
+SPACING = 5e-5
+"""Of the distances to the edges of holes [m]."""
 SCALES = np.array([5.0, 5.0, 10.0])
 """Of the misfit: m/s, ° at 50 mm, ° at 130 mm. Those of a solid plate's velocities are three times as large."""
-ROUNDS = 70
-"""Evaluations of a fit for each parameter."""
-
-
-@wp.struct
-class Near:
-    """What is near a surface element. Lengths are in metres.
-
-    Attributes:
-        face, edge: distance along the normal to a face of the plate, and to the edge of a hole.
-        nearest_face, nearest_edge: the same, at all.
-        radius, widest: of the core there, and at most.
-        thickness: of the plate.
-        closing: speed of the element along its normal [m/s].
-    """
-
-    face: real
-    edge: real
-    nearest_face: real
-    nearest_edge: real
-    radius: real
-    widest: real
-    thickness: real
-    closing: real
-
-
-@wp.func
-def distance_at(tile: wp.array2d(dtype=real), cell: wp.vec2d, y: real, z: real):
-    """Distance from the nearest edge at a point [m], negative in a hole; bilinear in a periodic tile."""
-    across, along = y / cell[0], z / cell[1]
-    row, column = wp.floor(across), wp.floor(along)
-    b, c = across - row, along - column
-    rows, columns = tile.shape[0], tile.shape[1]
-    i, j = ((wp.int32(row) % rows) + rows) % rows, ((wp.int32(column) % columns) + columns) % columns
-    k, m = (i + 1) % rows, (j + 1) % columns
-    one = real(1.0)
-    return (one - b) * ((one - c) * tile[i, j] + c * tile[i, m]) + b * ((one - c) * tile[k, j] + c * tile[k, m])
-
-
-@wp.func
-def edge_along(tile: wp.array2d(dtype=real), cell: wp.vec2d, y: real, z: real, unit_y: real, unit_z: real):
-    """Distance in the plane of the plate from a point to an edge in a direction [m], at most FAR."""
-    way = wp.max(distance_at(tile, cell, y, z), real(0.0))
-    left = real(1.0) * way
-    tries = int(0)
-    while tries < 16 and way < real(FAR) and left > real(2e-5):
-        left = distance_at(tile, cell, y + way * unit_y, z + way * unit_z)
-        way += wp.max(left, real(2e-5))
-        tries += 1
-    return wp.where(left > real(2e-5), real(FAR), wp.min(way, real(FAR)))
-
-
-def built(law: Any) -> Any:
-    """The march under a law, a function of the parameters and of what is near."""
-
-    @wp.kernel(module="unique")
-    def march(
-        start: wp.array2d(dtype=real),
-        hits: wp.array2d(dtype=real),
-        rings: wp.array2d(dtype=real),
-        around: wp.int32,
-        tile: wp.array2d(dtype=real),
-        cell: wp.vec2d,
-        body: wp.array(dtype=real),
-        parameters: wp.array(dtype=real),
-        ends: wp.array2d(dtype=real),
-    ):
-        i = wp.tid()
-        zero, half, one = real(0.0), real(0.5), real(1.0)
-        mass, axial, transverse, thickness = body[0], body[1], body[2], body[3]
-        place = wp.vec3d(start[i, 0], start[i, 1], start[i, 2])
-        axis = wp.vec3d(start[i, 3], start[i, 4], start[i, 5])
-        velocity = wp.vec3d(start[i, 6], start[i, 7], start[i, 8])
-        momentum = wp.vec3d()
-        first = wp.length(velocity)
-        dt = body[4] / first
-        sector = real(2.0 * math.pi) / real(around)
-        status = int(-1)
-        steps = int(0)
-        drift = half * dt
-        while status < 0 and steps < 4000:
-            steps += 1
-            place = place + drift * velocity
-            size = wp.length(momentum)
-            if size > real(1e-12):
-                angle, about = size / transverse * drift, momentum / size
-                along = wp.dot(about, axis) * about
-                axis = wp.normalize(along + wp.cos(angle) * (axis - along) + wp.sin(angle) * wp.cross(about, axis))
-            drift = dt
-            aside = wp.where(wp.abs(axis[2]) < real(0.9), wp.vec3d(zero, zero, one), wp.vec3d(zero, one, zero))
-            right = wp.normalize(wp.cross(axis, aside))
-            up = wp.cross(axis, right)
-            spin = momentum / transverse + (wp.dot(momentum, axis) * (one / axial - one / transverse)) * axis
-            speed = wp.length(velocity)
-            onset = wp.max(real(ONSET) * speed, body[6] * dt)
-            force = wp.vec3d()
-            moment = wp.vec3d()
-            rear = real(1.0)
-            front = real(-1.0)
-            for k in range(rings.shape[0]):
-                station, radius, length = rings[k, 0], rings[k, 1], rings[k, 5]
-                middle = place[0] + station * axis[0]
-                extent = radius * wp.sqrt(wp.max(zero, one - axis[0] * axis[0])) + length
-                rear, front = wp.min(rear, middle - extent), wp.max(front, middle + extent)
-                if middle + extent > zero and middle - extent < thickness:
-                    for j in range(around):
-                        azimuth = (real(j) + half) * sector
-                        outward = wp.cos(azimuth) * right + wp.sin(azimuth) * up
-                        arm = station * axis + radius * outward
-                        x = place + arm
-                        normal = rings[k, 2] * axis + rings[k, 3] * outward
-                        moving = velocity + wp.cross(spin, arm)
-                        closing = wp.dot(moving, normal)
-                        share = wp.clamp(closing / onset, zero, one)
-                        share *= wp.clamp(half + half * x[0] / length, zero, one)
-                        share *= wp.clamp(half + half * (thickness - x[0]) / length, zero, one)
-                        y, z = x[1] + hits[i, 0], x[2] + hits[i, 1]
-                        if share > zero:
-                            inside = distance_at(tile, cell, y, z)
-                            share *= wp.clamp(inside / real(EDGE) + half, zero, one)
-                            depth = wp.clamp(x[0], zero, thickness)
-                            steep = wp.max(wp.abs(normal[0]), real(1e-3))
-                            flat = wp.max(wp.sqrt(normal[1] * normal[1] + normal[2] * normal[2]), real(1e-3))
-                            near = Near()
-                            near.face = wp.where(normal[0] > zero, thickness - depth, depth) / steep
-                            near.edge = edge_along(tile, cell, y, z, normal[1] / flat, normal[2] / flat) / flat
-                            near.nearest_face = wp.min(depth, thickness - depth)
-                            near.nearest_edge = wp.max(inside, zero)
-                            near.radius = radius
-                            near.widest = body[5]
-                            near.thickness = thickness
-                            near.closing = closing
-                            sliding = moving - closing * normal
-                            rubbing = parameters[0] / wp.max(wp.length(sliding), real(1e-5) * speed)
-                            pressing = law(parameters, near) * share * rings[k, 4]
-                            part = -pressing * (normal + rubbing * sliding)
-                            force += part
-                            moment += wp.cross(arm, part)
-            if rear > thickness and velocity[0] > zero:
-                status = 0
-            elif (front < zero and velocity[0] < zero) or speed < real(0.01) * first:
-                status = 1
-            velocity = velocity + dt / mass * force
-            momentum = momentum + dt * moment
-        ends[i, 0] = real(status)
-        for m in range(3):
-            ends[i, 1 + m] = place[m]
-            ends[i, 4 + m] = axis[m]
-            ends[i, 7 + m] = velocity[m]
-            ends[i, 10 + m] = momentum[m]
-
-    return march
-
-
-def rings_of(core: Core, axial: int, around: int) -> Array:
-    """Station ahead of the centre of mass and radius [m], normal along the axis and outwards, area of an element [m²],
-    half its length [m]; shape [rings, 6]."""
-    stations = np.linspace(0.0, core.length, 4001)
-    widest = stations[core.radius(stations).argmax()]
-    fore = max(1, round(axial * widest / core.length))
-    behind = np.linspace(widest, core.length, max(1, axial - fore) + 1)[1:]
-    edges = np.append(np.linspace(0.0, widest, fore + 1), behind)
-    edges = edges[np.append(True, np.diff(edges) > 1e-9)]
-    radii, middle, half = core.radius(edges), 0.5 * (edges[1:] + edges[:-1]), 0.5 * np.diff(edges)
-    forward = 0.5 * np.diff(radii**2)
-    outward = (radii[1:] + radii[:-1] + 4.0 * core.radius(middle)) / 6.0 * np.diff(edges)
-    middle, radius = np.append(0.0, middle), np.append(2.0 / 3.0 * radii[0], core.radius(middle))
-    forward, outward, half = np.append(0.5 * radii[0] ** 2, forward), np.append(0.0, outward), np.append(2e-5, half)
-    kept = np.hypot(forward, outward) > 0.0
-    area = np.hypot(forward, outward)[kept]
-    columns = (core.mass_properties.centre_of_mass - middle[kept], radius[kept])
-    normal = (forward[kept] / area, outward[kept] / area)
-    return np.stack([*columns, *normal, 2.0 * np.pi / around * area, np.maximum(0.9 * half[kept], 2e-5)], axis=1)
+ROUNDS = 45
+"""Evaluations of a fit for each free parameter."""
 
 
 class Plate:
     """The hits of a plate: what the continuum says of those that perforate, and what a law does."""
 
-    def __init__(self, name: str, rows: list[dict[str, str]]) -> None:
+    def __init__(self, name: str, rows: list[dict[str, str]], every: int = 1) -> None:
         known = measured(rows, name, "continuum")
-        self.name, self.case, self.hits = name, CASES[name], np.array(sorted(known))
+        self.name, self.case, self.hits = name, {**CASES, **KEPT}[name], np.array(sorted(known))[::every]
         self.truth = np.array([known[hit] for hit in self.hits])
-        self.solid = name.startswith("solid")
+        self.solid = self.case.layers[0].open_area == 0.0
         self.plate, core = self.case.layers[0], self.case.core
         self.shots = self.case.shots(int(self.hits.max()) + 1)[self.hits]
         self.flight, axis, place = launch_state(core, self.shots)
@@ -328,35 +153,84 @@ def nearest(p: wp.array(dtype=real), near: Near):
     return p[1] * real(1e9) * (real(1.0) - wp.exp(-way / (wp.abs(p[2]) * near.radius) - wp.abs(p[3])))
 
 
+@wp.func
+def linear(p: wp.array(dtype=real), near: Near):
+    """A constant and a stress of the speed."""
+    return p[1] * real(1e9) + p[2] * of_speed(p[1], near)
+
+
+@wp.func
+def of_speed(strength: real, near: Near):
+    """√(ρ P) v of steel [Pa]: the middle term of spherical cavity expansion."""
+    return wp.sqrt(strength * real(1e9) * real(7850.0)) * near.closing
+
+
+@wp.func
+def confined(p: wp.array(dtype=real), near: Near):
+    """The logarithm of the thickness over the radius there, and a stress of the speed."""
+    return p[1] * real(1e9) * wp.log(real(1.0) + near.thickness / near.radius) + p[2] * of_speed(p[1], near)
+
+
+@wp.func
+def bounded(p: wp.array(dtype=real), near: Near):
+    """A share of the stress deep inside that grows with the thickness over the radius there, and a stress of the
+    speed."""
+    deep = near.thickness / (near.thickness + near.radius)
+    return p[1] * real(1e9) * deep + p[2] * of_speed(p[1], near)
+
+
+@wp.func
+def covered(p: wp.array(dtype=real), near: Near):
+    """As `bounded`, times a share that grows with the material ahead and with what the core has pushed ahead of it,
+    which presses in a hole, too."""
+    cover = near.ahead + wp.max(p[4] * near.carried - p[5] * near.gap, real(0.0))
+    return bounded(p, near) * (real(1.0) - wp.exp(-p[3] * cover / near.radius))
+
+
 class Law(NamedTuple):
-    """A law and the parameters from which a fit begins."""
+    """A law, the parameters from which a fit begins, those that it does not change, and whether material that the core
+    has pushed into a hole presses."""
 
     stress: Any
     begin: tuple[float, ...]
+    held: tuple[int, ...] = ()
+    pushes: bool = False
+    lip: float = 0.0
 
 
 LAWS = {
     "constant": Law(constant, (0.05, 1.8)),
+    "constant_smooth": Law(constant, (0.0, 2.2), (0,)),
     "inertial": Law(inertial, (0.05, 1.6, 0.3)),
     "thicker": Law(thicker, (0.05, 1.8, 0.3)),
     "cavity": Law(cavity, (0.05, 0.5, 0.2)),
     "near_edges": Law(near_edges, (0.05, 2.2, 0.3, 0.3)),
     "near_any": Law(near_any, (0.05, 2.5, 0.4, 0.3)),
     "nearest": Law(nearest, (0.05, 2.5, 0.2, 0.3)),
+    "linear": Law(linear, (0.0, 1.1, 4.0), (0,)),
+    "confined": Law(confined, (0.0, 1.3, 2.5), (0,)),
+    "bounded": Law(bounded, (0.0, 2.8, 1.0), (0, 2)),
+    "covered": Law(covered, (0.0, 2.5, 1.8, 1.2, 0.5, 0.05), (0, 5), True),
+    "covered_bulging": Law(covered, (0.0, 2.5, 1.8, 0.9, 0.5, 0.05), (0, 5), True, 0.4),
 }
 
 
 def fitted(law: Law, march: Any, plates: list[Plate]) -> Array:
     """The parameters that miss the plates least, each plate alike; none is negative."""
-    begin, count = np.array(law.begin), len(law.begin)
+    begin = np.array(law.begin)
+    free = np.setdiff1d(np.arange(len(begin)), law.held)
+
+    def parameters(factors: Array) -> Array:
+        found = begin.copy()
+        found[free] *= np.abs(factors)
+        return found
 
     def misfit(factors: Array) -> float:
-        missed = sum(plate.misfit(march, factors * begin) for plate in plates)
-        return missed + 1e3 * float(np.maximum(-factors, 0.0).sum())
+        return sum(plate.misfit(march, parameters(factors)) for plate in plates)
 
-    simplex = np.ones((count + 1, count)) + np.vstack([np.zeros(count), np.diag([0.5] + [0.25] * (count - 1))])
-    options = {"maxfev": ROUNDS * count, "xatol": 0.01, "fatol": 0.005, "initial_simplex": simplex}
-    return np.asarray(minimize(misfit, simplex[0], method="Nelder-Mead", options=options).x * begin)
+    simplex = np.ones((len(free) + 1, len(free))) + np.vstack([np.zeros(len(free)), 0.3 * np.eye(len(free))])
+    options = {"maxfev": ROUNDS * len(free), "xatol": 0.01, "fatol": 0.005, "initial_simplex": simplex}
+    return parameters(minimize(misfit, simplex[0], method="Nelder-Mead", options=options).x)
 
 
 def check(plates: list[Plate]) -> None:
@@ -379,12 +253,14 @@ def main() -> None:
     """Fit laws to some plates, and print what each gives at all of them."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("laws", nargs="*", metavar="LAW", help=f"of {', '.join(LAWS)} (default: all)")
-    parser.add_argument("--fit", default="slotted,thin")
-    parser.add_argument("--plates", default="slotted,thin,thick,oblique,solid_12")
+    parser.add_argument("--fit", default="slotted,thin,solid_12")
+    parser.add_argument("--plates", default="slotted,thin,solid_12,thick,oblique", help="any of CASES and KEPT")
+    parser.add_argument("--every", type=int, default=1, help="fit to every such hit (default: 1)")
     parser.add_argument("--check", action="store_true", help="compare the march with the package, and fit nothing")
     given = parser.parse_args()
     wp.config.quiet = True
-    rows = written(BENCHMARKS / "results" / "continuum_trade.csv")
+    results = BENCHMARKS / "results"
+    rows = [row for name in ("trade", "kept") for row in written(results / f"continuum_{name}.csv")]
     plates = [Plate(name, rows) for name in given.plates.split(",")]
     if given.check:
         check(plates)
@@ -392,8 +268,8 @@ def main() -> None:
     inside = given.fit.split(",")
     for name in given.laws or LAWS:
         law = LAWS[name]
-        march = built(law.stress)
-        parameters = fitted(law, march, [plate for plate in plates if plate.name in inside])
+        march = built(law.stress, law.pushes, law.lip)
+        parameters = fitted(law, march, [Plate(name, rows, given.every) for name in inside])
         print(f"{name}: {parameters.round(3)}")
         for plate in plates:
             print(f"   {'in ' if plate.name in inside else 'out'} {plate.line(march, parameters)}", flush=True)
