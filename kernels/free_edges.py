@@ -1,8 +1,8 @@
 """How much of a patch presses on a plate with holes: the material ahead of it, along its normal (docs/model.md §4.9).
 
-A table has the length of this material, the cover, at the nodes of a period and in directions in the plane of the
-plate. A length is negative where its node, or a neighbour, has no material: there the tile decides how much of a patch
-is on material.
+A table has the length of this material, the cover, at the nodes of a period, in directions in the plane of the plate
+and for radii of the core. A length is negative where its node, or a neighbour, has no material: there the tile decides
+how much of a patch is on material.
 """
 
 from functools import cache
@@ -50,6 +50,12 @@ def build(variant: Variant) -> SimpleNamespace:
         return node, within - real(node)
 
     @wp.func
+    def class_of(plate: struct.Plate, surface: struct.Surface, ring: struct.Ring):
+        """The class of a ring's radius in the table."""
+        share = ring.radius / surface.max_radius
+        return wp.min(wp.int32(share * real(plate.radii)), plate.radii - 1)
+
+    @wp.func
     def find_covers(context: struct.Context, slab: struct.Slab, base: wp.int32, begin: wp.int32, end: wp.int32):
         """Fill in where the patches begin ≤ j < end, from index `base` + begin on, are in the table. A loop of its own:
         a compiler vectorises none that writes more lists than `contact.find_touches` does."""
@@ -64,7 +70,8 @@ def build(variant: Variant) -> SimpleNamespace:
             row, y = node_before(across, plate.cover_y)
             column, z = node_before(along, plate.cover_z)
             turn, part = node_before(direction_of(plate, pose, ring, cosine, sine), plate.directions)
-            write_index(touches.cover, base + j, (turn * (plate.cover_y + 1) + row) * (plate.cover_z + 1) + column)
+            layer = class_of(plate, surface, ring) * (plate.directions + 1) + turn
+            write_index(touches.cover, base + j, (layer * (plate.cover_y + 1) + row) * (plate.cover_z + 1) + column)
             write(touches.cover_y, base + j, y)
             write(touches.cover_z, base + j, z)
             write(touches.cover_turn, base + j, part)

@@ -174,10 +174,10 @@ def _build(double: bool, many_plates: bool) -> SimpleNamespace:
         at least 1. A window has `planes` of the grid through the thickness, `per_plane` of them per metre, of which a
         contact weakens those up to `plane_reach` planes away; one plane stands for the whole thickness.
 
-        `cover` has the material along a normal [m] (kernels/free_edges.py), shape [(directions + 1) × (cover_y + 1) ×
-        (cover_z + 1)]: directions, of which the last is the first, and the nodes of a period and the first ones of the
-        next. `cover_per_y` and `cover_per_z` are nodes per metre, `cover_per_row` and `cover_per_column` nodes
-        per cell of the tile.
+        `cover` has the material along a normal [m] (kernels/free_edges.py), shape [radii × (directions + 1) ×
+        (cover_y + 1) × (cover_z + 1)]: classes of the core's radius, directions, of which the last is the first, and
+        the nodes of a period and the first ones of the next. `cover_per_y` and `cover_per_z` are nodes per metre,
+        `cover_per_row` and `cover_per_column` nodes per cell of the tile.
         """
 
         tile: wp.array(dtype=real)
@@ -197,6 +197,7 @@ def _build(double: bool, many_plates: bool) -> SimpleNamespace:
         cover: wp.array(dtype=real)
         cover_y: wp.int32
         cover_z: wp.int32
+        radii: wp.int32
         directions: wp.int32
         cover_per_y: real
         cover_per_z: real

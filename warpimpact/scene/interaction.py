@@ -22,9 +22,9 @@ class FreeSurface(Model):
     """
 
     reach: PositiveNumber = 1.0
-    power: PositiveNumber = 2.0
-    cover: PositiveNumber = 2.0
-    carried: NonNegativeNumber = 0.2
+    power: PositiveNumber = 1.0
+    cover: PositiveNumber = 1.45
+    carried: NonNegativeNumber = 0.4
     gap: NonNegativeNumber = 0.05
 
 

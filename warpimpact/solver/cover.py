@@ -31,11 +31,13 @@ COARSER = 3
 """Cells of the tile per node of the cover, in each direction: lengths change slowly. Edges are the tile's."""
 IN_AN_EIGHTH = 4
 """Directions in an eighth of a turn."""
+RADII = 12
+"""Classes of the core's radius, as the core has pushed no more than what lay within its radius there."""
 FAR = 4.0
 """Radii of the core up to which edges are searched."""
 SOLID = 1.0e3
 """Length ahead in a plate without holes [m]: nothing is left of an exponential of it."""
-PER_LENGTH = 1.3e-7
+PER_LENGTH = 3.5e-7
 """Seconds of a core per node and direction."""
 
 
@@ -56,22 +58,24 @@ class Pushed(NamedTuple):
 @dataclass(frozen=True, eq=False)
 class Cover(Tile):
     """A table of lengths [m] at the nodes of a period, the first of which is at the origin, in `directions` from z on
-    towards y. `material` has them, of shape [directions + 1, nodes along y + 1, nodes along z + 1]: the last ones are
-    the first ones again. A length is negative where its node, or one beside it, does not press."""
+    towards y, for each of `radii` classes of the core's radius. `material` has them, of shape [radii, directions + 1,
+    nodes along y + 1, nodes along z + 1]: the last ones are the first ones again. A length is negative where its node,
+    or one beside it, does not press."""
 
     directions: int = 8 * IN_AN_EIGHTH
+    radii: int = RADII
 
     @property
     def bytes(self) -> int:
         """Memory of the table."""
-        return self.size * math.prod(count + 1 for count in (*self.shape, self.directions))
+        return self.size * self.radii * math.prod(count + 1 for count in (*self.shape, self.directions))
 
 
 def cover_of(plate: Plate, spacing: float, pushed: Pushed, *, double: bool) -> Cover:
     """The cover of a plate whose tile has cells of at most `spacing` [m]. Nothing is computed yet."""
     key: Key[Pattern] = Key(plate.pattern)
     real: Real = np.float64 if double else np.float32
-    asked = (key, spacing, pushed, real, IN_AN_EIGHTH, COARSER)
+    asked = (key, spacing, pushed, real, IN_AN_EIGHTH, COARSER, RADII)
     return kept(asked, lambda: _planned(key.value, COARSER * spacing, pushed, real))
 
 
@@ -83,21 +87,22 @@ def _planned(pattern: Pattern, spacing: float, pushed: Pushed, real: Real) -> Co
     dy, dz = (extent / count for extent, count in zip(pattern.period, counts, strict=True))
     make = partial(_table, pattern, counts, pushed, directions, real)
     seconds = PER_LENGTH * math.prod(counts) * directions
-    return Cover(counts, dy, dz, make, seconds, np.dtype(real).itemsize, directions=directions)
+    return Cover(counts, dy, dz, make, seconds, np.dtype(real).itemsize, directions=directions, radii=RADII)
 
 
 def _table(
     pattern: Pattern, counts: tuple[int, int], pushed: Pushed, directions: int, real: Real, check: Check
 ) -> Floats:
     if isinstance(pattern, NoPattern):
-        return np.full((directions + 1, 2, 2), SOLID, dtype=real)
+        return np.full((RADII, directions + 1, 2, 2), SOLID, dtype=real)
     y, z = (
         np.arange(count, dtype=np.float64) * (extent / count)
         for count, extent in zip(counts, pattern.period, strict=True)
     )
     check()
     inside = pattern.edge_distance(y[:, None], z[None, :])
-    table = np.empty((directions, *counts), dtype=real)
+    table = np.empty((RADII, directions, *counts), dtype=real)
+    radii = pushed.radius * (np.arange(RADII) + 0.5) / RADII
     sides = (pattern.period[0] / counts[0], pattern.period[1] / counts[1])
     parts, half = directions // 8, directions // 2
     rays = list(_rays(parts))
@@ -106,9 +111,10 @@ def _table(
         ahead, behind = (
             _first_two_edges(inside, ray, parts, sides, FAR * pushed.radius) for ray in (rays[k], rays[k + half])
         )
-        table[k] = _cover(inside > 0.0, ahead[0], behind, pushed)
-        table[k + half] = _cover(inside > 0.0, behind[0], ahead, pushed)
-    return np.pad(table, ((0, 1), (0, 1), (0, 1)), mode="wrap")
+        for row, radius in zip(table, radii, strict=True):
+            row[k] = _cover(inside > 0.0, ahead[0], behind, pushed, radius)
+            row[k + half] = _cover(inside > 0.0, behind[0], ahead, pushed, radius)
+    return np.pad(table, ((0, 0), (0, 1), (0, 1), (0, 1)), mode="wrap")
 
 
 def _rays(parts: int) -> Iterator[tuple[int, int]]:
@@ -162,9 +168,10 @@ def _between(values: Array, rows: int, columns: int, parts: int) -> Array:
     return np.asarray(here + ((beside + along) / parts) * (next_one - here))
 
 
-def _cover(solid: NDArray[np.bool_], ahead: Array, behind: tuple[Array, Array], pushed: Pushed) -> Array:
-    """Lengths of one direction, for the first edge ahead and the first two behind; negative where they do not count."""
-    gap, end = (np.minimum(edge, pushed.radius) for edge in behind)
+def _cover(solid: NDArray[np.bool_], ahead: Array, behind: tuple[Array, Array], pushed: Pushed, radius: float) -> Array:
+    """Lengths of one direction, for the first edge ahead and the first two behind, where the core has a radius [m];
+    negative where they do not count."""
+    gap, end = (np.minimum(edge, radius) for edge in behind)
     in_material = np.minimum(ahead, FAR * pushed.radius) + pushed.carried * gap
     length = np.where(solid, in_material, np.maximum(pushed.carried * (end - gap) - pushed.gap * gap, 0.0))
     presses = length > 0.0

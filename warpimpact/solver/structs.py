@@ -210,7 +210,7 @@ def plate_of(struct: Any, grid: Grid, put: Put) -> Any:
     if grid.cover is not None:
         plate.cover = _cover_on_device(grid.cover, put)
         plate.cover_y, plate.cover_z = grid.cover.shape
-        plate.directions = grid.cover.directions
+        plate.radii, plate.directions = grid.cover.radii, grid.cover.directions
         plate.cover_per_y, plate.cover_per_z = 1.0 / grid.cover.dy, 1.0 / grid.cover.dz
         plate.cover_per_row, plate.cover_per_column = (
             count / cells for count, cells in zip(grid.cover.shape, grid.tile.shape, strict=True)
