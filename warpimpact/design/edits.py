@@ -65,7 +65,7 @@ def changed(design: ValidDesign, shelf: Shelf, what: str, layer: int, value: str
         case "material":
             _take_material(_plate(tables, layer), design.campaign.target.layers[layer], value)
             if not value:
-                tables["interaction"] = design.campaign.interaction.model_dump()
+                tables["interaction"] = design.campaign.interaction.model_dump(exclude_none=True)
         case "shape":
             _take_shape(tables, design, shelf, layer, value)
         case "add layer":

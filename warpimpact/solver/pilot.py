@@ -204,7 +204,8 @@ class _Pilot:
     @property
     def counts(self) -> list[int]:
         """Numbers of shots that may judge a level: twice as many each time, of whole plates."""
-        most, at_a_plate = min(MOST, len(self.shots)), self.shots.at_a_plate
+        at_a_plate = self.shots.at_a_plate
+        most = min(-(-MOST // at_a_plate) * at_a_plate, len(self.shots))
         counts = [min(most, -(-_first_shots(self.numerics.asked) // at_a_plate) * at_a_plate)]
         while counts[-1] < most:
             counts.append(min(most, 2 * counts[-1]))

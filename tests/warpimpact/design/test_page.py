@@ -69,6 +69,9 @@ def opened(browser: Any, address: str) -> Any:
     browser.open("about:blank")
     browser.open(address, 1400)
     browser.wait(lambda: "Complete" in browser.text("#status"), 180.0)
+    browser.wait(
+        lambda: len(browser.driver.execute_script("return location.hash")) > 1
+    )  # a design that stays for a while
     return browser
 
 
