@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from textwrap import fill
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import xarray
@@ -81,7 +81,7 @@ def _lines(sweep: xarray.Dataset, measures: Sequence[Measure], along: str) -> di
 
 
 def _draw(
-    axes: Axes, measure: Measure, places: xarray.DataArray, line: Sequence[Point], style: dict[str, str], *, below: bool
+    axes: Axes, measure: Measure, places: xarray.DataArray, line: Sequence[Point], style: dict[str, Any], *, below: bool
 ) -> None:
     """Draw a line with its intervals, and write the share of the hits that a value counts beside it, above or below
     the line, and left of the last place."""
@@ -90,7 +90,7 @@ def _draw(
     is_number = places.dtype.kind == "f"
     x = places.values * STORED[places.attrs["units"]].factor if is_number else np.arange(len(line))
     bars = np.clip(np.nan_to_num([value - low, high - value]), 0.0, None)
-    axes.errorbar(x, value, yerr=bars, fmt="o-", capsize=3.0, **style)  # type: ignore[arg-type]
+    axes.errorbar(x, value, yerr=bars, fmt="o-", capsize=3.0, **style)
     if not is_number:
         axes.set_xticks(x, places.values)
     for at, height, point, estimate in zip(x, value, line, estimates, strict=True):
