@@ -19,26 +19,27 @@ from warpimpact.solver.findings import HitErrors
 Array = NDArray[np.float64]
 
 RISK = 1.0 / 6.0
-"""Probability at most that the estimate from the pilot's shots lies below the percentile of all shots that is promised;
-where there are enough shots for that."""
+"""Largest probability that the estimate from the pilot's shots lies below the promised percentile of all shots, where
+the pilot has enough shots for that."""
 FEWEST = 1.6
-"""Shots of a pilot that lie beyond the promised percentile, in the mean, at least."""
+"""Fewest shots of a pilot that are expected beyond the promised percentile."""
 SLOW = 0.25
-"""Share of the impact velocity below which the error of a speed is weighed as that of the energy, E = m v²/2: in
-proportion to the speed. The energy is computed to some accuracy, so the error of a speed near 0 has no bound."""
+"""Share of the impact velocity below which the error of a speed is weighed as the error of the energy, E = m v²/2, is:
+in proportion to the speed. The energy is computed to some accuracy, so the error of a speed near 0 has no bound."""
 TYPICAL = 0.75
-"""Share of the first shots whose errors tell how errors fall from level to level: the largest few fall by chance."""
+"""Share of the first shots whose errors show how errors fall from level to level. The largest few fall by chance."""
 
 
 class Verdict(NamedTuple):
-    """A level by its errors over what is allowed.
+    """What the errors of a level say, over what is allowed.
 
     Attributes:
         kept: whether the level keeps the promise.
         excess: upper estimate of the largest error over what is allowed.
-        typical: the same of most of the first shots, without a margin for chance: how errors fall from level to level.
-        weighed: the excess by which a level nearly keeps the promise: with the errors of slow cores weighed by their
-            energy, or the median error of limits.
+        typical: the same for the TYPICAL share of the first shots, without a margin for chance: it shows how errors
+            fall from level to level.
+        weighed: excess by which a level nearly keeps the promise: the errors of slow cores are weighed by their energy;
+            of limits, the median error counts.
     """
 
     kept: bool
@@ -55,13 +56,13 @@ def compared(
     shots: Shots,
     free: Sequence[bool],
 ) -> tuple[HitErrors, Verdict]:
-    """The errors of numerics, and what they are over what is allowed.
+    """The errors of numerics, and their ratio to what is allowed.
 
     Args:
-        numerics: of a level, with coarser settings or without.
-        outcomes: of the shots with these numerics; at the level itself, which are the same without coarser settings;
+        numerics: a level, with or without coarser settings.
+        outcomes: outcomes of the shots with these numerics, at the level itself (the same if no setting is coarser),
             and at a finer level.
-        margin: error of the level over its change to the finer one. What it has beyond 1 is what the finer one errs by.
+        margin: error of the level over its change to the finer one. The part beyond 1 is the error of the finer level.
         free: as in `changes`.
     """
     coarse, between, fine = outcomes
@@ -79,7 +80,7 @@ def compared(
     weighed = _excess(accuracy, upper(relative=relative, impact=shots.velocity), layered)
     status = float(ended_otherwise(coarse, fine).mean()) if layered else math.nan
     if status > 1.0 - accuracy.share:
-        typical = math.inf  # shots that end otherwise err most, but have no errors
+        typical = math.inf  # shots that end otherwise err most, but have no number for their error
     kept = excess <= 1.0 and not status > accuracy.status_share
     velocity, tilt, depth = (float(error) for error in upper())
     errors = HitErrors(numerics, kept, accuracy.share, velocity, tilt, depth, status, finer=fine)
@@ -87,13 +88,13 @@ def compared(
 
 
 def _relative(accuracy: Accuracy) -> tuple[float, float]:
-    """The relative parts of what is allowed behind layers over the absolute ones."""
+    """The relative bounds over the absolute ones, for the velocity and the tilt behind layers."""
     return accuracy.residual_velocity_share / accuracy.residual_velocity, accuracy.tilt_share / accuracy.tilt
 
 
 def _excess(accuracy: Accuracy, errors: Array, layered: bool) -> float:
-    """The largest of the errors over what is allowed; infinite if no shot has a speed. A depth counts behind layers.
-    What is not asked for counts as 0, however large its error is."""
+    """The largest of the errors over what is allowed; infinite if no shot has a speed. The depth counts behind layers.
+    An error without a bound counts as 0."""
     velocity, tilt = np.nan_to_num(errors[:2], nan=math.inf)
     depth = np.nan_to_num(errors[2], nan=0.0) if layered else 0.0
     allowed = accuracy.residual_velocity, accuracy.tilt, accuracy.depth
@@ -113,20 +114,20 @@ def upper_errors(
     free: Sequence[bool] | None = None,
     risk: float = RISK,
 ) -> Array:
-    """Changes of residual velocity [m/s], last tilt [rad] and depth [m] that a share of the shots stay within, but for
-    a risk; NaN of what no shot has. The other arguments are those of `changes`."""
+    """Upper bounds, at this risk, of the changes of residual velocity [m/s], last tilt [rad] and depth [m] of a share
+    of the shots; NaN where no shot has the quantity. The other arguments are those of `changes`."""
     plates = np.arange(len(fine)) // at_a_plate
     known = [(errors, ~np.isnan(errors)) for errors in changes(coarse, fine, impact, relative, free)]
     return np.array([upper_error(x[has], share, plates[has], risk) if has.any() else math.nan for x, has in known])
 
 
 def upper_error(errors: Array, share: float, plates: NDArray[np.intp] | None = None, risk: float = RISK) -> float:
-    """The error that a share of the shots stay within, but for a risk.
+    """Upper bound, at this risk, of the errors of a share of the shots.
 
     Args:
         errors: shape [shots].
-        plates: numbers of the plates that the shots hit, shape [shots]; None if each has its own. Shots at one plate
-            count as one as far as they err alike.
+        plates: number of the plate that each shot hits, shape [shots]; None if each has its own. Shots at one plate
+            count as one as far as their errors agree.
     """
     ordered, count = np.sort(errors), float(len(errors))
     if plates is not None:
@@ -137,12 +138,12 @@ def upper_error(errors: Array, share: float, plates: NDArray[np.intp] | None = N
 
 
 def design_effect(values: Array, groups: NDArray[np.intp]) -> float:
-    """Number of values that tell as much of the mean as an independent one, where values of a group are alike: the
-    variance of the mean by the sums of groups over that by the values (Kish, Survey Sampling, 1965), plus one standard
-    error, as there may be few groups; from 1 to the mean size of a group.
+    """Number of grouped values that determine the mean as well as one independent value (design effect; Kish, Survey
+    Sampling, 1965): the variance of the mean from the sums of groups over that from single values, plus one standard
+    error, because there may be few groups; clipped to 1 … mean size of a group.
 
     Args:
-        values, groups: values and the numbers of their groups, shape [values].
+        values, groups: values and the number of the group of each, shape [values].
     """
     sums = np.bincount(groups, values - values.mean())
     sizes = np.bincount(groups)
@@ -168,13 +169,13 @@ def upper_place(count: int, share: float, risk: float = RISK) -> int:
 
 
 def fewest(share: float) -> int:
-    """Shots that a pilot needs to tell what a share of all shots stay within."""
+    """Shots that a pilot needs to estimate the percentile of this share."""
     return math.ceil(FEWEST / (1.0 - share) - 1e-9)
 
 
 def limit_changes(coarse: Array, fine: Array, share: float) -> tuple[float, float, float]:
-    """The change that a share of the limits stay within, but for RISK; the median change of the limits that are finite
-    at one level at least; and the median limit."""
+    """Upper bound, at RISK, of the change of a share of the limits; the median change of the limits that are finite at
+    one level at least; and the median limit."""
     same = (coarse == fine) | (np.isnan(coarse) & np.isnan(fine))
     with np.errstate(invalid="ignore"):
         change = np.where(same, 0.0, np.abs(coarse - fine))
@@ -194,19 +195,19 @@ def changes(
     relative: tuple[float, float] = (0.0, 0.0),
     free: Sequence[bool] | None = None,
 ) -> tuple[Array, Array, Array]:
-    """What changes between the outcomes of the same shots, each of shape [shots]: the residual velocity [m/s], or that
-    behind a layer if it changes by more; the tilt at the last stand-off [rad]; and the depth [m].
+    """What changes between the outcomes of the same shots, each of shape [shots]: the residual velocity [m/s], or the
+    velocity behind a layer if it changes more; the tilt at the last stand-off [rad]; and the depth [m].
 
-    A core that does not leave the target, or a layer, has the speed 0 there; one that comes back has a negative one. A
-    tilt that only one of both has counts as half a turn. The first two are infinite where the computation of one alone
-    failed. The depth is NaN where the core does not stop in the same layer. At several layers the first two are NaN
-    where the core ends otherwise (`ended_otherwise`), which is an error by itself.
+    A core that does not leave the target, or a layer, has the speed 0 there. A core that comes back has a negative
+    speed. A tilt in one outcome alone counts as half a turn. Velocity and tilt are infinite where only one of both
+    computations failed. The depth is NaN unless the core stops in the same layer in both. At several layers, velocity
+    and tilt are NaN where the core ends otherwise (`ended_otherwise`), which is an error by itself.
 
     Args:
-        impact: velocities [m/s], shape [shots], to weigh the first two by the energy of slow cores (SLOW).
-        relative: (s/m, 1/rad): an error of a speed v is divided by 1 + |v| × the first, one of a tilt by 1 + tilt × the
-            second. So an absolute bound stands for one with a relative part.
-        free: of each layer, whether residual velocities behind it count; None if all do.
+        impact: impact velocities [m/s], shape [shots], to weigh the errors of slow cores by their energy (SLOW).
+        relative: (s/m, 1/rad): the error of a speed v is divided by 1 + first × |v|, the error of a tilt by 1 + second
+            × tilt. An absolute bound on the quotient is a bound with a relative part on the error.
+        free: for each layer, whether the residual velocity behind it counts; None if all count.
     """
     before, after = _speeds(coarse, free), _speeds(fine, free)
     weight = _weight(before, after, impact)
@@ -231,8 +232,8 @@ def ended_otherwise(coarse: Outcomes, fine: Outcomes) -> NDArray[np.bool_]:
 
 
 def _speeds(outcomes: Outcomes, free: Sequence[bool] | None) -> Array:
-    """Residual velocities [m/s] behind the target, then behind the layers that count; shape [shots, 1 or more]. One of
-    a core that comes back is negative."""
+    """Residual velocities [m/s] behind the target, then behind the layers that count, shape [shots, 1 or more];
+    negative for a core that comes back."""
     back = outcomes.status == Status.RICOCHETED
     speeds = np.where(back, -outcomes.residual_velocity, outcomes.residual_velocity)[:, None]
     if LAYER_RESIDUAL_VELOCITY in outcomes:

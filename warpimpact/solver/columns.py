@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 Path = tuple[str | int, ...]
-"""Of a key in the tables of a scene, such as ("plate", "pattern", "spacing", 0)."""
+"""Place of a key in the tables of a scene, such as ("plate", "pattern", "spacing", 0)."""
 
 COLUMNS: dict[Path, str] = {(QUANTITIES[name].table, name): name for name in (*OF_THE_SCENE, *OF_A_DRAW)}
 """Name of the column, by the path."""
@@ -25,11 +25,11 @@ UNITS_OF_EXPOSURE: tuple[Path, ...] = (("plate", "degradation_interval"), ("plat
 
 
 def columns_of(values: Mapping[Path, Array], plate: Plate) -> dict[str, Array]:
-    """Columns for some values, each of their shape.
+    """Columns of Shots for some values, each of their shape.
 
     Args:
-        values: by path; paths that make no column are left out.
-        plate: that of the scene, whose degradation and unit of exposure count where they have no values.
+        values: values by path. Paths that make no column are left out.
+        plate: plate of the scene. Its degradation and unit of exposure hold where no value replaces them.
     """
     columns = {name: values[path] for path, name in COLUMNS.items() if path in values}
     for path in UNITS_OF_EXPOSURE:

@@ -25,7 +25,7 @@ from warpimpact.scene.toml_text import parsed_json
 _logger = logging.getLogger(__name__)
 Scratch = TypeVar("Scratch")
 _SUMS = "checksums.json"
-"""In the folder of a compiled module: the checksum of each file there."""
+"""File in the folder of a compiled module with the checksum of every other file there."""
 
 
 class DeviceError(RuntimeError):
@@ -76,7 +76,8 @@ def _start_warp() -> None:
 
 
 SMALL_MEMORY = 2**24
-"""Bytes that any machine has: whether so few are free is not asked, as the answer takes as long as some shots."""
+"""Bytes that every machine has free. The system is not asked about less, because its answer takes as long as some
+shots."""
 
 
 def free_memory() -> int:
@@ -102,8 +103,8 @@ def cores() -> int:
 
 
 def launching(threads: int | None) -> int:
-    """Threads that launch on a CPU: the given number, or one for every core. One where Warp runs blocks on a CPU, as
-    two threads crash there."""
+    """Threads that launch on a CPU: the given number, or one per core. Where Warp runs blocks on a CPU, it is one,
+    because two threads crash there."""
     return 1 if wp.config.enable_cpu_blocks else threads or cores()
 
 
@@ -117,8 +118,8 @@ _LOADING = threading.RLock()
 
 
 def load(kernel: Any, device: Any) -> None:
-    """Load a kernel on a device for launches with Warp's own block size; compile it if it is not cached or damaged.
-    Several threads may load the same one.
+    """Load a kernel on a device for launches with Warp's own block size. Compile it if the cache has no whole copy.
+    Several threads may load the same kernel.
 
     A module is compiled for one block size. By default Warp loads with the block size of CUDA on a CPU, too, and
     compiles again at the launch. Warp trusts the files of its cache, and one wrong bit in them can end the process.
@@ -152,9 +153,9 @@ def _load(kernel: Any, device: Any) -> None:
 
 @contextmanager
 def _alone(folder: Path) -> Iterator[None]:
-    """Wait until no other process compiles the module of a folder: processes that begin together would compile it once
-    each. Where no lock can be had, they do."""
-    from filelock import FileLock  # takes longer to import than some shots, and only who compiles needs it
+    """Hold a lock while a module is compiled, so that processes that begin together compile it once. Without a lock
+    each of them compiles it."""
+    from filelock import FileLock  # takes longer to import than some shots, and only a compiling process needs it
 
     lock = FileLock(folder.with_name(f"{folder.name}.lock"))
     with suppress(OSError, NotImplementedError):
@@ -180,7 +181,7 @@ def _is_whole(folder: Path) -> bool:
 
 
 def _seal(folder: Path) -> None:
-    """Write the checksums of a module that was compiled; where that fails, it is compiled again next time."""
+    """Write the checksums of a compiled module. If that fails, the module is compiled again next time."""
     part = folder / f"{os.getpid()}.json"
     with suppress(OSError):
         part.write_text(json.dumps(_sums(folder)), encoding="utf-8")
@@ -202,8 +203,8 @@ def _remove(folder: Path) -> None:
 
 
 def halving(slots: int, allocate: Callable[[int], Scratch]) -> tuple[int, Scratch]:
-    """Slots and their scratch. The number is halved until the allocation succeeds, because the free memory is only an
-    estimate.
+    """Number of slots and their scratch. The number is halved until the allocation succeeds, because the free memory is
+    only an estimate.
 
     Raises:
         MemoryError: there is no memory for one slot.

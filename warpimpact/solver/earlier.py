@@ -16,12 +16,12 @@ if TYPE_CHECKING:
     from warpimpact.solver.prepare import Prepared
 
 PLANES = 1.5
-"""Largest distance of the planes of a channel, in √(R × cell), R the largest radius of the core. Between two planes the
-side wall of an oblique channel is off by 0.28 tan² of the angle with the normal, in cells, at most."""
+"""Largest distance of two planes of a channel, in √(R × cell), with R the largest radius of the core. Between two
+planes the side wall of an oblique channel is wrong by at most 0.28 tan²(angle with the normal) cells."""
 
 
 def planes(prepared: Prepared) -> list[int]:
-    """Planes on which the channels through each layer are kept; none where no earlier hits are."""
+    """Number of planes on which the channels through each layer are kept; 0 without earlier hits."""
     if not prepared.variant.burst:
         return [0] * len(prepared.grids)
     thickest = [float(material.thickness.max()) for material in prepared.materials]
@@ -29,7 +29,7 @@ def planes(prepared: Prepared) -> list[int]:
 
 
 def planes_of(prepared: Prepared, layer: int, thickness: float) -> int:
-    """Planes of a channel through a layer of some thickness [m]; a shot has those of its own thickness."""
+    """Number of planes of a channel through a layer of this thickness [m], which may differ from shot to shot."""
     return 1 + math.ceil(thickness / float(_apart(prepared)[layer]))
 
 
@@ -40,20 +40,20 @@ def _apart(prepared: Prepared) -> NDArray[np.float64]:
 
 
 def channel_nodes(prepared: Prepared, windows: Sequence[tuple[int, int]]) -> list[int]:
-    """Nodes of the channels through each layer in a slot, for windows of these cells along y and z."""
+    """Nodes of the channels through each layer in a slot, for windows of these numbers of cells along y and z."""
     return [number * math.prod(cells) for number, cells in zip(planes(prepared), windows, strict=True)]
 
 
 def scratch(
     prepared: Prepared, stage: Any, put: Any, fields: Any, slots: int, nodes: int, windows: Sequence[tuple[int, int]]
 ) -> Any:
-    """The Earlier of some slots; the channels that a shot finds are in its fields.
+    """The Earlier of some slots. The channels that a shot finds are put in its fields.
 
     Args:
-        stage: the build of the march.
+        stage: build of the march.
         put: puts values on the device (`solver.structs.Put`).
-        nodes: of the exposure in a slot.
-        windows: cells of the windows of all layers.
+        nodes: nodes of the exposure in a slot.
+        windows: numbers of cells of the windows of all layers.
     """
     earlier = stage.Earlier()
     count, layers = prepared.shots.at_a_plate, len(prepared.grids)

@@ -13,7 +13,7 @@ from warpimpact.records.outcomes import Outcomes
 from warpimpact.scene import Numerics
 
 DEAR = 10.0
-"""Times the cost of the first level, from which on the cost of another is announced."""
+"""Ratio to the cost of the first level above which the cost of another level is announced."""
 
 
 @dataclass(frozen=True)
@@ -21,11 +21,10 @@ class Found:
     """What a pilot found.
 
     Attributes:
-        numerics: of the level for all shots, with coarser settings where these do.
-        kept: whether the errors are within what was asked for.
-        share: of the shots that are within the errors.
-        finer: outcomes of the first shots of the pilot at the finer level that it was compared with; None where there
-            are none.
+        numerics: numerics for all shots: a level, with coarser settings where these keep the promise.
+        kept: whether the errors are within the promise.
+        share: share of the shots that are within the errors.
+        finer: outcomes of the pilot's first shots at the finer level of the comparison; None without a comparison.
     """
 
     numerics: Numerics
@@ -40,17 +39,18 @@ class Found:
 
     @property
     def told(self) -> Self:
-        """The same without outcomes of shots."""
+        """These findings without outcomes of shots."""
         return replace(self, finer=None)
 
     @property
     def phrase(self) -> str:
-        """The errors, for a line of progress."""
+        """A phrase with the errors for a line of progress."""
         return f"accuracy {self.errors} for {hits_text(self.share)}{'' if self.kept else ', not as promised'}"
 
 
 class LevelCost(NamedTuple):
-    """What a shot costs at the level that was found, and at the first one that was tried [s], and the errors there."""
+    """Cost of a shot [s] at the level that was found and at the first level tried, and the errors at the first
+    level."""
 
     seconds: float
     first_seconds: float
@@ -58,7 +58,8 @@ class LevelCost(NamedTuple):
     first_errors: str
 
     def announced(self, level: int, shots: int) -> str:
-        """A sentence on the time that shots will take, where it is DEAR times that of the first level; else empty."""
+        """A sentence on the time that the shots will take if it exceeds DEAR times that of the first level; else
+        empty."""
         times = self.seconds / self.first_seconds
         if times < DEAR:
             return ""
@@ -71,15 +72,15 @@ class LevelCost(NamedTuple):
 
 @dataclass(frozen=True)
 class HitErrors(Found):
-    """Upper estimates of the errors of what becomes of the shots; infinite where the pilot could not tell.
+    """Upper estimates of the errors of outcomes; infinite where the pilot could not estimate them.
 
     Attributes:
-        residual_velocity_error: [m/s]; the residual velocities behind all layers count.
+        residual_velocity_error: [m/s], the largest behind any layer.
         tilt_error: at the last stand-off [rad].
-        depth_error: of the shots that stop in a layer [m]; NaN where none does.
-        status_error: share of the shots that end otherwise on a finer level; NaN of a single plate.
-        cost: of the level beside the first one that was tried; None if that is not known.
-        shifts: by levels that were tried, what the numerics may shift the means of a run by.
+        depth_error: of the shots that stop in a layer [m]; NaN where none stops.
+        status_error: share of the shots that end otherwise at a finer level; NaN for a single plate.
+        cost: cost of the level beside that of the first level tried; None if unknown.
+        shifts: by level tried, the shift of a run's mean measures at this level.
         tried: levels that were judged, coarse to fine.
     """
 
@@ -103,7 +104,7 @@ class HitErrors(Found):
 
 
 class Tried(NamedTuple):
-    """A level that a pilot judged: its errors, and outcomes of the same shots there and at a finer level."""
+    """A level that a pilot judged: its errors, and outcomes of the same shots at this level and at a finer one."""
 
     errors: HitErrors
     coarse: Outcomes
@@ -115,9 +116,9 @@ class LimitErrors(Found):
     """Upper estimate of the errors of limits.
 
     Attributes:
-        error: of velocities [m/s] or of thicknesses [m]; infinite where the pilot could not tell.
+        error: error of limit velocities [m/s] or thicknesses [m]; infinite where the pilot could not estimate it.
         quantity: "velocity" or "thickness".
-        finer_level: that the limits were compared with; None where it did not fit the memory.
+        finer_level: level that the limits were compared with; None where it did not fit the memory.
     """
 
     error: float
@@ -130,12 +131,12 @@ class LimitErrors(Found):
 
 
 def hits_text(share: float) -> str:
-    """A share of the hits."""
+    """Words for a share of the hits."""
     return f"{100.0 * share:.3g} % of the hits"
 
 
 def errors_text(velocity: float, tilt: float, depth: float = math.nan, status: float = math.nan) -> str:
-    """Errors of residual velocity [m/s] and tilt [degree]; of depth [m] and of the status, where there is one."""
+    """Words for the errors of residual velocity [m/s] and tilt [degree], and of depth [m] and status unless NaN."""
     parts = [f"{upper_digits(velocity)} m/s", f"{upper_digits(tilt)} deg"]
     if not math.isnan(depth):
         parts.append(f"{upper_digits(1e3 * depth)} mm of depth")
@@ -145,12 +146,12 @@ def errors_text(velocity: float, tilt: float, depth: float = math.nan, status: f
 
 
 def limit_error_text(error: float, quantity: str) -> str:
-    """Error of a limit velocity [m/s] or of a limit thickness [m]."""
+    """Words for the error of a limit velocity [m/s] or a limit thickness [m]."""
     return f"{upper_digits(error)} m/s" if quantity == "velocity" else f"{upper_digits(1e3 * error)} mm"
 
 
 def accuracy_text(asked: Mapping[str, float], *, layered: bool) -> str:
-    """An accuracy, by the names and in the units of `Accuracy`; what it lacks is not asked for."""
+    """Words for an accuracy, by the names and in the units of `Accuracy`. A bound that it lacks is not asked for."""
 
     def bound(name: str, unit: str, factor: float = 1.0) -> str:
         share = asked.get(f"{name}_share", 0.0) if layered else 0.0

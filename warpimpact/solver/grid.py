@@ -22,29 +22,31 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 FINER = 5
-"""Cells of the tile per cell of the exposure's grid, in each direction. A patch reads the cell under its centre."""
+"""Cells of the tile per cell of the exposure's grid, in each direction. A patch reads the tile's cell under its
+centre."""
 FINEST = 15.0
-"""Fewest cells of the tile per degradation length: the edge of a hole decides more about tilt than the grid does."""
+"""Fewest cells of the tile per degradation length. The edge of a hole affects tilt more than the grid does."""
 SHARED = 4
-"""Cells of shared tiles per factor of two."""
+"""Sizes of a shared tile's cells per factor of two."""
 
 FEWEST_PLANES, PLANES = 3, 1.6
-"""Per degradation depth: at least, and times the square root of its steps, as planes err by the fourth order of their
-distance and steps by the second of theirs. Twice as many change no answer by a tenth of its error (oblique, slots)."""
+"""Planes per degradation depth: the fewest, and the factor of the square root of the steps in that depth, because the
+error of planes is of the fourth order in their distance and that of steps of the second. Twice as many planes change no
+answer by a tenth of its error (oblique, slots)."""
 SPARE = 4
-"""Planes beyond those within a laminate: one on each side, the one behind the last whole spacing, and its neighbour."""
+"""Planes beyond those within a laminate: one on each side, one behind the last whole spacing, and its neighbour."""
 
 
 class Lengths(NamedTuple):
-    """Over which a layer weakens together: `length` in its plane and `depth` through its thickness [m]."""
+    """Lengths over which a layer weakens together: `length` in its plane, `depth` through its thickness [m]."""
 
     length: float
     depth: float
 
 
 class Planes(NamedTuple):
-    """Planes of a window through the thickness: their number, the `spacing` between two [m], and how many of them a
-    degradation depth has. One stands for the whole thickness."""
+    """Planes of a window through the thickness: their number, their `spacing` [m], and the number within a degradation
+    depth (`reach`). A single plane stands for the whole thickness."""
 
     number: int = 1
     spacing: float = math.inf
@@ -59,11 +61,11 @@ class Grid:
     """A plate as the kernels see it.
 
     Attributes:
-        tile: one period of it.
-        period, half_size: extents (y, z) of the period, and half of those of the plate [m]; infinite without a rim.
-        spacing: of the window's grid [m].
-        taps: the tent's filter from its middle on, and one 0.
-        planes: of the window's grid through the thickness.
+        tile: one period of the plate.
+        period, half_size: extents (y, z) of the period, and half extents of the plate [m]; infinite without a rim.
+        spacing: spacing of the window's grid [m].
+        taps: weights of the tent filter from its middle on, and one 0.
+        planes: planes of the window's grid through the thickness.
         cover: material along a normal, where a free surface counts.
     """
 
@@ -77,7 +79,7 @@ class Grid:
 
     @property
     def tiles(self) -> list[Tile]:
-        """What is computed before the first shot."""
+        """Tiles that are computed before the first shot."""
         return [self.tile] if self.cover is None else [self.tile, self.cover]
 
     @property
@@ -96,13 +98,13 @@ def grids_of(
     shared: bool,
     cover: Pushed | None,
 ) -> list[Grid]:
-    """The grids of some layers, whose cells are as wide as their degradation lengths have it.
+    """The grids of some layers. The width of their cells is proportional to their degradation lengths.
 
     Args:
-        lengths: over which the layers weaken, in the place of their own.
+        lengths: degradation lengths and depths that replace those of the layers.
         deep: whether windows have planes through the thickness.
-        shared: whether plates of other degradation lengths have the same tiles, in finer cells than they need.
-        cover: what their covers depend on; None without a free surface.
+        shared: whether plates with similar degradation lengths share a tile, whose cells are then finer than needed.
+        cover: what the covers depend on; None without a free surface.
     """
     return [
         _grid(plate, resolution, reach, reach.length / lengths[0].length, material if deep else None, shared, cover)
@@ -119,10 +121,10 @@ def _grid(
     shared: bool,
     cover: Pushed | None,
 ) -> Grid:
-    """The grid of a layer with some degradation lengths. Its cells are `wider` times as wide as those of the plate.
+    """The grid of a layer with these degradation lengths. Its cells are `wider` times as wide as those of the plate.
 
     Args:
-        deep: its material, where windows have planes through the thickness.
+        deep: material of the layer, where windows have planes through the thickness; else None.
     """
     nodal, spacing = resolution.nodal, wider * resolution.grid_spacing
     cells = spacing if nodal else min(spacing / FINER, own.length / FINEST)
@@ -146,13 +148,14 @@ def _grid(
 
 
 def half_taps(length: float, spacing: float) -> Array:
-    """The filter of a degradation length [m] on a grid as the kernels read it: from its middle on, and one 0."""
+    """The tent filter of a degradation length [m] on a grid as the kernels read it: from its middle on, and one 0."""
     taps = tent_taps(length, spacing)
     return np.append(taps[len(taps) // 2 :], 0.0)
 
 
 def _planes(depth: float, material: Materials, resolution: Resolution) -> Planes:
-    """Those of a layer with a degradation depth [m], which the step of a plate as thick as that refines."""
+    """Planes of a layer with a degradation depth [m]. They are finer where the steps in a plate of this thickness
+    are."""
     way = resolution.travel * float(resolution.passage(depth, depth, weakens=True))
     reach = max(FEWEST_PLANES, math.ceil(PLANES * math.sqrt(depth / way)))
     most = float(material.together.max()) / depth if material.weakens else 0.0
@@ -169,7 +172,7 @@ def tent_taps(length: float, cell: float) -> Array:
     if length <= math.sqrt(2.0) * cell:
         return np.ones(1)
 
-    moment = (length / cell) ** 2 / 6.0 - 1.0 / 3.0  # of the filter, in cells
+    moment = (length / cell) ** 2 / 6.0 - 1.0 / 3.0  # second moment of the filter, in cells
     for reach in range(1, math.ceil(length / cell) + 1):
         # Σ(1 - |k|/w) k² = moment Σ(1 - |k|/w) over |k| <= reach is linear in 1/w.
         points, ramp = 2 * reach + 1, reach * (reach + 1)

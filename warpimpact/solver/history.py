@@ -16,7 +16,7 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class History:
-    """The state of a core in the middle of every step and at the end of contact: plate frame, SI.
+    """State of a core in the middle of every step and at the end of contact: plate frame, SI.
 
     Attributes:
         time: since the first touch of the front face [s], shape [steps].

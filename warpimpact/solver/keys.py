@@ -12,8 +12,8 @@ Value = TypeVar("Value", bound=Model)
 
 @dataclass(frozen=True, eq=False)
 class Key(Generic[Value]):
-    """A model as the key of a cache. It equals one with the same fields; but where it reads a file, which may have
-    changed since another one read it, it equals itself only."""
+    """A model as the key of a cache. Two keys are equal if their models have the same fields. A model that reads a file
+    equals itself only, because the file may have changed between two readings."""
 
     value: Value
 

@@ -1,7 +1,8 @@
 """Limits: the impact velocity at which each shot just perforates, or the thickness of plate that it just perforates.
 
-A few shots are searched first. What they tell is where the searches of the others begin (solver/limit_near.py). Every
-search goes on by what its own runs tell (solver/limit_search.py).
+A few shots are searched first. Their limits say where the searches of the others begin (solver/limit_near.py). Then
+each
+search follows its own runs (solver/limit_search.py).
 """
 
 from __future__ import annotations
@@ -29,38 +30,39 @@ from warpimpact.solver.worker import Worker
 Array = NDArray[np.float64]
 
 VELOCITY_TOLERANCE, THICKNESS_TOLERANCE = 1.0, 1.0e-5
-"""Of a limit velocity [m/s] and of a limit thickness [m]."""
+"""Default tolerance of a limit velocity [m/s] and of a limit thickness [m]."""
 PASSAGES = 35
-"""Time of a search of one limit over that of a passage: some five shots, slow near the limit. It was 34 to 65 for
+"""Time of the search of one limit over that of a passage: some five shots, slow near the limit. It was 34 to 65 for
 campaigns/limit_velocity.toml."""
 HIGHEST_VELOCITY = 3000.0
 """Largest impact velocity tried [m/s]."""
 THICKEST = 16.0
 """Largest thickness tried, in thicknesses of the plate."""
 STEPS_OF_LIMITS = 6.0
-"""How many times shorter than elsewhere a step is. It follows from the impact velocity, but near its limit a core is
-slow for a while, and touches by a small share of its speed. With the step of a hit map limit velocities in a slotted
-plate are off by 140 m/s of 210 m/s (90 % of the hits), with this one by 2 m/s."""
+"""How many times shorter the steps of a search are than those of a hit map. The step follows from the impact velocity,
+but near its limit a core is slow for a while and moves by a small share of its speed per step. With the step of a hit
+map, limit velocities in a slotted plate are wrong by 140 m/s of 210 m/s (90 % of the hits), with this one by 2 m/s."""
 
 FIRST = 8
-"""Shots that are searched before anything is known. Then as many follow as are found."""
+"""Shots that are searched before any limit is known. Each later batch is as large as the number of limits found."""
 
 
 @dataclass(frozen=True)
 class Limits:
-    """What was found of every shot, each of shape [shots]; the limit of velocity [m/s] or of thickness [m].
+    """The limits of all shots: velocities [m/s] or thicknesses [m]; arrays of shape [shots].
 
     Attributes:
-        value: the limit, between lower and upper; 0 of velocity and infinite thickness where the core touches nothing;
-            infinite where the largest value tried did not reach it; NaN where the run at the end at which the core
-            does not pass failed. A run that fails elsewhere counts as one that does not pass, and spoils nothing.
+        value: the limit, between lower and upper. Where the core touches nothing, a limit velocity is 0 and a limit
+            thickness infinite. It is infinite where even the largest value tried lies below the limit, and NaN where
+            the run at the end at which the core does not pass failed. A run that fails elsewhere counts as one that
+            does not pass.
         lower, upper: values tried, or 0, that enclose the limit: the core passed at one and was stopped at the other.
-            Where passing is not monotone this is one such change among several.
+            If passing is not monotone, they enclose one of several such changes.
         runs: how often the shot was computed.
         converged: whether lower and upper are within the tolerance, or the limit needs no search (0 or infinite).
-        shots: the shots as they last passed, or those at the largest value tried where they never did; of a NaN the
-            shots that failed.
-        outcomes: theirs.
+        shots: the shots at the value at which they last passed; at the largest value tried where they never passed; at
+            the value that failed where the limit is NaN.
+        outcomes: outcomes of `shots`.
     """
 
     value: Array
@@ -78,15 +80,15 @@ class Limits:
 
 @dataclass(frozen=True)
 class Sought:
-    """What limit is searched.
+    """The limit that is searched.
 
     Attributes:
         quantity: "velocity" or "thickness".
-        tolerance: how far lower and upper may lie apart [m/s] or [m].
+        tolerance: largest distance of lower and upper [m/s] or [m].
         highest: largest value tried [m/s] or [m].
-        layer: whose thickness it is; 0 is the plate, 1 the first layer behind it.
-        by_thickness: thicknesses of the layer, ascending [m], and its resistance there, as a share of that of the shot;
-            linear in ln h between them. None where the resistance does not depend on the thickness.
+        layer: number of the layer whose thickness is varied; 0 is the plate.
+        by_thickness: thicknesses of the layer, ascending [m], and its resistance there as a share of the shot's; linear
+            in ln h between them. None where the resistance does not depend on the thickness.
     """
 
     quantity: str
@@ -96,7 +98,7 @@ class Sought:
     by_thickness: tuple[tuple[float, ...], tuple[float, ...]] | None = None
 
     def put(self, target: Target, shots: Shots, values: Array) -> Shots:
-        """Shots with values of their own that are tried, shape [shots]: velocities [m/s], or thicknesses [m]."""
+        """The shots with the values to try, shape [shots]: velocities [m/s] or thicknesses [m]."""
         if self.quantity == "velocity":
             return replace(shots, velocity=values)
         own = {"thickness": values}
@@ -121,10 +123,10 @@ def limit_velocity(
     """Find the impact velocity at which each shot just perforates the target, within MOST_RUNS runs of a shot.
 
     Args:
-        shots: their own velocities are the first ones tried.
-        numerics: as in `simulate`; of an accuracy its `limit` counts. A level has short steps (STEPS_OF_LIMITS).
+        shots: their velocities are the first ones tried.
+        numerics: as in `simulate`; of an accuracy, `limit` counts. A level has shorter steps (STEPS_OF_LIMITS).
         device, threads, progress: as in `simulate`; progress counts shots whose search has ended.
-        tolerance: how far lower and upper may lie apart [m/s].
+        tolerance: largest distance of lower and upper [m/s].
         highest: largest velocity tried [m/s].
 
     Raises:
@@ -146,15 +148,15 @@ def limit_thickness(
     threads: int | None = None,
     progress: Progress | None = None,
 ) -> Limits:
-    """Find the thickness of a plate with which each shot just perforates the target, within MOST_RUNS runs of a shot.
+    """Find the thickness of a layer that each shot just perforates, within MOST_RUNS runs of a shot.
 
-    It is at most THICKEST times the thickness in the scene, and all thicknesses have one resistance. A lower end of 0
-    was not computed: where the rest of the target stops a core, no thickness is found above 0.
+    The thickness is at most THICKEST times that of the scene, and the resistance is the same at all thicknesses. A
+    lower end of 0 was not computed: where the rest of the target stops a core, no thickness above 0 is found.
 
     Args:
-        shots: their own thicknesses, or the scene's, are the first ones tried.
-        layer: whose thickness it is; 0 is the plate, 1 the first layer behind it.
-        tolerance: how far lower and upper may lie apart [m].
+        shots: their thicknesses, or the scene's, are the first ones tried.
+        layer: number of the layer whose thickness is varied; 0 is the plate.
+        tolerance: largest distance of lower and upper [m].
         numerics, device, threads, progress: as in `limit_velocity`.
 
     Raises:
@@ -165,7 +167,7 @@ def limit_thickness(
 
 
 def thickest(scene: Scene, layer: int) -> float:
-    """The largest thickness of a layer that is tried [m]."""
+    """Largest thickness of a layer that is tried [m]."""
     return THICKEST * scene.target.layers[layer].thickness
 
 
@@ -213,8 +215,8 @@ def limits(
 ) -> Limits:
     """Find the limit of every shot, with numerics that fix the resolution.
 
-    A limit may differ within the tolerance with the shots that are searched together, because the first ones that are
-    found tell where the searches of the others begin (solver/limit_near.py).
+    A limit may change within the tolerance with the shots that are searched together, because the first limits found
+    say where the other searches begin (solver/limit_near.py).
 
     Args:
         together: number of shots that are searched together; None for all.
@@ -236,8 +238,8 @@ def limits(
 def _limits_of(
     scene: Scene, shots: Shots, sought: Sought, numerics: Numerics, worker: Worker, progress: Progress
 ) -> Limits:
-    """The limits of shots that are searched together, with numerics as they are: at first those of FIRST shots, then of
-    twice as many in all, and so on."""
+    """The limits of shots that are searched together, at fixed numerics, in batches: first FIRST shots, then up to
+    twice that number in all, and so on."""
     near = Neighbours(scene, shots, (sought.quantity, sought.layer), sought.tolerance)
     order, parts, done = spread_places(len(shots), len(shots)), list[Limits](), 0
     while done < len(shots):
@@ -262,7 +264,7 @@ def _searched(
     guess: Guess,
     progress: Callable[[int], object],
 ) -> tuple[LimitSearch, Limits]:
-    """The limits of some shots of which something is known, one run of each at a time, and their search."""
+    """Search the limits of a batch, one run of each pending shot at a time; returns the limits and the search."""
     search, target = _begun(scene, shots, sought, guess), scene.target
     total = len(shots)
     kept, failing = _Kept(total), _Kept(total)
@@ -280,7 +282,7 @@ def _searched(
 
 
 def _joined(parts: list[Limits], order: NDArray[np.int64]) -> Limits:
-    """Limits one behind the other, in another order."""
+    """Concatenate limits, then put them in this order."""
     numbers = ("value", "lower", "upper", "runs", "converged")
     return Limits(
         **{name: np.concatenate([getattr(part, name) for part in parts])[order] for name in numbers},
@@ -299,21 +301,21 @@ def _begun(scene: Scene, shots: Shots, sought: Sought, guess: Guess) -> LimitSea
 
 
 def short_steps(numerics: Numerics) -> Numerics:
-    """Numerics as limits need them: a level has steps that are STEPS_OF_LIMITS times shorter."""
+    """Numerics for limits: a level gets steps that are STEPS_OF_LIMITS times shorter."""
     if numerics.level is None or numerics.travel is not None or numerics.explicit == "scheme" or numerics.time_step:
         return numerics
     return numerics.model_copy(update={"travel": level_of(numerics).travel / STEPS_OF_LIMITS})
 
 
 def check_arrests(scene: Scene, shots: Shots | None = None) -> None:
-    """Refuse a target with a plate that weakens by time: it stops no core, however slow, so there is no limit
+    """Refuse a target with a plate that weakens by time: such a plate stops no core, however slow, so there is no limit
     (docs/model.md §4).
 
     Args:
-        shots: whose own degradation counts, too.
+        shots: shots whose own degradation counts, too.
 
     Raises:
-        ValueError: names what to give instead.
+        ValueError: the message says what to give instead.
     """
     for k, (place, plate) in enumerate(scene.target.named):
         if plate.degradation_distance is not None or not _weakens(plate, shots, k):
@@ -326,13 +328,13 @@ def check_arrests(scene: Scene, shots: Shots | None = None) -> None:
 
 
 def _weakens(plate: Plate, shots: Shots | None, layer: int) -> bool:
-    """Whether a layer weakens in any shot."""
+    """Whether a layer weakens in any of the shots."""
     own = None if shots is None or not shots.differs("degradation", layer) else shots.columns["degradation"][:, layer]
     return plate.degradation < 1.0 or (own is not None and bool((own < 1.0).any()))
 
 
 class _Kept:
-    """The values and outcomes of one run of every shot."""
+    """Values and outcomes of one run of every shot."""
 
     outcomes: Outcomes
 
@@ -340,7 +342,7 @@ class _Kept:
         self.values = np.empty(count)
 
     def take(self, places: NDArray[np.int64], which: NDArray[np.int64], tried: Array, ended: Outcomes) -> None:
-        """Keep the runs in some places of `which`; the first ones are of all shots."""
+        """Keep the runs at some places of `which`. The first call has all shots."""
         if not hasattr(self, "outcomes"):
             self.outcomes = ended
         self.outcomes = self.outcomes.with_rows(which[places], ended[places])

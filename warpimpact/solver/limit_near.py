@@ -1,4 +1,4 @@
-"""What the limits of some hits tell of those of others that hit near them, or arrive in nearly the same way."""
+"""Guesses of limits from the known limits of other hits that are near in hit point and conditions."""
 
 from __future__ import annotations
 
@@ -14,29 +14,29 @@ from warpimpact.solver.simulate import spread_places
 Array = NDArray[np.float64]
 
 NEAREST = 4
-"""Hits that tell of another one."""
+"""Number of nearest hits from which a limit is guessed."""
 WITHIN = 0.75
-"""Share of the limits that lie within what they are expected to be off by."""
+"""Share of the limits that shall lie within their stated doubt."""
 LEAST, MOST = 0.02, 0.5
-"""Of the doubt of a limit (solver/limit_search.py)."""
+"""Bounds of the doubt of a limit (solver/limit_search.py)."""
 TRIED = 256
-"""Found limits that are compared with what the others tell of them."""
+"""Most known limits that are compared with their guesses from the others."""
 PLACES = 0.0, 0.1, 0.3, 1.0, 3.0, 10.0
-"""Weights that the distance of hit points may have beside that of the other conditions."""
+"""Candidate weights of the distance of hit points beside that of the other conditions."""
 
 
 class Neighbours:
-    """All shots of a search, with the limits of those that are found.
+    """All shots of a search, with the limits that are known.
 
-    Two shots are near by their hit points and by all conditions in which shots differ. A found limit is also that of
-    its images under the symmetries of the plate (scene/symmetry.py), and the map of hit points repeats with the cell of
-    the plate. Conditions count by how the limit changes with them. The weight of the hit points is that with which the
-    found limits tell each other best.
+    Two shots are near by their hit points and by all conditions in which shots differ. A known limit also holds for the
+    images of its shot under the symmetries of the plate (scene/symmetry.py), and the map of hit points repeats with the
+    cell of the plate. A condition is weighed by how much the limit changes with it. The hit points get the weight with
+    which the known limits predict each other best.
 
     Args:
-        scene, shots: what is shot at what.
-        sought: the quantity and the layer whose limit is searched, which are no condition.
-        tolerance: of the search.
+        scene, shots: scene and its shots.
+        sought: quantity and layer whose limit is searched; the quantity is no condition.
+        tolerance: tolerance of the search.
     """
 
     def __init__(self, scene: Scene, shots: Shots, sought: tuple[str, int], tolerance: float) -> None:
@@ -54,12 +54,12 @@ class Neighbours:
         self._errors = np.full((3, len(shots)), np.nan)
 
     def learn(self, which: NDArray[np.int64], search: LimitSearch) -> None:
-        """Take in limits that are found."""
+        """Take in known limits."""
         self._value[which], self._sums[:, which] = search.value(), search.curve_sums()
         self._errors[:, which] = search.errors()
 
     def guess(self, which: NDArray[np.int64]) -> Guess:
-        """What is known of the limits of some shots."""
+        """Guess the limits of some shots."""
         known = np.flatnonzero(np.isfinite(self._value) & (self._value > 0.0))
         if len(known) <= NEAREST:
             return Guess.nothing(len(which))
@@ -84,20 +84,20 @@ class Neighbours:
         return Guess(found, np.minimum(scale * (sure + least), 0.5 * found), linear, square, doubt)
 
     def _places(self, which: NDArray[np.int64], weights: Array, place: float, images: int | None = None) -> Array:
-        """Where some shots, and then their images, lie, shape [shots × images, 2 + conditions]; the first two columns
-        repeat with `place`."""
+        """Coordinates of some shots, then of their images, shape [shots × images, 2 + conditions]. The first two
+        columns are periodic with `place`."""
         pairs = list(zip(self._points, self._conditions, strict=True))[:images]
         at = [np.column_stack([point[which] * place, other[which] * weights]) for point, other in pairs]
         return np.concatenate(at)
 
 
 class _Near:
-    """Finds the nearest of some shots and their images.
+    """Finds the nearest shots among some shots and their images.
 
     Args:
-        places: theirs, the shots first.
-        period: with which the first two columns repeat.
-        count: how many shots that are.
+        places: coordinates of the shots, then of the images.
+        period: period of the first two columns.
+        count: number of shots.
     """
 
     def __init__(self, places: Array, period: float, count: int) -> None:
@@ -109,11 +109,11 @@ class _Near:
     def told(
         self, places: Array, values: Array, own: NDArray[np.int64] | None = None
     ) -> tuple[Array, Array, NDArray[np.int64]]:
-        """What the nearest shots tell of others, how far off that may be, and which they are.
+        """Predict values at places from the nearest shots: the values, their doubt, and the numbers of the nearest.
 
         Args:
-            values: of the shots and their images.
-            own: which of the shots the others are, which do not tell of themselves.
+            values: values at the shots and their images.
+            own: number of the shot at each place, which is left out of its own prediction.
         """
         count = NEAREST if own is None else NEAREST + self._images
         distance, near = self._tree.query(places, min(count, self._count * self._images))
@@ -129,8 +129,8 @@ class _Near:
 
 
 def _coordinates(shots: Shots, sought: tuple[str, int]) -> tuple[Array, Array, Array]:
-    """Hit points, shape [shots, 2]; the conditions whose sign changes with the images, in the order of `_signs`, shape
-    [shots, 5]; and the others."""
+    """Hit points, shape [shots, 2]; the conditions that change sign under symmetries, in the order of `_signs`, shape
+    [shots, 5]; and the other conditions."""
     across = np.sin(shots.obliquity)
     signed = (across * np.cos(shots.azimuth), across * np.sin(shots.azimuth), shots.yaw, shots.pitch, shots.spin)
     used = (*OF_A_SHOT, "hit_y", "hit_z", "obliquity", "azimuth", "yaw", "pitch", "spin")
@@ -145,14 +145,14 @@ def _coordinates(shots: Shots, sought: tuple[str, int]) -> tuple[Array, Array, A
 
 
 def _signs(symmetry: Symmetry) -> Array:
-    """Factors of the flight along y and z, yaw, pitch and spin."""
+    """Signs of flight along y and z, yaw, pitch and spin under a symmetry."""
     y, z = symmetry.along_y, symmetry.along_z
     return np.array([y, z, y, z, y * z], dtype=np.float64)
 
 
 def _symmetries(scene: Scene, signed: Array) -> list[Symmetry]:
-    """Those of the plate under which a condition that all shots have keeps its sign; the identity alone where another
-    layer may have others."""
+    """Symmetries of the plate under which each condition that all shots share keeps its sign. Only the identity if the
+    target has other layers, whose symmetries may differ."""
     if any(layer.open_area > 0.0 or layer.size is not None for layer in scene.target.layers[1:]):
         return [IDENTITY]
     alike = np.ptp(signed, axis=0) <= 1e-9 * np.abs(signed).max(axis=0)
@@ -161,7 +161,7 @@ def _symmetries(scene: Scene, signed: Array) -> list[Symmetry]:
 
 
 def _slopes(conditions: Array, value: Array) -> Array:
-    """How the limit changes with each condition, by least squares with a small penalty."""
+    """Change of the limit per unit of each condition, by least squares with a small penalty."""
     count = len(value)
     design = np.column_stack([np.ones(count), conditions])
     penalty = 1e-3 * count * np.diag([0.0, *np.ones(conditions.shape[1])])
@@ -169,7 +169,7 @@ def _slopes(conditions: Array, value: Array) -> Array:
 
 
 def _curve(sums: Array) -> tuple[Array, Array]:
-    """b and c with the least squares of (b r + c r²) / d − 1, neither less than 0; NaN without passages."""
+    """b and c that minimise the squares of (b r + c r²) / d − 1, neither less than 0; NaN without passages."""
     rr, rs, ss, r, s = sums
     with np.errstate(invalid="ignore", divide="ignore"):
         determinant = rr * ss - rs**2

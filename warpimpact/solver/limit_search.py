@@ -1,10 +1,11 @@
-"""The values that a search of limits tries next, by what the runs before them told.
+"""The values that a search of limits tries next, from the results of its earlier runs.
 
-A search keeps two ends: a value at which the core passes, and one at which it does not. The residual velocity r of
-cores that pass tells where the limit lies. With the drive D, which is v² or a thickness, |D − D_limit| = b r + c r². In
-a solid plate that does not weaken b = 0, because the work of a straight passage is constant (docs/model.md §6.1). Where
-a slow core meets less resistance, b > 0. Three passages give D_limit, b and c. Two give D_limit and the scale of the
-curve, one gives D_limit, with b and c of other hits. Bisection takes over where this does not help.
+A search keeps two ends: a value at which the core passes, and one at which it does not. The residual velocities r of
+passing cores determine the limit: with the drive D, which is v² or a thickness, |D − D_limit| = b r + c r². In a solid
+plate that does not weaken, b = 0, because the work of a straight passage is constant (docs/model.md §6.1). Where a slow
+core meets less resistance, b > 0. Three passages give D_limit, b and c. Two give D_limit and the scale of the curve,
+one
+gives D_limit, with b and c of other hits. Bisection takes over where this does not help.
 """
 
 from __future__ import annotations
@@ -21,36 +22,36 @@ from warpimpact.records.outcomes import Outcomes
 Array = NDArray[np.float64]
 
 MOST_RUNS = 14
-"""Runs of a shot at most."""
+"""Most runs of a shot."""
 STAGES = 3
-"""Passages after which more of them no longer change how a limit follows."""
+"""Passages beyond which a further one no longer changes how the limit is determined."""
 DOUBT = 0.35, 0.2, 0.12
-"""How uncertain the limit is that one, two and three passages tell, as a share of its distance from the nearest one, as
-long as no other hits have shown it."""
+"""Default doubt of a limit that follows from one, two and three passages, as a share of its distance from the nearest
+passage. Known limits of other hits replace it."""
 TELLING = 5.0
-"""Tolerances, beyond which a passage shows how far off a limit was that it told."""
+"""Distance [tolerances] of a passage from the limit above which it counts for the error of predictions."""
 BESIDE = 0.4
-"""How far beside the expected limit a run is made that is to come close to it, in tolerances."""
+"""Distance [tolerances] from the expected limit of a run that shall come close to it."""
 ACROSS = 0.98
-"""How far from a near end a run is made that is to settle a limit, in tolerances."""
+"""Distance [tolerances] from a near end of a run that shall settle a limit."""
 SETTLED = 1.2
-"""Doubt in tolerances, up to which runs are made so close."""
+"""Largest doubt [tolerances] at which such close runs are made."""
 OUTWARD = 1.4, 2.0, 4.0
-"""How many times as large as the last value the next one is as long as nothing is expected: at first, then, and from
-then on."""
+"""Ratio of the next value to the last one while nothing is expected: in the first run, in the second, and in later
+ones."""
 PATIENT = 5
-"""Runs after which those that follow go farther each time, if all have stopped or all have passed."""
+"""Runs after which the steps grow with each run, if all runs have stopped or all have passed."""
 
 
 @dataclass(frozen=True)
 class Guess:
-    """What is known of some limits before any run, each of shape [shots].
+    """What is known of some limits before any run; arrays of shape [shots].
 
     Attributes:
-        value: the limits as they are expected; NaN where nothing is known.
-        sure: how far off they may be.
+        value: expected limits; NaN where nothing is known.
+        sure: doubt of the expected limits.
         linear, square: b and c of other hits; NaN where there are none.
-        doubt: as DOUBT, shape [STAGES].
+        doubt: doubts that replace DOUBT, shape [STAGES].
     """
 
     value: Array
@@ -61,7 +62,7 @@ class Guess:
 
     @classmethod
     def nothing(cls, count: int) -> Guess:
-        """Where no other limits are known."""
+        """The guess where no other limits are known."""
         unknown = np.full(count, np.nan)
         return cls(unknown, unknown, unknown, unknown, np.array(DOUBT))
 
@@ -69,13 +70,13 @@ class Guess:
 class LimitSearch:
     """The state of all searches; arrays of shape [shots].
 
-    `passed` is the value nearest to the limit at which the core passed, `stopped` that at which it was stopped. One of
-    them is 0 at first and the other infinite: a core at rest is stopped, one that meets no plate passes.
+    `passed` is the value nearest to the limit at which the core passed, `stopped` the nearest at which it was stopped.
+    At first one of them is 0 and the other infinite: a core at rest is stopped, a core that meets no plate passes.
 
     Args:
-        start: values to try first where nothing is known.
-        passed: infinite for a velocity, 0 for a thickness.
-        speed: residual velocity of a core that passed there.
+        start: first values to try where nothing is known.
+        passed: initial `passed`: infinite for a velocity, 0 for a thickness.
+        speed: residual velocity of a core that passes there.
         tolerance, highest: as in `limit_velocity`.
         guess: what is known of the limits.
     """
@@ -97,7 +98,7 @@ class LimitSearch:
 
     @property
     def width(self) -> Array:
-        """Distance of the two ends; 0 where both are infinite."""
+        """Distance between the two ends; 0 where both are infinite."""
         same = self.passed == self.stopped
         return np.asarray(np.abs(np.where(same, 0.0, self.passed) - np.where(same, 0.0, self.stopped)))
 
@@ -135,7 +136,7 @@ class LimitSearch:
         return np.asarray(np.minimum(np.where(unknown, self.start[which], chosen), self.highest))
 
     def learn(self, which: NDArray[np.int64], tried: Array, outcomes: Outcomes) -> NDArray[np.int64]:
-        """Take in one run of some shots; returns the places of those that say how a shot ends at its limit."""
+        """Take in one run of some shots; returns the places of the runs that show how a shot ends at its limit."""
         status = outcomes.status
         passes, failed, untouched = status == Status.PERFORATED, failures(status), status == Status.MISSED
         through, back = which[passes], which[~passes]
@@ -152,7 +153,7 @@ class LimitSearch:
         return np.flatnonzero(passes | never)
 
     def value(self) -> Array:
-        """The limits as they are expected, or the middle of the ends."""
+        """The expected limits, or the middles between the ends where none is expected there."""
         lower, upper = self.ends()
         expected = self._value(self.curve()[0])
         inside = (expected > lower) & (expected < upper)
@@ -164,7 +165,7 @@ class LimitSearch:
         return np.minimum(self.passed, self.stopped), np.maximum(self.passed, self.stopped)
 
     def curve(self) -> tuple[Array, Array, Array]:
-        """The drive at which no speed is left, b and c, by the passages; NaN where there are none."""
+        """The drive at which no speed is left, b and c, from the passages; NaN where there are none."""
         sign = 1.0 if self.rising else -1.0
         drive, (r1, r2, r3) = sign * self.drives, self.speeds[:3]
         linear = np.where(np.isfinite(self.guess.linear), self.guess.linear, 0.0)
@@ -184,8 +185,8 @@ class LimitSearch:
     def curve_sums(self) -> Array:
         """Sums over the passages of a shot from which b and c follow by least squares of (b r + c r²) / d − 1.
 
-        d is the distance from the limit in the drive. With x = r / d and y = r² / d these are the sums of
-        xx, xy, yy, x and y, shape [5, shots]. A passage within two tolerances does not count.
+        d is the distance of the drive from its limit. With x = r / d and y = r² / d, these are the sums of xx, xy, yy,
+        x and y, shape [5, shots]. A passage within two tolerances of the limit does not count.
         """
         limit = self.value()
         with np.errstate(invalid="ignore", divide="ignore"):
@@ -196,8 +197,9 @@ class LimitSearch:
         return np.asarray(np.where(np.isfinite(x) & (d > least), terms, 0.0).sum(axis=1))
 
     def errors(self) -> Array:
-        """How far off the limits were that one, two and three passages told, as shares of their distances from the
-        nearest one, shape [STAGES, shots]; NaN where there were fewer or this one was within some tolerances."""
+        """Errors of the limits predicted from one, two and three passages, as shares of the distance from the nearest
+        passage, shape [STAGES, shots]; NaN without a prediction, or where that passage was within TELLING
+        tolerances."""
         with np.errstate(invalid="ignore", divide="ignore"):
             share = np.abs(self.foreseen - self.value()) / self.distance
         return np.where(self.distance > TELLING * self.tolerance, share, np.nan)
@@ -210,14 +212,14 @@ class LimitSearch:
             return np.asarray(np.sqrt(drive) if self.rising else drive)
 
     def _foresee(self, which: NDArray[np.int64]) -> None:
-        """Note what the first passages of some shots tell."""
+        """Keep the limits predicted from the first passages of some shots."""
         stage = np.isfinite(self.drives[:, which]).sum(axis=0) - 1
         which, stage = which[stage < STAGES], stage[stage < STAGES]
         value = self._value(self.curve()[0])[which]
         self.foreseen[stage, which], self.distance[stage, which] = value, np.abs(self.passed[which] - value)
 
     def _expected(self) -> tuple[Array, Array]:
-        """The limits as they are expected, and how uncertain that is."""
+        """The expected limits and their doubt."""
         value, count = self._value(self.curve()[0]), np.isfinite(self.drives).sum(axis=0)
         doubt = self.guess.doubt[np.clip(count - 1, 0, STAGES - 1)] * np.abs(self.passed - value)
         known = np.isfinite(value)
@@ -226,9 +228,9 @@ class LimitSearch:
     def _aimed(self) -> Array:
         """The next values; NaN or beyond the ends where nothing is expected.
 
-        As long as the limit is not about known, runs are made where the core is expected to pass, since only passages
-        tell where it lies. If all of them pass, runs follow where it is expected to stop. In the sense in which cores
-        pass, `passed` lies ahead and `stopped` behind.
+        While the limit is uncertain, runs are made where the core is expected to pass, because only passages tell where
+        the limit lies. If all of them pass, runs follow where it is expected to stop. Signs are such that `passed` lies
+        ahead of the limit and `stopped` behind it.
         """
         sign, tolerance = 1.0 if self.rising else -1.0, self.tolerance
         expected, doubt = self._expected()
@@ -241,7 +243,7 @@ class LimitSearch:
             creeps = ((behind == 0.0) | np.isinf(behind)) & (self.runs >= PATIENT)
             aimed = expected + np.where(creeps, -(2.0 ** (self.runs - PATIENT)), 1.0) * beside
             aimed = np.where(to_behind <= 0.0, refuted, aimed)
-            near = ACROSS * tolerance - np.maximum(1.2 * doubt, 0.1 * tolerance)  # it then hardly lies farther
+            near = ACROSS * tolerance - np.maximum(1.2 * doubt, 0.1 * tolerance)  # the limit then hardly lies farther
             aimed = np.where(close & (to_behind <= near), behind + ACROSS * tolerance, aimed)
             aimed = np.where(close & (to_ahead <= near), ahead - ACROSS * tolerance, aimed)
         return np.asarray(sign * aimed)

@@ -1,4 +1,4 @@
-"""Shots at many scenes: designs of a plate, or sets of parameters, computed side by side."""
+"""Shots at many scenes, such as designs of a plate or sets of parameters, computed side by side."""
 
 from __future__ import annotations
 
@@ -29,13 +29,12 @@ def simulate_many(
 ) -> list[Outcomes]:
     """Compute the shots of many scenes. The outcomes of each are those of `simulate`, bit for bit.
 
-    On a CPU as many scenes as there are threads are prepared and marched at a time, and threads that have no scene left
-    help to march the last ones. A GPU computes one scene after another. The scratch is that of the scenes that are
-    computed at a time.
+    On a CPU, each thread prepares and marches a scene of its own. Threads that have no scene left help to march the
+    last ones. A GPU computes one scene after another. Only the scenes in progress take scratch memory.
 
     Args:
-        scenes: a scene and its shots each. They may differ in everything: cores, layers, what is recorded.
-        numerics: of a resolution, such as Numerics(level=2), for all scenes. There is no pilot.
+        scenes: scenes with their shots. They may differ in everything: cores, layers, records.
+        numerics: a fixed resolution, such as Numerics(level=2), for all scenes. There is no pilot.
         progress: called with (shots done, all shots), by any thread.
 
     Returns:
@@ -67,11 +66,11 @@ def simulate_many(
 def side_by_side(
     compute: Callable[[int, Worker, Helpers | None], Value], count: int, worker: Worker = _ANY
 ) -> list[Value]:
-    """What is computed for the numbers from 0 on: on a CPU as many at a time as there are threads.
+    """The values of `compute` for the numbers 0 … count − 1, in order; on a CPU, one per thread at a time.
 
     Args:
-        compute: called with a number, with its share of the threads, which no other number has, and with those who may
-            help it, where there is nothing else for them to do.
+        compute: called with a number, a worker with a share of the threads that no other call has, and the helpers that
+            may join when they have nothing else to do.
 
     Raises:
         DeviceError: the device is absent.
@@ -88,7 +87,7 @@ def side_by_side(
     try:
         futures = [pool.submit(computed, number) for number in range(count)]
         wait(futures, return_when=FIRST_EXCEPTION)
-    finally:  # after an error or an interrupt the others are worth nothing, and nobody waits for them
+    finally:  # after an error or an interrupt the other results are not needed, and nobody waits for them
         stop.cancel()
         pool.shutdown(wait=False, cancel_futures=True)
     ended = [future for future in futures if future.done() and not future.cancelled()]

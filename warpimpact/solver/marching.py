@@ -1,4 +1,4 @@
-"""Marches the shots of a scene on a device: windows that grow, threads, and the order of the shots at one plate."""
+"""The march of a scene's shots on a device: growing windows, threads, and the order of the shots at one plate."""
 
 from __future__ import annotations
 
@@ -31,34 +31,34 @@ Progress1 = Callable[[int], None]
 Launch = Callable[[Any, int, int, int], int]
 
 FEWEST_CELLS = 16
-"""Along a side of the plate's window, which would hold no core if it were smaller still."""
+"""Fewest cells along a side of the plate's window. A smaller window would hold no core."""
 MAX_DOUBLINGS = 6
-"""Largest number of times that the windows are doubled for the shots that left theirs."""
+"""Most times that the windows are doubled for shots that leave theirs."""
 
 
 CHUNK = 64
-"""Most shots of a chunk, where other threads look for the progress."""
+"""Most shots of a chunk, where another thread reports the progress."""
 SHARES = 3
-"""Chunks per thread into which the shots that are left would be divided at least."""
+"""Fewest chunks per thread into which the remaining shots would be divided."""
 SHORTEST, LONGEST = 0.002, 0.25
-"""Seconds that a chunk is to take. A computation can be broken off between two of them."""
+"""Shortest and longest time that a chunk shall take [s]. A computation can be cancelled between two chunks."""
 
 
 class Helpers(NamedTuple):
-    """A pool that computes scenes, one of which is marched on a thread of it, and how many other threads it has."""
+    """A pool whose threads compute a scene each, and the number of its threads that may help with another scene."""
 
     pool: Executor
     threads: int
 
 
 class March:
-    """The march of what is in the memory of a device; see `simulate` for the arguments.
+    """The march of the shots in the memory of a device; see `simulate` for the arguments.
 
     Attributes:
-        helpers: who helps a thread that is not the main one, as soon as there is nothing else to do.
-        memory: where the shots are. Windows that do not fit a block have another one, for the simple layout.
-        cells: of the plate's window.
-        sizes: of windows that are tried, each twice as wide as the one before.
+        helpers: threads that help a thread other than the main one when they have nothing else to do.
+        memory: memory with the shots. Windows that do not fit a block have a memory for the simple layout.
+        cells: cells of the plate's window.
+        sizes: number of window sizes to try, each twice as wide as the one before.
     """
 
     def __init__(self, memory: Memory, threads: int | None = None, helpers: Helpers | None = None) -> None:
@@ -67,7 +67,7 @@ class March:
         self.cells = self._window_cells()
 
     def march(self, progress: Progress | None = None, cancel: Cancel = NEVER) -> Any:
-        """March all shots; repeat those that leave their window in wider windows."""
+        """March all shots, and march those again in wider windows which leave theirs."""
         outcomes = self.memory.outcomes()
         count = len(outcomes.status)
 
@@ -89,19 +89,19 @@ class March:
         return outcomes
 
     def widen(self, cells: Cells) -> None:
-        """Have wider windows; those that do not fit a block are for the simple layout."""
+        """Set wider windows. Windows that do not fit a block need the simple layout."""
         self.cells, prepared = cells, self.memory.prepared
         if 0 < prepared.variant.window < math.prod(cells):
             simple = replace(prepared, variant=replace(prepared.variant, window=0))
             wider = Memory(simple, self.memory.device)
-            wider.passage, wider.history = self.memory.passage, self.memory.history  # with the shots that are done
+            wider.passage, wider.history = self.memory.passage, self.memory.history  # these hold the finished shots
             self.memory = wider
 
     def _window_cells(self) -> Cells:
-        """Cells of a first window, or what memory allows.
+        """Cells of the first window, fewer if memory does not allow them.
 
         Raises:
-            MemoryError: windows do not fit in which a core is at all.
+            MemoryError: no window that holds a core fits.
         """
         cells = first = (self.memory.prepared.cells,) * 2
         while not self._fits(cells):  # a shot that leaves a smaller window ends as LEFT_WINDOW
@@ -131,13 +131,13 @@ class March:
             progress(first + count)
 
     def _on_threads(self, launch: Launch, apiece: list[Any], total: int, progress: Progress1) -> None:
-        """Compute chunks of shots on threads, each with its own scratch. A CPU launch runs its shots one after another
-        on the calling thread, without the interpreter lock."""
+        """Compute chunks of shots on threads with a scratch each. A CPU launch runs its shots one after another on the
+        calling thread, without the interpreter lock."""
         if len(apiece) == 1 and threading.current_thread() is not threading.main_thread():
             self._here(launch, apiece[0], total, progress)
             return
         chunks, ended = Chunks(total, self.at_a_plate, SHARES * len(apiece), CHUNK), SimpleQueue[int]()
-        # The main thread is interrupted, so it computes nothing. Who interrupts does not wait for a long shot.
+        # Signals reach the main thread, so it computes nothing: an interrupt need not wait for a long shot.
         pool = ThreadPoolExecutor(len(apiece))
         try:
             threads = [pool.submit(_work, launch, scratch, chunks, ended.put) for scratch in apiece]
@@ -154,9 +154,9 @@ class March:
             pool.shutdown(wait=False, cancel_futures=True)
 
     def _here(self, launch: Launch, scratch: Any, total: int, progress: Progress1) -> None:
-        """Compute chunks of shots on this thread, and on those of the helpers that have nothing else to do."""
+        """Compute chunks of shots on this thread, and on helper threads that have nothing else to do."""
         memory, cells, helpers = self.memory, self.cells, self.helpers
-        # Without helpers few chunks: after each, this thread may wait for one that prepares another scene.
+        # Without helpers few chunks: between two of them, this thread may wait for one that prepares another scene.
         chunks = Chunks(total, self.at_a_plate, SHARES * (1 + helpers.threads) if helpers else 1, total)
 
         def others_work() -> None:
@@ -177,27 +177,27 @@ class March:
 class Chunks:
     """Some shots in chunks; safe to use by several threads.
 
-    The first chunks are of one shot each, as some scenes take seconds per shot. The last ones are small, as no thread
-    is to wait long for another.
+    The first chunks have one shot each, because some scenes take seconds per shot. The last ones are small, so that no
+    thread waits long for another.
 
     Attributes:
-        total, done: shots, and how many of them are computed.
+        total, done: numbers of all shots and of computed ones.
     """
 
     def __init__(self, total: int, together: int, shares: int, most: int) -> None:
-        """Shots that are not computed.
+        """Chunks of shots none of which is computed.
 
         Args:
-            together: shots in a row that no two chunks share.
-            shares: into how many the shots that are left would be divided at least, if that takes no time.
-            most: shots of a chunk.
+            together: number of consecutive shots that one thread must compute.
+            shares: fewest chunks into which the remaining shots would be divided, unless these take no time.
+            most: most shots of a chunk.
         """
         self.total, self.done = total, 0
         self._together, self._shares, self._most = together, shares, most
         self._begun, self._pace, self._lock = 0, math.inf, threading.Lock()
 
     def take(self) -> tuple[int, int]:
-        """The first shot of a chunk that nobody has taken, and their number; 0 where none is left."""
+        """The first shot of the next chunk and its number of shots; 0 where none is left."""
         with self._lock:
             left, fewest, most = self.total - self._begun, SHORTEST / self._pace, LONGEST / self._pace
             count = min(max(left // self._shares, int(fewest)), int(most), self._most)
@@ -206,13 +206,13 @@ class Chunks:
             return first, count
 
     def computed(self, count: int, seconds: float) -> None:
-        """Count shots of a chunk that are computed, which took some seconds."""
+        """Count the shots of a computed chunk, which took these seconds."""
         with self._lock:
             self.done += count
             self._pace = max(seconds, 1e-9) / count
 
     def end(self) -> None:
-        """Nobody takes what is left."""
+        """Leave the remaining shots to nobody."""
         with self._lock:
             self._begun = self.total
 
@@ -227,7 +227,7 @@ def _work(launch: Launch, scratch: Any, chunks: Chunks, ended: Callable[[int], o
 
 
 def apart(function: Callable[..., int], *arguments: Any) -> int:
-    """Call what computes without the interpreter lock on a thread of its own, so that a signal need not wait for it."""
+    """Call a function that releases the interpreter lock on another thread, so that signals are handled meanwhile."""
     pool = ThreadPoolExecutor(1)
     try:
         return pool.submit(function, *arguments).result()
@@ -236,18 +236,18 @@ def apart(function: Callable[..., int], *arguments: Any) -> int:
 
 
 def _after(finished: int, progress: Progress1) -> Progress1:
-    """Progress of what comes after the shots already finished."""
+    """Progress of further shots, after those already finished."""
     return lambda done: progress(finished + done)
 
 
 def whole_plates(which: NDArray[np.bool_], count: int) -> Numbers:
-    """Indices of all shots at those plates of which any shot is marked."""
+    """Indices of all shots at the plates with a marked shot."""
     return np.flatnonzero(np.repeat(which.reshape(-1, count).any(axis=1), count))
 
 
 def in_turns(which: Numbers, count: int, slots: int) -> Numbers:
-    """Shots in the order in which a device takes them that computes `slots` plates at a time: of each lot of plates
-    first all first shots, then all second ones. Shots at one plate are then in one slot, one after another."""
+    """Order in which a device with `slots` plates at a time takes the shots: for each lot of plates first all first
+    shots, then all second ones. Shots at one plate then use the same slot, one after another."""
     lots = (which[first : first + slots * count] for first in range(0, len(which), slots * count))
     return np.concatenate([lot.reshape(-1, count).T.reshape(-1) for lot in lots])
 
@@ -260,8 +260,8 @@ def turns(total: int, count: int, slots: int) -> Iterator[tuple[int, int]]:
 
 
 def spoilt(status: NDArray[np.int32], count: int) -> NDArray[np.int32]:
-    """Statuses of all shots, in which a shot fails, too, where the computation of an earlier one at its plate failed:
-    nobody knows what that one left of the plate."""
+    """Statuses of all shots, where a shot also fails if an earlier one at its plate failed: what that shot left of the
+    plate is unknown."""
     rows = status.reshape(-1, count).copy()
     for order in range(1, count):
         before = rows[:, order - 1]

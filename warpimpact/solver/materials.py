@@ -1,4 +1,4 @@
-"""What each layer of a target resists with, shot by shot, and which layers weaken together (docs/model.md §4.8)."""
+"""The material of each layer in every shot, and which layers weaken together (docs/model.md §4.8)."""
 
 from __future__ import annotations
 
@@ -18,14 +18,14 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 ONSET = 0.02
-"""Onset speed of contact in units of what full contact of a wall as deep as the plate does in one step."""
+"""Onset speed of contact, as a share of the speed that full contact of a wall as deep as the plate takes in a step."""
 FASTEST_DECAY = 1.0e30
-"""Of the resistance [1/s]: β = 0 takes all of it at the first touch, a rate beyond any exposure, yet finite (0 × it
-is 0)."""
+"""Largest rate of decay of the resistance [1/s]. β = 0 takes all resistance at the first touch; its rate is beyond any
+exposure, yet finite, because 0 × ∞ is no number."""
 OWN_LENGTHS = ("degradation_length", "degradation_depth")
-"""Of the plate, which a shot may have of its own."""
+"""Lengths of the plate that may differ from shot to shot."""
 ROUNDING = 1e-9
-"""Of a thickness in degradation depths, which may be a sum."""
+"""Rounding error of a thickness in degradation depths, which may be a sum."""
 
 
 @dataclass(frozen=True)
@@ -33,19 +33,20 @@ class Materials:
     """Place and material of one layer in every shot: SI, each of shape [1] or [shots].
 
     Attributes:
-        front: its front face behind that of the target.
-        thickness: of the layer.
+        front: distance of its front face behind that of the target.
+        thickness: thickness of the layer.
         together: thickness of its laminate.
-        depth: over which its material weakens together.
-        deep: 1 where that is more than the degradation depth, so that it remembers how deep a contact was, else 0.
+        depth: degradation depth of its material.
+        deep: 1 where the laminate is thicker than the degradation depth, so that it remembers contact by depth; else 0.
         offset_y, offset_z: place of its origin in the plane of the plate.
-        a0, a1, a2, friction, degradation, decay_rate: of the law (kernels/interaction.py).
-        onset_jump: of the law if the core touches this layer alone; all the layers that it touches add theirs.
-        most_jump: that of a layer of this material as thick as the core is long, which is the most that all can add.
+        a0, a1, a2, friction, degradation, decay_rate: coefficients of the law (kernels/interaction.py).
+        onset_jump: onset speed per time step if the core touches this layer alone. Layers in contact add theirs.
+        most_jump: onset jump of a layer of this material as thick as the core is long, the most that all layers
+            together can add.
         per_reach: 1 / λH of a free surface [1/m]; 0 without one.
-        by_path: whether exposure counts the path of the core, not the time.
-        laminate: the first layer of those with which it shares the memory of contact.
-        weakens: whether it keeps such a memory.
+        by_path: whether exposure counts the path of the core instead of the time.
+        laminate: number of the first layer of its laminate, with which it shares the memory of contact.
+        weakens: whether it remembers contact.
     """
 
     front: Array
@@ -70,12 +71,12 @@ class Materials:
 
 
 def materials_of(scene: Scene, shots: Shots) -> list[Materials]:
-    """Those of all layers of a scene, front to back."""
+    """The Materials of all layers of a scene, front to back."""
     target = scene.target
     weakening = weakens(target, shots)
     thickness = [shots.own_of(target, "thickness", k) for k in range(len(target.layers))]
     fronts, laminates = target.fronts(thickness), _laminates(target, weakening, shots)
-    rears = {k: front + h for k, front, h in zip(laminates, fronts, thickness, strict=True)}  # those of the last layers
+    rears = {k: front + h for k, front, h in zip(laminates, fronts, thickness, strict=True)}  # last layers
     return [
         _material(scene, shots, k, fronts[k], thickness[k], rears[first] - fronts[first], first, weakens)
         for k, (first, weakens) in enumerate(zip(laminates, weakening, strict=True))
@@ -83,7 +84,7 @@ def materials_of(scene: Scene, shots: Shots) -> list[Materials]:
 
 
 def weakens(target: Target, shots: Shots | None = None) -> list[bool]:
-    """Whether each layer weakens; one that differs from shot to shot may."""
+    """Whether each layer weakens. A layer whose degradation differs from shot to shot counts as one that does."""
     return [
         layer.degradation < 1.0 or (shots is not None and shots.differs("degradation", k))
         for k, layer in enumerate(target.layers)
@@ -91,8 +92,9 @@ def weakens(target: Target, shots: Shots | None = None) -> list[bool]:
 
 
 def _laminates(target: Target, weakening: Sequence[bool], shots: Shots) -> list[int]:
-    """For every layer, the first one of its laminate: of layers that weaken, touch each other and remember alike. A
-    laminate of one material is the plate of its thickness. A plate that remembers as each shot has it is in none."""
+    """For every layer, the number of the first layer of its laminate. Layers form a laminate if they weaken, touch each
+    other and have the same memory. A laminate of one material acts as one plate of its thickness. A plate whose memory
+    differs from shot to shot is in no laminate."""
     differs = any(name in shots.columns for name in OWN_LENGTHS)
     first = [0]
     for k, (before, layer) in enumerate(pairwise(target.layers), start=1):
@@ -151,13 +153,13 @@ def _material(
 
 
 def onset_jump(core: Core, thickness: Array, mass: Array, static_stress: Array) -> Array:
-    """Onset speed of contact per time step [m/s²] of cores of some masses [kg] in plates of some thicknesses [m] and
-    static stresses [Pa], of their shape; positive, also for a plate without resistance."""
+    """Onset speed of contact per time step [m/s²] for masses [kg], thicknesses [m] and static stresses [Pa] of the same
+    shape. It is positive even for a plate without resistance."""
     wall = 2.0 * core.max_radius * np.minimum(thickness, core.length)
     return np.maximum(ONSET * static_stress * wall / mass, 1.0)
 
 
 def decay_rate(degradation: Array, unit: float) -> Array:
-    """ln(β)/Δt_β [1/s], or ln(β)/Δs_β [1/m], for some β, of their shape."""
+    """ln(β)/Δt_β [1/s], or ln(β)/Δs_β [1/m], of the shape of β."""
     log = np.log(degradation, where=degradation > 0.0, out=np.full_like(degradation, -np.inf))
     return np.maximum(log / unit, -FASTEST_DECAY)

@@ -1,5 +1,5 @@
-"""What was prepared, in the memory of one device: the inputs of the kernels, the scratch of the shots that are
-computed at a time, and what the kernels fill."""
+"""A prepared scene in the memory of one device: inputs of the kernels, scratch of the shots in progress, and
+results."""
 
 from __future__ import annotations
 
@@ -29,25 +29,26 @@ Array = NDArray[np.float64]
 
 CUDA_CHUNK = 65536
 MEMORY_SHARE = 0.5
-"""Share of the free memory that scratch may take."""
+"""Largest share of the free memory for scratch."""
 
 
 class Memory:
-    """What was prepared, on one device, with all that a launch of the march needs (kernels/march.py).
+    """A prepared scene on one device, with all that a launch of the march needs (kernels/march.py).
 
     Attributes:
-        prepared: what is there.
-        device: where.
-        stage, flight: the builds of the march and of the free flight that the scene needs.
+        prepared: the prepared scene.
+        device: the device.
+        stage, flight: builds of the march and of the free flight that the scene needs.
         put: puts values on the device.
-        at_a_plate: shots in a row that share a slot of scratch, as the earlier ones leave the plate to the later ones.
+        at_a_plate: consecutive shots that share a slot of scratch, because the earlier ones change the plate for the
+            later ones.
         inputs: what a launch of the march reads.
-        rings, patches: of the largest surface.
+        rings, patches: numbers of the largest surface.
         bending, passage, history: what the march fills beside the outcomes.
     """
 
     def __init__(self, prepared: Prepared, device: Any, cancel: Cancel = NEVER) -> None:
-        """Build the tiles of the plates, unless `cancel` ends that, and put all on the device."""
+        """Build the tiles of the plates, unless `cancel` ends it, and copy everything to the device."""
         for tile in prepared.tiles:
             tile.build(cancel.check)
         variant, scene, count = prepared.variant, prepared.scene, len(prepared.shots)
@@ -67,25 +68,25 @@ class Memory:
         self.passage = empty(self.stage.Passage, device, *sizes)
 
     def build(self) -> float:
-        """Compile the kernels, once per version and machine, and load them; returns how long that took [s]."""
+        """Compile the kernels, once per version and machine, and load them; returns the time [s]."""
         begin = time.perf_counter()
         for kernel in (self.stage.kernel, self.flight.kernel):
             load(kernel, self.device)
         return time.perf_counter() - begin
 
     def give_up_after(self, way: float) -> None:
-        """Give up the last shot after this distance [m] at impact velocity."""
+        """Give up the last shot after this way [m] at impact velocity."""
         longest_way = self.inputs.shots.longest_way.numpy()
         ways = np.resize(longest_way, max(len(longest_way), len(self.prepared.shots)))
         ways[-1] = way
         self.inputs.shots.longest_way = self.put(ways, wp.float64)
 
     def outcomes(self) -> Any:
-        """Room for the outcomes of all shots."""
+        """Empty arrays for the outcomes of all shots."""
         return empty(self.stage.Outcomes, self.device, (len(self.prepared.shots),))
 
     def firsts(self, cells: Cells) -> NDArray[np.int64]:
-        """The first node of every layer's field among those of its slot."""
+        """Index of the first node of every layer's field in a slot."""
         before = np.cumsum([0, *self.prepared.nodes(cells)[:-1]])
         return np.asarray(before[[material.laminate for material in self.prepared.materials]])
 
@@ -101,11 +102,12 @@ class Memory:
 
     @property
     def _patches(self) -> int:
-        """Patches of a slot's touches."""
+        """Patches per slot in the Touches."""
         return 0 if self.variant.nodal else self.patches
 
     def slots(self, cells: Cells, threads: int) -> int:
-        """Slots of scratch that the device's free memory and 32-bit indices allow; on a CPU one per thread at most."""
+        """Slots of scratch that the free memory of the device and 32-bit indices allow; on a CPU at most one per
+        thread."""
         count, nodes = self.at_a_plate, max(sum(self.prepared.nodes(cells)), self._pierced(cells))
         wanted = threads if self.device.is_cpu else min(CUDA_CHUNK, len(self.prepared.shots) // count)
         bytes_of_one = self.slot_bytes(cells)
@@ -113,7 +115,7 @@ class Memory:
         return min(wanted, fitting, (2**31 - 1) // (count * max(nodes, 1)))
 
     def too_large(self, cells: Cells) -> str:
-        """Why there is no slot for a window of the plate of these cells."""
+        """A message that says why there is no slot for a plate's window of these cells."""
         prepared = self.prepared
         windows = [
             f"{place}: {y} × {z} nodes" + (f" in {grid.planes.number} planes" if grid.planes.number > 1 else "")
@@ -129,11 +131,11 @@ class Memory:
 
     @property
     def _free(self) -> int:
-        """Bytes."""
+        """Free memory of the device [bytes]."""
         return free_memory() if self.device.is_cpu else int(self.device.free_memory)
 
     def _pierced(self, cells: Cells) -> int:
-        """Nodes of a slot in the channels of earlier hits."""
+        """Nodes per slot in the channels of earlier hits."""
         return sum(earlier_hits.channel_nodes(self.prepared, self.prepared.windows(cells)))
 
     def slot_bytes(self, cells: Cells) -> int:
@@ -181,7 +183,7 @@ class Memory:
         return filled(stage.Scratch, fields=fields, touches=touches, stack=stack, earlier=earlier)
 
     def launch(self, order: Any, outcomes: Any, scratch: Any, slots: int, first: int, count: int) -> int:
-        """March `count` shots from order[first] on; returns `count`."""
+        """March `count` shots from order[first] on; returns their number."""
         results = filled(
             self.stage.Results, outcomes=outcomes, passage=self.passage, bending=self.bending, trace=self.history
         )
@@ -193,7 +195,7 @@ class Memory:
         return count
 
     def report(self, contact: Any) -> Returned:
-        """Compute the free flight to the stand-offs; return all that the device knows of the shots."""
+        """Compute the free flight to the stand-offs; returns all results of the shots on the device."""
         scene, count = self.prepared.scene, len(self.prepared.shots)
         flight, standoffs = self.flight, np.array(scene.record.standoffs, dtype=np.float64)
         report = empty(self.stage.Report, self.device, (count,), (count, len(standoffs)))
@@ -209,6 +211,6 @@ _BUILDING = threading.Lock()
 
 
 def built(variant: Variant) -> tuple[Any, Any]:
-    """The builds of the march and of the free flight for a variant: one each, whichever threads ask for it."""
+    """The builds of the march and of the free flight for a variant. Threads that ask at the same time build it once."""
     with _BUILDING:
         return march.build(variant), free_flight.build(variant)

@@ -1,15 +1,20 @@
-"""The resolution that keeps a promised accuracy: every level that the user does not fix is chosen here.
+"""The resolution that keeps a promised accuracy. Every level that the user does not fix is chosen here.
 
 A pilot computes 64 of a run's shots on levels of LADDER, coarse to fine, and takes the coarsest level whose error is
-within the promise. The error of a level is its change to the level two finer, because neighbours err alike, times
-ERROR_PER_CHANGE for what the finer one errs by. Of the shots an order statistic counts that rarely lies below the
+within the promise. The error of a level is its change to the level two finer (neighbours err alike), times
+ERROR_PER_CHANGE for the error of the finer one. The order statistic of the shots that counts rarely lies below the
 promised percentile (changes.py). Where 64 shots leave the choice open, 128 and 256 are computed. Where the error is far
-beyond the promise, the next level is left out. The search ends where errors stall, where a level costs more than it is
-worth, and one level behind the first that nearly keeps the promise: with errors of slow cores weighed by their energy,
-because near the limit velocity those of speeds have no bound. If no level keeps the promise, the run takes the first
-that nearly does, else the coarsest whose errors are about the smallest, and tells its change to the finest level
-computed. A long run then takes coarser levels of single settings that keep the promise, too. Limits, of which a pilot
-has 16, and the measure of a stop rule choose their level in the same way, by errors of their own.
+beyond the promise, the next level is left out.
+
+The search ends where errors stall, where a level costs more than it is worth, and one level behind the first that
+nearly
+keeps the promise: there the errors of slow cores are weighed by their energy, because near the limit velocity the error
+of a speed has no bound. If no level keeps the promise, the run takes the first that nearly does, else the coarsest
+whose
+errors are about the smallest, and states its change to the finest level computed. A long run then takes coarser levels
+of single settings that keep the promise, too. Limits (16 in a pilot) and the measure of a stop rule choose their level
+in
+the same way, by errors of their own.
 
 Long because the ways to choose a level share the same comparison of outcomes at three levels.
 """
@@ -39,46 +44,49 @@ Excess: TypeAlias = Callable[[Outcomes, Outcomes, Shots], float]
 _logger = logging.getLogger(__name__)
 
 SHOTS, SHOTS_OF_FINE, FINE = 64, 32, 4
-"""First shots of a pilot; and of one that begins at level FINE, where shots are dear."""
+"""First shots of a pilot; the same for a pilot that begins at level FINE or finer, where shots are expensive; FINE."""
 MOST, PART = 256, 16
-"""Shots that choose a level at most; and the run's shots for each of them, also where single settings are tried."""
+"""Most shots that choose a level; and the shots of a run per shot of its pilot, also where single settings are
+tried."""
 COMPARED = 4.0
-"""Time of the shots beyond these that are compared at the level taken for measures of layers, over that of the run, as
-it is foreseen; it takes about half as long."""
+"""Foreseen time of the further shots that are compared at the chosen level for measures of layers, over that of the
+run. The real time is about half."""
 LIMITS, FINEST_LIMIT = 16, 6
-"""Limits of a pilot; and the last level that is taken for limits. A finer one is only compared with."""
+"""Limits of a pilot; and the finest level that is taken for limits. Finer levels only serve for comparison."""
 OPEN, OPEN_MEASURE = (0.7, 1.5), (0.7, 3.0)
-"""Errors over what is allowed, between which more shots may choose another level. Those of a measure are mostly noise,
-of which four times as many shots leave half."""
+"""Ranges of errors over what is allowed in which more shots may change the choice. The errors of a measure are mostly
+noise, and four times as many shots halve it."""
 OPEN_STATUS = 2
-"""Shots that end otherwise, up to which their share is too uncertain to break the promise."""
+"""Number of shots that end otherwise up to which their share is too uncertain to break the promise."""
 ERROR_PER_CHANGE = {1: 2.0, 2: 1.4}
-"""Error of a level over its change, by the number of levels to the finer one. In 40 random scenes 83 to 98 % of the
-estimates are then at least the 90th percentile that other hits show (tests/benchmarks/random_scenes.py)."""
+"""Error of a level over its change, by the number of levels to the finer one. In 40 random scenes, 83 to 98 % of the
+estimates then reach the 90th percentile of other hits (tests/benchmarks/random_scenes.py)."""
 SKIPS_A_LEVEL = 4.0
-"""Errors over what is allowed, above which the next level is left out: errors about halve from level to level."""
+"""Errors over what is allowed above which the next level is left out. Errors about halve from level to level."""
 STALLED = 0.7
-"""Share of an error left two levels on, above which finer levels are of little use: a quarter is left where it
-converges, but not where cores barely pass or tumble. Errors that differ by less count as equal."""
+"""Share of an error that is left two levels on, above which finer levels are of little use: a quarter is left where
+errors converge, but not where cores barely pass or tumble. Errors that differ by less count as equal."""
 FURTHER, FURTHER_LAYERED = 5, 3
-"""Levels behind the first one on which a promise is looked for, at a single plate and at several layers: 105 random
-scenes of single plates needed no finer one for draft and standard, but one. Layers take eight to ten times as long."""
+"""Most levels behind the first one that are tried for a promise, at a single plate and at several layers. All but one
+of 105 random scenes of single plates needed no finer level for draft and standard. Layers take eight to ten times as
+long."""
 PATIENCE, WORTH = 10.0, 1600
-"""What a pilot may take: these seconds of a core, or the time of these shots at the level that it looks at: a tenth of
-a run of 16,384 hits. Within these seconds it looks at levels beyond FURTHER, too. Times are those that are foreseen
-(`Prepared.seconds`), so that a level does not depend on the machine."""
+"""What a pilot may take: PATIENCE seconds of a core, or the time of WORTH shots at the level in question, a tenth of a
+run of 16,384 hits. Within PATIENCE it also tries levels beyond FURTHER. Times are foreseen ones (`Prepared.seconds`),
+so that a level does not depend on the machine."""
 SETTINGS, ROOM = ("step", "grid", "around", "along"), 0.9
-"""Settings that may have coarser levels, the one that saves most first; and errors over what is allowed, up to which
-one is taken. The rest makes up for the choice: trials pass whose errors on the pilot's shots happen to be small."""
+"""Settings that may have coarser levels, the one that saves most first; and the largest error over what is allowed for
+a coarser setting. The margin makes up for the choice: a trial also passes if its errors on the pilot's shots are small
+by chance."""
 
 
 class Aim(NamedTuple):
-    """Measures that a level is looked for, beside an accuracy of single hits.
+    """Measures for which a level is chosen, instead of or beside an accuracy of single hits.
 
     Attributes:
-        excess: error of measures over what is allowed.
-        alone: whether it chooses the level alone; else a level that keeps the accuracy will do, too, and the accuracy
-            tells whether finer levels are of use: the shift of a mean may be small by chance.
+        excess: error of the measures over what is allowed.
+        alone: whether the measures alone choose the level. Otherwise a level that keeps the accuracy will do, too, and
+            the accuracy says whether finer levels are of use, because the shift of a mean may be small by chance.
     """
 
     excess: Excess
@@ -91,13 +99,13 @@ def climb(
     beyond: int,
     worth: Callable[[int, int], bool] = lambda level, finer: True,
 ) -> int | None:
-    """The level that is taken of those that are tried, coarse to fine; None if not even the first one fits the memory.
+    """Try levels, coarse to fine, and choose one; None if not even the first one fits the memory.
 
     Args:
-        judge: the verdict on a level by comparing it with a finer one.
-        levels: that may be taken. The level behind the last of them is compared with, no finer one.
-        beyond: levels that are tried behind one that nearly keeps the promise.
-        worth: whether a level, compared with a finer one, is worth its cost.
+        judge: returns the verdict on a level from a comparison with a finer one.
+        levels: levels that may be taken. The finest level of a comparison is the one behind the last of them.
+        beyond: number of levels to try behind one that nearly keeps the promise.
+        worth: whether a level and the finer one of its comparison are worth their cost.
     """
     tried: dict[int, Verdict] = {}
     enough: int | None = None
@@ -130,7 +138,7 @@ def climb(
 
 
 def pilot_size(accuracy: Accuracy, hits: int = 0) -> int:
-    """Shots of a pilot at most, for a run of some hits."""
+    """Most shots of a pilot for a run of this number of hits."""
     return max(_first_shots(accuracy), min(MOST, hits // PART))
 
 
@@ -152,16 +160,16 @@ def pilot_hits(
 
     Args:
         outcomes_at: computes shots with numerics of a level.
-        shots: of the pilot; the first of them are spread like all. The first `MOST` of them choose a level.
-        numerics: the accuracy, precision and layout; other settings would promise nothing.
+        shots: shots of the pilot. Any first part of them is spread like all. The first MOST of them choose a level.
+        numerics: accuracy, precision and layout. Other settings would promise nothing.
         price: seconds that a shot takes at a level.
-        free: of each layer of the target, whether a core flies free behind it (`Scene.free_behind`). Residual
+        free: for each layer of the target, whether a core flies free behind it (`Scene.free_behind`). Residual
             velocities behind other layers count in no error.
-        aim: measures in place of the accuracy or beside it, from level 0 on.
-        hits: of the run, which may have coarser settings where it is long; 0 if that is not known.
+        aim: measures instead of the accuracy or beside it. Levels from 0 on are tried.
+        hits: hits of the run, which may have coarser settings if it is long; 0 if unknown.
 
     Raises:
-        ValueError: the accuracy says nothing of outcomes.
+        ValueError: the accuracy has no bound on outcomes.
     """
     accuracy = numerics.asked
     if math.isinf(accuracy.residual_velocity) and math.isinf(accuracy.tilt):
@@ -183,12 +191,12 @@ def pilot_hits(
 
 @dataclass(frozen=True)
 class _Pilot:
-    """What a pilot of hits has computed; the arguments are those of `pilot_hits`.
+    """State of a pilot of hits; the arguments are those of `pilot_hits`.
 
     Attributes:
-        known: outcomes of the first shots at levels.
-        tried: levels that were judged.
-        shifts: of measures at these levels, over what is allowed.
+        known: outcomes of the first shots, by level.
+        tried: judged levels.
+        shifts: shift of the measures over what is allowed, by judged level.
     """
 
     outcomes_at: Callable[[Numerics, Shots], Outcomes]
@@ -203,7 +211,7 @@ class _Pilot:
 
     @property
     def counts(self) -> list[int]:
-        """Numbers of shots that may judge a level: twice as many each time, of whole plates."""
+        """Numbers of shots that may judge a level: each twice the one before, of whole plates."""
         at_a_plate = self.shots.at_a_plate
         most = min(-(-MOST // at_a_plate) * at_a_plate, len(self.shots))
         counts = [min(most, -(-_first_shots(self.numerics.asked) // at_a_plate) * at_a_plate)]
@@ -212,11 +220,11 @@ class _Pilot:
         return counts
 
     def missing(self, level: int, count: int) -> int:
-        """Shots of the first `count` that are not computed at a level."""
+        """How many of the first `count` shots are not computed at a level."""
         return max(0, count - len(self.known[level])) if level in self.known else count
 
     def worth(self, level: int, finer: int, count: int | None = None) -> bool:
-        """Whether a level and a finer one are worth computing the first `count` shots at (PATIENCE, WORTH)."""
+        """Whether the first `count` shots at a level and a finer one are worth their cost (PATIENCE, WORTH)."""
         if not self.tried:
             return True
         further = FURTHER if len(self.free) == 1 else FURTHER_LAYERED
@@ -237,7 +245,8 @@ class _Pilot:
         return self.known[level][:count]
 
     def judge(self, level: int, finer: int) -> Verdict:
-        """A level by its change to a finer one, of as many shots as tell whether it keeps the promise."""
+        """Judge a level by its change to a finer one, with more shots until they decide whether it keeps the
+        promise."""
         first = verdict = self.judged(level, finer, self.counts[0])
         for count in self.counts[1:]:
             if self.decided(level, verdict) or not self.worth(level, finer, count):
@@ -246,7 +255,7 @@ class _Pilot:
         return verdict._replace(typical=first.typical)
 
     def decided(self, level: int, verdict: Verdict) -> bool:
-        """Whether more shots would hardly tell otherwise."""
+        """Whether more shots would hardly change the verdict."""
         if self.aim is not None:
             low, high = OPEN_MEASURE
             return not low < self.shifts[level] < high
@@ -255,10 +264,11 @@ class _Pilot:
         return not low < verdict.excess < high and not (few and verdict.excess <= low)
 
     def judged(self, level: int, finer: int, count: int) -> Verdict:
-        """A level by its change to a finer one, of the first `count` shots."""
+        """Judge a level by its change to a finer one, with the first `count` shots."""
         coarse, fine = self.at(level, count), self.at(finer, count)
         errors, verdict = self.compared(at_level(level, self.numerics), coarse, fine, coarse)
-        # Finer levels end no more shots otherwise than a coarser one, of which more shots tell.
+        # A finer level ends no more shots otherwise than a coarser one. If that had more shots, its share is better
+        # known.
         coarser = [
             level_tried.errors.status_error
             for at, level_tried in self.tried.items()
@@ -279,14 +289,14 @@ class _Pilot:
     def compared(
         self, numerics: Numerics, coarse: Outcomes, fine: Outcomes, between: Outcomes
     ) -> tuple[HitErrors, Verdict]:
-        """`changes.compared` of this pilot's shots, with numerics of a level."""
+        """`changes.compared` for this pilot's shots, at numerics of a level."""
         assert numerics.level is not None
         margin, shots = ERROR_PER_CHANGE[min(2, len(LADDER) - 1 - numerics.level)], self.shots[: len(fine)]
         return compared(numerics, self.numerics.asked, (coarse, between, fine), margin, shots, self.free)
 
     def compare_more(self, level: int, hits: int) -> None:
-        """Compare more shots at the level that is taken, as many as take COMPARED times the run of some hits: of shots
-        that end otherwise, few tell little."""
+        """Compare further shots at the chosen level, within COMPARED times the cost of the run: a few shots say little
+        of the share that ends otherwise."""
         kept, finer = self.tried[level].errors.kept, min(level + 2, len(LADDER) - 1)
         known = min(len(self.known[level]), len(self.known[finer]))
         room = COMPARED * hits * self.price(level) / (self.price(level) + self.price(finer))
@@ -297,8 +307,8 @@ class _Pilot:
             self.tried[level] = tried._replace(errors=replace(tried.errors, kept=kept))
 
     def tell_to_finest(self, level: int) -> None:
-        """Tell the errors of a level that breaks the promise by its change to the finest level that as many shots are
-        known at: where errors stall, a change over two levels tells too little."""
+        """State the errors of a level that breaks the promise by its change to the finest level with as many shots:
+        where errors stall, a change over two levels is too small."""
         coarse = self.tried[level].coarse
         finest = max(at for at, outcomes in self.known.items() if len(outcomes) >= len(coarse))
         fine = self.known[finest][: len(coarse)]
@@ -306,8 +316,8 @@ class _Pilot:
         self.tried[level] = Tried(replace(errors, kept=False), coarse, fine)
 
     def ease(self, level: int) -> None:
-        """Take coarser levels of single settings where these leave a tenth of what is allowed, by plain errors or by
-        weighed ones, as the level itself keeps the promise, and end no more shots otherwise."""
+        """Take coarser levels of single settings if the errors stay below ROOM times what is allowed and no more shots
+        end otherwise. The errors are plain or weighed ones, as those by which the level itself was taken."""
         errors, coarse, fine = self.tried[level]
         settings = dict[str, int]()
         plain, verdict = self.compared(errors.numerics, coarse, fine, coarse)
@@ -331,23 +341,23 @@ class _Pilot:
 
 
 def limits_pilot_size(accuracy: Accuracy) -> int:
-    """Limits of a pilot."""
+    """Number of limits in a pilot."""
     return max(LIMITS, fewest(accuracy.share))
 
 
 def pilot_limits(limits_at: Callable[[int], Array], numerics: Numerics, quantity: str) -> LimitErrors:
     """Find the level whose limits have the accuracy that is asked for.
 
-    Errors about halve from level to level, so limits half of which are within the promise are tried two levels on. Some
-    limits, such as those at which the outcome jumps, or that come and go, have no bounded error.
+    Errors about halve from level to level, so if half of the limits are within the promise, two more levels are tried.
+    Some limits have no bounded error, such as those at which the outcome jumps or passing is not monotone.
 
     Args:
         limits_at: computes the limits of a pilot's shots on a level of LADDER.
         numerics: as in `pilot_hits`.
-        quantity: "velocity", or "thickness", which goes with the square of the velocity.
+        quantity: "velocity" or "thickness". A thickness goes with the square of the velocity.
 
     Raises:
-        ValueError: the accuracy says nothing of limits.
+        ValueError: the accuracy has no bound on limits.
     """
     asked, usual = numerics.asked, PRESETS["draft"].limit
     if asked.limit is None or usual is None:

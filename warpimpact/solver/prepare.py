@@ -1,5 +1,4 @@
-"""From a scene, its shots and numerics to the plain arrays that the kernels read: the one place where all choices are
-made, for those who build, march or describe."""
+"""From a scene, its shots and numerics to the plain arrays that the kernels read. All choices are made here, once."""
 
 from __future__ import annotations
 
@@ -28,15 +27,15 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 PER_BYTE, PER_PATCH, PER_NODE = 1.7e-10, 2.8e-9, 1.5e-9
-"""Seconds that a core takes to open a window, per byte; for a step, per patch; and per node under the core
+"""Seconds that a core takes: to open a window, per byte; for a step, per patch and per node under the core
 (tests/benchmarks/NOTES.md)."""
 AFTER_OTHERS = 3.0
-"""Times as much where earlier hits have left their marks in the plate."""
+"""Factor on the time of a shot where earlier hits have left their marks in the plate."""
 
 
 class Surface(NamedTuple):
-    """A core in patches: its rings, the azimuths of the patches of even rings, then of odd rings [rad], shape
-    [2 around], and the sections behind the rings; None where it does not bend."""
+    """A core in patches: its rings; the azimuths of the patches of even rings, then of odd rings [rad], shape [2
+    around]; and the sections behind the rings, None without bending."""
 
     rings: Rings
     azimuths: Array
@@ -53,21 +52,19 @@ class Prepared:
     """A scene and its shots as the kernels see them: SI and radians.
 
     Attributes:
-        scene, shots: what was prepared.
-        resolution: its numerics with every choice made.
-        variant: the build of the kernels that the scene needs.
-        surfaces: of the core, of which each shot has one.
-        plates: grids of all layers; several sets where shots have degradation lengths of their own.
-        materials: of the plate, and of the layers behind it.
+        scene, shots: the scene and its shots.
+        resolution: the numerics with every choice made.
+        variant: build of the kernels that the scene needs.
+        surfaces: surfaces of the core. Each shot uses one of them.
+        plates: grids of all layers; several sets where degradation lengths differ from shot to shot.
+        materials: materials of all layers; the plate is the first.
         conditions: every member of the kernels' Shots (kernels/shots.py), each of shape [1] or [shots].
         stretch: length of a step in each layer over that of the shortest (kernels/structs.py, Target), each of shape
             [1] or [shots].
-        steps: of a passage that nothing hinders, at most.
-        first_cells: nodes of a first window of the plate in each direction, as each shot by itself would have it, shape
-            [shots].
-        rows: of the trace of each shot; 0 for none.
-        slide: whether windows behind several layers follow a core that leaves them. Snapshots need all that it has
-            passed.
+        steps: largest number of steps of an unhindered passage.
+        first_cells: nodes of the first window of the plate in each direction, as each shot needs it, shape [shots].
+        rows: rows of the trace of each shot; 0 for none.
+        slide: whether windows behind several layers follow a core that leaves them. Snapshots need all that it passed.
     """
 
     scene: Scene
@@ -86,39 +83,39 @@ class Prepared:
 
     @property
     def grids(self) -> list[Grid]:
-        """The plate, and the layers behind it, of the first plates."""
+        """Grids of all layers, in the first set."""
         return self.plates[0]
 
     @property
     def grid(self) -> Grid:
-        """The plate."""
+        """Grid of the plate, in the first set."""
         return self.grids[0]
 
     @property
     def tiles(self) -> set[Tile]:
-        """Those of all plates."""
+        """Tiles of all plates."""
         return {tile for grids in self.plates for grid in grids for tile in grid.tiles}
 
     @property
     def cells(self) -> int:
-        """Nodes of a first window of the plate, in each direction, that serves all shots."""
+        """Nodes, in each direction, of a first window of the plate that serves all shots."""
         return int(self.first_cells.max())
 
     def windows(self, cells: Cells) -> list[Cells]:
-        """Cells of the windows of all layers, for those of the plate's window; 0 where a layer keeps no field."""
+        """Cells of the windows of all layers, for a plate's window of these cells; 0 where a layer keeps no field."""
         counts = self.windows_behind(np.array(cells[:1])).max(axis=1)
         return [(int(count), int(count)) for count in counts]
 
     def windows_behind(self, plate: NDArray[np.int64]) -> NDArray[np.int64]:
-        """`windows.windows_behind` of what was prepared."""
+        """`windows.windows_behind` for this scene."""
         core, burst = self.scene.core, self.variant.burst
         return windows_behind(
             core, self.shots, self.materials, self.plates, self.conditions["plates"], plate, burst=burst
         )
 
     def nodes(self, cells: Cells) -> list[int]:
-        """Nodes of a shot in the windows of all layers, for the cells of the plate's window. Those of a laminate count
-        in its first layer."""
+        """Nodes of a shot in the windows of all layers, for a plate's window of these cells. The nodes of a laminate
+        count in its first layer."""
         return [
             max(grids[k].planes.number for grids in self.plates) * math.prod(window) if material.laminate == k else 0
             for k, (material, window) in enumerate(zip(self.materials, self.windows(cells), strict=True))
@@ -126,24 +123,24 @@ class Prepared:
 
     @property
     def window_nodes(self) -> int:
-        """Nodes of all first windows of a shot together; 0 where nothing weakens."""
+        """Nodes of all first windows of a shot; 0 where nothing weakens."""
         return sum(self.nodes((self.cells,) * 2)) if self.variant.degrades else 0
 
     @property
     def window_bytes(self) -> int:
-        """Memory of their exposure and of what a step adds to it [bytes]."""
+        """Memory of the exposure in these windows and of what a step adds to it [bytes]."""
         return 2 * (8 if self.variant.double else 4) * self.window_nodes
 
     @property
     def seconds(self) -> float:
-        """What a shot that passes all layers takes a core, roughly: the same on every machine."""
+        """Rough time that a core takes for a shot that passes all layers [s]; the same on every machine."""
         patches = len(self.surfaces[0].rings.station) * self.resolution.patches_around
         steps = sum(steps * (PER_PATCH * patches + PER_NODE * nodes) for steps, nodes in self._passages())
         alone = PER_BYTE * self.window_bytes + steps
         return AFTER_OTHERS * alone if self.variant.burst else alone
 
     def _passages(self) -> Iterator[tuple[float, float]]:
-        """Of each layer, the steps of a passage and the nodes below the core's largest section."""
+        """For each layer, the steps of a passage and the nodes below the core's largest section."""
         core, shots = self.scene.core, self.shots
         for material, grid, stretch in zip(self.materials, self.grids, self.stretch, strict=True):
             way = stretch * self.conditions["time_step"] * shots.velocity * np.cos(shots.obliquity)
@@ -158,7 +155,7 @@ def prepare(scene: Scene, shots: Shots, numerics: Numerics) -> Prepared:
     """Make every choice for some shots.
 
     Args:
-        numerics: those of a resolution; for an accuracy a pilot finds it first.
+        numerics: numerics that fix a resolution. For an accuracy, a pilot finds them first.
 
     Raises:
         ValueError: the numerics fix no resolution; they cannot compute the bending moment that the scene records,
@@ -194,7 +191,7 @@ def prepare(scene: Scene, shots: Shots, numerics: Numerics) -> Prepared:
             exclusions.FREE_SURFACE: interaction.free_surface is not None,
         }
     )
-    # A shot is computed by the same build in any company: what counts is which quantities may differ, not the values.
+    # The build depends on which quantities may differ, not on their values, so a shot has the same bits in any company.
     deep |= not resolution.nodal and any(weakening[k] and shots.differs("thickness", k) for k, _ in plates)
     deep |= not resolution.nodal and weakening[0] and "degradation_depth" in shots.columns
     cover = None if interaction.free_surface is None else Pushed.of(interaction.free_surface, core)
@@ -220,7 +217,7 @@ def prepare(scene: Scene, shots: Shots, numerics: Numerics) -> Prepared:
         layered=len(plates) > 1,
         deep=deep,
         tabled=tabled,
-        burst=burst,  # also of one shot, as a replay of the first one of several is
+        burst=burst,  # even for one shot, as a replay of the first of several is
         window=block_window(int(first_cells.max())) if resolution.block else 0,
     )
     rings = [
@@ -257,8 +254,8 @@ def prepare(scene: Scene, shots: Shots, numerics: Numerics) -> Prepared:
 
 
 def _lengths(layers: Sequence[Plate], shots: Shots) -> tuple[list[list[Lengths]], NDArray[np.int64]]:
-    """Over which the layers weaken, in each way that the shots have of their own; and which of them each shot has,
-    shape [1] where they all have the same."""
+    """All different degradation lengths of the layers among the shots; and which of them each shot has, shape [1] where
+    all have the same."""
     front, *behind = [Lengths(layer.degradation_length, layer.degradation_depth) for layer in layers]
     if not any(name in shots.columns for name in OWN_LENGTHS):
         return [[front, *behind]], np.zeros(1, dtype=np.int64)

@@ -1,4 +1,4 @@
-"""One shot computed again with its history, and with what is left of the layers."""
+"""One shot computed again with its history, and with the resistance left in the layers."""
 
 from __future__ import annotations
 
@@ -33,27 +33,27 @@ Array = NDArray[np.float64]
 _logger = logging.getLogger(__name__)
 
 HISTORY_BYTES = 1000
-"""That a step of a history takes until it is written [bytes]: its trace, and twice the columns of its Dataset."""
+"""Memory per step of a history until it is written [bytes]: its trace, and twice the columns of its Dataset."""
 SNAPSHOT_COPIES, OTHER_COPIES = 3, 8
-"""Numbers for every cell that each snapshot takes until it is written, and that computing any takes."""
+"""Numbers per cell until the file is written: those of each snapshot, and those of the computation."""
 THROUGH = 16
-"""Depths at which the mean through a layer is taken."""
+"""Depths over which the mean through a layer is taken."""
 
 
 AT_A_TIME = 2**13
 """Nodes of a window that are computed together."""
 SAMPLES, MOST_POINTS = 16, 2**24
-"""Points along the side of a node with an edge, and points of all such nodes: a window that is wide and full of small
-holes has fewer along a side, as it would take minutes."""
+"""Points along the side of a node with an edge; and most points of all such nodes. A wide window full of small holes
+has fewer points along a side, because it would take minutes."""
 
 
 class Weakened(NamedTuple):
-    """What is left of a layer behind the plate, in the window where a core reached it.
+    """Resistance left of a layer behind the plate, in the window where a core reached it.
 
     Attributes:
         cell_y, cell_z: centres of the cells in the plane of the plate [m], shapes [cells_y] and [cells_z].
         material: share of material in each cell, shape [cells_y, cells_z].
-        share: resistance left, as a share of Y, the mean through the thickness; 0 in holes.
+        share: remaining share of the resistance Y, mean through the thickness, of the same shape; 0 in holes.
     """
 
     cell_y: Array
@@ -83,13 +83,13 @@ class Replay:
     """One shot with its full history: SI, float64.
 
     Attributes:
-        outcomes: how it ended; of one shot.
-        history: the core at every step, and at the end.
+        outcomes: outcomes of the one shot.
+        history: state of the core at every step, and at the end.
         plate_time: instants at which the plate is shown [s], shape [snapshots]; 0 is the first touch.
-        resistance_share: resistance left, as a share of Y, in the cells of the plate that the core may reach: 0 in
-            holes, shape [snapshots, cells_y, cells_z].
-        cell_y, cell_z: centres of those cells in the plate [m], shapes [cells_y] and [cells_z].
-        behind: the same of every layer behind the plate that weakens and is reached, by its number, with `share` of
+        resistance_share: remaining share of the resistance Y in the cells of the plate that the core may reach, shape
+            [snapshots, cells_y, cells_z]; 0 in holes.
+        cell_y, cell_z: centres of these cells in the plane of the plate [m], shapes [cells_y] and [cells_z].
+        behind: the Weakened of every layer behind the plate that weakens and is reached, by its number; `share` has the
             shape [snapshots, cells_y, cells_z].
         deformed: the layers of a hit by finite elements.
     """
@@ -115,17 +115,17 @@ def replay(scene: Scene, shots: Shots, *, numerics: Numerics, snapshots: int = 6
     for bit.
 
     Args:
-        shots: the shot, after those that hit the same plate before it.
+        shots: the shot, preceded by the earlier shots at the same plate.
         numerics: the resolution with which `simulate` computed it.
-        snapshots: number of instants at which the plate is shown, evenly from the first touch to the end. Each computes
-            the shot again up to there; 0 computes no field of any layer.
+        snapshots: number of instants at which the plate is shown, evenly from the first touch to the end. For each of
+            them the shot is computed again up to there; 0 computes no field of any layer.
 
     Raises:
         MemoryError: history and snapshots do not fit; the message is for the user.
     """
     march, contact = traced(scene, shots, numerics, snapshots)
     memory, trace = march.memory, traces_of(march.memory, contact)[-1]
-    outcomes = outcomes_of(memory, contact)[-1:]  # a snapshot writes over what the march has filled
+    outcomes = outcomes_of(memory, contact)[-1:]  # before snapshots overwrite the results of the march
     time_step = float(memory.prepared.conditions["time_step"][-1])
     steps = np.unique(np.linspace(0, len(trace) - 1, snapshots).round().astype(int))
     home, spacing = _hit(memory.prepared), memory.prepared.grid.spacing
@@ -148,7 +148,7 @@ def replay(scene: Scene, shots: Shots, *, numerics: Numerics, snapshots: int = 6
 
 
 def _over_time(number: int, left: list[dict[int, Weakened]]) -> Weakened:
-    """A layer at all snapshots, in its last window: before the core came there it was as new."""
+    """A layer at all snapshots, in its last window. Where the window was elsewhere, the layer was still intact."""
     last = left[-1][number]
 
     def share(layer: Weakened | None) -> Array:
@@ -162,9 +162,9 @@ def _over_time(number: int, left: list[dict[int, Weakened]]) -> Weakened:
 
 
 def traced(scene: Scene, shots: Shots, numerics: Numerics, snapshots: int = 0) -> tuple[March, Any]:
-    """March shots on the CPU with their histories; returns what marched, and the outcomes on the device.
+    """March shots on the CPU with their histories; returns the march, and the outcomes on the device.
 
-    They march twice: the most steps that a shot may take are thousands of times those that it takes.
+    They march twice, because the largest number of steps that a shot may take is thousands of times the real one.
 
     Raises:
         MemoryError: the histories and the snapshots do not fit.
@@ -186,9 +186,9 @@ def traced(scene: Scene, shots: Shots, numerics: Numerics, snapshots: int = 0) -
         "a history of %d steps and %d snapshots of %d cells, %.3g GiB", steps, snapshots, cells, needed / 2**30
     )
     march = March(Memory(replace(prepared, rows=steps + 1), device))
-    if len(shots) == march.at_a_plate:  # others would all be in the window that the widest one needs
+    if len(shots) == march.at_a_plate:  # shots at several plates would all get the widest window
         march.widen(first.cells)
-        march.sizes = 1  # a shot that leaves this window, too, would take more steps in a wider one
+        march.sizes = 1  # a shot that left this window would take more steps in a wider one
     return march, march.march()
 
 
@@ -215,12 +215,12 @@ def _left_after(
     memory: Memory, cells: Cells, scratch: Any, steps: int, time_step: float, material: Array
 ) -> tuple[Array, dict[int, Weakened]]:
     """Share of the plate's resistance that is left after some steps of the last shot on the CPU, in the window of its
-    march, and what is left of the layers behind it by their numbers. All shots hit one plate.
+    march, and the layers behind it by number. All shots hit one plate.
 
     Args:
-        cells: of the plate's window.
-        scratch: of one slot.
-        material: share of material about every node of it.
+        cells: cells of the plate's window.
+        scratch: scratch of one slot.
+        material: share of material about every node.
     """
     prepared, variant = memory.prepared, memory.variant
     before, outcomes = len(prepared.shots) - 1, memory.outcomes()
@@ -230,7 +230,7 @@ def _left_after(
     memory.give_up_after((steps - 0.5) * time_step * prepared.shots.velocity[-1])
     if before:
         apart(memory.launch, order, outcomes, scratch, 1, 0, before)
-    if variant.burst:  # a shot that meets no channel leaves what the one before knew of channels
+    if variant.burst:  # a shot that meets no channel leaves the channels found by the shot before it
         scratch.fields.channel.fill_(constants.NO_CHANNEL.value)
     apart(memory.launch, order, outcomes, scratch, 1, before, 1)
     if variant.nodal:
@@ -240,11 +240,11 @@ def _left_after(
 
 
 def _behind(memory: Memory, scratch: Any, plate: Cells) -> dict[int, Weakened]:
-    """The layers behind the plate that the last shot reached, of those that weaken or that earlier hits pierce, after a
+    """The layers behind the plate that the last shot reached and that weaken or are pierced by earlier hits, after a
     march of one slot.
 
     Args:
-        scratch: of the slot.
+        scratch: scratch of the slot.
         plate: cells of the plate's window.
     """
     prepared, hit = memory.prepared, _hit(memory.prepared)
@@ -261,10 +261,10 @@ def _behind(memory: Memory, scratch: Any, plate: Cells) -> dict[int, Weakened]:
 
 
 def _share_left(memory: Memory, layer: int, fields: Any, plate: Cells) -> Array:
-    """Share of the resistance that is left of a layer in its window, the mean through its thickness, of the last shot.
+    """Share of a layer's resistance that the last shot leaves in its window, mean through the thickness.
 
     Args:
-        fields: of one slot.
+        fields: fields of one slot.
         plate: cells of the plate's window.
     """
     material, cells = memory.prepared.materials[layer], memory.prepared.windows(plate)[layer]
@@ -274,12 +274,12 @@ def _share_left(memory: Memory, layer: int, fields: Any, plate: Cells) -> Array:
         field = _planes_of(fields.exposure, memory.firsts(plate)[layer], planes.number, cells)
         depth = material.front[-1] - memory.prepared.materials[material.laminate].front[-1]
         depth = depth + material.thickness[-1] * through
-        weakened = depth / planes.spacing + (planes.number > 1)  # a plane to spare before the first face
+        weakened = depth / planes.spacing + (planes.number > 1)  # one spare plane lies before the first face
     if memory.variant.burst:
         firsts = np.cumsum([0, *channel_nodes(memory.prepared, memory.prepared.windows(plate))])
         number = planes_of(memory.prepared, layer, float(material.thickness[-1]))
         channel, pierced = _planes_of(fields.channel, firsts[layer], number, cells), through * (number - 1)
-    for k in range(THROUGH):  # all depths at once would take tens of gigabytes of a wide window
+    for k in range(THROUGH):  # all depths of a wide window at once would take tens of gigabytes
         share = np.ones(cells)
         if material.weakens:
             share *= np.exp(material.decay_rate[-1] * np.maximum(_between(field, weakened[k]), 0.0))
@@ -297,7 +297,7 @@ def _planes_of(field: Any, first: int, number: int, cells: Cells) -> NDArray[Any
 
 
 def _between(planes: NDArray[Any], place: float) -> Array:
-    """Linear interpolation between planes at a place that counts in planes."""
+    """Linear interpolation between planes at a place in units of planes."""
     low = math.floor(place)
     at, high = place - low, min(low + 1, len(planes) - 1)
     return np.asarray((1.0 - at) * planes[low].astype(np.float64) + at * planes[high].astype(np.float64))

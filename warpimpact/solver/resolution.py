@@ -25,7 +25,7 @@ class TooManySteps(ValueError):
 
 @dataclass(frozen=True)
 class Level:
-    """Settings that go together; lengths scale with the scene (docs/model.md §4's table)."""
+    """Settings of one level of resolution; lengths scale with the scene (docs/model.md §4's table)."""
 
     patches_axial: int
     patches_around: int
@@ -37,39 +37,40 @@ class Level:
 
     @property
     def patch_width(self) -> float:
-        """Widest patch as the plate sees it, in degradation lengths: wider ones leave gaps in the exposure, and
-        weaken the plate under themselves too much. It is that of the paper's core (R = 3.02 mm, ℓ = 0.5 mm), for
-        which the patches of two neighbouring rings together go round."""
+        """Largest width of a patch as the plate sees it, in degradation lengths. Wider patches leave gaps in the
+        exposure, and weaken the plate under themselves too much. It is the width for the paper's core (R = 3.02 mm, ℓ =
+        0.5 mm) at which the patches of two neighbouring rings together close the circle."""
         return 19.0 / self.patches_around
 
 
 SLENDER = 1.0 / 7.0
 ACTING_DEPTHS = 2.0
-"""Of the degradation depth: a passage no longer than that leaves a step within the depth."""
+"""Thickness, in degradation depths, up to which a step of the passage stays within the depth."""
 ALONG = 1.6
-"""Way of a step in the plane of a plate, in degradation lengths and per unit of `travel`: contact that sweeps sideways
-by more than that leaves gaps in the exposure, and jumps over edges of holes."""
+"""Largest way of a step in the plane of a plate, in degradation lengths and per unit of `travel`. Contact that sweeps
+farther sideways leaves gaps in the exposure, and jumps over edges of holes."""
 
 WEAKENING = 2.7
-"""ln of what a step may take off the resistance where it acts all the time, per unit of `travel`: exposure counts as
-it is in mid-step, and a longer step leaves too little of a plate that weakens at once."""
+"""Largest decrease of ln(resistance) in a step of permanent contact, per unit of `travel`. Exposure counts as it is in
+mid-step, and a longer step leaves too little of a plate that weakens at once."""
 
 SLOWING = 0.25
-"""Share of the core's energy that a step may take if the plate acts on the whole cross section of the core, per unit of
-`travel`: near the limit velocity a core would else lose most of its energy in one step. No step of the paper's shots is
-shortened by it."""
+"""Largest share of the core's energy that a step may take if the plate acts on the core's whole cross section, per unit
+of `travel`. Otherwise a core near the limit velocity would lose most of its energy in one step. It shortens no step of
+the paper's shots."""
 
 SLOWEST_DECAY = 1.0e-30
-"""Below which nothing weakens [1/s]."""
+"""Rate of decay below which nothing weakens [1/s]."""
 SMALLEST_STRESS = 1.0
-"""Below which nothing slows down [Pa]."""
+"""Stress below which nothing slows down [Pa]."""
 
 STEP_ALLOWANCE = 200
-"""How many times the way of an unhindered passage a shot may take, at impact velocity, before it is given up."""
+"""Ratio of the way at impact velocity after which a shot is given up to the way of an unhindered passage."""
 MOST_STEPS = 10**7
-"""Of an unhindered passage: a shot may take STEP_ALLOWANCE times as many, and they are counted in 32 bits."""
+"""Most steps of an unhindered passage. A shot may take STEP_ALLOWANCE times as many, and they are counted in 32
+bits."""
 UNBREAKABLE = 1.0e30
-"""Strength of a core that has none [Pa], beyond any stress."""
+"""Strength of a core without a strength [Pa], beyond any stress."""
 
 LADDER = (
     Level(14, 16, 1.0, 0.5),
@@ -92,17 +93,17 @@ NODAL: dict[str, Any] = {
     "grid_spacing": 1.0e-5,
     "time_step": 1.0e-6,
 }
-"""The paper's own resolution; its time step is the one that meets its rows (docs/model.md §4)."""
+"""The paper's own resolution. Its time step is the one that reproduces its rows (docs/model.md §4)."""
 
 
 def at_level(index: int, numerics: Numerics, **coarser: int) -> Numerics:
-    """A level of the ladder, in precision and layout of the numerics; with coarser levels of single settings."""
+    """Numerics of a level of the ladder, with the precision and layout given, and coarser levels of single settings."""
     kept = {name: getattr(numerics, name) for name in ("precision", "layout") if name in numerics.model_fields_set}
     return Numerics(level=index, **kept, **({"coarser": Coarser(**coarser)} if coarser else {}))
 
 
 def level_of(numerics: Numerics) -> Level:
-    """What fills in what the numerics do not give."""
+    """The level that supplies the settings which the numerics do not give."""
     index, coarser = base_level(numerics), numerics.coarser or Coarser()
     along, around, grid, step = (
         LADDER[index if level is None else level]
@@ -112,12 +113,12 @@ def level_of(numerics: Numerics) -> Level:
 
 
 def coarsest_level(strictness: float) -> int:
-    """The level from which on an accuracy is looked for, by how many times as strict as draft it is."""
+    """The first level that is tried for an accuracy, by how many times as strict as draft it is."""
     return int(np.clip(math.floor(math.log2(max(strictness, 1.0)) + 1e-9), 0, len(LADDER) - 2))
 
 
 def base_level(numerics: Numerics) -> int:
-    """The level that fills in what the numerics do not give."""
+    """Index of the level that supplies the settings which the numerics do not give."""
     return coarsest_level(numerics.asked.strictness) if numerics.level is None else numerics.level
 
 
@@ -128,40 +129,40 @@ class Resolution:
     nodal: bool
     time_step: float | None
     travel: float
-    """Way per step at impact velocity, as a share of the passage: the thickness of the plate, or `slender` [m] where
-    that is less. A step, also a given one, that is longer than the passage jumps over what happens in the plate."""
+    """Way per step at impact velocity, as a share of the passage, which is the thickness of the plate or, if less,
+    `slender` [m]. A step longer than the passage, also a given one, jumps over what happens in the plate."""
     slender: float
     along: float
-    """The most of a step's way that may lie in the plane of a plate, in degradation lengths, if a quarter of it is
-    enough for that."""
+    """Largest part of a step's way in the plane of a plate, in degradation lengths. It shortens a step to a quarter at
+    most."""
     weakening: float
-    """The most that contact may take off ln of the resistance in a step, with the same bound."""
+    """Largest decrease of ln(resistance) by contact in a step. It shortens a step to a quarter at most."""
     slowing: float
-    """The most that contact may take off the speed in a step, with the same bound."""
+    """Largest share of the speed that contact may take in a step. It shortens a step to a quarter at most."""
     section: float
     """The core's largest cross section [m²]."""
     mass: float
-    """Of the core, where no other is given [kg]."""
+    """Mass of the core where a shot has none of its own [kg]."""
     static: float
     """Static stress over the resistance."""
     patches_axial: int
     patches_around: int
     grid_spacing: float
-    """In the plate [m]; in a layer in proportion to its degradation length."""
+    """Spacing of the grid in the plate [m]; in a layer it is proportional to the degradation length."""
     double: bool
     block: bool
     """Whether a block of threads computes a shot."""
     patch_width: float
-    """No ring is wider than this radially [m]."""
+    """Largest radial width of a ring [m]."""
 
     def passage(self, thickness: ArrayLike, depth: ArrayLike, *, weakens: bool) -> Array:
-        """Way [m] on which a plate acts on a core, for some thicknesses and degradation depths [m], of their shape."""
+        """Way on which a plate acts on a core [m], for thicknesses and degradation depths [m] of the same shape."""
         acting = np.minimum(thickness, ACTING_DEPTHS * np.asarray(depth)) if weakens else thickness
         return np.minimum(acting, self.slender)
 
     def way_along(self, plate: Plate, length: ArrayLike, *, weakens: bool, behind: bool) -> Array:
-        """The most of a step's way that may lie in the plane of a plate [m], for some degradation lengths [m], of their
-        shape; infinite where it stands behind another one, and is and stays the same everywhere."""
+        """Largest part of a step's way in the plane of a plate [m], for degradation lengths [m], of their shape;
+        infinite for a layer behind another one that is and stays homogeneous."""
         if behind and isinstance(plate.pattern, NoPattern) and plate.size is None and not weakens:
             return np.full(np.shape(length), math.inf)
         return self.along * np.asarray(length)
@@ -169,8 +170,8 @@ class Resolution:
     def longest_time(
         self, decay: Array, plate: Plate, velocity: ArrayLike, mass: ArrayLike, static_stress: ArrayLike
     ) -> Array:
-        """Time [s] in which contact weakens a plate, and slows down a core, by as much as a step may, for some rates
-        of decay (`decay_rate`), impact velocities [m/s], masses [kg] and static stresses [Pa], of their shape."""
+        """Time [s] in which contact weakens a plate, or slows down a core, by as much as a step may, for rates of decay
+        (`decay_rate`), impact velocities [m/s], masses [kg] and static stresses [Pa] of the same shape."""
         longest = self.weakening / np.maximum(-decay, SLOWEST_DECAY)
         weakened = longest if plate.degradation_distance is None else longest / np.asarray(velocity)
         stopping = self.section * np.maximum(static_stress, SMALLEST_STRESS)
@@ -185,8 +186,8 @@ class Resolution:
         longest_time: ArrayLike,
         way_along: ArrayLike = math.inf,
     ) -> Array:
-        """Time steps [s] at impact velocities [m/s], obliquities [rad], `passage` [m], `longest_time` [s] and
-        `way_along` [m], of their shape."""
+        """Time steps [s] for impact velocities [m/s], obliquities [rad], `passage` [m], `longest_time` [s] and
+        `way_along` [m] of the same shape."""
         longest = self.travel * np.asarray(passage)
         aslant = np.asarray(way_along) / np.maximum(np.sin(obliquity), 1e-9)
         way = np.clip(np.minimum(aslant, np.multiply(longest_time, velocity)), 0.25 * longest, longest)
@@ -195,7 +196,8 @@ class Resolution:
         return np.asarray(np.minimum(way, passage) / velocity)
 
     def step_of(self, impact: Impact, plate: Plate, *, behind: bool = False) -> float:
-        """Time step [s] of a plate that stands alone, or behind another one; where it scatters, of its means."""
+        """Time step [s] of a plate that stands alone, or behind another one. Mean values stand for scattered
+        quantities."""
         stress = self.static * plate.resistance
         decay = decay_rate(np.array(plate.degradation), plate.degradation_unit)
         longest_time = self.longest_time(decay, plate, impact.velocity, self.mass, stress)
@@ -205,7 +207,7 @@ class Resolution:
         return float(self.step_at(impact.velocity, impact.obliquity, passage, longest_time, way_along))
 
     def step_in(self, impact: Impact, target: Target) -> float:
-        """Time step [s] of a target: that of the layer that needs the shortest."""
+        """Time step [s] of a target: the shortest of its layers."""
         return min(self.step_of(impact, plate, behind=k > 0) for k, plate in enumerate(target.layers))
 
 
@@ -216,7 +218,7 @@ def resolve(
 
     Args:
         weakening: whether each layer weakens.
-        lengths: over which the layers weaken [m], in the place of those of the scene.
+        lengths: degradation lengths of the layers [m] that replace those of the scene.
     """
     core, every = scene.core, lengths or [layer.degradation_length for layer in scene.target.layers]
     nodal, level = numerics.scheme == "nodal", level_of(numerics)
@@ -255,7 +257,7 @@ def layer_steps(
     """Time steps in all layers [s], each of shape [shots].
 
     Args:
-        lengths: over which the layers weaken [m], each of shape [1] or [shots].
+        lengths: degradation lengths of the layers [m], each of shape [1] or [shots].
     """
     mass = shots.own("mass", scene.core.mass_properties.mass)
     return [
@@ -273,7 +275,7 @@ def layer_steps(
 def conditions_of(
     scene: Scene, shots: Shots, materials: Sequence[Materials], steps: Sequence[Array]
 ) -> dict[str, Array]:
-    """What every shot is computed with, under the names of the kernels' Shots; of shape [1] where all share it.
+    """The conditions of every shot, under the names of the kernels' Shots; of shape [1] where all shots share one.
 
     Args:
         steps: as `layer_steps` gives them.
@@ -281,7 +283,7 @@ def conditions_of(
     core, target = scene.core, scene.target
     body = core.mass_properties
     mass, depth = shots.own("mass", body.mass), materials[-1].front + materials[-1].thickness
-    scale = mass / body.mass  # of the body as a whole, so of its moments of inertia, too
+    scale = mass / body.mass  # the whole body is scaled, so its moments of inertia are, too
     gaps = sum(target.gaps)
     return {name: values for name, values in shots.columns.items() if name not in BY_LAYER} | {
         "mass": mass,
@@ -295,7 +297,7 @@ def conditions_of(
 
 
 def steps_of(shots: Shots, conditions: dict[str, Array]) -> Array:
-    """Steps of passages that nothing hinders, shape [shots].
+    """Numbers of steps of unhindered passages, shape [shots].
 
     Args:
         conditions: as `conditions_of` gives them.

@@ -18,16 +18,16 @@ BEHIND = 0.57
 """Length of the rings behind the core's widest station, as a share of the length of those ahead of it. The rings behind
 touch when the core swings, and they have the longest levers."""
 ZOOMS = 4
-"""Searches for the widest station, each within the two gaps that the one before leaves of a thousand."""
+"""Rounds of the search for the widest station. Each divides the two best gaps of the round before into a thousand."""
 THINNEST = 0.5
-"""Sections thinner than this share of the largest radius have no nominal stress. 4M/(πr³) has no bound at a pointed
+"""Radius, as a share of the largest, below which a section has no nominal stress. 4M/(πr³) has no bound at a pointed
 nose, and beam theory does not hold within a diameter of a load."""
 
 
 @dataclass(frozen=True, eq=False)
 class Rings:
-    """Rings of patches from nose to base; arrays of shape [rings], SI (kernels/structs.py, Surface). A core has one
-    such object for the same patches."""
+    """Rings of patches from nose to base; arrays of shape [rings], SI (kernels/structs.py, Surface). The same core in
+    the same patches has one such object."""
 
     station: Array
     radius: Array
@@ -113,10 +113,10 @@ def _ends(key: Key[Core]) -> tuple[float, float]:
 
 @lru_cache(maxsize=16)
 def _stations(key: Key[Core], count: int) -> tuple[Array, Array]:
-    """Edges of the profile's rings, and how much the radius changes from one to the next [m].
+    """Edges of the profile's rings, and the change of radius from each to the next [m].
 
-    They are length/count apart ahead of the widest station, BEHIND times this distance behind it. The widest station is
-    an edge. Jumps of the slope are edges, too, if they are fewer than `count`.
+    The edges are length/count apart ahead of the widest station, and BEHIND times this distance behind it. The widest
+    station is an edge. Jumps of the slope are edges, too, if they are fewer than `count`.
     """
     core = key.value
     breaks, widest = core.breaks if len(core.breaks) < count else (), _widest_station(core)
@@ -132,14 +132,14 @@ def _stations(key: Key[Core], count: int) -> tuple[Array, Array]:
 
 @lru_cache(maxsize=64)
 def _divided(edges: bytes, parts: bytes) -> bytes:
-    """Edges of rings, each of which is divided into its number of parts."""
+    """Edges of finer rings: each ring is divided into its number of parts."""
     ends, counts = np.frombuffer(edges), np.frombuffer(parts, dtype=int)
     finer = [np.linspace(a, b, n, endpoint=False) for a, b, n in zip(ends[:-1], ends[1:], counts, strict=True)]
     return np.append(np.concatenate(finer), ends[-1]).tobytes()
 
 
 def _widest_station(core: Core) -> float:
-    """First station of the largest radius [m]. It must be an edge: the loads on a ring across it would partly
+    """First station of the largest radius [m]. It must be an edge, because the loads on a ring across it would partly
     cancel."""
     low, high = 0.0, core.length
     for _ in range(ZOOMS):
@@ -182,12 +182,12 @@ def _normals(core: Core, stations: Array, step: Array) -> Array:
 
 
 def _discs(radius: float, widest: float) -> int:
-    """Rings of a disc that are no wider than that radially [m]."""
-    return int(np.ceil(radius / widest)) if radius > 1e-6 * widest else 0  # below that it is a point
+    """Number of rings of a disc whose radial width is at most `widest` [m]."""
+    return int(np.ceil(radius / widest)) if radius > 1e-6 * widest else 0  # a smaller disc is a point
 
 
 def _disc_rings(station: float, radius: float, count: int, *, facing: float) -> tuple[Array, ...]:
-    """As `_profile_rings`, for a disc in `count` rings that faces along the axis (+1 towards the nose)."""
+    """The values of `_profile_rings` for a disc in `count` rings that faces along the axis (+1 towards the nose)."""
     edges = np.linspace(0.0, radius, count + 1)
     low, high = edges[:-1], edges[1:]
     nothing = np.zeros(count)

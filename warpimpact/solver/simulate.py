@@ -35,8 +35,8 @@ def simulate(
     progress: Progress | None = None,
     cancel: Cancel = NEVER,
 ) -> Outcomes:
-    """Compute every shot on its own copy of the target (docs/model.md §§1–5), or those of a sample one after another on
-    one copy (`Shots.sample`, docs/model.md §8).
+    """Compute every shot on its own copy of the target (docs/model.md §§1–5). The shots of a sample hit one copy, one
+    after another (`Shots.sample`, docs/model.md §8).
 
     Args:
         numerics: as in a campaign. None is the standard fidelity: a pilot on some of the shots finds the resolution. A
@@ -45,7 +45,7 @@ def simulate(
         progress: called repeatedly with (shots done, all shots).
 
     Returns:
-        The outcomes, with what the scene records (records/registry.py).
+        The outcomes, with the records of the scene (records/registry.py).
 
     Raises:
         DeviceError: the device is absent.
@@ -58,21 +58,21 @@ def simulate(
 
 
 def computed(prepared: Prepared, worker: Worker, progress: Progress | None = None) -> Outcomes:
-    """Compute what was prepared; see `simulate`."""
+    """Compute a prepared scene; see `simulate`."""
     memory = Memory(prepared, find_device(worker.device), worker.cancel)
     return marched(memory, worker, progress)
 
 
 def marched(memory: Memory, worker: Worker, progress: Progress | None = None) -> Outcomes:
-    """Compute what is in the memory of a device; see `simulate`."""
+    """Compute a scene in the memory of a device; see `simulate`."""
     march = March(memory, worker.threads)
     contact = march.march(progress, worker.cancel)
     return outcomes_of(march.memory, contact)
 
 
 def numerics_for(scene: Scene, shots: Shots, numerics: Numerics, worker: Worker, hits: int = 0) -> Numerics:
-    """Numerics that fix the resolution: those given, or what a pilot of some of the shots finds for a run of some
-    hits."""
+    """Numerics that fix the resolution: those given, or those that a pilot of some of the shots finds for a run of this
+    number of hits."""
     if numerics.explicit is not None:
         return numerics
     return pilot_of(scene, spread(shots, pilot_size(numerics.asked, hits)), numerics, worker, hits=hits).numerics
@@ -121,7 +121,7 @@ def pilot_of(
 
 
 def spread(shots: Shots, most: int) -> Shots:
-    """Some of the shots, as `spread_places` has them; those at one plate go together."""
+    """At least `most` shots at even distances, in the order of `spread_places`. Shots at one plate stay together."""
     together = shots.at_a_plate
     plates = len(shots) // together
     places = spread_places(plates, min(plates, -(-most // together)))
@@ -129,12 +129,12 @@ def spread(shots: Shots, most: int) -> Shots:
 
 
 def spread_places(places: int, count: int) -> NDArray[np.int64]:
-    """Numbers of `count` of some places at even distances; the first of them lie all over, too."""
+    """`count` of the numbers 0 … places − 1 at even distances, in an order in which any first part is spread, too."""
     digits = max(1, (count - 1).bit_length())
     order = np.array([int(f"{k:0{digits}b}"[::-1], 2) for k in range(2**digits)])
     return np.asarray(np.linspace(0, places, count, endpoint=False).astype(np.int64)[order[order < count]])
 
 
 def outcomes_of(memory: Memory, contact: Any) -> Outcomes:
-    """What became of the shots, after their march."""
+    """Outcomes of the shots after their march."""
     return Outcomes.collected(memory.prepared.scene, memory.prepared.shots, memory.report(contact))

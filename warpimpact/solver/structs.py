@@ -1,4 +1,4 @@
-"""The inputs of the kernels (kernels/structs.py, Inputs): what was prepared, put on a device once."""
+"""The inputs of the kernels (kernels/structs.py, Inputs): a prepared scene, copied to a device once."""
 
 from __future__ import annotations
 
@@ -25,17 +25,17 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 LARGEST_ONSET = 0.02
-"""Bound of the onset speed, as a share of the impact velocity."""
+"""Largest onset speed, as a share of the impact velocity."""
 PROFILE = 128
-"""Parts of a core's length, between which its radius is linear, as its channel has it."""
+"""Parts of a core's length in which the radius of its channel is linear."""
 
 
 @dataclass(frozen=True)
 class Put:
     """Puts values on the named device, by default in the floating-point type `real` of the kernels.
 
-    On a CPU values that have the type stay where they are, unless they are to be `aligned`, as loops over patches read
-    them best.
+    On a CPU, values of this type are not copied, unless they shall be `aligned`, which is fastest for loops over
+    patches.
     """
 
     device: str
@@ -54,7 +54,7 @@ def filled(struct: Any, **members: Any) -> Any:
 
 
 def empty(struct: Any, device: Any, *shapes: tuple[int, ...]) -> Any:
-    """A struct of empty arrays on a device; each has the shape with its number of dimensions."""
+    """A struct of empty arrays on a device. `shapes` has one shape for each number of dimensions."""
     arrays = {name: variable.type for name, variable in struct.vars.items()}
     return filled(
         struct,
@@ -63,11 +63,11 @@ def empty(struct: Any, device: Any, *shapes: tuple[int, ...]) -> Any:
 
 
 def inputs_of(stage: Any, prepared: Prepared, put: Put) -> tuple[Any, list[Any]]:
-    """The Inputs of the march, and what has to be kept with them: an array of structs does not keep the arrays that its
-    members point to.
+    """The Inputs of the march, and the arrays that must be kept alive with them: an array of structs does not keep the
+    arrays that its members point to.
 
     Args:
-        stage: the build of the march.
+        stage: build of the march.
     """
     core, variant = prepared.scene.core, prepared.variant
     surfaces = [surface_of(stage.Surface, core, surface.rings, surface.azimuths, put) for surface in prepared.surfaces]
@@ -100,7 +100,7 @@ def _free_surface(prepared: Prepared) -> dict[str, float]:
 
 
 def _target_of(stage: Any, prepared: Prepared, put: Put) -> tuple[Any, Any]:
-    """The Target, and what has to be kept of its plates."""
+    """The Target, and the arrays of its plates that must be kept alive."""
     target, kept, materials, record = stage.Target(), None, prepared.materials, prepared.scene.record
     target.count = len(materials)
     if prepared.variant.layered or prepared.variant.tabled:
@@ -125,10 +125,10 @@ def surface_of(struct: Any, core: Core, rings: Rings, azimuths: Array, put: Put)
 
 @lru_cache(maxsize=64)
 def _surface(struct: Any, key: Key[Core], rings: Rings, azimuth: bytes, put: Put) -> Any:
-    """No kernel changes it, so it is kept for later shots with the same core."""
+    """The Surface, cached for later shots with the same core, because no kernel changes it."""
     core, azimuths = key.value, np.frombuffer(azimuth)
     surface, area, around = struct(), np.hypot(rings.area_axial, rings.area_radial), len(azimuths) // 2
-    azimuth_of = np.resize(azimuths, len(area) * around)  # of even and of odd rings in turn
+    azimuth_of = np.resize(azimuths, len(area) * around)  # of even and odd rings in turn
     values = {name: getattr(rings, name) for name in _OF_A_RING} | {
         "area": area,
         "normal_axial": rings.area_axial / area,
@@ -162,7 +162,7 @@ _OF_A_RING = ("station", "radius", "half_axial", "half_radial", "turn_axial", "t
 
 
 def table_of(struct: Any, values: Sequence[Any], put: Put, **members: Any) -> Any:
-    """An array of structs, which does not keep what their members point to; some members have another value."""
+    """An array of structs with some members replaced. It does not keep alive what the members point to."""
     if not values:
         return _empty(struct, put.device)
     table = np.array([value.numpy_value() for value in values], dtype=struct.numpy_dtype())
@@ -177,7 +177,7 @@ def _empty(struct: Any, device: str) -> Any:
 
 
 def plates_of(struct: Any, grids: Sequence[Grid], put: Put) -> tuple[Any, Any]:
-    """An array of the Plates of some grids, and what has to be kept of them."""
+    """An array of the Plates of some grids, and the arrays that must be kept alive with it."""
     firsts = {(grid.tile, grid.period, grid.half_size): grid for grid in grids}
     kept = [plate_of(struct, grid, put) for grid in firsts.values()]
     values = dict(zip(firsts, (plate.numpy_value() for plate in kept), strict=True))
@@ -222,7 +222,7 @@ _ON_DEVICE: WeakKeyDictionary[Tile, dict[Put, tuple[Any, ...]]] = WeakKeyDiction
 
 
 def _cover_on_device(cover: Cover, put: Put) -> Any:
-    """The table of a cover, kept as that of a tile."""
+    """The table of a cover, cached as that of a tile is."""
     kept = _ON_DEVICE.setdefault(cover, {})
     if put not in kept:
         kept[put] = (put(cover.material.reshape(-1)),)
@@ -230,7 +230,7 @@ def _cover_on_device(cover: Cover, put: Put) -> Any:
 
 
 def _on_device(tile: Tile, put: Put) -> tuple[Any, Any]:
-    """Material and clearance of a tile. No kernel changes them, so they are kept as long as the tile is."""
+    """Material and clearance of a tile, cached as long as the tile is, because no kernel changes them."""
     kept = _ON_DEVICE.setdefault(tile, {})
     if put not in kept:
         kept[put] = put(tile.material.reshape(-1)), put(tile.clearance.reshape(-1))

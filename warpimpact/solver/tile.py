@@ -1,4 +1,5 @@
-"""The tile: one period of the pristine plate in cells, planned at once, and built where somebody may end it."""
+"""The tile: one period of the pristine plate in cells. It is planned at once, and built later, where it can be
+cancelled."""
 
 from __future__ import annotations
 
@@ -28,32 +29,31 @@ Real = type[np.floating[Any]]
 Kept = TypeVar("Kept", bound="Tile")
 
 BLUR = 3
-"""Cells of the tile over which its material is averaged, in each direction: a patch then crosses an edge gradually.
-Odd."""
+"""Cells over which the material is averaged, in each direction, so that a patch crosses an edge gradually. Odd."""
 BLOCKS = 96
 """Largest number of blocks of a period, in each direction, in the search for the clearance."""
 AT_ONCE = 2**22
-"""Cells that are computed between two looks at who may end it, about."""
+"""Approximate number of cells that are computed between two checks for cancellation."""
 
 MOST_BYTES, MOST_SECONDS = 2**31, 20.0
-"""What all tiles of a target may take: memory, and time of a core as it is foreseen. A plate of 0.5 m in cells of 1/15
-of the usual degradation length fits."""
+"""Bounds for all tiles of a target: memory, and foreseen time of a core. A plate of 0.5 m in cells of 1/15 of the usual
+degradation length fits."""
 PER_CELL, PER_SHARP_CELL = 5.0e-8, 1.0e-7
-"""Seconds of a core (tests/benchmarks/NOTES.md)."""
+"""Seconds of a core per cell (tests/benchmarks/NOTES.md)."""
 MOST_KEPT = 16
-"""Tiles, built or not, for later shots at the same plate."""
+"""Most tiles, built or not, that are kept for later shots at the same plate."""
 
 
 @dataclass(frozen=True, eq=False)
 class Tile:
-    """One period of the pristine plate: cells of dy × dz [m], `shape` along y and z. `material` has their fractions and
-    `clearance` is a lower bound of every cell's distance from the material of the whole lattice [m]; both of `shape`,
-    of the floating-point type of the kernels, and built when they are first read.
+    """One period of the pristine plate: cells of dy × dz [m], `shape` along y and z. `material` is the material
+    fraction of each cell; `clearance` is a lower bound of its distance from the material of the whole lattice [m]. Both
+    have the shape `shape` and the floating-point type of the kernels, and are built when they are first read.
 
     Attributes:
         make: computes the material.
-        seconds: that it takes a core, roughly.
-        size: of a number [bytes].
+        seconds: rough time that it takes a core [s].
+        size: size of a number [bytes].
     """
 
     shape: tuple[int, int]
@@ -75,7 +75,7 @@ class Tile:
         return "material" in vars(self)
 
     def build(self, check: Check) -> None:
-        """Compute the material, once, whichever threads ask for it; `check` ends that."""
+        """Compute the material once, whichever threads ask for it; `check` may cancel it."""
         with self._building:
             if not self.built:
                 _make_room(self.bytes)
@@ -87,7 +87,7 @@ class Tile:
 
     @cached_property
     def clearance(self) -> Floats:
-        # The search runs over blocks of cells. A block with any material is a wall.
+        # The search runs over blocks of cells. A block with any material counts as a wall.
         rows, columns = self.shape
         block = (math.ceil(rows / BLOCKS), math.ceil(columns / BLOCKS))
         wall = _any_of(_any_of(self.material > 0.0, block[0]).T, block[1]).T
@@ -95,19 +95,18 @@ class Tile:
             return np.full_like(self.material, math.inf)
         widths = (self.dy * rows / len(wall), self.dz * columns / wall.shape[1])
         distance = nearest_wall(wall, widths)
-        # Two blocks are subtracted, as distances are from centre to centre and the last block of a period may be
-        # narrower.
+        # Distances are from centre to centre, and the last block of a period may be narrower, so two blocks are
+        # subtracted.
         kept = np.maximum(0.0, distance - 2.0 * math.hypot(self.dy * block[0], self.dz * block[1]))
         every = kept.astype(self.material.dtype).repeat(block[1], axis=1)[:, :columns].repeat(block[0], axis=0)[:rows]
         return np.asarray(every)
 
 
 def tile_of(plate: Plate, spacing: float, *, sharp: bool = False, double: bool = False) -> Tile:
-    """Material fraction about every cell of one period; cell (0, 0) has its corner at the origin. Nothing is computed
-    yet.
+    """The tile of a plate; cell (0, 0) has its corner at the origin. Nothing is computed yet.
 
-    Cells are at most `spacing` wide and fit the period; fractions are means over BLUR × BLUR cells. `sharp` takes each
-    cell's centre alone, as the literal scheme does, and `double` has them in float64.
+    Cells are at most `spacing` wide and fit the period. Fractions are means over BLUR × BLUR cells; with `sharp` they
+    are the material at the cell's centre, as in the literal scheme. `double` selects float64.
     """
     key: Key[Pattern] = Key(plate.pattern)
     real: Real = np.float64 if double else np.float32
@@ -115,7 +114,7 @@ def tile_of(plate: Plate, spacing: float, *, sharp: bool = False, double: bool =
 
 
 def kept(asked: Any, planned: Callable[[], Kept]) -> Kept:
-    """The tile that was planned for what is asked, now or before."""
+    """The tile for a key, planned now or before."""
     with _KEEPING:
         tile: Kept = _KEPT.pop(asked, None) or planned()
         _KEPT[asked] = tile
@@ -129,13 +128,13 @@ _KEEPING = Lock()
 
 
 def forget_tiles() -> None:
-    """Keep no tile."""
+    """Drop all tiles."""
     with _KEEPING:
         _KEPT.clear()
 
 
 def _make_room(needed: int) -> None:
-    """Keep the tiles that were asked for last, as far as they leave room for another one of some size [bytes]."""
+    """Drop the tiles that were asked for longest ago, until another one of `needed` bytes fits."""
     with _KEEPING:
         for asked in [asked for asked, tile in _KEPT.items() if tile.built]:
             if sum(tile.bytes for tile in _KEPT.values() if tile.built) + needed <= MOST_BYTES:
@@ -144,10 +143,10 @@ def _make_room(needed: int) -> None:
 
 
 def check_tiles(tiles: Mapping[Tile, str]) -> None:
-    """Raise a MemoryError, whose message is for the user, if tiles take more memory or time than they may.
+    """Raise a MemoryError, whose message is for the user, if the tiles take more memory or time than allowed.
 
     Args:
-        tiles: with the places of their plates in a campaign.
+        tiles: tiles, with the places of their plates in a campaign.
     """
     needed, seconds = sum(tile.bytes for tile in tiles), sum(tile.seconds for tile in tiles)
     if needed <= SMALL_MEMORY:
@@ -190,8 +189,8 @@ def _sharp(pattern: Pattern, counts: tuple[int, int], sides: tuple[float, float]
 
 
 def _blurred(pattern: Pattern, counts: tuple[int, int], sides: tuple[float, float], real: Real, check: Check) -> Floats:
-    """Means of material over BLUR × BLUR cells of a period: sums of whole numbers, which floats of 32 bits hold
-    exactly, and one division."""
+    """Material averaged over BLUR × BLUR cells of a period: exact sums of whole numbers in float32, then one
+    division."""
     inside, (rows, columns), beside = pattern.shares_in_holes(counts, sides, check), counts, BLUR // 2
     material = np.empty(counts, dtype=real)
     for band in _bands(counts):
@@ -227,9 +226,9 @@ def _any_of(marked: NDArray[np.bool_], size: int) -> NDArray[np.bool_]:
 
 def nearest_wall(wall: NDArray[np.bool_], widths: tuple[float, float]) -> Array:
     """Distance [m] of every block of one period from the nearest wall of the lattice, centre to centre, for blocks of
-    these widths: first along z, then over all rows. At least one block is a wall.
+    these widths: first along z, then over all rows. At least one block must be a wall.
 
-    scipy.ndimage has this, too, but a run would wait a quarter of a second for its import.
+    scipy.ndimage can compute this, but a run would wait a quarter of a second for its import.
     """
     rows, columns = wall.shape
     number, walls = np.arange(3 * columns), np.tile(wall, 3)

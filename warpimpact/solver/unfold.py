@@ -18,7 +18,7 @@ def image_of(replay: Replay, symmetry: Symmetry, *, home: tuple[float, float], i
 
     Args:
         home: hit point (y, z) of the replayed shot [m].
-        image: that of its image [m].
+        image: hit point (y, z) of its image [m].
     """
     history, polar, axial = replay.history, symmetry.polar, symmetry.axial
     signs = symmetry.along_y, symmetry.along_z

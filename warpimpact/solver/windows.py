@@ -1,4 +1,4 @@
-"""Windows: the part of each layer about a hit whose nodes remember what has weakened them."""
+"""Windows: the parts of the layers about a hit whose nodes remember what has weakened them."""
 
 from __future__ import annotations
 
@@ -14,30 +14,31 @@ if TYPE_CHECKING:
     from warpimpact.solver.materials import Materials
 
 Cells = tuple[int, int]
-"""Of a window, along y and z."""
+"""Numbers of a window's cells along y and z."""
 Counts = NDArray[np.int64]
 
 SIZES = (1024, 2048, 3072, 4096, 6144)
-"""Windows that blocks have [nodes]; each is compiled by itself. Two fields of float32 of the largest fill the 48 KiB of
-shared memory that a block of every CUDA device has."""
+"""Sizes of windows in the block layout [nodes]; each is compiled by itself. Two float32 fields of the largest fill the
+48 KiB of shared memory that a block has on every CUDA device."""
 SLACK, NODAL_SLACK = 1.6, 1.2
-"""Half the width of a first window for a straight shot, in radii of the core. It is smaller for the literal scheme: on
-its fine grid, large windows cost more time than the repetition of some shots."""
+"""Half the width of a first window for a straight shot, in radii of the core. It is smaller in the literal scheme, on
+whose fine grid large windows cost more time than the repetition of some shots."""
 WIDER_BEHIND = 0.6
-"""Half of what the first window of a layer behind the plate is wider than that of the plate, in largest distances of
+"""Half of the difference between the widths of the first windows of a layer and of the plate, in largest distances of
 the core's surface from its centre of mass: the core arrives turned."""
 
 
 def first_windows(
     core: Core, shots: Shots, material: Materials, plates: Sequence[Sequence[Grid]], which: Counts, *, nodal: bool
 ) -> Counts:
-    """Nodes of a window, in each direction, that holds the footprint of a core that keeps its attitude through the
-    plate, or the laminate that it begins; shape [shots]. Layers farther away have windows of their own.
+    """Nodes, in each direction, of a window that holds the footprint of a core that keeps its attitude through the
+    plate, or through the laminate that begins with the plate; shape [shots]. Layers farther behind have windows of
+    their own.
 
     Args:
-        material: of the plate.
-        plates: the grids of all layers, one way or several.
-        which: of these, shape [1] or [shots].
+        material: material of the plate.
+        plates: sets of grids of all layers.
+        which: number of the set that each shot uses, shape [1] or [shots].
     """
     slack = NODAL_SLACK if nodal else SLACK
     turned = np.minimum(1.0, np.sin(np.hypot(shots.pitch, shots.yaw)))
@@ -80,5 +81,5 @@ def windows_behind(
 
 
 def block_window(cells: int) -> int:
-    """Nodes of the smallest window of a block that holds cells × cells nodes; 0 if none does."""
+    """Nodes of the smallest block window that holds cells × cells nodes; 0 if none does."""
     return next((size for size in SIZES if size >= cells**2), 0)

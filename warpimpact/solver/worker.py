@@ -9,29 +9,29 @@ class Cancelled(Exception):
 
 
 class Cancel:
-    """Passed down to the march, which looks at it between two launches of a kernel."""
+    """A token that the march checks between two launches of a kernel."""
 
     def __init__(self, outer: "Cancel | None" = None) -> None:
-        """A token that is cancelled with an outer one, too."""
+        """Create a token that is also cancelled with an outer one."""
         self._asked, self._outer = threading.Event(), outer
 
     def cancel(self) -> None:
-        """End what was given this token."""
+        """Cancel all computations that were given this token."""
         self._asked.set()
 
     @property
     def cancelled(self) -> bool:
-        """Whether it was cancelled."""
+        """Whether the token, or its outer one, was cancelled."""
         return self._asked.is_set() or (self._outer is not None and self._outer.cancelled)
 
     def check(self) -> None:
-        """Raise Cancelled if it was cancelled."""
+        """Raise Cancelled if the token was cancelled."""
         if self.cancelled:
             raise Cancelled
 
 
 NEVER = Cancel()
-"""Of computations that nobody cancels."""
+"""Token of computations that nobody cancels."""
 
 
 @dataclass(frozen=True)
@@ -40,8 +40,8 @@ class Worker:
 
     Attributes:
         device: "auto" (CUDA if there is one, else CPU), "cpu", "cuda:0", …
-        threads: number on a CPU; None is one for every core that this process may use.
-        cancel: ends what it computes, which then raises Cancelled.
+        threads: number of threads on a CPU; None is one for every core that this process may use.
+        cancel: token that ends the computation with Cancelled.
     """
 
     device: str = "auto"
