@@ -1,7 +1,8 @@
-"""Some hits of a campaign with what nobody measured chosen otherwise: how far every number of a result may be off.
+"""Some hits of a campaign computed under other assumptions about what nobody measured. They show how much every number
+of a result may be wrong.
 
-The hits are those of a pilot, at the resolution of the run, so that what they have in common drops out of the
-difference to the hits as given.
+The hits are those of a pilot, at the resolution of the run, so that common errors cancel in the difference to the hits
+as given.
 """
 
 from __future__ import annotations
@@ -26,35 +27,36 @@ from warpimpact.scene import Numerics, Scene, Shots
 from warpimpact.solver.prepare import prepare
 
 SHARE = 1.0 / 128.0
-"""Hits of an alternative over those of a run: some twelve alternatives cost a run a tenth, those whose plates have
-finer grids included about 15 %."""
+"""Hits per alternative over the hits of a run. Some twelve alternatives then cost a tenth of a run, or about 15 % with
+alternatives whose plates have finer grids."""
 FEWEST, MOST = 64, 256
-"""Hits of an alternative unless the campaign tells how many."""
+"""Fewest and most hits per alternative, unless the campaign gives their number."""
 FEWEST_LIMITS = 8
-"""The same of limits at least, each of which takes several runs."""
+"""Fewest hits per alternative in a computation of limits, where each hit takes several runs."""
 SECONDS = 2.0
-"""Of a core, for passages that nothing hinders, that all alternatives may take where that is more than their share of
-the run: of what takes long fewer hits are taken, but FEWEST_GROUPS. Cores that slide and stop take several times as
+"""Seconds of a core for unhindered passages that all alternatives together may take where their share of the run takes
+longer. Fewer hits are computed then, but at least FEWEST_GROUPS. Cores that slide and stop take several times as
 long."""
 FEWEST_GROUPS = 8
-"""Hits or bursts of an alternative that are no images of each other, at least."""
+"""Fewest hits or bursts per alternative, images not counted."""
 
 Computed = Callable[[list[tuple[Scene, Shots]]], list[Outcomes]]
 
 
 def has_assumptions(campaign: Campaign) -> bool:
-    """Whether alternatives of a campaign are computed: unless it tells, where a pilot finds the resolution."""
+    """Whether alternatives of a campaign are computed. By default they are where a pilot finds the resolution."""
     asked = campaign.assumptions.compute
     return campaign.numerics.explicit is None if asked is None else asked
 
 
 def assumed(campaign: Campaign, numerics: Numerics, compute: Computed, *, limits: bool = False) -> HitTable:
-    """Hits under assumptions, with their attributes; empty of a campaign that has no alternative.
+    """Hits under assumptions, with their attributes; an empty table for a campaign without alternatives.
 
     Args:
-        numerics: of the run, which fix a resolution.
-        compute: the outcomes of the shots of scenes.
-        limits: whether it computes limits: few, which depend on no stand-off, and not which cores would break.
+        numerics: numerics of the run, which fix a resolution.
+        compute: returns the outcomes of scenes with their shots.
+        limits: whether `compute` returns limits. Then there are few hits, and alternatives of the stand-offs and of the
+            cores' strength are left out.
     """
     begin = time.perf_counter()
     images, group = len(campaign.symmetries), len(campaign.symmetries) * campaign.at_a_plate
@@ -64,7 +66,7 @@ def assumed(campaign: Campaign, numerics: Numerics, compute: Computed, *, limits
     possible = [alternative for alternative in others if alternative.is_possible(shots)]
     if not possible:
         return HitTable.of({}, {}, {})
-    # What turns a shot leaves no image of it.
+    # An alternative that turns shots differently breaks the symmetry, so all images are computed.
     scenes = [
         (alternative.scene, alternative.shots(shots if alternative.turned else shots[::images]))
         for alternative in possible
@@ -80,8 +82,8 @@ def assumed(campaign: Campaign, numerics: Numerics, compute: Computed, *, limits
 
 
 def _groups(campaign: Campaign, numerics: Numerics, others: int, fewest: int) -> int:
-    """How many hits or bursts that are no images of each other each alternative has. The speed of the machine does not
-    count."""
+    """Number of groups of images, or of bursts with their images, per alternative. It does not depend on the
+    machine."""
     group, total = len(campaign.symmetries) * campaign.at_a_plate, len(campaign.sampler())
     hits = campaign.assumptions.hits
     if hits is None:
@@ -100,7 +102,7 @@ def _columns(possible: list[Alternative], outcomes: list[Outcomes], numbers: NDA
 
 
 def _attributes(possible: list[Alternative], outcomes: list[Outcomes]) -> dict[str, Any]:
-    """Numbers of the alternatives by name, and the share of cores that would break by their strength."""
+    """Attributes: number of each alternative by name, and share of the cores that would break by their strength."""
     names = [alternative.name for alternative in possible if not alternative.breaks]
     broken = {
         alternative.name: float(np.mean(outcome.broken))

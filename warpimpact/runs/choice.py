@@ -1,4 +1,4 @@
-"""Which executor computes: the one that the options of a command, or of a call in Python, ask for."""
+"""The executor that the options of a command, or of a call in Python, ask for."""
 
 from __future__ import annotations
 
@@ -19,16 +19,15 @@ def executor_for(
     after: float = 0.0,
     cancel: Cancel | None = None,
 ) -> Iterator[Executor]:
-    """The executor that the options of a command ask for; without any, the devices of this machine.
+    """The executor that the options of a command ask for. By default the devices of this machine compute.
 
     Args:
-        device: "auto" (every CUDA device if there is one, else the CPU), or names with commas between them.
+        device: "auto" (every CUDA device if there is one, else the CPU), or names separated by commas.
         workers: number of processes on this machine. They need a main module that does nothing when it is imported.
-        scheduler: address of a Dask scheduler, whose workers compute.
-        apart: whether jobs spend much of their time in Python: on a CPU, as many of them are computed at a time as
-            there are cores, each on one core.
-        after: seconds of computing by this process before others are begun.
-        cancel: ends what this process computes, whose futures then raise Cancelled.
+        scheduler: address of a Dask scheduler whose workers compute.
+        apart: whether jobs spend much of their time in Python. On a CPU, each core then computes a job of its own.
+        after: seconds that this process computes before other processes are started.
+        cancel: cancels what this process computes; the futures then raise Cancelled.
 
     Raises:
         DeviceError: a device is absent, or devices are of different kinds, which compute different bits.
@@ -49,5 +48,5 @@ def executor_for(
 
 
 def opened(device: str | Executor) -> AbstractContextManager[Executor]:
-    """An executor of the devices of some names; a given one stays open afterwards."""
+    """An executor for device names, closed afterwards. A given executor stays open."""
     return executor_for(device) if isinstance(device, str) else nullcontext(device)

@@ -1,4 +1,4 @@
-"""The workers of a Dask cluster as an executor. What a worker that dies was computing goes to another."""
+"""The workers of a Dask cluster as an executor. If a worker dies, another one computes its jobs."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from warpimpact.solver.device import DeviceError
 from warpimpact.solver.worker import Worker
 
 LONELY = 120.0
-"""Seconds for which a scheduler may be without workers."""
+"""Seconds that a scheduler may be without workers."""
 
 Entered = TypeVar("Entered")
 
@@ -26,23 +26,23 @@ def cluster(address: str, device: str = "auto") -> Iterator[Cluster]:
     """The workers of a scheduler.
 
     Args:
-        address: of the scheduler.
-        device: that every worker computes on.
+        address: address of the scheduler.
+        device: device of every worker.
 
     Raises:
-        ClusterError: Dask is not installed, the scheduler cannot be reached, is lost or has no worker for LONELY
-            seconds, or jobs kill one worker after another.
-        DeviceError: the workers lack the device, or compute other bits than the first one asked.
+        ClusterError: Dask is not installed; the scheduler cannot be reached, is lost or has no worker for LONELY
+            seconds; or jobs kill one worker after another.
+        DeviceError: the workers lack the device, or compute other bits than the first worker asked.
     """
     with _starting():
         from distributed import Client, KilledWorker
         from distributed.comm import CommClosedError
         from distributed.utils import silence_logging_cmgr
     with ExitStack() as stack:
-        stack.enter_context(silence_logging_cmgr(logging.CRITICAL))  # a lost scheduler gets our sentence, no traceback
+        stack.enter_context(silence_logging_cmgr(logging.CRITICAL))  # a lost scheduler is reported by our own sentence
         with _starting():
             try:
-                # Not the default of its process, of which xarray takes the locks of the files that are written here.
+                # Not the default client of the process: xarray would take its locks for the files written here.
                 client = stack.enter_context(_ended(Client(address, timeout="20s", set_as_default=False)))
             except (OSError, ValueError) as error:
                 raise ClusterError(f'scheduler: got "{address}", which cannot be reached ({error})') from None
@@ -56,7 +56,8 @@ def cluster(address: str, device: str = "auto") -> Iterator[Cluster]:
 
 @contextmanager
 def _ended(part: AbstractContextManager[Entered]) -> Iterator[Entered]:
-    """A client that does not end in time, on a busy machine, must not hide how the computation ended."""
+    """Ignore that a client does not end in time on a busy machine, so that it does not hide how the computation
+    ended."""
     entered = part.__enter__()
     try:
         yield entered
@@ -67,7 +68,7 @@ def _ended(part: AbstractContextManager[Entered]) -> Iterator[Entered]:
 
 @contextmanager
 def _starting() -> Iterator[None]:
-    """Name the settings of Dask where it does not start.
+    """Turn an error of a start of Dask into a ClusterError that names the settings.
 
     Raises:
         ClusterError: it is not installed, or does not start.
@@ -103,7 +104,7 @@ class Cluster:
         return future
 
     def width(self) -> int:
-        """Twice as many as the workers have threads; 2 while there are no workers."""
+        """Twice the number of the workers' threads; 2 while there are no workers."""
         threads: int = sum(self._asked(self._client.nthreads).values())
         now = time.monotonic()
         if threads:
@@ -120,7 +121,7 @@ class Cluster:
         return []
 
     def _asked(self, request: Callable[..., Any], *arguments: Any) -> Any:
-        """What a request to the scheduler returns."""
+        """The answer to a request to the scheduler."""
         from distributed.client import ClosedClientError
 
         try:
@@ -144,7 +145,7 @@ def _on_worker(job: Job, device: str, kind: dict[str, str]) -> Any:
     """Compute a job on a worker.
 
     Args:
-        kind: what `made_by` says of the other workers; empty where no worker was asked before.
+        kind: `made_by` of the other workers; empty if no worker was asked before.
 
     Raises:
         DeviceError: the worker computes other bits.

@@ -1,4 +1,4 @@
-"""From shots of a campaign to their columns; every hit map, local or distributed, goes through here."""
+"""From shots of a campaign to their columns. Every hit map, local or distributed, is computed here."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class HitMap:
-    """How every hit of a campaign ends, as a `Computation`."""
+    """The `Computation` of how every hit of a campaign ends."""
 
     most_solid: ClassVar[int] = 2**12
     passages: ClassVar[int] = 1
@@ -57,7 +57,7 @@ class HitMap:
     def pilot(
         self, campaign: Campaign, worker: Worker, trying: Callable[[int], object] = lambda level: None
     ) -> HitErrors | None:
-        """What a pilot of the campaign's own hits finds; None if the campaign fixes the resolution itself."""
+        """The findings of a pilot with hits of the campaign; None if the campaign fixes the resolution."""
         if campaign.numerics.explicit is not None:
             return None
         pilot = pilot_shots(campaign, pilot_most(campaign))
@@ -66,7 +66,7 @@ class HitMap:
         return replace(errors, shifts=shifts_of(campaign, pilot, errors), tried=())
 
     def found_in(self, result: Result) -> HitErrors | None:
-        """What the pilot of a result found; None if its campaign fixed the resolution."""
+        """The findings of the pilot of a result; None if its campaign fixed the resolution."""
         attributes = result.attrs
         if attr.RESOLUTION not in attributes:
             return None
@@ -84,13 +84,14 @@ HIT_MAP = HitMap()
 
 
 def compute(campaign: Campaign, task: Task, worker: Worker, progress: Progress | None = None) -> HitTable:
-    """Compute some shots of a campaign. If it uses symmetry, only the first shot of each group of images is computed.
+    """Compute some shots of a campaign. If the campaign uses symmetry, only the first shot of each group of images is
+    computed.
 
     Args:
         progress: as in `simulate`.
 
     Returns:
-        The columns of results/dataset.py, one entry per shot; they are a complete result.
+        The columns of results/dataset.py, one entry per shot. They are a complete result.
 
     Raises:
         DeviceError: the device is absent.
@@ -113,7 +114,7 @@ def finer_hits(campaign: Campaign, found: Found | None, most: int) -> dict[str, 
     """Columns of the hits that a pilot computed at a finer level.
 
     Args:
-        most: shots of the pilot, at most, as in `pilot_shots`.
+        most: most shots of the pilot, as in `pilot_shots`.
     """
     if found is None or found.finer is None:
         return {}
@@ -124,17 +125,17 @@ def finer_hits(campaign: Campaign, found: Found | None, most: int) -> dict[str, 
 
 
 def numerics_of(campaign: Campaign, found: Found | None) -> Numerics:
-    """Those of the campaign, or what its pilot found."""
+    """The numerics of the campaign, or those that its pilot found."""
     return campaign.numerics if found is None else found.numerics
 
 
 def of_images(progress: Progress | None, images: int) -> Progress | None:
-    """Progress in hits of which so many are computed as one."""
+    """Progress in hits, where each group of `images` hits is computed as one."""
     return progress and (lambda done, total: progress(done * images, total * images))
 
 
 def found_in(result: Result) -> tuple[Numerics, bool, float]:
-    """The values of `Found` that a result tells."""
+    """The values of `Found` in the attributes of a result."""
     attributes = result.attrs
     numerics = Numerics.model_validate_json(attributes[attr.RESOLUTION])
     return numerics, bool(attributes[attr.PROMISE_KEPT]), float(json.loads(attributes[attr.ACCURACY])["share"])
@@ -157,7 +158,7 @@ def _errors(found: Found | None) -> dict[str, Any]:
 def _outcomes(
     scene: Scene, shots: Shots, numerics: Numerics, worker: Worker, progress: Progress | None = None
 ) -> tuple[Outcomes, float]:
-    """Outcomes of shots, and the time [s] that it took to prepare and to compute them, but not to build kernels."""
+    """Outcomes of shots, and the time to prepare and compute them [s], without the build of the kernels."""
     begin = time.perf_counter()
     prepared = prepare(scene, shots, numerics)
     memory = Memory(prepared, find_device(worker.device), worker.cancel)

@@ -1,4 +1,4 @@
-"""What a result says of its campaign and of how it was computed."""
+"""The attributes of a result: its campaign, and how it was computed."""
 
 from __future__ import annotations
 
@@ -35,9 +35,9 @@ def described(
 
     Args:
         shots: whole groups of images.
-        outcomes: of the first shot of every group.
-        numerics: with which they were computed.
-        attributes: those of how they were computed (`computed_by`), and of what is not the same in any campaign.
+        outcomes: outcomes of the first shot of every group.
+        numerics: numerics of the computation.
+        attributes: attributes on how it was computed (`computed_by`), and further ones.
         beside: columns of other shots, as in `to_table`.
     """
     told = _numerics(campaign, resolve(campaign.scene, numerics, weakens(campaign.target, shots)))
@@ -55,10 +55,10 @@ def described_as(
     *,
     double: bool,
 ) -> HitTable:
-    """The columns of shots of a campaign and of the outcomes of all of them.
+    """The columns of shots of a campaign with the outcomes of all of them.
 
     Args:
-        attributes: those that do not follow from the campaign alone.
+        attributes: attributes that do not follow from the campaign alone.
         beside, double: as in `to_table`.
     """
     return to_table(
@@ -74,12 +74,12 @@ def described_as(
 
 
 def is_double(campaign: Campaign) -> bool:
-    """Whether it is computed, and stored, in double precision."""
+    """Whether a campaign is computed, and stored, in double precision."""
     return campaign.numerics.precision == "double"
 
 
 def computed_by(campaign: Campaign, device: str, computed: int, elapsed: float) -> dict[str, Any]:
-    """Who computed so many shots, and in what time [s]."""
+    """Attributes on versions, device, number of computed shots, and time [s]."""
     chosen, group = find_device(device), campaign.symmetries
     attributes = {
         **attr.versions(),
@@ -98,7 +98,8 @@ def computed_by(campaign: Campaign, device: str, computed: int, elapsed: float) 
 
 
 def found_attributes(campaign: Campaign, found: Found | None) -> dict[str, Any]:
-    """What a pilot was asked for and found; nothing without one. The errors are for the kind of computation to add."""
+    """Attributes on what a pilot was asked for and found; none without a pilot. The kind of computation adds the
+    errors."""
     if found is None:
         return {}
     asked = {name: getattr(campaign.numerics.asked, name) for name in Accuracy.model_fields}
@@ -154,7 +155,7 @@ def _impact(campaign: Campaign) -> str:
 
 
 def _material(campaign: Campaign) -> str:
-    """What the plate resists with, as JSON: of its material, and of the law of its stress."""
+    """The resistance of the plate as JSON: its material and the law of its stress."""
     of_plate = campaign.plate.model_dump(exclude={"thickness", "size", "margin", "pattern"})
     law = campaign.interaction.model_dump(exclude={"free_surface"})
     free = campaign.interaction.free_surface
@@ -167,7 +168,7 @@ def _plate(campaign: Campaign) -> str:
 
 
 def _layers(campaign: Campaign) -> str:
-    """What stands behind the plate, as JSON: each layer by its number, with what scatters in it."""
+    """The layers behind the plate as JSON: each by its number, with its scattered quantities."""
     layers = {str(k + 1): json.loads(layer.model_dump_json()) for k, layer in enumerate(campaign.layer)}
     for (name, k), given in campaign.scatter.given.items():
         if k:
@@ -176,12 +177,12 @@ def _layers(campaign: Campaign) -> str:
 
 
 def _burst(burst: Burst) -> dict[str, Any]:
-    """How many shots hit a plate, and how they lie."""
+    """The burst as attributes: number of shots at a plate, and their places."""
     return {attr.BURST: burst.model_dump_json(exclude_none=True), attr.SHOTS_AT_A_PLATE: burst.count}
 
 
 def _numerics(campaign: Campaign, resolution: Resolution) -> dict[str, Any]:
-    """The numerics as they were given, and in force with every choice made: as one line and as numbers."""
+    """The numerics as given, and as used with every choice made: as a line of text and as numbers."""
     numerics, impact, precision = campaign.numerics, campaign.impact, "double" if resolution.double else "single"
     return {
         attr.NUMERICS: f"{_asked(campaign)}, {numerics.scheme} scheme, "
@@ -198,7 +199,7 @@ def _numerics(campaign: Campaign, resolution: Resolution) -> dict[str, Any]:
 
 
 def _asked(campaign: Campaign) -> str:
-    """What decided the resolution."""
+    """What determined the resolution."""
     numerics = campaign.numerics
     if numerics.explicit is None:
         return "accuracy in numbers" if numerics.accuracy is not None else f"{numerics.fidelity} fidelity"

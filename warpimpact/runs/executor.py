@@ -1,8 +1,8 @@
-"""Who computes: the devices of this machine, processes of it, or the workers of a Dask cluster (`cluster.py`).
+"""Executors of jobs: the devices of this machine, processes of it, or the workers of a Dask cluster (`cluster.py`).
 
-A job is a function with its arguments; all of them can be pickled. The function also takes `worker`, which says where
-to compute, and `report`, which is called with how far the job is. Its result depends on its arguments and the kind of
-device alone, so every executor returns the same bits.
+A job is a function with its arguments, all of which can be pickled. The function also takes `worker`, which says where
+to compute, and `report`, which it calls with its progress. The result depends only on the arguments and the kind of
+device, so every executor returns the same bits.
 """
 
 from __future__ import annotations
@@ -27,15 +27,15 @@ from warpimpact.solver.device import DeviceError, cores, find_device
 from warpimpact.solver.worker import Cancel, Worker
 
 LOOK_EVERY = 0.2
-"""Seconds between two looks at the reports of jobs, at signals and at the workers."""
+"""Seconds between two checks of the reports of jobs, of signals and of the workers."""
 PATIENCE = 1.0
-"""Seconds to wait for jobs that nobody wants any more: a thread ends between two launches of a kernel only."""
+"""Seconds to wait for jobs whose results are not needed. A thread can only end between two launches of a kernel."""
 
 Key = TypeVar("Key")
 
 
 class ClusterError(RuntimeError):
-    """A cluster that cannot be used; the message is for a person."""
+    """A cluster cannot be used; the message is for the user."""
 
 
 class Job(NamedTuple):
@@ -49,8 +49,8 @@ class Executor(Protocol):
     """Computes jobs.
 
     Attributes:
-        made_by: versions and kind of device, which decide the bits of a result.
-        is_remote: whether jobs are computed outside of this process, where those of a process that dies are lost.
+        made_by: versions and kind of device, which determine the bits of a result.
+        is_remote: whether other processes compute the jobs. If such a process dies, its unfinished jobs are lost.
     """
 
     made_by: dict[str, str]
@@ -60,14 +60,14 @@ class Executor(Protocol):
         """Compute a job in the background."""
 
     def width(self) -> int:
-        """Number of jobs to keep under way: as many as are computed at a time, and as many that wait.
+        """Number of jobs to keep submitted: those computed at a time, and as many that wait.
 
         Raises:
             ClusterError: the cluster is lost.
         """
 
     def reports(self) -> list[Any]:
-        """The last report of every job that is being computed, where it is known."""
+        """The last report of every running job, where it is known."""
 
 
 def completed(
@@ -75,14 +75,14 @@ def completed(
 ) -> Generator[tuple[Key, Any]]:
     """Results of jobs as they come, each with the key of its job.
 
-    A job is taken from `jobs` when it is submitted. Close the iterator to give up what is under way.
+    A job is taken from `jobs` when it is submitted. Closing the iterator gives up the submitted jobs.
 
     Args:
         tick: called several times a second.
 
     Raises:
         KeyboardInterrupt: a signal came.
-        Exception: of the first job that fails.
+        Exception: the error of the first job that fails.
     """
     waiting: dict[Future[Any], Key] = {}
     try:
@@ -111,7 +111,7 @@ def result_of(
 
 
 class Threads:
-    """The devices of this machine, each of which computes a job at a time; arguments as of `choice.executor_for`."""
+    """The devices of this machine, each of which computes a job at a time; arguments as in `choice.executor_for`."""
 
     is_remote = False
 
@@ -146,15 +146,15 @@ class Threads:
             self._idle.put(worker)
 
     def width(self) -> int:
-        """Twice as many as there are devices, or cores."""
+        """Twice the number of devices, or of cores."""
         return 2 * self._count
 
     def reports(self) -> list[Any]:
-        """The last report of every job that is being computed."""
+        """The last report of every running job."""
         return list(self._reports.copy().values())
 
     def close(self) -> None:
-        """Give up the jobs that are under way."""
+        """Give up the submitted jobs."""
         self._stop.cancel()
         self._pool.shutdown(wait=False, cancel_futures=True)
         wait([future for future in self._begun if not future.cancelled()], timeout=PATIENCE)
@@ -163,14 +163,13 @@ class Threads:
 class Processes:
     """Processes of this machine, which share its cores.
 
-    What a process cannot compute, as it was killed or an error came, the threads of this one compute, or tell why not.
+    If a process was killed or failed, the threads of this process compute its job or raise the error.
 
     Args:
         count: number of processes.
-        device: that every process computes on.
-        threads: of this process.
-        after: seconds of computing by the threads before processes begin, each of which takes some two seconds and
-            0.4 GB.
+        device: device of every process.
+        threads: threads of this process.
+        after: seconds that the threads compute before processes are started. A start takes some two seconds and 0.4 GB.
     """
 
     is_remote = True
@@ -190,7 +189,7 @@ class Processes:
         try:
             with _interrupts_held():
                 in_process = self._begun_pool().submit(_in_process, pickle.dumps(job))
-        except (OSError, RuntimeError):  # one was killed, or none can be begun: memory may be short
+        except (OSError, RuntimeError):  # a process was killed, or none can be started: memory may be short
             self._broken = True
             return self._threads.submit(job)
         future = Future[Any]()
@@ -198,7 +197,7 @@ class Processes:
         def passed_on(ended: Future[Any]) -> None:
             try:
                 self._pass_on(job, ended, future)
-            except Exception as error:  # which a callback would log alone, while who waits for the job waits for ever
+            except Exception as error:  # a callback only logs it, and whoever waits for the job waits for ever
                 future.set_exception(error)
 
         in_process.add_done_callback(passed_on)
@@ -211,7 +210,7 @@ class Processes:
         return self._pool
 
     def _pass_on(self, job: Job, ended: Future[Any], future: Future[Any]) -> None:
-        """Give the result of a process to the future of a job; where there is none, that of the threads."""
+        """Pass the result of a process to the future of a job. Without a result the threads compute the job."""
         if ended.cancelled() or not future.set_running_or_notify_cancel():
             return
         if ended.exception() is None and ended.result() is not _FAILED:
@@ -231,24 +230,24 @@ class Processes:
             future.set_exception(error)
 
     def width(self) -> int:
-        """Twice as many as there are processes, or devices and cores of this one."""
+        """Twice the number of processes, or of this process's devices and cores."""
         return max(2 * self._count, self._threads.width())
 
     def reports(self) -> list[Any]:
-        """Those of this process."""
+        """Reports of the jobs of this process."""
         return self._threads.reports()
 
     def close(self) -> None:
-        """End the processes; each ends what it computes first."""
+        """End the processes. Each first ends its job."""
         self._broken = True
         if self._pool is not None:
             self._pool.shutdown(wait=False, cancel_futures=True)
 
 
 _FAILED = None
-"""What a process returns of a job that it could not compute; a result is in a tuple."""
+"""Returned by a process for a job that it could not compute. A result is in a tuple."""
 _process_worker: list[Worker] = []
-"""Of a process of `Processes`."""
+"""The worker of a process of `Processes`."""
 
 
 def _begin_process(device: str, threads: int) -> None:
@@ -258,7 +257,7 @@ def _begin_process(device: str, threads: int) -> None:
 
 
 def _end_with_parent() -> None:
-    """A process whose parent was killed would wait for jobs for ever."""
+    """End this process when its parent is gone, because it would wait for jobs for ever."""
     parent = multiprocessing.parent_process()
     if parent is not None:
         parent.join()
@@ -266,7 +265,7 @@ def _end_with_parent() -> None:
 
 
 def _in_process(pickled: bytes) -> tuple[Any] | None:
-    """Compute a job in a process."""
+    """Compute a job in a process of `Processes`."""
     with suppress(Exception):
         job: Job = pickle.loads(pickled)
         return (job.function(*job.arguments, worker=_process_worker[0], report=lambda value: None),)
@@ -275,12 +274,12 @@ def _in_process(pickled: bytes) -> tuple[Any] | None:
 
 @contextmanager
 def _interrupts_held() -> Iterator[None]:
-    """Begin processes that Ctrl-C leaves alone, also while they load: they inherit a mask. What comes meanwhile is
-    raised afterwards, as a process that is half begun would print a traceback."""
+    """Start processes that ignore Ctrl-C, also while they load: they inherit a mask. A signal that comes meanwhile is
+    raised afterwards, because a process that is only half started would print a traceback."""
     if not hasattr(signal, "pthread_sigmask") or threading.current_thread() is not threading.main_thread():
         yield
         return
-    resource_tracker.ensure_running()  # which would end the mask when it begins with the first process
+    resource_tracker.ensure_running()  # if it started with the first process, it would remove the mask
     came: list[int] = []
     handler = signal.signal(signal.SIGINT, lambda number, frame: came.append(number))
     mask = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
@@ -294,7 +293,7 @@ def _interrupts_held() -> Iterator[None]:
 
 
 def _devices(names: str) -> list[Any]:
-    """The devices of some names with commas between them."""
+    """The devices for names separated by commas."""
     first = find_device(names.split(",")[0].strip())
     if names == "auto":
         import warp

@@ -1,4 +1,4 @@
-"""Hits by finite elements: those of a campaign, or some of a result, one job each, to a result as others are."""
+"""Hits by finite elements, one job each, of a campaign or of a result, written to a result file as others are."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What the hits of a campaign will cost, before they are computed: told where it is far more than usual."""
+"""The foreseen cost of a campaign's hits, announced before the run if it is far more than usual."""
 
 from __future__ import annotations
 
@@ -9,10 +9,10 @@ from warpimpact.scene import Numerics
 from warpimpact.solver.prepare import prepare
 
 SLOW, SLOW_BEFORE = 1.0, 5.0
-"""Seconds of a core that a hit takes, or all hits of a burst, and what comes before the first one, from which on that
-is told."""
+"""Seconds of a core above which the cost is announced: of a hit or a whole burst, and of what comes before the first
+hit."""
 LARGE = 2**30
-"""Bytes of the windows of a hit, from which on they are told: each thread has its own."""
+"""Bytes of the windows of a hit above which they are announced. Each thread has its own."""
 
 
 class Costly(UserWarning):
@@ -20,10 +20,10 @@ class Costly(UserWarning):
 
 
 class Cost:
-    """Warns (`Costly`) of hits, or bursts, that take more than SLOW on a CPU, once at each resolution.
+    """Warns (`Costly`), once at each resolution, of hits or bursts that take more than SLOW on a CPU.
 
     Args:
-        device: kind of it.
+        device: kind of the device.
         passages: as in `Computation`.
     """
 
@@ -32,8 +32,8 @@ class Cost:
         self._passages = passages
 
     def tell(self, numerics: Numerics) -> None:
-        """Warn of what hits take with numerics that fix the resolution: the first hit of the campaign, if nothing
-        hinders it, stands for all.
+        """Warn of the cost of hits with numerics that fix the resolution. An unhindered first hit of the campaign
+        stands for all.
 
         Raises:
             TooManySteps, MemoryError: as in `prepare`.
@@ -47,7 +47,7 @@ class Cost:
 
 
 def cost_of(campaign: Campaign, numerics: Numerics, passages: int = 1) -> str | None:
-    """A sentence about what hits take; None where that is little."""
+    """A sentence about the cost of hits; None where it is low."""
     sampler, images = campaign.sampler(), len(campaign.symmetries)
     shots = sampler.shots(0, images * campaign.at_a_plate)[::images]
     prepared = prepare(campaign.scene, shots, numerics)
@@ -70,5 +70,5 @@ def cost_of(campaign: Campaign, numerics: Numerics, passages: int = 1) -> str | 
 
 
 def _long(seconds: float) -> str:
-    """A time that a person grasps."""
+    """A time in the unit that suits it."""
     return f"{seconds:.2g} s" if seconds < 120.0 else f"{seconds / 3600.0:.2g} h"

@@ -1,4 +1,4 @@
-"""The jobs of a run: shots of a campaign that are computed together, and what a run does before and after them."""
+"""The jobs of a run: its pilot, its hits under assumptions, and its tasks of shots."""
 
 from __future__ import annotations
 
@@ -20,15 +20,15 @@ from warpimpact.solver.findings import Found
 from warpimpact.solver.worker import Worker
 
 CUDA_SHOTS = 2**17
-"""Shots per task on a GPU, which fewer would not fill."""
+"""Shots per task on a GPU. Fewer shots would not fill it."""
 CPU_SHOTS, CPU_SECONDS = 2**14, 0.5
-"""Most shots of a task on the CPU of this machine, and the time that it is to take: its set-up, on one core, is lost in
-that. A task is one shard at least, and one shard where another process computes."""
+"""Most shots of a task on the CPU of this machine, and the time that it shall take, beside which its set-up on one core
+is short. A task is at least one shard; another process computes one shard per task."""
 
 
 def with_ligament(campaign: Campaign, *, worker: Worker, report: Callable[[int], object]) -> Campaign:
-    """The campaign, which carries the ligament of its plate from then on: that of a free form takes seconds, and every
-    shard tells it."""
+    """The campaign with the ligament of its plate computed. The ligament of a free form takes seconds, and every shard
+    states it."""
     _ = campaign.plate.ligament
     return campaign
 
@@ -36,7 +36,7 @@ def with_ligament(campaign: Campaign, *, worker: Worker, report: Callable[[int],
 def pilot_job(
     computation: Computation, campaign: Campaign, *, worker: Worker, report: Callable[[int], object]
 ) -> Found | None:
-    """What the pilot of a campaign finds; it reports the levels that it computes."""
+    """Run the pilot of a campaign; reports the levels that it computes."""
     return computation.pilot(campaign, worker, report)
 
 
@@ -48,14 +48,14 @@ def assumed_job(
     worker: Worker,
     report: Callable[[int], object],
 ) -> HitTable:
-    """Some hits of a campaign under assumptions; it reports nothing."""
+    """Compute some hits of a campaign under assumptions; reports nothing."""
     return computation.assumed(campaign, found, worker)
 
 
 def task_job(
     computation: Computation, campaign: Campaign, task: Task, *, worker: Worker, report: Callable[[int], object]
 ) -> HitTable:
-    """The columns of the shots of a task; it reports how many shots are done."""
+    """Compute the columns of the shots of a task; reports how many shots are done."""
 
     def progress(done: int, total: int) -> None:
         report(done)
@@ -64,15 +64,15 @@ def task_job(
 
 
 def task_size(executor: Executor, rate: float) -> int:
-    """Shots per task, at a rate of shots per second; 0 is one shard."""
+    """Shots per task, at a rate of shots per second; 0 stands for one shard."""
     if executor.made_by[attr.DEVICE] != "cpu":
         return CUDA_SHOTS
     return 0 if executor.is_remote else min(CPU_SHOTS, int(CPU_SECONDS * rate))
 
 
 def solid_shots(campaign: Campaign, shots: Shots, most: int) -> Shots | None:
-    """Those of the first shard's shots that the references take: one tells of all where no two differ but in where they
-    hit, and the base has no holes."""
+    """The shots of the first shard that are also fired at the solid reference plates. One stands for all if the shots
+    differ only in their places and the base has no holes."""
     if not campaign.output.solid_reference or not has_solid(campaign):
         return None
     elsewhere = (v.HIT_Y, v.HIT_Z, "offset_y", "offset_z")
@@ -85,7 +85,7 @@ def solid_shots(campaign: Campaign, shots: Shots, most: int) -> Shots | None:
 
 
 def ranges(shards: Shards, total: int, shots: Callable[[], int]) -> Iterator[range]:
-    """Ranges of shards that are not there, each of about as many shots as are asked for when it begins."""
+    """Ranges of missing shards. Each has about as many shots as `shots` returns when the range begins."""
     there, count, first = frozenset(shards.there()), -(-total // shards.extent), 0
     while first < count:
         most, stop = max(1, shots() // shards.extent), first
@@ -97,8 +97,8 @@ def ranges(shards: Shards, total: int, shots: Callable[[], int]) -> Iterator[ran
 
 
 def split(table: HitTable, task: range, size: int) -> Iterator[tuple[int, HitTable]]:
-    """The shards of a task, each with its share of the time and of what was computed; the first one of a campaign keeps
-    what is said once."""
+    """The shards of a task, each with its share of the time and of the computed hits. Only the first shard of a
+    campaign keeps the variables of the whole campaign."""
     hits, of_the_campaign = table.sizes["hit"], [name for names in v.GROUPS.values() for name in names]
     for place, index in enumerate(task):
         shard = numbered(table.isel(hit=slice(place * size, (place + 1) * size)), first=index * size)
@@ -109,5 +109,5 @@ def split(table: HitTable, task: range, size: int) -> Iterator[tuple[int, HitTab
 
 
 def computed_hits(table: HitTable, hits: int) -> dict[str, int]:
-    """How many of some hits of a HitTable were computed, if that is not all the same."""
+    """The attribute with the number of computed ones among `hits` hits; none where a HitTable has no such attribute."""
     return {attr.COMPUTED_HITS: hits // images(table)} if attr.COMPUTED_HITS in table.attrs else {}

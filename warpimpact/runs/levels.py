@@ -1,4 +1,4 @@
-"""Levels of resolution for the measures of a run: what the numerics may shift them by at each."""
+"""Levels of resolution for the measures of a run: the shift of the measures by the numerics at each level."""
 
 from __future__ import annotations
 
@@ -23,16 +23,16 @@ from warpimpact.statistics.shifts import SHIFT_MARGIN
 Array = NDArray[np.float64]
 
 OF_THE_NUMERICS = 0.5
-"""Share of an interval's half width that the numerics may take."""
+"""Largest shift by the numerics, as a share of an interval's half width."""
 MEASURES = "the measures"
-"""What the level is looked for at several layers."""
+"""Words for what the level is chosen for at several layers."""
 LAYERED = ("mean(residual_velocity)", "P(perforated)", "mean(base_depth)")
 """Measures that choose the level at several layers, beside the mean tilt at the last stand-off."""
 
 
 def level_for(campaign: Campaign) -> str:
-    """What a pilot looks for the level of, where that is no accuracy of single hits: the quantity of a stop rule, or
-    the measures of a target of several layers. Empty where the campaign asks for an accuracy or fixes the level."""
+    """What the level is chosen for, if not for an accuracy of single hits: the quantity of a stop rule, or the measures
+    of a target of several layers. Empty where the campaign asks for an accuracy or fixes the level."""
     if {"fidelity", "accuracy"} & campaign.numerics.model_fields_set or campaign.numerics.explicit is not None:
         return ""
     if campaign.stop is not None:
@@ -41,11 +41,11 @@ def level_for(campaign: Campaign) -> str:
 
 
 def aim_of(campaign: Campaign, hits: int) -> Aim | None:
-    """Measures that a level is looked for, by what the numerics shift them by over what they may; None where it is not
-    looked for by that. At several layers a level that keeps the accuracy will do, too.
+    """The measures for which a pilot chooses the level; None where it chooses for an accuracy of single hits. At
+    several layers a level that keeps the accuracy will do, too.
 
     Args:
-        hits: that will be computed of the campaign, images not counted.
+        hits: computed hits of the campaign, images not counted.
     """
     if not level_for(campaign):
         return None
@@ -55,7 +55,7 @@ def aim_of(campaign: Campaign, hits: int) -> Aim | None:
 
 
 def _excess_of_stop(campaign: Campaign, rule: Stop) -> Excess:
-    """By the quantity of a stop rule: what the numerics may shift it by, over what they may take of its interval."""
+    """Excess for a stop rule: the shift of its quantity by the numerics over the allowed part of its interval."""
     measure, allowed = rule.measure, OF_THE_NUMERICS * rule.measure.shown(rule.half_width)
 
     def excess(coarse: Outcomes, fine: Outcomes, shots: Shots) -> float:
@@ -67,8 +67,8 @@ def _excess_of_stop(campaign: Campaign, rule: Stop) -> Excess:
 
 
 def _excess_of_layers(campaign: Campaign, hits: int) -> Excess:
-    """By the measures of a target of several layers: the shift that the pilot's hits show, over what the hits of the
-    run leave open. What the pilot's few hits leave open of the shift would ask for dearer levels."""
+    """Excess for several layers: the shift of the measures between the pilot's hits over the interval that the run will
+    have. An upper estimate of the shift from the pilot's few hits would ask for more expensive levels."""
     measures = [Measure.parse(text) for text in (*LAYERED, *_last_tilts(campaign))]
 
     def excess(coarse: Outcomes, fine: Outcomes, shots: Shots) -> float:
@@ -79,8 +79,8 @@ def _excess_of_layers(campaign: Campaign, hits: int) -> Excess:
 
 
 def _open_share(coarse: Array, fine: Array, hits: int) -> float:
-    """Shift of a mean between two levels by the same shots, with the margin for the finer one, over half the
-    95 % interval by a number of independent hits; 0 where fewer than two shots count."""
+    """Shift of a mean between two levels with the same shots, with the margin for the finer one, over half the 95 %
+    interval of this number of independent hits; 0 where fewer than two shots count."""
     counts = ~np.isnan(coarse) & ~np.isnan(fine)
     if counts.sum() < 2:
         return 0.0
@@ -91,8 +91,8 @@ def _open_share(coarse: Array, fine: Array, hits: int) -> float:
 
 
 def shifts_of(campaign: Campaign, pilot: Shots, found: HitErrors) -> dict[int, tuple[float, ...]]:
-    """What the numerics may shift the mean residual velocity [m/s] and the mean last tilt [degree] by, at every level
-    that a pilot tried."""
+    """Upper estimates of the shifts of the mean residual velocity [m/s] and the mean last tilt [degree] by the
+    numerics, for every level that a pilot tried."""
     measures = [Measure.parse(text) for text in ("mean(residual_velocity)", *_last_tilts(campaign))]
     shifts: dict[int, tuple[float, ...]] = {}
     for errors, *outcomes in found.tried:
@@ -107,7 +107,7 @@ def _last_tilts(campaign: Campaign) -> list[str]:
 
 
 def _table(campaign: Campaign, shots: Shots, outcomes: Outcomes) -> HitTable:
-    """Outcomes of a pilot's shots as a result."""
+    """A result of a pilot's shots and their outcomes."""
     together = {attr.SHOTS_AT_A_PLATE: campaign.at_a_plate} if campaign.at_a_plate > 1 else {}
     period = campaign.hits.covered(campaign.plate)
     return to_table(campaign.scene, shots, outcomes, period=period, attributes=together)

@@ -1,4 +1,4 @@
-"""Manifests: what decides every bit of a result, as nested dictionaries, and in what two of them differ."""
+"""Manifests: nested dictionaries of everything that determines the bits of a result, and how two of them differ."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ def digest(path: Path) -> str:
 
 
 def fingerprint(content: Mapping[str, Any]) -> str:
-    """Short name of a manifest: results with the same have the same bits."""
+    """Short hash of a manifest. Results with the same hash have the same bits."""
     return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()[:16]
 
 
@@ -27,7 +27,7 @@ def difference(begun: Any, now: Any) -> str | None:
 
 
 def first_difference(one: Any, other: Any, place: str = "") -> tuple[str, str, str] | None:
-    """Where two nested dictionaries differ first, and what is there in each; None if they do not."""
+    """Place and both values of the first difference between two nested dictionaries; None if they are equal."""
     if _are_tables(one) and _are_tables(other) and len(one) == len(other):
         one, other = ({str(place): table for place, table in enumerate(tables)} for tables in (one, other))
     if isinstance(one, dict) and isinstance(other, dict):

@@ -1,10 +1,11 @@
-"""What a computation has on the disk before its result is complete: a folder of parts beside the result file.
+"""The parts of an unfinished computation on the disk: a folder beside the result file.
 
-Beside RESULT.nc the folder RESULT.nc.parts holds a manifest, which says what is being computed, and the parts. A file
-is written under another name, flushed and renamed, so that whatever has its name is whole. A part carries a seal of its
-bytes, its place and the manifest's content: a part that was damaged, moved or taken from another computation does not
-have it, and is computed again. Parts that are there without a manifest, or with a damaged one, are kept for the same
-reason. A lock in the folder keeps a second process away; the system lets go of it when a process ends, however it ends.
+Beside RESULT.nc the folder RESULT.nc.parts holds the parts and a manifest, which says what is being computed. A file is
+written under another name, flushed and renamed, so a file with its final name is whole. A part carries a seal of its
+bytes, its place and the manifest's content. A part that was damaged, moved or taken from another computation lacks the
+right seal, and is computed again. For the same reason, parts without a manifest, or with a damaged one, are kept. A
+lock
+in the folder keeps a second process away. The system releases it when the process ends, however it ends.
 """
 
 from __future__ import annotations
@@ -37,7 +38,7 @@ class Interrupted(KeyboardInterrupt):
 
 
 def folder_of(output: Path) -> Path:
-    """Where the parts of a result file are."""
+    """Folder with the parts of a result file."""
     return output.with_name(f"{output.name}.parts")
 
 
@@ -48,10 +49,10 @@ def is_begun(output: Path) -> bool:
 
 @contextmanager
 def claimed(output: Path) -> Iterator[None]:
-    """Keep other processes away from a result file and its parts, whose folder is there meanwhile.
+    """Lock a result file and the folder of its parts, which exists meanwhile, against other processes.
 
     Raises:
-        OutputError: another process is at it, or the folder cannot be written into.
+        OutputError: another process has locked it, or the folder cannot be written into.
     """
     folder = folder_of(output)
     lock = FileLock(folder / _LOCK, timeout=0)
@@ -75,14 +76,14 @@ def claimed(output: Path) -> Iterator[None]:
 
 @contextmanager
 def telling(kept: Callable[[], str]) -> Iterator[None]:
-    """Say what is kept of a computation that does not come to its end.
+    """Report what is kept of a computation that breaks off.
 
     Args:
-        kept: saves what can be saved, and says what that is.
+        kept: saves what can be saved; returns a sentence about it.
 
     Raises:
-        Interrupted: by the keyboard.
-        OutputError: something cannot be written.
+        Interrupted: the user interrupted it.
+        OutputError: a file cannot be written.
     """
     try:
         yield
@@ -96,12 +97,12 @@ def telling(kept: Callable[[], str]) -> Iterator[None]:
 
 
 class Form(NamedTuple):
-    """How parts are named: with what they hold, the number of the first of it, and their seal.
+    """Names of parts: what they hold, the number of its first item, and a seal.
 
     Attributes:
-        holds: what they hold, such as "hits".
-        suffix: of their files.
-        extent: how many of it a part holds.
+        holds: the items of a part, such as "hits".
+        suffix: suffix of the files.
+        extent: number of items in a part.
     """
 
     holds: str
@@ -110,15 +111,15 @@ class Form(NamedTuple):
 
     @property
     def pattern(self) -> str:
-        """Of the names of parts."""
+        """Glob pattern of the names of parts."""
         return f"{self.holds}_*{self.suffix}"
 
     def stem(self, number: int) -> str:
-        """The name of a part before its seal."""
+        """Name of a part before its seal."""
         return f"{self.holds}_{number * self.extent:010d}"
 
     def number_in(self, name: str) -> int:
-        """Number of the part of a name; 0 of a name that no part has."""
+        """Number of the part with this name; 0 for a name that no part has."""
         first = re.match(rf"{self.holds}_(\d{{10}})_", name)
         return int(first[1]) // self.extent if first else 0
 
@@ -128,16 +129,16 @@ class Parts:
 
     Args:
         output: the result file.
-        content: what decides every bit of the result.
-        kind: what messages call the computation: "run", "search" or "fit".
-        form: how the parts are named.
-        counted: says how much a number of parts is, for example "3 of 32 shards".
-        tell: called with a sentence for what was damaged and is computed again.
+        content: everything that determines the bits of the result.
+        kind: the computation in messages: "run", "search" or "fit".
+        form: names of the parts.
+        counted: returns words for a number of parts, for example "3 of 32 shards".
+        tell: called with a sentence for each damaged part, which is computed again.
 
     Attributes:
-        folder: where they are.
-        saved: the parts on the disk, by their numbers.
-        fingerprint: short name of the content.
+        folder: folder of the parts.
+        saved: parts on the disk, by their numbers.
+        fingerprint: short hash of the content.
     """
 
     def __init__(
@@ -157,13 +158,13 @@ class Parts:
         self._manifest = self.folder / _MANIFEST
 
     def begin(self, *, resume: bool, overwrite: bool) -> bool:
-        """Take the folder, with the parts in it if they are to be resumed.
+        """Take the folder, and the parts in it if they shall be resumed.
 
         Returns:
-            Whether there is anything to do: the result of this very computation may be complete already.
+            Whether anything is left to compute. The result of this computation may already be complete.
 
         Raises:
-            OutputError: something is there that must be neither resumed nor overwritten.
+            OutputError: something there must be neither resumed nor overwritten.
         """
         complete = not overwrite and self.is_complete()
         if complete and resume:
@@ -189,15 +190,15 @@ class Parts:
         return True
 
     def is_complete(self) -> bool:
-        """Whether the result file is that of this very computation."""
+        """Whether the result file is the complete result of this computation."""
         try:
             return self.output.is_file() and bool(attribute(self.output, attr.FINGERPRINT) == self.fingerprint)
         except (OSError, RuntimeError, ValueError):
             return False
 
     def _begun(self) -> dict[str, Any] | None:
-        """What was begun here; None if nothing was; empty if that cannot be known."""
-        if self._manifest.is_fifo():  # it would be waited for
+        """The manifest in the folder; None without one; empty if it cannot be read."""
+        if self._manifest.is_fifo():  # reading would wait for a writer
             return {}
         try:
             begun = json.loads(self._manifest.read_bytes())
@@ -239,7 +240,7 @@ class Parts:
             file.write_text(json.dumps(content, indent=1), encoding="utf-8")
 
     def _take(self, path: Path) -> bool:
-        """Count a part as saved if it is what its name says, and no other is there for its place."""
+        """Count a part as saved if its seal is right and its place is still free."""
         number = self._form.number_in(path.name)
         if number in self.saved or not self._is_whole(number, path):
             return False
@@ -249,21 +250,21 @@ class Parts:
     def _is_whole(self, number: int, path: Path) -> bool:
         try:
             return path == self._named(number, path)
-        except OSError:  # a folder, for instance
+        except OSError:  # it may be a folder
             return False
 
     def _named(self, number: int, written: Path) -> Path:
-        """The name of a part with these bytes at this place."""
+        """Path of the part with this number and these bytes."""
         with written.open("rb") as file:
             bits = hashlib.file_digest(file, "sha256").hexdigest()
         seal = hashlib.sha256(f"{self.fingerprint} {number} {bits}".encode()).hexdigest()[:16]
         return self.folder / f"{self._form.stem(number)}_{seal}{self._form.suffix}"
 
     def path(self, number: int) -> Path:
-        """A part that is saved.
+        """Path of a saved part.
 
         Raises:
-            OutputError: it is gone or damaged.
+            OutputError: the part is gone or damaged.
         """
         path = self.saved[number]
         if not self._is_whole(number, path):
@@ -271,13 +272,13 @@ class Parts:
         return path
 
     def save(self, number: int, write: Callable[[Path], object]) -> None:
-        """Put a part on the disk, whole or not at all, in place of one of this number.
+        """Put a part on the disk, whole or not at all, in place of an older part with this number.
 
         Args:
-            write: writes the file of a name.
+            write: writes the file at a path.
 
         Raises:
-            OutputError: it cannot be written.
+            OutputError: the part cannot be written.
         """
         before = self.saved.get(number)
 
@@ -291,16 +292,16 @@ class Parts:
             remove(before)
 
     def paths(self) -> list[Path]:
-        """The parts that are there."""
+        """Paths of the saved parts."""
         return sorted(path for path in self.folder.glob(self._form.pattern) if not path.is_fifo())
 
     @property
     def counted(self) -> str:
-        """How many parts are there, in words."""
+        """Words for the number of saved parts."""
         return self._counted(len(self.paths()))
 
     def kept(self) -> str:
-        """What a computation that breaks off leaves behind; the folder is emptied if that is nothing."""
+        """A sentence about what an interrupted computation leaves. If it leaves nothing, the folder is emptied."""
         if not self.paths():
             self.discard()
             return "nothing is saved"
@@ -313,7 +314,7 @@ class Parts:
 
 
 def remove(path: Path) -> None:
-    """Remove a file, or a folder of that name."""
+    """Remove a file or a folder."""
     if path.is_dir() and not path.is_symlink():
         shutil.rmtree(path, ignore_errors=True)
     else:

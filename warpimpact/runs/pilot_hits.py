@@ -1,4 +1,4 @@
-"""Which hits of a campaign stand for all of them: those of a pilot, and those under assumptions."""
+"""The hits that stand for all hits of a campaign, in a pilot and under assumptions."""
 
 from __future__ import annotations
 
@@ -12,38 +12,38 @@ from warpimpact.solver.pilot import pilot_size
 from warpimpact.solver.simulate import spread_places
 
 _FEWEST_BURSTS = 8
-"""Of a pilot, however many shots they have."""
+"""Fewest bursts of a pilot, however many shots they have."""
 _MOST_OF_LAYERS = 1024
-"""Shots of a pilot of several layers, at most."""
+"""Most shots of a pilot at several layers."""
 
 
 def pilot_shots(campaign: Campaign, most: int) -> Shots:
-    """Some of the hits of a campaign, no two of them images of each other; of bursts, whole ones."""
+    """Some hits of a campaign, none an image of another; of bursts, whole ones."""
     return shots_at(campaign, pilot_places(campaign, most))[:: len(campaign.symmetries)]
 
 
 def pilot_most(campaign: Campaign) -> int:
-    """Shots of a pilot of a campaign, at most. Of several layers, whose measures it is for, it may take all of a short
-    run: of hits that end otherwise, few tell little."""
+    """Most shots of a campaign's pilot. At several layers, where the level is chosen for measures, it may be all shots
+    of a short run, because a few shots say little of the share that ends otherwise."""
     hits, usual = len(campaign.sampler()) // len(campaign.symmetries), campaign.numerics.asked
     fewest = pilot_size(usual, hits)
     return max(fewest, min(hits, _MOST_OF_LAYERS)) if level_for(campaign) == MEASURES else fewest
 
 
 def pilot_places(campaign: Campaign, most: int) -> NDArray[np.int64]:
-    """Which groups of images, or bursts with their images, `pilot_shots` takes."""
+    """Numbers of the groups of images, or bursts with their images, that `pilot_shots` takes."""
     at_a_plate = campaign.at_a_plate
     return places_of(campaign, most if at_a_plate == 1 else max(-(-most // at_a_plate), _FEWEST_BURSTS))
 
 
 def places_of(campaign: Campaign, most: int) -> NDArray[np.int64]:
-    """Groups of images, or bursts with their images, that stand for all of them.
+    """Numbers of groups of images, or bursts with their images, that stand for all of them.
 
-    They depend on the campaign alone: the first ones of a Sobol or random sampling, those at even distances of a grid
-    or a list.
+    They depend on the campaign alone: the first ones of a Sobol or random sampling, or ones at even distances of a grid
+    or list.
 
     Args:
-        most: groups, at most.
+        most: most groups.
     """
     groups = len(campaign.sampler()) // (len(campaign.symmetries) * campaign.at_a_plate)
     count = min(most, groups)
@@ -51,7 +51,8 @@ def places_of(campaign: Campaign, most: int) -> NDArray[np.int64]:
 
 
 def shots_at(campaign: Campaign, places: NDArray[np.int64]) -> Shots:
-    """The shots of groups, with their images. Bursts are whole, as a later hit meets what the earlier ones left."""
+    """The shots of groups, with their images. Bursts are whole, because a later hit meets what the earlier ones
+    left."""
     sampler, group = campaign.sampler(), len(campaign.symmetries) * campaign.at_a_plate
     if campaign.hits.sampling in ("sobol", "random"):
         return sampler.shots(0, len(places) * group)

@@ -1,4 +1,4 @@
-"""How far a run is, for those who follow it."""
+"""The progress of a run, and how it is shown."""
 
 from __future__ import annotations
 
@@ -16,17 +16,17 @@ from warpimpact.statistics.intervals import Estimate
 
 @dataclass(frozen=True)
 class RunProgress:
-    """How far a run is.
+    """The progress of a run.
 
     Attributes:
-        done, total: shots; `total` is the most that a stop rule allows.
-        saved: shots of whole shards, which no interrupt loses; `done` counts those of unfinished ones too.
-        resumed: shots that an earlier run had done.
+        done, total: numbers of shots; `total` is the most that a stop rule allows.
+        saved: shots of whole shards, which no interrupt loses; `done` also counts those of unfinished shards.
+        resumed: shots that an earlier run had computed.
         failed: shots whose computation failed.
         estimates: running estimates of the main quantities, over the shots from the first on without a gap.
-        piloting: whether a pilot is at work still; no shot is done then.
-        trying: the level that it computes; None where that is not known.
-        found: what it found; None if the campaign fixes the resolution.
+        piloting: whether the pilot is still running. No shot is done then.
+        trying: level that the pilot computes; None where unknown.
+        found: findings of the pilot; None if the campaign fixes the resolution.
     """
 
     done: int
@@ -45,7 +45,8 @@ Follow = Callable[[RunProgress], None]
 
 @contextmanager
 def followed(given: Follow | None) -> Iterator[Follow]:
-    """The function that follows a run: the given one, or a bar in a notebook; elsewhere nothing is shown."""
+    """The function that shows the progress of a run: the given one, or a bar in a notebook. Elsewhere nothing is
+    shown."""
     if given is not None or not _in_a_notebook():
         yield given or (lambda now: None)
         return
@@ -62,7 +63,7 @@ def followed(given: Follow | None) -> Iterator[Follow]:
 
 
 def _bar() -> Any:
-    """The bars of notebooks where they can be shown, else those of a terminal."""
+    """The progress bar class for notebooks if it works here, else the one for terminals."""
     if find_spec("ipywidgets"):
         from tqdm.notebook import tqdm as widget
 

@@ -1,7 +1,7 @@
 """Questions that are answered in rounds: the results of some jobs decide which jobs come next.
 
 A question is a generator. It yields a `Round`, is sent the results of its jobs in their order, and returns its answer.
-So it knows neither who computes nor what is on the disk, and its answer is the same bits whoever does.
+It knows neither who computes nor what is on the disk, so its answer has the same bits everywhere.
 """
 
 from __future__ import annotations
@@ -23,12 +23,12 @@ Answer = TypeVar("Answer")
 
 
 class RoundProgress(NamedTuple):
-    """How far a round is.
+    """The progress of a round.
 
     Attributes:
-        done: jobs, with the shares of those under way that their reports tell.
+        done: number of jobs done, with the reported shares of running ones.
         resumed: jobs that an earlier call had computed.
-        results: of jobs that are done, by their places in the round.
+        results: results of the jobs done, by their places in the round.
     """
 
     done: float
@@ -41,8 +41,8 @@ class Round:
     """Jobs that are computed together.
 
     Attributes:
-        jobs: each reports the share of it that is done, from 0 to 1, and returns `Arrays`.
-        keys: of the jobs: what decides their results beside the content of the store.
+        jobs: jobs. Each reports the share that is done, from 0 to 1, and returns `Arrays`.
+        keys: for each job, what determines its result beside the content of the store.
         tell: called with the progress of the round.
     """
 
@@ -58,11 +58,11 @@ def answered(question: Question[Answer], executor: Executor, store: Store | None
     """Answer a question.
 
     Args:
-        store: from which results are taken that an earlier call has computed, and to which new ones go at once.
+        store: holds results of an earlier call, and takes each new result at once.
 
     Raises:
         OutputError: a result cannot be stored.
-        Exception: of the question, or of a job.
+        Exception: the error of the question, or of a job.
     """
     first = 0
     try:
@@ -77,7 +77,7 @@ def answered(question: Question[Answer], executor: Executor, store: Store | None
 
 
 def _results(asked: Round, first: int, executor: Executor, store: Store | None) -> list[Arrays]:
-    """Results of a round, whose first job is number `first` of its question."""
+    """The results of a round. Its first job is number `first` of its question."""
     results: dict[int, Arrays] = {}
     for place, key in enumerate(asked.keys):
         if store is not None and (saved := store.load(first + place)) is not None and str(saved.pop("key", "")) == key:

@@ -26,7 +26,7 @@ from warpimpact.solver.unfold import image_of
 
 DEVICE_ROUNDING = {v.RESIDUAL_VELOCITY: 0.1, v.DEFLECTION: 0.5, v.TILT: 0.5}
 """Largest change of an outcome by the rounding of another device [m/s, degree]. Between single and double precision,
-6144 hits on the slotted plate (825, 300 and 200 m/s) differ by 0.012 m/s and 0.04 degrees at most."""
+6144 hits on the slotted plate (825, 300 and 200 m/s) differ by at most 0.012 m/s and 0.04 degrees."""
 _OF_A_MAP = (
     *(attr.COUNT, attr.COMPUTE_TIME, attr.CONTINUUM, attr.HITS_PER_SECOND, attr.COMPUTED_HITS, attr.IMAGES),
     attr.SHOTS_AT_A_PLATE,
@@ -42,16 +42,16 @@ def replay(result: xarray.Dataset, hit: int, *, folder: str | Path = ".", snapsh
 
     Args:
         result: the Dataset of `run`.
-        hit: its number, which in a choice of the hits is still that of the whole result.
+        hit: number of the hit in the whole result, also if `result` is a choice of its hits.
         folder: folder of the files that the campaign names, if it names any.
-        snapshots: number of instants at which the history shows what is left of the plate; 0 costs least.
+        snapshots: number of instants at which the history shows the resistance left in the plate; 0 costs least.
 
     Returns:
         The Dataset of `results.history_dataset`. Its attribute `agreement` compares its end with the stored
         outcome: "bit-identical", as on the same CPU; "within rounding", as after another device; or "different".
 
     Raises:
-        ResultError: there is no such hit, or the campaign and its files now give another one.
+        ResultError: there is no such hit, or the campaign and its files now give another hit.
         CampaignError: the campaign in the result cannot be read, for example because a file that it names is missing.
     """
     hits, numbers = result.sizes["hit"], hit_numbers(result)
@@ -66,7 +66,7 @@ def replay(result: xarray.Dataset, hit: int, *, folder: str | Path = ".", snapsh
         raise ResultError(f"hit: got {hit}, but the campaign and the files it names give only {len(sampler)} hits")
     scene, group = campaign.scene, campaign.symmetries
     image = hit % len(group)
-    # Every image of the hit, or every hit of its burst up to it.
+    # Every image of the hit, or every earlier hit of its burst and itself.
     before = hit % campaign.at_a_plate
     drawn = sampler.shots(hit - image - before, len(group) + before)
     images = _at_their_limit(scene, drawn, result, place)
@@ -112,7 +112,7 @@ def _with_mesh(history: xarray.Dataset, deformed: solver.Deformed) -> xarray.Dat
 
 
 def _at_their_limit(scene: Scene, shots: Shots, result: xarray.Dataset, place: int) -> Shots:
-    """In a result of limits: the images of a hit as they just perforate."""
+    """The images of a hit at their limit, for a result of limits; else the shots as given."""
     if attr.LIMIT not in result.attrs:
         return shots
     layer = int(result.attrs[attr.LIMIT_LAYER])
@@ -121,27 +121,27 @@ def _at_their_limit(scene: Scene, shots: Shots, result: xarray.Dataset, place: i
     hit = result.isel(hit=place)
     own = {name: values_of(scene.target, hit, name)[layer] for name in ("thickness", "resistance")}
     given = scene.target.value("resistance", layer)
-    if own["resistance"] == given:  # none of its own
+    if own["resistance"] == given:  # the shot has the resistance of the scene
         del own["resistance"]
     return shots.with_own({name: np.full(len(shots), value) for name, value in own.items()}, layer)
 
 
 def _numerics(campaign: Campaign, result: xarray.Dataset) -> Numerics:
-    """What the hits were computed with."""
+    """The numerics of the hits of a result."""
     has_pilot = attr.RESOLUTION in result.attrs
     numerics = Numerics.model_validate_json(result.attrs[attr.RESOLUTION]) if has_pilot else campaign.numerics
     return short_steps(numerics) if attr.LIMIT in result.attrs else numerics
 
 
 def campaign_in(result: xarray.Dataset, folder: Path) -> Campaign:
-    """The campaign that a result holds.
+    """The campaign in a result.
 
     Args:
-        folder: of the files that the campaign names, if it names any.
+        folder: folder of the files that the campaign names, if it names any.
 
     Raises:
-        ResultError: the result has none.
-        CampaignError: it cannot be read.
+        ResultError: the result has no campaign.
+        CampaignError: the campaign cannot be read.
     """
     if attr.CAMPAIGN not in result.attrs:
         raise ResultError("the result does not contain its campaign")
@@ -154,12 +154,12 @@ def campaign_in(result: xarray.Dataset, folder: Path) -> Campaign:
     dealt = int(result.attrs[attr.REPLICATES])
     if campaign.replicates == dealt:
         return campaign
-    # A result computed under another default of the replicates keeps its own hits.
+        # If the default of the replicates has changed since, the result keeps its own hits.
     return campaign.model_copy(update={"hits": campaign.hits.model_copy(update={"replicates": dealt})})
 
 
 def _same(one: xarray.Dataset, other: xarray.Dataset, names: tuple[str, ...]) -> bool:
-    """Whether variables agree in every bit; NaN equals NaN."""
+    """Whether variables agree in every bit. NaN equals NaN."""
     return all(np.array_equal(one[name], other[name], equal_nan=True) for name in names)
 
 
@@ -175,7 +175,7 @@ def _agreement(end: xarray.Dataset, stored: xarray.Dataset) -> str:
 
 
 def _alike(one: xarray.DataArray, other: xarray.DataArray) -> bool:
-    """Whether codes are equal, and numbers are there in the same places."""
+    """Whether codes are equal, and numbers stand in the same places."""
     if one.dtype.kind == "f":
         one, other = one.isnull(), other.isnull()
     return bool((one == other).all())

@@ -1,4 +1,4 @@
-"""From a campaign to its Dataset, in memory or as a file that survives what may happen on the way."""
+"""From a campaign to its Dataset, in memory or as a file. A run into a file survives interrupts and can be resumed."""
 
 from __future__ import annotations
 
@@ -81,7 +81,7 @@ def run(
 def with_assumptions(
     dataset: xarray.Dataset, campaign: Campaign, *, device: str = "auto", cancel: Cancel | None = None
 ) -> xarray.Dataset:
-    """A result of a campaign that left out its assumptions, with the hits under them that `run` computes of it.
+    """Add the hits under assumptions to a result whose campaign left them out, as `run` would compute them.
 
     Args:
         device, cancel: as in `run`.
@@ -104,24 +104,24 @@ def run_to_file(
     progress: Follow | None = None,
     tell: Callable[[str], object] = warnings.warn,
 ) -> None:
-    """Compute every hit of a campaign into a file; what is computed is on the disk at once, in `output`.parts.
+    """Compute every hit of a campaign into a file. Computed hits are on the disk at once, in `output`.parts.
 
     Args:
         campaign: the campaign, or its file.
-        output: the netCDF file, which appears when it is complete.
+        output: the netCDF file. It appears when it is complete.
         device: as in `run`, or an executor.
         progress: as in `run`.
-        computation: of every hit.
-        resume: continue what is in `output`.parts; begin where there is nothing.
-        overwrite: replace an existing file, and begin anew in place of a run that has not ended.
-        tell: called with a sentence for what was damaged and is computed again.
+        computation: what is computed of every hit.
+        resume: continue what is in `output`.parts; begin if there is nothing.
+        overwrite: replace an existing file, and begin anew in place of an unfinished run.
+        tell: called with a sentence for each damaged part, which is computed again.
 
     Raises:
         CampaignError: as in `run`.
-        OutputError: something cannot be written, must not be overwritten or is no part of this campaign, or another
-            run is at work on it.
+        OutputError: a file cannot be written, must not be overwritten or belongs to another campaign, or another run is
+            at work on it.
         DeviceError: the device is absent.
-        Interrupted: by the keyboard; what is saved can be resumed.
+        Interrupted: the user interrupted the run; what is saved can be resumed.
     """
     campaign, output = _read(campaign), Path(output)
     with claimed(output), opened(device) as computing:
@@ -142,8 +142,7 @@ def _read(campaign: Campaign | str | Path) -> Campaign:
 
 @dataclass(frozen=True)
 class _End:
-    """How a run ended: its number of shards and of hits, the time that computing took [s], and the estimate that a stop
-    rule asked for."""
+    """How a run ended: numbers of shards and hits, time of computing [s], and the estimate of a stop rule."""
 
     shards: int
     hits: int
@@ -152,7 +151,7 @@ class _End:
 
 
 def _fill(campaign: Campaign, computation: Computation, shards: Shards, executor: Executor, follow: Follow) -> _End:
-    """Compute the shards that are not there, until all are or the stop rule is met."""
+    """Compute the missing shards until none is missing or the stop rule is met."""
     sampler = campaign.sampler()
     watch = _Watch(campaign, len(sampler), shards, computation.measures)
     there = sorted(shards.there())
@@ -161,7 +160,7 @@ def _fill(campaign: Campaign, computation: Computation, shards: Shards, executor
     watch.resumed, cost = watch.done, Cost(campaign, executor.made_by[attr.DEVICE], computation.passages)
     if watch.end is None:
         campaign = result_of(executor, with_ligament, campaign)
-    if 0 in there:  # it holds what the pilot found, and its hits at a finer level
+    if 0 in there:  # shard 0 holds the pilot's findings, and its hits at a finer level
         watch.found = computation.found_in(shards.shard(0))
     else:
 
@@ -193,7 +192,7 @@ def _fill(campaign: Campaign, computation: Computation, shards: Shards, executor
         watch.add(index, shard)
 
     with closing(completed(executor, jobs(), lambda: follow(watch.progress(sum(executor.reports()))))) as tables:
-        first = assumed = None  # the first shard holds the assumptions, and waits for them
+        first = assumed = None  # the first shard takes up the assumed hits, and is kept until they are there
         while watch.end is None:
             task, table = next(tables)
             if task is None:
@@ -212,10 +211,10 @@ def _fill(campaign: Campaign, computation: Computation, shards: Shards, executor
 
 
 class _Watch:
-    """Follows a run: what is done, what failed, what the estimates are, and when it is enough.
+    """Follows a run: finished and failed shots, estimates, and whether the stop rule is met.
 
-    All but the counts is looked at in the order of the shots, whatever order they come in, so that a run ends with the
-    same shots however it was computed.
+    Except for the counts, shards are looked at in the order of their shots, in whatever order they come. So a run ends
+    with the same shots however it was computed.
     """
 
     def __init__(self, campaign: Campaign, total: int, shards: Shards, measures: Sequence[str] = ()) -> None:
@@ -238,7 +237,7 @@ class _Watch:
         self.found: Found | None = None
 
     def add(self, index: int, shard: HitTable) -> None:
-        """Take in a shard that is there; one that comes before its turn is loaded when that is."""
+        """Take in a finished shard. A shard that comes before its turn is loaded again when its turn comes."""
         self.done += shard.sizes["hit"]
         self.failed += int(failed(shard).sum())
         self._early.add(index)
@@ -248,7 +247,7 @@ class _Watch:
 
     @property
     def rate(self) -> float:
-        """Hits per second of computing so far; 0 before the first shard."""
+        """Computed hits per second; 0 before the first shard."""
         return self._hits / self._time if self._time > 0.0 else 0.0
 
     def _advance(self, shard: HitTable) -> None:
@@ -267,7 +266,7 @@ class _Watch:
             self.end = _End(self._next, self._hits, self._time, stop)
 
     def _looked_at(self) -> dict[str, Any]:
-        """What there is to say at the end, if this is one."""
+        """Attributes that say how the stop rule ended the run; empty while it has not."""
         rule = self._rule
         assert rule is not None
         if self._next != self._look:
@@ -276,7 +275,7 @@ class _Watch:
         estimate, asked, shift = self._stop.estimate(), rule.measure.shown(rule.half_width), self._shift or 0.0
         met = estimate.half_width + shift <= asked
         left = max(asked - shift, 0.0)
-        # Half widths go with the root of the hits, about.
+        # The half width is about proportional to 1/√hits.
         in_reach = self._hits * estimate.half_width**2 <= left**2 * self._total
         no_use = not met and not in_reach and estimate.half_width <= (1.0 - OF_THE_NUMERICS) * asked
         if not met and not no_use and self._next != self._shards:
@@ -292,7 +291,7 @@ class _Watch:
         }
 
     def progress(self, underway: int) -> RunProgress:
-        """How far the run is, with shots of unfinished shards."""
+        """The progress of the run, with shots of unfinished shards."""
         tallies = [*self._tallies, self._stop] if self._rule is not None else self._tallies
         estimates = {
             tally.measure: tally.estimate()
@@ -304,7 +303,7 @@ class _Watch:
 
 
 def _attributes(table: HitTable, end: _End) -> dict[str, Any]:
-    """Global attributes of a complete result over those of its first shard."""
+    """Global attributes of a complete result that replace those of its first shard."""
     return {
         attr.HISTORY: attr.history_line(table.attrs[attr.HISTORY].partition(" warpimpact ")[2]),
         attr.COMPUTE_TIME: end.compute_time,

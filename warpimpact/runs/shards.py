@@ -1,8 +1,7 @@
-"""A run on its way to the disk: shards as parts beside the result file (`parts.py`), which appears when all of them
-are there.
+"""The shards of a run: parts beside the result file (`parts.py`), which appears when all of them are there.
 
-A shard is the result of a fixed range of shots. A process that is killed loses what it was computing and what came in
-the last HELD seconds. The result file grows beside the shards meanwhile; it is worth nothing before it is complete.
+A shard is the result of a fixed range of shots. A process that is killed loses the shots in progress and the shards of
+the last HELD seconds. The result file grows beside the shards meanwhile, but has no value before it is complete.
 """
 
 from __future__ import annotations
@@ -31,35 +30,35 @@ _logger = logging.getLogger(__name__)
 
 _GROWING = ".growing.part"
 FEWEST, MOST, SHARDS = 2**11, 2**16, 32
-"""Shots per shard, and how many shards are aimed at between these. A shard costs some 10 ms beside its computing."""
+"""Fewest and most shots per shard, and the number of shards within these bounds. A shard costs some 10 ms."""
 HELD = 1.0
-"""Seconds for which shards are held before they are on the disk, if they are few: a run that is that short needs none
-there."""
+"""Seconds for which a few shards may be held in memory before they are written. A run shorter than this writes none."""
 
 
 def extent(count: int, at_a_plate: int = 1) -> int:
-    """Shots per shard of a campaign of so many, which follows from the campaign alone: a power of two plates, each with
-    so many shots."""
+    """Shots per shard of a campaign of `count` shots, `at_a_plate` of which hit each plate: a power of two plates. It
+    depends on the campaign alone."""
     shots = min(MOST, max(FEWEST, 1 << (count // SHARDS).bit_length()))
     return at_a_plate << max(0, (shots // at_a_plate).bit_length() - 1)
 
 
 def manifest(campaign: Campaign, made_by: Mapping[str, str]) -> dict[str, Any]:
-    """What decides every bit of a result: the campaign with the contents of its files, versions and kind of device."""
+    """What determines every bit of a result: the campaign with the contents of its files, versions and kind of
+    device."""
     contents = json.loads(json.dumps(campaign.model_dump(), default=digest))
     dealt = {"replicates": campaign.replicates, "extent": extent(len(campaign.sampler()), campaign.at_a_plate)}
     return {"campaign": contents, **dealt, **made_by}
 
 
 class Shards:
-    """The shards of one run, each the results of `extent` shots."""
+    """The shards of one run in memory. Each holds the results of `extent` shots."""
 
     def __init__(self, extent: int) -> None:
         self.extent = extent
         self._held: dict[int, HitTable] = {}
 
     def there(self) -> Collection[int]:
-        """Numbers of the shards that are there."""
+        """Numbers of the finished shards."""
         return self._held.keys()
 
     def save(self, index: int, table: HitTable) -> None:
@@ -67,16 +66,16 @@ class Shards:
         self._held[index] = table
 
     def shard(self, index: int) -> HitTable:
-        """A shard that is there."""
+        """A finished shard."""
         return self._held[index]
 
 
 class ShardsOnDisk(Shards):
-    """The shards of one run on the disk, in a folder that is `claimed`. Those that came last are held in memory.
+    """The shards of one run on the disk, in a folder that is `claimed`. The latest shards are held in memory.
 
     Args:
-        grows: whether the result file grows beside the shards as they come, so that no more than its end is left to do
-            when they are there; that needs to know how many there will be.
+        grows: whether the result file grows while shards come, so that little is left to do at the end. This needs a
+            known number of shards.
 
     Attributes:
         parts: the folder with the shards.
@@ -105,20 +104,20 @@ class ShardsOnDisk(Shards):
         return -(-self.total // self.extent)
 
     def there(self) -> Collection[int]:
-        """Numbers of the shards that are there."""
+        """Numbers of the finished shards."""
         return self._held.keys() | self.parts.saved.keys()
 
     def save(self, index: int, table: HitTable) -> None:
-        """Take in a shard. It is on the disk after HELD seconds at most, if the run goes on.
+        """Take in a shard. In a continuing run it is on the disk after HELD seconds at most.
 
         Raises:
-            OutputError: what was held cannot be written.
+            OutputError: the held shards cannot be written.
         """
         super().save(index, table)
         if self._grows:
             try:
                 self._grow()
-            except OutputError:  # as the disk is full, for instance: the shards are worth more
+            except OutputError:  # the disk may be full; the shards have priority over the growing file
                 self._stop_growing()
                 self._grows = False
         if time.monotonic() - self._written >= HELD or len(self._held) * self.extent >= files.CHUNK:
@@ -128,7 +127,7 @@ class ShardsOnDisk(Shards):
         """Put all shards on the disk.
 
         Raises:
-            OutputError: one cannot be written; it is held, like those behind it.
+            OutputError: a shard cannot be written. It stays in memory, as do those behind it.
         """
         while self._held:
             index = min(self._held)
@@ -139,22 +138,22 @@ class ShardsOnDisk(Shards):
         self._written = time.monotonic()
 
     def kept(self) -> str:
-        """What a run that breaks off leaves behind, in words."""
+        """A sentence about what an interrupted run leaves."""
         self._stop_growing()
         with suppress(OutputError):
             self.flush()
         return self.parts.kept()
 
     def shard(self, index: int) -> HitTable:
-        """A shard that is there.
+        """A finished shard.
 
         Raises:
-            OutputError: it is gone or damaged meanwhile.
+            OutputError: its file is gone or was damaged.
         """
         return super().shard(index) if index in self._held else read_table(self.parts.path(index))
 
     def _grow(self, count: int | None = None) -> None:
-        """Add the shards to the result file that are there and follow those in it, or the first `count` shards."""
+        """Append to the result file the next shards in order that are finished, or those up to `count`."""
         if self._growing is None:
             hits = min(self.total, (self.count if count is None else count) * self.extent)
             self._growing = IncrementalFile(self.parts.output, self.parts.folder / _GROWING, hits)
@@ -174,14 +173,14 @@ class ShardsOnDisk(Shards):
         """Join the first `count` shards into the result file, and remove them.
 
         Args:
-            attributes: global attributes from the first shard.
+            attributes: computes global attributes from the first shard.
 
         Raises:
-            OutputError: the file cannot be written, or a shard is damaged meanwhile; the others are still there.
+            OutputError: the file cannot be written, or a shard was damaged; the other shards are kept.
         """
         complete = {**attributes(self.shard(0)), attr.FINGERPRINT: self.parts.fingerprint}
         self._grow(count)
-        assert self._growing is not None  # there are hits
+        assert self._growing is not None  # a campaign has hits
         self._growing.complete(complete)
         self._held.clear()
         _logger.info("%d shards joined into %s", count, self.parts.output)

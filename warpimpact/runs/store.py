@@ -1,6 +1,6 @@
-"""What a fit or a search has computed, on the disk: batches as parts beside its result (`parts.py`).
+"""The results of a fit or a search on the disk: batches as parts beside its result (`parts.py`).
 
-Batches follow from what is computed and from earlier batches alone, so a resumed computation equals an undisturbed one.
+A batch depends only on the content and on earlier batches, so a resumed computation equals an undisturbed one.
 """
 
 from __future__ import annotations
@@ -22,12 +22,12 @@ from warpimpact.runs.parts import Form, Parts, claimed, telling
 
 
 def content_of(text: str, name: str, folder: Path, made_by: Mapping[str, str]) -> dict[str, Any]:
-    """What decides every bit of a result: the tables of a design or fit file, the contents of the files that it names,
-    versions and kind of device.
+    """What determines every bit of a result: the tables of a design or fit file, the contents of the files that it
+    names, versions and kind of device.
 
     Args:
-        name: what errors call the file.
-        folder: from which file names in it count.
+        name: name of the file in errors.
+        folder: folder from which file names in it count.
     """
     tables = json.loads(json.dumps(parsed(text, name), default=str))
     named = {file: folder / file for file in files_in(tables)}
@@ -44,16 +44,16 @@ def stored(
     overwrite: bool,
     tell: Callable[[str], object] = warnings.warn,
 ) -> Iterator[Store | None]:
-    """The `Store` of a computation while it runs; None if its result is complete already. The store is empty when the
-    result is written; whatever ends the computation before leaves what can be resumed.
+    """The `Store` of a computation while it runs; None if its result is already complete. The store is emptied when the
+    result is written. If the computation ends before, the store can be resumed.
 
     Args:
         content, kind, tell: as in `Parts`.
 
     Raises:
-        OutputError: something is there that must be neither resumed nor overwritten, another computation is at work, or
-            the disk is full; the message says what is saved.
-        Interrupted: by the keyboard; the message says what is saved.
+        OutputError: something there must be neither resumed nor overwritten, another computation is at work, or the
+            disk is full; the message says what is saved.
+        Interrupted: the user interrupted the computation; the message says what is saved.
     """
     with claimed(output):
         store = Store(output, content, kind, tell)
@@ -82,10 +82,10 @@ class Store:
         self.parts = Parts(output, content, kind, Form("batch", ".npz"), counted, tell)
 
     def load(self, batch: int) -> dict[str, NDArray[Any]] | None:
-        """A batch that was computed; None if it is not there.
+        """The results of a batch; None if it was not computed.
 
         Raises:
-            OutputError: it is gone or damaged meanwhile.
+            OutputError: its file is gone or was damaged.
         """
         if batch not in self.parts.saved:
             return None
@@ -96,7 +96,7 @@ class Store:
         """Put a batch on the disk.
 
         Raises:
-            OutputError: it cannot be written.
+            OutputError: the batch cannot be written.
         """
 
         def write(path: Path) -> None:

@@ -1,4 +1,4 @@
-"""What a run computes: a task, and the kind of computation that takes it."""
+"""A task of a run, and the kinds of computation that a run can have."""
 
 from __future__ import annotations
 
@@ -23,8 +23,8 @@ class Task:
 
     Attributes:
         shots: whole groups of images, as the campaign's sampler gives them.
-        solid: those of them that the solid plate of equal areal density takes, too; None for no such shots.
-        found: what a pilot found; None if the campaign fixes the resolution itself.
+        solid: the shots among them that are also fired at the solid plate of equal areal density; None for none.
+        found: findings of the pilot; None if the campaign fixes the resolution.
     """
 
     shots: Shots
@@ -33,40 +33,40 @@ class Task:
 
 
 class Computation(Protocol):
-    """What is computed of every hit of a campaign: how it ends (`HitMap`), or its limit (`studies.limit.LimitMap`)."""
+    """What is computed for every hit of a campaign: its outcome (`HitMap`), or its limit (`studies.limit.LimitMap`)."""
 
     @property
     def most_solid(self) -> int:
-        """Shots at most at the solid plate of equal areal density."""
+        """Most shots at the solid plate of equal areal density."""
 
     @property
     def passages(self) -> int:
-        """How many times as long as a passage that nothing hinders a hit takes, roughly."""
+        """Rough ratio of the time of a hit to that of an unhindered passage."""
 
     @property
     def content(self) -> Mapping[str, str]:
-        """What decides the bits of a result, beside the campaign, the versions and the device."""
+        """What determines the bits of a result, beside the campaign, the versions and the device."""
 
     @property
     def measures(self) -> Sequence[str]:
-        """Whose running estimates are shown; those of a hit map where there are none."""
+        """Measures whose running estimates are shown; empty for those of a hit map."""
 
     def compute(self, campaign: Campaign, task: Task, worker: Worker, progress: Progress | None = None) -> HitTable:
-        """Compute a task: the columns of results/dataset.py, one entry per shot; they are a complete result."""
+        """Compute a task: the columns of results/dataset.py, one entry per shot. They are a complete result."""
 
     def assumed(self, campaign: Campaign, found: Found | None, worker: Worker) -> HitTable:
-        """Some hits of the campaign under assumptions, as `runs.assumed.assumed` has them.
+        """Some hits of the campaign under assumptions, by `runs.assumed.assumed`.
 
         Args:
             found: as in a task.
         """
 
     def pilot(self, campaign: Campaign, worker: Worker, trying: Callable[[int], object]) -> Found | None:
-        """What a pilot of the campaign's own hits finds; None if the campaign fixes the resolution itself.
+        """The findings of a pilot with hits of the campaign; None if the campaign fixes the resolution.
 
         Args:
             trying: called with every level that the pilot computes.
         """
 
     def found_in(self, result: Result) -> Found | None:
-        """What the pilot of a result found."""
+        """The findings of the pilot of a result."""
