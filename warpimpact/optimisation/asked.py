@@ -1,4 +1,4 @@
-"""What a design file asks for: objectives and bounds, each a measure, also by the names of earlier versions."""
+"""What a design file asks for: objectives and bounds, each a measure. Names of earlier versions are accepted, too."""
 
 from __future__ import annotations
 
@@ -22,12 +22,12 @@ OLD_WORDS = {
     "broken_share": "P(broken)",
     "stopped_or_broken_share": "P(stopped_or_broken)",
 }
-"""Measures under names of earlier versions; a quantity alone was its mean, and with _worst_tenth its worst tenth."""
+"""Measures by their names in earlier versions. A quantity alone meant its mean, with _worst_tenth its worst tenth."""
 
 
 def in_new_words(name: str, angle: object = "30 deg", standoff: object = "", layer: object = 0) -> str:
-    """The text of a measure that is given by its name in an earlier version, with its place in keys of its own: angles
-    are in degrees, stand-offs in metres. Other texts stay unchanged."""
+    """The text of a measure that is given by its name in an earlier version, with angle [degree], stand-off [m] and
+    layer in keys of their own. Other texts stay unchanged."""
     angle = f"{angle} deg" if isinstance(angle, int | float) else angle
     at = f"@{standoff} m" if isinstance(standoff, int | float) else f"@{standoff}" if standoff else ""
     if name in OLD_WORDS:
@@ -45,8 +45,8 @@ class _Asked(Model):
 
     Attributes:
         measure: such as `mean(residual_energy_density@130mm)`, `worst_tenth(base_depth)`, `P(base_perforated)`,
-            `P(inclination@130mm > 30 deg)`, `V50`, `mean(limit_thickness@layer 1)` or `areal_density`; without a
-            stand-off the largest one counts.
+            `P(inclination@130mm > 30 deg)`, `V50`, `mean(limit_thickness@layer 1)` or `areal_density`; the default
+            stand-off is the largest one.
         threats: over several threats the "worst" one counts, or their weighted "mean".
         assumptions: of what nobody measured, what the campaign says counts ("given"), or over all assumptions the
             "worst" or the "mean".
@@ -59,7 +59,8 @@ class _Asked(Model):
     @model_validator(mode="before")
     @classmethod
     def _in_new_words(cls, given: Any) -> Any:
-        """A measure by its name in earlier versions, which had angle, stand-off and layer as keys of their own."""
+        """Translate a measure by its name in earlier versions, which had angle, stand-off and layer in keys of their
+        own."""
         if not isinstance(given, dict) or not isinstance(name := given.get("measure"), str):
             return given
         places = {key: given[key] for key in ("angle", "standoff", "layer") if key in given}
@@ -86,14 +87,14 @@ class Objective(_Asked):
     """What is minimised or maximised.
 
     Attributes:
-        goal: "minimise" or "maximise"; unless given, what is better for whoever is behind the plate.
+        goal: "minimise" or "maximise"; by default, what is better for whoever is behind the plate.
     """
 
     goal: Literal["minimise", "maximise"] | None = None
 
     @property
     def sign(self) -> float:
-        """Factor that makes it a quantity to minimise."""
+        """Factor that turns the measure into a quantity to minimise."""
         if self.goal is not None:
             return 1.0 if self.goal == "minimise" else -1.0
         return -1.0 if self.asked.higher_is_better else 1.0
@@ -106,7 +107,7 @@ class Objective(_Asked):
 
 
 class Bound(_Asked):
-    """A measure that is held within a limit, one of both.
+    """A measure with an upper or a lower limit.
 
     Attributes:
         at_most, at_least: limits, in the units in which inspect shows the measure.
@@ -127,20 +128,20 @@ class Bound(_Asked):
 
     @property
     def sign(self) -> float:
-        """Factor that makes it a quantity that must not exceed the limit."""
+        """Factor that turns a lower limit into an upper one."""
         return 1.0 if self.at_most is not None else -1.0
 
 
 def check_needs(asked: Mapping[str, Objective | Bound], output: Mapping[str, Any], *, layered: bool) -> None:
-    """Refuse a measure of which a campaign lacks what it needs.
+    """Refuse a measure if the campaign lacks what it needs.
 
     Args:
         asked: objectives and bounds by their places in the file.
-        output: the table of the campaign.
-        layered: whether it has layers behind the plate.
+        output: table [output] of the campaign.
+        layered: whether the campaign has layers behind the plate.
 
     Raises:
-        ValueError: names the measure, and what it needs.
+        ValueError: the message names the measure, and what it needs.
     """
     bends, none = output.get("bending") is True, output.get("standoffs") == []
     for place, goal in asked.items():

@@ -1,4 +1,4 @@
-"""The front computed again with fresh hits: a search selects lucky hits, so its own numbers are biased."""
+"""Confirmation of the front with fresh hits: a search selects lucky hits, so its own numbers are biased."""
 
 from __future__ import annotations
 
@@ -34,9 +34,9 @@ Array = NDArray[np.float64]
 FIDELITY = "standard"
 """Fidelity of the pilots of the designs of the front, unless the campaign fixes a resolution."""
 SOLID_HITS = 64
-"""Number of hits of a solid plate, which differ only in scattered quantities."""
+"""Number of hits of a solid plate, which differ in scattered quantities only."""
 SAME_WEIGHT = 0.01
-"""Areal densities that differ by less than this share are the same weight."""
+"""Relative difference below which two areal densities are the same weight."""
 
 
 @dataclass(frozen=True)
@@ -44,19 +44,19 @@ class Confirmed:
     """The front by fresh hits.
 
     Attributes:
-        numbers: of its designs among those of the search.
-        records: of fresh hits.
-        places: y and z of the hits of each [m], shape [front, 2, hits].
+        numbers: numbers of its designs in the search.
+        records: its designs with fresh hits.
+        places: y and z of the hits of each design [m], shape [front, 2, hits].
         solids: solid plates of equal areal density.
-        kept: whether fresh hits leave a design on the front and within the bounds.
-        groups: number of the first design than which each is not certainly better.
+        kept: whether each design is still on the front and within the bounds by fresh hits.
+        groups: for each design, the number of the first design than which it is not certainly better.
         references: targets to compare with.
-        assumptions: names of what is otherwise.
+        assumptions: names of the assumptions.
         under: objectives and bounds of the front, then of the references, under every assumption, shape [front +
             references, assumptions, asked].
-        survival: of each design, per objective and bound, the share of the draws of a posterior for which it differs
-            from the next one of another group in the same direction as over all hits, and the lower end of the
-            interval of that share, shape [front, asked, 2]; NaN where it is not known.
+        survival: for each design and each objective and bound, the share of a posterior's draws in which the difference
+            to the next design of another group has the same sign as over all hits, and the lower end of the interval of
+            this share, shape [front, asked, 2]; NaN where unknown.
     """
 
     numbers: NDArray[np.int64]
@@ -72,7 +72,7 @@ class Confirmed:
 
 
 Follow = Callable[[int, int, str], object]
-"""Called with how many targets are done, how many there are, and what is computed of them."""
+"""Called with the number of targets done, the number of all targets, and what is computed of them."""
 
 
 def confirm(design: Design, found: Searched, follow: Follow) -> Question[Confirmed]:
@@ -100,7 +100,7 @@ def confirm(design: Design, found: Searched, follow: Follow) -> Question[Confirm
 
 
 def spread(front: NDArray[np.int64], most: int) -> NDArray[np.int64]:
-    """At most `most` designs at even distances along a front, with both ends."""
+    """At most `most` designs at even distances along a front, including both ends."""
     if len(front) <= most:
         return front
     places = np.unique(np.round(np.linspace(0, len(front) - 1, most)).astype(np.int64))
@@ -130,21 +130,21 @@ def check_references(design: Design) -> None:
     """Refuse a reference that is no campaign before anything is computed.
 
     Raises:
-        CampaignError: names it.
+        CampaignError: the message names the reference.
     """
     for place in range(len(design.references)):
         _reference(design, place)
 
 
 def _telling(follow: Follow, targets: int, jobs: int, what: str) -> Told:
-    """Return a function that follows jobs by the number of targets done; all targets have equally many jobs."""
+    """Return a function that converts finished jobs to finished targets for `follow`. All targets have as many jobs."""
     return lambda done, _: follow(int(targets * done / jobs), targets, what)
 
 
 def _fresh(
     design: Design, targets: Sequence[DesignRecord], follow: Follow
 ) -> Question[tuple[list[DesignRecord], Array, list[Array]]]:
-    """Targets with fresh hits, where these lie, and the draws of a posterior that they took."""
+    """Targets with fresh hits, the places of the hits, and their draws of a posterior."""
     seed, count = fresh_seed(design), design.search.confirm_hits if design.keys else 1
     threats, situations = range(len(design.threats)), design.situations
     asked = [HitJob(target.tables, threat, 0, count, FIDELITY, seed) for target in targets for threat in threats]
@@ -185,8 +185,8 @@ def _fresh(
 def _under_assumptions(
     design: Design, targets: Sequence[DesignRecord], follow: Follow
 ) -> Question[tuple[tuple[str, ...], Array]]:
-    """Names of the assumptions that a target can have, and objectives and bounds of all targets under them: as given,
-    moved by what the first hits tell."""
+    """Names of the possible assumptions, and objectives and bounds of all targets under them: the values as given plus
+    the change between the first hits."""
     count = min(design.search.assumed_hits, design.search.confirm_hits)
     if not count or not design.keys:
         return (), np.zeros((len(targets), 0, len(design.asked)))
@@ -212,7 +212,7 @@ def _under_assumptions(
 
 
 def _solids(design: Design, front: Sequence[DesignRecord], follow: Follow) -> Question[list[DesignRecord]]:
-    """The solid plate of the areal density of every design of the front."""
+    """The solid plate with the areal density of each design of the front."""
     if not design.keys or not front:
         return list(front)
     jobs = [
@@ -236,7 +236,7 @@ def _solids(design: Design, front: Sequence[DesignRecord], follow: Follow) -> Qu
 
 
 def _kept(design: Design, front: Sequence[DesignRecord]) -> NDArray[np.bool_]:
-    """Whether each design is within the bounds, and no other one that is dominates it."""
+    """Whether each design is within the bounds, and not dominated by another design within the bounds."""
     kept = np.array([not excesses(design, record).any() for record in front], dtype=bool)
     within = np.flatnonzero(kept)
     points = np.array([objectives(design, front[int(number)]) for number in within])
@@ -246,7 +246,7 @@ def _kept(design: Design, front: Sequence[DesignRecord]) -> NDArray[np.bool_]:
 
 
 def groups(design: Design, front: Sequence[DesignRecord]) -> NDArray[np.int64]:
-    """For each design the number of the first design of the front from which no objective tells it apart as better."""
+    """For each design, the number of the first design of the front than which it is not certainly better."""
     found = np.arange(len(front))
     for number, record in enumerate(front):
         leaders = [lead for lead in range(number) if found[lead] == lead]
@@ -255,7 +255,7 @@ def groups(design: Design, front: Sequence[DesignRecord]) -> NDArray[np.int64]:
 
 
 def is_better(design: Design, one: DesignRecord, other: DesignRecord) -> bool:
-    """Whether some objective tells at 95 %, by the same hits of both, that one design is better than another."""
+    """Whether one design is better than another in some objective at 95 %, by the same hits of both."""
     count = len(design.objectives)
     signs = np.array([asked.sign for asked in design.objectives])[:, None]
     theirs = means(design, other, other.hits)[:count]
@@ -265,8 +265,8 @@ def is_better(design: Design, one: DesignRecord, other: DesignRecord) -> bool:
 
 
 def survival(design: Design, front: Sequence[DesignRecord], draws: Sequence[Array], leads: NDArray[np.bool_]) -> Array:
-    """Whether the order of neighbours on the front survives the uncertainty of the parameters: the array of
-    `Confirmed.survival`. Hit k of every design takes the same draw."""
+    """Whether the order of neighbours on the front survives the uncertainty of the parameters (`Confirmed.survival`).
+    Hit k of every design takes the same draw."""
     found = np.full((len(front), len(design.asked), 2), np.nan)
     for number, following in pairwise(int(lead) for lead in np.flatnonzero(leads)):
         one, other = front[number], front[following]

@@ -1,4 +1,4 @@
-"""A design file: a campaign, and what is searched in it."""
+"""A design file: a campaign with free variables, objectives, bounds and constraints."""
 
 from __future__ import annotations
 
@@ -34,20 +34,20 @@ Array = NDArray[np.float64]
 SCRAMBLINGS = 16
 """Number of scramblings of the hits of a search: hit k belongs to scrambling k modulo this number."""
 _TRIED = 64
-"""Number of points of a space that are asked which assumptions they can have."""
+"""Points of a space at which the possible assumptions are looked up."""
 _Table = dict[str, Any]
 _Name = Annotated[Title, Field(min_length=1, max_length=80)]
 
 OWN = ("variables", "objectives", "bounds", "threats", "constraints", "search", "references")
-"""Tables that a design file has beside those of a campaign."""
+"""Tables of a design file beside those of a campaign."""
 
 
 class FacedThreat(Model):
-    """A threat: what it replaces of the campaign.
+    """A threat, given by the keys of the campaign that it replaces.
 
     Attributes:
-        name: of the threat.
-        weight: in a mean over the threats.
+        name: name of the threat.
+        weight: weight in a mean over the threats.
         core, impact: keys of these tables.
     """
 
@@ -58,12 +58,12 @@ class FacedThreat(Model):
 
 
 class Reference(Model):
-    """A target to compare with, such as a published plate: what it replaces of the campaign.
+    """A target to compare with, such as a published plate, given by the tables of the campaign that it replaces.
 
     Attributes:
-        name: of the target.
+        name: name of the target.
         plate: the whole table.
-        layer: all tables behind it; those of the campaign unless given.
+        layer: all tables of layers behind the plate; those of the campaign by default.
     """
 
     name: _Name
@@ -72,7 +72,7 @@ class Reference(Model):
 
 
 class Constraints(Model):
-    """What is checked of every layer with holes before anything is computed.
+    """Bounds that every layer with holes must keep before anything is computed.
 
     Attributes:
         smallest_ligament: least width of material between two holes [m].
@@ -101,12 +101,12 @@ class Search(Model):
     """How much is computed.
 
     Attributes:
-        designs: that are computed at most.
+        designs: most designs that are computed.
         population: designs that are computed together, and from which the next ones follow.
-        seed: of the optimiser and of the hits.
-        hits: computed of every design at first.
-        most_hits: computed of a design while the paired difference to the front does not decide.
-        confirmed: designs of the front that are computed again with fresh hits, at most.
+        seed: seed of the optimiser and of the hits.
+        hits: first number of hits of every design.
+        most_hits: most hits of a design while the paired difference to the front does not decide.
+        confirmed: most designs of the front that are computed again with fresh hits.
         confirm_hits: hits of each of these.
         allow_untested: whether a design may have holes, thicknesses or resistances that no published test had
             (campaign/tested.py).
@@ -131,7 +131,7 @@ class Search(Model):
 
     @property
     def extent(self) -> str:
-        """How much is computed at most, for people who wait."""
+        """Words for the most that is computed."""
         assumed = f" and {self.assumed_hits} under every assumption" if self.assumed_hits else ""
         fresh = f"{self.confirm_hits} fresh hits{assumed}"
         return (
@@ -164,16 +164,16 @@ class Design:
     """A design file.
 
     Attributes:
-        title: of the campaign.
-        text: the file.
-        name, folder: what errors call it, and where the files are that it names.
+        title: title of the campaign.
+        text: text of the file.
+        name, folder: name of the file in errors, and folder from which file names in it count.
         base: tables of the campaign.
-        space: its variables.
-        objectives, bounds, threats, references, constraints, search: as in the file; without threats there is that of
-            the campaign, without a name.
-        keys: what is computed of every hit: the columns of the measures that are asked for.
-        assumed: assumptions under which a search computes every hit, too: none unless an objective or a bound is over
-            them.
+        space: free variables.
+        objectives, bounds, threats, references, constraints, search: as in the file. Without threats there is the
+            threat of the campaign, without a name.
+        keys: columns that are computed of every hit, for the measures that are asked for.
+        assumed: assumptions under which a search computes every hit, too; empty unless an objective or a bound is over
+            assumptions.
     """
 
     title: str
@@ -210,11 +210,11 @@ class Design:
         """The campaign of a target and a threat.
 
         Args:
-            tables: of the target.
+            tables: tables of the target.
             replaced: keys of [hits] and [numerics], by table.
 
         Raises:
-            CampaignError: it is not valid.
+            CampaignError: the campaign is not valid.
         """
         data = dict(tables)
         for table in ("core", "impact"):
@@ -227,7 +227,7 @@ class Design:
 
 @lru_cache(maxsize=256)
 def _campaign(text: str, name: str, folder: Path) -> Campaign:
-    """A campaign of a search, kept while more hits of it may be asked for: its plate then keeps its tile, too."""
+    """A campaign of a search, cached for further hits, so that its plate also keeps its tile."""
     return Campaign.from_text(text, name=name, folder=folder)
 
 
@@ -242,7 +242,7 @@ def read_design(path: str | Path) -> Design:
 
 
 def design_from(text: str, name: str, folder: Path) -> Design:
-    """Read a design from its text; `name` is what errors call it."""
+    """Read a design from its text; `name` is the name of the file in errors."""
     data = parsed(text, name, DESIGN)
     own = {key: data.pop(key) for key in OWN if key in data}
     for table in ("stop", "burst"):
@@ -287,7 +287,7 @@ def design_from(text: str, name: str, folder: Path) -> Design:
 
 
 def _assumptions(design: Design) -> tuple[str, ...]:
-    """Names of the assumptions that some of a few points of the space can have."""
+    """Names of the assumptions that are possible at some of a few points of the space."""
     names: dict[str, None] = {}
     for values in design.space.some(_TRIED, design.search.seed):
         with suppress(CampaignError):
@@ -297,5 +297,5 @@ def _assumptions(design: Design) -> tuple[str, ...]:
 
 
 def alternatives_of(campaign: Campaign) -> dict[str, Alternative]:
-    """The alternatives of a campaign that move its hits, by name."""
+    """The alternatives of a campaign that change its hits, by name."""
     return {alternative.name: alternative for alternative in alternatives(campaign) if not alternative.breaks}

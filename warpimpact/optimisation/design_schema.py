@@ -11,7 +11,7 @@ Schema = dict[str, Any]
 
 
 def asking_schema() -> Schema:
-    """The JSON schema of the tables that a design file has beside those of a campaign."""
+    """The JSON schema of the tables of a design file beside those of a campaign."""
     schema = completed_schema(Asking)
     schema["properties"]["variables"] = {
         "description": 'Free variables by their places, such as "plate.pattern.width": a range with low, high and, '

@@ -1,4 +1,4 @@
-"""Designs in, the measured numbers of their hits out: the one place of a search that computes."""
+"""From designs to the measured numbers of their hits. All computing of a search is done here."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ from warpimpact.solver.worker import Worker
 Array = NDArray[np.float64]
 
 MOST_HITS = 2**20
-"""Number of hits, images counted, of the sampler of a search; far fewer are computed."""
+"""Number of hits, images counted, of the sampler of a search. Far fewer are computed."""
 TOGETHER = 16
 """Number of jobs that a worker computes side by side and saves together."""
 _TURNING = ("obliquity", "azimuth", "pitch", "yaw", "spin")
@@ -44,13 +44,14 @@ class HitJob:
     """Some hits of a target by a threat.
 
     Attributes:
-        tables: of the target's campaign.
-        threat: its number in the design file.
-        first, count: hits that are computed, from the first on; equal numbers of all designs belong together.
+        tables: tables of the target's campaign.
+        threat: number of the threat in the design file.
+        first, count: first hit and number of hits. Hits of the same number are paired across designs.
         level: numerics as JSON.
-        seed: of the hits.
+        seed: seed of the hits.
         solid: whether the solid plate of equal areal density takes the place of the target.
-        assumption: what is otherwise; as given if it is empty, and for a target that has no such alternative.
+        assumption: name of the assumption; empty for the target as given. A target without such an alternative is
+            computed as given.
     """
 
     tables: Mapping[str, Any]
@@ -64,13 +65,14 @@ class HitJob:
 
 
 class Said(NamedTuple):
-    """What the hits of a job say.
+    """The numbers of the hits of a job.
 
     Attributes:
-        values: of every effect that the design file asks for, shape [effects, hits]; NaN where a hit does not count.
+        values: value of every measure that the design file asks for, shape [measures, hits]; NaN where a hit does not
+            count.
         places: y and z of the hits [m], shape [2, hits].
-        draws: of the posterior that the hits took, shape [hits]; empty without one.
-        seconds: processor time of preparing and marching, its share of those computed side by side.
+        draws: draw of the posterior that each hit took, shape [hits]; empty without one.
+        seconds: processor time of preparing and marching; a share of that of the jobs side by side [s].
     """
 
     values: Array
@@ -80,13 +82,13 @@ class Said(NamedTuple):
 
 
 def campaign_of(design: Design, tables: Mapping[str, Any], threat: FacedThreat, seed: int | None = None) -> Campaign:
-    """The campaign whose hits a search computes: those of the irreducible part of the cell, where it has one.
+    """The campaign whose hits a search computes: hits in the irreducible part of the cell, where it has one.
 
     Args:
-        seed: of the hits; that of the search if None.
+        seed: seed of the hits; None for that of the search.
 
     Raises:
-        CampaignError: it is not valid.
+        CampaignError: the campaign is not valid.
     """
     seed = design.search.seed if seed is None else seed
     sampling = {"sampling": "sobol", "count": MOST_HITS, "seed": seed, "irreducible": is_even(tables)}
@@ -95,18 +97,18 @@ def campaign_of(design: Design, tables: Mapping[str, Any], threat: FacedThreat, 
 
 
 def is_even(tables: Mapping[str, Any]) -> bool:
-    """Whether plate and shot alone decide the symmetries of a target."""
+    """Whether the symmetries of a target depend only on plate and shot."""
     layers, impact = tables.get("layer", ()), tables.get("impact", {})
     holed = any({"pattern", "size"} & {*layer} for layer in layers)
     return not holed and not any(isinstance(impact.get(name), dict) for name in _TURNING)
 
 
 def hits_of(campaign: Campaign, first: int, count: int, *, turned: bool = False) -> Shots:
-    """Hits of a campaign that are computed: none is an image of another.
+    """Hits of a campaign that are computed, none an image of another.
 
     Args:
-        turned: whether shots will be turned, so that images differ: each hit is then another one of its images, in
-            turn within every scrambling.
+        turned: whether the shots will be turned, so that images differ. The hits then take the different images in turn
+            within every scrambling.
     """
     sampler = campaign.sampler()
     shots, hits = sampler.shots(first * sampler.images, count * sampler.images), np.arange(count)
@@ -115,7 +117,7 @@ def hits_of(campaign: Campaign, first: int, count: int, *, turned: bool = False)
 
 
 Told = Callable[[float, bool], object]
-"""Called with how many jobs are done, parts of jobs included, and with whether all of them come from the disk."""
+"""Called with the number of jobs done, fractions included, and with whether all of them come from the disk."""
 
 
 Share = Callable[[float], object]
@@ -123,7 +125,7 @@ Share = Callable[[float], object]
 
 
 def said_by(design: Design, jobs: Sequence[HitJob], worker: Worker, told: Share = lambda done: None) -> list[Said]:
-    """Compute jobs side by side. The result of a job depends on the job alone.
+    """Compute jobs side by side. The result of a job does not depend on the other jobs.
 
     Raises:
         DeviceError: the device is absent.
@@ -181,8 +183,8 @@ def _marched(
     worker: Worker,
     told: Callable[[float], object],
 ) -> tuple[list[Outcomes], float]:
-    """Outcomes of the shots of scenes, each with its numerics as JSON, and the processor time [s] that they took; tells
-    the share of the shots that are done."""
+    """Outcomes of the shots of scenes, each with its numerics as JSON, and their processor time [s]; reports the share
+    of the shots that are done."""
     found: dict[int, Outcomes] = {}
     begin, total = time.process_time(), sum(len(shots) for *_, shots in scenes)
     for level in dict.fromkeys(levels):
@@ -199,8 +201,8 @@ def _marched(
 
 
 def said_of(design: Design, table: HitTable) -> Array:
-    """What every measure of a design file counts of the hits of a table, in the unit in which it is shown, shape
-    [measures, hits]; NaN of one that the table lacks, as a solid plate has no base."""
+    """The value of every measure of a design file for the hits of a table, in its display unit, shape [measures, hits];
+    NaN for a measure that the table lacks, as a solid plate lacks a base."""
     said = np.full((len(design.keys), table.sizes["hit"]), np.nan)
     for row, measure in enumerate(design.keys):
         if not measure.quantity.lacking(table):
@@ -211,11 +213,11 @@ def said_of(design: Design, table: HitTable) -> Array:
 def level_of(design: Design, job: HitJob, worker: Worker) -> str:
     """The numerics, as JSON, that a pilot finds for a job; those of the campaign where it fixes a resolution.
 
-    At several layers the level is what the measures need, as in a run (runs/levels.py).
+    At several layers the level is chosen for the measures, as in a run (runs/levels.py).
 
     Args:
-        job: its `level` is the fidelity that is asked for, where the campaign does not fix a resolution; its `count`
-            the hits that will be computed.
+        job: `level` is the required fidelity unless the campaign fixes a resolution; `count` is the number of hits that
+            will be computed.
     """
     campaign = campaign_of(design, job.tables, design.threats[job.threat], job.seed)
     if campaign.numerics.explicit is not None:
@@ -229,7 +231,7 @@ def level_of(design: Design, job: HitJob, worker: Worker) -> str:
 
 
 def hits_asked(design: Design, jobs: Sequence[HitJob], tell: Told) -> Question[list[Said]]:
-    """What the hits of jobs say, in their order, as a round of a question; tells how many are done."""
+    """The numbers of the hits of jobs, in their order, as a round of a question; reports how many jobs are done."""
     if not jobs:
         return []
     groups = [jobs[first : first + TOGETHER] for first in range(0, len(jobs), TOGETHER)]
@@ -257,7 +259,7 @@ def _hits_computed(
 
 
 def levels_asked(design: Design, jobs: Sequence[HitJob], tell: Told) -> Question[list[str]]:
-    """What the pilots of jobs find, as a round of a question; tells how many are done."""
+    """The levels that the pilots of jobs find, as a round of a question; reports how many jobs are done."""
     if not jobs:
         return []
     results = yield Round(

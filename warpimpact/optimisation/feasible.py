@@ -26,7 +26,7 @@ UNTESTED = "within what was tested, as search.allow_untested is not true"
 
 
 _OF_PLATES = ("holes", "thickness", "resistance", "the kind of material")
-"""Subjects of what a design decides."""
+"""Subjects of published tests that a design decides."""
 
 
 class Violation(NamedTuple):
@@ -34,8 +34,8 @@ class Violation(NamedTuple):
 
     Attributes:
         constraint: its key in [constraints], or INVALID.
-        share: by how much, as a share of what is asked for.
-        text: what was found and what is allowed.
+        share: relative size of the violation.
+        text: found value and allowed range in words.
     """
 
     constraint: str
@@ -47,8 +47,8 @@ class Checked(NamedTuple):
     """A design before anything is computed.
 
     Attributes:
-        campaign: that of its first threat; None of one that is not valid.
-        violations: none of a feasible one.
+        campaign: campaign of its first threat; None if it is not valid.
+        violations: violated constraints; empty if the design is feasible.
     """
 
     campaign: Campaign | None
@@ -56,7 +56,7 @@ class Checked(NamedTuple):
 
     @property
     def excess(self) -> float:
-        """Sum of what is violated; 0 of a feasible design."""
+        """Sum of the violations; 0 if the design is feasible."""
         return sum(violation.share for violation in self.violations)
 
 
@@ -91,7 +91,7 @@ def _violations(design: Design, campaign: Campaign) -> Iterator[Violation]:
 
 
 def untested(campaign: Campaign) -> list[Standing]:
-    """What of the plates of a campaign lies beyond every published test."""
+    """The properties of a campaign's plates that lie beyond every published test."""
     standings = standings_of(campaign, Catalogue.of(campaign.catalogue).all(Material))
     return [standing for standing in standings if standing.subject in _OF_PLATES]
 
@@ -127,7 +127,7 @@ def _most(key: str, found: float, most: float | None, what: str, unit: str) -> I
 
 
 def hole_sizes(plate: Plate) -> tuple[float, float]:
-    """Diameter of the largest circle in the narrowest hole, and greatest extent of the widest one [m]; within a
+    """Diameter of the largest circle in the narrowest hole, and greatest extent of the widest hole [m]; within a
     thousandth of the extent where the pattern is no lattice."""
     if isinstance(plate.pattern, LatticePattern):
         return plate.pattern.hole_size
@@ -143,7 +143,7 @@ def hole_sizes(plate: Plate) -> tuple[float, float]:
 
 
 def corner_radius(plate: Plate) -> float:
-    """Least radius of the corners of the holes [m]; infinite where their outline is not known."""
+    """Least radius of the corners of the holes [m]; infinite where their outline is unknown."""
     pattern = plate.pattern
     if isinstance(pattern, EllipsePattern):
         return float(pattern.width**2 / (2.0 * pattern.length))

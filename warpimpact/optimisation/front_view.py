@@ -20,13 +20,13 @@ if TYPE_CHECKING:
 _ROUNDED = 1e-6
 """Largest relative difference of objectives that count as equal."""
 _NAMED = 3
-"""Most assumptions that are named as turning a comparison over."""
+"""Most assumptions that are named as reversing a comparison."""
 NEEDED = 0.95
-"""Share of the draws of a posterior from which a difference survives."""
+"""Share of a posterior's draws in which a difference must have the same sign to survive."""
 
 
 def front_view(dataset: xarray.Dataset) -> list[Section]:
-    """The view of a search: its front with intervals, the values of its variables, and what fresh hits took from it."""
+    """The view of a search: its front with intervals, the values of its variables, and how fresh hits changed it."""
     designs, told = dataset.sizes["design"], dataset.attrs
     computed = (
         f"{designs} designs computed, {int(dataset[f.HITS].sum())} hits, {told[f.PILOTS]} pilots; "
@@ -49,7 +49,7 @@ def front_view(dataset: xarray.Dataset) -> list[Section]:
 
 
 def _assumptions(dataset: xarray.Dataset) -> Iterator[Section]:
-    """In how many assumptions a design stays on the front and is better than each reference, and what moves it most."""
+    """In how many assumptions a design stays on the front and is better than each reference, and the largest change."""
     if f.ASSUMPTION not in dataset:
         return
     stays, names = stays_on_front(dataset), [str(name) for name in dataset[f.ASSUMPTION].values]
@@ -70,7 +70,7 @@ def _assumptions(dataset: xarray.Dataset) -> Iterator[Section]:
 
 
 def stays_on_front(dataset: xarray.Dataset) -> np.ndarray[Any, np.dtype[np.bool_]]:
-    """Whether each design keeps the bounds and is beaten by no other one of the front under each assumption, shape
+    """Whether each design keeps the bounds and is beaten by no other design of the front under each assumption, shape
     [front, assumptions]."""
     goals, bounds = _goals(dataset), _bounds(dataset)
     signs, limits = dataset[f.SIGN].values, dataset[f.LIMIT].values
@@ -83,14 +83,14 @@ def stays_on_front(dataset: xarray.Dataset) -> np.ndarray[Any, np.dtype[np.bool_
 
 
 def _beats(one: Any, others: Any) -> Any:
-    """Whether objectives to minimise are no worse than others in all and better in one."""
+    """Whether objectives to minimise are no worse than others in all and better in at least one."""
     close = _ROUNDED * np.abs(others)
     return (one <= others + close).all(axis=-1) & (one < others - close).any(axis=-1)
 
 
 def _better_text(dataset: xarray.Dataset, place: int, reference: int) -> str:
-    """Text such as "4 of 14", with the assumptions that turn the comparison over where the design is better as
-    given."""
+    """Text such as "4 of 14". Where the design is better as given, the assumptions that reverse the comparison are
+    named."""
     goals = _goals(dataset)
     signs = dataset[f.SIGN].values[goals]
     places = (place, f.UNDER, f.FRESH), (reference, f.REFERENCE_UNDER, f.REFERENCE_FOUND)
@@ -116,7 +116,7 @@ def _moved_text(dataset: xarray.Dataset, place: int, goal: int, names: list[str]
 
 
 def _goals(dataset: xarray.Dataset) -> list[int]:
-    """Indices of the objectives among all that is asked."""
+    """Indices of the objectives among objectives and bounds."""
     return np.flatnonzero(np.isnan(dataset[f.LIMIT].values)).tolist()
 
 
@@ -125,12 +125,12 @@ def _bounds(dataset: xarray.Dataset) -> list[int]:
 
 
 def is_weight(dataset: xarray.Dataset, place: int) -> bool:
-    """Whether what is asked is the weight of the target, which no assumption moves."""
+    """Whether an objective or bound is the weight of the target, which no assumption changes."""
     return str(dataset[f.ASKED].values[place]).startswith(tuple(WEIGHTS))
 
 
 def _front_table(dataset: xarray.Dataset) -> Table:
-    """Objectives and bounds of the front and of what it is compared with, by fresh hits."""
+    """Objectives and bounds of the front and of the targets to compare with, by fresh hits."""
     columns = [Column("design")]
     for label in dataset[f.LABEL].values:
         name, unit = label_and_unit(label)
@@ -161,7 +161,7 @@ def _cells(dataset: xarray.Dataset, names: tuple[str, str, str], place: int) -> 
 
 
 def _variables_table(dataset: xarray.Dataset) -> Table:
-    """The values of the variables on the front; not of those that count nowhere on it."""
+    """The values of the variables that count somewhere on the front."""
     designs = dataset[f.NUMBER].values
     used = np.flatnonzero(np.isfinite(dataset[f.VALUE].values[designs]).any(axis=0))
     names, units = dataset[f.NAME].values[used], dataset[f.UNIT].values[used]
@@ -186,7 +186,7 @@ def _survival(dataset: xarray.Dataset) -> Iterator[str]:
 
 
 def _against(dataset: xarray.Dataset, reference: int) -> Iterator[str]:
-    """How much better than a reference a design is in one of two objectives that is no worse in the other."""
+    """How much better than a reference a design is in one of two objectives while no worse in the other."""
     goals = np.flatnonzero(np.isnan(dataset[f.LIMIT].values))
     if len(goals) != 2:
         return

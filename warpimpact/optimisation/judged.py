@@ -1,8 +1,9 @@
 """Objectives and bounds of designs from the numbers of their hits, and which paired differences decide.
 
 Hit k of every design lies at the same place of its irreducible part (common random numbers), and belongs to the
-scrambling k modulo their number. Means over the hits of a scrambling are independent of those of another. A difference
-of two designs is the mean of their differences by scrambling, with Student's interval.
+scrambling k modulo SCRAMBLINGS. Means over the hits of different scramblings are independent. A difference of two
+designs
+is the mean of their differences by scrambling, with Student's interval.
 """
 
 from __future__ import annotations
@@ -35,13 +36,13 @@ class DesignRecord:
     """A target with the numbers of its hits so far.
 
     Attributes:
-        values: of its variables, shape [variables].
-        tables: of its campaign.
-        weights: masses per area [kg/m²], by the measures that ask for them (results/measures.py).
+        values: values of its variables, shape [variables].
+        tables: tables of its campaign.
+        weights: masses per area [kg/m²], by the names of the measures (results/measures.py).
         levels: numerics for every threat, as JSON.
         said: columns of `Design.keys` in each of `Design.situations`, shape [situations, columns, hits].
-        seconds: processor time of its hits.
-        means, known: results of `means` and `values`, kept by the number of hits.
+        seconds: processor time of its hits [s].
+        means, known: cached results of `means` and `values`, by number of hits.
     """
 
     values: Array
@@ -65,13 +66,13 @@ class DesignRecord:
 
 
 def weights_of(target: Target) -> dict[str, float]:
-    """What a record has of the weights of its target."""
+    """Masses per area of a target, by the names of the measures."""
     weights = target.weights
     return {attr.AREAL_DENSITY: target.areal_density, attr.ADD_ON_DENSITY: weights.get("add-on", target.areal_density)}
 
 
 def means(design: Design, record: DesignRecord, hits: int) -> Array:
-    """Objectives and bounds over the first hits by scrambling, shape [asked, SCRAMBLINGS]."""
+    """Objectives and bounds over the first hits, by scrambling, shape [asked, SCRAMBLINGS]."""
     if hits not in record.means:
         rows = [_by_scrambling(numbers_of(design, record, goal, hits)) for goal in design.asked]
         record.means[hits] = np.array(rows)
@@ -87,8 +88,8 @@ def values(design: Design, record: DesignRecord, hits: int | None = None) -> Arr
 
 
 def numbers_of(design: Design, record: DesignRecord, goal: Objective | Bound, hits: int) -> Array:
-    """Numbers of the first hits whose mean is an objective or a bound, shape [hits]: of the worst threat and
-    assumption, or averaged over them, as the goal asks."""
+    """Numbers of the first hits whose mean is an objective or a bound, shape [hits]: those of the worst threat and
+    assumption, or averages over them, as the goal asks."""
     measure = goal.asked
     if measure.kind == "target":
         return np.full(hits, record.weights[measure.name])
@@ -113,8 +114,8 @@ def _worst(goal: Objective | Bound, numbers: Array) -> Array:
 
 
 def _averaged(measure: Measure, numbers: Array) -> Array:
-    """Numbers of hits whose mean is a measure, shape [hits]. A quantile is that of Harrell and Davis, a smooth function
-    of the hits, so that a small change of a design changes it little (statistics/tails.py)."""
+    """Numbers of hits whose mean is a measure, shape [hits]. A quantile is the one of Harrell and Davis, a smooth
+    function of the hits, so that a small change of a design changes it little (statistics/tails.py)."""
     if measure.kind == "quantile":
         return pseudo_values(numbers, np.zeros(len(numbers)), quantile_weights(measure.share))
     return measure.averaged(measure.counted(numbers))
@@ -132,7 +133,7 @@ def estimate(design: Design, record: DesignRecord, goal: Objective | Bound) -> E
 
 
 def objectives(design: Design, record: DesignRecord, hits: int | None = None) -> Array:
-    """Objectives with signs that make them quantities to minimise, shape [objectives]; infinite where no hit counts."""
+    """Objectives, with signs such that they are to be minimised, shape [objectives]; infinite where no hit counts."""
     signs = np.array([objective.sign for objective in design.objectives])
     signed = signs * values(design, record, hits)[: len(signs)]
     return np.asarray(np.nan_to_num(signed, nan=np.inf, posinf=np.inf, neginf=-np.inf))
@@ -153,8 +154,8 @@ def excesses(design: Design, record: DesignRecord, hits: int | None = None) -> A
 def undecided(
     design: Design, candidates: Sequence[DesignRecord], rivals: Sequence[DesignRecord], hits: int
 ) -> list[bool]:
-    """Whether the first hits leave open that each candidate is on the front: no bound is certainly broken, and no rival
-    is certainly better. A difference within rounding decides nothing."""
+    """Whether each candidate may be on the front by the first hits: no bound is certainly broken, and no rival is
+    certainly better. A difference within rounding decides nothing."""
     signs = np.array([goal.sign for goal in design.asked])[:, None]
     count = len(design.objectives)
     limits = np.array([bound.sign * bound.limit for bound in design.bounds]).reshape(-1, 1)
@@ -173,10 +174,10 @@ def undecided(
 
 
 def interval(numbers: Array, confidence: float = CONFIDENCE) -> tuple[Array, Array]:
-    """Ends of Student's intervals of means over the last axis; (−inf, inf) where fewer than two numbers count."""
+    """Student's intervals of means over the last axis; (−inf, inf) where fewer than two numbers count."""
     count = np.sum(~np.isnan(numbers), axis=-1)
     with warnings.catch_warnings():
-        warnings.simplefilter("ignore", RuntimeWarning)  # of no number
+        warnings.simplefilter("ignore", RuntimeWarning)  # numpy warns of means over no number
         mean, spread = np.nanmean(numbers, axis=-1), np.nanstd(numbers, axis=-1)
         by_count = {n: student_quantile(0.5 + 0.5 * confidence, int(n) - 1) for n in np.unique(count) if n > 1}
         factor = np.vectorize(lambda n: by_count.get(n, np.inf), otypes=[float])(count)
@@ -191,7 +192,7 @@ def _mean(numbers: Array) -> float:
 
 
 def _by_scrambling(numbers: Array) -> Array:
-    """Mean over the hits of every scrambling, shape [SCRAMBLINGS]; NaN of a scrambling without a hit that counts."""
+    """Mean over the hits of every scrambling, shape [SCRAMBLINGS]; NaN where no hit of a scrambling counts."""
     missing = -len(numbers) % SCRAMBLINGS
     dealt = np.concatenate([numbers, np.full(missing, np.nan)]).reshape(-1, SCRAMBLINGS)
     with warnings.catch_warnings():

@@ -26,7 +26,7 @@ Array = NDArray[np.float64]
 
 
 def sought_by(campaign: Campaign, scene: Scene, key: Measure) -> Sought:
-    """The limit that a measure is made of, with the tolerance of `warpimpact limit`."""
+    """The limit behind a measure, with the tolerance of `warpimpact limit`."""
     if key.name == "limit_velocity":
         return Sought("velocity", VELOCITY_TOLERANCE, HIGHEST_VELOCITY)
     layer = key.layer or 0
@@ -38,8 +38,7 @@ def sought_by(campaign: Campaign, scene: Scene, key: Measure) -> Sought:
 def limits_said(
     campaign: Campaign, scene: Scene, shots: Shots, key: Measure, numerics: Numerics, worker: Worker
 ) -> Array:
-    """The values of a measure of limits, in the unit in which it is shown, shape [shots]; NaN where the computation
-    failed."""
+    """The values of a measure of limits, in its display unit, shape [shots]; NaN where the computation failed."""
     sought = sought_by(campaign, scene, key)
     found = limits(scene, shots, sought, numerics, worker)
     value = np.minimum(found.value, sought.highest)

@@ -32,10 +32,10 @@ def optimise(design: Design | str | Path, *, device: str = "auto", progress: Fol
     Args:
         design: the design, or its file.
         device: "auto" (CUDA if there is one, else the CPU), "cpu" or "cuda:0".
-        progress: called with how far the search is.
+        progress: called with the progress of the search.
 
     Returns:
-        The Dataset of results/front.py: every design that was computed, and the front by fresh hits.
+        The Dataset of results/front.py: every computed design, and the front by fresh hits.
 
     Raises:
         CampaignError: the file has a value that is not allowed, or no design keeps the constraints.
@@ -56,22 +56,23 @@ def optimise_to_file(
     progress: Follow | None = None,
     tell: Callable[[str], object] = warnings.warn,
 ) -> list[Path]:
-    """Search the best designs into a file, with a campaign file for each design of the front in `folder_of(output)`;
-    what is computed is on the disk at once, in `output`.parts.
+    """Search the best designs into a file, with a campaign file for each design of the front in `folder_of(output)`.
+    Computed designs are on the disk at once, in `output`.parts.
 
     Args:
         device: as in `run_to_file`.
-        resume: continue what is in `output`.parts; of a search that is complete, write the campaigns that are missing.
+        resume: continue what is in `output`.parts; for a complete search, write the missing campaigns.
         overwrite: replace an existing result with its campaigns, and begin anew in place of an unfinished search.
-        tell: called with a sentence for what was damaged and is computed again, or is kept as it was changed.
+        tell: called with a sentence for each damaged part, which is computed again, and for each changed campaign,
+            which is kept.
 
     Returns:
         The campaign files.
 
     Raises:
-        OutputError: something cannot be written, must not be overwritten or is no part of this search.
+        OutputError: a file cannot be written, must not be overwritten or belongs to another search.
         CampaignError: no design keeps the constraints.
-        Interrupted: by the keyboard; what is saved can be resumed.
+        Interrupted: the user interrupted the search; what is saved can be resumed.
     """
     folder = folder_of(output)
     check_campaigns(folder, overwrite=overwrite or (resume and is_begun(output)))

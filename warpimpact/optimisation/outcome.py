@@ -1,4 +1,4 @@
-"""A search as the Dataset of its file, and as campaign files of its front."""
+"""The Dataset of a search, and the campaign files of its front."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 _LONGEST_ENDING = 80
-"""Most bytes of a threat's name in the name of a file; file systems allow 255 in all."""
+"""Most bytes of a threat's name in a file name. File systems allow 255 in all."""
 
 
 def key_of(design: Design, place: int) -> str:
@@ -96,7 +96,7 @@ def to_dataset(design: Design, found: Searched, confirmed: Confirmed, made_by: M
     if confirmed.records:
         targets = [campaign_of(design, one.tables, threat) for one in confirmed.records for threat in design.threats]
         dataset = dataset.assign_attrs({attr.EVIDENCE: summary_of_all(targets, "designs")})
-    return dataset.set_coords([f.UNIT, f.LABEL])  # a value that is picked out keeps its unit and its label beside it
+    return dataset.set_coords([f.UNIT, f.LABEL])  # a selected value keeps its unit and its label
 
 
 def _untested(design: Design, record: DesignRecord) -> str:
@@ -114,7 +114,7 @@ def _levels(record: DesignRecord) -> str:
 
 
 def _estimates(design: Design, records: Sequence[DesignRecord]) -> Array:
-    """Values and both ends of their intervals, shape [3, records, asked]."""
+    """Values, and lower and upper ends of their intervals, shape [3, records, asked]."""
     rows = [[estimate(design, record, goal) for goal in design.asked] for record in records]
     ends = [[[number.value, number.low, number.high] for number in row] for row in rows]
     return np.moveaxis(np.array(ends, dtype=float).reshape(len(records), len(design.asked), 3), -1, 0)
@@ -135,16 +135,16 @@ def _attributes(design: Design, found: Searched, made_by: Mapping[str, str]) -> 
 
 
 def _campaign(design: Design, record: DesignRecord) -> str:
-    """The campaign of a target and the first threat, as TOML."""
+    """The campaign of a target with the first threat, as TOML."""
     return toml_text(campaign_tables(design, record.tables, record.values, design.threats[0]))
 
 
 def campaign_tables(design: Design, tables: Mapping[str, Any], values: Array, threat: FacedThreat) -> dict[str, Any]:
-    """The tables of the campaign of a target and a threat, which `warpimpact run` takes.
+    """The tables of the campaign of a target and a threat, for `warpimpact run`.
 
     Args:
-        tables: of the target.
-        values: of the variables; none of a reference.
+        tables: tables of the target.
+        values: values of the variables; empty for a reference.
     """
     made = json.loads(json.dumps(tables, default=str))
     named = f", {threat.name}" if len(design.threats) > 1 else ""
@@ -158,10 +158,10 @@ def campaign_tables(design: Design, tables: Mapping[str, Any], values: Array, th
 
 
 def check_campaigns(folder: Path, *, overwrite: bool) -> None:
-    """Refuse a folder for campaigns that is somebody's own, before anything is computed.
+    """Refuse a folder for campaigns that is not empty, before anything is computed.
 
     Raises:
-        OutputError: something is in the folder, or it is a file.
+        OutputError: the folder has content, or is a file.
     """
     if folder.exists() and not folder.is_dir():
         raise OutputError(f"{folder}: is no folder, but the campaigns of the designs need one of this name")
@@ -175,19 +175,19 @@ def check_campaigns(folder: Path, *, overwrite: bool) -> None:
 def write_campaigns(
     design: Design, dataset: xarray.Dataset, folder: Path, *, overwrite: bool, tell: Tell = warnings.warn
 ) -> list[Path]:
-    """A campaign file per design of the front, and per threat where there are several.
+    """Write a campaign file per design of the front, and per threat if there are several.
 
     Args:
-        dataset: of the search, as results/front.py has it.
-        overwrite: replace campaigns of an earlier search, and remove those of designs that there are no more; otherwise
-            a file that is there and differs is kept.
+        dataset: Dataset of the search (results/front.py).
+        overwrite: replace campaigns of an earlier search, and remove those of designs that are no longer on the front;
+            otherwise a changed file is kept.
         tell: called with a sentence for each file that is kept.
 
     Returns:
-        The files of the designs.
+        The campaign files.
 
     Raises:
-        OutputError: one cannot be written.
+        OutputError: a file cannot be written.
     """
     numbers, names = dataset[f.NUMBER].values, dataset[f.FILE].values
     texts = {}
@@ -211,7 +211,7 @@ Tell = Callable[[str], object]
 
 
 def _write_campaign(path: Path, text: str, tell: Tell | None) -> None:
-    """Write a campaign. An existing file with another content is kept and reported if `tell` is given."""
+    """Write a campaign. If `tell` is given, an existing file with another content is kept and reported."""
     if tell is not None and path.exists():
         if not path.is_file() or path.read_bytes() != text.encode():
             tell(f"{path}: differs from the design of the front and is kept; --overwrite replaces it")
@@ -221,7 +221,7 @@ def _write_campaign(path: Path, text: str, tell: Tell | None) -> None:
 
 
 def endings(threats: Sequence[FacedThreat]) -> list[str]:
-    """Unique endings of the names of campaign files, by threat; empty for a single threat."""
+    """Unique endings of the names of campaign files, one per threat; empty for a single threat."""
     if len(threats) == 1:
         return [""]
     words = ["".join(c if c.isalnum() else "_" for c in threat.name) for threat in threats]

@@ -1,4 +1,5 @@
-"""The search: few hits of the points that the optimiser asks for, more where the paired difference does not decide."""
+"""The search: few hits of each point that the optimiser asks for, and more where the paired difference does not
+decide."""
 
 from __future__ import annotations
 
@@ -20,27 +21,27 @@ from warpimpact.runs.questions import Question
 Array = NDArray[np.float64]
 
 IDLE = 25
-"""Number of generations without a new design that keeps the constraints, after which a search ends."""
+"""Generations without a new feasible design after which a search ends."""
 FIDELITY = "draft"
 """Fidelity of the pilots of a search, unless the campaign fixes a resolution."""
 MARGIN = 0.1
-"""Share of the box of the first generation by which the reference of the hypervolume lies beyond it."""
+"""Distance of the hypervolume's reference beyond the box of the first generation, as a share of the box."""
 NEIGHBOURHOOD = 0.5
-"""Share of every range within which designs of the same alternatives share a pilot."""
+"""Distance, as a share of every range, within which designs of the same alternatives share a pilot."""
 
 
 @dataclass(frozen=True)
 class SearchProgress:
-    """How far a search is.
+    """The progress of a search.
 
     Attributes:
-        done, total: designs that are computed, at the end with fresh hits.
-        certain: whether `total` will be reached; else it is the most.
-        resumed: of `done`, those that an earlier call had computed.
+        done, total: numbers of designs, first of the search, then of those with fresh hits.
+        certain: whether `total` will be reached; else it is an upper bound.
+        resumed: designs among `done` that an earlier call had computed.
         front: designs on the front.
-        hypervolume: of the front up to a tenth beyond the worst values of the first generation, in units of the box
-            between its best and worst values; NaN before there is one.
-        what: what is computed.
+        hypervolume: hypervolume of the front up to a tenth beyond the worst values of the first generation, in units of
+            the box between its best and worst values; NaN before there is a front.
+        what: words for what is being computed.
     """
 
     done: int
@@ -60,13 +61,13 @@ class Searched:
     """A search that has ended.
 
     Attributes:
-        records: all designs that were computed, in that order.
-        front: numbers of those on the front, by the first objective.
-        refused: designs that broke a constraint and were not computed.
+        records: all computed designs, in the order of computing.
+        front: numbers of the designs on the front, sorted by the first objective.
+        refused: number of designs that broke a constraint and were not computed.
         history: computed designs and hypervolume after every generation, shape [generations, 2].
-        reference, scale: worst values of the first generation to minimise, and the distance from the best, shape
-            [objectives]; empty where no design keeps the bounds.
-        pilots: that were run.
+        reference, scale: worst values of the objectives to minimise in the first generation, and their distance from
+            the best, shape [objectives]; empty where no design keeps the bounds.
+        pilots: number of pilots.
     """
 
     records: tuple[DesignRecord, ...]
@@ -79,10 +80,10 @@ class Searched:
 
 
 def search(design: Design, follow: Follow = lambda now: None) -> Question[Searched]:
-    """Search until the designs of the budget are computed, or there are no others.
+    """Search until the budget of designs is computed, or there are no others.
 
     Raises:
-        CampaignError: no design keeps the constraints; the message names the one that rules them out.
+        CampaignError: no design keeps the constraints; the message names the constraint that rules them out.
     """
     state = _State(design, follow)
     if design.space.size <= design.search.designs:
@@ -107,7 +108,7 @@ Tell = Callable[[Array, Array], None]
 
 
 def _generations(design: Design) -> Iterator[tuple[list[Array], Tell]]:
-    """Points of the space, with a function that takes what became of them."""
+    """Points of the space, with a function that takes the results of each point."""
     space, plan = design.space, design.search
     searcher = Searcher(space, len(design.objectives), 1 + len(design.bounds), plan.population, plan.seed)
     while asked := searcher.ask():
@@ -116,14 +117,14 @@ def _generations(design: Design) -> Iterator[tuple[list[Array], Tell]]:
 
 @dataclass
 class _State:
-    """What a search knows.
+    """The state of a search.
 
     Attributes:
-        records: designs that are computed; front: those on the front, in that order.
-        drafts: designs that keep the constraints and are not yet computed.
+        records: computed designs; front: numbers of those on the front.
+        drafts: feasible designs that are not computed yet.
         refused: designs that break a constraint.
-        total, certain, resumed: as of `SearchProgress`.
-        is_resumed: whether all rounds of the generation so far come from the disk.
+        total, certain, resumed: as in `SearchProgress`.
+        is_resumed: whether all rounds of this generation so far come from the disk.
     """
 
     design: Design
@@ -148,7 +149,7 @@ class _State:
         return len(self.records)
 
     def generation(self, points: Sequence[Array]) -> Question[None]:
-        """Compute the points that are new and keep the constraints."""
+        """Compute the new feasible points among these."""
         new: dict[bytes, DesignRecord] = {}
         for values in points:
             key = values.tobytes()
@@ -186,7 +187,7 @@ class _State:
         self.drafts[key] = DesignRecord(values, tables, weights_of(found.campaign.target), (), nothing)
 
     def _compute(self, new: dict[bytes, DesignRecord]) -> Question[None]:
-        """Compute the hits of designs; designs that may be on the front get the hits of the next rung."""
+        """Compute hits of designs. Designs that may be on the front get the hits of the next rung."""
         levels = yield from self._levels(list(new.values()))
         for key, of_threats in zip(list(new), levels, strict=True):
             one = new[key]
@@ -205,7 +206,7 @@ class _State:
         self.records |= new
 
     def _more(self, records: Sequence[DesignRecord], first: int, stop: int) -> Question[list[DesignRecord]]:
-        """The designs with hits `first` to `stop` added."""
+        """The designs with the hits from `first` up to `stop` added."""
         design = self.design
         if not design.keys:
             return [record.more(np.zeros((len(design.situations), 0, stop)), 0.0) for record in records]
@@ -231,7 +232,7 @@ class _State:
         return found
 
     def _levels(self, records: Sequence[DesignRecord]) -> Question[list[tuple[str, ...]]]:
-        """Numerics of designs for every threat, from the pilot of a neighbour or from their own."""
+        """Numerics of designs for every threat, from the pilot of a neighbour or one of their own."""
         places = [self._place(record.values) for record in records]
         if not self.design.keys:
             return [("",) * len(self.design.threats) for _ in records]
@@ -252,8 +253,8 @@ class _State:
         return min(near, key=lambda pair: pair[0])[1]
 
     def _place(self, values: Array) -> Array:
-        """Coordinates in shares of the ranges. Different choices lie far apart, as do variables of which only one
-        counts."""
+        """Coordinates as shares of the ranges. Different choices lie far apart, as do points only one of which uses a
+        variable."""
         shares = [
             1e6 * value if variable.labels else (value - variable.low) / ((variable.high - variable.low) or 1.0)
             for variable, value in zip(self.design.space.variables, values, strict=True)
@@ -261,7 +262,7 @@ class _State:
         return np.asarray(np.nan_to_num(np.array(shares), nan=-1e6))
 
     def _admit(self, new: Sequence[DesignRecord]) -> None:
-        """Admit to the front the designs that keep the bounds, have all their hits, and are dominated by none."""
+        """Add to the front the designs that keep the bounds, have all their hits, and are not dominated."""
         most = self.design.search.most_hits if self.design.keys else self.design.search.hits
         full = [record for record in new if record.hits >= most and not excesses(self.design, record).any()]
         may = [*self.front, *(record for record in full if np.isfinite(objectives(self.design, record)).all())]
@@ -270,7 +271,7 @@ class _State:
         self.front = [may[number] for number in front_of(points)]
 
     def _measure(self) -> None:
-        """Note the hypervolume, in the box of the first generation in which some design keeps the bounds."""
+        """Record the hypervolume, in the box of the first generation in which some design keeps the bounds."""
         if self.box is None:
             kept = [record for record in self.records.values() if not excesses(self.design, record).any()]
             every = [objectives(self.design, record) for record in kept]
@@ -303,13 +304,13 @@ class _State:
         return told[:, :count], told[:, count:]
 
     def tell(self, what: str) -> None:
-        """Report how far the search is, and what is computed."""
+        """Report the progress of the search, and what is being computed."""
         volume = self.history[-1][1] if self.history else math.nan
         told = (self.done, self.total, self.certain, self.resumed, len(self.front), volume)
         self.follow(SearchProgress(*told, what))
 
     def why_none(self) -> str:
-        """Which constraint rules out all designs that were tried."""
+        """A sentence about the constraint that rules out all designs tried."""
         tried = list(self.refused.values())
         broken: dict[str, list[float]] = {}
         for attempt in tried:

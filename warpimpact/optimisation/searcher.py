@@ -1,4 +1,4 @@
-"""The optimiser: NSGA-II of pymoo with mixed variables and constraints, asked for points and told what became of them.
+"""The optimiser: NSGA-II of pymoo with mixed variables and constraints. It is asked for points and told their results.
 
 K. Deb and others, IEEE Transactions on Evolutionary Computation 6 (2002) 182; J. Blank, K. Deb, IEEE Access 8 (2020)
 89497. tests/benchmarks/NOTES.md compares it with others.
@@ -20,10 +20,10 @@ Array = NDArray[np.float64]
 
 
 def check_installed() -> None:
-    """Refuse a search without the libraries that it needs.
+    """Refuse a search if a library that it needs is missing.
 
     Raises:
-        CampaignError: names the one that is not installed.
+        CampaignError: the message names the library.
     """
     for library in ("pymoo", "moocore"):
         if find_spec(library) is None:
@@ -31,11 +31,11 @@ def check_installed() -> None:
 
 
 class Searcher:
-    """Points of a space, a generation at a time. They depend on the seed and on the results of earlier points alone.
+    """Points of a space, a generation at a time. They depend only on the seed and on the results of earlier points.
 
     Args:
-        objectives, constraints: how many.
-        population: points of a generation.
+        objectives, constraints: numbers of these.
+        population: number of points in a generation.
     """
 
     def __init__(self, space: Space, objectives: int, constraints: int, population: int, seed: int) -> None:
@@ -58,14 +58,14 @@ class Searcher:
         self._asked: Any = None
 
     def ask(self) -> list[Sequence[float]]:
-        """Coordinates of the next points, as `Variable.at` takes them; none where there are no others."""
+        """Coordinates of the next points, as `DesignVariable.at` takes them; empty if there are no others."""
         self._asked = self._algorithm.ask()
         if self._asked is None or not len(self._asked):
             return []
         return [[float(point[name]) for name in self._names] for point in self._asked.get("X")]
 
     def tell(self, objectives: Array, violations: Array) -> None:
-        """Tell what became of the points that were asked for.
+        """Tell the results of the points that were asked for.
 
         Args:
             objectives: to minimise, shape [points, objectives].
@@ -87,7 +87,7 @@ def _kind(variable: Any) -> Any:
 
 
 def hypervolume(points: Array, reference: Array) -> float:
-    """Volume that points to minimise dominate up to a reference, shape [points, objectives]; 0 of no point.
+    """Volume between the points to minimise, shape [points, objectives], and a reference; 0 without points.
 
     Exact: A. P. Guerreiro, C. M. Fonseca, L. Paquete, ACM Computing Surveys 54 (2021) 119, by moocore.
     """
@@ -98,7 +98,7 @@ def hypervolume(points: Array, reference: Array) -> float:
 
 
 def front_of(points: Array) -> NDArray[np.int64]:
-    """Numbers of the points to minimise that no other dominates; of those that are equal to seven digits the first."""
+    """Numbers of the points to minimise that no other dominates; the first of points that agree in seven digits."""
     import moocore
 
     if not len(points):

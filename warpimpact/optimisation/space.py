@@ -1,4 +1,4 @@
-"""The free variables of a design: ranges, steps, lists and alternatives, flattened; a point of them as a campaign."""
+"""The free variables of a design: ranges, steps, lists and alternatives, and the campaign of a point in their space."""
 
 from __future__ import annotations
 
@@ -31,12 +31,12 @@ class DesignVariable:
     """A free variable: a range, with or without a step, or a choice.
 
     Attributes:
-        name: its key in the design file; below an alternative as "plate.pattern[slots].width".
-        place: where its value stands in the campaign.
-        low, high, step: of a range, in its unit; no step of a continuous one.
-        unit: as it was written.
-        labels, values: of a choice.
-        under: number of the choice, and of its option, below which the variable stands; None where it always counts.
+        name: key in the design file; below an alternative such as "plate.pattern[slots].width".
+        place: place of its value in the campaign.
+        low, high, step: bounds and step of a range, in its unit; no step if the range is continuous.
+        unit: unit as written.
+        labels, values: options of a choice.
+        under: number of the choice, and of its option, below which the variable stands; None if it always counts.
     """
 
     name: str
@@ -59,8 +59,8 @@ class DesignVariable:
         return None if self.step is None else 1 + math.floor((self.high - self.low) / self.step + 1e-9)
 
     def at(self, coordinate: float) -> float:
-        """The value at a coordinate: of a share of a continuous range, or of the number of a value. Of a choice it is
-        that number."""
+        """The value at a coordinate, which is a share of a continuous range, else the number of a value. The value of a
+        choice is the number of the option."""
         if self.labels:
             return float(int(coordinate))
         if self.count is None:
@@ -71,32 +71,32 @@ class DesignVariable:
         return min(max(round(value, digits), self.low), self.high)
 
     def written(self, value: float) -> Any:
-        """A value in the form of a campaign."""
+        """A value as a campaign has it."""
         if self.labels:
             return self.values[int(value)]
         number = int(value) if not self.unit and value == int(value) and self.step is not None else value
         return f"{value:.12g} {self.unit}" if self.unit else number
 
     def text(self, value: float) -> str:
-        """A value as text for people."""
+        """A value as text."""
         return self.labels[int(value)] if self.labels else f"{value:.6g} {self.unit}".strip()
 
 
 @dataclass(frozen=True)
 class Space:
-    """All variables, a choice before what stands below it."""
+    """All variables; a choice comes before the variables below it."""
 
     variables: tuple[DesignVariable, ...]
 
     @property
     def size(self) -> float:
-        """Number of its points; infinite for a continuous space. Points that differ only in variables that do not
-        count are counted, too."""
+        """Number of points; infinite for a continuous space. Points that differ only in variables without effect are
+        counted, too."""
         counts = [variable.count for variable in self.variables]
         return math.inf if None in counts else float(math.prod(count for count in counts if count is not None))
 
     def at(self, coordinates: Sequence[float]) -> Array:
-        """Values at coordinates of `DesignVariable.at`, shape [variables]; NaN for variables that do not count."""
+        """Values at coordinates (`DesignVariable.at`), shape [variables]; NaN for variables without effect."""
         values = np.full(len(self.variables), math.nan)
         for number, (variable, coordinate) in enumerate(zip(self.variables, coordinates, strict=True)):
             if variable.under is None or values[variable.under[0]] == variable.under[1]:
@@ -124,8 +124,8 @@ class Space:
         """The tables of the campaign of a point.
 
         Args:
-            base: those of the design file.
-            name: what errors call it.
+            base: tables of the design file.
+            name: name of the file in errors.
         """
         data = json.loads(json.dumps(base, default=str))
         for variable, value in zip(self.variables, values, strict=True):
@@ -139,7 +139,7 @@ class Space:
         return dict(data)
 
     def text(self, values: Array) -> str:
-        """A point as text for people."""
+        """A point as text."""
         told = zip(self.variables, values, strict=True)
         return ", ".join(
             f"{variable.name} = {variable.text(value)}" for variable, value in told if not math.isnan(value)
@@ -150,7 +150,7 @@ def read_space(given: Any, name: str) -> Space:
     """The table `[variables]` of a design file.
 
     Args:
-        name: what errors call the file.
+        name: name of the file in errors.
 
     Raises:
         CampaignError: a variable is neither a range nor a list, or has no value.
@@ -212,12 +212,12 @@ def _range(name: str, place: str, given: dict[str, Any], where: str, under: Any)
 def _number(value: float | str) -> float:
     try:
         return float(value)
-    except OverflowError:  # a whole number of hundreds of digits
+    except OverflowError:  # a whole number may have hundreds of digits
         return math.inf
 
 
 def _read_choice(found: list[DesignVariable], name: str, place: str, given: list[Any], where: str, under: Any) -> None:
-    """A list of values, or of tables with names; ranges and lists in a table are variables below it."""
+    """A list of values, or of tables with names. Ranges and lists in a table are variables below the choice."""
     whole = is_table(place) or place == "layer" or all(isinstance(option, dict) for option in given)
     if whole and not all(isinstance(option, dict) and isinstance(option.get("name"), str) for option in given):
         raise CampaignError(f"{where}: must be a list of tables, each with a name")
@@ -253,7 +253,7 @@ def _read_choice(found: list[DesignVariable], name: str, place: str, given: list
 
 
 def _free(inside: Any, path: str = "") -> Iterator[tuple[str, Any]]:
-    """The ranges in a table, with their places in it."""
+    """The ranges in a table, with their places."""
     entries = inside.items() if isinstance(inside, dict) else enumerate(inside) if isinstance(inside, list) else ()
     for key, entry in entries:
         place = f"{path}.{key}" if path else str(key)
