@@ -39,8 +39,7 @@ class SearchProgress:
         certain: whether `total` will be reached; else it is an upper bound.
         resumed: designs among `done` that an earlier call had computed.
         front: designs on the front.
-        hypervolume: hypervolume of the front up to a tenth beyond the worst values of the first generation, in units of
-            the box between its best and worst values; NaN before there is a front.
+        hypervolume: volume of the front up to the reference (`MARGIN`), in boxes of the first generation; or NaN.
         what: words for what is being computed.
     """
 
