@@ -15,6 +15,8 @@ from ..variant import Variant
 
 CORNERS, COMPONENTS = 8, 24
 """Corners of an element, and components of the forces on them."""
+PIECE = 8
+"""Consecutive elements, or nodes, into which runs divide: what a CPU computes side by side."""
 RIGID = Variant(double=True)
 """The core moves in double precision whatever the elements have."""
 
@@ -147,5 +149,25 @@ def build(variant: Variant) -> SimpleNamespace:
         last_touch: wp.float64
         status: wp.int32
         steps: wp.int32
+
+    @wp.struct
+    class Hit:
+        """One of the hits that march together, with arrays of its own.
+
+        Attributes:
+            pieces: first number and sheet of each piece of the runs of elements, shape [2 pieces]; a piece is PIECE
+                consecutive elements.
+            node_pieces: the same of nodes.
+            flights: how far it is, shape [1].
+            left: as in the march of one hit (passing.py).
+        """
+
+        core: Core
+        limits: Limits
+        mesh: Mesh
+        pieces: wp.array(dtype=wp.int32)
+        node_pieces: wp.array(dtype=wp.int32)
+        flights: wp.array(dtype=Flight)
+        left: wp.array2d(dtype=wp.float64)
 
     return SimpleNamespace(**locals())

@@ -82,6 +82,52 @@ def build(variant: Variant) -> SimpleNamespace:
         cylinder.square = real(core.largest * core.largest)
         return cylinder
 
+    @wp.func
+    def pushed(core: struct.Core, flight: struct.Flight, force: wp.vec3d, moment: wp.vec3d, touching: wp.bool):
+        """A flight whose core a load has kicked [N, N m] and that has drifted over the step."""
+        kick = half * (flight.before + flight.step)
+        if touching:
+            flight.last_touch = flight.time
+            if flight.first_touch < zero:
+                flight.first_touch = flight.time
+        kicked = rigid.State()
+        kicked.position = flight.state.position
+        kicked.attitude = flight.state.attitude
+        kicked.velocity = flight.state.velocity + (kick / core.body.mass) * force
+        kicked.angular_momentum = flight.state.angular_momentum + kick * moment
+        flight.state = move.drift(core.body, kicked, flight.step)
+        return flight
+
+    @wp.func
+    def stepped(
+        core: struct.Core,
+        limits: struct.Limits,
+        mesh: struct.Mesh,
+        flight: struct.Flight,
+        crossing: wp.float64,
+        left: wp.array2d(dtype=wp.float64),
+    ):
+        """A flight at the end of a step: its clock, its next step by the shortest crossing, and its status. Notes which
+        layers are marched next, and how the core left those that it has left (see `advance`)."""
+        dt = flight.step
+        flight.time += dt
+        flight.steps += 1
+        flight.before = dt
+        flight.step = wp.where(crossing < one, wp.min(courant * crossing, growth * dt), dt)
+        rearmost, foremost = contact.ends_of(core, flight.state)
+        axis = move.axis_of(flight.state.attitude)
+        for layer in range(mesh.sheets.shape[0]):
+            sheet = mesh.sheets[layer]
+            passed = rearmost > sheet.rear + behind and flight.time - mesh.touched[layer] > quiet
+            mesh.awake[layer] = wp.where(foremost > sheet.front - behind and not passed, 1, 0)
+            if rearmost > sheet.rear and wp.isnan(left[layer, 6]):
+                for k in range(3):
+                    left[layer, k] = flight.state.velocity[k]
+                    left[layer, 3 + k] = axis[k]
+                left[layer, 6] = flight.time
+        flight.status = status_of(core, limits, flight)
+        return flight
+
     def advance(
         # inputs
         core: struct.Core,
@@ -102,40 +148,15 @@ def build(variant: Variant) -> SimpleNamespace:
         for _ in range(steps):
             if flight.status != running:
                 break
-            kick = half * (flight.before + flight.step)
             dt = flight.step
+            mesh.kick = real(half * (flight.before + dt))
             load = contact.load_on(mesh, core, flight.state, flight.time, dt)
-            if load.touching:
-                flight.last_touch = flight.time
-                if flight.first_touch < zero:
-                    flight.first_touch = flight.time
-            kicked = rigid.State()
-            kicked.position = flight.state.position
-            kicked.attitude = flight.state.attitude
-            kicked.velocity = flight.state.velocity + (kick / core.body.mass) * load.force
-            kicked.angular_momentum = flight.state.angular_momentum + kick * load.moment
-            flight.state = move.drift(core.body, kicked, dt)
-            mesh.kick = real(kick)
+            flight = pushed(core, flight, load.force, load.moment, load.touching)
             mesh.cylinder = cylinder_about(core, flight.state)
             mesh_nodes.move_nodes(mesh, real(dt))
             elements.deform_elements(mesh, real(dt))
-            flight.time += dt
-            flight.steps += 1
-            flight.before = dt
-            crossing = shortest_crossing(mesh)
-            flight.step = wp.where(crossing < one, wp.min(courant * crossing, growth * dt), dt)
-            rearmost, foremost = contact.ends_of(core, flight.state)
-            axis = move.axis_of(flight.state.attitude)
-            for layer in range(mesh.sheets.shape[0]):
-                sheet = mesh.sheets[layer]
-                passed = rearmost > sheet.rear + behind and flight.time - mesh.touched[layer] > quiet
-                mesh.awake[layer] = wp.where(foremost > sheet.front - behind and not passed, 1, 0)
-                if rearmost > sheet.rear and wp.isnan(left[layer, 6]):
-                    for k in range(3):
-                        left[layer, k] = flight.state.velocity[k]
-                        left[layer, 3 + k] = axis[k]
-                    left[layer, 6] = flight.time
-            flight.status = status_of(core, limits, flight)
+            flight = stepped(core, limits, mesh, flight, shortest_crossing(mesh), left)
         flights[0] = flight
 
-    return SimpleNamespace(kernel=variant.kernel(advance), **vars(struct))
+    kernel = variant.kernel(advance)
+    return SimpleNamespace(**locals())

@@ -15,7 +15,7 @@ _SERIES = {
 def _exp(size: int) -> str:
     """2^t = 2^whole · e^rest, |rest| ≤ ln 2 / 2: a series for the rest, the bits of the exponent for the whole."""
     _, terms, whole, bits, bias, shift, _ = _SERIES[size]
-    kind, rint, suffix = ("float", "__builtin_rintf", "f") if size == 4 else ("double", "__builtin_rint", "")
+    kind, rint, suffix = ("float", "rintf", "f") if size == 4 else ("double", "rint", "")
     high, low = (
         ("0.693359375f", "-2.12194440e-4f")
         if size == 4
@@ -28,7 +28,12 @@ def _exp(size: int) -> str:
     const {kind} limit = {bias - 1}.0{suffix};
     {kind} t = x * 1.44269504088896340736{suffix};
     t = t < -limit ? -limit : t > limit ? limit : t;
-    const {kind} whole = {rint}(t), rest = (x - whole * {high}) - whole * {low};
+    #if defined(__CUDA_ARCH__)
+    const {kind} whole = {rint}(t);
+    #else
+    const {kind} whole = __builtin_{rint}(t);
+    #endif
+    const {kind} rest = (x - whole * {high}) - whole * {low};
     const {whole} raised = (__builtin_bit_cast({whole}, whole + {shift}) + {bias}) << {bits};
     return {series} * __builtin_bit_cast({kind}, raised);
     """

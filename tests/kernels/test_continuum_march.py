@@ -1,7 +1,11 @@
-"""Some steps of a small hit: bounds of all arrays in debug mode, the same bits again, and a core that presses."""
+"""Some steps of small hits, alone and together: bounds of all arrays in debug mode, the same bits again, and a core
+that presses."""
 
 import numpy as np
+import pytest
+from numpy.typing import ArrayLike
 
+from warpimpact.continuum.many_hits import ManyHits
 from warpimpact.continuum.meshing import SheetMesh
 from warpimpact.continuum.one_hit import OneHit, Start
 from warpimpact.scene import PolynomialCore
@@ -11,17 +15,17 @@ CORE = PolynomialCore(coefficients=(3.0e-4, 0.24, -5.29), length=27.86e-3, mass=
 STEEL = Flow(yield_stress=2.03e9, hardening=568e6, rate_exponent=0.001, fracture_work=2.31e9)
 
 
-def small_hit() -> OneHit:
+def small_hit(velocity: float = 825.0, across: int = 5, *, double: bool = False, device: str = "cpu") -> OneHit:
     """Two layers of 5 × 5 elements with a hole beside the core; the second one begins where the first one ends."""
-    y, z = np.meshgrid(*[1e-3 * (np.arange(6) - 2.5)] * 2, indexing="ij")
-    solid = np.ones((5, 5), dtype=bool)
+    y, z = np.meshgrid(*[1e-3 * (np.arange(across + 1) - 0.5 * across)] * 2, indexing="ij")
+    solid = np.ones((across, across), dtype=bool)
     solid[0, :2] = False
     sheets = [SheetMesh(y, z, solid, 1e-3 * np.arange(first, first + 3), 1e-3) for first in (0, 2)]
     still, upright = np.zeros(3), np.array([0.0, 0.0, 0.0, 1.0])
     start = Start(
-        np.array([-17.5e-3, 2e-4, 0.0]), upright, np.array([825.0, 0.0, 0.0]), still, 4e-3, 1.5e-8, 1.65e-7, 0.1
+        np.array([-17.5e-3, 2e-4, 0.0]), upright, np.array([velocity, 0.0, 0.0]), still, 4e-3, 1.5e-8, 1.65e-7, 0.1
     )
-    return OneHit(CORE, start, sheets, [STEEL, STEEL])
+    return OneHit(CORE, start, sheets, [STEEL, STEEL], double, device)
 
 
 def test_a_small_hit_has_the_same_bits_again() -> None:
@@ -35,3 +39,51 @@ def test_a_small_hit_has_the_same_bits_again() -> None:
     assert one.energies.imbalance < 0.01
     for name in ("position", "stress", "alive"):
         assert np.array_equal(getattr(one.mesh, name).numpy(), getattr(other.mesh, name).numpy()), name
+
+
+DIFFERENT = [(825.0, 5), (400.0, 8), (600.0, 6)]
+"""Velocities of hits [m/s], and elements across their meshes."""
+
+
+def apart(values: ArrayLike, expected: ArrayLike) -> float:
+    """Largest difference, as a share of the largest number; beside a mesh there may be none of either."""
+    assert np.array_equal(np.isnan(values), np.isnan(expected))
+    return float(np.nanmax(np.abs(np.subtract(values, expected))) / np.nanmax(np.abs(expected)))
+
+
+@pytest.mark.parametrize(("double", "rounding"), [(True, 1e-11), (False, 1e-5)])
+def test_hits_take_the_same_steps_together_as_one_by_one(double: bool, rounding: float, device: str) -> None:
+    """To the rounding of other sums: an error in the order of a step, or of its length, is much larger."""
+    one_by_one = [small_hit(*own, double=double) for own in DIFFERENT]
+    together = [small_hit(*own, double=double, device=device) for own in DIFFERENT]
+    many = ManyHits(together)
+    for _ in range(3):
+        many.advance(50)
+    for one, other in zip(one_by_one, together, strict=True):
+        one.advance(150)
+        assert one.touched.any()
+        for name in ("time", "step", "before", "first_touch", "last_touch", "steps", "status"):
+            assert other.flight[name] == pytest.approx(one.flight[name], rel=rounding), name
+        for name in ("position", "velocity", "attitude", "angular_momentum"):
+            assert apart(other.flight["state"][name], one.flight["state"][name]) < rounding, name
+        for name in ("position", "velocity", "stress", "strain", "damage", "contact_work", "radiated", "work", "near"):
+            assert apart(getattr(other.mesh, name).numpy(), getattr(one.mesh, name).numpy()) < 100 * rounding, name
+        assert other.mesh.alive.numpy().tolist() == one.mesh.alive.numpy().tolist()
+        assert other.mesh.awake.numpy().tolist() == one.mesh.awake.numpy().tolist()
+        assert other.mesh.touched.numpy() == pytest.approx(one.mesh.touched.numpy(), rel=rounding)
+
+
+def test_a_hit_has_the_same_bits_alone_and_together(device: str) -> None:
+    alone, first, last, later = (small_hit(device=device) for _ in range(4))
+    ManyHits([alone]).advance(150)
+    others = [small_hit(*own, device=device) for own in DIFFERENT[1:]]
+    ManyHits([first, others[0]]).advance(150)
+    many = ManyHits([others[1], last])
+    many.advance(150)
+    many.put(1, later)
+    many.advance(150)
+    for other in (first, last, later):
+        assert alone.flight == other.flight
+        for name in ("position", "stress", "alive", "work"):
+            assert np.array_equal(getattr(alone.mesh, name).numpy(), getattr(other.mesh, name).numpy()), name
+    assert others[1].flight["steps"] == 300

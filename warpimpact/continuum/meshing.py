@@ -8,6 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from warpimpact.kernels.continuum.fields import PIECE
 from warpimpact.scene import Plate
 
 Array = NDArray[np.float64]
@@ -20,8 +21,6 @@ FARTHEST_MOVE = 0.7
 """Most that a node is moved onto an edge, in cells; one farther from it stays where it is."""
 SLIVER = 0.15
 """Share of the area of its cell below which a column is left out."""
-LANES = 8
-"""Elements of a run are a multiple of these, as many as a processor computes side by side."""
 
 
 class Extent(NamedTuple):
@@ -170,7 +169,7 @@ def _areas(y: Array, z: Array) -> Array:
     return np.asarray(0.5 * (dy * ez - dz * ey))
 
 
-def runs_of(present: NDArray[np.bool_], first: int, lanes: int = LANES) -> NDArray[np.int32]:
+def runs_of(present: NDArray[np.bool_], first: int, lanes: int = PIECE) -> NDArray[np.int32]:
     """Runs of consecutive numbers that hold all that are present, as multiples of the lanes, shape [runs, 2].
 
     Args:

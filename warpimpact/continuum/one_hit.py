@@ -1,4 +1,4 @@
-"""One hit on the CPU: its mesh and its core in arrays, the march, and what it took from whom."""
+"""One hit: its mesh and its core in arrays of a device, its march on the CPU, and what it took from whom."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ import math
 import threading
 from collections.abc import Iterator
 from dataclasses import dataclass
+from types import ModuleType
 from typing import Any
 
 import numpy as np
@@ -86,33 +87,41 @@ class Energies:
 _BUILDING = threading.Lock()
 
 
-def built(double: bool) -> Any:
-    """The build of the march for a precision: one, whichever threads ask for it, and compiled."""
+def built(march: ModuleType, variant: Variant) -> Any:
+    """The build of a march for a variant: one, whichever threads ask for it."""
     with _BUILDING:
-        stage = passing.build(Variant(double=double))
-        load(stage.kernel, find_device("cpu"))
-        return stage
+        return march.build(variant)
 
 
 class OneHit:
     """A hit in memory.
 
     Attributes:
+        device: that its arrays are on; `advance` marches it on the CPU only.
         flight: how far it is (kernels/continuum/fields.py).
         left: state with which the core left each layer, shape [layers, 7].
     """
 
     def __init__(
-        self, core: Core, start: Start, sheets: list[SheetMesh], flows: list[Flow], double: bool = False
+        self,
+        core: Core,
+        start: Start,
+        sheets: list[SheetMesh],
+        flows: list[Flow],
+        double: bool = False,
+        device: str = "cpu",
     ) -> None:
-        self.device, self.stage = find_device("cpu"), built(double)
-        self.variant = Variant(double=double)
+        self.device, self.variant = find_device(device), Variant(double=double)
+        self.stage = built(passing, self.variant)
+        self.struct = self.stage.struct
+        if self.device.is_cpu:
+            load(self.stage.kernel, self.device)
         self.real, self.dtype = self.variant.real, np.dtype("f8" if double else "f4")
         self.sheets, self.flows = sheets, flows
         self.speed = float(np.linalg.norm(start.velocity))
         self.mesh = self._mesh()
         self.core = self._core(core, start)
-        self.limits, rear = self.stage.Limits(), max(float(sheet.x[-1]) for sheet in sheets)
+        self.limits, rear = self.struct.Limits(), max(float(sheet.x[-1]) for sheet in sheets)
         self.limits.rear, self.limits.longest = rear, 30.0 * (rear + core.length) / self.speed
         self.left = self._put(np.full((len(sheets), 7), np.nan), wp.float64)
         self.flights = self._flights(start)
@@ -122,7 +131,7 @@ class OneHit:
         return wp.array(np.ascontiguousarray(values), dtype=dtype, device=self.device)
 
     def _mesh(self) -> Any:
-        mesh, first, firsts = self.stage.Mesh(), 0, []
+        mesh, first, firsts = self.struct.Mesh(), 0, []
         for sheet in self.sheets:
             pad = sheet.plane + sheet.row + 32
             firsts.append(first + pad)
@@ -152,7 +161,7 @@ class OneHit:
         self.inverse_mass, self._masses = inverse_mass, masses
         mesh.sheets = wp.array(
             [self._sheet(sheet, flow) for sheet, flow in zip(self.sheets, self.flows, strict=True)],
-            dtype=self.stage.Sheet,
+            dtype=self.struct.Sheet,
             device=self.device,
         )
         mesh.runs, mesh.node_runs = self._put(np.ravel(runs), wp.int32), self._put(np.ravel(node_runs), wp.int32)
@@ -174,7 +183,7 @@ class OneHit:
         return mesh
 
     def _sheet(self, sheet: SheetMesh, flow: Flow) -> Any:
-        filled = self.stage.Sheet()
+        filled = self.struct.Sheet()
         filled.row, filled.plane = sheet.row, sheet.plane
         filled.front, filled.rear = float(sheet.x[0]), float(sheet.x[-1])
         filled.stiffness = PENALTY * flow.wave_modulus * sheet.spacing
@@ -183,12 +192,12 @@ class OneHit:
         return filled
 
     def _core(self, core: Core, start: Start) -> Any:
-        filled = self.stage.Core()
+        filled = self.struct.Core()
         filled.length, filled.centre_of_mass = core.length, core.mass_properties.centre_of_mass
         radii = np.asarray(core.radius(np.linspace(0.0, core.length, STATIONS)))
         filled.largest, filled.radii = float(radii.max()), self._put(radii, wp.float64)
         filled.friction = start.friction
-        body = self.stage.rigid.Body()
+        body = self.struct.rigid.Body()
         body.mass, body.inertia_axial, body.inertia_transverse = (
             start.mass,
             start.inertia_axial,
@@ -199,10 +208,10 @@ class OneHit:
         return filled
 
     def _flights(self, start: Start) -> Any:
-        state = self.stage.rigid.State()
+        state = self.struct.rigid.State()
         state.position, state.velocity = wp.vec3d(*start.position), wp.vec3d(*start.velocity)
         state.attitude, state.angular_momentum = wp.quatd(*start.attitude), wp.vec3d(*start.angular_momentum)
-        flight = self.stage.Flight()
+        flight = self.struct.Flight()
         flight.state, flight.first_touch, flight.last_touch, flight.status = state, -1.0, -1.0, RUNNING
         shortest = min(
             float((self.mesh.length.numpy()[at : at + sheet.nodes][sheet.alive]).min()) / flow.wave_speed
@@ -212,7 +221,12 @@ class OneHit:
             if awake
         )
         flight.step = flight.before = 0.5 * choices.COURANT.value * shortest
-        return wp.array([flight], dtype=self.stage.Flight, device=self.device)
+        return wp.array([flight], dtype=self.struct.Flight, device=self.device)
+
+    @property
+    def bytes(self) -> int:
+        """That its mesh takes: 55 numbers of its precision for each node of the grid."""
+        return 55 * self.dtype.itemsize * int(self.mesh.size)
 
     @property
     def flight(self) -> Any:

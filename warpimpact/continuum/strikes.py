@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from warpimpact.continuum.many_hits import ended
 from warpimpact.continuum.meshing import Extent, SheetMesh, meshed
 from warpimpact.continuum.one_hit import STEPS, Energies, OneHit, Start
 from warpimpact.kernels.status import Status
@@ -72,7 +74,8 @@ def simulate(
         numerics: as in a campaign. None is the standard fidelity: a pilot on some of the shots finds the resolution. A
             level or a single setting, such as Numerics(level=2), needs no pilot. A Continuum has every shot computed by
             finite elements; the stress of the scene's fast law does not count then.
-        device: a name of Warp, such as "cpu" or "cuda:0"; finite elements are computed on the CPU.
+        device: a name of Warp, such as "cpu" or "cuda:0"; by default a GPU if there is one. By finite elements a GPU
+            computes hundreds of hits at a time.
         threads: on a CPU; one per core by default. A thread computes one hit of the continuum at a time.
         progress: called repeatedly with (shots done, all shots).
         cancel: can be told from elsewhere to break off.
@@ -88,9 +91,7 @@ def simulate(
     if not isinstance(numerics, Continuum):
         given: dict[str, Any] = {"device": device, "threads": threads, "progress": progress, "cancel": cancel}
         return by_fast_law(scene, shots, numerics=numerics, **given)
-    if device not in ("auto", "cpu"):
-        raise ValueError(f'device: got "{device}", but finite elements are computed on the CPU')
-    return struck(scene, shots, numerics, Worker("cpu", threads, cancel), progress)
+    return struck(scene, shots, numerics, Worker(device, threads, cancel), progress)
 
 
 def check_continuum(scene: Scene, shots: Shots, continuum: Continuum) -> None:
@@ -114,20 +115,20 @@ def struck(
     worker: Worker,
     progress: Progress | None = None,
 ) -> Outcomes:
-    """Compute the shots by finite elements, in the threads of a worker; see `simulate`."""
+    """Compute the shots by finite elements, on a GPU or in the threads of a worker; see `simulate`."""
     check_continuum(scene, shots, continuum)
-    memory = memory_of(scene, shots, worker)
-    conditions = memory.prepared.conditions
-    hits: list[Struck] = []
-    for hit in _in_threads(
-        lambda k: march_of(scene, shots, k, continuum, conditions).ended(worker.cancel),
-        len(shots),
-        worker.threads or cores(),
-    ):
-        hits.append(hit)
+    memory, device = memory_of(scene, shots, worker), find_device(worker.device)
+    march = partial(march_of, scene, shots, continuum=continuum, conditions=memory.prepared.conditions)
+    if device.is_cpu:
+        computed = _in_threads(lambda k: march(k).ended(worker.cancel), len(shots), worker.threads or cores())
+    else:
+        computed = together((march(k, device=device.alias) for k in range(len(shots))), worker.cancel)
+    hits: dict[int, Struck] = {}
+    for number, hit in computed:
+        hits[number] = hit
         if progress:
             progress(len(hits), len(shots))
-    return outcomes_of(memory, hits)
+    return outcomes_of(memory, [hits[number] for number in range(len(shots))])
 
 
 def memory_of(scene: Scene, shots: Shots, worker: Worker) -> Memory:
@@ -135,13 +136,20 @@ def memory_of(scene: Scene, shots: Shots, worker: Worker) -> Memory:
     return Memory(prepare(scene, shots, Numerics(level=0, precision="double")), find_device("cpu"), worker.cancel)
 
 
-def _in_threads(compute: Callable[[int], Struck], count: int, threads: int) -> Iterator[Struck]:
-    """Results in their order; one thread is that of the caller."""
+def _in_threads(compute: Callable[[int], Struck], count: int, threads: int) -> Iterator[tuple[int, Struck]]:
+    """Results with their numbers, in their order; one thread is that of the caller."""
     if threads == 1:
-        yield from map(compute, range(count))
+        yield from enumerate(map(compute, range(count)))
         return
     with ThreadPoolExecutor(threads) as pool:
-        yield from pool.map(compute, range(count))
+        yield from enumerate(pool.map(compute, range(count)))
+
+
+def together(marches: Iterable[March], cancel: Cancel = NEVER) -> Iterator[tuple[int, Struck]]:
+    """What became of hits that march together on their device, with their numbers, as they end."""
+    coming = (((number, march), march.hit) for number, march in enumerate(marches))
+    for (number, march), at_edge in ended(coming, cancel):
+        yield number, march.struck(at_edge)
 
 
 class March:
@@ -156,14 +164,18 @@ class March:
         self, cancel: Cancel = NEVER, *, every: int = STEPS, follow: Callable[[OneHit], object] = lambda hit: None
     ) -> Struck:
         """March to the end; `follow` is called after so many steps again and again."""
-        status = None
+        at_edge = False
         for _ in self.hit.steps(every, cancel):
             follow(self.hit)
-            if self.hit.mesh.near.numpy()[self._edge].any():
-                status = Status.LEFT_WINDOW
+            at_edge = bool(self.hit.mesh.near.numpy()[self._edge].any())
+            if at_edge:
                 break
+        return self.struck(at_edge)
+
+    def struck(self, at_edge: bool) -> Struck:
+        """What became of the hit, which has ended, or whose core is near the outer edge of a mesh."""
         flight, energies = self.hit.flight, self.hit.energies
-        status = status or judged(Status(int(flight["status"])), energies)
+        status = Status.LEFT_WINDOW if at_edge else judged(Status(int(flight["status"])), energies)
         alive = self.hit.mesh.alive.numpy()
         eroded = sum(int(sheet.alive.sum()) for sheet in self.sheets) - int((alive > 0.0).sum())
         return Struck(status, flight, self.hit.touched, self.hit.left.numpy(), energies, eroded)
@@ -179,12 +191,18 @@ def judged(status: Status, energies: Energies) -> Status:
 
 
 def march_of(
-    scene: Scene, shots: Shots, number: int, continuum: Continuum, conditions: dict[str, NDArray[Any]]
+    scene: Scene,
+    shots: Shots,
+    number: int,
+    continuum: Continuum,
+    conditions: dict[str, NDArray[Any]],
+    device: str = "cpu",
 ) -> March:
     """The march of one of the shots.
 
     Args:
         conditions: as `prepare` has them.
+        device: that has its arrays.
     """
     core, target = scene.core, scene.target
     start = start_of(scene, shots, number, continuum.friction, conditions)
@@ -203,7 +221,7 @@ def march_of(
         plate = layer.model_copy(update={"thickness": thickness})
         sheets.append(meshed(plate, place, front, spacing, (extents[0], extents[1])))
     flows = [continuum.flow(k) for k in range(len(sheets))]
-    return March(OneHit(core, start, sheets, flows, continuum.double), sheets)
+    return March(OneHit(core, start, sheets, flows, continuum.double, device), sheets)
 
 
 def _extent(radius: float, half: float, flight: Array, axis: int, front: float, thickness: float) -> Extent:

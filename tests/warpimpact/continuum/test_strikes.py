@@ -12,6 +12,7 @@ from warpimpact.continuum import strikes
 from warpimpact.continuum.one_hit import Energies
 from warpimpact.kernels.status import Status
 from warpimpact.scene.flow import FINENESS
+from warpimpact.solver.device import DeviceError
 from warpimpact.solver.worker import Worker
 
 CORE = PolynomialCore(coefficients=(3.0e-4, 0.24, -5.29), length=27.86e-3, mass=4.0e-3)
@@ -59,9 +60,9 @@ def test_a_hit_that_loses_energy_to_its_numerics_is_a_failure(energies: Energies
     assert strikes.judged(Status.NOT_FINITE, energies) is Status.NOT_FINITE
 
 
-def test_finite_elements_on_another_device_are_refused() -> None:
-    with pytest.raises(ValueError, match='got "cuda:0", but finite elements are computed on the CPU'):
-        simulate(Scene(core=CORE, target=PLATE), SHOT, numerics=COARSE, device="cuda:0")
+def test_a_device_that_is_not_there_is_refused() -> None:
+    with pytest.raises(DeviceError, match='got "cuda:99", but this machine has no such device'):
+        simulate(Scene(core=CORE, target=PLATE), SHOT, numerics=COARSE, device="cuda:99")
 
 
 def test_a_failed_hit_has_no_outcome_and_the_others_are_told() -> None:
@@ -101,11 +102,15 @@ def test_a_march_has_what_belongs_to_its_shot_and_its_layers() -> None:
     assert 0.5 * (along.min() + along.max()) == pytest.approx(6e-3, abs=0.7e-3)  # its pattern moved by 6 mm
 
 
-def test_a_core_that_reaches_the_edge_of_the_mesh_has_left_it(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_core_that_reaches_the_edge_of_the_mesh_has_left_it(monkeypatch: pytest.MonkeyPatch, device: str) -> None:
     monkeypatch.setattr(strikes, "FINE", 0.5)
     monkeypatch.setattr(strikes, "PATCH", 0.6)
     narrow = Continuum(flows=(STEEL,), spacing=1e-3)
-    assert simulate(Scene(core=CORE, target=PLATE), SHOT, numerics=narrow).status[0] == Status.LEFT_WINDOW
+    scene = Scene(core=CORE, target=PLATE)
+    assert simulate(scene, SHOT, numerics=narrow).status[0] == Status.LEFT_WINDOW
+    conditions = strikes.memory_of(scene, SHOT, Worker("cpu", 1)).prepared.conditions
+    ((number, together),) = strikes.together([strikes.march_of(scene, SHOT, 0, narrow, conditions, device)])
+    assert (number, together.status) == (0, Status.LEFT_WINDOW)
 
 
 def test_elements_follow_core_thickness_and_ligament() -> None:
