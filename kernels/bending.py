@@ -24,13 +24,13 @@ def build(variant: Variant) -> SimpleNamespace:
 
     @wp.func
     def mean_force(sums: struct.Sums, dv: vec3, dw: vec3):
-        """Force on a ring [N], mean over the step, if the velocities change by (dv, dw) more than foreseen."""
+        """Mean force on a ring over the step [N], if the velocities change by (dv, dw) more than foreseen."""
         slopes = sums.slopes
         return sums.force - half * (use.damping.damping_vv(slopes) * dv + use.damping.damping_vw(slopes) * dw)
 
     @wp.func
     def mean_moment(sums: struct.Sums, dv: vec3, dw: vec3):
-        """Moment of a ring about the centre of mass [N m], with the same mean."""
+        """Mean moment of a ring about the centre of mass over the step [N m], for the same change."""
         slopes = sums.slopes
         coupled = wp.transpose(use.damping.damping_vw(slopes)) * dv
         return sums.moment - half * (coupled + use.damping.damping_ww(slopes) * dw)
@@ -52,7 +52,7 @@ def build(variant: Variant) -> SimpleNamespace:
         clock: struct.Clock,
     ):
         """The larger of `before` and the bending in one step, whose load changes the velocities in `state`. The loads
-        on the rings are those at half of the foreseen change.
+        on the rings are taken at half of the foreseen change.
 
         A slice at ξ ahead of the centre of mass accelerates across the axis by a + (α + ω_x J ω) × ξ. Its moment per
         rotary inertia is α − ω_x J ω. Here J ω = axis × ω. The terms with ω_x come from the spin: Euler's equations for

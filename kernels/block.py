@@ -2,42 +2,46 @@
 
 Lane k takes every 32nd patch, from the k-th on, of one list: the patches of all rings that may close in.
 
-The passes, the law and the filter are those of the simple layout (kernels/contact.py, kernels/exposure.py). Different
-are the place of the window, and how exposure is added to it: as whole numbers, because their sum does not depend on the
-order of the lanes. So an outcome has the same bits in every run. The front window, that of the plate or of the laminate
-that it begins, is in the block's shared memory. The windows of layers behind it are in global memory: a core arrives
-turned, so they are some 130 nodes wide, and shared memory would not hold them. Nor would it hold several planes: where
-any layer is deep, all windows are in global memory.
+The passes, the law and the filter are those of the simple layout (kernels/contact.py, kernels/exposure.py). Two things
+differ: where a window lies, and that exposure is added to it as whole numbers, because their sum does not depend on the
+order of the lanes. So an outcome has the same bits in every run. The front window (of the plate, or of the laminate
+that
+begins with it) is in the block's shared memory. The windows of layers behind it are in global memory: a core arrives
+turned, so they are some 130 nodes wide, and shared memory would not hold them. It would not hold several planes,
+either:
+if any layer is deep, all windows are in global memory.
 
-Where the barriers stand, and what would go wrong without each of them (E is the exposure, G the exposure gained):
+The barriers, and the error that each of them prevents (E is the exposure, G the exposure gained):
 
 1. After the deposits: a lane converts nodes of G that all lanes add to.
 2. After the conversion: the filter reads nodes of G that other lanes have converted.
-3. Between the filter's directions, in `exposure.spread`: the second one reads what other lanes have filtered, and
-   overwrites G, which they read in the first one. The same holds before what spreads over planes overwrites what was
-   filtered.
+3. Between the filter's directions, in `exposure.spread`: the second direction reads what other lanes have filtered, and
+   overwrites G, which they read in the first one. The same barrier stands before spreading over planes overwrites what
+   was filtered.
 4. Before the second pass: a patch reads nodes of E that other lanes have raised to mid-step.
 5. After the second pass: `settle` raises nodes of E that other lanes read as they are at mid-step.
 6. After `settle`: the next step adds to nodes of G that other lanes clear.
 7. After the window is cleared (`open_window`), as after 6.
 
-All lanes write what a slot knows of the layers (`Stack`, `Passage`) and of earlier hits (`Earlier`, `Channels`), and
-they write the same. So a lane reads what itself has written, and a barrier stands only before a write, for lanes that
-still read what it replaces:
+All lanes write the slot's state of the layers (`Stack`, `Passage`) and of earlier hits (`Earlier`, `Channels`), and all
+write the same values. A lane therefore reads its own writes, and barriers stand only before a write, for lanes that
+still read the old value:
 
-8. Before a window opens (kernels/layers.py): other lanes find out whether it is open.
+8. Before a window opens (kernels/layers.py): other lanes check whether it is open.
 9. Before a layer's footprint is kept, there: other lanes read the last one, and whether the core was near the layer.
 10. Before a core leaves a layer (kernels/passage.py): other lanes read whether it has left, and whether it has touched.
-11. Before the box of a channel widens (kernels/channel.py): other lanes read it, and the last section that was drawn on
-    the plane has to be there, as this one may be the share of other lanes.
+11. Before the box of a channel widens (kernels/channel.py): other lanes read it, and the last section drawn on the
+plane
+    must be complete, because other lanes may have drawn it.
 12. Before a section is kept, there: other lanes compare it with the next one.
-13. After each step of `recall` (kernels/earlier.py): the next one, or the march, reads what other lanes have written.
+13. After each step of `recall` (kernels/earlier.py): the next step, or the march, reads what other lanes have written.
 
-Butterflies stand between the passes and 5, between the steps, and between what 9, 11 and 12 separate. They make lanes
-wait, but order no memory: hence these barriers. The shots of a burst are launches of their own. Touches need no
-barrier: a patch belongs to the same lane in every loop. Nor does `settle` need one before it for G: it goes over the
-same nodes, in the same lanes, as the second direction of the filter. All conditions around barriers hold for all lanes
-alike, since they follow from sums over the lanes, from the state, or from what all lanes write alike.
+Butterflies stand between the passes and 5, between the steps, and between the places that 9, 11 and 12 separate. They
+make lanes wait, but order no memory: hence these barriers. The shots of a burst are launches of their own. Touches need
+no barrier: a patch belongs to the same lane in every loop. `settle` needs none before it for G: it goes over the same
+nodes, in the same lanes, as the second direction of the filter. All conditions around barriers hold for all lanes
+alike,
+because they follow from sums over the lanes, from the state, or from values that all lanes write alike.
 """
 
 from functools import cache
@@ -117,7 +121,7 @@ def build(variant: Variant) -> SimpleNamespace:
         end: wp.int32,
         units: real,
     ):
-        """Add the exposure of this lane's patches, of those with begin ≤ j < end, to the plate."""
+        """Add the exposure of this lane's patches among begin ≤ j < end to the plate."""
         j = begin + use.lanes.lane()
         while j < end:
             gain = read(touches.gain, base + j)

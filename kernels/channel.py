@@ -1,9 +1,10 @@
-"""The channels of cores that went through a layer: later hits find no material there (docs/model.md §8).
+"""The channels of cores that went through a layer. Later hits find no material there (docs/model.md §8).
 
-A channel is all that was inside the core at some time. Nodes on planes through the thickness hold how deep they lie in
-it; between them the depth is interpolated, so the wall of a channel is sharp within a part of a cell, at any angle.
+A channel is all that was inside the core at some time. Nodes on planes through the thickness hold their depth inside
+the
+channel. Between nodes the depth is interpolated, so the wall of a channel is sharp within a part of a cell, at any
+angle.
 A section of the core that lies in the next one, or in the last one drawn, adds nothing, so few sections are drawn.
-
 Long because functions in native code take every length and place by itself.
 """
 
@@ -28,8 +29,8 @@ def build(variant: Variant) -> SimpleNamespace:
     read, write = memory.build(real).read, memory.build(real).write
 
     def shifted(combined: str) -> Any:
-        """The function that combines the value `held` by each node of a window with the `value` that another window
-        has there."""
+        """A function that combines the value `held` by each node of a window with the `value` of another window
+        there."""
 
         # Native, because a compiler vectorises these loops only if the pointers do not alias.
         @wp.func_native(
@@ -69,15 +70,15 @@ def build(variant: Variant) -> SimpleNamespace:
             z: real,
         ):
             """The window has rows × columns nodes from index `start` on, the other one from `first` on. Node (i, j) of
-            the window lies behind node (i + row, j + column) of the other one by the shares y and z of a cell. The
-            other one holds nothing outside a box, and nothing on its outermost nodes."""
+            the window lies behind node (i + row, j + column) of the other one by the fractions y and z of a cell. The
+            other window holds nothing outside a box, and nothing on its outermost nodes."""
             ...
 
         return combine
 
     add_shifted, join_shifted = shifted("held + value"), shifted("value > held ? value : held")
 
-    # (r² − d²) / 2r in the place of the distance r − d: the same at the wall, and without a root.
+    # (r² − d²) / 2r replaces the distance r − d: it is equal at the wall, and needs no root.
     @wp.func_native(
         share
         + """
@@ -112,9 +113,9 @@ def build(variant: Variant) -> SimpleNamespace:
         turn_y: real,
         turn_z: real,
     ):
-        """Join the ellipse in which a plane cuts a cylinder of some radius [m] to a channel, at nodes a `cell` apart
-        [m], of which the first is at (y, z) from the cylinder's axis [m]. The axis has the components (turn_y, turn_z)
-        in the plane."""
+        """Join to a channel the ellipse in which a plane cuts a cylinder of a radius [m]. Nodes are a `cell` apart [m];
+        the first is at (y, z) from the cylinder's axis [m]. The axis has the components (turn_y, turn_z) in the
+        plane."""
         ...
 
     @wp.func
@@ -135,7 +136,7 @@ def build(variant: Variant) -> SimpleNamespace:
 
     @wp.func
     def box_about(window: struct.Window, y: real, z: real, reach: real):
-        """The nodes of a window about a place, as far as some reach [m]."""
+        """The nodes of a window within a reach [m] of a place."""
         home_y, home_z = window.home_y, window.home_z
         box = struct.Box()
         box.y_low = wp.max(0, home_y - 1 + wp.int32(wp.floor((y - reach) * window.per_cell)))
@@ -146,7 +147,7 @@ def build(variant: Variant) -> SimpleNamespace:
 
     @wp.func
     def widen(earlier: struct.Earlier, index: wp.int32, box: struct.Box):
-        """A channel may hold the nodes of a box, too."""
+        """Extend the box of nodes that a channel may hold."""
         whole = use.sliding.around(earlier.box[index], box)
         use.lanes.barrier()
         earlier.box[index] = whole
@@ -160,8 +161,8 @@ def build(variant: Variant) -> SimpleNamespace:
         plane: wp.int32,
         core: struct.Section,
     ):
-        """Join a section of a core to the channel on a plane: at its own nodes, and around them as far as it moves to
-        the next plane."""
+        """Join a section of a core to the channel on a plane, at its own nodes and at those that it sweeps on its way
+        to the next plane."""
         steep = wp.abs(core.axis[0])
         slope = wp.sqrt(wp.max(zero, one - steep * steep)) / steep
         reach = surface.max_radius * wp.sqrt(one + slope * slope) + slope / window.per_channel_plane
@@ -206,7 +207,7 @@ def build(variant: Variant) -> SimpleNamespace:
 
     @wp.func
     def section_of(surface: struct.Surface, pose: struct.Pose, x: real):
-        """The core at the plane at a depth x [m]."""
+        """The section of the core at the plane at a depth x [m]."""
         section = struct.Section()
         station = (x - pose.position[0]) / pose.axis[0]
         section.axis = pose.axis
@@ -217,7 +218,8 @@ def build(variant: Variant) -> SimpleNamespace:
 
     @wp.func
     def holds(outer: struct.Section, inner: struct.Section, slack: real):
-        """Whether a section holds another one, up to some slack [m]. Both are ellipses, alike where the axes are."""
+        """Whether a section contains another one, up to a slack [m]. Both are ellipses, of equal shape where the axes
+        are equal."""
         spare = outer.radius + slack - inner.radius
         held = bool(False)
         if spare >= zero:
@@ -236,8 +238,8 @@ def build(variant: Variant) -> SimpleNamespace:
         place: struct.Place,
         pose: struct.Pose,
     ):
-        """Take note of where the core of a shot is in a layer, unless no later shot follows. A section is drawn only
-        when the next one does not hold it."""
+        """Keep the place of a shot's core in a layer, unless no later shot follows. A section is drawn only when the
+        next one does not contain it."""
         if place.last:
             return
         slack = spared / window.per_cell
@@ -256,7 +258,7 @@ def build(variant: Variant) -> SimpleNamespace:
 
     @wp.func
     def conclude(earlier: struct.Earlier, surface: struct.Surface, window: struct.Window, place: struct.Place):
-        """Leave the channel of a shot, whose core went through, to later ones."""
+        """Leave to later shots the channel of a shot whose core went through."""
         if not place.last:
             for plane in range(window.channel_planes):
                 before = earlier.sections[place.section + plane]
@@ -276,12 +278,12 @@ def build(variant: Variant) -> SimpleNamespace:
 
     @wp.func
     def clear(fields: struct.Fields, window: struct.Window):
-        """A window knows of no channels."""
+        """Clear the channels in a window."""
         use.exposure.fill(fields.channel, window.channel, window.channel_planes * window.nodes, outside)
 
     @wp.func
     def begin(earlier: struct.Earlier, window: struct.Window, place: struct.Place):
-        """A shot has made no channel yet in its window."""
+        """Begin the channel of a shot in its window, empty."""
         if not place.last:
             use.exposure.fill(earlier.inside, place.channel, window.channel_planes * window.nodes, outside)
             nothing = struct.Box()
@@ -302,7 +304,7 @@ def build(variant: Variant) -> SimpleNamespace:
         y: real,
         z: real,
     ):
-        """Join the channel of an earlier shot to what a window knows of channels; it is shifted as in `shifted`."""
+        """Join the channel of an earlier shot to the channels in a window, shifted as in `shifted`."""
         for plane in range(window.channel_planes):
             ahead = plane * window.nodes
             join_shifted(
@@ -321,8 +323,8 @@ def build(variant: Variant) -> SimpleNamespace:
 
     @wp.func
     def node_at(window: struct.Window, x: real, index: wp.int32):
-        """Where a depth x [m] lies in a cell of the window: the first node of its channel there, and how far it is on
-        the way to the next plane, 0 to 1."""
+        """The first node of a cell's channel on the plane before a depth x [m], and the fraction of the way to the next
+        plane, 0 to 1."""
         depth = wp.clamp(x, zero, window.thickness) * window.per_channel_plane
         plane = wp.min(wp.floor(depth), real(window.channel_planes - 2))
         return window.channel + (index - window.first) + wp.int32(plane) * window.nodes, depth - plane
@@ -369,14 +371,14 @@ def build(variant: Variant) -> SimpleNamespace:
         stride: wp.int32,
         per_wall: real,
     ):
-        """Multiply three lists, from `start` on, by the share of material that earlier cores have left at places of the
-        channel: between the nodes from `at` on, on this plane and the next, `nodes` later. The share goes from 0 to 1
-        by `per_wall` per depth outside a channel [1/m]."""
+        """Multiply three lists, from `start` on, by the share of material that earlier cores have left. The places lie
+        in the cells at nodes `at`, between this plane and the next, `nodes` later. The share rises from 0 to 1 with the
+        depth outside a channel, by `per_wall` [1/m]."""
         ...
 
     @wp.func
     def spare(fields: struct.Fields, window: struct.Window, touches: struct.Touches, first: wp.int32, count: wp.int32):
-        """Restrict touches, from index `first` on, to what the channels of earlier hits leave."""
+        """Restrict touches, from index `first` on, to the material that the channels of earlier hits leave."""
         spare_channels(
             touches.area,
             touches.slope,

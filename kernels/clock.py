@@ -1,9 +1,9 @@
 """The time of a shot: steps of several lengths, each of which counts from mid-step.
 
-A kick acts at the middle of its step, and the core drifts free from there to the middle of the next step (leapfrog). So
-the position of a step is that at mid-step, and the state after the last kick is drifted to the middle of a step that is
-not computed. Whole steps of the shortest length are counted, and only what other lengths add is summed: a shot of equal
-steps has times without rounding errors.
+A kick acts at the middle of its step, and the core drifts freely from there to the middle of the next step (leapfrog).
+The position of a step is therefore the one at mid-step, and the state after the last kick is drifted to the middle of a
+step that is not computed. Steps are counted as if all had the shortest length, and only the excess of longer ones is
+summed, so a shot of equal steps has times without rounding errors.
 """
 
 from functools import cache

@@ -1,8 +1,8 @@
 """The constants of the device code: value, unit, reason, section of docs/model.md, and the test that binds the value.
 
-The test that is named with a constant computes what the constant decides. The stages read their constants from here,
-and docs/reference/device.md shows them. Not here are numbers of a formula, such as ½, which stand where it is, and
-settings that the host chooses (solver/).
+A constant names the test that computes what the constant decides. The stages read their constants from here, and
+docs/reference/device.md shows them. Numbers of a formula, such as ½, stand in the formula, and settings that the host
+chooses stand in solver/.
 """
 
 from typing import NamedTuple
@@ -12,10 +12,10 @@ class Constant(NamedTuple):
     """A number that somebody chose.
 
     Attributes:
-        value: in the unit.
+        value: number in the unit.
         unit: what the number counts or is a share of.
-        reason: what it is for, and why it is not larger or smaller.
-        section: of docs/model.md; empty where the number belongs to the computation alone.
+        reason: purpose, and why it is not larger or smaller.
+        section: section of docs/model.md; empty where the number belongs to the computation alone.
         test: file and function in tests/ of the test that binds it; empty where any value of its order serves.
     """
 

@@ -49,7 +49,7 @@ def build(variant: Variant) -> SimpleNamespace:
         surface, touches = context.surface, context.touches
         plate, law, window, pose, dt = slab.plate, slab.law, slab.window, slab.pose, slab.dt
         per_node = use.interaction.exposure_in(law, dt, wp.length(pose.velocity)) * window.per_cell * window.per_cell
-        # A ring outside the slab, between others, may be outside the window, too. It touches nothing.
+        # A ring outside the slab, between rings in it, may be outside the window, too. It touches nothing.
         last_cell = window.first + (window.cells_y - 1) * window.cells_z - 2
         j = begin + use.lanes.lane()
         while j < end:
@@ -100,9 +100,9 @@ def build(variant: Variant) -> SimpleNamespace:
 
     @wp.func
     def expose(context: struct.Context, window: struct.Window, first: wp.int32):
-        """Add the exposure of a ring's patches to the plate, one patch of each quarter in turn. Neighbours share nodes,
-        so a CPU would have to wait between them. A patch that does not touch adds zero, which is faster than a
-        branch."""
+        """Add the exposure of a ring's patches to the plate, one patch of each quarter in turn, because neighbours
+        share nodes and a CPU would have to wait between them. A patch that does not touch adds zero, which is faster
+        than a branch."""
         fields, touches, quarter = context.fields, context.touches, context.surface.around // 4
         j = int(first)
         while j < first + quarter:
@@ -117,7 +117,7 @@ def build(variant: Variant) -> SimpleNamespace:
                 use.exposure.scatter(fields.gain, window.cells_z, cell, y, z, gain)
             j += 1
 
-    # Native, because a compiler vectorises it only so.
+    # Native, because a compiler vectorises the loop only in this form.
     @wp.func_native(
         lanes.share(variant)
         + """
@@ -140,20 +140,20 @@ def build(variant: Variant) -> SimpleNamespace:
         start: wp.int32,
         count: wp.int32,
     ) -> wp.int32:
-        """The largest sign × place of the patches that give exposure to their nodes, at least `least`."""
+        """The largest sign × place among the patches that give exposure to their nodes; `least` if it is larger."""
         ...
 
     @wp.func
     def ends_of(touches: struct.Touches, place: wp.array(dtype=wp.int32), start: wp.int32, count: wp.int32):
-        """The first and the last place of the patches that give exposure to their nodes, on all lanes."""
+        """The first and the last place among the patches, on all lanes, that give exposure to their nodes."""
         low = -largest_of(-1, -far, touches.gain, place, start, count)
         high = largest_of(1, -far, touches.gain, place, start, count)
         return use.lanes.least(low), use.lanes.most(high + 1)
 
     @wp.func
     def gained_box(touches: struct.Touches, whole: struct.Box, start: wp.int32, count: wp.int32):
-        """The nodes to which patches give exposure, of the nodes that a step can touch. What spreads over several
-        planes costs more than to look at the patches."""
+        """The nodes that gain exposure, among those that a step can touch. To spread over more planes than needed costs
+        more than this look at the patches."""
         box = whole
         if wp.static(variant.deep):
             y_low, y_high = ends_of(touches, touches.row, start, count)
@@ -168,7 +168,7 @@ def build(variant: Variant) -> SimpleNamespace:
         return box
 
     def summing(weakened: bool) -> Any:
-        """The second pass, in a layer that weakens or in one that does not: without a branch inside."""
+        """The second pass, without a branch, for a layer that weakens or for one that does not."""
 
         @wp.func(name="sum_weakened" if weakened else "sum_sound")
         def sum_patches(
@@ -275,7 +275,7 @@ def build(variant: Variant) -> SimpleNamespace:
 
     @wp.func
     def clear_sums(context: struct.Context):
-        """No layer has touched yet."""
+        """Begin the sums of all layers at zero."""
         touches, first = context.touches, use.core_surface.rings_before(context.surface, context.slot)
         for index in range(first, first + context.surface.rings):
             touches.total_area[index] = zero
@@ -283,7 +283,7 @@ def build(variant: Variant) -> SimpleNamespace:
 
     @wp.func
     def keep_sums(touches: struct.Touches, index: wp.int32, sums: struct.Sums):
-        """Keep what the second pass sums over a ring, of all layers together."""
+        """Add a ring's sums of the second pass to those of all layers."""
         touches.total_area[index] = touches.total_area[index] + touches.ring_area[index]
         touches.sums[index] = use.damping.joined(touches.sums[index], sums)
 
@@ -305,8 +305,8 @@ def build(variant: Variant) -> SimpleNamespace:
 
     @wp.func
     def load_of(sums: struct.Sums):
-        """The load of what touches. Its damping is half of the slope of the traction. So the step is of second order
-        where the stress depends on the rate, and stable where a wall lies on the steep ramp of the contact."""
+        """The load of the touching patches. Its damping is half of the slope of the traction. So the step is of second
+        order where the stress depends on the rate, and stable where a wall lies on the steep ramp of the contact."""
         load, slopes = struct.Load(), sums.slopes
         load.touching = True
         load.force = sums.force
@@ -327,7 +327,7 @@ def build(variant: Variant) -> SimpleNamespace:
         begin, end = footprint.first_closing * surface.around, (footprint.last_closing + 1) * surface.around
         base = (
             use.core_surface.patches_before(surface, context.slot) - begin
-        )  # what a step touches stays in the fastest cache
+        )  # the touches of a step then stay in the fastest cache
         rings = use.core_surface.rings_before(surface, context.slot)
         find_touches(context, slab, base, begin, end)
         if wp.static(variant.burst):
@@ -345,8 +345,8 @@ def build(variant: Variant) -> SimpleNamespace:
             weakened = bool(False)
             if wp.static(variant.degrades):
                 if weakens(window):
-                    # After all rings are found: a CPU has to wait before it reads single values that it has just
-                    # stored as vectors.
+                    # After all rings are found: a CPU has to wait before it reads single values that it has just stored
+                    # as vectors.
                     for index in range(first, last + 1):
                         if touches.ring_area[rings + index] > zero:
                             expose(context, window, base + index * surface.around)

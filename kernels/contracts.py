@@ -1,8 +1,8 @@
-"""What a scheme and a kind of target offer to the march: their functions, with arguments, shapes and units.
+"""The contracts of a scheme and of a kind of target: the functions that the march needs, with arguments and units.
 
 A contract annotates each function with its arguments, as `name: type`: a struct (kernels/structs.py) or a scalar.
-`checked` compares a build with its contract. So a function that is missing, or that takes other arguments, is named
-when a variant is built, and not by a compiler's message about the march.
+`checked` compares a build with its contract. A missing function, or one with other arguments, is then named when a
+variant is built, not in a compiler's message about the march.
 """
 
 from dataclasses import dataclass
@@ -22,12 +22,12 @@ class Scheme:
     (block.py), or the paper's literal scheme (nodal.py).
 
     Attributes:
-        fields_of_slot: Fields of all slots → those of one slot, from its first node on.
-        fields_of_window: Fields of a slot → those of the window that begins at its node `first`. They differ where the
+        fields_of_slot: Fields of all slots → Fields of one slot, from its first node on.
+        fields_of_window: Fields of a slot → Fields of the window that begins at its node `first`. They differ where the
             window lies in shared memory.
         open_window: plate, its thickness [m], the fields of a slot, the number of the layer, the hit in the layer's
-            frame [m] → Window about the hit, of a plate that nothing has touched.
-        load_on: → Load of one layer in a step. The fields of the context then have the exposure of the step, too.
+            frame [m] → Window about the hit on an untouched plate.
+        load_on: → Load of one layer in a step. It also adds the exposure of the step to the fields of the context.
     """
 
     fields_of_slot: Annotated[wp.Function, "fields: Fields, slot: int32"]
@@ -40,21 +40,21 @@ class Scheme:
 
 @dataclass(frozen=True)
 class TargetKind:
-    """What a step can touch of a target, and its load: a target of one plate (one_plate.py), or of several layers
-    (layers.py). All of it belongs to the shot of the context.
+    """What a step can touch of a target, and its load. A target has one plate (one_plate.py) or several layers
+    (layers.py). The shot is the one in the context.
 
     Attributes:
-        first_step: → length of the first step [s], of the length of the `shortest`.
-        begin: state at the first mid-step → Reach before the first step, and the shot's status: it may have ended.
-        find_reach: Reach of the step before → that of this step, which is at the pose, at the time `now` and `dt` long
+        first_step: length of the `shortest` step [s] → length of the first step [s].
+        begin: state at the first mid-step → Reach before the first step, and status of the shot, which may have ended.
+        find_reach: Reach of the step before → Reach of this step, which is at the pose, at the time `now` and `dt` long
             [s]. `last` is the change of the velocities in the step before.
         law_at: law of the plate → the law with the onset of contact of all that the step can touch.
         load_on: → Load of all that the step touches.
-        follow: keeps, for later shots at this target, where the core is.
-        free_time: of a core that touches nothing → time [s] that it flies on after this step without a contact, and
-            whether it is lost between layers.
-        next_step: → length of the step after this one and the `free` time [s].
-        given_up: of a core that has not ended after the last step → its status.
+        follow: keeps the place of the core for later shots at this target.
+        free_time: state of a core that touches nothing → time [s] for which it flies on after this step without a
+            contact, and whether it is lost between layers.
+        next_step: `free` time [s] after this step → length of the next step [s].
+        given_up: → status of a core that has not ended after the last step.
         conclude: keeps what the results and later shots need of a shot that ended.
     """
 
@@ -75,10 +75,10 @@ class TargetKind:
 
 
 def checked(contract: type[Contract], variant: Variant, build: Any) -> Contract:
-    """The functions of a build that a contract names.
+    """The functions of a build that its contract names.
 
     Raises:
-        TypeError: the build lacks a function, or one takes other arguments.
+        TypeError: the build lacks a function, or a function takes other arguments.
     """
     struct = structs.build(variant)
     scalars = {"real": variant.real, "int32": wp.int32, "float64": wp.float64, "bool": wp.bool}

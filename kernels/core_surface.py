@@ -23,12 +23,12 @@ def build(variant: Variant) -> SimpleNamespace:
 
     @wp.func
     def rings_before(surface: struct.Surface, slot: wp.int32):
-        """Rings of all slots before one."""
+        """Number of rings in the slots before this one."""
         return slot * (surface.most_rings if wp.static(variant.tabled) else surface.rings)
 
     @wp.func
     def patches_before(surface: struct.Surface, slot: wp.int32):
-        """Patches of all slots before one."""
+        """Number of patches in the slots before this one."""
         return slot * (surface.most_patches if wp.static(variant.tabled) else surface.rings * surface.around)
 
     @wp.func
@@ -46,7 +46,7 @@ def build(variant: Variant) -> SimpleNamespace:
 
     @wp.func
     def ring_at(surface: struct.Surface, pose: struct.Pose, index: wp.int32):
-        """The ring of a number, from the nose on."""
+        """Ring number `index`, from the nose on."""
         ring = struct.Ring()
         ring.station = read(surface.station, index)
         ring.radius = read(surface.radius, index)
@@ -64,7 +64,7 @@ def build(variant: Variant) -> SimpleNamespace:
 
     @wp.func
     def ring_of(surface: struct.Surface, pose: struct.Pose, patch: wp.int32):
-        """The ring of a patch; the same as `ring_at`, but neighbours in memory belong to neighbouring patches."""
+        """The ring of a patch. It equals `ring_at`, but neighbours in memory belong to neighbouring patches."""
         apart = surface.rings * surface.around
         ring = struct.Ring()
         ring.station = read(surface.patches, patch)
@@ -87,7 +87,7 @@ def build(variant: Variant) -> SimpleNamespace:
 
     @wp.func
     def ends_of(surface: struct.Surface, pose: struct.Pose):
-        """The rearmost and the foremost x of the core [m]."""
+        """The lowest and the highest x of the core [m]."""
         rearmost, foremost = real(far), real(-far)
         wide = broadside(pose)
         index = use.lanes.lane()
@@ -102,8 +102,7 @@ def build(variant: Variant) -> SimpleNamespace:
     @wp.func
     def reach_along_x(ring: struct.Ring, pose: struct.Pose, broadside: real, advance: real, turning: real):
         """Largest distance along x between the ring's centre and any part of the ring within the step [m]. `advance` is
-        half of the way of the centre of mass along x in the step [m]; `turning` is half of the step's rotation
-        [rad]."""
+        half of the way of the centre of mass along x in the step [m], `turning` half of the step's rotation [rad]."""
         around = (one + ring.sector) * ring.radius
         return (
             (around + wp.abs(ring.half_radial)) * broadside
@@ -114,7 +113,7 @@ def build(variant: Variant) -> SimpleNamespace:
 
     @wp.func
     def patch_at(pose: struct.Pose, ring: struct.Ring, cosine: real, sine: real):
-        """The patch of a ring at an azimuth, of which cosine and sine are given."""
+        """The patch of a ring at an azimuth with this cosine and sine."""
         patch = struct.Patch()
         patch.outward_x = cosine * pose.right[0] + sine * pose.up[0]
         patch.around_x = cosine * pose.up[0] - sine * pose.right[0]
@@ -134,12 +133,12 @@ def build(variant: Variant) -> SimpleNamespace:
 
     @wp.func
     def half_lever(ring: struct.Ring):
-        """Half of what the closing speed changes by over a ring, along the meridian, per rate of swing [m]."""
+        """Half of the change of the closing speed over a ring, along the meridian, per rate of swing [m]."""
         return ring.normal_radial * ring.half_axial - ring.normal_axial * ring.half_radial
 
     @wp.func
     def closes(pose: struct.Pose, ring: struct.Ring):
-        """Whether any part of a ring may advance along its normal. This is a bound: a ring for which it is False cannot
+        """Whether any part of a ring may advance along its normal. This is a bound: if it is False, the ring cannot
         touch."""
         along = pose.velocity[0]
         across = wp.sqrt(pose.velocity[1] * pose.velocity[1] + pose.velocity[2] * pose.velocity[2])
@@ -161,8 +160,8 @@ def build(variant: Variant) -> SimpleNamespace:
         """Share of a patch beyond a face at x = 0, averaged over the step, minus 1/2.
 
         The patch spreads evenly over ±extent about its mid-step depth and moves evenly by ±motion. `wide` is the larger
-        of extent and motion, `narrow` the smaller, and per_area = 1 / (2 wide narrow). With the convolution of both,
-        the sum of the immersed area over the steps is exact in straight flight.
+        of extent and motion, `narrow` the smaller, and per_area = 1 / (2 wide narrow). The convolution of both makes
+        the sum of the immersed area over the steps exact in straight flight.
         """
         rest = wp.max(zero, wide + narrow - wp.abs(depth))
         edge = half - quarter * rest * rest * per_area

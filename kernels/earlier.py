@@ -1,8 +1,9 @@
-"""Earlier hits on the same plate: what each of them added to the exposure, the channel that it left, and what a later
-one meets of both (docs/model.md §8).
+"""Earlier hits on the same plate: the exposure that each of them added, and the channel that it left, for later hits
+(docs/model.md §8).
 
-Every shot of a burst keeps its own window about its own hit. A later one reads the windows of the earlier ones
-bilinearly at its own nodes. So windows that do not overlap change no bit, and those about one point add exactly.
+Every shot of a burst keeps its own window about its own hit. A later shot reads the windows of the earlier ones
+bilinearly at its own nodes. Windows that do not overlap therefore change no bit, and windows about one point add
+exactly.
 """
 
 from functools import cache
@@ -22,8 +23,8 @@ def build(variant: Variant) -> SimpleNamespace:
     use, share = variant.use(channel, exposure, lanes), lanes.share(variant)
 
     def filled_with(value: str) -> Any:
-        """target[start + j] = value of from[j] and into[j] for j < count, where source[first] is from[0] and
-        target[start] is into[0]."""
+        """A function that sets target[start + j] = `value` for j < count. In `value`, from[j] is source[first + j] and
+        into[j] is target[start + j]."""
 
         # Native, because a compiler vectorises this loop only if the pointers do not alias.
         @wp.func_native(
@@ -48,7 +49,8 @@ def build(variant: Variant) -> SimpleNamespace:
 
     @wp.func
     def place_of(earlier: struct.Earlier, slot: wp.int32, shot: wp.int32, layer: wp.int32):
-        """Where a slot keeps what a shot leaves of a layer; the order of a shot at its target stands for it, too."""
+        """The place where a slot keeps what a shot leaves in a layer; the order of a shot at its target also does for
+        `shot`."""
         place = struct.Place()
         place.order = shot % earlier.count
         place.last = place.order + 1 == earlier.count
@@ -61,7 +63,7 @@ def build(variant: Variant) -> SimpleNamespace:
 
     @wp.func
     def begin(earlier: struct.Earlier, slot: wp.int32, shot: wp.int32):
-        """This shot has opened no window yet."""
+        """Record that this shot has opened no window yet."""
         first = (slot * earlier.count + shot % earlier.count) * earlier.layers
         for layer in range(earlier.layers):
             earlier.open[first + layer] = False
@@ -79,8 +81,8 @@ def build(variant: Variant) -> SimpleNamespace:
         y: wp.float64,
         z: wp.float64,
     ):
-        """Fill a shot's blank window about (y, z) [m] with what the earlier shots have left of this layer; return
-        whether a core went through it."""
+        """Fill a shot's blank window about (y, z) [m] with the exposure and the channels of the earlier shots in this
+        layer; returns whether a core went through it."""
         place, pierced = place_of(earlier, slot, shot, layer), bool(False)
         row, nodes = place.window + window.first, window.planes * window.nodes
         whole = struct.Box()
@@ -135,8 +137,8 @@ def build(variant: Variant) -> SimpleNamespace:
 
     @wp.func
     def keep(earlier: struct.Earlier, fields: struct.Fields, window: struct.Window, slot: wp.int32, shot: wp.int32):
-        """Keep what a shot has added to a layer: what there is in the end less what there was before it. This is exact
-        to the rounding of the sum, and never negative."""
+        """Keep the exposure that a shot has added to a layer: that at its end minus that before it. This is exact to
+        the rounding of the sum, and never negative."""
         row = (slot * earlier.count + shot % earlier.count) * earlier.nodes + window.first
         nodes = window.planes * window.nodes
         subtract_from(earlier.exposure, row, fields.exposure, window.first, nodes)

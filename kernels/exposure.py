@@ -1,11 +1,11 @@
 """The exposure T [s] that each node of a window remembers, and how a contact spreads it (docs/model.md §4): over the
 degradation length in the plane of the plate, by the tent filter, and over the degradation depth through its thickness.
 
-A window has one plane of nodes for the whole thickness, or several where a plate is thicker than the depth. Where shots
-have thicknesses of their own, a window of several planes serves both: a shot at a plate that is no thicker than the
-depth uses the first.
+A window has one plane of nodes for the whole thickness, or several where a plate is thicker than the depth. Where the
+thickness differs from shot to shot, a window of several planes serves both: a shot at a plate that is no thicker than
+the depth uses the first plane.
 
-Long because all that is spread goes over the same strips of a window.
+Long because all spreading goes over the same strips of a window.
 """
 
 from functools import cache
@@ -55,7 +55,7 @@ def build(variant: Variant) -> SimpleNamespace:
         write(field, next + 1, read(field, next + 1) + high * z)
 
     # Native and volatile, because a compiler would store neighbours in pairs. The pair of the next patch overlaps with
-    # this one, so the next patch would wait for the memory.
+    # this pair, so the next patch would wait for the memory.
     @wp.func_native("""
     assert(index >= 0 && index + stride + 1 < field.shape[0]);
     volatile float* const at = field.data + index;
@@ -74,7 +74,7 @@ def build(variant: Variant) -> SimpleNamespace:
         z: wp.float32,
         amount: wp.float32,
     ):
-        """The same in float32."""
+        """`scatter_plain` in float32."""
         ...
 
     scatter = scatter_plain if variant.double else scatter_single
@@ -94,7 +94,7 @@ def build(variant: Variant) -> SimpleNamespace:
         ...
 
     def by_rows(loop: str) -> str:
-        """Native code that does a loop over j < count in each row of a strip. Whole rows are one loop."""
+        """Native code that runs a loop over j < count in each row of a strip. Whole rows are one loop."""
         return (
             share
             + "int start = strip.start, rows = strip.rows, count = strip.count;"
@@ -188,7 +188,7 @@ def build(variant: Variant) -> SimpleNamespace:
 
     @wp.func
     def fields_of_window(fields: struct.Fields, first: wp.int32):
-        """The fields of a window that begins at node `first` of its slot: those of the slot."""
+        """The fields of a window: those of its slot."""
         return fields
 
     @wp.func
@@ -235,13 +235,13 @@ def build(variant: Variant) -> SimpleNamespace:
         rows: wp.int32,
         columns: wp.int32,
     ):
-        """The nodes of a window that has slid over its plate by some rows and columns; new ones are 0."""
+        """Move the nodes of a window that has slid over its plate by some rows and columns. New nodes are 0."""
         ...
 
     @wp.func
     def strip_of(plate: struct.Plate, window: struct.Window, box: struct.Box):
-        """The nodes of a box and those that the filter reaches from there: whole vectors of columns, or whole rows
-        where these are not much more, because all of them are then one loop."""
+        """The nodes of a box and those within the filter's reach: whole vectors of columns, or whole rows where these
+        are not much more, because whole rows are one loop."""
         first = box.z_low - plate.reach
         columns = box.z_high - box.z_low + 1 + 2 * plate.reach
         columns = wp.static(vector) * ((columns + wp.static(vector - 1)) // wp.static(vector))
@@ -257,7 +257,7 @@ def build(variant: Variant) -> SimpleNamespace:
 
     @wp.func
     def nodes_later(strip: struct.Strip, nodes: wp.int32):
-        """The strip that begins some nodes later, as that of another plane does."""
+        """The strip that begins this number of nodes later, such as that of another plane."""
         later = strip
         later.start += nodes
         return later
@@ -270,7 +270,8 @@ def build(variant: Variant) -> SimpleNamespace:
         strip: struct.Strip,
         step: wp.int32,
     ):
-        """target = the tent's taps along one direction, `step` apart, applied to source in a strip."""
+        """Apply the tent's taps along one direction, `step` apart, to `source` in a strip, and put the result in
+        `target`."""
         filter_near(target, source, strip, step, plate.taps[0], plate.taps[1])
         for k in range(2, plate.reach + 1):
             filter_far(target, source, strip, k * step, plate.taps[k])
@@ -299,10 +300,12 @@ def build(variant: Variant) -> SimpleNamespace:
     """
 
     # Σ over |i − plane| < reach, and half of the planes at ± reach: the trapezoidal rule over twice the depth. From one
-    # plane to the next two planes come in by halves, and two go. The sums are those of a kernel with ends that three
-    # linear interpolations blur (of what is scattered, of the trapezoidal rule, and of what is gathered), each with the
-    # variance 1/6 of a spacing squared. What a quarter of the second difference takes off makes up for that: the error
-    # is of fourth order. All planes of a few nodes at a time stay in registers.
+    # plane to the next two planes come in by halves, and two go. The sums are those of a kernel whose ends are blurred
+    # by
+    # three linear interpolations (scattering, the trapezoidal rule, gathering), each with the variance 1/6 of a spacing
+    # squared. Subtracting a quarter of the second difference makes up for that: the error is of fourth order. All
+    # planes
+    # of a few nodes at a time stay in registers.
     @wp.func_native(
         share
         + """
@@ -359,7 +362,7 @@ def build(variant: Variant) -> SimpleNamespace:
         reach: wp.int32,
     ):
         """Add half of what a gain spreads over the planes up to `reach` away, of `nodes` each, in a strip of each, and
-        keep it in `later`. Only the planes from `low` to `high` have gained."""
+        keep this half in `later`. Only the planes from `low` to `high` have a gain."""
         ...
 
     @wp.func
@@ -374,7 +377,7 @@ def build(variant: Variant) -> SimpleNamespace:
         if through:
             for plane in range(box.plane_low, box.plane_high + 1):
                 filter_plane(plate, fields, nodes_later(strip, plane * window.nodes))
-            use.lanes.barrier()  # what other lanes read of the filtered is overwritten
+            use.lanes.barrier()  # the next loop overwrites filtered values that other lanes read
             add_half_of_planes(
                 fields.exposure,
                 fields.filtered,

@@ -1,4 +1,4 @@
-"""Exposure gained in a step as whole numbers: their sum is the same in every order, so lanes may add in any."""
+"""The exposure gained in a step as whole numbers. Their sum is the same in any order, so lanes may add in any order."""
 
 from functools import cache
 from types import SimpleNamespace
@@ -19,13 +19,12 @@ def build(variant: Variant) -> SimpleNamespace:
 
     @wp.func
     def units(law: struct.Law, window: struct.Window, coarsest: real, velocity: real, dt: real):
-        """Units per exposure [1/s]: `sheet` of them are what one advancing sheet, or the coarsest patch, gives to a
-        node. So the rounding is that of float32, and 128 times as much still fits: a node lies below a few sheets of a
-        core."""
+        """Units per exposure [1/s]: one advancing sheet, or the coarsest patch, gives `sheet` units to a node. The
+        rounding is then that of float32, and 128 times as much still fits. A node lies below a few sheets of a core."""
         patches = wp.max(one, coarsest * window.per_cell * window.per_cell)
         return sheet / (wp.max(use.interaction.exposure_in(law, dt, velocity), tiny) * patches)
 
-    # Bits are copied, because a compiler takes numbers of different types for different numbers.
+    # Bits are copied, because a compiler assumes that numbers of different types do not share memory.
     @wp.func_native("""
     assert(index >= 0 && index + stride + 1 < field.shape[0]);
     const float high = amount * y, low = amount - high;
@@ -72,12 +71,12 @@ def build(variant: Variant) -> SimpleNamespace:
     """
     )
     def convert(field: wp.array(dtype=wp.float32), start: wp.int32, count: wp.int32, unit: wp.float32):
-        """Whole numbers of a unit become numbers."""
+        """Convert whole numbers of a unit to numbers."""
         ...
 
     @wp.func
     def measure(field: wp.array(dtype=wp.float32), window: struct.Window, box: struct.Box, units: real):
-        """The whole numbers in the rows of a box become exposure [s]."""
+        """Convert the whole numbers in the rows of a box to exposure [s]."""
         start, count = window.first + box.y_low * window.cells_z, (box.y_high - box.y_low + 1) * window.cells_z
         if wp.static(variant.deep):
             for plane in range(box.plane_low, wp.min(box.plane_high, window.planes - 1) + 1):

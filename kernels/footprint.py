@@ -21,7 +21,7 @@ def build(variant: Variant) -> SimpleNamespace:
 
     @wp.func
     def node_below(window: struct.Window, place: real):
-        """Nodes from the hit to the last one before a place along one direction."""
+        """Number of nodes from the hit to the last node before a place along one direction."""
         return wp.int32(wp.floor(place * window.per_cell))
 
     @wp.func
@@ -97,7 +97,7 @@ def build(variant: Variant) -> SimpleNamespace:
 
     @wp.func
     def pushes(surface: struct.Surface):
-        """How far ahead of material a core presses on what it has pushed there, at most [m]."""
+        """Largest distance at which a core presses on material that it has pushed ahead [m]."""
         far = zero
         if wp.static(variant.free_surface):
             far = surface.max_radius
@@ -111,8 +111,8 @@ def build(variant: Variant) -> SimpleNamespace:
 
     @wp.func
     def is_clear(plate: struct.Plate, window: struct.Window, footprint: struct.Footprint, pushed: real):
-        """Whether there is no material at the nodes around the rings in the slab, or `pushed` away from them [m], with
-        a node to spare."""
+        """Whether there is no material within `pushed` [m] and one spare node of the nodes around the rings in the
+        slab."""
         y = half * real(footprint.box.y_low + footprint.box.y_high - 2 * window.home_y) * plate.spacing
         z = half * real(footprint.box.z_low + footprint.box.z_high - 2 * window.home_z) * plate.spacing
         wide = half * real(footprint.box.y_high - footprint.box.y_low) + one
@@ -122,8 +122,8 @@ def build(variant: Variant) -> SimpleNamespace:
 
     @wp.func
     def is_beside(window: struct.Window, footprint: struct.Footprint, cells: wp.int32):
-        """Whether a window with this number of cells in each direction would hold none of the nodes around the rings in
-        the slab: the core comes back elsewhere."""
+        """Whether the core comes back elsewhere: a window with this number of cells in each direction would hold none
+        of the nodes around the rings in the slab."""
         first_y, first_z = window.home_y - cells // 2, window.home_z - cells // 2
         return (
             footprint.box.y_high < first_y

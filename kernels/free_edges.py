@@ -131,8 +131,8 @@ def build(variant: Variant) -> SimpleNamespace:
         start: wp.int32,
         count: wp.int32,
     ):
-        """Multiply three lists, from `start` on, by the share that presses; the next row and the next direction are so
-        many numbers on."""
+        """Multiply three lists, from `start` on, by the share that presses; the next row and the next direction are
+        `row` and `direction` numbers on."""
         ...
 
     @wp.func

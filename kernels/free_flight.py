@@ -33,8 +33,8 @@ def build(variant: Variant) -> SimpleNamespace:
     ):
         """Report one shot per thread.
 
-        `standoffs` are distances behind the rear face [m]. The point of the axis that passes them is `ahead` of the
-        centre of mass, towards the nose [m].
+        `standoffs` are distances behind the rear face [m]. They count for the point of the axis that lies `ahead` of
+        the centre of mass, towards the nose [m].
         """
         shot = wp.tid()
         body = use.shots.body_of(shots, shot)

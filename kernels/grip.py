@@ -1,4 +1,4 @@
-"""How a curved patch touches: normal and velocity vary linearly over it, and only the part that closes in does."""
+"""How a curved patch touches: normal and velocity vary linearly over it, and only its part that closes in touches."""
 
 from functools import cache
 from types import SimpleNamespace
@@ -18,8 +18,9 @@ def build(variant: Variant) -> SimpleNamespace:
 
     @wp.func
     def variations(ring: struct.Ring, patch: struct.Patch):
-        """Half of what the closing speed varies by over a patch, along the meridian and around [m/s].
-        Along the meridian the swing of the core counts, too: at 10⁴ rad/s for more than a slender core's bend."""
+        """Half of the variation of the closing speed over a patch, along the meridian and around [m/s]. Along the
+        meridian the swing of the core counts, too: at 10⁴ rad/s it is more than the bend of a slender core's
+        surface."""
         meridian = ring.turn_axial * patch.velocity_axial + ring.turn_radial * patch.velocity_outward
         meridian += use.core_surface.half_lever(ring) * patch.swing
         return meridian, ring.sector * ring.normal_radial * patch.velocity_around
@@ -35,8 +36,8 @@ def build(variant: Variant) -> SimpleNamespace:
 
     @wp.func
     def face_of(ring: struct.Ring, patch: struct.Patch, shift: real):
-        """The part of a patch in contact, from its grip's shift. There its power is that of its closing speed: the load
-        of a part that closes in never drives the core."""
+        """The part of a patch in contact, from its grip's shift. Its power is taken at its own closing speed, so the
+        load of a part that closes in never drives the core."""
         meridian, around = variations(ring, patch)
         face = struct.Face()
         face.axial = ring.normal_axial + shift * meridian * ring.turn_axial

@@ -1,4 +1,4 @@
-"""What a surface element in contact carries (docs/model.md §4; the paper's eq. 5, general form of Ben-Dor et al.)."""
+"""The stress on a surface element in contact (docs/model.md §4; the paper's eq. 5, general form of Ben-Dor et al.)."""
 
 from functools import cache
 from types import SimpleNamespace
@@ -26,8 +26,8 @@ EXPONENTIAL = """
         } else return exp(x);
     };
 """
-"""Native code that defines the function `exponential`: wp.exp's bits but for 2 ulp in float32. The library's own is a
-call that no compiler vectorises."""
+"""Native code of the function `exponential`. It equals wp.exp to the bit in float64, and to 2 ulp in float32, where no
+compiler vectorises the call of the library."""
 
 
 @cache
@@ -41,8 +41,8 @@ def build(variant: Variant) -> SimpleNamespace:
 
     @wp.func
     def onset_speed(law: struct.Law, dt: real, velocity: real, impact_velocity: real):
-        """Closing speed over which contact sets in [m/s]: follows a core that slows down, so that it is arrested where
-        it should be."""
+        """Closing speed over which contact sets in [m/s]. It follows a core that slows down, so that the core is
+        arrested at the right place."""
         wider = wp.min(law.onset_jump * dt, law.onset_limit * velocity)
         return wp.max(wp.max(law.onset_share * velocity, wider), smallest_onset * impact_velocity)
 
@@ -50,13 +50,13 @@ def build(variant: Variant) -> SimpleNamespace:
     def contact_of(law: struct.Law, closing: real, variation: real, speed: real):
         """Contact of a patch whose closing speeds are spread evenly over closing ± variation [m/s].
 
-        Each part of it is in contact by min(1, v_p·n / onset) where v_p·n > 0 (docs/model.md §4). This is the exact
-        mean over the patch, and the mean place of what touches, each part weighed by its share. The part that moves
-        away, the part on the ramp and the part in full contact are three pieces of the patch, on which the share is 0,
-        linear and 1.
+        Each part of the patch is in contact by min(1, v_p·n / onset) where v_p·n > 0 (docs/model.md §4). The contact is
+        the exact mean over the patch, and the mean place of its touching parts, each weighed by its share. The patch
+        has three pieces, on which the share is 0, linear and 1: the piece that moves away, the piece on the ramp and
+        the piece in full contact.
 
         Args:
-            speed: no point of the core is faster [m/s].
+            speed: upper bound of the speed of all points of the core [m/s].
         """
         middle = closing - at_rest * speed
         per_variation = one / (variation + tiny)
@@ -78,9 +78,9 @@ def build(variant: Variant) -> SimpleNamespace:
     def steady_slope(law: struct.Law, share: real, slope: real, closing: real):
         """Derivative of the share of contact by the closing speed [s/m].
 
-        Where a core swings between two walls from step to step, it is the chord down to no contact instead. Full
-        contact has no slope, and a long step carries the core across the whole ramp. The change of the last step is
-        foreseen, so the chord adds an error of second order.
+        Where a core swings between two walls from step to step, the chord down to no contact replaces the derivative,
+        because full contact has no slope, and a long step carries the core across the whole ramp. The change of the
+        last step is foreseen, so the chord adds an error of second order.
         """
         return wp.where(closing < law.steadied, share / wp.max(closing, tiny), slope)
 
@@ -114,14 +114,14 @@ def build(variant: Variant) -> SimpleNamespace:
     #endif
     """)
     def log_single(x: wp.float32) -> wp.float32:
-        """ln x of a normal number, as exact as float32 is."""
+        """ln x of a normal number, to the accuracy of float32."""
         ...
 
     logarithm = wp.log if variant.double else log_single
 
     @wp.func
     def normal_stress(law: struct.Law, closing: real, radius: real):
-        """Normal stress [Pa] of undamaged material at closing speed v_n, where the core has some radius [m]."""
+        """Normal stress [Pa] of undamaged material at closing speed v_n, on a core that has this radius there [m]."""
         stress = law.a0
         if wp.static(variant.free_surface):
             stress /= one + exponential(law.power * logarithm(radius * law.per_reach))
@@ -131,7 +131,7 @@ def build(variant: Variant) -> SimpleNamespace:
 
     @wp.func
     def exposure_in(law: struct.Law, dt: real, velocity: real):
-        """What a step adds to the exposure under one advancing sheet: its time [s], or its path [m] at a velocity."""
+        """Exposure by a step under one advancing sheet: the time of the step [s], or its path [m] at this velocity."""
         return wp.where(law.by_path, velocity * dt, dt)
 
     @wp.func

@@ -1,11 +1,12 @@
 """The lanes of a block: the threads of one CUDA warp, which compute one shot together (the block layout).
 
-Every lane holds the whole state of the shot, and moves it alike: the lanes share out only the patches, the rings and
+Every lane holds the whole state of the shot, and computes its motion: the lanes share out only the patches, the rings
+and
 the nodes. A sum over the lanes is formed as a butterfly, which gives every lane the same bits. So every lane takes the
 same branches, and no lane waits at a barrier that another one does not reach.
 
-On a CPU a block has one lane, and nothing of this costs anything. With Warp's `enable_cpu_blocks` the lanes of a block
-run there one after another, from barrier to barrier, on one thread of the machine: for tests.
+On a CPU a block has one lane, and all of this costs nothing. With Warp's `enable_cpu_blocks` the lanes of a block run
+there one after another, from barrier to barrier, on one thread of the machine: for tests.
 """
 
 from functools import cache
@@ -21,20 +22,20 @@ THREADS, LANES, BLOCKS = (number.value for number in (constants.THREADS, constan
 LANE = "WP_TILE_THREAD_IDX"
 """Number of this lane in native code."""
 WAIT = "WP_TILE_SYNC();"
-"""A barrier in native code on a CPU: lanes that run one after another take turns there."""
+"""A barrier in native code on a CPU, where the lanes run one after another and take turns."""
 
 
 def share(variant: Variant) -> str:
-    """Native code before a loop over j that the lanes of a block share out: `for (int j = lane; j < n; j += lanes)`.
-    In the simple layout it is the plain loop."""
+    """Native code before a loop over j that the lanes of a block share out: `for (int j = lane; j < n; j += lanes)`. In
+    the simple layout it gives the plain loop."""
     if variant.window:
         return f"const int lane = {LANE}, lanes = WP_TILE_BLOCK_DIM;"
     return "constexpr int lane = 0, lanes = 1;"
 
 
 def _butterfly(variant: Variant, kind: str, both: str) -> str:
-    """Native code that combines the x of all lanes by `both`, an expression of x and that of the `other` lane. In the
-    simple layout a lane is alone."""
+    """Native code that combines the x of all lanes by `both`, an expression of `x` and the x of the `other` lane. In
+    the simple layout a lane is alone."""
     if not variant.window:
         return "return x;"
     return f"""
@@ -86,7 +87,7 @@ def build(variant: Variant) -> SimpleNamespace:
 
     @wp.func_native(waiting if variant.window else "")
     def barrier():
-        """Wait for all lanes; each then sees what the others have written. It does nothing in the simple layout."""
+        """Wait for all lanes, so that each sees what the others have written. In the simple layout it does nothing."""
         ...
 
     @wp.func_native(f"{share(variant)} return j % lanes == lane;")
@@ -131,7 +132,7 @@ def build(variant: Variant) -> SimpleNamespace:
 
     @wp.func
     def any_of(x: wp.bool):
-        """Whether it is true for any lane."""
+        """Whether x is true for any lane."""
         return most(wp.where(x, 1, 0)) > 0
 
     def shared(name: str) -> Any:
@@ -149,7 +150,7 @@ def build(variant: Variant) -> SimpleNamespace:
         #endif
         """)
         def place(field: wp.array(dtype=real), first: wp.int32) -> wp.array(dtype=real):
-            """The nodes of the front window, which would be those of a field from number `first` on."""
+            """The nodes of the front window. Without shared memory they are those of a field from number `first` on."""
             ...
 
         return place

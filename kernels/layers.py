@@ -1,9 +1,10 @@
-"""A target of several layers: which of them a step can touch, the load of all of them, and how the core left each.
+"""A target of several layers: the layers that a step can touch, their load, and how the core left each of them.
 
-A layer sees the core in a frame of its own: its front at x = 0, its window's home at y = z = 0. So the load of one
-layer is the load of one plate, and loads of layers add (kernels/contracts.py, TargetKind).
+A layer sees the core in a frame of its own: its front at x = 0, its window's home at y = z = 0. The load of one layer
+is
+therefore the load of one plate, and the loads of layers add (kernels/contracts.py, TargetKind).
 
-Long because all of them read the same layers of the same slot.
+Long because all functions read the same layers of the same slot.
 """
 
 from functools import cache
@@ -42,7 +43,7 @@ def build(variant: Variant) -> SimpleNamespace:
 
     @wp.func
     def first_step(context: struct.Context, shortest: real):
-        """Length of the first step [s]: that of the plate."""
+        """Length of the first step [s], which is that of the plate."""
         return layer_value(context.target.stretch, 0, context.shot) * shortest
 
     @wp.func
@@ -54,9 +55,9 @@ def build(variant: Variant) -> SimpleNamespace:
         clock: struct.Clock,
         free: real,
     ):
-        """Length of the step after the present one and a `free` time [s]. Of the layers that the core can be in until
-        then, the one that needs the shortest step decides. The step is not so long that it takes more than a share of
-        the speed, if it takes as much of it per time as the present one."""
+        """Length of the next step [s], after the present one and a `free` time [s]. It is the shortest of those for the
+        layers in which the core can then be. It is also so short that it takes at most a share of the speed, if it
+        slows down the core as the present step does."""
         target, shot, dt = context.target, context.shot, clock.step
         longest = one
         for k in range(target.count):
@@ -74,7 +75,7 @@ def build(variant: Variant) -> SimpleNamespace:
 
     @wp.func
     def begin(context: struct.Context, state: struct.State):
-        """No layer is reached yet."""
+        """The Reach before the first step: no layer is reached."""
         target, stack, shot = context.target, context.stack, context.shot
         use.target.begin(context)
         for k in range(target.count):
@@ -84,7 +85,7 @@ def build(variant: Variant) -> SimpleNamespace:
         reach = struct.Reach()
         straight = use.shots.line_of_flight(context.shots, shot)
         reach.flight = vec3(real(straight[0]), real(straight[1]), real(straight[2]))
-        # A core that slides between two layers never ends: it has gone farther than one that goes straight through.
+        # A core that slides between two layers never ends: it goes farther than one that goes straight through.
         steep = wp.length(vec3(zero, reach.flight[1], reach.flight[2])) / reach.flight[0]
         longest_way = real(use.shots.shot_value(context.shots.longest_way, shot))
         reach.farthest = longest_way + steep * real(use.target.depth_of(target, shot))
@@ -102,11 +103,10 @@ def build(variant: Variant) -> SimpleNamespace:
 
     @wp.func
     def slide(context: struct.Context, layer: wp.int32, touch: struct.Footprint):
-        """Have the window of a layer and its laminate follow a core that leaves it, and return whether it could.
+        """Have the window of a layer and its laminate follow a core that leaves the window; returns whether it could.
 
-        What the window leaves behind must not be needed any more: nodes come back as if nothing had been there, so the
-        window takes in none that it has held before. Nor may another layer of the laminate have been looked up in the
-        window in this step.
+        Nodes that leave the window lose their memory. Therefore the window must not take in nodes that it has held
+        before, and no other layer of the laminate may have been looked up in the window in this step.
         """
         target, stack, fields = context.target, context.stack, context.fields
         base, first = context.slot * target.count, target.laminate[layer]
@@ -129,8 +129,8 @@ def build(variant: Variant) -> SimpleNamespace:
 
     @wp.func
     def open_layer(context: struct.Context, layer: wp.int32, pose: struct.Pose, ahead: vec3):
-        """Open the windows of a layer and its laminate where the core will reach it, at first that of the plate about
-        the hit."""
+        """Open the windows of a layer and its laminate where the core will reach the layer; at first that of the plate
+        about the hit."""
         target, stack, base = context.target, context.stack, context.slot * context.target.count
         home = vec3()
         if layer > 0 or stack.open[base + layer]:
@@ -145,7 +145,7 @@ def build(variant: Variant) -> SimpleNamespace:
 
     @wp.func
     def was_near(context: struct.Context, layer: wp.int32):
-        """Whether the core was near a layer, or another one of its laminate, in the last step."""
+        """Whether the core was near a layer, or near another layer of its laminate, in the last step."""
         target, near = context.target, bool(False)
         for k in range(target.laminate[layer], target.count):
             same = target.laminate[k] == target.laminate[layer]
@@ -154,8 +154,9 @@ def build(variant: Variant) -> SimpleNamespace:
 
     @wp.func
     def touch_of(context: struct.Context, layer: wp.int32, state: struct.State, pose: struct.Pose, dt: real):
-        """What a step can touch of a layer that the core is near, and a lower bound of the core's distance from its
-        material [m]. A window opens when the core comes near, and again where it comes back elsewhere."""
+        """The footprint of a step on a layer that the core is near, and a lower bound of the core's distance from the
+        material of the layer [m]. A window opens when the core comes near, and opens anew where the core comes back
+        elsewhere."""
         surface, target, stack = context.surface, context.target, context.stack
         here, plate = context.slot * target.count + layer, plate_of(target, layer)
         if not stack.open[here]:
@@ -194,8 +195,8 @@ def build(variant: Variant) -> SimpleNamespace:
         now: real,
         dt: real,
     ):
-        """What a step can touch of every layer. The layers that the core has left are recorded; `last` is the change of
-        its velocities in the last step."""
+        """The Reach of a step in every layer. Layers that the core has left are recorded; `last` is the change of its
+        velocities in the last step."""
         surface, target, stack, shot = context.surface, context.target, context.stack, context.shot
         reach = before
         rearmost, foremost = use.core_surface.ends_of(surface, pose)
@@ -215,7 +216,7 @@ def build(variant: Variant) -> SimpleNamespace:
         for k in range(target.count):
             here = context.slot * target.count + k
             front, rear = faces_of(target, k, shot)
-            footprint.through = low > rear  # in the end, that of the last layer
+            footprint.through = low > rear  # after the loop, it holds for the last layer
             near = high > front and low < rear
             if low > rear:
                 section = real(wp.pi) * surface.max_radius * surface.max_radius
@@ -245,7 +246,7 @@ def build(variant: Variant) -> SimpleNamespace:
 
     @wp.func
     def law_at(context: struct.Context, law: struct.Law, reach: struct.Reach):
-        """The law with the onset of what a step can touch: the layers add theirs."""
+        """The law with the onset of contact for all layers that a step can touch, the sum of theirs."""
         target, jump, most = context.target, real(0.0), real(0.0)
         for k in range(reach.first, reach.last + 1):
             if context.stack.footprint[context.slot * target.count + k].last_ring >= 0:
@@ -286,7 +287,7 @@ def build(variant: Variant) -> SimpleNamespace:
 
     @wp.func
     def follow(context: struct.Context, reach: struct.Reach, pose: struct.Pose):
-        """Take note of where the core is in the layers that a step can touch."""
+        """Keep the place of the core in the layers that a step can touch."""
         stack, base = context.stack, context.slot * context.target.count
         for k in range(reach.first, reach.last + 1):
             if stack.footprint[base + k].last_ring >= 0:
@@ -295,8 +296,8 @@ def build(variant: Variant) -> SimpleNamespace:
     @wp.func
     def free_time(context: struct.Context, reach: struct.Reach, state: struct.State, pose: struct.Pose, dt: real):
         """Time [s] that a core between layers can go on after a step before it may touch one, and whether it is lost
-        between them. No part of it moves along x faster than its centre of mass and its turn together. It never passes
-        more than its own size."""
+        between them. No part of the core moves along x faster than its centre of mass and its turn together. The core
+        never passes more than its own size."""
         surface, target = context.surface, context.target
         ahead, behind = real(far), real(far)
         for k in range(target.count):
@@ -319,8 +320,8 @@ def build(variant: Variant) -> SimpleNamespace:
 
     @wp.func
     def given_up(context: struct.Context, reach: struct.Reach, state: struct.State, touched: wp.bool):
-        """A core that has not ended rests if it has touched, the whole of it is in the target, and its centre of mass
-        is in none of the layers."""
+        """The status of a core that has not ended. It rests if it has touched, all of it is in the target, and its
+        centre of mass is in no layer."""
         target, x, between = context.target, state.position[0], touched and reach.rearmost > zero
         for k in range(target.count):
             front, rear = faces_of(target, k, context.shot)
@@ -331,8 +332,8 @@ def build(variant: Variant) -> SimpleNamespace:
 
     @wp.func
     def conclude(context: struct.Context, reach: struct.Reach, status: wp.int32):
-        """Say how the core ended in the layers that it did not leave through their rear faces. Keep what later shots at
-        this target need of those that it reached, each in its last window there."""
+        """Record how the core ended in the layers that it did not leave through their rear faces. Keep for later shots
+        at this target what they need of the layers that it reached, each in its last window there."""
         target, stack, shot = context.target, context.stack, context.shot
         for k in range(target.count):
             here = context.slot * target.count + k

@@ -50,8 +50,8 @@ def build(variant: Variant) -> SimpleNamespace:
         """The final status of a core, or RUNNING.
 
         A core outside the target cannot come back if it moves away faster than its rotation moves any part of it. A
-        core that turns back behind a layer, and is spent, rests there; between layers, what it has along them does not
-        count (docs/model.md §8).
+        core that turns back behind a layer with too little energy rests there. Between layers, the energy of its motion
+        along them does not count (docs/model.md §8).
         """
         body, surface, footprint = context.body, context.surface, reach.footprint
         status = RUNNING
@@ -86,7 +86,7 @@ def build(variant: Variant) -> SimpleNamespace:
     def context_of(
         inputs: struct.Inputs, scratch: struct.Scratch, passage: struct.Passage, slot: wp.int32, shot: wp.int32
     ):
-        """A shot in a slot, with the surface and the plates of the shot, and the fields of the slot."""
+        """The context of a shot in a slot: its surface and plates, and the fields of the slot."""
         context, shots = struct.Context(), inputs.shots
         context.shot = shot
         context.slot = slot
@@ -118,12 +118,12 @@ def build(variant: Variant) -> SimpleNamespace:
         results: struct.Results,
     ):
         """March one shot per thread, or per block of threads: number k computes shot order[first + k] in slot k mod
-        slots. Shots at one plate are numbered in a row, and are computed one after another in one slot.
+        slots. Shots at one plate have consecutive numbers, and are computed one after another in one slot.
 
         A step finds what the core can touch at mid-step, loads the core, kicks it there, and drifts it to the middle of
         the next step (kernels/clock.py). Velocities therefore change at mid-steps only, where positions are known: the
-        method is of second order, and exact where nothing touches. A load depends on the velocities at mid-step, of
-        which half of the change is still to come: this half is foreseen from the last step.
+        method is of second order, and exact where nothing touches. A load depends on the velocities at mid-step, half
+        of whose change is still to come. This half is foreseen from the last step.
 
         The trace has no build of its own, so a shot computes the same bits with and without it.
         """
@@ -151,7 +151,7 @@ def build(variant: Variant) -> SimpleNamespace:
                 body, use.rigid_body.axis_of(state.attitude), state.angular_momentum
             )
             pose = use.core_surface.pose_of(surface, state.position, state.attitude, state.velocity, omega)
-            # The closing speeds are those at mid-step, if this step changes the velocities as much as the last one did.
+            # These are the closing speeds at mid-step if this step changes the velocities as the last one did.
             pose.velocity += half * last.velocity
             pose.omega += half * last.omega
             reach = kind.find_reach(context, reach, state, pose, last, now, dt)

@@ -19,14 +19,14 @@ ACROSS = """
         return from[0] + z * (from[1] - from[0]);
     };
 """
-"""Native code that defines the function `across` of an address and a place between 0 and 1."""
+"""Native code of the function `across`: linear interpolation from an address on, at a place between 0 and 1."""
 
 
 @cache
 def build(dtype: Any) -> SimpleNamespace:
     """Element access for contiguous arrays of one scalar type.
 
-    Warp's own indexing takes any stride and counts negative indices from the end. So a compiler cannot see that
+    Warp's own indexing takes any stride and counts negative indices from the end, so a compiler cannot see that
     neighbours are adjacent in memory. Warp's debug mode checks the bounds here, as it does for its own indexing.
     """
 

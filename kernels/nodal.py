@@ -1,8 +1,9 @@
 """The paper's literal scheme (its eqs. 4 to 6): points, nearest nodes, β once per node and step.
 
-The published rows came from this scheme. It has no limit in the time step or the grid (docs/model.md §4), and it has no
-condition on the direction of motion. Its forces can push energy into the core. Therefore the kick is reduced where it
-would raise the kinetic energy (rigid_body.restraint), as in every scheme here.
+The published rows came from this scheme. It has no limit in the time step or the grid (docs/model.md §4), and no
+condition
+on the direction of motion. Its forces can push energy into the core. The kick is therefore reduced where it would raise
+the kinetic energy (rigid_body.restraint), as in every scheme here.
 """
 
 from functools import cache
@@ -50,8 +51,8 @@ def build(variant: Variant) -> SimpleNamespace:
         hit_y: wp.float64,
         hit_z: wp.float64,
     ):
-        """The window of a layer about a hit: nodes at the centres of the tile's cells, each with its share of the
-        resistance; nothing touched."""
+        """The window of a layer about a hit, untouched. Its nodes are the centres of the tile's cells, each with its
+        share of the resistance."""
         cells_y, cells_z = fields.cells_y[layer], fields.cells_z[layer]
         window = use.plate_grid.window_at(plate, thickness, fields.first[layer], cells_y, cells_z, hit_y, hit_z)
         dy, dz = plate.period_y / wp.float64(plate.tile_y), plate.period_z / wp.float64(plate.tile_z)
@@ -77,7 +78,7 @@ def build(variant: Variant) -> SimpleNamespace:
 
     @wp.func
     def node_under(window: struct.Window, point: vec3):
-        """Index of the nearest node."""
+        """Index of the node nearest to a point."""
         row = wp.int32(wp.floor((point[1] - window.y0) * window.per_row + half))
         column = wp.int32(wp.floor((point[2] - window.z0) * window.per_column + half))
         return window.home + row * window.cells_z + column
@@ -111,7 +112,7 @@ def build(variant: Variant) -> SimpleNamespace:
 
     @wp.func
     def degrade(context: struct.Context, slab: struct.Slab):
-        """Multiply every node that was touched in this step by β, once even if several points touched it (eq. 6)."""
+        """Multiply every node that was touched in this step by β once, even if several points touched it (eq. 6)."""
         surface, fields, window, pose = context.surface, context.fields, slab.window, slab.pose
         for index in range(slab.footprint.first_ring, slab.footprint.last_ring + 1):
             ring = use.core_surface.ring_at(surface, pose, index)

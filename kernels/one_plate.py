@@ -1,4 +1,4 @@
-"""A target of one plate: what a step can touch of it, and its load (kernels/contracts.py, TargetKind)."""
+"""A target of one plate: its footprint in a step, and its load (kernels/contracts.py, TargetKind)."""
 
 from functools import cache
 from types import SimpleNamespace
@@ -22,7 +22,7 @@ def build(variant: Variant) -> SimpleNamespace:
         """Largest distance from the hit [m], in the plane of the plate, of any part of a core that touches nothing."""
         axis = use.rigid_body.axis_of(state.attitude)
         slope = vec3(zero, state.velocity[1], state.velocity[2]) / state.velocity[0]
-        lean = axis - axis[0] * slope  # of the axis against the line of flight
+        lean = axis - axis[0] * slope  # lean of the axis against the line of flight
         steep = wp.length(slope)
         return (
             surface.max_radius * (one + steep)
@@ -32,7 +32,7 @@ def build(variant: Variant) -> SimpleNamespace:
 
     @wp.func
     def first_step(context: struct.Context, shortest: real):
-        """Every step has the shortest length [s]."""
+        """Length of the first step [s]. Every step has the shortest length."""
         return shortest
 
     @wp.func
@@ -44,7 +44,7 @@ def build(variant: Variant) -> SimpleNamespace:
         clock: struct.Clock,
         free: real,
     ):
-        """Every step has the shortest length [s]."""
+        """Length of the next step [s]. Every step has the shortest length."""
         return clock.shortest
 
     @wp.func
@@ -54,7 +54,7 @@ def build(variant: Variant) -> SimpleNamespace:
         reach = struct.Reach()
         reach.window = use.target.open_window(context, 0, vec3())
         plate = use.target.plate_of(context.target, 0)
-        clear = plate.clear[use.plate_grid.tile_at(plate, reach.window, zero, zero)]  # at the hit
+        clear = plate.clear[use.plate_grid.tile_at(plate, reach.window, zero, zero)]  # clearance at the hit
         off = farthest_off(context.surface, reach.window.thickness, state) + use.footprint.pushes(context.surface)
         return reach, wp.where(clear > off, Status.MISSED, RUNNING)
 
@@ -95,17 +95,17 @@ def build(variant: Variant) -> SimpleNamespace:
 
     @wp.func
     def follow(context: struct.Context, reach: struct.Reach, pose: struct.Pose):
-        """Take note of where the core is in the plate."""
+        """Keep the place of the core in the plate."""
         use.target.follow(context, reach.window, 0, pose)
 
     @wp.func
     def free_time(context: struct.Context, reach: struct.Reach, state: struct.State, pose: struct.Pose, dt: real):
-        """A core beside the plate goes on step by step, and it is never lost."""
+        """No free time: a core beside the plate goes on step by step, and is never lost."""
         return zero, False
 
     @wp.func
     def given_up(context: struct.Context, reach: struct.Reach, state: struct.State, touched: wp.bool):
-        """The computation of a core that has not ended is not complete."""
+        """The status of a core that has not ended: its computation is not complete."""
         return Status.UNFINISHED
 
     @wp.func

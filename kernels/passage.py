@@ -17,11 +17,11 @@ def build(variant: Variant) -> SimpleNamespace:
     real, vec3 = variant.real, variant.vec3
     slowest = real(constants.SLOWEST.value)
     use = variant.use(lanes, rigid_body)
-    ENTERED = wp.constant(int(Status.ARRESTED))  # what a core that touches a layer is until it leaves
+    ENTERED = wp.constant(int(Status.ARRESTED))  # the status of a core in a layer until it leaves the layer
 
     @wp.func
     def begin(passage: struct.Passage, shot: wp.int32, layers: wp.int32):
-        """No layer is reached yet."""
+        """Record that the core has reached no layer yet."""
         for k in range(layers):
             passage.status[shot, k] = Status.NOT_REACHED
             passage.velocity[shot, k] = real(wp.nan)
@@ -43,12 +43,12 @@ def build(variant: Variant) -> SimpleNamespace:
 
     @wp.func
     def has_left(passage: struct.Passage, shot: wp.int32, layer: wp.int32):
-        """Whether the core has left a layer through its rear face before."""
+        """Whether the core has already left a layer through its rear face."""
         return passage.status[shot, layer] == Status.PERFORATED or passage.status[shot, layer] == Status.MISSED
 
     @wp.func
     def fly_on(context: struct.Context, layer: wp.int32, state: struct.State, rear: real, flight: vec3):
-        """Record the attitude at distances behind a layer's rear face [m] of a core that flies free."""
+        """Record the attitude of a core in free flight at distances behind a layer's rear face [m]."""
         passage, target, shot = context.passage, context.target, context.shot
         axis, forwards = use.rigid_body.axis_of(state.attitude), wp.max(state.velocity[0], slowest)
         for m in range(target.standoffs.shape[0]):
@@ -78,8 +78,8 @@ def build(variant: Variant) -> SimpleNamespace:
     def conclude(
         passage: struct.Passage, shot: wp.int32, layer: wp.int32, status: wp.int32, inside: wp.bool, depth: real
     ):
-        """Say how the core ended in a layer that it did not leave through the rear face. It rests there if it is
-        `inside`; `depth` is how far it came behind the front face [m]."""
+        """Record how the core ended in a layer that it did not leave through the rear face. It rests there if it is
+        `inside`; `depth` is the largest distance of its points behind the front face [m]."""
         if passage.status[shot, layer] == ENTERED:
             stays = status == Status.ARRESTED and inside
             other = wp.where(status >= Status.UNFINISHED, status, Status.RICOCHETED)

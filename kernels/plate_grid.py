@@ -44,7 +44,8 @@ def build(variant: Variant) -> SimpleNamespace:
         window.thickness = thickness
         window.per_cell = one / plate.spacing
         window.per_plane = plate.per_plane
-        # Whole cells of the tile are separate from the rest. So two hits that differ by a lattice vector of whole cells
+        # Whole cells of the tile are kept apart from the rest, so two hits that differ by a lattice vector of whole
+        # cells
         # compute the same bits.
         across = hit_y * wp.float64(plate.tile_y) / plate.period_y
         along = hit_z * wp.float64(plate.tile_z) / plate.period_z
@@ -62,7 +63,7 @@ def build(variant: Variant) -> SimpleNamespace:
 
     @wp.func
     def within(place: real, period: wp.int32):
-        """Bring a whole number, at most a few periods away, into 0 … period − 1. A compiler vectorises floor, but no
+        """Wrap a whole number, at most a few periods away, into 0 … period − 1. A compiler vectorises floor, but no
         remainder."""
         return wp.int32(place - real(period) * wp.floor((place + half) / real(period)))
 
@@ -108,7 +109,7 @@ def build(variant: Variant) -> SimpleNamespace:
 
     @wp.func
     def on_plate(plate: struct.Plate, window: struct.Window, y: real, z: real):
-        """Share of half a grid cell about a point that belongs to a finite plate."""
+        """Share of half a grid cell about a point that lies on a finite plate."""
         width = half * plate.spacing
         inside_y = wp.min(y - window.low_y, window.high_y - y) / width + half
         inside_z = wp.min(z - window.low_z, window.high_z - z) / width + half
@@ -116,7 +117,7 @@ def build(variant: Variant) -> SimpleNamespace:
 
     @wp.func
     def cell_at(window: struct.Window, y: real, z: real):
-        """The cell of the grid around a point; the caller keeps it inside the window."""
+        """The grid cell around a point. The caller keeps the point inside the window."""
         across, along = y * window.per_cell, z * window.per_cell
         row, column = wp.floor(across), wp.floor(along)
         cell = struct.Cell()
@@ -129,7 +130,7 @@ def build(variant: Variant) -> SimpleNamespace:
 
     @wp.func
     def planes_at(window: struct.Window, x: real):
-        """Where a depth behind the front face lies among the planes, in planes; a point outside counts at the face."""
+        """Place of a depth behind the front face among the planes, in planes. A point outside counts at the face."""
         return (wp.clamp(x, zero, window.thickness) + window.behind) * window.per_plane
 
     return SimpleNamespace(**locals())

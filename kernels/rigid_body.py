@@ -1,7 +1,7 @@
 """Motion of a rigid body of revolution (docs/model.md §5; the paper's eqs. 1 and 3).
 
-The state holds the angular momentum in the plate frame, not the angular velocity. The angular momentum is constant
-between contacts. So a drift is exact for any time step, and the rotational energy stays exact.
+The state holds the angular momentum in the plate frame, not the angular velocity, because the angular momentum is
+constant between contacts. So a drift is exact for any time step, and the rotational energy stays exact.
 """
 
 import math
@@ -59,7 +59,7 @@ def build(variant: Variant) -> SimpleNamespace:
 
     @wp.func
     def rotation(vector: vec3):
-        """Turn by a rotation vector [rad]."""
+        """The quaternion of a rotation vector [rad]."""
         square = quarter * wp.dot(vector, vector)  # of half the angle
         # The series is exact to the last bit of float64 for the turn of one step. A sine is a call and takes ten times
         # as long.
@@ -73,14 +73,14 @@ def build(variant: Variant) -> SimpleNamespace:
 
     @wp.func
     def turned(body: struct.Body, axis: vec3, momentum: vec3, time: real):
-        """The axis after torque-free motion over a time: it precesses about L at |L|/I_t."""
+        """The axis after a time of torque-free motion. It precesses about L at |L|/I_t."""
         return wp.quat_rotate(rotation((time / body.inertia_transverse) * momentum), axis)
 
     @wp.func
     def axis_at(body: struct.Body, axis: vec3, momentum: vec3, ahead: real, velocity: real, distance: real):
-        """The axis at the moment when the point `ahead` of the centre of mass has moved by `distance` along x.
+        """The axis when the point `ahead` of the centre of mass has moved by `distance` along x.
 
-        The swing of the point changes the time of flight, which a fixed-point iteration finds. It converges while the
+        The swing of the point changes the time of flight, which a fixed-point iteration finds. It converges if the
         swing is slower than the flight. If `ahead` is 0, the first iteration is exact.
         """
         then = axis
@@ -110,16 +110,16 @@ def build(variant: Variant) -> SimpleNamespace:
 
     @wp.func
     def velocity_change(body: struct.Body, load: struct.Load, dt: real):
-        """Change Δu = (Δv, Δω) of the velocities, along the body axes, that a load makes over dt; and the change e
-        whose damping the load feels on average: M Δu = dt (F − D e).
+        """Change Δu = (Δv, Δω) of the velocities, along the body axes, by a load over dt; and the change e in the mean
+        damping of the load: M Δu = dt (F − D e).
 
         With J = 2 D the load's full derivative, Rosenbrock's method of second order in two stages of the same matrix,
         γ = 1 − √½:
 
             (M + γ dt J) Δu₁ = dt F,        (M + γ dt J) Δu = γ dt F + (1 − γ) M Δu₁.
 
-        So e = 2 γ (Δu + (1 − γ) Δu₁). It forgets at once what a step cannot resolve: a wall that rests on the steep
-        ramp of the contact. The trapezoid rule of the same order would let it ring.
+        So e = 2 γ (Δu + (1 − γ) Δu₁). The method damps at once what a step cannot resolve, such as a wall on the steep
+        ramp of the contact. The trapezoidal rule of the same order would let it ring.
         """
         # In units of m and I_t, so that the determinants of a small core do not underflow.
         light, agile = dt / body.mass, dt / body.inertia_transverse
@@ -146,7 +146,7 @@ def build(variant: Variant) -> SimpleNamespace:
 
     @wp.func
     def restraint(body: struct.Body, axis: vec3, state: struct.State, dv: vec3, dw: vec3):
-        """Share of a change of velocities, in the plate frame, that can be applied without a rise of the kinetic
+        """Largest share, at most 1, of a change of velocities in the plate frame that does not raise the kinetic
         energy.
 
         Every surface element takes power from the core, so the energy cannot grow in continuous time. A finite step may
@@ -183,7 +183,7 @@ def build(variant: Variant) -> SimpleNamespace:
 
     @wp.func
     def change_between(body: struct.Body, before: struct.State, after: struct.State):
-        """The change of the velocities by a kick."""
+        """The change of the velocities between two states, as by a kick."""
         momentum = after.angular_momentum - before.angular_momentum
         change = struct.Change()
         change.velocity = wp.quat_rotate_inv(before.attitude, after.velocity - before.velocity)
@@ -192,7 +192,7 @@ def build(variant: Variant) -> SimpleNamespace:
 
     @wp.func
     def in_step(change: struct.Change, share: real):
-        """The change in a step that is longer than another by some factor, if the load stays as it was."""
+        """The change in a step that is `share` times as long, under the same load."""
         foreseen = struct.Change()
         foreseen.velocity = share * change.velocity
         foreseen.omega = share * change.omega
@@ -200,8 +200,8 @@ def build(variant: Variant) -> SimpleNamespace:
 
     @wp.func
     def swings(body: struct.Body, before: struct.Change, last: struct.Change):
-        """Whether a step has turned back the change across the axis that the one before it made, by more than rounding
-        can: in a straight shot nothing else acts across the axis."""
+        """Whether a step has reversed the change across the axis by the step before, by more than rounding can: in a
+        straight shot nothing else acts across the axis."""
         pushed = before.velocity[1] * last.velocity[1] + before.velocity[2] * last.velocity[2]
         turned = before.omega[1] * last.omega[1] + before.omega[2] * last.omega[2]
         rounding = faint * wp.abs(before.velocity[0] * last.velocity[0])

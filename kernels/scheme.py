@@ -1,4 +1,4 @@
-"""The scheme of a variant: how one layer loads a core in one step (kernels/contracts.py says what it offers)."""
+"""The scheme of a variant: how one layer loads a core in one step (contract: kernels/contracts.py)."""
 
 from functools import cache
 

@@ -19,7 +19,7 @@ def build(variant: Variant) -> SimpleNamespace:
 
     @wp.func
     def shot_value(values: wp.array(dtype=Any), shot: wp.int32):
-        """The value of one shot, or the one value of all shots."""
+        """The value of one shot, or the value that all shots share."""
         return values[wp.min(shot, values.shape[0] - 1)]
 
     @wp.func
@@ -40,12 +40,12 @@ def build(variant: Variant) -> SimpleNamespace:
 
     @wp.func
     def attitude_of(axis: wp.vec3d):
-        """The shortest turn that takes the plate normal to the axis (axis_x > 0)."""
+        """The quaternion of the shortest turn from the plate normal to the axis (axis_x > 0)."""
         return wp.normalize(wp.quatd(wp.float64(0.0), -axis[2], axis[1], wp.float64(1.0) + axis[0]))
 
     @wp.func
     def launch_state(surface: struct.Surface, body: struct.Body, shots: struct.Shots, shot: wp.int32):
-        """State with the foremost point at the front face, the centre of mass on the line through the hit."""
+        """State with the foremost point at the front face and the centre of mass on the line through the hit."""
         flight = line_of_flight(shots, shot)
         yaw = wp.atan2(flight[1], flight[0]) + shot_value(shots.yaw, shot)
         pitch = wp.atan2(flight[2], flight[0]) + shot_value(shots.pitch, shot)

@@ -1,4 +1,4 @@
-"""Where a window is that slides over its plate to follow a core, and whether it may (kernels/layers.py)."""
+"""The place of a window that slides over its plate to follow a core, and whether it may slide (kernels/layers.py)."""
 
 from functools import cache
 from types import SimpleNamespace
@@ -16,7 +16,7 @@ def build(variant: Variant) -> SimpleNamespace:
 
     @wp.func
     def extent_of(window: struct.Window):
-        """The nodes of a window, from its home."""
+        """The nodes of a window, counted from its home."""
         extent = struct.Box()
         extent.y_low = -window.home_y
         extent.z_low = -window.home_z
@@ -26,7 +26,7 @@ def build(variant: Variant) -> SimpleNamespace:
 
     @wp.func
     def around(a: struct.Box, b: struct.Box):
-        """The nodes about those of two boxes."""
+        """The smallest box that holds two boxes."""
         both = a
         both.y_low = wp.min(a.y_low, b.y_low)
         both.z_low = wp.min(a.z_low, b.z_low)
@@ -36,7 +36,7 @@ def build(variant: Variant) -> SimpleNamespace:
 
     @wp.func
     def moved(box: struct.Box, rows: wp.int32, columns: wp.int32):
-        """The nodes of a box as a window has them that has slid by some rows and columns."""
+        """A box in the node numbers of a window that has slid by some rows and columns."""
         seen = box
         seen.y_low -= rows
         seen.y_high -= rows
@@ -46,7 +46,7 @@ def build(variant: Variant) -> SimpleNamespace:
 
     @wp.func
     def slid(window: struct.Window, rows: wp.int32, columns: wp.int32):
-        """A window that has slid over its plate by some rows and columns."""
+        """A window after it has slid over its plate by some rows and columns."""
         moved_window = window
         moved_window.home -= rows * window.cells_z + columns
         moved_window.home_y -= rows
@@ -55,8 +55,8 @@ def build(variant: Variant) -> SimpleNamespace:
 
     @wp.func
     def is_ahead(before: struct.Box, after: struct.Box, known: struct.Box):
-        """Whether a window that slides from one place to another takes in none of the nodes that it has left earlier,
-        of all that are `known`."""
+        """Whether a window that slides takes in only nodes that it has never held, of all that it has held
+        (`known`)."""
         return (
             wp.max(after.y_low, known.y_low) >= before.y_low
             and wp.min(after.y_high, known.y_high) <= before.y_high

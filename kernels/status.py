@@ -3,12 +3,12 @@
 from enum import IntEnum
 
 RUNNING = -1
-"""In the place of a status while a shot has not ended."""
+"""Stands in place of a status while a shot has not ended."""
 
 
 class Status(IntEnum):
-    """Outcome of one shot, or how its core ended in one layer. Codes from UNFINISHED on are failures of the
-    computation, not of the plate, but for NOT_REACHED, which only a layer can be. The last two are the continuum's."""
+    """Outcome of a shot, or of its core in one layer. Codes from UNFINISHED on are failures of the computation, not of
+    the plate, except NOT_REACHED, which only a layer can have. The last two belong to the continuum."""
 
     PERFORATED = 0
     ARRESTED = 1
@@ -24,7 +24,7 @@ class Status(IntEnum):
 
     @property
     def sentence(self) -> str:
-        """What happened, for a person."""
+        """A sentence about the outcome."""
         return _SENTENCES[self]
 
     @property
@@ -48,4 +48,4 @@ _SENTENCES = {
 }
 
 OF_SHOTS = tuple(status for status in Status if status is not Status.NOT_REACHED)
-"""What a shot can end with."""
+"""Statuses that a whole shot can have."""

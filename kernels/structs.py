@@ -1,8 +1,9 @@
 """All structs of the device code, in the order of a shot: core, target, shots, one step, memory, results.
 
 A struct is what functions of several stages, or the host and a kernel, pass to each other. Its docstring gives the
-meaning, the unit and the shape of each member. Numbers are SI, angles in radians. A member whose type is an array lies
-in the memory of the device; the host fills those of the inputs (solver/structs.py, solver/memory.py).
+meaning, the unit and the shape of each member. Numbers are SI, angles in radians. Arrays lie in the memory of the
+device;
+the host fills those of the inputs (solver/structs.py, solver/memory.py).
 
 Long because all structs stand in one place.
 """
@@ -16,8 +17,8 @@ from .variant import Variant
 
 
 def build(variant: Variant) -> SimpleNamespace:
-    """The structs of one variant, by name. Variants of one precision have the same ones, whatever their physics, so
-    what one has filled another one can read; only a plate may come by value or from a table."""
+    """The structs of one variant, by name. Variants of one precision have the same structs, whatever their physics, so
+    a variant can read what another has filled. Only a plate may come by value or from a table."""
     return _build(variant.double, variant.layered or variant.tabled)
 
 
@@ -33,14 +34,15 @@ def _build(double: bool, many_plates: bool) -> SimpleNamespace:
         """The surface of a core: rings from nose to base, the discs that close them included.
 
         Per ring: station ahead of the centre of mass and radius [m], area of one patch [m²], the patch's normal along
-        the axis and outwards, half of the ring's extent along the meridian, axially and radially [m], and half of
-        the change of the normal over it.
-        `cosine` and `sine` are those of the azimuths of all patches, ring by ring. Odd rings are turned by half a
-        patch, so neighbouring rings do not all miss the same edge. The number of patches around a ring is a multiple of
-        4. `profile` has radii [m] at even stations, `per_station` of them per metre, from the base's station `base` [m]
-        on. `patches` repeats the members of a ring for each of its patches, one array behind the other: a CPU then goes
-        through the patches of all rings in one loop. A slot has room for `most_rings` and `most_patches`: those of the
-        largest surface of a launch.
+        the axis and outwards, half of the ring's extent along the meridian, axially and radially [m], and half of the
+        change of the normal over it.
+        `cosine` and `sine` belong to the azimuths of all patches, ring by ring. Odd rings are turned by half a patch,
+        so
+        that neighbouring rings do not all miss the same edge. The number of patches around a ring is a multiple of 4.
+        `profile` has radii [m] at equidistant stations, `per_station` of them per metre, from the base's station `base`
+        [m] on. `patches` repeats the members of a ring for each of its patches, one array behind the other, so that a
+        CPU goes through the patches of all rings in one loop. A slot has room for `most_rings` and `most_patches`, the
+        numbers of the largest surface of a launch.
         """
 
         station: wp.array(dtype=real)
@@ -104,8 +106,8 @@ def _build(double: bool, many_plates: bool) -> SimpleNamespace:
     @wp.struct
     class Pose:
         """A core as its surface sees it: centre of mass [m] and body axes in the plate frame; velocity [m/s] and
-        angular velocity [rad/s] along the body axes (axis, right, up). No point of the core is faster than `speed`
-        [m/s]."""
+        angular velocity [rad/s] along the body axes (axis, right, up). `speed` is an upper bound of the speed of its
+        points [m/s]."""
 
         position: vec3
         axis: vec3
@@ -168,16 +170,17 @@ def _build(double: bool, many_plates: bool) -> SimpleNamespace:
         """The pristine pattern of a plate.
 
         `tile` holds the material fractions of one period, shape [tile_y × tile_z]; its corner is at the origin. `clear`
-        is a lower bound of each cell's distance from material [m]. `period_y` and `period_z` are the period [m].
-        `half_y` and `half_z` are half the sides of a finite plate [m], infinite if there is no rim. `spacing` is that
-        of the exposure's grid [m]. `taps` is half of the tent filter on this grid, and `reach` is its reach in nodes,
-        at least 1. A window has `planes` of the grid through the thickness, `per_plane` of them per metre, of which a
+        is a lower bound of each cell's distance from material [m]. `period_y` and `period_z` are the extents of the
+        period [m]. `half_y` and `half_z` are half the sides of a finite plate [m], infinite without a rim. `spacing` is
+        the spacing of the exposure's grid [m]. `taps` is half of the tent filter on this grid, and `reach` is its reach
+        in nodes, at least 1. A window has `planes` of the grid through the thickness, `per_plane` of them per metre. A
+        contact weakens those up to `plane_reach` planes away. One plane stands for the whole thickness.
         contact weakens those up to `plane_reach` planes away; one plane stands for the whole thickness.
 
-        `cover` has the material along a normal [m] (kernels/free_edges.py), shape [radii × (directions + 1) ×
-        (cover_y + 1) × (cover_z + 1)]: classes of the core's radius, directions, of which the last is the first, and
-        the nodes of a period and the first ones of the next. `cover_per_y` and `cover_per_z` are nodes per metre,
-        `cover_per_row` and `cover_per_column` nodes per cell of the tile.
+        `cover` has the material along a normal [m] (kernels/free_edges.py), shape [radii × (directions + 1) × (cover_y
+        + 1) × (cover_z + 1)]: classes of the core's radius; directions, where the last repeats the first; the nodes of
+        a period and the first ones of the next. `cover_per_y` and `cover_per_z` are nodes per metre, `cover_per_row`
+        and `cover_per_column` nodes per cell of the tile.
         """
 
         tile: wp.array(dtype=real)
@@ -208,15 +211,16 @@ def _build(double: bool, many_plates: bool) -> SimpleNamespace:
     class Window:
         """The part of a slot's fields that a layer has, and its place on the tile.
 
-        `first` is the index of the first node. `home` is that of the node at the hit, which is in row `home_y` and
-        column `home_z`, within the window or not: so a shot computes the same bits in a window of any size and place.
+        `first` is the index of the first node. `home` is the index of the node at the hit, in row `home_y` and column
+        `home_z`, which may lie outside the window: so a shot computes the same bits in a window of any size and place.
         `per_cell` is nodes per metre. `row` and `column` are the cell of the tile that holds the hit, `tile_y` and
         `tile_z` are the hit's place in this cell, `per_row` and `per_column` are cells of the tile per metre.
-        `thickness` is that of the plate; its front face is `behind` [m] the first of `planes` planes of `nodes` nodes
-        each; `low_y`, `high_y`, `low_z` and `high_z` are its rims relative to the hit [m]. (y0, z0) is the place of the
-        node `home` in the literal scheme [m]. `weakens` says whether the fields hold this window. `channel` is the
-        first node of its `channel_planes` planes with the channels of earlier hits (kernels/channel.py), `pierced` says
-        whether there are any.
+        `thickness` is the thickness of the plate. Its front face is `behind` [m] the first of `planes` planes of
+        `nodes`
+        nodes each; `low_y`, `high_y`, `low_z` and `high_z` are its rims relative to the hit [m]. (y0, z0) is the place
+        of the node `home` in the literal scheme [m]. `weakens` says whether the fields hold this window. `channel` is
+        the first node of its `channel_planes` planes with the channels of earlier hits (kernels/channel.py), `pierced`
+        says whether there are any.
         """
 
         first: wp.int32
@@ -286,10 +290,10 @@ def _build(double: bool, many_plates: bool) -> SimpleNamespace:
         of the centre of mass (`by_path`), ln(β)/Δs_β [1/m]. The literal scheme takes β itself (`degradation`) once a
         step.
 
-        `onset` is the closing speed [m/s] over which contact sets in (`onset_speed`): the law's own, the share
-        `onset_share` of the core's velocity; or, where the step needs a wider one, a multiple, `onset_jump` [m/s²], of
-        the time step, and at most the share `onset_limit` of the core's velocity. `steadied` is the closing speed
-        [m/s] below which contact damps by its chord (`steady_slope`).
+        `onset` is the closing speed [m/s] over which contact sets in (`onset_speed`). It is the share `onset_share` of
+        the core's velocity; or, where the step needs a wider one, `onset_jump` [m/s²] times the time step, but at most
+        the share `onset_limit` of the core's velocity. `steadied` is the closing speed [m/s] below which contact damps
+        by its chord (`steady_slope`).
 
         Near a free surface a0 is less by 1 + (r · `per_reach`)^`power` [1/m], r the radius of the core, and a patch
         presses by 1 − exp(−`cover` · b / r), b the length of material ahead of it.
@@ -311,26 +315,26 @@ def _build(double: bool, many_plates: bool) -> SimpleNamespace:
         power: real
         cover: real
 
-    # A single plate comes by value, because CUDA does not know where a pointer leads that lies in memory.
+    # A single plate comes by value, because CUDA does not know the memory behind a pointer that lies in memory.
     Plates = wp.array(dtype=Plate) if many_plates else Plate
 
     @wp.struct
     class Target:
-        """The layers of the target, front to back; arrays of shape [layers]. A table of `plates` has those of several
-        targets, one after the other, of which a shot has those from number `first` on.
+        """The layers of the target, front to back; arrays of shape [layers]. A table of `plates` holds several targets,
+        one after the other; a shot has those from number `first` on.
 
         `front` is the front face behind that of the target [m]; `offset_y` and `offset_z` are the place of the layer's
         origin in the plane of the plate [m]. These, `thickness` [m] and the members of Law have one value for all shots
         or one per shot: shape [layers, 1] or [layers, shots]. The layers that a step can touch add their `onset_jump`,
         up to `most_jump`, as if they were one plate. `weakens` says whether the layer keeps a field.
-        Layers that touch each other and remember alike are one laminate: a contact in one weakens the others, and they
-        share a field. `laminate` is the number of the first of them. `deep` is 1 where the laminate is thicker than the
-        depth over which it weakens together, else 0.
-        `stretch` is how many times longer a step may be than the shortest, where a core touches nothing but the layer,
-        and `slowing` is the share of its speed that a longer step may take. Windows that `slide` follow a core that
-        leaves them, where there are several layers.
-        `standoffs` are distances behind the rear face of every layer [m], which the point `ahead` of the centre of mass
-        passes [m].
+        Layers that touch each other and have the same memory form a laminate: a contact in one weakens the others, and
+            they share a field. `laminate` is the number of its first layer. `deep` is 1 where the laminate is thicker
+            than the depth over which it weakens together, else 0.
+        `stretch` is the ratio of the longest allowed step to the shortest one while a core touches nothing but the
+        layer, and `slowing` is the share of its speed that a longer step may take. Where there are several layers,
+        windows that `slide` follow a core that leaves them.
+        `standoffs` are distances behind the rear face of every layer [m], which count for the point `ahead` of the
+        centre of mass [m].
         """
 
         count: wp.int32
@@ -365,10 +369,10 @@ def _build(double: bool, many_plates: bool) -> SimpleNamespace:
     class Shots:
         """The conditions of all shots. Arrays of shape [1], one value for all shots, or [shots].
 
-        Hit point, velocity and attitude on impact (docs/model.md §1); the members of Body, the strength of the core
-        [Pa], `onset_share` of Law, the time step [s] where it is shortest, and the distance [m] at impact velocity
-        after which a shot that has not ended is given up. `plates` is the number of the target's plates, and `surface`
-        that of the core's surface, where these come from tables.
+        Hit point, velocity and attitude on impact (docs/model.md §1); the members of Body; the strength of the core
+        [Pa]; `onset_share` of Law; the shortest time step [s]; and the way [m] at impact velocity after which a shot
+        that has not ended is given up. `plates` is the number of the target's plates, and `surface` that of the core's
+        surface, where these come from tables.
         """
 
         hit_y: wp.array(dtype=wp.float64)
@@ -392,7 +396,7 @@ def _build(double: bool, many_plates: bool) -> SimpleNamespace:
     @wp.struct
     class Inputs:
         """What a launch of the march reads. All shots have one `surface` with its `sections`, by value as one plate is;
-        or, where shots have surfaces of their own, each has one of the tables. Each shot has `rows` rows of the trace;
+        or, where surfaces differ from shot to shot, each has one of the tables. Each shot has `rows` rows of the trace;
         0 means no trace."""
 
         surface: Surface
@@ -411,8 +415,8 @@ def _build(double: bool, many_plates: bool) -> SimpleNamespace:
         """The time of a shot (kernels/clock.py): it has done `steps` steps, of which `contact_steps` touched material.
 
         `step` is the length of the present step and `shortest` that of the shortest one [s]. Steps are counted as if
-        each were the shortest; `beyond` is the time that this leaves out, and `contact_beyond` the part of it in
-        contact [s].
+        all were the shortest; `beyond` is the time that this leaves out, and `contact_beyond` the part of it in contact
+        [s].
         """
 
         shortest: real
@@ -425,10 +429,10 @@ def _build(double: bool, many_plates: bool) -> SimpleNamespace:
     @wp.struct
     class Footprint:
         """The rings and the nodes of one layer that a step can touch. `first_ring` and `last_ring` are the first and
-        the last ring that can be in the slab; last < first if there is none. `first_closing` and `last_closing` are
-        the first and the last of these that may close in. `through` means that all rings are behind the rear face,
-        `back` that all are before the front face. `box` holds the nodes around the rings in the slab. `inside` means
-        that the window holds the box."""
+        the last ring that can be in the slab; last < first if there is none. `first_closing` and `last_closing` are the
+        first and the last of these that may close in. `through` means that all rings are behind the rear face, `back`
+        that all are before the front face. `box` holds the nodes around the rings in the slab. `inside` means that the
+        window holds the box."""
 
         first_ring: wp.int32
         last_ring: wp.int32
@@ -442,7 +446,7 @@ def _build(double: bool, many_plates: bool) -> SimpleNamespace:
     @wp.struct
     class Slab:
         """One layer as a step loads it, in the frame of the layer: its front face is at x = 0, and the home of its
-        window at y = z = 0. `pose` is that at mid-step, and `dt` is the length of the step [s]."""
+        window at y = z = 0. `pose` is the pose at mid-step, and `dt` the length of the step [s]."""
 
         plate: Plate
         law: Law
@@ -453,18 +457,17 @@ def _build(double: bool, many_plates: bool) -> SimpleNamespace:
 
     @wp.struct
     class Reach:
-        """What a step can touch of the target: `footprint` is that of all layers together.
+        """What a step can touch of the target. `footprint` covers all layers together.
 
-        Of a target of one plate, `window` is the plate's. It has no other members: a core is never `behind` a plate of
-        its target, and nothing is a `barrier` to it.
+        For a target of one plate, `window` is the plate's. The other members have no meaning: a core is never `behind`
+        a plate of its target, and nothing is a `barrier` to it.
 
-        Of a target of several layers, the layers from `first` to `last` can be touched; `first` > `last` if there is
+        For a target of several layers, the layers from `first` to `last` can be touched; `first` > `last` if there is
         none. `rearmost` and `foremost` are the ends of the core along x, and `deepest` is the largest x that it has
-        reached so far [m]. `clearance` is a lower bound of its distance from the material of layers that it passes
-        through a hole or beside [m]. `behind` says whether it has left the plate through its rear face. `barrier` is
-        the work that a core takes straight through the layers before it, if they were solid [J]. `flight` is the unit
-        vector along the line of fire; a core that gets farther away from the hit across the line than `farthest` [m]
-        never ends.
+        reached [m]. `clearance` is a lower bound of its distance from the material of layers that it passes through a
+        hole or beside [m]. `behind` says whether it has left the plate through its rear face. `barrier` is the work [J]
+        of a core that goes straight through the layers before it, if they were solid. `flight` is the unit vector along
+        the line of fire; a core that gets farther than `farthest` [m] away from the hit across the line never ends.
         """
 
         footprint: Footprint
@@ -482,9 +485,9 @@ def _build(double: bool, many_plates: bool) -> SimpleNamespace:
 
     @wp.struct
     class Contact:
-        """How a patch touches: its mean share of contact, the derivative of that by the closing speed [s/m], and how
-        far the middle of what touches is from the patch's own, in halves of the patch and per variation of the closing
-        speed over it [s/m]."""
+        """How a patch touches: its mean share of contact; the derivative of this share by the closing speed [s/m]; and
+        the distance of the middle of its touching part from its own middle, in halves of the patch and per variation of
+        the closing speed over it [s/m]."""
 
         share: real
         slope: real
@@ -540,13 +543,13 @@ def _build(double: bool, many_plates: bool) -> SimpleNamespace:
 
     @wp.struct
     class Fields:
-        """The nodes of all slots, or of one. A slot has `nodes` of each array; the window of a layer has planes of
+        """The nodes of all slots, or of one. A slot has `nodes` of each array. The window of a layer has planes of
         cells_y × cells_z of them, from number `first` on; shape [layers].
 
-        The consistent law keeps the exposure [s], or [m] where it counts a path, the exposure gained in the step, and
-        room for the filter. `channel` has other planes of the same windows, `channel_nodes` in a slot: how deep each
-        node lies in the channels of earlier hits [m], negative outside. The literal scheme keeps each node's share of
-        the resistance Y, 0 in holes, and 1 where the step `touched` the node.
+        The consistent law keeps the exposure [s] (or [m] where it counts a path), the exposure gained in the step, and
+        room for the filter. `channel` has other planes of the same windows, `channel_nodes` in a slot: the depth of
+        each node inside the channels of earlier hits [m], negative outside. The literal scheme keeps each node's share
+        of the resistance Y, 0 in holes, and 1 where the step `touched` the node.
         """
 
         exposure: wp.array(dtype=real)
@@ -563,18 +566,18 @@ def _build(double: bool, many_plates: bool) -> SimpleNamespace:
 
     @wp.struct
     class Touches:
-        """What the first pass over the patches finds for every patch of every slot, from the first ring on that may
+        """What the first pass over the patches finds, for every patch of every slot, from the first ring on that may
         close in.
 
         `area` is the area that presses on material [m²], `slope` its derivative by the closing speed [m s], and `shift`
         that of Contact. `gain` is the exposure that the patch gives to its nodes [s]. `tile` and `cell` are its cells
         of the tile and of the grid; `x`, `y` and `z` are its place in the grid's cell, `x` only where a window has
         planes. There `row`, `column` and `plane` are those of the cell, too. `ring_area` is the area of all patches of
-        a ring. `sums` is what the second pass sums over a ring, if the bending moment is recorded. Then
-        `total_area` is the area of a ring in all layers of the target. `place` and `ahead` are the patch's place in the
+        a ring. If the bending moment is recorded, `sums` holds the sums of the second pass over a ring, and
+        `total_area` the area of a ring in all layers of the target. `place` and `ahead` are the patch's place in the
         channels of earlier hits (kernels/channel.py). `cover` is the index of the node and direction before the patch
-        in the table of the cover, `cover_y`, `cover_z` and `cover_turn` the shares of the way to the next ones, and
-        `cover_decay` the negative exponent per cover [1/m].
+        in the table of the cover, `cover_y`, `cover_z` and `cover_turn` are the fractions of the way to the next ones,
+        and `cover_decay` is the negative exponent per cover [1/m].
         """
 
         area: wp.array(dtype=real)
@@ -602,13 +605,13 @@ def _build(double: bool, many_plates: bool) -> SimpleNamespace:
 
     @wp.struct
     class Stack:
-        """What a slot knows of several layers; shape [slots × layers], empty for one plate.
+        """State of several layers in each slot; shape [slots × layers], empty for one plate.
 
-        What a step can touch of each layer, the layer's window, the place of the window's home relative to the hit [m],
-        whether the window is open, whether the core was near the layer in the last step, and the nodes that the window
-        has held, from its home (`known`). `first_cells` are the nodes in each direction of the first window that a shot
-        has by itself, shape [layers, 1] or [layers, shots]: the windows of shots that are computed with it may be
-        wider, and its outcome must not depend on them.
+        For each layer: the footprint of the step, the layer's window, the place of the window's home relative to the
+            hit [m], whether the window is open, whether the core was near the layer in the last step, and the nodes
+            that the window has held, from its home (`known`). `first_cells` are the nodes, in each direction, of the
+            first window that a shot alone needs, shape [layers, 1] or [layers, shots]: the windows of shots that are
+            computed with it may be wider, and its outcome must not depend on them.
         """
 
         footprint: wp.array(dtype=Footprint)
@@ -621,8 +624,8 @@ def _build(double: bool, many_plates: bool) -> SimpleNamespace:
 
     @wp.struct
     class Section:
-        """A core at a plane: its axis, and where this crosses the plane, with what radius [m]; the radius is 0 if it
-        does not."""
+        """A core at a plane: its axis, and the place where the axis crosses the plane, with the radius there [m], 0 if
+        it does not cross."""
 
         axis: vec3
         y: real
@@ -634,13 +637,13 @@ def _build(double: bool, many_plates: bool) -> SimpleNamespace:
         """What the `count` shots at a slot's plate leave to each other, in all slots.
 
         Of the windows: `exposure` has the `nodes` of all layers of every shot, shape [slots × count × nodes]: while a
-        shot is under way the exposure before it, then what it added [s]. `y` and `z` are the centres of the windows in
-        the frames of their layers [m], `open` says whether a shot has opened its window; shape [slots × count ×
-        layers].
+            shot is under way the exposure before it, afterwards the exposure that it added [s]. `y` and `z` are the
+            centres of the windows in the frames of their layers [m], `open` says whether a shot has opened its window;
+            shape [slots × count × layers].
 
-        Of the channels (kernels/channel.py): `inside` has the `channel_nodes` of all layers of every shot, how deep
-        each lies in its channel [m], negative outside; shape [slots × count × channel_nodes]. `box` has all nodes that
-        a channel may hold, and `through` says whether the shot has left the layer through its rear face; shape [slots ×
+        Of the channels (kernels/channel.py): `inside` has the `channel_nodes` of all layers of every shot, the depth of
+        each inside its channel [m], negative outside; shape [slots × count × channel_nodes]. `box` has all nodes that a
+        channel may hold, and `through` says whether the shot has left the layer through its rear face; shape [slots ×
         count × layers]. `sections` are those of the shot under way that are not drawn yet, shape [slots × planes].
         `first` and `first_plane` are the first node and plane of every layer, and `apart` is the largest distance of
         its planes [m]; shape [layers].
@@ -678,7 +681,7 @@ def _build(double: bool, many_plates: bool) -> SimpleNamespace:
 
     @wp.struct
     class Scratch:
-        """What the shots of a launch write on their way."""
+        """What the shots of a launch write while they run."""
 
         fields: Fields
         touches: Touches
@@ -704,12 +707,12 @@ def _build(double: bool, many_plates: bool) -> SimpleNamespace:
     class Passage:
         """How each core left each layer: arrays of shape [shots, layers], empty for one plate.
 
-        Velocity, tilt and time are those at the instant when the last point of the core leaves the layer through its
-        rear face; NaN where that does not happen. Per shot: the layer that the core came to rest in, or −1, and how far
-        behind this layer's front face any of its points came [m].
+        Velocity, tilt and time are taken at the instant when the last point of the core leaves the layer through its
+        rear face; NaN where it does not leave. Per shot: the layer in which the core came to rest, or −1, and the
+        largest distance of its points behind this layer's front face [m].
 
-        `deflection` is that of the velocity at that instant; `standoff_tilt`, `standoff_pitch` and `standoff_yaw`, of
-        shape [shots, layers, stand-offs], are those of a core that flies on free from there.
+        `deflection` is that of the velocity at this instant; `standoff_tilt`, `standoff_pitch` and `standoff_yaw`, of
+        shape [shots, layers, stand-offs], are those of a core that flies freely from there on.
         """
 
         status: wp.array2d(dtype=wp.int32)
@@ -727,8 +730,9 @@ def _build(double: bool, many_plates: bool) -> SimpleNamespace:
     class Bending:
         """The largest bending moment [N m] and nominal stress [Pa] so far, and where behind the nose [m].
 
-        A core is broken from the first step on in which the stress is above its `strength` [Pa]: the middle of that
-        step [s], the most stressed section then behind the nose [m], and that section ahead of the hit point along x.
+        A core is broken from the first step on in which the stress is above its `strength` [Pa]. Recorded are the
+        middle of that step [s], the most stressed section then, behind the nose [m], and this section ahead of the hit
+        point along x.
         """
 
         moment: real
@@ -743,8 +747,8 @@ def _build(double: bool, many_plates: bool) -> SimpleNamespace:
 
     @wp.struct
     class Report:
-        """What a person is told of each shot; arrays of shape [shots] or [shots, stand-offs], NaN where there is no
-        value."""
+        """The values of each shot that a result shows; arrays of shape [shots] or [shots, stand-offs], NaN where there
+        is no value."""
 
         residual_velocity: wp.array(dtype=real)
         deflection: wp.array(dtype=real)
@@ -772,7 +776,7 @@ def _build(double: bool, many_plates: bool) -> SimpleNamespace:
     class Context:
         """One shot, number `shot` of all, in slot number `slot`: what stays the same from its start to its end, and the
         memory that its functions share. `depth` is the rear face of the target behind its front [m], `impact_energy`
-        the kinetic energy at the start [J]. `law` is that of the plate."""
+        the kinetic energy at the start [J]. `law` is the law of the plate."""
 
         shot: wp.int32
         slot: wp.int32

@@ -1,4 +1,4 @@
-"""The target: its layers, front to back, of which the plate is number 0; and how the window of a layer opens."""
+"""The target: its layers, front to back (layer 0 is the plate), and how the window of a layer opens."""
 
 from functools import cache
 from types import SimpleNamespace
@@ -42,7 +42,7 @@ def build(variant: Variant) -> SimpleNamespace:
 
     @wp.func
     def law_of(target: struct.Target, common: struct.Law, layer: wp.int32, shot: wp.int32):
-        """The law of a layer; the onset of contact in a step is common to all."""
+        """The law of a layer. The onset of contact in a step is common to all layers."""
         law = common
         law.by_path = target.by_path[layer]
         law.a0 = layer_value(target.a0, layer, shot)
@@ -69,7 +69,7 @@ def build(variant: Variant) -> SimpleNamespace:
 
     @wp.func
     def open_window(context: struct.Context, layer: wp.int32, home: vec3):
-        """A layer's window about a place relative to the hit [m], with what earlier shots have left there."""
+        """Open a layer's window about a place relative to the hit [m], with what earlier shots have left there."""
         target, shots, shot = context.target, context.shots, context.shot
         y = use.shots.shot_value(shots.hit_y, shot) + wp.float64(home[1]) - layer_value(target.offset_y, layer, shot)
         z = use.shots.shot_value(shots.hit_z, shot) + wp.float64(home[2]) - layer_value(target.offset_z, layer, shot)
@@ -81,8 +81,8 @@ def build(variant: Variant) -> SimpleNamespace:
                 within = layer_value(target.front, layer, shot) - layer_value(
                     target.front, target.laminate[layer], shot
                 )
-                window.behind = real(within) + one / plate.per_plane  # a plane to spare
-            else:  # it weakens as a whole: all is remembered on the first plane
+                window.behind = real(within) + one / plate.per_plane  # one spare plane
+            else:  # it weakens as a whole, and only the first plane has a memory
                 window.planes = 1
                 window.per_plane = real(0.0)
         if wp.static(variant.burst):
@@ -91,11 +91,12 @@ def build(variant: Variant) -> SimpleNamespace:
             window.pierced = use.earlier.recall(context.earlier, fields, plate, window, context.slot, shot, layer, y, z)
         return window
 
-    # What a shot leaves to later ones at the same target; nothing where each shot has a target of its own.
+    # These functions keep what a shot leaves to later shots at the same target, and do nothing if it has no later
+    # shots.
 
     @wp.func
     def begin(context: struct.Context):
-        """This shot has opened no window yet."""
+        """Record that this shot has opened no window yet."""
         if wp.static(variant.burst):
             use.earlier.begin(context.earlier, context.slot, context.shot)
 
@@ -109,14 +110,14 @@ def build(variant: Variant) -> SimpleNamespace:
 
     @wp.func
     def follow(context: struct.Context, window: struct.Window, layer: wp.int32, pose: struct.Pose):
-        """Take note of where the core is in a layer."""
+        """Keep the place of the core in a layer."""
         if wp.static(variant.burst):
             place = use.earlier.place_of(context.earlier, context.slot, context.shot, layer)
             use.channel.follow(context.earlier, context.surface, window, place, pose)
 
     @wp.func
     def leave_channel(context: struct.Context, window: struct.Window, layer: wp.int32):
-        """Keep where this shot went through a layer."""
+        """Keep that this shot went through a layer, with its channel."""
         if wp.static(variant.burst):
             place = use.earlier.place_of(context.earlier, context.slot, context.shot, layer)
             use.channel.conclude(context.earlier, context.surface, window, place)

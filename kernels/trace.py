@@ -19,7 +19,7 @@ COLUMNS = {
     "step": slice(20, 21),
 }
 """Columns of a row, SI. The attitude is (x, y, z, w); force and moment are means over the step, `step` is its length.
-Times are those of mid-step."""
+The time is that of mid-step."""
 WIDTH = COLUMNS["step"].stop
 """Numbers per row."""
 

@@ -12,9 +12,9 @@ CPU_FLAGS = (
     "-march=native -mprefer-vector-width=512 -mllvm=-inline-threshold=9000 -mstackrealign -fno-slp-vectorize "
     "-mreassociate -fno-signed-zeros -freciprocal-math -ffp-contract=fast"
 )
-"""Flags that let the compiler vectorise sums and divisions, as wide as the processor can; its default for Intel is half
-of that. NaN and infinity keep their meaning. Straight-line code stays scalar: on some processors the compiler breaks a
-large kernel there (LLVM: "Instruction does not dominate all uses"), and loops are what counts."""
+"""Flags that let the compiler vectorise sums and divisions as wide as the processor can; for Intel its default is half
+of that. NaN and infinity keep their meaning. Straight-line code stays scalar, because on some processors the compiler
+breaks a large kernel there (LLVM: "Instruction does not dominate all uses"), and loops take most of the time."""
 
 
 @dataclass(frozen=True)
@@ -33,9 +33,9 @@ class Variant:
         layered: the target has several layers.
         burst: several shots hit one and the same plate.
         deep: a plate is thicker than the depth over which its material weakens together.
-        tabled: shots have plates and surfaces of their own, from tables.
-        window: nodes of a shot's window in shared memory, at most, in the block layout: one block of CUDA threads per
-            shot (kernels/block.py). 0 is the simple layout: one thread per shot, windows in global memory.
+        tabled: plates and surfaces differ from shot to shot, and come from tables.
+        window: largest number of nodes of a shot's window in shared memory, in the block layout: one block of CUDA
+            threads per shot (kernels/block.py). 0 is the simple layout: one thread per shot, windows in global memory.
     """
 
     double: bool = False
@@ -81,7 +81,7 @@ class Variant:
         return "_".join(["variant", *parts])
 
     def use(self, *modules: ModuleType) -> SimpleNamespace:
-        """What some modules build for this variant, each under the module's own name."""
+        """The builds of some modules for this variant, each under the module's name."""
         return SimpleNamespace(**{module.__name__.rpartition(".")[2]: module.build(self) for module in modules})
 
     def kernel(self, function: Callable[..., None], launch_bounds: tuple[int, ...] | None = None) -> wp.Kernel:
@@ -89,7 +89,7 @@ class Variant:
         compiled.
 
         Args:
-            launch_bounds: threads of a block on CUDA, and how many blocks a multiprocessor is to hold at least.
+            launch_bounds: threads of a block on CUDA, and the least number of blocks on a multiprocessor.
         """
         module = wp.get_module(f"{function.__module__}.{self.name}")
         module.options["enable_backward"] = False
