@@ -13,11 +13,11 @@ Kind = Literal["text", "table", "number", "count", "pair"]
 
 
 class Attribute(NamedTuple):
-    """What a result has under the name of a global attribute.
+    """The kind and the units of a global attribute.
 
     Attributes:
         kind: a "table" is a text with a JSON object, a "count" a whole number of at least 1, a "pair" two numbers.
-        units: as CF writes them, which the attribute ``<name>_units`` of a result says; empty where it has none.
+        units: CF units, which the attribute ``<name>_units`` of a result repeats; empty where there are none.
     """
 
     kind: Kind
@@ -25,7 +25,7 @@ class Attribute(NamedTuple):
 
 
 ATTRIBUTES: dict[str, Attribute] = {}
-"""By name."""
+"""All attributes by name."""
 _SI = "SI; a text says its unit"
 
 
@@ -47,12 +47,12 @@ PYTHON_VERSION = _declared("python_version")
 NUMPY_VERSION = _declared("numpy_version")
 XARRAY_VERSION = _declared("xarray_version")
 COMMIT = _declared("commit")
-"""Of the checkout that computed the result; not there where warpimpact was installed without one."""
+"""Commit of the checkout that computed the result; absent where warpimpact was installed without one."""
 MACHINE = _declared("machine")
 PROCESSOR = _declared("processor")
 DEVICE = _declared("device")
 NUMERICS = _declared("numerics")
-"""The numerics in force in words. As numbers:"""
+"""The numerics as used, in words. The next attributes are their numbers."""
 PATCHES_AXIAL = _declared("patches_axial", "number")
 PATCHES_AROUND = _declared("patches_around", "number")
 GRID_SPACING = _declared("grid_spacing", "number", "m")
@@ -60,20 +60,20 @@ TIME_STEP = _declared("time_step", "number", "s")
 PRECISION = _declared("precision")
 NUMERICS_GIVEN = _declared("numerics_given", "table", _SI)
 RESOLUTION = _declared("resolution", "table")
-"""JSON of the numerics that a pilot found; likewise only with a pilot:"""
+"""JSON of the numerics that a pilot found. The next attributes, up to LEVEL_SHIFTS, are present only with a pilot."""
 PROMISE_KEPT = _declared("promise_kept", "number")
 ACCURACY = _declared("accuracy", "table")
-"""JSON of what was asked for: errors in SI, and the share of the hits that is to stay within them. What was found:"""
+"""JSON of the accuracy that was asked for: errors in SI, and the share of the hits that shall stay within them."""
 RESIDUAL_VELOCITY_ERROR = _declared("residual_velocity_error", "number", "m s-1")
 TILT_ERROR = _declared("tilt_error", "number", "degree")
 DEPTH_ERROR = _declared("depth_error", "number", "m")
-"""Only where some shots of the pilot stop in a layer."""
+"""Error of the depth; present only where some shots of the pilot stop in a layer."""
 STATUS_ERROR = _declared("status_error", "number")
-"""Share of the hits; only of targets with several layers."""
+"""Share of the hits that end otherwise at a finer level; only of targets with several layers."""
 LEVEL_FOR = _declared("level_for")
-"""The quantity of a stop rule, where the pilot found the level for it and not for single hits."""
+"""The quantity of a stop rule, where the pilot chose the level for it instead of single hits."""
 LEVEL_SHIFTS = _declared("level_shifts", "table")
-"""JSON of what the numerics may shift the mean residual velocity [m s-1] and the mean last tilt [degree] by, at every
+"""JSON of the shift of the mean residual velocity [m s-1] and the mean last tilt [degree] by the numerics, at every
 level that the pilot tried."""
 CONTINUUM = _declared("continuum", "table", _SI)
 """JSON of the settings and the materials of a result by finite elements, which has no other numerics."""
@@ -81,7 +81,7 @@ FINGERPRINT = _declared("fingerprint")
 COMPUTE_TIME = _declared("compute_time", "number", "s")
 HITS_PER_SECOND = _declared("hits_per_second", "number", "s-1")
 
-# By which a file of another kind is recognised; its room has its other attributes
+# These recognise files of other kinds, whose other attributes are in their own rooms
 DESIGN_FILE = "design_file"
 """The text of the design file."""
 FIRING_TEST = "firing_test"
@@ -94,10 +94,11 @@ COUNT = _declared("count", "count")
 REPLICATES = _declared("replicates", "count")
 SYMMETRIES = _declared("symmetries")
 IMAGES = _declared("images", "count")
-"""How many hits in a row are images of each other. SYMMETRIES, IMAGES and COMPUTED_HITS need `hits.irreducible`."""
+"""Number of consecutive hits that are images of each other. SYMMETRIES, IMAGES and COMPUTED_HITS need
+`hits.irreducible`."""
 COMPUTED_HITS = _declared("computed_hits", "count")
 BURST = _declared("burst", "table")
-"""JSON of the burst; likewise only of a campaign of bursts:"""
+"""JSON of the burst. This and the next attributes are present only for a campaign of bursts."""
 SHOTS_AT_A_PLATE = _declared("shots_at_a_plate", "count")
 
 # Core, plate and output
@@ -106,32 +107,32 @@ PLATE = _declared("plate", "table", _SI)
 IMPACT = _declared("impact", "table", _SI)
 MATERIAL = _declared("material", "table", _SI)
 EVIDENCE = _declared("evidence")
-"""What a result rests on, names of threat and materials with the state of their evidence, and what was not measured: a
-line each."""
+"""What a result rests on, one line each: names of threat and materials with the state of their evidence, and what was
+not measured."""
 ASSUMPTIONS = _declared("assumptions", "table")
 """JSON of the numbers of the assumptions under which some hits were computed, too, by their names."""
 ASSUMED_TIME = _declared("assumed_time", "number", "s")
 WOULD_BREAK = _declared("would_break", "table")
 """JSON of the share of cores that would break, by the strength that they might have."""
 RESTS_ON, NOT_TESTED = "evidence: ", "not tested: "
-"""Begin the first line of the evidence, and those of what was not measured."""
+"""Beginnings of the first line of the evidence, and of the lines about what was not measured."""
 EFFECTIVE = "effective_sample_size"
-"""Of a posterior, which has no map of hits."""
+"""Effective number of draws of a posterior, which has no map of hits."""
 DISCREPANCY = _declared("discrepancy", "table")
-"""JSON of the standard deviation that a posterior's model misses by, by units of the Dataset."""
+"""JSON of the standard deviation of the error of a posterior's model, by units of the Dataset."""
 DISCREPANCY_COUNTS = _declared("discrepancy_counts", "number")
-"""1 where a reader asks to count it; in no file."""
+"""1 where a reader asks to count the discrepancy; in no file."""
 LAYERS = _declared("layers", "table")
-"""JSON of what stands behind the plate, by its number; not there where that is nothing."""
+"""JSON of the layers behind the plate, by number; absent if there are none."""
 STANDOFF_POINT = _declared("standoff_point")
 OPEN_AREA = _declared("open_area", "number", "1")
 AREAL_DENSITY = _declared("areal_density", "number", "kg m-2")
-"""Of the whole target."""
+"""Areal density of the whole target."""
 ADD_ON_DENSITY = _declared("add_on_areal_density", "number", "kg m-2")
-"""Of the layers in front of the base; only with a base. A file of layers without it is of a version whose solid plate
-was one plate in the place of the whole target."""
+"""Areal density of the layers in front of the base; only with a base. A file of layers without this attribute is from a
+version whose solid plate replaced the whole target."""
 SOLID_ADD_ON = _declared("solid_add_on")
-"""JSON of the plates that make the solid reference of the plate, or of the layers in front of the base."""
+"""JSON of the plates of the solid reference: the plate's, or that of the layers in front of the base."""
 LIGAMENT = _declared("ligament", "number", "m")
 PLATE_PERIOD = _declared("plate_period", "pair", "m")
 PLATE_THICKNESS = _declared("plate_thickness", "number", "m")
@@ -147,7 +148,7 @@ STOP_REASON = _declared("stop_reason")
 ESTIMATE = _declared("estimate", "number")
 ESTIMATE_INTERVAL = _declared("estimate_interval", "pair")
 ESTIMATE_NUMERICS = _declared("estimate_numerics", "number")
-"""How far the numerics may shift the estimate; only with a pilot."""
+"""Largest shift of the estimate by the numerics; only with a pilot."""
 ESTIMATE_UNITS = _declared("estimate_units")
 CONFIDENCE = _declared("confidence", "number")
 
@@ -155,24 +156,24 @@ CONFIDENCE = _declared("confidence", "number")
 LIMIT = _declared("limit")
 """The quantity: "velocity" or "thickness"."""
 LIMIT_LAYER = _declared("limit_layer", "number")
-"""Whose thickness was searched; 0 is the plate."""
+"""Number of the layer whose thickness was searched; 0 is the plate."""
 LIMIT_DENSITY = _declared("limit_density", "number", "kg m-3")
-"""Mass per area and thickness of that layer, its holes included."""
+"""Mass per area and thickness of this layer, including its holes."""
 LIMIT_ELSEWHERE = _declared("limit_elsewhere", "number", "kg m-2")
 """Areal density of all other layers."""
 SOLID_LIMIT_TIME = _declared("solid_limit_time", "number", "s")
-"""Time that the search at the solid plate took [s]."""
+"""Time of the search at the solid plate [s]."""
 SOLID_LIMIT_DENSITY = _declared("solid_limit_density", "number", "kg m-3")
 SOLID_LIMIT_ELSEWHERE = _declared("solid_limit_elsewhere", "number", "kg m-2")
-"""As `LIMIT_DENSITY` and `LIMIT_ELSEWHERE`, of the solid reference. A file without the second one is of a version that
-put one solid plate in the place of the whole target."""
+"""`LIMIT_DENSITY` and `LIMIT_ELSEWHERE` of the solid reference. A file without the second one is from a version whose
+solid plate replaced the whole target."""
 SOLID_LIMIT_HIGHEST = _declared("solid_limit_highest", "number")
 """Mass per volume of the solid plate that replaces the whole target, and the largest value tried."""
 LIMIT_TOLERANCE = _declared("limit_tolerance", "number")
 LIMIT_HIGHEST = _declared("limit_highest", "number")
 LIMIT_ERROR = _declared("limit_error", "number")
 LIMIT_FACTORS = _declared("limit_material_factors", "pair", "1")
-"""Ends of the 90 % interval of a limit velocity over the velocity, by what is known of the material."""
+"""Ends of the 90 % interval of a limit velocity over the velocity, from the evidence on the material"""
 """Of a limit velocity [m/s] or of a limit thickness [m]."""
 
 # A replayed hit
@@ -181,7 +182,7 @@ AGREEMENT = _declared("agreement")
 
 
 def with_units(attributes: Mapping[str, Any]) -> dict[str, Any]:
-    """Attributes, each that has a unit followed by it."""
+    """Attributes, where each that has units is followed by its units."""
     described: dict[str, Any] = {}
     for name, value in attributes.items():
         described[name] = value
@@ -191,13 +192,13 @@ def with_units(attributes: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def history_line(command: str) -> str:
-    """A line of the history: the time, and the command that has made a result."""
+    """A line of the history: the time, and the command that made a result."""
     return f"{datetime.now(UTC):%Y-%m-%dT%H:%M:%SZ} warpimpact {command}"
 
 
 @cache
 def versions() -> dict[str, str]:
-    """The attributes that say which versions computed a result and decide its bits."""
+    """Attributes with the versions that determine the bits of a result."""
     import warp  # a second to import
 
     return {WARPIMPACT_VERSION: version("warpimpact"), WARP_VERSION: warp.__version__}
@@ -205,7 +206,7 @@ def versions() -> dict[str, str]:
 
 @cache
 def machine() -> dict[str, str]:
-    """The attributes that say what else was there: machine, processor, commit and other versions."""
+    """Attributes on machine, processor, commit and versions that do not change the bits."""
     description = {
         PYTHON_VERSION: platform.python_version(),
         NUMPY_VERSION: version("numpy"),

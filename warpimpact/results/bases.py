@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 NEEDED = (v.STATUS, v.STOPPED_IN, v.DEPTH, v.LAYER_THICKNESS, *v.LAYER_FACES)
-"""Variables that say so."""
+"""Variables from which the depth in the base follows."""
 
 
 def has_base(dataset: Result) -> bool:
@@ -34,9 +34,9 @@ def base_thickness(dataset: Result) -> Array:
 def base_depth(dataset: Result) -> Array:
     """How deep every core goes into the base [m], shape [hits]; NaN where the computation failed.
 
-    A core that stops before the base or bounces off it counts 0. A core that pierces or passes the base counts with the
-    thickness of the base, which is the least that it could go into a thicker one. NaN where the result has no depth, as
-    that of a single plate.
+    A core that stops before the base or bounces off it counts as 0. A core that pierces or passes the base counts as
+    the thickness of the base, the least depth that it could reach in a thicker one. NaN where the result has no depth,
+    as for a single plate.
     """
     if not has_base(dataset):
         return np.full(dataset.sizes["hit"], np.nan)
@@ -54,8 +54,8 @@ def is_pierced(dataset: Result) -> Array:
 
 
 def piercing_margin(dataset: Result) -> Array:
-    """How far behind the rear face of the base every core comes [m], negative before it; shape [hits]. Infinite for a
-    core that passes the base, or rests before it; NaN as in `base_depth`."""
+    """Distance of every core's foremost point behind the rear face of the base [m], negative before it, shape [hits].
+    Infinite for a core that passes the base, minus infinity for one that rests before it; NaN as in `base_depth`."""
     if not has_base(dataset):
         return np.full(dataset.sizes["hit"], np.nan)
     rests = dataset[v.STOPPED_IN].values == dataset.sizes["layer"] - 1

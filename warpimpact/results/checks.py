@@ -1,4 +1,4 @@
-"""Whether a file that says it is a result, a history or a sweep is one."""
+"""Checks that a file that says it is a result, a history or a sweep is one."""
 
 from __future__ import annotations
 
@@ -35,13 +35,13 @@ _TOGETHER = (
     (attr.PROMISE_KEPT, attr.RESOLUTION, attr.ACCURACY, attr.NUMERICS_GIVEN),
     (attr.RESIDUAL_VELOCITY_ERROR, attr.TILT_ERROR, attr.PROMISE_KEPT),
 )
-"""Attributes of which the first needs the others."""
+"""Groups of attributes: the first one needs the others."""
 _SLICE = 2**22
-"""Hits that are looked at together."""
+"""Hits that are checked at a time."""
 
 
 def _of_columns(dataset: xarray.Dataset, known: Sequence[v.Variable]) -> Iterator[str]:
-    """What is wrong with the variables of hits, whose values are not read."""
+    """Faults of the variables of hits. Their values are not read."""
     for variable in known:
         if variable in dataset.variables and variable is not v.AXIS:
             array = dataset.variables[variable]
@@ -51,7 +51,7 @@ def _of_columns(dataset: xarray.Dataset, known: Sequence[v.Variable]) -> Iterato
 
 
 def _attribute_faults(attributes: Mapping[Any, Any]) -> Iterator[str]:
-    """What is wrong with the attributes of hits."""
+    """Faults of the attributes of hits."""
     yield from attribute_faults(attributes)
     for first, *others in _TOGETHER:
         missing = [name for name in others if name not in attributes]
@@ -65,8 +65,8 @@ def _hit_variables() -> list[v.Variable]:
 
 
 def _map_fault(dataset: xarray.Dataset) -> str | None:
-    """What keeps a Dataset from being a map of hits, as a phrase; None if nothing does. Of its hits only what a reader
-    relies on is looked at, a part at a time."""
+    """What keeps a Dataset from being a map of hits, as a phrase; None if nothing does. Only the values on which
+    readers rely are checked, a part at a time."""
     return next(_map_faults(dataset), None)
 
 
@@ -74,7 +74,7 @@ def _map_faults(dataset: xarray.Dataset) -> Iterator[str]:
     known = _hit_variables()
     yield from _of_columns(dataset, known)
     yield from _attribute_faults(dataset.attrs)
-    chosen = parsed_json(dataset.attrs.get(attr.SWEEP)) or ()  # inputs of a sweep's point
+    chosen = parsed_json(dataset.attrs.get(attr.SWEEP)) or ()  # inputs of a point of a sweep
     for variable in known:
         if variable in dataset.variables and dataset.variables[variable].dims not in (
             (variable.dims, ()) if variable in chosen else (variable.dims,)
@@ -85,7 +85,7 @@ def _map_faults(dataset: xarray.Dataset) -> Iterator[str]:
 
 
 def _of_hits(dataset: xarray.Dataset) -> Iterator[str]:
-    """What is wrong with how hits ended, where they are and at what stand-offs they are told."""
+    """Faults in the statuses, the places and the stand-offs of hits."""
     codes = np.array([*Status])
     if not all(_ended(part, codes) for part in _parts(dataset[v.STATUS])):
         yield f'its variable "{v.STATUS}" has unknown codes'
@@ -103,7 +103,7 @@ def _parts(array: xarray.DataArray) -> Iterator[np.ndarray[Any, Any]]:
 
 
 def _ended(status: np.ndarray[Any, Any], codes: np.ndarray[Any, Any]) -> bool:
-    """A point of a sweep may lack hits that another has: they are NaN."""
+    """Whether statuses are known codes, or NaN: a point of a sweep may lack hits that another has."""
     return bool((np.isin(status, codes) | np.isnan(status)).all())
 
 
@@ -135,7 +135,7 @@ def _sweep_faults(dataset: xarray.Dataset) -> Iterator[str]:
 
 
 def _missing(dataset: xarray.Dataset, *names: str) -> str | None:
-    """What every result has and this one has not, as a sentence; None if nothing is missing."""
+    """A sentence about a variable or attribute that every result has and this one lacks; None if nothing is missing."""
     missing = {*names, *v.COORDINATES, *v.VARIABLES} - {v.HIT} - dataset.variables.keys()
     if missing:
         return f'not a warpimpact result, it has no variable "{min(missing)}"'
@@ -148,7 +148,7 @@ def _missing(dataset: xarray.Dataset, *names: str) -> str | None:
 
 
 def _misuse(dataset: xarray.Dataset) -> str | None:
-    """What keeps hits that were chosen from a result from being used as one, as a sentence; None if nothing does."""
+    """A sentence about why hits chosen from a result cannot be used as a result; None if they can."""
     if (sentence := _missing(dataset)) is not None:
         return sentence
     if v.HIT not in dataset.sizes:
@@ -162,7 +162,7 @@ def _misuse(dataset: xarray.Dataset) -> str | None:
 
 
 def packing_fault(dataset: xarray.Dataset) -> str | None:
-    """Numbers may be stored with a factor and an offset, which are read only when the numbers are."""
+    """What is wrong with the factor and the offset of packed numbers, which are read only when the numbers are."""
     for name, array in dataset.variables.items():
         for attribute in ("scale_factor", "add_offset"):
             if attribute in array.encoding and not isinstance(array.encoding[attribute], int | float | np.number):

@@ -1,5 +1,4 @@
-"""The Datasets of a hit map and of a history: functions that build and read them. variables.py says what they
-hold.
+"""The Datasets of a hit map and of a history: functions that build and read them (variables: variables.py).
 
 Inside the package everything is in SI and radians; angles become degrees here. The Dataset follows the CF conventions
 and opens with plain ``xarray.open_dataset``.
@@ -58,7 +57,7 @@ def to_table(
 ) -> HitTable:
     """Gather shots and outcomes into the columns of the hit map.
 
-    Hits are numbered from 0. The outlines of the holes are coordinates: no choice of hits spreads them over the hits.
+    Hits are numbered from 0. The outlines of the holes are coordinates, so that no choice of hits repeats them per hit.
 
     Args:
         scene: The scene, which records m stand-offs.
@@ -68,8 +67,8 @@ def to_table(
         attributes: Global attributes of the run: title, history, campaign, versions, device, seed, ...
         double: Whether the outcomes were computed in double precision. If not, they are stored in single precision;
             shots are always double.
-        beside: Columns of other shots: those of the solid plate (v.SOLID_VARIABLES, v.SOLID_LIMITS), and those at a
-            finer level (`finer_columns`); SI and radians.
+        beside: Columns of other shots: at the solid plate (v.SOLID_VARIABLES, v.SOLID_LIMITS), and at a finer level
+            (`finer_columns`); SI and radians.
         left_out: Variables that are not stored.
     """
     coordinates: dict[str, Any] = {
@@ -104,8 +103,8 @@ def to_table(
 
 
 def narrow_table(scene: Scene, shots: Shots, outcomes: Outcomes, names: Collection[str]) -> HitTable:
-    """Only some columns of `to_table`, as far as the outcomes have them, with stand-offs and the core: for who computes
-    with many small results at once."""
+    """Some columns of `to_table`, if the outcomes have them, with stand-offs and the core, for computations with many
+    small results at once."""
     columns = own_columns(scene.target, shots)
     values: dict[str, Any] = {variable: getattr(shots, variable.field) for variable in v.SHOT_VARIABLES}
     values |= {name: columns[name] for name in v.OPTIONAL_SHOT_VARIABLES if name in columns}
@@ -122,52 +121,52 @@ def to_dataset(scene: Scene, shots: Shots, outcomes: Outcomes, **arguments: Any)
 
 
 def solid_columns(outcomes: Outcomes) -> dict[str, Any]:
-    """What is stored of the first shots at the solid reference, SI and radians."""
+    """Stored columns of the first shots at the solid reference, SI and radians."""
     stored = (v.SOLID_VARIABLES | v.SOLID_DEPTHS).items()
     return {name: getattr(outcomes, of_hits) for name, of_hits in stored if of_hits in outcomes}
 
 
 def base_alone_columns(outcomes: Outcomes) -> dict[str, Any]:
-    """What is stored of the same shots at the base alone, SI and radians."""
+    """Stored columns of the same shots at the base alone, SI and radians."""
     return {name: getattr(outcomes, of_hits) for name, of_hits in v.BASE_ALONE_VARIABLES.items()}
 
 
 def finer_columns(outcomes: Outcomes, numbers: NDArray[np.int64]) -> dict[str, Any]:
-    """What is stored of the hits with some numbers that were computed at a finer level, too; SI and radians."""
+    """Stored columns of the hits with these numbers that were computed at a finer level, too; SI and radians."""
     stored = {name: of_hits for name, of_hits in v.FINER_VARIABLES.items() if of_hits in outcomes}
     return {v.FINER_HIT: numbers.astype(np.int32)} | {name: getattr(outcomes, stored[name]) for name in stored}
 
 
 def assumed_columns(outcomes: Outcomes, numbers: NDArray[np.int64], assumptions: NDArray[np.int64]) -> dict[str, Any]:
-    """What is stored of hits under assumptions, by the numbers of both; SI and radians."""
+    """Stored columns of hits under assumptions, by the numbers of hits and assumptions; SI and radians."""
     told = {v.ASSUMED_HIT: numbers.astype(np.int32), v.ASSUMPTION: assumptions.astype(np.int8)}
     stored = {name: of_hits for name, of_hits in v.ASSUMED_VARIABLES.items() if of_hits in outcomes}
     return told | {name: getattr(outcomes, of_hits) for name, of_hits in stored.items()}
 
 
 def assumed_table(columns: Mapping[str, Any], attributes: Mapping[str, Any], *, double: bool) -> HitTable:
-    """Columns of hits under assumptions as `to_table` stores them, to be joined to those of the hits."""
+    """A table of hits under assumptions as `to_table` stores them, to be joined to the table of the hits."""
     stored = (name for name in v.GROUPS["assumed"] if name in columns)
     return HitTable.of({}, stored_columns(stored, columns, () if double else _computed()), attr.with_units(attributes))
 
 
 def _computed() -> set[v.Variable]:
-    """What is stored in single precision unless it was computed in double precision, of other shots, too."""
+    """Variables, also of other shots, that are stored in single precision unless computed in double precision."""
     computed = {*v.computed_variables(), *v.SOLID_VARIABLES, *v.SOLID_DEPTHS, *v.BASE_ALONE_VARIABLES}
     of_hits = v.FINER_VARIABLES | v.ASSUMED_VARIABLES
     return computed | {name for name, variable in of_hits.items() if variable in computed}
 
 
 def finer_pair(dataset: Result) -> tuple[Any, Any] | None:
-    """The hits of a result that were computed at a finer level, too, in memory: as they are in the result, and at that
-    level. None if there are none."""
+    """The hits of a result that were computed at a finer level, too, in memory: with their values in the result, and
+    with those at the finer level. None if there are none."""
     pair = _pair(dataset, v.FINER_HIT, v.FINER_VARIABLES)
     return None if pair is None else pair[:2]
 
 
 def assumed_pair(dataset: Result) -> tuple[Any, Any, NDArray[np.int64]] | None:
-    """The hits of a result under assumptions, one assumption after another, in memory: as they are in the result, under
-    the assumption, and its number, shape [hits]. None if there are none."""
+    """The hits of a result under assumptions, one assumption after another, in memory: with their values in the result,
+    with those under the assumption, and the number of the assumption, shape [hits]. None if there are none."""
     if v.ASSUMPTION not in dataset:
         return None
     pair = _pair(dataset, v.ASSUMED_HIT, v.ASSUMED_VARIABLES)
@@ -177,13 +176,13 @@ def assumed_pair(dataset: Result) -> tuple[Any, Any, NDArray[np.int64]] | None:
 def _pair(
     dataset: Result, of_number: v.Variable, variables: Mapping[v.Variable, v.Variable]
 ) -> tuple[Any, Any, NDArray[np.int64]] | None:
-    """Hits of a result that were computed otherwise, too: as they are in the result, otherwise, and their places among
-    those that were."""
+    """Hits of a result that were also computed otherwise: with their values in the result, with the other values, and
+    their places among the other values."""
     if of_number not in dataset or v.HIT not in dataset.sizes:
         return None
     stored = {name: of_hits for name, of_hits in variables.items() if name in dataset and of_hits in dataset}
     if any(dataset[name].dims != name.dims for name in (of_number, *stored)) or v.STATUS not in stored.values():
-        return None  # results that were joined have several; altered ones lack some
+        return None  # joined results have several hits of a number, and altered ones lack some
     numbers, hits = dataset[of_number].values, hit_numbers(dataset)
     order = np.argsort(hits, kind="stable")
     places = order[np.minimum(np.searchsorted(hits, numbers, sorter=order), len(order) - 1)]
@@ -206,13 +205,13 @@ def numbered(dataset: AResult, first: int = 0) -> AResult:
 
 
 def hit_numbers(dataset: Result) -> NDArray[np.int64]:
-    """Numbers of the hits in their campaign, shape (hit,); those of a file without them count from 0."""
+    """Numbers of the hits in their campaign, shape (hit,). In a file without numbers they count from 0."""
     return np.asarray(dataset[v.HIT].values)
 
 
 def is_choice(dataset: Result) -> bool:
-    """Whether the hits are others than the first ones of the campaign in their order; of an open file, one slice at a
-    time is in memory."""
+    """Whether the hits differ from the first ones of the campaign in their order. Of an open file, one slice at a time
+    is in memory."""
     if v.HIT not in dataset.coords:
         return False
     hits = dataset.sizes["hit"]
@@ -226,13 +225,13 @@ def is_choice(dataset: Result) -> bool:
 def history_dataset(
     scene: Scene, hit: xarray.Dataset, replay: Replay, *, attributes: Mapping[str, Any]
 ) -> xarray.Dataset:
-    """Gather a replayed shot into the Dataset of its history, which has enough data of core and plate to draw them.
+    """Gather a replayed shot into the Dataset of its history, with the data of core and plate that drawings need.
 
     Args:
-        scene: what was shot at what.
-        hit: one hit of a Dataset of `to_dataset`. Its values stay as scalars; its angular velocity becomes
+        scene: scene of the shot.
+        hit: one hit of a Dataset of `to_dataset`. Its values become scalars; its angular velocity becomes
             `residual_angular_velocity`.
-        replay: the shot's history.
+        replay: history of the shot.
         attributes: global attributes, which override those of `hit`.
     """
     core, plate = scene.core, scene.target.layers[0]
@@ -275,10 +274,10 @@ def history_dataset(
 
 
 def dataset_of(columns: Mapping[v.Variable, Any], attributes: Mapping[str, Any]) -> xarray.Dataset:
-    """The Dataset of a result that is no map of hits; its coordinates are the variables named as their dimension.
+    """The Dataset of a result that is no map of hits. Variables named as their dimension become coordinates.
 
     Args:
-        columns: values in the units that their variables are stored in.
+        columns: values in the units of their variables.
     """
     import xarray
 
@@ -296,7 +295,7 @@ def stored_columns(
     """Values in the units of the Dataset, with dimensions and attributes, as xarray takes them.
 
     Args:
-        single: those whose numbers are stored in single precision.
+        single: variables whose numbers are stored in single precision.
     """
     return {
         str(variable): (variable.dims, _stored(variable, values[variable], variable in single), variable.attributes)
@@ -328,10 +327,10 @@ def failed(dataset: Result) -> NDArray[np.bool_]:
 
 
 def shots_at_a_plate(dataset: Result) -> int:
-    """How many hits in a row are on one plate; 1 without bursts."""
+    """Number of consecutive hits on one plate; 1 without bursts."""
     return int(dataset.attrs.get(attr.SHOTS_AT_A_PLATE, 1))
 
 
 def images(dataset: Result) -> int:
-    """How many hits in a row are images of each other; 1 without `hits.irreducible`."""
+    """Number of consecutive hits that are images of each other; 1 without `hits.irreducible`."""
     return int(dataset.attrs.get(attr.IMAGES, 1))

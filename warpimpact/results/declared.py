@@ -1,4 +1,4 @@
-"""What a file of some kind has: variables with their values, and attributes, each by its declaration."""
+"""Declarations of what a kind of file has: variables with rules for their values, and attributes with their types."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     import xarray
 
 Rule: TypeAlias = Callable[[np.ndarray[Any, Any], Mapping[str, int]], bool]
-"""What the values of a variable are held to, given the sizes of all dimensions."""
+"""Check of the values of a variable, given the sizes of all dimensions."""
 
 Number = Annotated[float, Field(strict=True)]
 Finite = Annotated[Number, Field(ge=-LARGEST, le=LARGEST)]
@@ -74,7 +74,7 @@ class _DeclaredMaterial(BaseModel):
 
 
 _Shifts = Annotated[list[Number], Field(min_length=1, max_length=2)]
-"""Of the means of residual velocity and, where there is a stand-off, tilt."""
+"""Shifts of the means of residual velocity and, where there is a stand-off, tilt."""
 _TYPES: Mapping[str, Any] = {
     "text": Text,
     "table": Json[dict[str, Any]],
@@ -82,7 +82,7 @@ _TYPES: Mapping[str, Any] = {
     "count": Count,
     "pair": tuple[Number, Number],
 }
-"""Of attributes by their kind."""
+"""Types of attributes by their kind."""
 _SHAPES: Mapping[str, Any] = {
     attr.CORE: Json[_Core],
     attr.RESOLUTION: Json[_Resolution],
@@ -99,36 +99,36 @@ _SHAPES: Mapping[str, Any] = {
     attr.STOP_REASON: Literal["half_width", "numerics", "max_count"],
     attr.PLATE_PERIOD: tuple[Positive, Positive],
 }
-"""Of attributes whose readers rely on more."""
+"""Types of attributes on whose contents readers rely."""
 
 
 def numbers(values: np.ndarray[Any, Any], _: Mapping[str, int]) -> bool:
-    """Numbers; NaN or infinite where there is no value."""
+    """Whether the values are numbers; NaN or infinity stands for no value."""
     return values.dtype.kind in "iuf" and not bool((np.abs(values[np.isfinite(values)]) > LARGEST).any())
 
 
 def finite(values: np.ndarray[Any, Any], sizes: Mapping[str, int]) -> bool:
-    """Numbers, each with a value."""
+    """Whether the values are finite numbers."""
     return numbers(values, sizes) and bool(np.isfinite(values).all())
 
 
 def not_negative(values: np.ndarray[Any, Any], sizes: Mapping[str, int]) -> bool:
-    """Numbers of at least 0, each with a value."""
+    """Whether the values are finite numbers of at least 0."""
     return finite(values, sizes) and bool((values >= 0).all())
 
 
 def texts(values: np.ndarray[Any, Any], _: Mapping[str, int]) -> bool:
-    """Texts; where there is none, a file does not tell their type."""
+    """Whether the values are texts. The type of an empty array is not stored in a file."""
     return values.size == 0 or values.dtype.kind in "UT" or all(isinstance(value, str) for value in values.flat)
 
 
 def among(*allowed: float) -> Rule:
-    """Each one of these numbers."""
+    """Rule that each value is one of these numbers."""
     return lambda values, _: values.dtype.kind in "iuf" and bool(np.isin(values, allowed).all())
 
 
 def place_in(dim: str) -> Rule:
-    """Whole numbers, each a place along a dimension."""
+    """Rule that each value is the index of a place along a dimension."""
     return lambda values, sizes: (
         values.size == 0 or (values.dtype.kind in "iu" and bool(((values >= 0) & (values < sizes.get(dim, 0))).all()))
     )
@@ -136,15 +136,15 @@ def place_in(dim: str) -> Rule:
 
 @dataclass(frozen=True)
 class Declaration:
-    """What a file, or a group of one, has; whatever else is in it counts for nothing.
+    """What a file, or a group in a file, has. Anything else in it is ignored.
 
     Attributes:
-        variables: by name what they are along. A `Variable` has its units, too.
-        optional: those that may be absent.
-        whole: of each of these groups all are there or none.
-        rules: what a variable holds, where that is not `numbers`.
-        attributes: global attributes that it has, with their types for pydantic.
-        more: what else keeps it from being such a file, as a phrase.
+        variables: dimensions of each variable, by name. The units of a `Variable` are checked, too.
+        optional: variables that may be absent.
+        whole: groups of variables that are present or absent together.
+        rules: rules of variables, where they are not `numbers`.
+        attributes: global attributes, with their types for pydantic.
+        more: returns a further fault of a Dataset as a phrase; None if there is none.
     """
 
     variables: Mapping[str, tuple[str, ...]]
@@ -186,7 +186,7 @@ class Declaration:
 
 
 def missing_fault(dataset: xarray.Dataset, names: Sequence[str]) -> str | None:
-    """The first variable that is not there, of such as are there together."""
+    """A phrase about the first missing variable, if not all of these are missing."""
     there = [name for name in names if name in dataset.variables]
     absent = [name for name in names if name not in there]
     return f'it has "{there[0]}", but no variable "{absent[0]}"' if there and absent else None
@@ -202,7 +202,7 @@ def metadata_faults(array: xarray.Variable, declared: v.Variable) -> Iterator[st
 
 
 def attribute_faults(attributes: Mapping[Any, Any]) -> Iterator[str]:
-    """What is wrong with global attributes that any kind of file may have."""
+    """Faults of global attributes that any kind of file may have."""
     for name, value in attributes.items():
         if not _is_allowed(str(name), value):
             yield f'its attribute "{name}" is not what it should be'

@@ -27,11 +27,11 @@ if TYPE_CHECKING:
 
 
 class OutputError(OSError):
-    """A result file that cannot be written; the message is one sentence for the user."""
+    """A result file cannot be written; the message is one sentence for the user."""
 
 
 class ResultError(ValueError):
-    """A file that cannot be read as a warpimpact result; the message is one sentence for the user."""
+    """A file cannot be read as a warpimpact result; the message is one sentence for the user."""
 
 
 def write(dataset: xarray.Dataset, path: Path) -> None:
@@ -50,8 +50,8 @@ CHUNK = 2**15
 
 @contextmanager
 def aside(path: Path, folder: Path | None = None, *, named: Callable[[Path], Path] | None = None) -> Iterator[Path]:
-    """A name in a folder of the same disk, if not given that of `path`, to write to; what was written there is on the
-    disk before it gets its own name, which is `path` or, where there is `named`, what that makes of the file.
+    """A temporary path on the same disk to write to. After the block the file is flushed and renamed to `path`, or to
+    `named(file)` if that is given. `folder` is where the temporary file lies; by default that of `path`.
 
     Raises:
         OutputError: The file cannot be written; what was there before is untouched.
@@ -71,7 +71,7 @@ def aside(path: Path, folder: Path | None = None, *, named: Callable[[Path], Pat
 
 @contextmanager
 def told_as(path: Path) -> Iterator[None]:
-    """Tell what goes wrong in writing as an OutputError of this file."""
+    """Raise errors of writing as an OutputError about this file."""
     try:
         yield
     except (OSError, RuntimeError) as error:  # netCDF reports a full disk as RuntimeError
@@ -87,7 +87,7 @@ def _flush(path: Path, mode: int) -> None:
 
 
 def _cause(error: Exception, path: Path) -> str:
-    """What an error of the disk means: netCDF does not say that the disk is full."""
+    """The cause of an error of the disk in words: netCDF does not say that the disk is full."""
     with suppress(OSError):
         if isinstance(error, RuntimeError) and shutil.disk_usage(path.parent).free < 2**20:
             return "the disk is full"
@@ -130,7 +130,7 @@ def read_tree(path: Path, kind: Kind) -> xarray.DataTree:
 
 
 def open_result(path: str | Path) -> xarray.Dataset:
-    """Open a result file. Only what is used of it is read; ``with open_result(path) as result:`` closes it.
+    """Open a result file. Values are read when they are used. ``with open_result(path) as result:`` closes the file.
 
     Args:
         path: a file of ``warpimpact run``, of `run_to_file`, or of ``to_netcdf`` of a result.
@@ -142,7 +142,7 @@ def open_result(path: str | Path) -> xarray.Dataset:
         ResultError: the file is missing, is not netCDF, or is not a warpimpact result.
     """
     with opened(Path(path)):
-        pass  # checked; the file that is returned stays open
+        pass  # the file is checked here; the one that is returned stays open
     dataset = _joined(Path(path))
     result = _numbered(dataset)
     result.set_close(dataset.close)
@@ -155,9 +155,9 @@ def _numbered(dataset: xarray.Dataset) -> xarray.Dataset:
 
 @contextmanager
 def opened(path: Path, *kinds_allowed: Kind) -> Iterator[xarray.Dataset]:
-    """A file of one of some kinds, of which only what is used is read; without kinds a map of hits.
+    """Open a file of one of these kinds (by default a map of hits). Values are read when they are used.
 
-    What the library finds damaged, now or when it is read, is told in a sentence.
+    Damage that the library finds, now or when values are read, is raised as a sentence.
 
     Raises:
         ResultError: The file is missing, is not netCDF, or is of no such kind.
@@ -187,14 +187,14 @@ def is_history(dataset: xarray.Dataset) -> bool:
 
 
 _MOST_PACKED = 2000
-"""How many times its size a file may hold: zlib packs a thousand bytes into one at best."""
+"""Largest ratio of the contents of a file to its size: zlib packs a thousand bytes into one at best."""
 
 
 def kind_of(path: Path) -> Kind | None:
-    """What a file is, by its contents; None of one that is nothing known.
+    """The kind of a file, by its contents; None if it is no known kind.
 
     Raises:
-        ResultError: it is missing, is no regular file, or is damaged.
+        ResultError: the file is missing, is no regular file, or is damaged.
     """
     try:
         check_file(path)
@@ -205,10 +205,11 @@ def kind_of(path: Path) -> Kind | None:
 
 
 def check_kind(path: Path, *wanted: Kind) -> Kind:
-    """The kind of a file, if it is one of some; where nothing tells it, a map of hits counts, which says what it lacks.
+    """The kind of a file, if it is one of the wanted ones. A file without a recognised kind counts as a map of hits,
+    whose reader says what it lacks.
 
     Raises:
-        ResultError: it is missing, is damaged, or is of another kind.
+        ResultError: the file is missing, is damaged, or is of another kind.
     """
     kind = kind_of(path)
     for allowed in wanted:
@@ -225,8 +226,7 @@ def check_kind(path: Path, *wanted: Kind) -> Kind:
 
 @contextmanager
 def readable(path: Path) -> Iterator[None]:
-    """Tell what goes wrong in opening a file as a ResultError: one that was altered leads the libraries into errors of
-    any class."""
+    """Raise errors of opening a file as a ResultError. An altered file leads the libraries into errors of any class."""
     try:
         yield
     except Exception as error:
@@ -234,10 +234,10 @@ def readable(path: Path) -> Iterator[None]:
 
 
 def _joined(path: Path) -> xarray.Dataset:
-    """The root of a file with the contents of its groups as coordinates, and with room for some chunks of a variable
-    instead of for tens of megabytes.
+    """The root of a file with the contents of its groups as coordinates. The cache has room for some chunks per
+    variable instead of tens of megabytes.
 
-    Numbers of hits have no index, which would be in memory as a whole.
+    Numbers of hits have no index, because the whole index would be in memory.
     """
     import xarray
 
@@ -262,10 +262,10 @@ def _joined(path: Path) -> xarray.Dataset:
 
 
 def _loaded(path: Path) -> xarray.DataTree:
-    """The groups in memory, read one after the other.
+    """The groups of a file in memory, read one after the other.
 
-    Each is closed before the next one opens. A tree that stays open is closed when Python collects it, in the middle of
-    another access, which crashes netCDF.
+    Each group is closed before the next one is opened. Python would close an open tree when it collects it, in the
+    middle of another access, which crashes netCDF.
     """
     import xarray
 

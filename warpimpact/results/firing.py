@@ -103,25 +103,26 @@ VARIABLES = (
 )
 TEST = attr.FIRING_TEST
 SETTINGS = "firing_test_settings"
-"""Attribute: all settings in SI, defaults included, as JSON."""
+"""Attribute: all settings in SI, including defaults, as JSON."""
 REQUIREMENT = "requirement"
-"""Attribute: what a named requirement is taken to ask for, its source and what is assumed; empty without one."""
+"""Attribute: what a named requirement asks for as understood here, its source and what is assumed; empty without
+one."""
 DISCLAIMER = "disclaimer"
 SENTENCE = "a computation by a model, not a certificate: no shot was fired"
 FIXED = {attr.REFERENCES: "docs/firing.md of warpimpact", DISCLAIMER: SENTENCE}
 """Attributes that every test has."""
 TRUE_V50, TRUE_SPREAD = "true_v50", "true_spread"
-"""Of the target [m/s]: the median of its limit velocities, and half the distance from V16 to V84."""
+"""True values of the target [m/s]: the median of its limit velocities, and half the distance from V16 to V84."""
 PROOF_SHOTS, PROOF_ALLOWED, PROOF_VELOCITY = "proof_shots", "proof_allowed", "proof_velocity"
 CELL = "plate_period"
 UNFAIR_YAW, UNFAIR_VELOCITY = "unfair_yaw_share", "unfair_velocity_share"
 """Shares of the shots that the rules of fair hits refuse."""
 MEAN, MEAN_INTERVAL = "mean_perforation_probability", "mean_perforation_probability_interval"
-"""Over all directions, weighted."""
+"""Weighted mean over all directions, and its interval."""
 SEARCH = "limit_runs_per_hit"
-"""Runs per hit that the search of limits took."""
+"""Runs per hit of the search of limits."""
 ASSUMPTIONS_NOTE = "assumptions_note"
-"""How the answers under assumptions were computed, or why they are not known; absent of a target that is known."""
+"""How the answers under assumptions were computed, or why they are unknown; absent if the target itself is known."""
 
 
 _RESPONSE = (SHARE, SHARE_LOW, SHARE_HIGH, VELOCITY, QUANTILE, QUANTILE_VELOCITY, QUANTILE_LOW, QUANTILE_HIGH)

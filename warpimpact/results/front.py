@@ -106,16 +106,16 @@ VARIABLES = (
 )
 DESIGN = attr.DESIGN_FILE
 OUTCOME, FEASIBLE, NONE_FEASIBLE = "outcome", "front", "no design within the bounds"
-"""Attribute: how the search ended, one of both."""
+"""Attribute: how the search ended, one of FEASIBLE and NONE_FEASIBLE."""
 BOX = "hypervolume_box"
-"""Attribute: worst values of the first generation to minimise, then the distances from the best."""
+"""Attribute: worst values of the first generation to minimise, then their distances from the best."""
 REFUSED, PILOTS = "refused_designs", "pilots"
 """Attributes: designs that broke a constraint, and pilots of the search."""
 REFERENCES = "docs/howto/optimise.md of warpimpact"
 
 
 def _labels(values: np.ndarray[Any, Any], sizes: Mapping[str, int]) -> bool:
-    """JSON lists of what a variable chooses from, empty of a range."""
+    """Whether the values are JSON lists of the options of each variable; empty for a range."""
     choices = [parsed_json(text) for text in values.flat if text] if texts(values, sizes) else [None]
     return all(isinstance(choice, list) and all(isinstance(label, str) for label in choice) for choice in choices)
 
@@ -134,7 +134,7 @@ def _more(dataset: xarray.Dataset) -> str | None:
 
 
 _OF_ASSUMPTIONS = (ASSUMPTION, UNDER, REFERENCE_UNDER)
-"""Files of earlier versions have none."""
+"""Variables that files of earlier versions lack."""
 _TEXTS = (
     UNTESTED,
     ASSUMPTION,

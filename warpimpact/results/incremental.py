@@ -1,4 +1,4 @@
-"""A result file that is written part by part, as a run goes on."""
+"""A result file that is written part by part during a run."""
 
 from __future__ import annotations
 
@@ -14,12 +14,12 @@ from warpimpact.results.table import HitTable, joined
 
 
 class IncrementalFile:
-    """A result file that is written part by part under another name, and gets its own when it is complete.
+    """A result file that is written part by part under another name, and renamed when it is complete.
 
     Args:
         path: the file.
-        written: where its parts are written, on the same disk; an existing file is replaced.
-        hits: how many there will be.
+        written: file on the same disk to which parts are written. An existing file is replaced.
+        hits: number of all hits.
     """
 
     def __init__(self, path: Path, written: Path, hits: int) -> None:
@@ -29,10 +29,10 @@ class IncrementalFile:
         self._at = 0
 
     def add(self, table: HitTable) -> None:
-        """Add the next hits. Few of them wait for others: every access to the file costs some time.
+        """Add the next hits. A few hits are held back, because every access to the file costs some time.
 
         Raises:
-            OutputError: they cannot be written; the file is of no use then.
+            OutputError: they cannot be written. The file cannot be used then.
         """
         self._waiting.append(table)
         if sum(table.sizes["hit"] for table in self._waiting) >= CHUNK // 2:
@@ -40,10 +40,10 @@ class IncrementalFile:
                 self._write()
 
     def complete(self, attributes: Mapping[str, Any]) -> None:
-        """Give the file its name; an existing one is replaced.
+        """Rename the file to its final name, which replaces an existing file.
 
         Args:
-            attributes: global attributes over those of the first part.
+            attributes: global attributes that replace those of the first part.
 
         Raises:
             OutputError: The file cannot be written; what was there before is untouched.
@@ -55,7 +55,7 @@ class IncrementalFile:
             os.replace(self._written, file)
 
     def close(self) -> None:
-        """Let go of the file."""
+        """Close the file."""
         if self._file is not None:
             self._file, file = None, self._file
             file.close()

@@ -1,5 +1,5 @@
-"""Ctrl-C and the SIGTERM of a batch system: both stop in the same way, both wait for the end of a protected block, and
-neither is lost."""
+"""Ctrl-C and the SIGTERM of a batch system. Both stop a process in the same way, both wait for the end of a protected
+block, and neither is lost."""
 
 import signal
 import threading
@@ -14,8 +14,8 @@ _asked: list[int] = []
 def terminated_as_interrupted() -> Iterator[None]:
     """Treat SIGTERM like Ctrl-C. A batch system sends it to a job whose time is used up.
 
-    Both are remembered: the exception is lost where it is raised in code that ignores exceptions, for instance while an
-    object is deleted or a module is imported (`stop_if_asked`).
+    Both signals are remembered, because code that ignores exceptions, such as a destructor or an import, may lose the
+    exception (`stop_if_asked`).
     """
     if threading.current_thread() is not threading.main_thread():  # signals reach the main thread only
         yield
@@ -25,7 +25,7 @@ def terminated_as_interrupted() -> Iterator[None]:
         _asked.append(number)
         raise KeyboardInterrupt
 
-    # A background job of a shell ignores SIGINT, and goes on doing so.
+    # A shell has its background jobs ignore SIGINT, and this does not change that.
     numbers = [number for number in _STOPPING if signal.getsignal(number) is not signal.SIG_IGN]
     before = {number: signal.signal(number, interrupt) for number in numbers}
     try:
@@ -37,7 +37,7 @@ def terminated_as_interrupted() -> Iterator[None]:
 
 
 def stop_if_asked() -> None:
-    """Raise KeyboardInterrupt if a signal asked for it."""
+    """Raise KeyboardInterrupt if a signal has asked for it."""
     if _asked:
         raise KeyboardInterrupt
 

@@ -1,4 +1,4 @@
-"""What a kind of file is: its name, who writes and takes it, by what it is recognised, and what is checked of it."""
+"""Kinds of files: name, maker, user, marks by which a file is recognised, and checks."""
 
 from __future__ import annotations
 
@@ -14,15 +14,15 @@ class Kind:
     """A kind of file.
 
     Attributes:
-        name: what it is, with its article.
-        use: which command takes it.
-        marks: names of variables, groups and attributes, or of tables, one of which every such file has and no other.
-        maker: the command that writes it; empty of a file that people write.
-        misuse: says of a Dataset what its user must do otherwise, as a sentence; None if nothing.
-        fault: says what keeps a Dataset, or the tree of a posterior, from being of this kind, as a phrase; None if
+        name: name with its article.
+        use: the command that takes it.
+        marks: names of variables, groups, attributes or tables. Every file of this kind, and no other, has one of them.
+        maker: the command that writes it; empty if people write it.
+        misuse: returns a sentence about what the user of a Dataset must do otherwise; None if nothing.
+        fault: returns a phrase about what keeps a Dataset, or the tree of a posterior, from being of this kind; None if
             nothing does.
         is_tree: whether it is read as a tree of its groups.
-        view: what `warpimpact inspect` and `report` show of it; None where a room above this one has its view.
+        view: what `warpimpact inspect` and `report` show of it; None where a higher room has its view.
     """
 
     name: str
@@ -35,7 +35,7 @@ class Kind:
     view: Callable[[Any], list[Section]] | None = None
 
     def told(self, path: object, wanted: str) -> str:
-        """A sentence that a file is of this kind and not what is wanted, with what takes it."""
+        """A sentence that a file is of this kind and not the wanted one, with the command that takes it."""
         written = f", as {self.maker} writes" if self.maker else ""
         return f"{path}: is {self.name}{written}, not {wanted}; {self.use}"
 

@@ -1,4 +1,4 @@
-"""All kinds of files, and how one is recognised."""
+"""All kinds of files, and how a file's kind is recognised."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ _BEGIN_NETCDF = b"\x89HDF", b"CDF"
 
 
 NETCDF = (posterior_file.POSTERIOR, front.FRONT, firing.FIRING, replayed_hit.HISTORY)
-"""Kinds that are recognised by their marks; a map of hits and a sweep by the variable of statuses."""
+"""Kinds that are recognised by their marks. A map of hits and a sweep are recognised by the variable of statuses."""
 
 DESIGN = Kind("a design file", "warpimpact optimise takes it", ("variables", "objectives"))
 FIT = Kind("a fit", "warpimpact identify takes it", ("shot", "prior"))
@@ -28,13 +28,13 @@ _TEXTS = (DESIGN, FIT, TEST, ENTRIES, CAMPAIGN)
 
 
 def is_netcdf(path: Path) -> bool:
-    """Whether a file begins as netCDF files do; it is a regular one."""
+    """Whether a path is a regular file that begins as netCDF files do."""
     with path.open("rb") as file:
         return file.read(4).startswith(_BEGIN_NETCDF)
 
 
 def kind_of(path: Path) -> Kind | None:
-    """What a regular file is, by its contents; None of one that is nothing known.
+    """The kind of a regular file, by its contents; None if it is no known kind.
 
     Raises:
         Exception: of any class, for a damaged netCDF file.
@@ -55,7 +55,7 @@ def kind_of(path: Path) -> Kind | None:
 
 
 def kind_of_tables(tables: Collection[str]) -> Kind | None:
-    """What a TOML file with these tables is."""
+    """The kind of a TOML file with these tables."""
     return _marked(tables, _TEXTS)
 
 

@@ -1,4 +1,4 @@
-"""What a Dataset tells of the layers of a target: where they stand, what scatters in them, where they are solid."""
+"""Layers of a target in a Dataset: their faces, their scattered quantities, and where they are solid."""
 
 from __future__ import annotations
 
@@ -18,8 +18,8 @@ if TYPE_CHECKING:
 
 
 def own_columns(target: Target, shots: Shots) -> dict[str, NDArray[Any]]:
-    """What differs from shot to shot under the names of a result: of what every layer has, the plate's own as
-    `thickness`; those of all layers as `layer_thickness`, if a layer behind the plate differs."""
+    """Quantities that differ from shot to shot, under the names of a result. A quantity that every layer has is named
+    as `thickness` for the plate, and as `layer_thickness` for all layers if a layer behind the plate differs."""
     elsewhere = (*BY_LAYER, *OF_A_DRAW)  # the latter in the posterior, at `posterior_draw`
     columns: dict[str, NDArray[Any]] = {name: values for name, values in shots.columns.items() if name not in elsewhere}
     for name in BY_LAYER:
@@ -32,7 +32,8 @@ def own_columns(target: Target, shots: Shots) -> dict[str, NDArray[Any]]:
 
 
 def values_of(target: Target, hit: xarray.Dataset, name: str) -> list[float]:
-    """A quantity of every layer in a hit of a result, which has it under the names of `own_columns`."""
+    """The values of a quantity in all layers for one hit of a result, which has them under the names of
+    `own_columns`."""
     if f"layer_{name}" in hit:
         return [float(value) for value in hit[f"layer_{name}"]]
     values = [target.value(name, k) for k in range(len(target.layers))]
@@ -54,8 +55,8 @@ def labels(target: Target) -> dict[str, Any]:
 
 
 def sections(scene: Scene, hit: xarray.Dataset, section: NDArray[np.float64]) -> dict[str, NDArray[Any]]:
-    """Faces of the layers for one hit, and where each is solid along y and z through the hit point; empty if the plate
-    stands alone."""
+    """Faces of the layers for one hit, and where each layer is solid along y and z through the hit point; empty for a
+    single plate."""
     target, hit_y, hit_z = scene.target, float(hit[v.HIT_Y]), float(hit[v.HIT_Z])
     if len(target.layers) == 1:
         return {}
@@ -73,8 +74,8 @@ def sections(scene: Scene, hit: xarray.Dataset, section: NDArray[np.float64]) ->
 
 
 def fields(scene: Scene, behind: dict[int, Weakened]) -> dict[str, NDArray[Any]]:
-    """What is left of the layers behind the plate in a replayed hit, by LAYER_FIELDS; empty if none is reached that
-    weakens. Windows of several sizes are filled up with NaN."""
+    """Resistance left in the layers behind the plate in a replayed hit, by LAYER_FIELDS; empty if no layer that weakens
+    is reached. Smaller windows are filled up with NaN."""
     if not behind:
         return {}
     snapshots = len(next(iter(behind.values())).share)

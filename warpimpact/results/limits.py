@@ -1,5 +1,4 @@
-"""What a Dataset tells of a search of limits, at the solid plate of equal areal density, and at the base
-alone."""
+"""The limits in a Dataset at the solid plate of equal areal density, and at the base alone."""
 
 from __future__ import annotations
 
@@ -18,8 +17,8 @@ if TYPE_CHECKING:
 
 
 def solid_limits(dataset: xarray.Dataset) -> xarray.Dataset | None:
-    """The limits at the solid plate as a result of limits: along "hit", with the attributes of that plate. None if the
-    result has none. One shot tells of all hits; else they are those of the first hits."""
+    """The limits at the solid plate as a result of limits, along "hit", with the attributes of this plate; None if the
+    result has none. They belong to the first hits, or one shot stands for all hits."""
     attributes = dataset.attrs
     if not {attr.LIMIT, attr.SOLID_LIMIT_DENSITY, attr.SOLID_LIMIT_HIGHEST} <= attributes.keys():
         return None
@@ -33,7 +32,7 @@ def solid_limits(dataset: xarray.Dataset) -> xarray.Dataset | None:
 
 
 def base_alone_limits(dataset: xarray.Dataset) -> xarray.Dataset | None:
-    """The limits at the base alone, as `solid_limits`."""
+    """The limits at the base alone, in the form of `solid_limits`."""
     attributes = dataset.attrs
     if attr.LIMIT not in attributes:
         return None
@@ -46,17 +45,17 @@ def base_alone_limits(dataset: xarray.Dataset) -> xarray.Dataset | None:
 def _limits_in(
     dataset: xarray.Dataset, variables: Mapping[str, v.Variable], attributes: Mapping[str, Any]
 ) -> xarray.Dataset | None:
-    """The limits at a reference, whose variables are given by the quantity of the search."""
+    """The limits at a reference. `variables` are its variables by the quantity of the search."""
     import xarray
 
     quantity = dataset.attrs[attr.LIMIT]
     if (name := variables[quantity]) not in dataset.variables:
         return None
-    if dataset[name].dims != name.dims:  # of results of different plates that were joined
+    if dataset[name].dims != name.dims:  # joined results of different plates
         return None
     values = dataset[name].values
     if len(values) > 1 and not np.array_equal(hit_numbers(dataset[[v.HIT]])[: len(values)], np.arange(len(values))):
-        return None  # a choice of hits that are not the first ones
+        return None  # the hits were chosen, and are not the first ones
     status = np.where(np.isnan(values), Status.UNFINISHED, Status.PERFORATED).astype(np.int8)
     names = v.LIMITS[quantity].value, v.STATUS
     columns = stored_columns(names, dict(zip(names, (values, status), strict=True)))

@@ -2,8 +2,8 @@
 
     mean(q)   worst_tenth(q)   worst_point(q)   quantile(q, 0.05)   P(q > 30 deg)   P(event)   areal_density
 
-q is a quantity of vocabulary.py, with its stand-off behind @ where it has one, as in `mean(tilt@130mm)`; without it the
-largest stand-off counts. A limit thickness is that of `@layer 1` where a search for designs asks for it.
+q is a quantity of vocabulary.py, with its stand-off behind @ if it has one, as in `mean(tilt@130mm)`; the default is
+the largest stand-off. A search for designs may ask for the limit thickness of a layer with `@layer 1`.
 """
 
 from __future__ import annotations
@@ -37,12 +37,12 @@ _KINDS: dict[str, Any] = {
         *(units.Length, units.ArealDensity, units.Number),
     )
 }
-"""Types of the quantities that have these units in the Dataset."""
+"""Types of the quantities with these units in the Dataset."""
 
 STATUSES = {status.name.lower(): status for status in OF_SHOTS if not status.failed}
 NAMES = {"V50": "quantile(limit_velocity, 0.5)", "V05": "quantile(limit_velocity, 0.05)"}
 NAMES |= {"H50": "quantile(limit_thickness, 0.5)", "H05": "quantile(limit_thickness, 0.05)"}
-"""Measures that have a name of their own."""
+"""Measures by names of their own."""
 
 _FORM = re.compile(
     r"(?P<statistic>\w+)\(\s*(?P<name>\w+)\s*(?:@\s*(?P<place>[^<>,]+?)\s*)?"
@@ -63,7 +63,7 @@ _STATISTICS = {
     "target": ("", "", ""),
     "by_hit": ("", "", ""),
 }
-"""Kinds of measures, with what each adds to label, definition and source of a quantity."""
+"""Kinds of measures, with what each adds to label, definition and source of its quantity."""
 
 
 @dataclass(frozen=True)
@@ -74,9 +74,9 @@ class Measure:
         text: the measure in the language of this file.
         kind: "mean", "worst_tenth", "worst_point", "quantile", "probability" (of a quantity beyond a limit), "share"
             (of the shots to which an event happens) or "target" (of a number of the target itself).
-        name: of the quantity or the event.
-        standoff: distance behind the rear face [m]; None where the largest counts, or there is none.
-        layer: whose limit thickness it is; None where that is the layer whose limits were sought.
+        name: name of the quantity or the event.
+        standoff: distance behind the rear face [m]; None for the largest, or where there is none.
+        layer: layer of the limit thickness; None for the layer whose limits were searched.
         share: share of the values below a quantile.
         above, limit: side and limit of a probability, in the units of the Dataset.
     """
@@ -95,7 +95,7 @@ class Measure:
         """Read a measure.
 
         Raises:
-            ValueError: says what was found, what is allowed and, where it is clear, what was meant.
+            ValueError: the message says what was found, what is allowed and, where it is clear, what was meant.
         """
         text = text.strip()
         if text in WEIGHTS:
@@ -148,14 +148,14 @@ class Measure:
 
     @property
     def place(self) -> str:
-        """Where it is measured, such as " at 130 mm"; empty where that is not given."""
+        """Words for the place of the measurement, such as " at 130 mm"; empty where no place is given."""
         if not self.quantity.has_standoff:
             return ""
         return " at the last stand-off" if self.standoff is None else f" at {self.standoff * 1e3:g} mm"
 
     @property
     def label(self) -> str:
-        """The measure for people, without its unit."""
+        """The measure in words, without its unit."""
         layer = "the layer" if self.layer is None else f"layer {self.layer}" if self.layer else "the plate"
         label = self.quantity.label.format(layer=layer) + self.place
         if self.kind == "share":
@@ -173,7 +173,7 @@ class Measure:
 
     @property
     def axis(self) -> str:
-        """What an axis says: the quantity with its unit, or the probability."""
+        """Label of an axis: the quantity with its unit, or the probability."""
         return self.column.title
 
     @property
@@ -186,23 +186,23 @@ class Measure:
 
     @property
     def higher_is_better(self) -> bool | None:
-        """For whoever is behind the target; None where neither is."""
+        """Whether a higher value is better for whoever is behind the target; None where neither direction is better."""
         better = self.quantity.higher_is_better
         return not better if self.kind == "probability" and not self.above and better is not None else better
 
     @property
     def better(self) -> str:
-        """What is better, as text."""
+        """Words for the better direction."""
         return {True: "higher is better", False: "lower is better", None: "neither is better"}[self.higher_is_better]
 
     @property
     def least(self) -> float:
-        """What no value is below."""
+        """Lower bound of all values."""
         return 0.0 if self.is_binary else self.quantity.least
 
     @property
     def most(self) -> float:
-        """What no value is above."""
+        """Upper bound of all values."""
         return 1.0 if self.is_binary else self.quantity.most
 
     @property
@@ -212,32 +212,32 @@ class Measure:
 
     @property
     def has_interval(self) -> bool:
-        """Whether hits give it an interval."""
+        """Whether the hits give an interval."""
         return self.kind not in ("worst_point", "target")
 
     @property
     def is_limit(self) -> bool:
-        """Whether a search of limits tells it."""
+        """Whether the measure needs a search of limits."""
         return self.quantity.need in (LIMIT_VELOCITY, LIMIT_THICKNESS, OTHER_LAYERS)
 
     @property
     def column(self) -> Measure:
-        """The numbers of the shots that it is made of, as a measure: the same for all statistics of a quantity."""
+        """The mean of the numbers behind the measure. It is the same for all statistics of a quantity."""
         return self if self.is_binary else replace(self, text=self.name, kind="by_hit", share=0.5)
 
     @property
     def units(self) -> str:
-        """Those of the Dataset; "1" for a probability."""
+        """Units in the Dataset; "1" for a probability."""
         return "1" if self.is_binary else self.quantity.units
 
     @property
     def display(self) -> Unit:
-        """How its values are shown."""
+        """The unit and the format in which its values are shown."""
         return STORED[self.units]
 
     @property
     def worse(self) -> float:
-        """Factor that makes larger values worse ones."""
+        """Factor that makes larger values worse."""
         return -1.0 if self.quantity.higher_is_better else 1.0
 
     def in_units(self, value: object) -> float:
@@ -249,7 +249,7 @@ class Measure:
         return _stored(value, self.units)
 
     def of(self, dataset: Result) -> Self:
-        """The measure with its place in a result: the largest stand-off unless it is given.
+        """The measure with its place in a result: by default the largest stand-off.
 
         Raises:
             ValueError: the result lacks what the measure needs.
@@ -281,22 +281,22 @@ class Measure:
         return self.quantity.values(dataset, standoff)
 
     def values(self, dataset: Result) -> Array:
-        """What the measure counts of every shot, shape [hits]."""
+        """The values of all shots of which the measure is made, shape [hits]."""
         return self.counted(self.by_hit(dataset))
 
     def counted(self, by_hit: Array) -> Array:
-        """What the measure counts of the quantity of every shot: 1 or 0 of a probability, no infinite number of a
+        """The values of the measure from the quantity of every shot: 1 or 0 for a probability, finite numbers for a
         mean."""
         if self.kind == "probability":
             return np.where(np.isnan(by_hit), np.nan, self.margin(by_hit) > 0.0)
         return np.where(np.isinf(by_hit), np.nan, by_hit) if self.kind == "mean" else by_hit
 
     def margin(self, by_hit: Array) -> Array:
-        """How far the quantity of every shot is on the side of the limit that counts."""
+        """Distance of every shot's quantity from the limit of the probability, positive on the side that counts."""
         return by_hit - self.limit if self.above else self.limit - by_hit
 
     def averaged(self, values: Array) -> Array:
-        """Numbers of the shots whose mean is the measure, of their values; not of a quantile or a worst point."""
+        """Numbers of the shots whose mean is the measure, from their values. A quantile and a worst point have none."""
         if self.kind != "worst_tenth":
             return values
         numbers = self.worse * worst_tenth(self.worse * values)

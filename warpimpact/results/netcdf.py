@@ -1,4 +1,4 @@
-"""Tables in netCDF files, which are those that xarray would write of their Datasets, to the bit."""
+"""Tables in netCDF files. The files are those that xarray would write of the Datasets, to the bit."""
 
 from __future__ import annotations
 
@@ -18,11 +18,11 @@ _PACKED = {"zlib": True, "complevel": 1}
 
 
 def write_table(table: HitTable, file: Path, *, chunk: int | None = None, compressed: bool = True) -> None:
-    """Write a HitTable, with the coordinates that have a group of their own in it.
+    """Write a HitTable. Coordinates that belong to a group are written into it.
 
     Args:
-        chunk: hits per chunk; "hit" is unlimited then.
-        compressed: numbers of the root are compressed; those of the groups always are.
+        chunk: hits per chunk; "hit" is then unlimited.
+        compressed: whether numbers of the root are compressed. Those of the groups always are.
     """
     groups = {group: [name for name in names if name in table.coords] for group, names in v.GROUPS.items()}
     root = table.drop_vars([name for names in groups.values() for name in names])
@@ -69,8 +69,8 @@ def _write(
 
 
 def open_to_append(file: Path) -> Any:
-    """A file that `write_table` wrote in chunks, for `append`; of the megabytes that it may keep of every variable, two
-    chunks will do."""
+    """Open a file that `write_table` wrote in chunks, for `append`. The cache of a variable, by default megabytes, has
+    room for two chunks."""
     target = netCDF4.Dataset(file, "a")
     target.set_auto_maskandscale(False)
     for variable in target.variables.values():
@@ -80,7 +80,7 @@ def open_to_append(file: Path) -> Any:
 
 
 def append(table: HitTable, target: Any, first: int) -> None:
-    """Write what a HitTable has along "hit" behind the first so many hits of an open file."""
+    """Write the columns of a HitTable along "hit" into an open file, from hit number `first` on."""
     for name, column in table.variables.items():
         if v.HIT in column.dims and name in target.variables:
             target[name][first : first + column.shape[0]] = column.values
@@ -88,7 +88,7 @@ def append(table: HitTable, target: Any, first: int) -> None:
 
 @contextmanager
 def open_table(path: Path) -> Iterator[HitTable]:
-    """A file that `write_table` wrote, of which only what is used is read."""
+    """Open a file that `write_table` wrote. Values are read when they are used."""
     with netCDF4.Dataset(path) as source:
         source.set_auto_maskandscale(False)
         groups = [group for group in v.GROUPS if group in source.groups]
@@ -107,7 +107,7 @@ def open_table(path: Path) -> Iterator[HitTable]:
 
 
 def read_table(path: Path) -> HitTable:
-    """The same, in memory."""
+    """Read a file that `write_table` wrote into memory."""
     with open_table(path) as table:
         return table.load()
 

@@ -1,7 +1,7 @@
-"""Outlines of the holes of a plate: what a result has of them in memory and in its file.
+"""Outlines of the holes of a plate, in memory and in a file.
 
 In a file they are a group of their own. In memory they follow from the attributes, or are attributes themselves: along
-"vertex" no two plates have as many, so results with such variables could not be joined.
+"vertex" their number differs from plate to plate, so results with such variables could not be joined.
 """
 
 from __future__ import annotations
@@ -24,11 +24,11 @@ if TYPE_CHECKING:
 
 
 def outlines(dataset: xarray.Dataset | HitTable, layer: int = 0) -> dict[str, NDArray[np.float64]]:
-    """Outlines of the holes of a layer, 0 the plate, [m], each of shape (vertex,), by the axis "y" and "z", with a NaN
-    between one and the next.
+    """Outlines of the holes of a layer (0 is the plate) [m], each of shape (vertex,), by the axis "y" and "z", with a
+    NaN between two outlines.
 
-    They follow from the plate. Where they do not, as in files of version 0.1 whose holes came from an image, those of
-    the plate are an attribute. They are empty if nothing tells them.
+    They follow from the plate. Where they do not, as in files of version 0.1 with holes from an image, the outlines of
+    the plate are an attribute. They are empty if they are unknown.
     """
     if not layer and v.OUTLINE_Y in dataset.attrs:
         return {axis: np.atleast_1d(dataset.attrs[name]) for axis, name in v.OUTLINE.items()}
@@ -47,7 +47,7 @@ def outlines(dataset: xarray.Dataset | HitTable, layer: int = 0) -> dict[str, ND
 def outlines_in(
     plate: Plate, y_range: tuple[float, float], z_range: tuple[float, float]
 ) -> dict[str, NDArray[np.float64]]:
-    """Outlines of the holes in a rectangle [m], by OUTLINE_VARIABLES, with a NaN between one and the next."""
+    """Outlines of the holes in a rectangle [m], by OUTLINE_VARIABLES, with a NaN between two outlines."""
     gap = np.full((1, 2), np.nan)
     rows = [row for outline in plate.pattern.outlines(y_range, z_range) for row in (gap, outline)]
     vertices = np.concatenate(rows[1:]) if rows else np.empty((0, 2))
@@ -55,7 +55,7 @@ def outlines_in(
 
 
 def in_memory(dataset: xarray.Dataset) -> xarray.Dataset:
-    """A map of hits without outlines along "vertex"; those that do not follow from its plate are attributes."""
+    """A map of hits without outlines along "vertex". Outlines that do not follow from its plate become attributes."""
     if not set(v.OUTLINE_VARIABLES) <= set(dataset.coords):
         return dataset
     stored = {name: dataset[name].values for name in v.OUTLINE_VARIABLES}

@@ -1,4 +1,4 @@
-"""Numbers of single hits: what a quantity or an event of vocabulary.py has, and how the numbers are computed."""
+"""Numbers of single hits: what describes a quantity or an event of vocabulary.py, and functions that compute them."""
 
 from __future__ import annotations
 
@@ -23,19 +23,19 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 Values = Callable[["Result", float], Array]
-"""Numbers of all hits of a result, shape [hits], at a stand-off [m] where they have one; NaN where a hit does not
-count."""
+"""Computes the numbers of all hits of a result, shape [hits], at a stand-off [m] where they have one; NaN where a hit
+does not count."""
 
 _THICKNESS = v.LIMITS["thickness"].value
 
 
 class Need(NamedTuple):
-    """What a result must have beside the columns of every result.
+    """A requirement on a result beyond the columns of every result.
 
     Attributes:
-        name: of a variable or an attribute that it has then.
-        words: what it is.
-        keys: of a campaign that asks for it.
+        name: a variable or an attribute that must be present.
+        words: the requirement in words.
+        keys: keys of a campaign that produce it.
     """
 
     name: str
@@ -48,21 +48,22 @@ class PerHit:
     """A quantity or an event.
 
     Attributes:
-        name: in a measure.
-        label: for people, with {layer} where it names the layer.
-        units: as a result stores the numbers; "1" of an event.
+        name: name in a measure.
+        label: label, with {layer} where it names the layer.
+        units: units of the stored numbers; "1" for an event.
         definition: one sentence or two.
-        source: of the definition.
-        higher_is_better: for whoever is behind the target; None where neither is.
-        values: numbers of the hits. Infinite numbers are beyond every limit of a probability; a mean leaves them out.
-        of: variables that they are made of.
+        source: source of the definition.
+        higher_is_better: for whoever is behind the target; None where neither direction is better.
+        values: computes the numbers of the hits. An infinite number is beyond every limit of a probability; a mean
+            leaves it out.
+        of: variables from which the numbers follow.
         has_standoff: whether they depend on the distance behind the rear face.
-        has_layer: whether they depend on the layer whose limit thickness is sought.
-        need: what a result must have; None where every result has it.
+        has_layer: whether they depend on the layer whose limit thickness is searched.
+        need: requirement on the result; None where every result has it.
         or_else: what makes a number infinite, as text behind a probability.
-        least, most: ends of what the numbers can be.
-        margin: of an event, a number of every hit that is positive where it happens, negative where it does not, and
-            steady at 0; None without one.
+        least, most: bounds of the numbers.
+        margin: for an event, computes a number of every hit that is positive where the event happens, negative where it
+            does not, and continuous at 0; None without one.
     """
 
     name: str
@@ -82,7 +83,7 @@ class PerHit:
     margin: Callable[[Result], Array] | None = None
 
     def lacking(self, dataset: Result) -> str:
-        """What a result lacks of what is needed; empty where it has all."""
+        """Words for what a result lacks; empty where it lacks nothing."""
         if self.need is not None and self.need.name not in dataset and self.need.name not in dataset.attrs:
             return self.need.words
         if self.has_standoff and not len(dataset[v.STANDOFF].values):
@@ -93,8 +94,8 @@ class PerHit:
 def place_of_standoff(distances: Sequence[float] | Array, standoff: float) -> int:
     """Index of a stand-off [m] among the distances of a result.
 
-    Raises:
-        ValueError: it is none of them.
+    ValueError: the stand-off is none of them.
+    ValueError: it is none of them.
     """
     places = np.flatnonzero(np.isclose(distances, standoff, rtol=1e-9, atol=0.0))
     if not len(places):
@@ -118,12 +119,12 @@ def of_all(part: Result, of_passed: Array, of_stopped: float) -> Array:
 
 
 def is_so(which: Callable[[Result], NDArray[np.bool_]]) -> Values:
-    """1 where it is so, 0 elsewhere, NaN of failed computations."""
+    """Values of an event: 1 where `which` holds, 0 elsewhere, NaN where the computation failed."""
     return lambda part, _: np.where(failed(part), np.nan, which(part))
 
 
 def ended_as(status: Status) -> Values:
-    """1 where a shot ended so."""
+    """Values of an event: 1 where a shot ended with this status."""
     return is_so(lambda part: np.asarray(part[v.STATUS].values == status))
 
 
@@ -154,13 +155,13 @@ def _core(text: str) -> Core:
 
 @lru_cache(maxsize=64)
 def _silhouette(text: str) -> tuple[Array, Array]:
-    """Inclinations of a core [degree] and its presented areas [m²]; steps of a quarter of a degree err by 1e-5."""
+    """Inclinations of a core [degree] and its presented areas [m²]. Steps of a quarter of a degree err by 1e-5."""
     inclinations = np.linspace(0.0, 90.0, 361)
     return inclinations, _core(text).presented_area(np.radians(inclinations))
 
 
 def limit(part: Result, name: str) -> Array:
-    """Limits, at most the largest value that was tried; NaN where the computation failed."""
+    """Limits, at most the largest value tried; NaN where the computation failed."""
     return np.where(failed(part), np.nan, np.minimum(part[name].values, part.attrs.get(attr.LIMIT_HIGHEST, np.inf)))
 
 

@@ -4,7 +4,7 @@ posterior, prior          draws of the parameters, along chain and draw; the pos
 sample_stats              ln of the likelihood and the misfit of every draw
 log_likelihood            of every draw and shot
 observed_data             what was measured
-posterior_predictive      what another such shot would show; `fitted` is what the draw computes for this very shot
+posterior_predictive      what another shot like each would show; `fitted` is what the draw computes for this very shot
 sets                      all sets of parameters that were computed, with their weights
 best                      the set of smallest misfit
 """
@@ -37,7 +37,7 @@ GROUPS = (
     "best",
 )
 HITS = ("hit_y", "hit_z")
-"""Variables of the posterior that are no parameters."""
+"""Variables of the posterior that are not parameters."""
 MEASURED, STD, FITTED = "measured", "std", "fitted"
 UNITS_OF = "units_of_observation"
 SHOT_OF = "shot_of_observation"
@@ -46,7 +46,7 @@ PATH = "path"
 
 FIT = "fit"
 MATERIAL = "material"
-"""What the material had in the fit, the parameters at their medians: JSON of the tables plate and interaction."""
+"""The material in the fit, with the parameters at their medians: JSON of the tables plate and interaction."""
 EFFECTIVE = attr.EFFECTIVE
 PARETO_K = "pareto_k"
 CONVERGED = "converged"
@@ -55,7 +55,7 @@ EVIDENCE = "log_evidence"
 SETS = "computed_sets"
 WANTED = "wanted_sample_size"
 ROW_PROBABILITY = "row_probability"
-"""JSON: of every shot the share of rows of another such shot that are less probable than its own."""
+"""JSON: for every shot, the share of simulated rows that are less probable than its own row."""
 
 _DRAWS, _SHOTS, _OBSERVED = ("chain", "draw"), ("shot",), ("observation",)
 _OF_A_POSTERIOR: Mapping[str, Mapping[str, tuple[str, ...]]] = {
@@ -64,9 +64,9 @@ _OF_A_POSTERIOR: Mapping[str, Mapping[str, tuple[str, ...]]] = {
     "observed_data": {MEASURED: _OBSERVED, STD: _OBSERVED},
     "posterior_predictive": {MEASURED: _DRAWS + _OBSERVED, FITTED: _DRAWS + _OBSERVED},
 }
-"""Numbers of a posterior beside its parameters, by group, and what they are along."""
+"""Numbers of a posterior beside its parameters, by group, and their dimensions."""
 _MAY_LACK = {"best": ("misfit",), "posterior_predictive": (MEASURED, FITTED)}
-"""NaN where a core does not come through, by group."""
+"""Numbers that are NaN where a core does not come through, by group."""
 _OF_A_PARAMETER = {"prior": _DRAWS, "posterior": _DRAWS, "sets": ("set",), "best": ()}
 _GROUPS_OF_DRAWS = ("posterior",)
 
@@ -88,7 +88,7 @@ _OF_A_REPORT: Mapping[str, Any] = {
 
 
 def _fault(tree: xarray.DataTree, groups: Sequence[str]) -> str | None:
-    """What keeps a tree from being a posterior in some of its groups, as a phrase; None if nothing does."""
+    """What keeps these groups of a tree from being a posterior, as a phrase; None if nothing does."""
     if missing := [name for name in groups if name not in tree.children]:
         return f'it has no group "{missing[0]}"'
     alone = groups == _GROUPS_OF_DRAWS
@@ -104,11 +104,11 @@ def _fault(tree: xarray.DataTree, groups: Sequence[str]) -> str | None:
 
 
 def _declared(group: str, parameters: Sequence[Any], datasets: Mapping[str, xarray.Dataset]) -> Declaration:
-    """What a group has: the parameters, along what they are in it, and what stands beside them."""
+    """The declaration of a group: the parameters with their dimensions in it, and the numbers beside them."""
     variables = dict.fromkeys(map(str, parameters), _OF_A_PARAMETER[group]) if group in _OF_A_PARAMETER else {}
     if len(datasets) > 1:
         variables |= _OF_A_POSTERIOR.get(group, {})
-        if not datasets["observed_data"].data_vars:  # of limits and of how shots ended alone
+        if not datasets["observed_data"].data_vars:  # only limits, or statuses, were measured
             variables = {name: dims for name, dims in variables.items() if _OBSERVED[0] not in dims}
     along = {dim: (dim,) for dims in variables.values() for dim in dims if dim in (*_SHOTS, *_OBSERVED)}
     rules = {name: numbers if name in _MAY_LACK.get(group, ()) else _some for name in variables}
@@ -135,4 +135,4 @@ POSTERIOR = Kind(
     is_tree=True,
 )
 DRAWS = replace(POSTERIOR, fault=lambda tree: _fault(tree, _GROUPS_OF_DRAWS))
-"""The same, of which the draws alone are needed."""
+"""A posterior of which only the draws are needed."""

@@ -25,7 +25,7 @@ def _history_fault(dataset: xarray.Dataset) -> str | None:
 
 
 def _turns(values: np.ndarray[Any, Any], sizes: Mapping[str, int]) -> bool:
-    """Quaternions, of which none is 0."""
+    """Whether the values are quaternions, none of which is 0."""
     return finite(values, sizes) and values.shape[-1] == 4 and bool((np.linalg.norm(values, axis=-1) > 0.0).all())
 
 

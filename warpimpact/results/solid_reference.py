@@ -1,4 +1,4 @@
-"""What a Dataset tells of its references: the solid plate, or the solid add-on before the base, and the base alone."""
+"""The references in a Dataset: the solid plate, or the solid add-on before the base, and the base alone."""
 
 from __future__ import annotations
 
@@ -13,10 +13,10 @@ from warpimpact.results.dataset import hit_numbers
 
 
 def solid_reference(dataset: xarray.Dataset) -> xarray.Dataset | None:
-    """Shots and outcomes of the solid plate, or of the solid add-on before the base, with the names of a hit map and
+    """Shots and outcomes at the solid plate, or at the solid add-on before the base, with the names of a hit map and
     along "hit"; None if there are none.
 
-    Its hits are the first ones of the Dataset, or one where one shot tells of all. A solid plate that stands alone is
+    The hits are the first ones of the Dataset, or a single one that stands for all. A solid plate that stands alone is
     its own reference.
     """
     if dataset.attrs.get(attr.OPEN_AREA) == 0.0 and v.LAYER_STATUS not in dataset.variables:
@@ -29,17 +29,17 @@ def solid_reference(dataset: xarray.Dataset) -> xarray.Dataset | None:
 
 
 def base_alone(dataset: xarray.Dataset) -> xarray.Dataset | None:
-    """Shots and outcomes of the base alone, as `solid_reference`."""
+    """Shots and outcomes at the base alone, in the form of `solid_reference`."""
     return _of_the_first_hits(dataset, v.BASE_ALONE_VARIABLES)
 
 
 def _of_the_first_hits(dataset: xarray.Dataset, variables: Mapping[v.Variable, v.Variable]) -> xarray.Dataset | None:
-    """Shots and outcomes of a reference, whose variables are given with those of the hits."""
+    """Shots and outcomes at a reference. `variables` are its variables with those of the hits."""
     if any(name not in dataset.variables or dataset[name].dims != name.dims for name in variables):
-        return None  # results of different plates that were joined have several
+        return None  # joined results of different plates have several references
     shots = dataset.sizes["solid_hit"]
     numbers = np.zeros(1, dtype=int) if shots == 1 else hit_numbers(dataset[[v.HIT]].isel(hit=slice(shots)))
-    numbers = numbers[: np.argmax(np.append(numbers, shots) >= shots)]  # the first hits, as far as they have one
+    numbers = numbers[: np.argmax(np.append(numbers, shots) >= shots)]  # the first hits that have a reference
     if not len(numbers):
         return None
     solid = dataset[list(variables)].reset_coords(list(variables)).isel(solid_hit=numbers).load()

@@ -1,8 +1,8 @@
-"""A hit map as plain columns, with those methods of an xarray Dataset that a run needs.
+"""A hit map as plain columns, with the methods of an xarray Dataset that a run needs.
 
-The first Dataset of a process takes xarray a good part of a second: it looks for pint, Dask and other kinds of arrays.
-So a run computes, gathers and writes a HitTable, and whoever asks for a Dataset gets it from `HitTable.to_xarray`.
-Functions that take a `Result` take either.
+The first Dataset of a process takes xarray a good part of a second, because it looks for pint, Dask and other kinds of
+arrays. A run therefore computes, gathers and writes a HitTable, and `HitTable.to_xarray` makes a Dataset where one is
+needed. Functions that take a `Result` take either.
 """
 
 from __future__ import annotations
@@ -19,20 +19,20 @@ if TYPE_CHECKING:
 
     Result: TypeAlias = "HitTable | xarray.Dataset"
     AResult = TypeVar("AResult", "HitTable", "xarray.Dataset")
-    """Either, the same that was given."""
+    """A HitTable or a Dataset; functions return the type that they were given."""
 
 _HIT = "hit"
 
 
 @dataclass(frozen=True)
 class StoredColumn:
-    """One variable.
+    """A variable.
 
     Attributes:
         dims: names of its dimensions.
-        data: its values, or a variable of an open netCDF file that has them, which is read when `values` are asked for.
+        data: its values, or a variable of an open netCDF file, which is read by `values`.
         attrs: its attributes.
-        first, stop: the hits of `data` that count; it has others, if it has any.
+        first, stop: range of the hits of `data` that count; `data` may have others.
     """
 
     dims: tuple[str, ...]
@@ -67,8 +67,8 @@ class HitTable:
     """Variables, coordinates among them, and global attributes.
 
     Attributes:
-        variables: columns by their names; "hit" is the first dimension of those that have it.
-        coords: names of those that are coordinates.
+        variables: columns by their names. If a column has "hit", it is its first dimension.
+        coords: names of the columns that are coordinates.
         attrs: global attributes.
     """
 
@@ -80,12 +80,12 @@ class HitTable:
     def of(
         cls, data: Mapping[str, tuple[Any, ...]], coordinates: Mapping[str, tuple[Any, ...]], attrs: Mapping[str, Any]
     ) -> HitTable:
-        """From dimensions, values and attributes of every variable, as xarray takes them."""
+        """A table from dimensions, values and attributes of every variable, as xarray takes them."""
         return cls(_columns({**data, **coordinates}), frozenset(coordinates), dict(attrs))
 
     @classmethod
     def from_xarray(cls, dataset: xarray.Dataset) -> HitTable:
-        """That of a Dataset, in memory."""
+        """A table from a Dataset, in memory."""
         columns = {str(name): (column.dims, column.values, column.attrs) for name, column in dataset.variables.items()}
         data = {name: column for name, column in columns.items() if name not in dataset.coords}
         return cls.of(data, {name: columns[name] for name in columns if name not in data}, dataset.attrs)
@@ -108,7 +108,7 @@ class HitTable:
     def __getitem__(self, name: list[str]) -> HitTable: ...
 
     def __getitem__(self, name: str | list[str]) -> StoredColumn | HitTable:
-        """A column, or those of some names with all coordinates."""
+        """A column, or a table of some columns with all coordinates."""
         if isinstance(name, str):
             return self.variables[name]
         kept = {*name, *self.coords}
@@ -119,31 +119,31 @@ class HitTable:
         return replace(self, variables={name: column.part(hit) for name, column in self.variables.items()})
 
     def load(self) -> HitTable:
-        """The same, in memory."""
+        """The table in memory."""
         return self.assign(
             {name: (column.dims, column.values, column.attrs) for name, column in self.variables.items()}
         )
 
     def assign(self, variables: Mapping[str, tuple[Any, ...]]) -> HitTable:
-        """With other values of these variables; new ones are no coordinates."""
+        """The table with new values of these variables. New variables are no coordinates."""
         return replace(self, variables={**self.variables, **_columns(variables)})
 
     def assign_coords(self, variables: Mapping[str, tuple[Any, ...]]) -> HitTable:
-        """With these coordinates behind all others."""
+        """The table with these coordinates behind all others."""
         kept = self.drop_vars(variables)
         return replace(kept, variables={**kept.variables, **_columns(variables)}, coords=self.coords | {*variables})
 
     def assign_attrs(self, attrs: Mapping[str, Any]) -> HitTable:
-        """With these global attributes over its own."""
+        """The table with these global attributes, which replace its own of the same name."""
         return replace(self, attrs=self.attrs | dict(attrs))
 
     def beside(self, other: HitTable) -> HitTable:
-        """With the variables and attributes of another one, which has other dimensions."""
+        """The table with the variables and attributes of another one, which has other dimensions."""
         variables, coords = {**self.variables, **other.variables}, self.coords | other.coords
         return replace(self, variables=variables, coords=coords, attrs=self.attrs | other.attrs)
 
     def drop_vars(self, names: Collection[str]) -> HitTable:
-        """Without these variables, as far as they are there."""
+        """The table without these variables. Names that it lacks are ignored."""
         kept = {name: column for name, column in self.variables.items() if name not in names}
         return replace(self, variables=kept, coords=self.coords - {*names})
 
@@ -159,7 +159,8 @@ class HitTable:
 
 
 def joined(tables: Iterable[HitTable]) -> HitTable:
-    """Tables of the same variables, one behind the other; what has no hits, and the attributes, from the first."""
+    """Concatenate tables of the same variables along "hit". Columns without "hit", and attributes, are the first
+    table's."""
     first, *others = tables
     columns = {
         name: (column.dims, np.concatenate([column.values, *(other[name].values for other in others)]), column.attrs)

@@ -1,4 +1,4 @@
-"""Numbers of measures: gathered over shots, with their intervals and what the numerics may shift them by."""
+"""Estimates of measures, gathered over shots: intervals, and the shift by the numerics."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 class Tally:
     """Gathers a measure over shots, in the order of their numbers.
 
-    Means and probabilities keep a few numbers in all; a quantile and a worst tenth keep one number per shot.
+    Means and probabilities keep a few numbers in all. A quantile and a worst tenth keep one number per shot.
 
     Args:
         dealt: `replicates`, `images` and `confidence` as in `Dealt`.
@@ -51,7 +51,7 @@ class Tally:
 
 
 def estimate_from(measure: Measure, values: Array, **dealt: Unpack[Estimating]) -> Estimate:
-    """A measure with its interval, from the values of all shots; a worst point and a number of the target have none."""
+    """A measure with its interval, from the values of all shots. A worst point and a number of the target have none."""
     known = values[~np.isnan(values)]
     if not measure.has_interval or not len(known):
         worst = measure.worse * float(np.max(measure.worse * known)) if len(known) else math.nan
@@ -64,7 +64,8 @@ def estimate_from(measure: Measure, values: Array, **dealt: Unpack[Estimating]) 
 
 
 def shift_of(measure: Measure, levels: tuple[Result, Result] | None, confidence: float = 0.95) -> float | None:
-    """How far the numerics may shift a measure, by hits of a result at two levels (`finer_pair`); None without them."""
+    """Upper estimate of the shift of a measure by the numerics, from hits at two levels (`finer_pair`); None without
+    them."""
     if levels is None or not measure.has_interval:
         return None
     dealt: Estimating = {**dealing(levels[0]), "replicates": 1, "confidence": confidence}
@@ -84,8 +85,8 @@ def shift_of(measure: Measure, levels: tuple[Result, Result] | None, confidence:
 
 
 def dealing(dataset: Result) -> Dealing:
-    """Arguments of `Dealt` that fit the sampling of a result. The shots at one plate count as one, like images. Chosen
-    hits are no longer dealt out in turn."""
+    """Arguments of `Dealt` for the sampling of a result. The shots at one plate count as one, like images. Chosen hits
+    are no longer in the order of the replicates."""
     if is_choice(dataset):
         return {"replicates": 1, "images": 1}
     together = images(dataset) * shots_at_a_plate(dataset)

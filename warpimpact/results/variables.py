@@ -1,5 +1,5 @@
-"""The variables of the Datasets, with dimensions, units and meanings: those that records/ declares, the conditions of
-the shots, which scene/quantities.py has, and what stands beside them."""
+"""The variables of the Datasets, with dimensions, units and meanings: the records (records/), the conditions of the
+shots (scene/quantities.py), and further ones."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 
 def _condition(name: str, of: str = "") -> Variable:
-    """The column of a quantity of the shots; `of` says of what, where each layer has the quantity."""
+    """The column of a quantity of the shots; `of` names its object if each layer has the quantity."""
     known = QUANTITIES[name]
     units = quantity(known.type).display.stored
     return Variable(known.column or name, HITS, units, f"{known.meaning}{of}", field=name)
@@ -67,28 +67,27 @@ OPTIONAL_SHOT_VARIABLES = (*SCATTER_VARIABLES, *BURST_VARIABLES, *POSTERIOR_VARI
 
 
 def _beside(variable: Variable, kind: str, along: str, what: str) -> Variable:
-    """The same variable of other shots than the hits, along a dimension of their own."""
+    """A variable of shots other than the hits, along a dimension of their own."""
     dims = tuple(along if dim == "hit" else dim for dim in variable.dims)
     return Variable(f"{kind}_{variable}", dims, variable.units, f"{variable.long_name}, {what}")
 
 
 def _solid(variable: Variable) -> Variable:
-    """The same variable for the solid plate of equal areal density, or the solid add-on before the same base."""
+    """A variable at the solid plate of equal areal density, or at the solid add-on before the same base."""
     return _beside(variable, "solid", "solid_hit", "solid plate of equal areal density")
 
 
 SOLID_VARIABLES = {_solid(variable): variable for variable in (STATUS, RESIDUAL_VELOCITY, TILT)}
-"""Outcomes of the first shots against the solid plate of equal areal density, each with the variable of the hits that
-it corresponds to; of layers, against the solid add-on of equal areal density before the same base. There is one shot if
-the shots differ only in their hit points. Present only for a perforated plate or layers, and with
-`output.solid_reference`."""
+"""Outcomes of the first shots at the solid plate of equal areal density, each with the corresponding variable of the
+hits; with layers, at the solid add-on of equal areal density before the same base. There is one shot if the shots
+differ only in their hit points. Present only for a perforated plate or layers, and with `output.solid_reference`."""
 SOLID_DEPTHS = {_solid(variable): variable for variable in (STOPPED_IN, DEPTH)}
-"""The same of layers, which say how deep the cores go into the base."""
+"""Further outcomes with layers: how deep the cores go into the base."""
 BASE_ALONE_VARIABLES = {
     _beside(variable, "base_alone", "solid_hit", "base without the layers in front"): variable
     for variable in SOLID_VARIABLES.values()
 }
-"""Outcomes of the same shots against the base alone. Present with layers and `output.solid_reference`."""
+"""Outcomes of the same shots at the base alone. Present with layers and `output.solid_reference`."""
 
 SOLID_LIMITS = {quantity: _solid(limit.value) for quantity, limit in LIMITS.items()}
 """Limits of the first shots at the solid plate of equal areal density, by the quantity of the search; one if all shots
@@ -111,8 +110,8 @@ FINER_VARIABLES = {
     for variable in (*_RECORDED, STOPPED_IN, DEPTH, *LIMIT_VARIABLES)
     if variable.is_number_of_hit or variable in (STATUS, STOPPED_IN, BROKEN)
 }
-"""Outcomes of some hits at a finer level of resolution, each with the variable of the hits that it corresponds to.
-Present where a pilot found the resolution."""
+"""Outcomes of some hits at a finer level of resolution, each with the corresponding variable of the hits. Present where
+a pilot found the resolution."""
 
 ASSUMED_HIT = Variable("assumed_hit", ("assumed",), "1", "number of a hit that was computed under an assumption, too")
 ASSUMPTION = Variable("assumption", ("assumed",), "1", "number of the assumption, from 0, in the attribute assumptions")
@@ -120,8 +119,8 @@ ASSUMED_COORDINATES = (ASSUMED_HIT, ASSUMPTION)
 ASSUMED_VARIABLES = {
     _beside(variable, "assumed", "assumed", "under an assumption"): variable for variable in FINER_VARIABLES.values()
 }
-"""Outcomes of some hits with something otherwise that nobody measured (campaign/alternatives.py), each with the
-variable of the hits that it corresponds to."""
+"""Outcomes of some hits under other assumptions about what nobody measured (campaign/alternatives.py), each with the
+corresponding variable of the hits."""
 
 OUTLINE_Y = Variable("outline_y", ("vertex",), "m", "hole outlines in the unit cell, y, separated by NaN")
 OUTLINE_Z = Variable("outline_z", ("vertex",), "m", "hole outlines in the unit cell, z, separated by NaN")
@@ -140,8 +139,8 @@ GROUPS = {
     "finer": (*FINER_COORDINATES, *FINER_VARIABLES),
     "assumed": (*ASSUMED_COORDINATES, *ASSUMED_VARIABLES),
 }
-"""What is not along "hit" stands in groups of the file. In memory those of other shots are coordinates, which no choice
-of hits spreads over the hits; outlines.py says what becomes of the outlines."""
+"""Groups of the file for variables that are not along "hit". In memory those of other shots are coordinates, so that no
+choice of hits repeats them per hit. For the outlines see outlines.py."""
 
 VARIABLES = (*SHOT_VARIABLES, *OUTCOME_VARIABLES)
 """Present in every hit map."""
@@ -199,11 +198,11 @@ LAYER_RESISTANCE_SHARE = Variable(
 )
 
 LAYER_FIELDS = (LAYER_CELL_Y, LAYER_CELL_Z, LAYER_RESISTANCE_SHARE)
-"""Present only if the core reached a layer behind the plate that weakens. No value in a layer that does not, and beyond
-the window of one whose window is smaller than that of another. Layer 0 has its own variables."""
+"""Present only if the core reached a layer behind the plate that weakens. They have no value in a layer that does not
+weaken, and beyond the windows that are smaller than the largest. Layer 0 has its own variables."""
 
 LAYER_SECTIONS = (LAYER_SOLID_ALONG_Y, LAYER_SOLID_ALONG_Z)
-"""Present only with layers behind the plate, as LAYER_FACES, which are those of the hit here."""
+"""Present only with layers behind the plate, as LAYER_FACES, which here are those of the hit."""
 
 ELEMENT_CORNER = Variable("element_corner", ("element", "corner"), "1", "node at a corner, in the order of VTK")
 NODE_POSITION = Variable("node_position", ("snapshot", "node", "axis"), "m", "place of a node in the plate frame")
@@ -218,7 +217,7 @@ HISTORY_VARIABLES = (
     *(TRANSLATIONAL_ENERGY, ROTATIONAL_ENERGY, RESISTANCE_SHARE, CORE_RADIUS, SOLID_ALONG_Y, SOLID_ALONG_Z),
 )
 RESIDUAL_ANGULAR_VELOCITY = "residual_angular_velocity"
-"""Name of the outcome's angular velocity in a history. Its own name belongs to the motion there."""
+"""Name of the outcome's angular velocity in a history, where the name `angular_velocity` belongs to the motion."""
 
 # By the axis y or z of the plate frame.
 HIT_POINT = {"y": HIT_Y, "z": HIT_Z}
@@ -249,13 +248,13 @@ def computed_variables() -> set[Variable]:
 
 
 def hit_variables() -> tuple[Variable, ...]:
-    """All that a map of hits may have beside its coordinates, in the order of a file."""
+    """All variables that a map of hits may have beside its coordinates, in the order of a file."""
     always, *others = registry.RECORDS
     optional = (variable for group in others for variable in (*group, *group.beside))
     return tuple(dict.fromkeys((*SHOT_VARIABLES, EDGE_DISTANCE, *always, *OPTIONAL_SHOT_VARIABLES, *optional)))
 
 
 def whole_groups() -> list[tuple[Variable, ...]]:
-    """Variables of which a result has all or none."""
+    """Groups of variables; a result has all variables of a group or none."""
     of_records = [(*group, *group.beside) for group in registry.RECORDS if group.whole]
     return [*of_records, OUTLINE_VARIABLES, *map(tuple, (SOLID_VARIABLES, SOLID_DEPTHS, BASE_ALONE_VARIABLES))]

@@ -1,7 +1,7 @@
-"""What may be asked of a hit, each thing once: quantities (a number per hit) and events (1 where it happens, else 0).
+"""What may be asked of a hit: quantities (a number per hit) and events (1 where it happens, else 0).
 
-An entry of `QUANTITIES` or `EVENTS` is all that a new one takes. Measures (measures.py) make numbers of a result of
-them: means, worst tenths, quantiles, probabilities.
+A new one needs only an entry of `QUANTITIES` or `EVENTS`. Measures (measures.py) turn them into numbers of a result:
+means, worst tenths, quantiles, probabilities.
 """
 
 from __future__ import annotations
@@ -152,7 +152,7 @@ _DERIVED = (
         need=OTHER_LAYERS,
     ),
 )
-"""Quantities that are made of what is recorded."""
+"""Quantities that follow from what is recorded."""
 
 EVENTS: Mapping[str, PerHit] = {
     event.name: event
@@ -222,11 +222,11 @@ EVENTS: Mapping[str, PerHit] = {
         ),
     )
 }
-"""What may happen to a shot, by name; all shots count except those whose computation failed."""
+"""Events of a shot, by name. All shots count except those whose computation failed."""
 
 
 def _recorded() -> Iterator[PerHit]:
-    """A quantity for every recorded number of a hit; the cores that passed the target count."""
+    """A quantity for every recorded number of a hit. The cores that passed the target count."""
     derived = {quantity.name for quantity in _DERIVED}
     better = {v.RESIDUAL_VELOCITY: False, v.ENERGY_LOSS: True}
     for variable in v.HIT_NUMBERS:
@@ -255,7 +255,7 @@ def _recorded() -> Iterator[PerHit]:
 
 
 QUANTITIES: Mapping[str, PerHit] = {quantity.name: quantity for quantity in (*_DERIVED, *_recorded())}
-"""All numbers that a hit may have, by name."""
+"""All quantities, by name."""
 
 
 def _weight(name: str, label: str, of: str) -> PerHit:
