@@ -11,7 +11,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import partial
 from itertools import pairwise
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -101,8 +101,8 @@ def _table(
     )
     check()
     inside = pattern.edge_distance(y[:, None], z[None, :])
-    table = np.empty((RADII, directions, *counts), dtype=real)
-    radii = pushed.radius * (np.arange(RADII) + 0.5) / RADII
+    table = np.empty((directions, RADII, *counts), dtype=real)
+    radii = pushed.radius * (np.arange(RADII) + 0.5)[:, None, None] / RADII
     sides = (pattern.period[0] / counts[0], pattern.period[1] / counts[1])
     parts, half = directions // 8, directions // 2
     rays = list(_rays(parts))
@@ -111,9 +111,9 @@ def _table(
         ahead, behind = (
             _first_two_edges(inside, ray, parts, sides, FAR * pushed.radius) for ray in (rays[k], rays[k + half])
         )
-        for row, radius in zip(table, radii, strict=True):
-            row[k] = _cover(inside > 0.0, ahead[0], behind, pushed, radius)
-            row[k + half] = _cover(inside > 0.0, behind[0], ahead, pushed, radius)
+        table[k] = _cover(inside > 0.0, ahead[0], behind, pushed, radii)
+        table[k + half] = _cover(inside > 0.0, behind[0], ahead, pushed, radii)
+    table = table.swapaxes(0, 1)
     return np.pad(table, ((0, 0), (0, 1), (0, 1), (0, 1)), mode="wrap")
 
 
@@ -168,23 +168,25 @@ def _between(values: Array, rows: int, columns: int, parts: int) -> Array:
     return np.asarray(here + ((beside + along) / parts) * (next_one - here))
 
 
-def _cover(solid: NDArray[np.bool_], ahead: Array, behind: tuple[Array, Array], pushed: Pushed, radius: float) -> Array:
-    """Lengths of one direction, for the first edge ahead and the first two behind, where the core has a radius [m];
-    negative where they do not count."""
-    gap, end = (np.minimum(edge, radius) for edge in behind)
+def _cover(solid: NDArray[np.bool_], ahead: Array, behind: tuple[Array, Array], pushed: Pushed, radii: Array) -> Array:
+    """Lengths of one direction, for the first edge ahead and the first two behind, where the core has each of some
+    radii [m], of shape [radii, 1, 1]; negative where they do not count."""
+    gap, end = (np.minimum(edge, radii) for edge in behind)
     in_material = np.minimum(ahead, FAR * pushed.radius) + pushed.carried * gap
     length = np.where(solid, in_material, np.maximum(pushed.carried * (end - gap) - pushed.gap * gap, 0.0))
     presses = length > 0.0
+    everywhere = _around(presses.astype(np.int8)) == 9
     shown, filled = presses, length
     for _ in range(2):  # so that lengths between nodes are those of the material beside them
-        count = _around(shown.astype(np.float64))
-        mean = _around(np.where(shown, filled, 0.0)) / np.maximum(count, 1.0)
+        count = _around(shown.astype(np.int8))
+        mean = _around(filled) / np.maximum(count, 1)
         filled = np.where(shown, filled, mean)
-        shown = count > 0.0
-    return np.where(_around((~presses).astype(np.float64)) > 0.0, -filled, filled)
+        shown = count > 0
+    return np.where(everywhere, filled, -filled)
 
 
-def _around(values: Array) -> Array:
+def _around(values: NDArray[Any]) -> NDArray[Any]:
     """Sums over every node of a period and the eight around it."""
-    rows = values + np.roll(values, 1, axis=0) + np.roll(values, -1, axis=0)
-    return np.asarray(rows + np.roll(rows, 1, axis=1) + np.roll(rows, -1, axis=1))
+    padded = np.pad(values, ((0, 0), (1, 1), (1, 1)), mode="wrap")
+    rows = padded[:, :-2] + padded[:, 1:-1] + padded[:, 2:]
+    return np.asarray(rows[..., :-2] + rows[..., 1:-1] + rows[..., 2:])
