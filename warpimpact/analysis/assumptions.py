@@ -1,4 +1,5 @@
-"""How far numbers of a result move if something that nobody measured is otherwise: hits under assumptions, read."""
+"""How much numbers of a result change under other assumptions about what nobody measured, from hits under
+assumptions."""
 
 from __future__ import annotations
 
@@ -28,12 +29,12 @@ AS_GIVEN = "as given"
 
 @dataclass(frozen=True)
 class Moves:
-    """What assumptions do to the numbers of a measure.
+    """Changes of a measure by assumptions.
 
     Attributes:
-        by: how far each assumption moves the measure, by its name; none that leaves no hit that counts.
-        hits: numbers of the hits that tell it, shape [hits].
-        of_hits: how far each assumption moves the number of each hit, shape [hits] each.
+        by: change of the measure by each assumption, by name; without assumptions that leave no hit that counts.
+        hits: numbers of the hits from which the changes follow, shape [hits].
+        of_hits: change of the number of each hit by each assumption, shape [hits] each.
     """
 
     by: Mapping[str, float]
@@ -41,13 +42,13 @@ class Moves:
     of_hits: Mapping[str, Array]
 
     def times(self, factor: float) -> Moves:
-        """The moves in another unit."""
+        """The changes in another unit."""
         by = {name: factor * move for name, move in self.by.items()}
         return Moves(by, self.hits, {name: factor * moves for name, moves in self.of_hits.items()})
 
 
 class Assumed:
-    """The hits of a result that were computed under assumptions, too; empty where there are none."""
+    """The hits of a result that were computed under assumptions, too; empty if there are none."""
 
     def __init__(self, dataset: Result, measures: Sequence[Measure]) -> None:
         names: dict[str, int] = json.loads(dataset.attrs.get(attr.ASSUMPTIONS, "{}"))
@@ -63,7 +64,7 @@ class Assumed:
         self._by_hit: tuple[Array, Array] = np.empty(0), np.empty(0)
 
     def moves(self, measure: Measure) -> Moves | None:
-        """What assumptions do to a measure; None where that is not known."""
+        """The changes of a measure by assumptions; None where unknown."""
         if self._given is None or not measure.has_interval:
             return None
         if self._key != (key := (measure.quantity, measure.standoff)):
@@ -81,9 +82,9 @@ class Assumed:
 
 
 def moved_apart(one: Moves | None, other: Moves | None, confidence: float) -> dict[str, tuple[float, float]]:
-    """By how much each assumption moves the difference of two plates, and the half width that the hits leave open.
+    """Change of the difference of two plates by each assumption, and the half width of its interval by the hits.
 
-    A plate that has no such assumption stays where it is. Both plates take the same hits, where they have them.
+    A plate without an assumption keeps its value. Both plates take the same hits, where they have them.
     """
     of_plates = [moves or Moves({}, np.empty(0, dtype=np.int64), {}) for moves in (one, other)]
     apart = {}
@@ -99,7 +100,7 @@ def moved_apart(one: Moves | None, other: Moves | None, confidence: float) -> di
 
 
 def _half_width(numbers: Array, confidence: float) -> float:
-    """Half width of Student's interval of a mean; 0 of no numbers."""
+    """Half width of Student's interval of a mean; 0 without numbers."""
     known = numbers[~np.isnan(numbers)]
     if len(known) < 2:
         return 0.0
@@ -108,5 +109,5 @@ def _half_width(numbers: Array, confidence: float) -> float:
 
 
 def would_break(dataset: Result) -> Iterator[tuple[str, float]]:
-    """Cores that may break, and the share of hits that would break them."""
+    """Assumptions under which cores may break, and the share of hits that would break them."""
     yield from json.loads(dataset.attrs.get(attr.WOULD_BREAK, "{}")).items()

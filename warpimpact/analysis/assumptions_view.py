@@ -1,4 +1,4 @@
-"""What nobody measured, and how far it moves the numbers of a result, as people read it."""
+"""A view of the assumptions: how much the numbers of a result change under each."""
 
 from __future__ import annotations
 
@@ -18,16 +18,17 @@ if TYPE_CHECKING:
     from warpimpact.results.table import Result
 
 LARGEST = 3
-"""Assumptions that are named beside a number: those that move it most."""
+"""Assumptions that are named beside a number: those with the largest changes."""
 _NO_MOVE = 1e-3
-"""Moves below this share of the number, or of the largest move, are none."""
+"""Share of the number, or of the largest change, below which a change is not shown."""
 
 
 def assumptions_view(dataset: Result, measures: Sequence[Measure] = ()) -> Section:
-    """How far each number may be off if one thing that nobody measured is otherwise, and what moves it most.
+    """How much each number changes if one thing that nobody measured is otherwise, and the assumptions of the largest
+    changes.
 
     Args:
-        measures: whose numbers are shown; by default those that a person looks at first.
+        measures: measures to show; by default those of `_first`.
     """
     estimates = estimated(dataset, measures or _first(dataset))
     table = assumptions_table(
@@ -38,7 +39,7 @@ def assumptions_view(dataset: Result, measures: Sequence[Measure] = ()) -> Secti
 
 
 def assumptions_table(estimates: Mapping[str, Estimate]) -> Table:
-    """Between what values assumptions move numbers, and what moves them most; a row for each that is known, by name."""
+    """Range of numbers under assumptions, and the assumptions of the largest changes; a row for each known number."""
     columns = [Column(header, write=rough_text, right=True) for header in ("as given", "lowest", "highest")]
     rows = [
         (name, estimate.value, *estimate.assumed, largest_text(estimate) or "nothing moves it")
@@ -49,7 +50,7 @@ def assumptions_table(estimates: Mapping[str, Estimate]) -> Table:
 
 
 def _first(dataset: Result) -> list[Measure]:
-    """The limit of a search of limits; else means behind the target, and the shares of what may happen."""
+    """The measures to show by default: the limit of a search of limits; else means behind the target, and shares."""
     if attr.LIMIT in dataset.attrs:
         return [Measure.parse(f"quantile({v.LIMITS[dataset.attrs[attr.LIMIT]].value}, 0.5)")]
     standoffs = dataset[v.STANDOFF].values.tolist()[-1:]
@@ -59,7 +60,7 @@ def _first(dataset: Result) -> list[Measure]:
 
 
 def largest_text(estimate: Estimate) -> str:
-    """The assumptions that move a number most, with what it is then; empty where none moves it visibly."""
+    """The assumptions that change a number most, with its values under them; empty where none changes it visibly."""
     by_move = sorted(estimate.assumptions.items(), key=lambda under: -abs(under[1] - estimate.value))
     shown = [
         f"{name}: {rough_text(value)}" for name, value in by_move if rough_text(value) != rough_text(estimate.value)
@@ -68,7 +69,7 @@ def largest_text(estimate: Estimate) -> str:
 
 
 def notes_of(dataset: Result, *, known: bool = True) -> Iterator[str]:
-    """What else there is to say of assumptions: how they were computed, and which cores would break."""
+    """Further notes on assumptions: how they were computed, and which cores would break."""
     if not known:
         yield f"how far assumptions move these numbers is not known: {_why_not(dataset)}"
         return
@@ -86,7 +87,7 @@ def _why_not(dataset: Result) -> str:
 
 
 def assumptions_lines(dataset: Result) -> list[str]:
-    """The same in a sentence for each number that a person looks at first; nothing where that is not known."""
+    """A sentence for each number of `_first`; empty where the changes are unknown."""
     lines = []
     for measure, estimate in estimated(dataset, _first(dataset)).items():
         if moved := largest_text(estimate.times(measure.display.factor)):

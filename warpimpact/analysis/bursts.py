@@ -1,6 +1,6 @@
-"""What earlier hits on the same plate change: by the order of the hits, and by the distance to the nearest earlier one.
+"""Effects of earlier hits on the same plate: by the order of the hits, and by the distance to the nearest earlier one.
 
-The hits of a burst are no independent numbers. Intervals count bursts (statistics/clusters.py).
+The hits of a burst are not independent. Intervals count bursts (statistics/clusters.py).
 """
 
 from __future__ import annotations
@@ -28,18 +28,18 @@ if TYPE_CHECKING:
     from warpimpact.results.table import Result
 
 BINS = 12
-"""Bins of distance, with equal numbers of hits; fewer if the hits lie at fewer distances."""
+"""Number of bins of distance, with equal numbers of hits each; fewer if the hits lie at fewer distances."""
 
 
 @dataclass(frozen=True)
 class Group:
-    """Hits of bursts that have something in common.
+    """Hits of bursts with the same order, or at similar distances.
 
     Attributes:
-        name: such as "2" of the second hits, or "1.2 to 2.5" of hits at these distances [mm].
+        name: such as "2" for the second hits, or "1.2 to 2.5" for hits at these distances [mm].
         distance: smallest, mean and largest distance from the nearest earlier hit on the plate [m]; NaN for first hits.
         estimates: mean or share of every measure.
-        differences: those less the ones of the first hits, in intervals that hold together for all bins of distance.
+        differences: estimates minus those of the first hits, in intervals that hold together for all bins of distance.
     """
 
     name: str
@@ -58,7 +58,7 @@ class Bursts:
     """How much later hits of bursts differ from first ones.
 
     Attributes:
-        measures: what is told of every group.
+        measures: measures of every group.
         orders: first hits, second hits, …
         distances: later hits by the distance to the nearest earlier one, increasing.
     """
@@ -71,7 +71,7 @@ class Bursts:
         """Distance [m] from which a hit no longer notices the nearest earlier one: the far end of the last bin in which
         the interval of the difference from the first hits does not contain 0.
 
-        0 if there is no such bin, infinite if it is the last one. More bursts show smaller differences.
+        0 if there is no such bin, infinite if it is the last one. With more bursts smaller differences can be seen.
         """
         noticed = [group for group in self.distances if _is_apart(group.differences[measure])]
         if not noticed:
@@ -80,7 +80,7 @@ class Bursts:
 
 
 def bursts(dataset: Result) -> Bursts:
-    """Analyse a result of bursts; of an open file one number per hit is in memory."""
+    """Analyse a result of bursts. Of an open file one number per hit is in memory."""
     members = shots_at_a_plate(dataset)
     velocity, *tilts = means_of((v.RESIDUAL_VELOCITY, v.TILT), dataset[v.STANDOFF].values.tolist())
     measures = (velocity, *tilts[-1:], Measure.parse("P(perforated)"))
@@ -122,7 +122,7 @@ def bursts(dataset: Result) -> Bursts:
 
 
 def _bins(distances: Array) -> list[tuple[float, float]]:
-    """Ends of the bins, both included: single distances if there are few."""
+    """Ends of the bins, both included. If there are few distances, each is a bin."""
     distinct = np.unique(np.round(distances, 9))
     if len(distinct) <= BINS:
         return [(float(at) - 1e-9, float(at) + 1e-9) for at in distinct]

@@ -1,4 +1,4 @@
-"""Whether results answer the same question: what must be the same, and whether the shots are."""
+"""Whether results answer the same question, and whether their shots are the same."""
 
 from __future__ import annotations
 
@@ -21,10 +21,10 @@ _ANGLES = ("obliquity", "azimuth", "pitch", "yaw")
 
 
 def check_same_question(one: xarray.Dataset, name: str, other: xarray.Dataset, other_name: str) -> None:
-    """Refuse results of another core, impact or stand-offs.
+    """Refuse results with another core, impact or stand-offs.
 
     Raises:
-        ResultError: names the first difference.
+        ResultError: the message names the first difference.
     """
     asked, asked_other = _question(one, name), _question(other, other_name)
     if (found := first_difference(asked, asked_other)) is not None:
@@ -48,7 +48,7 @@ def _question(dataset: xarray.Dataset, name: str) -> dict[str, Any]:
 
 
 def _in_degrees(impact: dict[str, Any]) -> dict[str, Any]:
-    """An impact with the angles that it gives as numbers as a person reads them."""
+    """An impact whose angles in numbers are in degrees."""
     return {
         name: f"{math.degrees(value)!r} deg" if name in _ANGLES and isinstance(value, float) else value
         for name, value in impact.items()
@@ -56,7 +56,7 @@ def _in_degrees(impact: dict[str, Any]) -> dict[str, Any]:
 
 
 def other_shots(one: xarray.Dataset, other: xarray.Dataset) -> str:
-    """Why the shots of two results are not the same ones; empty where they are."""
+    """Why the shots of two results differ; empty where they are the same."""
     if dealing(one) != dealing(other):
         return "their shots have other replicates or symmetries"
     for axis, coordinate in enumerate((v.HIT_Y, v.HIT_Z)):

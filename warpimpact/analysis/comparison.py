@@ -1,15 +1,15 @@
-"""Plates side by side: which protects better, by how much, and whether that can be told.
+"""Plates side by side: which protects better, by how much, and whether the hits show a difference.
 
-Shot k hits every plate at the same place of its unit cell under the same conditions. What the shots have in common
-then drops out of the differences (common random numbers), which are means of differences shot by shot and have their
-intervals (statistics/intervals.py). Where one plate has more hits, the first ones are paired and the others count too;
-plates that were hit by other shots are compared as independent (statistics/comparisons.py). No hit is left out.
+Shot k hits every plate at the same place of its unit cell under the same conditions. What the shots have in common then
+cancels in the differences (common random numbers), which are means of differences shot by shot with their intervals
+(statistics/intervals.py). Where one plate has more hits, the first ones are paired and the others count, too. Plates
+that were hit by different shots are compared as independent (statistics/comparisons.py). No hit is left out.
 
 Plates of different weight are compared by their ratios to the solid plate of the same areal density.
 
 The intervals of all pairs of plates hold together, for each measure on its own: each has its share of the error
-(Bonferroni). The numerics and the tolerance of a limit may shift both plates, which their intervals hold, too. Two
-plates are told apart where the interval of their difference leaves out 0 by more than rounding.
+(Bonferroni). They include the shift of both plates by the numerics and by the tolerance of a limit. Two plates are told
+apart where the interval of their difference excludes 0 by more than rounding.
 """
 
 from __future__ import annotations
@@ -53,15 +53,15 @@ from warpimpact.statistics.intervals import Array, Estimate, Estimating, estimat
 from warpimpact.view.view import html_of
 
 _SAME_WEIGHT = 1.01
-"""Plates whose areal densities differ by less than this factor weigh the same."""
+"""Largest ratio of the areal densities of plates that count as equally heavy."""
 
 
 class Comparison(ComparedPlates):
-    """Plates side by side, by their measures, with what the hits tell apart. A notebook shows the short answer, and
-    every measure behind it."""
+    """Plates side by side, by their measures, with the differences that the hits show. A notebook shows the short
+    answer, and every measure behind it."""
 
     def _repr_html_(self) -> str:
-        """What a notebook shows."""
+        """HTML for a notebook."""
         every = html_of(comparison_view(self))
         return f"{html_of([short_view(self)])}<details><summary>Every measure</summary>{every}</details>"
 
@@ -76,14 +76,14 @@ def compare(
     """Compare the plates of some hit maps, by all their hits.
 
     Args:
-        datasets: two or more, of the same core under the same impact; of open files one number per hit is in memory.
-        names: of the plates, each once.
-        texts: of measures; by default those that `inspect` shows of all the plates.
-        confidence: of all differences in a measure together.
+        datasets: two or more, with the same core and impact. Of open files one number per hit is in memory.
+        names: names of the plates, each once.
+        texts: texts of measures; by default those that `inspect` shows for all the plates.
+        confidence: confidence of all differences in a measure together.
 
     Raises:
-        ResultError: core, impact or stand-offs differ, so that the plates were not asked the same; or a plate lacks
-            what a measure needs.
+        ResultError: core, impact or stand-offs differ, so that the question is not the same; or a plate lacks what a
+            measure needs.
     """
     for dataset, name in zip(datasets[1:], names[1:], strict=True):
         check_same_question(datasets[0], names[0], dataset, name)
@@ -155,8 +155,8 @@ def _verdicts(
     *,
     paired: bool,
 ) -> Iterator[Verdict]:
-    """Which of two plates has the better value as given and under every assumption of either; nothing where one has no
-    hits under assumptions, or where hits give no interval."""
+    """Which of two plates has the better value as given, and under every assumption of either; empty where a plate has
+    no hits under assumptions, or where hits give no interval."""
     measure, moves = scored[0].score.measure, [side.of.moves for side in scored]
     if measure.higher_is_better is None or not all(moves):
         return
@@ -179,7 +179,7 @@ def _verdicts(
 
 
 def _with_numerics(one: Estimate, other: Estimate, value: float, low: float, high: float) -> tuple[float, float, float]:
-    """A difference with its interval, wider by what the numerics may shift both plates; rounding counts as 0."""
+    """A difference with its interval, widened by the shift of both plates by the numerics. Rounding counts as 0."""
     shift = (one.numerics or 0.0) + (other.numerics or 0.0)
     rounded = ROUNDED * max(abs(one.value), abs(other.value))
     value, low, high = (0.0 if abs(end) <= rounded else end for end in (value, low - shift, high + shift))
@@ -187,19 +187,19 @@ def _with_numerics(one: Estimate, other: Estimate, value: float, low: float, hig
 
 
 def _differ_in_weight(datasets: Sequence[xarray.Dataset]) -> bool:
-    """Whether weight counts: a search of thickness tells itself how heavy a target must be."""
+    """Whether the weights count and differ. In a search of thickness the limit itself is a weight."""
     densities = [dataset.attrs[attr.AREAL_DENSITY] for dataset in datasets]
     return datasets[0].attrs.get(attr.LIMIT) != "thickness" and max(densities) > _SAME_WEIGHT * min(densities)
 
 
 def _depths_are_bounds(datasets: Sequence[xarray.Dataset], measures: Sequence[Sequence[Score]]) -> bool:
-    """Whether depths cannot be ranked: cores pierce a base and count with its thickness, and the thicknesses differ."""
+    """Whether depths cannot be ranked: cores pierce a base and count as its thickness, and the thicknesses differ."""
     thicknesses = [float(np.mean(base_thickness(dataset))) for dataset in datasets]
     return max(thicknesses) > _SAME_WEIGHT * min(thicknesses) and any(map(depth_note, measures))
 
 
 def _notes_of_bases(datasets: Sequence[xarray.Dataset], plates: Sequence[Contestant]) -> Iterator[str]:
-    """What there is to say of the bases behind the plates."""
+    """Notes on the bases behind the plates."""
     based = [has_base(dataset) for dataset in datasets]
     if any(based) and not all(based) and attr.LIMIT not in datasets[0].attrs:
         alone = [plate.name for plate, is_based in zip(plates, based, strict=True) if not is_based]
@@ -225,9 +225,9 @@ def _used(one: xarray.Dataset, name: str, other: xarray.Dataset, other_name: str
 
 
 class _Side(NamedTuple):
-    """What of a plate is compared: whether it is a share or made of one, whether it is a ratio to the solid plate,
-    numbers whose mean it is, those whose mean over the shots of a draw is that of the draw, and its estimate, with how
-    far the numerics may shift it."""
+    """What is compared of a plate: whether it is a share or follows from one; whether it is a ratio to the solid plate;
+    numbers whose mean it is; numbers whose mean over the shots of a draw is its value for the draw; and its estimate,
+    with the shift by the numerics."""
 
     is_share: bool
     by_ratio: bool
@@ -237,8 +237,8 @@ class _Side(NamedTuple):
 
 
 def _sought_to(dataset: xarray.Dataset, measure: Measure) -> float:
-    """How far a limit of a result may lie from the one that is told, as the measure is shown; 0 of other results, and
-    of a share, for which it is not known."""
+    """Largest distance of a limit in a result from the stated one, in the unit of the measure; 0 for other results, and
+    for a share, where it is unknown."""
     attributes = dataset.attrs
     if measure.is_binary:
         return 0.0
@@ -276,7 +276,7 @@ def _difference(one: _Side, other: _Side, dealt: Estimating, *, paired: bool) ->
     if math.isnan(a.low + b.low):
         return estimate.value, math.nan, math.nan
     if one.is_share and estimate.half_width == 0.0 and a.half_width + b.half_width > 0.0:
-        return independent  # shares that agree in every shot are no more certain than the shares
+        return independent  # if shares agree in every shot, their difference is no more certain than the shares
     return estimate.value, estimate.low, estimate.high
 
 
@@ -291,7 +291,7 @@ def _weights(datasets: Sequence[xarray.Dataset], names: Sequence[str]) -> Iterat
 
 
 def _cautions(datasets: Sequence[xarray.Dataset], names: Sequence[str]) -> Iterator[tuple[str, str]]:
-    """What ranks do not allow for, in a few words and in a sentence."""
+    """What the ranks do not consider, in a few words and in a sentence."""
     if len({d.attrs.get(attr.LAYERS, "") for d in datasets}) > 1:
         yield "layers", "The targets differ in the layers behind the plate."
     if differences := "; ".join(_materials(datasets, names)):
@@ -317,7 +317,7 @@ def _notes(datasets: Sequence[xarray.Dataset], names: Sequence[str]) -> Iterator
 
 
 def _materials(datasets: Sequence[xarray.Dataset], names: Sequence[str]) -> Iterator[str]:
-    """Quantities in which the materials differ, with that of every plate that tells it."""
+    """Quantities in which the materials differ, with the value of every plate that has one."""
     materials = {
         name: json.loads(d.attrs[attr.MATERIAL])
         for name, d in zip(names, datasets, strict=True)

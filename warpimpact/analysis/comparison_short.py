@@ -1,5 +1,5 @@
-"""The short answer of a comparison: the measure that decides, the plates in its order with their differences from the
-best one, and what the hits leave open. `comparison_text` has every measure."""
+"""The short answer of a comparison: the deciding measure, the plates in its order with their differences from the best
+one, and open points. `comparison_text` has every measure."""
 
 from __future__ import annotations
 
@@ -23,10 +23,10 @@ from warpimpact.view.view import Column, Section, Table, number
 
 
 def deciding(comparison: ComparedPlates) -> Score | None:
-    """The measure that decides, as the first plate has it: the first one by which hits tell two plates apart, or else
-    the first one that ranks plates; None where there is none.
+    """The measure that decides, with the values of the first plate: the first measure by which hits tell two plates
+    apart, else the first one that ranks plates; None if there is none.
 
-    Measures come in the order in which they were asked for, by default that of `effectiveness.SHOWN`: what reaches the
+    Measures have the order in which they were asked for, by default that of `effectiveness.SHOWN`: what reaches the
     base comes before what flies behind the target.
     """
     ranked = _ranking_scores(comparison)
@@ -44,21 +44,21 @@ def _ranking_scores(comparison: ComparedPlates) -> list[Score]:
 
 
 def from_best(comparison: ComparedPlates, measure: str) -> list[Difference]:
-    """By how much every plate but the best exceeds the best one, in the order of the ranks."""
+    """Differences of the other plates from the best one, in the order of the ranks."""
     best, *others = comparison.ordered(measure)
     pairs = {(pair.one, pair.other): pair for pair in comparison.differences if pair.measure == measure}
     return [pairs[name, best] if (name, best) in pairs else _reversed(pairs[best, name]) for name in others]
 
 
 def _reversed(pair: Difference) -> Difference:
-    """The difference of the other plate from the one."""
+    """The difference with both plates exchanged."""
     survival = pair.survival and replace(pair.survival, interval=negative(pair.survival.interval))
     low, high = negative((pair.low, pair.high))
     return Difference(pair.measure, pair.other, pair.one, 0.0 - pair.value, low, high, survival)
 
 
 def short_view(comparison: ComparedPlates, evidence: Sequence[str] = ()) -> Section:
-    """The measure that decides with its ranks and differences, what is not told apart, and on what the answer rests.
+    """The deciding measure with its ranks and differences, what is not told apart, and what the answer rests on.
 
     Args:
         evidence: lines on what the results rest on (`evidence_lines.evidence_of_all`).
@@ -71,7 +71,7 @@ def short_view(comparison: ComparedPlates, evidence: Sequence[str] = ()) -> Sect
 
 
 def verdict_of(comparison: ComparedPlates) -> list[str]:
-    """Who is best by the measure that decides, and what is not told apart, in sentences; empty where none decides."""
+    """Sentences about the best plate by the deciding measure, and what is not told apart; empty where none decides."""
     score = deciding(comparison)
     if score is None:
         return []
@@ -82,7 +82,7 @@ def verdict_of(comparison: ComparedPlates) -> list[str]:
 
 
 def _title(comparison: ComparedPlates, score: Score) -> str:
-    """The measure that decides, which way is better, and which measures before it tell no plates apart."""
+    """The deciding measure, its better direction, and the measures before it that tell no plates apart."""
     before = []
     for other in _ranking_scores(comparison):
         if other.name == score.name:
@@ -127,7 +127,7 @@ def _ranks(comparison: ComparedPlates, score: Score) -> Table:
 
 
 def _open(comparison: ComparedPlates, score: Score) -> str:
-    """Pairs that the measure does not tell apart, and other measures at which another plate is best."""
+    """Pairs that the measure does not tell apart, and other measures in which another plate is best."""
     pairs = [pair for pair in comparison.differences if pair.measure == score.name and not pair.told_apart]
     total = sum(pair.measure == score.name for pair in comparison.differences)
     alike = "; ".join(f"{pair.one} and {pair.other}" for pair in pairs)
@@ -142,7 +142,7 @@ def _open(comparison: ComparedPlates, score: Score) -> str:
 
 
 def _used(comparison: ComparedPlates) -> str:
-    """How many hits were compared, and what the ranks do not allow for."""
+    """How many hits were compared, and what the ranks do not consider."""
     hits = {plate.hits for plate in comparison.plates}
     count = f"{min(hits)}" if len(hits) == 1 else f"{min(hits)} to {max(hits)}"
     same = "" if any(pair.independent for pair in comparison.pairs) else ", the same shots"
@@ -151,7 +151,7 @@ def _used(comparison: ComparedPlates) -> str:
 
 
 def _assumptions(comparison: ComparedPlates, score: Score) -> str:
-    """Whether the best plate stays so if something that nobody measured is otherwise."""
+    """Whether the best plate stays the best under other assumptions about what nobody measured."""
     best = comparison.ordered(score.name)[0]
     about = [each for each in comparison.verdicts if each.measure == score.name and best in (each.one, each.other)]
     told = [verdict for verdict in about if verdict.given and (verdict.given > 0) == (verdict.one == best)]

@@ -1,5 +1,5 @@
-"""A comparison of plates: its values and ranks, and its words. Who is best at what comes first, then every measure as a
-ranking with its differences."""
+"""A comparison of plates: values and ranks, and their text. The best plates come first, then every measure as a ranking
+with its differences."""
 
 from __future__ import annotations
 
@@ -22,14 +22,14 @@ class ComparedPlates:
 
     Attributes:
         plates: in the order in which they were given; all have the same measures.
-        differences: of every pair of plates in every measure that has intervals.
+        differences: differences of every pair of plates in every measure that has intervals.
         pairs: how the hits of every pair were used.
-        at_equal_weight: names of the measures in which the plates, of different weight, were compared by their ratios
-            to the solid plate; None where their weights are the same.
-        confidence: at which the intervals of a measure's differences hold together.
-        notes: what else there is to say, a sentence each.
-        verdicts: of every pair in every measure that assumptions move.
-        cautions: what differs between the plates, or is not known of them, that ranks do not allow for, in few words.
+        at_equal_weight: names of the measures in which plates of different weight were compared by their ratios to the
+            solid plate; None if the weights are the same.
+        confidence: confidence at which the intervals of a measure's differences hold together.
+        notes: further notes, a sentence each.
+        verdicts: verdicts on every pair in every measure that assumptions change.
+        cautions: differences or unknowns of the plates that the ranks do not consider, in a few words.
     """
 
     plates: tuple[Contestant, ...]
@@ -43,12 +43,12 @@ class ComparedPlates:
 
     @property
     def reference(self) -> str:
-        """What the solid references are called."""
+        """Name of the solid references."""
         return common_name(plate.reference for plate in self.plates)
 
     def ranks(self, measure: str) -> dict[str, int]:
-        """Name of each plate → its rank, by value. Plates that share a rank are a group in which no two are told apart;
-        the rank of a group is one more than the number of plates before it."""
+        """Rank of each plate by its value, by name. Plates with the same rank form a group in which no two are told
+        apart. The rank of a group is one more than the number of plates before it."""
         distinct = {(pair.one, pair.other) for pair in self.differences if pair.measure == measure and pair.told_apart}
         group: list[str] = []
         ranks: dict[str, int] = {}
@@ -60,7 +60,7 @@ class ComparedPlates:
         return ranks
 
     def ordered(self, measure: str) -> list[str]:
-        """Names of the plates, the best value first: of the ratio to the solid plate where that counts."""
+        """Names of the plates, the best value first (or the best ratio to the solid plate, where that counts)."""
         by_ratio = measure in (self.at_equal_weight or ())
 
         def worse(plate: Contestant) -> float:
@@ -77,7 +77,7 @@ def comparison_text(comparison: ComparedPlates) -> str:
 
 
 def comparison_view(comparison: ComparedPlates) -> list[Section]:
-    """What was compared, who is best at what, then every measure as a ranking with differences in words."""
+    """What was compared, the best plates, then every measure as a ranking with differences in words."""
     best = Table((Column("best at"), Column("plate")), best_rows(comparison))
     rankings = (_ranking(comparison, measure) for measure in compared_scores(comparison))
     return [Section(conditions(comparison)), Section([best]), *rankings]
@@ -91,7 +91,7 @@ def conditions(comparison: ComparedPlates) -> list[str]:
 
 
 def _drawn(comparison: ComparedPlates) -> list[str]:
-    """How verdicts are weighed against the uncertainty of the parameters, where that is known."""
+    """How verdicts consider the uncertainty of the parameters, where it is known."""
     if all(pair.survival is None for pair in comparison.differences):
         return []
     return [
@@ -123,12 +123,12 @@ def hits_used(comparison: ComparedPlates) -> list[str]:
 
 
 def compared_scores(comparison: ComparedPlates) -> list[Score]:
-    """The measures of the first plate in which plates are compared; a worst hit has no interval."""
+    """The measures of the first plate in which plates are compared, without worst hits, which have no interval."""
     return [score for score in comparison.plates[0].measures if score.measure.kind != "worst_point"]
 
 
 def best_rows(comparison: ComparedPlates) -> list[tuple[str, str]]:
-    """Every measure and who is best at it."""
+    """Every measure and the best plate in it."""
     rows = []
     for measure in compared_scores(comparison):
         if measure.measure.higher_is_better is None:
@@ -143,7 +143,7 @@ def best_rows(comparison: ComparedPlates) -> list[tuple[str, str]]:
 
 
 def _as_good(comparison: ComparedPlates, measure: str, first: Sequence[str]) -> str:
-    """What to say of plates behind the best that no difference tells from all of these; mostly empty."""
+    """Words about plates behind the best that no difference tells from any of these; mostly empty."""
     apart = [{pair.one, pair.other} for pair in comparison.differences if pair.measure == measure and pair.told_apart]
     others = [plate.name for plate in comparison.plates if plate.name not in first]
     open_ = [name for name in others if not all({name, leader} in apart for leader in first)]
@@ -151,16 +151,16 @@ def _as_good(comparison: ComparedPlates, measure: str, first: Sequence[str]) -> 
 
 
 def _doubt(comparison: ComparedPlates, measure: str) -> str:
-    """What to say of plates that are best: whether a verdict about the measure does not survive; mostly empty."""
+    """Words about a verdict on the measure that does not survive the uncertainty of the parameters; mostly empty."""
     survivals = [pair.survival for pair in comparison.differences if pair.measure == measure and pair.told_apart]
     failing = any(survival is not None and not survival.survives for survival in survivals)
     return " (not certain under the uncertainty of the parameters)" if failing else ""
 
 
 def _turned(comparison: ComparedPlates, measure: str, first: Sequence[str]) -> str:
-    """What to say of plates that are best where assumptions turn that over; mostly empty."""
+    """Words about assumptions that reverse the verdict on the best plates; mostly empty."""
     if measure in (comparison.at_equal_weight or ()):
-        return ""  # verdicts are by value
+        return ""  # verdicts compare values, not ratios
     about = [verdict for verdict in comparison.verdicts if verdict.measure == measure]
     turned = dict.fromkeys(
         name
@@ -173,12 +173,12 @@ def _turned(comparison: ComparedPlates, measure: str, first: Sequence[str]) -> s
 
 
 def is_ranked(comparison: ComparedPlates, measure: str) -> bool:
-    """Whether the plates are compared in a measure; if not, the notes or the missing interval say why."""
+    """Whether the plates are ranked in a measure. If not, the notes or the missing interval say why."""
     return any(pair.measure == measure and not math.isnan(pair.low) for pair in comparison.differences)
 
 
 def listed(names: Sequence[str]) -> str:
-    """Such as "a, b and c"."""
+    """Names as text such as "a, b and c"."""
     return " and ".join([", ".join(names[:-1]), names[-1]] if len(names) > 1 else names)
 
 
@@ -217,7 +217,7 @@ def weighed(comparison: ComparedPlates, measure: str) -> str:
 
 
 def _in_words(pair: Difference, measure: Score, what: str) -> str:
-    """Such as "a better than b by 0.1 (0.05 to 0.15)"; `what` follows the difference."""
+    """Text such as "a better than b by 0.1 (0.05 to 0.15)"; `what` follows the difference."""
     if math.isnan(pair.low):
         text = f"difference{what} {number_text(pair.value)}"
         return f"{pair.one} and {pair.other}: {text}, of which these hits give no interval"
@@ -237,7 +237,7 @@ def _in_words(pair: Difference, measure: Score, what: str) -> str:
 
 
 def negative(interval: tuple[float, float]) -> tuple[float, float]:
-    """The interval of the negative number."""
+    """The interval of the negated number."""
     return -interval[1], -interval[0]
 
 

@@ -1,4 +1,4 @@
-"""What a comparison of plates consists of: the plates, differences of pairs of them, and verdicts under assumptions."""
+"""The parts of a comparison of plates: the plates, differences of pairs of them, and verdicts under assumptions."""
 
 from __future__ import annotations
 
@@ -11,8 +11,8 @@ from warpimpact.analysis.survival import Survival
 
 @dataclass(frozen=True)
 class Contestant:
-    """A plate and how well it protects; areal density of the whole target [kg/m²], open area as a share, what its solid
-    reference is and is called, and `Target.weights`."""
+    """A plate and how well it protects: areal density of the whole target [kg/m²], share of open area, solid reference
+    and its name, and `Target.weights`."""
 
     name: str
     hits: int
@@ -26,9 +26,9 @@ class Contestant:
 
 @dataclass(frozen=True)
 class Difference:
-    """By how much a measure of one plate exceeds that of another, with its interval; NaN where there is none.
+    """Difference of a measure between one plate and another, with its interval; NaN where there is none.
 
-    `survival` tells whether its sign holds for the true parameters, too; None without a posterior.
+    `survival` says whether its sign also holds for the true parameters; None without a posterior.
     """
 
     measure: str
@@ -41,23 +41,22 @@ class Difference:
 
     @property
     def parameters(self) -> tuple[float, float] | None:
-        """Its interval by the parameters, as in `Estimate`."""
+        """The interval by the parameters, as in `Estimate`."""
         return None if self.survival is None else self.survival.interval
 
     @property
     def told_apart(self) -> bool:
-        """Whether the interval leaves out 0."""
+        """Whether the interval excludes 0."""
         return self.low > 0.0 or self.high < 0.0
 
 
 @dataclass(frozen=True)
 class Verdict:
-    """Which of two plates has the better value of a measure, whatever their weight: 1 the one, −1 the other, 0 where
-    that cannot be told.
+    """Which of two plates has the better value of a measure, whatever their weight: 1 the one, −1 the other, 0 unknown.
 
     Attributes:
-        given: as the campaigns have it.
-        under: if something that nobody measured is otherwise, by what that is.
+        given: verdict for the campaigns as given.
+        under: verdict under each assumption, by name.
     """
 
     measure: str
@@ -68,12 +67,12 @@ class Verdict:
 
     @property
     def turned(self) -> list[str]:
-        """Assumptions that turn it over."""
+        """Assumptions that reverse the verdict."""
         return [name for name, verdict in self.under.items() if verdict == -self.given]
 
     @property
     def text(self) -> str:
-        """Such as "a is better than b in 9 of 12 assumptions; turned over by: β = 1"."""
+        """Text such as "a is better than b in 9 of 12 assumptions; turned over by: β = 1"."""
         if not self.given:
             apart = [name for name, verdict in self.under.items() if verdict]
             sentence = f"{self.one} and {self.other} cannot be told apart as given"

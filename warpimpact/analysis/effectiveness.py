@@ -1,8 +1,8 @@
 """How well a plate protects: measures of a result beside those of the solid plate of equal areal density.
 
-Every number but a quantile and the worst point is a mean over the shots: of one number per shot, or of numbers made for
-the purpose (statistics/tails.py). All of them have the intervals of statistics/intervals.py, and their ratios to
-the solid plate those of statistics/comparisons.py.
+Every number but a quantile and the worst point is a mean over the shots, either of their values or of pseudo-values
+(statistics/tails.py). All numbers have the intervals of statistics/intervals.py, and their ratios to the solid plate
+those of statistics/comparisons.py.
 """
 
 from __future__ import annotations
@@ -42,29 +42,30 @@ SHOWN = (
     *(*_three("residual_energy_fraction"), *_three("residual_energy_density")),
     *("P(inclination > 30 deg)", "P(stopped)", "P(broken)", "P(stopped_or_broken)"),
 )
-"""Measures that are shown of a map of hits unless others are asked for, as far as the result has them."""
+"""Default measures of a map of hits, as far as the result has them."""
 SHOWN_OF_LIMITS = tuple(
     text for quantity in ("limit_velocity", "limit_thickness", "limit_areal_density") for text in _three(quantity)
 )
-"""The same of a search of limits."""
+"""Default measures of a search of limits."""
 
 
 @dataclass(frozen=True)
 class Score:
-    """One number of how well a plate protects, in the unit of its title; NaN where something does not exist.
+    """A measure of how well a plate protects, in the unit of its title; NaN where something does not exist.
 
     Attributes:
-        measure: what it is.
-        value: the number.
-        low, high: its confidence interval by the hits; none of a worst point: what lies between the hits may be worse.
-        solid: the same of the solid reference: a plate of equal areal density, or an add-on before the same base.
-        ratio, ratio_low, ratio_high: the value as a multiple of that.
-        hit: number of the hit that is the worst point; None of anything else.
-        parameters: its interval by the parameters, as in `Estimate`.
-        ratio_parameters: that of the ratio.
-        numerics: how far the numerics may shift the value; None or NaN where that is not known.
-        alone: the same of the base alone.
-        assumptions: the value under each assumption, as in `Estimate`.
+        measure: the measure.
+        value: its value.
+        low, high: confidence interval by the hits. A worst point has none, because a point between the hits may be
+            worse.
+        solid: value of the solid reference: a plate of equal areal density, or an add-on before the same base.
+        ratio, ratio_low, ratio_high: ratio of the value to `solid`, with its interval.
+        hit: number of the hit that is the worst point; None for other measures.
+        parameters: interval by the parameters, as in `Estimate`.
+        ratio_parameters: interval of the ratio by the parameters.
+        numerics: largest shift of the value by the numerics; None or NaN where unknown.
+        alone: value of the base alone.
+        assumptions: value under each assumption, as in `Estimate`.
     """
 
     measure: Measure
@@ -95,7 +96,7 @@ class Score:
 
     @property
     def ratio_text(self) -> str:
-        """The interval of the ratio, or both; empty where there is none."""
+        """The interval of the ratio, or both intervals; empty where there is none."""
         if math.isnan(self.ratio) or (self.ratio_parameters is None and math.isnan(self.ratio_low)):
             return ""
         numerics = None if self.numerics is None else self.numerics / self.solid
@@ -104,11 +105,11 @@ class Score:
 
 @dataclass(frozen=True)
 class Scored:
-    """A score and the numbers that it is made of.
+    """A score and the numbers behind it.
 
     Attributes:
         solid: numbers of the first shots at the solid plate whose mean is its measure; None where there are none.
-        solid_drawn: as `Evidence.drawn`, of the solid plate.
+        solid_drawn: `Evidence.drawn` of the solid plate.
     """
 
     score: Score
@@ -130,7 +131,7 @@ def measures_of(dataset: xarray.Dataset, texts: Sequence[str] = ()) -> list[Meas
         asked = [Measure.parse(text).of(dataset) for text in texts]
     except ValueError as error:
         raise ResultError(f"measure: {error}") from None
-    pierced = Measure.parse(_PIERCED)  # tells whether depths are lower bounds
+    pierced = Measure.parse(_PIERCED)  # with it, readers see whether depths are lower bounds
     return (
         [*asked, pierced] if any(measure.name == "base_depth" for measure in asked) and pierced not in asked else asked
     )
@@ -140,8 +141,8 @@ def effectiveness(dataset: xarray.Dataset, texts: Sequence[str] = ()) -> list[Sc
     """How well the plate of a result protects.
 
     Args:
-        dataset: a hit map; of an open file a slice is in memory at a time, and one number per hit.
-        texts: of measures; by default those that `inspect` shows.
+        dataset: a hit map. Of an open file, one slice at a time and one number per hit are in memory.
+        texts: texts of measures; by default those that `inspect` shows.
 
     Raises:
         ResultError: a text is no measure, or the result lacks what it needs.
@@ -150,7 +151,7 @@ def effectiveness(dataset: xarray.Dataset, texts: Sequence[str] = ()) -> list[Sc
 
 
 def scores(dataset: xarray.Dataset, measures: Sequence[Measure], confidence: float = 0.95) -> Iterator[Scored]:
-    """Measures one after the other, beside those of the solid plate, with the numbers that they are made of."""
+    """Measures one after the other, beside those of the solid plate, with the numbers behind them."""
     of_limits = attr.LIMIT in dataset.attrs
     reference = solid_limits(dataset) if of_limits else solid_reference(dataset)
     alone = base_alone_limits(dataset) if of_limits else base_alone(dataset)
@@ -169,7 +170,8 @@ def _value_of(reference: xarray.Dataset | None, measure: Measure) -> float:
 
 
 def _is_comparable(measure: Measure, dataset: xarray.Dataset, reference: xarray.Dataset) -> bool:
-    """Whether the reference has what is measured: a thickness counts where all else is as heavy."""
+    """Whether the reference has the measure. A limit thickness counts only if the rest of both targets is equally
+    heavy."""
     if measure.kind == "target":
         return False
     if measure.name != "limit_thickness":
@@ -213,7 +215,8 @@ def _scored(found: Evidence, dataset: xarray.Dataset, reference: xarray.Dataset 
 
 
 def _averaged_of_solid(measure: Measure, values: Array) -> Array:
-    """Numbers of the shots at the solid plate whose mean is its measure: one number of a quantile or a worst point."""
+    """Numbers of the shots at the solid plate whose mean is its measure; for a quantile or a worst point a single
+    one."""
     if measure.kind in ("quantile", "worst_point"):
         return np.array([estimate_from(measure, values).value])
     return measure.averaged(values)
@@ -230,7 +233,7 @@ def effectiveness_text(dataset: xarray.Dataset, texts: Sequence[str] = ()) -> st
 
 
 def effectiveness_view(dataset: xarray.Dataset, texts: Sequence[str] = ()) -> Section:
-    """The same as a view."""
+    """The scores of `effectiveness` as a view."""
     measures = effectiveness(dataset, texts)
     with_solid = any(not math.isnan(measure.solid) for measure in measures)
     notes = [depth_note(measures), solid_note(dataset)]
@@ -244,7 +247,7 @@ def effectiveness_view(dataset: xarray.Dataset, texts: Sequence[str] = ()) -> Se
 
 
 def measures_table(measures: Sequence[Score], reference: str | None = "solid plate") -> Table:
-    """Measures with their intervals, and beside the references: a solid one of this name, and the base alone."""
+    """Measures with their intervals, beside the references: the solid one of this name, and the base alone."""
     columns = [Column(), number("value"), Column("95 % interval")]
     if reference is not None:
         columns += [number(reference), number("ratio to it"), Column("95 % interval")]
@@ -265,7 +268,7 @@ def measures_table(measures: Sequence[Score], reference: str | None = "solid pla
 
 
 def depth_note(measures: Sequence[Score]) -> str:
-    """What to know of the depths in a base that some cores pierce; empty if none does."""
+    """A note on the depths in a base that some cores pierce; empty if none does."""
     share = {measure.name: measure.value for measure in measures}.get(_PIERCED, 0.0)
     if not share > 0.0:
         return ""

@@ -1,5 +1,4 @@
-"""Measures of a result as estimates: with their intervals, what the numerics may shift them by, and the numbers of the
-shots that they are made of."""
+"""Measures of a result as estimates: with intervals, with shifts by the numerics, and with the numbers of the shots."""
 
 from __future__ import annotations
 
@@ -31,12 +30,12 @@ SLICE = 2**18
 
 @dataclass(frozen=True)
 class Evidence:
-    """A measure of a result, and what it is made of, in the units of the Dataset unless it is `shown`.
+    """A measure of a result with the numbers behind it, in the units of the Dataset unless it is `shown`.
 
     Attributes:
-        values: what the measure counts of each shot, NaN where it does not count, shape [hits].
-        drawn: numbers whose mean over the shots of a draw of a posterior is the measure of the draw, shape [hits].
-        moves: what assumptions do to it; None where that is not known.
+        values: values of the shots for the measure, NaN where a shot does not count, shape [hits].
+        drawn: numbers whose mean over the shots of a draw of a posterior is the measure for this draw, shape [hits].
+        moves: changes by assumptions; None where unknown.
     """
 
     measure: Measure
@@ -47,27 +46,27 @@ class Evidence:
 
     @property
     def numbers(self) -> Array | None:
-        """Numbers of the shots whose mean is the measure; None of a quantile, a worst point and areal density."""
+        """Numbers of the shots whose mean is the measure; None for a quantile, a worst point and areal density."""
         has_none = self.measure.kind in ("quantile", "worst_point", "target")
         return None if has_none else self.measure.averaged(self.values)
 
     @property
     def worst_shot(self) -> int | None:
-        """Index of the shot that is the worst point; None of other measures, and where no shot counts."""
+        """Index of the shot that is the worst point; None for other measures, and where no shot counts."""
         known = ~np.isnan(self.values)
         if self.measure.kind != "worst_point" or not known.any():
             return None
         return int(np.argmax(np.where(known, self.measure.worse * self.values, -np.inf)))
 
     def shown(self) -> Evidence:
-        """The same in the units in which the measure is shown."""
+        """The evidence in the display unit of the measure."""
         factor = self.measure.display.factor
         estimate, moves = self.estimate.times(factor), self.moves and self.moves.times(factor)
         return Evidence(self.measure, estimate, factor * self.values, factor * self.drawn, moves)
 
 
 def evidence(dataset: Result, measures: Sequence[Measure], confidence: float = 0.95) -> Iterator[Evidence]:
-    """Measures one after the other; of an open file a slice is in memory at a time, and one number per hit."""
+    """Measures one after the other. Of an open file, one slice at a time and one number per hit are in memory."""
     needed = (v.STATUS, *v.GROUPS["finer"], *(name for measure in measures for name in measure.quantity.of))
     pair = finer_pair(dataset[[name for name in dict.fromkeys(needed) if name in dataset]])
     dealt, assumed = dealing(dataset), Assumed(dataset, measures)
@@ -90,19 +89,19 @@ def evidence(dataset: Result, measures: Sequence[Measure], confidence: float = 0
 
 
 def _beyond(estimate: Estimate, highest: float) -> Estimate:
-    """A quantile of limits, of which an end at the largest value tried lies beyond it."""
+    """A quantile of limits whose end becomes infinite where it is the largest value tried."""
     value, low, high = (math.inf if end >= highest else end for end in (estimate.value, estimate.low, estimate.high))
     return replace(estimate, value=value, low=low, high=high)
 
 
 def by_hit_of(dataset: Result, measure: Measure) -> Array:
-    """The quantity of every hit, shape [hits]; of an open file a slice is in memory at a time."""
+    """The quantity of every hit, shape [hits]. Of an open file, one slice at a time is in memory."""
     names: list[str] = [name for name in (v.STATUS, *measure.quantity.of) if name in dataset]
     return np.concatenate([measure.by_hit(part) for part in slices(dataset[names])])
 
 
 def _drawn(dataset: Result, measure: Measure, values: Array) -> Array:
-    """Numbers whose mean over the shots of a draw is the measure of the draw."""
+    """Numbers whose mean over the shots of a draw is the measure for this draw."""
     if measure.kind == "quantile":
         return by_draws(dataset, values, quantile_weights(measure.share))
     if measure.kind == "worst_tenth":
@@ -119,13 +118,13 @@ def estimated(dataset: Result, measures: Sequence[Measure], confidence: float = 
 
 
 def status_shares(dataset: Result) -> dict[str, Estimate]:
-    """Shares of the shots by how they ended, of the statuses that occur."""
+    """Shares of the shots by status, for the statuses that occur."""
     shares = estimated(dataset, [Measure.parse(f"P({name})") for name in STATUSES])
     return {measure.name: estimate for measure, estimate in shares.items() if estimate.value > 0.0}
 
 
 def means_of(variables: Sequence[v.Variable], standoffs: Sequence[float]) -> list[Measure]:
-    """Means of recorded quantities; of a quantity with stand-offs one mean at each [m]."""
+    """Means of recorded quantities. A quantity with stand-offs has a mean at each of them [m]."""
     return [
         Measure.parse(f"mean({variable})" if at is None else f"mean({variable}@{at!r}m)")
         for variable in variables

@@ -12,10 +12,11 @@ if TYPE_CHECKING:
 
 
 def evidence_lines(dataset: Result, *, file: str | None = None) -> list[str]:
-    """What a result rests on in a line, and its names with their evidence; what was not measured is counted only.
+    """A line on what a result rests on, with names and the state of their evidence. What was not measured is only
+    counted.
 
     Args:
-        file: of the result, whose `inspect` tells more.
+        file: file of the result, whose `inspect` says more.
     """
     lines = str(dataset.attrs.get(attr.EVIDENCE, "")).splitlines()
     shown = [line for line in lines if not line.startswith(attr.NOT_TESTED)]
@@ -25,7 +26,7 @@ def evidence_lines(dataset: Result, *, file: str | None = None) -> list[str]:
 
 
 def evidence_of_all(datasets: Mapping[str, Result]) -> list[str]:
-    """What results of these names rest on, a line for those that rest on the same."""
+    """What results rest on, by name: one line for all results that rest on the same."""
     names: dict[str, list[str]] = {}
     for name, dataset in datasets.items():
         for line in evidence_lines(dataset)[:1]:

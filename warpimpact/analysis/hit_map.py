@@ -21,14 +21,14 @@ if TYPE_CHECKING:
     Array = NDArray[np.float64]
 
 PIXELS = 200
-"""Along the longer side of a map."""
+"""Pixels along the longer side of a map."""
 _FARTHEST = 2.0
-"""A place farther than this from every hit, in mean hit spacings, has too few hits. Of random hits, 3e-6 of the places
-are."""
+"""Largest distance of a place from the nearest hit, in mean hit spacings; farther places have too few hits. With random
+hits, 3e-6 of the places lie farther."""
 _MARGIN = 4.0
 """Width of the strip that continues a periodic cell, in mean hit spacings."""
 _BEHIND = {v.RESIDUAL_VELOCITY, v.DEFLECTION}
-"""A core that ricocheted has them, too, but in front of the plate."""
+"""Variables that a core that ricocheted has, too, but in front of the plate."""
 
 
 def hit_map(
@@ -52,8 +52,8 @@ def hit_map(
         standoff: distance behind the plate, or the layer, [m] for a variable that has one; the largest if None.
         layer: number of the layer for a variable that has layers, 0 the plate; the last one if None.
         method: "nearest" gives every place the value of the nearest hit. "linear" interpolates between three hits.
-        pixels: places along the longer side, 1 or more; None gives the places of the hits themselves if they were
-            sampled as a grid (mean of hits at the same place), else 200.
+        pixels: places along the longer side, 1 or more. None gives the places of the hits if they were sampled as a
+            grid (with means of hits at the same place), else 200.
 
     Returns:
         Map of shape [hit_z, hit_y], with these coordinates [m] and the attributes of the variable.
@@ -87,7 +87,7 @@ def hit_map(
 
 
 _DIMENSIONS = {("hit",), ("hit", "standoff"), ("hit", "layer"), v.LAYER_STANDOFF_TILT.dims}
-"""Of variables with one number per hit, once a stand-off and a layer are chosen."""
+"""Dimensions of variables with one number per hit, once a stand-off and a layer are chosen."""
 
 
 def chosen(
@@ -129,8 +129,8 @@ def hit_points(dataset: xarray.Dataset) -> Array:
 
 
 def is_folded(dataset: xarray.Dataset) -> bool:
-    """Whether a map shows hits at their places in the cell, and not in the plate: the hits of a burst lie in several
-    cells of the pattern. A plate with a rim does not repeat."""
+    """Whether a map shows hits at their places in the cell instead of the plate, because the hits of a burst lie in
+    several cells of the pattern. A plate with a rim does not repeat."""
     return v.BURST_ORDER in dataset and _is_periodic(dataset)
 
 
@@ -163,7 +163,7 @@ def _on_grid(result: xarray.Dataset, hits: Array, values: Array) -> tuple[Array,
 
 
 def _between(hits: Array, values: Array, places: Array, period: Array, *, wraps: bool, method: str) -> Array:
-    """Values at places [z, y, 2] from those of the hits."""
+    """Values at places, shape [z, y, 2], from those of the hits."""
     spacing = float(np.sqrt(period.prod() / len(hits)))
     if wraps:
         hits, values = _continued(hits, values, period, _MARGIN * spacing)

@@ -1,4 +1,4 @@
-"""What is in a result file: who made it, from what campaign, its numbers with their intervals, and what failed."""
+"""The contents of a result file: origin, numbers with their intervals, and failures."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ _ARRESTED = "Other cores count in none of these numbers; in the file an arrested
 
 
 def inspect_text(dataset: xarray.Dataset) -> str:
-    """All that a person may ask of a hit map, as text; of an open file only a part is in memory at a time."""
+    """All information on a hit map as text. Of an open file only a part is in memory at a time."""
     return text_of(inspect_view(dataset))
 
 

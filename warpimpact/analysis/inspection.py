@@ -1,4 +1,4 @@
-"""What a notebook shows of a result: a map, what comes through, and all its numbers."""
+"""What a notebook shows of a result: a map, a verdict, and all its numbers."""
 
 from __future__ import annotations
 
@@ -25,13 +25,13 @@ from warpimpact.results.outlines import outlines
 from warpimpact.view import svg
 
 _MOST_HITS = 2000
-"""Hits that a drawing has."""
+"""Most hits in a drawing."""
 _PASSED, _STOPPED, _FAILED, _EDGE = "#D55E00", "#56B4E9", "#000000", "#d8d8d8"
 
 
 @dataclass(frozen=True)
 class Inspection:
-    """All that a person may ask of a result, as text, and in a notebook with a map.
+    """All information on a result, as text, and in a notebook with a map.
 
     Attributes:
         text: what `warpimpact inspect` prints.
@@ -47,12 +47,12 @@ class Inspection:
         return self.text
 
     def _repr_html_(self) -> str:
-        """What a notebook shows."""
+        """HTML for a notebook."""
         return f"<div><p><b>{escape(self.verdict)}</b></p>{self.drawing}<pre>{escape(self.text)}</pre></div>"
 
 
 def inspect(dataset: xarray.Dataset | str | Path) -> Inspection:
-    """A result, or its file, as text, with a verdict and a map; of a file only a part is in memory at a time.
+    """A result, or its file, as text, with a verdict and a map. Of a file only a part is in memory at a time.
 
     Raises:
         ResultError: the file is missing or damaged, or is no map of hits.
@@ -64,7 +64,7 @@ def inspect(dataset: xarray.Dataset | str | Path) -> Inspection:
 
 
 def verdict(dataset: xarray.Dataset, first: Score) -> str:
-    """How many cores pass, one measure of protection, and how exact the numerics are."""
+    """How many cores pass, one measure of protection, and the accuracy of the numerics."""
     count, interval = sum(int(passed(part).sum()) for part in slices(dataset[[v.STATUS]])), intervals_text(first.ends)
     protection = f"{first.measure.title} {number_text(first.value)}"
     protection += "" if interval == "-" else f" ({interval})"

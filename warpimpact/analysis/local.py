@@ -31,9 +31,9 @@ def plane_fit(offsets: Array, values: Array, confidence: float = 0.95) -> Local:
     """Value at points by least squares: a plane through the values of the hits near each point (local linear
     regression, Cleveland and Devlin 1988, with equal weights).
 
-    The interval is Student's and uses the scatter about the plane. A bend or a jump of the map among the hits widens
-    it in the same way as the scatter of shots. It assumes independent hits. Next to an axis of symmetry, where hits
-    and their images meet, it is up to √2 too narrow.
+    The interval is Student's and uses the scatter about the plane. A bend or a jump of the map among the hits widens it
+    as the scatter of shots does. It assumes independent hits. Next to an axis of symmetry, where hits and their images
+    meet, it is up to √2 too narrow.
 
     Args:
         offsets: from each point to its hits [m], shape [points, hits, 2].

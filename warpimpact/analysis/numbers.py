@@ -1,4 +1,4 @@
-"""Numbers and intervals as people read them."""
+"""Text of numbers and intervals."""
 
 from __future__ import annotations
 
@@ -9,16 +9,16 @@ from typing import NamedTuple
 from warpimpact.statistics.intervals import Estimate
 
 ROUNDING = 1e-5
-"""Numbers up to this are shown as 0. In the units that people see, they are rounding of the computation."""
+"""Largest number that is shown as 0. In display units, smaller numbers are rounding of the computation."""
 
 
 def number_text(number: float) -> str:
-    """With four digits; a dash for what does not exist."""
+    """A number with four digits; a dash for NaN."""
     return "-" if math.isnan(number) else f"{0.0 if abs(number) < ROUNDING else number:#.4g}"
 
 
 def rough_text(number: float) -> str:
-    """With three digits, for what is not better known."""
+    """A number with three digits, for what is not known better."""
     return f"{float(f'{number:.3g}'):.10g}"
 
 
@@ -32,8 +32,8 @@ def interval_text(low: float, high: float, text: Callable[[float], str] = number
 
 
 class Ends(NamedTuple):
-    """Intervals of a number: by the hits, by the parameters where shots draw these from a posterior, and how far the
-    numerics may shift it, None or NaN where that is not known, and between what numbers assumptions move it."""
+    """Intervals of a number: by the hits; by the parameters where shots draw these from a posterior; the largest shift
+    by the numerics, None or NaN where unknown; and the range under assumptions."""
 
     low: float
     high: float
@@ -43,15 +43,15 @@ class Ends(NamedTuple):
 
 
 def ends_of(estimate: Estimate) -> Ends:
-    """Those of an estimate."""
+    """The intervals of an estimate."""
     return Ends(estimate.low, estimate.high, estimate.parameters, estimate.numerics, estimate.assumed)
 
 
 def intervals_text(
     ends: Ends, text: Callable[[float], str] | None = None, shift: Callable[[float], str] | None = None
 ) -> str:
-    """The intervals of a number; without a format of its ends four digits, and two of what the numerics may shift it
-    by, or the format of the ends if only that is given."""
+    """The intervals of a number as text. Ends have four digits by default. The shift by the numerics has two, or the
+    format of the ends if only that is given."""
     shift = shift or text or "{:.2g}".format
     text = text or number_text
     text_of_ends = interval_text(ends.low, ends.high, text)
@@ -71,15 +71,15 @@ def intervals_text(
 
 
 def plus_minus(estimate: Estimate, number: str, half_width: str) -> str:
-    """A mean ± half the width of its confidence interval, the one meaning of the sign; without it where there is none.
+    """A mean ± half the width of its confidence interval (± means nothing else here); without ± if it has none.
 
     Args:
-        number, half_width: the formats of both, such as ".5g".
+        number, half_width: formats of both, such as ".5g".
     """
     value = format(estimate.value, number)
     return value if math.isnan(estimate.half_width) else f"{value} ± {format(estimate.half_width, half_width)}"
 
 
 def of_each(names: Sequence[str], values: Sequence[str]) -> str:
-    """Such as "a 1 m, b 2 m"."""
+    """Text such as "a 1 m, b 2 m"."""
     return ", ".join(f"{name} {value}" for name, value in zip(names, values, strict=True))

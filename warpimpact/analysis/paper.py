@@ -1,4 +1,4 @@
-"""The paper's two shots: what it publishes of them (its Tables 1 and 2), beside what a campaign makes of them."""
+"""The paper's two shots: the published values (its Tables 1 and 2) beside those of a campaign."""
 
 from __future__ import annotations
 
@@ -39,11 +39,11 @@ PUBLISHED = {
         "paper's model": Row(730, 8.5, 1, 23, 4),
     },
 }
-"""Shot → source → row."""
+"""Rows by shot and source."""
 
 STANDOFFS = (0.05, 0.13)
 UNCERTAIN = (8.0, 3.0, 5.0)
-"""Of a residual velocity [m/s], and of a tilt at both stand-offs [degree]: scales of the misfit without signs
+"""Scales of the misfit without signs: of a residual velocity [m/s], and of a tilt at both stand-offs [degree]
 (docs/identification.md)."""
 
 NOTE = """\
@@ -58,11 +58,11 @@ def paper_campaign() -> Path:
 
 
 def check_scene(campaign: Campaign, name: str) -> None:
-    """Refuse a campaign whose shots are not those of the paper; what it does not publish may be anything: the lattice
+    """Refuse a campaign whose shots are not those of the paper. What the paper does not publish may differ: the lattice
     of the slots, the hit points, the stand-off point and the numerics.
 
     Raises:
-        CampaignError: names the campaign by `name`, and the first difference.
+        CampaignError: the message has the campaign's `name`, and the first difference.
     """
     published = _scene(Campaign.from_toml(paper_campaign()))
     if (found := first_difference(_scene(campaign), published)) is not None:
@@ -74,7 +74,7 @@ def check_scene(campaign: Campaign, name: str) -> None:
 
 
 def _scene(campaign: Campaign) -> dict[str, Any]:
-    """What the paper publishes of its scene, as a campaign has it."""
+    """The published part of a scene, in the keys of a campaign."""
     lattice = {"spacing", "staggered", "holes", "rotation"}
     return {
         "core": campaign.core.model_dump(),
@@ -90,7 +90,7 @@ def _scene(campaign: Campaign) -> dict[str, Any]:
 def computed_row(dataset: xarray.Dataset, hit: int) -> Row:
     """One hit of a Dataset in the paper's terms: its pitch is our yaw, each positive at 130 mm.
 
-    The hit's mirror images turn the other way, so the paper's signs can always be had.
+    The hit's mirror images turn the other way, so the paper's signs are always possible.
     """
     shot = dataset.isel(hit=hit).sel(standoff=list(STANDOFFS), method="nearest")
     angles = [_positive_at_last(shot[name].values.tolist()) for name in (v.YAW, v.PITCH)]

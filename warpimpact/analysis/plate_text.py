@@ -35,7 +35,8 @@ def plate_numbers(
 
 
 def weights_of(dataset: Result) -> dict[str, float]:
-    """What `Target.weights` says of the target of a result; of a file that does not part add-on and base, the whole."""
+    """`Target.weights` of the target of a result; only the whole weight if the file does not separate add-on and
+    base."""
     whole = float(dataset.attrs[attr.AREAL_DENSITY])
     if attr.ADD_ON_DENSITY not in dataset.attrs:
         return {"whole target" if v.LAYER_STATUS in dataset else "areal density": whole}
@@ -57,18 +58,18 @@ def plate_text(dataset: Result) -> str:
 
 
 def reference_name(dataset: Result) -> str:
-    """What a target is compared with."""
+    """Name of the reference with which a target is compared."""
     return "solid add-on" if attr.ADD_ON_DENSITY in dataset.attrs else "solid plate"
 
 
 def common_name(references: Iterable[str]) -> str:
-    """The name of several references: theirs, if it is one."""
+    """The name that several references share, or a general one."""
     names = {*references}
     return names.pop() if len(names) == 1 else "solid reference"
 
 
 def solid_plate(dataset: Result) -> str:
-    """Thickness and material of the solid reference as a phrase; empty where that is not told."""
+    """Thickness and material of the solid reference as a phrase; empty where unknown."""
     attributes = dataset.attrs
     plates = json.loads(attributes.get(attr.SOLID_ADD_ON, "[]")) or _whole(dataset)
     if attr.CONTINUUM in attributes:
@@ -86,7 +87,7 @@ def _named(plate: Mapping[str, Any]) -> str:
 
 
 def _whole(dataset: Result) -> list[dict[str, Any]]:
-    """One solid plate in the place of the whole target, as files of earlier versions have it."""
+    """A single solid plate that replaces the whole target, as files of earlier versions have it."""
     material = json.loads(dataset.attrs.get(attr.MATERIAL, "{}"))
     if not {"resistance", "density"} <= material.keys() or attr.AREAL_DENSITY not in dataset.attrs:
         return []
@@ -107,7 +108,7 @@ def _weakens(material: Mapping[str, Any]) -> str:
 
 
 def solid_note(dataset: Result) -> str:
-    """What the solid plate beside a result is, and what keeps it from being the best plate of that weight; empty where
+    """A sentence about the solid plate beside a result, and why it may not be the best plate of its weight; empty where
     the result has none."""
     plate = solid_plate(dataset)
     if not plate or not {*v.SOLID_VARIABLES, *v.SOLID_LIMIT_VARIABLES} & dataset.variables.keys():

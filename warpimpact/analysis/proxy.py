@@ -1,4 +1,4 @@
-"""The proxy of how deep a core goes into what follows, beside what it stands for: the limit thickness."""
+"""The proxy of a core's depth in what follows, beside the limit thickness that it stands for."""
 
 from __future__ import annotations
 
@@ -21,9 +21,9 @@ class Proxy(NamedTuple):
     """The proxy of every hit, shape [hits].
 
     Attributes:
-        inclination: between the axis and the line of fire on impact [degree].
+        inclination: angle between the axis and the line of fire on impact [degree].
         depth: kinetic energy over the presented area and the resistance [m].
-        ratio: this depth over the limit thickness.
+        ratio: `depth` over the limit thickness.
     """
 
     inclination: Array
@@ -32,7 +32,7 @@ class Proxy(NamedTuple):
 
 
 def proxy(dataset: xarray.Dataset) -> Proxy | None:
-    """The proxy for hits whose limit thickness was searched; None where the target is not one solid plate."""
+    """The proxy for hits with known limit thickness; None where the target is not one solid plate."""
     attributes = dataset.attrs
     needed = {attr.CORE, attr.MATERIAL, attr.OPEN_AREA}
     if not needed <= attributes.keys() or attributes[attr.OPEN_AREA] > 0.0 or v.LAYER_STATUS in dataset:
@@ -47,7 +47,7 @@ def proxy(dataset: xarray.Dataset) -> Proxy | None:
 
 
 def inclination(dataset: xarray.Dataset) -> Array:
-    """Between the axis, whose projected angles add to those of the line of fire, and this line [rad]."""
+    """Angle between the axis and the line of fire [rad]. The projected angles of the axis add to those of the line."""
     names = (v.OBLIQUITY, v.AZIMUTH, v.IMPACT_PITCH, v.IMPACT_YAW)
     obliquity, azimuth, pitch, yaw = (np.radians(dataset[name].values) for name in names)
     along_y, along_z = np.tan(obliquity) * np.cos(azimuth), np.tan(obliquity) * np.sin(azimuth)

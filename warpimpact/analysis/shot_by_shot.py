@@ -1,4 +1,4 @@
-"""Two results of the same shots, hit by hit: by how much one differs from the other, and where most."""
+"""Two results of the same shots, hit by hit: how much they differ, and where most."""
 
 from __future__ import annotations
 
@@ -16,16 +16,16 @@ from warpimpact.view.view import Column, Section, Table, number
 Array = NDArray[np.float64]
 
 MOST_NAMED = 12
-"""Hits that are named as those that end otherwise."""
+"""Most hits that are named as ending otherwise."""
 MOST_WORST = 3
-"""Hits that are named as those of the largest differences."""
+"""Number of hits that are named for the largest differences."""
 FEWEST_RANKED = 3
-"""Hits below which no ranks are correlated."""
+"""Fewest hits for a correlation of ranks."""
 
 
 def shared_hits(datasets: Mapping[str, xarray.Dataset]) -> dict[str, xarray.Dataset] | None:
-    """The hits that both results have, in memory, the one by finite elements last; None unless there are two results,
-    one of them by finite elements, of the same shots.
+    """The hits that both results have, in memory, the result by finite elements last; None unless there are two results
+    of the same shots, one of them by finite elements.
 
     Args:
         datasets: results by their names.
@@ -47,7 +47,7 @@ def shared_hits(datasets: Mapping[str, xarray.Dataset]) -> dict[str, xarray.Data
 
 def shot_by_shot(shared: Mapping[str, xarray.Dataset]) -> Section:
     """How two results differ, hit by hit: bias, root mean square, correlation of ranks and the worst hits by quantity.
-    The numbers describe these hits and have no intervals. Hits of which either failed are left out, and counted.
+    The numbers describe these hits and have no intervals. Hits that failed in either result are left out, and counted.
 
     Args:
         shared: as `shared_hits` gives them.
@@ -105,7 +105,7 @@ def _row(
 
 
 def rank_correlation(one: Array, other: Array) -> float:
-    """Spearman's; NaN of fewer than three hits, or where all are the same."""
+    """Spearman's correlation; NaN for fewer than three hits, or where all values are the same."""
     if len(one) < FEWEST_RANKED:
         return float("nan")
     from scipy.stats import rankdata

@@ -1,4 +1,4 @@
-"""The layers of a replayed hit as slabs: where each stands, and where it is solid beside the hit."""
+"""The layers of a replayed hit as slabs: faces, and where each layer is solid beside the hit."""
 
 from __future__ import annotations
 
@@ -32,13 +32,13 @@ def slabs(history: xarray.Dataset, view: str) -> list[Slab]:
 
 
 def depth_of(history: xarray.Dataset) -> float:
-    """From the front face of the target to the rear face of its last layer [m]."""
+    """Distance from the front face of the target to the rear face of its last layer [m]."""
     return slabs(history, "y")[-1].rear
 
 
 class LayerField(NamedTuple):
-    """What is left of a layer behind the plate: its number, the cells of its window [m], and the share of the
-    resistance in them at every snapshot, shape [snapshots, cells_y, cells_z]."""
+    """Resistance left in a layer behind the plate: its number, the cells of its window [m], and the remaining share of
+    the resistance in them at every snapshot, shape [snapshots, cells_y, cells_z]."""
 
     number: int
     cell_y: NDArray[np.float64]
@@ -47,11 +47,11 @@ class LayerField(NamedTuple):
 
 
 def fields_behind(history: xarray.Dataset) -> list[LayerField]:
-    """Those of the layers behind the plate that weaken and that the core reached."""
+    """The LayerFields of the layers behind the plate that weaken and that the core reached."""
     slabs = []
     for number in range(history.sizes["layer"]) if v.LAYER_RESISTANCE_SHARE in history else ():
         y, z = (history[name].values[number] for name in (v.LAYER_CELL_Y, v.LAYER_CELL_Z))
-        rows, columns = (int((cells == cells).sum()) for cells in (y, z))  # NaN fills up
+        rows, columns = (int((cells == cells).sum()) for cells in (y, z))  # smaller windows are filled up with NaN
         if rows:
             share = history[v.LAYER_RESISTANCE_SHARE].values[:, number, :rows, :columns]
             slabs.append(LayerField(number, y[:rows], z[:columns], share))

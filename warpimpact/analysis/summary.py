@@ -1,4 +1,4 @@
-"""The few numbers a person wants first: how the shots ended, and what comes through the plate."""
+"""The first numbers of a result: how the shots ended, and what comes through the plate."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ if TYPE_CHECKING:
 class Spread:
     """Mean and standard deviation over the ``count`` hits that have a quantity; NaN when there are none.
 
-    ``interval`` holds the mean at 95 %, and is NaN if the hits give none; ``parameters``, ``numerics`` and
+    ``interval`` is the 95 % interval of the mean, NaN if the hits give none. ``parameters``, ``numerics`` and
     ``assumptions`` are those of the mean's `Estimate`.
     """
 
@@ -46,7 +46,7 @@ class Spread:
 
     @classmethod
     def of(cls, estimate: Estimate) -> Spread:
-        """Of the values that exist; the standard deviation is that of the hits themselves (ddof = 0)."""
+        """The spread of an estimate. The standard deviation is that of the hits themselves (ddof = 0)."""
         interval = estimate.low, estimate.high
         beside = estimate.parameters, estimate.numerics, estimate.assumptions
         return cls(estimate.count, estimate.value, estimate.spread, interval, *beside)
@@ -66,7 +66,7 @@ class Spread:
         )
 
     def times(self, factor: float) -> Spread:
-        """The same in another unit."""
+        """The spread in another unit."""
         return Spread.of(self.estimate.times(factor))
 
 
@@ -74,9 +74,9 @@ class Spread:
 class Summary:
     """Outcome counts by status, and the spread of what left the rear face.
 
-    Velocities are in m/s, angles in degrees; ``tilt`` is keyed by the stand-off [m]. ``base_depth`` [m] counts as
-    `results.bases.base_depth`; None where no layer is behind the plate. ``broken`` counts the cores whose bending
-    stress passed their strength, whatever their status; None if cores have none.
+    Velocities are in m/s, angles in degrees; ``tilt`` is keyed by the stand-off [m]. ``base_depth`` [m] is that of
+    `results.bases.base_depth`, None if no layer is behind the plate. ``broken`` counts the cores whose bending stress
+    passed their strength, whatever their status; None if cores have no strength.
     """
 
     counts: dict[str, int]
@@ -88,7 +88,7 @@ class Summary:
 
 
 def promise_text(dataset: Result) -> str | None:
-    """What the errors of the numerics are, and whether the fidelity keeps its promise; None of an older result."""
+    """The errors of the numerics in words, and whether the fidelity keeps its promise; None for an older result."""
     attributes = dataset.attrs
     if attr.NUMERICS_GIVEN not in attributes or attr.LIMIT in attributes:
         return None
@@ -109,7 +109,7 @@ def promise_text(dataset: Result) -> str | None:
 
 
 def numerics_sentence(dataset: Result) -> str:
-    """What is known of the errors of the numerics, as a sentence."""
+    """A sentence about the errors of the numerics."""
     promise = promise_text(dataset)
     return f"Numerics: {promise}." if promise else "The error of the numerics is not known."
 
@@ -122,7 +122,7 @@ def _fixed_by(told: Mapping[str, Any]) -> str:
 
 
 def _level_for(told: Mapping[str, Any]) -> str:
-    """What the level of a run with a stop rule was found for."""
+    """What the level of a run with a stop rule was chosen for."""
     velocity, tilt = told[attr.RESIDUAL_VELOCITY_ERROR], told[attr.TILT_ERROR]
     depth, status = (told.get(name, math.nan) for name in (attr.DEPTH_ERROR, attr.STATUS_ERROR))
     errors = f"single hits may err by {errors_text(velocity, tilt, depth, status)}"
@@ -168,7 +168,7 @@ _SAMPLINGS = {
 
 
 def sampling_note(dataset: Result) -> str:
-    """What there is to say of the intervals of a result because of its sampling, if anything."""
+    """A note on the intervals of a result that its sampling needs, or none."""
     attributes = dataset.attrs
     if is_choice(dataset):
         return (
@@ -179,7 +179,7 @@ def sampling_note(dataset: Result) -> str:
 
 
 def summary_text(dataset: Result) -> str:
-    """The summary as text; statuses that did not occur are left out."""
+    """The summary as text, without statuses that did not occur."""
     result, hits = summary(dataset), dataset.sizes["hit"]
     counts = {name.replace("_", " "): count for name, count in result.counts.items() if count}
     if result.broken is not None:
@@ -209,19 +209,19 @@ def summary_text(dataset: Result) -> str:
 
 
 def _counted(count: int, hits: int) -> str:
-    """Which hits a mean is over; empty where it is over all."""
+    """Words for the hits behind a mean; empty where it is over all hits."""
     return "no core behind the plate" if not count else f"of {count} hits" if count < hits else ""
 
 
 def numerics_note(dataset: Result) -> str:
-    """What tells how far the numerics may shift the numbers of a result, or why that is not known."""
+    """How the shift of a result's numbers by the numerics is known, or why it is unknown."""
     if hits := hits_at_two_levels(dataset):
         return f"numerics ±: from {hits} of the hits, which were computed at a finer level, too."
     return f"numerics ± is not known: {_why_not_known(dataset)}."
 
 
 def hits_at_two_levels(dataset: Result) -> int:
-    """How many hits of a result were computed at a finer level, too, which tell what the numerics may shift."""
+    """Number of hits of a result that were computed at a finer level, too, for the shift by the numerics."""
     pair = finer_pair(dataset[[v.STATUS, *(name for name in v.GROUPS["finer"] if name in dataset)]])
     return 0 if pair is None else pair[0].sizes["hit"]
 
@@ -236,7 +236,7 @@ def _why_not_known(dataset: Result) -> str:
 
 
 def levels_note(dataset: Result) -> str:
-    """Whether the means of a result ask for another level than its single hits do; empty where they do not."""
+    """A note where the means of a result need another level than its single hits; else empty."""
     attributes = dataset.attrs
     if attr.LEVEL_SHIFTS not in attributes or attr.RESOLUTION not in attributes or attr.LEVEL_FOR in attributes:
         return ""
@@ -269,7 +269,7 @@ _STOPPED = {
 
 
 def stop_lines(dataset: Result) -> list[str]:
-    """What the stop rule asked for, if there was one."""
+    """What the stop rule asked for; empty without a stop rule."""
     attributes = dataset.attrs
     if attr.STOP_QUANTITY not in attributes:
         return []

@@ -17,9 +17,9 @@ if TYPE_CHECKING:
     Array = NDArray[np.float64]
 
 AROUND = 72
-"""Points around the core on every section of its profile."""
-_SPENT = 1e-9  # a smaller share of the resistance counts as none
-_AT_REST = 1e-5  # share of the speed; less is rounding: a wall that slides along itself does not close in
+"""Points around the core in every section of its profile."""
+_SPENT = 1e-9  # share of the resistance below which it counts as none
+_AT_REST = 1e-5  # share of the speed below which it is rounding: a wall that slides along itself does not close in
 
 
 class PressedSurface(NamedTuple):
@@ -39,8 +39,8 @@ def pressed(history: xarray.Dataset, step: int) -> PressedSurface:
     """The core's surface in a step of its history, with the normal stress of the paper's law (its eqs. 4 and 5).
 
     A point carries stress if it is in the plate and advances along its normal. The stress is the share of the
-    resistance that is left there. For 48 hits on the slotted plate without friction, at their largest force, the sum
-    of the stresses is 0.86 to 1.26 times the recorded force, and its direction is within 4° of it. The discs that close
+    resistance that is left there. For 48 hits on the slotted plate without friction, at their largest force, the sum of
+    the stresses is 0.86 to 1.26 times the recorded force, and its direction is within 4° of it. The discs that close
     nose and base are left out.
     """
     arm, normal, area = _body(history)
@@ -56,9 +56,10 @@ def pressed(history: xarray.Dataset, step: int) -> PressedSurface:
 
 
 def largest_in_plate(history: xarray.Dataset) -> int:
-    """The step of the largest force; with layers behind the plate, of those in which the core reaches none of them.
+    """The step of the largest force; with layers behind the plate, only among steps in which the core reaches none of
+    them.
 
-    A history holds what is left of the resistance of the plate alone.
+    A history contains the resistance left in the plate alone.
     """
     force = np.linalg.norm(history[v.FORCE], axis=1)
     if v.LAYER_FRONT in history:

@@ -1,8 +1,10 @@
-"""Whether the better of two plates is better for the true parameters, too, where shots draw theirs from a posterior.
+"""Whether the better of two plates is also better for the true parameters, where shots draw their parameters from a
+posterior.
 
 The interval of a difference describes the mean over all draws, and narrows with the number of hits. The true parameters
-are one draw: what counts is for how many draws the difference has the same sign (statistics/random_effects.py). Shot k
-has the same draw at every plate of a comparison, and the differences shot by shot are grouped by it.
+are one draw, so what counts is for how many draws the difference has the same sign (statistics/random_effects.py). Shot
+k
+has the same draw at every plate of a comparison, and the differences shot by shot are grouped by draw.
 """
 
 from __future__ import annotations
@@ -30,14 +32,14 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Survival:
-    """Probability that a difference has its sign for the true parameters; NaN where it is not known.
+    """Probability that a difference has its sign for the true parameters; NaN where unknown.
 
     Attributes:
-        probability: share of the posterior's draws for which it has that sign.
-        at_least: lower end of the one-sided interval of that, as the hits leave it.
+        probability: share of the posterior's draws for which it has this sign.
+        at_least: lower end of the one-sided interval of `probability` by the hits.
         needed: probability from which a verdict survives, and confidence of `at_least`.
-        reason: why it is not known; empty where it is.
-        interval: of the difference for the true parameters.
+        reason: why it is unknown; empty where it is known.
+        interval: interval of the difference for the true parameters.
     """
 
     probability: float
@@ -48,17 +50,17 @@ class Survival:
 
     @property
     def survives(self) -> bool | None:
-        """Whether the verdict survives the uncertainty of the parameters; None if the hits do not tell."""
+        """Whether the verdict survives the uncertainty of the parameters; None if the hits do not decide."""
         if math.isnan(self.probability) or self.at_least < self.needed <= self.probability:
             return None
         return self.at_least >= self.needed
 
 
 def by_draws(dataset: Result, values: Array, weights: OrderWeights) -> Array:
-    """Numbers of shots whose mean over those of a draw is the worst tenth or the quantile of that draw.
+    """Numbers of shots whose mean over the shots of a draw is the worst tenth, or the quantile, of this draw.
 
     Args:
-        values: of the first shots, shape [shots].
+        values: values of the first shots, shape [shots].
         weights: as in `tails.pseudo_values`.
     """
     if v.POSTERIOR_DRAW not in dataset:
@@ -71,8 +73,9 @@ def over_draws(dataset: Result, estimate: Estimate, numbers: Array, *, units: st
     """An estimate with its interval by the parameters, where shots draw these from a posterior.
 
     Args:
-        numbers: of all shots; their mean over the shots of a draw is the estimated number of that draw, shape [hits].
-        units: of the numbers; with units of a discrepancy that the result asks to count, this adds to every draw.
+        numbers: numbers of all shots, whose mean over the shots of a draw is the estimated number for this draw, shape
+            [hits].
+        units: units of the numbers. If the result asks to count a discrepancy in these units, it adds to every draw.
     """
     if v.POSTERIOR_DRAW not in dataset:
         return estimate
@@ -85,14 +88,15 @@ def over_draws(dataset: Result, estimate: Estimate, numbers: Array, *, units: st
 
 
 def _no_less(found: tuple[float, float], by_hits: tuple[float, float]) -> tuple[float, float]:
-    """An interval by the parameters: the hits leave the number of one draw no more certain than that of all."""
+    """An interval by the parameters that is at least as wide as that by the hits, which also bound the number of a
+    draw."""
     if math.isnan(sum(by_hits)):
         return found
     return min(found[0], by_hits[0]), max(found[1], by_hits[1])
 
 
 def draws_note(dataset: Result) -> str:
-    """What the two intervals of a result with a posterior are, and whether they count the discrepancy; else empty."""
+    """A note on the two intervals of a result with a posterior, and on the discrepancy in them; else empty."""
     if v.POSTERIOR_DRAW not in dataset:
         return ""
     shown = {"m s-1": " m/s", "degree": "°"}
@@ -115,13 +119,14 @@ def survival_of(
     reason: str,
     confidence: tuple[float, float],
 ) -> Survival | None:
-    """Whether the sign of a difference survives; None where no result draws its parameters from a posterior.
+    """Whether the sign of a difference survives; None if no result draws its parameters from a posterior.
 
     Args:
-        numbers: of the shots of both plates, whose means over those of a draw are compared, shape [hits] each.
-        by_hits: the difference of the means over all shots, with its interval by the hits.
-        reason: why the numbers are not compared by draws, if so.
-        confidence: of the sign, and of the interval of the difference.
+        numbers: numbers of the shots of both plates, whose means over the shots of a draw are compared, shape [hits]
+            each.
+        by_hits: difference of the means over all shots, with its interval by the hits.
+        reason: why the numbers are not compared by draws; empty if they are.
+        confidence: confidence of the sign, and of the interval of the difference.
     """
     drawn = [dataset[v.POSTERIOR_DRAW].values for dataset in datasets if v.POSTERIOR_DRAW in dataset]
     if not drawn:
@@ -145,11 +150,11 @@ def survival_of(
 
 
 def why_not_by_draws(numbers: tuple[Array, Array], *, independent: str, by_ratio: bool) -> str:
-    """Why the numbers of two plates do not tell the difference for each draw; empty where they do.
+    """Why the numbers of two plates do not give the difference for each draw; empty where they do.
 
     Args:
-        independent: why the plates are compared as independent, if so.
-        by_ratio: the numbers are those of ratios to the solid plate.
+        independent: why the plates are compared as independent; empty if they are not.
+        by_ratio: whether the numbers are ratios to the solid plate.
     """
     if not independent and by_ratio and len(numbers[0]) != len(numbers[1]):
         return "a ratio to the solid plate needs as many hits of both plates"
@@ -157,7 +162,7 @@ def why_not_by_draws(numbers: tuple[Array, Array], *, independent: str, by_ratio
 
 
 def survival_text(survival: Survival | None) -> str:
-    """What to append to a verdict."""
+    """Words to append to a verdict."""
     if survival is None:
         return ""
     if survival.reason:
@@ -172,5 +177,5 @@ def survival_text(survival: Survival | None) -> str:
 
 
 def _floored(probability: float) -> str:
-    """Two decimals, not rounded up over the limit that it was compared with."""
+    """Two decimals, not rounded up over the limit of the comparison."""
     return f"{math.floor(100.0 * probability + 1e-9) / 100.0:.2f}"

@@ -22,7 +22,7 @@ from warpimpact.statistics.intervals import Estimate
 from warpimpact.view.view import Column, Section, Table, number
 
 SHOWN_OF_SWEEPS = (f"mean({v.RESIDUAL_VELOCITY})", f"mean({v.DEFLECTION})", f"mean({v.TILT})", "P(perforated)")
-"""Measures that are shown of a sweep unless others are asked for, as far as it has them."""
+"""Default measures of a sweep, as far as it has them."""
 
 _MORE = "means are over the cores that passed; --measure TEXT tells how far numerics and assumptions may shift it"
 
@@ -31,8 +31,8 @@ class Point(NamedTuple):
     """One combination of the inputs.
 
     Attributes:
-        labels: values of the inputs as the campaign says them, by input.
-        estimates: of the measures, in the units of the Dataset.
+        labels: values of the inputs as the campaign writes them, by input.
+        estimates: estimates of the measures, in the units of the Dataset.
         hits: number of the hits that did not fail.
     """
 
@@ -42,8 +42,8 @@ class Point(NamedTuple):
 
 
 def measures_of(sweep: xarray.Dataset, texts: Sequence[str] = ()) -> list[Measure]:
-    """The measures that are asked of a sweep, without a text those of `SHOWN_OF_SWEEPS`; of tilts the largest stand-off
-    counts.
+    """The measures with these texts for a sweep; by default those of `SHOWN_OF_SWEEPS`, with tilts at the largest
+    stand-off.
 
     Raises:
         ResultError: a text is no measure, or the sweep lacks what it needs.
@@ -58,7 +58,7 @@ def measures_of(sweep: xarray.Dataset, texts: Sequence[str] = ()) -> list[Measur
 
 
 def inputs_of(sweep: xarray.Dataset) -> dict[str, list[str]]:
-    """The values of every input as the campaign says them; without an input of which one value was chosen."""
+    """The values of every input as the campaign writes them, without inputs of which one value was chosen."""
     return {name: labels for name, labels in json.loads(sweep.attrs[attr.SWEEP]).items() if name in sweep.dims}
 
 
@@ -74,8 +74,8 @@ def points(sweep: xarray.Dataset, measures: Sequence[Measure]) -> Iterator[Point
 
 
 def sweep_view(sweep: xarray.Dataset, texts: Sequence[str] = ()) -> list[Section]:
-    """The view of a sweep: one table with a row for every combination and its measures. With measures that are asked
-    for, a table for each of them, with what the numerics and assumptions may shift it by, and the hits that count."""
+    """The view of a sweep: one table with a row for every combination and its measures. If measures are asked for, each
+    has a table, with its shifts by the numerics and by assumptions, and the hits that count."""
     measures = measures_of(sweep, texts)
     every = list(points(sweep, measures))
     title = str(sweep.attrs.get(attr.TITLE, "untitled"))
