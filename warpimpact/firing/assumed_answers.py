@@ -1,4 +1,5 @@
-"""What a test tells if something that nobody measured is otherwise: the same shots at a target whose limits have moved.
+"""The answers of a test under other assumptions about what nobody measured: the same shots at a target with changed
+limits.
 
 The limits under assumptions are those of the search (`runs/assumed.py`), so nothing more is computed of the target.
 """
@@ -26,7 +27,7 @@ Array = NDArray[np.float64]
 Answers = Mapping[Variable, Array]
 
 MOST_TESTS = 1000
-"""Tests that are fired again under each assumption, at most."""
+"""Most tests that are fired again under each assumption."""
 
 
 def assumed(
@@ -56,7 +57,8 @@ def assumed(
 
 
 def _answers(test: FiringTest, responses: Mapping[str, Response]) -> dict[str, dict[Variable, float]]:
-    """What the test tells of every response, by the variables of the file; all have the same drawn shots."""
+    """The answers of the test for every response, by the variables of the file. All responses get the same drawn
+    shots."""
     test = test.model_copy(update={"tests": min(test.tests, MOST_TESTS)})
     told = {name: {f.ASSUMED_V50: response.quantile(0.5)} for name, response in responses.items()}
     for add in (_add_reported, _add_proof):
@@ -65,7 +67,7 @@ def _answers(test: FiringTest, responses: Mapping[str, Response]) -> dict[str, d
 
 
 def _add_reported(test: FiringTest, responses: Mapping[str, Response], told: dict[str, dict[Variable, float]]) -> None:
-    """Mean of the V50 that tests report, and how many report the required one."""
+    """Add the mean of the reported V50, and the share of tests that report the required one."""
     if test.procedure is None:
         return
     required = test.required
@@ -82,7 +84,7 @@ def _add_reported(test: FiringTest, responses: Mapping[str, Response], told: dic
 
 
 def _add_proof(test: FiringTest, responses: Mapping[str, Response], told: dict[str, dict[Variable, float]]) -> None:
-    """How often a shot of the proof is stopped, and how often the proof is passed."""
+    """Add how often a shot of the proof is stopped, and how often the proof is passed."""
     proof = test.proof
     if proof is None or proof.velocity is None:
         return

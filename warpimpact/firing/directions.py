@@ -39,20 +39,21 @@ Angles = Annotated[tuple[Angle, ...], Field(min_length=1, max_length=64)]
 
 _STEEPEST = math.radians(89.0)
 ASSUMED_HITS = 64
-"""Hits under each assumption, over all directions, unless the campaign tells how many."""
+"""Hits under each assumption, over all directions, unless the campaign gives their number."""
 
 
 class Directions(Model):
-    """Directions that fire comes from.
+    """Directions of fire.
 
     Attributes:
         azimuth: from the normal of the plate about the vertical, ascending [rad].
         elevation: of the threat above the horizon, ascending [rad].
-        velocity: of the shots at the median [m/s]; not given, that of the named requirement, else of the campaign.
-        weight: of a direction in the mean: "solid_angle", or "area", the solid angle times the area that the plate
-            presents in the direction.
-        half_width: of the 95 % interval of P(perforation) in a direction, at which no more hits are computed.
-        first_count, max_count: hits in a direction: at first, and at most.
+        velocity: of the shots at the median [m/s]; by default that of the named requirement, else of the campaign.
+        weight: weight of a direction in the mean: "solid_angle", or "area", the solid angle times the area that the
+            plate presents in the direction.
+        half_width: half width of the 95 % interval of P(perforation) in a direction, at which no more hits are
+            computed.
+        first_count, max_count: first and largest number of hits in a direction.
     """
 
     azimuth: Angles = tuple(math.radians(degrees) for degrees in (-60, -40, -20, 0, 20, 40, 60))
@@ -80,7 +81,7 @@ class Directions(Model):
 
     def weights(self) -> Array:
         """Weights of the directions, shape [azimuths, elevations], with the sum 1. A direction stands for the angles up
-        to the middle between it and the next; at the ends of the grid it stands for its inner half alone."""
+        to the middle between it and the next one; at the ends of the grid only for its inner half."""
         across, up = _widths(self.azimuth), _edges(self.elevation)
         solid = across[:, None] * (np.sin(up[1:]) - np.sin(up[:-1]))
         if self.weight == "area":
@@ -118,14 +119,14 @@ def impact_azimuth(azimuth: float, elevation: float) -> float:
 
 @dataclass(frozen=True)
 class Sector:
-    """What was found, each of shape [azimuths, elevations].
+    """Protection by direction; arrays of shape [azimuths, elevations].
 
     Attributes:
         share, low, high: P(perforation) and its 95 % interval.
-        hits: how many were computed.
-        failed: how many of these failed.
+        hits: number of computed hits.
+        failed: number of hits that failed.
         mean: the weighted mean of P(perforation) with its 95 % interval, and under assumptions.
-        assumed_hits: hits that were computed under each assumption.
+        assumed_hits: number of hits under each assumption.
         evidence: as in `Response`.
     """
 
@@ -143,7 +144,7 @@ def check_directions(campaign: Campaign) -> None:
     """Refuse a campaign whose hits cannot be continued, or which gives the direction of fire itself.
 
     Raises:
-        CampaignError: says why.
+        CampaignError: the message gives the reason.
     """
     if campaign.burst is not None or campaign.stop is not None or campaign.posterior is not None:
         raise CampaignError("directions cannot be combined with burst, stop or posterior")
@@ -162,7 +163,7 @@ def protect(
     directions finds the resolution.
 
     Args:
-        progress: called with the number of directions that are settled and the number of all directions.
+        progress: called with the number of settled directions and the number of all directions.
     """
     check_directions(campaign)
     if directions.velocity is not None:
@@ -201,11 +202,11 @@ def _under_assumptions(
     numerics: str,
     passed: dict[tuple[int, int], Array],
 ) -> Question[Sector]:
-    """The mean over directions under each assumption, by some of the hits: a direction has a share of them that is its
-    weight, so that their plain mean is the weighted one.
+    """The mean over directions under each assumption, from some of the hits. The number of hits in a direction is
+    proportional to its weight, so their plain mean is the weighted one.
 
     Args:
-        first: the hits that every direction has.
+        first: hits that every direction has.
         passed: answers in every direction.
     """
     if not has_assumptions(campaign):
@@ -233,7 +234,7 @@ def _under_assumptions(
 
 
 def _piloted(campaign: Campaign, shots: Shots, *, worker: Worker, report: Callable[[float], object]) -> Arrays:
-    """A pilot of some of the shots finds the numerics, which are returned as JSON."""
+    """Find the numerics with a pilot of some of the shots; returns them as JSON."""
     return {"numerics": np.array(numerics_for(campaign.scene, shots, campaign.numerics, worker).model_dump_json())}
 
 
@@ -269,7 +270,7 @@ def _estimate(campaign: Campaign, passed: Array) -> Estimate:
 
 
 def _told_from(settled: int, total: int, progress: Callable[[int, int], object]) -> Callable[[RoundProgress], object]:
-    """Return a function that reports the progress of a round; `settled` of all directions need no more hits."""
+    """Return a function that reports the progress of a round after `settled` directions that need no more hits."""
     return lambda now: progress(settled + int(now.done), total)
 
 
@@ -289,9 +290,9 @@ def _sector(campaign: Campaign, directions: Directions, passed: dict[tuple[int, 
 def weighted_mean(passed: list[Array], weights: Array, replicates: int) -> Estimate:
     """The weighted mean over directions of the share of answers 1, with its 95 % interval.
 
-    With replicates Student's interval over their weighted means is used, which the same hits in all directions do not
-    bias. Without, the errors of all directions are added, as if they went together. Where all answers are alike, the
-    ends are the means of those of the directions.
+    With replicates the interval is Student's over their weighted means, which is valid although all directions have the
+    same hits. Without replicates the errors of all directions are added, as if they were fully correlated. Where all
+    answers are equal, the ends are the means of those of the directions.
 
     Args:
         passed: answers in every direction, NaN for a hit that failed.

@@ -1,4 +1,4 @@
-"""What a laboratory reports of a test: V50, spread, and an interval of V50."""
+"""The report of a laboratory on a test: V50, spread, and an interval of V50."""
 
 from __future__ import annotations
 
@@ -24,8 +24,8 @@ class Estimator(Model):
 
     Attributes:
         name: "probit" or "logit" regression of all shots; "mean" of the stops and perforations that MIL-STD-662F takes,
-            or of all levels; "dixon_mood", the sums of the up-and-down method. Not given, it is "mean" for
-            mil_std_662f, "probit" for all else.
+            or of all levels; "dixon_mood", the sums of the up-and-down method. The default is "mean" for mil_std_662f,
+            "probit" for all else.
         interval: of a regression, by the "likelihood" ratio or by Fisher's information ("wald"), or "none".
         confidence: of the interval.
     """
@@ -42,14 +42,14 @@ class Estimator(Model):
 
 @dataclass(frozen=True)
 class Reports:
-    """What every test reports [m/s], each of shape [tests]; NaN where it has none.
+    """Reports of all tests [m/s]; arrays of shape [tests], NaN where a test reports none.
 
     Attributes:
-        v50: its V50.
-        spread: its standard deviation; of "mean" the distance from the slowest perforation up to the fastest stop, the
-            zone of mixed results, 0 where there is none.
+        v50: reported V50.
+        spread: reported standard deviation; for "mean" the zone of mixed results, from the slowest perforation up to
+            the fastest stop, 0 where there is none.
         low, high: interval of V50; an end is infinite where the shots do not bound it.
-        shots: how many it took.
+        shots: number of shots of the test.
     """
 
     v50: Array

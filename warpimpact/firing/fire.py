@@ -1,6 +1,6 @@
 """Fires a procedure many times at a target, each test with its own places and velocities.
 
-What is drawn for shot k of test t depends on the seed, t and k alone.
+The random numbers of shot k of test t depend on the seed, t and k alone.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 
 _LEAST = 1.0
-"""Slowest velocity that a gun fires at [m/s]."""
+"""Slowest velocity of a gun [m/s]."""
 
 
 class Answering(Protocol):
@@ -36,10 +36,10 @@ class Firings:
     """The shots of all tests, each of shape [tests, shots].
 
     Attributes:
-        aimed, velocity: velocity that was aimed at, and that of the shot [m/s].
-        perforated: whether it perforated.
-        place: which place of the target it hit.
-        used: whether the test had that shot.
+        aimed, velocity: velocity aimed at, and velocity of the shot [m/s].
+        perforated: whether the shot perforated.
+        place: place of the target that it hit.
+        used: whether the test had this shot.
     """
 
     aimed: Array
@@ -68,7 +68,7 @@ def fire(procedure: Procedure, response: Answering, places: NDArray[np.int64], e
     """Fire all tests.
 
     Args:
-        places: which place of the response every shot hits, shape [tests, shots].
+        places: place of the response that every shot hits, shape [tests, shots].
         errors: velocity of each shot minus the velocity aimed at [m/s], shape [tests, shots], from `Gun.errors`.
     """
     tests, most = len(places), procedure.most
@@ -96,7 +96,7 @@ def fire(procedure: Procedure, response: Answering, places: NDArray[np.int64], e
 
 
 def _aims(asked: Sequence[float | Optimal | Estimated], velocity: Array, perforated: Flags, used: Flags) -> Array:
-    """Velocities to aim at [m/s]; the D-optimal ones are computed together."""
+    """Velocities to aim at [m/s]. The D-optimal ones are computed together."""
     optimal = np.array([isinstance(velocity, Optimal) for velocity in asked])
     aims = np.array([0.0 if isinstance(velocity, Optimal | Estimated) else velocity for velocity in asked])
     if optimal.any():
@@ -114,7 +114,7 @@ def _aims(asked: Sequence[float | Optimal | Estimated], velocity: Array, perfora
 
 def fit_within(velocity: Array, perforated: Flags, used: Flags) -> tuple[Array, Array]:
     """Median and standard deviation of greatest likelihood, kept within the velocities fired and their range, as Neyer
-    and 3pod do; where the odds fall with the velocity, the middle and the whole range."""
+    and 3pod do. Where the odds fall with the velocity, they are the middle and the whole range."""
     slowest = np.where(used, velocity, np.inf).min(axis=1)
     fastest = np.where(used, velocity, -np.inf).max(axis=1)
     fit = fit_quantal(velocity, perforated, used)

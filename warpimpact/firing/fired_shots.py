@@ -1,4 +1,4 @@
-"""The shots of a test at a target: those of its procedure, and those of its proof."""
+"""The shots of a simulated test: those of its procedure, and those of its proof."""
 
 from __future__ import annotations
 
@@ -15,11 +15,11 @@ from warpimpact.statistics.acceptance import fewest_shots
 Array = NDArray[np.float64]
 
 _PLACES, _VELOCITIES, _NODES = 1, 2, 64
-"""Kinds of numbers that are drawn; equally probable velocities of a shot in a proof."""
+"""Keys of the random numbers of places and of velocities; number of equally probable velocities of a proof's shot."""
 
 
 def drawn_shots(test: FiringTest, procedure: Procedure, response: Response) -> tuple[NDArray[np.int64], Array]:
-    """Places of the shots of all tests, and their velocities less those aimed at [m/s], shape [tests, shots] each."""
+    """Places of the shots of all tests, and their velocities minus those aimed at [m/s], shape [tests, shots] each."""
     tests, most = test.tests, procedure.most
     places = drawn_places(test.fair_hit, response, uniform(test.seed, _PLACES, tests, most), test.seed)
     return places, test.gun.errors(uniform(test.seed, _VELOCITIES, tests, most))
@@ -31,7 +31,7 @@ def fired(test: FiringTest, procedure: Procedure, response: Response) -> Firings
 
 
 def proof_shots(proof: Proof) -> int:
-    """Shots of a proof: those given, or the fewest that show what a pass is to show."""
+    """Shots of a proof: the given number, or the fewest that show what a pass shall show."""
     return proof.shots or fewest_shots(proof.allowed, proof.stop_probability, proof.confidence)
 
 

@@ -1,4 +1,4 @@
-"""The view of a simulated firing test: the target, what tests report of it, and what the plan of a proof means."""
+"""The view of a simulated firing test: the target, the reports of the tests, and the meaning of the plan of a proof."""
 
 from __future__ import annotations
 
@@ -26,19 +26,18 @@ _ANSWERS = {
     f.ASSUMED_PASS: "tests that pass the proof",
     f.ASSUMED_MEAN: "P(perforation), mean over directions",
 }
-"""What people call the answers that assumptions move."""
+"""Words for the answers that assumptions change."""
 
 
 @dataclass(frozen=True)
 class ProcedureVerdict:
-    """How far tests of this procedure can be trusted.
+    """How far tests of a procedure can be trusted.
 
     Attributes:
         known: share of the tests that report a V50.
-        bias, deviation: of the reported V50 from the true one [m/s].
+        bias, deviation: mean and standard deviation of the reported minus the true V50 [m/s].
         spread: median of the reported spread [m/s].
-        coverage: share of the reported intervals that contain the true V50, of the tests that report one; None where
-            none does.
+        coverage: share of the reported intervals that contain the true V50; None where no test reports one.
         open: share of the reported intervals that are open on a side.
         passed: share of the tests that report the required V50; None where none is required.
     """
@@ -97,7 +96,7 @@ def firing_view(dataset: xarray.Dataset) -> list[Section]:
 
 
 def _assumptions(dataset: xarray.Dataset) -> Section:
-    """Between what values assumptions move the answers of the test."""
+    """Ranges of the answers of the test under assumptions."""
     answers = {answer: dataset[answer].values for answer in f.ASSUMED_ANSWERS if answer in dataset}
     names = [str(name) for name in dataset[f.ASSUMPTION].values] if answers else []
     table = assumptions_table({_ANSWERS[answer]: assumed_estimate(names, values) for answer, values in answers.items()})
@@ -105,7 +104,7 @@ def _assumptions(dataset: xarray.Dataset) -> Section:
 
 
 def assumed_estimate(names: list[str], values: NDArray[np.float64]) -> Estimate:
-    """An answer as given, the first of the values, with those under assumptions, as far as they are known."""
+    """An answer as given (the first value), with the known ones under assumptions."""
     under = {name: float(value) for name, value in zip(names[1:], values[1:], strict=True) if np.isfinite(value)}
     return Estimate(float(values[0]), np.nan, np.nan, 0, np.nan, assumptions=under)
 
@@ -128,7 +127,7 @@ def _directions(dataset: xarray.Dataset) -> Section:
 
 
 def _target(dataset: xarray.Dataset) -> Section:
-    """Quantiles of the limit velocities of the target, and the shots that no rule counts."""
+    """Quantiles of the limit velocities of the target, and the shots that the rules refuse."""
     searched = f.CHANGES in dataset
     columns = [Column("target"), number("velocity", "m/s", ".5g"), *([Column("95 % interval")] if searched else [])]
     names = (f.QUANTILE, f.QUANTILE_VELOCITY, f.QUANTILE_LOW, f.QUANTILE_HIGH)
@@ -151,7 +150,7 @@ def _target(dataset: xarray.Dataset) -> Section:
 
 
 def _reported(dataset: xarray.Dataset, worth: ProcedureVerdict, test: dict[str, Any]) -> Section:
-    """What the tests report, beside the truth."""
+    """The reports of the tests, beside the truth."""
     tests, shots = dataset.sizes["test"], dataset[f.SHOTS].values
     shot_count = f"{shots.min()}" if np.ptp(shots) == 0 else f"{shots.min()} to {shots.max()}, mean {shots.mean():.3g},"
     notes = [f"reports a V50 in {share_text(worth.known)} of the tests"] if worth.known.value < 1.0 else []
@@ -172,7 +171,7 @@ def _reported(dataset: xarray.Dataset, worth: ProcedureVerdict, test: dict[str, 
 
 
 def _size(dataset: xarray.Dataset, precision: dict[str, Any]) -> str:
-    """Number of shots that a test needs for the precision that was asked for."""
+    """Number of shots that a test needs for the required precision."""
     within, share = float(precision["within"]), float(precision["share"])
     enough = np.flatnonzero(dataset[f.SIZE_WITHIN].values >= share)
     what = f"V50 within ± {within:g} m/s in {100 * share:g} % of the tests"

@@ -1,4 +1,4 @@
-"""The target of a firing test: its response, from a file of the test or from a search of limits."""
+"""The target of a firing test: its response, from a file or from a search of limits."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ def known_target(test: FiringTest) -> Response | None:
 
     Raises:
         CampaignError: the file that the target names gives no response.
-        ResultError: it is no result.
+        ResultError: the file is no result.
     """
     target = test.target
     if target.mean is not None and target.deviation is not None:
@@ -95,10 +95,10 @@ def response_of(
     progress: Follow | None = None,
     tell: Callable[[str], object] = warnings.warn,
 ) -> tuple[Response | None, dict[str, Any]]:
-    """The response of the target of a test, which is None where the test asks for directions alone.
+    """The response of the target of a test; None where the test asks for directions alone.
 
-    The limits of a campaign are searched into OUTPUT_limits.nc, which `warpimpact inspect` and a test's
-    `target.limits` take.
+    The limits of a campaign are searched into OUTPUT_limits.nc, which `warpimpact inspect` and a test's `target.limits`
+    take.
 
     Args:
         output: the file of the test.
@@ -106,7 +106,7 @@ def response_of(
         executor, resume, overwrite, progress, tell: as in `run_to_file`.
 
     Returns:
-        The response, and attributes that say what the search took.
+        The response, and attributes on the cost of the search.
     """
     if not test.needs_limits:
         return None, {}
@@ -141,7 +141,7 @@ def directions_of(
     progress: Callable[[int, int], object] = lambda done, total: None,
     tell: Callable[[str], object] = warnings.warn,
 ) -> Iterator[Sector | None]:
-    """Compute the directions of a test; None if it asks for none. Results are saved in `output`.parts as they come; the
+    """Compute the directions of a test; None if it asks for none. Results are saved in `output`.parts as they come. The
     caller writes the output before the block ends.
 
     Args:

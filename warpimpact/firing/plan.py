@@ -83,7 +83,7 @@ class Required(Model):
     """A required V50.
 
     Attributes:
-        v50: that a test must report at least [m/s].
+        v50: least V50 that a test must report [m/s].
         by: what must reach it: the reported "v50", or the lower end of its interval ("lower_end").
     """
 
@@ -95,11 +95,11 @@ class Proof(Model):
     """Shots at one velocity, of which at most some may perforate.
 
     Attributes:
-        velocity: that is aimed at [m/s]; not given, that of the named requirement.
-        shots: of a test; not given, the fewest that show `stop_probability` at `confidence`.
-        allowed: perforations that a target may have and pass.
-        stop_probability: probability that a shot is stopped, which a pass is to show.
-        confidence: at which it shows this.
+        velocity: velocity aimed at [m/s]; by default that of the named requirement.
+        shots: shots of a test; by default the fewest that show `stop_probability` at `confidence`.
+        allowed: perforations with which a target still passes.
+        stop_probability: probability of a stop that a pass shall show.
+        confidence: confidence at which it shows this.
     """
 
     velocity: PositiveSpeed | None = None
@@ -116,12 +116,12 @@ class Proof(Model):
 
 
 class FiringTest(Model):
-    """A firing test: what is fired at, how, and what is asked of it.
+    """A firing test: target, procedure, and questions.
 
     Attributes:
         title: one line, which the figure shows.
         tests: how often the procedure is fired.
-        seed: of all that is drawn.
+        seed: of all random numbers.
         target: what is fired at.
         procedure: how V50 is sought.
         gun: how well a velocity is met.

@@ -1,4 +1,4 @@
-"""Reads a firing test: one TOML file, validated; a mistake becomes one sentence."""
+"""Reads a firing test from a TOML file and validates it. A mistake becomes one sentence."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ def read_test(path: str | Path) -> FiringTest:
 
 
 def firing_test(text: str, name: str, folder: Path) -> FiringTest:
-    """Read a test from its text; `name` is what errors call it."""
+    """Read a test from its text; `name` is the name of the file in errors."""
     data: dict[str, Any] = parsed(text, name, TEST)
     try:
         test = FiringTest.model_validate(data, context={"folder": folder})

@@ -1,4 +1,4 @@
-"""Procedures: which velocity the next shot of a test is fired at, by the answers before it (`steps.py`)."""
+"""Procedures: how the velocity of the next shot of a test follows from the answers before it (`steps.py`)."""
 
 from __future__ import annotations
 
@@ -93,8 +93,8 @@ def within_span(stops: list[float], perforations: list[float], pairs: int, span:
 class Langlie(InRange):
     """One-shot test of H. J. Langlie (A reliability test method for "one-shot" items, Aeronutronic U-1792, 1962).
 
-    The next velocity is the middle of the last one and that of the nearest earlier shot from which on stops and
-    perforations are equal in number; without such a shot, of the last one and an end of the range.
+    The next velocity is the middle between the last one and that of the nearest earlier shot from which on stops and
+    perforations are equal in number; without such a shot, between the last one and an end of the range.
 
     Attributes:
         lowest, highest: ends of the range, in which V50 must lie [m/s].
@@ -123,9 +123,9 @@ class Langlie(InRange):
 
 
 class Neyer(InRange):
-    """D-optimal test (B. T. Neyer, Technometrics 36 (1994) 61): search until there are a stop and a perforation, halve
-    their distance down to the guess of the spread, shrink this guess until the answers overlap; from then on the
-    velocity that tells most about V50 and spread together.
+    """D-optimal test (B. T. Neyer, Technometrics 36 (1994) 61). It searches until there are a stop and a perforation,
+    halves their distance down to the guess of the spread, and shrinks this guess until the answers overlap. From then
+    on the velocity is the one that says most about V50 and spread together.
 
     Attributes:
         lowest, highest: ends of the range that V50 is expected in [m/s].

@@ -1,4 +1,4 @@
-"""A firing test at a target: fired many times, as one Dataset (`results/firing.py`)."""
+"""A firing test that is fired many times at a target, as one Dataset (`results/firing.py`)."""
 
 from __future__ import annotations
 
@@ -40,9 +40,9 @@ def simulate_test(
     """Fire a test many times at a target whose response is known.
 
     Args:
-        response: None where the test asks for directions alone.
-        sector: what was computed of the directions.
-        attributes: more global attributes, such as what the search of limits took.
+        response: response of the target; None where the test asks for directions alone.
+        sector: protection by direction.
+        attributes: further global attributes, such as the cost of the search of limits.
 
     Raises:
         ValueError: the rules of fair hits leave no place.
@@ -110,7 +110,7 @@ def _fired(test: FiringTest, response: Response | None) -> tuple[dict[Variable, 
 
 
 def _grid(response: Response, proof: Proof | None) -> Array:
-    """Velocities of the curves, from where nothing perforates to where all does; that of the proof is among them."""
+    """Velocities of the curves, from where nothing perforates to where all does. The proof's velocity is among them."""
     finite = response.changes[np.isfinite(response.changes)]
     of_proof = [] if proof is None or proof.velocity is None else [proof.velocity]
     low, high = np.min([*finite, *of_proof]), np.max([*finite, *of_proof])

@@ -1,7 +1,7 @@
-"""Named requirements: threat, velocity, directions and shots that a standard asks for, as far as it is known here.
+"""Named requirements: threat, velocity, directions and shots that a standard asks for, as far as known here.
 
-Threats and their velocities are those of the catalogue. No text of a standard was at hand: what stands here was found
-second-hand, and `assumed` says what was not found.
+Threats and their velocities are those of the catalogue. No text of a standard was at hand: these values come from
+secondary sources, and `assumed` says what was not found.
 """
 
 from __future__ import annotations
@@ -24,12 +24,12 @@ class Requirement:
     """What a standard asks for.
 
     Attributes:
-        name: as a test file gives it.
-        standard: its name in the catalogue.
-        shots: of a proof; None for the fewest that show P(stop) ≥ 0.9 at 90 % confidence.
-        azimuth, elevation: of the threat, at which a plate is to hold [degree]; empty for fire along the normal alone.
-        source: of what is known.
-        assumed: what is not known, and what stands in its place.
+        name: name in a test file.
+        standard: name in the catalogue.
+        shots: shots of a proof; None for the fewest that show P(stop) ≥ 0.9 at 90 % confidence.
+        azimuth, elevation: directions of the threat at which a plate shall hold [degree]; empty for the normal alone.
+        source: source of these values.
+        assumed: what is unknown, and what is taken instead.
     """
 
     name: str
@@ -65,10 +65,10 @@ REQUIREMENTS = (
 
 
 def named_requirement(name: str) -> Requirement:
-    """A requirement.
+    """The requirement with this name.
 
     Raises:
-        CampaignError: there is none of that name.
+        CampaignError: there is none.
     """
     known = {requirement.name: requirement for requirement in REQUIREMENTS}
     if name in known:
@@ -82,7 +82,7 @@ def threat_of(requirement: Requirement, name: str | None) -> tuple[Threat, Veloc
     """The threat of a requirement, and the velocity that the standard asks for.
 
     Raises:
-        CampaignError: it has several and none is named, or has none of that name.
+        CampaignError: the requirement has several threats and none is named, or has none of that name.
     """
     asked = {
         threat.name: (threat, velocity)
@@ -100,7 +100,7 @@ def threat_of(requirement: Requirement, name: str | None) -> tuple[Threat, Veloc
 
 
 def with_requirement(test: FiringTest) -> FiringTest:
-    """The test with the proof, the window of velocity and the directions of its named requirement, where it gives no
+    """The test with the proof, the window of velocity and the directions of its named requirement, unless it gives
     others.
 
     Raises:
@@ -129,8 +129,8 @@ def with_requirement(test: FiringTest) -> FiringTest:
 
 
 def with_threat(campaign: Campaign, test: FiringTest) -> Campaign:
-    """The campaign with core and velocity of the threat of a test's requirement; where the catalogue does not know the
-    core, that of the campaign stays."""
+    """The campaign with core and velocity of the threat of a test's requirement. It keeps its own core if the catalogue
+    does not have the threat's."""
     if test.requirement is None:
         return campaign
     threat, velocity = threat_of(named_requirement(test.requirement), test.threat)
@@ -140,7 +140,7 @@ def with_threat(campaign: Campaign, test: FiringTest) -> Campaign:
 
 
 def requirement_line(test: FiringTest) -> str:
-    """What a requirement is taken to ask for, with its source and what is assumed; empty where none is named."""
+    """A line on what a requirement asks for as understood here, its source and what is assumed; empty without one."""
     if test.requirement is None:
         return ""
     asked = named_requirement(test.requirement)

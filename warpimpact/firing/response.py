@@ -1,8 +1,9 @@
 """The response of a target: the probability that a shot perforates, against the impact velocity.
 
-It comes from places: a place is one hit of a campaign with its attitude and material. At a place the answer follows
-from the velocity alone. Where a limit velocity is unique the answer changes once, at the limit; a sweep of velocities
-may find several changes.
+The response follows from places. A place is one hit of a campaign with its attitude and material, and its answer
+depends
+on the velocity alone. Where a limit velocity is unique the answer changes once, at the limit; a sweep of velocities may
+find several changes.
 """
 
 from __future__ import annotations
@@ -34,24 +35,24 @@ Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 
 _KNOWN_PLACES = 4000
-"""Of a response that is given as a distribution: its quantiles at even distances."""
+"""Number of places of a response that is given as a distribution: its quantiles at even distances."""
 
 
 @dataclass(frozen=True)
 class Response:
-    """What every place answers.
+    """The answers of all places.
 
     Attributes:
         changes: velocities [m/s] at which the answer changes, ascending, infinite where there are fewer; below the
             first the target stops. Shape [places, changes].
         hit_y, hit_z: hit points [m], shape [places].
         yaw: angle between core axis and line of fire at impact [degree], shape [places].
-        cell: extent along y and z of the unit cell that the hits cover [m]; None of a response without places.
-        dealt: how places are dealt out to the replicates of the sampling (`results.measures.dealing`).
+        cell: extent along y and z of the unit cell that the hits cover [m]; None for a response without places.
+        dealt: how places are dealt to the replicates of the sampling (`results.measures.dealing`).
         outline: outlines of the holes in the cell, y and z [m], separated by NaN.
-        under: `changes` if something that nobody measured is otherwise, by what that is.
-        under_note: how these were computed, or why they are not known.
-        evidence: what the limits rest on, a line each, the summary first; empty of a target that is known.
+        under: `changes` under each assumption, by name.
+        under_note: how these were computed, or why they are unknown.
+        evidence: what the limits rest on, one line each, the summary first; empty if the target itself is known.
     """
 
     changes: Array
@@ -70,7 +71,7 @@ class Response:
 
     @property
     def unique(self) -> bool:
-        """Whether every place has one limit velocity at most."""
+        """Whether every place has at most one limit velocity."""
         return bool(self.changes.shape[1] == 1)
 
     def perforates(self, place: NDArray[np.int64], velocity: Array) -> Flags:
@@ -96,14 +97,14 @@ class Response:
         return np.asarray(self.by_place(velocity, np.zeros(1)).mean(axis=1))
 
     def estimate(self, velocity: float) -> Estimate:
-        """That probability with its 95 % interval over the places."""
+        """The probability of perforation with its 95 % interval over the places."""
         return estimate_of("share", self.answers(velocity), **self.dealt)
 
     def quantile(self, share: float) -> float:
-        """The least velocity from which this share of the places perforates; infinite if none does."""
+        """The least velocity at which this share of the places perforates; infinite if none does."""
         if self.unique:
             finite = np.sort(self.changes[:, 0])
-            place = share * len(finite) - 0.5  # Hazen's
+            place = share * len(finite) - 0.5  # Hazen's plotting position
             low, high = finite[max(0, int(np.floor(place)))], finite[min(len(finite) - 1, int(np.floor(place)) + 1)]
             return (
                 float(low + (place - np.floor(place)) * (high - low)) if np.isfinite(high) and place > 0 else float(low)
@@ -121,8 +122,8 @@ class Response:
         return self.changes[known][order], np.cumsum(sign[known][order]) / len(self)
 
     def quantile_estimate(self, share: float) -> Estimate:
-        """`quantile` with its 95 % interval over the places; NaN where an end is not determined. Of several changes no
-        interval is known."""
+        """`quantile` with its 95 % interval over the places; NaN where an end is not determined. No interval is known
+        for several changes."""
         value = self.quantile(share)
         if not self.unique or self.cell is None:
             return Estimate(value, np.nan, np.nan, len(self), np.nan)
@@ -138,7 +139,7 @@ class Response:
         return 0.5 * (high - low)
 
     def only(self, which: Flags) -> Response:
-        """Some of the places; they are no longer dealt out in turn."""
+        """Some of the places. They are no longer in the order of the replicates."""
         return replace(
             self,
             changes=self.changes[which],
@@ -155,13 +156,13 @@ class Response:
 
 
 def known_response(velocities: Sequence[float], shares: Sequence[float]) -> Response:
-    """Limit velocities that are known by their values and the share of the hits that have each."""
+    """The response of known limit velocities, each with its share of the hits."""
     counts = np.diff(np.round(_KNOWN_PLACES * np.cumsum([0.0, *shares]) / np.sum(shares))).astype(int)
     return _without_places(np.repeat(np.asarray(velocities, dtype=float), counts))
 
 
 def normal_response(mean: float, deviation: float) -> Response:
-    """Limit velocities with a normal distribution."""
+    """The response of normally distributed limit velocities."""
     return _without_places(mean + deviation * special.ndtri((np.arange(_KNOWN_PLACES) + 0.5) / _KNOWN_PLACES))
 
 
@@ -171,10 +172,10 @@ def _without_places(limits: Array) -> Response:
 
 
 def response_of_limits(dataset: xarray.Dataset) -> Response:
-    """The response that a result of `warpimpact limit` describes.
+    """The response in a result of `warpimpact limit`.
 
     Raises:
-        ValueError: it has limits of thickness.
+        ValueError: the result has limits of thickness.
     """
     if dataset.attrs.get(attr.LIMIT) != "velocity":
         raise ValueError("is no result of a search of limit velocities, as warpimpact limit writes")
@@ -189,8 +190,8 @@ def response_of_limits(dataset: xarray.Dataset) -> Response:
 
 
 def limits_under_assumptions(dataset: xarray.Dataset, limits: Array) -> dict[str, Array]:
-    """Limits of all places under each assumption: a place moves as far as the quantile at its limit does, among the
-    hits that were searched under the assumption. A place without material stays."""
+    """Limits of all places under each assumption. The limit of a place moves as the quantile at its limit does among
+    the hits that were searched under the assumption. A place without material stays."""
     measure = Measure.parse(f"mean({v.LIMITS['velocity'].value})")
     moves = Assumed(dataset, [measure]).moves(measure)
     if moves is None:
@@ -208,13 +209,13 @@ def limits_under_assumptions(dataset: xarray.Dataset, limits: Array) -> dict[str
 
 
 def response_of_sweep(sweep: xarray.Dataset, layer: int | None = None) -> Response:
-    """The response that a sweep of the impact velocity describes; a change lies in the middle of two velocities.
+    """The response in a sweep of the impact velocity. A change lies in the middle between two velocities.
 
     Args:
         layer: the layer that must hold, 0 is the plate; None is the last one.
 
     Raises:
-        ValueError: it sweeps something else, or more.
+        ValueError: the sweep is of another input, or of several.
     """
     names = list(json.loads(sweep.attrs[attr.SWEEP]))
     if (

@@ -1,4 +1,4 @@
-"""The gun, and what makes a hit fair: which velocity and which place a shot gets."""
+"""The gun, and the rules of fair hits: velocity and place of every shot."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ Array = NDArray[np.float64]
 Places = NDArray[np.int64]
 
 _TRIALS, _ROUNDS = 64, 16
-"""Places that are tried at a time for a shot on a panel, and how often, before a new panel is taken."""
+"""Places that are tried at a time for a shot on a panel, and number of such trials before a new panel is taken."""
 
 
 class Gun(Model):
@@ -32,7 +32,7 @@ class Gun(Model):
     window: PositiveSpeed | None = None
 
     def errors(self, drawn: Array) -> Array:
-        """Differences from the velocity aimed at [m/s] for numbers drawn in [0, 1): a normal distribution, cut at the
+        """Differences from the velocity aimed at [m/s] for uniform numbers in [0, 1): a normal distribution, cut at the
         window."""
         if self.deviation == 0.0:
             return np.zeros_like(drawn)
@@ -91,10 +91,10 @@ def fair_places(rules: FairHit, response: Response) -> Places:
 
 
 def drawn_places(rules: FairHit, response: Response, drawn: Array, seed: int) -> Places:
-    """Which place every shot hits, shape [tests, shots].
+    """The place that every shot hits, shape [tests, shots].
 
     Args:
-        drawn: numbers in [0, 1) of every shot; without a panel a place follows from its number alone.
+        drawn: uniform numbers in [0, 1) of every shot. Without a panel a place follows from its number alone.
 
     Raises:
         ValueError: no place is fair, or the panel has none.

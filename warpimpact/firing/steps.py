@@ -1,7 +1,8 @@
-"""What a procedure and those who fire it exchange.
+"""The messages between a procedure and those who fire it.
 
-A procedure is a generator per test. It yields a velocity to aim at [m/s] and is sent the Shot that this became; it ends
-when the test is over. For a D-optimal velocity it yields Optimal: these are computed for all tests at once.
+A procedure is a generator per test. It yields a velocity to aim at [m/s] and is sent the resulting Shot; it ends when
+the
+test is over. For a D-optimal velocity it yields Optimal, because these are computed for all tests at once.
 """
 
 from __future__ import annotations
@@ -16,10 +17,10 @@ from warpimpact.scene.units import PositiveSpeed
 
 
 class Shot(NamedTuple):
-    """What a shot became.
+    """A fired shot.
 
     Attributes:
-        velocity: as it was measured [m/s].
+        velocity: measured velocity [m/s].
         perforated: whether it perforated.
     """
 
@@ -28,19 +29,19 @@ class Shot(NamedTuple):
 
 
 class Optimal(NamedTuple):
-    """Asks for the D-optimal velocity (`statistics.quantal.d_optimal`): at the fit of greatest likelihood, or at a
-    guess of the median and the standard deviation [m/s]."""
+    """Asks for the D-optimal velocity (`statistics.quantal.d_optimal`) at the fit of greatest likelihood, or at a guess
+    of the median and the standard deviation [m/s]."""
 
     location: float | None = None
     scale: float | None = None
 
 
 class Estimated(NamedTuple):
-    """Asks for the fit of greatest likelihood so far; what is sent back is a StepEstimate in the place of a Shot."""
+    """Asks for the fit of greatest likelihood so far. A StepEstimate is sent back instead of a Shot."""
 
 
 class StepEstimate(NamedTuple):
-    """The fit of greatest likelihood within the levels that were fired [m/s], and the information sums of it."""
+    """The fit of greatest likelihood within the levels that were fired [m/s], and its information sums."""
 
     location: float
     scale: float
@@ -59,23 +60,23 @@ def ends(fired: list[Shot]) -> tuple[float | None, float | None]:
 
 
 class OfShots(Model):
-    """A procedure with a number of `shots`; its fields stand in the order in which it is read."""
+    """A procedure with a number of `shots`. Its fields stand in the order in which they are read."""
 
     if TYPE_CHECKING:
         shots: Count
 
     @property
     def prefixes(self) -> bool:
-        """Whether the first shots of a test are those of a shorter one."""
+        """Whether the first shots of a test are the shots of a shorter test."""
         return True
 
     @property
     def most(self) -> int:
-        """Shots of a test, at most."""
+        """Most shots of a test."""
         return self.shots
 
     def of_size(self, size: int) -> Self:
-        """The procedure with so many shots."""
+        """The procedure with this number of shots."""
         return self.model_copy(update={"shots": size})
 
 

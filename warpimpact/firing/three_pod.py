@@ -36,12 +36,12 @@ class ThreePod(InRange):
 
     @property
     def prefixes(self) -> bool:
-        """Whether the first shots of a test are those of a shorter one: not where a third phase follows."""
+        """Whether the first shots of a test are the shots of a shorter test; not if a third phase follows."""
         return self.quantile_shots == 0
 
     @property
     def most(self) -> int:
-        """Shots of a test, at most."""
+        """Most shots of a test."""
         return self.shots + self.quantile_shots
 
     def steps(self) -> Steps:
@@ -95,8 +95,8 @@ class ThreePod(InRange):
                 fired.append((yield aim))
 
     def _approach(self, estimate: StepEstimate) -> Steps:
-        """Phase III, in units of the standard deviation; τ² is the variance of the quantile that the fit leaves, kept
-        between those of ± 3 and ± 5 at 95 %, and β = 1/2, as Wu and Tian take them."""
+        """Phase III, in units of the standard deviation. τ² is the variance of the quantile by the fit, kept between
+        those of ± 3 and ± 5 at 95 %, and β = 1/2, as Wu and Tian take them."""
         z = float(special.ndtri(self.quantile))
         s0, s1, s2 = estimate.information
         determinant = max(s0 * s2 - s1 * s1, 1e-12)

@@ -1,4 +1,4 @@
-"""The points over which a measured shot is integrated: each set of parameters has points of its own."""
+"""The hit points over which a measured shot is integrated. Each set of parameters has points of its own."""
 
 from __future__ import annotations
 
@@ -13,24 +13,24 @@ from warpimpact.scene.model import Array
 from warpimpact.scene.symmetry import irreducible_part
 
 REPLICATES = 8
-"""Parts of the hit points, every eighth point each: their spread tells how well the hits are integrated out."""
+"""Parts of the hit points, every eighth point each. Their spread shows how exactly the hits are integrated out."""
 POINT_STEPS = 0.7548776662466927, 0.5698402909980532
-"""From one point to the next along y and z, as shares of the part of the cell, modulo 1: the powers of the root of
-x³ = x + 1, whose points leave no wide gaps (M. Roberts, "The unreasonable effectiveness of quasirandom sequences",
-2018)."""
+"""Steps from one point to the next along y and z, as shares of the part of the cell, modulo 1. They are the powers of
+the root of x³ = x + 1, whose points leave no wide gaps (M. Roberts, "The unreasonable effectiveness of quasirandom
+sequences", 2018)."""
 
 
 @dataclass(frozen=True)
 class Aim:
-    """The points over which one shot is integrated at some sets of parameters, at one scene.
+    """The hit points over which one shot is integrated at some sets of parameters, at one scene.
 
     Attributes:
-        shots: with all images, those of one set after the other, shape [sets · points].
-        group: symmetries, by which the images of a shot follow each other; `computed` are the first of each group.
+        shots: shots with all images, set after set, shape [sets · points].
+        group: symmetries; the images of a shot follow each other, and `computed` are the first of each group.
         weight: 1 where a point is of the shot's class, else 0, shape [sets, points].
-        replicates: number of parts that the computed shots of a set are dealt out to in turn.
-        part: extent of the part of the unit cell that the computed points cover evenly [m], and of the whole cell, each
-            along y and z; None where they do not, or differ in more than their place.
+        replicates: number of parts to which the computed shots of a set are dealt in turn.
+        part: extent along y and z [m] of the part of the unit cell that the computed points cover evenly, and of the
+            whole cell; None if they do not cover it evenly, or if shots differ in more than their place.
     """
 
     shots: Shots
@@ -59,8 +59,8 @@ def aim(shot: MeasuredShot, plate: Plate, core: Core, sampling: Sampling, shifts
     """Points for a shot at some sets of parameters, spread over the cell of the plate.
 
     Args:
-        shifts: uniform numbers that move the points of each set, shape [sets, 2]. Thus the error of a finite number of
-            points differs from set to set, and the spread of the weights contains it.
+        shifts: uniform numbers that move the points of each set, shape [sets, 2]. The error of a finite number of
+            points then differs from set to set, and is part of the spread of the weights.
     """
     placed = isinstance(shot.hit, HitPlace)
     turned = any(name != "velocity" for name, _ in shot.scatter.given)
@@ -70,7 +70,7 @@ def aim(shot: MeasuredShot, plate: Plate, core: Core, sampling: Sampling, shifts
     replicates = 1 if alone else REPLICATES
     alike = Hits(count=count, seed=sampling.seed, irreducible=not (placed or turned or alone))
     group, cell = symmetries_used(shot.impact, alike, plate), np.array(plate.sampled_cell)
-    numbers = alike.model_copy(update={"irreducible": False})  # of what scatters: images share them
+    numbers = alike.model_copy(update={"irreducible": False})  # images share the scattered quantities
     shots = Sampler(shot.impact, numbers, plate, shot.scatter).shots(0, count)
     shares = np.mod(shifts[:, None] + np.arange(count)[:, None] * POINT_STEPS, 1.0).reshape(-1, 2).T
     if isinstance(shot.hit, HitPlace):

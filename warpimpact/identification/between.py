@@ -1,4 +1,4 @@
-"""Interpolation between hit points: numbers follow the plane through those of the nearest points."""
+"""Interpolation between hit points: numbers follow a plane through those of the nearest points."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ NEAREST = 6
 
 
 def signs(observations: Sequence[Observation], group: Sequence[Symmetry]) -> Array:
-    """How numbers change from a computed point to its images, shape [images, observations]."""
+    """Signs of numbers from a computed point to its images, shape [images, observations]."""
     mirrors = [MEASURABLE[observation.name].mirror for observation in observations]
     factors = [[1.0 if mirror is None else getattr(symmetry, mirror) for mirror in mirrors] for symmetry in group]
     return np.array(factors, dtype=np.float64).reshape(len(group), len(mirrors))
@@ -33,6 +33,7 @@ def changes(observations: Sequence[Observation], aim: Aim, computed: Array) -> A
     Returns:
         Shape [sets, computed points, 2, observations], along y and z; 0 where too few neighbours have the numbers, and
         where the points do not cover a part of the unit cell evenly.
+        where the points do not cover a part of the unit cell evenly.
     """
     images = len(aim.group)
     sets, points, numbers = computed.shape
@@ -41,7 +42,7 @@ def changes(observations: Sequence[Observation], aim: Aim, computed: Array) -> A
     part, cell = aim.part
     places, period = aim.hits / part, cell / part
     slopes = [_slopes(observations, *set_numbers, period, images) for set_numbers in zip(places, computed, strict=True)]
-    side = np.sqrt(images / points)  # of the square that a point stands for; its variance is a twelfth of its square
+    side = np.sqrt(images / points)  # side of the square that a point stands for; its variance is side²/12
     return np.asarray(np.stack(slopes) * (side / np.sqrt(12.0)))
 
 

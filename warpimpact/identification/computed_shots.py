@@ -1,4 +1,4 @@
-"""A result by finite elements as measured shots: the fit that `identify` makes of it."""
+"""A result by finite elements as measured shots: the fit that `identify` makes from it."""
 
 from __future__ import annotations
 
@@ -18,14 +18,14 @@ from warpimpact.results import variables as v
 from warpimpact.results.dataset import failed, hit_numbers
 
 VELOCITY, NEAR, FAR = 5.0, 5.0, 10.0
-"""What the numerics of the continuum leave open: of a velocity [m/s], of a tilt at the first stand-off and at the
+"""Uncertainty of the continuum by its numerics: of a velocity [m/s], and of a tilt at the first stand-off and at the
 others [degree] (docs/continuum.md)."""
 PRIORS: dict[str, Any] = {
     "resistance": {"distribution": "uniform", "low": "0.3 GPa", "high": "6 GPa"},
     "shear_coefficient": {"distribution": "uniform", "low": 0, "high": 0.2},
     "degradation": {"distribution": "uniform", "low": 0.6, "high": 1.0},
 }
-"""Of Y, η and β, which such a fit finds."""
+"""Priors of Y, η and β, the parameters of such a fit."""
 
 
 def fit_of_result(path: Path) -> Fit:

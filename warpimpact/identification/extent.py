@@ -1,4 +1,4 @@
-"""What a fit will compute, and roughly how long that takes, before it begins."""
+"""What a fit will compute, and its approximate time, before it begins."""
 
 from __future__ import annotations
 
@@ -12,12 +12,12 @@ from warpimpact.solver.limit import PASSAGES
 from warpimpact.solver.prepare import prepare
 
 SCORING = 1e-4
-"""Seconds of a core that a hit takes beside its march, for scenes, places and scores: 0.9e-4 and 1.3e-4 of the fits in
+"""Seconds of a core for a hit beside its march, for scenes, places and scores: 0.9e-4 and 1.3e-4 in the fits of
 campaigns/fits."""
 
 
 def core_seconds(fit: Fit) -> float:
-    """Time that all sets of a fit take one core, roughly, if the sampling does not end early [s]."""
+    """Approximate time that a core takes for all sets of a fit if the sampling does not end early [s]."""
     of_a_set = 0.0
     for bench in benches(fit):
         scene = fit.scene_of(bench.shot)
@@ -28,20 +28,20 @@ def core_seconds(fit: Fit) -> float:
 
 
 def _limited(fit: Fit, bench: Bench) -> bool:
-    """Whether limits of a bench were measured."""
+    """Whether limits were measured in a bench."""
     return any(observation.is_limit for place in bench.which for observation in fit.shots[place].observations)
 
 
 def sets_of(fit: Fit) -> int:
-    """Sets of parameters at most."""
+    """Largest number of sets of parameters."""
     return sum(rounds(fit.sampling)) // DISCREPANCIES
 
 
 def extent_of(fit: Fit, cores: int | None) -> str:
-    """What a fit will compute at most, in a sentence.
+    """A sentence about the most that a fit will compute.
 
     Args:
-        cores: that will compute; None where that is not known, and so no time is told.
+        cores: number of cores that will compute; None where unknown, and then no time is given.
     """
     sentence = f"computes at most {sets_of(fit)} sets of parameters, {fit.sampling.hits} hits of each shot"
     if cores is None:

@@ -1,4 +1,4 @@
-"""Fit: measured shots, the scene they were fired in, and the priors of what is unknown of it (fit_file.py reads it)."""
+"""A fit: measured shots, their scenes, and priors of the unknown numbers (fit_file.py reads it)."""
 
 from __future__ import annotations
 
@@ -23,12 +23,12 @@ class Sampling(Model):
     """How much is computed.
 
     Attributes:
-        sets: sets of parameters at most.
+        sets: most sets of parameters.
         hits: hit points per set over the part of the cell that differs.
-        draws: of the posterior in the file, of equal weight.
+        draws: draws of the posterior in the file, of equal weight.
         effective: effective sample size at which the sampling ends.
         shared: sets that share the numbers which need a scene of their own, such as a spacing of holes.
-        seed: of all that is drawn.
+        seed: seed of all random numbers.
     """
 
     sets: Annotated[int, Field(strict=True, ge=64, le=2**20)] = 4096
@@ -41,15 +41,15 @@ class Sampling(Model):
 
 @dataclass(frozen=True)
 class MeasuredShot:
-    """A shot that was fired, and what was measured of it.
+    """A fired shot and its measurements.
 
     Attributes:
-        hit: where it hit: a class, or a place.
-        impact, scatter: how the core arrived, and what of that is uncertain.
-        tables: of its scene, with the medians of the priors.
-        own: paths that it gives itself, for which no prior counts.
-        observations: numbers that were measured.
-        status: how it ended, None if that was not told.
+        hit: class or place of its hit.
+        impact, scatter: how the core arrived, and the uncertainty of that.
+        tables: tables of its scene, with the medians of the priors.
+        own: paths of the values that the shot itself gives, for which no prior counts.
+        observations: measured numbers.
+        status: how it ended; None if not reported.
     """
 
     name: str
@@ -63,12 +63,12 @@ class MeasuredShot:
 
     @property
     def numbers(self) -> int:
-        """How many numbers were measured; how it ended counts as one."""
+        """Number of measured values, including how the shot ended."""
         return len(self.observations) + (self.status is not None)
 
     @property
     def content(self) -> tuple[Any, ...]:
-        """All but the name: what two shots are compared by."""
+        """All fields but the name, for comparisons of two shots."""
         return self.hit, self.impact, self.scatter, repr(self.tables), self.observations, self.status
 
 
@@ -77,10 +77,10 @@ class Fit:
     """Measured shots, and what is unknown.
 
     Attributes:
-        parameters: of the scene, and the scales of discrepancy that the observations need; first those that make a
-            scene of their own.
-        discrepancy: standard deviation that the model adds to each kind of observation where it is fixed, by kind.
-        selection: what had to be true of a shot so that it was measured.
+        parameters: unknown numbers of the scene, and the scales of discrepancy that the observations need. Those that
+            need a scene of their own come first.
+        discrepancy: fixed standard deviations of the model's error, by kind of observation.
+        selection: condition under which a shot was measured.
     """
 
     title: str
@@ -101,11 +101,11 @@ class Fit:
 
     @cached_property
     def observed(self) -> int:
-        """How many numbers were measured."""
+        """Number of all measured values."""
         return sum(shot.numbers for shot in self.shots)
 
     def scene_of(self, shot: MeasuredShot, values: Mapping[Path, float] | None = None) -> Scene:
-        """The scene of a shot at some values of the parameters, the medians elsewhere.
+        """The scene of a shot at these values of the parameters, at the medians of the others.
 
         Raises:
             ValidationError: such a scene is not possible.
@@ -120,7 +120,7 @@ class Fit:
 
 
 def scene_from(tables: Mapping[str, Any], record: Record, folder: FilePath) -> Scene:
-    """A scene from its tables; parts that are models already stay the same objects."""
+    """A scene from its tables. Parts that are already models stay the same objects."""
     context = {"folder": folder}
     plate = Plate.model_validate(tables["plate"], context=context)
     interaction = Interaction.model_validate(tables.get("interaction", {}), context=context)

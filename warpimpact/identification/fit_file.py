@@ -1,4 +1,4 @@
-"""Reads a fit: one TOML file, validated; a mistake becomes one sentence, a doubt a warning."""
+"""Reads a fit from a TOML file and validates it. A mistake becomes one sentence, a doubt a warning."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ from warpimpact.solver.limit import check_arrests
 
 _Table = dict[str, Any]
 _CONDITIONS = tuple(name for name in v.HIT_NUMBERS if name in (*v.OUTCOME_VARIABLES, *v.BENDING_VARIABLES))
-"""Recorded numbers of a hit that a condition may be of."""
+"""Recorded numbers of a hit that may be in a condition."""
 _MOST_SHOTS = 256
 DISCREPANCY = {
     "velocity": (Speed, {"distribution": "truncated_normal", "mean": 0, "std": 10, "low": 0, "high": 50}),
@@ -51,7 +51,7 @@ DISCREPANCY = {
         {"distribution": "truncated_normal", "mean": "0 deg", "std": "5 deg", "low": "0 deg", "high": "25 deg"},
     ),
 }
-"""Quantity of a scale of discrepancy, and its prior where none is given: half of a normal distribution."""
+"""Quantity of a scale of discrepancy, and its default prior: half of a normal distribution."""
 
 
 def read_fit(path: str | FilePath) -> Fit:
@@ -59,14 +59,14 @@ def read_fit(path: str | FilePath) -> Fit:
 
     Raises:
         FitError: the file has a value that is not allowed.
-        CampaignError: it is missing, or is not TOML.
+        CampaignError: the file is missing, or is not TOML.
     """
     path = FilePath(path)
     return fit_from(read_text(path), str(path), path.parent)
 
 
 def _at_a_level(numerics: Any) -> Any:
-    """Numerics of level 0 unless they name another; they may not ask for an accuracy."""
+    """Numerics of level 0 by default. They may not ask for an accuracy."""
     if not isinstance(numerics, dict):
         return numerics
     if named := next((key for key in ("fidelity", "accuracy") if key in numerics), None):
@@ -96,7 +96,7 @@ class _ShotTable(_WithScene):
 
 
 class _DiscrepancyTable(Model):
-    """A scale for each kind of discrepancy, a number or a prior; None is the usual prior."""
+    """A scale for each kind of discrepancy, a number or a prior; None is the default prior."""
 
     velocity: Any = None
     angle: Any = None
@@ -117,7 +117,7 @@ class _FitFile(_WithScene):
 
 
 def fit_from(text: str, name: str, folder: FilePath) -> Fit:
-    """Read a fit from its text; `name` is what errors call it."""
+    """Read a fit from its text; `name` is the name of the file in errors."""
     data = parsed(text, name, FIT)
     catalogue = catalogue_of(data, name, folder)
     given: _FitFile = _model(_FitFile, with_cores(data, catalogue, name), name)
@@ -174,7 +174,7 @@ def _shot(
         impact[key] = read.as_read(median)
     observations, status = read_measured(given.measured, record.standoffs, f"{place}.measured")
     limits = [observation.value for observation in observations if observation.is_limit]
-    if limits:  # at which its search begins
+    if limits:  # the search of limits begins at these values
         impact.setdefault("velocity", limits[0])
     return MeasuredShot(
         name=given.name or place.partition(": ")[2],
@@ -189,13 +189,13 @@ def _shot(
 
 
 def _with_material(tables: _Table, impact: _Table, catalogue: Catalogue, place: str) -> _Table:
-    """Tables with what the material of the plate is known for; a prior overrides it."""
+    """Tables with the known values of the plate's material. A prior overrides them."""
     resolved = with_materials(tables | {"impact": impact}, catalogue, place)
     return {name: table for name, table in resolved.items() if name in tables}
 
 
 def _merged(tables: Any, of_shot: Any) -> Any:
-    """Tables with a shot's own values over those of the fit; a table with another shape replaces the fit's."""
+    """Tables of the fit, overridden by a shot's own values. A table with another shape replaces the fit's table."""
     if not (isinstance(tables, Mapping) and isinstance(of_shot, Mapping)) or of_shot.get(
         "shape", tables.get("shape")
     ) != (tables.get("shape")):
@@ -231,7 +231,7 @@ def _condition(text: Any, record: Record, place: str) -> Measure:
 
 
 def _discrepancy(given: _DiscrepancyTable, kinds: set[str], name: str) -> tuple[list[Parameter], dict[str, float]]:
-    """Scales of discrepancy that are unknown, and those that are fixed."""
+    """Scales of discrepancy: the unknown ones as parameters, and the fixed ones by kind."""
     scales, fixed = list[Parameter](), dict[str, float]()
     for kind, (unit, default) in DISCREPANCY.items():
         value, read = getattr(given, kind), quantity(unit)
@@ -254,7 +254,7 @@ def _discrepancy(given: _DiscrepancyTable, kinds: set[str], name: str) -> tuple[
 
 
 def _doubts(shots: tuple[MeasuredShot, ...], parameters: list[Parameter]) -> list[str]:
-    """Sentences about data that a fit can take, but that say less than they seem to."""
+    """Sentences about data that a fit accepts, but that say less than they seem to."""
     doubts, before = list[str](), dict[str, str]()
     for shot in shots:
         if (first := before.get(content := repr(shot.content))) is None:
@@ -273,7 +273,7 @@ def _doubts(shots: tuple[MeasuredShot, ...], parameters: list[Parameter]) -> lis
 
 
 def _check_scenes(fit: Fit, name: str) -> None:
-    """Refuse priors that reach scenes which are not possible."""
+    """Refuse priors that reach impossible scenes."""
     checked = set[tuple[str, frozenset[Path], bool]]()
     for place, shot in enumerate(fit.shots):
         where = f"{name}: shot[{place}]"
@@ -289,7 +289,7 @@ def _check_scenes(fit: Fit, name: str) -> None:
         has_limit = any(observation.is_limit for observation in shot.observations)
         if has_limit and fit.record.bending:
             raise FitError(f"{where}: limit_velocity and a selection by bending_stress cannot be combined")
-        key = repr(shot.tables), shot.own, has_limit  # what the scenes below follow from
+        key = repr(shot.tables), shot.own, has_limit  # the scenes below depend on these alone
         if key in checked:
             continue
         checked.add(key)
@@ -316,6 +316,6 @@ def _check_hit(shot: MeasuredShot, scene: Scene, where: str) -> None:
 
 
 def _some(hit: str, plate: Plate, core: Core) -> bool:
-    """Whether any place of a cell is of a class."""
+    """Whether a class of hits has any place in the cell."""
     y, z = (np.linspace(-0.5, 0.5, 65)[1:] * side for side in plate.sampled_cell)
     return bool(CLASSES[hit](plate, core, *np.meshgrid(y, z, indexing="ij")).any())

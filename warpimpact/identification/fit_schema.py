@@ -14,10 +14,10 @@ Schema = dict[str, Any]
 
 def fit_schema() -> Schema:
     """The JSON schema (2020-12) of a fit file. Its tables core, plate, interaction and impact are those of a campaign,
-    of which a prior may give any key."""
+    where a prior may replace any value."""
     whole = campaign_schema()
     for definition in whole["$defs"].values():
-        definition.pop("allOf", None)  # what a name of the catalogue stands for, a prior may give, too
+        definition.pop("allOf", None)  # a prior may also give what a name of the catalogue gives
         definition["required"] = [name for name in definition.get("required", []) if name in ("shape", "distribution")]
         if definition.get("if") == {"required": ["areal_density"]}:  # a prior may give the thickness
             del definition["if"], definition["then"], definition["else"]

@@ -17,7 +17,7 @@ from warpimpact.scene.model import Array
 from warpimpact.scene.units import Length, quantity, quoted
 
 _AROUND = 24
-"""Points of the core's largest circle that tell whether it crosses the edge of a hole."""
+"""Points on the core's largest circle by which it is checked whether the circle crosses the edge of a hole."""
 
 BoolArray = NDArray[np.bool_]
 
@@ -57,7 +57,7 @@ the core's largest circle crosses the edge of a hole."""
 
 @dataclass(frozen=True)
 class HitPlace:
-    """A hit point that was measured: each coordinate a number [m] or a distribution."""
+    """A measured hit point: each coordinate is a number [m] or a distribution."""
 
     y: float | Distribution
     z: float | Distribution
@@ -81,7 +81,7 @@ def read_hit(given: Any) -> str | HitPlace:
     """Read the class or the place of a hit.
 
     Raises:
-        ValueError: says what is allowed.
+        ValueError: the message says what is allowed.
     """
     if isinstance(given, str):
         if given not in CLASSES:

@@ -1,4 +1,4 @@
-"""From a fit to its posterior: sets of parameters are computed in rounds and saved as they come."""
+"""From a fit to its posterior: sets of parameters are computed in rounds, and saved as they come."""
 
 from __future__ import annotations
 
@@ -28,25 +28,25 @@ from warpimpact.statistics.importance import LARGEST_K, ImportanceSampler
 Array = NDArray[np.float64]
 
 FIRST, FIRST_SHARE = 192, 0.25
-"""Sets of the first round, which is drawn from the prior, and the largest share of all sets that they may be."""
+"""Sets of the first round, which is drawn from the prior, and their largest share of all sets."""
 GROWTH = 0.1
 """Sets of a later round, as a share of all before it; at least half of the first round."""
 DISCREPANCIES = 8
-"""Scales of discrepancy per set of parameters: they need no runs of their own."""
+"""Scales of discrepancy per set of parameters. They need no runs of their own."""
 BATCH = 16
 """Sets per file."""
 FARTHEST = 5.0
-"""Largest miss of a number by the best set of the prior, in standard deviations including the discrepancy."""
+"""Largest miss of a number in the best set of the prior, in standard deviations including the discrepancy."""
 
 
 @dataclass(frozen=True)
 class FitProgress:
-    """How far a fit is.
+    """The progress of a fit.
 
     Attributes:
-        done, total: sets of parameters; `total` is the most that is computed.
+        done, total: sets of parameters; `total` is an upper bound.
         resumed: sets that an earlier call had computed.
-        effective, pareto_k: of the weights so far; NaN before the first round ends.
+        effective, pareto_k: effective size and Pareto k of the weights so far; NaN before the first round ends.
         misfit: smallest sum over shots of Σ (miss/σ)² so far.
     """
 
@@ -71,16 +71,16 @@ def identify_to_file(
     progress: Follow | None = None,
     tell: Callable[[str], object] = warnings.warn,
 ) -> None:
-    """Compute the posterior of a fit into a file; what is computed is on the disk at once, in `output`.parts.
+    """Compute the posterior of a fit into a file. Computed sets are on the disk at once, in `output`.parts.
 
     Args:
         device: as in `run_to_file`.
-        tell: called with a sentence for what was damaged and is computed again.
+        tell: called with a sentence for each damaged part, which is computed again.
 
     Raises:
-        OutputError: something cannot be written, must not be overwritten or is no part of this fit.
+        OutputError: a file cannot be written, must not be overwritten or belongs to another fit.
         FitError: the priors exclude what was measured.
-        Interrupted: by the keyboard; what is saved can be resumed.
+        Interrupted: the user interrupted the fit; what is saved can be resumed.
     """
     with opened(device) as computing:
         content = content_of(fit.text, "fit", fit.folder, computing.made_by)
@@ -92,7 +92,7 @@ def identify_to_file(
 
 
 def sampled(fit: Fit, progress: Follow | None = None) -> Question[Sampled]:
-    """Draw sets of parameters in rounds until their effective size is what the fit asks for, or all are drawn.
+    """Draw sets of parameters in rounds until they reach the required effective size, or all are drawn.
 
     Raises:
         FitError: the priors exclude what was measured.
@@ -117,8 +117,8 @@ def sampled(fit: Fit, progress: Follow | None = None) -> Question[Sampled]:
 
 
 def shared(fit: Fit) -> list[tuple[int, int]]:
-    """How many of the numbers are shared within blocks of draws: first those that need a scene of their own, then all
-    that need runs."""
+    """Numbers of parameters that blocks of draws share, with the size of the blocks: first the parameters that need a
+    scene of their own, then all that need runs."""
     scenes = sum(not parameter.is_column for parameter in fit.parameters)
     return [(scenes, fit.sampling.shared * DISCREPANCIES), (len(fit.scene_parameters), DISCREPANCIES)]
 
@@ -133,7 +133,7 @@ def rounds(plan: Sampling) -> list[int]:
 
 
 class _Scored:
-    """Scores sets of parameters in batches; a batch is a job of a round."""
+    """Scores sets of parameters in batches. A batch is a job of a round."""
 
     def __init__(self, fit: Fit, follow: Follow) -> None:
         self._fit, self._follow = fit, follow
@@ -143,7 +143,7 @@ class _Scored:
         self._progress = FitProgress(0, self._total, 0, np.nan, np.nan, np.inf)
 
     def round(self, points: Array) -> Question[Array]:
-        """Score the sets of one round; return the logarithm of their likelihood, shape [sets]."""
+        """Score the sets of one round; returns the logarithms of their likelihoods, shape [sets]."""
         size, first, before = BATCH * DISCREPANCIES, len(self._batches), self._progress
         batches = [points[place : place + size] for place in range(0, len(points), size)]
         sets = [len(batch) // DISCREPANCIES for batch in batches]
@@ -189,7 +189,7 @@ class _Scored:
 
 
 def _batch_scored(fit: Fit, points: Array, number: int, *, worker: Worker, report: Callable[[float], object]) -> Arrays:
-    """Scores of the sets of a batch; its number is the seed of the places of its hits."""
+    """Scores of the sets of a batch. Its number is the seed of the places of its hits."""
     scores = evaluate(fit, points, worker, seed=number)
     return {
         f"{f.name}_{place}": getattr(score, f.name) for place, score in enumerate(scores) for f in fields(ShotScore)
@@ -197,10 +197,10 @@ def _batch_scored(fit: Fit, points: Array, number: int, *, worker: Worker, repor
 
 
 def _check_reach(fit: Fit, scores: list[ShotScore]) -> None:
-    """Refuse priors that are far from the measurements in every set.
+    """Refuse priors all of whose sets are far from the measurements.
 
     Raises:
-        FitError: names the shot and how far the nearest set is.
+        FitError: the message names the shot and how far the nearest set is.
     """
     for shot, score in zip(fit.shots, scores, strict=True):
         sets = len(score.misfit)

@@ -3,11 +3,14 @@
     L = Σ_h w_h S_h N(measured | computed_h, σ² + δ²) / Σ_h w_h S_h
 
 over points h of the cell: w is 1 in the class of the hit, S is 1 where the shot would have been measured (selection), σ
-is the uncertainty of the measurement and δ the discrepancy of the model. Given the parameters, shots are independent:
-their ln L add up. So are the discrepancies of different numbers; a bias that all shots share is not part of the model.
+is the uncertainty of the measurement and δ the discrepancy of the model. Given the parameters, shots are independent,
+so
+their ln L add up. The discrepancies of different numbers are independent, too; the model has no bias that all shots
+share.
 
-A point stands for its share of the cell, over which numbers follow a plane (between.py). So the covariance of N is
-σ² + δ² along the diagonal, and C Cᵀ, where C are the changes of the numbers over a standard deviation along y and z.
+A point stands for its share of the cell, over which numbers follow a plane (between.py). The covariance of N is
+therefore σ² + δ² along the diagonal, plus C Cᵀ, where C are the changes of the numbers over a standard deviation along
+y and z.
 """
 
 from __future__ import annotations
@@ -31,16 +34,16 @@ from warpimpact.results.per_hit import place_of_standoff
 Array = NDArray[np.float64]
 
 KEPT = 4
-"""Number of hit points that are kept per set and shot, for the posterior and for the prediction."""
+"""Number of hit points per set and shot that are kept for the posterior and for the prediction."""
 
 
 @dataclass(frozen=True)
 class Data:
-    """What was measured of a shot, and on which condition.
+    """The measurements of a shot, and their condition.
 
     Attributes:
-        selection: what had to be true of the shot so that it was measured.
-        standoffs: of the record [m].
+        selection: condition under which the shot was measured.
+        standoffs: stand-offs of the record [m].
     """
 
     observations: tuple[Observation, ...]
@@ -54,7 +57,7 @@ class Data:
         return np.array([observation.value for observation in self.observations])
 
     def miss(self, computed: Array) -> Array:
-        """Computed less measured along the last axis, of the same shape."""
+        """Computed minus measured along the last axis, of the same shape."""
         missed = np.empty_like(computed)
         for place, observation in enumerate(self.observations):
             missed[..., place] = observation.miss(computed[..., place])
@@ -75,13 +78,14 @@ class ShotScore:
 
     Attributes:
         log_likelihood: shape [sets].
-        noise: standard error of it that the finite number of hit points leaves, shape [sets].
+        noise: standard error of it by the finite number of hit points, shape [sets].
         misfit: smallest Σ (miss/σ)² over the hit points, shape [sets]; infinite where no shot has the numbers.
-        best: computed numbers at that hit, shape [sets, observations]; best_hit: its place [m], shape [sets, 2].
+        best: computed numbers at the hit of smallest misfit, shape [sets, observations]; best_hit: its place [m], shape
+            [sets, 2].
         fitted, fitted_hit: computed numbers and hits drawn from their posterior, shapes [sets, kept, observations] and
             [sets, kept, 2].
-        predicted: numbers that another such shot would show, with uncertainty and discrepancy, NaN where it would show
-            none; shape [sets, kept, observations].
+        predicted: numbers that another shot like it would show, with uncertainty and discrepancy, NaN where it would
+            show none; shape [sets, kept, observations].
     """
 
     log_likelihood: Array
@@ -95,7 +99,7 @@ class ShotScore:
 
     @classmethod
     def joined(cls, parts: Sequence[Self]) -> Self:
-        """Join scores along the sets."""
+        """Concatenate scores along the sets."""
         return cls(**{f.name: np.concatenate([getattr(part, f.name) for part in parts]) for f in fields(cls)})
 
     def __getitem__(self, which: slice | NDArray[np.int64]) -> Self:
@@ -107,9 +111,9 @@ class Compared:
     """Computed shots beside a measured one, before any scale of discrepancy; SI and radians.
 
     Attributes:
-        computed: numbers of all points, shape [sets, points, observations]; `missed` is computed less measured.
-        changes: of the numbers about each computed point, shape [sets, computed points, 2, observations].
-        possible: where the shot ended as the measured one did, with all its numbers, shape [sets, points].
+        computed: numbers of all points, shape [sets, points, observations]; `missed` is computed minus measured.
+        changes: changes of the numbers about each computed point, shape [sets, computed points, 2, observations].
+        possible: whether the shot ended as the measured one did, with all its numbers, shape [sets, points].
         counts: weight of each point, 0 where the shot would not have been measured, shape [sets, points].
     """
 
@@ -126,8 +130,8 @@ class Compared:
         """Compare sets of parameters with one measured shot.
 
         Args:
-            outcomes: of all points of the aim at one set after the other, images included, shape [sets · points].
-            known: `changes`, if another shot of the same numbers has them already.
+            outcomes: outcomes of all points of the aim, set after set, images included, shape [sets · points].
+            known: `changes`, if another shot with the same numbers has them already.
         """
         sets, points = aim.weight.shape
         computed = np.empty((sets, points, len(data.observations)))
@@ -149,9 +153,10 @@ class Compared:
         """Score the sets with scales of discrepancy.
 
         Args:
-            discrepancy: by kind, each of shape [sets].
+            discrepancy: standard deviations by kind, each of shape [sets].
             rng: draws the hits that are kept.
-            of: index of the computed set that each set belongs to, shape [sets]; such sets differ in the scales alone.
+            of: index of the computed set of each set, shape [sets]. Sets with the same index differ in the scales
+                alone.
         """
         row = np.arange(len(self.computed)) if of is None else of
         spread = np.broadcast_to(self.data.spread(discrepancy), (len(row), self.computed.shape[-1]))
@@ -235,7 +240,7 @@ def _median(values: Array, weight: Array) -> Array:
 
 def _integrated(log: Array, counts: Array, aim: Aim) -> tuple[Array, Array, Array]:
     """ln of the mean over the points, and its standard error from the spread of the replicates, both of shape [sets];
-    what each point contributes to the mean, as a share of the largest, shape [sets, points]."""
+    and the contribution of each point to the mean, as a share of the largest, shape [sets, points]."""
     highest = np.where(np.isfinite(log), log, -1e300).max(axis=1)
     relative = np.exp(log - highest[:, None]) * counts
     total = counts.sum(axis=1)

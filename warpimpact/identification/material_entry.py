@@ -1,4 +1,4 @@
-"""A posterior as a material of a catalogue file: the parameters of the fast law, of which plate, and what they miss."""
+"""A posterior as a material of a catalogue file: parameters of the fast law, their plate, and their misses."""
 
 from __future__ import annotations
 
@@ -17,16 +17,16 @@ from warpimpact.results import files, posterior_file
 from warpimpact.scene.display import STORED
 
 INTERVAL = 0.05, 0.5, 0.95
-"""Quantiles of a parameter that an entry has."""
+"""Quantiles of a parameter in an entry."""
 LONGEST_NAME = 80
-"""Letters of the name of an entry."""
+"""Most letters of the name of an entry."""
 
 
 def material_entry(path: Path) -> str:
-    """The text of a catalogue file with the material that a posterior tells of.
+    """The text of a catalogue file with the material of a posterior.
 
-    The medians become numbers of the entry; the law of a plate that weakens is in its table `weakening`. `found` says
-    of which plate and shots they are, and what they leave unexplained.
+    The medians become numbers of the entry; the law of a plate that weakens is in its table `weakening`. `found` names
+    the plate and the shots, and what the medians leave unexplained.
 
     Raises:
         ResultError, FitError, ValueError: the file is no posterior, or a file that its fit names is missing.
@@ -82,7 +82,7 @@ def _quantiles(tree: xarray.DataTree) -> dict[tuple[Any, ...], tuple[float, floa
 
 
 def _found(tree: xarray.DataTree, shots: int, quantiles: dict[Any, tuple[float, float, float]]) -> str:
-    """Shots, intervals, and root mean squares of what the medians of the computed numbers miss, by quantity."""
+    """Shots, intervals, and root mean squares of the misses of the computed medians, by quantity."""
     ranges = {"resistance": ("Y", 1e-9, " GPa"), "shear_coefficient": ("η", 1.0, ""), "degradation": ("β", 1.0, "")}
     intervals = [
         f"{letter} {scale * low:.3g} to {scale * high:.3g}{unit}"

@@ -1,4 +1,4 @@
-"""What was measured of a shot: numbers with their uncertainty in the names of the Dataset, and how the shot ended."""
+"""The measurements of a shot: numbers with their uncertainty in the names of the Dataset, and how the shot ended."""
 
 from __future__ import annotations
 
@@ -34,9 +34,9 @@ class Observation:
     """One measured number.
 
     Attributes:
-        name: of the variable of the Dataset.
-        standoff: place of the stand-off in the record, None where the variable has none.
-        at: that stand-off [m].
+        name: name of the variable in the Dataset.
+        standoff: index of the stand-off in the record; None if the variable has none.
+        at: the stand-off [m].
         value, std: the number and its standard uncertainty, SI and radians.
     """
 
@@ -76,11 +76,11 @@ class Observation:
         return column if self.standoff is None else column[:, self.standoff]
 
     def miss(self, computed: Array) -> Array:
-        """Computed less measured, of the same shape; an angle the short way round."""
+        """Computed minus measured, of the same shape; for an angle, the shorter way round."""
         return self.shortest(computed - self.value)
 
     def shortest(self, difference: Array) -> Array:
-        """A difference of two such numbers; of angles the short way round."""
+        """A difference of two numbers; for angles, the shorter way round."""
         return np.remainder(difference + np.pi, 2.0 * np.pi) - np.pi if self.kind == "angle" else difference
 
 
@@ -88,7 +88,7 @@ def read_measured(given: Any, standoffs: Sequence[float], place: str) -> tuple[t
     """The table `measured` of a shot: numbers, and how it ended.
 
     Raises:
-        FitError: names the key.
+        FitError: the message names the key.
     """
     if not isinstance(given, dict) or not given:
         raise FitError(f"{place}: is missing, but a fit needs what was measured, such as residual_velocity")

@@ -1,4 +1,4 @@
-"""Parameters of a fit: which numbers of the scene are unknown, their priors, and the scene at some values of them."""
+"""Parameters of a fit: the unknown numbers of the scene, their priors, and the scene at some values of them."""
 
 from __future__ import annotations
 
@@ -34,10 +34,10 @@ class Parameter:
     """An unknown number of the scene, or the scale of a discrepancy.
 
     Attributes:
-        path: of its key in the fit file, such as ("plate", "pattern", "spacing", 0).
-        name: short, such as "spacing_y".
-        unit: SI unit, "rad" of an angle, "" of a number.
-        prior: in SI and radians.
+        path: path of its key in the fit file, such as ("plate", "pattern", "spacing", 0).
+        name: short name, such as "spacing_y".
+        unit: SI unit; "rad" for an angle, "" for a pure number.
+        prior: distribution in SI and radians.
     """
 
     path: Path
@@ -46,7 +46,8 @@ class Parameter:
     prior: Distribution
 
     def at(self, normal: Array) -> Array:
-        """Values at standard normal numbers, of their shape: the prior is normal there."""
+        """Values at standard normal numbers, of their shape. The parameter follows its prior if the numbers are
+        normal."""
         from scipy.special import ndtr  # a while to import
 
         return self.prior.quantile(np.clip(ndtr(normal), EDGE, 1.0 - EDGE))
@@ -67,12 +68,12 @@ def read_priors(prior: Mapping[str, Any], tables: Mapping[str, Any], name: str) 
     """The parameters of a table [prior].
 
     Args:
-        prior: nested as the tables of the scene are, with a distribution in the place of each unknown number.
-        tables: those of the scene, which say which shape a core or a pattern has.
-        name: of the file.
+        prior: nested as the tables of the scene, with a distribution in the place of each unknown number.
+        tables: tables of the scene, which say which shape a core or a pattern has.
+        name: name of the file.
 
     Raises:
-        FitError: names the key.
+        FitError: the message names the key.
     """
     parameters: list[Parameter] = []
     for path, given in _distributions(prior, (), name):
@@ -92,7 +93,7 @@ def read_distribution(read: Any, given: Mapping[str, Any], place: str) -> Distri
     """A distribution of a quantity, in SI.
 
     Raises:
-        FitError: names the place.
+        FitError: the message names the place.
     """
     try:
         return _DISTRIBUTION.validate_python(in_si(read, given))
@@ -127,7 +128,7 @@ def _distributions(node: Any, path: Path, name: str) -> Iterator[tuple[Path, Map
 
 
 def dotted(path: Path) -> str:
-    """A path as it is written in a fit file."""
+    """A path in the form of a fit file."""
     return "".join(f"[{part}]" if isinstance(part, int) else f".{part}" for part in path).removeprefix(".")
 
 

@@ -1,4 +1,4 @@
-"""The posterior of a fit as a tree of Datasets, and the numbers by which its accuracy is judged."""
+"""The posterior of a fit as a tree of Datasets, and the numbers that measure its accuracy."""
 
 from __future__ import annotations
 
@@ -26,16 +26,16 @@ from warpimpact.statistics.importance import LARGEST_K, Weights, resampled
 Array = NDArray[np.float64]
 
 LARGEST_NOISE = 0.5
-"""Standard error of ln L, over all shots, up to which the hits count as integrated out."""
+"""Largest standard error of ln L, over all shots, at which the hits count as integrated out."""
 ALIKE = 0.15
-"""Largest distance between the distribution functions of prior and posterior at which they count as alike."""
+"""Largest distance between the distribution functions of prior and posterior at which they count as equal."""
 WIDE = 0.6
 """Share of the prior within the posterior's 90 % interval (0.9 if nothing was learnt) above which little was learnt."""
 STRONG = 0.7
 """Correlation above which two parameters are reported as a combination."""
 _OF_PLATE = {path[1] for path in OF_THE_MATERIAL if path[0] == "plate"}
 _DENSITY_DRAWS = 400
-"""Predicted rows whose probability is compared with that of the measured one."""
+"""Number of predicted rows whose probability is compared with that of the measured row."""
 
 
 @dataclass(frozen=True)
@@ -45,7 +45,7 @@ class Sampled:
     Attributes:
         points: standard normal numbers, shape [sets, parameters].
         scores: one per shot.
-        block: sets in a row that differ in the scales of discrepancy alone.
+        block: number of consecutive sets that differ in the scales of discrepancy alone.
     """
 
     points: Array
@@ -138,7 +138,7 @@ def _described(parameter: Parameter) -> dict[str, str]:
 
 
 def _labels(fit: Fit) -> list[tuple[int, int]]:
-    """Shot and place in its observations of every measured number."""
+    """Shot, and place among its observations, of every measured number."""
     return [(place, index) for place, shot in enumerate(fit.shots) for index in range(len(shot.observations))]
 
 
@@ -164,13 +164,13 @@ def _observed(fit: Fit) -> xarray.Dataset:
 
 
 def _numbers(fit: Fit, of: Any) -> Array:
-    """Numbers of all observations side by side, in the units of the Dataset: `of` gives those of a shot, SI."""
+    """Numbers of all observations side by side, in the units of the Dataset. `of` returns those of a shot, SI."""
     columns = [fit.shots[place].observations[index].shown(of(place)[..., index]) for place, index in _labels(fit)]
     return np.stack(columns, axis=-1) if columns else np.empty((*of(0).shape[:-1], 0))
 
 
 def _computed(fit: Fit, sampled: Sampled, which: NDArray[np.int64], kept: NDArray[np.int64]) -> xarray.Dataset:
-    """What another such shot would show, and what each draw computes at its hit."""
+    """What another shot like each would show, and what each draw computes at its hit."""
     scores, over = sampled.scores, ("draw", "observation")
     predicted = _numbers(fit, lambda place: scores[place].predicted[which, kept])
     fitted = _numbers(fit, lambda place: scores[place].fitted[which, kept])
@@ -242,16 +242,16 @@ def _median(values: Array, sampled: Sampled) -> float:
 
 
 def is_converged(fit: Fit, sampled: Sampled, noise: float) -> bool:
-    """Whether weights and hits can be trusted."""
+    """Whether the weights, and the integration over hits, are accurate enough."""
     trusted = sampled.weights.pareto_k <= LARGEST_K and noise <= LARGEST_NOISE
     return trusted and sampled.effective >= fit.sampling.effective
 
 
 def row_probability(fit: Fit, place: int, sampled: Sampled) -> float:
-    """Probability that another such shot shows a row that is less probable than the measured one.
+    """Probability that another shot like it shows a row that is less probable than the measured one.
 
-    Their density is a mixture of normal distributions about the numbers that some sets predict, by their weights. A row
-    of a core that did not pass the plate counts as less probable.
+    The density of rows is a mixture of normal distributions about the numbers that some sets predict, by their weights.
+    A row of a core that did not pass the plate counts as less probable.
     """
     shot, scored = fit.shots[place], sampled.scores[place]
     rng = np.random.default_rng(np.random.SeedSequence(fit.sampling.seed, spawn_key=(3, place)))
@@ -278,7 +278,7 @@ def row_probability(fit: Fit, place: int, sampled: Sampled) -> float:
 
 @dataclass(frozen=True)
 class Learnt:
-    """What the shots tell of one parameter.
+    """What the shots say about one parameter.
 
     Attributes:
         distance: largest difference between the distribution functions of prior and posterior.
@@ -299,7 +299,7 @@ class Learnt:
 
 
 def learnt(tree: xarray.DataTree) -> dict[str, Learnt]:
-    """Prior and posterior compared, by parameter."""
+    """Comparison of prior and posterior, by parameter."""
     prior, posterior = (tree[name].to_dataset() for name in ("prior", "posterior"))
     by_name = {}
     for name in parameters_of(tree):
@@ -318,8 +318,8 @@ def learnt(tree: xarray.DataTree) -> dict[str, Learnt]:
 
 
 def together(tree: xarray.DataTree) -> list[tuple[str, str, float]]:
-    """Pairs of parameters of which the shots determine a combination: names, and their correlation in the posterior by
-    ranks, where it is strong."""
+    """Pairs of parameters whose combination the shots determine: names, and their rank correlation in the posterior
+    where it is strong."""
     from scipy.stats import spearmanr
 
     posterior, names = tree["posterior"].to_dataset(), parameters_of(tree)

@@ -1,4 +1,5 @@
-"""The view of a posterior: parameters with their intervals, what the shots determine, accuracy of the numbers."""
+"""The view of a posterior: parameters with their intervals, what the shots determine, and the accuracy of the
+numbers."""
 
 from __future__ import annotations
 
@@ -16,7 +17,7 @@ from warpimpact.view.view import Column, Section, Table, labelled, number
 
 
 def unit_of(array: xarray.DataArray | xarray.DataTree) -> tuple[str, float]:
-    """Unit of a parameter as it is shown, and the factor to it."""
+    """Display unit of a parameter, and the factor to it."""
     units = str(array.attrs.get("units", "1"))
     unit = STORED.get(units, Unit(units, units))
     return unit.shown, unit.factor
@@ -47,7 +48,7 @@ def _parameters(tree: xarray.DataTree) -> Section:
 
 
 def _measured(tree: xarray.DataTree) -> Section:
-    """Measured numbers beside what is computed for them, and what another shot would show."""
+    """Measured numbers beside the computed ones, and what another shot would show."""
     observed, computed = tree["observed_data"].to_dataset(), tree["posterior_predictive"].to_dataset()
     rows = []
     for place, label in enumerate(observed["observation"].values if "observation" in observed else ()):

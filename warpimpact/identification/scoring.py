@@ -23,17 +23,18 @@ from warpimpact.solver.worker import Worker
 Array = NDArray[np.float64]
 
 AT_A_TIME = 2**15
-"""Most shots of a computation, images not counted; their outcomes take some ten megabytes."""
+"""Most shots of a computation, images not counted. Their outcomes take some ten megabytes."""
 SCORED = 2**14
 """Points, images counted, that are scored together, so that they fit into a cache."""
 
 
 @dataclass(frozen=True)
 class Bench:
-    """Measured shots that differ only in what was measured and in the class of their hit. They share their runs.
+    """Measured shots that share their runs, because they differ only in their measurements and in the class of their
+    hit.
 
     Attributes:
-        shot: one of them; they are alike in all that is used of it.
+        shot: one of the shots.
         which: their places in the fit.
     """
 
@@ -46,10 +47,11 @@ class Run:
     """Outcomes of a bench at some sets of parameters.
 
     Attributes:
-        which: the sets, shape [computed sets, sets alike]: those in a row differ in the scales of discrepancy alone.
-        scene: what was shot at what; quantities that differ from set to set are at their medians.
+        which: numbers of the sets, shape [computed sets, equal sets]; equal sets differ in the scales of discrepancy
+            alone.
+        scene: the scene, with medians of the quantities that differ from set to set.
         aim: the points of the computed sets, without a class.
-        outcomes: images included, shape [computed sets · points].
+        outcomes: outcomes, images included, shape [computed sets · points].
     """
 
     which: NDArray[np.int64]
@@ -73,7 +75,7 @@ def runs(fit: Fit, bench: Bench, points: Array, worker: Worker, *, seed: int = 0
 
     Args:
         points: standard normal numbers, one column per parameter of the fit, shape [sets, parameters].
-        seed: of the places of the hits.
+        seed: seed of the places of the hits.
     """
     alike = _alike(points[:, [parameter.path[0] != "discrepancy" for parameter in fit.parameters]])
     values = {
@@ -92,7 +94,7 @@ def runs(fit: Fit, bench: Bench, points: Array, worker: Worker, *, seed: int = 0
     per_call = max(1, AT_A_TIME // fit.sampling.hits)
     jobs = list[_Job]()
     for rows in _of_one_scene(of_scene, len(alike)):
-        own_scene = own if len(rows) == 1 else of_scene  # a set alone needs no columns
+        own_scene = own if len(rows) == 1 else of_scene  # a single set needs no columns
         scene = fit.scene_of(bench.shot, {path: float(column[rows[0]]) for path, column in own_scene.items()})
         for first in range(0, len(rows), per_call):
             chosen = rows[first : first + per_call]
@@ -117,7 +119,7 @@ def _alike(points: Array) -> NDArray[np.int64]:
 
 
 class _Job(NamedTuple):
-    """Shots of a bench, of some sets that share a scene; see `Run`."""
+    """Shots of a bench, for sets that share a scene; see `Run`."""
 
     which: NDArray[np.int64]
     scene: Scene
@@ -131,7 +133,7 @@ def _run(fit: Fit, bench: Bench, jobs: Sequence[_Job], worker: Worker) -> Iterat
 
 
 def _outcomes(fit: Fit, bench: Bench, jobs: Sequence[_Job], worker: Worker) -> list[Outcomes]:
-    """What the observations of a bench need: outcomes at impact velocity, limit velocities, or both."""
+    """The outcomes that the observations of a bench need: at impact velocity, limit velocities, or both."""
     measured = [fit.shots[place] for place in bench.which]
     observations = [observation for shot in measured for observation in shot.observations]
     limited = any(observation.is_limit for observation in observations)
@@ -176,7 +178,7 @@ def with_own(shots: Shots, columns: Mapping[str, Array]) -> Shots:
     """Give shots the quantities of their sets. All sets have the same number of shots, one set after the other.
 
     Args:
-        columns: by the name of the quantity, each of shape [sets].
+        columns: values by the name of the quantity, each of shape [sets].
     """
     of_shots: dict[str, Any] = {name: np.repeat(column, len(shots) // len(column)) for name, column in columns.items()}
     return replace(shots, **of_shots)
@@ -201,7 +203,7 @@ def evaluate(fit: Fit, points: Array, worker: Worker, *, seed: int) -> list[Shot
 
     Args:
         points: standard normal numbers, shape [sets, parameters].
-        seed: of the places of the hits, and of those that are kept.
+        seed: seed of the places of the hits, and of the kept hits.
 
     Returns:
         One score per shot, over the sets.
@@ -232,7 +234,7 @@ def _scored(
 
     Args:
         which: as in `Run`.
-        scales: of all sets, by kind.
+        scales: standard deviations of all sets, by kind.
     """
     alike, at_a_time = which.shape[1], max(1, SCORED // compared.counts.shape[1])
     for first in range(0, which.size, at_a_time):

@@ -8,9 +8,9 @@ class Unit:
     """How a result stores a quantity, and how people see it.
 
     Attributes:
-        stored: as the CF conventions write it.
-        shown: as people write it.
-        factor: from what is stored to what is shown.
+        stored: unit in the form of the CF conventions.
+        shown: unit as people write it.
+        factor: factor from the stored to the shown value.
     """
 
     stored: str
@@ -43,6 +43,6 @@ UNITS = {
     "rad": Unit("degree", "°"),
     "rad/s": Unit("rad s-1", "rad/s"),
 }
-"""By the SI unit in which a quantity is computed."""
+"""Units by the SI unit in which a quantity is computed."""
 STORED = {unit.stored: unit for unit in UNITS.values()}
-"""By the unit of a result."""
+"""Units by the unit in a result."""

@@ -85,7 +85,7 @@ def check_together(given: Mapping[str, str | bool]) -> None:
             checked.
 
     Raises:
-        ValueError: names both options and the reason.
+        ValueError: the message names both options and the reason.
     """
     used = {option: option if name is True else name for option, name in given.items() if name}
     for option, other, why in EXCLUDED:

@@ -1,4 +1,4 @@
-"""What the continuum computes with: flow and failure of the materials, friction, and fineness (docs/continuum.md)."""
+"""The materials of the continuum: flow and failure, friction, and size of the elements (docs/continuum.md)."""
 
 import math
 from typing import Annotated, Literal
@@ -13,7 +13,7 @@ from .units import NonNegativeNumber, NonNegativeStress, Number, PositiveDensity
 FINENESS = {"draft": 1.0, "standard": 2.0 / 3.0, "reference": 0.5}
 """Size of an element over that of a draft, by fidelity."""
 OF_RADIUS, OF_THICKNESS, OF_LIGAMENT = 1.0 / 6.0, 1.0 / 4.0, 1.0 / 3.0
-"""Size of an element of a draft over the core's largest radius, the layer's thickness and its ligament, at most."""
+"""Largest size of an element of a draft, over the core's largest radius, the layer's thickness and its ligament."""
 
 
 class Flow(Model):

@@ -1,4 +1,4 @@
-"""Files that a scene names: where they are, and tables of numbers in them."""
+"""Files that a scene names: their paths, and tables of numbers in them."""
 
 import csv
 import math
@@ -20,7 +20,7 @@ _LONGEST_PATH = 255
 """Characters of a path that a message quotes."""
 _NAME_AND_UNIT = re.compile(r"(\w+)\s*(?:\[\s*([^\[\]]*?)\s*\])?")
 _MOST_BYTES, _MOST_ROWS = 2**28, 2**22
-"""Limits of a table."""
+"""Largest size and number of rows of a table."""
 
 
 def input_file(name: object, info: ValidationInfo) -> Path:
@@ -31,7 +31,7 @@ def input_file(name: object, info: ValidationInfo) -> Path:
     path = Path((info.context or {}).get("folder", "")) / name
     try:
         exists = path.is_file()
-    except (OSError, ValueError) as error:  # a name that is too long, or has a character that none can have
+    except (OSError, ValueError) as error:  # the name may be too long, or have a character that no name can have
         raise ValueError(f"got {quoted(name)}, which is no file name ({_reason(error)})") from None
     if not exists:
         got, place = (brief(str(text), _LONGEST_PATH) for text in (name, path))
@@ -44,10 +44,10 @@ def _reason(error: Exception) -> str:
 
 
 def check_file(path: Path, most: int | None = None) -> None:
-    """Refuse a pipe or a device, which may have no end, and a file of more than `most` bytes, before it is read.
+    """Refuse, before it is read, a pipe or a device, which may have no end, and a file of more than `most` bytes.
 
     Raises:
-        ValueError: names the file and what is wrong with it.
+        ValueError: the message names the file and its fault.
     """
     name = brief(str(path), _LONGEST_PATH)
     try:
@@ -69,7 +69,7 @@ def read_table(path: Path, columns: tuple[str, ...]) -> Array:
     """Numbers of a CSV file with exactly this header line, shape [rows, columns], read-only.
 
     Raises:
-        ValueError: names the file, the line and what is wrong with it.
+        ValueError: the message names the file, the line and its fault.
     """
     with _open_table(path) as (header, reader):
         if header != columns:
@@ -78,7 +78,7 @@ def read_table(path: Path, columns: tuple[str, ...]) -> Array:
 
 
 class CsvColumn(NamedTuple):
-    """A column of numbers, shape [rows], read-only; `unit` is what its header gives in brackets, or empty."""
+    """A column of numbers, shape [rows], read-only; `unit` is the unit in brackets in its header, or empty."""
 
     values: Array
     unit: str
@@ -97,7 +97,7 @@ def read_columns(
         exported: name in an exported file → name here.
 
     Raises:
-        ValueError: names the file, the line and what is wrong with it.
+        ValueError: the message names the file, the line and its fault.
     """
     with _open_table(path) as (header, reader):
         matches = [_NAME_AND_UNIT.fullmatch(column) for column in header]
@@ -120,7 +120,7 @@ def read_columns(
 
 
 def _got(header: tuple[str, ...], known: tuple[str, ...]) -> str:
-    """The start of a message that quotes the header; empty if it has no known column: an unrelated file is not
+    """The start of a message that quotes the header; empty if it has no known column, because an unrelated file is not
     quoted."""
     return f'got "{brief(",".join(header))}", but ' if set(header) & set(known) else ""
 

@@ -43,8 +43,7 @@ class Model(BaseModel):
         return values
 
     def model_copy(self, *, update: Mapping[str, Any] | None = None, deep: bool = False) -> Self:
-        """A copy with changes. It is validated like any other value. Values that were computed from the original are
-        not copied.
+        """A copy with changes. It is validated like any other value. Cached values of the original are not copied.
 
         Args:
             update: new values of fields, as the model takes them; file names are relative to the working directory.
@@ -57,11 +56,11 @@ class Model(BaseModel):
         return type(self).model_validate((deepcopy(kept) if deep else kept) | dict(update or {}))
 
     def __eq__(self, other: object) -> bool:
-        """Whether all fields are equal; values computed from them do not count."""
+        """Whether all fields are equal. Cached values do not count."""
         return isinstance(other, Model) and type(self) is type(other) and self._values == other._values
 
     def _repr_html_(self) -> str:
-        """What a notebook shows."""
+        """HTML for a notebook."""
         return html_of(self)
 
     @property

@@ -26,7 +26,7 @@ _CORE = "#D55E00"
 
 
 def html_of(model: BaseModel) -> str:
-    """The drawings of a model and of its parts, and a table of the values that were given."""
+    """The drawings of a model and of its parts, and a table of the given values."""
     parts = [model, *(getattr(model, name) for name in type(model).model_fields)]
     if (target := getattr(model, "target", None)) is not None:
         parts = [target if part is getattr(model, "plate", None) else part for part in parts]

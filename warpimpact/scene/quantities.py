@@ -32,7 +32,7 @@ class Quantity(NamedTuple):
     """A quantity of a scene.
 
     Attributes:
-        table: of a campaign file that has it; the plate's for a quantity of layers.
+        table: table of a campaign file that has it; for a quantity of layers, that of the plate.
         type: annotated type that reads it.
         meaning: long name of its column in a result.
         by_layer: whether each layer has a value.
@@ -96,7 +96,7 @@ QUANTITIES: Mapping[str, Quantity] = {
     "quadratic": _of_material("interaction", NonNegativeNumber),
     "onset": _of_material("interaction", NonNegativeNumber),
 }
-"""By name."""
+"""All quantities by name."""
 SCATTERED = {name: quantity for name, quantity in QUANTITIES.items() if quantity.scatters}
 LISTED = tuple(name for name, quantity in QUANTITIES.items() if quantity.listed)
 BY_LAYER = tuple(name for name, quantity in QUANTITIES.items() if quantity.by_layer)

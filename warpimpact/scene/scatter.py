@@ -28,7 +28,7 @@ def check_range(name: str, low: float, high: float, known: Mapping[str, Quantity
     """Refuse a range of a quantity, `low` to `high`, with values that the quantity may not have.
 
     Raises:
-        ValueError: says which value is reached and what is allowed.
+        ValueError: the message has the value that is reached and what is allowed.
     """
     read = quantity(known[name].type)
     for value in (low, high):
@@ -44,7 +44,7 @@ def in_si(read: Any, given: Mapping[str, Any]) -> dict[str, Any]:
     """The parameters of a distribution in SI; `read` is the reader of its quantity.
 
     Raises:
-        ValueError: names the parameter.
+        ValueError: the message names the parameter.
     """
     return {name: part if name in PURE_NUMBERS else _read(read, name, part) for name, part in given.items()}
 
@@ -57,7 +57,7 @@ class Scattering(Model):
     @field_validator("*", mode="before")
     @classmethod
     def _in_si(cls, value: Any, info: ValidationInfo) -> Any:
-        """Parameters may have units of their quantity."""
+        """Read parameters with the unit of their quantity."""
         known = cls._quantities.get(str(info.field_name))
         if known is not None and known.by_layer:
             layers = (value,) if isinstance(value, dict | Distribution) else value
@@ -78,7 +78,7 @@ class Scattering(Model):
 
     @field_serializer("*", mode="wrap")
     def _as_read(self, value: Any, write: SerializerFunctionWrapHandler, info: FieldSerializationInfo) -> Any:
-        """Angles in the form in which they are read."""
+        """Write angles in the form in which they are read."""
         written = write(value)
         known = self._quantities.get(info.field_name)
         if not isinstance(written, dict) or known is None or quantity(known.type).unit != "rad":

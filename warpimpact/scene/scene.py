@@ -44,7 +44,7 @@ class Record(Model):
         """Refuse to record the bending moment of a core that overrides its mass properties, and a strength without it.
 
         Raises:
-            ValueError: names what the core overrides.
+            ValueError: the message names what the core overrides.
         """
         overridden = ("centre_of_mass", "inertia_axial", "inertia_transverse")
         given = [f"core.{name}" for name in overridden if getattr(core, name) is not None]
@@ -63,7 +63,7 @@ class Record(Model):
         """Refuse stand-offs at which a core may still be in the target, and layer stand-offs that fit in no gap.
 
         Raises:
-            ValueError: names the stand-off and what is allowed.
+            ValueError: the message names the stand-off and what is allowed.
         """
         needed = self._clearance(core)
         for name in ("standoffs", "layer_standoffs"):

@@ -23,8 +23,8 @@ _RIGHT_ANGLE = np.pi / 2
 FARTHEST_HIT = 100.0
 """Largest distance of a hit from the origin [m]."""
 _REPLICATES = 16
-"""Default, independent of the count, so that a larger count keeps the earlier shots. Student's interval over 16 means
-is 9 % wider than over infinitely many."""
+"""Default number of scramblings. It does not depend on the count, so a larger count keeps the earlier shots. Student's
+interval over 16 means is 9 % wider than over infinitely many."""
 OF_A_SHOT = ("sample", "burst_order", "nearest_earlier_hit", "posterior_draw")
 """Columns of shots that share their plates or draw their parameters; no campaign gives their values."""
 EXPORTED = {quantity.column: name for name, quantity in QUANTITIES.items() if quantity.column is not None}
@@ -228,7 +228,7 @@ class Shots:
 
     @property
     def columns(self) -> dict[str, NDArray[Any]]:
-        """The arrays by name, without those that are None."""
+        """The arrays by name. Arrays that are None are left out."""
         return {f.name: values for f in fields(self) if (values := getattr(self, f.name)) is not None}
 
     @property

@@ -13,13 +13,13 @@ from .plate import Plate
 from .units import Length
 
 _WIDEST_GAP = 10.0
-"""[m]: within it positions are exact to a micrometre. Air has no effect on the core."""
+"""Largest gap [m]: within it positions are exact to a micrometre. Air has no effect on the core."""
 MOST_LAYERS = 64
 """Largest number of layers behind the plate."""
 
 
 def layer_name(number: int) -> str:
-    """What a layer is called: the plate is number 0, the first table [[layer]] is "layer 1"."""
+    """The name of a layer: number 0 is the plate, the first table [[layer]] is "layer 1"."""
     return f"layer {number}" if number else "plate"
 
 
@@ -65,8 +65,8 @@ class Target(Model):
         return tuple(layer.gap if isinstance(layer, Layer) else 0.0 for layer in self.layers)
 
     def by_path(self, velocity: float) -> Self:
-        """The target with layers that weaken by the path where they weakened by the time, alike at this velocity [m/s]:
-        what weakens by the time has no limit velocity."""
+        """The target with every law by time replaced by the law by path that weakens alike at this velocity [m/s],
+        because a plate that weakens by time has no limit velocity."""
 
         def changed(layer: Plate) -> Plate:
             if layer.degradation == 1.0 or layer.degradation_interval is None:
@@ -97,7 +97,7 @@ class Target(Model):
 
     @property
     def depth(self) -> float:
-        """From the front face to the rear face of the last layer, gaps included [m]."""
+        """Distance from the front face to the rear face of the last layer, gaps included [m]."""
         return float(self.faces[-1, 1])
 
     @property
@@ -107,12 +107,12 @@ class Target(Model):
 
     @property
     def add_on(self) -> tuple[Plate, ...]:
-        """The layers in front of the base, which is the last of several; of a plate alone the plate."""
+        """The layers in front of the base, which is the last of several layers. A plate alone is its own add-on."""
         return self.layers[:-1] or self.layers
 
     @property
     def weights(self) -> dict[str, float]:
-        """Mass per area [kg/m²] of what every text and figure tells apart, by its name there."""
+        """Masses per area [kg/m²] that texts and figures distinguish, by their names there."""
         if len(self.layers) == 1:
             return {"areal density": self.areal_density}
         add_on = sum(layer.areal_density for layer in self.add_on)
@@ -120,13 +120,14 @@ class Target(Model):
 
     @property
     def solid(self) -> Self:
-        """The target with an add-on, or a plate alone, that has no holes, the same materials and the same weight."""
+        """The target whose add-on, or whose plate if it stands alone, has no holes, the same materials and the same
+        weight."""
         solid = tuple(layer.solid for layer in self.add_on)
         return self.model_copy(update={"layers": (*solid, *self.layers[len(solid) :])})
 
     @property
     def base_alone(self) -> Self:
-        """The last layer as it stands without the others: the target without its add-on."""
+        """The base at its place without the other layers."""
         base = self.layers[-1]
         front = base.model_copy(update={"gap": 0.0, "offset": (0.0, 0.0)}) if isinstance(base, Layer) else base
         return self.model_copy(update={"layers": (front,)})

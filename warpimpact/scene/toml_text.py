@@ -1,4 +1,4 @@
-"""The text of a file that a user names, TOML or JSON: read and parsed within bounds, not yet validated."""
+"""The text of a TOML or JSON file that a user names, read and parsed within bounds but not validated."""
 
 import json
 import re
@@ -17,7 +17,7 @@ def read_text(path: Path) -> str:
     """The text of a file, cut after the length that `parsed` refuses.
 
     Raises:
-        ValueError: it is missing or cannot be read.
+        ValueError: the file is missing or cannot be read.
     """
     check_file(path)
     try:
@@ -33,7 +33,7 @@ def parsed(text: str, name: str) -> dict[str, Any]:
     """The tables of a text, TOML or JSON.
 
     Raises:
-        ValueError: the text, which errors call `name`, is neither.
+        ValueError: the text is neither; `name` is its name in the message.
     """
     if len(text) > _MOST_TEXT or (not text.startswith("{") and _has_long_key(text)):
         raise ValueError(f"{name}: at most {_MOST_TEXT} characters are read, with {_MOST_DOTS} dots in a key")
@@ -59,7 +59,7 @@ def parsed_json(text: Any) -> Any:
 
 
 def _has_long_key(text: str) -> bool:
-    """Whether a key or a table has more than _MOST_DOTS dots: the time of the parser grows with their square."""
+    """Whether a key or a table has more than _MOST_DOTS dots. The parser's time grows with the square of the dots."""
     _, *parts = _BESIDE_A_KEY.split(f"\n{text}\n")
     around = zip(parts[::2], parts[1::2], parts[2::2], strict=False)
     return any((before == "\n" or behind == "=") and key.count(".") > _MOST_DOTS for before, key, behind in around)
@@ -69,7 +69,7 @@ def _from_json(text: str) -> Any:
     """The tables of a JSON text.
 
     Raises:
-        ValueError: it is not JSON, or escapes half of a surrogate pair, which cannot be written as text.
+        ValueError: the text is not JSON, or escapes half of a surrogate pair, which cannot be written as text.
     """
     data = json.loads(text)
     json.dumps(data, ensure_ascii=False).encode()

@@ -96,7 +96,7 @@ class _Quantity:
         """SI value of a number or of a string with a unit.
 
         Raises:
-            ValueError: says what is allowed.
+            ValueError: the message says what is allowed.
         """
         if isinstance(value, str):
             number = self._from_text(value)
@@ -184,8 +184,8 @@ COMMON = {
     ("deg", "rad"): math.pi / 180.0,
     ("rad/s", "rad/s"): 1.0,
 }
-"""Factors of the common units, so that most campaigns need no pint, whose import takes as long as a thousand hits. A
-test compares each with pint."""
+"""Factors of the common units, so that most campaigns do not import pint, which takes as long as a thousand hits. A
+test compares each factor with pint."""
 
 
 @cache
@@ -303,7 +303,7 @@ Angle = Annotated[
     AfterValidator(Radians),
     PlainSerializer(in_radians, return_type=str, when_used="json"),
 ]
-"""A number is degrees; the field holds radians, and JSON says so."""
+"""A plain number is in degrees. The field holds radians, and JSON says so."""
 
 
 def _is_obliquity(angle: float) -> float:
