@@ -161,8 +161,8 @@ def build(variant: Variant) -> SimpleNamespace:
         plane: wp.int32,
         core: struct.Section,
     ):
-        """Join a section of a core to the channel on a plane, at its own nodes and at those that it sweeps on its way
-        to the next plane."""
+        """Join a section of a core to the channel on a plane, at its own nodes and at the nodes that it sweeps on its
+        way to the next plane."""
         steep = wp.abs(core.axis[0])
         slope = wp.sqrt(wp.max(zero, one - steep * steep)) / steep
         reach = surface.max_radius * wp.sqrt(one + slope * slope) + slope / window.per_channel_plane

@@ -152,8 +152,8 @@ def build(variant: Variant) -> SimpleNamespace:
 
     @wp.func
     def gained_box(touches: struct.Touches, whole: struct.Box, start: wp.int32, count: wp.int32):
-        """The nodes that gain exposure, among those that a step can touch. To spread over more planes than needed costs
-        more than this look at the patches."""
+        """The nodes that gain exposure, among the nodes that a step can touch. To spread over more planes than needed
+        costs more than this look at the patches."""
         box = whole
         if wp.static(variant.deep):
             y_low, y_high = ends_of(touches, touches.row, start, count)

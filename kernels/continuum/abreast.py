@@ -1,8 +1,8 @@
 """The march of many hits at once: a thread for each node and each element of every hit, and six launches a step.
 
-Sums over a hit have a fixed order, which no other hit changes: first PARTS partial sums, each of every so many-th node,
-then these. So a hit has the same bits in every launch, whichever hits are beside it. The order is another one than that
-of the march of one hit (passing.py), so the last digits of the two differ.
+Sums over a hit have a fixed order, which no other hit changes: first PARTS partial sums, each over every PARTS-th node,
+then the sum of these. So a hit has the same bits in every launch, whichever hits are beside it. The order differs from
+that of the march of one hit (passing.py), so the last digits of the two differ.
 """
 
 from functools import cache

@@ -108,7 +108,7 @@ def build(variant: Variant) -> SimpleNamespace:
         left: wp.array2d(dtype=wp.float64),
     ):
         """A flight at the end of a step: its clock, its next step by the shortest crossing, and its status. Notes which
-        layers are marched next, and how the core left those that it has left (see `advance`)."""
+        layers are marched next, and how the core left the layers behind it (see `advance`)."""
         dt = flight.step
         flight.time += dt
         flight.steps += 1

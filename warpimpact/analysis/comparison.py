@@ -78,7 +78,7 @@ def compare(
     Args:
         datasets: two or more, with the same core and impact. Of open files one number per hit is in memory.
         names: names of the plates, each once.
-        texts: texts of measures; by default those that `inspect` shows for all the plates.
+        texts: texts of measures; by default the measures that `inspect` shows for all the plates.
         confidence: confidence of all differences in a measure together.
 
     Raises:

@@ -142,7 +142,7 @@ def effectiveness(dataset: xarray.Dataset, texts: Sequence[str] = ()) -> list[Sc
 
     Args:
         dataset: a hit map. Of an open file, one slice at a time and one number per hit are in memory.
-        texts: texts of measures; by default those that `inspect` shows.
+        texts: texts of measures; by default the measures that `inspect` shows.
 
     Raises:
         ResultError: a text is no measure, or the result lacks what it needs.

@@ -21,13 +21,13 @@ class Assumptions(Model):
     A value that the campaign has itself, that scatters or that is drawn from a posterior is no alternative.
 
     Attributes:
-        compute: whether alternatives are computed; unless told, where a pilot finds the resolution.
-        hits: of each alternative, at most; unless told, so many that all of them cost a run of 16,384 hits some 15 %,
-            but 64 to 256, and fewer where a hit takes long.
-        resistance: factors of the resistance Y of all layers. Unless told, they are the ends of the catalogue's 90 %
+        compute: whether alternatives are computed; by default only where a pilot finds the resolution.
+        hits: most hits of each alternative. By default all alternatives cost some 15 % of a run of 16,384 hits, with 64
+            to 256 hits each, and fewer where a hit takes long.
+        resistance: factors of the resistance Y of all layers. By default they are the ends of the catalogue's 90 %
             interval where Y is the catalogue's, and 0.7 and 1.3 where it is yours.
-        degradation: β of the layers that weaken; unless told, 1. Plates with holes that do not weaken get 0.8 in 1 µs,
-            that of the paper.
+        degradation: β of the layers that weaken; by default 1. Plates with holes that do not weaken get the paper's 0.8
+            in 1 µs.
         rate: factors of how fast a plate weakens, ln β per time or distance.
         reach: factors of the length and the depth over which a plate weakens.
         shear_coefficient: η of all layers.

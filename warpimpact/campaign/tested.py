@@ -93,7 +93,7 @@ def summary_of_all(campaigns: Iterable[Campaign], what: str) -> str:
 
 
 def _summary(campaigns: Sequence[Campaign], subjects: Sequence[Sequence[str]], what: str) -> str:
-    """What answers rest on, and what lies beyond: of several campaigns with the number of those that it is true of."""
+    """What answers rest on, and what lies beyond the tests; for several campaigns, each with their number."""
     holed = any(plate.open_area for campaign in campaigns for plate in campaign.target.layers)
     base = "two shots at one slotted plate, and limit velocities of solid plates" if holed else "limit velocities"
     counts = Counter(subject for beyond in subjects for subject in dict.fromkeys(beyond))
@@ -204,7 +204,7 @@ def _of_rows(campaign: Campaign, plate: Plate, material: Material) -> Iterator[S
 
 
 def _oblique(campaign: Campaign, low: float, high: float, whose: str) -> Iterator[Standing]:
-    """An obliquity beyond the ends of those that were measured [rad]; a shot of a test may lie a little off."""
+    """An obliquity beyond the measured range [rad], with a tolerance for the shots of a test."""
     obliquity = campaign.impact.obliquity
     if not low - _STRAIGHT <= obliquity <= high + _STRAIGHT:
         ends = math.degrees(low), math.degrees(high)

@@ -157,7 +157,7 @@ def _under_assumptions(comparison: "Comparison") -> str:
 
 
 def _plates_run(arguments: argparse.Namespace, folder: Path) -> dict[str, Path]:
-    """Result files of a campaign's plates by name; computes those that do not exist."""
+    """Result files of a campaign's plates by name. Missing ones are computed."""
     from warpimpact.campaign.plates import read_plates
     from warpimpact.campaign.text import CampaignError
     from warpimpact.runs.run import run_to_file

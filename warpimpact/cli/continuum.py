@@ -45,7 +45,9 @@ def add_continuum(commands: Commands) -> None:
         metavar="N",
         help="of a result: this hit; may be given several times",
     )
-    chosen.add_argument("--hits", type=at_least(1), metavar="N", help="of a result: so many hits, spread over the map")
+    chosen.add_argument(
+        "--hits", type=at_least(1), metavar="N", help="of a result: number of hits, spread over the map"
+    )
     parser.add_argument(
         "--material",
         action="append",

@@ -128,7 +128,7 @@ def ended(coming: Iterable[tuple[Key, OneHit]], cancel: Cancel = NEVER, most: in
     if not hits:
         return
     many = ManyHits(hits)
-    del hits  # those that have ended make room
+    del hits  # ended hits make room
     while running:
         cancel.check()
         many.advance()

@@ -244,7 +244,7 @@ class OneHit:
         )
 
     def steps(self, every: int = STEPS, cancel: Cancel = NEVER) -> Iterator[None]:
-        """March to the end; yields after so many steps again and again."""
+        """March to the end; yields at regular numbers of steps."""
         while self.flight["status"] == RUNNING:
             cancel.check()
             self.advance(every)

@@ -163,7 +163,7 @@ class March:
     def ended(
         self, cancel: Cancel = NEVER, *, every: int = STEPS, follow: Callable[[OneHit], object] = lambda hit: None
     ) -> Struck:
-        """March to the end; `follow` is called after so many steps again and again."""
+        """March to the end; `follow` is called at regular numbers of steps."""
         at_edge = False
         for _ in self.hit.steps(every, cancel):
             follow(self.hit)

@@ -116,7 +116,7 @@ class Answers:
     def maps(
         self, name: str, designs: Mapping[str, ValidDesign], full: Mapping[str, ValidDesign], level: int, cancel: Cancel
     ) -> dict[str, Any]:
-        """The maps of a design and of those that it is compared with, at one stage.
+        """The maps of a design, and of the designs to compare with, at one stage.
 
         Args:
             name: of the stage.
@@ -222,7 +222,7 @@ class Answers:
 
 
 def named(design: ValidDesign, others: Sequence[tuple[str, ValidDesign]]) -> dict[str, ValidDesign]:
-    """A design and those that it is compared with, by names that differ.
+    """A design and the designs to compare with, by names that differ.
 
     Raises:
         CampaignError: two have one name.

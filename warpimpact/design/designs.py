@@ -49,7 +49,7 @@ class Shelf:
 
     Attributes:
         designs: tables of the campaigns by name.
-        files: those that the campaigns name, and that designs of the page may name.
+        files: files that the campaigns name, which designs of the page may name, too.
     """
 
     designs: Mapping[str, Tables]

@@ -97,7 +97,7 @@ def write_csv(dataset: xarray.Dataset, path: Path) -> None:
 
 
 def _no_formula(text: str) -> str:
-    """A text that a spreadsheet does not compute: those that begin as formulas do get an apostrophe in front. Names of
+    """A text that a spreadsheet does not compute: an apostrophe stands before what begins as a formula. Names of
     variables, and the words of a status, are whatever the file says."""
     return f"'{text}" if text.startswith(("=", "+", "-", "@", "\t", "\r")) else text
 

@@ -176,7 +176,7 @@ def _bars(dataset: xarray.Dataset, names: tuple[str, str, str], asked: int) -> n
 
 
 def _draw_variables(figure: SubFigure, dataset: xarray.Dataset, leaders: Any) -> None:
-    """Values of the variables over the first objective; not of those that count nowhere on the front."""
+    """Values over the first objective of the variables that count somewhere on the front."""
     names, values = dataset[f.NAME].values, dataset[f.VALUE].values[dataset[f.NUMBER].values[leaders]]
     shown = np.flatnonzero(np.isfinite(values).any(axis=0))
     if not len(shown):

@@ -1,4 +1,4 @@
-"""Tables in netCDF files. The files are those that xarray would write of the Datasets, to the bit."""
+"""Tables in netCDF files. xarray would write the same files of the Datasets, to the bit."""
 
 from __future__ import annotations
 

@@ -125,7 +125,7 @@ def finer_hits(campaign: Campaign, found: Found | None, most: int) -> dict[str, 
 
 
 def numerics_of(campaign: Campaign, found: Found | None) -> Numerics:
-    """The numerics of the campaign, or those that its pilot found."""
+    """The numerics of the campaign, or what its pilot found."""
     return campaign.numerics if found is None else found.numerics
 
 

@@ -71,7 +71,7 @@ def marched(memory: Memory, worker: Worker, progress: Progress | None = None) ->
 
 
 def numerics_for(scene: Scene, shots: Shots, numerics: Numerics, worker: Worker, hits: int = 0) -> Numerics:
-    """Numerics that fix the resolution: those given, or those that a pilot of some of the shots finds for a run of this
+    """Numerics that fix the resolution: the given ones, or what a pilot of some of the shots finds for a run of this
     number of hits."""
     if numerics.explicit is not None:
         return numerics

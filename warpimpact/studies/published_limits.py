@@ -20,7 +20,7 @@ from warpimpact.view.view import Column, Section, Table, number
 
 _MEDIAN = Measure.parse("V50")
 _SAME_OBLIQUITY = 0.5
-"""Hits whose obliquity is within so many degrees of a published one are beside it [degree]."""
+"""Largest difference of a hit's obliquity from a published one to which it is compared [degree]."""
 
 
 class Beside(NamedTuple):
