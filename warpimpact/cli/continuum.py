@@ -8,6 +8,7 @@ from .mistakes import memory_told
 from .options import (
     Commands,
     add_command,
+    add_computing,
     add_count,
     add_output,
     add_overwrite,
@@ -29,9 +30,9 @@ def add_continuum(commands: Commands) -> None:
         _continuum,
         summary="compute hits by finite elements",
         description="Compute hits of a campaign, or some of those of a result, by explicit finite elements of the "
-        "target, which take seconds to minutes of a core each, and write a result as run does. It stands beside the "
-        "fast law: compare takes both. Its materials have constants of their own (docs/continuum.md). Options come "
-        "before the campaign's table [continuum].",
+        "target, which take seconds to minutes of a core each, and write a result as run does. A GPU computes hundreds "
+        "at a time. It stands beside the fast law: compare takes both. Its materials have constants of their own "
+        "(docs/continuum.md). Options come before the campaign's table [continuum].",
         example="continuum campaigns/slotted_plate.toml --count 4 --material ARMOX560T -o continuum.nc",
     )
     parser.add_argument("file", type=Path, metavar="FILE", help="a campaign, or a result of warpimpact run")
@@ -69,9 +70,7 @@ def add_continuum(commands: Commands) -> None:
     parser.add_argument(
         "--element", metavar="LENGTH", help='size of the elements, such as "0.5 mm", in place of a fidelity'
     )
-    where = parser.add_mutually_exclusive_group()
-    where.add_argument("--scheduler", metavar="ADDRESS", help="compute on the workers of this Dask scheduler")
-    where.add_argument("--workers", type=at_least(1), metavar="N", help="compute in N processes on this machine")
+    add_computing(parser)
     parser.add_argument(
         "--resume", action="store_true", help="continue an interrupted computation; start a new one if there is none"
     )
@@ -92,7 +91,7 @@ def _continuum(arguments: argparse.Namespace) -> int:
     check_place(output)
     check_suffix(output, "a result", ".nc")
     campaign = campaign.computed_by(_elements(arguments, campaign))
-    computing = executor_for("cpu", workers=arguments.workers, scheduler=arguments.scheduler, apart=True)
+    computing = executor_for(arguments.device, workers=arguments.workers, scheduler=arguments.scheduler, apart=True)
     with memory_told(arguments.file), show_progress() as show, computing as executor:
         try:
             continuum_to_file(
@@ -102,7 +101,7 @@ def _continuum(arguments: argparse.Namespace) -> int:
                 device=executor,
                 resume=arguments.resume,
                 overwrite=arguments.overwrite,
-                progress=lambda now, total: show(Step(min(len(now.results), total), total, min(now.resumed, total))),
+                progress=lambda done, resumed, total: show(Step(done, total, resumed)),
                 tell=warn,
             )
         except ValueError as error:
@@ -111,7 +110,8 @@ def _continuum(arguments: argparse.Namespace) -> int:
         print(summary_text(dataset))
         for line in evidence_lines(dataset, file=str(output)):
             print(line)
-        print(f"{dataset.attrs[attr.COMPUTE_TIME]:.4g} s of a core")
+        computer = "core" if dataset.attrs[attr.DEVICE].startswith("cpu") else "GPU"
+        print(f"{dataset.attrs[attr.COMPUTE_TIME]:.4g} s of a {computer}")
         print(f"written to {output}")
         return failure_code(dataset, output)
 

@@ -7,6 +7,7 @@ import json
 import time
 import warnings
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -15,6 +16,7 @@ import numpy as np
 from warpimpact.campaign.campaign import Campaign
 from warpimpact.campaign.continuum_settings import FiniteElements
 from warpimpact.campaign.references import at_solid
+from warpimpact.continuum.many_hits import MOST
 from warpimpact.continuum.strikes import check_continuum, struck
 from warpimpact.records.outcomes import Outcomes
 from warpimpact.results import attributes as attr
@@ -30,6 +32,7 @@ from warpimpact.runs.shards import manifest
 from warpimpact.runs.store import stored
 from warpimpact.scene import Scene, Shots
 from warpimpact.scene.flow import Continuum
+from warpimpact.solver.device import find_device
 from warpimpact.solver.worker import Worker
 
 if TYPE_CHECKING:
@@ -47,15 +50,15 @@ def continuum_to_file(
     device: Executor,
     resume: bool = False,
     overwrite: bool = False,
-    progress: Callable[[RoundProgress, int], object] = lambda now, total: None,
+    progress: Callable[[int, int, int], object] = lambda done, resumed, total: None,
     tell: Callable[[str], object] = warnings.warn,
 ) -> None:
-    """Compute hits of a campaign by finite elements, as its table [continuum] says, into a result file; each is on the
-    disk when it has ended.
+    """Compute hits of a campaign by finite elements, as its table [continuum] says, into a result file; each job is on
+    the disk when it has ended.
 
     Args:
         hits: by their numbers in the campaign; None is all of them, of which images are not computed.
-        progress: called with the progress of the hits and their number.
+        progress: called with the hits that are done, how many of them an earlier call had computed, and all hits.
 
     Raises:
         ValueError: the continuum does not compute this campaign.
@@ -70,34 +73,39 @@ def continuum_to_file(
     with stored(output, content, "continuum", resume=resume, overwrite=overwrite, tell=tell) as store:
         if store is None:
             return
-        count = len(campaign.sampler() if hits is None else hits)
-        question = _computed(campaign, hits, lambda now: progress(now, count))
+        question = _computed(campaign, hits, device.made_by[attr.DEVICE], progress)
         dataset = answered(question, device, store)
         dataset.attrs[attr.FINGERPRINT] = store.parts.fingerprint
         files.write(dataset, output)
 
 
 def _computed(
-    campaign: Campaign, hits: tuple[int, ...] | None, tell: Callable[[RoundProgress], object]
+    campaign: Campaign, hits: tuple[int, ...] | None, device: str, progress: Callable[[int, int, int], object]
 ) -> Question[xarray.Dataset]:
     """The result of the hits of some numbers; where they are all, the first one of each group of images is computed."""
     sampler, elements, images = campaign.sampler(), campaign.continuum, hits is None
     continuum, numbers = elements.solver, range(len(sampler)) if hits is None else hits
-    group = len(campaign.symmetries) if images else 1
+    group, together = len(campaign.symmetries) if images else 1, 1 if device == "cpu" else MOST
     shots = Shots.joined([sampler.shots(int(number), 1) for number in numbers])
     computed = shots[::group]
-    asked = [(campaign.scene, computed[k : k + 1], continuum) for k in range(len(computed))]
+    asked = [(campaign.scene, computed[k : k + together], continuum) for k in range(0, len(computed), together)]
     solid = solid_shots(campaign, shots[:1], 1)
     if solid is not None:
         scene, alone = at_solid(campaign, solid)
         asked.append((scene, alone, continuum))
-    results = yield Round([Job(_hit, one) for one in asked], [_key(*one) for one in asked], tell)
+
+    def tell(now: RoundProgress) -> None:
+        done, resumed = (min(int(jobs * together * group), len(shots)) for jobs in (now.done, now.resumed))
+        progress(done, resumed, len(shots))
+
+    results = yield Round([Job(_hits, one) for one in asked], [_key(*one) for one in asked], tell)
     outcomes = [Outcomes(**{name: values for name, values in row.items() if name != SECONDS}) for row in results]
     beside = {} if solid is None else solid_columns(outcomes.pop())
     elapsed = float(sum(float(row[SECONDS][0]) for row in results))
     told = (
         computed_by(campaign, "cpu", len(computed), elapsed) if images else _computed_alone(campaign, computed, elapsed)
     )
+    told |= {} if device == "cpu" else {attr.DEVICE: device}
     told |= {
         attr.CONTINUUM: json.dumps(
             {"materials": [entry.name for entry in elements.entries], **json.loads(continuum.model_dump_json())}
@@ -138,11 +146,15 @@ def _key(scene: Scene, shots: Shots, continuum: Continuum) -> str:
     return hashlib.sha256((told + columns).encode()).hexdigest()
 
 
-def _hit(
+def _hits(
     scene: Scene, shots: Shots, continuum: Continuum, *, worker: Worker, report: Callable[[float], object]
 ) -> Arrays:
-    """The outcomes of one hit."""
-    begin = time.thread_time()
-    single = Worker("cpu", 1, worker.cancel)
-    outcomes = struck(scene, shots, continuum, single)
-    return {SECONDS: np.array([time.thread_time() - begin]), **vars(outcomes)}
+    """The outcomes of some hits, by one core or by a GPU."""
+
+    def progress(done: int, total: int) -> None:
+        report(done / total)
+
+    clock = time.thread_time if find_device(worker.device).is_cpu else time.perf_counter
+    begin = clock()
+    outcomes = struck(scene, shots, continuum, replace(worker, threads=1), progress)
+    return {SECONDS: np.array([clock() - begin]), **vars(outcomes)}

@@ -14,6 +14,7 @@ from warpimpact.continuum import strikes
 from warpimpact.export.paraview import write_vtk
 from warpimpact.results import attributes as attr
 from warpimpact.results import files
+from warpimpact.runs import finite_elements
 from warpimpact.runs.choice import executor_for
 from warpimpact.runs.finite_elements import continuum_to_file
 
@@ -97,6 +98,26 @@ def test_a_hit_that_is_there_is_not_computed_again(
     assert 3 < len(calls) < 3 + 5  # of four hits and the solid plate
     for name in ("residual_velocity", "tilt", "hourglass_share"):
         assert np.array_equal(files.read(output)[name].values, straight[name].values, equal_nan=True), name
+
+
+def test_a_job_of_a_gpu_has_many_hits(campaign_file: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The CPU stands in for it: jobs of three hits, of one, and of the solid plate."""
+    monkeypatch.setattr(finite_elements, "MOST", 3)
+    whole, told = files.read(computed(tmp_path / "all.nc", campaign_file)), list[tuple[int, int, int]]()
+    with executor_for("cpu", apart=True) as executor:
+        executor.made_by = executor.made_by | {attr.DEVICE: "a GPU"}
+        continuum_to_file(
+            Campaign.from_toml(campaign_file),
+            tmp_path / "together.nc",
+            device=executor,
+            progress=lambda *now: told.append(now),
+        )
+    together = files.read(tmp_path / "together.nc")
+    assert together.attrs[attr.DEVICE] == "a GPU"
+    for name in ("residual_velocity", "tilt", "hourglass_share", "solid_residual_velocity"):
+        assert np.array_equal(whole[name].values, together[name].values, equal_nan=True), name
+    assert told[0] == (0, 0, 4)
+    assert told[-1] == (4, 0, 4)
 
 
 def test_a_hit_is_replayed_bit_by_bit(campaign_file: Path, tmp_path: Path) -> None:
