@@ -99,14 +99,15 @@ def build(variant: Variant) -> SimpleNamespace:
             move_node(mesh, mesh.sheets[layer], number_at(pieces, place), real(flight.step))
 
     def deform(hits: wp.array(dtype=struct.Hit)):
-        """Take the elements over the step. Threads [hits, most elements of a hit]."""
+        """Take the elements over the step. Those that have failed, and places where none is, have no force any more, so
+        they are left alone. Threads [hits, most elements of a hit]."""
         number, place = wp.tid()
         flight, pieces = hits[number].flights[0], hits[number].pieces
         if flight.status != running or place >= places(pieces):
             return
-        mesh, layer = hits[number].mesh, layer_at(pieces, place)
-        if mesh.awake[layer] != 0:
-            deform_element(mesh, mesh.sheets[layer], number_at(pieces, place), real(flight.step))
+        mesh, layer, element = hits[number].mesh, layer_at(pieces, place), number_at(pieces, place)
+        if mesh.awake[layer] != 0 and read(mesh.alive, element) > real(0.0):
+            deform_element(mesh, mesh.sheets[layer], element, real(flight.step))
 
     def cross(hits: wp.array(dtype=struct.Hit), crossings: wp.array2d(dtype=real)):
         """The shortest time that a wave takes across an element of each part [s]; 1 s if there is none. Threads

@@ -3,8 +3,9 @@
     python tests/benchmarks/gpu.py              # writes results/gpu.json, from which the benchmark page has its rows
 
 Answers of every build of the kernels against the CPU, in both layouts; hits per second of three scenes in both; the
-slotted plate with other block sizes and without grid-stride loops; ten million hits into a file. Builds are compiled
-by several processes, then each rate is measured alone. What no time is left for is named as left out.
+slotted plate with other block sizes and without grid-stride loops; hits by finite elements that march together; ten
+million hits into a file. Builds are compiled by several processes, then each rate is measured alone. What no time is
+left for is named as left out.
 
 It needs the checkout and warpimpact's dependencies, no installation. The exit code is 1 if the device's answers differ
 from the CPU's by more than stated, and 2 if there is no such device. `--device cpu` tries the script itself.
@@ -34,14 +35,18 @@ from roads import NORMAL, ROADS, base, scene_and_shots
 from roads import OBLIQUE as OBLIQUE_IMPACT
 
 from warpimpact.campaign.campaign import Campaign
+from warpimpact.catalogue.flow_entries import flow_entry
+from warpimpact.continuum.many_hits import MOST, ManyHits
+from warpimpact.continuum.strikes import Struck, march_of, memory_of, outcomes_of, simulate, together
 from warpimpact.kernels import lanes, march
 from warpimpact.runs.run import run_to_file
 from warpimpact.scene import Numerics, Scene, Shots
+from warpimpact.scene.flow import Continuum
 from warpimpact.solver.device import DeviceError, find_device
 from warpimpact.solver.marching import March
 from warpimpact.solver.memory import Memory
 from warpimpact.solver.prepare import prepare
-from warpimpact.solver.simulate import simulate
+from warpimpact.solver.worker import Worker
 
 LEVEL = 2
 """Of the ladder: that of the slotted plate at standard."""
@@ -50,6 +55,9 @@ BUDGET = 450.0
 END_TO_END, FOR_THE_FILE = 10_000_000, 60.0
 SMALLEST, GROWTH, LARGEST, LONG = 4096, 8, 2**21, 0.5
 """Numbers of hits of a rate, which grow until a run takes LONG [s]."""
+ELEMENTS, COMPARED, MATERIAL, SPACING = "finite elements", 8, "ARMOX560T", None
+"""The part of the continuum, its hits that are compared with the CPU, its material, and the size of its elements, which
+are drafts without one."""
 DISTINCT = 2**15
 """Number of different hits in a run; larger runs repeat them."""
 AGREEING, AGREEING_NODAL, FLOOR_HITS = 256, 16, 16
@@ -136,6 +144,7 @@ class Asked:
     hits: int
     largest: int
     file_hits: int
+    continuum_hits: int
     only: list[str] | None
     begin: float
 
@@ -157,13 +166,14 @@ def main(argv: Sequence[str] | None = None) -> int:
         return 2
     values: dict[str, Any] = {"device": device.name, "level": LEVEL, "machine": machine(), "tolerance": TOLERANCE}
     values |= {"agreement": {}, "rates": {}, "left_out": [], "seconds": {}}
-    for part in (agreements, rates, file_of, above_floor):
+    for part in (agreements, rates, elements, file_of, above_floor):
         begin = time.monotonic()
         part(values, asked)
         values["seconds"][part.__name__] = time.monotonic() - begin
         asked.output.write_text(json.dumps(values, indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
     print(f"{asked.output}: {time.monotonic() - asked.begin:.0f} s in all", flush=True)
-    different = [name for name, one in values["agreement"].items() if not one["same"]]
+    compared = values["agreement"] | {"finite elements": values.get("continuum", {}).get("agreement", {"same": True})}
+    different = [name for name, one in compared.items() if not one["same"]]
     if different:
         print(f"further from the CPU's answers than stated: {', '.join(different)}", file=sys.stderr)
     return 1 if different else 0
@@ -177,6 +187,7 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--hits", type=int, default=AGREEING, help=f"compared with the CPU (default: {AGREEING})")
     parser.add_argument("--largest", type=int, default=LARGEST, help=f"hits of a rate at most (default: {LARGEST})")
     parser.add_argument("--file-hits", type=int, default=END_TO_END, help=f"into a file (default: {END_TO_END})")
+    parser.add_argument("--continuum-hits", type=int, default=MOST, help=f"by finite elements (default: {MOST})")
     parser.add_argument("--only", nargs="*", choices=list(SCENES), help="scenes (default: all)")
     return parser
 
@@ -278,6 +289,34 @@ def rate(name: str, way: Way, asked: Asked) -> dict[int, float]:
         found[count] = count / taken
         count *= GROWTH
     return found
+
+
+def elements(values: dict[str, Any], asked: Asked) -> None:
+    """Hits of the slotted plate by finite elements that march together: how long they take, and how far the first ones
+    are from the CPU's, which march one by one."""
+    if time.monotonic() - asked.begin > BUDGET - FOR_THE_FILE:
+        values["left_out"].append(ELEMENTS)
+        print(f"{ELEMENTS}: left out, for want of time", flush=True)
+        return
+    continuum = Continuum(flows=(flow_entry(MATERIAL).flow,), spacing=SPACING)
+    scene, shots = scene_of(SLOTS, asked.continuum_hits)
+    memory = memory_of(scene, shots, Worker("cpu"))
+    begun = [
+        march_of(scene, shots, number, continuum, memory.prepared.conditions, asked.device)
+        for number in [0, *range(len(shots))]
+    ]
+    ManyHits([begun.pop(0).hit]).advance(1)  # compiles
+    counts = np.array([sum(int(sheet.alive.sum()) for sheet in march.sheets) for march in begun])
+    hits: dict[int, Struck] = {}
+    taken = seconds(lambda: hits.update(together(begun)))
+    there = outcomes_of(memory, [hits[number] for number in range(len(shots))])
+    here = simulate(scene, shots[:COMPARED], numerics=continuum, device="cpu")
+    work = sum(int(counts[number]) * int(hit.flight["steps"]) for number, hit in hits.items())
+    values["continuum"] = {"hits": len(shots), "seconds": taken, "elements": float(counts.mean())}
+    values["continuum"] |= {"hits_per_second": len(shots) / taken, "nanoseconds": 1e9 * taken / work}
+    values["continuum"]["agreement"] = difference(there[: len(here)], here)
+    print(f"{ELEMENTS}: {len(shots) / taken:.3g} hits/s, {1e9 * taken / work:.3g} ns per element and step", flush=True)
+    print(f"{ELEMENTS}: {told(values['continuum']['agreement'])}", flush=True)
 
 
 def file_of(values: dict[str, Any], asked: Asked) -> None:

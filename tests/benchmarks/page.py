@@ -314,6 +314,15 @@ def _gpu(values: Mapping[str, Any]) -> Iterator[Row]:
             f"the same hits on the CPU; {one['end_otherwise']} end otherwise",
             f"{one['hits']} Sobol hits",
         )
+    if "continuum" in values:
+        one = values["continuum"]
+        yield Row(
+            "hits by finite elements on a GPU, hits per second",
+            f"slotted plate; {one['elements']:,.0f} elements",
+            f"{one['hits_per_second']:.3g}",
+            f"wall time of the march; {one['nanoseconds']:.3g} ns per element and step",
+            f"one run of {one['hits']} hits",
+        )
     if "file" in values:
         one = values["file"]
         yield Row(

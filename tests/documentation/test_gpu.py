@@ -16,9 +16,10 @@ import gpu
 import page
 
 
-def test_one_call_measures_what_the_page_shows(tmp_path: Path) -> None:
+def test_one_call_measures_what_the_page_shows(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(gpu, "SPACING", 1.3e-3)
     path = tmp_path / "gpu.json"
-    sizes = ["--hits", "12", "--largest", "16", "--file-hits", "64", "--workers", "0"]
+    sizes = ["--hits", "12", "--largest", "16", "--file-hits", "64", "--continuum-hits", "2", "--workers", "0"]
     assert gpu.main(["--device", "cpu", "--only", gpu.SLOTS, *sizes, "--output", str(path)]) == 0
     values = json.loads(path.read_text(encoding="utf-8"))
     assert values["left_out"] == []
@@ -28,8 +29,10 @@ def test_one_call_measures_what_the_page_shows(tmp_path: Path) -> None:
     }
     assert set(values["rates"][gpu.SLOTS]) == {gpu.SIMPLE.name, gpu.BLOCK.name}
     assert values["file"]["bytes"] > 64 * 40
+    assert values["continuum"]["hits"] == values["continuum"]["agreement"]["hits"] == 2
+    assert values["continuum"]["nanoseconds"] > 1.0
     rows = list(page.rows({"gpu": values}))
-    assert len(rows) == 2 + 2 + 1
+    assert len(rows) == 2 + 2 + 1 + 1
     assert all(all(row) for row in rows)
 
 
