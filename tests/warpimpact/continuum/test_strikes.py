@@ -2,17 +2,19 @@
 
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
 
 from warpimpact import CirclePattern, Continuum, Layer, Plate, PolynomialCore, Record, Scene, Shots, simulate
 from warpimpact.catalogue.flow_entries import flow_entry, flow_names
-from warpimpact.continuum import strikes
+from warpimpact.continuum import many_hits, strikes
 from warpimpact.continuum.one_hit import Energies
 from warpimpact.kernels.status import Status
 from warpimpact.scene.flow import FINENESS
-from warpimpact.solver.device import DeviceError
+from warpimpact.solver.device import DeviceError, find_device
 from warpimpact.solver.worker import Worker
 
 CORE = PolynomialCore(coefficients=(3.0e-4, 0.24, -5.29), length=27.86e-3, mass=4.0e-3)
@@ -63,6 +65,38 @@ def test_a_hit_that_loses_energy_to_its_numerics_is_a_failure(energies: Energies
 def test_a_device_that_is_not_there_is_refused() -> None:
     with pytest.raises(DeviceError, match='got "cuda:99", but this machine has no such device'):
         simulate(Scene(core=CORE, target=PLATE), SHOT, numerics=COARSE, device="cuda:99")
+
+
+def test_a_gpu_computes_the_hits_of_a_scene_together(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The CPU stands in for it. The slower hit ends last, and the outcomes have the order of the shots."""
+    monkeypatch.setattr(strikes, "LARGEST_HOURGLASS_SHARE", 1.0)
+    gpu = SimpleNamespace(is_cpu=False, alias="cpu")
+    monkeypatch.setattr(strikes, "find_device", lambda name: gpu if name == "gpu" else find_device(name))
+    shots = replace(Shots.joined([SHOT, SHOT]), velocity=np.array([500.0, 825.0]))
+    told: list[tuple[int, int]] = []
+    there, here = (
+        simulate(
+            Scene(core=CORE, target=PLATE),
+            shots,
+            numerics=COARSE,
+            device=device,
+            progress=lambda done, total: told.append((done, total)),
+        )
+        for device in ("gpu", "cpu")
+    )
+    assert told[:2] == [(1, 2), (2, 2)]
+    assert (there.status == Status.PERFORATED).all()
+    assert there.residual_velocity == pytest.approx(here.residual_velocity, abs=0.01)
+    assert there.residual_velocity[1] > there.residual_velocity[0] + 300.0
+
+
+@pytest.mark.parametrize(("free", "room"), [(2.5e9, False), (2.7e9, True)])
+def test_hits_take_half_of_the_free_memory_of_a_gpu(free: float, room: bool) -> None:
+    """Two hits of 0.4 GB, one of 0.6 GB, and one more like it: 2 GB, where 3.9 or 4.1 GB are free without them."""
+    device = SimpleNamespace(is_cpu=False, free_memory=int(free))
+    hits: Any = [SimpleNamespace(device=device, bytes=int(size)) for size in (0.4e9, 0.4e9, 0.6e9)]
+    assert many_hits._has_room(hits) == room
+    assert many_hits._has_room([])
 
 
 def test_a_failed_hit_has_no_outcome_and_the_others_are_told() -> None:
