@@ -14,8 +14,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from pydantic import ValidationError
 
-from ..scene import Core, Plate, Scene, Shots, Target
+from ..scene import FreeSurface, Interaction, Plate, Scene, Shots, Target
 from .resistances import catalogue_resistance, is_drawn
+from .straight_passage import StraightPassage
 
 if TYPE_CHECKING:
     from ..catalogue.strength import Resistance
@@ -29,9 +30,8 @@ _STEEPEST = math.radians(85.0)
 """Largest obliquity, and largest projected angle of the axis, of an alternative [rad]."""
 _DIFFERENT = 1e-6
 """Relative change of a value below which an alternative is none."""
-
-_STATIONS = 4001
-"""Stations of a core over which its work is summed."""
+RATE = 1.7
+"""C of the law with free surfaces, as it was fitted with them."""
 
 Values = Mapping[tuple[str, int], float]
 
@@ -78,7 +78,18 @@ def alternatives(campaign: Campaign) -> list[Alternative]:
     """All alternatives that [assumptions] asks for and that differ from the campaign, in the order of its keys."""
     return [
         alternative
-        for asked in (_resistances, _degradations, _rates, _reaches, _frictions, _onsets, _turns, _standoffs, _breaks)
+        for asked in (
+            _resistances,
+            _degradations,
+            _rates,
+            _reaches,
+            _frictions,
+            _onsets,
+            _edges,
+            _turns,
+            _standoffs,
+            _breaks,
+        )
         for alternative in asked(campaign)
     ]
 
@@ -107,30 +118,23 @@ def _in_catalogue(campaign: Campaign, plate: Plate) -> Resistance | None:
     return known if known is not None and known.deviation else None
 
 
-def _refitted(campaign: Campaign, friction: float | None = None, onset: float | None = None) -> Values:
-    """Y of the layers that have it from the catalogue, as published limit velocities would give it with another η or κ:
-    the work of a straight passage stays (docs/model.md §6.2)."""
-    core, given = campaign.core, campaign.interaction.onset
-    refitted = {}
-    for k, plate in enumerate(campaign.target.layers):
-        if _in_catalogue(campaign, plate) is not None:
-            own = plate.shear_coefficient
-            before = _passage(core, own, given)
-            after = _passage(core, own if friction is None else friction, given if onset is None else onset)
-            refitted["resistance", k] = plate.resistance * before / after
-    return refitted
+def _refitted(campaign: Campaign, law: Interaction, friction: float | None = None) -> Values:
+    """Y of the layers that have it from the catalogue, as published limit velocities would give it under another law or
+    with another η: the limit velocity of a solid plate stays (docs/model.md §6.2)."""
+    layers = enumerate(campaign.target.layers)
+    return {
+        ("resistance", k): _passage(campaign, plate).resistance_under(
+            law, plate.shear_coefficient if friction is None else friction, plate.resistance
+        )
+        for k, plate in layers
+        if _in_catalogue(campaign, plate) is not None
+    }
 
 
-def _passage(core: Core, friction: float, onset: float) -> float:
-    """Work of a straight passage over 2π Y h [m²] (docs/model.md §6.2)."""
-    s = np.linspace(0.0, core.length, _STATIONS)
-    radius = core.radius(s)
-    widest = int(np.argmax(radius >= core.max_radius * (1.0 - _DIFFERENT))) + 1
-    s, radius = s[:widest], radius[:widest]
-    slope = np.maximum(np.gradient(radius, s), 0.0)
-    facing = slope / np.sqrt(1.0 + slope * slope)
-    pressed = np.minimum(facing / onset, 1.0) if onset > 0.0 else (facing > 0.0).astype(float)
-    return 0.5 * float(radius[0]) ** 2 + float(np.trapezoid(pressed * (slope + friction) * radius, s))
+def _passage(campaign: Campaign, plate: Plate) -> StraightPassage:
+    """The core straight through a plate without holes."""
+    given = campaign.interaction, plate.shear_coefficient, plate.thickness, plate.density
+    return StraightPassage(campaign.core, *given)
 
 
 def _degradations(campaign: Campaign) -> Iterator[Alternative]:
@@ -173,16 +177,16 @@ def _frictions(campaign: Campaign) -> Iterator[Alternative]:
     for value in campaign.assumptions.shear_coefficient:
         every = dict.fromkeys(range(len(campaign.target.layers)), value)
         for changed in _of_layers(campaign, f"friction η = {value:g}", "shear_coefficient", every):
-            yield _with_refitted(campaign, changed, _refitted(campaign, friction=value))
+            yield _with_refitted(campaign, changed, _refitted(campaign, campaign.interaction, value))
 
 
 def _onsets(campaign: Campaign) -> Iterator[Alternative]:
     law = campaign.interaction
     for value in campaign.assumptions.onset:
         if not math.isclose(law.onset, value) and not is_drawn(campaign, "onset"):
-            scene = campaign.scene.model_copy(update={"interaction": law.model_copy(update={"onset": value})})
-            changed = Alternative(f"onset κ = {value:g}", scene)
-            yield _with_refitted(campaign, changed, _refitted(campaign, onset=value))
+            other = law.model_copy(update={"onset": value})
+            changed = Alternative(f"onset κ = {value:g}", campaign.scene.model_copy(update={"interaction": other}))
+            yield _with_refitted(campaign, changed, _refitted(campaign, other))
 
 
 def _with_refitted(campaign: Campaign, changed: Alternative, refitted: Values) -> Alternative:
@@ -190,6 +194,31 @@ def _with_refitted(campaign: Campaign, changed: Alternative, refitted: Values) -
     if not refitted or is_drawn(campaign, "resistance", [k for _, k in refitted]):
         return changed
     return replace(changed, name=f"{changed.name}, Y fitted with it", layers={**changed.layers, **refitted})
+
+
+def _edges(campaign: Campaign) -> Iterator[Alternative]:
+    """Less resistance near edges, and a stress of the speed, in place of weakening (docs/model.md §4.9): what finite
+    elements of plates with holes ask for. A plate without holes takes as much from the core as before."""
+    law, plates, burst = campaign.interaction, campaign.target.layers, campaign.at_a_plate > 1
+    every, drawn = range(len(plates)), ("resistance", "degradation", "linear", "static", "quadratic")
+    if (
+        not campaign.assumptions.edges
+        or law != Interaction(onset=law.onset)
+        or not any(plate.open_area for plate in plates)
+        or burst
+        or campaign.numerics.scheme == "nodal"
+        or any(is_drawn(campaign, name, every) for name in drawn)
+    ):
+        return
+    other = Interaction(linear=RATE, onset=law.onset, free_surface=FreeSurface())
+
+    def changed(k: int, plate: Plate) -> dict[str, Any]:
+        arriving = 0.0 if _in_catalogue(campaign, plate) is not None else campaign.impact.velocity
+        alike = _passage(campaign, plate).resistance_under(other, plate.shear_coefficient, plate.resistance, arriving)
+        return {"resistance": alike, "degradation": 1.0}
+
+    scene = _changed(campaign, changed).model_copy(update={"interaction": other})
+    yield Alternative("less resistance near edges, Y fitted with it", scene)
 
 
 def _turns(campaign: Campaign) -> Iterator[Alternative]:

@@ -32,6 +32,7 @@ class Assumptions(Model):
         reach: factors of the length and the depth over which a plate weakens.
         shear_coefficient: η of all layers.
         onset: κ of the law of stress.
+        edges: whether less resistance near the edges of holes is an alternative (docs/model.md §4.9).
         obliquity, yaw: by how much the shot is more oblique, and the core more yawed [rad].
         standoff: factors of the stand-offs.
         strength: of a core that the campaign takes to be unbreakable [Pa]; it tells how many cores would break.
@@ -45,6 +46,7 @@ class Assumptions(Model):
     reach: Annotated[tuple[_Factor, ...], _Few] = (0.5, 2.0)
     shear_coefficient: Annotated[tuple[NonNegativeNumber, ...], _Few] = (0.0, 0.1)
     onset: Annotated[tuple[NonNegativeNumber, ...], _Few] = (0.0, 0.02)
+    edges: Annotated[bool, Field(strict=True)] = True
     obliquity: Annotated[tuple[Obliquity, ...], _Few] = (math.radians(5.0),)
     yaw: Annotated[tuple[Tilt, ...], _Few] = (math.radians(2.0),)
     standoff: Annotated[tuple[_Factor, ...], _Few] = (0.5,)

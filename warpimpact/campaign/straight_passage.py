@@ -1,0 +1,99 @@
+"""A core that goes straight through a solid plate: what its resistance is worth under another law (docs/model.md §6.2).
+
+A resistance belongs to the law with which it was found. What stays under another one is what was seen: the limit
+velocity of a solid plate, or what it takes from a core.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ..scene import Core, Interaction
+
+Array = NDArray[np.float64]
+
+_STATIONS, _DEPTHS = 2001, 400
+"""Points along a core, and steps of its way."""
+_WIDEST = 1e-6
+"""Relative difference from the largest radius at which a core counts as that wide."""
+_FACTORS = np.geomspace(0.02, 50.0, 401)
+"""Resistances that are tried, over the one before."""
+_SPEEDS = 401
+"""Velocities behind the plate that are tried."""
+
+
+@dataclass(frozen=True)
+class StraightPassage:
+    """A core without obliquity and yaw, and a solid plate.
+
+    Attributes:
+        core: the core.
+        law: stress of an element.
+        friction: η.
+        thickness: length of the way through the plate [m].
+        density: of the plate [kg/m³].
+    """
+
+    core: Core
+    law: Interaction
+    friction: float
+    thickness: float
+    density: float
+
+    def entry(self, resistance: ArrayLike, leaving: ArrayLike = 0.0) -> Array:
+        """Velocity with which the core enters [m/s], of the shape to which the arguments broadcast; the motion is
+        followed from the rear face back to the front one.
+
+        Args:
+            resistance: Y [Pa].
+            leaving: velocity behind the plate [m/s]; with 0, the limit velocity results.
+        """
+        station, radius, slope = self._nose()
+        facing, law, free = slope / np.sqrt(1.0 + slope * slope), self.law, self.law.free_surface
+        touching = np.minimum(facing / law.onset, 1.0) if law.onset > 0.0 else (facing > 0.0).astype(float)
+        area = 2.0 * np.pi * radius * np.gradient(station) * touching * (slope + self.friction)
+        near = np.ones_like(radius)
+        if free is not None:
+            near /= 1.0 + (radius / (free.reach * self.thickness)) ** free.power
+        edges = np.linspace(self.thickness + station[-1], 0.0, _DEPTHS + 1)
+        depth, step = 0.5 * (edges[1:] + edges[:-1])[:, None], edges[0] - edges[1]
+        inside = (depth > station) & (depth < station + self.thickness)
+        tip = np.pi * radius[0] ** 2 * inside[:, 0]
+        static, linear, quadratic = (
+            inside @ (area * share) + tip * at_tip
+            for share, at_tip in ((near, near[0]), (facing, 1.0), (facing**2, 1.0))
+        )
+        strength, behind = np.broadcast_arrays(np.asarray(resistance, dtype=float), np.asarray(leaving, dtype=float))
+        by_speed, square = law.linear * np.sqrt(self.density * strength), behind**2
+        for at, once, twice in zip(static, linear, quadratic, strict=True):
+            force = law.static * strength * at + by_speed * np.sqrt(square) * once
+            force += law.quadratic * self.density * square * twice
+            square = square + 2.0 * step / self.core.mass_properties.mass * force
+        return np.asarray(np.sqrt(square))
+
+    def resistance_under(self, law: Interaction, friction: float, resistance: float, velocity: float = 0.0) -> float:
+        """Resistance Y [Pa] with which the plate takes as much from the core under another law.
+
+        Args:
+            law, friction: the other ones.
+            resistance: Y under this one [Pa].
+            velocity: with which the core arrives [m/s]. The limit velocity stays where it is no less.
+        """
+        limit, leaving = float(self.entry(resistance)), 0.0
+        if velocity > limit:
+            behind = np.linspace(0.0, velocity, _SPEEDS)
+            leaving = float(np.interp(velocity, self.entry(resistance, behind), behind))
+        tried = resistance * _FACTORS
+        entered = replace(self, law=law, friction=friction).entry(tried, leaving)
+        return float(np.exp(np.interp(np.log(max(velocity, limit)), np.log(entered), np.log(tried))))
+
+    def _nose(self) -> tuple[Array, Array, Array]:
+        """Stations, radii [m] and slopes of the core from its tip to where it is widest."""
+        station = np.linspace(0.0, self.core.length, _STATIONS)
+        radius = np.asarray(self.core.radius(station))
+        widest = int(np.argmax(radius >= self.core.max_radius * (1.0 - _WIDEST))) + 1
+        station, radius = station[:widest], radius[:widest]
+        return station, radius, np.maximum(np.gradient(radius, station), 0.0)
