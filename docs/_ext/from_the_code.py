@@ -45,10 +45,10 @@ class ExclusionReference(FromTheCode):
     """What cannot be combined, and what needs what."""
 
     def lines(self) -> Iterator[str]:
-        from warpimpact.scene.exclusions import EXCLUDED, NEEDED
+        from warpimpact.scene.exclusions import EXCLUDED, NEEDS
 
         yield from table(("this", "excludes", "because"), [(code(a), code(b), why) for a, b, why in EXCLUDED])
-        yield from table(("this", "needs", "because"), [(code(a), code(b), why) for a, b, why in NEEDED])
+        yield from table(("this", "needs", "because"), [(code(a), code(b), why) for a, b, why in NEEDS])
 
 
 class MeasureReference(FromTheCode):

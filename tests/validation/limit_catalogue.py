@@ -11,7 +11,7 @@ import pandas as pd
 from warpimpact.campaign.tested import nose_length
 from warpimpact.catalogue.catalogue import FOLDERS, HERE, file_name
 from warpimpact.catalogue.entries import Material
-from warpimpact.catalogue.strength import FIT, HEAVY, NINETY, Plates, limit_fit
+from warpimpact.catalogue.strength import FIT_FILE, HEAVY, NINETY, Plates, limit_fit
 
 from .limit_model import Fit, packaged
 from .limit_rows import PROJECTILES, Rows, core, published
@@ -161,7 +161,7 @@ def _plates(rows: Rows, calibres: np.ndarray) -> Plates:
 
 def main() -> None:
     rows, predicted = published(), pd.read_csv(PREDICTIONS)
-    FIT.write_text(json.dumps(packaged(rows, stored_fit()), separators=(",", ":")) + "\n", encoding="utf-8")
+    FIT_FILE.write_text(json.dumps(packaged(rows, stored_fit()), separators=(",", ":")) + "\n", encoding="utf-8")
     (HERE / "figures.json").write_text(json.dumps(figures(rows, predicted), indent=1) + "\n", encoding="utf-8")
     for text in entries(rows, stored_fit(), predicted):
         name = text.partition('"')[2].partition('"')[0]

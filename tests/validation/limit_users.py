@@ -53,7 +53,7 @@ def predicted(rows: Rows, row: int) -> tuple[float, float, float]:
 
 def _without(rows: Rows, row: int, steel: bool) -> strength.LimitFit:
     """The fit of the package without a row."""
-    stored = json.loads(strength.FIT.read_text(encoding="utf-8"))
+    stored = json.loads(strength.FIT_FILE.read_text(encoding="utf-8"))
     columns = {name: np.array(values) for name, values in stored["rows"].items()}
     kept = ((columns["density"] > strength.HEAVY) == steel) & (np.arange(len(rows)) != row)
     chosen = {name: column[kept] for name, column in columns.items()}

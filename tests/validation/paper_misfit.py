@@ -57,7 +57,7 @@ def refined(fit: Fit, points: np.ndarray, misfit: np.ndarray, seed: int = 0) -> 
 
 def main() -> None:
     tree = read_tree(Path(sys.argv[1]), posterior_file.POSTERIOR)
-    fit = fit_from(str(tree.attrs[posterior_file.FIT]), sys.argv[1], Path("campaigns"))
+    fit = fit_from(str(tree.attrs[posterior_file.FIT_TEXT]), sys.argv[1], Path("campaigns"))
     sets = tree["sets"].to_dataset()
     shares, grid = [], np.linspace(EDGE, 1.0 - EDGE, 10_001)
     for one in fit.parameters:

@@ -116,7 +116,7 @@ def test_a_shot_has_the_same_bits_in_any_company(name: str, company: str, device
 @pytest.mark.parametrize("name", CASES)
 @pytest.mark.parametrize(("threads", "chunk"), [(1, 64), (3, 1), (2, 5)])
 def test_threads_and_chunks_change_no_bit(name: str, threads: int, chunk: int, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(marching, "CHUNK", chunk)
+    monkeypatch.setattr(marching, "LARGEST_CHUNK", chunk)
     assert_expected(computed(name, threads=threads), name, "cpu")
 
 

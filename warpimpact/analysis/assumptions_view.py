@@ -17,7 +17,7 @@ from warpimpact.view.view import Column, Section, Table
 if TYPE_CHECKING:
     from warpimpact.results.table import Result
 
-LARGEST = 3
+MOST_NAMED = 3
 """Assumptions that are named beside a number: those with the largest changes."""
 _NO_MOVE = 1e-3
 """Share of the number, or of the largest change, below which a change is not shown."""
@@ -65,7 +65,7 @@ def largest_text(estimate: Estimate) -> str:
     shown = [
         f"{name}: {rough_text(value)}" for name, value in by_move if rough_text(value) != rough_text(estimate.value)
     ]
-    return ", ".join(shown[:LARGEST])
+    return ", ".join(shown[:MOST_NAMED])
 
 
 def notes_of(dataset: Result, *, known: bool = True) -> Iterator[str]:

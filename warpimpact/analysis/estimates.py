@@ -13,7 +13,7 @@ from warpimpact.analysis.assumptions import Assumed, Moves
 from warpimpact.analysis.survival import by_draws, over_draws
 from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
-from warpimpact.results.dataset import finer_pair
+from warpimpact.results.dataset import SLICE, finer_pair
 from warpimpact.results.measures import STATUSES, Measure
 from warpimpact.results.per_hit import Array
 from warpimpact.results.tallies import dealing, estimate_from, shift_of
@@ -24,8 +24,6 @@ if TYPE_CHECKING:
     from warpimpact.results.table import Result
 
 _LIMITS = tuple(names.value for names in v.LIMITS.values())
-SLICE = 2**18
-"""Hits in memory at a time."""
 
 
 @dataclass(frozen=True)

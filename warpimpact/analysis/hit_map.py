@@ -25,10 +25,10 @@ PIXELS = 200
 _FARTHEST = 2.0
 """Largest distance of a place from the nearest hit, in mean hit spacings; farther places have too few hits. With random
 hits, 3e-6 of the places lie farther."""
-_MARGIN = 4.0
+_CONTINUED = 4.0
 """Width of the strip that continues a periodic cell, in mean hit spacings."""
-_BEHIND = {v.RESIDUAL_VELOCITY, v.DEFLECTION}
-"""Variables that a core that ricocheted has, too, but in front of the plate."""
+OF_PASSED = {v.RESIDUAL_VELOCITY, v.DEFLECTION}
+"""Variables that count only for cores that passed: a core that ricocheted has them in front of the plate."""
 
 
 def hit_map(
@@ -69,7 +69,7 @@ def hit_map(
     if variable == v.STATUS and method == "linear":
         raise ValueError('got "status" with method = "linear", but codes cannot be interpolated; use "nearest"')
     values = array.values.astype(np.float64)
-    if variable in _BEHIND:
+    if variable in OF_PASSED:
         values = np.where(passed(result), values, np.nan)
     period, hits = np.asarray(result.attrs[attr.PLATE_PERIOD]), hit_points(result)
     if not len(hits):
@@ -166,7 +166,7 @@ def _between(hits: Array, values: Array, places: Array, period: Array, *, wraps:
     """Values at places, shape [z, y, 2], from those of the hits."""
     spacing = float(np.sqrt(period.prod() / len(hits)))
     if wraps:
-        hits, values = _continued(hits, values, period, _MARGIN * spacing)
+        hits, values = _continued(hits, values, period, _CONTINUED * spacing)
     distance, nearest = KDTree(hits).query(places)
     near = distance <= _FARTHEST * spacing
     image = values[nearest]

@@ -15,7 +15,7 @@ from warpimpact.view.view import Column, Section, Table, number
 
 Array = NDArray[np.float64]
 
-MOST_NAMED = 12
+MOST_OTHERWISE = 12
 """Most hits that are named as ending otherwise."""
 MOST_WORST = 3
 """Number of hits that are named for the largest differences."""
@@ -73,8 +73,8 @@ def shot_by_shot(shared: Mapping[str, xarray.Dataset]) -> Section:
 
 def _text_of(numbers: NDArray[np.int64]) -> str:
     """The first hits, and how many more there are."""
-    named = ", ".join(str(number) for number in numbers[:MOST_NAMED])
-    return named + (f" and {len(numbers) - MOST_NAMED} more" if len(numbers) > MOST_NAMED else "")
+    named = ", ".join(str(number) for number in numbers[:MOST_OTHERWISE])
+    return named + (f" and {len(numbers) - MOST_OTHERWISE} more" if len(numbers) > MOST_OTHERWISE else "")
 
 
 def _pairs(one: xarray.Dataset, other: xarray.Dataset) -> list[tuple[str, str, Array, Array]]:

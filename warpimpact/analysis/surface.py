@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
     Array = NDArray[np.float64]
 
-AROUND = 72
+POINTS_AROUND = 72
 """Points around the core in every section of its profile."""
 _SPENT = 1e-9  # share of the resistance below which it counts as none
 _AT_REST = 1e-5  # share of the speed below which it is rounding: a wall that slides along itself does not close in
@@ -74,14 +74,14 @@ def _body(history: xarray.Dataset) -> tuple[Array, Array, Array]:
     station, radius = history[v.STATION].values, history[v.CORE_RADIUS].values
     along, outward = -np.diff(station), np.diff(radius)  # from one section to the next, towards the base
     slant = np.hypot(along, outward)
-    azimuth = (np.arange(AROUND) + 0.5) * 2.0 * np.pi / AROUND
-    ring = np.stack([np.zeros(AROUND), np.cos(azimuth), np.sin(azimuth)], axis=-1)
+    azimuth = (np.arange(POINTS_AROUND) + 0.5) * 2.0 * np.pi / POINTS_AROUND
+    ring = np.stack([np.zeros(POINTS_AROUND), np.cos(azimuth), np.sin(azimuth)], axis=-1)
     middle, wide = (station[1:] + station[:-1]) / 2, (radius[1:] + radius[:-1]) / 2
 
     def combined(axial: Array, radial: Array) -> Array:
         return np.asarray(axial[:, None, None] * np.array([1.0, 0.0, 0.0]) + radial[:, None, None] * ring)
 
-    area = np.broadcast_to((slant * wide * 2.0 * np.pi / AROUND)[:, None], (len(middle), AROUND))
+    area = np.broadcast_to((slant * wide * 2.0 * np.pi / POINTS_AROUND)[:, None], (len(middle), POINTS_AROUND))
     return combined(middle, wide), combined(outward / slant, along / slant), area
 
 

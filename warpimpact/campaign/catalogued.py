@@ -6,18 +6,16 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
-from pydantic import TypeAdapter, ValidationError
+from pydantic import ValidationError
 
 from ..catalogue.catalogue import Catalogue
-from ..catalogue.entries import Material, Threat, Velocity
-from ..scene import AnyCore, Core, Layer, Plate
+from ..catalogue.entries import CORE, OBLIQUITY, Material, Threat, Velocity
+from ..scene import Core, Layer, Plate
 from ..scene.target import layer_name
-from ..scene.units import Obliquity, quoted
+from ..scene.units import quoted
 from .text import CampaignError
 
 _Table = dict[str, Any]
-_CORE: TypeAdapter[Core] = TypeAdapter(AnyCore)
-_OBLIQUITY: TypeAdapter[float] = TypeAdapter(Obliquity)
 _OF_ANY_CORE = set(Core.model_fields)
 SEARCHED_FROM = 800.0
 """Impact velocity at which a search of limit velocities begins where the threat has none [m/s]."""
@@ -174,10 +172,10 @@ def _resistance(data: Mapping[str, Any], material: Material, plate: Mapping[str,
     keys = {key: value for key, value in plate.items() if key != "pattern" or "areal_density" in plate}
     impact = data.get("impact", {})
     try:
-        core = _CORE.validate_python(data.get("core"))
+        core = CORE.validate_python(data.get("core"))
         model = Layer if {"gap", "offset"} & set(plate) else Plate
         shot = model.model_validate({"resistance": 1.0, "density": material.density} | keys)
-        obliquity = _OBLIQUITY.validate_python(impact.get("obliquity", 0.0) if isinstance(impact, dict) else 0.0)
+        obliquity = OBLIQUITY.validate_python(impact.get("obliquity", 0.0) if isinstance(impact, dict) else 0.0)
     except ValidationError:
         return material.resistance
     return catalogue.resistance(material, core, shot.thickness, obliquity).median

@@ -17,7 +17,7 @@ from .tested import standings_of, summary_of
 if TYPE_CHECKING:
     from .campaign import Campaign
 
-_CLOSE = 1e-6
+_EQUAL = 1e-6
 """Largest relative difference of numbers that count as equal."""
 
 
@@ -101,5 +101,5 @@ def _own(names: list[str]) -> str:
 
 def _same(first: object, other: object) -> bool:
     if isinstance(first, float) and isinstance(other, float):
-        return math.isclose(first, other, rel_tol=_CLOSE)
+        return math.isclose(first, other, rel_tol=_EQUAL)
     return first == other

@@ -10,7 +10,7 @@ from ..scene.units import quoted
 from .campaign import Campaign
 from .text import CampaignError, parsed, read_text
 
-_NAME = re.compile(r"\w[\w .+-]{,79}")
+_PLATE_NAME = re.compile(r"\w[\w .+-]{,79}")
 """Names of plates; the result files get the same names."""
 
 
@@ -63,7 +63,7 @@ def _name(plate: Any, place: str) -> str:
     if not isinstance(plate, dict) or "name" not in plate:
         raise CampaignError(f"{place}: is missing, but must be given")
     name = plate["name"]
-    if not isinstance(name, str) or not _NAME.fullmatch(name):
+    if not isinstance(name, str) or not _PLATE_NAME.fullmatch(name):
         raise CampaignError(
             f"{place}: got {quoted(name)}, but a name begins with a letter or a digit and contains only letters, "
             "digits, blanks and the characters _ . + -, 80 at most"

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 Figures = Mapping[str, Mapping[str, float]]
 
-_CLOSE = 0.05
+_SLACK = 0.05
 """Relative distance from the end of a range that still counts as inside."""
 _HEAVY, _CARBIDE = 5000.0, 11_000.0
 """Density above which a plate is steel, and above which a core is a carbide or a heavy metal [kg/m³]."""
@@ -36,7 +36,7 @@ _STRAIGHT = math.radians(2.0)
 _HOLED_CALIBRES, _HOLED_LIGAMENT = 0.66, 1.0
 """The plate of the two shots: its thickness in calibres, and about its ligament over its thickness, as the spacing of
 the slots is not published (the paper's §2)."""
-_ALIKE = 1.5
+_SIMILAR_RATIO = 1.5
 """Ratio up to which a plate with holes is like that of the two shots. It is chosen."""
 
 
@@ -223,7 +223,7 @@ def _of_holes(core: Core, plate: Plate) -> Iterator[Standing]:
 
 
 def _alike(value: float, other: float) -> bool:
-    return other / _ALIKE <= value <= other * _ALIKE
+    return other / _SIMILAR_RATIO <= value <= other * _SIMILAR_RATIO
 
 
 def _thin_hard(core: Core, plate: Plate, figure: Mapping[str, float]) -> Iterator[Standing]:
@@ -273,5 +273,5 @@ def _outside(subject: str, value: float, low: float, high: float, unit: str, who
     yield Standing(subject, text.replace(" °", "°"))
 
 
-def _within(value: float, low: float, high: float, close: float = _CLOSE) -> bool:
+def _within(value: float, low: float, high: float, close: float = _SLACK) -> bool:
     return low * (1.0 - close) - 1e-12 <= value <= high * (1.0 + close) + 1e-12

@@ -8,15 +8,11 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from typing import Any, Generic
 
-from pydantic import TypeAdapter
-
 from warpimpact.catalogue.catalogue import Catalogue, Entry
-from warpimpact.catalogue.entries import Material, Threat
+from warpimpact.catalogue.entries import OBLIQUITY, Material, Threat
 from warpimpact.scene import Core, Layer, Plate
-from warpimpact.scene.units import Obliquity
 
 __all__ = ["Layer", "Plate", "material", "threat"]
-_OBLIQUITY: TypeAdapter[float] = TypeAdapter(Obliquity)
 
 
 class Entries(Mapping[str, Entry], Generic[Entry]):
@@ -80,7 +76,7 @@ def _filled(model: type[Plate], given: dict[str, Any]) -> dict[str, Any]:
             f"{' and '.join(missing)} must be given: the resistance of {steel.name} depends on threat, thickness and "
             'angle; give threat = ".30 AP M2" or a core, and obliquity, or else resistance'
         )
-    core, obliquity = _core(given["threat"]), _OBLIQUITY.validate_python(given["obliquity"])
+    core, obliquity = _core(given["threat"]), OBLIQUITY.validate_python(given["obliquity"])
     thickness = model.model_validate(steel.table(keys, resistance=1.0)).thickness
     return steel.table(keys, Catalogue().resistance(steel, core, thickness, obliquity).median)
 

@@ -27,7 +27,8 @@ from warpimpact.scene.units import (
     quoted,
 )
 
-_CORE: TypeAdapter[Core] = TypeAdapter(AnyCore)
+CORE: TypeAdapter[Core] = TypeAdapter(AnyCore)
+OBLIQUITY: TypeAdapter[float] = TypeAdapter(Obliquity)
 Name = Annotated[Title, Field(min_length=1, max_length=80)]
 Share = Annotated[Number, Field(ge=0, le=1)]
 
@@ -82,7 +83,7 @@ class Threat(Model):
         if not isinstance(core, dict):
             return core
         try:
-            return _CORE.validate_python(core | {"threat": info.data.get("name")})
+            return CORE.validate_python(core | {"threat": info.data.get("name")})
         except ValidationError as error:
             problem = error.errors(include_url=False)[0]
             place = ".".join(map(str, problem["loc"][1:]))

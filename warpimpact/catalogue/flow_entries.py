@@ -15,7 +15,7 @@ from warpimpact.scene.flow import Flow
 from warpimpact.scene.toml_text import parsed, read_text
 from warpimpact.scene.units import Title
 
-FOLDER = Path(__file__).parent / "flows"
+FLOWS = Path(__file__).parent / "flows"
 
 
 class FlowEntry(Flow):
@@ -61,7 +61,7 @@ def flow_entry(name: str) -> FlowEntry:
 
 @cache
 def _packaged() -> dict[str, FlowEntry]:
-    tables = {path: tomllib.loads(path.read_text(encoding="utf-8")) for path in sorted(FOLDER.glob("*.toml"))}
+    tables = {path: tomllib.loads(path.read_text(encoding="utf-8")) for path in sorted(FLOWS.glob("*.toml"))}
     return {table["name"]: FlowEntry.model_validate(table) for table in tables.values()}
 
 

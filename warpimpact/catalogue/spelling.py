@@ -8,11 +8,11 @@ from difflib import SequenceMatcher
 
 from warpimpact.scene.units import MOST_QUOTED, quoted
 
-_ALIKE = 0.75
+_EQUAL_LETTERS = 0.75
 """Smallest share of equal letters of a slip of the keyboard."""
 _FEW = 12
 """Most entries that a message lists."""
-_NUMBER = r"\.?\d+(?:\.\d+)?(?:mm)?"
+_CALIBRE = r"\.?\d+(?:\.\d+)?(?:mm)?"
 _ALUMINIUM = r"^(?:enaw|aa|aluminium|aluminum|al)(?=\d{4})"
 
 
@@ -62,9 +62,9 @@ def _close(name: str, spelling: str) -> bool:
     numbers, others = _numbers(given), _numbers(known)
     if len(given) > 1 and given in known and numbers <= others:
         return True
-    letters, other_letters = (re.sub(_NUMBER, "", word) for word in (given, known))
-    return numbers == others and SequenceMatcher(None, letters, other_letters).ratio() >= _ALIKE
+    letters, other_letters = (re.sub(_CALIBRE, "", word) for word in (given, known))
+    return numbers == others and SequenceMatcher(None, letters, other_letters).ratio() >= _EQUAL_LETTERS
 
 
 def _numbers(word: str) -> set[str]:
-    return {number.removeprefix(".") for number in re.findall(_NUMBER, word)}
+    return {number.removeprefix(".") for number in re.findall(_CALIBRE, word)}

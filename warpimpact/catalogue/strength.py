@@ -19,13 +19,13 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 
-FIT = Path(__file__).parent / "limit_fit.json"
+FIT_FILE = Path(__file__).parent / "limit_fit.json"
 """Rows and sizes of the fit; `python -m tests.validation.limit_catalogue` writes it."""
 HEAVY = 5000.0
 """Plate density that parts steel from aluminium [kg/m³]."""
 CONSTRAINT = 3.0
 """Prior median of Y over flow stress: that of indentation (Tabor)."""
-TYPICAL = {True: (1500e6, 480.0), False: (350e6, 120.0)}
+TYPICAL_METAL = {True: (1500e6, 480.0), False: (350e6, 120.0)}
 """Flow stress [Pa] and hardness [HV] of a usual steel and a usual aluminium."""
 SAME_THICKNESS, SAME_CURVE = 0.2, 0.5
 """Ratios, as logarithms, over which plates share what a single thickness adds, and what a curve in calibres adds."""
@@ -71,7 +71,7 @@ class Plates:
     @property
     def strengths(self) -> tuple[Array, Array]:
         """How much stronger than usual, and how much harder than that, plates are, as logarithms."""
-        flow, hardness = np.array([TYPICAL[bool(steel)] for steel in self.steel]).T
+        flow, hardness = np.array([TYPICAL_METAL[bool(steel)] for steel in self.steel]).T
         excess = np.log(self.flow_stress / flow)
         return excess, np.log(self.hardness / hardness) - excess
 
@@ -268,7 +268,7 @@ def _of_metal(steel: bool) -> LimitFit:
 
 @cache
 def _stored() -> dict[str, Any]:
-    stored: dict[str, Any] = json.loads(FIT.read_text(encoding="utf-8"))
+    stored: dict[str, Any] = json.loads(FIT_FILE.read_text(encoding="utf-8"))
     return stored
 
 

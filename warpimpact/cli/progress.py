@@ -18,7 +18,7 @@ _SILENCE, _LONGEST_SILENCE = 5.0, 60.0
 a twelfth of the time so far."""
 _SHORT_PILOT = 2.0
 """Seconds for which a pilot works without a word."""
-_BAR = "{l_bar}{bar:20}{r_bar}"
+_BAR_FORMAT = "{l_bar}{bar:20}{r_bar}"
 """Of a terminal: a bar of one width, as estimates beside it would leave it one character."""
 _BAR_OF_MOST = "{l_bar}{bar:20}| {n_fmt}/{total_fmt} at most [{elapsed}, {rate_fmt}{postfix}]"
 
@@ -109,10 +109,10 @@ def show_progress(unit: str = "hit") -> Iterator[Callable[[Step], None]]:
         return
     from tqdm import tqdm
 
-    with tqdm(unit=unit, dynamic_ncols=True, bar_format=_BAR, miniters=0) as bar:
+    with tqdm(unit=unit, dynamic_ncols=True, bar_format=_BAR_FORMAT, miniters=0) as bar:
 
         def show(step: Step) -> None:
-            bar.bar_format = _BAR if step.certain else _BAR_OF_MOST
+            bar.bar_format = _BAR_FORMAT if step.certain else _BAR_OF_MOST
             if step.before or bar.total is None or _another(step, int(bar.n), int(bar.total)):
                 bar.reset(step.total)
                 bar.n = step.resumed

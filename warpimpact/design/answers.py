@@ -19,11 +19,11 @@ from warpimpact.campaign.evidence import evidence_of
 from warpimpact.campaign.plausible import doubted, doubted_holes
 from warpimpact.campaign.text import CampaignError
 from warpimpact.design.controls import groups
-from warpimpact.design.designs import FOLDER, Shelf, ValidDesign, stage_of, work_ahead
+from warpimpact.design.designs import ROOT, Shelf, ValidDesign, stage_of, work_ahead
 from warpimpact.design.edits import choices
 from warpimpact.design.geometry import drawn
 from warpimpact.plotting.trajectory import FIGURES
-from warpimpact.report.hit_data import MOST_HITS, PIXELS, page_data, thinned, trajectory_data
+from warpimpact.report.hit_data import MOST_HITS, PAGE_PIXELS, page_data, thinned, trajectory_data
 from warpimpact.report.report import report_page
 from warpimpact.report.words import compared, result_content
 from warpimpact.results import attributes as attr
@@ -43,7 +43,7 @@ PACE, BESIDE = 1.2, 0.3
 """Time of a complete map over what it takes a core, before that is measured; and what it takes beside pilot and hits,
 by `work_ahead`: references and tables [s]."""
 _FIRST = "The error of the numerics is not known."
-OWN = "this design"
+THIS_DESIGN = "this design"
 """Name of the design that is on the page; those it is compared with have names of their own."""
 
 
@@ -130,7 +130,7 @@ class Answers:
         new, begin = [design for design in designs.values() if design.text not in self._results], time.perf_counter()
         datasets = {label: self.result(design, cancel) for label, design in designs.items()}
         cancel.check()
-        own = datasets[OWN]
+        own = datasets[THIS_DESIGN]
         foreseen = sum(
             BESIDE + work_ahead(design.campaign, level) for design in (new if name == "full" else full.values())
         )
@@ -143,13 +143,13 @@ class Answers:
             "kind": "maps",
             "stage": name,
             "hits": own.sizes["hit"],
-            "total": full[OWN].campaign.hits.count or 0,
+            "total": full[THIS_DESIGN].campaign.hits.count or 0,
             "ahead": ahead if math.isfinite(ahead) else 0.0,
             "numerics": _FIRST if name == "first" else numerics_sentence(own),
             "kept": not breaks_promise(own),
             "level": resolution.get("level"),
             "data": page_data(
-                [thinned(dataset, most) for dataset in datasets.values()], _COARSE if name == "first" else PIXELS
+                [thinned(dataset, most) for dataset in datasets.values()], _COARSE if name == "first" else PAGE_PIXELS
             ),
         }
 
@@ -216,9 +216,7 @@ class Answers:
         """
         self.assume(designs, cancel)
         datasets = {name: self.result(design, cancel) for name, design in designs.items()}
-        return report_page(
-            datasets, folders=dict.fromkeys(datasets, FOLDER), progress=lambda done, total: cancel.check()
-        )
+        return report_page(datasets, folders=dict.fromkeys(datasets, ROOT), progress=lambda done, total: cancel.check())
 
 
 def named(design: ValidDesign, others: Sequence[tuple[str, ValidDesign]]) -> dict[str, ValidDesign]:
@@ -227,7 +225,7 @@ def named(design: ValidDesign, others: Sequence[tuple[str, ValidDesign]]) -> dic
     Raises:
         CampaignError: two have one name.
     """
-    names = [OWN, *(name for name, _ in others)]
+    names = [THIS_DESIGN, *(name for name, _ in others)]
     if len(set(names)) < len(names):
         raise CampaignError("got two designs of one name to compare; give each its own")
-    return {OWN: design, **dict(others)}
+    return {THIS_DESIGN: design, **dict(others)}

@@ -37,9 +37,9 @@ FIRST_WORK, FEWEST = 0.08, 64
 fewest hits. A lower level comes before fewer hits."""
 _MOST_ADDRESS = 2**20
 """Characters of a design in an address, unpacked."""
-FOLDER = Path("/")
+ROOT = Path("/")
 """Names of files in a design are absolute, so no folder counts."""
-_NAME = "design"
+_DESIGN_NAME = "design"
 """What errors call a design."""
 
 
@@ -62,17 +62,17 @@ class Shelf:
             CampaignError: it is not a valid campaign, or names a file that no campaign of the start names.
         """
         if not isinstance(tables, dict):
-            raise CampaignError(f"{_NAME}: got {quoted(tables)}, but it must be a table")
+            raise CampaignError(f"{_DESIGN_NAME}: got {quoted(tables)}, but it must be a table")
         for place, name in _files_of(tables, ""):
             if name not in self.files:
                 raise CampaignError(
-                    f"{_NAME}: {place}: got {quoted(name)}, but a page reads only files that the campaigns name which "
-                    "warpimpact design was started with"
+                    f"{_DESIGN_NAME}: {place}: got {quoted(name)}, but a page reads only files that the campaigns "
+                    "name which warpimpact design was started with"
                 )
         if (null := _null_in(tables, "")) is not None:
-            raise CampaignError(f"{_NAME}: {null}: got null, but it must be a value, or be left out")
+            raise CampaignError(f"{_DESIGN_NAME}: {null}: got null, but it must be a value, or be left out")
         text = toml_text(tables)
-        return ValidDesign(tables, text, Campaign.from_text(text, name=_NAME, folder=FOLDER))
+        return ValidDesign(tables, text, Campaign.from_text(text, name=_DESIGN_NAME, folder=ROOT))
 
 
 @dataclass(frozen=True)

@@ -10,7 +10,7 @@ from typing import Any
 from warpimpact.campaign.catalogued import catalogue_of
 from warpimpact.campaign.text import CampaignError
 from warpimpact.catalogue.entries import Material, Threat
-from warpimpact.design.designs import FOLDER, Shelf, Tables, ValidDesign
+from warpimpact.design.designs import ROOT, Shelf, Tables, ValidDesign
 from warpimpact.scene import Plate
 from warpimpact.scene.patterns.lattice import LatticePattern
 from warpimpact.scene.units import quoted
@@ -40,7 +40,7 @@ def _oblong(width: float, slender: float) -> dict[str, float]:
 
 def choices(design: Tables) -> dict[str, list[str]]:
     """Names that each choice offers; none of threats whose core is not known."""
-    catalogue = catalogue_of(design, "design", FOLDER)
+    catalogue = catalogue_of(design, "design", ROOT)
     threats = [name for name, threat in catalogue.all(Threat).items() if threat.shape is not None]
     return {"threat": threats, "material": list(catalogue.all(Material)), "shape": list(SHAPES)}
 
@@ -102,7 +102,7 @@ def _take_threat(tables: Tables, design: ValidDesign, name: str) -> None:
     impact, core = tables.setdefault("impact", {}), design.campaign.core
     if name:
         tables["core"] = {"threat": name}
-        known = catalogue_of(tables, "design", FOLDER).all(Threat).get(name)
+        known = catalogue_of(tables, "design", ROOT).all(Threat).get(name)
         if known is not None and known.velocities:
             impact.pop("velocity", None)
         else:

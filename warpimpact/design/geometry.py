@@ -13,6 +13,7 @@ from warpimpact.plotting.dimensions import Dimension, hole_dimensions, smallest_
 from warpimpact.plotting.fire import fire_of
 from warpimpact.plotting.plate import drawn_extent
 from warpimpact.scene import NoPattern
+from warpimpact.scene.display import MM
 from warpimpact.scene.patterns.lattice import LatticePattern
 from warpimpact.view import svg
 
@@ -22,38 +23,37 @@ if TYPE_CHECKING:
     from warpimpact.campaign.campaign import Campaign
     from warpimpact.scene import Target
 
-_MM = 1e3
 _ACROSS, _ALONG = ("width", "diameter", "side"), ("length",)
 """Lengths of a hole across its direction, and along it."""
-_SECTION_POINTS = 801
-_DIGITS = 3
+_PAGE_SECTION = 801
+_COORDINATE_DIGITS = 3
 
 
 def drawn(campaign: Campaign) -> dict[str, Any]:
     """Plate, section of the target and numbers of a campaign."""
     plate, core, target = campaign.plate, campaign.core, campaign.target
-    extent = drawn_extent(plate, core) * _MM
-    half = extent / _MM / 2
+    extent = drawn_extent(plate, core) * MM
+    half = extent / MM / 2
     rings = plate.pattern.outlines((-half[0], half[0]), (-half[1], half[1]))
     ligament = smallest_ligament(plate)
-    cell = None if isinstance(plate.pattern, NoPattern) else _rounded(np.array(plate.pattern.unit_cell) * _MM)
+    cell = None if isinstance(plate.pattern, NoPattern) else _rounded(np.array(plate.pattern.unit_cell) * MM)
     return {
         "extent": _rounded(extent),
         "path": svg.path(rings),
         "cell": cell,
-        "core": round(core.max_radius * _MM, _DIGITS),
+        "core": round(core.max_radius * MM, _COORDINATE_DIGITS),
         "dimensions": [_line(hole_dimension) for hole_dimension in hole_dimensions(plate, ligament)],
         "ligament": None if ligament is None else _line(ligament),
         "fire": fire_of(campaign.impact.obliquity, campaign.impact.azimuth)._asdict(),
         "handles": list(_handles(campaign)),
         "section": _section(target, half[1]),
         "numbers": plate_numbers(plate.open_area, plate.ligament, target.weights, plate.pattern.resolution),
-        "thickness": f"{plate.thickness * _MM:.4g} mm",
+        "thickness": f"{plate.thickness * MM:.4g} mm",
     }
 
 
 def _line(dimension: Dimension) -> dict[str, Any]:
-    ends = [_rounded(end * _MM) for end in (dimension.start, dimension.end)]
+    ends = [_rounded(end * MM) for end in (dimension.start, dimension.end)]
     return {"start": ends[0], "end": ends[1], "text": dimension.text}
 
 
@@ -84,29 +84,29 @@ def _handles(campaign: Campaign) -> Iterator[dict[str, Any]]:
 def _handle(
     path: list[str | int], at: NDArray[np.float64], direction: NDArray[np.float64], gain: float
 ) -> dict[str, Any]:
-    return {"path": path, "at": _rounded(at * _MM), "direction": _rounded(direction, 6), "gain": round(gain, 6)}
+    return {"path": path, "at": _rounded(at * MM), "direction": _rounded(direction, 6), "gain": round(gain, 6)}
 
 
 def _section(target: Target, half: float) -> dict[str, Any]:
     """The layers in the section y = 0, and the faces that can be dragged along x."""
-    z = np.linspace(-half, half, _SECTION_POINTS)
+    z = np.linspace(-half, half, _PAGE_SECTION)
     layers, handles = [], list[dict[str, Any]]()
-    for number, (layer, (front, rear)) in enumerate(zip(target.layers, target.faces * _MM, strict=True)):
+    for number, (layer, (front, rear)) in enumerate(zip(target.layers, target.faces * MM, strict=True)):
         offset = [target.value(f"offset_{axis}", number) for axis in "yz"]
         solid = np.concatenate([[0], layer.is_solid(np.array(-offset[0]), z - offset[1]).astype(int), [0]])
         edges = np.diff(solid)
-        starts, ends = z[np.flatnonzero(edges == 1)] * _MM, z[np.flatnonzero(edges == -1) - 1] * _MM
-        parts = np.round(np.stack([starts, ends], axis=-1), _DIGITS).tolist()
+        starts, ends = z[np.flatnonzero(edges == 1)] * MM, z[np.flatnonzero(edges == -1) - 1] * MM
+        parts = np.round(np.stack([starts, ends], axis=-1), _COORDINATE_DIGITS).tolist()
         name = "plate" if number == 0 else f"layer {number}"
-        text = f"{name}, {layer.thickness * _MM:.4g} mm"
+        text = f"{name}, {layer.thickness * MM:.4g} mm"
         layers.append({"front": float(front), "rear": float(rear), "parts": parts, "text": text})
         table: list[str | int] = ["plate"] if number == 0 else ["layer", number - 1]
         along = np.array([1.0, 0.0])
-        handles.append(_handle([*table, "thickness"], np.array([rear / _MM, 0.0]), along, 1.0))
+        handles.append(_handle([*table, "thickness"], np.array([rear / MM, 0.0]), along, 1.0))
         if number:
-            handles.append(_handle([*table, "gap"], np.array([front / _MM, 0.0]), along, 1.0))
-    return {"half": round(half * _MM, _DIGITS), "layers": layers, "handles": handles}
+            handles.append(_handle([*table, "gap"], np.array([front / MM, 0.0]), along, 1.0))
+    return {"half": round(half * MM, _COORDINATE_DIGITS), "layers": layers, "handles": handles}
 
 
-def _rounded(values: NDArray[np.float64], digits: int = _DIGITS) -> list[float]:
+def _rounded(values: NDArray[np.float64], digits: int = _COORDINATE_DIGITS) -> list[float]:
     return [float(value) for value in np.round(values, digits)]

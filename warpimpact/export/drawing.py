@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from warpimpact.results.files import OutputError, aside
+from warpimpact.scene.display import MM
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -15,10 +16,9 @@ if TYPE_CHECKING:
     from warpimpact.scene import Plate
 
 SUFFIXES = (".svg", ".dxf")
-_MM = 1e3
 _CORNERS = 12
 """Points of an outline up to which it may be a regular polygon."""
-_ROUND = 1e-6
+_ROUNDNESS = 1e-6
 """Spread of the distances from the middle up to which a hole is round, as a share of its radius."""
 
 
@@ -35,9 +35,9 @@ def write_drawing(plate: Plate, output: Path) -> None:
     outlines = plate.pattern.outlines((-half[0], half[0]), (-half[1], half[1]))
     if not outlines:
         raise OutputError(f"{output}: the plate has no holes to draw")
-    holes = [_MM * outline for outline in outlines]
+    holes = [MM * outline for outline in outlines]
     with aside(output) as file:
-        (_write_svg if output.suffix.lower() == ".svg" else _write_dxf)(holes, _MM * half, file)
+        (_write_svg if output.suffix.lower() == ".svg" else _write_dxf)(holes, MM * half, file)
 
 
 def _write_svg(holes: list[NDArray[np.float64]], half: NDArray[np.float64], file: Path) -> None:
@@ -74,5 +74,5 @@ def _circle(outline: NDArray[np.float64]) -> tuple[tuple[float, float], float] |
     centre = 0.5 * (low + high)
     distances = np.linalg.norm(outline - centre, axis=1)
     radius = float(distances.max())
-    is_round = len(outline) > _CORNERS and np.ptp(distances) < _ROUND * radius
+    is_round = len(outline) > _CORNERS and np.ptp(distances) < _ROUNDNESS * radius
     return ((float(centre[0]), float(centre[1])), radius) if is_round else None

@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 
     Array = NDArray[np.float64]
 
-AROUND = 48
+SIDES = 48
 """Points around the core's surface."""
 _BODY = (v.VELOCITY, v.MARCHED_ANGULAR_VELOCITY, v.FORCE, v.MOMENT)
 
@@ -70,8 +70,8 @@ def cores(history: xarray.Dataset) -> Iterator[pyvista.PolyData]:
     import pyvista
 
     station, radius = history[v.STATION].values, history[v.CORE_RADIUS].values
-    azimuth = np.linspace(0.0, 2.0 * np.pi, AROUND, endpoint=False)
-    ring = np.stack([np.zeros(AROUND), np.cos(azimuth), np.sin(azimuth)], axis=-1)
+    azimuth = np.linspace(0.0, 2.0 * np.pi, SIDES, endpoint=False)
+    ring = np.stack([np.zeros(SIDES), np.cos(azimuth), np.sin(azimuth)], axis=-1)
     arms = (station[:, None, None] * [1.0, 0.0, 0.0] + radius[:, None, None] * ring).reshape(-1, 3)
     faces = _faces(len(station))
     for step in range(history.sizes["time"]):
@@ -87,13 +87,13 @@ def cores(history: xarray.Dataset) -> Iterator[pyvista.PolyData]:
 
 def _faces(rings: int) -> NDArray[np.int64]:
     """Quadrilaterals between rings and the polygons that close nose and base, in PyVista's format."""
-    here = np.arange(AROUND)
-    nxt = (here + 1) % AROUND
-    start = AROUND * np.arange(rings - 1)[:, None]
-    quads = np.stack([start + here, start + nxt, start + nxt + AROUND, start + here + AROUND], axis=-1).reshape(-1, 4)
+    here = np.arange(SIDES)
+    nxt = (here + 1) % SIDES
+    start = SIDES * np.arange(rings - 1)[:, None]
+    quads = np.stack([start + here, start + nxt, start + nxt + SIDES, start + here + SIDES], axis=-1).reshape(-1, 4)
     sides = np.hstack([np.full((len(quads), 1), 4), quads]).ravel()
-    base = AROUND * (rings - 1) + here
-    return np.concatenate([sides, [AROUND], here[::-1], [AROUND], base])
+    base = SIDES * (rings - 1) + here
+    return np.concatenate([sides, [SIDES], here[::-1], [SIDES], base])
 
 
 def plates(history: xarray.Dataset) -> Iterator[pyvista.ImageData]:

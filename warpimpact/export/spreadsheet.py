@@ -15,7 +15,7 @@ from warpimpact.results import variables as v
 from warpimpact.results.dataset import hit_numbers, status_codes
 from warpimpact.results.files import aside
 
-_DIGITS = 10
+_ANGLE_DECIMALS = 10
 """Digits behind the point of an angle that somebody gave in degrees."""
 
 
@@ -45,7 +45,7 @@ def _as_given(array: xarray.DataArray) -> np.ndarray[Any, Any]:
     values: np.ndarray[Any, Any] = array.values
     if array.attrs.get("units") != "degree" or values.dtype != np.float64:
         return values
-    short = np.round(values, _DIGITS)
+    short = np.round(values, _ANGLE_DECIMALS)
     return np.where(np.degrees(np.radians(short)) == values, short, values)
 
 

@@ -37,7 +37,7 @@ from warpimpact.statistics.student import student_quantile
 Array = NDArray[np.float64]
 Angles = Annotated[tuple[Angle, ...], Field(min_length=1, max_length=64)]
 
-_STEEPEST = math.radians(89.0)
+_LARGEST_OBLIQUITY = math.radians(89.0)
 ASSUMED_HITS = 64
 """Hits under each assumption, over all directions, unless the campaign gives their number."""
 
@@ -71,7 +71,7 @@ class Directions(Model):
             if (np.diff(angles) <= 0.0).any():
                 raise ValueError(f"got {name} = {[f'{one:g}' for one in angles]} deg, but it must ascend")
         steepest = float(self.obliquities().max())
-        if steepest > _STEEPEST:
+        if steepest > _LARGEST_OBLIQUITY:
             raise ValueError(f"got {math.degrees(steepest):.3g} deg from the normal, but at most 89 deg is allowed")
         if self.first_count > self.max_count:
             raise ValueError(

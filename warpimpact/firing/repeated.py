@@ -28,7 +28,7 @@ Array = NDArray[np.float64]
 
 QUANTILES = (0.5, 0.05, 0.01)
 """Shares of perforations whose velocities are given: V50, V05, V01."""
-_GRID = 81
+_CURVE_POINTS = 81
 
 
 def simulate_test(
@@ -115,7 +115,7 @@ def _grid(response: Response, proof: Proof | None) -> Array:
     of_proof = [] if proof is None or proof.velocity is None else [proof.velocity]
     low, high = np.min([*finite, *of_proof]), np.max([*finite, *of_proof])
     margin = 0.05 * max(high - low, 0.02 * high)
-    return np.unique([*np.linspace(max(1.0, low - margin), high + margin, _GRID), *of_proof])
+    return np.unique([*np.linspace(max(1.0, low - margin), high + margin, _CURVE_POINTS), *of_proof])
 
 
 def _response(response: Response, velocity: Array) -> dict[Variable, Any]:

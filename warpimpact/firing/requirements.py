@@ -41,7 +41,7 @@ class Requirement:
     assumed: str
 
 
-_ROUND = (-80.0, -60.0, -40.0, -20.0, 0.0, 20.0, 40.0, 60.0, 80.0)
+_ALL_AZIMUTHS = (-80.0, -60.0, -40.0, -20.0, 0.0, 20.0, 40.0, 60.0, 80.0)
 _TABLE = "a second-hand table of threats"
 _STANAG = "a second-hand table of threats, and public summaries of STANAG 4569"
 _STANAG_ASSUMED = (
@@ -52,7 +52,7 @@ _STANAG_ASSUMED = (
 
 def _stanag(level: int) -> Requirement:
     names = f"STANAG 4569 L{level}", f"STANAG 4569 level {level}"
-    return Requirement(*names, None, _ROUND, (0.0, 15.0, 30.0), _STANAG, _STANAG_ASSUMED)
+    return Requirement(*names, None, _ALL_AZIMUTHS, (0.0, 15.0, 30.0), _STANAG, _STANAG_ASSUMED)
 
 
 REQUIREMENTS = (

@@ -12,7 +12,7 @@ from warpimpact.scene import Core, Hits, Plate, Sampler, Shots, Symmetry, symmet
 from warpimpact.scene.model import Array
 from warpimpact.scene.symmetry import irreducible_part
 
-REPLICATES = 8
+HIT_REPLICATES = 8
 """Parts of the hit points, every eighth point each. Their spread shows how exactly the hits are integrated out."""
 POINT_STEPS = 0.7548776662466927, 0.5698402909980532
 """Steps from one point to the next along y and z, as shares of the part of the cell, modulo 1. They are the powers of
@@ -67,7 +67,7 @@ def aim(shot: MeasuredShot, plate: Plate, core: Core, sampling: Sampling, shifts
     solid = plate.open_area == 0.0 and plate.size is None
     alone = not shot.scatter.given and (solid or (isinstance(shot.hit, HitPlace) and shot.hit.is_exact))
     count = 1 if alone else sampling.hits
-    replicates = 1 if alone else REPLICATES
+    replicates = 1 if alone else HIT_REPLICATES
     alike = Hits(count=count, seed=sampling.seed, irreducible=not (placed or turned or alone))
     group, cell = symmetries_used(shot.impact, alike, plate), np.array(plate.sampled_cell)
     numbers = alike.model_copy(update={"irreducible": False})  # images share the scattered quantities

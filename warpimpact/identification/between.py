@@ -13,7 +13,7 @@ from warpimpact.scene import Symmetry
 
 Array = NDArray[np.float64]
 
-NEAREST = 6
+PLANE_NEIGHBOURS = 6
 """Number of neighbours, images included, through which the plane of a point is fitted by least squares."""
 
 
@@ -51,7 +51,7 @@ def _slopes(observations: Sequence[Observation], places: Array, computed: Array,
     from scipy.spatial import cKDTree  # a while to import
 
     inside = np.minimum(np.mod(places, period), np.nextafter(period, 0.0))
-    _, near = cKDTree(inside, boxsize=period).query(inside[::images], k=NEAREST + 1)
+    _, near = cKDTree(inside, boxsize=period).query(inside[::images], k=PLANE_NEIGHBOURS + 1)
     near = near[:, 1:]
     apart = places[near] - places[::images, None]
     apart -= period * np.round(apart / period)

@@ -43,7 +43,7 @@ from warpimpact.solver.limit import check_arrests
 _Table = dict[str, Any]
 _CONDITIONS = tuple(name for name in v.HIT_NUMBERS if name in (*v.OUTCOME_VARIABLES, *v.BENDING_VARIABLES))
 """Recorded numbers of a hit that may be in a condition."""
-_MOST_SHOTS = 256
+_MOST_MEASURED = 256
 DISCREPANCY = {
     "velocity": (Speed, {"distribution": "truncated_normal", "mean": 0, "std": 10, "low": 0, "high": 50}),
     "angle": (
@@ -112,7 +112,7 @@ class _FitFile(_WithScene):
     discrepancy: _DiscrepancyTable = _DiscrepancyTable()
     selection: tuple[Any, ...] = ()
     sampling: Sampling = Sampling()
-    shot: Annotated[tuple[_ShotTable, ...], Field(min_length=1, max_length=_MOST_SHOTS)]
+    shot: Annotated[tuple[_ShotTable, ...], Field(min_length=1, max_length=_MOST_MEASURED)]
     catalogue: Any = None
 
 

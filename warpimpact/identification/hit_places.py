@@ -16,7 +16,7 @@ from warpimpact.scene.distributions import EDGE, Distribution
 from warpimpact.scene.model import Array
 from warpimpact.scene.units import Length, quantity, quoted
 
-_AROUND = 24
+_CIRCLE_POINTS = 24
 """Points on the core's largest circle by which it is checked whether the circle crosses the edge of a hole."""
 
 BoolArray = NDArray[np.bool_]
@@ -36,7 +36,7 @@ def _on_material(plate: Plate, core: Core, y: Array, z: Array) -> BoolArray:
 
 def _on_an_edge(plate: Plate, core: Core, y: Array, z: Array) -> BoolArray:
     """Whether the core's largest circle about the hit crosses the edge of a hole."""
-    angles = np.linspace(0.0, 2.0 * np.pi, _AROUND, endpoint=False)
+    angles = np.linspace(0.0, 2.0 * np.pi, _CIRCLE_POINTS, endpoint=False)
     around = [
         _in_a_hole(plate, core, y + core.max_radius * np.cos(angle), z + core.max_radius * np.sin(angle))
         for angle in angles

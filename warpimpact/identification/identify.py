@@ -29,7 +29,7 @@ Array = NDArray[np.float64]
 
 FIRST, FIRST_SHARE = 192, 0.25
 """Sets of the first round, which is drawn from the prior, and their largest share of all sets."""
-GROWTH = 0.1
+ROUND_GROWTH = 0.1
 """Sets of a later round, as a share of all before it; at least half of the first round."""
 DISCREPANCIES = 8
 """Scales of discrepancy per set of parameters. They need no runs of their own."""
@@ -128,7 +128,7 @@ def rounds(plan: Sampling) -> list[int]:
     blocks = plan.sets // plan.shared
     counts = [max(1, int(min(FIRST / plan.shared, FIRST_SHARE * blocks)))]
     while (left := blocks - sum(counts)) > 0:
-        counts.append(min(left, max(1, counts[0] // 2, int(GROWTH * sum(counts)))))
+        counts.append(min(left, max(1, counts[0] // 2, int(ROUND_GROWTH * sum(counts)))))
     return [count * plan.shared * DISCREPANCIES for count in counts]
 
 

@@ -33,7 +33,7 @@ from warpimpact.results.per_hit import place_of_standoff
 
 Array = NDArray[np.float64]
 
-KEPT = 4
+KEPT_HITS = 4
 """Number of hit points per set and shot that are kept for the posterior and for the prediction."""
 
 
@@ -167,7 +167,7 @@ class Compared:
         nearest = misfits.argmin(axis=1)[row]
         hits = self.aim.hits
         fitted, ahead = _drawn(relative, rng), _drawn(self.counts[row], rng)
-        errors = spread[:, None] * rng.standard_normal((len(row), KEPT, spread.shape[-1]))
+        errors = spread[:, None] * rng.standard_normal((len(row), KEPT_HITS, spread.shape[-1]))
         return ShotScore(
             log_likelihood=log_likelihood,
             noise=noise,
@@ -253,9 +253,9 @@ def _integrated(log: Array, counts: Array, aim: Aim) -> tuple[Array, Array, Arra
 
 
 def _drawn(weights: Array, rng: np.random.Generator) -> NDArray[np.int64]:
-    """KEPT indices along the second axis in proportion to weights, shape [sets, KEPT]; 0 where all weights are 0."""
+    """Indices along the second axis in proportion to weights, shape [sets, KEPT_HITS]; 0 where all weights are 0."""
     ends = np.cumsum(weights, axis=1)
-    places = rng.random((len(weights), KEPT)) * ends[:, -1:]
+    places = rng.random((len(weights), KEPT_HITS)) * ends[:, -1:]
     drawn: NDArray[np.int64] = np.stack(
         [np.searchsorted(end, at, side="right") for end, at in zip(ends, places, strict=True)]
     )

@@ -16,7 +16,7 @@ from warpimpact.results import attributes as attr
 from warpimpact.results import files, posterior_file
 from warpimpact.scene.display import STORED
 
-INTERVAL = 0.05, 0.5, 0.95
+ENTRY_QUANTILES = 0.05, 0.5, 0.95
 """Quantiles of a parameter in an entry."""
 LONGEST_NAME = 80
 """Most letters of the name of an entry."""
@@ -33,7 +33,7 @@ def material_entry(path: Path) -> str:
     """
     tree = files.read_tree(path, posterior_file.POSTERIOR)
     title = str(tree.attrs[attr.TITLE])
-    fit = fit_from(str(tree.attrs[posterior_file.FIT]), f"the fit in {path}", path.parent)
+    fit = fit_from(str(tree.attrs[posterior_file.FIT_TEXT]), f"the fit in {path}", path.parent)
     quantiles = _quantiles(tree)
     medians = {place: float(of[1]) for place, of in quantiles.items()}
     scene = fit.scene_of(fit.shots[0], medians)
@@ -75,7 +75,7 @@ def _quantiles(tree: xarray.DataTree) -> dict[tuple[Any, ...], tuple[float, floa
     """Ends and middle of the 90 % interval of each parameter, by its path."""
     posterior = tree["posterior"].to_dataset()
     return {
-        tuple(json.loads(array.attrs[posterior_file.PATH])): tuple(np.quantile(array.values, INTERVAL).tolist())
+        tuple(json.loads(array.attrs[posterior_file.PATH])): tuple(np.quantile(array.values, ENTRY_QUANTILES).tolist())
         for name, array in posterior.data_vars.items()
         if name not in posterior_file.HITS
     }

@@ -17,7 +17,7 @@ from warpimpact.scene.distributions import EDGE, AnyDistribution, Distribution
 from warpimpact.scene.model import Array, Model
 from warpimpact.scene.scatter import in_si
 from warpimpact.scene.units import quoted, reader_in, typed
-from warpimpact.solver.columns import COLUMNS, UNITS_OF_EXPOSURE, Path
+from warpimpact.solver.columns import COLUMN_OF, UNITS_OF_EXPOSURE, Path
 
 TABLES: dict[str, Any] = {"plate": Plate, "interaction": Interaction, "core": AnyCore}
 """Tables of the scene whose numbers may be parameters."""
@@ -61,7 +61,7 @@ class Parameter:
     @property
     def is_column(self) -> bool:
         """Whether its values may differ from shot to shot of one computation."""
-        return self.path in COLUMNS or self.path in UNITS_OF_EXPOSURE or self.path[0] == "discrepancy"
+        return self.path in COLUMN_OF or self.path in UNITS_OF_EXPOSURE or self.path[0] == "discrepancy"
 
 
 def read_priors(prior: Mapping[str, Any], tables: Mapping[str, Any], name: str) -> list[Parameter]:

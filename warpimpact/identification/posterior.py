@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from warpimpact.campaign.drawn import OF_THE_MATERIAL
 from warpimpact.identification.fit import Fit
-from warpimpact.identification.likelihood import KEPT, ShotScore
+from warpimpact.identification.likelihood import KEPT_HITS, ShotScore
 from warpimpact.identification.parameters import Parameter
 from warpimpact.identification.scoring import data_of, discrepancies
 from warpimpact.results import attributes as attr
@@ -66,7 +66,7 @@ def to_datatree(fit: Fit, sampled: Sampled, made: Mapping[str, str]) -> xarray.D
     """
     rng = np.random.default_rng(np.random.SeedSequence(fit.sampling.seed, spawn_key=(2,)))
     which = resampled(sampled.weights.values, fit.sampling.draws, rng)
-    kept = rng.integers(KEPT, size=len(which))
+    kept = rng.integers(KEPT_HITS, size=len(which))
     hits = np.stack([score.fitted_hit[which, kept] for score in sampled.scores], axis=1)
     likelihood = np.stack([score.log_likelihood for score in sampled.scores], axis=-1)
     noise = np.sqrt(sum(score.noise[which] ** 2 for score in sampled.scores))
@@ -208,7 +208,7 @@ def _attributes(fit: Fit, sampled: Sampled, made: Mapping[str, str], noise: Arra
     return {
         attr.TITLE: fit.title,
         attr.HISTORY: attr.history_line("identify"),
-        posterior_file.FIT: fit.text,
+        posterior_file.FIT_TEXT: fit.text,
         posterior_file.MATERIAL: _material(fit, sampled),
         **made,
         attr.SEED: fit.sampling.seed,
@@ -256,7 +256,7 @@ def row_probability(fit: Fit, place: int, sampled: Sampled) -> float:
     shot, scored = fit.shots[place], sampled.scores[place]
     rng = np.random.default_rng(np.random.SeedSequence(fit.sampling.seed, spawn_key=(3, place)))
     which = resampled(sampled.weights.values, 2000, rng)
-    rows = scored.predicted[which, rng.integers(KEPT, size=len(which))]
+    rows = scored.predicted[which, rng.integers(KEPT_HITS, size=len(which))]
     data = data_of(fit, shot)
     spread = data.spread(discrepancies(fit, sampled.points[which]))
     there = ~np.isnan(rows).any(axis=1)

@@ -15,14 +15,14 @@ from warpimpact.identification.hit_places import HitPlace
 from warpimpact.identification.likelihood import Compared, Data, ShotScore
 from warpimpact.records.outcomes import Outcomes
 from warpimpact.scene import Scene, Shots
-from warpimpact.solver.columns import COLUMNS, UNITS_OF_EXPOSURE, Path, columns_of
+from warpimpact.solver.columns import COLUMN_OF, UNITS_OF_EXPOSURE, Path, columns_of
 from warpimpact.solver.limit import Limits, limit_velocity
 from warpimpact.solver.many import side_by_side, simulate_many
 from warpimpact.solver.worker import Worker
 
 Array = NDArray[np.float64]
 
-AT_A_TIME = 2**15
+SHOTS_AT_A_TIME = 2**15
 """Most shots of a computation, images not counted. Their outcomes take some ten megabytes."""
 SCORED = 2**14
 """Points, images counted, that are scored together, so that they fit into a cache."""
@@ -91,7 +91,7 @@ def runs(fit: Fit, bench: Bench, points: Array, worker: Worker, *, seed: int = 0
     shifts = np.random.default_rng(np.random.SeedSequence(fit.sampling.seed, spawn_key=(4, seed))).random(
         (len(alike), 2)
     )
-    per_call = max(1, AT_A_TIME // fit.sampling.hits)
+    per_call = max(1, SHOTS_AT_A_TIME // fit.sampling.hits)
     jobs = list[_Job]()
     for rows in _of_one_scene(of_scene, len(alike)):
         own_scene = own if len(rows) == 1 else of_scene  # a single set needs no columns
@@ -103,7 +103,7 @@ def runs(fit: Fit, bench: Bench, points: Array, worker: Worker, *, seed: int = 0
                 {path: column[chosen] for path, column in own.items() if path not in own_scene}, scene.target.layers[0]
             )
             jobs.append(_Job(alike[chosen], scene, targets, with_own(targets.computed, of_sets)))
-            if sum(len(job.shots) for job in jobs) >= AT_A_TIME:
+            if sum(len(job.shots) for job in jobs) >= SHOTS_AT_A_TIME:
                 yield from _run(fit, bench, jobs, worker)
                 jobs = []
     yield from _run(fit, bench, jobs, worker)
@@ -160,7 +160,7 @@ def _outcomes(fit: Fit, bench: Bench, jobs: Sequence[_Job], worker: Worker) -> l
 def _as_columns(fit: Fit, columns: Mapping[Path, Array]) -> dict[Path, Array]:
     """Parameters that may differ from shot to shot. The literal scheme counts steps, so its interval may not."""
     nodal = fit.numerics.scheme == "nodal"
-    return {path: columns[path] for path in columns if path in COLUMNS or (path in UNITS_OF_EXPOSURE and not nodal)}
+    return {path: columns[path] for path in columns if path in COLUMN_OF or (path in UNITS_OF_EXPOSURE and not nodal)}
 
 
 def _of_one_scene(of_scene: Mapping[Path, Array], count: int) -> Iterator[NDArray[np.int64]]:

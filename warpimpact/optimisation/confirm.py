@@ -31,7 +31,7 @@ from warpimpact.statistics.random_effects import positive_share
 
 Array = NDArray[np.float64]
 
-FIDELITY = "standard"
+CONFIRM_FIDELITY = "standard"
 """Fidelity of the pilots of the designs of the front, unless the campaign fixes a resolution."""
 SOLID_HITS = 64
 """Number of hits of a solid plate, which differ in scattered quantities only."""
@@ -147,7 +147,9 @@ def _fresh(
     """Targets with fresh hits, the places of the hits, and their draws of a posterior."""
     seed, count = fresh_seed(design), design.search.confirm_hits if design.keys else 1
     threats, situations = range(len(design.threats)), design.situations
-    asked = [HitJob(target.tables, threat, 0, count, FIDELITY, seed) for target in targets for threat in threats]
+    asked = [
+        HitJob(target.tables, threat, 0, count, CONFIRM_FIDELITY, seed) for target in targets for threat in threats
+    ]
     if not design.keys:
         empty = np.zeros((len(situations), 0, count))
         found = [

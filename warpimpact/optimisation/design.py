@@ -38,7 +38,7 @@ _TRIED = 64
 _Table = dict[str, Any]
 _Name = Annotated[Title, Field(min_length=1, max_length=80)]
 
-OWN = ("variables", "objectives", "bounds", "threats", "constraints", "search", "references")
+OWN_TABLES = ("variables", "objectives", "bounds", "threats", "constraints", "search", "references")
 """Tables of a design file beside those of a campaign."""
 
 
@@ -244,7 +244,7 @@ def read_design(path: str | Path) -> Design:
 def design_from(text: str, name: str, folder: Path) -> Design:
     """Read a design from its text; `name` is the name of the file in errors."""
     data = parsed(text, name, DESIGN)
-    own = {key: data.pop(key) for key in OWN if key in data}
+    own = {key: data.pop(key) for key in OWN_TABLES if key in data}
     for table in ("stop", "burst"):
         if table in data:
             raise CampaignError(f"{name}: {table}: a design file takes no [{table}]; [search] sets the hits")

@@ -32,9 +32,9 @@ from warpimpact.solver.worker import Worker
 
 Array = NDArray[np.float64]
 
-MOST_HITS = 2**20
+SAMPLER_HITS = 2**20
 """Number of hits, images counted, of the sampler of a search. Far fewer are computed."""
-TOGETHER = 16
+JOBS_TOGETHER = 16
 """Number of jobs that a worker computes side by side and saves together."""
 _TURNING = ("obliquity", "azimuth", "pitch", "yaw", "spin")
 
@@ -91,7 +91,7 @@ def campaign_of(design: Design, tables: Mapping[str, Any], threat: FacedThreat, 
         CampaignError: the campaign is not valid.
     """
     seed = design.search.seed if seed is None else seed
-    sampling = {"sampling": "sobol", "count": MOST_HITS, "seed": seed, "irreducible": is_even(tables)}
+    sampling = {"sampling": "sobol", "count": SAMPLER_HITS, "seed": seed, "irreducible": is_even(tables)}
     kept = {key: value for key, value in tables.get("hits", {}).items() if key == "area"}
     return design.campaign(dict(tables) | {"hits": kept | sampling}, threat)
 
@@ -234,11 +234,11 @@ def hits_asked(design: Design, jobs: Sequence[HitJob], tell: Told) -> Question[l
     """The numbers of the hits of jobs, in their order, as a round of a question; reports how many jobs are done."""
     if not jobs:
         return []
-    groups = [jobs[first : first + TOGETHER] for first in range(0, len(jobs), TOGETHER)]
+    groups = [jobs[first : first + JOBS_TOGETHER] for first in range(0, len(jobs), JOBS_TOGETHER)]
     results = yield Round(
         [Job(_hits_computed, (design, group)) for group in groups],
         [_key(group) for group in groups],
-        lambda now: tell(min(now.done * TOGETHER, len(jobs)), now.resumed == len(groups)),
+        lambda now: tell(min(now.done * JOBS_TOGETHER, len(jobs)), now.resumed == len(groups)),
     )
     return [
         Said(arrays[f"values_{k}"], arrays[f"places_{k}"], arrays[f"draws_{k}"], float(arrays[f"seconds_{k}"]))

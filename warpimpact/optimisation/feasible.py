@@ -22,7 +22,7 @@ from warpimpact.scene.patterns.lattice import LatticePattern
 from warpimpact.solver.limit import check_arrests
 
 INVALID = "a campaign that is valid"
-UNTESTED = "within what was tested, as search.allow_untested is not true"
+NOT_TESTED = "within what was tested, as search.allow_untested is not true"
 
 
 _OF_PLATES = ("holes", "thickness", "resistance", "the kind of material")
@@ -83,7 +83,7 @@ def _violations(design: Design, campaign: Campaign) -> Iterator[Violation]:
         yield from _least(smallest, density, getattr(limits, smallest), what, "kg/m²")
         yield from _most(largest, density, getattr(limits, largest), what, "kg/m²")
     if not design.search.allow_untested:
-        yield from (Violation(UNTESTED, 1.0, standing.sentence) for standing in untested(campaign))
+        yield from (Violation(NOT_TESTED, 1.0, standing.sentence) for standing in untested(campaign))
     for name, plate in target.named:
         if plate.open_area > 0.0:
             for of_hole in _of_holes(design, plate):

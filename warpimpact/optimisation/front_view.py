@@ -21,7 +21,7 @@ _ROUNDED = 1e-6
 """Largest relative difference of objectives that count as equal."""
 _NAMED = 3
 """Most assumptions that are named as reversing a comparison."""
-NEEDED = 0.95
+SURVIVING_SHARE = 0.95
 """Share of a posterior's draws in which a difference must have the same sign to survive."""
 
 
@@ -73,7 +73,7 @@ def stays_on_front(dataset: xarray.Dataset) -> np.ndarray[Any, np.dtype[np.bool_
     """Whether each design keeps the bounds and is beaten by no other design of the front under each assumption, shape
     [front, assumptions]."""
     goals, bounds = _goals(dataset), _bounds(dataset)
-    signs, limits = dataset[f.SIGN].values, dataset[f.LIMIT].values
+    signs, limits = dataset[f.SIGN].values, dataset[f.ASKED_LIMIT].values
     signed = signs * dataset[f.UNDER].values
     kept = (signed[:, :, bounds] <= signs[bounds] * limits[bounds] + _ROUNDED * np.abs(limits[bounds])).all(axis=-1)
     beaten = np.zeros(kept.shape, dtype=bool)
@@ -117,11 +117,11 @@ def _moved_text(dataset: xarray.Dataset, place: int, goal: int, names: list[str]
 
 def _goals(dataset: xarray.Dataset) -> list[int]:
     """Indices of the objectives among objectives and bounds."""
-    return np.flatnonzero(np.isnan(dataset[f.LIMIT].values)).tolist()
+    return np.flatnonzero(np.isnan(dataset[f.ASKED_LIMIT].values)).tolist()
 
 
 def _bounds(dataset: xarray.Dataset) -> list[int]:
-    return np.flatnonzero(~np.isnan(dataset[f.LIMIT].values)).tolist()
+    return np.flatnonzero(~np.isnan(dataset[f.ASKED_LIMIT].values)).tolist()
 
 
 def is_weight(dataset: xarray.Dataset, place: int) -> bool:
@@ -178,16 +178,16 @@ def _survival(dataset: xarray.Dataset) -> Iterator[str]:
     for place, label in enumerate(dataset[f.LABEL].values):
         least = dataset[f.SURVIVAL_AT_LEAST].values[:, place]
         if (known := np.isfinite(least)).any():
-            name, survive = label_and_unit(label)[0], int((least[known] >= NEEDED).sum())
+            name, survive = label_and_unit(label)[0], int((least[known] >= SURVIVING_SHARE).sum())
             yield (
                 f"{name}: {survive} of {int(known.sum())} differences between neighbours on the front survive the "
-                f"uncertainty of the parameters (in at least {NEEDED:.0%} of the draws)"
+                f"uncertainty of the parameters (in at least {SURVIVING_SHARE:.0%} of the draws)"
             )
 
 
 def _against(dataset: xarray.Dataset, reference: int) -> Iterator[str]:
     """How much better than a reference a design is in one of two objectives while no worse in the other."""
-    goals = np.flatnonzero(np.isnan(dataset[f.LIMIT].values))
+    goals = np.flatnonzero(np.isnan(dataset[f.ASKED_LIMIT].values))
     if len(goals) != 2:
         return
     signs, names = dataset[f.SIGN].values[goals], [label_and_unit(label)[0] for label in dataset[f.LABEL].values]
@@ -254,7 +254,7 @@ def _shrinkage(dataset: xarray.Dataset) -> Iterator[str]:
     """How much worse the fresh hits are than the hits of the search."""
     searched, fresh = dataset[f.FOUND].values[dataset[f.NUMBER].values], dataset[f.FRESH].values
     for place, (label, sign, limit) in enumerate(
-        zip(dataset[f.LABEL].values, dataset[f.SIGN].values, dataset[f.LIMIT].values, strict=True)
+        zip(dataset[f.LABEL].values, dataset[f.SIGN].values, dataset[f.ASKED_LIMIT].values, strict=True)
     ):
         if not np.isnan(limit) or not len(fresh) or str(dataset[f.ASKED].values[place]).startswith(tuple(WEIGHTS)):
             continue
@@ -270,7 +270,7 @@ def _shrinkage(dataset: xarray.Dataset) -> Iterator[str]:
 
 def _nearest(dataset: xarray.Dataset) -> Iterator[str]:
     """The design that comes nearest to the bounds, if none keeps them."""
-    limits, signs, found = dataset[f.LIMIT].values, dataset[f.SIGN].values, dataset[f.FOUND].values
+    limits, signs, found = dataset[f.ASKED_LIMIT].values, dataset[f.SIGN].values, dataset[f.FOUND].values
     bounds = np.flatnonzero(~np.isnan(limits))
     over = np.maximum(
         signs[bounds] * (found[:, bounds] - limits[bounds]) / np.maximum(np.abs(limits[bounds]), 1e-30), 0.0

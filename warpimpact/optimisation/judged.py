@@ -28,7 +28,7 @@ from warpimpact.statistics.tails import pseudo_values, quantile_weights
 
 Array = NDArray[np.float64]
 
-CONFIDENCE = 0.95
+DIFFERENCE_CONFIDENCE = 0.95
 
 
 @dataclass(frozen=True)
@@ -173,7 +173,7 @@ def undecided(
     return still_open
 
 
-def interval(numbers: Array, confidence: float = CONFIDENCE) -> tuple[Array, Array]:
+def interval(numbers: Array, confidence: float = DIFFERENCE_CONFIDENCE) -> tuple[Array, Array]:
     """Student's intervals of means over the last axis; (−inf, inf) where fewer than two numbers count."""
     count = np.sum(~np.isnan(numbers), axis=-1)
     with warnings.catch_warnings():

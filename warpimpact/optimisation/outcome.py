@@ -55,7 +55,7 @@ def to_dataset(design: Design, found: Searched, confirmed: Confirmed, made_by: M
         f.ASKED: _texts(key_of(design, place) for place in range(len(asked))),
         f.LABEL: _texts(goal.asked.title for goal in asked),
         f.SIGN: [int(goal.sign) for goal in asked],
-        f.LIMIT: [goal.limit if isinstance(goal, Bound) else np.nan for goal in asked],
+        f.ASKED_LIMIT: [goal.limit if isinstance(goal, Bound) else np.nan for goal in asked],
         f.VALUE: np.array([record.values for record in found.records]).reshape(len(found.records), len(variables)),
         f.HITS: [record.hits for record in found.records],
         f.LEVELS: _texts(_levels(record) for record in found.records),

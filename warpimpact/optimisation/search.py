@@ -22,7 +22,7 @@ Array = NDArray[np.float64]
 
 IDLE = 25
 """Generations without a new feasible design after which a search ends."""
-FIDELITY = "draft"
+SEARCH_FIDELITY = "draft"
 """Fidelity of the pilots of a search, unless the campaign fixes a resolution."""
 MARGIN = 0.1
 """Distance of the hypervolume's reference beyond the box of the first generation, as a share of the box."""
@@ -241,7 +241,7 @@ class _State:
             for threat in range(len(self.design.threats)):
                 if not any(of == threat and _near(place, centre) for centre, of in centres):
                     centres.append((place, threat))
-                    jobs.append(HitJob(record.tables, threat, 0, count, FIDELITY, self.design.search.seed))
+                    jobs.append(HitJob(record.tables, threat, 0, count, SEARCH_FIDELITY, self.design.search.seed))
         tell = lambda done, _: self.tell(f"{done:.0f} of {len(jobs)} pilots")  # noqa: E731
         found = yield from levels_asked(self.design, jobs, tell)
         self.pilots += [(*centre, level) for centre, level in zip(centres[len(self.pilots) :], found, strict=True)]

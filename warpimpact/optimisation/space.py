@@ -19,10 +19,10 @@ from warpimpact.scene.units import LARGEST, quoted
 Array = NDArray[np.float64]
 
 MOST_VARIABLES = 64
-MOST_STEPS = 100_000
+MOST_VALUES = 100_000
 _RANGE = {"low", "high", "step"}
 _NUMBER = re.compile(r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*(\S.*)?")
-_DIGITS = 6
+_RANGE_DIGITS = 6
 """Significant digits of a value of a range without a step."""
 
 
@@ -67,7 +67,7 @@ class DesignVariable:
             value = self.low + coordinate * (self.high - self.low)
         else:
             value = self.low + int(coordinate) * (self.step or 0.0)
-        digits = _DIGITS - 1 - math.floor(math.log10(max(abs(self.low), abs(self.high), 1e-300)))
+        digits = _RANGE_DIGITS - 1 - math.floor(math.log10(max(abs(self.low), abs(self.high), 1e-300)))
         return min(max(round(value, digits), self.low), self.high)
 
     def written(self, value: float) -> Any:
@@ -202,9 +202,9 @@ def _range(name: str, place: str, given: dict[str, Any], where: str, under: Any)
     low, high, step = numbers["low"], numbers["high"], numbers.get("step")
     if not low <= high:
         raise CampaignError(f"{where}: got low = {low:g} and high = {high:g}, but low must not be greater")
-    if step is not None and not (step > 0.0 and (high - low) / step <= MOST_STEPS):
+    if step is not None and not (step > 0.0 and (high - low) / step <= MOST_VALUES):
         raise CampaignError(
-            f"{where}.step: got {step:g}, but it must be greater than 0 and divide the range into at most {MOST_STEPS}"
+            f"{where}.step: got {step:g}, but it must be greater than 0 and divide the range into at most {MOST_VALUES}"
         )
     return DesignVariable(name, place, low, high, step, units["low"], under=under)
 

@@ -13,6 +13,7 @@ from warpimpact.analysis.bursts import PASSED_ALONE, Bursts, bursts
 from warpimpact.plotting.cell import shots_text
 from warpimpact.plotting.heading import inscribe
 from warpimpact.plotting.style import BLUE, GREY, VERMILION, hide_sides
+from warpimpact.scene.display import MM
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -21,8 +22,6 @@ if TYPE_CHECKING:
 
     from warpimpact.analysis.bursts import Group
     from warpimpact.results.measures import Measure
-
-_MM = 1e3
 
 
 def bursts_figure(dataset: xarray.Dataset) -> Figure:
@@ -66,14 +65,14 @@ def _draw(axes: Axes, places: Sequence[float], groups: Sequence[Group], measure:
 
 def _draw_distances(axes: Axes, result: Bursts, measure: Measure) -> None:
     """Draw the bins of distance, the first hits as a band, and the distance beyond which no difference shows."""
-    low, middle, high = np.array([group.distance for group in result.distances]).T * _MM
+    low, middle, high = np.array([group.distance for group in result.distances]).T * MM
     _draw(axes, list(middle), result.distances, measure)
     values = [group.estimates[measure].value for group in result.distances]
     axes.hlines(values, low, high, color=BLUE, lw=1.0, alpha=0.5)
     first = result.orders[0].estimates[measure]
     axes.axhspan(first.low, first.high, color=VERMILION, alpha=0.25, lw=0.0)
     axes.axhline(first.value, color=VERMILION, lw=1.0, label="first hits")
-    within = result.noticed_within(measure) * _MM
+    within = result.noticed_within(measure) * MM
     if 0.0 < within < math.inf:
         axes.axvline(within, color=GREY, lw=1.0, ls="--", label="differs from first hits up to here")
     axes.set_xlim(left=0.0)

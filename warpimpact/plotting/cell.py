@@ -20,7 +20,7 @@ from matplotlib.patheffects import Normal, Stroke
 from matplotlib.transforms import ScaledTranslation
 from scipy.spatial import KDTree
 
-from warpimpact.analysis.hit_map import chosen, hit_points
+from warpimpact.analysis.hit_map import OF_PASSED, chosen, hit_points
 from warpimpact.analysis.summary import breaks_promise
 from warpimpact.kernels.status import Status
 from warpimpact.plotting.fire import common_fire, draw_fire
@@ -28,7 +28,7 @@ from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
 from warpimpact.results.dataset import passed
 from warpimpact.results.outlines import outlines
-from warpimpact.scene.display import STORED
+from warpimpact.scene.display import MM, STORED
 
 if TYPE_CHECKING:
     from matplotlib.artist import Artist
@@ -40,10 +40,10 @@ if TYPE_CHECKING:
     Array = NDArray[np.float64]
     Scale = tuple[Colormap, Normalize]
 
-PIXELS = 400  # along the longer side of the cell
+CELL_PIXELS = 400  # along the longer side of the cell
 FEWEST_HITS = 64  # fewer are drawn as points: an image would suggest detail that they do not have
 WIDEST_GAP = 3.0  # largest distance from a pixel to its hit, in mean hit spacings; random hits reach about 2
-GREY = "0.62"  # for hits without a value
+NO_VALUE = "0.62"  # for hits without a value
 # Colours of Okabe and Ito: they differ in every kind of colour blindness.
 STATUS_COLOURS = (
     *("#D55E00", "#56B4E9", "#009E73", "#E69F00", "#000000", "#CC79A7", "#F0E442", "#0072B2", "#FFFFFF"),
@@ -56,8 +56,6 @@ _SIGNED = {
     *(v.AZIMUTH, v.IMPACT_PITCH, v.IMPACT_YAW, v.EDGE_DISTANCE),
     *(v.PITCH, v.YAW, v.LAYER_STANDOFF_PITCH, v.LAYER_STANDOFF_YAW),
 }
-_BEHIND = {v.RESIDUAL_VELOCITY, v.DEFLECTION}  # a ricochet has them, too, but in front of the plate
-_MM = 1e3
 
 
 class Shown(NamedTuple):
@@ -85,14 +83,14 @@ def shown(dataset: xarray.Dataset, variable: str, standoff: float | None = None,
     """
     array = _selected(dataset, variable, standoff, layer)
     unit = STORED[array.attrs["units"]]
-    exists = np.isfinite(array.values) & (passed(dataset) if variable in _BEHIND else True)
+    exists = np.isfinite(array.values) & (passed(dataset) if variable in OF_PASSED else True)
     title = name = words(
         variable.removeprefix("layer_").removeprefix("standoff_") if variable in v.LAYER_NUMBERS else variable
     )
     if "standoff" in array.coords:
-        title += f", {float(array[v.STANDOFF]) * _MM:g} mm behind the {struck(dataset)}"
+        title += f", {float(array[v.STANDOFF]) * MM:g} mm behind the {struck(dataset)}"
     if v.LAYER_STANDOFF in array.coords:
-        title += f", {float(array[v.LAYER_STANDOFF]) * _MM:g} mm behind layer {_number(dataset, layer)}"
+        title += f", {float(array[v.LAYER_STANDOFF]) * MM:g} mm behind layer {_number(dataset, layer)}"
     elif variable in v.LAYER_NUMBERS:
         title += f", layer {_number(dataset, layer)}"
     if array.attrs["long_name"] != title:
@@ -142,7 +140,7 @@ def limits(dataset: xarray.Dataset) -> Array:
     """Range [mm] along y and z that contains the whole cell and every hit, shape [2, 2]."""
     half = np.asarray(dataset.attrs[attr.PLATE_PERIOD]) / 2
     hits = hit_points(dataset)
-    return np.stack([np.minimum(-half, hits.min(axis=0)), np.maximum(half, hits.max(axis=0))], axis=1) * _MM
+    return np.stack([np.minimum(-half, hits.min(axis=0)), np.maximum(half, hits.max(axis=0))], axis=1) * MM
 
 
 def scale_of(columns: Sequence[Array], *, signed: bool = False) -> Scale:
@@ -156,7 +154,7 @@ def scale_of(columns: Sequence[Array], *, signed: bool = False) -> Scale:
         lowest, highest = (finite.min(), finite.max()) if finite.size else (0.0, 1.0)
         if np.isclose(lowest, highest):  # a scale from 0: it shows no rounding as a pattern
             lowest, highest = min(0.0, highest), max(0.0, highest) or 1.0
-    colours = colormaps["RdBu_r" if signed else "viridis"].with_extremes(bad=GREY)
+    colours = colormaps["RdBu_r" if signed else "viridis"].with_extremes(bad=NO_VALUE)
     return colours, Normalize(lowest, highest)
 
 
@@ -167,7 +165,7 @@ def draw_values(
     without a value shows how it ended, or how it ended in one layer."""
     artist = _paint(axes, dataset, values, *scale)
     exists = np.isfinite(values)
-    grey = [] if exists.all() else [Patch(facecolor=GREY, label=_without_value(dataset, exists, layer))]
+    grey = [] if exists.all() else [Patch(facecolor=NO_VALUE, label=_without_value(dataset, exists, layer))]
     _furnish(axes, dataset, grey, layer)
     return artist
 
@@ -198,8 +196,8 @@ def draw_holes(axes: Axes, dataset: xarray.Dataset, layer: int | None = None) ->
     if not len(holes["y"]):
         return []
     (edge,) = axes.plot(
-        holes["y"] * _MM,
-        holes["z"] * _MM,
+        holes["y"] * MM,
+        holes["z"] * MM,
         color="white",
         linewidth=1.2,
         path_effects=[Stroke(linewidth=2.8, foreground="black"), Normal()],
@@ -210,7 +208,7 @@ def draw_holes(axes: Axes, dataset: xarray.Dataset, layer: int | None = None) ->
     return [edge]
 
 
-def pixels(dataset: xarray.Dataset, count: int = PIXELS) -> Array:
+def pixels(dataset: xarray.Dataset, count: int = CELL_PIXELS) -> Array:
     """Centres [m] of the cell's pixels, relative to its lower left corner, shape [z, y, 2].
 
     Args:
@@ -228,7 +226,7 @@ def tree_of(dataset: xarray.Dataset, which: NDArray[np.bool_] | slice = slice(No
     return KDTree((hit_points(dataset)[which] + period / 2) % period, boxsize=period)
 
 
-def nearest_hits(dataset: xarray.Dataset, count: int = PIXELS) -> NDArray[np.intp] | None:
+def nearest_hits(dataset: xarray.Dataset, count: int = CELL_PIXELS) -> NDArray[np.intp] | None:
     """Index of the hit nearest to each of the `pixels`, shape [z, y]; None if the hits do not cover the cell."""
     period, hits = np.asarray(dataset.attrs[attr.PLATE_PERIOD]), hit_points(dataset)
     if len(hits) < FEWEST_HITS or np.any(np.abs(hits) > period / 2):
@@ -240,7 +238,7 @@ def nearest_hits(dataset: xarray.Dataset, count: int = PIXELS) -> NDArray[np.int
 
 def paint_pixels(axes: Axes, dataset: xarray.Dataset, image: Array, scale: Scale) -> ScalarMappable:
     """Colour the cell by an image of shape [z, y]."""
-    y, z = np.asarray(dataset.attrs[attr.PLATE_PERIOD]) / 2 * _MM
+    y, z = np.asarray(dataset.attrs[attr.PLATE_PERIOD]) / 2 * MM
     colours, norm = scale
     extent = (-y, y, -z, z)
     return axes.imshow(image, cmap=colours, norm=norm, origin="lower", extent=extent, interpolation="nearest")
@@ -251,7 +249,7 @@ def _paint(axes: Axes, dataset: xarray.Dataset, values: Array, colours: Colormap
     nearest = nearest_hits(dataset)
     if nearest is not None:
         return paint_pixels(axes, dataset, values[nearest], (colours, norm))
-    y, z = hit_points(dataset).T * _MM
+    y, z = hit_points(dataset).T * MM
     return axes.scatter(
         y,
         z,

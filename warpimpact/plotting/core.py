@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from warpimpact.scene import Core
 
 _MM, _G = 1e3, 1e3
-_STATIONS = 801
+_PROFILE_STATIONS = 801
 _WIDTH = 7.5  # of the figure [inch]
 
 
@@ -25,7 +25,7 @@ def core_figure(core: Core, title: str, evidence: str) -> Figure:
         evidence: stands below the figure.
     """
     lines = note_lines(_WIDTH, "", [evidence])
-    s = np.linspace(0.0, core.length, _STATIONS)
+    s = np.linspace(0.0, core.length, _PROFILE_STATIONS)
     r = core.radius(s)
     height = 0.95 * _WIDTH * 2.0 * core.max_radius / core.length + 1.1 + 0.2 * len(lines)
     figure = Figure(figsize=(_WIDTH, height), layout="constrained")

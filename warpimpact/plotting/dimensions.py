@@ -9,6 +9,7 @@ import numpy as np
 import shapely
 
 from warpimpact.scene import NoPattern
+from warpimpact.scene.display import MM
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -18,10 +19,9 @@ if TYPE_CHECKING:
 
     Array = NDArray[np.float64]
 
-_MM = 1e3
 _NEAREST_HOLES = 40
 """Holes about the middle among which the smallest ligament is looked for."""
-_CLOSE = 1.01
+_EQUALLY_SMALL = 1.01
 """Ligaments up to this factor longer than the smallest count as equally small: outlines are polygons. The length that
 is written is the exact one of the plate."""
 _BESIDE, _BELOW = 0.1, 0.05
@@ -65,11 +65,13 @@ def smallest_ligament(plate: Plate) -> Dimension | None:
     lengths = np.array([first.distance(other) for first, other in pairs])
     if not lengths.min() > 0.0:
         return None
-    lines = [shapely.shortest_line(*pairs[place]) for place in np.flatnonzero(lengths <= _CLOSE * lengths.min())]
+    lines = [
+        shapely.shortest_line(*pairs[place]) for place in np.flatnonzero(lengths <= _EQUALLY_SMALL * lengths.min())
+    ]
     line = min(lines, key=lambda line: line.distance(shapely.Point(0.0, 0.0)))
     start, end = np.asarray(line.coords)
     smallest = plate.ligament
-    return _dimension(start, end, smallest if lengths.min() <= _CLOSE * smallest else None)
+    return _dimension(start, end, smallest if lengths.min() <= _EQUALLY_SMALL * smallest else None)
 
 
 def draw_dimensions(axes: Axes, plate: Plate) -> None:
@@ -86,7 +88,7 @@ def _dimension(
 ) -> Dimension:
     """A dimension; `length` [m] replaces the distance of its ends if it is known better."""
     start, end = np.asarray(start), np.asarray(end)
-    return Dimension(start, end, f"{(float(np.linalg.norm(end - start)) if length is None else length) * _MM:.3g}")
+    return Dimension(start, end, f"{(float(np.linalg.norm(end - start)) if length is None else length) * MM:.3g}")
 
 
 def _holes(plate: Plate) -> list[shapely.Polygon]:
@@ -100,7 +102,7 @@ def _holes(plate: Plate) -> list[shapely.Polygon]:
 
 def _draw(axes: Axes, dimension: Dimension, colour: str) -> None:
     """Draw a line with an arrow at each end, and its length [mm] beside the middle."""
-    start, end = dimension.start * _MM, dimension.end * _MM
+    start, end = dimension.start * MM, dimension.end * MM
     style = {"arrowstyle": "<->", "color": colour, "linewidth": 1.2, "shrinkA": 0.0, "shrinkB": 0.0}
     axes.annotate("", tuple(end), tuple(start), arrowprops=style, zorder=5)
     along_z = abs(end[1] - start[1]) > abs(end[0] - start[0])

@@ -27,10 +27,11 @@ from warpimpact.plotting.cell import (
     tree_of,
 )
 from warpimpact.plotting.heading import LINE, inscribe, names, note_lines
-from warpimpact.plotting.style import BLUE, VERMILION
+from warpimpact.plotting.style import BLUE, MAP_SIDE, VERMILION
 from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
 from warpimpact.results.measures import Measure
+from warpimpact.scene.display import MM
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -40,8 +41,6 @@ if TYPE_CHECKING:
 
     Array = NDArray[np.float64]
 
-_MM = 1e3
-_LONGER_SIDE = 4.2  # of a map on paper [inch]
 _BANDS = {"5 to 95 %": (0.05, 0.95, 0.2), "25 to 75 %": (0.25, 0.75, 0.4)}  # two quantiles and the opacity
 _PER_STRIP, _MOST_STRIPS = 50, 48  # fewest hits of a strip; most strips along an axis
 _NARROW = 16  # characters of a label along 1.2 inch
@@ -71,7 +70,7 @@ def marginals(dataset: xarray.Dataset, variable: str, standoff: float | None = N
         beside = centre.inset_axes((1.0 + 0.12 * wide, 0.0, 1.2 * wide, 1.0), sharey=centre)
         bar = centre.inset_axes((1.0 + 1.6 * wide, 0.0, 0.17 * wide, 1.0))
         histogram = centre.inset_axes((1.0 + 1.77 * wide, 0.0, 1.2 * wide, 1.0))
-        values, points = column.values[exists], hit_points(dataset)[exists] * _MM
+        values, points = column.values[exists], hit_points(dataset)[exists] * MM
         _draw_strips(above, points[:, 0], values, upright=False)
         _draw_strips(beside, points[:, 1], values, upright=True)
         above.set_ylabel(fill(column.label, _NARROW))
@@ -273,7 +272,7 @@ def _local(
 def _map_size(dataset: xarray.Dataset) -> Array:
     """Width and height of a map to scale [inch]."""
     extent = np.ptp(limits(dataset), axis=1)
-    size: Array = _LONGER_SIDE * extent / extent.max()
+    size: Array = MAP_SIDE * extent / extent.max()
     return size
 
 

@@ -16,11 +16,11 @@ from warpimpact.plotting.heading import add_heading
 from warpimpact.plotting.style import BLUE, GREEN, VERMILION
 from warpimpact.results import attributes as attr
 from warpimpact.results import firing as f
+from warpimpact.scene.display import MM
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-_MM = 1e3
 _ABOVE = (-11, 4, -7)
 """How far the names of V50, V05 and V01 stand above their points [pt]."""
 _Settings = Mapping[str, Any]
@@ -89,7 +89,7 @@ def _draw_response(axes: Axes, dataset: xarray.Dataset, settings: _Settings) -> 
 def _draw_map(axes: Axes, dataset: xarray.Dataset, settings: _Settings) -> None:
     """The lowest limit of every place; rings mark the weakest twentieth and, filled, the weakest hundredth."""
     first = dataset[f.CHANGES].values[:, 0]
-    y, z = _MM * dataset[f.HIT_Y].values, _MM * dataset[f.HIT_Z].values
+    y, z = MM * dataset[f.HIT_Y].values, MM * dataset[f.HIT_Z].values
     shown = np.where(np.isfinite(first), first, np.nan)
     size = float(np.clip(9000.0 / len(first), 4.0, 40.0))
     artist = axes.scatter(y, z, c=shown, s=size, cmap="viridis", plotnonfinite=True)
@@ -101,8 +101,8 @@ def _draw_map(axes: Axes, dataset: xarray.Dataset, settings: _Settings) -> None:
         axes.scatter(
             y[weakest], z[weakest], s=2.2 * size, edgecolors=VERMILION, linewidths=1.2, label=label, facecolors=face
         )
-    axes.plot(_MM * dataset[f.OUTLINE_Y].values, _MM * dataset[f.OUTLINE_Z].values, color="black", linewidth=1.0)
-    half = 0.5 * _MM * np.asarray(dataset.attrs[f.CELL])
+    axes.plot(MM * dataset[f.OUTLINE_Y].values, MM * dataset[f.OUTLINE_Z].values, color="black", linewidth=1.0)
+    half = 0.5 * MM * np.asarray(dataset.attrs[f.CELL])
     limits = {
         "xlim": (min(-half[0], y.min()), max(half[0], y.max())),
         "ylim": (min(-half[1], z.min()), max(half[1], z.max())),

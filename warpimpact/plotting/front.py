@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
     from warpimpact.scene import Plate
 
-DRAWN = 6
+MOST_DRAWN = 6
 """Plates that are drawn, at most."""
 _LONGEST_LABEL = 60
 """Characters of a line that stands upright beside the axes."""
@@ -43,7 +43,7 @@ def front_figure(dataset: xarray.Dataset, folder: Path = Path()) -> Figure:
         folder: of the files that the design file names.
     """
     leaders = front_leaders(dataset)
-    drawn = leaders[np.unique(np.round(np.linspace(0, len(leaders) - 1, min(DRAWN, len(leaders)))).astype(int))]
+    drawn = leaders[np.unique(np.round(np.linspace(0, len(leaders) - 1, min(MOST_DRAWN, len(leaders)))).astype(int))]
     names = {int(place): _LETTERS[number] for number, place in enumerate(drawn)}
     figure = Figure(figsize=(12.0, 8.0 if names else 5.6), layout="constrained")
     rows = figure.subfigures(2 if names else 1, 1, height_ratios=(1.0, 2.4) if names else None, squeeze=False)[:, 0]
@@ -76,8 +76,8 @@ def holding(dataset: xarray.Dataset) -> np.ndarray[Any, np.dtype[np.bool_]]:
 
     The others lie beyond the front by the few hits of the search only: among many designs the luckiest are the best.
     """
-    goals, sign = np.isnan(dataset[f.LIMIT].values), dataset[f.SIGN].values
-    limits, searched = sign * dataset[f.LIMIT].values, sign * dataset[f.FOUND].values
+    goals, sign = np.isnan(dataset[f.ASKED_LIMIT].values), dataset[f.SIGN].values
+    limits, searched = sign * dataset[f.ASKED_LIMIT].values, sign * dataset[f.FOUND].values
     front = (sign * dataset[f.FRESH].values)[front_leaders(dataset)][:, goals]
     breaks = (searched[:, ~goals] > limits[~goals]).any(axis=1)
     beaten = (front[None] <= searched[:, None, goals]).all(axis=-1).any(axis=1)
@@ -108,7 +108,7 @@ def _plate(text: str, folder: Path) -> Plate | None:
 
 
 def _draw_front(axes: Axes, dataset: xarray.Dataset, names: dict[int, str]) -> None:
-    labels, limits = dataset[f.LABEL].values, dataset[f.LIMIT].values
+    labels, limits = dataset[f.LABEL].values, dataset[f.ASKED_LIMIT].values
     goals = [place for place in range(len(labels)) if np.isnan(limits[place])]
     across, up = goals[0], goals[min(1, len(goals) - 1)]
     every, fresh = dataset[f.FOUND].values, dataset[f.FRESH].values

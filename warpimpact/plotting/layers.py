@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
 _MM, _US = 1e3, 1e6
-_MARGIN = 2.0
+_ROOM_ABOUT = 2.0
 """Margin about the part that the core weakened [mm]."""
 
 
@@ -53,4 +53,4 @@ def _touched(layer: LayerField, axis: int) -> tuple[float, float]:
     cells = (layer.cell_y, layer.cell_z)[axis]
     low, high = _edges(cells)
     there = cells[(layer.share[-1] < layer.share[0]).any(axis=1 - axis)] * _MM
-    return (max(low, there.min() - _MARGIN), min(high, there.max() + _MARGIN)) if there.size else (low, high)
+    return (max(low, there.min() - _ROOM_ABOUT), min(high, there.max() + _ROOM_ABOUT)) if there.size else (low, high)

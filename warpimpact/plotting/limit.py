@@ -16,7 +16,7 @@ from warpimpact.analysis.plate_text import reference_name
 from warpimpact.analysis.proxy import inclination
 from warpimpact.plotting.cell import draw_values, limits, scale_of, shown
 from warpimpact.plotting.heading import inscribe
-from warpimpact.plotting.style import BLUE, GREY, VERMILION
+from warpimpact.plotting.style import BLUE, GREY, MAP_SIDE, VERMILION
 from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
 from warpimpact.results.limits import base_alone_limits, solid_limits
@@ -31,7 +31,6 @@ _CURVE = {
     "velocity": ("impact velocity", "share of the hits that perforate"),
     "thickness": ("thickness of {}", "share of the hits whose limit is thinner"),
 }
-_LONGER_SIDE = 4.2  # of the map on paper [inch]
 _LOW_SHARE = 0.15
 """Shares up to this have their name above the point."""
 
@@ -49,7 +48,7 @@ def limit_figure(dataset: xarray.Dataset) -> Figure:
     column = shown(dataset, v.LIMITS[quantity].value)
     values = np.where(np.isinf(column.values), np.nan, column.values)
     extent = np.ptp(limits(dataset), axis=1)
-    width, height = _LONGER_SIDE * extent / extent.max()
+    width, height = MAP_SIDE * extent / extent.max()
     figure = Figure(figsize=(width + 7.6, max(height + 2.2, 5.2)), layout="constrained")
     at, curve = figure.subplots(1, 2, width_ratios=[width + 1.4, 5.2])
     artist = draw_values(at, dataset, values, scale_of([values], signed=False))

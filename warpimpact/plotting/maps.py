@@ -24,11 +24,13 @@ from warpimpact.plotting.distribution import (
     uncertainty,
 )
 from warpimpact.plotting.heading import LINE, add_heading, names, note_lines
+from warpimpact.plotting.style import MAP_SIDE
 from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
 from warpimpact.results.dataset import passed, status_codes
 from warpimpact.results.files import OutputError
 from warpimpact.results.measures import Measure
+from warpimpact.scene.display import MM
 
 if TYPE_CHECKING:
     from matplotlib.artist import Artist
@@ -36,10 +38,8 @@ if TYPE_CHECKING:
 
     from warpimpact.plotting.cell import Scale
 
-_MM = 1e3
 _MAIN = (v.RESIDUAL_VELOCITY, v.DEFLECTION, v.TILT)
 # Sizes on paper [inch]: the longer side of the largest map, the room round it, the title and the note of a sheet.
-_LONGER_SIDE = 4.2
 _LEFT, _RIGHT, _ABOVE, _BELOW = 0.75, 1.15, 0.55, 1.2
 _NARROWEST_PANEL = 5.4  # holds the legend
 _HEAD, _FOOT = 0.5, 0.3
@@ -177,7 +177,7 @@ def save_maps(dataset: xarray.Dataset, folder: Path, stem: str, *, overwrite: bo
     for variable in (name for name in v.shown_by("plot") if name in dataset):
         at_standoffs = v.STANDOFF in variable.dims
         for standoff in dataset[v.STANDOFF].values.tolist() if at_standoffs else [None]:
-            name = variable if standoff is None else f"{variable}_{standoff * _MM:g}mm"
+            name = variable if standoff is None else f"{variable}_{standoff * MM:g}mm"
             if np.isfinite(shown(dataset, variable, standoff).values).any():
                 figures[name] = variable_map(dataset, variable, standoff)
     behind = bool(passed(dataset).any())
@@ -236,7 +236,7 @@ def _sheet(
     """
     below, foot = (_BELOW, _FOOT) if len(datasets) == 1 else (_BELOW_NO_LEGEND, _FOOT_WITH_LEGEND)
     extents = np.array([np.ptp(limits(dataset), axis=1) for dataset in datasets])
-    sizes = _LONGER_SIDE * extents / extents.max()
+    sizes = MAP_SIDE * extents / extents.max()
     rows, (widest, tallest) = -(-len(datasets) // columns), sizes.max(axis=0)
     panel_width = max(_LEFT + widest + _RIGHT, _NARROWEST_PANEL)
     panel_height = _ABOVE + tallest + below

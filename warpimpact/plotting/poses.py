@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 INSTANTS = 5
 """Poses of the core within the plate that are drawn."""
 _MM, _US = 1e3, 1e6
-_AROUND = np.linspace(0.0, 2.0 * np.pi, 73)
+_FULL_TURN = np.linspace(0.0, 2.0 * np.pi, 73)
 
 
 class Pose(NamedTuple):
@@ -71,7 +71,7 @@ def silhouette(dataset: xarray.Dataset, pose: Pose, view: str) -> Array:
     """
     _, _, (_, right, up) = np.linalg.svd(pose.axis[None, :])  # two directions at right angles to the axis
     station, radius = (dataset[name].values[:, None, None] for name in (v.STATION, v.CORE_RADIUS))
-    ring = np.cos(_AROUND)[:, None] * right + np.sin(_AROUND)[:, None] * up
+    ring = np.cos(_FULL_TURN)[:, None] * right + np.sin(_FULL_TURN)[:, None] * up
     points = (pose.position + station * pose.axis + radius * ring)[..., [0, "xyz".index(view)]].reshape(-1, 2)
     outline: Array = points[ConvexHull(points).vertices]
     return outline

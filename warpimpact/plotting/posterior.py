@@ -17,6 +17,7 @@ from warpimpact.plotting.heading import add_heading, legend_below
 from warpimpact.plotting.style import BLUE, VERMILION
 from warpimpact.results import attributes as attr
 from warpimpact.results import posterior_file
+from warpimpact.scene.display import MM
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -25,9 +26,8 @@ if TYPE_CHECKING:
     Array = NDArray[np.float64]
 
 _GREY = "0.6"
-_MM = 1e3
 _POINTS = 600
-_CELLS = 5.0
+_CELLS_BESIDE = 5.0
 """Cells of holes that a figure shows at most on either side of the middle; a fit looks for hits in the first."""
 
 
@@ -134,7 +134,7 @@ def hits_figure(tree: xarray.DataTree) -> Figure:
 
     The plate is drawn at the posterior's medians; where the spacing of its holes is unknown, so are their places.
     """
-    fit = fit_from(str(tree.attrs[posterior_file.FIT]), "the fit of this posterior", Path())
+    fit = fit_from(str(tree.attrs[posterior_file.FIT_TEXT]), "the fit of this posterior", Path())
     posterior, best = tree["posterior"].to_dataset(), tree["best"].to_dataset()
     medians = {
         scene_parameter.path: float(np.median(posterior[scene_parameter.name]))
@@ -148,16 +148,16 @@ def hits_figure(tree: xarray.DataTree) -> Figure:
     for place, shot in enumerate(fit.shots):
         axes = panels[place]
         scene = fit.scene_of(shot, medians)
-        y, z = (_MM * posterior[name].values[..., place].ravel() for name in posterior_file.HITS)
-        cell = [side * _MM for side in scene.target.layers[0].sampled_cell]
+        y, z = (MM * posterior[name].values[..., place].ravel() for name in posterior_file.HITS)
+        cell = [side * MM for side in scene.target.layers[0].sampled_cell]
         far = [float(np.abs(at).max()) * 1.05 for at in (y, z)]
-        half = [min(max(0.55 * side, most), _CELLS * side) for side, most in zip(cell, far, strict=True)]
-        ranges = [(-side / _MM, side / _MM) for side in half]
+        half = [min(max(0.55 * side, most), _CELLS_BESIDE * side) for side, most in zip(cell, far, strict=True)]
+        ranges = [(-side / MM, side / MM) for side in half]
         axes.set_facecolor("0.85")
         for outline in scene.target.layers[0].pattern.outlines(*ranges):
-            axes.fill(*(_MM * outline.T), facecolor="white", edgecolor="black", lw=0.8)
+            axes.fill(*(MM * outline.T), facecolor="white", edgecolor="black", lw=0.8)
         axes.scatter(y, z, s=5, color=BLUE, alpha=0.35, lw=0, label="posterior")
-        at = (_MM * float(best[name][place]) for name in posterior_file.HITS)
+        at = (MM * float(best[name][place]) for name in posterior_file.HITS)
         axes.plot(*at, "X", color=VERMILION, ms=8, mec="white", label="smallest misfit")
         axes.set(xlim=(-half[0], half[0]), ylim=(-half[1], half[1]), aspect="equal", xlabel="y [mm]", ylabel="z [mm]")
         axes.set_title(str(posterior["shot"].values[place]))

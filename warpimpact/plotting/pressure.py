@@ -10,13 +10,13 @@ from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
-from warpimpact.analysis.surface import AROUND, largest_in_plate, pressed
+from warpimpact.analysis.surface import POINTS_AROUND, largest_in_plate, pressed
 from warpimpact.plotting.heading import inscribe
 from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
 
 _MM, _US = 1e3, 1e6
-_ARROW = 5.0  # length of the largest stress [mm]
+_LONGEST_STRESS = 5.0  # length of the largest stress [mm]
 _SECTIONS, _SPOKES = 3, 3  # every third section and azimuth gets an arrow
 
 
@@ -32,12 +32,12 @@ def pressure(dataset: xarray.Dataset) -> Figure:
     inscribe(figure, dataset, title=f"hit {dataset.attrs[attr.HIT]}: normal stress under the largest force, {when}")
     axes = figure.add_subplot(projection="3d")
     x, y, z = np.moveaxis(np.concatenate([surface.point, surface.point[:, :1]], axis=1) * _MM, -1, 0)
-    axes.plot_wireframe(x, y, z, rcount=24, ccount=AROUND // _SPOKES, color="0.75", linewidth=0.5)
+    axes.plot_wireframe(x, y, z, rcount=24, ccount=POINTS_AROUND // _SPOKES, color="0.75", linewidth=0.5)
     some = np.zeros(surface.stress.shape, dtype=bool)
     some[::_SECTIONS, ::_SPOKES] = True
     some &= surface.stress > 0.0
     scale, colours = Normalize(0.0, 1.0), colormaps["viridis"]
-    arrows = -surface.normal[some] * surface.stress[some][:, None] * _ARROW
+    arrows = -surface.normal[some] * surface.stress[some][:, None] * _LONGEST_STRESS
     tails = surface.point[some] * _MM - arrows
     axes.quiver(
         *tails.T, *arrows.T, colors=colours(scale(surface.stress[some])), linewidths=1.2, arrow_length_ratio=0.3

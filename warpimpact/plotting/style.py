@@ -11,6 +11,8 @@ if TYPE_CHECKING:
 BLUE, VERMILION, GREEN = "#0072B2", "#D55E00", "#009E73"
 """Colours of Okabe and Ito: they differ in every kind of colour blindness."""
 GREY = "0.55"
+MAP_SIDE = 4.2
+"""Longer side of a map on paper [inch]."""
 
 
 def hide_sides(axes: Axes, *sides: str) -> None:

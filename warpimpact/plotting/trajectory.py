@@ -35,7 +35,7 @@ if TYPE_CHECKING:
     Array = NDArray[np.float64]
 
 _MM, _US = 1e3, 1e6
-_ANGLES = {"y": v.YAW, "z": v.PITCH}  # view → projected angle of the axis that it shows
+_ANGLE_SHOWN = {"y": v.YAW, "z": v.PITCH}  # view → projected angle of the axis that it shows
 _COMPONENTS = {"x": "black", "y": BLUE, "z": VERMILION}
 # Blue and green as in the paper's fig. 5, but light, because the core is dark.
 _LOADS = {v.FORCE: ("#56B4E9", "kN", 1e-3), v.MOMENT: ("#009E73", "N m", 1.0)}
@@ -70,7 +70,7 @@ def flight(dataset: xarray.Dataset) -> Figure:
             axes.add_patch(Polygon(outline, facecolor=GREY, edgecolor="black"))
             angle = np.degrees(np.arctan2(pose.axis["xyz".index(view)], pose.axis[0]))
             angle = round(float(angle), 1) + 0.0  # no "-0.0"
-            text = f"{label}: {_ANGLES[view]} {angle:.1f}°".replace("-", "−")
+            text = f"{label}: {_ANGLE_SHOWN[view]} {angle:.1f}°".replace("-", "−")
             x, side = _within(axes, outline[:, 0])
             axes.text(x, outline[:, 1].max() + 1.0, text, ha=side, va="bottom")
     return figure
@@ -151,7 +151,7 @@ def course(dataset: xarray.Dataset) -> Figure:
     _draw_components(panels[1, 0], time, dataset[v.FORCE] / 1e3, "force [kN]")
     _draw_components(panels[1, 1], time, dataset[v.MOMENT], "moment [N m]")
     _draw_energy(panels[2, 0], time, dataset)
-    for view, angle in _ANGLES.items():
+    for view, angle in _ANGLE_SHOWN.items():
         values = np.degrees(np.unwrap(np.arctan2(axis.sel(axis=view), axis.sel(axis="x"))))
         panels[2, 1].plot(time, values, color=_COMPONENTS[view], label=angle)
     panels[2, 1].set_ylabel("angle of the axis [°]")
@@ -221,7 +221,7 @@ def two_views(
     """A figure with two views to scale that contain the plate, all poses of the core and a margin `room` [mm]."""
     poses = list(poses)
     corners = {}
-    for view in _ANGLES:
+    for view in _ANGLE_SHOWN:
         outlines = np.concatenate([silhouette(dataset, pose, view) for pose in poses])
         hit = [depth_of(dataset), float(dataset[v.HIT_POINT[view]])]
         points = np.vstack([outlines, [[0.0, hit[1]], hit]]) * _MM

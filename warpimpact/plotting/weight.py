@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from warpimpact.analysis.contestants import Contestant
 from warpimpact.analysis.effectiveness import Score
 
-_STYLES = {
+_MARKERS = {
     "mean": ("mean, or share", "o", BLUE),
     "share": ("mean, or share", "o", BLUE),
     "worst_tenth": ("worst tenth", "s", VERMILION),
@@ -75,7 +75,7 @@ def _draw_against_weight(axes: Axes, comparison: Comparison, name: str) -> None:
     for plate in comparison.plates:
         scores = _scores(plate, name)
         for kind, score in scores.items():
-            _draw_point(axes, plate.areal_density, score, _STYLES[kind])
+            _draw_point(axes, plate.areal_density, score, _MARKERS[kind])
         first = next(iter(scores.values()))
         if not math.isnan(first.solid):
             solid: dict[str, Any] = {"color": GREY, "fillstyle": "none", "markersize": 11.0, "linestyle": "none"}
@@ -97,7 +97,7 @@ def _draw_needed(axes: Axes, comparison: Comparison, name: str) -> None:
         for kind, score in _scores(plate, name).items():
             if (density := densities.get(kind)) is not None:
                 across = None if math.isnan(density.low) else (density.low, density.high)
-                _draw_point(axes, density.value, score, _STYLES[kind], across)
+                _draw_point(axes, density.value, score, _MARKERS[kind], across)
         _name(axes, plate.name, (_first(plate, _NEEDED).value, _first(plate, name).value), middle)
     needed = {_first(plate, _NEEDED).solid for plate in comparison.plates}
     for solid in filter(math.isfinite, needed):
@@ -108,7 +108,7 @@ def _draw_needed(axes: Axes, comparison: Comparison, name: str) -> None:
 def _scores(plate: Contestant, name: str) -> dict[str, Score]:
     """The scores of a plate in a quantity, by the kinds of measures that have a style."""
     scores = {score.measure.kind: score for score in plate.measures if score.measure.name == name}
-    return {kind: scores[kind] for kind in _STYLES if kind in scores}
+    return {kind: scores[kind] for kind in _MARKERS if kind in scores}
 
 
 def _first(plate: Contestant, name: str) -> Score:

@@ -33,7 +33,7 @@ _WIDTH, _HEIGHT, _LEFT, _TOP, _ROOM = 900.0, 520.0, 70.0, 10.0, 44.0
 """Of the chart [px], and what is left of it for labels."""
 _SIDE = 30e-3
 """Of the drawn part of a plate [m]."""
-_PIXELS = 160
+_MAP_PIXELS = 160
 """Of a map along its longer side."""
 
 
@@ -46,7 +46,7 @@ def write_front_report(dataset: xarray.Dataset, path: Path, folder: Path) -> Non
     Raises:
         OutputError: the file cannot be written.
     """
-    goals = np.flatnonzero(np.isnan(dataset[f.LIMIT].values))
+    goals = np.flatnonzero(np.isnan(dataset[f.ASKED_LIMIT].values))
     across, up = int(goals[0]), int(goals[min(1, len(goals) - 1)])
     chart = _Chart(dataset, across, up)
     leaders = {*front_leaders(dataset).tolist()}
@@ -202,7 +202,7 @@ def _coloured(places: Array, values: Array, cell: tuple[float, float]) -> tuple[
 
     known = np.isfinite(values)
     low, high = (float(values[known].min()), float(values[known].max())) if known.any() else (0.0, 1.0)
-    counts = [max(8, round(_PIXELS * side / max(cell))) for side in cell]
+    counts = [max(8, round(_MAP_PIXELS * side / max(cell))) for side in cell]
     y, z = (((np.arange(count) + 0.5) / count - 0.5) * side for count, side in zip(counts, cell, strict=True))
     at = np.stack(np.meshgrid(y, z[::-1]), axis=-1).reshape(-1, 2)
     sides = np.array(cell)

@@ -21,6 +21,7 @@ from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
 from warpimpact.results.dataset import hit_numbers
 from warpimpact.results.outlines import outlines
+from warpimpact.scene.display import MM
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -31,12 +32,11 @@ MOST_HITS = 12_000
 """Most hits on a page, for all results together: about 1 MB, compressed."""
 WORST_SHARE = 0.25
 """Share of the trajectories that show the worst hits; the others are spread evenly."""
-PIXELS = 160
+PAGE_PIXELS = 160
 """Along the longer side of a map."""
-_BEHIND = "#707070"  # colour of the core behind the plate
-_DIGITS = 5
+_CORE_BEHIND = "#707070"  # colour of the core behind the plate
+_VALUE_DIGITS = 5
 _TURN = 1.5  # turn of an outline from point to point [degree]; its error is 0.01 mm of a core's profile
-_MM = 1e3
 
 
 def thinned(dataset: xarray.Dataset, most: int, *, keep: Sequence[int] = ()) -> xarray.Dataset:
@@ -77,7 +77,7 @@ def worst_and_spread(dataset: xarray.Dataset, count: int, *, first: Sequence[int
     return [int(number) for number in numbers[chosen]]
 
 
-def page_data(datasets: Sequence[xarray.Dataset], pixels: int = PIXELS) -> dict[str, Any]:
+def page_data(datasets: Sequence[xarray.Dataset], pixels: int = PAGE_PIXELS) -> dict[str, Any]:
     """Data of the maps of a page: the variables, and the hits of each result in shown units.
 
     Args:
@@ -109,7 +109,7 @@ def _columns(dataset: xarray.Dataset) -> dict[str, Shown]:
         for standoff in dataset[v.STANDOFF].values.tolist() if at_standoff else [None]:
             column = shown(dataset, variable, standoff)
             if variable not in (*v.SHOT_VARIABLES, v.EDGE_DISTANCE) or np.ptp(column.values) > 0.0:
-                name = words(variable) + ("" if standoff is None else f" at {standoff * _MM:g} mm")
+                name = words(variable) + ("" if standoff is None else f" at {standoff * MM:g} mm")
                 columns[name] = column._replace(label=f"{name} [{column.label.partition('[')[2]}")
     for variable in (name for name in v.LAYER_NUMBERS if name in dataset):
         at_standoff = v.LAYER_STANDOFF in variable.dims
@@ -124,12 +124,12 @@ def _columns(dataset: xarray.Dataset) -> dict[str, Shown]:
 
 def _map_data(dataset: xarray.Dataset, columns: dict[str, Array], pixels: int) -> dict[str, Any]:
     nearest = nearest_hits(dataset, pixels)
-    y, z = hit_points(dataset).T * _MM
+    y, z = hit_points(dataset).T * MM
     return {
-        "period": _rounded(np.asarray(dataset.attrs[attr.PLATE_PERIOD]) * _MM),
+        "period": _rounded(np.asarray(dataset.attrs[attr.PLATE_PERIOD]) * MM),
         "limits": limits(dataset).tolist(),
         "fire": None if (fire := common_fire(dataset)) is None else fire._asdict(),
-        "outline": [_rounded(outline * _MM) for outline in outlines(dataset).values()],
+        "outline": [_rounded(outline * MM) for outline in outlines(dataset).values()],
         "number": hit_numbers(dataset).tolist(),
         "y": _rounded(y),
         "z": _rounded(z),
@@ -150,13 +150,13 @@ def trajectory_data(history: xarray.Dataset) -> dict[str, Any]:
     return {
         "solid": {view: _solid_boxes(history, view) for view in "yz"},
         "inside": [drawn(*pose, colour) for pose, colour in zip(inside.items(), colours, strict=True)],
-        "behind": [drawn(*pose, _BEHIND) for pose in behind.items()],
+        "behind": [drawn(*pose, _CORE_BEHIND) for pose in behind.items()],
     }
 
 
 def _outline(history: xarray.Dataset, pose: Pose, view: str) -> list[list[float | None]]:
     """Closed outline of the core in a view [mm]; it is convex and has one point for each `_TURN` of its direction."""
-    outline = silhouette(history, pose, view) * _MM
+    outline = silhouette(history, pose, view) * MM
     along, up = (np.roll(outline, -1, axis=0) - outline).T
     heading = np.floor(np.degrees(np.arctan2(up, along)) / _TURN)
     few = outline[heading != np.roll(heading, 1)]
@@ -165,20 +165,20 @@ def _outline(history: xarray.Dataset, pose: Pose, view: str) -> list[list[float 
 
 def _solid_boxes(history: xarray.Dataset, view: str) -> list[list[float]]:
     """Front, rear, low and high [mm] of what is solid along y or z through the hit point, in all layers."""
-    along = (history[v.SECTION].values + float(history[v.HIT_POINT[view]])) * _MM
+    along = (history[v.SECTION].values + float(history[v.HIT_POINT[view]])) * MM
     boxes = []
     for front, rear, there in slabs(history, view):
         edges = np.diff(np.concatenate([[0], there.astype(int), [0]]))
         starts, ends = np.flatnonzero(edges == 1), np.flatnonzero(edges == -1) - 1
-        faces = [front * _MM, rear * _MM]
+        faces = [front * MM, rear * MM]
         boxes += [[*faces, float(along[low]), float(along[high])] for low, high in zip(starts, ends, strict=True)]
     return boxes
 
 
 def _rounded(values: Array) -> list[float | None]:
-    """Values rounded to `_DIGITS` digits; None for NaN."""
+    """Values rounded to `_VALUE_DIGITS` digits; None for NaN."""
     size = np.abs(values, out=np.ones_like(values), where=np.isfinite(values) & (values != 0.0))
-    power = np.clip(_DIGITS - 1 - np.floor(np.log10(size)), -300.0, 300.0)
+    power = np.clip(_VALUE_DIGITS - 1 - np.floor(np.log10(size)), -300.0, 300.0)
     up, down = 10.0 ** np.maximum(power, 0.0), 10.0 ** np.maximum(-power, 0.0)  # whole powers, which are exact
     rounded = np.rint(values * up / down) / up * down
     return [value if math.isfinite(value) else None for value in rounded.tolist()]

@@ -61,7 +61,7 @@ _SHOWN = {
             "Measured and computed": ("", measured_figure),
             "Where the shots hit": ("", hits_figure),
         },
-        asked=posterior_file.FIT,
+        asked=posterior_file.FIT_TEXT,
     ),
     front.FRONT.name: _Shown(front_view, asked=front.DESIGN),
     checks.SWEEP.name: _Shown(sweep_view, measured=True, figures={"By input": ("", sweep_figure)}, asked=attr.CAMPAIGN),

@@ -31,11 +31,11 @@ from warpimpact.results import variables as v
 from warpimpact.results.dataset import passed
 from warpimpact.results.files import ResultError
 from warpimpact.results.outlines import outlines
+from warpimpact.scene.display import MM
 from warpimpact.studies.limit_view import in_short, limit_view
 from warpimpact.view import svg
 from warpimpact.view.view import Column, Section, Table, html_of, table_html
 
-_MM = 1e3
 _PLATE_WIDTH = 240.0
 """Of the widest cell on the page [px]."""
 _PROVENANCE = (
@@ -113,7 +113,7 @@ def conclusion(results: Sequence[Mapping[str, Any]], comparison: Mapping[str, An
 
 def _asked(dataset: xarray.Dataset) -> str:
     """Hits, cell, impact and plate in one or two sentences."""
-    y, z = (f"{length * _MM:.4g}" for length in dataset.attrs[attr.PLATE_PERIOD])
+    y, z = (f"{length * MM:.4g}" for length in dataset.attrs[attr.PLATE_PERIOD])
     velocity, obliquity = (range_text(dataset[name]) for name in (v.IMPACT_VELOCITY, v.OBLIQUITY))
     sampling = f", {dataset.attrs[attr.SAMPLING]} sampling" if attr.SAMPLING in dataset.attrs else ""
     text = (
@@ -180,12 +180,12 @@ def _through(dataset: xarray.Dataset) -> Table:
 def cell_drawings(datasets: Mapping[str, xarray.Dataset]) -> list[dict[str, Any]]:
     """The cells that were hit, drawn at one scale, and their sides [mm]."""
     halves = {name: 0.5 * np.asarray(dataset.attrs[attr.PLATE_PERIOD]) for name, dataset in datasets.items()}
-    scale = _PLATE_WIDTH / (2.0 * _MM * max(half[0] for half in halves.values()))
+    scale = _PLATE_WIDTH / (2.0 * MM * max(half[0] for half in halves.values()))
     drawings = []
     for name, dataset in datasets.items():
         half, holes = halves[name], outlines(dataset)
         cell = svg.plate(svg.rings(holes["y"], holes["z"]), -half, half)
         label = f"cell of the plate {name}"
         drawn = svg.drawing([cell], -half, half, label, scale=scale, bar=True)
-        drawings.append({"drawing": Markup(drawn), "y": 2.0 * _MM * half[0], "z": 2.0 * _MM * half[1]})
+        drawings.append({"drawing": Markup(drawn), "y": 2.0 * MM * half[0], "z": 2.0 * MM * half[1]})
     return drawings

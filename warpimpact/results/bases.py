@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
-NEEDED = (v.STATUS, v.STOPPED_IN, v.DEPTH, v.LAYER_THICKNESS, *v.LAYER_FACES)
+DEPTH_VARIABLES = (v.STATUS, v.STOPPED_IN, v.DEPTH, v.LAYER_THICKNESS, *v.LAYER_FACES)
 """Variables from which the depth in the base follows."""
 
 

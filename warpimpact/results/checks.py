@@ -36,7 +36,7 @@ _TOGETHER = (
     (attr.RESIDUAL_VELOCITY_ERROR, attr.TILT_ERROR, attr.PROMISE_KEPT),
 )
 """Groups of attributes: the first one needs the others."""
-_SLICE = 2**22
+_CHECKED_AT_ONCE = 2**22
 """Hits that are checked at a time."""
 
 
@@ -99,7 +99,10 @@ def _of_hits(dataset: xarray.Dataset) -> Iterator[str]:
 
 def _parts(array: xarray.DataArray) -> Iterator[np.ndarray[Any, Any]]:
     along = array.sizes[v.HIT] if v.HIT in array.dims else 1
-    return (array.isel(hit=slice(at, at + _SLICE), missing_dims="ignore").values for at in range(0, along, _SLICE))
+    return (
+        array.isel(hit=slice(at, at + _CHECKED_AT_ONCE), missing_dims="ignore").values
+        for at in range(0, along, _CHECKED_AT_ONCE)
+    )
 
 
 def _ended(status: np.ndarray[Any, Any], codes: np.ndarray[Any, Any]) -> bool:

@@ -38,9 +38,9 @@ _ATTRIBUTES = {
     "front face; y and z in the plate. NaN marks a value that does not exist.",
 }
 
-_SLICE = 2**18
+SLICE = 2**18
 """Numbers of hits in memory at a time."""
-_STATIONS, _SECTION_POINTS = 101, 1601
+_CORE_STATIONS, _SECTION_POINTS = 101, 1601
 """Points of a core's profile and of a section of the plate in a history."""
 
 
@@ -216,9 +216,9 @@ def is_choice(dataset: Result) -> bool:
         return False
     hits = dataset.sizes["hit"]
     return any(
-        not np.array_equal(hit_numbers(dataset[[v.HIT]].isel(hit=slice(first, first + _SLICE))), numbers)
-        for first in range(0, hits, _SLICE)
-        for numbers in [np.arange(first, min(first + _SLICE, hits))]
+        not np.array_equal(hit_numbers(dataset[[v.HIT]].isel(hit=slice(first, first + SLICE))), numbers)
+        for first in range(0, hits, SLICE)
+        for numbers in [np.arange(first, min(first + SLICE, hits))]
     )
 
 
@@ -236,7 +236,7 @@ def history_dataset(
     """
     core, plate = scene.core, scene.target.layers[0]
     hit_y, hit_z = float(hit[v.HIT_Y]), float(hit[v.HIT_Z])
-    history, stations = replay.history, np.union1d(np.linspace(0.0, core.length, _STATIONS), core.breaks)
+    history, stations = replay.history, np.union1d(np.linspace(0.0, core.length, _CORE_STATIONS), core.breaks)
     farthest = np.abs(history.position[:, 1:]).max() if len(scene.target.layers) > 1 else 0.0
     section = np.linspace(-4.0, 4.0, _SECTION_POINTS) * (core.bounding_radius + 0.25 * farthest)
     values: dict[str, Any] = {name: getattr(history, name) for name in v.HISTORY_VARIABLES if hasattr(history, name)}

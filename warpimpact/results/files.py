@@ -44,7 +44,7 @@ def write(dataset: xarray.Dataset, path: Path) -> None:
         write_table(in_a_file(HitTable.from_xarray(dataset)), file)
 
 
-CHUNK = 2**15
+FILE_CHUNK = 2**15
 """Hits per chunk of a joined file: 256 KiB of one variable."""
 
 
@@ -242,7 +242,7 @@ def _joined(path: Path) -> xarray.Dataset:
     import xarray
 
     _, slots, preemption = kept = netCDF4.get_chunk_cache()
-    netCDF4.set_chunk_cache(4 * 8 * CHUNK, slots, preemption)
+    netCDF4.set_chunk_cache(4 * 8 * FILE_CHUNK, slots, preemption)
     try:
         root = xarray.open_dataset(path, engine="netcdf4", create_default_indexes=False)
     finally:

@@ -33,7 +33,7 @@ LABELS = Variable("variable_labels", ("variable",), "1", "what a variable choose
 ASKED = Variable("asked", ("asked",), "1", "objective or bound")
 LABEL = Variable("asked_label", ("asked",), "1", "what it is, for people, with its unit")
 SIGN = Variable("asked_sign", ("asked",), "1", "1 where less is sought, -1 where more is")
-LIMIT = Variable("asked_limit", ("asked",), "1", "limit of a bound in its own units; no value of an objective")
+ASKED_LIMIT = Variable("asked_limit", ("asked",), "1", "limit of a bound in its own units; no value of an objective")
 
 VALUE = Variable("value", ("design", "variable"), "1", "value in its unit; number of a choice; none where unused")
 FOUND = Variable("found", _BY_DESIGN, "1", "objective or bound in its own units")
@@ -85,7 +85,7 @@ VOLUME = Variable(
 )
 
 VARIABLES = (
-    *(NAME, UNIT, LABELS, ASKED, LABEL, SIGN, LIMIT, VALUE, FOUND, FOUND_LOW, FOUND_HIGH, HITS, LEVELS, COST),
+    *(NAME, UNIT, LABELS, ASKED, LABEL, SIGN, ASKED_LIMIT, VALUE, FOUND, FOUND_LOW, FOUND_HIGH, HITS, LEVELS, COST),
     *(
         ON_FRONT,
         NUMBER,
@@ -121,7 +121,7 @@ def _labels(values: np.ndarray[Any, Any], sizes: Mapping[str, int]) -> bool:
 
 
 def _more(dataset: xarray.Dataset) -> str | None:
-    if not np.isnan(dataset[LIMIT].values).any():
+    if not np.isnan(dataset[ASKED_LIMIT].values).any():
         return "it has no objective"
     if not dataset.sizes["design"]:
         return "it has no design"

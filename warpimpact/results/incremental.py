@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from warpimpact.results.files import CHUNK, aside, told_as
+from warpimpact.results.files import FILE_CHUNK, aside, told_as
 from warpimpact.results.interrupts import uninterrupted
 from warpimpact.results.netcdf import append, open_to_append, write_table
 from warpimpact.results.table import HitTable, joined
@@ -23,7 +23,7 @@ class IncrementalFile:
     """
 
     def __init__(self, path: Path, written: Path, hits: int) -> None:
-        self._path, self._written, self._chunk = path, written, min(hits, CHUNK)
+        self._path, self._written, self._chunk = path, written, min(hits, FILE_CHUNK)
         self._waiting: list[HitTable] = []
         self._file: Any = None
         self._at = 0
@@ -35,7 +35,7 @@ class IncrementalFile:
             OutputError: they cannot be written. The file cannot be used then.
         """
         self._waiting.append(table)
-        if sum(table.sizes["hit"] for table in self._waiting) >= CHUNK // 2:
+        if sum(table.sizes["hit"] for table in self._waiting) >= FILE_CHUNK // 2:
             with told_as(self._path):
                 self._write()
 

@@ -24,7 +24,7 @@ FIT = Kind("a fit", "warpimpact identify takes it", ("shot", "prior"))
 TEST = Kind("a test file", "warpimpact test takes it", ("target", "procedure"))
 ENTRIES = Kind("a catalogue", "warpimpact catalogue --file takes it", ("threat", "material"))
 CAMPAIGN = Kind("a campaign", "warpimpact run takes it", ("hits", "sweep"))
-_TEXTS = (DESIGN, FIT, TEST, ENTRIES, CAMPAIGN)
+_TEXT_KINDS = (DESIGN, FIT, TEST, ENTRIES, CAMPAIGN)
 
 
 def is_netcdf(path: Path) -> bool:
@@ -56,7 +56,7 @@ def kind_of(path: Path) -> Kind | None:
 
 def kind_of_tables(tables: Collection[str]) -> Kind | None:
     """The kind of a TOML file with these tables."""
-    return _marked(tables, _TEXTS)
+    return _marked(tables, _TEXT_KINDS)
 
 
 def _marked(names: Collection[str], kinds: Collection[Kind]) -> Kind | None:

@@ -44,7 +44,7 @@ SHOT_OF = "shot_of_observation"
 PATH = "path"
 """Attribute of a parameter: its key in the scene, as JSON."""
 
-FIT = "fit"
+FIT_TEXT = "fit"
 MATERIAL = "material"
 """The material in the fit, with the parameters at their medians: JSON of the tables plate and interaction."""
 EFFECTIVE = attr.EFFECTIVE
@@ -77,7 +77,7 @@ class _Material(BaseModel):
     discrepancy: dict[str, Finite] = {}
 
 
-_OF_THE_DRAWS: Mapping[str, Any] = {attr.WARPIMPACT_VERSION: Text, FIT: Text, MATERIAL: Json[_Material]}
+_OF_THE_DRAWS: Mapping[str, Any] = {attr.WARPIMPACT_VERSION: Text, FIT_TEXT: Text, MATERIAL: Json[_Material]}
 _OF_A_REPORT: Mapping[str, Any] = {
     **dict.fromkeys((attr.TITLE, attr.HISTORY, attr.DEVICE), Text),
     **dict.fromkeys((EFFECTIVE, WANTED), Finite),

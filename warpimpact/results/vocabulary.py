@@ -59,7 +59,7 @@ _DERIVED = (
         source=f"residual depth of penetration in a backing: {_ROSENBERG}",
         higher_is_better=False,
         values=lambda part, _: bases.base_depth(part),
-        of=bases.NEEDED,
+        of=bases.DEPTH_VARIABLES,
         need=BASE,
     ),
     PerHit(
@@ -176,7 +176,7 @@ EVENTS: Mapping[str, PerHit] = {
             "Wiley 1982",
             higher_is_better=False,
             values=lambda part, _: bases.is_pierced(part),
-            of=bases.NEEDED,
+            of=bases.DEPTH_VARIABLES,
             need=BASE,
             margin=bases.piercing_margin,
         ),

@@ -26,14 +26,14 @@ from warpimpact.runs.pilot_hits import places_of, shots_at
 from warpimpact.scene import Numerics, Scene, Shots
 from warpimpact.solver.prepare import prepare
 
-SHARE = 1.0 / 128.0
+SHARE_OF_RUN = 1.0 / 128.0
 """Hits per alternative over the hits of a run. Some twelve alternatives then cost a tenth of a run, or about 15 % with
 alternatives whose plates have finer grids."""
 FEWEST, MOST = 64, 256
 """Fewest and most hits per alternative, unless the campaign gives their number."""
 FEWEST_LIMITS = 8
 """Fewest hits per alternative in a computation of limits, where each hit takes several runs."""
-SECONDS = 2.0
+ASSUMED_SECONDS = 2.0
 """Seconds of a core for unhindered passages that all alternatives together may take where their share of the run takes
 longer. Fewer hits are computed then, but at least FEWEST_GROUPS. Cores that slide and stop take several times as
 long."""
@@ -88,8 +88,8 @@ def _groups(campaign: Campaign, numerics: Numerics, others: int, fewest: int) ->
     hits = campaign.assumptions.hits
     if hits is None:
         first = shots_at(campaign, places_of(campaign, 1))
-        in_time = int(SECONDS / (max(others, 1) * prepare(campaign.scene, first, numerics).seconds))
-        hits = min(max(min(fewest, in_time), int(SHARE * total)), MOST)
+        in_time = int(ASSUMED_SECONDS / (max(others, 1) * prepare(campaign.scene, first, numerics).seconds))
+        hits = min(max(min(fewest, in_time), int(SHARE_OF_RUN * total)), MOST)
     return min(max(FEWEST_GROUPS, hits // group), total // group)
 
 

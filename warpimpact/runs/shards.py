@@ -120,7 +120,7 @@ class ShardsOnDisk(Shards):
             except OutputError:  # the disk may be full; the shards have priority over the growing file
                 self._stop_growing()
                 self._grows = False
-        if time.monotonic() - self._written >= HELD or len(self._held) * self.extent >= files.CHUNK:
+        if time.monotonic() - self._written >= HELD or len(self._held) * self.extent >= files.FILE_CHUNK:
             self.flush()
 
     def flush(self) -> None:

@@ -2,6 +2,9 @@
 
 from dataclasses import dataclass
 
+MM = 1e3
+"""Millimetres in a metre."""
+
 
 @dataclass(frozen=True)
 class Unit:

@@ -26,7 +26,7 @@ CELLS = 'shape = "supershape", "level_set" or "polygons"'
 THICKNESS, AREAL_DENSITY = "thickness", "areal_density"
 SPACING, OFFSETS, HIT_SCATTER = "burst.spacing", "burst.offsets", "burst.scatter"
 FREE_SURFACE = "interaction.free_surface"
-LIMIT = "warpimpact limit"
+LIMIT_COMMAND = "warpimpact limit"
 
 
 class Rule(NamedTuple):
@@ -44,8 +44,8 @@ EXCLUDED = (
     Rule(BURST, POSTERIOR, "the shots of a burst share one plate, not their draws"),
     Rule(SPACING, OFFSETS, "each says how the hits of a burst lie"),
     Rule(SPACING, HIT_SCATTER, "each says how the hits of a burst lie"),
-    Rule(LIMIT, STOP, "limits are searched for every hit; leave out the table [stop]"),
-    Rule(LIMIT, BURST, "limits are searched for every hit alone; leave out the table [burst]"),
+    Rule(LIMIT_COMMAND, STOP, "limits are searched for every hit; leave out the table [stop]"),
+    Rule(LIMIT_COMMAND, BURST, "limits are searched for every hit alone; leave out the table [burst]"),
     Rule(BY_TIME, BY_PATH, "exposure counts either time or path"),
     Rule(THICKNESS, AREAL_DENSITY, "with the holes each gives the other"),
     Rule(STAGGERED, HOLES, "it stands for two holes; list all holes of the cell"),
@@ -68,7 +68,7 @@ EXCLUDED = (
     Rule(STOP, UNEVEN, 'an interval needs "sobol" or "random"'),
     Rule(STOP, ONE_SCRAMBLING, 'an interval of "sobol" needs several scramblings'),
 )
-NEEDED = (
+NEEDS = (
     Rule(LISTED_STRENGTH, BENDING, "a core breaks by its bending stress"),
     Rule(STRENGTH, BENDING, "a core breaks by its bending stress"),
     Rule(LAYER_STANDOFFS, LAYERS, "behind a plate alone output.standoffs count"),
@@ -91,6 +91,6 @@ def check_together(given: Mapping[str, str | bool]) -> None:
     for option, other, why in EXCLUDED:
         if option in used and other in used:
             raise ValueError(f"{used[option]} cannot be combined with {used[other]}: {why}")
-    for option, other, why in NEEDED:
+    for option, other, why in NEEDS:
         if option in used and other in given and other not in used:
             raise ValueError(f"{used[option]} needs {other}: {why}")

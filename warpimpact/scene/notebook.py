@@ -19,10 +19,10 @@ from .units import reader_in, typed
 
 Array = NDArray[np.float64]
 
-_CELLS = 3
+UNIT_CELLS = 3
 """Unit cells of an unbounded plate along each side of a drawing."""
-_MOST_HOLES = 2000
-_CORE = "#D55E00"
+_HOLES_DRAWN = 2000
+_CORE_COLOUR = "#D55E00"
 
 
 def html_of(model: BaseModel) -> str:
@@ -74,8 +74,8 @@ def _drawn(part: Any) -> str:
 def _holes(plate: Any) -> str:
     """A plate from the front, y to the right and z up."""
     cell = np.array(plate.sampled_cell)
-    whole = plate.size is not None and np.prod(np.array(plate.size) / cell) <= _MOST_HOLES
-    half = 0.5 * (np.array(plate.size) if whole else _CELLS * cell)
+    whole = plate.size is not None and np.prod(np.array(plate.size) / cell) <= _HOLES_DRAWN
+    half = 0.5 * (np.array(plate.size) if whole else UNIT_CELLS * cell)
     outlines = plate.pattern.outlines((-half[0], half[0]), (-half[1], half[1]))
     return svg.drawing([svg.plate(outlines, -half, half)], -half, half, "plate")
 
@@ -86,7 +86,7 @@ def _core(core: Any) -> str:
     radius = core.radius(stations)
     along = np.concatenate([-stations, -stations[::-1]])
     shape = np.column_stack([along, np.concatenate([radius, -radius[::-1]])])
-    return svg.drawing([svg.Shape([shape], _CORE)], shape.min(axis=0), shape.max(axis=0), "core")
+    return svg.drawing([svg.Shape([shape], _CORE_COLOUR)], shape.min(axis=0), shape.max(axis=0), "core")
 
 
 def _section(target: Any) -> str:

@@ -106,16 +106,16 @@ OF_A_DRAW = ("degradation_length", "degradation_depth", "static", "linear", "qua
 """Quantities of plate and interaction that only a posterior gives by shot. A unit of exposure becomes a degradation."""
 
 _OF_THE_PLATE = [name for name, quantity in SCATTERED.items() if quantity.table != "layer"]
-_BEHIND = ("thickness", "resistance", "shear_coefficient", "degradation", "offset_y", "offset_z")
+_OF_LAYERS_BEHIND = ("thickness", "resistance", "shear_coefficient", "degradation", "offset_y", "offset_z")
 DRAWN = len(_OF_THE_PLATE)
 """Columns of random numbers without those of layers behind the plate."""
 
 
 def drawn_columns(layers: int) -> int:
     """Number of columns of random numbers for a target of this number of layers."""
-    return DRAWN + len(_BEHIND) * (layers - 1)
+    return DRAWN + len(_OF_LAYERS_BEHIND) * (layers - 1)
 
 
 def drawn_column(name: str, layer: int = 0) -> int:
     """Column of random numbers of a quantity, which does not depend on the other quantities that scatter."""
-    return drawn_columns(layer) + _BEHIND.index(name) if layer else _OF_THE_PLATE.index(name)
+    return drawn_columns(layer) + _OF_LAYERS_BEHIND.index(name) if layer else _OF_THE_PLATE.index(name)

@@ -16,9 +16,7 @@ from .model import Array, Model
 from .plate import Plate
 from .quantities import BY_LAYER, LISTED, QUANTITIES
 from .target import Target
-from .units import Angle, AngularVelocity, Obliquity, PositiveSpeed, Tilt, quantity
-
-_RIGHT_ANGLE = np.pi / 2
+from .units import RIGHT_ANGLE, Angle, AngularVelocity, Obliquity, PositiveSpeed, Tilt, quantity
 
 FARTHEST_HIT = 100.0
 """Largest distance of a hit from the origin [m]."""
@@ -70,7 +68,7 @@ class Impact(Model):
         """The axis is built from its projected angles, which flip at 90 degrees."""
         flight = np.tan(self.obliquity) * np.array([np.sin(self.azimuth), np.cos(self.azimuth)])
         for name, angle, of_flight in zip(("pitch", "yaw"), (self.pitch, self.yaw), np.arctan(flight), strict=True):
-            if abs(angle + of_flight) >= _RIGHT_ANGLE:
+            if abs(angle + of_flight) >= RIGHT_ANGLE:
                 raise ValueError(
                     f"got {name} = {math.degrees(angle):g} deg on a line of flight that has "
                     f"{math.degrees(of_flight):.4g} deg of its own, but their sum must lie between -90 and 90 deg"

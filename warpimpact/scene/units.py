@@ -19,7 +19,7 @@ MOST_QUOTED = 80
 """Largest number of characters of input in a message, and of a number with its unit."""
 LARGEST = 1e30
 """Largest quantity in SI; results such as a volume then stay finite."""
-_RIGHT_ANGLE = math.pi / 2
+RIGHT_ANGLE = math.pi / 2
 _TOWER = re.compile(r"(?:\*\*|\^)\s*(?:[-+]?\d{3}|\(|[-+]?\d+\s*(?:\*\*|\^))|[)⁰¹²³⁴-⁹]\s*(?:\*\*|\^)|[⁰¹²³⁴-⁹]{3}")
 """Powers of powers, and exponents of three digits: no unit has them, and they can take for ever."""
 _STRING = r"^\s*[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?\s*$"
@@ -307,13 +307,13 @@ Angle = Annotated[
 
 
 def _is_obliquity(angle: float) -> float:
-    if not 0.0 <= angle < _RIGHT_ANGLE:
+    if not 0.0 <= angle < RIGHT_ANGLE:
         raise PydanticCustomError("obliquity", "Input should be at least 0 and less than 90 deg")
     return angle
 
 
 def _is_tilt(angle: float) -> float:
-    if not abs(angle) < _RIGHT_ANGLE:
+    if not abs(angle) < RIGHT_ANGLE:
         raise PydanticCustomError("tilt", "Input should be greater than -90 and less than 90 deg")
     return angle
 

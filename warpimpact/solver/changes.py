@@ -23,7 +23,7 @@ RISK = 1.0 / 6.0
 the pilot has enough shots for that."""
 FEWEST = 1.6
 """Fewest shots of a pilot that are expected beyond the promised percentile."""
-SLOW = 0.25
+SLOW_SHARE = 0.25
 """Share of the impact velocity below which the error of a speed is weighed as the error of the energy, E = m v²/2, is:
 in proportion to the speed. The energy is computed to some accuracy, so the error of a speed near 0 has no bound."""
 TYPICAL = 0.75
@@ -204,7 +204,7 @@ def changes(
     and tilt are NaN where the core ends otherwise (`ended_otherwise`), which is an error by itself.
 
     Args:
-        impact: impact velocities [m/s], shape [shots], to weigh the errors of slow cores by their energy (SLOW).
+        impact: impact velocities [m/s], shape [shots], to weigh the errors of slow cores by their energy (SLOW_SHARE).
         relative: (s/m, 1/rad): the error of a speed v is divided by 1 + first × |v|, the error of a tilt by 1 + second
             × tilt. An absolute bound on the quotient is a bound with a relative part on the error.
         free: for each layer, whether the residual velocity behind it counts; None if all count.
@@ -246,4 +246,4 @@ def _weight(before: Array, after: Array, impact: Array | None) -> Array:
     """Weights of errors between speeds, of their shape."""
     if impact is None:
         return np.ones_like(before)
-    return np.asarray(np.minimum(1.0, 0.5 * (np.abs(before) + np.abs(after)) / (SLOW * impact[:, None])))
+    return np.asarray(np.minimum(1.0, 0.5 * (np.abs(before) + np.abs(after)) / (SLOW_SHARE * impact[:, None])))

@@ -18,7 +18,7 @@ Array = NDArray[np.float64]
 Path = tuple[str | int, ...]
 """Place of a key in the tables of a scene, such as ("plate", "pattern", "spacing", 0)."""
 
-COLUMNS: dict[Path, str] = {(QUANTITIES[name].table, name): name for name in (*OF_THE_SCENE, *OF_A_DRAW)}
+COLUMN_OF: dict[Path, str] = {(QUANTITIES[name].table, name): name for name in (*OF_THE_SCENE, *OF_A_DRAW)}
 """Name of the column, by the path."""
 UNITS_OF_EXPOSURE: tuple[Path, ...] = (("plate", "degradation_interval"), ("plate", "degradation_distance"))
 """β per Δt_β is the same law as β^(Δt₀/Δt_β) per Δt₀, so these become a degradation of the shot."""
@@ -31,7 +31,7 @@ def columns_of(values: Mapping[Path, Array], plate: Plate) -> dict[str, Array]:
         values: values by path. Paths that make no column are left out.
         plate: plate of the scene. Its degradation and unit of exposure hold where no value replaces them.
     """
-    columns = {name: values[path] for path, name in COLUMNS.items() if path in values}
+    columns = {name: values[path] for path, name in COLUMN_OF.items() if path in values}
     for path in UNITS_OF_EXPOSURE:
         if path in values:
             base = columns.get("degradation", np.full_like(values[path], plate.degradation))

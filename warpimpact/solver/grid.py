@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpimpact.solver.cover import Cover, Pushed, cover_of
-from warpimpact.solver.materials import ROUNDING
+from warpimpact.solver.materials import THICKNESS_ROUNDING
 from warpimpact.solver.tile import Tile, tile_of
 
 if TYPE_CHECKING:
@@ -159,7 +159,7 @@ def _planes(depth: float, material: Materials, resolution: Resolution) -> Planes
     way = resolution.travel * float(resolution.passage(depth, depth, weakens=True))
     reach = max(FEWEST_PLANES, math.ceil(PLANES * math.sqrt(depth / way)))
     most = float(material.together.max()) / depth if material.weakens else 0.0
-    return Planes(math.floor(most * reach + ROUNDING) + SPARE, depth / reach, reach)
+    return Planes(math.floor(most * reach + THICKNESS_ROUNDING) + SPARE, depth / reach, reach)
 
 
 def tent_taps(length: float, cell: float) -> Array:

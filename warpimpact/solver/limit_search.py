@@ -32,7 +32,7 @@ TELLING = 5.0
 """Distance [tolerances] of a passage from the limit above which it counts for the error of predictions."""
 BESIDE = 0.4
 """Distance [tolerances] from the expected limit of a run that shall come close to it."""
-ACROSS = 0.98
+SETTLING = 0.98
 """Distance [tolerances] from a near end of a run that shall settle a limit."""
 SETTLED = 1.2
 """Largest doubt [tolerances] at which such close runs are made."""
@@ -243,7 +243,7 @@ class LimitSearch:
             creeps = ((behind == 0.0) | np.isinf(behind)) & (self.runs >= PATIENT)
             aimed = expected + np.where(creeps, -(2.0 ** (self.runs - PATIENT)), 1.0) * beside
             aimed = np.where(to_behind <= 0.0, refuted, aimed)
-            near = ACROSS * tolerance - np.maximum(1.2 * doubt, 0.1 * tolerance)  # the limit then hardly lies farther
-            aimed = np.where(close & (to_behind <= near), behind + ACROSS * tolerance, aimed)
-            aimed = np.where(close & (to_ahead <= near), ahead - ACROSS * tolerance, aimed)
+            near = SETTLING * tolerance - np.maximum(1.2 * doubt, 0.1 * tolerance)  # the limit then hardly lies farther
+            aimed = np.where(close & (to_behind <= near), behind + SETTLING * tolerance, aimed)
+            aimed = np.where(close & (to_ahead <= near), ahead - SETTLING * tolerance, aimed)
         return np.asarray(sign * aimed)

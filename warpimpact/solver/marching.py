@@ -36,7 +36,7 @@ MAX_DOUBLINGS = 6
 """Most times that the windows are doubled for shots that leave theirs."""
 
 
-CHUNK = 64
+LARGEST_CHUNK = 64
 """Most shots of a chunk, where another thread reports the progress."""
 SHARES = 3
 """Fewest chunks per thread into which the remaining shots would be divided."""
@@ -136,7 +136,7 @@ class March:
         if len(apiece) == 1 and threading.current_thread() is not threading.main_thread():
             self._here(launch, apiece[0], total, progress)
             return
-        chunks, ended = Chunks(total, self.at_a_plate, SHARES * len(apiece), CHUNK), SimpleQueue[int]()
+        chunks, ended = Chunks(total, self.at_a_plate, SHARES * len(apiece), LARGEST_CHUNK), SimpleQueue[int]()
         # Signals reach the main thread, so it computes nothing: an interrupt need not wait for a long shot.
         pool = ThreadPoolExecutor(len(apiece))
         try:

@@ -24,7 +24,7 @@ FASTEST_DECAY = 1.0e30
 exposure, yet finite, because 0 × ∞ is no number."""
 OWN_LENGTHS = ("degradation_length", "degradation_depth")
 """Lengths of the plate that may differ from shot to shot."""
-ROUNDING = 1e-9
+THICKNESS_ROUNDING = 1e-9
 """Rounding error of a thickness in degradation depths, which may be a sum."""
 
 
@@ -134,7 +134,7 @@ def _material(
         thickness=thickness,
         together=together,
         depth=depth,
-        deep=np.asarray(weakens & (together > (1.0 + ROUNDING) * depth), dtype=np.float64),
+        deep=np.asarray(weakens & (together > (1.0 + THICKNESS_ROUNDING) * depth), dtype=np.float64),
         offset_y=offset_y,
         offset_z=offset_z,
         a0=a0,

@@ -40,7 +40,7 @@ THROUGH = 16
 """Depths over which the mean through a layer is taken."""
 
 
-AT_A_TIME = 2**13
+NODES_AT_A_TIME = 2**13
 """Nodes of a window that are computed together."""
 SAMPLES, MOST_POINTS = 16, 2**24
 """Points along the side of a node with an edge; and most points of all such nodes. A wide window full of small holes
@@ -311,7 +311,7 @@ def nodes_about(home: tuple[float, float], cells: Sequence[int], spacing: float)
 
 def material_about(plate: Plate, y: Array, z: Array, spacing: float) -> Array:
     """Share of material about every node, shape [nodes_y, nodes_z]; points are taken where an edge may be."""
-    share, rows = np.empty((len(y), len(z))), max(1, AT_A_TIME // len(z))
+    share, rows = np.empty((len(y), len(z))), max(1, NODES_AT_A_TIME // len(z))
     parts = {first: y[first : first + rows, None] for first in range(0, len(y), rows)}
     edges = {first: plate.has_edge(along_y, z, spacing) for first, along_y in parts.items()}
     nodes = max(1, sum(int(edge.sum()) for edge in edges.values()))

@@ -87,7 +87,7 @@ LADDER = (
 """Levels of resolution, coarse to fine: patches, grid and step are refined together. The error about halves from one
 to the next, and the cost about doubles."""
 
-NODAL: dict[str, Any] = {
+NODAL_SETTINGS: dict[str, Any] = {
     "patches_axial": 36,
     "patches_around": 36,
     "grid_spacing": 1.0e-5,
@@ -231,7 +231,7 @@ def resolve(
         "grid_spacing": every[0] / level.cells_per_length,
     }
     if nodal:
-        defaults = NODAL
+        defaults = NODAL_SETTINGS
     given = {name: getattr(numerics, name) for name in defaults if getattr(numerics, name) is not None}
     travel = level.travel if numerics.travel is None else numerics.travel
     return Resolution(

@@ -14,12 +14,12 @@ from warpimpact.solver.keys import Key
 
 Array = NDArray[np.float64]
 
-BEHIND = 0.57
+SHORTER_BEHIND = 0.57
 """Length of the rings behind the core's widest station, as a share of the length of those ahead of it. The rings behind
 touch when the core swings, and they have the longest levers."""
 ZOOMS = 4
 """Rounds of the search for the widest station. Each divides the two best gaps of the round before into a thousand."""
-THINNEST = 0.5
+THINNEST_SECTION = 0.5
 """Radius, as a share of the largest, below which a section has no nominal stress. 4M/(πr³) has no bound at a pointed
 nose, and beam theory does not hold within a diameter of a load."""
 
@@ -115,15 +115,15 @@ def _ends(key: Key[Core]) -> tuple[float, float]:
 def _stations(key: Key[Core], count: int) -> tuple[Array, Array]:
     """Edges of the profile's rings, and the change of radius from each to the next [m].
 
-    The edges are length/count apart ahead of the widest station, and BEHIND times this distance behind it. The widest
-    station is an edge. Jumps of the slope are edges, too, if they are fewer than `count`.
+    The edges are length/count apart ahead of the widest station, and SHORTER_BEHIND times this distance behind it. The
+    widest station is an edge. Jumps of the slope are edges, too, if they are fewer than `count`.
     """
     core = key.value
     breaks, widest = core.breaks if len(core.breaks) < count else (), _widest_station(core)
     inner = np.unique([*breaks, widest])
     apart = np.diff(inner, prepend=0.0, append=core.length) > 1e-6 * core.length
     knots = np.array([0.0, *inner[apart[:-1] & apart[1:]], core.length])
-    apiece = np.where(knots[:-1] < widest - 1e-6 * core.length, 1.0, BEHIND) * core.length / count
+    apiece = np.where(knots[:-1] < widest - 1e-6 * core.length, 1.0, SHORTER_BEHIND) * core.length / count
     shares = np.maximum(1, np.round(np.diff(knots) / apiece)).astype(int)
     edges = [np.linspace(a, b, n, endpoint=False) for a, b, n in zip(knots[:-1], knots[1:], shares, strict=True)]
     joined = np.append(np.concatenate(edges), core.length)
@@ -208,7 +208,7 @@ def sections_of(core: Core, rings: Rings) -> Sections:
     centre = core.mass_properties.centre_of_mass
     station = np.clip(centre - rings.station - rings.half_axial, 0.0, core.length)
     ahead, radius = centre - station, core.radius(station)
-    thick = radius >= THINNEST * core.max_radius
+    thick = radius >= THINNEST_SECTION * core.max_radius
     stress = np.where(thick, 4.0 / np.pi / np.where(thick, radius, 1.0) ** 3, 0.0)
     mass, first, second, rotary = _integrals(core, station)
     return Sections(station, ahead, stress, first - ahead * mass, second - ahead * first, rotary)

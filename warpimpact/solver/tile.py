@@ -30,7 +30,7 @@ Kept = TypeVar("Kept", bound="Tile")
 
 BLUR = 3
 """Cells over which the material is averaged, in each direction, so that a patch crosses an edge gradually. Odd."""
-BLOCKS = 96
+CLEARANCE_BLOCKS = 96
 """Largest number of blocks of a period, in each direction, in the search for the clearance."""
 AT_ONCE = 2**22
 """Approximate number of cells that are computed between two checks for cancellation."""
@@ -89,7 +89,7 @@ class Tile:
     def clearance(self) -> Floats:
         # The search runs over blocks of cells. A block with any material counts as a wall.
         rows, columns = self.shape
-        block = (math.ceil(rows / BLOCKS), math.ceil(columns / BLOCKS))
+        block = (math.ceil(rows / CLEARANCE_BLOCKS), math.ceil(columns / CLEARANCE_BLOCKS))
         wall = _any_of(_any_of(self.material > 0.0, block[0]).T, block[1]).T
         if not wall.any():
             return np.full_like(self.material, math.inf)

@@ -10,7 +10,7 @@ from scipy import special
 
 from warpimpact.statistics.intervals import Array
 
-_MOST_SHOTS = 100_000
+_LONGEST_PROOF = 100_000
 
 
 def acceptance(shots: int, allowed: int, perforation: Array | float) -> Array:
@@ -27,10 +27,10 @@ def fewest_shots(allowed: int, stop_probability: float, confidence: float) -> in
     Raises:
         ValueError: more than 100 000 shots are needed.
     """
-    counts = np.arange(allowed + 1, _MOST_SHOTS)
+    counts = np.arange(allowed + 1, _LONGEST_PROOF)
     enough = special.bdtr(float(allowed), counts, 1.0 - stop_probability) <= 1.0 - confidence
     if not enough.any():
-        raise ValueError(f"got P(stop) >= {stop_probability:g}, which needs more than {_MOST_SHOTS} shots")
+        raise ValueError(f"got P(stop) >= {stop_probability:g}, which needs more than {_LONGEST_PROOF} shots")
     return int(counts[enough.argmax()])
 
 

@@ -21,7 +21,7 @@ Flags = NDArray[np.bool_]
 
 LINKS = ("probit", "logit")
 _LN_2_PI = math.log(2.0 * math.pi)
-_FARTHEST = 35.0
+_NO_INFORMATION = 35.0
 """Distance from the location, in scales, beyond which the information of an answer is below double precision."""
 
 
@@ -205,7 +205,7 @@ def information(
     """Sums of w, w z and w z² over the levels, z = (level − location) / scale: scale² times Fisher's information of
     location and scale. Shape [tests] each; NaN where the scale is not positive."""
     safe = np.where(scale > 0.0, scale, np.nan)[:, None]
-    z = np.where(used, np.clip((levels - location[:, None]) / safe, -_FARTHEST, _FARTHEST), 0.0)
+    z = np.where(used, np.clip((levels - location[:, None]) / safe, -_NO_INFORMATION, _NO_INFORMATION), 0.0)
     w = np.where(used, weight(z, link), 0.0)
     return w.sum(axis=1), (w * z).sum(axis=1), (w * z * z).sum(axis=1)
 
@@ -217,7 +217,7 @@ def weight(z: Array, link: str = "probit") -> Array:
     return np.asarray(special.expit(z) * special.expit(-z))
 
 
-_GRID = np.linspace(-4.0, 4.0, 401)
+_CANDIDATES = np.linspace(-4.0, 4.0, 401)
 
 
 def d_optimal(levels: Array, used: Flags, location: Array, scale: Array) -> Array:
@@ -227,11 +227,13 @@ def d_optimal(levels: Array, used: Flags, location: Array, scale: Array) -> Arra
     An answer with weight w at z adds w (S₀ z² − 2 S₁ z + S₂) to the determinant.
     """
     s0, s1, s2 = (total[:, None] for total in information(levels, used, location, scale))
-    gain = weight(_GRID) * (s0 * _GRID**2 - 2.0 * s1 * _GRID + s2)
-    best = np.clip(gain.argmax(axis=1), 1, len(_GRID) - 2)
+    gain = weight(_CANDIDATES) * (s0 * _CANDIDATES**2 - 2.0 * s1 * _CANDIDATES + s2)
+    best = np.clip(gain.argmax(axis=1), 1, len(_CANDIDATES) - 2)
     rows = np.arange(len(levels))
     left, middle, right = (gain[rows, best + k] for k in (-1, 0, 1))
     bend = left - 2.0 * middle + right
     with np.errstate(divide="ignore", invalid="ignore"):
         shift = np.where(bend < 0.0, 0.5 * (left - right) / bend, 0.0)
-    return np.asarray(location + scale * (_GRID[best] + np.clip(shift, -1.0, 1.0) * (_GRID[1] - _GRID[0])))
+    return np.asarray(
+        location + scale * (_CANDIDATES[best] + np.clip(shift, -1.0, 1.0) * (_CANDIDATES[1] - _CANDIDATES[0]))
+    )

@@ -75,7 +75,7 @@ class LimitMap:
         """
         try:
             given = {exclusions.STOP: campaign.stop is not None, exclusions.BURST: campaign.burst is not None}
-            exclusions.check_together({exclusions.LIMIT: True} | given)
+            exclusions.check_together({exclusions.LIMIT_COMMAND: True} | given)
             check_arrests(campaign.scene, campaign.sampler().shots(0, 1))
         except ValueError as error:
             raise CampaignError(str(error)) from None

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 
 STEEL = "#b8b8b8"
-_PIXELS = 260.0
+_DRAWING_PIXELS = 260.0
 """Longer side of a drawing without a scale of its own."""
 _BAR = 10.0
 """Length of a bar for the scale [mm]."""
@@ -66,7 +66,7 @@ def drawing(
         bar: whether a bar of 10 mm stands below.
     """
     (width, height), (left, top) = 1e3 * (np.asarray(high) - low), (1e3 * low[0], -1e3 * high[1])
-    scale, room = scale or _PIXELS / max(width, height), 2.0 if bar else 0.0
+    scale, room = scale or _DRAWING_PIXELS / max(width, height), 2.0 if bar else 0.0
     frame = f'x="{left:.4f}" y="{top:.4f}" width="{width:.4f}" height="{height:.4f}"'
     parts = [f'<image {frame} href="{image}" preserveAspectRatio="none"/>'] if image else []
     parts += [

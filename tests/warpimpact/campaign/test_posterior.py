@@ -79,7 +79,7 @@ def posterior(folder: Path, interval: str = "degradation_interval", **of_draw: f
         "interaction": Interaction().model_dump(),
         "discrepancy": {"m s-1": 7.0, "degree": 3.0},
     }
-    told = {posterior_file.FIT: "", posterior_file.MATERIAL: json.dumps(material), "warpimpact_version": "0"}
+    told = {posterior_file.FIT_TEXT: "", posterior_file.MATERIAL: json.dumps(material), "warpimpact_version": "0"}
     groups = {name: xarray.Dataset({"a": 1}) for name in posterior_file.GROUPS} | {"posterior": draws}
     path = folder / "posterior.nc"
     write_tree(xarray.DataTree.from_dict({"/": xarray.Dataset(attrs=told), **groups}), path)

@@ -16,7 +16,7 @@ from warpimpact import Campaign, to_dataframe
 from warpimpact.analysis import estimates
 from warpimpact.cli import main
 from warpimpact.export.drawing import write_drawing
-from warpimpact.export.paraview import AROUND, write_vtk
+from warpimpact.export.paraview import SIDES, write_vtk
 from warpimpact.export.spreadsheet import write_csv
 from warpimpact.kernels.status import Status
 from warpimpact.results import files
@@ -150,9 +150,9 @@ def test_vtk_reads_the_core_and_the_plate_back(history: xarray.Dataset, tmp_path
     for step in (0, -1):
         surface, now = pyvista.read(core[step][1]), history.isel(time=step)
         nose = float(history["station"].max()) * now["core_axis"].values + now["plate_position"].values
-        np.testing.assert_allclose(surface.points[:AROUND].mean(axis=0), nose, atol=1e-7)
+        np.testing.assert_allclose(surface.points[:SIDES].mean(axis=0), nose, atol=1e-7)
         stations, radius = history["station"].values, history["core_radius"].values
-        polygon = 0.5 * AROUND * np.sin(2.0 * np.pi / AROUND) / np.pi
+        polygon = 0.5 * SIDES * np.sin(2.0 * np.pi / SIDES) / np.pi
         cut = (np.diff(-stations) * (radius[1:] ** 2 + radius[1:] * radius[:-1] + radius[:-1] ** 2)).sum() / 3.0
         assert surface.is_manifold
         assert surface.volume == pytest.approx(np.pi * polygon * cut, rel=1e-3)  # closed, normals outwards

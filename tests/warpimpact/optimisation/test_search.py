@@ -87,7 +87,7 @@ def test_a_space_is_searched_whole_and_its_progress_is_that_of_what_keeps_the_co
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     """140 points of 151 break the constraint, more in a row than a search waits for."""
-    monkeypatch.setattr(evaluate, "TOGETHER", 4)
+    monkeypatch.setattr(evaluate, "JOBS_TOGETHER", 4)
     told: list[SearchProgress] = []
     reference = '[[references]]\nname = "thin"\nplate = { thickness = "3 mm", resistance = "2600 MPa" }\n'
     least = "[constraints]\nsmallest_areal_density = 76.8\n"  # 9.78 mm

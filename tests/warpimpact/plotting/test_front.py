@@ -22,8 +22,8 @@ def test_the_front_its_plates_and_the_references_are_drawn(searched: xarray.Data
 def test_what_lies_beyond_the_front_by_few_hits_is_counted_and_not_drawn(searched: xarray.Dataset) -> None:
     lucky = int(searched[f.NUMBER][-1])  # it is taken off the front
     changed = searched.isel(front=slice(None, -1)).copy(deep=True)
-    goals = np.isnan(changed[f.LIMIT].values)
-    changed[f.FOUND][lucky] = np.where(goals, -1e6 * changed[f.SIGN], changed[f.LIMIT])
+    goals = np.isnan(changed[f.ASKED_LIMIT].values)
+    changed[f.FOUND][lucky] = np.where(goals, -1e6 * changed[f.SIGN], changed[f.ASKED_LIMIT])
     assert not holding(changed)[lucky]
     figure = front_figure(changed)
     (front,) = [axes for axes in figure.axes if axes.get_xlabel().startswith("areal density [kg/m²], less")]

@@ -12,7 +12,7 @@ from warpimpact.analysis.inspect import inspect_text
 from warpimpact.campaign.text import CampaignError
 from warpimpact.kernels.status import Status
 from warpimpact.plotting import poses, trajectory
-from warpimpact.plotting.cell import GREY, STATUS_COLOURS, shown
+from warpimpact.plotting.cell import NO_VALUE, STATUS_COLOURS, shown
 from warpimpact.plotting.maps import layers_figure
 from warpimpact.report.words import result_content
 from warpimpact.results import files
@@ -121,7 +121,7 @@ def test_the_legend_of_layers_names_each_colour_once(result: xarray.Dataset) -> 
     assert sorted(texts) == ["arrested", "edge of hole", "no value: arrested", "perforated"]
     colours = {patch.get_label(): to_hex(patch.get_facecolor()).upper() for patch in legend.get_patches()}
     assert colours["arrested"] == STATUS_COLOURS[Status.ARRESTED]
-    assert colours["no value: arrested"] == to_hex(GREY).upper()
+    assert colours["no value: arrested"] == to_hex(NO_VALUE).upper()
 
 
 def test_a_report_tells_every_layer(result: xarray.Dataset) -> None:

@@ -57,7 +57,7 @@ def test_memory_does_not_grow_with_the_count(
     numbers = 8 + (4 + 4 * 3 + 4 * 2) / 2  # of a shot, and of its outcome at two stand-offs in single precision
     with files.opened(output) as dataset:
         assert dataset.sizes["hit"] == count
-        assert dataset["tilt"].encoding["chunksizes"] == (files.CHUNK, 2)
+        assert dataset["tilt"].encoding["chunksizes"] == (files.FILE_CHUNK, 2)
         assert (dataset["status"] == Status.PERFORATED).all()
     assert peak < count * numbers * 8 / 3  # bytes; a third of what the result takes
 

@@ -2,7 +2,7 @@
 
 import pytest
 
-from warpimpact.scene.exclusions import EXCLUDED, NEEDED, Rule, check_together
+from warpimpact.scene.exclusions import EXCLUDED, NEEDS, Rule, check_together
 
 
 @pytest.mark.parametrize("rule", EXCLUDED, ids=lambda rule: f"{rule.what}, {rule.other}")
@@ -14,7 +14,7 @@ def test_what_excludes_is_refused(rule: Rule) -> None:
     check_together({rule.other: True})
 
 
-@pytest.mark.parametrize("rule", NEEDED, ids=lambda rule: f"{rule.what}, {rule.other}")
+@pytest.mark.parametrize("rule", NEEDS, ids=lambda rule: f"{rule.what}, {rule.other}")
 def test_what_is_needed_is_asked_for(rule: Rule) -> None:
     with pytest.raises(ValueError, match="found here needs ") as refused:
         check_together({rule.what: "found here", rule.other: False})

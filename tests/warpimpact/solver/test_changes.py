@@ -10,7 +10,7 @@ from warpimpact.records.outcomes import Outcomes
 from warpimpact.scene import Accuracy, Hits, Numerics, Target, make_shots
 from warpimpact.solver.changes import (
     RISK,
-    SLOW,
+    SLOW_SHARE,
     Verdict,
     _excess,
     changes,
@@ -74,7 +74,7 @@ def test_errors_of_slow_cores_are_those_of_their_energy(fine: Outcomes) -> None:
         status=np.array(back, dtype=np.int8),
     )
     velocity, tilt, depth = changes(passed.assign(tilt=np.stack([one.tilt[:, -1]] * 2, axis=1)), slower, impact)
-    energy = (speeds**2 - slower.residual_velocity**2)[1:] / (2.0 * SLOW * 800.0)
+    energy = (speeds**2 - slower.residual_velocity**2)[1:] / (2.0 * SLOW_SHARE * 800.0)
     assert velocity == pytest.approx([1.0, *energy])
     assert tilt == pytest.approx([0.01, 0.01 * 19.0 / 200.0, math.pi * 10.0 / 200.0])
     assert np.isnan(depth).all()
@@ -84,7 +84,7 @@ def test_fast_cores_count_as_they_are(fine: Outcomes) -> None:
     coarse = simulate(SCENE, OTHERS, numerics=Numerics(level=1), device="cpu")
     velocity, tilt, _ = changes(coarse, fine, OTHERS.velocity)
     plain = changes(coarse, fine)
-    assert fine.residual_velocity.min() > SLOW * 820.0
+    assert fine.residual_velocity.min() > SLOW_SHARE * 820.0
     np.testing.assert_array_equal(velocity, plain[0])
     np.testing.assert_array_equal(tilt, plain[1])
 
@@ -164,5 +164,5 @@ def test_what_a_level_errs_by_over_what_is_allowed(fine: Outcomes) -> None:
     fast, slow = verdict(600.0), verdict(20.0)
     assert fast.excess == fast.weighed == slow.excess == 0.7 * (upper_place(32, 0.9) - 1)
     assert fast.typical == 0.7 * (upper_place(32, 0.75, 0.5) - 1)
-    assert slow.weighed == pytest.approx(slow.excess * (20.0 + 15.0) / (SLOW * 820.0))
+    assert slow.weighed == pytest.approx(slow.excess * (20.0 + 15.0) / (SLOW_SHARE * 820.0))
     assert not fast.kept

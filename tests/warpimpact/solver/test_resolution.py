@@ -17,7 +17,7 @@ from warpimpact.solver import materials
 from warpimpact.solver.materials import FASTEST_DECAY, decay_rate, onset_jump
 from warpimpact.solver.resolution import (
     LADDER,
-    NODAL,
+    NODAL_SETTINGS,
     SLENDER,
     WEAKENING,
     Resolution,
@@ -103,7 +103,7 @@ def test_precision_goes_before_the_level(precision: str, double: bool) -> None:
 def test_nodal_scheme_has_the_paper_s_own_resolution(level: int | None) -> None:
     resolution = resolved(scheme="nodal", level=level)
     assert resolution.nodal
-    assert {name: getattr(resolution, name) for name in NODAL} == NODAL
+    assert {name: getattr(resolution, name) for name in NODAL_SETTINGS} == NODAL_SETTINGS
     assert (resolution.patches_axial, resolution.patches_around) == (36, 36)
     assert (resolution.grid_spacing, resolution.time_step) == (1e-5, 1e-6)
 

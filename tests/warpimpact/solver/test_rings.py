@@ -12,7 +12,7 @@ from warpimpact.scene import (
     PolynomialCore,
     ProfileCore,
 )
-from warpimpact.solver.rings import BEHIND, azimuths_of, rings_of
+from warpimpact.solver.rings import SHORTER_BEHIND, azimuths_of, rings_of
 
 PAPER = PolynomialCore(coefficients=(3.0e-4, 0.24, -5.29), length=27.86e-3, density=7850.0)
 OGIVE = OgiveCore(diameter=6.17e-3, crh=3.0, length=27.0e-3, density=7850.0)
@@ -122,7 +122,7 @@ def test_rings_are_shorter_behind_the_widest_station(core: Core) -> None:
     stations = np.linspace(0.0, core.length, 100_001)
     widest = stations[np.argmax(core.radius(stations) >= (1 - 1e-9) * core.max_radius)]
     assert length.sum() == pytest.approx(core.length)
-    for part, longest in ((station < widest, 1.0), (station > widest, BEHIND)):
+    for part, longest in ((station < widest, 1.0), (station > widest, SHORTER_BEHIND)):
         if part.any():
             assert length[part].mean() == pytest.approx(longest * core.length / count, rel=0.15)
 

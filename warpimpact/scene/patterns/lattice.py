@@ -20,7 +20,7 @@ from .roundings import area, chords, distance, geometries, neighbours, outline, 
 _MOST_HOLES = 20_000
 _ROWS_PER_CHECK = 64
 """Rows of cells between two calls of `check`."""
-_SAME = 1e-9
+_EQUAL_LENGTHS = 1e-9
 """Largest difference of two equal lengths, as a share of the period."""
 
 _PAIR = tuple[PositiveLength, PositiveLength]
@@ -110,7 +110,7 @@ class LatticePattern(Pattern):
         if self.open_area >= 1:
             raise ValueError(f"got spacing = {_millimetres(self.spacing)}, but the cell must be larger than its holes")
         gap, first, second = self._nearest
-        if gap <= _SAME * max(self.spacing):
+        if gap <= _EQUAL_LENGTHS * max(self.spacing):
             raise ValueError(
                 f"got spacing = {_millimetres(self.spacing)}, which lets the holes at {_millimetres(first)} and "
                 f"{_millimetres(second)} overlap or touch, but a ligament must be left between them"
@@ -154,7 +154,9 @@ class LatticePattern(Pattern):
         return pattern
 
     def is_hole(self, y: Array, z: Array) -> BoolArray:
-        inside: BoolArray = self._deepest(y, z) >= -_SAME * max(self.spacing)  # an edge lies in its hole on any side
+        inside: BoolArray = self._deepest(y, z) >= -_EQUAL_LENGTHS * max(
+            self.spacing
+        )  # an edge lies in its hole on any side
         return inside
 
     def has_edge(self, y: Array, z: Array, reach: float) -> BoolArray:
@@ -209,10 +211,10 @@ class LatticePattern(Pattern):
         middles, marks, tree = self._marked
         images = middles * mirror + (period / 2 if centred else 0.0)
         distances, nearest = tree.query(images % period % period)
-        if distances.max() > _SAME * period.max():
+        if distances.max() > _EQUAL_LENGTHS * period.max():
             return False
         mirrored = (marks * mirror)[:, :, None] - marks[nearest][:, None]
-        return bool(np.linalg.norm(mirrored, axis=-1).min(axis=-1).max() <= _SAME * period.max())
+        return bool(np.linalg.norm(mirrored, axis=-1).min(axis=-1).max() <= _EQUAL_LENGTHS * period.max())
 
     @cached_property
     def _marked(self) -> tuple[Array, Array, Any]:
@@ -245,7 +247,7 @@ class LatticePattern(Pattern):
             )
         inner = np.array(size) / 2 - margin
         places = self._repeated(self._cell_places, self.unit_cell, (-inner[0], inner[0]), (-inner[1], inner[1]))
-        kept: Array = places[(np.abs(self._boxes(places)) <= inner * (1 + _SAME)).all(axis=(1, 2))]
+        kept: Array = places[(np.abs(self._boxes(places)) <= inner * (1 + _EQUAL_LENGTHS)).all(axis=(1, 2))]
         return kept
 
     def _reaching(self, y_range: Range, z_range: Range) -> Array:
