@@ -43,7 +43,7 @@ from warpimpact.runs.run import run_to_file
 from warpimpact.scene import Numerics, Scene, Shots
 from warpimpact.scene.flow import Continuum
 from warpimpact.solver.device import DeviceError, find_device
-from warpimpact.solver.marching import March
+from warpimpact.solver.marching import Marching
 from warpimpact.solver.memory import Memory
 from warpimpact.solver.prepare import prepare
 from warpimpact.solver.worker import Worker
@@ -285,7 +285,7 @@ def rate(name: str, way: Way, asked: Asked) -> dict[int, float]:
         shots = copied(some, -(-count // len(some)))[:count]
         memory = Memory(prepare(scene, shots, numerics_of(name, way)), find_device(asked.device))
         memory.build()
-        taken = min(seconds(lambda memory=memory: March(memory).march()) for _ in range(2))
+        taken = min(seconds(lambda memory=memory: Marching(memory).march()) for _ in range(2))
         found[count] = count / taken
         count *= GROWTH
     return found

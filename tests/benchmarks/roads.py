@@ -26,7 +26,7 @@ from random_scenes import draw
 from warpimpact import Campaign, Numerics, Scene, Shots
 from warpimpact.scene import PRESETS
 from warpimpact.solver.device import find_device
-from warpimpact.solver.marching import March
+from warpimpact.solver.marching import Marching
 from warpimpact.solver.memory import Memory
 from warpimpact.solver.pilot import pilot_size
 from warpimpact.solver.prepare import prepare
@@ -116,7 +116,7 @@ class Road:
         """Processor time of a hit [s]."""
         begin, count = time.process_time(), 0
         while time.process_time() - begin < TIMED:
-            march = March(Memory(prepare(self.scene, self.shots, self.numerics), find_device("cpu")), 1)
+            march = Marching(Memory(prepare(self.scene, self.shots, self.numerics), find_device("cpu")), 1)
             count += len(outcomes_of(march.memory, march.march(None, NEVER)).status)
         return (time.process_time() - begin) / count
 

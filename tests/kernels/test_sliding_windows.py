@@ -12,7 +12,7 @@ from warpimpact.kernels.variant import Variant
 from warpimpact.scene import Hits, Impact, Layer, Numerics, Plate, Scene, Target, make_shots
 from warpimpact.solver import windows
 from warpimpact.solver.device import find_device
-from warpimpact.solver.marching import March
+from warpimpact.solver.marching import Marching
 from warpimpact.solver.memory import Memory
 from warpimpact.solver.prepare import prepare
 from warpimpact.solver.replay import traced
@@ -43,7 +43,7 @@ def marched(target: tuple[Plate, ...], impact: dict[str, float], device: str, *,
     scene = Scene(core=PAPER_CORE, target=Target(layers=target))
     shots = make_shots(Impact(velocity=825.0, **impact), Hits(count=HITS, seed=2), target[0])
     prepared = replace(prepare(scene, shots, Numerics(level=0)), slide=slide)
-    march = March(Memory(prepared, find_device(device)))
+    march = Marching(Memory(prepared, find_device(device)))
     first, found = march.cells, march.march()
     names = ("status", "steps", "velocity", "position", "axis", "angular_momentum", "energy_loss")
     return Marched({name: getattr(found, name).numpy() for name in names}, first, march.cells)

@@ -13,7 +13,7 @@ from warpimpact.records.outcomes import Outcomes
 from warpimpact.scene import Layer, Numerics, Plate, Record, Scene, Shots, Target
 from warpimpact.solver import marching, replay
 from warpimpact.solver import simulate as simulation
-from warpimpact.solver.marching import March
+from warpimpact.solver.marching import Marching
 from warpimpact.solver.memory import Memory
 from warpimpact.solver.prepare import prepare
 
@@ -162,7 +162,7 @@ def test_the_exposure_of_a_burst_is_the_sum_of_what_its_shots_add(offset: float)
     shots = burst(shots_at([0.0, offset], [0.0, 0.6 * offset]), 2)
     prepared = prepare(scene_of(solid_plate()), shots, Numerics(precision="double", patches_axial=23))
     memory = Memory(prepared, wp.get_device("cpu"))
-    cells = March(memory, 1).cells
+    cells = Marching(memory, 1).cells
     scratch = memory.scratch(1, cells)
     order, outcomes = memory.put(np.arange(2), wp.int32), memory.outcomes()
     memory.launch(order, outcomes, scratch, 1, 0, 2)
@@ -178,7 +178,7 @@ def test_the_order_of_a_device_with_many_slots(behind: Any, slots: int) -> None:
     shots = near_bursts()
     prepared = prepare(scene_of(paper_plate(), behind), shots, Numerics(level=0))
     memory = Memory(prepared, wp.get_device("cpu"))
-    cells = March(memory, 1).cells
+    cells = Marching(memory, 1).cells
     outcomes = memory.outcomes()
     order = memory.put(marching.in_turns(np.arange(len(shots)), COUNT, slots), wp.int32)
     scratch = memory.scratch(slots, cells)

@@ -66,15 +66,15 @@ class Windows:
 
     def __init__(self, monkeypatch: pytest.MonkeyPatch, first: tuple[int, int] | None = None) -> None:
         self.marched: list[tuple[int, int]] = []
-        march_some = marching.March._march_some
+        march_some = marching.Marching._march_some
 
         def watched(task: Any, which: Any, *rest: Any) -> None:
             self.marched.append((len(which), task.cells[0]))
             march_some(task, which, *rest)
 
-        monkeypatch.setattr(marching.March, "_march_some", watched)
+        monkeypatch.setattr(marching.Marching, "_march_some", watched)
         if first is not None:
-            monkeypatch.setattr(marching.March, "_window_cells", lambda task: first)
+            monkeypatch.setattr(marching.Marching, "_window_cells", lambda task: first)
 
 
 def test_shots_that_leave_their_window_are_marched_in_wider_ones(monkeypatch: pytest.MonkeyPatch, device: str) -> None:

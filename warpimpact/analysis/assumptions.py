@@ -81,12 +81,12 @@ class Assumed:
         return Moves(by, hits, of_hits) if by else None
 
 
-def moved_apart(one: Moves | None, other: Moves | None, confidence: float) -> dict[str, tuple[float, float]]:
+def moved_apart(first: Moves | None, second: Moves | None, confidence: float) -> dict[str, tuple[float, float]]:
     """Change of the difference of two plates by each assumption, and the half width of its interval by the hits.
 
     A plate without an assumption keeps its value. Both plates take the same hits, where they have them.
     """
-    of_plates = [moves or Moves({}, np.empty(0, dtype=np.int64), {}) for moves in (one, other)]
+    of_plates = [moves or Moves({}, np.empty(0, dtype=np.int64), {}) for moves in (first, second)]
     apart = {}
     for name in dict.fromkeys(name for moves in of_plates for name in moves.by):
         move = of_plates[0].by.get(name, 0.0) - of_plates[1].by.get(name, 0.0)

@@ -20,15 +20,15 @@ _SAME_PLACE = 1e-9
 _ANGLES = ("obliquity", "azimuth", "pitch", "yaw")
 
 
-def check_same_question(one: xarray.Dataset, name: str, other: xarray.Dataset, other_name: str) -> None:
+def check_same_question(result: xarray.Dataset, name: str, other: xarray.Dataset, other_name: str) -> None:
     """Refuse results with another core, impact or stand-offs.
 
     Raises:
         ResultError: the message names the first difference.
     """
-    asked, asked_other = _question(one, name), _question(other, other_name)
-    if (found := first_difference(asked, asked_other)) is not None:
-        place, was, now = found
+    asked, asked_other = _question(result, name), _question(other, other_name)
+    if (mismatch := first_difference(asked, asked_other)) is not None:
+        place, was, now = mismatch
         raise ResultError(f"{other_name}: cannot be compared with {name}: {place} is {now} here and {was} there")
 
 
@@ -55,15 +55,17 @@ def _in_degrees(impact: dict[str, Any]) -> dict[str, Any]:
     }
 
 
-def other_shots(one: xarray.Dataset, other: xarray.Dataset) -> str:
+def other_shots(result: xarray.Dataset, other: xarray.Dataset) -> str:
     """Why the shots of two results differ; empty where they are the same."""
-    if dealing(one) != dealing(other):
+    if dealing(result) != dealing(other):
         return "their shots have other replicates or symmetries"
     for axis, coordinate in enumerate((v.HIT_Y, v.HIT_Z)):
-        here, there = (dataset[coordinate].values / dataset.attrs[attr.PLATE_PERIOD][axis] for dataset in (one, other))
+        here, there = (
+            dataset[coordinate].values / dataset.attrs[attr.PLATE_PERIOD][axis] for dataset in (result, other)
+        )
         if not np.allclose(here, there, rtol=0.0, atol=_SAME_PLACE):
             return "their shots hit other places of the cell"
     for name in (*v.SHOT_VARIABLES, v.MASS):
-        if name in one and not (name in other and np.array_equal(one[name], other[name])):
+        if name in result and not (name in other and np.array_equal(result[name], other[name])):
             return f"their shots differ in {name}"
     return ""

@@ -112,14 +112,16 @@ def compare(
             by_ratio.add(measure.text)
         for (i, j), pair in zip(pairs, used, strict=True):
             both, is_ratio = (datasets[i], datasets[j]), measure.text in by_ratio
-            one, other = (
+            first_side, second_side = (
                 _side(scored[k], datasets[k], {**dealing(datasets[k]), "confidence": of_each_pair}, by_ratio=is_ratio)
                 for k in (i, j)
             )
             paired = not pair.independent and measure.kind != "quantile"
-            difference = _difference(one, other, {**dealing(datasets[i]), "confidence": of_each_pair}, paired=paired)
-            interval = _with_numerics(one.estimate, other.estimate, *difference)
-            drawn = one.drawn, other.drawn
+            difference = _difference(
+                first_side, second_side, {**dealing(datasets[i]), "confidence": of_each_pair}, paired=paired
+            )
+            interval = _with_numerics(first_side.estimate, second_side.estimate, *difference)
+            drawn = first_side.drawn, second_side.drawn
             why = why_not_by_draws(drawn, independent=pair.independent, by_ratio=is_ratio)
             survival = survival_of(both, drawn, interval, reason=why, confidence=(confidence, of_each_pair))
             differences.append(Difference(measure.text, names[i], names[j], *interval, survival))
@@ -160,12 +162,12 @@ def _verdicts(
     measure, moves = scored[0].score.measure, [side.of.moves for side in scored]
     if measure.higher_is_better is None or not all(moves):
         return
-    one, other = (
+    first_side, second_side = (
         _side(side, dataset, {**dealing(dataset), "confidence": confidence}, by_ratio=False)
         for side, dataset in zip(scored, datasets, strict=True)
     )
-    difference = _difference(one, other, {**dealing(datasets[0]), "confidence": confidence}, paired=paired)
-    value, low, high = _with_numerics(one.estimate, other.estimate, *difference)
+    difference = _difference(first_side, second_side, {**dealing(datasets[0]), "confidence": confidence}, paired=paired)
+    value, low, high = _with_numerics(first_side.estimate, second_side.estimate, *difference)
     if math.isnan(low + high):
         return
     half, sign = max(high - value, value - low), 1 if measure.higher_is_better else -1
@@ -178,10 +180,12 @@ def _verdicts(
     yield Verdict(measure.text, *names, by.pop(AS_GIVEN), by)
 
 
-def _with_numerics(one: Estimate, other: Estimate, value: float, low: float, high: float) -> tuple[float, float, float]:
+def _with_numerics(
+    estimate: Estimate, other: Estimate, value: float, low: float, high: float
+) -> tuple[float, float, float]:
     """A difference with its interval, widened by the shift of both plates by the numerics. Rounding counts as 0."""
-    shift = (one.numerics or 0.0) + (other.numerics or 0.0)
-    rounded = ROUNDED * max(abs(one.value), abs(other.value))
+    shift = (estimate.numerics or 0.0) + (other.numerics or 0.0)
+    rounded = ROUNDED * max(abs(estimate.value), abs(other.value))
     value, low, high = (0.0 if abs(end) <= rounded else end for end in (value, low - shift, high + shift))
     return value, low, high
 
@@ -217,10 +221,10 @@ def _notes_of_bases(datasets: Sequence[xarray.Dataset], plates: Sequence[Contest
         yield from notes
 
 
-def _used(one: xarray.Dataset, name: str, other: xarray.Dataset, other_name: str) -> Pair:
+def _used(result: xarray.Dataset, name: str, other: xarray.Dataset, other_name: str) -> Pair:
     """How the hits of two results are used."""
-    common = min(one.sizes["hit"], other.sizes["hit"])
-    why = other_shots(one.isel(hit=slice(common)), other.isel(hit=slice(common)))
+    common = min(result.sizes["hit"], other.sizes["hit"])
+    why = other_shots(result.isel(hit=slice(common)), other.isel(hit=slice(common)))
     return Pair(name, other_name, 0 if why else common, why)
 
 
@@ -249,33 +253,33 @@ def _sought_to(dataset: xarray.Dataset, measure: Measure) -> float:
 
 
 def _side(scored: Scored, dataset: xarray.Dataset, dealt: Estimating, *, by_ratio: bool) -> _Side:
-    score, measure, found = scored.score, scored.score.measure, scored.of
+    score, measure, evidence = scored.score, scored.score.measure, scored.of
     shift = float(np.nan_to_num(score.numerics or 0.0)) + _sought_to(dataset, measure)
-    estimate = replace(estimate_from(measure, found.values, **dealt), numerics=shift)
-    numbers = found.values if found.numbers is None else found.numbers
+    estimate = replace(estimate_from(measure, evidence.values, **dealt), numerics=shift)
+    numbers = evidence.values if evidence.numbers is None else evidence.numbers
     if not by_ratio:
-        return _Side(measure.is_binary, False, numbers, found.drawn, estimate)
+        return _Side(measure.is_binary, False, numbers, evidence.drawn, estimate)
     assert scored.solid is not None
     assert scored.solid_drawn is not None
     ratio = Ratio.of(estimate, numbers, scored.solid, dealt)
     numbers = ratio_numbers(numbers, scored.solid, ratio.value)
-    drawn = ratio_of_draws(found.drawn, scored.solid_drawn)
+    drawn = ratio_of_draws(evidence.drawn, scored.solid_drawn)
     estimate = replace(estimate, value=ratio.value, low=ratio.low, high=ratio.high, numerics=shift / ratio.reference)
     return _Side(measure.is_binary, True, numbers, drawn, estimate)
 
 
-def _difference(one: _Side, other: _Side, dealt: Estimating, *, paired: bool) -> tuple[float, float, float]:
+def _difference(side: _Side, other: _Side, dealt: Estimating, *, paired: bool) -> tuple[float, float, float]:
     """Difference of two plates and its interval; NaN where there is none."""
-    a, b = one.estimate, other.estimate
+    a, b = side.estimate, other.estimate
     independent = a.value - b.value, *difference_of_independent(a, b)
     if not paired:
         return independent
-    numbers = difference_numbers(one.numbers, other.numbers)
-    matched = one.is_share and not one.by_ratio and len(one.numbers) == len(other.numbers)
+    numbers = difference_numbers(side.numbers, other.numbers)
+    matched = side.is_share and not side.by_ratio and len(side.numbers) == len(other.numbers)
     estimate = estimate_of("difference" if matched else "mean", numbers, **dealt)
     if math.isnan(a.low + b.low):
         return estimate.value, math.nan, math.nan
-    if one.is_share and estimate.half_width == 0.0 and a.half_width + b.half_width > 0.0:
+    if side.is_share and estimate.half_width == 0.0 and a.half_width + b.half_width > 0.0:
         return independent  # if shares agree in every shot, their difference is no more certain than the shares
     return estimate.value, estimate.low, estimate.high
 
@@ -299,8 +303,11 @@ def _cautions(datasets: Sequence[xarray.Dataset], names: Sequence[str]) -> Itera
     texts = [dataset.attrs[attr.NUMERICS_GIVEN] for dataset in datasets if attr.NUMERICS_GIVEN in dataset.attrs]
     asked = [json.loads(text) for text in texts]
     differing = (first_difference(first, other) for first, other in pairwise(asked))
-    if (found := next(filter(None, differing), None)) is not None:
-        yield "different numerics", "The plates were computed with different numerics: {} is {} and {}.".format(*found)
+    if (caution := next(filter(None, differing), None)) is not None:
+        yield (
+            "different numerics",
+            "The plates were computed with different numerics: {} is {} and {}.".format(*caution),
+        )
     if broken := [name for name, dataset in zip(names, datasets, strict=True) if breaks_promise(dataset)]:
         sentence = f"The numerics are less exact than promised: {', '.join(broken)} (warpimpact inspect)."
         yield "numerics less exact than promised", sentence

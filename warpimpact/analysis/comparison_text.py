@@ -104,9 +104,9 @@ def _drawn(comparison: ComparedPlates) -> list[str]:
 def hits_used(comparison: ComparedPlates) -> list[str]:
     """How many hits were compared and how, a sentence each."""
     hits = {plate.name: plate.hits for plate in comparison.plates}
-    one, *others = dict.fromkeys(hits.values())
+    shared, *others = dict.fromkeys(hits.values())
     if not others and not any(pair.independent for pair in comparison.pairs):
-        return [f"{one} hits of each plate: the same shots at every plate, compared shot by shot."]
+        return [f"{shared} hits of each plate: the same shots at every plate, compared shot by shot."]
     lines = [f"Hits: {of_each(list(hits), list(map(str, hits.values())))}; all of them count."]
     for pair in comparison.pairs:
         if pair.independent:

@@ -155,10 +155,10 @@ def scores(dataset: xarray.Dataset, measures: Sequence[Measure], confidence: flo
     of_limits = attr.LIMIT in dataset.attrs
     reference = solid_limits(dataset) if of_limits else solid_reference(dataset)
     alone = base_alone_limits(dataset) if of_limits else base_alone(dataset)
-    for found in evidence(dataset, measures, confidence):
-        comparable = reference is not None and _is_comparable(found.measure, dataset, reference)
-        scored = _scored(found.shown(), dataset, reference if comparable else None, confidence)
-        yield replace(scored, score=replace(scored.score, alone=_value_of(alone, found.measure)))
+    for scored_evidence in evidence(dataset, measures, confidence):
+        comparable = reference is not None and _is_comparable(scored_evidence.measure, dataset, reference)
+        scored = _scored(scored_evidence.shown(), dataset, reference if comparable else None, confidence)
+        yield replace(scored, score=replace(scored.score, alone=_value_of(alone, scored_evidence.measure)))
 
 
 def _value_of(reference: xarray.Dataset | None, measure: Measure) -> float:
@@ -181,15 +181,15 @@ def _is_comparable(measure: Measure, dataset: xarray.Dataset, reference: xarray.
     return same_layer and math.isclose(*elsewhere, rel_tol=1e-9)
 
 
-def _scored(found: Evidence, dataset: xarray.Dataset, reference: xarray.Dataset | None, confidence: float) -> Scored:
-    measure, estimate = found.measure, found.estimate
+def _scored(given: Evidence, dataset: xarray.Dataset, reference: xarray.Dataset | None, confidence: float) -> Scored:
+    measure, estimate = given.measure, given.estimate
     solid = solid_drawn = None
     if reference is not None:
         of_solid = measure.display.factor * measure.counted(by_hit_of(reference, measure))
         solid = solid_drawn = _averaged_of_solid(measure, of_solid)
         if measure.kind == "worst_tenth" and len(of_solid) > 1:
             solid_drawn = measure.worse * by_draws(dataset, measure.worse * of_solid, worst_tenth_weights)
-    numbers = found.values if found.numbers is None else found.numbers
+    numbers = given.values if given.numbers is None else given.numbers
     against = Ratio.of(estimate, numbers, solid, {**dealing(dataset), "confidence": confidence})
     score = Score(
         measure=measure,
@@ -200,18 +200,18 @@ def _scored(found: Evidence, dataset: xarray.Dataset, reference: xarray.Dataset 
         ratio=against.value,
         ratio_low=against.low,
         ratio_high=against.high,
-        hit=None if found.worst_shot is None else int(dataset[v.HIT][found.worst_shot]),
+        hit=None if given.worst_shot is None else int(dataset[v.HIT][given.worst_shot]),
         parameters=estimate.parameters,
         numerics=estimate.numerics,
         assumptions=estimate.assumptions,
     )
-    if found.numbers is not None and score.parameters and solid_drawn is not None:
+    if given.numbers is not None and score.parameters and solid_drawn is not None:
         by_parameters = Estimate(against.value, math.nan, math.nan, 1, math.nan)
         if np.isfinite(solid_drawn).any() and np.nanmean(solid_drawn) > 0.0:
             ends = replace(by_parameters, low=against.low, high=against.high)
-            by_parameters = over_draws(dataset, ends, ratio_of_draws(found.drawn, solid_drawn)).within(0.0)
+            by_parameters = over_draws(dataset, ends, ratio_of_draws(given.drawn, solid_drawn)).within(0.0)
         score = replace(score, ratio_parameters=by_parameters.parameters or (math.nan, math.nan))
-    return Scored(score, found, solid, solid_drawn)
+    return Scored(score, given, solid, solid_drawn)
 
 
 def _averaged_of_solid(measure: Measure, values: Array) -> Array:

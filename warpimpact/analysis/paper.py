@@ -65,8 +65,8 @@ def check_scene(campaign: Campaign, name: str) -> None:
         CampaignError: the message has the campaign's `name`, and the first difference.
     """
     published = _scene(Campaign.from_toml(paper_campaign()))
-    if (found := first_difference(_scene(campaign), published)) is not None:
-        place, here, there = found
+    if (mismatch := first_difference(_scene(campaign), published)) is not None:
+        place, here, there = mismatch
         raise CampaignError(
             f"{name}: is not the paper's scene, so its shots cannot be compared with the paper's: {place} is {here} "
             f"here and {there} there; spacing, hit points and numerics may differ"

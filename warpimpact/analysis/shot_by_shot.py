@@ -52,9 +52,9 @@ def shot_by_shot(shared: Mapping[str, xarray.Dataset]) -> Section:
     Args:
         shared: as `shared_hits` gives them.
     """
-    (name, one), (reference, other) = shared.items()
-    numbers, sound = hit_numbers(one), ~(failed(one) | failed(other))
-    rows = [row for label, unit, a, b in _pairs(one, other) if (row := _row(label, unit, a, b, numbers, sound))]
+    (name, compared), (reference, other) = shared.items()
+    numbers, sound = hit_numbers(compared), ~(failed(compared) | failed(other))
+    rows = [row for label, unit, a, b in _pairs(compared, other) if (row := _row(label, unit, a, b, numbers, sound))]
     left_out = int((~sound).sum())
     sentence = f"{name} less {reference}, of the {len(numbers)} hits that both have" + (
         f"; {left_out} of them failed and count nowhere" if left_out else ""
@@ -65,7 +65,7 @@ def shot_by_shot(shared: Mapping[str, xarray.Dataset]) -> Section:
     )
     ended = (
         [f"{name} and {reference} end otherwise at hits {_text_of(numbers[differs])}"]
-        if (differs := sound & (passed(one) != passed(other))).any()
+        if (differs := sound & (passed(compared) != passed(other))).any()
         else []
     )
     return Section([sentence, *ended, *([Table(columns, rows)] if rows else [])], "shot by shot")
@@ -77,40 +77,40 @@ def _text_of(numbers: NDArray[np.int64]) -> str:
     return named + (f" and {len(numbers) - MOST_OTHERWISE} more" if len(numbers) > MOST_OTHERWISE else "")
 
 
-def _pairs(one: xarray.Dataset, other: xarray.Dataset) -> list[tuple[str, str, Array, Array]]:
+def _pairs(result: xarray.Dataset, other: xarray.Dataset) -> list[tuple[str, str, Array, Array]]:
     """Quantities with their units and values in both results."""
     pairs = [
-        (str(name), unit, one[name].values, other[name].values)
+        (str(name), unit, result[name].values, other[name].values)
         for name, unit in ((v.RESIDUAL_VELOCITY, "m/s"), (v.DEFLECTION, "°"))
     ]
-    for k, standoff in enumerate(one[v.STANDOFF].values):
+    for k, standoff in enumerate(result[v.STANDOFF].values):
         if k < other.sizes[v.STANDOFF] and other[v.STANDOFF].values[k] == standoff:
             label = f"tilt at {1e3 * standoff:g} mm"
-            pairs.append((label, "°", one[v.TILT].values[:, k], other[v.TILT].values[:, k]))
+            pairs.append((label, "°", result[v.TILT].values[:, k], other[v.TILT].values[:, k]))
     return pairs
 
 
 def _row(
-    label: str, unit: str, one: Array, other: Array, numbers: NDArray[np.int64], sound: NDArray[np.bool_]
+    label: str, unit: str, values: Array, other: Array, numbers: NDArray[np.int64], sound: NDArray[np.bool_]
 ) -> tuple[str, float, float, float, float, str] | None:
-    known = sound & ~np.isnan(one) & ~np.isnan(other)
+    known = sound & ~np.isnan(values) & ~np.isnan(other)
     if not known.any():
         return None
-    apart, hits = (one - other)[known].astype(np.float64), numbers[known]
+    apart, hits = (values - other)[known].astype(np.float64), numbers[known]
     order = np.argsort(-np.abs(apart), kind="stable")[:MOST_WORST]
     worst = ", ".join(f"{hits[k]} ({apart[k]:+.3g})" for k in order)
     head = f"{label.replace('_', ' ')}, {unit}"
-    ranked = rank_correlation(one[known], other[known])
+    ranked = rank_correlation(values[known], other[known])
     return head, float(known.sum()), float(apart.mean()), float(np.sqrt((apart**2).mean())), ranked, worst
 
 
-def rank_correlation(one: Array, other: Array) -> float:
+def rank_correlation(first: Array, second: Array) -> float:
     """Spearman's correlation; NaN for fewer than three hits, or where all values are the same."""
-    if len(one) < FEWEST_RANKED:
+    if len(first) < FEWEST_RANKED:
         return float("nan")
     from scipy.stats import rankdata
 
-    ranks = [rankdata(values) for values in (one, other)]
+    ranks = [rankdata(values) for values in (first, second)]
     if any(np.ptp(rank) == 0.0 for rank in ranks):
         return float("nan")
     return float(np.corrcoef(*ranks)[0, 1])

@@ -87,12 +87,12 @@ def over_draws(dataset: Result, estimate: Estimate, numbers: Array, *, units: st
     return replace(estimate, parameters=_no_less((low, high), (estimate.low, estimate.high)))
 
 
-def _no_less(found: tuple[float, float], by_hits: tuple[float, float]) -> tuple[float, float]:
+def _no_less(by_parameters: tuple[float, float], by_hits: tuple[float, float]) -> tuple[float, float]:
     """An interval by the parameters that is at least as wide as that by the hits, which also bound the number of a
     draw."""
     if math.isnan(sum(by_hits)):
-        return found
-    return min(found[0], by_hits[0]), max(found[1], by_hits[1])
+        return by_parameters
+    return min(by_parameters[0], by_hits[0]), max(by_parameters[1], by_hits[1])
 
 
 def draws_note(dataset: Result) -> str:

@@ -34,10 +34,10 @@ class FiniteElements(Model):
     @classmethod
     def _are_known(cls, names: tuple[str, ...], info: ValidationInfo) -> tuple[str, ...]:
         """Every name is one of the catalogue, or an absolute path of a file that has a set of constants."""
-        found = tuple(str(input_file(name, info)) if name.endswith(".toml") else name for name in names)
-        for name in found:
+        paths = tuple(str(input_file(name, info)) if name.endswith(".toml") else name for name in names)
+        for name in paths:
             flow_entry(name)
-        return found
+        return paths
 
     @property
     def entries(self) -> list[FlowEntry]:

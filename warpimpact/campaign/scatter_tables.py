@@ -43,11 +43,11 @@ def _taken(table: Any, field: str, place: str, layer: int) -> Distribution | Non
     key, at = (field[:-2], "yz".index(field[-1])) if field.startswith("offset") else (field, None)
     value: Any = table.get(key)
     pair = isinstance(value, list) and len(value) == 2
-    one = value if at is None else value[at] if pair else None
-    if not isinstance(one, dict):
+    entry = value if at is None else value[at] if pair else None
+    if not isinstance(entry, dict):
         return None
     known, label = SCATTERED[field], key if at is None else f"{key}[{at}]"
-    given = [*[None] * layer, one] if known.by_layer else one
+    given = [*[None] * layer, entry] if known.by_layer else entry
     try:
         ((_, distribution),) = Scatter.model_validate({field: given}).given.items()
     except ValidationError as error:

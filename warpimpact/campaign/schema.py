@@ -206,17 +206,17 @@ def _referred(schema: Schema, part: Schema) -> list[Schema]:
 
 def _take_plates(schema: Schema) -> None:
     """Several plates, each with a name, in a file for ``warpimpact compare``."""
-    one = schema["$defs"]["Plate"]
+    plate_schema = schema["$defs"]["Plate"]
     name = {"type": "string", "description": "Name of the plate and of its result; only where there are several."}
     layers = {
         "type": "array",
         "items": {"$ref": "#/$defs/Layer"},
         "description": "What stands behind this plate, in order.",
     }
-    schema["$defs"]["NamedPlate"] = one | {
+    schema["$defs"]["NamedPlate"] = plate_schema | {
         "description": "One of several plates that are compared.",
-        "properties": {"name": name, "layer": layers} | one["properties"],
-        "required": ["name", *one["required"]],
+        "properties": {"name": name, "layer": layers} | plate_schema["properties"],
+        "required": ["name", *plate_schema["required"]],
     }
     several = {"type": "array", "items": {"$ref": "#/$defs/NamedPlate"}, "minItems": 2}
     plate = schema["properties"]["plate"]

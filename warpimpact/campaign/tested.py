@@ -62,12 +62,12 @@ class Standing(NamedTuple):
 def standings_of(campaign: Campaign, materials: Mapping[str, Material]) -> list[Standing]:
     """Everything of a campaign that lies beyond what was measured; layers that say the same are told together."""
     figures = _figures()
-    found = list(_of_shot(campaign, figures))
+    standings = list(_of_shot(campaign, figures))
     for place, plate in campaign.target.named:
         material = None if plate.material is None else materials.get(plate.material)
-        found += [standing._replace(place=place) for standing in _of_plate(campaign, plate, material, figures)]
+        standings += [standing._replace(place=place) for standing in _of_plate(campaign, plate, material, figures)]
     places: dict[tuple[str, str], list[str]] = {}
-    for subject, text, place in found:
+    for subject, text, place in standings:
         places.setdefault((subject, text), []).append(place)
     return [Standing(subject, text, _joined(where)) for (subject, text), where in places.items()]
 

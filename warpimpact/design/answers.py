@@ -130,7 +130,7 @@ class Answers:
         new, begin = [design for design in designs.values() if design.text not in self._results], time.perf_counter()
         datasets = {label: self.result(design, cancel) for label, design in designs.items()}
         cancel.check()
-        own = datasets[THIS_DESIGN]
+        design_data = datasets[THIS_DESIGN]
         foreseen = sum(
             BESIDE + work_ahead(design.campaign, level) for design in (new if name == "full" else full.values())
         )
@@ -138,15 +138,15 @@ class Answers:
             self._pace = (time.perf_counter() - begin) / foreseen
         ahead = 0.0 if name == "full" else self._pace * foreseen
         most = MOST_HITS // len(datasets)
-        resolution = json.loads(own.attrs[attr.RESOLUTION]) if attr.RESOLUTION in own.attrs else {}
+        resolution = json.loads(design_data.attrs[attr.RESOLUTION]) if attr.RESOLUTION in design_data.attrs else {}
         return {
             "kind": "maps",
             "stage": name,
-            "hits": own.sizes["hit"],
+            "hits": design_data.sizes["hit"],
             "total": full[THIS_DESIGN].campaign.hits.count or 0,
             "ahead": ahead if math.isfinite(ahead) else 0.0,
-            "numerics": _FIRST if name == "first" else numerics_sentence(own),
-            "kept": not breaks_promise(own),
+            "numerics": _FIRST if name == "first" else numerics_sentence(design_data),
+            "kept": not breaks_promise(design_data),
             "level": resolution.get("level"),
             "data": page_data(
                 [thinned(dataset, most) for dataset in datasets.values()], _COARSE if name == "first" else PAGE_PIXELS

@@ -166,9 +166,9 @@ def _null_in(part: Any, place: str) -> str | None:
     """Place of the first null, which TOML does not have."""
     for key, value in part.items() if isinstance(part, dict) else enumerate(part) if isinstance(part, list) else ():
         inner = f"{place}[{key}]" if isinstance(key, int) else f"{place}.{key}".removeprefix(".")
-        found = inner if value is None else _null_in(value, inner)
-        if found is not None:
-            return found
+        null_place = inner if value is None else _null_in(value, inner)
+        if null_place is not None:
+            return null_place
     return None
 
 

@@ -122,7 +122,10 @@ class _Pages:
         every = [{stage.name: stage.design for stage in stages(self._shelf, other, level)} for _, other in others]
         plate = True
         for name, stage_design in stages(self._shelf, design, level):
-            at = [(label, one.get(name, one["full"])) for (label, _), one in zip(others, every, strict=True)]
+            at = [
+                (label, by_stage.get(name, by_stage["full"]))
+                for (label, _), by_stage in zip(others, every, strict=True)
+            ]
             designs = named(stage_design, at)
             maps = asyncio.ensure_future(
                 self._desk.do(_STAGES[name], partial(self._answers.maps, name, designs, full, level))
@@ -136,7 +139,7 @@ class _Pages:
                 yield told
             finally:
                 maps.cancel()
-            asks = name == "full" and any(has_assumptions(one.campaign) for one in designs.values())
+            asks = name == "full" and any(has_assumptions(by_stage.campaign) for by_stage in designs.values())
             yield await self._desk.do(
                 _STAGES[name], partial(self._answers.numbers, designs, name == "full" and not asks)
             )

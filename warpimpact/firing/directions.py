@@ -69,7 +69,7 @@ class Directions(Model):
         for name in ("azimuth", "elevation"):
             angles = np.degrees(getattr(self, name))
             if (np.diff(angles) <= 0.0).any():
-                raise ValueError(f"got {name} = {[f'{one:g}' for one in angles]} deg, but it must ascend")
+                raise ValueError(f"got {name} = {[f'{angle:g}' for angle in angles]} deg, but it must ascend")
         steepest = float(self.obliquities().max())
         if steepest > _LARGEST_OBLIQUITY:
             raise ValueError(f"got {math.degrees(steepest):.3g} deg from the normal, but at most 89 deg is allowed")
@@ -219,7 +219,9 @@ def _under_assumptions(
         [toward(first[numbers[which == place]], directions, cells[place]) for place in np.unique(which)]
     )
     given = np.concatenate([passed[cells[place]][numbers[which == place]] for place in np.unique(which)])
-    possible = [one for one in alternatives(campaign) if one.moves_limits and one.is_possible(shots)]
+    possible = [
+        candidate for candidate in alternatives(campaign) if candidate.moves_limits and candidate.is_possible(shots)
+    ]
     results = yield Round(
         [Job(_answers, (alternative.scene, alternative.shots(shots), numerics)) for alternative in possible],
         [f"assumption {alternative.name}" for alternative in possible],

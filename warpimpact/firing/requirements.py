@@ -116,8 +116,8 @@ def with_requirement(test: FiringTest) -> FiringTest:
     if velocity.tolerance and test.gun.window is None:
         updates["gun"] = {"deviation": test.gun.deviation, "window": velocity.tolerance}
     if asked.azimuth and test.target.campaign is not None:
-        own = Directions() if test.directions is None else test.directions
-        given = {name: getattr(own, name) for name in own.model_fields_set}
+        test_directions = Directions() if test.directions is None else test.directions
+        given = {name: getattr(test_directions, name) for name in test_directions.model_fields_set}
         angles = {
             "azimuth": [f"{math.radians(angle)!r} rad" for angle in asked.azimuth],
             "elevation": [f"{math.radians(angle)!r} rad" for angle in asked.elevation],

@@ -21,7 +21,7 @@ sequences", 2018)."""
 
 
 @dataclass(frozen=True)
-class Aim:
+class HitPoints:
     """The hit points over which one shot is integrated at some sets of parameters, at one scene.
 
     Attributes:
@@ -48,14 +48,14 @@ class Aim:
         """Places of the points [m], shape [sets, points, 2]."""
         return np.stack([self.shots.hit_y, self.shots.hit_z], axis=-1).reshape(*self.weight.shape, 2)
 
-    def of(self, hit: str | HitPlace, plate: Plate, core: Core) -> Aim:
+    def of(self, hit: str | HitPlace, plate: Plate, core: Core) -> HitPoints:
         """The same points, weighted for another class of hits."""
         inside = CLASSES[hit](plate, core, self.shots.hit_y, self.shots.hit_z) if isinstance(hit, str) else None
         weight = np.ones_like(self.weight) if inside is None else inside.reshape(self.weight.shape).astype(np.float64)
         return replace(self, weight=weight)
 
 
-def aim(shot: MeasuredShot, plate: Plate, core: Core, sampling: Sampling, shifts: Array) -> Aim:
+def aim(shot: MeasuredShot, plate: Plate, core: Core, sampling: Sampling, shifts: Array) -> HitPoints:
     """Points for a shot at some sets of parameters, spread over the cell of the plate.
 
     Args:
@@ -85,4 +85,4 @@ def aim(shot: MeasuredShot, plate: Plate, core: Core, sampling: Sampling, shifts
     even = not (placed or shot.scatter.given or plate.size is not None or alone)
     part = (np.array([high_y - low_y, high_z - low_z]) * cell, cell) if even else None
     weight = np.ones((len(shifts), count * len(group)))
-    return Aim(shots, group, weight, replicates, part).of(shot.hit, plate, core)
+    return HitPoints(shots, group, weight, replicates, part).of(shot.hit, plate, core)

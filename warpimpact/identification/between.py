@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from warpimpact.identification.aim import Aim
+from warpimpact.identification.aim import HitPoints
 from warpimpact.identification.measured import MEASURABLE, Observation
 from warpimpact.scene import Symmetry
 
@@ -24,7 +24,7 @@ def signs(observations: Sequence[Observation], group: Sequence[Symmetry]) -> Arr
     return np.array(factors, dtype=np.float64).reshape(len(group), len(mirrors))
 
 
-def changes(observations: Sequence[Observation], aim: Aim, computed: Array) -> Array:
+def changes(observations: Sequence[Observation], aim: HitPoints, computed: Array) -> Array:
     """Change of numbers over a standard deviation of the places that a computed point stands for.
 
     Args:

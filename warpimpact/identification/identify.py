@@ -225,10 +225,11 @@ def _check_reach(fit: Fit, scores: list[ShotScore]) -> None:
             )
             for place, observation in enumerate(shot.observations)
         ]
-        worst, one, place = max(missed, key=lambda miss: miss[0])
+        worst, number, place = max(missed, key=lambda miss: miss[0])
         if worst > FARTHEST:
             raise FitError(
-                f'the priors exclude shot "{shot.name}": the nearest of {sets} sets of parameters has {one.label} = '
-                f"{one.shown(score.best[nearest, place]):.4g} instead of {one.shown(one.value):.4g}, {worst:.3g} "
-                "standard deviations off with the largest discrepancy that its prior expects; widen the priors"
+                f'the priors exclude shot "{shot.name}": the nearest of {sets} sets of parameters has {number.label} = '
+                f"{number.shown(score.best[nearest, place]):.4g} instead of {number.shown(number.value):.4g}, "
+                f"{worst:.3g} standard deviations off with the largest discrepancy that its prior "
+                "expects; widen the priors"
             )

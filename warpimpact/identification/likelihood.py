@@ -22,7 +22,7 @@ from typing import Self
 import numpy as np
 from numpy.typing import NDArray
 
-from warpimpact.identification.aim import Aim
+from warpimpact.identification.aim import HitPoints
 from warpimpact.identification.between import changes, signs
 from warpimpact.identification.measured import Observation
 from warpimpact.records.group import failures
@@ -118,7 +118,7 @@ class Compared:
     """
 
     data: Data
-    aim: Aim
+    aim: HitPoints
     computed: Array
     missed: Array
     changes: Array
@@ -126,7 +126,7 @@ class Compared:
     counts: Array
 
     @classmethod
-    def of(cls, data: Data, aim: Aim, outcomes: Outcomes, known: Array | None = None) -> Self:
+    def of(cls, data: Data, aim: HitPoints, outcomes: Outcomes, known: Array | None = None) -> Self:
         """Compare sets of parameters with one measured shot.
 
         Args:
@@ -204,7 +204,7 @@ class Compared:
 
 
 def score(
-    data: Data, aim: Aim, outcomes: Outcomes, discrepancy: Mapping[str, Array], rng: np.random.Generator
+    data: Data, aim: HitPoints, outcomes: Outcomes, discrepancy: Mapping[str, Array], rng: np.random.Generator
 ) -> ShotScore:
     """Score sets of parameters against one measured shot; the arguments are those of `Compared`."""
     return Compared.of(data, aim, outcomes).score(discrepancy, rng)
@@ -238,7 +238,7 @@ def _median(values: Array, weight: Array) -> Array:
     return np.array(medians)[:, None]
 
 
-def _integrated(log: Array, counts: Array, aim: Aim) -> tuple[Array, Array, Array]:
+def _integrated(log: Array, counts: Array, aim: HitPoints) -> tuple[Array, Array, Array]:
     """ln of the mean over the points, and its standard error from the spread of the replicates, both of shape [sets];
     and the contribution of each point to the mean, as a share of the largest, shape [sets, points]."""
     highest = np.where(np.isfinite(log), log, -1e300).max(axis=1)

@@ -185,7 +185,7 @@ def _element(annotation: Any, index: int) -> Any:
         if len(inner) == 2 and inner[1] is Ellipsis:
             return inner[0]
         return inner[index] if index < len(inner) else None
-    return next((found for inner in get_args(annotation) if (found := _element(inner, index)) is not None), None)
+    return next((element for inner in get_args(annotation) if (element := _element(inner, index)) is not None), None)
 
 
 def with_medians(table: Any, prior: Any, parameters: Sequence[Parameter], path: Path = ()) -> Any:

@@ -143,21 +143,24 @@ def _labels(fit: Fit) -> list[tuple[int, int]]:
 
 
 def _along_observations(fit: Fit) -> dict[str, Any]:
-    names, ones = _names(fit), [fit.shots[place].observations[index] for place, index in _labels(fit)]
+    names, measured = _names(fit), [fit.shots[place].observations[index] for place, index in _labels(fit)]
     shots = [names[place] for place, _ in _labels(fit)]
     return {
-        "observation": [f"{shot}: {one.label}" for shot, one in zip(shots, ones, strict=True)],
+        "observation": [f"{shot}: {number.label}" for shot, number in zip(shots, measured, strict=True)],
         posterior_file.SHOT_OF: ("observation", shots),
-        posterior_file.UNITS_OF: ("observation", [one.units for one in ones]),
+        posterior_file.UNITS_OF: ("observation", [number.units for number in measured]),
     }
 
 
 def _observed(fit: Fit) -> xarray.Dataset:
-    ones = [fit.shots[place].observations[index] for place, index in _labels(fit)]
+    measured = [fit.shots[place].observations[index] for place, index in _labels(fit)]
     return xarray.Dataset(
         {
-            posterior_file.MEASURED: ("observation", np.array([float(one.shown(one.value)) for one in ones])),
-            posterior_file.STD: ("observation", np.array([float(one.shown(one.std)) for one in ones])),
+            posterior_file.MEASURED: (
+                "observation",
+                np.array([float(number.shown(number.value)) for number in measured]),
+            ),
+            posterior_file.STD: ("observation", np.array([float(number.shown(number.std)) for number in measured])),
         },
         _along_observations(fit),
     )

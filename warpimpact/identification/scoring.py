@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from warpimpact.identification.aim import Aim, aim
+from warpimpact.identification.aim import HitPoints, aim
 from warpimpact.identification.fit import Fit, MeasuredShot
 from warpimpact.identification.hit_places import HitPlace
 from warpimpact.identification.likelihood import Compared, Data, ShotScore
@@ -56,7 +56,7 @@ class Run:
 
     which: NDArray[np.int64]
     scene: Scene
-    aim: Aim
+    aim: HitPoints
     outcomes: Outcomes
 
 
@@ -81,26 +81,27 @@ def runs(fit: Fit, bench: Bench, points: Array, worker: Worker, *, seed: int = 0
     values = {
         parameter.path: parameter.at(points[alike[:, 0], column]) for column, parameter in enumerate(fit.parameters)
     }
-    own = {
+    by_path = {
         scene_parameter.path: values[scene_parameter.path]
         for scene_parameter in fit.scene_parameters
         if scene_parameter.path not in bench.shot.own
     }
-    columns = _as_columns(fit, own)
-    of_scene = {path: column for path, column in own.items() if path not in columns}
+    columns = _as_columns(fit, by_path)
+    of_scene = {path: column for path, column in by_path.items() if path not in columns}
     shifts = np.random.default_rng(np.random.SeedSequence(fit.sampling.seed, spawn_key=(4, seed))).random(
         (len(alike), 2)
     )
     per_call = max(1, SHOTS_AT_A_TIME // fit.sampling.hits)
     jobs = list[_Job]()
     for rows in _of_one_scene(of_scene, len(alike)):
-        own_scene = own if len(rows) == 1 else of_scene  # a single set needs no columns
+        own_scene = by_path if len(rows) == 1 else of_scene  # a single set needs no columns
         scene = fit.scene_of(bench.shot, {path: float(column[rows[0]]) for path, column in own_scene.items()})
         for first in range(0, len(rows), per_call):
             chosen = rows[first : first + per_call]
             targets = aim(bench.shot, scene.target.layers[0], scene.core, fit.sampling, shifts[chosen])
             of_sets = columns_of(
-                {path: column[chosen] for path, column in own.items() if path not in own_scene}, scene.target.layers[0]
+                {path: column[chosen] for path, column in by_path.items() if path not in own_scene},
+                scene.target.layers[0],
             )
             jobs.append(_Job(alike[chosen], scene, targets, with_own(targets.computed, of_sets)))
             if sum(len(job.shots) for job in jobs) >= SHOTS_AT_A_TIME:
@@ -123,7 +124,7 @@ class _Job(NamedTuple):
 
     which: NDArray[np.int64]
     scene: Scene
-    aim: Aim
+    aim: HitPoints
     shots: Shots
 
 

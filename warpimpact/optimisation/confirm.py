@@ -75,10 +75,10 @@ Follow = Callable[[int, int, str], object]
 """Called with the number of targets done, the number of all targets, and what is computed of them."""
 
 
-def confirm(design: Design, found: Searched, follow: Follow) -> Question[Confirmed]:
+def confirm(design: Design, searched: Searched, follow: Follow) -> Question[Confirmed]:
     """Compute the front, its solid plates and the references with fresh hits at the standard fidelity."""
-    numbers = spread(found.front, design.search.confirmed)
-    chosen = [found.records[int(number)] for number in numbers]
+    numbers = spread(searched.front, design.search.confirmed)
+    chosen = [searched.records[int(number)] for number in numbers]
     others = [_reference(design, place) for place in range(len(design.references))]
     records, places, draws = yield from _fresh(design, [*chosen, *others], follow)
     front = records[: len(chosen)]
@@ -152,11 +152,11 @@ def _fresh(
     ]
     if not design.keys:
         empty = np.zeros((len(situations), 0, count))
-        found = [
+        without_hits = [
             DesignRecord(target.values, target.tables, target.weights, ("",) * len(threats), empty)
             for target in targets
         ]
-        return found, np.zeros((len(targets), 2, 0)), [np.zeros(0)] * len(targets)
+        return without_hits, np.zeros((len(targets), 2, 0)), [np.zeros(0)] * len(targets)
     whose = "the front and references" if design.references else "the front"
     piloting = _telling(follow, len(targets), len(asked), f"pilots for fresh hits of {whose}")
     levels = yield from levels_asked(design, asked, piloting)
@@ -169,19 +169,19 @@ def _fresh(
     said = yield from hits_asked(design, jobs, _telling(follow, len(targets), len(jobs), f"fresh hits of {whose}"))
     records = []
     for number, target in enumerate(targets):
-        own = slice(number * len(situations), (number + 1) * len(situations))
+        jobs_of_target = slice(number * len(situations), (number + 1) * len(situations))
         records.append(
             DesignRecord(
                 values=target.values,
                 tables=target.tables,
                 weights=target.weights,
                 levels=of_targets[number],
-                said=np.array([part.values for part in said[own]]),
-                seconds=sum(part.seconds for part in said[own]),
+                said=np.array([part.values for part in said[jobs_of_target]]),
+                seconds=sum(part.seconds for part in said[jobs_of_target]),
             )
         )
     of_first = said[:: len(situations)]
-    return records, np.array([one.places for one in of_first]), [first.draws for first in of_first]
+    return records, np.array([first.places for first in of_first]), [first.draws for first in of_first]
 
 
 def _under_assumptions(
@@ -249,19 +249,19 @@ def _kept(design: Design, front: Sequence[DesignRecord]) -> NDArray[np.bool_]:
 
 def groups(design: Design, front: Sequence[DesignRecord]) -> NDArray[np.int64]:
     """For each design, the number of the first design of the front than which it is not certainly better."""
-    found = np.arange(len(front))
+    leaders_of = np.arange(len(front))
     for number, record in enumerate(front):
-        leaders = [lead for lead in range(number) if found[lead] == lead]
-        found[number] = next((lead for lead in leaders if not is_better(design, record, front[lead])), number)
-    return found
+        leaders = [lead for lead in range(number) if leaders_of[lead] == lead]
+        leaders_of[number] = next((lead for lead in leaders if not is_better(design, record, front[lead])), number)
+    return leaders_of
 
 
-def is_better(design: Design, one: DesignRecord, other: DesignRecord) -> bool:
+def is_better(design: Design, record: DesignRecord, other: DesignRecord) -> bool:
     """Whether one design is better than another in some objective at 95 %, by the same hits of both."""
     count = len(design.objectives)
     signs = np.array([asked.sign for asked in design.objectives])[:, None]
     theirs = means(design, other, other.hits)[:count]
-    low = interval(signs * (theirs - means(design, one, one.hits)[:count]))[0]
+    low = interval(signs * (theirs - means(design, record, record.hits)[:count]))[0]
     same = [SAME_WEIGHT if asked.asked.kind == "target" else ROUNDED for asked in design.objectives]
     return bool((low > np.array(same) * np.nan_to_num(np.abs(theirs)).max(axis=1)).any())
 
@@ -269,14 +269,14 @@ def is_better(design: Design, one: DesignRecord, other: DesignRecord) -> bool:
 def survival(design: Design, front: Sequence[DesignRecord], draws: Sequence[Array], leads: NDArray[np.bool_]) -> Array:
     """Whether the order of neighbours on the front survives the uncertainty of the parameters (`Confirmed.survival`).
     Hit k of every design takes the same draw."""
-    found = np.full((len(front), len(design.asked), 2), np.nan)
+    shares = np.full((len(front), len(design.asked), 2), np.nan)
     for number, following in pairwise(int(lead) for lead in np.flatnonzero(leads)):
-        one, other = front[number], front[following]
+        leader, follower = front[number], front[following]
         if not len(draws[number]) or not np.array_equal(draws[number], draws[following]):
             continue
         for row, asked in enumerate(design.asked):
-            apart = numbers_of(design, one, asked, one.hits) - numbers_of(design, other, asked, other.hits)
+            apart = numbers_of(design, leader, asked, leader.hits) - numbers_of(design, follower, asked, follower.hits)
             if asked.asked.kind != "target" and np.isfinite(apart).any():
                 share = positive_share(np.sign(np.nanmean(apart)) * apart, draws[number])
-                found[number, row] = (np.nan, np.nan) if share is None else (share.share, share.at_least)
-    return found
+                shares[number, row] = (np.nan, np.nan) if share is None else (share.share, share.at_least)
+    return shares

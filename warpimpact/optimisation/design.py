@@ -218,8 +218,8 @@ class Design:
         """
         data = dict(tables)
         for table in ("core", "impact"):
-            own = getattr(threat, table)
-            data[table] = dict(own) if table == "core" and own else data.get(table, {}) | own
+            overrides = getattr(threat, table)
+            data[table] = dict(overrides) if table == "core" and overrides else data.get(table, {}) | overrides
         for table, given in replaced.items():
             data[table] = data.get(table, {}) | given
         return _campaign(json.dumps(data, ensure_ascii=False), self.name, self.folder)
@@ -244,15 +244,15 @@ def read_design(path: str | Path) -> Design:
 def design_from(text: str, name: str, folder: Path) -> Design:
     """Read a design from its text; `name` is the name of the file in errors."""
     data = parsed(text, name, DESIGN)
-    own = {key: data.pop(key) for key in OWN_TABLES if key in data}
+    asking_tables = {key: data.pop(key) for key in OWN_TABLES if key in data}
     for table in ("stop", "burst"):
         if table in data:
             raise CampaignError(f"{name}: {table}: a design file takes no [{table}]; [search] sets the hits")
-    space = read_space(own.pop("variables", {}), name)
+    space = read_space(asking_tables.pop("variables", {}), name)
     try:
-        asking = Asking.model_validate(own)
+        asking = Asking.model_validate(asking_tables)
     except ValidationError as error:
-        raise CampaignError(f"{name}: {sentence(error, own)}") from None
+        raise CampaignError(f"{name}: {sentence(error, asking_tables)}") from None
     threats = asking.threats or (FacedThreat(name="threat"),)
     names = [threat.name for threat in threats] + [reference.name for reference in asking.references]
     if twice := next((name for name in names if names.count(name) > 1), None):

@@ -185,19 +185,19 @@ def _marched(
 ) -> tuple[list[Outcomes], float]:
     """Outcomes of the shots of scenes, each with its numerics as JSON, and their processor time [s]; reports the share
     of the shots that are done."""
-    found: dict[int, Outcomes] = {}
+    outcomes: dict[int, Outcomes] = {}
     begin, total = time.process_time(), sum(len(shots) for *_, shots in scenes)
     for level in dict.fromkeys(levels):
         numerics = Numerics.model_validate_json(level)
         same = [number for number, each_level in enumerate(levels) if each_level == level]
-        before = sum(len(scenes[number][2]) for number in found)
+        before = sum(len(scenes[number][2]) for number in outcomes)
 
         def progress(done: int, _: int, before: int = before) -> None:
             told((before + done) / total)
 
         some = simulate_many([scenes[number][1:] for number in same], numerics, worker, progress)
-        found |= zip(same, some, strict=True)
-    return [found[number] for number in range(len(scenes))], time.process_time() - begin
+        outcomes |= zip(same, some, strict=True)
+    return [outcomes[number] for number in range(len(scenes))], time.process_time() - begin
 
 
 def said_of(design: Design, table: HitTable) -> Array:
@@ -224,10 +224,10 @@ def level_of(design: Design, job: HitJob, worker: Worker) -> str:
         return campaign.numerics.model_dump_json()
     asked = campaign.numerics.model_copy(update={"fidelity": job.level, "accuracy": None})
     shots = hits_of(campaign, 0, pilot_size(asked.asked))
-    found = [limits_level(campaign, shots, key, asked, worker) for key in design.keys if key.is_limit]
-    if len(found) < len(design.keys):
-        found.append(pilot_of(campaign.scene, shots, asked, worker, aim=aim_of(campaign, job.count)).numerics)
-    return max(found, key=lambda numerics: numerics.level or 0).model_dump_json()
+    found_levels = [limits_level(campaign, shots, key, asked, worker) for key in design.keys if key.is_limit]
+    if len(found_levels) < len(design.keys):
+        found_levels.append(pilot_of(campaign.scene, shots, asked, worker, aim=aim_of(campaign, job.count)).numerics)
+    return max(found_levels, key=lambda numerics: numerics.level or 0).model_dump_json()
 
 
 def hits_asked(design: Design, jobs: Sequence[HitJob], tell: Told) -> Question[list[Said]]:

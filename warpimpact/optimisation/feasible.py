@@ -114,16 +114,16 @@ def _times(factor: float, value: float | None) -> float | None:
     return None if value is None else factor * value
 
 
-def _least(key: str, found: float, least: float | None, what: str, unit: str) -> Iterator[Violation]:
-    if least is not None and found < least * (1.0 - 1e-9):
-        text = f"{what} of {found:.4g} {unit}, but it must be at least {least:.4g} {unit}"
-        yield Violation(key, (least - found) / least, " ".join(text.split()))
+def _least(key: str, value: float, least: float | None, what: str, unit: str) -> Iterator[Violation]:
+    if least is not None and value < least * (1.0 - 1e-9):
+        text = f"{what} of {value:.4g} {unit}, but it must be at least {least:.4g} {unit}"
+        yield Violation(key, (least - value) / least, " ".join(text.split()))
 
 
-def _most(key: str, found: float, most: float | None, what: str, unit: str) -> Iterator[Violation]:
-    if most is not None and found > most * (1.0 + 1e-9):
-        text = f"{what} of {found:.4g} {unit}, but it must be at most {most:.4g} {unit}"
-        yield Violation(key, (found - most) / most, " ".join(text.split()))
+def _most(key: str, value: float, most: float | None, what: str, unit: str) -> Iterator[Violation]:
+    if most is not None and value > most * (1.0 + 1e-9):
+        text = f"{what} of {value:.4g} {unit}, but it must be at most {most:.4g} {unit}"
+        yield Violation(key, (value - most) / most, " ".join(text.split()))
 
 
 def hole_sizes(plate: Plate) -> tuple[float, float]:

@@ -270,15 +270,15 @@ def _shrinkage(dataset: xarray.Dataset) -> Iterator[str]:
 
 def _nearest(dataset: xarray.Dataset) -> Iterator[str]:
     """The design that comes nearest to the bounds, if none keeps them."""
-    limits, signs, found = dataset[f.ASKED_LIMIT].values, dataset[f.SIGN].values, dataset[f.FOUND].values
+    limits, signs, values = dataset[f.ASKED_LIMIT].values, dataset[f.SIGN].values, dataset[f.FOUND].values
     bounds = np.flatnonzero(~np.isnan(limits))
     over = np.maximum(
-        signs[bounds] * (found[:, bounds] - limits[bounds]) / np.maximum(np.abs(limits[bounds]), 1e-30), 0.0
+        signs[bounds] * (values[:, bounds] - limits[bounds]) / np.maximum(np.abs(limits[bounds]), 1e-30), 0.0
     )
     nearest = int(np.nanargmin(over.sum(axis=1))) if len(bounds) and np.isfinite(over).any() else 0
     asked = [
         f"{dataset[f.LABEL].values[bound]!s} {'<' if signs[bound] > 0 else '>'}= {limits[bound]:.4g}"
-        f" (nearest: {number_text(float(found[nearest, bound]))})"
+        f" (nearest: {number_text(float(values[nearest, bound]))})"
         for bound in bounds
     ]
     yield f"no design keeps the bounds: {'; '.join(asked) or 'no hit of any design could be computed'}"

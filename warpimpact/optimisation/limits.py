@@ -40,9 +40,9 @@ def limits_said(
 ) -> Array:
     """The values of a measure of limits, in its display unit, shape [shots]; NaN where the computation failed."""
     sought = sought_by(campaign, scene, key)
-    found = limits(scene, shots, sought, numerics, worker)
-    value = np.minimum(found.value, sought.highest)
-    value = np.where(failures(found.outcomes.status), np.nan, value)
+    limits_found = limits(scene, shots, sought, numerics, worker)
+    value = np.minimum(limits_found.value, sought.highest)
+    value = np.where(failures(limits_found.outcomes.status), np.nan, value)
     if key.name == "limit_areal_density":
         layer = scene.target.layers[sought.layer]
         value = scene.target.areal_density + layer.areal_density * (value / layer.thickness - 1.0)

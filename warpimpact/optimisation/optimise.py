@@ -41,9 +41,9 @@ def optimise(design: Design | str | Path, *, device: str = "auto", progress: Fol
         CampaignError: the file has a value that is not allowed, or no design keeps the constraints.
         DeviceError: the device is absent.
     """
-    one = design if isinstance(design, Design) else read_design(design)
+    asked = design if isinstance(design, Design) else read_design(design)
     with executor_for(device) as executor:
-        return _answered(one, executor, progress)
+        return _answered(asked, executor, progress)
 
 
 def optimise_to_file(
@@ -110,6 +110,6 @@ def _searched(design: Design, follow: Follow) -> Question[tuple[Searched, Confir
     def confirming(done: int, total: int, what: str) -> None:
         follow(replace(last[-1], done=done, total=total, resumed=0, what=what))
 
-    found = yield from search(design, kept)
-    confirmed = yield from confirm(design, found, confirming)
-    return found, confirmed
+    searched = yield from search(design, kept)
+    confirmed = yield from confirm(design, searched, confirming)
+    return searched, confirmed

@@ -42,11 +42,11 @@ def key_of(design: Design, place: int) -> str:
     return names[place] if names.count(names[place]) == 1 else f"{names[place]}_{place}"
 
 
-def to_dataset(design: Design, found: Searched, confirmed: Confirmed, made_by: Mapping[str, str]) -> xarray.Dataset:
+def to_dataset(design: Design, searched: Searched, confirmed: Confirmed, made_by: Mapping[str, str]) -> xarray.Dataset:
     """The Dataset of results/front.py."""
     asked, variables = design.asked, design.space.variables
-    on_front = np.zeros(len(found.records), dtype=np.int8)
-    on_front[found.front] = 1
+    on_front = np.zeros(len(searched.records), dtype=np.int8)
+    on_front[searched.front] = 1
     width = max(2, len(str(max(len(confirmed.numbers) - 1, 0))))
     columns: dict[Any, Any] = {
         f.NAME: _texts(variable.name for variable in variables),
@@ -56,10 +56,12 @@ def to_dataset(design: Design, found: Searched, confirmed: Confirmed, made_by: M
         f.LABEL: _texts(goal.asked.title for goal in asked),
         f.SIGN: [int(goal.sign) for goal in asked],
         f.ASKED_LIMIT: [goal.limit if isinstance(goal, Bound) else np.nan for goal in asked],
-        f.VALUE: np.array([record.values for record in found.records]).reshape(len(found.records), len(variables)),
-        f.HITS: [record.hits for record in found.records],
-        f.LEVELS: _texts(_levels(record) for record in found.records),
-        f.COST: [record.seconds for record in found.records],
+        f.VALUE: np.array([record.values for record in searched.records]).reshape(
+            len(searched.records), len(variables)
+        ),
+        f.HITS: [record.hits for record in searched.records],
+        f.LEVELS: _texts(_levels(record) for record in searched.records),
+        f.COST: [record.seconds for record in searched.records],
         f.ON_FRONT: on_front,
         f.NUMBER: confirmed.numbers,
         f.KEPT: confirmed.kept.astype(np.int8),
@@ -74,8 +76,8 @@ def to_dataset(design: Design, found: Searched, confirmed: Confirmed, made_by: M
         f.FRESH_LEVELS: _texts(_levels(record) for record in confirmed.records),
         f.REFERENCE: _texts(reference.name for reference in design.references),
         f.REFERENCE_CAMPAIGN: _texts(_campaign(design, record) for record in confirmed.references),
-        f.COMPUTED: found.history[:, 0].astype(np.int64),
-        f.VOLUME: found.history[:, 1],
+        f.COMPUTED: searched.history[:, 0].astype(np.int64),
+        f.VOLUME: searched.history[:, 1],
     }
     columns[f.UNTESTED] = _texts(_untested(design, record) for record in confirmed.records)
     if confirmed.assumptions:
@@ -83,7 +85,7 @@ def to_dataset(design: Design, found: Searched, confirmed: Confirmed, made_by: M
         of_front, of_references = np.split(confirmed.under, [len(confirmed.records)])
         columns |= {f.UNDER: of_front, f.REFERENCE_UNDER: of_references}
     for records, names in (
-        (found.records, (f.FOUND, f.FOUND_LOW, f.FOUND_HIGH)),
+        (searched.records, (f.FOUND, f.FOUND_LOW, f.FOUND_HIGH)),
         (confirmed.records, (f.FRESH, f.FRESH_LOW, f.FRESH_HIGH)),
         (confirmed.references, (f.REFERENCE_FOUND, f.REFERENCE_LOW, f.REFERENCE_HIGH)),
         (confirmed.solids, (f.SOLID,)),
@@ -92,9 +94,11 @@ def to_dataset(design: Design, found: Searched, confirmed: Confirmed, made_by: M
     if design.keys and len(confirmed.records):
         columns |= {f.HIT_Y: confirmed.places[:, 0], f.HIT_Z: confirmed.places[:, 1]}
         columns[f.HIT_VALUE] = np.array([record.said[0] for record in confirmed.records])
-    dataset = dataset_of(columns, {attr.REFERENCES: f.REFERENCES, **_attributes(design, found, made_by)})
+    dataset = dataset_of(columns, {attr.REFERENCES: f.REFERENCES, **_attributes(design, searched, made_by)})
     if confirmed.records:
-        targets = [campaign_of(design, one.tables, threat) for one in confirmed.records for threat in design.threats]
+        targets = [
+            campaign_of(design, fresh.tables, threat) for fresh in confirmed.records for threat in design.threats
+        ]
         dataset = dataset.assign_attrs({attr.EVIDENCE: summary_of_all(targets, "designs")})
     return dataset.set_coords([f.UNIT, f.LABEL])  # a selected value keeps its unit and its label
 
@@ -120,17 +124,17 @@ def _estimates(design: Design, records: Sequence[DesignRecord]) -> Array:
     return np.moveaxis(np.array(ends, dtype=float).reshape(len(records), len(design.asked), 3), -1, 0)
 
 
-def _attributes(design: Design, found: Searched, made_by: Mapping[str, str]) -> dict[str, Any]:
+def _attributes(design: Design, searched: Searched, made_by: Mapping[str, str]) -> dict[str, Any]:
     return {
         **made_by,
         attr.TITLE: design.title,
         attr.HISTORY: attr.history_line("optimise"),
         attr.SEED: design.search.seed,
         f.DESIGN: design.text,
-        f.OUTCOME: f.FEASIBLE if len(found.front) else f.NONE_FEASIBLE,
-        f.BOX: np.concatenate([found.reference, found.scale]),
-        f.REFUSED: found.refused,
-        f.PILOTS: found.pilots,
+        f.OUTCOME: f.FEASIBLE if len(searched.front) else f.NONE_FEASIBLE,
+        f.BOX: np.concatenate([searched.reference, searched.scale]),
+        f.REFUSED: searched.refused,
+        f.PILOTS: searched.pilots,
     }
 
 

@@ -167,30 +167,30 @@ class _State:
 
     def feasible(self, points: Iterable[Array]) -> list[Array]:
         """The points that keep the constraints."""
-        found = []
+        keeping = []
         for values in points:
             key = values.tobytes()
             if key not in self.drafts and key not in self.refused:
                 self._check(key, values)
             if key in self.drafts:
-                found.append(values)
-        return found
+                keeping.append(values)
+        return keeping
 
     def _check(self, key: bytes, values: Array) -> None:
         tables = self.design.tables(values)
-        found = checked(self.design, tables)
-        if found.violations or found.campaign is None:
-            self.refused[key] = found
+        checked_design = checked(self.design, tables)
+        if checked_design.violations or checked_design.campaign is None:
+            self.refused[key] = checked_design
             return
         nothing = np.zeros((len(self.design.situations), len(self.design.keys), 0))
-        self.drafts[key] = DesignRecord(values, tables, weights_of(found.campaign.target), (), nothing)
+        self.drafts[key] = DesignRecord(values, tables, weights_of(checked_design.campaign.target), (), nothing)
 
     def _compute(self, new: dict[bytes, DesignRecord]) -> Question[None]:
         """Compute hits of designs. Designs that may be on the front get the hits of the next rung."""
         levels = yield from self._levels(list(new.values()))
         for key, of_threats in zip(list(new), levels, strict=True):
-            one = new[key]
-            new[key] = DesignRecord(one.values, one.tables, one.weights, of_threats, one.said)
+            old = new[key]
+            new[key] = DesignRecord(old.values, old.tables, old.weights, of_threats, old.said)
         going, before = list(new), 0
         for hits in self.design.search.rungs if self.design.keys else [self.design.search.hits]:
             with_more = yield from self._more([new[key] for key in going], before, hits)
@@ -224,11 +224,11 @@ class _State:
             self.tell(f"{what}, {done / len(jobs):.0%}")
 
         said = yield from hits_asked(design, jobs, tell)
-        found = []
+        extended = []
         for number, record in enumerate(records):
-            own = said[number * each : (number + 1) * each]
-            found.append(record.more(np.array([part.values for part in own]), sum(part.seconds for part in own)))
-        return found
+            hits = said[number * each : (number + 1) * each]
+            extended.append(record.more(np.array([part.values for part in hits]), sum(part.seconds for part in hits)))
+        return extended
 
     def _levels(self, records: Sequence[DesignRecord]) -> Question[list[tuple[str, ...]]]:
         """Numerics of designs for every threat, from the pilot of a neighbour or one of their own."""
@@ -243,8 +243,8 @@ class _State:
                     centres.append((place, threat))
                     jobs.append(HitJob(record.tables, threat, 0, count, SEARCH_FIDELITY, self.design.search.seed))
         tell = lambda done, _: self.tell(f"{done:.0f} of {len(jobs)} pilots")  # noqa: E731
-        found = yield from levels_asked(self.design, jobs, tell)
-        self.pilots += [(*centre, level) for centre, level in zip(centres[len(self.pilots) :], found, strict=True)]
+        levels = yield from levels_asked(self.design, jobs, tell)
+        self.pilots += [(*centre, level) for centre, level in zip(centres[len(self.pilots) :], levels, strict=True)]
         return [tuple(self._nearest(place, threat) for threat in range(len(self.design.threats))) for place in places]
 
     def _nearest(self, place: Array, threat: int) -> str:
@@ -342,9 +342,9 @@ class _State:
         )
 
 
-def _apart(one: Array, other: Array) -> float:
-    return float(np.abs(one - other).max(initial=0.0))
+def _apart(place: Array, other: Array) -> float:
+    return float(np.abs(place - other).max(initial=0.0))
 
 
-def _near(one: Array, other: Array) -> bool:
-    return _apart(one, other) <= NEIGHBOURHOOD
+def _near(place: Array, other: Array) -> bool:
+    return _apart(place, other) <= NEIGHBOURHOOD

@@ -157,23 +157,23 @@ def read_space(given: Any, name: str) -> Space:
     """
     if not isinstance(given, dict):
         raise CampaignError(f"{name}: variables: got {quoted(given)}, but it must be a table")
-    found: list[DesignVariable] = []
+    variables: list[DesignVariable] = []
     for key, value in given.items():
-        _read(found, key, resolved(key, f"{name}: variables"), value, f"{name}: variables.{key}")
-    if len(found) > MOST_VARIABLES:
-        raise CampaignError(f"{name}: variables: got {len(found)}, but at most {MOST_VARIABLES} are searched")
-    places = [variable.place for variable in found if variable.under is None]
+        _read(variables, key, resolved(key, f"{name}: variables"), value, f"{name}: variables.{key}")
+    if len(variables) > MOST_VARIABLES:
+        raise CampaignError(f"{name}: variables: got {len(variables)}, but at most {MOST_VARIABLES} are searched")
+    places = [variable.place for variable in variables if variable.under is None]
     if twice := next((place for place in places if places.count(place) > 1), None):
         raise CampaignError(f"{name}: variables: got two variables for {twice}")
-    return Space(tuple(found))
+    return Space(tuple(variables))
 
 
-def _read(found: list[DesignVariable], name: str, place: str, given: Any, where: str, under: Any = None) -> None:
+def _read(variables: list[DesignVariable], name: str, place: str, given: Any, where: str, under: Any = None) -> None:
     """Add a variable and those below its alternatives."""
     if isinstance(given, dict) and "low" in given:
-        found.append(_range(name, place, given, where, under))
+        variables.append(_range(name, place, given, where, under))
     elif isinstance(given, list) and given:
-        _read_choice(found, name, place, given, where, under)
+        _read_choice(variables, name, place, given, where, under)
     else:
         raise CampaignError(
             f"{where}: got {quoted(given)}, but it must be a range, as "
@@ -216,7 +216,9 @@ def _number(value: float | str) -> float:
         return math.inf
 
 
-def _read_choice(found: list[DesignVariable], name: str, place: str, given: list[Any], where: str, under: Any) -> None:
+def _read_choice(
+    variables: list[DesignVariable], name: str, place: str, given: list[Any], where: str, under: Any
+) -> None:
     """A list of values, or of tables with names. Ranges and lists in a table are variables below the choice."""
     whole = is_table(place) or place == "layer" or all(isinstance(option, dict) for option in given)
     if whole and not all(isinstance(option, dict) and isinstance(option.get("name"), str) for option in given):
@@ -231,19 +233,19 @@ def _read_choice(found: list[DesignVariable], name: str, place: str, given: list
         raise CampaignError(f"{where}: got {quoted(wrong)}, but it must be one line without control characters")
     if len(set(labels)) < len(labels):
         raise CampaignError(f"{where}: got a value twice, but each must differ")
-    number, values, below = len(found), [], []
-    for option, one in enumerate(given):
+    number, values, below = len(variables), [], []
+    for option, option_value in enumerate(given):
         if not whole:
-            values.append(one)
+            values.append(option_value)
             continue
-        table = {key: part for key, part in one.items() if key != "name"}
+        table = {key: part for key, part in option_value.items() if key != "name"}
         inner: Any = table.get("layer", []) if place == "layer" else table
         values.append(inner)
         below += [(option, path, part) for path, part in _free(inner)]
-    found.append(DesignVariable(name, place, labels=labels, values=tuple(values), under=under))
+    variables.append(DesignVariable(name, place, labels=labels, values=tuple(values), under=under))
     for option, path, part in below:
         _read(
-            found,
+            variables,
             f"{name}[{labels[option]}].{path}",
             f"{place}.{path}",
             part,

@@ -43,8 +43,8 @@ def add_heading(figure: Figure, title: str, *notes: str) -> None:
 
 def inscribe(figure: Figure, dataset: xarray.Dataset, *notes: str, title: str = "") -> None:
     """Write the title of a result over a figure, or another one; below it the notes and the names of the catalogue."""
-    own = str(dataset.attrs.get(attr.TITLE, ""))
-    add_heading(figure, title or own, *([own] if title else []), *notes, *names(dataset))
+    run_title = str(dataset.attrs.get(attr.TITLE, ""))
+    add_heading(figure, title or run_title, *([run_title] if title else []), *notes, *names(dataset))
 
 
 def legend_below(figure: Figure, handles: Sequence[Artist], labels: Sequence[str], columns: int) -> None:

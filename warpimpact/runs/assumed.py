@@ -72,8 +72,8 @@ def assumed(campaign: Campaign, numerics: Numerics, compute: Computed, *, limits
         for alternative in possible
     ]
     outcomes = [
-        found if alternative.turned else found.unfolded(campaign.symmetries)
-        for alternative, found in zip(possible, compute(scenes), strict=True)
+        outcomes_of_one if alternative.turned else outcomes_of_one.unfolded(campaign.symmetries)
+        for alternative, outcomes_of_one in zip(possible, compute(scenes), strict=True)
     ]
     numbers = (places[:, None] * group + np.arange(group)).reshape(-1)
     columns = _columns(possible, outcomes, numbers)

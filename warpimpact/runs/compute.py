@@ -49,9 +49,9 @@ class HitMap:
         """See `compute`."""
         return compute(campaign, task, worker, progress)
 
-    def assumed(self, campaign: Campaign, found: Found | None, worker: Worker) -> HitTable:
+    def assumed(self, campaign: Campaign, findings: Found | None, worker: Worker) -> HitTable:
         """See `Computation.assumed`."""
-        numerics = numerics_of(campaign, found)
+        numerics = numerics_of(campaign, findings)
         return assumed(campaign, numerics, lambda scenes: simulate_many(scenes, numerics, worker))
 
     def pilot(
@@ -96,37 +96,37 @@ def compute(campaign: Campaign, task: Task, worker: Worker, progress: Progress |
     Raises:
         DeviceError: the device is absent.
     """
-    images, numerics = len(campaign.symmetries), numerics_of(campaign, task.found)
+    images, numerics = len(campaign.symmetries), numerics_of(campaign, task.findings)
     progress = of_images(progress, images)
     outcomes, elapsed = _outcomes(campaign.scene, task.shots[::images], numerics, worker, progress)
-    beside = finer_hits(campaign, task.found, pilot_most(campaign))
+    beside = finer_hits(campaign, task.findings, pilot_most(campaign))
     if task.solid is not None:
         beside |= solid_columns(_outcomes(*at_solid(campaign, task.solid), numerics, worker)[0])
         if campaign.layer:
             beside |= base_alone_columns(_outcomes(*at_base_alone(campaign, task.solid), numerics, worker)[0])
     attributes = computed_by(campaign, worker.device, len(outcomes), elapsed)
-    attributes |= found_attributes(campaign, task.found) | _errors(task.found)
+    attributes |= found_attributes(campaign, task.findings) | _errors(task.findings)
     attributes |= {attr.LEVEL_FOR: what} if (what := level_for(campaign)) else {}
     return described(campaign, task.shots, outcomes, numerics, attributes, beside)
 
 
-def finer_hits(campaign: Campaign, found: Found | None, most: int) -> dict[str, Any]:
+def finer_hits(campaign: Campaign, findings: Found | None, most: int) -> dict[str, Any]:
     """Columns of the hits that a pilot computed at a finer level.
 
     Args:
         most: most shots of the pilot, as in `pilot_shots`.
     """
-    if found is None or found.finer is None:
+    if findings is None or findings.finer is None:
         return {}
     group = len(campaign.symmetries) * campaign.at_a_plate
-    groups = len(found.finer) // campaign.at_a_plate
+    groups = len(findings.finer) // campaign.at_a_plate
     numbers = pilot_places(campaign, most)[:groups, None] * group + np.arange(group)
-    return finer_columns(found.finer.unfolded(campaign.symmetries), numbers.reshape(-1))
+    return finer_columns(findings.finer.unfolded(campaign.symmetries), numbers.reshape(-1))
 
 
-def numerics_of(campaign: Campaign, found: Found | None) -> Numerics:
+def numerics_of(campaign: Campaign, findings: Found | None) -> Numerics:
     """The numerics of the campaign, or what its pilot found."""
-    return campaign.numerics if found is None else found.numerics
+    return campaign.numerics if findings is None else findings.numerics
 
 
 def of_images(progress: Progress | None, images: int) -> Progress | None:
@@ -141,17 +141,17 @@ def found_in(result: Result) -> tuple[Numerics, bool, float]:
     return numerics, bool(attributes[attr.PROMISE_KEPT]), float(json.loads(attributes[attr.ACCURACY])["share"])
 
 
-def _errors(found: Found | None) -> dict[str, Any]:
+def _errors(findings: Found | None) -> dict[str, Any]:
     """The errors that a pilot of a hit map found, as attributes."""
-    if not isinstance(found, HitErrors):
+    if not isinstance(findings, HitErrors):
         return {}
     errors = {
-        attr.RESIDUAL_VELOCITY_ERROR: found.residual_velocity_error,
-        attr.TILT_ERROR: math.degrees(found.tilt_error),
-        attr.DEPTH_ERROR: found.depth_error,
-        attr.STATUS_ERROR: found.status_error,
+        attr.RESIDUAL_VELOCITY_ERROR: findings.residual_velocity_error,
+        attr.TILT_ERROR: math.degrees(findings.tilt_error),
+        attr.DEPTH_ERROR: findings.depth_error,
+        attr.STATUS_ERROR: findings.status_error,
     }
-    shifts = {attr.LEVEL_SHIFTS: json.dumps(found.shifts)} if found.shifts else {}
+    shifts = {attr.LEVEL_SHIFTS: json.dumps(findings.shifts)} if findings.shifts else {}
     return {name: error for name, error in errors.items() if not math.isnan(error)} | shifts
 
 

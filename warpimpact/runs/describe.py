@@ -97,16 +97,16 @@ def computed_by(campaign: Campaign, device: str, computed: int, elapsed: float) 
     return attributes
 
 
-def found_attributes(campaign: Campaign, found: Found | None) -> dict[str, Any]:
+def found_attributes(campaign: Campaign, findings: Found | None) -> dict[str, Any]:
     """Attributes on what a pilot was asked for and found; none without a pilot. The kind of computation adds the
     errors."""
-    if found is None:
+    if findings is None:
         return {}
     asked = {name: getattr(campaign.numerics.asked, name) for name in Accuracy.model_fields}
     given = {name: value for name, value in asked.items() if value is not None and math.isfinite(value)}
     return {
-        attr.RESOLUTION: found.numerics.model_dump_json(),
-        attr.PROMISE_KEPT: int(found.kept),
+        attr.RESOLUTION: findings.numerics.model_dump_json(),
+        attr.PROMISE_KEPT: int(findings.kept),
         attr.ACCURACY: json.dumps(given),
     }
 
@@ -150,7 +150,7 @@ def _campaign(campaign: Campaign) -> dict[str, Any]:
 def _impact(campaign: Campaign) -> str:
     """Impact quantities as JSON, each with its value or its distribution, and the distribution of the core's mass."""
     scatter = campaign.scatter.given.items()
-    given = {name: one.model_dump() for (name, _), one in scatter if not QUANTITIES[name].by_layer}
+    given = {name: law.model_dump() for (name, _), law in scatter if not QUANTITIES[name].by_layer}
     return json.dumps(dict(campaign.impact) | given)
 
 

@@ -43,13 +43,13 @@ def pilot_job(
 def assumed_job(
     computation: Computation,
     campaign: Campaign,
-    found: Found | None,
+    findings: Found | None,
     *,
     worker: Worker,
     report: Callable[[int], object],
 ) -> HitTable:
     """Compute some hits of a campaign under assumptions; reports nothing."""
-    return computation.assumed(campaign, found, worker)
+    return computation.assumed(campaign, findings, worker)
 
 
 def task_job(

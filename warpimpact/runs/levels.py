@@ -90,12 +90,12 @@ def _open_share(coarse: Array, fine: Array, hits: int) -> float:
     return shift / left_open
 
 
-def shifts_of(campaign: Campaign, pilot: Shots, found: HitErrors) -> dict[int, tuple[float, ...]]:
+def shifts_of(campaign: Campaign, pilot: Shots, findings: HitErrors) -> dict[int, tuple[float, ...]]:
     """Upper estimates of the shifts of the mean residual velocity [m/s] and the mean last tilt [degree] by the
     numerics, for every level that a pilot tried."""
     measures = [Measure.parse(text) for text in ("mean(residual_velocity)", *_last_tilts(campaign))]
     shifts: dict[int, tuple[float, ...]] = {}
-    for errors, *outcomes in found.tried:
+    for errors, *outcomes in findings.tried:
         coarse, fine = (_table(campaign, pilot[: len(outcome)], outcome) for outcome in outcomes)
         assert errors.numerics.level is not None
         shifts[errors.numerics.level] = tuple(shift_of(measure, (coarse, fine)) or 0.0 for measure in measures)

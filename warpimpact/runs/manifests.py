@@ -26,17 +26,17 @@ def difference(begun: Any, now: Any) -> str | None:
     return where and "{} was {} and is {}".format(*where)
 
 
-def first_difference(one: Any, other: Any, place: str = "") -> tuple[str, str, str] | None:
+def first_difference(left: Any, right: Any, place: str = "") -> tuple[str, str, str] | None:
     """Place and both values of the first difference between two nested dictionaries; None if they are equal."""
-    if _are_tables(one) and _are_tables(other) and len(one) == len(other):
-        one, other = ({str(place): table for place, table in enumerate(tables)} for tables in (one, other))
-    if isinstance(one, dict) and isinstance(other, dict):
-        for name in sorted(one.keys() | other.keys()):
+    if _are_tables(left) and _are_tables(right) and len(left) == len(right):
+        left, right = ({str(place): table for place, table in enumerate(tables)} for tables in (left, right))
+    if isinstance(left, dict) and isinstance(right, dict):
+        for name in sorted(left.keys() | right.keys()):
             inner = f"{place}.{name}".removeprefix("campaign.").strip(".")
-            if found := first_difference(one.get(name), other.get(name), inner):
-                return found
+            if inner_difference := first_difference(left.get(name), right.get(name), inner):
+                return inner_difference
         return None
-    return None if one == other else (place, _brief(one), _brief(other))
+    return None if left == right else (place, _brief(left), _brief(right))
 
 
 def _are_tables(value: Any) -> bool:

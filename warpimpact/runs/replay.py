@@ -119,11 +119,11 @@ def _at_their_limit(scene: Scene, shots: Shots, result: xarray.Dataset, place: i
     if result.attrs[attr.LIMIT] == "velocity":
         return replace(shots, velocity=np.full(len(shots), float(result[v.IMPACT_VELOCITY][place])))
     hit = result.isel(hit=place)
-    own = {name: values_of(scene.target, hit, name)[layer] for name in ("thickness", "resistance")}
+    values = {name: values_of(scene.target, hit, name)[layer] for name in ("thickness", "resistance")}
     given = scene.target.value("resistance", layer)
-    if own["resistance"] == given:  # the shot has the resistance of the scene
-        del own["resistance"]
-    return shots.with_own({name: np.full(len(shots), value) for name, value in own.items()}, layer)
+    if values["resistance"] == given:  # the shot has the resistance of the scene
+        del values["resistance"]
+    return shots.with_own({name: np.full(len(shots), value) for name, value in values.items()}, layer)
 
 
 def _numerics(campaign: Campaign, result: xarray.Dataset) -> Numerics:
@@ -158,9 +158,9 @@ def campaign_in(result: xarray.Dataset, folder: Path) -> Campaign:
     return campaign.model_copy(update={"hits": campaign.hits.model_copy(update={"replicates": dealt})})
 
 
-def _same(one: xarray.Dataset, other: xarray.Dataset, names: tuple[str, ...]) -> bool:
+def _same(dataset: xarray.Dataset, other: xarray.Dataset, names: tuple[str, ...]) -> bool:
     """Whether variables agree in every bit. NaN equals NaN."""
-    return all(np.array_equal(one[name], other[name], equal_nan=True) for name in names)
+    return all(np.array_equal(dataset[name], other[name], equal_nan=True) for name in names)
 
 
 def _agreement(end: xarray.Dataset, stored: xarray.Dataset) -> str:
@@ -174,8 +174,8 @@ def _agreement(end: xarray.Dataset, stored: xarray.Dataset) -> str:
     return "within rounding" if close and all(_alike(end[name], stored[name]) for name in names) else "different"
 
 
-def _alike(one: xarray.DataArray, other: xarray.DataArray) -> bool:
+def _alike(values: xarray.DataArray, other: xarray.DataArray) -> bool:
     """Whether codes are equal, and numbers stand in the same places."""
-    if one.dtype.kind == "f":
-        one, other = one.isnull(), other.isnull()
-    return bool((one == other).all())
+    if values.dtype.kind == "f":
+        values, other = values.isnull(), other.isnull()
+    return bool((values == other).all())

@@ -86,9 +86,9 @@ def with_assumptions(
     Args:
         device, cancel: as in `run`.
     """
-    found = HIT_MAP.found_in(dataset)
+    findings = HIT_MAP.found_in(dataset)
     with executor_for(device, cancel=cancel) as executor:
-        table = result_of(executor, assumed_job, HIT_MAP, campaign, None if found is None else found.told)
+        table = result_of(executor, assumed_job, HIT_MAP, campaign, None if findings is None else findings.told)
     assumed = in_memory(table.to_xarray())
     return dataset.assign(assumed.variables).assign_attrs(assumed.attrs)
 
@@ -184,8 +184,8 @@ def _fill(campaign: Campaign, computation: Computation, shards: Shards, executor
             shots = sampler.shots(task.start * shards.extent, len(task) * shards.extent)
             first = shots[: shards.extent] if task.start == 0 else None
             solid = None if first is None else solid_shots(campaign, first, computation.most_solid)
-            found = watch.found if task.start == 0 else found_alone
-            yield task, Job(task_job, (computation, campaign, Task(shots, solid, found)))
+            findings = watch.found if task.start == 0 else found_alone
+            yield task, Job(task_job, (computation, campaign, Task(shots, solid, findings)))
 
     def take(index: int, shard: HitTable) -> None:
         shards.save(index, shard)

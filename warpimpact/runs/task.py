@@ -24,12 +24,12 @@ class Task:
     Attributes:
         shots: whole groups of images, as the campaign's sampler gives them.
         solid: the shots among them that are also fired at the solid plate of equal areal density; None for none.
-        found: findings of the pilot; None if the campaign fixes the resolution.
+        findings: findings of the pilot; None if the campaign fixes the resolution.
     """
 
     shots: Shots
     solid: Shots | None = None
-    found: Found | None = None
+    findings: Found | None = None
 
 
 class Computation(Protocol):
@@ -54,11 +54,11 @@ class Computation(Protocol):
     def compute(self, campaign: Campaign, task: Task, worker: Worker, progress: Progress | None = None) -> HitTable:
         """Compute a task: the columns of results/dataset.py, one entry per shot. They are a complete result."""
 
-    def assumed(self, campaign: Campaign, found: Found | None, worker: Worker) -> HitTable:
+    def assumed(self, campaign: Campaign, findings: Found | None, worker: Worker) -> HitTable:
         """Some hits of the campaign under assumptions, by `runs.assumed.assumed`.
 
         Args:
-            found: as in a task.
+            findings: as in a task.
         """
 
     def pilot(self, campaign: Campaign, worker: Worker, trying: Callable[[int], object]) -> Found | None:

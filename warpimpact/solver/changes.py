@@ -30,7 +30,7 @@ TYPICAL = 0.75
 """Share of the first shots whose errors show how errors fall from level to level. The largest few fall by chance."""
 
 
-class Verdict(NamedTuple):
+class LevelVerdict(NamedTuple):
     """What the errors of a level say, over what is allowed.
 
     Attributes:
@@ -55,7 +55,7 @@ def compared(
     margin: float,
     shots: Shots,
     free: Sequence[bool],
-) -> tuple[HitErrors, Verdict]:
+) -> tuple[HitErrors, LevelVerdict]:
     """The errors of numerics, and their ratio to what is allowed.
 
     Args:
@@ -84,7 +84,7 @@ def compared(
     kept = excess <= 1.0 and not status > accuracy.status_share
     velocity, tilt, depth = (float(error) for error in upper())
     errors = HitErrors(numerics, kept, accuracy.share, velocity, tilt, depth, status, finer=fine)
-    return errors, Verdict(kept, excess, typical, weighed)
+    return errors, LevelVerdict(kept, excess, typical, weighed)
 
 
 def _relative(accuracy: Accuracy) -> tuple[float, float]:

@@ -115,7 +115,7 @@ def grids_of(
 def _grid(
     plate: Plate,
     resolution: Resolution,
-    own: Lengths,
+    lengths: Lengths,
     wider: float,
     deep: Materials | None,
     shared: bool,
@@ -127,11 +127,11 @@ def _grid(
         deep: material of the layer, where windows have planes through the thickness; else None.
     """
     nodal, spacing = resolution.nodal, wider * resolution.grid_spacing
-    cells = spacing if nodal else min(spacing / FINER, own.length / FINEST)
+    cells = spacing if nodal else min(spacing / FINER, lengths.length / FINEST)
     if shared:
         cells = 2.0 ** (math.floor(SHARED * math.log2(cells)) / SHARED)
-    taps = half_taps(0.0 if nodal else own.length, spacing)
-    planes = WHOLE if deep is None else _planes(own.depth, deep, resolution)
+    taps = half_taps(0.0 if nodal else lengths.length, spacing)
+    planes = WHOLE if deep is None else _planes(lengths.depth, deep, resolution)
     tile = tile_of(plate, cells, sharp=nodal, double=resolution.double)
     if nodal:  # its nodes are the tile's cells, which fit the period
         spacing = min(tile.dy, tile.dz)

@@ -101,12 +101,12 @@ class Sought:
         """The shots with the values to try, shape [shots]: velocities [m/s] or thicknesses [m]."""
         if self.quantity == "velocity":
             return replace(shots, velocity=values)
-        own = {"thickness": values}
+        values_of_layer = {"thickness": values}
         if self.by_thickness is not None:
             thickness, share = self.by_thickness
             there = np.interp(np.log(np.maximum(values, thickness[0])), np.log(thickness), share)
-            own["resistance"] = shots.own_of(target, "resistance", self.layer) * there
-        return shots.with_own(own, self.layer)
+            values_of_layer["resistance"] = shots.own_of(target, "resistance", self.layer) * there
+        return shots.with_own(values_of_layer, self.layer)
 
 
 def limit_velocity(
@@ -248,9 +248,9 @@ def _limits_of(
         def told(ended: int, before: int = done) -> None:
             progress(before + ended, len(shots))
 
-        search, found = _searched(scene, shots[which], sought, numerics, worker, near.guess(which), told)
+        search, batch = _searched(scene, shots[which], sought, numerics, worker, near.guess(which), told)
         near.learn(which, search)
-        parts.append(found)
+        parts.append(batch)
         done += len(which)
     return _joined(parts, np.argsort(order))
 
@@ -329,8 +329,9 @@ def check_arrests(scene: Scene, shots: Shots | None = None) -> None:
 
 def _weakens(plate: Plate, shots: Shots | None, layer: int) -> bool:
     """Whether a layer weakens in any of the shots."""
-    own = None if shots is None or not shots.differs("degradation", layer) else shots.columns["degradation"][:, layer]
-    return plate.degradation < 1.0 or (own is not None and bool((own < 1.0).any()))
+    if plate.degradation < 1.0 or shots is None or not shots.differs("degradation", layer):
+        return plate.degradation < 1.0
+    return bool((shots.columns["degradation"][:, layer] < 1.0).any())
 
 
 class _Kept:

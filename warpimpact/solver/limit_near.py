@@ -80,8 +80,8 @@ class Neighbours:
         linear, square = _curve(self._sums[:, known[who]].sum(axis=2))
         errors = [np.append(error[np.isfinite(error)], first) for error, first in zip(self._errors, DOUBT, strict=True)]
         doubt = np.array([np.clip(np.quantile(error, WITHIN), LEAST, MOST) for error in errors])
-        found = np.maximum(trend[0][which] + told, 0.1 * value.min())
-        return Guess(found, np.minimum(scale * (sure + least), 0.5 * found), linear, square, doubt)
+        expected = np.maximum(trend[0][which] + told, 0.1 * value.min())
+        return Guess(expected, np.minimum(scale * (sure + least), 0.5 * expected), linear, square, doubt)
 
     def _places(self, which: NDArray[np.int64], weights: Array, place: float, images: int | None = None) -> Array:
         """Coordinates of some shots, then of their images, shape [shots × images, 2 + conditions]. The first two
@@ -107,18 +107,18 @@ class _Near:
         self._tree = KDTree(places, boxsize=[period, period, *np.zeros(places.shape[1] - 2)])
 
     def told(
-        self, places: Array, values: Array, own: NDArray[np.int64] | None = None
+        self, places: Array, values: Array, left_out: NDArray[np.int64] | None = None
     ) -> tuple[Array, Array, NDArray[np.int64]]:
         """Predict values at places from the nearest shots: the values, their doubt, and the numbers of the nearest.
 
         Args:
             values: values at the shots and their images.
-            own: number of the shot at each place, which is left out of its own prediction.
+            left_out: number of the shot at each place, which is left out of its own prediction.
         """
-        count = NEAREST if own is None else NEAREST + self._images
+        count = NEAREST if left_out is None else NEAREST + self._images
         distance, near = self._tree.query(places, min(count, self._count * self._images))
-        if own is not None:
-            distance = np.where(near % self._count == own[:, None], np.inf, distance)
+        if left_out is not None:
+            distance = np.where(near % self._count == left_out[:, None], np.inf, distance)
             order = np.argsort(distance, axis=1)[:, :NEAREST]
             distance, near = (np.take_along_axis(array, order, axis=1) for array in (distance, near))
         weight = 1.0 / (distance + 1e-9 + 0.1 * distance[:, -1:]) ** 2

@@ -11,7 +11,7 @@ from typing import TypeVar
 from warpimpact.records.outcomes import Outcomes
 from warpimpact.scene import Numerics, Scene, Shots
 from warpimpact.solver.device import find_device, launching
-from warpimpact.solver.marching import Helpers, March, Progress
+from warpimpact.solver.marching import Helpers, Marching, Progress
 from warpimpact.solver.memory import Memory
 from warpimpact.solver.prepare import prepare
 from warpimpact.solver.simulate import outcomes_of
@@ -47,7 +47,7 @@ def simulate_many(
     device, lock, total = find_device(worker.device), threading.Lock(), sum(len(shots) for _, shots in scenes)
     done = [0] * len(scenes)
 
-    def outcomes(number: int, own: Worker, helpers: Helpers | None) -> Outcomes:
+    def outcomes(number: int, share: Worker, helpers: Helpers | None) -> Outcomes:
         def told(some: int, _: int) -> None:
             with lock:
                 done[number] = some
@@ -55,9 +55,9 @@ def simulate_many(
                     progress(sum(done), total)
 
         prepared = prepare(*scenes[number], numerics)
-        memory = Memory(prepared, device, own.cancel)
-        march = March(memory, 1, helpers)
-        contact = march.march(told, own.cancel)
+        memory = Memory(prepared, device, share.cancel)
+        march = Marching(memory, 1, helpers)
+        contact = march.march(told, share.cancel)
         return outcomes_of(march.memory, contact)
 
     return side_by_side(outcomes, len(scenes), worker)

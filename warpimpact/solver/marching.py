@@ -51,7 +51,7 @@ class Helpers(NamedTuple):
     threads: int
 
 
-class March:
+class Marching:
     """The march of the shots in the memory of a device; see `simulate` for the arguments.
 
     Attributes:
@@ -67,7 +67,7 @@ class March:
         self.cells = self._window_cells()
 
     def march(self, progress: Progress | None = None, cancel: Cancel = NEVER) -> Any:
-        """March all shots, and march those again in wider windows which leave theirs."""
+        """Marching all shots, and march those again in wider windows which leave theirs."""
         outcomes = self.memory.outcomes()
         count = len(outcomes.status)
 
@@ -114,7 +114,7 @@ class March:
         return self.memory.slots(cells, self.threads) > 0
 
     def _march_some(self, which: Numbers, outcomes: Any, progress: Progress1) -> None:
-        """March the shots of the given indices in windows of one size."""
+        """Marching the shots of the given indices in windows of one size."""
         memory, cells = self.memory, self.cells
         load(memory.stage.kernel, memory.device)
         slots = memory.slots(cells, self.threads)

@@ -33,7 +33,7 @@ from numpy.typing import NDArray
 
 from warpimpact.records.outcomes import Outcomes
 from warpimpact.scene import PRESETS, Accuracy, Numerics, Shots
-from warpimpact.solver.changes import Verdict, compared, fewest, limit_changes
+from warpimpact.solver.changes import LevelVerdict, compared, fewest, limit_changes
 from warpimpact.solver.findings import HitErrors, LimitErrors, Tried
 from warpimpact.solver.resolution import LADDER, at_level, coarsest_level
 
@@ -94,7 +94,7 @@ class Aim(NamedTuple):
 
 
 def climb(
-    judge: Callable[[int, int], Verdict],
+    judge: Callable[[int, int], LevelVerdict],
     levels: range,
     beyond: int,
     worth: Callable[[int, int], bool] = lambda level, finer: True,
@@ -107,7 +107,7 @@ def climb(
         beyond: number of levels to try behind one that nearly keeps the promise.
         worth: whether a level and the finer one of its comparison are worth their cost.
     """
-    tried: dict[int, Verdict] = {}
+    tried: dict[int, LevelVerdict] = {}
     enough: int | None = None
     level, last = levels[0], levels[-1]
 
@@ -244,7 +244,7 @@ class _Pilot:
             self.known[level] = Outcomes.joined([self.known[level], more]) if level in self.known else more
         return self.known[level][:count]
 
-    def judge(self, level: int, finer: int) -> Verdict:
+    def judge(self, level: int, finer: int) -> LevelVerdict:
         """Judge a level by its change to a finer one, with more shots until they decide whether it keeps the
         promise."""
         first = verdict = self.judged(level, finer, self.counts[0])
@@ -254,7 +254,7 @@ class _Pilot:
             verdict = self.judged(level, finer, count)
         return verdict._replace(typical=first.typical)
 
-    def decided(self, level: int, verdict: Verdict) -> bool:
+    def decided(self, level: int, verdict: LevelVerdict) -> bool:
         """Whether more shots would hardly change the verdict."""
         if self.aim is not None:
             low, high = OPEN_MEASURE
@@ -263,7 +263,7 @@ class _Pilot:
         few = self.numerics.asked.status_share < errors.status_error <= OPEN_STATUS / len(coarse)
         return not low < verdict.excess < high and not (few and verdict.excess <= low)
 
-    def judged(self, level: int, finer: int, count: int) -> Verdict:
+    def judged(self, level: int, finer: int, count: int) -> LevelVerdict:
         """Judge a level by its change to a finer one, with the first `count` shots."""
         coarse, fine = self.at(level, count), self.at(finer, count)
         errors, verdict = self.compared(at_level(level, self.numerics), coarse, fine, coarse)
@@ -279,7 +279,7 @@ class _Pilot:
             errors = replace(errors, status_error=min(coarser), kept=kept)
         if self.aim is not None:
             excess = self.shifts[level] = self.aim.excess(coarse, fine, self.shots[:count])
-            by_aim = Verdict(excess <= 1.0, excess, excess, math.inf)
+            by_aim = LevelVerdict(excess <= 1.0, excess, excess, math.inf)
             verdict = by_aim if self.aim.alone else verdict._replace(kept=errors.kept or by_aim.kept)
             errors = replace(errors, kept=verdict.kept)
         _logger.info("pilot: %d shots at level %d err by %s, kept: %s", count, level, errors.errors, errors.kept)
@@ -288,7 +288,7 @@ class _Pilot:
 
     def compared(
         self, numerics: Numerics, coarse: Outcomes, fine: Outcomes, between: Outcomes
-    ) -> tuple[HitErrors, Verdict]:
+    ) -> tuple[HitErrors, LevelVerdict]:
         """`changes.compared` for this pilot's shots, at numerics of a level."""
         assert numerics.level is not None
         margin, shots = ERROR_PER_CHANGE[min(2, len(LADDER) - 1 - numerics.level)], self.shots[: len(fine)]
@@ -322,7 +322,7 @@ class _Pilot:
         settings = dict[str, int]()
         plain, verdict = self.compared(errors.numerics, coarse, fine, coarse)
 
-        def excess(verdict: Verdict) -> float:
+        def excess(verdict: LevelVerdict) -> float:
             return verdict.excess if errors.kept else verdict.weighed
 
         for name in SETTINGS:
@@ -365,12 +365,12 @@ def pilot_limits(limits_at: Callable[[int], Array], numerics: Numerics, quantity
     limit = (1.0 if quantity == "velocity" else 2.0) * asked.limit
     limits, tried = cache(limits_at), dict[int, LimitErrors]()
 
-    def judge(level: int, finer: int) -> Verdict:
+    def judge(level: int, finer: int) -> LevelVerdict:
         change, half, typical = limit_changes(limits(level), limits(finer), asked.share)
         margin, allowed = ERROR_PER_CHANGE[finer - level], limit * typical
         kept, excess = margin * change <= allowed, margin * half / max(allowed, 1e-30)
         tried[level] = LimitErrors(at_level(level, numerics), kept, asked.share, margin * change, quantity, finer)
-        return Verdict(kept, excess, excess, excess)
+        return LevelVerdict(kept, excess, excess, excess)
 
     first = min(coarsest_level(usual / asked.limit), FINEST_LIMIT)
     level = climb(judge, range(first, FINEST_LIMIT + 1), 2)

@@ -20,7 +20,7 @@ from warpimpact.solver.device import find_device, free_memory
 from warpimpact.solver.earlier import channel_nodes, planes_of
 from warpimpact.solver.grid import WHOLE
 from warpimpact.solver.history import History
-from warpimpact.solver.marching import March, apart
+from warpimpact.solver.marching import Marching, apart
 from warpimpact.solver.memory import Memory
 from warpimpact.solver.prepare import Prepared, prepare
 from warpimpact.solver.simulate import outcomes_of
@@ -161,8 +161,8 @@ def _over_time(number: int, left: list[dict[int, Weakened]]) -> Weakened:
     return last._replace(share=np.stack([share(layer.get(number)) for layer in left]))
 
 
-def traced(scene: Scene, shots: Shots, numerics: Numerics, snapshots: int = 0) -> tuple[March, Any]:
-    """March shots on the CPU with their histories; returns the march, and the outcomes on the device.
+def traced(scene: Scene, shots: Shots, numerics: Numerics, snapshots: int = 0) -> tuple[Marching, Any]:
+    """Marching shots on the CPU with their histories; returns the march, and the outcomes on the device.
 
     They march twice, because the largest number of steps that a shot may take is thousands of times the real one.
 
@@ -171,7 +171,7 @@ def traced(scene: Scene, shots: Shots, numerics: Numerics, snapshots: int = 0) -
     """
     prepared = replace(prepare(scene, shots, numerics), slide=False)
     device = find_device("cpu")
-    first = March(Memory(prepared, device))
+    first = Marching(Memory(prepared, device))
     steps = int(first.march().steps.numpy().max())
     cells = sum(math.prod(window) for window in first.memory.prepared.windows(first.cells))
     of_a_cell = 8 * (SNAPSHOT_COPIES * snapshots + OTHER_COPIES) if snapshots else 0
@@ -185,7 +185,7 @@ def traced(scene: Scene, shots: Shots, numerics: Numerics, snapshots: int = 0) -
     _logger.info(
         "a history of %d steps and %d snapshots of %d cells, %.3g GiB", steps, snapshots, cells, needed / 2**30
     )
-    march = March(Memory(replace(prepared, rows=steps + 1), device))
+    march = Marching(Memory(replace(prepared, rows=steps + 1), device))
     if len(shots) == march.at_a_plate:  # shots at several plates would all get the widest window
         march.widen(first.cells)
         march.sizes = 1  # a shot that left this window would take more steps in a wider one

@@ -15,7 +15,7 @@ from warpimpact.records.outcomes import Outcomes
 from warpimpact.scene import Numerics, Scene, Shots
 from warpimpact.solver.device import find_device
 from warpimpact.solver.findings import HitErrors, LevelCost
-from warpimpact.solver.marching import March, Progress
+from warpimpact.solver.marching import Marching, Progress
 from warpimpact.solver.memory import Memory
 from warpimpact.solver.pilot import Aim, pilot_hits, pilot_size
 from warpimpact.solver.prepare import Prepared, prepare
@@ -65,7 +65,7 @@ def computed(prepared: Prepared, worker: Worker, progress: Progress | None = Non
 
 def marched(memory: Memory, worker: Worker, progress: Progress | None = None) -> Outcomes:
     """Compute a scene in the memory of a device; see `simulate`."""
-    march = March(memory, worker.threads)
+    march = Marching(memory, worker.threads)
     contact = march.march(progress, worker.cancel)
     return outcomes_of(march.memory, contact)
 

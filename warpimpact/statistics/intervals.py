@@ -56,8 +56,8 @@ class Estimate:
         parameters = self.parameters and (factor * self.parameters[0], factor * self.parameters[1])
         numerics = None if self.numerics is None else factor * self.numerics
         assumptions = {name: factor * number for name, number in self.assumptions.items()}
-        own = replace(self, parameters=parameters, numerics=numerics, assumptions=assumptions)
-        return replace(own, value=value, low=low, high=high, spread=spread)
+        scaled = replace(self, parameters=parameters, numerics=numerics, assumptions=assumptions)
+        return replace(scaled, value=value, low=low, high=high, spread=spread)
 
     def within(self, least: float, most: float = math.inf) -> Self:
         """The estimate with the ends of its intervals limited to a range."""

@@ -124,16 +124,16 @@ class LimitMap:
         Args:
             progress: as in `simulate`.
         """
-        sought, images, found = self.sought, len(campaign.symmetries), task.found
-        numerics, together = numerics_of(campaign, found), extent(len(campaign.sampler())) // images
+        sought, images, findings = self.sought, len(campaign.symmetries), task.findings
+        numerics, together = numerics_of(campaign, findings), extent(len(campaign.sampler())) // images
         progress, shots = of_images(progress, images), task.shots[::images]
         begin = time.perf_counter()
         searched = limits(campaign.scene, shots, sought, numerics, worker, progress, together)
         elapsed = time.perf_counter() - begin
         attributes = {
             **computed_by(campaign, worker.device, len(shots), elapsed),
-            **found_attributes(campaign, found),
-            **({attr.LIMIT_ERROR: found.error} if isinstance(found, LimitErrors) else {}),
+            **found_attributes(campaign, findings),
+            **({attr.LIMIT_ERROR: findings.error} if isinstance(findings, LimitErrors) else {}),
             attr.HISTORY: attr.history_line(f"limit --quantity {sought.quantity}"),
             attr.LIMIT: sought.quantity,
             attr.LIMIT_LAYER: sought.layer,
@@ -143,7 +143,7 @@ class LimitMap:
         }
         if sought.quantity == "velocity" and (factors := limit_velocity_factors(campaign)) is not None:
             attributes[attr.LIMIT_FACTORS] = list(factors)
-        beside = finer_hits(campaign, found, limits_pilot_size(campaign.numerics.asked))
+        beside = finer_hits(campaign, findings, limits_pilot_size(campaign.numerics.asked))
         if task.solid is not None:
             solid, of_solid = self._at_solid(campaign, task.solid, numerics, worker)
             attributes |= of_solid
@@ -179,15 +179,15 @@ class LimitMap:
         searched = limits(*at_base_alone(campaign, shots), replace(sought, layer=0), numerics, worker)
         return {v.BASE_ALONE_LIMITS[sought.quantity]: searched.value}
 
-    def assumed(self, campaign: Campaign, found: Found | None, worker: Worker) -> HitTable:
+    def assumed(self, campaign: Campaign, findings: Found | None, worker: Worker) -> HitTable:
         """See `Computation.assumed`."""
-        sought, numerics = self.sought, numerics_of(campaign, found)
+        sought, numerics = self.sought, numerics_of(campaign, findings)
 
         def searched(scenes: list[tuple[Scene, Shots]]) -> list[Outcomes]:
-            def of_scene(number: int, own: Worker, _: Helpers | None) -> Outcomes:
+            def of_scene(number: int, share: Worker, _: Helpers | None) -> Outcomes:
                 scene, shots = scenes[number]
                 by_path = scene.model_copy(update={"target": scene.target.by_path(campaign.impact.velocity)})
-                return limits(by_path, shots, sought, numerics, own).recorded(sought.quantity)
+                return limits(by_path, shots, sought, numerics, share).recorded(sought.quantity)
 
             return side_by_side(of_scene, len(scenes), worker)
 

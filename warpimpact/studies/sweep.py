@@ -258,21 +258,21 @@ def _with(every: Mapping[str, Any], point: xarray.Dataset) -> xarray.Dataset:
     return point.reindex(other) if other else point
 
 
-def _equal(one: xarray.Variable, other: xarray.Variable) -> bool:
-    return np.array_equal(one.values, other.values, equal_nan=one.dtype.kind == "f")
+def _equal(value: xarray.Variable, other: xarray.Variable) -> bool:
+    return np.array_equal(value.values, other.values, equal_nan=value.dtype.kind == "f")
 
 
-def _coordinate(one: Input, sweep: Sweep) -> tuple[Any, ...]:
+def _coordinate(swept: Input, sweep: Sweep) -> tuple[Any, ...]:
     """Values of an input: a number with its unit where it is a quantity, else its label."""
-    kind = type_at(one.key, next(iter(sweep.campaigns.values())))
-    stride = math.prod(sweep.shape[sweep.inputs.index(one) + 1 :])
-    campaigns = list(sweep.campaigns.values())[:: max(1, stride)][: len(one.values)]
-    numbers = [value_at(one.key, campaign) for campaign in campaigns]
+    kind = type_at(swept.key, next(iter(sweep.campaigns.values())))
+    stride = math.prod(sweep.shape[sweep.inputs.index(swept) + 1 :])
+    campaigns = list(sweep.campaigns.values())[:: max(1, stride)][: len(swept.values)]
+    numbers = [value_at(swept.key, campaign) for campaign in campaigns]
     if kind is None or not all(isinstance(number, int | float) for number in numbers):
-        return one.name, np.array(one.labels), {"long_name": one.key}
+        return swept.name, np.array(swept.labels), {"long_name": swept.key}
     reader, values = reader_in(kind), np.array(numbers, dtype=float)
     units = reader.display.stored if reader else "1"
-    return one.name, np.degrees(values) if units == "degree" else values, {"units": units, "long_name": one.key}
+    return swept.name, np.degrees(values) if units == "degree" else values, {"units": units, "long_name": swept.key}
 
 
 def _attributes(sweep: Sweep, points: Sequence[xarray.Dataset]) -> dict[str, Any]:

@@ -66,7 +66,7 @@ def test_a_hit_does_not_depend_on_its_company(tmp_path: Path) -> None:
     whole = run(campaign, device="cpu")
     found = HitMap().found_in(whole)
     for hit in range(0, 64, 9):
-        alone = compute(campaign, Task(campaign.sampler().shots(hit, 1), found=found), Worker("cpu"))
+        alone = compute(campaign, Task(campaign.sampler().shots(hit, 1), findings=found), Worker("cpu"))
         for name in OUTCOME_VARIABLES:
             assert np.array_equal(alone[name].values[0], whole[name][hit], equal_nan=True), name
 

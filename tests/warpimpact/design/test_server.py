@@ -31,7 +31,7 @@ from warpimpact.results import attributes as attr
 from warpimpact.results import files, front
 from warpimpact.scene.input_files import input_file
 from warpimpact.scene.model import Model
-from warpimpact.solver.marching import March
+from warpimpact.solver.marching import Marching
 
 CAMPAIGNS = Path(__file__).parents[3] / "campaigns"
 
@@ -249,13 +249,13 @@ def test_a_first_map_takes_little(small: Path) -> None:
 def test_who_leaves_ends_the_work(address: str, small: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     tables = tables_of(small)
     tables["hits"]["count"] = 2**18
-    marched, march = [], March.march
+    marched, march = [], Marching.march
 
-    def marching(self: March, progress: Any, cancel: Any) -> Any:
+    def marching(self: Marching, progress: Any, cancel: Any) -> Any:
         marched.append(cancel)
         return march(self, progress, cancel)
 
-    monkeypatch.setattr(March, "march", marching)
+    monkeypatch.setattr(Marching, "march", marching)
     place = urlsplit(address)
     connection = http.client.HTTPConnection(place.hostname, place.port, timeout=60)
     headers = {"Origin": f"http://{place.netloc}"}

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.stats import multivariate_normal
 
-from warpimpact.identification.aim import POINT_STEPS, Aim
+from warpimpact.identification.aim import POINT_STEPS, HitPoints
 from warpimpact.identification.between import changes
 from warpimpact.identification.likelihood import Compared, Data
 from warpimpact.identification.measured import Observation
@@ -21,7 +21,7 @@ YAW = Observation("yaw", 0, 0.05, np.radians(20.0), np.radians(3.0))
 PITCH = Observation("pitch", 0, 0.05, np.radians(-4.0), np.radians(3.0))
 
 
-def aim_of(count: int, shift: float = 0.3) -> Aim:
+def aim_of(count: int, shift: float = 0.3) -> HitPoints:
     """Points of a quarter of the cell with their mirror images."""
     part = 0.5 * CELL
     places = np.mod(np.arange(count)[:, None] * POINT_STEPS + shift, 1.0) * part
@@ -32,7 +32,7 @@ def aim_of(count: int, shift: float = 0.3) -> Aim:
         hit_y=hits[:, 0],
         hit_z=hits[:, 1],
     )
-    return Aim(shots, MIRRORED, np.ones((1, len(hits))), 8, (part, CELL))
+    return HitPoints(shots, MIRRORED, np.ones((1, len(hits))), 8, (part, CELL))
 
 
 def outcomes_at(hits: np.ndarray) -> Outcomes:
@@ -88,7 +88,7 @@ def test_few_points_do_the_work_of_many() -> None:
     data = Data((VELOCITY, YAW, PITCH), None)
     scales = {"velocity": np.array([1.0]), "angle": np.radians([1.0])}
 
-    def log_likelihood(aim: Aim) -> float:
+    def log_likelihood(aim: HitPoints) -> float:
         compared = Compared.of(data, aim, outcomes_at(aim.hits[0]))
         return float(compared.score(scales, np.random.default_rng(0)).log_likelihood[0])
 

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from warpimpact.identification.aim import Aim, aim
+from warpimpact.identification.aim import HitPoints, aim
 from warpimpact.identification.fit import Fit
 from warpimpact.identification.hit_places import CLASSES
 from warpimpact.identification.likelihood import Data, holds, score
@@ -33,14 +33,14 @@ def outcomes_of(velocity: np.ndarray, angle: np.ndarray, status: Any = Status.PE
     return Outcomes(**columns | {"status": np.broadcast_to(np.int8(status), count), "residual_velocity": velocity})
 
 
-def aim_of(weight: np.ndarray, replicates: int = 8, sets: int = 2) -> Aim:
+def aim_of(weight: np.ndarray, replicates: int = 8, sets: int = 2) -> HitPoints:
     zeros = np.zeros(sets * len(weight))
     shots = Shots(
         **dict.fromkeys(("velocity", "obliquity", "azimuth", "pitch", "yaw", "spin"), zeros),
         hit_y=np.tile(np.arange(float(len(weight))), sets),
         hit_z=zeros,
     )
-    return Aim(shots, (IDENTITY,), np.tile(weight, (sets, 1)), replicates)
+    return HitPoints(shots, (IDENTITY,), np.tile(weight, (sets, 1)), replicates)
 
 
 VELOCITY = Observation("residual_velocity", None, None, 600.0, 10.0)

@@ -11,7 +11,7 @@ from warpimpact.scene import Accuracy, Hits, Numerics, Target, make_shots
 from warpimpact.solver.changes import (
     RISK,
     SLOW_SHARE,
-    Verdict,
+    LevelVerdict,
     _excess,
     changes,
     compared,
@@ -157,7 +157,7 @@ def test_errors_of_the_finer_level_count_as_much_as_the_level_between_says() -> 
 def test_what_a_level_errs_by_over_what_is_allowed(fine: Outcomes) -> None:
     some, shots, asked = fine[np.arange(32)], OTHERS[:32], Accuracy(residual_velocity=2.0)
 
-    def verdict(speed: float) -> Verdict:
+    def verdict(speed: float) -> LevelVerdict:
         coarse, finer = (some.assign(residual_velocity=speed + k * np.arange(32.0)) for k in (0.0, 1.0))
         return compared(Numerics(level=2), asked, (coarse, coarse, finer), 1.4, shots, (True,))[1]
 

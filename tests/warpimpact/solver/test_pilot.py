@@ -16,7 +16,7 @@ from warpimpact.runs.compute import HitMap
 from warpimpact.runs.replay import replay
 from warpimpact.scene import PRESETS, Accuracy, Hits, Impact, Numerics, Record, Scene, Shots, make_shots
 from warpimpact.solver import pilot
-from warpimpact.solver.changes import Verdict, changes, ended_otherwise
+from warpimpact.solver.changes import LevelVerdict, changes, ended_otherwise
 from warpimpact.solver.findings import HitErrors, LimitErrors, errors_text, upper_digits
 from warpimpact.solver.pilot import (
     ERROR_PER_CHANGE,
@@ -232,9 +232,9 @@ def test_levels_that_a_pilot_tries(
 ) -> None:
     seen = []
 
-    def judge(level: int, finer: int) -> Verdict:
+    def judge(level: int, finer: int) -> LevelVerdict:
         seen.append(level)
-        return Verdict(excess[level] <= 1.0, excess[level], (typical or excess)[level], math.inf)
+        return LevelVerdict(excess[level] <= 1.0, excess[level], (typical or excess)[level], math.inf)
 
     assert climb(judge, range(min(5, len(excess))), 1) == taken
     assert seen == tried
@@ -434,9 +434,9 @@ def test_errors_of_the_first_hits_tell_how_they_fall_from_level_to_level(
 def test_one_level_is_tried_behind_one_that_nearly_keeps_the_promise(
     keeps: int, level: int, known: Outcomes, from_level: Callable[..., None], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    def compared(at: Numerics, *rest: Any) -> tuple[HitErrors, Verdict]:
+    def compared(at: Numerics, *rest: Any) -> tuple[HitErrors, LevelVerdict]:
         kept = at.level >= keeps
-        return HitErrors(at, kept, 0.9, 0.0, 0.0), Verdict(kept, 0.5 if kept else 4.0, 0.5**at.level, 0.9)
+        return HitErrors(at, kept, 0.9, 0.0, 0.0), LevelVerdict(kept, 0.5 if kept else 4.0, 0.5**at.level, 0.9)
 
     from_level(0)
     monkeypatch.setattr(pilot, "compared", compared)
@@ -496,14 +496,16 @@ def test_coarser_settings_are_tried_as_far_as_there_is_room(
         velocities[tried[-1]] = known.residual_velocity[:4] + len(tried)
         return known[:4].assign(residual_velocity=velocities[tried[-1]])
 
-    def compared(at: Numerics, asked: Accuracy, given: Any, margin: float, *rest: Any) -> tuple[HitErrors, Verdict]:
+    def compared(
+        at: Numerics, asked: Accuracy, given: Any, margin: float, *rest: Any
+    ) -> tuple[HitErrors, LevelVerdict]:
         name, finer = str(at.coarser or ""), min(level + 2, 9)
         assert margin == ERROR_PER_CHANGE[finer - level]
         for outcomes, of in zip(given, (name or f"level {level}", f"level {level}", f"level {finer}"), strict=True):
             np.testing.assert_array_equal(outcomes.residual_velocity, velocities[of])
         over = excess.get(name, 2.0)
         errors = HitErrors(at, kept, 0.9, over, 0.0, status_error=status.get(name, 0.0))
-        return errors, Verdict(kept, over if kept else 9.0, 1.0, math.inf if kept else over)
+        return errors, LevelVerdict(kept, over if kept else 9.0, 1.0, math.inf if kept else over)
 
     from_level(level, FURTHER=0)
     monkeypatch.setattr(pilot, "compared", compared)
