@@ -98,7 +98,9 @@ def _computed(
         done, resumed = (min(int(jobs * together * group), len(shots)) for jobs in (now.done, now.resumed))
         progress(done, resumed, len(shots))
 
-    results = yield Round([Job(_hits, arguments) for arguments in asked], [_key(*arguments) for arguments in asked], tell)
+    results = yield Round(
+        [Job(_hits, arguments) for arguments in asked], [_key(*arguments) for arguments in asked], tell
+    )
     outcomes = [Outcomes(**{name: values for name, values in row.items() if name != SECONDS}) for row in results]
     beside = {} if solid is None else solid_columns(outcomes.pop())
     elapsed = float(sum(float(row[SECONDS][0]) for row in results))
