@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
@@ -10,9 +11,11 @@ from pydantic import ValidationError
 
 from ..catalogue.catalogue import Catalogue
 from ..catalogue.entries import CORE, OBLIQUITY, Material, Threat, Velocity
-from ..scene import Core, Layer, Plate
+from ..catalogue.strength import NINETY, Resistance
+from ..scene import Core, Interaction, Layer, Plate
 from ..scene.target import layer_name
 from ..scene.units import quoted
+from .straight_passage import StraightPassage
 from .text import CampaignError
 
 _Table = dict[str, Any]
@@ -167,18 +170,49 @@ def _plates(data: Mapping[str, Any]) -> Iterator[tuple[str, str, int | None, _Ta
 
 
 def _resistance(data: Mapping[str, Any], material: Material, plate: Mapping[str, Any], catalogue: Catalogue) -> float:
-    """Y of a plate of a material [Pa]; that of the entry if something of core, plate or shot is not valid, which the
-    validation of the whole campaign says better."""
+    """Y of a plate of a material under the law of a campaign [Pa]; that of the entry if something of core, plate, law
+    or shot is not valid, which the validation of the whole campaign says better."""
     keys = {key: value for key, value in plate.items() if key != "pattern" or "areal_density" in plate}
-    impact = data.get("impact", {})
+    impact, interaction = data.get("impact", {}), data.get("interaction", {})
     try:
         core = CORE.validate_python(data.get("core"))
         model = Layer if {"gap", "offset"} & set(plate) else Plate
-        shot = model.model_validate({"resistance": 1.0, "density": material.density} | keys)
+        shot = model.model_validate(material.table(keys, 1.0))
         obliquity = OBLIQUITY.validate_python(impact.get("obliquity", 0.0) if isinstance(impact, dict) else 0.0)
-    except ValidationError:
+        law = Interaction.model_validate(law_of(material).model_dump() | interaction)
+    except (ValidationError, TypeError):
         return material.resistance
-    return catalogue.resistance(material, core, shot.thickness, obliquity).median
+    return resistance_under(law, material, core, shot, obliquity, catalogue).median
+
+
+def law_of(material: Material) -> Interaction:
+    """The law that the resistance of a material was found with."""
+    return Interaction(**{key: getattr(material, key) for key in _LAW})
+
+
+def resistance_under(
+    law: Interaction, material: Material, core: Core, plate: Plate, obliquity: float, catalogue: Catalogue
+) -> Resistance:
+    """What is known of Y of a plate of a material under a law, with the friction of the plate.
+
+    The catalogue has it under the law and the friction of the material. Under others Y is such that the limit velocity
+    of a solid plate stays (docs/model.md §6.2).
+
+    Args:
+        plate: whose thickness, friction and density count.
+        obliquity: of the shot [rad].
+    """
+    known = catalogue.resistance(material, core, plate.thickness, obliquity)
+    of_material = law_of(material)
+    if law == of_material and plate.shear_coefficient == material.shear_coefficient:
+        return known
+    way = plate.thickness / math.cos(obliquity)
+    passage = StraightPassage(core, of_material, material.shear_coefficient, way, plate.density)
+    median, low, high = (
+        passage.resistance_under(law, plate.shear_coefficient, value) for value in (known.median, *known.ends)
+    )
+    ratio = math.log(high / low) / (2.0 * NINETY * known.deviation) if known.deviation else 1.0
+    return Resistance(median, ratio * known.deviation, ratio * known.test)
 
 
 def calibres_of(core: Core, plate: Plate) -> float:

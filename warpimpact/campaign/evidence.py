@@ -11,6 +11,7 @@ from ..catalogue.entries import Material, Threat
 from ..catalogue.strength import NINETY
 from ..results.attributes import NOT_TESTED
 from ..scene import Core, Plate
+from .catalogued import resistance_under
 from .resistances import catalogue_resistance
 from .tested import standings_of, summary_of
 
@@ -75,7 +76,8 @@ def _of_material(campaign: Campaign, place: str, plate: Plate, catalogue: Catalo
     material = catalogue.all(Material).get(str(plate.material))
     if material is None:
         return f"{place}: {plate.material}, which is not in the catalogue"
-    known = catalogue.resistance(material, campaign.core, plate.thickness, campaign.impact.obliquity)
+    obliquity = campaign.impact.obliquity
+    known = resistance_under(campaign.interaction, material, campaign.core, plate, obliquity, catalogue)
     expected = {
         "resistance": (plate.resistance, known.median),
         "shear_coefficient": (plate.shear_coefficient, material.shear_coefficient),

@@ -11,6 +11,7 @@ import numpy as np
 from ..catalogue.catalogue import Catalogue
 from ..catalogue.entries import Material
 from ..scene import Plate
+from .catalogued import resistance_under
 
 if TYPE_CHECKING:
     from ..catalogue.strength import Resistance
@@ -36,11 +37,15 @@ def catalogue_resistance(campaign: Campaign, plate: Plate, thickness: float | No
     material = catalogue.all(Material).get(str(plate.material))
     if material is None:
         return None
-    obliquity = campaign.impact.obliquity
-    known = catalogue.resistance(material, campaign.core, plate.thickness, obliquity)
+
+    def known_of(plate: Plate) -> Resistance:
+        given = campaign.interaction, material, campaign.core, plate, campaign.impact.obliquity, catalogue
+        return resistance_under(*given)
+
+    known = known_of(plate)
     if not math.isclose(known.median, plate.resistance, rel_tol=_SAME):
         return None
-    return known if thickness is None else catalogue.resistance(material, campaign.core, thickness, obliquity)
+    return known if thickness is None else known_of(plate.model_copy(update={"thickness": thickness}))
 
 
 def resistance_by_thickness(campaign: Campaign, layer: int, thickest: float, unit: float | None = None) -> Curve | None:

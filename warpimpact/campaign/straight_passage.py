@@ -15,7 +15,7 @@ from ..scene import Core, Interaction
 
 Array = NDArray[np.float64]
 
-_STATIONS, _DEPTHS = 2001, 400
+_STATIONS, _DEPTHS = 1001, 200
 """Points along a core, and steps of its way."""
 _WIDEST = 1e-6
 """Relative difference from the largest radius at which a core counts as that wide."""

@@ -1,6 +1,7 @@
 """Names of the catalogue in a campaign: what they stand for, what overrides it, and what is said of it."""
 
 import json
+import math
 from pathlib import Path
 from typing import Any
 
@@ -10,7 +11,9 @@ import pytest
 from warpimpact import Campaign
 from warpimpact.campaign.catalogued import SEARCHED_FROM
 from warpimpact.campaign.evidence import evidence_of, limit_velocity_factors
+from warpimpact.campaign.resistances import catalogue_resistance
 from warpimpact.campaign.schema import campaign_schema
+from warpimpact.campaign.straight_passage import StraightPassage
 from warpimpact.campaign.tested import summary_of_all
 from warpimpact.campaign.text import CampaignError
 from warpimpact.identification.fit_file import fit_from
@@ -92,9 +95,29 @@ def test_layers_have_materials(folder: Path) -> None:
     law = {"interaction": {"quadratic": 0.5}}
     layer = {"material": "plate B", "thickness": "10 mm", "gap": "5 mm"}
     campaign = read(folder, layer=[layer], **law)
-    assert (campaign.layer[0].resistance, campaign.layer[0].density) == (1e9, 2700.0)
+    assert (campaign.layer[0].density, campaign.plate.resistance) == (2700.0, 2e9)
+    assert 0.95e9 < campaign.layer[0].resistance < 1e9  # it was found without a stress of the speed
     with pytest.raises(CampaignError, match=r"interaction.quadratic: the materials were found with 0.5 \(plate\)"):
         read(folder, layer=[layer])
+
+
+@pytest.mark.parametrize(("thickness", "obliquity"), [("4 mm", "0 deg"), ("12 mm", "30 deg")])
+def test_under_another_law_a_material_keeps_its_limit_velocity(thickness: str, obliquity: str) -> None:
+    plate, impact = {"material": "HHA Class 1", "thickness": thickness}, {"obliquity": obliquity}
+
+    def limits(plate: dict[str, Any], interaction: dict[str, Any]) -> tuple[float, ...]:
+        """At the ends of the interval of Y, and at its median."""
+        tables = TABLES | {"plate": plate, "interaction": interaction, "impact": impact}
+        campaign = Campaign.from_text(json.dumps(tables | {"catalogue": None}), name="named.toml", folder=Path())
+        known = catalogue_resistance(campaign, campaign.plate)
+        assert known is not None
+        way = campaign.plate.thickness / math.cos(campaign.impact.obliquity)
+        given = campaign.interaction, campaign.plate.shear_coefficient, way, campaign.plate.density
+        passage = StraightPassage(campaign.core, *given)
+        return tuple(float(passage.entry(value)) for value in (*known.ends, campaign.plate.resistance))
+
+    free = {"linear": 1.7, "free_surface": {}}
+    assert limits(plate | {"shear_coefficient": 0.0}, free) == pytest.approx(limits(plate, {}), rel=0.01)
 
 
 def test_the_tolerance_of_a_standard_scatters(folder: Path) -> None:
