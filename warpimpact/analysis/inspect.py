@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
 from typing import Any
 
 import numpy as np
@@ -130,7 +129,8 @@ def _row(measure: Measure, estimate: Estimate) -> tuple[Any, ...]:
 def failures(dataset: xarray.Dataset) -> Section:
     """Every shot whose computation failed: its number, status and inputs."""
     inputs = [v.HIT_Y, v.HIT_Z, *v.shot_variables(dataset)]
-    places = [(name, layer) for name in inputs for layer in _layers_of(dataset, name)]
+    layers = {name: range(dataset.sizes["layer"]) if "layer" in dataset[name].dims else [None] for name in inputs}
+    places = [(name, layer) for name in inputs for layer in layers[name]]
     rows: list[tuple[Any, ...]] = []
     for part in slices(dataset[[v.STATUS, *inputs]]):
         for place in np.flatnonzero(failed(part)):
@@ -148,7 +148,3 @@ def failures(dataset: xarray.Dataset) -> Section:
 
 def _name(variable: str, layer: int | None) -> str:
     return variable if layer is None else f"{variable}_{layer}"
-
-
-def _layers_of(dataset: xarray.Dataset, name: str) -> Iterable[int | None]:
-    return range(dataset.sizes["layer"]) if "layer" in dataset[name].dims else [None]

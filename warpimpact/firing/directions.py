@@ -82,7 +82,7 @@ class Directions(Model):
     def weights(self) -> Array:
         """Weights of the directions, shape [azimuths, elevations], with the sum 1. A direction stands for the angles up
         to the middle between it and the next one; at the ends of the grid only for its inner half."""
-        across, up = _widths(self.azimuth), _edges(self.elevation)
+        across, up = np.diff(_edges(self.azimuth)), _edges(self.elevation)
         solid = across[:, None] * (np.sin(up[1:]) - np.sin(up[:-1]))
         if self.weight == "area":
             solid = solid * np.cos(self.obliquities())
@@ -100,10 +100,6 @@ def _edges(angles: tuple[float, ...]) -> Array:
         return np.array([angles[0] - 0.01, angles[0] + 0.01])
     middles = 0.5 * (np.array(angles[1:]) + np.array(angles[:-1]))
     return np.concatenate([[angles[0]], middles, [angles[-1]]])
-
-
-def _widths(angles: tuple[float, ...]) -> Array:
-    return np.diff(_edges(angles))
 
 
 def obliquity(azimuth: float, elevation: float) -> float:

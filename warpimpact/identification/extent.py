@@ -7,7 +7,7 @@ import numpy as np
 from warpimpact.identification.aim import aim
 from warpimpact.identification.fit import Fit
 from warpimpact.identification.identify import DISCREPANCIES, rounds
-from warpimpact.identification.scoring import Bench, benches
+from warpimpact.identification.scoring import benches
 from warpimpact.solver.limit import PASSAGES
 from warpimpact.solver.prepare import prepare
 
@@ -22,14 +22,10 @@ def core_seconds(fit: Fit) -> float:
     for bench in benches(fit):
         scene = fit.scene_of(bench.shot)
         hits = aim(bench.shot, scene.target.layers[0], scene.core, fit.sampling, np.zeros((1, 2))).computed
-        passages = PASSAGES if _limited(fit, bench) else 1
+        measured = (observation for place in bench.which for observation in fit.shots[place].observations)
+        passages = PASSAGES if any(observation.is_limit for observation in measured) else 1
         of_a_set += len(hits) * (SCORING + passages * prepare(scene, hits[:1], fit.numerics).seconds)
     return of_a_set * sets_of(fit)
-
-
-def _limited(fit: Fit, bench: Bench) -> bool:
-    """Whether limits were measured in a bench."""
-    return any(observation.is_limit for place in bench.which for observation in fit.shots[place].observations)
 
 
 def sets_of(fit: Fit) -> int:

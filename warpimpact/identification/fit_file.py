@@ -32,7 +32,7 @@ from warpimpact.results import variables as v
 from warpimpact.results.kinds import FIT
 from warpimpact.results.measures import STATUSES, Measure
 from warpimpact.results.per_hit import place_of_standoff
-from warpimpact.scene import Core, Impact, Numerics, Plate, Record, Scatter, Scene, exclusions
+from warpimpact.scene import Core, Impact, Numerics, Plate, Record, Scatter, exclusions
 from warpimpact.scene.distributions import EDGE, Distribution
 from warpimpact.scene.model import Model
 from warpimpact.scene.quantities import QUANTITIES
@@ -285,7 +285,8 @@ def _check_scenes(fit: Fit, name: str) -> None:
             check_plausible(scene.core, scene.target, scene.record, shot.impact)
         except ValueError as error:
             raise FitError(f"{where}: {_reason(error, shot)}") from None
-        _check_hit(shot, scene, where)
+        if isinstance(shot.hit, str) and not _some(shot.hit, scene.target.layers[0], scene.core):
+            raise FitError(f'{where}: hit: got "{shot.hit}", but no place of this plate is')
         has_limit = any(observation.is_limit for observation in shot.observations)
         if has_limit and fit.record.bending:
             raise FitError(f"{where}: limit_velocity and a selection by bending_stress cannot be combined")
@@ -308,11 +309,6 @@ def _check_scenes(fit: Fit, name: str) -> None:
 
 def _reason(error: ValueError, shot: MeasuredShot) -> str:
     return sentence(error, dict(shot.tables)) if isinstance(error, ValidationError) else str(error)
-
-
-def _check_hit(shot: MeasuredShot, scene: Scene, where: str) -> None:
-    if isinstance(shot.hit, str) and not _some(shot.hit, scene.target.layers[0], scene.core):
-        raise FitError(f'{where}: hit: got "{shot.hit}", but no place of this plate is')
 
 
 def _some(hit: str, plate: Plate, core: Core) -> bool:

@@ -53,7 +53,8 @@ def _assumptions(dataset: xarray.Dataset) -> Iterator[Section]:
     if f.ASSUMPTION not in dataset:
         return
     stays, names = stays_on_front(dataset), [str(name) for name in dataset[f.ASSUMPTION].values]
-    goals = [place for place in _goals(dataset) if not is_weight(dataset, place)]
+    asked = dataset[f.ASKED].values  # no assumption changes the weight
+    goals = [place for place in _goals(dataset) if not str(asked[place]).startswith(tuple(WEIGHTS))]
     columns = [Column("design"), Column("on the front")]
     columns += [Column(f"better than {name}") for name in dataset[f.REFERENCE].values]
     columns += [Column(f"{label_and_unit(dataset[f.LABEL].values[place])[0]}, moved most by") for place in goals]
@@ -72,8 +73,8 @@ def _assumptions(dataset: xarray.Dataset) -> Iterator[Section]:
 def stays_on_front(dataset: xarray.Dataset) -> np.ndarray[Any, np.dtype[np.bool_]]:
     """Whether each design keeps the bounds and is beaten by no other design of the front under each assumption, shape
     [front, assumptions]."""
-    goals, bounds = _goals(dataset), _bounds(dataset)
     signs, limits = dataset[f.SIGN].values, dataset[f.ASKED_LIMIT].values
+    goals, bounds = _goals(dataset), np.flatnonzero(~np.isnan(limits))
     signed = signs * dataset[f.UNDER].values
     kept = (signed[:, :, bounds] <= signs[bounds] * limits[bounds] + _ROUNDED * np.abs(limits[bounds])).all(axis=-1)
     beaten = np.zeros(kept.shape, dtype=bool)
@@ -118,15 +119,6 @@ def _moved_text(dataset: xarray.Dataset, place: int, goal: int, names: list[str]
 def _goals(dataset: xarray.Dataset) -> list[int]:
     """Indices of the objectives among objectives and bounds."""
     return np.flatnonzero(np.isnan(dataset[f.ASKED_LIMIT].values)).tolist()
-
-
-def _bounds(dataset: xarray.Dataset) -> list[int]:
-    return np.flatnonzero(~np.isnan(dataset[f.ASKED_LIMIT].values)).tolist()
-
-
-def is_weight(dataset: xarray.Dataset, place: int) -> bool:
-    """Whether an objective or bound is the weight of the target, which no assumption changes."""
-    return str(dataset[f.ASKED].values[place]).startswith(tuple(WEIGHTS))
 
 
 def _front_table(dataset: xarray.Dataset) -> Table:

@@ -125,11 +125,6 @@ def telling(dataset: xarray.Dataset, hits: Sequence[int]) -> int | None:
     return int(hit_numbers(chosen)[np.nanargmax(tilt)]) if np.isfinite(tilt).any() else hits[0]
 
 
-def _without_addresses(script: str) -> str:
-    """A script that names no place in a network but namespaces: of maps, and of where a chart would be uploaded to."""
-    return re.sub(r"https?://(?!www\.w3\.org/)", "", script)
-
-
 def _packed(text: str) -> str:
     """A text compressed by gzip, as base64; the same text gives the same bytes."""
     return b64encode(gzip.compress(text.encode(), mtime=0)).decode()
@@ -146,9 +141,10 @@ def _page(*, results: Sequence[dict[str, Any]], data: dict[str, Any], **content:
     environment = Environment(
         loader=PackageLoader("warpimpact.report", ""), autoescape=True, undefined=StrictUndefined, trim_blocks=True
     )
+    plotly = re.sub(r"https?://(?!www\.w3\.org/)", "", get_plotlyjs())  # addresses of maps and of where charts go
     return environment.get_template("page.html").render(
         results=results,
-        plotly=_packed(_without_addresses(get_plotlyjs())),
+        plotly=_packed(plotly),
         packed=_packed(json.dumps(data, separators=(",", ":"), allow_nan=False)),
         variables=data["variables"],
         first=_first([variable["key"] for variable in data["variables"]]),

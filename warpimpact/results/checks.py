@@ -64,13 +64,9 @@ def _hit_variables() -> list[v.Variable]:
     return [*v.COORDINATES, *v.hit_variables(), *in_groups]
 
 
-def _map_fault(dataset: xarray.Dataset) -> str | None:
-    """What keeps a Dataset from being a map of hits, as a phrase; None if nothing does. Only the values on which
-    readers rely are checked, a part at a time."""
-    return next(_map_faults(dataset), None)
-
-
 def _map_faults(dataset: xarray.Dataset) -> Iterator[str]:
+    """What keeps a Dataset from being a map of hits, as phrases. Only the values on which readers rely are checked, a
+    part at a time."""
     known = _hit_variables()
     yield from _of_columns(dataset, known)
     yield from _attribute_faults(dataset.attrs)
@@ -108,11 +104,6 @@ def _parts(array: xarray.DataArray) -> Iterator[np.ndarray[Any, Any]]:
 def _ended(status: np.ndarray[Any, Any], codes: np.ndarray[Any, Any]) -> bool:
     """Whether statuses are known codes, or NaN: a point of a sweep may lack hits that another has."""
     return bool((np.isin(status, codes) | np.isnan(status)).all())
-
-
-def _sweep_fault(dataset: xarray.Dataset) -> str | None:
-    """What keeps a Dataset from being a sweep, as a phrase; None if nothing does."""
-    return next(_sweep_faults(dataset), None)
 
 
 def _sweep_faults(dataset: xarray.Dataset) -> Iterator[str]:
@@ -178,7 +169,7 @@ RESULT = Kind(
     "warpimpact inspect, plot, report, export, compare and replay take it",
     maker="warpimpact run or limit",
     misuse=_misuse,
-    fault=_map_fault,
+    fault=lambda dataset: next(_map_faults(dataset), None),
 )
 SWEEP = Kind(
     "a sweep",
@@ -186,5 +177,5 @@ SWEEP = Kind(
     "chooses of it",
     maker="warpimpact sweep",
     misuse=lambda dataset: _missing(dataset, *v.COORDINATES),
-    fault=_sweep_fault,
+    fault=lambda dataset: next(_sweep_faults(dataset), None),
 )

@@ -79,7 +79,8 @@ class Marching:
         pending = np.arange(count)
         for size in range(1, self.sizes + 1):
             self._march_some(pending, outcomes, _after(count - len(pending), reached))
-            pending = whole_plates(outcomes.status.numpy() == Status.LEFT_WINDOW, self.at_a_plate)
+            left = (outcomes.status.numpy() == Status.LEFT_WINDOW).reshape(-1, self.at_a_plate).any(axis=1)
+            pending = np.flatnonzero(np.repeat(left, self.at_a_plate))  # all shots at a plate are marched again
             wider = 2 * self.cells[0], 2 * self.cells[1]
             if not len(pending) or size == self.sizes or not self._fits(wider):
                 break
@@ -238,11 +239,6 @@ def apart(function: Callable[..., int], *arguments: Any) -> int:
 def _after(finished: int, progress: Progress1) -> Progress1:
     """Progress of further shots, after those already finished."""
     return lambda done: progress(finished + done)
-
-
-def whole_plates(which: NDArray[np.bool_], count: int) -> Numbers:
-    """Indices of all shots at the plates with a marked shot."""
-    return np.flatnonzero(np.repeat(which.reshape(-1, count).any(axis=1), count))
 
 
 def in_turns(which: Numbers, count: int, slots: int) -> Numbers:

@@ -104,7 +104,8 @@ def at_level(index: int, numerics: Numerics, **coarser: int) -> Numerics:
 
 def level_of(numerics: Numerics) -> Level:
     """The level that supplies the settings which the numerics do not give."""
-    index, coarser = base_level(numerics), numerics.coarser or Coarser()
+    index = coarsest_level(numerics.asked.strictness) if numerics.level is None else numerics.level
+    coarser = numerics.coarser or Coarser()
     along, around, grid, step = (
         LADDER[index if level is None else level]
         for level in (coarser.along, coarser.around, coarser.grid, coarser.step)
@@ -115,11 +116,6 @@ def level_of(numerics: Numerics) -> Level:
 def coarsest_level(strictness: float) -> int:
     """The first level that is tried for an accuracy, by how many times as strict as draft it is."""
     return int(np.clip(math.floor(math.log2(max(strictness, 1.0)) + 1e-9), 0, len(LADDER) - 2))
-
-
-def base_level(numerics: Numerics) -> int:
-    """Index of the level that supplies the settings which the numerics do not give."""
-    return coarsest_level(numerics.asked.strictness) if numerics.level is None else numerics.level
 
 
 @dataclass(frozen=True)
