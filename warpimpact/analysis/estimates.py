@@ -107,12 +107,9 @@ def _drawn(dataset: Result, measure: Measure, values: Array) -> Array:
     return values
 
 
-def estimated(dataset: Result, measures: Sequence[Measure], confidence: float = 0.95) -> dict[Measure, Estimate]:
+def estimated(dataset: Result, measures: Sequence[Measure]) -> dict[Measure, Estimate]:
     """Measures of a result with their intervals, in the units of the Dataset."""
-    return {
-        estimated_measure.measure: estimated_measure.estimate
-        for estimated_measure in evidence(dataset, measures, confidence)
-    }
+    return {of_measure.measure: of_measure.estimate for of_measure in evidence(dataset, measures)}
 
 
 def status_shares(dataset: Result) -> dict[str, Estimate]:

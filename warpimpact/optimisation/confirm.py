@@ -204,11 +204,11 @@ def _under_assumptions(
     said = iter((yield from hits_asked(design, jobs, _telling(follow, len(targets), len(jobs), what))))
     threats, under = len(design.threats), np.zeros((len(targets), len(names), len(design.asked)))
     for number, (target, of_target) in enumerate(zip(targets, of_targets, strict=True)):
-        alone = replace(target, said=target.said[:threats], means={}, known={})
-        given = replace(alone, said=alone.said[:, :, :count], means={}, known={})
+        alone = replace(target, said=target.said[:threats])
+        given = replace(alone, said=alone.said[:, :, :count])
         under[number] = values(design, alone)
         for name in of_target:
-            moved = replace(given, said=np.array([next(said).values for _ in range(threats)]), means={}, known={})
+            moved = replace(given, said=np.array([next(said).values for _ in range(threats)]))
             under[number, names.index(name)] += values(design, moved) - values(design, given)
     return names, under
 

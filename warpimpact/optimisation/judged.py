@@ -42,7 +42,7 @@ class DesignRecord:
         levels: numerics for every threat, as JSON.
         said: columns of `Design.keys` in each of `Design.situations`, shape [situations, columns, hits].
         seconds: processor time of its hits [s].
-        means, known: cached results of `means` and `values`, by number of hits.
+        means, known: cached results of `means` and `values`, by number of hits; empty in every copy.
     """
 
     values: Array
@@ -51,8 +51,8 @@ class DesignRecord:
     levels: tuple[str, ...]
     said: Array
     seconds: float = 0.0
-    means: dict[int, Array] = field(default_factory=dict, compare=False)
-    known: dict[int, Array] = field(default_factory=dict, compare=False)
+    means: dict[int, Array] = field(default_factory=dict, init=False, compare=False)
+    known: dict[int, Array] = field(default_factory=dict, init=False, compare=False)
 
     @property
     def hits(self) -> int:
@@ -62,7 +62,7 @@ class DesignRecord:
     def more(self, said: Array, seconds: float) -> DesignRecord:
         """The record with further hits."""
         joined = np.concatenate([self.said, said], axis=2)
-        return replace(self, said=joined, seconds=self.seconds + seconds, means={}, known={})
+        return replace(self, said=joined, seconds=self.seconds + seconds)
 
 
 def weights_of(target: Target) -> dict[str, float]:
@@ -79,9 +79,9 @@ def means(design: Design, record: DesignRecord, hits: int) -> Array:
     return record.means[hits]
 
 
-def values(design: Design, record: DesignRecord, hits: int | None = None) -> Array:
-    """Objectives and bounds over the first hits, shape [asked]; NaN where no hit counts."""
-    hits = record.hits if hits is None else hits
+def values(design: Design, record: DesignRecord) -> Array:
+    """Objectives and bounds over all hits, shape [asked]; NaN where no hit counts."""
+    hits = record.hits
     if hits not in record.known:
         record.known[hits] = np.array([_mean(numbers_of(design, record, goal, hits)) for goal in design.asked])
     return record.known[hits]
@@ -132,17 +132,17 @@ def estimate(design: Design, record: DesignRecord, goal: Objective | Bound) -> E
     return estimate_of("share" if is_share else "mean", numbers, replicates=SCRAMBLINGS)
 
 
-def objectives(design: Design, record: DesignRecord, hits: int | None = None) -> Array:
+def objectives(design: Design, record: DesignRecord) -> Array:
     """Objectives, with signs such that they are to be minimised, shape [objectives]; infinite where no hit counts."""
     signs = np.array([objective.sign for objective in design.objectives])
-    signed = signs * values(design, record, hits)[: len(signs)]
+    signed = signs * values(design, record)[: len(signs)]
     return np.asarray(np.nan_to_num(signed, nan=np.inf, posinf=np.inf, neginf=-np.inf))
 
 
-def excesses(design: Design, record: DesignRecord, hits: int | None = None) -> Array:
+def excesses(design: Design, record: DesignRecord) -> Array:
     """Violation of each bound as a share of its limit, shape [bounds]; 0 where the bound is kept to rounding, 1 where
     no hit counts."""
-    bounded = values(design, record, hits)[len(design.objectives) :]
+    bounded = values(design, record)[len(design.objectives) :]
     over = [
         bound.sign * (value - bound.limit) / (abs(bound.limit) or 1.0)
         for bound, value in zip(design.bounds, bounded, strict=True)
@@ -173,13 +173,15 @@ def undecided(
     return still_open
 
 
-def interval(numbers: Array, confidence: float = DIFFERENCE_CONFIDENCE) -> tuple[Array, Array]:
+def interval(numbers: Array) -> tuple[Array, Array]:
     """Student's intervals of means over the last axis; (−inf, inf) where fewer than two numbers count."""
     count = np.sum(~np.isnan(numbers), axis=-1)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", RuntimeWarning)  # numpy warns of means over no number
         mean, spread = np.nanmean(numbers, axis=-1), np.nanstd(numbers, axis=-1)
-        by_count = {n: student_quantile(0.5 + 0.5 * confidence, int(n) - 1) for n in np.unique(count) if n > 1}
+        by_count = {
+            n: student_quantile(0.5 + 0.5 * DIFFERENCE_CONFIDENCE, int(n) - 1) for n in np.unique(count) if n > 1
+        }
         factor = np.vectorize(lambda n: by_count.get(n, np.inf), otypes=[float])(count)
         half = np.where(count > 1, factor * spread / np.sqrt(np.maximum(count - 1, 1)), np.inf)
     mean = np.nan_to_num(mean)
