@@ -15,10 +15,10 @@ _Factor = Annotated[Number, Field(gt=0, le=10)]
 
 
 class Assumptions(Model):
-    """How far every number of a result moves if something that nobody measured is otherwise.
+    """How much every number of a result changes under other assumptions about what nobody measured.
 
-    Each value is an alternative of its own, beside all else as the campaign has it; an empty list leaves its row out.
-    A value that the campaign has itself, that scatters or that is drawn from a posterior is no alternative.
+    Each value is an alternative of its own; all else stays as in the campaign. An empty list leaves its row out. A
+    value that the campaign itself has, that scatters or that is drawn from a posterior is no alternative.
 
     Attributes:
         compute: whether alternatives are computed; by default only where a pilot finds the resolution.

@@ -56,13 +56,13 @@ from .stop import Stop
 from .text import CampaignError, parsed, read_text
 
 _MOST_LENGTHS = 1000
-"""Most degradation lengths in the radius of a core, whose surface has patches of about that length."""
+"""Most degradation lengths in the radius of a core, whose surface has patches of about this length."""
 _MOST_DEPTHS = 100
-"""Most degradation depths in a thickness: each needs planes of every window in memory."""
+"""Most degradation depths in a thickness. Each needs planes of every window in memory."""
 
 
 class Output(Record):
-    """What is reported: what is recorded of every shot, of which a campaign needs a stand-off, and what a run adds.
+    """What is reported: the records of every shot, with at least one stand-off, and what a run adds.
 
     Attributes:
         failed_share: share of shots whose computation may fail; a run with more ends with exit code 3.
@@ -136,9 +136,9 @@ class Campaign(Model):
 
         Args:
             path: the TOML file.
-            count: number of hits, in place of the file's.
-            posterior: file of `warpimpact identify`, beside what the file says; its text then names it.
-            needs_velocity: whether the shots have a velocity. Where it is searched, a threat without one will do.
+            count: number of hits, instead of the file's.
+            posterior: file of `warpimpact identify`, in addition to the file; the campaign's text then names it.
+            needs_velocity: whether the shots need a velocity. Where it is searched, a threat without one will do.
 
         Raises:
             CampaignError: the file is missing, is not TOML, or has a value that is not allowed.
@@ -152,13 +152,13 @@ class Campaign(Model):
     def from_text(
         cls, text: str, *, name: str, folder: Path, count: int | None = None, needs_velocity: bool = True
     ) -> Self:
-        """Read what `text` gave.
+        """Read a campaign from its text.
 
         Args:
             text: TOML, or the JSON of a campaign made in Python.
-            name: what errors call it.
-            folder: where the files are that it names.
-            count: number of hits, in place of the text's.
+            name: name of the text in errors.
+            folder: folder of the files that it names.
+            count: number of hits, instead of the text's.
             needs_velocity: as in `from_toml`.
 
         Raises:
@@ -189,12 +189,12 @@ class Campaign(Model):
 
     @property
     def _values(self) -> tuple[Any, ...]:
-        """Values by which two campaigns are compared; the form of their text does not count."""
+        """Values by which two campaigns are compared. The form of their text does not count."""
         return tuple(getattr(self, name) for name in type(self).model_fields)
 
     @property
     def scene(self) -> Scene:
-        """What is shot at what, and what is recorded."""
+        """Core, target, interaction and records."""
         return Scene(core=self.core, target=self.target, interaction=self.interaction, record=self.output)
 
     @property
@@ -203,19 +203,19 @@ class Campaign(Model):
         return Target(layers=(self.plate, *self.layer))
 
     def computed_by(self, elements: FiniteElements) -> Self:
-        """The same campaign, with the text that it was read from, whose hits by finite elements are computed so."""
+        """The campaign, with its text, but with these settings for hits by finite elements."""
         changed = self.model_copy(update={"continuum": elements})
         changed._source = self._source
         return changed
 
     @property
     def replicates(self) -> int:
-        """Number of independent scramblings to which its shots are dealt out in turn."""
+        """Number of independent scramblings to which the shots are dealt in turn."""
         return self.hits.scramblings
 
     @property
     def symmetries(self) -> tuple[Symmetry, ...]:
-        """Symmetries by which its hits are images of each other; the identity alone if none is asked for or exists."""
+        """Symmetries by which the hits are images of each other; the identity alone if none is asked for or exists."""
         return symmetries_used(self.impact, self.hits, self.plate)
 
     def sampler(self) -> Sampler:
@@ -283,11 +283,12 @@ class Campaign(Model):
 
     @model_validator(mode="after")
     def _stop_computes_no_image(self) -> Self:
-        """An answer costs least from the irreducible part of the cell (tests/benchmarks/NOTES.md)."""
+        """Sample the irreducible part of the cell by default, where an answer costs least
+        (tests/benchmarks/NOTES.md)."""
         hits = self.hits
         chosen = "irreducible" in hits.model_fields_set or hits.area != "cell"
         if self.stop is None or self.burst is not None or chosen or any(unsymmetric(self.scatter, self.layer).values()):
-            return self  # of what has no symmetry every hit is computed
+            return self  # without symmetry every hit is computed
         part = hits.model_copy(update={"irreducible": hits.sampling in ("sobol", "random")})
         object.__setattr__(self, "hits", part)
         return self

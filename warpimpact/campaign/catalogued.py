@@ -1,4 +1,4 @@
-"""Names of the catalogue in a campaign, replaced by what they stand for; a key beside a name overrides it."""
+"""Names of the catalogue in a campaign, replaced by their entries. A key beside a name overrides its value."""
 
 from __future__ import annotations
 
@@ -21,20 +21,20 @@ from .text import CampaignError
 _Table = dict[str, Any]
 _OF_ANY_CORE = set(Core.model_fields)
 SEARCHED_FROM = 800.0
-"""Impact velocity at which a search of limit velocities begins where the threat has none [m/s]."""
+"""Impact velocity at which a search of limit velocities begins if the threat has none [m/s]."""
 _LAW = ("linear", "quadratic", "onset")
 """Keys of [interaction] that belong to a material."""
 
 
 def catalogue_of(data: Mapping[str, Any], name: str, folder: Path) -> Catalogue:
-    """The catalogue of a file: the package's, and the entries of the file that its key `catalogue` names.
+    """The catalogue of a file: the package's entries, and those in the file that its key `catalogue` names.
 
     Raises:
-        CampaignError: that file cannot be read; `name` is what errors call the campaign.
+        CampaignError: that file cannot be read; `name` is the campaign's name in errors.
     """
     given = data.get("catalogue")
     if not isinstance(given, str) or not (folder / given).is_file():
-        return Catalogue()  # a wrong name is refused where the campaign is validated
+        return Catalogue()  # the validation of the campaign refuses a wrong name
     try:
         return Catalogue.of(folder / given)
     except ValueError as error:
@@ -45,10 +45,10 @@ def with_threat(data: _Table, catalogue: Catalogue, name: str, *, needs_velocity
     """Tables with the core of their threat, and with its velocity unless they give one.
 
     Args:
-        needs_velocity: whether a threat without a velocity is refused; else the shot gets `SEARCHED_FROM`.
+        needs_velocity: whether a threat without a velocity is refused; otherwise the shot gets `SEARCHED_FROM`.
 
     Raises:
-        CampaignError: the catalogue has no such threat, or not what is needed of it.
+        CampaignError: the catalogue has no such threat, or its entry lacks a needed value.
     """
     core = data.get("core")
     threat = _threat(core, catalogue, f"{name}: core")
@@ -66,7 +66,7 @@ def with_threat(data: _Table, catalogue: Catalogue, name: str, *, needs_velocity
 
 
 def with_cores(data: _Table, catalogue: Catalogue, name: str) -> _Table:
-    """Tables of a fit with the cores of the threats that it and its shots name; velocities of shots are measured.
+    """Tables of a fit with the cores of the threats that it and its shots name. Velocities of shots are measured.
 
     Raises:
         CampaignError: as `with_threat`.
@@ -84,7 +84,7 @@ def with_cores(data: _Table, catalogue: Catalogue, name: str) -> _Table:
 
 
 def _threat(core: Any, catalogue: Catalogue, place: str) -> Threat | None:
-    """The threat that a table [core] names, if it does."""
+    """The threat that a table [core] names; None if it names none."""
     if not isinstance(core, dict) or not isinstance(core.get("threat"), str):
         return None
     try:
@@ -94,10 +94,10 @@ def _threat(core: Any, catalogue: Catalogue, place: str) -> Threat | None:
 
 
 def core_of(threat: Threat, given: Any, place: str) -> _Table:
-    """The table [core] of a threat, under the keys that are given.
+    """The table [core] of a threat, overridden by the given keys.
 
     Raises:
-        CampaignError: its core is not known, and no shape is given.
+        CampaignError: the threat's core is unknown, and no shape is given.
     """
     given_core = dict(given) | {"threat": threat.name}
     base = {} if threat.shape is None else threat.shape.model_dump(exclude_unset=True)
@@ -136,7 +136,7 @@ def _shot(velocity: Velocity, core: Mapping[str, Any], place: str) -> Any:
 
 
 def with_materials(data: _Table, catalogue: Catalogue, name: str) -> _Table:
-    """Tables with the numbers of the materials of plate and layers, and with their law; no value is a distribution.
+    """Tables with the numbers of the materials of plate and layers, and with their law. No value is a distribution.
 
     Raises:
         CampaignError: the catalogue has no such material, or the laws of two materials differ.
@@ -171,7 +171,7 @@ def _plates(data: Mapping[str, Any]) -> Iterator[tuple[str, str, int | None, _Ta
 
 def _resistance(data: Mapping[str, Any], material: Material, plate: Mapping[str, Any], catalogue: Catalogue) -> float:
     """Y of a plate of a material under the law of a campaign [Pa]; that of the entry if something of core, plate, law
-    or shot is not valid, which the validation of the whole campaign says better."""
+    or shot is not valid, which the validation of the whole campaign reports better."""
     keys = {key: value for key, value in plate.items() if key != "pattern" or "areal_density" in plate}
     impact, interaction = data.get("impact", {}), data.get("interaction", {})
     try:
@@ -221,7 +221,7 @@ def calibres_of(core: Core, plate: Plate) -> float:
 
 
 def _law(materials: Mapping[str, Material], given: Mapping[str, Any], name: str) -> dict[str, float]:
-    """The law of resistance that the materials give; the whole target has one law."""
+    """The law of resistance of the materials. The whole target has one law."""
     law: dict[str, float] = {}
     for key in _LAW:
         values = {getattr(material, key): place for place, material in materials.items()}

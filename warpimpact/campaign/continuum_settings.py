@@ -33,7 +33,8 @@ class FiniteElements(Model):
     @field_validator("materials")
     @classmethod
     def _are_known(cls, names: tuple[str, ...], info: ValidationInfo) -> tuple[str, ...]:
-        """Every name is one of the catalogue, or an absolute path of a file that has a set of constants."""
+        """Check that every name is in the catalogue, or is a file with a set of constants, whose path becomes
+        absolute."""
         paths = tuple(str(input_file(name, info)) if name.endswith(".toml") else name for name in names)
         for name in paths:
             flow_entry(name)
@@ -41,7 +42,7 @@ class FiniteElements(Model):
 
     @property
     def entries(self) -> list[FlowEntry]:
-        """Of the materials.
+        """Entries of the materials.
 
         Raises:
             ValueError: there are none.
@@ -55,7 +56,7 @@ class FiniteElements(Model):
 
     @property
     def solver(self) -> Continuum:
-        """What `simulate` takes as its numerics.
+        """These settings for `simulate`, in place of its numerics.
 
         Raises:
             ValueError: as `entries`.

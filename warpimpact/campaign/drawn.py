@@ -1,7 +1,8 @@
 """Parameters drawn from a posterior: every shot of a campaign gets one of its draws, all parameters together.
 
-The posterior says what the material resists with. Holes, thickness and core are those of the campaign, not those of the
-shots that the posterior was found from.
+The posterior gives the resistance of the material. Holes, thickness and core are those of the campaign, not those of
+the
+shots behind the posterior.
 """
 
 from __future__ import annotations
@@ -28,12 +29,12 @@ Array = NDArray[np.float64]
 OF_THE_MATERIAL: tuple[Path, ...] = tuple(
     (quantity.table, name) for name, quantity in QUANTITIES.items() if quantity.drawn
 )
-"""Quantities that a posterior may give; all others stay those of the campaign."""
+"""Quantities that a posterior may give. All others stay those of the campaign."""
 MOST_DRAWS = 64
-"""Number of draws that a run uses. Several hits of each separate the scatter of the parameters from that of the
+"""Most draws that a run uses. Several hits of each draw separate the scatter of the parameters from that of the
 hits."""
 _COLUMN = 2**20
-"""Column of the random numbers that choose the draws; scattered quantities have small column numbers."""
+"""Column of the random numbers that choose the draws. Scattered quantities have small column numbers."""
 
 
 @dataclass(frozen=True)
@@ -41,7 +42,7 @@ class Posterior:
     """Draws of material parameters, SI, by path, each of shape [draws].
 
     Attributes:
-        found_with: what else the material had in the fit, by table and key; a parameter is worth nothing without it.
+        found_with: other values of the material in the fit, by table and key. A parameter is only valid with them.
     """
 
     values: Mapping[Path, Array]
@@ -54,14 +55,14 @@ class Posterior:
 
     @property
     def discrepancy(self) -> dict[str, float]:
-        """Standard deviations by which the model misses, by units of a Dataset; empty in a file without them."""
+        """Standard deviations of the model's error, by units of a Dataset; empty in a file without them."""
         return {unit: float(size) for unit, size in self.found_with.get("discrepancy", {}).items()}
 
     def check(self, plate: Plate, interaction: Interaction) -> None:
         """Refuse a material whose fixed values differ from those of the fit.
 
         Raises:
-            ValueError: names the first difference.
+            ValueError: the message names the first difference.
         """
         given = {"plate": plate.model_dump(), "interaction": interaction.model_dump()}
         there, here = self.found_with["interaction"].get("free_surface"), given["interaction"]["free_surface"]
@@ -83,9 +84,9 @@ class Posterior:
                 )
 
     def which(self, seed: int, first: int, count: int) -> NDArray[np.int64]:
-        """Draws of shots from number `first` on: a function of the seed and the number of the shot.
+        """Numbers of the draws of shots from number `first` on. They depend on the seed and the number of the shot.
 
-        The seed chooses the draws from all of the posterior. Each block of as many consecutive shots has every draw
+        The seed chooses `draws` draws from all of the posterior. Each block of as many consecutive shots has every draw
         once, in an order of its own."""
 
         def ordered(key: int, size: int) -> NDArray[np.int64]:
@@ -117,8 +118,8 @@ def read_posterior(path: FilePath) -> Posterior:
     """The material parameters of a posterior file.
 
     Raises:
-        ResultError: it cannot be read.
-        ValueError: it has no parameter of a material.
+        ResultError: the file cannot be read.
+        ValueError: the file has no parameter of a material.
     """
     stat = path.stat() if path.is_file() else None
     return _read(path, None if stat is None else (stat.st_mtime_ns, stat.st_size))

@@ -1,5 +1,5 @@
-"""What stands behind the numbers of a campaign: names of the catalogue, the state of their evidence, and where the
-campaign leaves what limit velocities have tested (docs/validation.md)."""
+"""What the numbers of a campaign rest on: names of the catalogue with the state of their evidence, and where the
+campaign leaves the tested limit velocities (docs/validation.md)."""
 
 from __future__ import annotations
 
@@ -35,11 +35,11 @@ def evidence_of(campaign: Campaign) -> list[str]:
 
 
 def limit_velocity_factors(campaign: Campaign) -> tuple[float, float] | None:
-    """Ends of the 90 % interval of a limit velocity, over the velocity: what the published rows leave open of the
-    resistance, and the scatter of a test.
+    """Ends of the 90 % interval of a limit velocity, over the velocity, from the uncertainty of the resistance in the
+    published rows, and from the scatter of a test.
 
-    It holds where the limit velocity goes with the root of Y: a solid plate of a material, which does not weaken, and
-    whose resistance does not depend on the velocity. None elsewhere.
+    The limit velocity must go with the root of Y: a solid plate of a material that does not weaken, and whose
+    resistance does not depend on the velocity. None for other campaigns.
     """
     plate, law = campaign.plate, campaign.interaction
     alone = not campaign.layer and plate == plate.solid and plate.degradation == 1.0

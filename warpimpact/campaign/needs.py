@@ -1,4 +1,4 @@
-"""What a campaign must have so that its result holds a measure."""
+"""Keys that a campaign must have so that its result has a measure."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ def lacking(
     """Keys that a campaign needs for a measure of its hits and does not have; empty if it lacks none.
 
     Args:
-        standoffs: of the campaign [m]; None where they are not known yet, but some are computed.
+        standoffs: stand-offs of the campaign [m]; None where they are not known yet, but some are computed.
         layered: whether it has layers behind the plate.
         bending: whether it records bending.
         breakable: whether its cores have a strength.

@@ -1,4 +1,4 @@
-"""Dotted places of a campaign, such as "plate.pattern.width" or "layer 1.gap": resolved, filled and read; the files
+"""Dotted places of a campaign, such as "plate.pattern.width" or "layer 1.gap", resolved, filled and read; and the files
 that its tables name. Layer 0 is the plate, and layer 1 the first table [[layer]]."""
 
 from __future__ import annotations
@@ -15,12 +15,12 @@ from .campaign import Campaign
 from .text import CampaignError
 
 _TABLES: Mapping[str, Any] = {"impact": Impact, "plate": Plate, "interaction": Interaction}
-"""Tables whose keys may be given without the table, as their names are unique."""
+"""Tables whose keys may be given without the table, because their names are unique."""
 _WHOLE = ("core", "plate", "plate.pattern", "interaction")
 _WHOLE_OF_A_LAYER = re.compile(r"layer \d+(\.pattern)?")
 """Tables that may be given as a whole."""
 _LAYER, _BEFORE = re.compile(r"layer (\d{1,3})"), re.compile(r"layer\.(\d{1,3})(.*)")
-"""The number of a layer in a place; how earlier versions wrote it, which counted the tables [[layer]] from 0."""
+"""The number of a layer in a place; and the form of earlier versions, which counted the tables [[layer]] from 0."""
 _NAMES_A_FILE = ("file", "posterior", "catalogue")
 
 
@@ -33,7 +33,7 @@ def resolved(key: str, name: str) -> str:
     """The dotted place of a key, which may be that of an input of [impact], [plate] or [interaction] alone.
 
     Args:
-        name: what errors call the table of keys, such as "sweep.toml: sweep".
+        name: name of the table of keys in errors, such as "sweep.toml: sweep".
 
     Raises:
         CampaignError: there is no such key.
@@ -79,7 +79,7 @@ def put(data: dict[str, Any], key: str, value: Any, name: str) -> None:
 
 
 def _parts(key: str) -> list[str | int]:
-    """The parts of a dotted place; a number is that of an entry of a list."""
+    """The parts of a dotted place. A number is the index of an entry in a list."""
     first, *rest = key.split(".")
     layer = _LAYER.fullmatch(first)
     parts = ["layer", int(layer[1]) - 1] if layer else [first]
@@ -110,9 +110,9 @@ def relocated(tables: Any, before: Path, now: Path, key: str = "") -> Any:
 
 
 def type_at(key: str, campaign: Campaign) -> Any:
-    """The type of an input, with its marks; None where it is in no model."""
+    """The type of an input, with its annotations; None where it is in no model."""
     table, _, last = key.rpartition(".")
-    if last == "areal_density":  # which a plate reads and has, but not as a field
+    if last == "areal_density":  # a plate reads it and has it, but not as a field
         return PositiveArealDensity
     field = getattr(type(value_at(table, campaign)), "model_fields", {}).get(last)
     return None if field is None else typed(field)

@@ -1,5 +1,4 @@
-"""What of a campaign is probably not what was meant: a warning with the value as it was read, and the likely slip; and
-what cannot be meant: an error."""
+"""Values of a campaign that are probably not meant, with the likely slip (a warning), or cannot be meant (an error)."""
 
 from __future__ import annotations
 
@@ -25,13 +24,13 @@ _OF_A_PLATE = (
 )
 
 _MOST_OPEN = 0.6
-"""Open area of a plate beyond which its hits are told to meet little."""
+"""Open area of a plate above which a warning says that hits meet little."""
 _THIN = 0.25
-"""Ligament over thickness below which a web is told to be thin: a beam four times as deep as wide."""
+"""Ligament over thickness below which a web is called thin: a beam four times as deep as wide."""
 
 
 def warn_of(scene: Scene, impact: Impact, hits: Hits) -> None:
-    """Warn (`Implausible`) of every value of a campaign that is possible, but far from what such campaigns have."""
+    """Warn (`Implausible`) of every value of a campaign that is possible, but unusual."""
     for sentence in doubted(scene, impact, hits):
         warnings.warn(sentence, Implausible, stacklevel=2)
 
@@ -95,7 +94,7 @@ def _values(
     for name, column in ((hits and hits.listed) or {}).items():
         kind = f"{SCATTERED[name].table}.{name}" if name in SCATTERED else "hits"
         ends = [float(column[np.abs(column).argmax()])]
-        if kind != "hits":  # which may be as small as it likes
+        if kind != "hits":  # hits may be as near to the origin as they like
             ends.append(float(column[np.abs(column).argmin()]))
         for value in dict.fromkeys(ends):
             yield f"hits.file, column {name}", kind, value

@@ -1,4 +1,4 @@
-"""What keeps a campaign from being valid, as a sentence."""
+"""The reason why a campaign is not valid, as a sentence."""
 
 from typing import Any
 
@@ -22,7 +22,7 @@ def sentence(error: ValidationError, data: dict[str, Any]) -> str:
 
 
 def _follows(problem: ErrorDetails, error: ValidationError) -> bool:
-    """Whether a list is too short only because its items are wrong, which another problem says."""
+    """Whether a list is too short only because its items are wrong, which another problem reports."""
     place = problem["loc"]
     inner = (other["loc"] for other in error.errors(include_url=False) if len(other["loc"]) > len(place))
     return problem["type"] == "too_short" and any(other[: len(place)] == place for other in inner)
@@ -34,8 +34,8 @@ def _described(problem: ErrorDetails, data: dict[str, Any]) -> str:
 
 
 def _place(problem: ErrorDetails, data: Any) -> str:
-    """Dotted TOML key of a problem, without what a key of _CHOICES chooses, which pydantic counts as a key. The first
-    table [[layer]] is "layer 1", as the plate is layer 0."""
+    """Dotted TOML key of a problem, without the names of choices (_CHOICES), which pydantic counts as keys. The first
+    table [[layer]] is "layer 1", because the plate is layer 0."""
     place = ""
     for part in problem["loc"]:
         if isinstance(data, dict) and part not in data and part in map(data.get, _CHOICES):

@@ -1,4 +1,4 @@
-"""What a target is compared with: a solid add-on of its steel and weight before the same base, and the base alone."""
+"""References of a target: a solid add-on of its steel and weight before the same base, and the base alone."""
 
 from __future__ import annotations
 
@@ -14,7 +14,8 @@ from warpimpact.scene.quantities import BY_LAYER
 
 
 def solid_target(campaign: Campaign) -> Target:
-    """The target with a solid add-on, or a solid plate alone. Y of the catalogue is that of the new thickness."""
+    """The target with a solid add-on, or a solid plate alone. A Y of the catalogue becomes that of the new
+    thickness."""
     pairs = zip(campaign.target.layers, campaign.target.solid.layers, strict=True)
     return Target(layers=tuple(_of_its_thickness(campaign, *pair) for pair in pairs))
 
@@ -31,7 +32,7 @@ def has_solid(campaign: Campaign) -> bool:
 
 
 def at_solid(campaign: Campaign, shots: Shots) -> tuple[Scene, Shots]:
-    """The solid reference, and shots at it: its add-on is as heavy as that of each shot."""
+    """The scene of the solid reference, and shots at it. Its add-on is as heavy as that of each shot."""
     target, solid = campaign.target, solid_target(campaign)
     columns: dict[str, Any] = {}
     for name in ("thickness", "resistance"):
@@ -44,7 +45,7 @@ def at_solid(campaign: Campaign, shots: Shots) -> tuple[Scene, Shots]:
 
 
 def at_base_alone(campaign: Campaign, shots: Shots) -> tuple[Scene, Shots]:
-    """The base alone, and shots at the same places of its face."""
+    """The scene of the base alone, and shots at the same places of its face."""
     last = len(campaign.target.layers) - 1
     columns: dict[str, Any] = {
         name: shots.columns[name][:, last] if shots.differs(name, last) else None for name in BY_LAYER

@@ -1,4 +1,4 @@
-"""What the catalogue says of the resistance of the plates of a campaign, also of thicknesses that it does not have."""
+"""Resistance of a campaign's plates by the catalogue, also at thicknesses that the campaign does not have."""
 
 from __future__ import annotations
 
@@ -20,18 +20,18 @@ if TYPE_CHECKING:
 Curve = tuple[tuple[float, ...], tuple[float, ...]]
 
 _SAME = 1e-6
-"""Relative difference of a resistance from that of the catalogue, up to which it is the catalogue's."""
+"""Largest relative difference of a resistance from that of the catalogue at which it counts as the catalogue's."""
 _THINNEST, _POINTS = 1e-3, 128
-"""Of a curve: its least thickness, as a share of the largest, and its points. They are closer than a tenth of what the
-fit takes to be nearly one thickness (`catalogue.strength.SAME_THICKNESS`, as logarithms) is wide; what is linear
-between them is off by 0.1 % at most."""
+"""Least thickness of a curve as a share of the largest, and number of its points. The points are closer than a tenth of
+the width within which the fit takes thicknesses as nearly equal (`catalogue.strength.SAME_THICKNESS`, as logarithms).
+Linear interpolation is wrong by at most 0.1 %."""
 
 
 def catalogue_resistance(campaign: Campaign, plate: Plate, thickness: float | None = None) -> Resistance | None:
-    """What the catalogue knows of the Y of a plate; None where Y is the user's.
+    """The resistance of a plate by the catalogue; None where Y is the user's.
 
     Args:
-        thickness: of the plate, if it had another one [m].
+        thickness: another thickness of the plate [m].
     """
     catalogue = Catalogue.of(campaign.catalogue)
     material = catalogue.all(Material).get(str(plate.material))
@@ -65,7 +65,7 @@ def resistance_by_thickness(campaign: Campaign, layer: int, thickest: float, uni
 
 
 def is_drawn(campaign: Campaign, quantity: str, layers: Collection[int] = (0,)) -> bool:
-    """Whether shots have values of their own of a quantity, by a distribution, a list of hits or a posterior."""
+    """Whether a quantity differs from shot to shot, by a distribution, a list of hits or a posterior."""
     scattered = any(name == quantity and k in layers for name, k in campaign.scatter.given)
     listed = campaign.hits.listed is not None and quantity in campaign.hits.listed
     drawn = campaign.drawn is not None and any(str(path[1]).startswith(quantity) for path in campaign.drawn.values)

@@ -1,4 +1,4 @@
-"""Distributions of a campaign file, taken out of the places of the values that they replace."""
+"""Distributions of a campaign file, moved out of the places of the values that they replace."""
 
 from collections.abc import Iterator
 from typing import Any

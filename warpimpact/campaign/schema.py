@@ -25,7 +25,7 @@ def campaign_schema() -> Schema:
     """The JSON schema (2020-12) of a campaign file, and of one with several plates for ``warpimpact compare``.
 
     Every key has its description, its default and its bounds. A quantity is a number or a string with a unit; the
-    keyword ``unit`` is that of a number. A schema cannot tell that keys exclude each other: warpimpact does.
+    keyword ``unit`` is the unit of a number. A schema cannot say that keys exclude each other: warpimpact does.
     """
     schema = _described(Campaign)
     definitions = schema["$defs"]
@@ -47,7 +47,7 @@ def campaign_schema() -> Schema:
 
 
 def completed_schema(model: type[BaseModel]) -> Schema:
-    """The JSON schema of another file, whose tables are those of a model: with descriptions, defaults and bounds."""
+    """The JSON schema of a file whose tables are those of a model, with descriptions, defaults and bounds."""
     schema = _described(model)
     return {"$schema": "https://json-schema.org/draft/2020-12/schema", **_decided(schema, schema["$defs"])}
 
@@ -89,7 +89,7 @@ def _says_something(name: str, value: Any) -> bool:
 
 
 def _complete(definition: Schema, model: type[BaseModel]) -> None:
-    """Add what the model knows of its keys beyond their types."""
+    """Add to a definition what the model knows of its keys beyond their types."""
     properties, (summary, meanings) = definition["properties"], read_docstring(model)
     definition["description"] = summary
     for name, text in meanings.items():
@@ -107,12 +107,12 @@ def _complete(definition: Schema, model: type[BaseModel]) -> None:
 
 
 def _in_a_file(text: str) -> str:
-    """The description of a field for the key of a file, without its unit, which the schema gives by itself."""
+    """The description of a field for the key of a file. The unit is left out, because the schema gives it."""
     return re.sub(r"\bNone\b", "not given", re.sub(r"(?:^|\s)\[[^]]*\]", "", text)).strip(" .") + "."
 
 
 def read_docstring(model: type) -> tuple[str, dict[str, str]]:
-    """What the docstring of a model says: its first paragraphs, and the meanings of its keys."""
+    """The first paragraphs of a model's docstring, and the meanings of its keys."""
     meanings: dict[str, str] = {}
     for kind in reversed(model.__mro__):
         meanings |= _entries(inspect.cleandoc(kind.__doc__ or "").partition("Attributes:\n")[2])
@@ -135,7 +135,7 @@ def _entries(text: str) -> dict[str, str]:
 
 
 def _take_weights(definitions: Schema) -> None:
-    """A plate has a thickness or an areal density."""
+    """Accept a thickness or an areal density for a plate."""
     density = _tidied(TypeAdapter(PositiveArealDensity).json_schema())
     for table in (definitions["Plate"], definitions["Layer"]):
         table["properties"]["areal_density"] |= density
@@ -145,7 +145,8 @@ def _take_weights(definitions: Schema) -> None:
 
 
 def _named(schema: Schema) -> Schema:
-    """A schema in which a threat stands for the keys of a core and for the velocity, a material for a resistance."""
+    """A schema that also accepts a threat for the keys of a core and for the velocity, and a material for a
+    resistance."""
     definitions = schema["$defs"]
     cores = [choice["then"]["$ref"].rpartition("/")[2] for choice in schema["properties"]["core"]["allOf"]]
     for name in cores:
@@ -169,7 +170,7 @@ def _unless(key: str, rest: Schema) -> Schema:
 
 
 def _take_distributions(schema: Schema) -> None:
-    """A distribution may take the place of a value that scatters."""
+    """Accept distributions for values that scatter."""
     definitions, kinds = schema["$defs"], [model.__name__ for model in _models(Distribution)]
     kinds = [name for name in kinds if name in definitions]
     for name in kinds:
@@ -192,20 +193,20 @@ def _take_distributions(schema: Schema) -> None:
 
 
 def _let_scatter(properties: Schema, name: str) -> None:
-    """A distribution may take the place of this value."""
+    """Accept a distribution for this value."""
     value = properties[name]
     beside = {key: value.pop(key) for key in ("description", "default") if key in value}
     properties[name] = beside | {"anyOf": [value, {"$ref": "#/$defs/Distribution"}]}
 
 
 def _referred(schema: Schema, part: Schema) -> list[Schema]:
-    """The definitions that a part of the schema refers to."""
+    """The definitions to which a part of the schema refers."""
     references = [choice["$ref"] for choice in (part, *part.get("oneOf", [])) if "$ref" in choice]
     return [schema["$defs"][reference.rpartition("/")[2]] for reference in references]
 
 
 def _take_plates(schema: Schema) -> None:
-    """Several plates, each with a name, in a file for ``warpimpact compare``."""
+    """Accept several plates, each with a name, in a file for ``warpimpact compare``."""
     plate_schema = schema["$defs"]["Plate"]
     name = {"type": "string", "description": "Name of the plate and of its result; only where there are several."}
     layers = {
@@ -225,8 +226,8 @@ def _take_plates(schema: Schema) -> None:
 
 
 def _decided(part: Any, definitions: Schema) -> Any:
-    """The schema with conditions on the kind of a value or on a key, in the place of anyOf and oneOf. An editor then
-    marks the key that is wrong; of several choices none of which fits, it would mark the whole table."""
+    """The schema with conditions on the kind of a value or on a key instead of anyOf and oneOf. An editor then marks
+    the wrong key; for several choices none of which fits, it would mark the whole table."""
     if isinstance(part, list):
         return [_decided(entry, definitions) for entry in part]
     if not isinstance(part, dict):
@@ -241,7 +242,7 @@ def _decided(part: Any, definitions: Schema) -> Any:
 
 
 def _by_kind(choices: list[Schema]) -> Schema:
-    """A choice that the kind of the value decides: keywords of a number, a string or a list say nothing of others."""
+    """A choice by the kind of the value: keywords for a number, a string or a list do not affect other kinds."""
     merged: Schema = {"type": []}
     for choice in choices:
         table = "$ref" in choice or choice["type"] == "object"
@@ -254,7 +255,7 @@ def _by_kind(choices: list[Schema]) -> Schema:
 
 
 def _by_key(references: list[str], definitions: Schema) -> Schema:
-    """A choice between tables that one of their keys decides. Their keys stand here, too, for completion."""
+    """A choice between tables by one of their keys. Their keys are repeated here, for completion."""
     tables = [definitions[reference.rpartition("/")[2]] for reference in references]
     key = next(name for name, table in tables[0]["properties"].items() if "const" in table)
     names = [table["properties"][key]["const"] for table in tables]

@@ -1,7 +1,8 @@
-"""A core that goes straight through a solid plate: what its resistance is worth under another law (docs/model.md §6.2).
+"""A core that goes straight through a solid plate: its equivalent resistance under another law (docs/model.md §6.2).
 
-A resistance belongs to the law with which it was found. What stays under another one is what was seen: the limit
-velocity of a solid plate, or what it takes from a core.
+A resistance belongs to the law with which it was determined. Under another law the observation stays: the limit
+velocity
+of a solid plate, or the velocity that it takes from a core.
 """
 
 from __future__ import annotations
@@ -18,11 +19,11 @@ Array = NDArray[np.float64]
 _STATIONS, _DEPTHS = 1001, 200
 """Points along a core, and steps of its way."""
 _WIDEST = 1e-6
-"""Relative difference from the largest radius at which a core counts as that wide."""
+"""Relative difference from the largest radius at which a core counts as fully wide."""
 _FACTORS = np.geomspace(0.02, 50.0, 401)
-"""Resistances that are tried, over the one before."""
+"""Resistances to try, over the one before."""
 _SPEEDS = 401
-"""Velocities behind the plate that are tried."""
+"""Number of velocities behind the plate to try."""
 
 
 @dataclass(frozen=True)
@@ -44,12 +45,12 @@ class StraightPassage:
     density: float
 
     def entry(self, resistance: ArrayLike, leaving: ArrayLike = 0.0) -> Array:
-        """Velocity with which the core enters [m/s], of the shape to which the arguments broadcast; the motion is
-        followed from the rear face back to the front one.
+        """Velocity with which the core enters [m/s], of the broadcast shape of the arguments. The motion is followed
+        from the rear face back to the front face.
 
         Args:
             resistance: Y [Pa].
-            leaving: velocity behind the plate [m/s]; with 0, the limit velocity results.
+            leaving: velocity behind the plate [m/s]; 0 gives the limit velocity.
         """
         station, radius, slope = self._nose()
         facing, law, free = slope / np.sqrt(1.0 + slope * slope), self.law, self.law.free_surface
@@ -78,9 +79,9 @@ class StraightPassage:
         """Resistance Y [Pa] with which the plate takes as much from the core under another law.
 
         Args:
-            law, friction: the other ones.
-            resistance: Y under this one [Pa].
-            velocity: with which the core arrives [m/s]. The limit velocity stays where it is no less.
+            law, friction: the other law and friction.
+            resistance: Y under this law [Pa].
+            velocity: velocity with which the core arrives [m/s]. If the limit velocity is not less, it is kept instead.
         """
         limit, leaving = float(self.entry(resistance)), 0.0
         if velocity > limit:

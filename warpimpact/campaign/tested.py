@@ -1,5 +1,5 @@
 """What of a campaign was ever measured: published limit velocities of solid plates, and two shots at one slotted plate
-(docs/validation.md). Everything else of a campaign rests on the model alone, and is named here with its range."""
+(docs/validation.md). Everything else rests on the model alone, and is named here with its range."""
 
 from __future__ import annotations
 
@@ -24,28 +24,28 @@ if TYPE_CHECKING:
 Figures = Mapping[str, Mapping[str, float]]
 
 _SLACK = 0.05
-"""Relative distance from the end of a range that still counts as inside."""
+"""Relative distance beyond the end of a range that still counts as inside."""
 _HEAVY, _CARBIDE = 5000.0, 11_000.0
 """Density above which a plate is steel, and above which a core is a carbide or a heavy metal [kg/m³]."""
 _STRONG, _STEP = 2.0e9, 1.0
-"""A steel may be hard from this resistance on [Pa], and its resistance falls below this thickness in calibres."""
+"""Resistance from which a steel may be hard [Pa]; thickness in calibres below which its resistance falls."""
 _NOSE, _SHORT = 0.95, 0.75
-"""A nose ends where this share of the largest radius is reached; a blunt one is shorter, in diameters."""
+"""Share of the largest radius at which a nose ends; length in diameters below which it is blunt."""
 _STRAIGHT = math.radians(2.0)
 """Obliquity or yaw on impact that the two shots through holes may have had [rad]."""
 _HOLED_CALIBRES, _HOLED_LIGAMENT = 0.66, 1.0
-"""The plate of the two shots: its thickness in calibres, and about its ligament over its thickness, as the spacing of
-the slots is not published (the paper's §2)."""
+"""The plate of the two shots: its thickness in calibres, and its approximate ligament over its thickness, because the
+spacing of the slots is not published (the paper's §2)."""
 _SIMILAR_RATIO = 1.5
-"""Ratio up to which a plate with holes is like that of the two shots. It is chosen."""
+"""Largest ratio at which a plate with holes counts as similar to that of the two shots. It is chosen."""
 
 
 class Standing(NamedTuple):
-    """Something of a campaign that lies beyond what was measured, or that nobody measured.
+    """A property of a campaign that lies beyond what was measured, or that nobody measured.
 
     Attributes:
-        subject: what it is, in a word or two.
-        text: what was found, and what was measured.
+        subject: the property in a word or two.
+        text: the value found, and what was measured.
         place: layer of the target as a campaign names it; empty for the shot as a whole.
     """
 
@@ -60,7 +60,7 @@ class Standing(NamedTuple):
 
 
 def standings_of(campaign: Campaign, materials: Mapping[str, Material]) -> list[Standing]:
-    """Everything of a campaign that lies beyond what was measured; layers that say the same are told together."""
+    """Everything of a campaign that lies beyond what was measured. Layers with the same text are named together."""
     figures = _figures()
     standings = list(_of_shot(campaign, figures))
     for place, plate in campaign.target.named:
@@ -81,7 +81,7 @@ def summary_of_all(campaigns: Iterable[Campaign], what: str) -> str:
     """One sentence on what answers for several campaigns rest on.
 
     Args:
-        what: the campaigns are called, such as "designs".
+        what: name for the campaigns, such as "designs".
     """
     several = list(campaigns)
     materials = [Catalogue.of(campaign.catalogue).all(Material) for campaign in several]
@@ -105,7 +105,7 @@ def _summary(campaigns: Sequence[Campaign], subjects: Sequence[Sequence[str]], w
 
 
 def nose_length(core: Core) -> float:
-    """Where a core is nearly as wide as it gets, in its largest diameters behind the tip."""
+    """Distance behind the tip at which a core is nearly at its widest, in its largest diameters."""
     s = np.linspace(0.0, core.length, 1001)
     first = int(np.argmax(core.radius(s) >= _NOSE * core.max_radius))
     return float(s[first] / (2.0 * core.max_radius))
@@ -162,7 +162,7 @@ def _of_shot(campaign: Campaign, figures: Figures) -> Iterator[Standing]:
 
 
 def _of_plate(campaign: Campaign, plate: Plate, material: Material | None, figures: Figures) -> Iterator[Standing]:
-    """Where a plate leaves what was measured; the material's own rows count where it has some."""
+    """Properties in which a plate leaves what was measured. Rows of its material replace those of all materials."""
     core, steel = campaign.core, plate.density > _HEAVY
     rows = figures["steel" if steel else "aluminium"]
     if not _within(plate.density, rows["density_low"], rows["density_high"], 0.03):
@@ -189,7 +189,7 @@ def _of_plate(campaign: Campaign, plate: Plate, material: Material | None, figur
 
 
 def _of_rows(campaign: Campaign, plate: Plate, material: Material) -> Iterator[Standing]:
-    """Where a plate leaves the rows that its material comes from."""
+    """Properties in which a plate leaves the rows of its material."""
     core, name = campaign.core, material.name
     high = material.calibres_high or math.inf
     thickest = material.thickness_high or math.inf
@@ -227,7 +227,7 @@ def _alike(value: float, other: float) -> bool:
 
 
 def _thin_hard(core: Core, plate: Plate, figure: Mapping[str, float]) -> Iterator[Standing]:
-    """Of a plate whose Y is not the catalogue's, which follows the thickness."""
+    """The limits of the model for a thin hard plate whose Y is not the catalogue's, which follows the thickness."""
     ratio = calibres_of(core, plate)
     if plate.density < _HEAVY or ratio >= _STEP or plate.resistance < _STRONG:
         return
@@ -240,7 +240,7 @@ def _thin_hard(core: Core, plate: Plate, figure: Mapping[str, float]) -> Iterato
 
 
 def _dense(core: Core, plate: Plate, figure: Mapping[str, float]) -> Iterator[Standing]:
-    """Of a core of a carbide or a heavy metal that has no rows of its own."""
+    """The limits of the model for a core of a carbide or a heavy metal that has no rows of its own."""
     if _density(core) < _CARBIDE:
         return
     steel = plate.density >= _HEAVY
@@ -263,7 +263,7 @@ def _density(core: Core) -> float:
 
 
 def _outside(subject: str, value: float, low: float, high: float, unit: str, whose: str = "") -> Iterator[Standing]:
-    """A number that lies beyond a range that was measured."""
+    """A number that lies beyond a measured range."""
     if _within(value, low, high):
         return
     of = f" of {whose}" if whose else ""

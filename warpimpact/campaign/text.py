@@ -1,4 +1,4 @@
-"""The text of a campaign, TOML or JSON: read and parsed within bounds, not yet validated."""
+"""The text of a campaign, TOML or JSON, read and parsed within bounds but not validated."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -28,10 +28,10 @@ def parsed(text: str, name: str, kind: Kind | None = None) -> dict[str, Any]:
     """The tables of a campaign, TOML or JSON, not yet validated.
 
     Args:
-        kind: what it must be.
+        kind: kind of file that it must be.
 
     Raises:
-        CampaignError: the text, which errors call `name`, is neither, or is of another kind.
+        CampaignError: the text is neither, or is of another kind; `name` is its name in the message.
     """
     with _as_campaign():
         tables = toml_text.parsed(text, name)
@@ -45,7 +45,7 @@ def read_text(path: Path) -> str:
     """The text of a campaign file.
 
     Raises:
-        CampaignError: it is missing, cannot be read, or is a netCDF file.
+        CampaignError: the file is missing, cannot be read, or is a netCDF file.
     """
     with _as_campaign():
         check_file(path)

@@ -11,12 +11,12 @@ _BARE = re.compile(r"[A-Za-z0-9_-]+")
 
 
 def toml_text(tables: Mapping[str, Any]) -> str:
-    """Tables of strings, numbers, truth values, lists and tables as TOML; what is None is left out."""
+    """Tables of strings, numbers, truth values, lists and tables as TOML. Values that are None are left out."""
     return "\n".join(_lines(tables, ())).strip() + "\n"
 
 
 def _lines(table: Mapping[str, Any], path: tuple[str, ...]) -> list[str]:
-    """Values first, then the tables below, as TOML has it."""
+    """Lines of a table: first its values, then the tables below it, as TOML needs them."""
     lines, below = [], []
     for key, value in table.items():
         if isinstance(value, Mapping) and (not path or len(value) > 3):

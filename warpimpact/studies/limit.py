@@ -55,9 +55,9 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class LimitMap:
-    """The limit of every hit, as a `runs.task.Computation`: what `warpimpact limit` computes.
+    """The limit of every hit, as a `runs.task.Computation` for `warpimpact limit`.
 
-    The hits of a shard are searched together. So a limit depends on the campaign alone, whatever task it is part of.
+    The hits of a shard are searched together, so a limit depends on the campaign alone, not on the task.
     """
 
     sought: Sought
@@ -68,7 +68,7 @@ class LimitMap:
     def of(
         cls, campaign: Campaign, quantity: str = "velocity", tolerance: float | None = None, layer: int = 0
     ) -> LimitMap:
-        """The job for a campaign, with the usual tolerance where none is given.
+        """The computation for a campaign, with the default tolerance if none is given.
 
         Raises:
             CampaignError: the campaign has no limits, or this search cannot find them.
@@ -89,10 +89,10 @@ class LimitMap:
         return cls(Sought(quantity, tolerance or THICKNESS_TOLERANCE, highest, layer, curve))
 
     def check(self, texts: Sequence[str]) -> None:
-        """Refuse measures that this search does not tell.
+        """Refuse measures that this search does not give.
 
         Raises:
-            CampaignError: names the measure.
+            CampaignError: the message names the measure.
         """
         for text in texts:
             try:
@@ -107,7 +107,7 @@ class LimitMap:
 
     @property
     def content(self) -> Mapping[str, str]:
-        """What decides the bits beside the campaign."""
+        """What determines the bits beside the campaign."""
         sought = self.sought
         of_layer = f" of layer {sought.layer}" if sought.layer else ""
         curve = ", with the resistance of each thickness" if sought.by_thickness else ""
@@ -119,7 +119,7 @@ class LimitMap:
         return (f"mean({v.LIMITS[self.sought.quantity].value})",)
 
     def compute(self, campaign: Campaign, task: Task, worker: Worker, progress: Progress | None = None) -> HitTable:
-        """Search the limits of some shots. The Dataset is that of the shots as they just perforate, with their limits.
+        """Search the limits of some shots. The table has the shots as they just perforate, with their limits.
 
         Args:
             progress: as in `simulate`.
@@ -171,8 +171,8 @@ class LimitMap:
         }
 
     def _at_base_alone(self, campaign: Campaign, shots: Shots, numerics: Numerics, worker: Worker) -> dict[str, Array]:
-        """Column of the limits of some shots at the base alone; nothing where there is no base, or the thickness of a
-        layer in front of it is searched."""
+        """Column of the limits of some shots at the base alone; empty without a base, or if the thickness of a layer in
+        front of it is searched."""
         sought, base = self.sought, len(campaign.target.layers) - 1
         if not base or (sought.quantity == "thickness" and sought.layer != base):
             return {}
@@ -196,20 +196,21 @@ class LimitMap:
     def pilot(
         self, campaign: Campaign, worker: Worker, trying: Callable[[int], object] = lambda level: None
     ) -> LimitErrors | None:
-        """What a pilot of the campaign's own hits finds; None if the campaign fixes the resolution itself."""
+        """The findings of a pilot with hits of the campaign; None if the campaign fixes the resolution."""
         if campaign.numerics.explicit is not None:
             return None
         pilot = pilot_shots(campaign, limits_pilot_size(campaign.numerics.asked))
         return pilot_of_limits(campaign.scene, pilot, self.sought, campaign.numerics, worker, trying)
 
     def found_in(self, result: Result) -> LimitErrors | None:
-        """What the pilot of a result found."""
+        """The findings of the pilot of a result."""
         if attr.RESOLUTION not in result.attrs:
             return None
         return LimitErrors(*found_in(result), float(result.attrs[attr.LIMIT_ERROR]), result.attrs[attr.LIMIT])
 
     def weights(self, target: Target) -> dict[str, float]:
-        """What turns the thickness of the layer into the areal density of the target; nothing of a velocity."""
+        """Attributes that convert the thickness of the layer to the areal density of the target; none for a
+        velocity."""
         if self.sought.quantity == "velocity":
             return {}
         layer = target.layers[self.sought.layer]
@@ -227,7 +228,7 @@ class LimitMap:
 
 
 def warning_of(campaign: Campaign, quantity: str) -> str | None:
-    """What a user should know of a campaign whose limits are asked for."""
+    """A warning about a campaign whose limits are searched; None if there is nothing to warn of."""
     if (quantity, 0) not in campaign.scatter.given:
         return None
     return (

@@ -34,13 +34,13 @@ _MOST_LISTED = 12
 
 
 def shown_unit(name: str) -> tuple[str, float]:
-    """Unit that people see a limit in, and the factor to it."""
+    """Display unit of a limit, and the factor to it."""
     shown = reader_of(QUANTITIES[name].type).display
     return shown.shown, shown.factor
 
 
 def measures_of(dataset: xarray.Dataset, texts: Sequence[str] = ()) -> list[Measure]:
-    """The measures that are asked of a search of limits; without a text V50 and V05, or H50 and H05.
+    """The measures with these texts for a search of limits; by default V50 and V05, or H50 and H05.
 
     Raises:
         ResultError: a text is no measure, or the result lacks what it needs.
@@ -54,10 +54,10 @@ def measures_of(dataset: xarray.Dataset, texts: Sequence[str] = ()) -> list[Meas
 
 
 def limit_view(dataset: xarray.Dataset, texts: Sequence[str] = ()) -> list[Section]:
-    """The view of a search of limits: every hit of a short list, or its measures; what it is compared with; notes.
+    """The view of a search of limits: every hit of a short list, or its measures; its references; notes.
 
     Args:
-        texts: of measures, which are shown of a short list, too; by default as in `measures_of`.
+        texts: texts of measures, which are also shown for a short list; by default as in `measures_of`.
     """
     short = len(dataset[v.LIMITS[dataset.attrs[attr.LIMIT]].value]) <= _MOST_LISTED
     return [
@@ -70,7 +70,7 @@ def limit_view(dataset: xarray.Dataset, texts: Sequence[str] = ()) -> list[Secti
 
 
 def in_short(dataset: xarray.Dataset) -> str:
-    """V50 and V05, or H50 and H05, with their intervals in a sentence; of a short list the range of its limits."""
+    """A sentence with V50 and V05, or H50 and H05, and their intervals; for a short list the range of its limits."""
     quantity = dataset.attrs[attr.LIMIT]
     unit, factor = shown_unit(quantity)
     values = factor * dataset[v.LIMITS[quantity].value].values
@@ -103,7 +103,7 @@ def _hits(dataset: xarray.Dataset) -> Table:
 
 
 def _assumed(dataset: xarray.Dataset) -> list[tuple[float, float]]:
-    """The smallest and the largest limit of every hit under any assumption; nothing where that is not known of all."""
+    """The smallest and the largest limit of every hit under any assumption; empty unless known for all hits."""
     measure = Measure.parse(f"mean({v.LIMITS[dataset.attrs[attr.LIMIT]].value})")
     moves, value = Assumed(dataset, [measure]).moves(measure), measure.by_hit(dataset)
     if moves is None or not np.array_equal(moves.hits, hit_numbers(dataset)):
@@ -124,7 +124,7 @@ def _estimates(dataset: xarray.Dataset, texts: Sequence[str]) -> Table:
 
 
 def _left_out(dataset: xarray.Dataset) -> Iterator[str]:
-    """Hits without a limit, and limits that are less exact than asked for."""
+    """Hits without a limit, and limits that are less accurate than required."""
     attributes, quantity = dataset.attrs, dataset.attrs[attr.LIMIT]
     unit, factor = shown_unit(quantity)
     value, _, _, _, converged = (dataset[name].values for name in v.LIMITS[quantity])
@@ -139,7 +139,7 @@ def _left_out(dataset: xarray.Dataset) -> Iterator[str]:
 
 
 def _expected(dataset: xarray.Dataset) -> Iterator[str]:
-    """Where a test would find the limit velocity, by what is known of the material; nothing where that is not known."""
+    """Where a test would find the limit velocity, from the evidence on the material; empty without evidence."""
     value = dataset[v.LIMITS[dataset.attrs[attr.LIMIT]].value].values
     if attr.LIMIT_FACTORS not in dataset.attrs or not np.isfinite(value).any():
         return
@@ -152,7 +152,7 @@ def _expected(dataset: xarray.Dataset) -> Iterator[str]:
 
 
 def _costs(dataset: xarray.Dataset) -> Iterator[str]:
-    """How many runs the search took, and how exact its limits are."""
+    """Number of runs of the search, and accuracy of its limits."""
     runs = dataset[v.LIMITS[dataset.attrs[attr.LIMIT]].runs].values
     yield f"{runs.mean():.2g} runs of a hit on average, {runs.max()} at most"
     yield promise_line(dataset)
@@ -160,7 +160,7 @@ def _costs(dataset: xarray.Dataset) -> Iterator[str]:
 
 
 def _references(dataset: xarray.Dataset) -> Iterator[str]:
-    """The limits of the solid reference and of the base alone; nothing without them."""
+    """The limits of the solid reference and of the base alone; empty without them."""
     if (solid := solid_limits(dataset)) is not None:
         yield _of_solid(dataset, solid)
     if (alone := base_alone_limits(dataset)) is not None:
@@ -176,7 +176,7 @@ def _mean_text(reference: xarray.Dataset, quantity: str) -> str:
 
 
 def _of_solid(dataset: xarray.Dataset, reference: xarray.Dataset) -> str:
-    """The limit of the solid reference, and what its search cost."""
+    """The limit of the solid reference, and the cost of its search."""
     quantity, hit_count = dataset.attrs[attr.LIMIT], reference.sizes["hit"]
     limit = _mean_text(reference, quantity)
     density = float(dataset.attrs[attr.AREAL_DENSITY])
@@ -194,7 +194,7 @@ def _of_solid(dataset: xarray.Dataset, reference: xarray.Dataset) -> str:
 
 
 def _proxies(dataset: xarray.Dataset) -> list[Section]:
-    """The proxy beside the limit thickness of a solid plate; nothing for another search."""
+    """The proxy beside the limit thickness of a solid plate; empty for another search."""
     proxies = proxy(dataset) if dataset.attrs[attr.LIMIT] == "thickness" else None
     if proxies is None:
         return []
@@ -211,7 +211,7 @@ def _proxies(dataset: xarray.Dataset) -> list[Section]:
 
 
 def promise_line(dataset: xarray.Dataset) -> str:
-    """How far off the limits are estimated to be."""
+    """A line with the estimated error of the limits."""
     attributes = dataset.attrs
     unit, factor = shown_unit(attributes[attr.LIMIT])
     of_layer = f"thickness of layer {attributes[attr.LIMIT_LAYER]}; " if attributes[attr.LIMIT_LAYER] else ""

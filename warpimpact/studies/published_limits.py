@@ -31,7 +31,7 @@ class Beside(NamedTuple):
 
     @property
     def label(self) -> str:
-        """What stands in a legend."""
+        """Label in a legend."""
         return f"published: {self.published.label}".removesuffix(": ")
 
 
@@ -58,7 +58,7 @@ def _computed(dataset: xarray.Dataset, obliquity: float) -> float:
 
 
 def published_view(dataset: xarray.Dataset) -> list[Section]:
-    """The published limits beside the computed ones, and their sources; nothing of a campaign that names none."""
+    """The published limits beside the computed ones, and their sources; empty if the campaign names none."""
     beside = published_beside(dataset)
     if not beside:
         return []

@@ -30,9 +30,9 @@ from warpimpact.runs.run import run_to_file
 from warpimpact.scene.units import quoted, reader_in
 
 _OF_POINTS = {str(name) for group in ("plate", "solid") for name in v.GROUPS[group]}
-"""Holes and shots at the solid plate, which only the results of the points hold."""
+"""Holes and shots at the solid plate, which only the results of the points have."""
 _MOST = 10_000
-"""Points of a sweep."""
+"""Most points of a sweep."""
 _OF_A_POINT = (
     *(attr.CAMPAIGN, attr.HISTORY, attr.FINGERPRINT, attr.COMPUTE_TIME, attr.HITS_PER_SECOND, attr.TITLE),
     *(attr.RESOLUTION, attr.PROMISE_KEPT, attr.RESIDUAL_VELOCITY_ERROR, attr.TILT_ERROR, attr.NUMERICS_GIVEN),
@@ -40,17 +40,17 @@ _OF_A_POINT = (
     *(attr.LEVEL_FOR, attr.LEVEL_SHIFTS, attr.ESTIMATE_NUMERICS),
     *(attr.DEPTH_ERROR, attr.STATUS_ERROR, attr.CONFIDENCE, attr.SYMMETRIES, attr.COMPUTED_HITS),
 )
-"""Attributes of the result of a single point."""
+"""Attributes that only the result of a single point has."""
 
 
 @dataclass(frozen=True)
 class Input:
-    """An input that is swept.
+    """A swept input.
 
     Attributes:
         key: dotted place in the campaign, such as "impact.obliquity".
-        labels: its values as they were written, or the names of tables.
-        values: what stands in the campaign.
+        labels: its values as written, or the names of tables.
+        values: the values for the campaign.
     """
 
     key: str
@@ -59,8 +59,8 @@ class Input:
 
     @property
     def name(self) -> str:
-        """Name of the dimension: that of the variable of a hit map that holds the input, else the last part of the
-        key; of a layer the whole key, as "layer_1_thickness"."""
+        """Name of the dimension: that of the hit map's variable for the input, else the last part of the key; for a
+        layer the whole key, such as "layer_1_thickness"."""
         last = self.key.rpartition(".")[2]
         if self.key.startswith("layer "):
             return self.key.replace(" ", "_").replace(".", "_")
@@ -69,13 +69,13 @@ class Input:
 
 @dataclass(frozen=True)
 class Sweep:
-    """A campaign and the inputs that are swept.
+    """A campaign and its swept inputs.
 
     Attributes:
-        title: of the campaign.
+        title: title of the campaign.
         text: the campaign file.
         inputs: in the order of the file; the last one changes fastest.
-        campaigns: of every combination, in that order, by names that are fit for files.
+        campaigns: campaigns of all combinations in this order, by names that are fit for files.
     """
 
     title: str
@@ -92,7 +92,7 @@ class Sweep:
         """Refuse measures that a point will not have.
 
         Raises:
-            CampaignError: names the measure, the point and what it needs.
+            CampaignError: the message names the measure, the point and what it needs.
         """
         for text in texts:
             try:
@@ -168,7 +168,7 @@ def _input(key: str, values: Any, path: str) -> Input:
 
 
 def folder_of(output: Path) -> Path:
-    """Where the results of the points of a sweep are, each of them a result of its own."""
+    """Folder with the results of the points of a sweep."""
     return output.with_name(f"{output.stem}_points")
 
 
@@ -187,9 +187,9 @@ def run_sweep(
     Args:
         output: the file of the sweep; the results of the points go to the folder `folder_of(output)` and stay there.
         device, tell: as in `run_to_file`.
-        resume: keep the points that are complete, and continue one that is not.
+        resume: keep complete points, and continue an incomplete one.
         overwrite: replace an existing file and its points.
-        progress: gives what follows a point of a name.
+        progress: returns the function that follows the point with a name.
 
     Raises:
         OutputError, DeviceError, Interrupted: as in `run_to_file`.
@@ -253,7 +253,7 @@ def joined(sweep: Sweep, points: Sequence[xarray.Dataset]) -> xarray.Dataset:
 
 
 def _with(every: Mapping[str, Any], point: xarray.Dataset) -> xarray.Dataset:
-    """A point with these values along the dimensions in which it has others."""
+    """A point with these values along its dimensions where they differ."""
     other = {name: values for name, values in every.items() if not np.array_equal(point[name].values, values)}
     return point.reindex(other) if other else point
 
@@ -263,7 +263,7 @@ def _equal(value: xarray.Variable, other: xarray.Variable) -> bool:
 
 
 def _coordinate(swept: Input, sweep: Sweep) -> tuple[Any, ...]:
-    """Values of an input: a number with its unit where it is a quantity, else its label."""
+    """Coordinate of an input: numbers with their unit if it is a quantity, else its labels."""
     kind = type_at(swept.key, next(iter(sweep.campaigns.values())))
     stride = math.prod(sweep.shape[sweep.inputs.index(swept) + 1 :])
     campaigns = list(sweep.campaigns.values())[:: max(1, stride)][: len(swept.values)]
