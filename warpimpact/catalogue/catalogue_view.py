@@ -1,4 +1,4 @@
-"""The view of the catalogue: its list, and an entry with what is known from where and what is assumed."""
+"""The view of the catalogue: its list, and an entry with the sources of its values and its assumptions."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from warpimpact.view.view import Column, Section, Table, labelled
 
 _MM, _G = 1e3, 1e3
 _COLUMNS, _ROWS = 64, 6
-"""Of the drawing of a core: its length, and its radius if that were a quarter of the length."""
+"""Size of the drawing of a core in characters: its length, and its radius if that were a quarter of the length."""
 _BLOCKS = " ▁▂▃▄▅▆▇█"
 
 
@@ -55,7 +55,7 @@ def material_view(material: Material, *, is_own: bool = False) -> list[Section]:
     """A material: its strength and law with their uncertainty, the rows that they come from, and its evidence.
 
     Args:
-        is_own: whether it is of a user's file, whose numbers are all that is known.
+        is_own: whether it is from a user's file, whose numbers are the whole evidence.
     """
     law = (
         f"Y = {material.resistance / 1e9:.3g} GPa · (h / d)^{material.thickness_exponent:.3g}, "
@@ -81,7 +81,8 @@ def material_view(material: Material, *, is_own: bool = False) -> list[Section]:
 
 
 def drawn(core: Core) -> list[str]:
-    """The upper half of the profile of a core, nose to the left, in blocks of text; a column is as high as two wide."""
+    """The upper half of the profile of a core, nose to the left, in blocks of text. A column is as high as two are
+    wide."""
     edge = core.length / _COLUMNS
     radius = core.radius(np.asarray((np.arange(_COLUMNS) + 0.5) * edge)) / (2.0 * edge)  # in rows
     rows = min(_ROWS, math.ceil(radius.max()))

@@ -1,8 +1,8 @@
-"""What the resistance Y of a plate is, as published limit velocities tell: a hierarchical fit of their rows.
+"""The resistance Y of a plate from published limit velocities: a hierarchical fit of their rows.
 
 ln Y of a plate and projectile is a sum of normal parts (docs/validation.md). Two plates share a part as far as they
 share what it belongs to: a material, a projectile, a source, an angle, a thickness in calibres. With the fitted sizes
-of the parts, what the rows say of any further plate is again normal, with a mean and a standard deviation.
+of the parts, the rows give a normal distribution for any further plate, with a mean and a standard deviation.
 """
 
 from __future__ import annotations
@@ -24,11 +24,12 @@ FIT_FILE = Path(__file__).parent / "limit_fit.json"
 HEAVY = 5000.0
 """Plate density that parts steel from aluminium [kg/m³]."""
 CONSTRAINT = 3.0
-"""Prior median of Y over flow stress: that of indentation (Tabor)."""
+"""Prior median of Y over flow stress, as in indentation (Tabor)."""
 TYPICAL_METAL = {True: (1500e6, 480.0), False: (350e6, 120.0)}
 """Flow stress [Pa] and hardness [HV] of a usual steel and a usual aluminium."""
 SAME_THICKNESS, SAME_CURVE = 0.2, 0.5
-"""Ratios, as logarithms, over which plates share what a single thickness adds, and what a curve in calibres adds."""
+"""Ratios, as logarithms, over which plates share the part of a single thickness, and the part of a curve in
+calibres."""
 NINETY = 1.645
 """Standard deviations from the middle of a normal distribution to the ends of its 90 % interval."""
 
@@ -65,12 +66,12 @@ class Plates:
 
     @property
     def expected(self) -> Array:
-        """ln Y that indentation expects."""
+        """ln Y that indentation predicts."""
         return np.asarray(np.log(CONSTRAINT * self.flow_stress))
 
     @property
     def strengths(self) -> tuple[Array, Array]:
-        """How much stronger than usual, and how much harder than that, plates are, as logarithms."""
+        """How much stronger than usual plates are, and how much harder than their strength suggests, as logarithms."""
         flow, hardness = np.array([TYPICAL_METAL[bool(steel)] for steel in self.steel]).T
         excess = np.log(self.flow_stress / flow)
         return excess, np.log(self.hardness / hardness) - excess
@@ -105,7 +106,7 @@ def part_names(*, by_thickness: bool = True) -> list[str]:
 
 
 def shared(plates: Plates, others: Plates, *, by_thickness: bool = True) -> tuple[Array, dict[str, Array]]:
-    """What ln Y of plates and of others have in common: the covariance of the parts of known size, and that of each
+    """The common part of ln Y of plates and of others: the covariance of the parts of known size, and that of each
     fitted part at size 1, of shape [plates, others] each.
 
     Args:
@@ -146,12 +147,12 @@ def shared(plates: Plates, others: Plates, *, by_thickness: bool = True) -> tupl
 
 
 class Resistance(NamedTuple):
-    """What is known of the resistance of a plate.
+    """The resistance of a plate and its uncertainty.
 
     Attributes:
-        median: [Pa].
-        deviation: standard deviation of ln Y; 0 where it is not known.
-        test: standard deviation of ln Y that a test of the plate would add by its own scatter.
+        median: median of Y [Pa].
+        deviation: standard deviation of ln Y; 0 where unknown.
+        test: standard deviation of ln Y that the scatter of a test of the plate would add.
     """
 
     median: float
@@ -167,12 +168,12 @@ class Resistance(NamedTuple):
 
 @dataclass(frozen=True)
 class LimitFit:
-    """The fit that the package holds.
+    """The fit of the package.
 
     Attributes:
-        rows: what was measured.
-        sizes: standard deviation of the parts of ln Y, by their names with the metal.
-        test: of tests, by metal.
+        rows: the measured plates.
+        sizes: standard deviations of the parts of ln Y, by their names with the metal.
+        test: standard deviation of ln Y by tests, by metal.
         pulled: weights of the rows in the mean of further plates, shape [rows].
         precision: inverse of the covariance of ln Y of the rows, shape [rows, rows].
     """
@@ -191,7 +192,7 @@ class LimitFit:
 
         Args:
             sizes, test: as in the attributes.
-            residual: ln Y that a row asks for, less what indentation expects, shape [rows].
+            residual: ln Y of a row minus the prediction by indentation, shape [rows].
             noise: variance of ln Y of a row on its own, shape [rows].
         """
         precision = np.asarray(np.linalg.inv(covariance(rows, rows, sizes) + np.diag(noise)), dtype=np.float64)
@@ -247,7 +248,7 @@ def resistance_of(
 
 
 def limit_fit(material: str) -> LimitFit:
-    """The fit of the rows that say something of a material: those of its metal.
+    """The fit of the rows of a material's metal.
 
     Raises:
         KeyError: no row is of the material.

@@ -1,4 +1,4 @@
-"""The `warpimpact` command: what a person types, progress, tables and clear errors.
+"""The `warpimpact` command: arguments, progress, tables and clear errors.
 
 One file per group of commands. A command imports what is heavy when it runs; this keeps `--help` quick. Change
 arguments, messages and progress here; a number is computed in another room. It imports every other room.
@@ -51,28 +51,28 @@ warpimpact COMMAND --help explains a command. An example:
 def command() -> NoReturn:
     """Run one command as a process of its own.
 
-    Nothing is left to do when the command has ended, and the process ends at once. To free all that it has loaded would
+    Nothing is left to do when the command has ended, so the process ends at once: to free all that it has loaded would
     take as long as a small run computes. A thread that is still computing, after Ctrl-C, has nothing to save.
     """
     for name in ("stdout", "stderr"):
-        if getattr(sys, name) is None:  # closed; its number would go to the next file that is opened
+        if getattr(sys, name) is None:  # a closed stream: the next file that is opened would get its number
             setattr(sys, name, open(os.devnull, "w", encoding="utf-8"))  # noqa: SIM115, it stays open
     os.environ["MPLBACKEND"] = "agg"  # figures go to files, whatever is set
     code = main()
     for stream in (sys.stdout, sys.stderr):
-        with suppress(OSError):  # who reads it has gone
+        with suppress(OSError):  # the reader may be gone
             stream.flush()
     os._exit(code)
 
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Run one command and return its exit code: 2 after a mistake that the user can correct, 3 when more shots failed
-    than the campaign allows, 70 after a bug of warpimpact, 130 when interrupted, 141 when who reads its output has read
-    enough.
+    than the campaign allows, 70 after a bug of warpimpact, 130 when interrupted, 141 when the reader of its output has
+    closed it.
 
-    This is the one boundary for errors: each of them ends here in one sentence, never in a traceback.
+    All errors end here, each in one sentence, never in a traceback.
     """
-    with redirect_stderr(Plain(sys.stderr)):  # argparse quotes what was typed
+    with redirect_stderr(Plain(sys.stderr)):  # argparse quotes what the user typed
         arguments = parser().parse_args(argv)
     try:
         loud = verbosity(verbose=arguments.verbose, quiet=arguments.quiet)
@@ -82,7 +82,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     except KeyboardInterrupt as interrupt:
         say(str(interrupt) or "interrupted")
         return 130
-    except BrokenPipeError:  # who reads has read enough, as `head` does
+    except BrokenPipeError:  # the reader has closed the pipe, as `head` does
         os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
         return 141
     except Exception as error:

@@ -117,7 +117,7 @@ def _continuum(arguments: argparse.Namespace) -> int:
 
 
 def _asked(arguments: argparse.Namespace) -> "tuple[Campaign, tuple[int, ...] | None]":
-    """The campaign, and the numbers of the hits; None is all of them."""
+    """The campaign, and the numbers of the hits; None for all hits."""
     from warpimpact.campaign.campaign import Campaign
     from warpimpact.campaign.text import CampaignError
     from warpimpact.results import attributes as attr
@@ -150,7 +150,7 @@ def _asked(arguments: argparse.Namespace) -> "tuple[Campaign, tuple[int, ...] | 
 
 
 def _elements(arguments: argparse.Namespace, campaign: "Campaign") -> "FiniteElements":
-    """How the hits are computed: as the campaign says, unless an option says otherwise."""
+    """The settings for the hits: those of the campaign, overridden by the options."""
     from pydantic import ValidationError
 
     from warpimpact.campaign.continuum_settings import FiniteElements

@@ -76,8 +76,8 @@ def _design(arguments: argparse.Namespace) -> None:
 def _leading_to(address: str) -> Path:
     """A file that leads a browser to an address and that only its owner can read.
 
-    Every user of the machine sees with which words a browser is started, so the address is none of them. The file is in
-    the home folder: browsers in a sandbox see neither that for temporary files nor hidden ones.
+    Every user of the machine can see the command line of a browser, so the address is not part of it. The file is in
+    the home folder, because browsers in a sandbox see neither temporary nor hidden files.
     """
     home = Path("~").expanduser()
     folder = home if os.access(home, os.W_OK) else None

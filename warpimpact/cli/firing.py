@@ -1,4 +1,4 @@
-"""The command test: what a firing test would report of a target, and how far it is off."""
+"""The command test: what a firing test would report of a target, and the error of that report."""
 
 import argparse
 from pathlib import Path

@@ -17,9 +17,9 @@ if TYPE_CHECKING:
     from warpimpact.identification.identify import FitProgress
 
 PROCESSES = 16
-"""Processes of a fit at most, where the user says no number; each takes some 0.4 GB."""
+"""Most processes of a fit, unless the user gives a number; each takes some 0.4 GB."""
 WORTHWHILE = 2.0
-"""Seconds of computing from which on processes are begun, each of which needs as long until it computes."""
+"""Seconds of computing after which processes are started. A process needs as long until it computes."""
 
 
 def add_identify(commands: Commands) -> None:

@@ -21,14 +21,14 @@ def message_of(error: Exception) -> str | None:
         return f"{ascii(error.object)[1:200]}: the name contains bytes that are not UTF-8; rename the file"
     if isinstance(error, MemoryError):
         return f"not enough memory: {error}" if str(error) else "not enough memory"
-    if isinstance(error, OSError):  # of the system: a name that is too long, a disk that is full
+    if isinstance(error, OSError):  # from the system: a name that is too long, a full disk
         name = f"{os.fsdecode(error.filename)[:200]}: " if isinstance(error.filename, str | bytes) else ""
         return f"{name}{error.strerror or str(error) or type(error).__name__}"
     return None
 
 
 def bug_report(error: Exception) -> str:
-    """Write the details of a bug to a file; returns a phrase that says what it is and where they are."""
+    """Write the details of a bug to a file; returns a phrase with the error and the path of the file."""
     from warpimpact import __version__
 
     what = f"{type(error).__name__}: {str(error)[:200]}"
@@ -56,7 +56,7 @@ def mistakes() -> tuple[type[Exception], ...]:
 
 @contextmanager
 def implausible_told() -> Iterator[None]:
-    """A value that is probably not what was meant, and a computation that takes long, get a line on stderr, once."""
+    """Report implausible values and long computations, each once, as a line on stderr."""
     with warnings.catch_warnings():
         show, shown = warnings.showwarning, set[str]()
 

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from warpimpact.optimisation.search import SearchProgress
 
 NONE_WITHIN_BOUNDS = 4
-"""Exit code where no design that was computed keeps the bounds."""
+"""Exit code where no computed design keeps the bounds."""
 
 
 def add_optimise(commands: Commands) -> None:

@@ -49,7 +49,7 @@ def add_output(parser: argparse.ArgumentParser, metavar: str, text: str) -> None
 
 
 def add_measures(parser: argparse.ArgumentParser, default: str = "the measures of docs/protection.md") -> None:
-    """`--measure`: what is asked of the results; `default` says what is shown without it."""
+    """Add `--measure`, the measures of the results; `default` says what is shown without it."""
     parser.add_argument(
         "--measure",
         action="append",
@@ -92,7 +92,7 @@ def add_posterior(parser: argparse.ArgumentParser) -> None:
 
 
 def add_computing(parser: argparse.ArgumentParser) -> None:
-    """Where to compute: a device, processes, or the workers of a cluster; `executor_of` makes an executor of it."""
+    """Add the options on where to compute: a device, processes, or a cluster; `executor_of` reads them."""
     add_device(parser)
     cluster = parser.add_mutually_exclusive_group()
     cluster.add_argument("--scheduler", metavar="ADDRESS", help="compute on the workers of this Dask scheduler")
@@ -110,7 +110,7 @@ def read_option(option: str, kind: Any, text: str, mistake: type[ValueError]) ->
     """The number, in SI or `Radians`, of an option with a unit, whose type is one of scene/units.py.
 
     Raises:
-        mistake: names the option and what is allowed.
+        mistake: the message names the option and what is allowed.
     """
     from warpimpact.scene.units import quantity
 

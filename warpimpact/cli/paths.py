@@ -1,5 +1,5 @@
-"""Checks of paths: results get different names, and an output that cannot be written is refused before the computing
-starts."""
+"""Checks of paths: results get different names, and an output that cannot be written is refused before the
+computation."""
 
 import argparse
 import tempfile
@@ -8,7 +8,7 @@ from pathlib import Path
 
 
 def named(paths: Sequence[Path]) -> dict[str, Path]:
-    """Results by names that differ: the stems of the files, or else the whole paths."""
+    """Results by different names: the stems of the files if these differ, else the whole paths."""
     from warpimpact.results.files import ResultError
 
     if repeated := [path for path in paths if paths.count(path) > 1]:
@@ -18,8 +18,8 @@ def named(paths: Sequence[Path]) -> dict[str, Path]:
 
 
 def replaces(arguments: argparse.Namespace, output: Path) -> bool:
-    """Whether files beside a result are the command's to replace: with --overwrite, and with --resume where the result
-    is begun or complete."""
+    """Whether the command may replace files beside a result: with --overwrite, and with --resume where the result is
+    begun or complete."""
     from warpimpact.runs.parts import is_begun
 
     return arguments.overwrite or (arguments.resume and is_begun(output))
@@ -41,7 +41,7 @@ def check_picture(path: Path, *, overwrite: bool) -> None:
 
 
 def check_suffix(path: Path, what: str, *suffixes: str) -> None:
-    """Refuse a name that promises another format than the one that is written."""
+    """Refuse a name whose suffix belongs to another format."""
     from warpimpact.results.files import OutputError
 
     if path.suffix.lower() not in suffixes:

@@ -14,12 +14,12 @@ if TYPE_CHECKING:
     from warpimpact.statistics.intervals import Estimate
 
 _SILENCE, _LONGEST_SILENCE = 5.0, 60.0
-"""Longest times between two lines of a log [s]: in the first minute, and of a run that takes hours. Between these it is
-a twelfth of the time so far."""
+"""Longest times between two lines of a log [s]: in the first minute, and in a run of hours. Between these it is a
+twelfth of the time so far."""
 _SHORT_PILOT = 2.0
-"""Seconds for which a pilot works without a word."""
+"""Seconds after which a running pilot is announced."""
 _BAR_FORMAT = "{l_bar}{bar:20}{r_bar}"
-"""Of a terminal: a bar of one width, as estimates beside it would leave it one character."""
+"""Format of a bar on a terminal. Its width is fixed, because estimates beside it would leave it one character."""
 _BAR_OF_MOST = "{l_bar}{bar:20}| {n_fmt}/{total_fmt} at most [{elapsed}, {rate_fmt}{postfix}]"
 
 
@@ -28,7 +28,7 @@ _quiet = False
 
 @contextmanager
 def verbosity(*, verbose: int, quiet: bool) -> Iterator[None]:
-    """What a command writes beside its output and its warnings.
+    """Set what a command writes beside its output and its warnings.
 
     Args:
         verbose: 1 shows the log of the package from INFO on, 2 from DEBUG on.
@@ -45,7 +45,7 @@ def verbosity(*, verbose: int, quiet: bool) -> Iterator[None]:
 
 @contextmanager
 def _logged(verbose: int) -> Iterator[None]:
-    """Show the log of the package; nothing of it at 0."""
+    """Show the log of the package; at 0 show nothing of it."""
     if not verbose:
         yield
         return
@@ -64,20 +64,20 @@ def _logged(verbose: int) -> Iterator[None]:
 
 
 def warn(sentence: str) -> None:
-    """Say on the terminal or in the log what a person should know, though the command goes on."""
+    """Warn the user on the terminal or in the log, while the command goes on."""
     say(f"warning: {sentence}")
 
 
 class Step(NamedTuple):
-    """How far a computation is.
+    """The progress of a computation.
 
     Attributes:
-        done, total: of what is counted.
-        resumed: how many of those an earlier computation had done, which tell nothing of the rate.
-        text: what else there is to say.
-        before: what is under way before the first one is computed; its time does not count in the rate.
-        certain: whether `total` will be computed; else it is the most, and so is the time that is left.
-        now: which part is under way, from the start on.
+        done, total: numbers of the counted items.
+        resumed: items that an earlier computation had done, which do not count for the rate.
+        text: further information.
+        before: what is running before the first item; its time does not count for the rate.
+        certain: whether `total` will be computed; else it is an upper bound, as is the remaining time.
+        now: the part that is running.
     """
 
     done: int
@@ -90,16 +90,16 @@ class Step(NamedTuple):
 
     @property
     def words(self) -> str:
-        """All that there is to say."""
+        """The whole information in words."""
         return ", ".join(filter(None, (self.text, self.now)))
 
 
 @contextmanager
 def show_progress(unit: str = "hit") -> Iterator[Callable[[Step], None]]:
-    """Show how far a computation is, or several one after another.
+    """Show the progress of a computation, or of several one after another.
 
     Args:
-        unit: what is counted.
+        unit: name of the counted items.
     """
     if _quiet:
         yield lambda step: None
@@ -129,7 +129,7 @@ def _another(step: Step, done: int, total: int) -> bool:
 
 
 class _Log:
-    """A line at the start, after every tenth, and every few seconds."""
+    """Writes a line at the start, after every tenth, and every few seconds."""
 
     def __init__(self, unit: str) -> None:
         self._unit = unit
@@ -138,7 +138,7 @@ class _Log:
         self._step = Step(0, 0)
 
     def show(self, step: Step) -> None:
-        """Take in how far the computation is."""
+        """Take in the progress of the computation."""
         now, last = time.monotonic(), self._step
         if _another(step, last.done, last.total) or bool(step.before) != bool(last.before):  # the clock starts again
             self._begin, self._last, self._tenths, self._before = now, now, -1, ""
@@ -202,7 +202,7 @@ def _pilot(run: "RunProgress") -> str:
 
 
 def _cost(run: "RunProgress") -> str:
-    """What a level that costs much more than a coarser one will take; empty where it does not."""
+    """A sentence on the time of a level that costs much more than a coarser one; empty where it does not."""
     from warpimpact.solver.findings import HitErrors
 
     if not isinstance(run.found, HitErrors) or run.found.cost is None or run.found.numerics.level is None:
@@ -215,7 +215,7 @@ def _running(run: "RunProgress") -> str:
     from warpimpact.analysis.numbers import interval_text, plus_minus
 
     def text_of(measure: "Measure", estimate: "Estimate") -> str:
-        if measure.is_binary:  # not in the middle of its interval
+        if measure.is_binary:  # a share is not in the middle of its interval
             return f"{estimate.value:.4g} ({interval_text(estimate.low, estimate.high, '{:.4g}'.format)})"
         return plus_minus(estimate.times(measure.display.factor), ".5g", ".2g") + measure.display.suffix
 

@@ -71,7 +71,7 @@ def _run(arguments: argparse.Namespace) -> int:
 
 
 def add_run_options(parser: argparse.ArgumentParser, what: str) -> None:
-    """Options of a command that computes every hit: where, how many, by which posterior, and what becomes of an earlier
+    """Options of a command that computes every hit: device, number of hits, posterior, and what happens to an earlier
     computation, which `what` names."""
     add_computing(parser)
     add_count(parser)
@@ -88,8 +88,8 @@ def run_shown(
     """Compute every hit of a campaign into a file as the options say, and show the progress.
 
     Args:
-        arguments: with those of `add_run_options`.
-        computation: of every hit; a hit map if None.
+        arguments: parsed options, including those of `add_run_options`.
+        computation: what is computed of every hit; a hit map if None.
     """
     from warpimpact.runs.compute import HIT_MAP
     from warpimpact.runs.run import run_to_file

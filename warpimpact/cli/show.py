@@ -126,7 +126,7 @@ def _plot(arguments: argparse.Namespace) -> None:
 
 
 def _file_name(quantity: str) -> str:
-    """A part of a file name that tells a measure, such as "P_tilt_130mm_above_30_deg"."""
+    """A part of a file name for a measure, such as "P_tilt_130mm_above_30_deg"."""
     spoken = quantity.replace(">", " above ").replace("<", " below ")
     return "_".join(re.findall(r"[\w.]+", spoken))
 

@@ -1,4 +1,4 @@
-"""The commands examples, new and schema: what helps to write a campaign."""
+"""The commands examples, new and schema, which help to write a campaign."""
 
 import argparse
 import re
@@ -141,6 +141,6 @@ def _schema_text(kind: str) -> str:
         "fit": ("identification.fit_schema", "fit_schema"),
         "test": ("firing.plan_schema", "firing_schema"),
         "design": ("optimisation.design_schema", "design_schema"),
-    }[kind]  # the others would take seconds to import
+    }[kind]  # the schemas of the other kinds would take seconds to import
     made = getattr(import_module(f"warpimpact.{room}"), name)
     return json.dumps(made(), indent=1, ensure_ascii=False) + "\n"

@@ -1,4 +1,4 @@
-"""The command validate: the published shots beside what others measured and computed of them."""
+"""The command validate: the published shots beside measured and computed values by others."""
 
 import argparse
 from pathlib import Path

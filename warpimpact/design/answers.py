@@ -1,4 +1,4 @@
-"""What a page gets: hit maps of a design at each stage, trajectories, figures, reports."""
+"""The answers to a page: hit maps of a design at each stage, trajectories, figures, reports."""
 
 from __future__ import annotations
 
@@ -35,24 +35,24 @@ from warpimpact.solver.worker import Cancel
 from warpimpact.view.view import text_of
 
 _MOST_KEPT = 256 * 2**20
-"""Bytes of results that are kept: to go back to a design computes nothing."""
+"""Most bytes of results that are kept, so that a return to a design computes nothing."""
 _MOST_HISTORIES = 4
 _COARSE = 96
 """Pixels along the longer side of a first map, which has few hits."""
 PACE, BESIDE = 1.2, 0.3
-"""Time of a complete map over what it takes a core, before that is measured; and what it takes beside pilot and hits,
-by `work_ahead`: references and tables [s]."""
+"""Initial ratio of the time of a complete map to the time of a core (`work_ahead`), before it is measured; and its time
+beside pilot and hits, for references and tables [s]."""
 _FIRST = "The error of the numerics is not known."
 THIS_DESIGN = "this design"
-"""Name of the design that is on the page; those it is compared with have names of their own."""
+"""Name of the design on the page. The designs to compare with have names of their own."""
 
 
 class Answers:
-    """Answers the questions of a page, in the thread of the desk; keeps what it has computed.
+    """Answers the questions of a page, in the thread of the desk, and keeps computed results.
 
     Args:
-        shelf: what the page was started with.
-        device: where to compute.
+        shelf: designs and files with which the page was started.
+        device: device that computes.
     """
 
     def __init__(self, shelf: Shelf, device: str = "auto") -> None:
@@ -86,7 +86,7 @@ class Answers:
         }
 
     def result(self, design: ValidDesign, cancel: Cancel) -> xarray.Dataset:
-        """The hit map of a design; its hits under assumptions come by `assume`.
+        """The hit map of a design. `assume` adds its hits under assumptions.
 
         Raises:
             Cancelled: by `cancel`.
@@ -102,7 +102,7 @@ class Answers:
         return self._results[text]
 
     def assume(self, designs: Mapping[str, ValidDesign], cancel: Cancel) -> None:
-        """Compute the hits of designs under assumptions, where these are asked for and there are none.
+        """Compute the missing hits of designs under assumptions, if these are asked for.
 
         Raises:
             Cancelled: by `cancel`.
@@ -119,10 +119,10 @@ class Answers:
         """The maps of a design, and of the designs to compare with, at one stage.
 
         Args:
-            name: of the stage.
-            designs: as they are computed at it, by their names; the design of the page is the first.
-            full: the same at their last stage.
-            level: at which the hits will be, as far as that is known.
+            name: name of the stage.
+            designs: the designs at this stage, by name; the design of the page is the first.
+            full: the designs at their last stage.
+            level: level of the hits, as far as it is known.
 
         Raises:
             Cancelled: by `cancel`.
@@ -154,10 +154,10 @@ class Answers:
         }
 
     def numbers(self, designs: Mapping[str, ValidDesign], assumed: bool, cancel: Cancel) -> dict[str, Any]:
-        """The tables of the same designs as HTML.
+        """The tables of the designs as HTML.
 
         Args:
-            assumed: whether their hits under assumptions are computed, as far as they ever are.
+            assumed: whether all hits under assumptions that they can have are computed.
         """
         datasets = {label: self.result(design, cancel) for label, design in designs.items()}
         results = []

@@ -1,4 +1,4 @@
-"""What of a design can be changed on the page: sliders with their ranges and the meaning of their keys."""
+"""The controls of a design on the page: sliders with their ranges and the meaning of their keys."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ class _Range(NamedTuple):
 
 
 _UNITS = {"m": ("mm", 1e3), "Pa": ("MPa", 1e-6), "kg": ("g", 1e3), "rad": ("deg", math.degrees(1.0))}
-"""Units in which the page writes, and their size; others are written as they are."""
+"""Units in which the page writes, and their size. Others are written as they are."""
 _RANGES: Mapping[tuple[str, str], _Range] = {
     ("plate", "thickness"): _Range(0.5, 30.0, 0.1),
     ("plate", "areal_density"): _Range(2.0, 240.0, 0.5),
@@ -48,9 +48,9 @@ _RANGES: Mapping[tuple[str, str], _Range] = {
     ("impact", "pitch"): _Range(-20.0, 20.0, 0.5),
     ("impact", "yaw"): _Range(-20.0, 20.0, 0.5),
 }
-"""By table and key."""
+"""Ranges of sliders, by table and key."""
 _HOLE = _Range(0.5, 30.0, 0.1)
-"""Of any other length of a hole."""
+"""Range of any other length of a hole."""
 _SHOT = ("velocity", "obliquity", "azimuth", "yaw", "pitch")
 _AXES = ("along y", "along z")
 
@@ -111,12 +111,12 @@ def _choice(what: str, path: Place, value: str | None) -> Iterator[dict[str, Any
 def _slider(
     campaign: Campaign, tables: Tables, path: Place, table: str, key: str | None = None, value: float | None = None
 ) -> dict[str, Any]:
-    """A slider of the value at a place.
+    """A slider for the value at a place.
 
     Args:
-        table: of its range.
-        key: that declares it, if it is not the last of the place.
-        value: in the unit of the slider, if the campaign does not have it at that place.
+        table: table of its range.
+        key: key of its declaration, if it is not the last key of the place.
+        value: value in the unit of the slider, if the campaign does not have it at this place.
     """
     name = key or str(path[-1])
     owner = _owner(campaign, path if key is None else path[: path.index(key) + 1])
@@ -149,7 +149,7 @@ def _owner(campaign: Campaign, path: Place) -> BaseModel:
 
 
 def _value(holder: Any, path: Place) -> Any:
-    """What stands at a place in models or in tables; None where nothing does."""
+    """The value at a place in models or in tables; None if there is none."""
     for part in path:
         if isinstance(holder, dict):
             holder = holder.get(part)

@@ -1,4 +1,4 @@
-"""Designs: campaigns that a page holds as tables, how they are checked, and in which stages they are computed."""
+"""Designs: campaigns that a page holds as tables, with their checks and the stages of their computation."""
 
 from __future__ import annotations
 
@@ -30,22 +30,22 @@ Tables = dict[str, Any]
 FILE_KEYS = ("file", "posterior", "catalogue")
 """Keys of a campaign that name files."""
 FEW, SOME, _IMAGES = 256, 1024, 4
-"""Hits at most of the first map after a change, and of the draft. A first map has as many as the draft where
-at least four of them are images of each other."""
+"""Most hits of the first map after a change, and of the draft; and fewest images of each other with which a first map
+has as many hits as the draft."""
 FIRST_WORK, FEWEST = 0.08, 64
-"""Seconds of a core that the hits of a first map may take, roughly, so that it is there in 0.3 s on two cores; and its
-fewest hits. A lower level comes before fewer hits."""
+"""Approximate seconds of a core for the hits of a first map, so that it appears in 0.3 s on two cores; and its fewest
+hits. A lower level comes before fewer hits."""
 _MOST_ADDRESS = 2**20
-"""Characters of a design in an address, unpacked."""
+"""Most characters of a design in an address, unpacked."""
 ROOT = Path("/")
-"""Names of files in a design are absolute, so no folder counts."""
+"""Folder of a design's files. Their names are absolute, so it does not matter."""
 _DESIGN_NAME = "design"
-"""What errors call a design."""
+"""Name of a design in errors."""
 
 
 @dataclass(frozen=True)
 class Shelf:
-    """What a page was started with.
+    """Designs and files with which a page was started.
 
     Attributes:
         designs: tables of the campaigns by name.
@@ -77,12 +77,12 @@ class Shelf:
 
 @dataclass(frozen=True)
 class ValidDesign:
-    """A design that is valid.
+    """A valid design.
 
     Attributes:
-        tables: of the campaign, as written.
-        text: the same as a TOML file.
-        campaign: what it says.
+        tables: tables of the campaign, as written.
+        text: the tables as TOML.
+        campaign: the campaign.
     """
 
     tables: Tables
@@ -98,8 +98,8 @@ class Stage(NamedTuple):
 
 
 def shelf_of(paths: list[Path]) -> Shelf:
-    """What files hold: campaigns, of which one with several plates has a design each; searches of warpimpact optimise,
-    with the designs of their fronts; and results, with their campaigns.
+    """Designs in files: a campaign is one design per plate; a search of warpimpact optimise gives the designs of its
+    front; a result gives its campaign.
 
     Raises:
         CampaignError, ResultError: a file is missing or not valid.
@@ -134,7 +134,7 @@ def _texts(path: Path) -> Iterator[tuple[str, str]]:
 
 
 def _texts_of_results(path: Path) -> Iterator[tuple[str, str]]:
-    """The same of a file of results: the campaigns of a front, or that of a hit map."""
+    """Name and text of every design in a file of results: the campaigns of a front, or that of a hit map."""
     if kind_of(path) is not front.FRONT:
         with opened(path) as dataset:
             yield path.stem, str(dataset.attrs.get(attr.CAMPAIGN, ""))
@@ -173,15 +173,15 @@ def _null_in(part: Any, place: str) -> str | None:
 
 
 def stages(shelf: Shelf, design: ValidDesign, level: int) -> Iterator[Stage]:
-    """The stages in which a design is computed: few hits at one level of resolution, which need no pilot; more hits at
-    draft; and the campaign as it is. A stage that the campaign cannot have is left out, and a draft of several layers
-    that has as many hits as the campaign: measures need a lower level there than single hits at draft.
+    """The stages in which a design is computed: few hits at one level of resolution, without a pilot; more hits at
+    draft; and the campaign as it is. A stage that the campaign cannot have is left out. So is the draft of several
+    layers if it has as many hits as the campaign, because measures need a lower level there than single hits at draft.
 
-    The hits of the first stage are those of the irreducible part of the cell with their images, where there is one: as
+    The hits of the first stage are those of the irreducible part of the cell with their images, if there is one: as
     many hits for a part of the time.
 
     Args:
-        level: resolution of the first stage at most, as the last draft has found it.
+        level: finest level of the first stage, as the last draft has found it.
     """
     if (first := _first(shelf, design, level)) is not None and first.text != design.text:
         yield Stage("first", first)
@@ -191,7 +191,7 @@ def stages(shelf: Shelf, design: ValidDesign, level: int) -> Iterator[Stage]:
 
 
 def _draft(shelf: Shelf, design: ValidDesign) -> ValidDesign | None:
-    """A design as its draft is computed; None where it has none."""
+    """A design for its draft; None if it has none."""
     campaign = design.campaign
     if campaign.numerics.explicit is not None:
         return None
@@ -204,7 +204,7 @@ def _draft(shelf: Shelf, design: ValidDesign) -> ValidDesign | None:
 
 
 def _first(shelf: Shelf, design: ValidDesign, level: int) -> ValidDesign | None:
-    """A design as its first map is computed: as fine as FIRST_WORK allows; None where it cannot have one."""
+    """A design for its first map, as fine as FIRST_WORK allows; None if it cannot have one."""
     first = _of_first_hits(shelf, design, level, FEW)
     if first is None:
         return None
@@ -218,7 +218,7 @@ def _first(shelf: Shelf, design: ValidDesign, level: int) -> ValidDesign | None:
 
 
 def _of_first_hits(shelf: Shelf, design: ValidDesign, level: int, few: int) -> ValidDesign | None:
-    """A design of few hits at a level, or of four times as many where at least four are images of each other."""
+    """A design with few hits at a level, or with four times as many where at least four are images of each other."""
     numerics = design.tables.get("numerics", {})
     if design.campaign.numerics.explicit is None:
         numerics = _kept(design) | {"level": level}
@@ -229,17 +229,17 @@ def _of_first_hits(shelf: Shelf, design: ValidDesign, level: int, few: int) -> V
 
 
 def _kept(design: ValidDesign) -> Tables:
-    """Keys of the numerics that hold at any resolution."""
+    """Keys of the numerics that are valid at any resolution."""
     numerics = design.tables.get("numerics", {})
     return {key: numerics[key] for key in ("scheme", "precision", "layout") if key in numerics}
 
 
 def work(campaign: Campaign, numerics: Numerics | None = None) -> float:
-    """Seconds of a core that the hits of a campaign take, roughly and on every machine the same; infinite where they
-    cannot be computed.
+    """Approximate seconds of a core for the hits of a campaign, the same on every machine; infinite where they cannot
+    be computed.
 
     Args:
-        numerics: which fix a resolution; by default those of the campaign.
+        numerics: numerics that fix a resolution; by default those of the campaign.
     """
     sampler, images = campaign.sampler(), len(campaign.symmetries)
     try:
@@ -250,11 +250,11 @@ def work(campaign: Campaign, numerics: Numerics | None = None) -> float:
 
 
 def work_ahead(campaign: Campaign, level: int) -> float:
-    """Seconds of a core that a campaign takes, its pilot included, as `work`: of a pilot that ends at its first level,
-    or at a finer one.
+    """Approximate seconds of a core for a campaign (`work`), including a pilot that ends at its first level, or at a
+    finer one.
 
     Args:
-        level: at which its hits will be, as far as that is known.
+        level: level of its hits, as far as it is known.
     """
     if campaign.numerics.explicit is not None:
         return work(campaign)
@@ -268,7 +268,7 @@ def work_ahead(campaign: Campaign, level: int) -> float:
 
 
 def _valid(shelf: Shelf, tables: Tables) -> ValidDesign | None:
-    """A design, if it is valid."""
+    """The design in some tables; None if it is not valid."""
     try:
         return shelf.checked(tables)
     except CampaignError:
@@ -276,8 +276,8 @@ def _valid(shelf: Shelf, tables: Tables) -> ValidDesign | None:
 
 
 def _of_few_hits(design: ValidDesign, most: int, *, irreducible: bool = False) -> Tables:
-    """Tables of a design with a number of hits at most, without a stop rule and assumptions; a list has the hits of its
-    file."""
+    """Tables of a design with at most this number of hits, without a stop rule and assumptions. A list keeps the hits
+    of its file."""
     tables = {key: value for key, value in design.tables.items() if key not in ("stop", "assumptions")}
     tables["assumptions"] = {"compute": False}
     count, together = design.campaign.hits.count, design.campaign.at_a_plate
@@ -289,16 +289,16 @@ def _of_few_hits(design: ValidDesign, most: int, *, irreducible: bool = False) -
 
 
 def stage_of(shelf: Shelf, design: ValidDesign, level: int, name: str) -> ValidDesign:
-    """A design as it is computed at a stage; the last one that it has where it does not have that."""
+    """A design at a stage, or at its last stage if it does not have this one."""
     every = {stage.name: stage.design for stage in stages(shelf, design, level)}
     return every.get(name, every["full"])
 
 
 def from_address(address: str) -> Tables:
-    """The design that the address of a page holds behind its "#".
+    """The design in the address of a page, behind its "#".
 
     Raises:
-        CampaignError: it holds none.
+        CampaignError: the address has none.
     """
     _, _, packed = address.partition("#")
     try:
@@ -311,5 +311,5 @@ def from_address(address: str) -> Tables:
 
 
 def as_json(value: Any) -> str:
-    """A value as JSON that JavaScript reads; a number that is none is null."""
+    """A value as JSON that JavaScript reads. NaN and infinity become null."""
     return json.dumps(value, ensure_ascii=False, separators=(",", ":"), allow_nan=False, default=str)

@@ -1,4 +1,4 @@
-"""One computation at a time: a thread that computes what is asked for, the most urgent first."""
+"""One computation at a time: a thread that computes jobs, the most urgent first."""
 
 from __future__ import annotations
 
@@ -20,11 +20,11 @@ Result = TypeVar("Result")
 @dataclass(order=True)
 class _PageJob:
     """Attributes:
-    urgency, number: what is less comes first.
-    work: called with what ends it.
-    future: gets what it returns or raises.
-    cancel: ends it.
-    dropped: whether nobody wants it any more.
+    urgency, number: smaller ones come first.
+    work: called with the token that cancels it.
+    future: gets the result or the error.
+    cancel: cancels the job.
+    dropped: whether nobody waits for the job any more.
     """
 
     urgency: int
@@ -38,8 +38,8 @@ class _PageJob:
 class Desk:
     """Computes for any number of pages, one job at a time.
 
-    A job that comes puts off a less urgent one that runs; this one begins again later. So a page that refines its map
-    does not keep another one waiting.
+    A new job puts off a less urgent running one, which begins again later. So a page that refines its map does not keep
+    another one waiting.
     """
 
     def __init__(self) -> None:
@@ -50,11 +50,11 @@ class Desk:
         threading.Thread(target=self._work, daemon=True, name="desk").start()
 
     async def do(self, urgency: int, work: Callable[[Cancel], Result]) -> Result:
-        """What `work` returns or raises; if who awaits it is cancelled, so is the work, at once.
+        """Return or raise what `work` does. If the awaiting task is cancelled, so is the work, at once.
 
         Args:
             urgency: 0 is the most urgent.
-            work: called with what ends it, in the thread of the desk.
+            work: called with the token that cancels it, in the thread of the desk.
         """
         job = _PageJob(urgency, next(self._numbers), work)
         with self._change:
@@ -97,6 +97,6 @@ class Desk:
 
 
 def _settle(tell: Callable[[Any], None], end: Any) -> None:
-    """Set the result or the error of a future; a cancelled future has nobody who waits for it."""
+    """Set the result or the error of a future, unless it was cancelled and nobody waits for it."""
     with suppress(InvalidStateError):
         tell(end)

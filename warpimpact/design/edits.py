@@ -1,4 +1,4 @@
-"""Changes of a design that are more than one value: another threat, material or shape of hole, a layer more or less."""
+"""Changes of a design beyond one value: another threat, material or shape of hole, a layer more or less."""
 
 from __future__ import annotations
 
@@ -23,13 +23,13 @@ _SIZES: Mapping[str, Callable[[float], dict[str, float]]] = {
     "square": lambda area: {"side": math.sqrt(area)},
     "hexagon": lambda area: {"width": math.sqrt(2.0 * area / math.sqrt(3.0))},
 }
-"""Lengths [m] of a hole of some area [m²], by shape."""
+"""Lengths [m] of a hole with a given area [m²], by shape."""
 SHAPES = ("none", *_SIZES)
 _SPACING = (8e-3, 16e-3)
 _OPEN = 0.25
 """Cell [m] and open area of the first holes of a plate."""
 _BASE = {"gap": "100 mm", "thickness": "10 mm"}
-"""A layer that is added; its material is that of the layer in front."""
+"""A layer that is added. Its material is that of the layer in front."""
 _SMALLER, _TRIES = 0.85, 24
 _OF_A_MATERIAL = ("resistance", "shear_coefficient", "density")
 
@@ -39,7 +39,7 @@ def _oblong(width: float, slender: float) -> dict[str, float]:
 
 
 def choices(design: Tables) -> dict[str, list[str]]:
-    """Names that each choice offers; none of threats whose core is not known."""
+    """Names that each choice offers. Threats whose core is unknown are left out."""
     catalogue = catalogue_of(design, "design", ROOT)
     threats = [name for name, threat in catalogue.all(Threat).items() if threat.shape is not None]
     return {"threat": threats, "material": list(catalogue.all(Material)), "shape": list(SHAPES)}
@@ -50,8 +50,8 @@ def changed(design: ValidDesign, shelf: Shelf, what: str, layer: int, value: str
 
     Args:
         what: "threat", "material", "shape", "add layer" or "remove layer".
-        layer: number of the layer that is changed, 0 the plate.
-        value: what was chosen; "" is a core or a material of one's own.
+        layer: number of the changed layer, 0 the plate.
+        value: the chosen name; "" is a core or a material of one's own.
 
     Raises:
         CampaignError: there is no such change.

@@ -1,4 +1,4 @@
-"""The plate and the target of a design as lines for the page: to scale, lengths in mm, with what can be dragged."""
+"""The plate and the target of a design as lines for the page, to scale in mm, with draggable handles."""
 
 from __future__ import annotations
 
@@ -58,7 +58,7 @@ def _line(dimension: Dimension) -> dict[str, Any]:
 
 
 def _handles(campaign: Campaign) -> Iterator[dict[str, Any]]:
-    """Places of the plate that can be dragged: a handle changes its value by `gain` times the way along `direction`."""
+    """Handles of the plate. Dragging one changes its value by `gain` times the way along `direction`."""
     pattern = campaign.plate.pattern
     if not isinstance(pattern, LatticePattern):
         return

@@ -1,4 +1,4 @@
-"""Whom the server of the page answers: this machine's own page, and nobody else."""
+"""A guard for the server of the page: it answers this machine's own page, and nobody else."""
 
 from __future__ import annotations
 
@@ -24,15 +24,16 @@ _HEADERS = {
 
 
 class Guard:
-    """Answers this machine's own page alone: the host that a request names, its origin, and the token in its path.
+    """Answers this machine's own page alone. It checks the host that a request names, its origin, and the token in its
+    path.
 
     Another page in the same browser can send requests to this machine, and a name server can give this machine another
-    name; neither knows the token, and neither has this origin.
+    name. Neither knows the token, and neither has this origin.
 
     Args:
-        app: what answers.
-        token: the first part of every path.
-        port: of the server.
+        app: application that answers.
+        token: first part of every path.
+        port: port of the server.
     """
 
     def __init__(self, app: Any, token: str, port: int) -> None:

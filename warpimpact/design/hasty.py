@@ -1,4 +1,4 @@
-"""A connection that is closed where no whole request comes in time: a silent one would stay open without end."""
+"""A connection that is closed if no whole request comes in time, because a silent one would stay open for ever."""
 
 from __future__ import annotations
 

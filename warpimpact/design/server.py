@@ -37,17 +37,17 @@ from warpimpact.solver.device import DeviceError
 from warpimpact.solver.resolution import TooManySteps
 
 _MOST_BYTES = 2**20
-"""Of a request."""
+"""Most bytes of a request."""
 _MOST_PINS = 5
 _FILES = {
     "report": ("page.css", "drawing.js"),
     "design": ("design.css", "plate.js", "controls.js", "address.js", "design.js"),
 }
-"""Of the page, by the rooms that have them."""
+"""Files of the page, by the rooms that have them."""
 _MISTAKES = (CampaignError, ResultError, DeviceError, TooManySteps, MemoryError)
 """Errors that the page shows as a sentence."""
 _FIRST, _ASKED, _REFINE, _LAST = 0, 1, 2, 3
-"""Urgencies: the first map after a change, what somebody clicked, the stages that follow."""
+"""Urgencies: the first map after a change, a click of the user, the later stages, and hits under assumptions."""
 _LINES = "application/x-ndjson"
 _STAGES = {"first": _FIRST, "draft": _REFINE, "full": _LAST}
 
@@ -93,8 +93,8 @@ class _Pages:
         return PlainTextResponse(as_json({"designs": self._shelf.designs}), media_type="application/json")
 
     async def compute(self, request: Request) -> Response:
-        """The plate of a design at once, then its maps, a line of JSON each, from few hits to all of them. Whoever
-        closes the connection ends the work."""
+        """Answer with the plate of a design at once, then with its maps from few hits to all of them, a line of JSON
+        each. Closing the connection cancels the work."""
 
         try:
             asked = await _asked(request)
@@ -116,8 +116,8 @@ class _Pages:
     async def _lines(
         self, design: ValidDesign, others: list[tuple[str, ValidDesign]], level: int
     ) -> AsyncGenerator[Any]:
-        """The plate, and maps and numbers of each stage; then the numbers with what assumptions do to them. The first
-        map is computed while the plate is drawn."""
+        """The plate, and maps and numbers of each stage; then the numbers under assumptions. The first map is computed
+        while the plate is drawn."""
         full = named(design, others)
         every = [{stage.name: stage.design for stage in stages(self._shelf, other, level)} for _, other in others]
         plate = True
@@ -195,7 +195,7 @@ class _Pages:
         return await _answered(request, answer)
 
     def _designs(self, asked: Tables) -> tuple[ValidDesign, list[tuple[str, ValidDesign]]]:
-        """The design that is asked about, and those to compare it with."""
+        """The design in a request, and the designs to compare with."""
         pins = asked.get("pins", [])
         if not isinstance(pins, list) or len(pins) > _MOST_PINS or not all(isinstance(pin, dict) for pin in pins):
             raise CampaignError(f"pins: got {quoted(pins)}, but it must be a list of at most {_MOST_PINS} designs")
@@ -220,7 +220,7 @@ def _plotly() -> str:
 
 
 async def _asked(request: Request) -> Tables:
-    """What a request asks, as tables.
+    """The content of a request as tables.
 
     Raises:
         CampaignError: it is no JSON, too long or nested too deep.
@@ -240,7 +240,7 @@ async def _asked(request: Request) -> Tables:
 
 
 async def _answered(request: Request, answer: Callable[[Tables], Awaitable[Any]]) -> Response:
-    """The answer as JSON, or a sentence for a mistake. Whoever closes the connection ends the work."""
+    """The answer as JSON, or a sentence for a mistake. Closing the connection cancels the work."""
     try:
         asked = await _asked(request)
         work, gone = asyncio.ensure_future(answer(asked)), asyncio.ensure_future(_gone(request))
@@ -257,7 +257,7 @@ async def _answered(request: Request, answer: Callable[[Tables], Awaitable[Any]]
 
 
 async def _gone(request: Request) -> None:
-    """Returns when the connection of a request is closed."""
+    """Return when the connection of a request is closed."""
     while (await request.receive())["type"] != "http.disconnect":
         pass
 
@@ -267,7 +267,7 @@ def _refused(error: Exception) -> str:
 
 
 def _sentence(error: Exception) -> str:
-    """What the page says of an error; the details of a bug go to the terminal."""
+    """The sentence for an error on the page. The details of a bug go to the terminal."""
     if isinstance(error, _MISTAKES):
         return str(error).removeprefix("design: ") or "not enough memory"
     traceback.print_exception(error)
@@ -283,7 +283,7 @@ def _whole(asked: Tables, key: str, least: int, most: int) -> int:
 
 
 def _hit(asked: Tables) -> tuple[int, str, int]:
-    """Level, stage and number of the hit that a request asks about."""
+    """Level, stage and number of the hit in a request."""
     return _whole(asked, "level", 0, 9), str(asked.get("stage", "full")), _whole(asked, "hit", 0, 2**30)
 
 

@@ -17,9 +17,9 @@ if TYPE_CHECKING:
 
 SUFFIXES = (".svg", ".dxf")
 _CORNERS = 12
-"""Points of an outline up to which it may be a regular polygon."""
+"""Most points of an outline that may be a regular polygon."""
 _ROUNDNESS = 1e-6
-"""Spread of the distances from the middle up to which a hole is round, as a share of its radius."""
+"""Largest spread of the distances from the middle of a round hole, as a share of its radius."""
 
 
 def write_drawing(plate: Plate, output: Path) -> None:
@@ -69,7 +69,7 @@ def _write_dxf(holes: list[NDArray[np.float64]], half: NDArray[np.float64], file
 
 
 def _circle(outline: NDArray[np.float64]) -> tuple[tuple[float, float], float] | None:
-    """Centre and radius [mm] of an outline that is a round hole; None of any other."""
+    """Centre and radius [mm] of an outline that is a round hole; None for any other outline."""
     low, high = outline.min(axis=0), outline.max(axis=0)
     centre = 0.5 * (low + high)
     distances = np.linalg.norm(outline - centre, axis=1)

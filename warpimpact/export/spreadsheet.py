@@ -16,7 +16,7 @@ from warpimpact.results.dataset import hit_numbers, status_codes
 from warpimpact.results.files import aside
 
 _ANGLE_DECIMALS = 10
-"""Digits behind the point of an angle that somebody gave in degrees."""
+"""Decimals of an angle that a user gave in degrees."""
 
 
 def to_dataframe(dataset: xarray.Dataset) -> pd.DataFrame:
@@ -40,8 +40,8 @@ def _statuses(dataset: xarray.Dataset) -> dict[str, v.Variable]:
 
 
 def _as_given(array: xarray.DataArray) -> np.ndarray[Any, Any]:
-    """Values of a column. A file has degrees that were radians: where a short number of degrees becomes the same value
-    on that way, it is the one that was given."""
+    """Values of a column. Angles in a file are degrees converted from radians. If a short number of degrees has the
+    same value after this conversion, it is taken as the given one."""
     values: np.ndarray[Any, Any] = array.values
     if array.attrs.get("units") != "degree" or values.dtype != np.float64:
         return values
@@ -103,6 +103,6 @@ def _no_formula(text: str) -> str:
 
 
 def _header(name: str, unit: str) -> str:
-    """Such as "spin [rad/s]"; without brackets where there is no unit."""
+    """Text such as "spin [rad/s]"; without brackets if there is no unit."""
     shown = unit.replace(" s-1", "/s").replace("degree", "deg")
     return name if shown == "1" else f"{name} [{shown}]"

@@ -1,4 +1,4 @@
-"""Figure of bursts: what a plate lets through hit by hit, and how near an earlier hit must be to matter."""
+"""Figure of bursts: what a plate lets through hit by hit, and by the distance to an earlier hit."""
 
 from __future__ import annotations
 

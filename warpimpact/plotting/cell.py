@@ -49,7 +49,7 @@ STATUS_COLOURS = (
     *("#D55E00", "#56B4E9", "#009E73", "#E69F00", "#000000", "#CC79A7", "#F0E442", "#0072B2", "#FFFFFF"),
     *("#882255", "#999933"),
 )
-"""By the codes of `Status`: warm where the core comes through, cool where it is stopped or turned back, white
+"""Colours by the codes of `Status`: warm where the core comes through, cool where it is stopped or turned back, white
 where it did not reach the layer."""
 
 _SIGNED = {
@@ -112,7 +112,7 @@ def _selected(dataset: xarray.Dataset, variable: str, standoff: float | None, la
 
 
 def struck(dataset: xarray.Dataset) -> str:
-    """What the shots are fired at, in a word: plate, or target if there are layers."""
+    """The word for what the shots are fired at: plate, or target if there are layers."""
     return "target" if v.LAYER_STATUS in dataset else "plate"
 
 

@@ -34,13 +34,13 @@ _STYLES = {  # by the kind of a measure; the last number is the distance from th
     "worst_point": ("worst hit", "x", "#000000", 0.12),
 }
 _WIDE = 40
-"""Characters in a line of the weights of a plate."""
+"""Most characters in a line of the weights of a plate."""
 _ROW, _MARGIN, _LINE = 0.42, 0.75, 0.15
 """Height of a row, of the margin of a panel, and of a line of the label of a row [inch]."""
 
 
 def comparison_figure(comparison: Comparison, *, every: bool = False) -> Figure:
-    """The measure that decides: of every plate on the left, and by how much each differs from the best one on the
+    """The deciding measure: its value for every plate on the left, and the differences from the best plate on the
     right, with intervals.
 
     A hollow marker means that the interval of a difference contains 0: the plates cannot be told apart.
@@ -81,7 +81,7 @@ def comparison_figure(comparison: Comparison, *, every: bool = False) -> Figure:
 
 
 def _from_best(comparison: Comparison, measures: Sequence[Score]) -> list[Difference]:
-    """Differences from the best plate in each of some measures that rank plates."""
+    """Differences from the best plate in each of these measures that ranks plates."""
     names = [measure.name for measure in measures if is_ranked(comparison, measure.name)]
     return [pair for name in names for pair in from_best(comparison, name)]
 

@@ -1,4 +1,4 @@
-"""Figure of a core to scale: its profile, its centre of mass, and what is assumed of it."""
+"""Figure of a core to scale: its profile, its centre of mass, and its evidence."""
 
 from __future__ import annotations
 
@@ -21,8 +21,8 @@ def core_figure(core: Core, title: str, evidence: str) -> Figure:
     """Draw a core in its section, nose to the left.
 
     Args:
-        title: its name.
-        evidence: stands below the figure.
+        title: name of the core.
+        evidence: text below the figure.
     """
     lines = note_lines(_WIDTH, "", [evidence])
     s = np.linspace(0.0, core.length, _PROFILE_STATIONS)

@@ -20,10 +20,10 @@ if TYPE_CHECKING:
     Array = NDArray[np.float64]
 
 _NEAREST_HOLES = 40
-"""Holes about the middle among which the smallest ligament is looked for."""
+"""Number of holes about the middle among which the smallest ligament is searched."""
 _EQUALLY_SMALL = 1.01
-"""Ligaments up to this factor longer than the smallest count as equally small: outlines are polygons. The length that
-is written is the exact one of the plate."""
+"""Largest ratio of a ligament to the smallest one at which both count as equally small, because outlines are polygons.
+The written length is the exact one of the plate."""
 _BESIDE, _BELOW = 0.1, 0.05
 """Distance of the dimensions of a hole from it, in periods."""
 _COLOUR = "#0072B2"
@@ -31,7 +31,7 @@ _LIGAMENT_COLOUR = "#CC79A7"
 
 
 class Dimension(NamedTuple):
-    """A length between two points (y, z) [m]; the text of an upright one stands on its right, or on its left."""
+    """A length between two points (y, z) [m]. The text of an upright one stands on its right, or on its left."""
 
     start: Array
     end: Array

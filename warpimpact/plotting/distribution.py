@@ -151,7 +151,7 @@ def uncertainty(dataset: xarray.Dataset, variable: str, standoff: float | None =
 
 
 def mean_and_spread(dataset: xarray.Dataset, variable: str, standoff: float | None = None) -> Figure:
-    """A map of the mean over the draws of a posterior, and of their standard deviation about it, of the hits nearby.
+    """A map of the mean over the draws of a posterior, and of their standard deviation about it, from nearby hits.
 
     Args:
         dataset: a result whose hits cover the cell, each with a draw of its own.

@@ -30,15 +30,15 @@ def common_fire(dataset: Result) -> Fire | None:
 
 
 class Fire(NamedTuple):
-    """Where shots fly in the plane of the plate, seen from behind it: unit vector (y, z), and words. Along the normal
-    they fly at the reader; then `along` is (0, 0)."""
+    """Direction of flight in the plane of the plate, seen from behind it: unit vector (y, z), and words. Along the
+    normal, shots fly at the reader, and `along` is (0, 0)."""
 
     along: tuple[float, float]
     text: str
 
 
 def fire_of(obliquity: float, azimuth: float) -> Fire:
-    """What a drawing shows of the direction of fire; angles in radians."""
+    """The direction of fire for a drawing; angles in radians."""
     if abs(math.sin(obliquity)) < _ONE_DIRECTION:
         return Fire((0.0, 0.0), "⊙ fire")
     sign = math.copysign(1.0, obliquity)

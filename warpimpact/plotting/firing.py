@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 _ABOVE = (-11, 4, -7)
-"""How far the names of V50, V05 and V01 stand above their points [pt]."""
+"""Distances of the names of V50, V05 and V01 above their points [pt]."""
 _Settings = Mapping[str, Any]
 
 

@@ -25,9 +25,9 @@ if TYPE_CHECKING:
     from warpimpact.scene import Plate
 
 MOST_DRAWN = 6
-"""Plates that are drawn, at most."""
+"""Most plates that are drawn."""
 _LONGEST_LABEL = 60
-"""Characters of a line that stands upright beside the axes."""
+"""Most characters of a line that stands upright beside the axes."""
 _THUMBNAIL = 30.0
 """Side of the drawn part of a plate [mm]."""
 _LETTERS = "ABCDEFGHIJ"
@@ -35,12 +35,12 @@ _MARKS: tuple[Any, ...] = ("*", "P", "X", "^", "v")
 
 
 def front_figure(dataset: xarray.Dataset, folder: Path = Path()) -> Figure:
-    """The front of a search by fresh hits with 95 % intervals, beside all designs that were computed; plates along it;
-    and their variables.
+    """The front of a search by fresh hits with 95 % intervals, beside all computed designs; plates along it; and their
+    variables.
 
     Args:
         dataset: the result of `warpimpact optimise`.
-        folder: of the files that the design file names.
+        folder: folder of the files that the design file names.
     """
     leaders = front_leaders(dataset)
     drawn = leaders[np.unique(np.round(np.linspace(0, len(leaders) - 1, min(MOST_DRAWN, len(leaders)))).astype(int))]
@@ -100,7 +100,7 @@ def _draw_plates(figure: SubFigure, dataset: xarray.Dataset, names: dict[int, st
 
 
 def _plate(text: str, folder: Path) -> Plate | None:
-    """The plate of a campaign; None where a file that it names is not there any more."""
+    """The plate of a campaign; None if a file that it names is gone."""
     try:
         return Campaign.from_text(text, name="front", folder=folder).plate
     except CampaignError:
@@ -156,7 +156,7 @@ def _draw_fresh(axes: Axes, dataset: xarray.Dataset, shown: tuple[int, int], thi
 
 
 def _draw_assumptions(axes: Axes, dataset: xarray.Dataset, across: int, up: int) -> None:
-    """Between what values an objective of the front and of the references lies under all assumptions."""
+    """Draw the ranges of an objective under all assumptions, for the front and the references."""
     if f.ASSUMPTION not in dataset or across == up:
         return
     groups = ((f.FRESH, f.UNDER, BLUE), (f.REFERENCE_FOUND, f.REFERENCE_UNDER, VERMILION))

@@ -1,5 +1,5 @@
-"""What stands over and under a figure: its title in one line, and below the figure notes on what it shows, with the
-names of the catalogue and their evidence."""
+"""Title and notes of a figure: the title in one line above it; below it notes on what it shows, and the names of the
+catalogue with their evidence."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 _FROM_EDGE = 0.12
 """Distance of title and notes from the edge of a figure without layout engine [inch]."""
 _TITLE_SIZE, _SMALLEST_TITLE = 12.0, 9.0
-"""Font sizes of a title [pt]: as it is, and where it is long."""
+"""Font sizes of a title [pt]: the usual one, and the smallest for a long title."""
 _TITLE_LETTERS, _NOTE_LETTERS = 10.0, 15
 """Average number of letters in an inch of a title of the first size, and of a note."""
 LINE = 0.15
@@ -30,7 +30,8 @@ LINE = 0.15
 def add_heading(figure: Figure, title: str, *notes: str) -> None:
     """Write a title in one line at the top of a figure, and each note from a line of its own below the figure.
 
-    A long title is written smaller. What still is wider than the figure is cut, and stands whole before the notes.
+    A long title is written smaller. A title that is still wider than the figure is cut, and stands whole before the
+    notes.
     """
     line, size = _in_one_line(title, figure.get_figwidth())
     placed = figure.get_layout_engine() is None
@@ -42,13 +43,14 @@ def add_heading(figure: Figure, title: str, *notes: str) -> None:
 
 
 def inscribe(figure: Figure, dataset: xarray.Dataset, *notes: str, title: str = "") -> None:
-    """Write the title of a result over a figure, or another one; below it the notes and the names of the catalogue."""
+    """Write the title of a result, or another title, over a figure; below it the notes and the names of the
+    catalogue."""
     run_title = str(dataset.attrs.get(attr.TITLE, ""))
     add_heading(figure, title or run_title, *([run_title] if title else []), *notes, *names(dataset))
 
 
 def legend_below(figure: Figure, handles: Sequence[Artist], labels: Sequence[str], columns: int) -> None:
-    """Add the legend of a figure with a layout engine below its panels; notes that the figure has become its title, as
+    """Add the legend of a figure with a layout engine below its panels. Notes of the figure become its title, because
     nothing else keeps both apart."""
     figure.legend(handles, labels, loc="outside lower center", ncols=columns, frameon=False)
     if notes := figure.get_supxlabel():
@@ -57,7 +59,7 @@ def legend_below(figure: Figure, handles: Sequence[Artist], labels: Sequence[str
 
 
 def note_lines(width: float, title: str, notes: Sequence[str]) -> list[str]:
-    """Lines below a figure of a width [inch]."""
+    """Lines of the notes below a figure of this width [inch]."""
     cut = [title] if _in_one_line(title, width)[0] != title else []
     return [line for note in [*cut, *notes] for line in wrap(note, int(_NOTE_LETTERS * width))]
 
@@ -77,7 +79,7 @@ def _in_one_line(title: str, width: float) -> tuple[str, float]:
 
 
 def _write_notes(figure: Figure, text: str) -> None:
-    """Below all else; over the legend where a layout engine has placed one there."""
+    """Write the notes below all else; over the legend where a layout engine has placed one there."""
     if figure.get_layout_engine() is None:
         place = {"y": _FROM_EDGE / figure.get_figheight(), "va": "bottom"}
         figure.supxlabel(text, fontsize="small", color="0.3", **place)

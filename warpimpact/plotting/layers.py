@@ -1,4 +1,4 @@
-"""Figure of a replayed hit: what is left of the layers behind the plate."""
+"""Figure of a replayed hit: the resistance left in the layers behind the plate."""
 
 from __future__ import annotations
 

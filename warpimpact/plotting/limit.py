@@ -32,12 +32,12 @@ _CURVE = {
     "thickness": ("thickness of {}", "share of the hits whose limit is thinner"),
 }
 _LOW_SHARE = 0.15
-"""Shares up to this have their name above the point."""
+"""Largest share whose name stands above its point."""
 
 
 def limit_figure(dataset: xarray.Dataset) -> Figure:
-    """The map of the limits beside their cumulative distribution, with V50 and V05 and their 95 % intervals; of hits at
-    one place the limits against the obliquity.
+    """The map of the limits beside their cumulative distribution, with V50 and V05 and their 95 % intervals. For hits
+    at one place, the limits against the obliquity.
 
     Args:
         dataset: the result of `warpimpact limit`.

@@ -1,4 +1,4 @@
-"""Maps of what a shot does over where it hits, drawn to scale over the unit cell of the plate."""
+"""Maps of the outcomes of shots over their hit points, drawn to scale over the unit cell of the plate."""
 
 from __future__ import annotations
 
@@ -61,7 +61,7 @@ def variable_map(dataset: xarray.Dataset, variable: str, standoff: float | None 
 
 
 def measure_map(dataset: xarray.Dataset, text: str) -> Figure:
-    """Map of what a measure is made of: a probability from the nearest hits (`probability_map`), or its quantity.
+    """Map of a measure: of a probability from the nearest hits (`probability_map`), or of its quantity.
 
     Raises:
         ValueError: the text is no measure of hits, or the result does not have it.
@@ -80,10 +80,10 @@ def measure_map(dataset: xarray.Dataset, text: str) -> Figure:
 
 
 def variable_maps(datasets: Mapping[str, xarray.Dataset], variable: str, standoff: float | None = None) -> Figure:
-    """The same map of several results side by side, in the same colours and to the same scale.
+    """A map of one variable for several results side by side, in the same colours and to the same scale.
 
     Args:
-        datasets: results by the names that their maps get; the others as in `variable_map`.
+        datasets: results by the names of their maps; the other arguments are those of `variable_map`.
     """
     columns = [averaged(dataset, shown(dataset, variable, standoff)) for dataset in datasets.values()]
     scale = scale_of([column.values for column in columns], signed=columns[0].signed)
@@ -164,8 +164,8 @@ def _tilt_behind(dataset: xarray.Dataset, layer: int) -> Shown:
 
 
 def save_maps(dataset: xarray.Dataset, folder: Path, stem: str, *, overwrite: bool = False) -> list[Path]:
-    """Write the figures of one result as PNG files ``<stem>_<figure>.png`` and return their paths. What would have no
-    values is left out.
+    """Write the figures of one result as PNG files ``<stem>_<figure>.png`` and return their paths. Figures without
+    values are left out.
 
     Raises:
         OutputError: one of them exists, and must not be replaced.

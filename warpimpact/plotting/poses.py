@@ -1,4 +1,4 @@
-"""The core of a replayed hit as it is drawn: where it is, how it is turned, and its outline in a view."""
+"""The core of a replayed hit in drawings: its position, its attitude, and its outline in a view."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     Array = NDArray[np.float64]
 
 INSTANTS = 5
-"""Poses of the core within the plate that are drawn."""
+"""Number of drawn poses of the core within the plate."""
 _MM, _US = 1e3, 1e6
 _FULL_TURN = np.linspace(0.0, 2.0 * np.pi, 73)
 
@@ -47,7 +47,7 @@ def poses_behind(dataset: xarray.Dataset) -> dict[str, Pose]:
 
 
 def _poses_behind_layers(dataset: xarray.Dataset) -> dict[str, Pose]:
-    """Those at the stand-offs behind all layers but the last one: free flight leads from step to step there."""
+    """Poses at the stand-offs behind all layers but the last one. Free flight leads from step to step there."""
     if v.LAYER_STANDOFF not in dataset:
         return {}
     path, poses = dataset[v.PLATE_POSITION].values, {}
@@ -97,5 +97,5 @@ def _axis_of(yaw: float, pitch: float) -> Array:
 
 
 def _ahead(dataset: xarray.Dataset) -> float:
-    """How far ahead of the centre of mass the point is that passes the stand-offs [m]."""
+    """Distance of the stand-off point ahead of the centre of mass [m]."""
     return float(dataset[v.STATION].max()) if dataset.attrs[attr.STANDOFF_POINT] == "nose" else 0.0

@@ -28,11 +28,11 @@ if TYPE_CHECKING:
 _GREY = "0.6"
 _POINTS = 600
 _CELLS_BESIDE = 5.0
-"""Cells of holes that a figure shows at most on either side of the middle; a fit looks for hits in the first."""
+"""Most cells of holes that a figure shows on either side of the middle. A fit searches hits in the first."""
 
 
 def _values(tree: xarray.DataTree, group: str, name: str) -> tuple[Array, str]:
-    """Draws of a parameter in the units that people read, and its label."""
+    """Draws of a parameter in its display unit, and its label."""
     array = tree[group].to_dataset()[name]
     unit, factor = unit_of(array)
     return factor * array.values.ravel(), f"{name.replace('_', ' ')}{f' [{unit}]' if unit else ''}"

@@ -77,7 +77,7 @@ def flight(dataset: xarray.Dataset) -> Figure:
 
 
 def _within(axes: Axes, across: np.ndarray) -> tuple[float, str]:
-    """Where a text above a core stands, and which of its sides is there: near the frame it goes on away from that."""
+    """Place of a text above a core, and its side there. Near the frame it extends away from the frame."""
     low, high = axes.get_xlim()
     middle = (across.mean() - low) / (high - low)
     if middle < _NEAR_FRAME:
@@ -166,7 +166,8 @@ def course(dataset: xarray.Dataset) -> Figure:
 def plate(dataset: xarray.Dataset) -> Figure:
     """Resistance left in the plate, from the first contact to the end, seen from behind (the paper's fig. 6).
 
-    Each cell of the plate is shown as a share of its own at the start, which a cell at the edge of a hole has less of.
+    Each cell of the plate is shown as a share of its initial resistance, which is less for a cell at the edge of a
+    hole.
     """
     share = dataset[v.RESISTANCE_SHARE]
     columns = min(3, share.sizes["snapshot"])

@@ -1,5 +1,5 @@
-"""Figure of targets against their weight: what the base behind the plate takes, beside the solid reference of
-the same weight."""
+"""Figure of targets against their weight: the load on the base behind the plate, beside the solid reference of the same
+weight."""
 
 from __future__ import annotations
 
@@ -36,8 +36,8 @@ def weight_figure(comparison: Comparison) -> Figure | None:
     """Measures of the base, or limits, against the areal density of the whole target, with their 95 % intervals; None
     if the plates have none of them.
 
-    A limit thickness stands over the areal density that the target then has. A hollow diamond is the solid reference
-    of the same areal density; a line is what the target with it needs.
+    A limit thickness is drawn at the areal density that the target then has. A hollow diamond is the solid reference of
+    the same areal density; a line is the need of a target with it.
 
     Args:
         comparison: the result of `analysis.comparison.compare`.
@@ -60,7 +60,7 @@ def weight_figure(comparison: Comparison) -> Figure | None:
 
 
 def _solid_plates(comparison: Comparison) -> list[str]:
-    """What the solid plates are, a line for each material."""
+    """Descriptions of the solid plates, a line for each material."""
     solids = [plate.solid.partition(" mm of ") for plate in comparison.plates if plate.solid]
     thicknesses = {
         material: ", ".join(thickness for thickness, _, of in solids if of == material) for _, _, material in solids
@@ -90,7 +90,7 @@ def _draw_against_weight(axes: Axes, comparison: Comparison, name: str) -> None:
 
 
 def _draw_needed(axes: Axes, comparison: Comparison, name: str) -> None:
-    """The limit thickness over the areal density that the target has with it, and what a solid plate needs."""
+    """Draw the limit thickness over the resulting areal density of the target, and the need of a solid plate."""
     middle = _middle([_first(plate, _NEEDED).value for plate in comparison.plates])
     for plate in comparison.plates:
         densities = _scores(plate, _NEEDED)
@@ -123,7 +123,8 @@ def _draw_point(
     style: tuple[str, str, str],
     across: tuple[float, float] | None = None,
 ) -> None:
-    """A measure over an areal density, with its interval, and that of the density where it is one of a measure."""
+    """Draw a measure over an areal density, with its interval, and the interval of the density where it follows from
+    one."""
     label, marker, colour = style
     ends = bars(measure.value, measure.low, measure.high)
     beside = None if across is None else bars(density, *across)

@@ -30,18 +30,18 @@ from warpimpact.view.view import html_of
 Array = NDArray[np.float64]
 
 _WIDTH, _HEIGHT, _LEFT, _TOP, _ROOM = 900.0, 520.0, 70.0, 10.0, 44.0
-"""Of the chart [px], and what is left of it for labels."""
+"""Width and height of the chart, left and upper margin, and room for labels [px]."""
 _SIDE = 30e-3
-"""Of the drawn part of a plate [m]."""
+"""Side of the drawn part of a plate [m]."""
 _MAP_PIXELS = 160
-"""Of a map along its longer side."""
+"""Pixels along the longer side of a map."""
 
 
 def write_front_report(dataset: xarray.Dataset, path: Path, folder: Path) -> None:
     """Write the report of a search, whole or not at all.
 
     Args:
-        folder: of the files that its campaigns name.
+        folder: folder of the files that its campaigns name.
 
     Raises:
         OutputError: the file cannot be written.
@@ -141,7 +141,7 @@ class _Chart:
 
 
 def _design(dataset: xarray.Dataset, place: int, chart: _Chart, folder: Path) -> dict[str, Any]:
-    """What the page shows of a design of the front; no drawing where a file of its campaign is not there any more."""
+    """The content of the page for a design of the front; without a drawing if a file of its campaign is gone."""
     text = str(dataset[f.CAMPAIGN].values[place])
     try:
         campaign: Campaign | None = Campaign.from_text(text, name="front", folder=folder)
@@ -167,7 +167,7 @@ def _plate(campaign: Campaign, file: str) -> Markup:
 
 
 def _map(dataset: xarray.Dataset, place: int, campaign: Campaign, text: str) -> dict[str, Any]:
-    """The unit cell, coloured by what the nearest hit says of the first effect."""
+    """The unit cell, coloured by the first measure at the nearest hit."""
     from PIL import Image
 
     values = dataset[f.HIT_VALUE].values[place, 0]

@@ -33,7 +33,7 @@ MOST_HITS = 12_000
 WORST_SHARE = 0.25
 """Share of the trajectories that show the worst hits; the others are spread evenly."""
 PAGE_PIXELS = 160
-"""Along the longer side of a map."""
+"""Pixels along the longer side of a map."""
 _CORE_BEHIND = "#707070"  # colour of the core behind the plate
 _VALUE_DIGITS = 5
 _TURN = 1.5  # turn of an outline from point to point [degree]; its error is 0.01 mm of a core's profile
@@ -82,7 +82,7 @@ def page_data(datasets: Sequence[xarray.Dataset], pixels: int = PAGE_PIXELS) -> 
 
     Args:
         datasets: results from `thinned`.
-        pixels: along the longer side of a map.
+        pixels: pixels along the longer side of a map.
     """
     columns = [_columns(dataset) for dataset in datasets]
     shared = {key: column for key, column in columns[0].items() if all(key in others for others in columns)}

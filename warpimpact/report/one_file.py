@@ -38,13 +38,13 @@ _STYLE = (
 
 
 class _Shown(NamedTuple):
-    """What is shown of a kind beside its own view.
+    """The report of a kind beside its own view.
 
     Attributes:
-        view: its view, where results has none; of a kind with measures it takes their texts, too.
+        view: its view, if results has none; for a kind with measures it takes their texts, too.
         measured: whether it takes measures.
-        figures: by their headings, each with the variable that it needs, empty if none.
-        asked: attribute with the text of the file that it was computed from.
+        figures: figures by their headings, each with the variable that it needs, empty if none.
+        asked: attribute with the text of the file behind the result.
     """
 
     view: Callable[..., list[Section]] | None = None
@@ -88,10 +88,10 @@ def view_of(path: Path, kind: Kind, measures: Sequence[str] = ()) -> list[Sectio
     """The view of a file of a kind that is shown.
 
     Args:
-        measures: texts of what is asked of it; by default what the kind shows.
+        measures: texts of measures; by default those of the kind.
 
     Raises:
-        ResultError: it cannot be read, or has no such measures.
+        ResultError: the file cannot be read, or has no such measures.
     """
     return _view(kind, _loaded(path, kind), measures)
 
@@ -145,7 +145,7 @@ def write_file_report(path: Path, kind: Kind, output: Path) -> None:
 
 
 def _picture(figure: Figure) -> str:
-    """A figure as the address of an image that holds itself."""
+    """A figure as a data URL."""
     buffer = BytesIO()
     figure.savefig(buffer, format="png", dpi=110)
     return f"data:image/png;base64,{b64encode(buffer.getvalue()).decode()}"

@@ -117,7 +117,7 @@ def _followed(total: int, progress: Progress | None) -> Callable[[Sequence[int]]
 
 
 def telling(dataset: xarray.Dataset, hits: Sequence[int]) -> int | None:
-    """The one of some hits whose trajectory shows most: the largest tilt at the largest stand-off."""
+    """The hit whose trajectory shows most: the one with the largest tilt at the largest stand-off."""
     if not hits or not dataset.sizes["standoff"]:
         return hits[0] if hits else None
     chosen = dataset[[v.TILT]].isel(hit=np.isin(hit_numbers(dataset), hits), standoff=-1).load()
@@ -131,7 +131,7 @@ def _packed(text: str) -> str:
 
 
 def _first(keys: Sequence[str]) -> str:
-    """The variable that the maps show first: a limit where there is one."""
+    """The variable that the maps show first: a limit if there is one."""
     wanted = [*(words(names.value) for names in v.LIMITS.values()), words(v.RESIDUAL_VELOCITY)]
     return next((key for key in wanted if key in keys), keys[0])
 

@@ -37,7 +37,7 @@ from warpimpact.view import svg
 from warpimpact.view.view import Column, Section, Table, html_of, table_html
 
 _PLATE_WIDTH = 240.0
-"""Of the widest cell on the page [px]."""
+"""Width of the widest cell on the page [px]."""
 _PROVENANCE = (
     attr.HISTORY,
     attr.WARPIMPACT_VERSION,
@@ -83,8 +83,8 @@ def result_content(name: str, dataset: xarray.Dataset) -> dict[str, Any]:
 
 
 def compared(datasets: Mapping[str, xarray.Dataset], *, picture: bool = True) -> dict[str, Any]:
-    """The comparison of plates as HTML, the measure that decides apart from all others, and a picture, if one is
-    wanted; if there is no comparison, a sentence gives the reason."""
+    """The comparison of plates as HTML, the deciding measure apart from all others, and a picture if one is wanted.
+    Without a comparison, a sentence gives the reason."""
     try:
         comparison = compare(list(datasets.values()), list(datasets))
     except ResultError as error:
@@ -105,8 +105,8 @@ def _picture(comparison: Comparison) -> str:
 
 
 def conclusion(results: Sequence[Mapping[str, Any]], comparison: Mapping[str, Any] | None) -> list[str]:
-    """What a reader wants first, a sentence each: which plate is best by the measure that decides, and what passes of
-    every plate."""
+    """The conclusion, a sentence each: which plate is best by the deciding measure, and what passes through every
+    plate."""
     verdict = [] if comparison is None else comparison["verdict"]
     return [*verdict, *(f"{result['name']}: {result['verdict']}" for result in results)]
 
@@ -125,7 +125,7 @@ def _asked(dataset: xarray.Dataset) -> str:
 
 
 def _caveats(dataset: xarray.Dataset) -> list[str]:
-    """What limits the numbers of a result, a sentence each, beside every table of them."""
+    """Reservations about the numbers of a result, a sentence each, beside every table of them."""
     numerics = numerics_sentence(dataset)
     chance = "Intervals describe the hits that were drawn."
     model = "The core stays one rigid body, which overstates what comes through where cores break or erode."

@@ -14,16 +14,16 @@ from textwrap import wrap
 from typing import Any, NamedTuple
 
 _GAP = "   "
-"""Between two columns of a text."""
+"""Space between two columns of a text."""
 _HEAD = 24
-"""Characters that a head may take in a line of text, where its column is narrower."""
+"""Most characters of a header in a line of text if its column is narrower."""
 
 
 class Column(NamedTuple):
     """A column of a table.
 
     Attributes:
-        header: what stands above it; a table whose columns have no header has no head.
+        header: text above the column. A table none of whose columns has a header has no head.
         unit: unit of its numbers as people write it.
         write: gives the text of a value. A text in a row stays as it is, and None leaves its cell empty.
         right: whether the cells are aligned at their right end.
@@ -69,7 +69,7 @@ class Table:
 
 
 def labelled(rows: Iterable[tuple[str, str]]) -> Table:
-    """A table of labels and what belongs to each."""
+    """A table of labels and their texts."""
     return Table((Column(), Column()), list(rows))
 
 
