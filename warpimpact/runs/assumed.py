@@ -22,7 +22,7 @@ from warpimpact.results import attributes as attr
 from warpimpact.results.dataset import assumed_columns, assumed_table
 from warpimpact.results.table import HitTable
 from warpimpact.runs.describe import is_double
-from warpimpact.runs.pilot_hits import places_of, shots_at
+from warpimpact.runs.pilot_hits import hits_at, places_of, shots_at
 from warpimpact.scene import Numerics, Scene, Shots
 from warpimpact.solver.prepare import prepare
 
@@ -59,7 +59,6 @@ def assumed(campaign: Campaign, numerics: Numerics, compute: Computed, *, limits
             cores' strength are left out.
     """
     begin = time.perf_counter()
-    images, group = len(campaign.symmetries), len(campaign.symmetries) * campaign.at_a_plate
     others = [alternative for alternative in alternatives(campaign) if not limits or alternative.moves_limits]
     places = places_of(campaign, _groups(campaign, numerics, len(others), FEWEST_LIMITS if limits else FEWEST))
     shots = shots_at(campaign, places)
@@ -68,15 +67,14 @@ def assumed(campaign: Campaign, numerics: Numerics, compute: Computed, *, limits
         return HitTable.of({}, {}, {})
     # An alternative that turns shots differently breaks the symmetry, so all images are computed.
     scenes = [
-        (alternative.scene, alternative.shots(shots if alternative.turned else shots[::images]))
+        (alternative.scene, alternative.shots(shots if alternative.turned else shots[:: len(campaign.symmetries)]))
         for alternative in possible
     ]
     outcomes = [
         outcomes_of_one if alternative.turned else outcomes_of_one.unfolded(campaign.symmetries)
         for alternative, outcomes_of_one in zip(possible, compute(scenes), strict=True)
     ]
-    numbers = (places[:, None] * group + np.arange(group)).reshape(-1)
-    columns = _columns(possible, outcomes, numbers)
+    columns = _columns(possible, outcomes, hits_at(campaign, places))
     attributes = _attributes(possible, outcomes) | {attr.ASSUMED_TIME: time.perf_counter() - begin}
     return assumed_table(columns, attributes, double=is_double(campaign))
 

@@ -9,8 +9,6 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, ClassVar
 
-import numpy as np
-
 from warpimpact.campaign.campaign import Campaign
 from warpimpact.campaign.references import at_base_alone, at_solid
 from warpimpact.records.outcomes import Outcomes
@@ -20,7 +18,7 @@ from warpimpact.results.table import HitTable
 from warpimpact.runs.assumed import assumed
 from warpimpact.runs.describe import computed_by, described, found_attributes
 from warpimpact.runs.levels import aim_of, level_for, shifts_of
-from warpimpact.runs.pilot_hits import pilot_most, pilot_places, pilot_shots
+from warpimpact.runs.pilot_hits import pilot_most, pilot_shots
 from warpimpact.runs.task import Task
 from warpimpact.scene import Numerics, Scene, Shots
 from warpimpact.solver.device import find_device
@@ -60,10 +58,10 @@ class HitMap:
         """The findings of a pilot with hits of the campaign; None if the campaign fixes the resolution."""
         if campaign.numerics.explicit is not None:
             return None
-        pilot = pilot_shots(campaign, pilot_most(campaign))
+        pilot, numbers = pilot_shots(campaign, pilot_most(campaign))
         hits = len(campaign.sampler()) // len(campaign.symmetries)
         errors = pilot_of(campaign.scene, pilot, campaign.numerics, worker, trying, aim_of(campaign, hits), hits)
-        return replace(errors, shifts=shifts_of(campaign, pilot, errors), tried=())
+        return replace(errors, shifts=shifts_of(campaign, pilot, errors), tried=(), numbers=numbers)
 
     def found_in(self, result: Result) -> HitErrors | None:
         """The findings of the pilot of a result; None if its campaign fixed the resolution."""
@@ -99,7 +97,7 @@ def compute(campaign: Campaign, task: Task, worker: Worker, progress: Progress |
     images, numerics = len(campaign.symmetries), numerics_of(campaign, task.findings)
     progress = of_images(progress, images)
     outcomes, elapsed = _outcomes(campaign.scene, task.shots[::images], numerics, worker, progress)
-    beside = finer_hits(campaign, task.findings, pilot_most(campaign))
+    beside = finer_hits(campaign, task.findings)
     if task.solid is not None:
         beside |= solid_columns(_outcomes(*at_solid(campaign, task.solid), numerics, worker)[0])
         if campaign.layer:
@@ -110,18 +108,12 @@ def compute(campaign: Campaign, task: Task, worker: Worker, progress: Progress |
     return described(campaign, task.shots, outcomes, numerics, attributes, beside)
 
 
-def finer_hits(campaign: Campaign, findings: Found | None, most: int) -> dict[str, Any]:
-    """Columns of the hits that a pilot computed at a finer level.
-
-    Args:
-        most: most shots of the pilot, as in `pilot_shots`.
-    """
-    if findings is None or findings.finer is None:
+def finer_hits(campaign: Campaign, findings: Found | None) -> dict[str, Any]:
+    """Columns of the hits that a pilot computed at a finer level."""
+    if findings is None or findings.finer is None or findings.numbers is None:
         return {}
-    group = len(campaign.symmetries) * campaign.at_a_plate
-    groups = len(findings.finer) // campaign.at_a_plate
-    numbers = pilot_places(campaign, most)[:groups, None] * group + np.arange(group)
-    return finer_columns(findings.finer.unfolded(campaign.symmetries), numbers.reshape(-1))
+    finer = findings.finer.unfolded(campaign.symmetries)
+    return finer_columns(finer, findings.numbers[: len(finer)])
 
 
 def numerics_of(campaign: Campaign, findings: Found | None) -> Numerics:

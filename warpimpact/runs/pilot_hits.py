@@ -17,9 +17,12 @@ _MOST_OF_LAYERS = 1024
 """Most shots of a pilot at several layers."""
 
 
-def pilot_shots(campaign: Campaign, most: int) -> Shots:
-    """Some hits of a campaign, none an image of another; of bursts, whole ones."""
-    return shots_at(campaign, pilot_places(campaign, most))[:: len(campaign.symmetries)]
+def pilot_shots(campaign: Campaign, most: int) -> tuple[Shots, NDArray[np.int64]]:
+    """Some hits of a campaign, none an image of another (of bursts, whole ones); and the numbers of these hits with
+    their images."""
+    at_a_plate = campaign.at_a_plate
+    places = places_of(campaign, most if at_a_plate == 1 else max(-(-most // at_a_plate), _FEWEST_BURSTS))
+    return shots_at(campaign, places)[:: len(campaign.symmetries)], hits_at(campaign, places)
 
 
 def pilot_most(campaign: Campaign) -> int:
@@ -28,12 +31,6 @@ def pilot_most(campaign: Campaign) -> int:
     hits, usual = len(campaign.sampler()) // len(campaign.symmetries), campaign.numerics.asked
     fewest = pilot_size(usual, hits)
     return max(fewest, min(hits, _MOST_OF_LAYERS)) if level_for(campaign) == MEASURES else fewest
-
-
-def pilot_places(campaign: Campaign, most: int) -> NDArray[np.int64]:
-    """Numbers of the groups of images, or bursts with their images, that `pilot_shots` takes."""
-    at_a_plate = campaign.at_a_plate
-    return places_of(campaign, most if at_a_plate == 1 else max(-(-most // at_a_plate), _FEWEST_BURSTS))
 
 
 def places_of(campaign: Campaign, most: int) -> NDArray[np.int64]:
@@ -48,6 +45,12 @@ def places_of(campaign: Campaign, most: int) -> NDArray[np.int64]:
     groups = len(campaign.sampler()) // (len(campaign.symmetries) * campaign.at_a_plate)
     count = min(most, groups)
     return np.arange(count) if campaign.hits.sampling in ("sobol", "random") else spread_places(groups, count)
+
+
+def hits_at(campaign: Campaign, places: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Numbers of the hits of groups, with their images."""
+    group = len(campaign.symmetries) * campaign.at_a_plate
+    return (places[:, None] * group + np.arange(group)).reshape(-1)
 
 
 def shots_at(campaign: Campaign, places: NDArray[np.int64]) -> Shots:

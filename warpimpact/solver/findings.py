@@ -9,6 +9,9 @@ from dataclasses import dataclass, field, replace
 from decimal import ROUND_CEILING, Context
 from typing import NamedTuple, Self
 
+import numpy as np
+from numpy.typing import NDArray
+
 from warpimpact.records.outcomes import Outcomes
 from warpimpact.scene import Numerics
 
@@ -25,12 +28,14 @@ class Found:
         kept: whether the errors are within the promise.
         share: share of the shots that are within the errors.
         finer: outcomes of the pilot's first shots at the finer level of the comparison; None without a comparison.
+        numbers: numbers of all the pilot's hits in their campaign, images included; None without a campaign.
     """
 
     numerics: Numerics
     kept: bool
     share: float
     finer: Outcomes | None = field(default=None, compare=False, repr=False, kw_only=True)
+    numbers: NDArray[np.int64] | None = field(default=None, compare=False, repr=False, kw_only=True)
 
     @property
     @abstractmethod
@@ -40,7 +45,7 @@ class Found:
     @property
     def told(self) -> Self:
         """These findings without outcomes of shots."""
-        return replace(self, finer=None)
+        return replace(self, finer=None, numbers=None)
 
     @property
     def phrase(self) -> str:

@@ -143,7 +143,7 @@ class LimitMap:
         }
         if sought.quantity == "velocity" and (factors := limit_velocity_factors(campaign)) is not None:
             attributes[attr.LIMIT_FACTORS] = list(factors)
-        beside = finer_hits(campaign, findings, limits_pilot_size(campaign.numerics.asked))
+        beside = finer_hits(campaign, findings)
         if task.solid is not None:
             solid, of_solid = self._at_solid(campaign, task.solid, numerics, worker)
             attributes |= of_solid
@@ -199,8 +199,9 @@ class LimitMap:
         """The findings of a pilot with hits of the campaign; None if the campaign fixes the resolution."""
         if campaign.numerics.explicit is not None:
             return None
-        pilot = pilot_shots(campaign, limits_pilot_size(campaign.numerics.asked))
-        return pilot_of_limits(campaign.scene, pilot, self.sought, campaign.numerics, worker, trying)
+        pilot, numbers = pilot_shots(campaign, limits_pilot_size(campaign.numerics.asked))
+        errors = pilot_of_limits(campaign.scene, pilot, self.sought, campaign.numerics, worker, trying)
+        return replace(errors, numbers=numbers)
 
     def found_in(self, result: Result) -> LimitErrors | None:
         """The findings of the pilot of a result."""
