@@ -103,7 +103,7 @@ def compute(campaign: Campaign, task: Task, worker: Worker, progress: Progress |
         if campaign.layer:
             beside |= base_alone_columns(_outcomes(*at_base_alone(campaign, task.solid), numerics, worker)[0])
     attributes = computed_by(campaign, worker.device, len(outcomes), elapsed)
-    attributes |= found_attributes(campaign, task.findings) | _errors(task.findings)
+    attributes |= found_attributes(campaign.numerics.asked, task.findings) | _errors(task.findings)
     attributes |= {attr.LEVEL_FOR: what} if (what := level_for(campaign)) else {}
     return described(campaign, task.shots, outcomes, numerics, attributes, beside)
 

@@ -15,7 +15,7 @@ from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
 from warpimpact.results.dataset import to_table
 from warpimpact.results.table import HitTable
-from warpimpact.scene import Accuracy, Burst, Numerics, Shots
+from warpimpact.scene import Accuracy, Burst, Impact, Numerics, Shots, Target
 from warpimpact.scene.quantities import QUANTITIES
 from warpimpact.solver.device import find_device
 from warpimpact.solver.findings import Found
@@ -40,7 +40,8 @@ def described(
         attributes: attributes on how it was computed (`computed_by`), and further ones.
         beside: columns of other shots, as in `to_table`.
     """
-    told = _numerics(campaign, resolve(campaign.scene, numerics, weakens(campaign.target, shots)))
+    resolution = resolve(campaign.scene, numerics, weakens(campaign.target, shots))
+    told = _numerics(campaign.numerics, campaign.impact, campaign.target, resolution)
     told |= {attr.EVIDENCE: "\n".join(lines)} if (lines := evidence_of(campaign)) else {}
     unfolded = outcomes.unfolded(campaign.symmetries)
     return described_as(campaign, shots, unfolded, {**told, **attributes}, beside, double=is_double(campaign))
@@ -97,13 +98,13 @@ def computed_by(campaign: Campaign, device: str, computed: int, elapsed: float) 
     return attributes
 
 
-def found_attributes(campaign: Campaign, findings: Found | None) -> dict[str, Any]:
-    """Attributes on what a pilot was asked for and found; none without a pilot. The kind of computation adds the
-    errors."""
+def found_attributes(asked: Accuracy, findings: Found | None) -> dict[str, Any]:
+    """Attributes on the accuracy that a pilot was asked for, and on its findings; none without a pilot. The kind of
+    computation adds the errors."""
     if findings is None:
         return {}
-    asked = {name: getattr(campaign.numerics.asked, name) for name in Accuracy.model_fields}
-    given = {name: value for name, value in asked.items() if value is not None and math.isfinite(value)}
+    bounds = {name: getattr(asked, name) for name in Accuracy.model_fields}
+    given = {name: value for name, value in bounds.items() if value is not None and math.isfinite(value)}
     return {
         attr.RESOLUTION: findings.numerics.model_dump_json(),
         attr.PROMISE_KEPT: int(findings.kept),
@@ -181,12 +182,12 @@ def _burst(burst: Burst) -> dict[str, Any]:
     return {attr.BURST: burst.model_dump_json(exclude_none=True), attr.SHOTS_AT_A_PLATE: burst.count}
 
 
-def _numerics(campaign: Campaign, resolution: Resolution) -> dict[str, Any]:
+def _numerics(numerics: Numerics, impact: Impact, target: Target, resolution: Resolution) -> dict[str, Any]:
     """The numerics as given, and as used with every choice made: as a line of text and as numbers."""
-    numerics, impact, precision = campaign.numerics, campaign.impact, "double" if resolution.double else "single"
+    precision = "double" if resolution.double else "single"
     return {
-        attr.NUMERICS: f"{_asked(campaign)}, {numerics.scheme} scheme, "
-        f"time_step {resolution.step_in(impact, campaign.target):.4g} s, "
+        attr.NUMERICS: f"{_asked(numerics)}, {numerics.scheme} scheme, "
+        f"time_step {resolution.step_in(impact, target):.4g} s, "
         f"patches_axial {resolution.patches_axial}, patches_around {resolution.patches_around}, "
         f"grid_spacing {resolution.grid_spacing:.4g} m, precision {precision}",
         attr.NUMERICS_GIVEN: json.dumps(dict(numerics), default=lambda accuracy: accuracy.model_dump()),
@@ -194,13 +195,12 @@ def _numerics(campaign: Campaign, resolution: Resolution) -> dict[str, Any]:
         attr.PATCHES_AXIAL: resolution.patches_axial,
         attr.PATCHES_AROUND: resolution.patches_around,
         attr.GRID_SPACING: resolution.grid_spacing,
-        attr.TIME_STEP: resolution.step_of(impact, campaign.plate),
+        attr.TIME_STEP: resolution.step_of(impact, target.layers[0]),
     }
 
 
-def _asked(campaign: Campaign) -> str:
+def _asked(numerics: Numerics) -> str:
     """What determined the resolution."""
-    numerics = campaign.numerics
     if numerics.explicit is None:
         return "accuracy in numbers" if numerics.accuracy is not None else f"{numerics.fidelity} fidelity"
     if numerics.level is None:

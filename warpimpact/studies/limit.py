@@ -132,7 +132,7 @@ class LimitMap:
         elapsed = time.perf_counter() - begin
         attributes = {
             **computed_by(campaign, worker.device, len(shots), elapsed),
-            **found_attributes(campaign, findings),
+            **found_attributes(campaign.numerics.asked, findings),
             **({attr.LIMIT_ERROR: findings.error} if isinstance(findings, LimitErrors) else {}),
             attr.HISTORY: attr.history_line(f"limit --quantity {sought.quantity}"),
             attr.LIMIT: sought.quantity,
