@@ -19,8 +19,6 @@ if TYPE_CHECKING:
 
 MOST_NAMED = 3
 """Assumptions that are named beside a number: those with the largest changes."""
-_NO_MOVE = 1e-3
-"""Share of the number, or of the largest change, below which a change is not shown."""
 
 
 def assumptions_view(dataset: Result, measures: Sequence[Measure] = ()) -> Section:

@@ -19,7 +19,6 @@ from warpimpact.statistics.intervals import Array
 
 Flags = NDArray[np.bool_]
 
-LINKS = ("probit", "logit")
 _LN_2_PI = math.log(2.0 * math.pi)
 _NO_INFORMATION = 35.0
 """Distance from the location, in scales, beyond which the information of an answer is below double precision."""

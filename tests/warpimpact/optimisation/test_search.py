@@ -38,8 +38,6 @@ from warpimpact.view.view import text_of
 from ..campaign.test_posterior import posterior
 from .conftest import CORE, HOLES, SEARCH, WEIGHT_AND_ENERGY, design
 
-MORE_HITS = SEARCH.replace("hits = 64", "hits = 256")
-MANY = SEARCH.replace("designs = 12", "designs = 40")
 RANGE = '{ low = "4 mm", high = "4 mm" }'
 THICKNESS = '[variables]\nthickness = { low = "2 mm", high = "8 mm" }\n'
 
