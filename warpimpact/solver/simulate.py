@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 from dataclasses import replace
-from functools import cache
+from functools import cache, partial
 from typing import Any
 
 import numpy as np
@@ -94,13 +94,12 @@ def pilot_of(
         trying: called with every level that is computed.
         aim, hits: as in `pilot_hits`.
     """
-    seconds: dict[Numerics, float] = {}
+    prepared_of, seconds = partial(prepare, scene), dict[Numerics, float]()
 
     def outcomes_at(at: Numerics, some: Shots) -> Outcomes:
         assert at.level is not None
         trying(at.level)
-        prepared = prepare(scene, some, at)
-        memory = Memory(prepared, find_device(worker.device), worker.cancel)
+        memory = Memory(prepared_of(some, at), find_device(worker.device), worker.cancel)
         memory.build()
         begin = time.perf_counter()
         outcomes = marched(memory, worker)
@@ -109,7 +108,7 @@ def pilot_of(
 
     @cache
     def price(level: int) -> float:
-        return prepare(scene, pilot[: pilot.at_a_plate], at_level(level, numerics)).seconds
+        return prepared_of(pilot[: pilot.at_a_plate], at_level(level, numerics)).seconds
 
     errors = pilot_hits(outcomes_at, pilot, numerics, price, scene.free_behind, aim, hits)
     if not errors.tried:
