@@ -207,7 +207,7 @@ def build(variant: Variant) -> SimpleNamespace:
                 area = left * read(touches.area, base + j)
                 stress = use.interaction.normal_stress(law, face.closing, ring.radius)
                 slope = left * read(touches.slope, base + j) * stress
-                if wp.static(variant.rate_dependent):
+                if wp.static(variant.rate_dependent or variant.free_surface):
                     slope += area * use.interaction.stress_slope(law, face.closing)
                 # Traction = stress × (−n + η t), t against the sliding velocity.
                 f_axial, f_outward, f_around = -face.axial, -face.outward, -face.around

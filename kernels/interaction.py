@@ -47,6 +47,11 @@ def build(variant: Variant) -> SimpleNamespace:
         return wp.max(wp.max(law.onset_share * velocity, wider), smallest_onset * impact_velocity)
 
     @wp.func
+    def per_speed(velocity: real, impact_velocity: real):
+        """One over the velocity of the core [s/m], finite at rest."""
+        return one / wp.max(velocity, smallest_onset * impact_velocity)
+
+    @wp.func
     def contact_of(law: struct.Law, closing: real, variation: real, speed: real):
         """Contact of a patch whose closing speeds are spread evenly over closing ± variation [m/s].
 
@@ -87,7 +92,10 @@ def build(variant: Variant) -> SimpleNamespace:
     @wp.func
     def stress_slope(law: struct.Law, closing: real):
         """Derivative of the normal stress by the closing speed [Pa s/m]."""
-        return law.a1 + real(2.0) * law.a2 * closing
+        slope = law.a1 + real(2.0) * law.a2 * closing
+        if wp.static(variant.free_surface):
+            slope += wp.where(closing * law.per_speed < one, law.a0 * law.attack * law.per_speed, zero)
+        return slope
 
     @wp.func
     def friction_per_speed(law: struct.Law, sliding: real, speed: real):
@@ -124,7 +132,8 @@ def build(variant: Variant) -> SimpleNamespace:
         """Normal stress [Pa] of undamaged material at closing speed v_n, on a core that has this radius there [m]."""
         stress = law.a0
         if wp.static(variant.free_surface):
-            stress /= one + exponential(law.power * logarithm(radius * law.per_reach))
+            deep = one / (one + exponential(law.power * logarithm(radius * law.per_reach)))
+            stress *= deep + law.attack * wp.min(closing * law.per_speed, one)
         if wp.static(variant.rate_dependent):
             stress += closing * (law.a1 + law.a2 * closing)
         return stress

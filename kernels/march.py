@@ -159,6 +159,8 @@ def build(variant: Variant) -> SimpleNamespace:
             if status == RUNNING:
                 law = kind.law_at(context, context.law, reach)
                 law.onset = use.interaction.onset_speed(law, dt, wp.length(pose.velocity), real(speed))
+                if wp.static(variant.free_surface):
+                    law.per_speed = use.interaction.per_speed(wp.length(pose.velocity), real(speed))
                 law.steadied = wp.where(use.rigid_body.swings(body, before_last, last), steadied * law.onset, zero)
                 before_last = last
                 load = struct.Load()

@@ -39,6 +39,7 @@ class Near:
         radius, widest: of the core there, and at most.
         thickness: of the plate.
         closing: speed of the element along its normal [m/s].
+        attack: closing speed over the speed of the core: the sine of the angle of attack, if the core does not turn.
     """
 
     face: real
@@ -52,6 +53,7 @@ class Near:
     widest: real
     thickness: real
     closing: real
+    attack: real
 
 
 @wp.func
@@ -198,6 +200,7 @@ def built(law: Any, pushes: bool = False, lip: float = 0.0) -> Any:
                             near.widest = body[5]
                             near.thickness = thickness
                             near.closing = closing
+                            near.attack = closing / speed
                             sliding = moving - closing * normal
                             rubbing = parameters[0] / wp.max(wp.length(sliding), real(1e-5) * speed)
                             pressing = law(parameters, near) * share * rings[k, 4]

@@ -187,6 +187,17 @@ def covered(p: wp.array(dtype=real), near: Near):
     return bounded(p, near) * (real(1.0) - wp.exp(-p[3] * cover / near.radius))
 
 
+@wp.func
+def swept(p: wp.array(dtype=real), near: Near):
+    """As `covered`, with a stress of the angle of attack and the inertia of steel in the place of a stress of the
+    speed."""
+    cover = near.ahead + wp.max(p[4] * near.carried - p[5] * near.gap, real(0.0))
+    deep = near.thickness / (near.thickness + near.radius)
+    inertia = p[6] * real(7850.0) * near.closing * near.closing
+    pressure = p[1] * real(1e9) * (deep + p[2] * near.attack) + inertia
+    return pressure * (real(1.0) - wp.exp(-p[3] * cover / near.radius))
+
+
 class Law(NamedTuple):
     """A law, the parameters from which a fit begins, those that it does not change, and whether material that the core
     has pushed into a hole presses."""
@@ -211,7 +222,10 @@ LAWS = {
     "confined": Law(confined, (0.0, 1.3, 2.5), (0,)),
     "bounded": Law(bounded, (0.0, 2.8, 1.0), (0, 2)),
     "covered": Law(covered, (0.0, 2.5, 1.8, 1.2, 0.5, 0.05), (0, 5), True),
+    "swept_only": Law(swept, (0.0, 2.5, 2.0, 1.2, 0.5, 0.05, 0.0), (0, 5, 6), True),
+    "swept": Law(swept, (0.0, 2.8, 2.0, 1.2, 0.5, 0.05, 1.0), (0, 5, 6), True),
     "covered_bulging": Law(covered, (0.0, 2.5, 1.8, 0.9, 0.5, 0.05), (0, 5), True, 0.4),
+    "swept_bulging": Law(swept, (0.0, 2.8, 1.5, 1.0, 0.5, 0.05, 1.0), (0, 5, 6), True, 0.4),
 }
 
 

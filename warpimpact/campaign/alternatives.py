@@ -30,8 +30,8 @@ _STEEPEST = math.radians(85.0)
 """Largest obliquity, and largest projected angle of the axis, of an alternative [rad]."""
 _DIFFERENT = 1e-6
 """Relative change of a value below which an alternative is none."""
-RATE = 1.7
-"""C of the law with free surfaces, as it was fitted with them."""
+INERTIA = 1.0
+"""B of the law with free surfaces, with which its numbers were fitted."""
 
 Values = Mapping[tuple[str, int], float]
 
@@ -197,8 +197,8 @@ def _with_refitted(campaign: Campaign, changed: Alternative, refitted: Values) -
 
 
 def _edges(campaign: Campaign) -> Iterator[Alternative]:
-    """Less resistance near edges, and a stress of the speed, in place of weakening (docs/model.md §4.9): what finite
-    elements of plates with holes ask for. A plate without holes takes as much from the core as before."""
+    """Less resistance near edges in place of weakening (docs/model.md §4.9): what finite elements of plates with holes
+    ask for. A plate without holes takes as much from the core as before."""
     law, plates, burst = campaign.interaction, campaign.target.layers, campaign.at_a_plate > 1
     every, drawn = range(len(plates)), ("resistance", "degradation", "linear", "static", "quadratic")
     if (
@@ -210,7 +210,7 @@ def _edges(campaign: Campaign) -> Iterator[Alternative]:
         or any(is_drawn(campaign, name, every) for name in drawn)
     ):
         return
-    other = Interaction(linear=RATE, onset=law.onset, free_surface=FreeSurface())
+    other = Interaction(quadratic=INERTIA, onset=law.onset, free_surface=FreeSurface())
 
     def changed(k: int, plate: Plate) -> dict[str, Any]:
         arriving = 0.0 if _in_catalogue(campaign, plate) is not None else campaign.impact.velocity

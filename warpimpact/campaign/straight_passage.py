@@ -56,16 +56,17 @@ class StraightPassage:
         facing, law, free = slope / np.sqrt(1.0 + slope * slope), self.law, self.law.free_surface
         touching = np.minimum(facing / law.onset, 1.0) if law.onset > 0.0 else (facing > 0.0).astype(float)
         area = 2.0 * np.pi * radius * np.gradient(station) * touching * (slope + self.friction)
-        near = np.ones_like(radius)
+        near, steep = np.ones_like(radius), 0.0
         if free is not None:
             near /= 1.0 + (radius / (free.reach * self.thickness)) ** free.power
+            steep = free.attack
         edges = np.linspace(self.thickness + station[-1], 0.0, _DEPTHS + 1)
         depth, step = 0.5 * (edges[1:] + edges[:-1])[:, None], edges[0] - edges[1]
         inside = (depth > station) & (depth < station + self.thickness)
         tip = np.pi * radius[0] ** 2 * inside[:, 0]
         static, linear, quadratic = (
             inside @ (area * share) + tip * at_tip
-            for share, at_tip in ((near, near[0]), (facing, 1.0), (facing**2, 1.0))
+            for share, at_tip in ((near + steep * facing, near[0] + steep), (facing, 1.0), (facing**2, 1.0))
         )
         strength, behind = np.broadcast_arrays(np.asarray(resistance, dtype=float), np.asarray(leaving, dtype=float))
         by_speed, square = law.linear * np.sqrt(self.density * strength), behind**2

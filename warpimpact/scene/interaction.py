@@ -9,13 +9,15 @@ from .units import NonNegativeNumber, PositiveNumber
 
 
 class FreeSurface(Model):
-    """How material near a face or an edge resists less (docs/model.md §4.9). r is the radius of the core at a surface
-    element, H the thickness of the layer. The numbers were fitted to finite elements without friction and weakening,
-    with `linear` = 1.7 beside them (docs/continuum.md).
+    """How material near a face or an edge resists less, and steep surfaces are pressed harder (docs/model.md §4.9).
+
+    r is the radius of the core at a surface element, H the thickness of the layer. The numbers were fitted to finite
+    elements without friction and weakening, with `quadratic` = 1 beside them (docs/continuum.md).
 
     Attributes:
         reach: λ; A·Y is divided by 1 + (r / λH)^q.
         power: q, of r / λH.
+        attack: c; c·A·Y·sin α is added, α the angle between the surface and the velocity of the core.
         cover: k; the element presses by 1 − exp(−k b / r), b the length of material ahead of it along its normal in the
             plane of the layer.
         carried: s; of the material behind the element, which the core pushes ahead of itself, this share adds to b.
@@ -24,8 +26,9 @@ class FreeSurface(Model):
 
     reach: PositiveNumber = 1.0
     power: PositiveNumber = 1.0
-    cover: PositiveNumber = 1.45
-    carried: NonNegativeNumber = 0.4
+    attack: NonNegativeNumber = 1.45
+    cover: PositiveNumber = 1.7
+    carried: NonNegativeNumber = 0.35
     gap: NonNegativeNumber = 0.05
 
 

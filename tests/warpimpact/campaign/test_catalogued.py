@@ -116,7 +116,7 @@ def test_under_another_law_a_material_keeps_its_limit_velocity(thickness: str, o
         passage = StraightPassage(campaign.core, *given)
         return tuple(float(passage.entry(value)) for value in (*known.ends, campaign.plate.resistance))
 
-    free = {"linear": 1.7, "free_surface": {}}
+    free = {"quadratic": 1.0, "free_surface": {}}
     assert limits(plate | {"shear_coefficient": 0.0}, free) == pytest.approx(limits(plate, {}), rel=0.01)
 
 

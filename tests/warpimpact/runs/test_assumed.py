@@ -86,7 +86,7 @@ def test_each_alternative_changes_what_it_says_and_nothing_else() -> None:
         "friction η = 0.1": {"plate.shear_coefficient"},
         "onset κ = 0": {"interaction.onset"},
         "onset κ = 0.02": {"interaction.onset"},
-        EDGES: {"plate.resistance", "interaction.linear", "interaction.free_surface"} | rate,
+        EDGES: {"plate.resistance", "interaction.quadratic", "interaction.free_surface"} | rate,
         "5° more oblique": {"obliquity"},
         "2° of yaw": {"yaw"},
         "half the stand-off": {"record.standoffs"},
@@ -161,7 +161,7 @@ OTHERWISE: dict[str, dict[str, Any]] = {
     "friction η = 0": {"plate": PLATE | {"shear_coefficient": 0.0}},
     "onset κ = 0.02": {"interaction": {"onset": 0.02}},
     EDGES: {
-        "interaction": {"linear": 1.7, "free_surface": {}},
+        "interaction": {"quadratic": 1.0, "free_surface": {}},
         "plate": PLATE | {"resistance": EDGED, "degradation": 1.0},
     },
     "5° more oblique": {"impact": TABLES["impact"] | {"obliquity": "5 deg"}},
