@@ -245,6 +245,11 @@ class Campaign(Model):
         return 1 if self.burst is None else self.burst.count
 
     @property
+    def group(self) -> int:
+        """Number of consecutive hits that count as one: the shots at one plate, with their images."""
+        return len(self.symmetries) * self.at_a_plate
+
+    @property
     def drawn(self) -> Posterior | None:
         """The draws of its posterior, if it has one."""
         return None if self.posterior is None else read_posterior(self.posterior)

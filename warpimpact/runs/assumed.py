@@ -82,7 +82,7 @@ def assumed(campaign: Campaign, numerics: Numerics, compute: Computed, *, limits
 def _groups(campaign: Campaign, numerics: Numerics, others: int, fewest: int) -> int:
     """Number of groups of images, or of bursts with their images, per alternative. It does not depend on the
     machine."""
-    group, total = len(campaign.symmetries) * campaign.at_a_plate, len(campaign.sampler())
+    group, total = campaign.group, len(campaign.sampler())
     hits = campaign.assumptions.hits
     if hits is None:
         first = shots_at(campaign, places_of(campaign, 1))

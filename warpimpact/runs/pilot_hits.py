@@ -42,21 +42,20 @@ def places_of(campaign: Campaign, most: int) -> NDArray[np.int64]:
     Args:
         most: most groups.
     """
-    groups = len(campaign.sampler()) // (len(campaign.symmetries) * campaign.at_a_plate)
+    groups = len(campaign.sampler()) // campaign.group
     count = min(most, groups)
     return np.arange(count) if campaign.hits.sampling in ("sobol", "random") else spread_places(groups, count)
 
 
 def hits_at(campaign: Campaign, places: NDArray[np.int64]) -> NDArray[np.int64]:
     """Numbers of the hits of groups, with their images."""
-    group = len(campaign.symmetries) * campaign.at_a_plate
-    return (places[:, None] * group + np.arange(group)).reshape(-1)
+    return (places[:, None] * campaign.group + np.arange(campaign.group)).reshape(-1)
 
 
 def shots_at(campaign: Campaign, places: NDArray[np.int64]) -> Shots:
     """The shots of groups, with their images. Bursts are whole, because a later hit meets what the earlier ones
     left."""
-    sampler, group = campaign.sampler(), len(campaign.symmetries) * campaign.at_a_plate
+    sampler, group = campaign.sampler(), campaign.group
     if campaign.hits.sampling in ("sobol", "random"):
         return sampler.shots(0, len(places) * group)
     return Shots.joined([sampler.shots(int(place) * group, group) for place in places])

@@ -3,19 +3,17 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from contextlib import closing
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from warpimpact.campaign.campaign import Campaign
 from warpimpact.results import attributes as attr
-from warpimpact.results.dataset import failed, finer_pair, images
-from warpimpact.results.measures import Measure
+from warpimpact.results.dataset import images
 from warpimpact.results.outlines import in_memory
 from warpimpact.results.table import HitTable, joined
-from warpimpact.results.tallies import Tally, shift_of
 from warpimpact.runs.assumed import has_assumptions
 from warpimpact.runs.choice import executor_for, opened
 from warpimpact.runs.compute import HIT_MAP, numerics_of
@@ -32,15 +30,13 @@ from warpimpact.runs.jobs import (
     task_size,
     with_ligament,
 )
-from warpimpact.runs.levels import OF_THE_NUMERICS
 from warpimpact.runs.parts import claimed, telling
-from warpimpact.runs.progress import Follow, RunProgress, followed
+from warpimpact.runs.progress import Follow, followed
 from warpimpact.runs.shards import Shards, ShardsOnDisk, extent, manifest
 from warpimpact.runs.task import Computation, Task
-from warpimpact.solver.findings import Found
+from warpimpact.runs.watch import End, Watch
 from warpimpact.solver.resolution import at_level
 from warpimpact.solver.worker import Cancel
-from warpimpact.statistics.intervals import Dealing, looks
 
 if TYPE_CHECKING:
     import xarray
@@ -140,20 +136,10 @@ def _read(campaign: Campaign | str | Path) -> Campaign:
     return campaign if isinstance(campaign, Campaign) else Campaign.from_toml(campaign)
 
 
-@dataclass(frozen=True)
-class _End:
-    """How a run ended: numbers of shards and hits, time of computing [s], and the estimate of a stop rule."""
-
-    shards: int
-    hits: int
-    compute_time: float
-    stop: dict[str, Any]
-
-
-def _fill(campaign: Campaign, computation: Computation, shards: Shards, executor: Executor, follow: Follow) -> _End:
+def _fill(campaign: Campaign, computation: Computation, shards: Shards, executor: Executor, follow: Follow) -> End:
     """Compute the missing shards until none is missing or the stop rule is met."""
     sampler = campaign.sampler()
-    watch = _Watch(campaign, len(sampler), shards, computation.measures)
+    watch = Watch(campaign, len(sampler), shards, computation.measures)
     there = sorted(shards.there())
     for index in there:
         watch.add(index, shards.shard(index))
@@ -210,99 +196,7 @@ def _fill(campaign: Campaign, computation: Computation, shards: Shards, executor
     return watch.end
 
 
-class _Watch:
-    """Follows a run: finished and failed shots, estimates, and whether the stop rule is met.
-
-    Except for the counts, shards are looked at in the order of their shots, in whatever order they come. So a run ends
-    with the same shots however it was computed.
-    """
-
-    def __init__(self, campaign: Campaign, total: int, shards: Shards, measures: Sequence[str] = ()) -> None:
-        self._total, self._shards, self._load = total, -(-total // shards.extent), shards.shard
-        self._rule = campaign.stop
-        tilts = [f"mean(tilt@{last * 1e3:.10g}mm)" for last in campaign.output.standoffs[-1:]]
-        measures = measures or ("mean(residual_velocity)", *tilts)
-        dealt: Dealing = {"replicates": campaign.replicates, "images": len(campaign.symmetries) * campaign.at_a_plate}
-        self._tallies = [Tally(Measure.parse(measure), **dealt) for measure in measures]
-        if self._rule is not None:
-            rule = self._rule
-            self._stop = Tally(rule.measure, **dealt, confidence=rule.confidence)
-            self._looks = looks(campaign.hits.sampling, self._shards)
-            self._look = next(self._looks)
-        self._shift: float | None = None
-        self._early: set[int] = set()
-        self._next, self._hits, self._time = 0, 0, 0.0
-        self.done, self.resumed, self.failed = 0, 0, 0
-        self.end: _End | None = None
-        self.found: Found | None = None
-
-    def add(self, index: int, shard: HitTable) -> None:
-        """Take in a finished shard. A shard that comes before its turn is loaded again when its turn comes."""
-        self.done += shard.sizes["hit"]
-        self.failed += int(failed(shard).sum())
-        self._early.add(index)
-        while self.end is None and self._next in self._early:
-            self._early.remove(self._next)
-            self._advance(shard if self._next == index else self._load(self._next))
-
-    @property
-    def rate(self) -> float:
-        """Computed hits per second; 0 before the first shard."""
-        return self._hits / self._time if self._time > 0.0 else 0.0
-
-    def _advance(self, shard: HitTable) -> None:
-        self._next += 1
-        self._hits += shard.sizes["hit"]
-        self._time += shard.attrs[attr.COMPUTE_TIME]
-        for tally in self._tallies:
-            tally.add(shard)
-        stop: dict[str, Any] = {}
-        if self._rule is not None:
-            self._stop.add(shard)
-            if self._next == 1:
-                self._shift = shift_of(self._rule.measure, finer_pair(shard), self._rule.confidence)
-            stop = self._looked_at()
-        if self._next == self._shards or stop:
-            self.end = _End(self._next, self._hits, self._time, stop)
-
-    def _looked_at(self) -> dict[str, Any]:
-        """Attributes that say how the stop rule ended the run; empty while it has not."""
-        rule = self._rule
-        assert rule is not None
-        if self._next != self._look:
-            return {}
-        self._look = next(self._looks, self._shards)
-        estimate, asked, shift = self._stop.estimate(), rule.measure.shown(rule.half_width), self._shift or 0.0
-        met = estimate.half_width + shift <= asked
-        left = max(asked - shift, 0.0)
-        # The half width is about proportional to 1/√hits.
-        in_reach = self._hits * estimate.half_width**2 <= left**2 * self._total
-        no_use = not met and not in_reach and estimate.half_width <= (1.0 - OF_THE_NUMERICS) * asked
-        if not met and not no_use and self._next != self._shards:
-            return {}
-        return {
-            attr.STOP_QUANTITY: rule.quantity,
-            attr.STOP_REASON: "half_width" if met else "numerics" if no_use else "max_count",
-            **({} if self._shift is None else {attr.ESTIMATE_NUMERICS: shift}),
-            attr.ESTIMATE: estimate.value,
-            attr.ESTIMATE_INTERVAL: [estimate.low, estimate.high],
-            attr.ESTIMATE_UNITS: rule.measure.units,
-            attr.CONFIDENCE: rule.confidence,
-        }
-
-    def progress(self, underway: int) -> RunProgress:
-        """The progress of the run, with shots of unfinished shards."""
-        tallies = [*self._tallies, self._stop] if self._rule is not None else self._tallies
-        estimates = {
-            tally.measure: tally.estimate()
-            for tally in tallies
-            if tally.measure.kind not in ("quantile", "worst_tenth")
-        }
-        done = self.done if self.done == self._total else min(self.done + underway, self._total - 1)
-        return RunProgress(done, self._total, self.done, self.resumed, self.failed, estimates, found=self.found)
-
-
-def _attributes(table: HitTable, end: _End) -> dict[str, Any]:
+def _attributes(table: HitTable, end: End) -> dict[str, Any]:
     """Global attributes of a complete result that replace those of its first shard."""
     return {
         attr.HISTORY: attr.history_line(table.attrs[attr.HISTORY].partition(" warpimpact ")[2]),

@@ -26,8 +26,8 @@ from warpimpact.plotting import comparison_figure
 from warpimpact.results import attributes as attr
 from warpimpact.results import files
 from warpimpact.results.files import ResultError
+from warpimpact.runs.progress import RunProgress
 from warpimpact.runs.replay import replay
-from warpimpact.runs.run import RunProgress
 from warpimpact.view.view import text_of
 
 pytestmark = pytest.mark.usefixtures("small_shards")

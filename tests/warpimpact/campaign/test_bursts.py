@@ -16,8 +16,9 @@ from warpimpact.results.tallies import Tally, dealing
 from warpimpact.runs import shards
 from warpimpact.runs.compute import HitMap
 from warpimpact.runs.parts import Interrupted
+from warpimpact.runs.progress import RunProgress
 from warpimpact.runs.replay import replay
-from warpimpact.runs.run import RunProgress, run, run_to_file
+from warpimpact.runs.run import run, run_to_file
 from warpimpact.solver.findings import HitErrors
 from warpimpact.solver.worker import Worker
 

@@ -15,8 +15,9 @@ from warpimpact.results import files
 from warpimpact.results.variables import OUTCOME_VARIABLES
 from warpimpact.runs.compute import HitMap, compute
 from warpimpact.runs.parts import Interrupted
+from warpimpact.runs.progress import RunProgress
 from warpimpact.runs.replay import replay
-from warpimpact.runs.run import RunProgress, run, run_to_file
+from warpimpact.runs.run import run, run_to_file
 from warpimpact.runs.task import Task
 from warpimpact.solver.worker import Worker
 

@@ -17,7 +17,8 @@ from warpimpact.runs.choice import executor_for
 from warpimpact.runs.cluster import _made_by, _on_worker
 from warpimpact.runs.executor import ClusterError, Job
 from warpimpact.runs.jobs import with_ligament
-from warpimpact.runs.run import RunProgress, run_to_file
+from warpimpact.runs.progress import RunProgress
+from warpimpact.runs.run import run_to_file
 from warpimpact.solver.device import DeviceError
 from warpimpact.solver.worker import Worker
 

@@ -25,7 +25,8 @@ from warpimpact.results.files import OutputError
 from warpimpact.runs import shards
 from warpimpact.runs.manifests import difference
 from warpimpact.runs.parts import Interrupted, folder_of
-from warpimpact.runs.run import RunProgress, run, run_to_file
+from warpimpact.runs.progress import RunProgress
+from warpimpact.runs.run import run, run_to_file
 
 SameBits = Callable[[Path, Path], None]
 SLOTTED_PLATE = (Path(__file__).parents[3] / "campaigns" / "slotted_plate.toml").read_text(encoding="utf-8")

@@ -17,9 +17,11 @@ from warpimpact.results import files
 from warpimpact.results.measures import Measure
 from warpimpact.results.tallies import Tally
 from warpimpact.runs.parts import Interrupted
+from warpimpact.runs.progress import RunProgress
 from warpimpact.runs.replay import replay
-from warpimpact.runs.run import RunProgress, _Watch, run, run_to_file
+from warpimpact.runs.run import run, run_to_file
 from warpimpact.runs.shards import Shards
+from warpimpact.runs.watch import Watch
 
 SameBits = Callable[[Path, Path], None]
 SLOTTED_PLATE = (Path(__file__).parents[3] / "campaigns" / "slotted_plate.toml").read_text(encoding="utf-8")
@@ -98,7 +100,7 @@ def test_the_stop_rule_keeps_its_promise(sampling: str, tmp_path: Path) -> None:
     held, ends = 0, []
     for seed in range(TRIALS):
         reseeded = scene.model_copy(update={"hits": scene.hits.model_copy(update={"seed": seed})})
-        watch = _Watch(reseeded, 2**16, Shards(256))
+        watch = Watch(reseeded, 2**16, Shards(256))
         values = surface(reseeded, 0, 2**14)
         while watch.end is None:
             watch.add(watch._next, shard_of(values[watch._next * 256 : (watch._next + 1) * 256]))
@@ -119,8 +121,8 @@ def test_a_run_goes_on_as_long_as_hits_may_make_up_for_the_numerics(
     shift: float, reason: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     scene = campaign(tmp_path, "mean(residual_velocity)", "0.05 m/s", sampling='"random"')
-    monkeypatch.setattr(sys.modules[_Watch.__module__], "shift_of", lambda *_: shift)
-    watch = _Watch(scene, 2**14, Shards(256))  # which leave ± 0.006 m/s
+    monkeypatch.setattr(sys.modules[Watch.__module__], "shift_of", lambda *_: shift)
+    watch = Watch(scene, 2**14, Shards(256))  # which leave ± 0.006 m/s
     values = surface(scene, 0, 2**14)
     while watch.end is None:
         watch.add(watch._next, shard_of(values[watch._next * 256 : (watch._next + 1) * 256]))

@@ -24,8 +24,9 @@ from warpimpact.results.variables import OUTCOME_VARIABLES, SHOT_VARIABLES
 from warpimpact.runs import compute as computing
 from warpimpact.runs import shards
 from warpimpact.runs.parts import Interrupted
+from warpimpact.runs.progress import RunProgress
 from warpimpact.runs.replay import replay
-from warpimpact.runs.run import RunProgress, run_to_file
+from warpimpact.runs.run import run_to_file
 from warpimpact.scene import Scatter, Symmetry, TrianglePattern, make_shots, symmetries_used
 from warpimpact.solver import replay as replaying
 from warpimpact.solver import simulate as simulation

@@ -19,8 +19,9 @@ from warpimpact.results import variables as v
 from warpimpact.results.measures import Measure
 from warpimpact.runs import shards
 from warpimpact.runs.parts import Interrupted
+from warpimpact.runs.progress import RunProgress
 from warpimpact.runs.replay import replay
-from warpimpact.runs.run import RunProgress, run_to_file
+from warpimpact.runs.run import run_to_file
 from warpimpact.runs.task import Task
 from warpimpact.scene import Numerics, make_shots
 from warpimpact.solver.limit import limit_velocity
