@@ -33,8 +33,8 @@ LIMITS = {
     "velocity": _limit_variables("velocity", "m s-1", "limit velocity"),
     "thickness": _limit_variables("thickness", "m", "limit thickness of the plate"),
 }
-"""By the quantity of the search. Only results of `warpimpact limit` have them. Their other variables belong
-to the shot that just perforates, at the end of the limit at which the core passes."""
+"""Variables of a limit by the quantity of the search. Only results of `warpimpact limit` have them. All other variables
+of such a result belong to the shot at the end of the limit's interval at which the core passes."""
 LIMIT_VARIABLES = tuple(variables.value for variables in LIMITS.values())
 
 LIMIT_RECORDS = tuple(

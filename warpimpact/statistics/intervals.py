@@ -32,8 +32,8 @@ class Estimate:
         parameters: interval of the number over the draws of a posterior; None if shots draw no parameters, NaN if the
             hits are too few. `low` and `high` are the interval by the sample of hits alone.
         numerics: largest shift of the number by the numerics, to either side; None or NaN if it is not known.
-        assumptions: the number if something that nobody measured is otherwise, by what that is; empty if that is not
-            known.
+        assumptions: the number under each assumption about what nobody measured, by the name of the assumption; empty
+            if none was computed.
     """
 
     value: float
@@ -69,7 +69,7 @@ class Estimate:
 
     @property
     def assumed(self) -> tuple[float, float] | None:
-        """The smallest and the largest number under any assumption, as given among them; None if that is not known."""
+        """The smallest and the largest of the number as given and under each assumption; None if none was computed."""
         numbers = [self.value, *self.assumptions.values()]
         return (min(numbers), max(numbers)) if self.assumptions else None
 
@@ -212,7 +212,7 @@ def _matched(sample: _Sample, count: int, confidence: float) -> tuple[float, flo
 
 
 class _Sample:
-    """Count, mean and sum of squared deviations of numbers; with `keeps`, the numbers, too."""
+    """Count, mean and sum of squared deviations of numbers. With `keeps` it keeps the numbers, too."""
 
     def __init__(self, *, keeps: bool) -> None:
         self.count, self.mean, self._squares = 0, 0.0, 0.0

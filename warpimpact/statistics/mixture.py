@@ -20,12 +20,12 @@ FROM_PRIOR = 0.1
 MOST, DRAWS_EACH = 8, 40
 """Largest number of components, and effective draws per component."""
 PRIOR_DRAWS, PRIOR_SHARE = 20.0, 0.5
-"""Weight of the prior of a component's covariance in draws, and its share of the covariance of all draws: a covariance
-of few draws alone is too narrow."""
+"""Prior of a component's covariance, because that of a few draws alone is too narrow: its weight in draws, and its size
+as a share of the covariance of all draws."""
 PRIOR_DRAWS_OF_CENTRE = 2.0
 """Weight of the prior of a component's centre, the mean of all draws, in draws."""
 FITTED, PASSES = 4000, 25
-"""Largest number of draws that a mixture is fitted to, and passes over them."""
+"""Largest number of draws in a fit, and number of passes over them."""
 
 
 @dataclass(frozen=True)

@@ -19,7 +19,7 @@ from warpimpact.statistics.intervals import Array
 FEWEST_GROUPS = 8
 """Fewest groups with two numbers or more."""
 _FEWEST_FREE = 3.0
-"""Degrees of freedom of a variance between groups that the scatter within groups nearly hides."""
+"""Degrees of freedom of the variance between groups where the scatter within groups nearly hides it."""
 
 
 class Positive(NamedTuple):

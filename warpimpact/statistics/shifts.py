@@ -47,8 +47,8 @@ def change_of_mean(coarse: Array, fine: Array, **dealt: Unpack[Estimating]) -> E
 
 
 def shift_of_quantile(coarse: Array, fine: Array, share: float, **dealt: Unpack[Estimating]) -> float:
-    """Like `shift_of_mean`, of the number that exceeds this share of the shots: half of the shots, those nearest to it
-    in rank, show how it moves."""
+    """Largest probable error of a quantile; arguments as in `shift_of_mean`. The half of the shots that is nearest to
+    the quantile in rank shows how it moves."""
     both = np.flatnonzero(np.isfinite(coarse) & np.isfinite(fine))
     if not len(both):
         return math.nan
@@ -58,7 +58,8 @@ def shift_of_quantile(coarse: Array, fine: Array, share: float, **dealt: Unpack[
 
 
 def shift_of_share(coarse: Array, fine: Array, **dealt: Unpack[Estimating]) -> float:
-    """Like `shift_of_mean`, of the share of shots with a positive number; numbers may be infinite.
+    """Largest probable error of the share of shots with a positive number; arguments as in `shift_of_mean`. Numbers
+    may be infinite.
 
     The share changes by E[shift · δ(number)], with a window in place of δ. A shot that shifts by more than the window
     counts by its sign at both levels. If more shots cross 0 than this estimate allows, because many numbers lie in a
@@ -81,7 +82,8 @@ def shift_of_share(coarse: Array, fine: Array, **dealt: Unpack[Estimating]) -> f
 
 
 def shift_of_yes(coarse: Array, fine: Array, **dealt: Unpack[Estimating]) -> float:
-    """Like `shift_of_mean`, of the share of answers that are 1, not 0; 0 if all answers are the same."""
+    """Largest probable error of the share of answers that are 1, not 0; arguments as in `shift_of_mean`. It is 0 if all
+    answers are the same."""
     both = np.concatenate([coarse, fine])
     if len(np.unique(both[~np.isnan(both)])) < 2:
         return 0.0

@@ -28,7 +28,7 @@ FEWEST_SHOTS = 16
 """Fewest shots of a group that has a worst tenth or a quantile."""
 
 OrderWeights = Callable[[int], Array]
-"""Count of ordered numbers → their weights, shape [count], the smallest number first; the sum is 1."""
+"""Function of the count of ordered numbers: their weights, shape [count], the smallest number first. Their sum is 1."""
 
 
 def worst_tenth(values: Array) -> Array:
