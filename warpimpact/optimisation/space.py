@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from warpimpact.campaign.places import is_table, put, resolved
 from warpimpact.campaign.text import CampaignError
-from warpimpact.scene.units import LARGEST, quoted
+from warpimpact.scene.units import LARGEST, float_of, quoted
 
 Array = NDArray[np.float64]
 
@@ -190,7 +190,7 @@ def _range(name: str, place: str, given: dict[str, Any], where: str, under: Any)
     for key, value in given.items():
         match = _NUMBER.fullmatch(value) if isinstance(value, str) else None
         is_number = isinstance(value, int | float) and not isinstance(value, bool)
-        numbers[key] = _number(value if is_number else match[1] if match else math.nan)
+        numbers[key] = float_of(value if is_number else match[1] if match else math.nan)
         units[key] = (match[2] or "").strip() if match else ""
         if not abs(numbers[key]) <= LARGEST:
             raise CampaignError(
@@ -207,13 +207,6 @@ def _range(name: str, place: str, given: dict[str, Any], where: str, under: Any)
             f"{where}.step: got {step:g}, but it must be greater than 0 and divide the range into at most {MOST_VALUES}"
         )
     return DesignVariable(name, place, low, high, step, units["low"], under=under)
-
-
-def _number(value: float | str) -> float:
-    try:
-        return float(value)
-    except OverflowError:  # a whole number may have hundreds of digits
-        return math.inf
 
 
 def _read_choice(

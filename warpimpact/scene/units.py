@@ -102,7 +102,7 @@ class _Quantity:
             number = self._from_text(value)
         elif isinstance(value, Real) and not isinstance(value, bool):
             in_degrees = self.unit == "rad" and not isinstance(value, Radians)
-            number = math.radians(_float(value)) if in_degrees else _float(value)
+            number = math.radians(float_of(value)) if in_degrees else float_of(value)
         else:
             raise self._error(value, f"which is not {self.name}")
         if not math.isfinite(number):
@@ -151,7 +151,8 @@ class _Quantity:
         )
 
 
-def _float(value: Real) -> float:
+def float_of(value: Real | float | str) -> float:
+    """A number as a float; infinite if it is too large for one."""
     try:
         return float(value)
     except OverflowError:  # of an integer with more than 308 digits

@@ -7,12 +7,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-import xarray
 
 from warpimpact import Campaign
 from warpimpact.analysis.summary import summary_text
 from warpimpact.campaign.campaign import CampaignError
-from warpimpact.kernels.status import Status
 from warpimpact.results import files
 from warpimpact.results.measures import Measure
 from warpimpact.results.tallies import Tally
@@ -23,23 +21,15 @@ from warpimpact.runs.run import run, run_to_file
 from warpimpact.runs.shards import Shards
 from warpimpact.runs.watch import Watch
 
+from ..results.test_measures import LEAST, TRIALS, TRUTHS, shard_of
+
 SameBits = Callable[[Path, Path], None]
 SLOTTED_PLATE = (Path(__file__).parents[3] / "campaigns" / "slotted_plate.toml").read_text(encoding="utf-8")
 DRAFT = SLOTTED_PLATE.replace('"standard"', '"draft"').replace("count = 4096\n", "")
 STOP = '[stop]\nquantity = "{}"\nhalf_width = "{}"\nmax_count = {}\n\n[output]'
-TRIALS = 150
-# 95 % of 150 trials: 142.5 ± 2.7. Three standard deviations below; five for the rule, which looks more than once.
-LEAST, LEAST_STOPPED = 134, 129
+LEAST_STOPPED = 129
+"""95 % of 150 trials: 142.5 ± 2.7; five standard deviations below, because the rule looks more than once."""
 pytestmark = pytest.mark.usefixtures("small_shards")
-
-
-def shard_of(values: np.ndarray, status: int = Status.PERFORATED) -> xarray.Dataset:
-    """A shard with these residual velocities [m/s], and as much tilt [degree] at its only stand-off."""
-    variables = dict.fromkeys(("residual_velocity", "deflection"), ("hit", values))
-    variables |= dict.fromkeys(("energy_loss", "contact_duration"), ("hit", values))
-    variables |= dict.fromkeys(("tilt", "pitch", "yaw", "total_yaw"), (("hit", "standoff"), values[:, None]))
-    variables["status"] = ("hit", np.full(len(values), status, dtype=np.int8))
-    return xarray.Dataset(variables, {"standoff": [0.13]}, {"compute_time": 1.0})
 
 
 def campaign(tmp_path: Path, quantity: str, half_width: str, max_count: int = 2**16, **hits: object) -> Campaign:
@@ -49,15 +39,6 @@ def campaign(tmp_path: Path, quantity: str, half_width: str, max_count: int = 2*
     text = text.replace("[hits]", "[hits]\nirreducible = false")  # the numbers here know no symmetry
     (tmp_path / "campaign.toml").write_text(text, encoding="utf-8")
     return Campaign.from_toml(tmp_path / "campaign.toml")
-
-
-TRUTHS = {
-    # Of U(0, 1) + U(0, 1): the triangular distribution on 0 to 2.
-    "mean(residual_velocity)": 1.0,
-    "quantile(residual_velocity, 0.125)": 0.5,
-    "P(residual_velocity > 1.5 m/s)": 0.125,
-    "P(tilt@130mm < 0.2 deg)": 0.02,
-}
 
 
 def surface(campaign: Campaign, first: int, count: int) -> np.ndarray:
