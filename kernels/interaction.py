@@ -109,31 +109,12 @@ def build(variant: Variant) -> SimpleNamespace:
 
     exponential = wp.exp if variant.double else exp_single
 
-    @wp.func_native("""
-    #if defined(__CUDA_ARCH__)
-        return logf(x);
-    #else
-        const int bits = __builtin_bit_cast(int, x) - 0x3f3504f3;
-        const int exponent = bits >> 23;
-        const float m = __builtin_bit_cast(float, (bits & 0x7fffff) + 0x3f3504f3);
-        const float z = (m - 1.0f) / (m + 1.0f), zz = z * z;
-        return exponent * 0.693147181f
-             + z * (2.0f + zz * (0.666666667f + zz * (0.4f + zz * (0.285714286f + zz * 0.222222222f))));
-    #endif
-    """)
-    def log_single(x: wp.float32) -> wp.float32:
-        """ln x of a normal number, to the accuracy of float32."""
-        ...
-
-    logarithm = wp.log if variant.double else log_single
-
     @wp.func
     def normal_stress(law: struct.Law, closing: real, radius: real):
         """Normal stress [Pa] of undamaged material at closing speed v_n, on a core that has this radius there [m]."""
         stress = law.a0
         if wp.static(variant.free_surface):
-            deep = one / (one + exponential(law.power * logarithm(radius * law.per_reach)))
-            stress *= deep + law.attack * wp.min(closing * law.per_speed, one)
+            stress *= one / (one + radius * law.per_reach) + law.attack * wp.min(closing * law.per_speed, one)
         if wp.static(variant.rate_dependent):
             stress += closing * (law.a1 + law.a2 * closing)
         return stress

@@ -295,7 +295,7 @@ def _build(double: bool, many_plates: bool) -> SimpleNamespace:
         the share `onset_limit` of the core's velocity. `steadied` is the closing speed [m/s] below which contact damps
         by its chord (`steady_slope`).
 
-        Near a free surface a0 is divided by 1 + (r · `per_reach`)^`power` [1/m], r the radius of the core. The share
+        Near a free surface a0 is divided by 1 + r · `per_reach` [1/m], r the radius of the core. The share
         `attack` of it, times the sine v_n · `per_speed` of the angle of attack, is added; `per_speed` is one over the
         core's velocity [s/m]. A patch presses by 1 − exp(−`cover` · b / r), b the length of material ahead of it.
         """
@@ -315,7 +315,6 @@ def _build(double: bool, many_plates: bool) -> SimpleNamespace:
         per_reach: real
         attack: real
         per_speed: real
-        power: real
         cover: real
 
     # A single plate comes by value, because CUDA does not know the memory behind a pointer that lies in memory.

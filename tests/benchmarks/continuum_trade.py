@@ -23,7 +23,7 @@ from typing import Any
 from unittest import mock
 
 import numpy as np
-from continuum_cases import CASES, KEPT, MEASURES, Case, measured, written
+from continuum_cases import CASES, MEASURES, PLATES, Case, measured, written
 
 from warpimpact import Continuum, Numerics, Record, Scene, Shots, simulate
 from warpimpact.catalogue.flow_entries import flow_entry
@@ -101,7 +101,7 @@ def by_elements(case: Case, **settings: Any) -> Callable[[Shots], Any]:
 def write_rows(path: Path, plates: list[str], hits: int, settings: dict[str, float | str]) -> None:
     for name in plates:
         done = {(row["plate"], row["friction"], row["model"], row["hit"]) for row in written(path)}
-        case, friction = {**CASES, **KEPT}[name], f"{settings['friction']:g}"
+        case, friction = PLATES[name], f"{settings['friction']:g}"
         shots = case.shots(hits)
         numerics = Numerics(fidelity="standard")
         models: dict[str, Callable[[Shots], Any]] = {

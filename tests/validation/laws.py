@@ -24,7 +24,7 @@ BENCHMARKS = Path(__file__).resolve().parents[1] / "benchmarks"
 sys.path.insert(0, str(BENCHMARKS))
 
 from bench import launch_state, tilt_behind  # noqa: E402
-from continuum_cases import CASES, KEPT, measured, written  # noqa: E402
+from continuum_cases import PLATES, measured, written  # noqa: E402
 
 from warpimpact import Numerics, Scene, simulate  # noqa: E402
 
@@ -45,7 +45,7 @@ class Plate:
 
     def __init__(self, name: str, rows: list[dict[str, str]], every: int = 1) -> None:
         known = measured(rows, name, "continuum")
-        self.name, self.case, self.hits = name, {**CASES, **KEPT}[name], np.array(sorted(known))[::every]
+        self.name, self.case, self.hits = name, PLATES[name], np.array(sorted(known))[::every]
         self.truth = np.array([known[hit] for hit in self.hits])
         self.solid = self.case.layers[0].open_area == 0.0
         self.plate, core = self.case.layers[0], self.case.core
@@ -268,13 +268,13 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("laws", nargs="*", metavar="LAW", help=f"of {', '.join(LAWS)} (default: all)")
     parser.add_argument("--fit", default="slotted,thin,solid_12")
-    parser.add_argument("--plates", default="slotted,thin,solid_12,thick,oblique", help="any of CASES and KEPT")
+    parser.add_argument("--plates", default="slotted,thin,solid_12,thick,oblique", help="any of PLATES")
     parser.add_argument("--every", type=int, default=1, help="fit to every such hit (default: 1)")
     parser.add_argument("--check", action="store_true", help="compare the march with the package, and fit nothing")
     given = parser.parse_args()
     wp.config.quiet = True
     results = BENCHMARKS / "results"
-    rows = [row for name in ("trade", "kept") for row in written(results / f"continuum_{name}.csv")]
+    rows = [row for name in ("trade", "kept", "front") for row in written(results / f"continuum_{name}.csv")]
     plates = [Plate(name, rows) for name in given.plates.split(",")]
     if given.check:
         check(plates)

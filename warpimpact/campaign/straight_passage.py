@@ -58,7 +58,7 @@ class StraightPassage:
         area = 2.0 * np.pi * radius * np.gradient(station) * touching * (slope + self.friction)
         near, steep = np.ones_like(radius), 0.0
         if free is not None:
-            near /= 1.0 + (radius / (free.reach * self.thickness)) ** free.power
+            near /= 1.0 + radius / (free.reach * self.thickness)
             steep = free.attack
         edges = np.linspace(self.thickness + station[-1], 0.0, _DEPTHS + 1)
         depth, step = 0.5 * (edges[1:] + edges[:-1])[:, None], edges[0] - edges[1]

@@ -15,8 +15,7 @@ class FreeSurface(Model):
     elements without friction and weakening, with `quadratic` = 1 beside them (docs/continuum.md).
 
     Attributes:
-        reach: λ; A·Y is divided by 1 + (r / λH)^q.
-        power: q, of r / λH.
+        reach: λ; A·Y is divided by 1 + r / λH.
         attack: c; c·A·Y·sin α is added, α the angle between the surface and the velocity of the core.
         cover: k; the element presses by 1 − exp(−k b / r), b the length of material ahead of it along its normal in the
             plane of the layer.
@@ -25,7 +24,6 @@ class FreeSurface(Model):
     """
 
     reach: PositiveNumber = 1.0
-    power: PositiveNumber = 1.0
     attack: NonNegativeNumber = 1.45
     cover: PositiveNumber = 1.7
     carried: NonNegativeNumber = 0.35

@@ -96,7 +96,7 @@ def inputs_of(stage: Any, prepared: Prepared, put: Put) -> tuple[Any, list[Any]]
 
 def _free_surface(prepared: Prepared) -> dict[str, float]:
     free = prepared.scene.interaction.free_surface
-    return {} if free is None else {"power": free.power, "cover": free.cover, "attack": free.attack}
+    return {} if free is None else {"cover": free.cover, "attack": free.attack}
 
 
 def _target_of(stage: Any, prepared: Prepared, put: Put) -> tuple[Any, Any]:
