@@ -73,7 +73,7 @@ def test_the_interval_of_the_mean_holds_as_often_as_it_says() -> None:
 def test_more_hits_are_computed_where_the_share_is_between_0_and_1() -> None:
     """Through a plate without strength all cores pass, so that the mean under this assumption is near 1."""
     alone = "".join(f"{name} = [], " for name in ("degradation", "shear_coefficient", "onset", "obliquity", "yaw"))
-    assumptions = f"assumptions = {{ {alone}compute = true, hits = 32, resistance = [1e-3] }}\n"
+    assumptions = f"assumptions = {{ {alone}edges = false, compute = true, hits = 32, resistance = [1e-3] }}\n"
     campaign = Campaign.from_text(TEXT + assumptions, name="a", folder=Path())
     directions = Directions(azimuth=[0, "60 deg"], elevation=[0], first_count=32, max_count=128, half_width=0.01)
     with executor_for("cpu") as executor:
