@@ -9,10 +9,21 @@ from scipy.integrate import quad
 
 from warpimpact.kernels.status import Status
 from warpimpact.records.outcomes import Outcomes
-from warpimpact.scene import CirclePattern, Core, FreeSurface, Interaction, PolynomialCore, SlotPattern
+from warpimpact.scene import (
+    CirclePattern,
+    Core,
+    FreeSurface,
+    Interaction,
+    Numerics,
+    PolynomialCore,
+    Scene,
+    SlotPattern,
+)
+from warpimpact.solver.marching import one_beside_another
+from warpimpact.solver.prepare import prepare
 
 from . import references
-from .scenes import REFERENCE, histories, paper_plate, scattered_hits, shots_at, simulate, solid_plate
+from .scenes import PAPER_CORE, REFERENCE, histories, paper_plate, scattered_hits, shots_at, simulate, solid_plate
 
 LAW = FreeSurface()
 FREE = Interaction(free_surface=LAW)
@@ -155,3 +166,18 @@ def test_a_disc_looks_outwards(device: str) -> None:
     outcomes = simulate(plate, shots, core=core, interaction=FREE, precision="double", device=device)
     assert (outcomes.energy_loss > 10.0).all()
     assert np.degrees(outcomes.tilt).max() < 1e-3  # what rounding grows to: the web is a blade under the disc
+
+
+def test_cores_are_taken_one_beside_another_and_do_the_same_in_any_order() -> None:
+    y, z = scattered_hits(128)
+    shots, mixed = shots_at(y, z), np.random.default_rng(1).permutation(128)
+    scene = Scene(core=PAPER_CORE, target=PLATE, interaction=FREE)
+    order = one_beside_another(prepare(scene, shots, Numerics(level=0)), np.arange(128))
+    assert sorted(order) == list(range(128))
+
+    def ways(which: Any) -> Any:
+        return np.median(np.hypot(np.diff(y[which]), np.diff(z[which])))
+
+    assert ways(order) < 0.4 * ways(np.arange(128))
+    plain, shuffled = (simulate(PLATE, shots[which], interaction=FREE, level=0) for which in (order, mixed))
+    assert np.array_equal(plain.exit_velocity[np.argsort(order)], shuffled.exit_velocity[np.argsort(mixed)])

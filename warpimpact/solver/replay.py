@@ -162,7 +162,7 @@ def _over_time(number: int, left: list[dict[int, Weakened]]) -> Weakened:
 
 
 def traced(scene: Scene, shots: Shots, numerics: Numerics, snapshots: int = 0) -> tuple[Marching, Any]:
-    """Marching shots on the CPU with their histories; returns the march, and the outcomes on the device.
+    """March shots on the CPU with their histories; returns the march, and the outcomes on the device.
 
     They march twice, because the largest number of steps that a shot may take is thousands of times the real one.
 
