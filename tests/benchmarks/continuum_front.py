@@ -2,7 +2,7 @@
 
     python tests/benchmarks/continuum_trade.py rows tests/benchmarks/results/continuum_front.csv --hits 24 \\
         --plates paper_a,paper_b,paper_c,paper_d,free_a,free_b,free_c,free_d --friction 0
-    python tests/benchmarks/continuum_front.py
+    python tests/benchmarks/continuum_front.py [ROWS.csv]
 
 The first command computes the hits by finite elements and appends them to the table, the second one prints means over
 the hits that perforate by elements: residual velocity, energy per presented area 130 mm behind the plate, which both
@@ -11,6 +11,7 @@ searches made small, and tilt there; and how each law orders the designs (rank c
 
 from __future__ import annotations
 
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -50,7 +51,7 @@ def means(case: Case, velocity: np.ndarray, tilt: np.ndarray) -> np.ndarray:
 
 def main() -> None:
     """Print the tables."""
-    rows, found = written(ROWS), {law: [] for law in ("continuum", PAPER, CONSTANT, FITTED, ASSUMED)}
+    rows, found = written(Path(sys.argv[1]) if len(sys.argv) > 1 else ROWS), {law: [] for law in ("continuum", PAPER, CONSTANT, FITTED, ASSUMED)}
     for name, case in FRONT.items():
         known = measured(rows, name, "continuum")
         hits, truth = np.array(sorted(known)), np.array([known[hit] for hit in sorted(known)])
