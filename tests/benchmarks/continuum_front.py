@@ -51,7 +51,8 @@ def means(case: Case, velocity: np.ndarray, tilt: np.ndarray) -> np.ndarray:
 
 def main() -> None:
     """Print the tables."""
-    rows, found = written(Path(sys.argv[1]) if len(sys.argv) > 1 else ROWS), {law: [] for law in ("continuum", PAPER, CONSTANT, FITTED, ASSUMED)}
+    rows = written(Path(sys.argv[1]) if len(sys.argv) > 1 else ROWS)
+    found: dict[str, list[np.ndarray]] = {law: [] for law in ("continuum", PAPER, CONSTANT, FITTED, ASSUMED)}
     for name, case in FRONT.items():
         known = measured(rows, name, "continuum")
         hits, truth = np.array(sorted(known)), np.array([known[hit] for hit in sorted(known)])
