@@ -197,20 +197,23 @@ def _with_refitted(campaign: Campaign, changed: Alternative, refitted: Values) -
 
 
 def _edges(campaign: Campaign) -> Iterator[Alternative]:
-    """Less resistance near edges in place of weakening (docs/model.md §4.9): what finite elements of plates with holes
-    ask for. A plate without holes takes as much from the core as before."""
+    """Less resistance near edges in place of weakening (docs/model.md §4.9), which finite elements of plates with holes
+    ask for; of a campaign that has it, a constant stress. A plate without holes takes as much from the core as before.
+    """
     law, plates, burst = campaign.interaction, campaign.target.layers, campaign.at_a_plate > 1
+    constant = Interaction(onset=law.onset)
+    free = constant.model_copy(update={"quadratic": INERTIA, "free_surface": FreeSurface()})
     every, drawn = range(len(plates)), ("resistance", "degradation", "linear", "static", "quadratic")
     if (
         not campaign.assumptions.edges
-        or law != Interaction(onset=law.onset)
+        or law not in (constant, free)
         or not any(plate.open_area for plate in plates)
         or burst
         or campaign.numerics.scheme == "nodal"
         or any(is_drawn(campaign, name, every) for name in drawn)
     ):
         return
-    other = Interaction(quadratic=INERTIA, onset=law.onset, free_surface=FreeSurface())
+    other = free if law == constant else constant
 
     def changed(k: int, plate: Plate) -> dict[str, Any]:
         arriving = 0.0 if _in_catalogue(campaign, plate) is not None else campaign.impact.velocity
@@ -218,7 +221,8 @@ def _edges(campaign: Campaign) -> Iterator[Alternative]:
         return {"resistance": alike, "degradation": 1.0}
 
     scene = _changed(campaign, changed).model_copy(update={"interaction": other})
-    yield Alternative("less resistance near edges, Y fitted with it", scene)
+    name = "less resistance near edges" if other == free else "as much resistance near edges"
+    yield Alternative(f"{name}, Y fitted with it", scene)
 
 
 def _turns(campaign: Campaign) -> Iterator[Alternative]:

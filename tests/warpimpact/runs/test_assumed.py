@@ -154,6 +154,17 @@ def test_a_solid_plate_takes_as_much_under_a_law_that_is_fitted_with_it(velocity
 
 
 (EDGED,) = (one.scene.target.layers[0].resistance for one in alternatives(campaign()) if one.name == EDGES)
+
+
+def test_a_law_that_knows_edges_is_set_against_one_that_does_not() -> None:
+    free = {"interaction": {"quadratic": 1.0, "free_surface": {}}}
+    plate = PLATE | {"resistance": EDGED, "degradation": 1.0}
+    (other,) = (one for one in alternatives(campaign(plate=plate, **free)) if "near edges" in one.name)
+    assert other.name == "as much resistance near edges, Y fitted with it"
+    assert other.scene.interaction == Interaction()
+    assert other.scene.target.layers[0].resistance == pytest.approx(2.6e9, rel=1e-3)
+
+
 OTHERWISE: dict[str, dict[str, Any]] = {
     "Y at its high end": {"plate": PLATE | {"resistance": "3.38 GPa"}},
     "no weakening (β = 1)": {"plate": PLATE | {"degradation": 1.0}},
