@@ -16,7 +16,7 @@ import math
 import platform
 import time
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -31,8 +31,10 @@ from warpimpact.scene import (
     CirclePattern,
     ConeCore,
     Core,
+    FreeSurface,
     Hits,
     Impact,
+    Interaction,
     Numerics,
     OgiveCore,
     Pattern,
@@ -127,6 +129,14 @@ def draw(seed: int, index: int) -> Case:
     way = ("oblique" if oblique else "normal") + (" yawed" if yawed else "")
     scene = Scene(core=core, target=Target(layers=(plate,)), record=Record(standoffs=(STANDOFF,)))
     return Case(f"{kind}, {holes}, {way}", scene, impact)
+
+
+def near_edges(case: Case) -> Case:
+    """The case under the law with free surfaces, without weakening."""
+    plates = tuple(plate.model_copy(update={"degradation": 1.0}) for plate in case.scene.target.layers)
+    law = Interaction(quadratic=1.0, free_surface=FreeSurface())
+    scene = case.scene.model_copy(update={"target": Target(layers=plates), "interaction": law})
+    return replace(case, name=f"{case.name}, edges", scene=scene)
 
 
 def _core(rng: np.random.Generator, diameter: float) -> tuple[Core, str]:
@@ -372,15 +382,17 @@ def main() -> None:
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--scenes", type=int, default=24)
     parser.add_argument("--hits", type=int, default=32)
+    parser.add_argument("--edges", action="store_true", help="under the law with free surfaces, without weakening")
     parser.add_argument("--cache", type=Path, required=True)
     parser.add_argument("--output", type=Path, help="JSON file of the rows; a figure goes beside it")
     given = parser.parse_args()
     bench = Bench(given.cache, given.hits)
     scenes = []
     for index in range(given.scenes):
-        path = given.cache / f"row-{given.seed}-{index}-{given.hits}.json"
+        path = given.cache / f"row-{given.seed}-{index}-{given.hits}{'-edges' * given.edges}.json"
         if not path.exists():
-            path.write_text(json.dumps(measured(bench, draw(given.seed, index))))
+            case = draw(given.seed, index)
+            path.write_text(json.dumps(measured(bench, near_edges(case) if given.edges else case)))
         scenes.append(json.loads(path.read_text()))
         cells = "".join(
             f"{row['level']:4.1f}{'' if row['kept'] else '*':1}{row['error'][0]:7.2f}{row['error'][1]:6.2f}"
