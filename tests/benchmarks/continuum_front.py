@@ -55,6 +55,8 @@ def main() -> None:
     found: dict[str, list[np.ndarray]] = {law: [] for law in ("continuum", PAPER, CONSTANT, FITTED, ASSUMED)}
     for name, case in FRONT.items():
         known = measured(rows, name, "continuum")
+        if not known:
+            continue
         hits, truth = np.array(sorted(known)), np.array([known[hit] for hit in sorted(known)])
         found["continuum"].append(means(case, truth[:, 0], truth[:, 2]))
         shots = case.shots(24)[hits]
