@@ -22,8 +22,8 @@ class Assumptions(Model):
 
     Attributes:
         compute: whether alternatives are computed; by default only where a pilot finds the resolution.
-        hits: most hits of each alternative. By default all alternatives cost some 15 % of a run of 16,384 hits, with 64
-            to 256 hits each, and fewer where a hit takes long.
+        hits: most hits of each alternative. By default they are a 128th of the run's, but 64 to 256, and fewer where a
+            hit takes long (docs/certainty.md has what they cost).
         resistance: factors of the resistance Y of all layers. By default they are the ends of the catalogue's 90 %
             interval where Y is the catalogue's, and 0.7 and 1.3 where it is yours.
         degradation: β of the layers that weaken; by default 1. Plates with holes that do not weaken get the paper's 0.8

@@ -28,7 +28,7 @@ from warpimpact.solver.prepare import prepare
 
 SHARE_OF_RUN = 1.0 / 128.0
 """Hits per alternative over the hits of a run. Some twelve alternatives then cost a tenth of a run, or about 15 % with
-alternatives whose plates have finer grids."""
+alternatives whose plates have finer grids; a table of each plate with holes comes on top."""
 FEWEST, MOST = 64, 256
 """Fewest and most hits per alternative, unless the campaign gives their number."""
 FEWEST_LIMITS = 8
