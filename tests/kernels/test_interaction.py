@@ -25,6 +25,9 @@ A0, A1, A2 = 2.6e9, 4.5e6, 7850.0
 STATIC, SINGLE = Variant(double=True), Variant()
 static = STATIC.use(interaction)
 StaticLaw = structs.build(STATIC).Law
+FREE = Variant(double=True, rate_dependent=True, free_surface=True)
+free = FREE.use(interaction)
+FreeLaw = structs.build(FREE).Law
 single = SINGLE.use(interaction)
 SingleLaw = structs.build(SINGLE).Law
 
@@ -58,6 +61,20 @@ def static_law(law: StaticLaw, closing: wp.array(dtype=real), stresses: wp.array
     stresses[i] = static.interaction.normal_stress(law, closing[i], real(1.0))
 
 
+def free_law(
+    law: FreeLaw,
+    closing: wp.array(dtype=real),
+    velocity: real,
+    radius: real,
+    stresses: wp.array(dtype=real),
+    slopes: wp.array(dtype=real),
+) -> None:
+    i = wp.tid()
+    law.per_speed = free.interaction.per_speed(velocity, velocity)
+    stresses[i] = free.interaction.normal_stress(law, closing[i], radius)
+    slopes[i] = free.interaction.stress_slope(law, closing[i])
+
+
 def onset(law: Law, dt: real, velocity: wp.array(dtype=real), impact: real, onsets: wp.array(dtype=real)) -> None:
     i = wp.tid()
     onsets[i] = use.interaction.onset_speed(law, dt, velocity[i], impact)
@@ -69,6 +86,7 @@ def exponential(law: SingleLaw, x: wp.array(dtype=wp.float32), values: wp.array(
 
 
 LAW, ONSET_SPEED = VARIANT.kernel(law), VARIANT.kernel(onset)
+FREE_LAW = FREE.kernel(free_law)
 STATIC_LAW, EXPONENTIAL = STATIC.kernel(static_law), SINGLE.kernel(exponential)
 
 
@@ -243,6 +261,22 @@ def test_variant_without_rate_has_the_static_stress(device: str) -> None:
     inputs = [filled(StaticLaw), wp.array(closing, dtype=real, device=device)]
     wp.launch(STATIC_LAW, len(closing), inputs=inputs, outputs=[stresses], device=device)
     np.testing.assert_array_equal(stresses.numpy(), A0)
+
+
+def test_near_a_free_surface_stress_grows_with_the_angle_of_attack_up_to_an_upright_one(device: str) -> None:
+    # Points of a core that turns may close in faster than its centre of mass flies.
+    closing, velocity, radius, share = np.linspace(0.0, 900.0, 31), 600.0, 2e-3, 1.5
+    law = filled(FreeLaw)
+    law.per_reach, law.attack = 1.0 / 4e-3, share
+    given = [wp.array(closing, dtype=real, device=device), real(velocity), real(radius)]
+    stresses, slopes = (poisoned(len(closing), real, device) for _ in range(2))
+    wp.launch(FREE_LAW, len(closing), inputs=[law, *given], outputs=[stresses, slopes], device=device)
+    sine = np.minimum(closing / velocity, 1.0)
+    np.testing.assert_allclose(
+        stresses.numpy(), A0 * (1.0 / 1.5 + share * sine) + closing * (A1 + A2 * closing), rtol=1e-12
+    )
+    rise = np.where(closing < velocity, A0 * share / velocity, 0.0)
+    np.testing.assert_allclose(slopes.numpy(), A1 + 2 * A2 * closing + rise, rtol=1e-12)
 
 
 def single_exponential(x: Array, device: str) -> Array:
