@@ -163,9 +163,9 @@ def test_a_disc_looks_outwards(device: str) -> None:
     core: Core = PolynomialCore(coefficients=(2.5e-3, 0.02, 0.0), length=20e-3, mass=4e-3)
     plate = PLATE.model_copy(update={"pattern": CirclePattern(diameter=5e-3, spacing=(8e-3, 8e-3))})
     shots = shots_at([4e-3, 0.0], [0.0, 4e-3])
-    outcomes = simulate(plate, shots, core=core, interaction=FREE, precision="double", device=device)
+    outcomes = simulate(plate, shots, core=core, interaction=free(attack=0.0), precision="double", device=device)
     assert (outcomes.energy_loss > 10.0).all()
-    assert np.degrees(outcomes.tilt).max() < 1e-3  # what rounding grows to: the web is a blade under the disc
+    assert np.degrees(outcomes.tilt).max() < 1e-3  # measured: 3e-9, and 0.1 to 0.3 if it did not
 
 
 def test_cores_are_taken_one_beside_another_and_do_the_same_in_any_order() -> None:
