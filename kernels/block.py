@@ -5,11 +5,9 @@ Lane k takes every 32nd patch, from the k-th on, of one list: the patches of all
 The passes, the law and the filter are those of the simple layout (kernels/contact.py, kernels/exposure.py). Two things
 differ: where a window lies, and that exposure is added to it as whole numbers, because their sum does not depend on the
 order of the lanes. So an outcome has the same bits in every run. The front window (of the plate, or of the laminate
-that
-begins with it) is in the block's shared memory. The windows of layers behind it are in global memory: a core arrives
-turned, so they are some 130 nodes wide, and shared memory would not hold them. It would not hold several planes,
-either:
-if any layer is deep, all windows are in global memory.
+that begins with it) is in the block's shared memory. The windows of layers behind it are in global memory: a core
+arrives turned, so they are some 130 nodes wide, and shared memory would not hold them. It would not hold several
+planes, either: if any layer is deep, all windows are in global memory.
 
 The barriers, and the error that each of them prevents (E is the exposure, G the exposure gained):
 
@@ -31,8 +29,7 @@ still read the old value:
 9. Before a layer's footprint is kept, there: other lanes read the last one, and whether the core was near the layer.
 10. Before a core leaves a layer (kernels/passage.py): other lanes read whether it has left, and whether it has touched.
 11. Before the box of a channel widens (kernels/channel.py): other lanes read it, and the last section drawn on the
-plane
-    must be complete, because other lanes may have drawn it.
+    plane must be complete, because other lanes may have drawn it.
 12. Before a section is kept, there: other lanes compare it with the next one.
 13. After each step of `recall` (kernels/earlier.py): the next step, or the march, reads what other lanes have written.
 

@@ -1,11 +1,9 @@
 """The channels of cores that went through a layer. Later hits find no material there (docs/model.md §8).
 
 A channel is all that was inside the core at some time. Nodes on planes through the thickness hold their depth inside
-the
-channel. Between nodes the depth is interpolated, so the wall of a channel is sharp within a part of a cell, at any
-angle.
-A section of the core that lies in the next one, or in the last one drawn, adds nothing, so few sections are drawn.
-Long because functions in native code take every length and place by itself.
+the channel. Between nodes the depth is interpolated, so the wall of a channel is sharp within a part of a cell, at any
+angle. A section of the core that lies in the next one, or in the last one drawn, adds nothing, so few sections are
+drawn. Long because functions in native code take every length and place by itself.
 """
 
 from functools import cache

@@ -1,9 +1,8 @@
 """The lanes of a block: the threads of one CUDA warp, which compute one shot together (the block layout).
 
 Every lane holds the whole state of the shot, and computes its motion: the lanes share out only the patches, the rings
-and
-the nodes. A sum over the lanes is formed as a butterfly, which gives every lane the same bits. So every lane takes the
-same branches, and no lane waits at a barrier that another one does not reach.
+and the nodes. A sum over the lanes is formed as a butterfly, which gives every lane the same bits. So every lane takes
+the same branches, and no lane waits at a barrier that another one does not reach.
 
 On a CPU a block has one lane, and all of this costs nothing. With Warp's `enable_cpu_blocks` the lanes of a block run
 there one after another, from barrier to barrier, on one thread of the machine: for tests.

@@ -134,7 +134,7 @@ def _refitted(campaign: Campaign, law: Interaction, friction: float | None = Non
 def _passage(campaign: Campaign, plate: Plate) -> StraightPassage:
     """The core straight through a plate without holes."""
     given = campaign.interaction, plate.shear_coefficient, plate.thickness, plate.density
-    return StraightPassage(campaign.core, *given)
+    return StraightPassage(campaign.core, *given, campaign.impact.obliquity)
 
 
 def _degradations(campaign: Campaign) -> Iterator[Alternative]:

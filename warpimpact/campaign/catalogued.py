@@ -206,8 +206,8 @@ def resistance_under(
     of_material = law_of(material)
     if law == of_material and plate.shear_coefficient == material.shear_coefficient:
         return known
-    way = plate.thickness / math.cos(obliquity)
-    passage = StraightPassage(core, of_material, material.shear_coefficient, way, plate.density)
+    given = of_material, material.shear_coefficient, plate.thickness, plate.density
+    passage = StraightPassage(core, *given, obliquity)
     median, low, high = (
         passage.resistance_under(law, plate.shear_coefficient, value) for value in (known.median, *known.ends)
     )

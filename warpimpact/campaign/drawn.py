@@ -1,8 +1,7 @@
 """Parameters drawn from a posterior: every shot of a campaign gets one of its draws, all parameters together.
 
 The posterior gives the resistance of the material. Holes, thickness and core are those of the campaign, not those of
-the
-shots behind the posterior.
+the shots behind the posterior.
 """
 
 from __future__ import annotations

@@ -7,6 +7,7 @@ of a solid plate, or the velocity that it takes from a core.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -28,14 +29,15 @@ _SPEEDS = 401
 
 @dataclass(frozen=True)
 class StraightPassage:
-    """A core without obliquity and yaw, and a solid plate.
+    """A core that goes straight on through a solid plate, without yaw.
 
     Attributes:
         core: the core.
         law: stress of an element.
         friction: η.
-        thickness: length of the way through the plate [m].
+        thickness: of the plate [m].
         density: of the plate [kg/m³].
+        obliquity: of the shot [rad]; the way through the plate is as much longer.
     """
 
     core: Core
@@ -43,6 +45,7 @@ class StraightPassage:
     friction: float
     thickness: float
     density: float
+    obliquity: float = 0.0
 
     def entry(self, resistance: ArrayLike, leaving: ArrayLike = 0.0) -> Array:
         """Velocity with which the core enters [m/s], of the broadcast shape of the arguments. The motion is followed
@@ -60,9 +63,10 @@ class StraightPassage:
         if free is not None:
             near /= 1.0 + radius / (free.reach * self.thickness)
             steep = free.attack
-        edges = np.linspace(self.thickness + station[-1], 0.0, _DEPTHS + 1)
+        way = self.thickness / math.cos(self.obliquity)
+        edges = np.linspace(way + station[-1], 0.0, _DEPTHS + 1)
         depth, step = 0.5 * (edges[1:] + edges[:-1])[:, None], edges[0] - edges[1]
-        inside = (depth > station) & (depth < station + self.thickness)
+        inside = (depth > station) & (depth < station + way)
         tip = np.pi * radius[0] ** 2 * inside[:, 0]
         static, linear, quadratic = (
             inside @ (area * share) + tip * at_tip

@@ -113,7 +113,7 @@ def pieces_of(runs: NDArray[np.int32]) -> NDArray[np.int32]:
     return np.stack([np.repeat(runs[:, 0], counts) + PIECE * within, np.repeat(runs[:, 2], counts)], axis=1)
 
 
-def ended(coming: Iterable[tuple[Key, OneHit]], cancel: Cancel = NEVER, most: int = MOST) -> Iterator[tuple[Key, bool]]:
+def ended(coming: Iterable[tuple[Key, OneHit]], cancel: Cancel = NEVER) -> Iterator[tuple[Key, bool]]:
     """The key of each hit when it has ended, and whether its core had come near the outer edge of a mesh. The next hit
     takes its place.
 

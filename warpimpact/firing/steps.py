@@ -1,8 +1,7 @@
 """The messages between a procedure and those who fire it.
 
 A procedure is a generator per test. It yields a velocity to aim at [m/s] and is sent the resulting Shot; it ends when
-the
-test is over. For a D-optimal velocity it yields Optimal, because these are computed for all tests at once.
+the test is over. For a D-optimal velocity it yields Optimal, because these are computed for all tests at once.
 """
 
 from __future__ import annotations

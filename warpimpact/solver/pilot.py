@@ -13,8 +13,7 @@ of a speed has no bound. If no level keeps the promise, the run takes the first 
 whose
 errors are about the smallest, and states its change to the finest level computed. A long run then takes coarser levels
 of single settings that keep the promise, too. Limits (16 in a pilot) and the measure of a stop rule choose their level
-in
-the same way, by errors of their own.
+in the same way, by errors of their own.
 
 Long because the ways to choose a level share the same comparison of outcomes at three levels.
 """

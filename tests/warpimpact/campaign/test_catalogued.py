@@ -1,7 +1,6 @@
 """Names of the catalogue in a campaign: what they stand for, what overrides it, and what is said of it."""
 
 import json
-import math
 from pathlib import Path
 from typing import Any
 
@@ -111,9 +110,9 @@ def test_under_another_law_a_material_keeps_its_limit_velocity(thickness: str, o
         campaign = Campaign.from_text(json.dumps(tables | {"catalogue": None}), name="named.toml", folder=Path())
         known = catalogue_resistance(campaign, campaign.plate)
         assert known is not None
-        way = campaign.plate.thickness / math.cos(campaign.impact.obliquity)
-        given = campaign.interaction, campaign.plate.shear_coefficient, way, campaign.plate.density
-        passage = StraightPassage(campaign.core, *given)
+        target = campaign.plate
+        given = campaign.interaction, target.shear_coefficient, target.thickness, target.density
+        passage = StraightPassage(campaign.core, *given, campaign.impact.obliquity)
         return tuple(float(passage.entry(value)) for value in (*known.ends, campaign.plate.resistance))
 
     free = {"quadratic": 1.0, "free_surface": {}}

@@ -153,6 +153,17 @@ def test_a_solid_plate_takes_as_much_under_a_law_that_is_fitted_with_it(velocity
     assert lost[0] == pytest.approx(lost[1], rel=2e-3)
 
 
+def test_the_assumption_has_the_y_of_a_campaign_that_has_its_law() -> None:
+    named = {
+        "plate": {"material": "HHA Class 1", "thickness": "6 mm", "pattern": SLOTS},
+        "core": {"threat": ".30 AP M2"},
+    }
+    named |= {"impact": {"velocity": "878 m/s", "obliquity": "30 deg"}}
+    (other,) = (one for one in alternatives(campaign(**named)) if one.name == EDGES)
+    given = campaign(**named, interaction={"quadratic": 1.0, "free_surface": {}})
+    assert other.scene.target.layers[0].resistance == pytest.approx(given.plate.resistance, rel=1e-3)
+
+
 (EDGED,) = (one.scene.target.layers[0].resistance for one in alternatives(campaign()) if one.name == EDGES)
 
 
