@@ -18,11 +18,11 @@ import numpy as np
 from continuum_cases import FRONT, Case, measured, written
 from scipy.stats import spearmanr
 
-from warpimpact import FreeSurface, Interaction, Numerics, simulate
+from warpimpact import Interaction, Numerics, simulate
 from warpimpact.campaign.straight_passage import StraightPassage
+from warpimpact.scene.interaction import NEAR_EDGES
 
 ROWS = Path(__file__).parent / "results" / "continuum_front.csv"
-EDGES = Interaction(quadratic=1.0, free_surface=FreeSurface())
 PAPER, CONSTANT, FITTED, ASSUMED = "paper's", "constant, β = 1", "free surfaces, Y 2.8 GPa", "free surfaces, assumed"
 
 
@@ -36,7 +36,7 @@ def under(case: Case, law: str) -> Case:
     if law == ASSUMED:
         friction = plate.shear_coefficient
         passage = StraightPassage(case.core, Interaction(), friction, plate.thickness, plate.density)
-        alike = passage.resistance_under(EDGES, friction, plate.resistance, case.impact.velocity)
+        alike = passage.resistance_under(NEAR_EDGES, friction, plate.resistance, case.impact.velocity)
         keys = {"resistance": alike, "degradation": 1.0}
     else:
         keys["resistance"] = 2.8e9 if law == FITTED else 3.44e9
@@ -63,7 +63,7 @@ def main() -> None:
         for law in (PAPER, CONSTANT, FITTED, ASSUMED):
             scene = under(case, law).scene
             if law in (FITTED, ASSUMED):
-                scene = scene.model_copy(update={"interaction": EDGES})
+                scene = scene.model_copy(update={"interaction": NEAR_EDGES})
             outcomes = simulate(scene, shots, numerics=Numerics(level=2), device="cpu")
             found[law].append(means(case, outcomes.residual_velocity, np.degrees(outcomes.tilt[:, 1])))
         cells = (f"{v:.0f}; {energy:.1f}; {tilt:.0f}" for v, energy, tilt in (found[law][-1] for law in found))

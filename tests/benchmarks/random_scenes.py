@@ -31,10 +31,8 @@ from warpimpact.scene import (
     CirclePattern,
     ConeCore,
     Core,
-    FreeSurface,
     Hits,
     Impact,
-    Interaction,
     Numerics,
     OgiveCore,
     Pattern,
@@ -49,6 +47,7 @@ from warpimpact.scene import (
     TrianglePattern,
     make_shots,
 )
+from warpimpact.scene.interaction import NEAR_EDGES
 from warpimpact.solver.pilot import pilot_size
 from warpimpact.solver.resolution import Level
 from warpimpact.solver.simulate import pilot_of, simulate
@@ -134,8 +133,7 @@ def draw(seed: int, index: int) -> Case:
 def near_edges(case: Case) -> Case:
     """The case under the law with free surfaces, without weakening."""
     plates = tuple(plate.model_copy(update={"degradation": 1.0}) for plate in case.scene.target.layers)
-    law = Interaction(quadratic=1.0, free_surface=FreeSurface())
-    scene = case.scene.model_copy(update={"target": Target(layers=plates), "interaction": law})
+    scene = case.scene.model_copy(update={"target": Target(layers=plates), "interaction": NEAR_EDGES})
     return replace(case, name=f"{case.name}, edges", scene=scene)
 
 

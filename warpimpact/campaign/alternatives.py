@@ -14,7 +14,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from pydantic import ValidationError
 
-from ..scene import FreeSurface, Interaction, Plate, Scene, Shots, Target
+from ..scene import Interaction, Plate, Scene, Shots, Target
+from ..scene.interaction import NEAR_EDGES
 from .resistances import catalogue_resistance, is_drawn
 from .straight_passage import StraightPassage
 
@@ -30,8 +31,6 @@ _STEEPEST = math.radians(85.0)
 """Largest obliquity, and largest projected angle of the axis, of an alternative [rad]."""
 _DIFFERENT = 1e-6
 """Relative change of a value below which an alternative is none."""
-INERTIA = 1.0
-"""B of the law with free surfaces, with which its numbers were fitted."""
 
 Values = Mapping[tuple[str, int], float]
 
@@ -202,7 +201,7 @@ def _edges(campaign: Campaign) -> Iterator[Alternative]:
     """
     law, plates, burst = campaign.interaction, campaign.target.layers, campaign.at_a_plate > 1
     constant = Interaction(onset=law.onset)
-    free = constant.model_copy(update={"quadratic": INERTIA, "free_surface": FreeSurface()})
+    free = NEAR_EDGES.model_copy(update={"onset": law.onset})
     every, drawn = range(len(plates)), ("resistance", "degradation", "linear", "static", "quadratic")
     if (
         not campaign.assumptions.edges

@@ -53,6 +53,10 @@ class Interaction(Model):
     free_surface: FreeSurface | None = None
 
 
+NEAR_EDGES = Interaction(quadratic=1.0, free_surface=FreeSurface())
+"""The law with free surfaces as it was fitted, with the inertia of what is pushed aside."""
+
+
 def coefficients(static: Any, linear: Any, quadratic: Any, resistance: Any, density: float) -> tuple[Any, Any, Any]:
     """(a0 [Pa], a1 [Pa s/m], a2 [Pa s²/m²]) of σ = a0 + a1·v_n + a2·v_n² in undegraded material.
 
