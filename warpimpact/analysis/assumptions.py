@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -106,8 +106,3 @@ def _half_width(numbers: Array, confidence: float) -> float:
         return 0.0
     spread = float(np.std(known, ddof=1)) / math.sqrt(len(known))
     return spread * student_quantile(0.5 * (1.0 + confidence), len(known) - 1)
-
-
-def would_break(dataset: Result) -> Iterator[tuple[str, float]]:
-    """Assumptions under which cores may break, and the share of hits that would break them."""
-    yield from json.loads(dataset.attrs.get(attr.WOULD_BREAK, "{}")).items()

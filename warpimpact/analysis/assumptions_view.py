@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING
 
-from warpimpact.analysis.assumptions import would_break
 from warpimpact.analysis.estimates import estimated, means_of
 from warpimpact.analysis.numbers import rough_text
 from warpimpact.results import attributes as attr
@@ -71,7 +71,7 @@ def notes_of(dataset: Result, *, known: bool = True) -> Iterator[str]:
     if not known:
         yield f"how far assumptions move these numbers is not known: {_why_not(dataset)}"
         return
-    for name, share in would_break(dataset):
+    for name, share in json.loads(dataset.attrs.get(attr.WOULD_BREAK, "{}")).items():
         yield f"the core is taken to be unbreakable; {name} bending strength would break in {share:.0%} of these hits"
     count = dataset.sizes["assumed"] // max(int(dataset[v.ASSUMPTION].values.max()) + 1, 1)
     took = dataset.attrs.get(attr.ASSUMED_TIME)

@@ -33,7 +33,7 @@ from warpimpact.analysis.effectiveness import Score, Scored, depth_note, measure
 from warpimpact.analysis.numbers import of_each
 from warpimpact.analysis.plate_text import common_name, plate_text, reference_name, solid_note, solid_plate, weights_of
 from warpimpact.analysis.summary import breaks_promise, hits_at_two_levels, sampling_note
-from warpimpact.analysis.survival import draws_note, survival_of, why_not_by_draws
+from warpimpact.analysis.survival import draws_note, survival_of
 from warpimpact.results import attributes as attr
 from warpimpact.results.bases import base_thickness, has_base
 from warpimpact.results.measures import Measure
@@ -111,21 +111,15 @@ def compare(
         if differ_in_weight and has_ratios:
             by_ratio.add(measure.text)
         for (i, j), pair in zip(pairs, used, strict=True):
-            both, is_ratio = (datasets[i], datasets[j]), measure.text in by_ratio
-            first_side, second_side = (
-                _side(scored[k], datasets[k], {**dealing(datasets[k]), "confidence": of_each_pair}, by_ratio=is_ratio)
-                for k in (i, j)
-            )
+            both, sides, is_ratio = (datasets[i], datasets[j]), (scored[i], scored[j]), measure.text in by_ratio
             paired = not pair.independent and measure.kind != "quantile"
-            difference = _difference(
-                first_side, second_side, {**dealing(datasets[i]), "confidence": of_each_pair}, paired=paired
-            )
-            interval = _with_numerics(first_side.estimate, second_side.estimate, *difference)
-            drawn = first_side.drawn, second_side.drawn
-            why = why_not_by_draws(drawn, independent=pair.independent, by_ratio=is_ratio)
+            drawn, interval = _apart(sides, both, of_each_pair, by_ratio=is_ratio, paired=paired)
+            why = pair.independent
+            if not why and is_ratio and len(drawn[0]) != len(drawn[1]):
+                why = "a ratio to the solid plate needs as many hits of both plates"
             survival = survival_of(both, drawn, interval, reason=why, confidence=(confidence, of_each_pair))
             differences.append(Difference(measure.text, names[i], names[j], *interval, survival))
-            verdicts += _verdicts((scored[i], scored[j]), both, (names[i], names[j]), of_each_pair, paired=paired)
+            verdicts += _verdicts(sides, both, (names[i], names[j]), of_each_pair, paired=paired)
     plates = tuple(
         Contestant(
             name,
@@ -162,12 +156,7 @@ def _verdicts(
     measure, moves = scored[0].score.measure, [side.of.moves for side in scored]
     if measure.higher_is_better is None or not all(moves):
         return
-    first_side, second_side = (
-        _side(side, dataset, {**dealing(dataset), "confidence": confidence}, by_ratio=False)
-        for side, dataset in zip(scored, datasets, strict=True)
-    )
-    difference = _difference(first_side, second_side, {**dealing(datasets[0]), "confidence": confidence}, paired=paired)
-    value, low, high = _with_numerics(first_side.estimate, second_side.estimate, *difference)
+    _, (value, low, high) = _apart(scored, datasets, confidence, by_ratio=False, paired=paired)
     if math.isnan(low + high):
         return
     half, sign = max(high - value, value - low), 1 if measure.higher_is_better else -1
@@ -180,14 +169,23 @@ def _verdicts(
     yield Verdict(measure.text, *names, by.pop(AS_GIVEN), by)
 
 
-def _with_numerics(
-    estimate: Estimate, other: Estimate, value: float, low: float, high: float
-) -> tuple[float, float, float]:
-    """A difference with its interval, widened by the shift of both plates by the numerics. Rounding counts as 0."""
-    shift = (estimate.numerics or 0.0) + (other.numerics or 0.0)
-    rounded = ROUNDED * max(abs(estimate.value), abs(other.value))
+def _apart(
+    scored: tuple[Scored, Scored],
+    datasets: tuple[xarray.Dataset, xarray.Dataset],
+    confidence: float,
+    *,
+    by_ratio: bool,
+    paired: bool,
+) -> tuple[tuple[Array, Array], tuple[float, float, float]]:
+    """The numbers of two plates whose means over the shots of a draw are compared, and their difference with its
+    interval, widened by the shift of both plates by the numerics. Rounding counts as 0."""
+    dealt = [Estimating(**dealing(dataset), confidence=confidence) for dataset in datasets]
+    side, other = (_side(*given, by_ratio=by_ratio) for given in zip(scored, datasets, dealt, strict=True))
+    value, low, high = _difference(side, other, dealt[0], paired=paired)
+    shift = (side.estimate.numerics or 0.0) + (other.estimate.numerics or 0.0)
+    rounded = ROUNDED * max(abs(side.estimate.value), abs(other.estimate.value))
     value, low, high = (0.0 if abs(end) <= rounded else end for end in (value, low - shift, high + shift))
-    return value, low, high
+    return (side.drawn, other.drawn), (value, low, high)
 
 
 def _differ_in_weight(datasets: Sequence[xarray.Dataset]) -> bool:

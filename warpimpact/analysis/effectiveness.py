@@ -14,13 +14,12 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 import xarray
 
-from warpimpact.analysis.estimates import Evidence, by_hit_of, evidence
+from warpimpact.analysis.estimates import Evidence, asked_measures, by_hit_of, evidence
 from warpimpact.analysis.numbers import Ends, ends_of, intervals_text
 from warpimpact.analysis.plate_text import plate_text, reference_name, solid_note
 from warpimpact.analysis.survival import by_draws, over_draws
 from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
-from warpimpact.results.files import ResultError
 from warpimpact.results.limits import base_alone_limits, solid_limits
 from warpimpact.results.measures import Measure
 from warpimpact.results.per_hit import Array
@@ -124,17 +123,10 @@ def measures_of(dataset: xarray.Dataset, texts: Sequence[str] = ()) -> list[Meas
     Raises:
         ResultError: a text is no measure, or the result lacks what it needs.
     """
-    if not texts:
-        known = map(Measure.parse, SHOWN_OF_LIMITS if attr.LIMIT in dataset.attrs else SHOWN)
-        return [measure.of(dataset) for measure in known if not measure.quantity.lacking(dataset)]
-    try:
-        asked = [Measure.parse(text).of(dataset) for text in texts]
-    except ValueError as error:
-        raise ResultError(f"measure: {error}") from None
+    asked = asked_measures(dataset, texts, SHOWN_OF_LIMITS if attr.LIMIT in dataset.attrs else SHOWN)
     pierced = Measure.parse(_PIERCED)  # with it, readers see whether depths are lower bounds
-    return (
-        [*asked, pierced] if any(measure.name == "base_depth" for measure in asked) and pierced not in asked else asked
-    )
+    is_depth = texts and any(measure.name == "base_depth" for measure in asked)
+    return [*asked, pierced] if is_depth and pierced not in asked else asked
 
 
 def effectiveness(dataset: xarray.Dataset, texts: Sequence[str] = ()) -> list[Score]:
@@ -150,14 +142,14 @@ def effectiveness(dataset: xarray.Dataset, texts: Sequence[str] = ()) -> list[Sc
     return [scored.score for scored in scores(dataset, measures_of(dataset, texts))]
 
 
-def scores(dataset: xarray.Dataset, measures: Sequence[Measure], confidence: float = 0.95) -> Iterator[Scored]:
+def scores(dataset: xarray.Dataset, measures: Sequence[Measure]) -> Iterator[Scored]:
     """Measures one after the other, beside those of the solid plate, with the numbers behind them."""
     of_limits = attr.LIMIT in dataset.attrs
     reference = solid_limits(dataset) if of_limits else solid_reference(dataset)
     alone = base_alone_limits(dataset) if of_limits else base_alone(dataset)
-    for scored_evidence in evidence(dataset, measures, confidence):
+    for scored_evidence in evidence(dataset, measures):
         comparable = reference is not None and _is_comparable(scored_evidence.measure, dataset, reference)
-        scored = _scored(scored_evidence.shown(), dataset, reference if comparable else None, confidence)
+        scored = _scored(scored_evidence.shown(), dataset, reference if comparable else None)
         yield replace(scored, score=replace(scored.score, alone=_value_of(alone, scored_evidence.measure)))
 
 
@@ -181,7 +173,7 @@ def _is_comparable(measure: Measure, dataset: xarray.Dataset, reference: xarray.
     return same_layer and math.isclose(*elsewhere, rel_tol=1e-9)
 
 
-def _scored(given: Evidence, dataset: xarray.Dataset, reference: xarray.Dataset | None, confidence: float) -> Scored:
+def _scored(given: Evidence, dataset: xarray.Dataset, reference: xarray.Dataset | None) -> Scored:
     measure, estimate = given.measure, given.estimate
     solid = solid_drawn = None
     if reference is not None:
@@ -190,7 +182,7 @@ def _scored(given: Evidence, dataset: xarray.Dataset, reference: xarray.Dataset 
         if measure.kind == "worst_tenth" and len(of_solid) > 1:
             solid_drawn = measure.worse * by_draws(dataset, measure.worse * of_solid, worst_tenth_weights)
     numbers = given.values if given.numbers is None else given.numbers
-    against = Ratio.of(estimate, numbers, solid, {**dealing(dataset), "confidence": confidence})
+    against = Ratio.of(estimate, numbers, solid, {**dealing(dataset), "confidence": 0.95})
     score = Score(
         measure=measure,
         value=estimate.value,

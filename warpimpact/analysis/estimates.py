@@ -14,6 +14,7 @@ from warpimpact.analysis.survival import by_draws, over_draws
 from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
 from warpimpact.results.dataset import SLICE, finer_pair
+from warpimpact.results.files import ResultError
 from warpimpact.results.measures import STATUSES, Measure
 from warpimpact.results.per_hit import Array
 from warpimpact.results.tallies import dealing, estimate_from, shift_of
@@ -63,7 +64,7 @@ class Evidence:
         return Evidence(self.measure, estimate, factor * self.values, factor * self.drawn, moves)
 
 
-def evidence(dataset: Result, measures: Sequence[Measure], confidence: float = 0.95) -> Iterator[Evidence]:
+def evidence(dataset: Result, measures: Sequence[Measure]) -> Iterator[Evidence]:
     """Measures one after the other. Of an open file, one slice at a time and one number per hit are in memory."""
     needed = (v.STATUS, *v.GROUPS["finer"], *(name for measure in measures for name in measure.quantity.of))
     pair = finer_pair(dataset[[name for name in dict.fromkeys(needed) if name in dataset]])
@@ -73,8 +74,8 @@ def evidence(dataset: Result, measures: Sequence[Measure], confidence: float = 0
         if key != (key := (measure.quantity, measure.standoff)):
             by_hit = by_hit_of(dataset, measure)
         values = measure.counted(by_hit)
-        estimate = estimate_from(measure, values, **dealt, confidence=confidence)
-        estimate = replace(estimate, numerics=shift_of(measure, pair, confidence))
+        estimate = estimate_from(measure, values, **dealt)
+        estimate = replace(estimate, numerics=shift_of(measure, pair))
         drawn, moves = _drawn(dataset, measure, values), assumed.moves(measure)
         if measure.has_interval:
             units = "" if measure.name.startswith("limit_") else measure.units
@@ -105,6 +106,22 @@ def _drawn(dataset: Result, measure: Measure, values: Array) -> Array:
     if measure.kind == "worst_tenth":
         return measure.worse * by_draws(dataset, measure.worse * values, worst_tenth_weights)
     return values
+
+
+def asked_measures(dataset: Result, texts: Sequence[str], shown: Sequence[str]) -> list[Measure]:
+    """The measures with these texts at the stand-offs and layers of a result; without texts those in `shown` that the
+    result has.
+
+    Raises:
+        ResultError: a text is no measure, or the result lacks what it needs.
+    """
+    try:
+        if texts:
+            return [Measure.parse(text).of(dataset) for text in texts]
+        known = map(Measure.parse, shown)
+        return [measure.of(dataset) for measure in known if not measure.quantity.lacking(dataset)]
+    except ValueError as error:
+        raise ResultError(f"measure: {error}") from None
 
 
 def estimated(dataset: Result, measures: Sequence[Measure]) -> dict[Measure, Estimate]:

@@ -16,18 +16,20 @@ if TYPE_CHECKING:
 NEIGHBOURS = 24
 """Number of hits in the fit of a plane. It leaves 21 degrees of freedom for the scatter, and the fit stays local."""
 _COEFFICIENTS = 3
+_BOTH_SIDES = 0.975
+"""Share below the upper end of a 95 % interval."""
 
 
 class Local(NamedTuple):
     """Estimates at points, each of shape [points] and in the unit of the values: the value, half the width of its
-    confidence interval, and the standard deviation of the hits about the plane."""
+    95 % interval, and the standard deviation of the hits about the plane."""
 
     value: Array
     half_width: Array
     spread: Array
 
 
-def plane_fit(offsets: Array, values: Array, confidence: float = 0.95) -> Local:
+def plane_fit(offsets: Array, values: Array) -> Local:
     """Value at points by least squares: a plane through the values of the hits near each point (local linear
     regression, Cleveland and Devlin 1988, with equal weights).
 
@@ -48,16 +50,16 @@ def plane_fit(offsets: Array, values: Array, confidence: float = 0.95) -> Local:
     freedom = count - _COEFFICIENTS
     spread = np.sqrt(np.sum(residual**2, axis=1) / freedom)
     error = spread * np.sqrt(np.sum(inverse[:, 0] ** 2, axis=1))
-    return Local(plane[:, 0], float(student.ppf(0.5 + 0.5 * confidence, freedom)) * error, spread)
+    return Local(plane[:, 0], float(student.ppf(_BOTH_SIDES, freedom)) * error, spread)
 
 
-def share_of(hits: Array, confidence: float = 0.95) -> tuple[Array, Array]:
+def share_of(hits: Array) -> tuple[Array, Array]:
     """Share of ones among zeros and ones, and half the width of its interval (Wilson's; it assumes independent hits).
 
     Args:
         hits: zeros and ones, shape [points, hits]; the results have the shape [points].
     """
     count, share = hits.shape[1], hits.mean(axis=1)
-    z = float(normal.ppf(0.5 + 0.5 * confidence))
+    z = float(normal.ppf(_BOTH_SIDES))
     half_width = z * np.sqrt(share * (1.0 - share) / count + z**2 / (4.0 * count**2)) / (1.0 + z**2 / count)
     return share, half_width

@@ -71,7 +71,7 @@ def common_name(references: Iterable[str]) -> str:
 def solid_plate(dataset: Result) -> str:
     """Thickness and material of the solid reference as a phrase; empty where unknown."""
     attributes = dataset.attrs
-    plates = json.loads(attributes.get(attr.SOLID_ADD_ON, "[]")) or _whole(dataset)
+    plates = json.loads(attributes.get(attr.SOLID_ADD_ON, "[]"))
     if attr.CONTINUUM in attributes:
         materials = json.loads(attributes[attr.CONTINUUM])["materials"]
         pairs = zip(plates, materials, strict=False)
@@ -84,14 +84,6 @@ def solid_plate(dataset: Result) -> str:
 
 def _named(plate: Mapping[str, Any]) -> str:
     return f"{plate['material']}, " if plate.get("material") else ""
-
-
-def _whole(dataset: Result) -> list[dict[str, Any]]:
-    """A single solid plate that replaces the whole target, as files of earlier versions have it."""
-    material = json.loads(dataset.attrs.get(attr.MATERIAL, "{}"))
-    if not {"resistance", "density"} <= material.keys() or attr.AREAL_DENSITY not in dataset.attrs:
-        return []
-    return [material | {"thickness": float(dataset.attrs[attr.AREAL_DENSITY]) / material["density"]}]
 
 
 def _weakens(material: Mapping[str, Any]) -> str:

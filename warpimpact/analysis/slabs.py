@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, NamedTuple
 
+import numpy as np
 import xarray
 
 from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
 
 if TYPE_CHECKING:
-    import numpy as np
     from numpy.typing import NDArray
 
 
@@ -36,14 +36,25 @@ def depth_of(history: xarray.Dataset) -> float:
     return slabs(history, "y")[-1].rear
 
 
+def runs_of(solid: NDArray[np.bool_]) -> list[tuple[int, int]]:
+    """First and last places of the parts of a section that are solid."""
+    edges = np.diff(np.concatenate([[0], solid.astype(int), [0]]))
+    return list(zip(np.flatnonzero(edges == 1).tolist(), (np.flatnonzero(edges == -1) - 1).tolist(), strict=True))
+
+
 class LayerField(NamedTuple):
-    """Resistance left in a layer behind the plate: its number, the cells of its window [m], and the remaining share of
+    """Resistance left in a layer: its number, 0 the plate, the cells of its window [m], and the remaining share of
     the resistance in them at every snapshot, shape [snapshots, cells_y, cells_z]."""
 
     number: int
     cell_y: NDArray[np.float64]
     cell_z: NDArray[np.float64]
     share: NDArray[np.float64]
+
+
+def plate_field(history: xarray.Dataset) -> LayerField:
+    """The LayerField of the plate."""
+    return LayerField(0, *(history[name].values for name in (v.CELL_Y, v.CELL_Z, v.RESISTANCE_SHARE)))
 
 
 def fields_behind(history: xarray.Dataset) -> list[LayerField]:

@@ -5,10 +5,7 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
-
-import numpy as np
 
 from warpimpact.analysis.assumptions_view import assumptions_lines
 from warpimpact.analysis.estimates import estimated, means_of, slices
@@ -21,70 +18,10 @@ from warpimpact.results.dataset import finer_pair, is_choice, status_codes
 from warpimpact.results.measures import Measure
 from warpimpact.scene.display import STORED
 from warpimpact.solver.findings import accuracy_text, errors_text
-from warpimpact.statistics.intervals import Estimate
 from warpimpact.view.view import Column, Section, Table, number, text_of
 
 if TYPE_CHECKING:
     from warpimpact.results.table import Result
-
-
-@dataclass(frozen=True)
-class Spread:
-    """Mean and standard deviation over the ``count`` hits that have a quantity; NaN when there are none.
-
-    ``interval`` is the 95 % interval of the mean, NaN if the hits give none. ``parameters``, ``numerics`` and
-    ``assumptions`` are those of the mean's `Estimate`.
-    """
-
-    count: int
-    mean: float
-    standard_deviation: float
-    interval: tuple[float, float] = (math.nan, math.nan)
-    parameters: tuple[float, float] | None = None
-    numerics: float | None = None
-    assumptions: Mapping[str, float] = field(default_factory=dict)
-
-    @classmethod
-    def of(cls, estimate: Estimate) -> Spread:
-        """The spread of an estimate. The standard deviation is that of the hits themselves (ddof = 0)."""
-        interval = estimate.low, estimate.high
-        beside = estimate.parameters, estimate.numerics, estimate.assumptions
-        return cls(estimate.count, estimate.value, estimate.spread, interval, *beside)
-
-    @property
-    def estimate(self) -> Estimate:
-        """The estimate of the mean."""
-        return Estimate(
-            value=self.mean,
-            low=self.interval[0],
-            high=self.interval[1],
-            count=self.count,
-            spread=self.standard_deviation,
-            parameters=self.parameters,
-            numerics=self.numerics,
-            assumptions=self.assumptions,
-        )
-
-    def times(self, factor: float) -> Spread:
-        """The spread in another unit."""
-        return Spread.of(self.estimate.times(factor))
-
-
-@dataclass(frozen=True)
-class Summary:
-    """Outcome counts by status, and the spread of what left the rear face.
-
-    Velocities are in m/s, angles in degrees; ``tilt`` is keyed by the stand-off [m]. ``base_depth`` [m] is that of
-    `results.bases.base_depth`, None if no layer is behind the plate. ``broken`` counts the cores whose bending stress
-    passed their strength, whatever their status; None if cores have no strength.
-    """
-
-    counts: dict[str, int]
-    residual_velocity: Spread
-    deflection: Spread
-    tilt: dict[float, Spread]
-    base_depth: Spread | None = None
-    broken: int | None = None
 
 
 def promise_text(dataset: Result) -> str | None:
@@ -140,26 +77,6 @@ def breaks_promise(dataset: Result) -> bool:
 _DEPTH, _BROKEN = Measure.parse("mean(base_depth)"), Measure.parse("P(broken)")
 
 
-def summary(dataset: Result) -> Summary:
-    """Summarise a hit map; velocity, deflection and tilt count only the cores that passed the plate."""
-    codes, standoffs = status_codes(dataset), dataset[v.STANDOFF].values.tolist()
-    velocity, deflection, *tilt = means_of((v.RESIDUAL_VELOCITY, v.DEFLECTION, v.TILT), standoffs)
-    estimates = estimated(dataset, [velocity, deflection, *tilt])
-    (depth,) = estimated(dataset, [_DEPTH]).values() if has_base(dataset) else (None,)
-    broken = estimated(dataset, [_BROKEN])[_BROKEN] if v.BROKEN in dataset else None
-    counts = np.zeros(len(codes), dtype=int)
-    for part in slices(dataset[[v.STATUS]]):
-        counts += (part[v.STATUS].values[:, None] == list(codes.values())).sum(axis=0)
-    return Summary(
-        counts=dict(zip(codes, counts.tolist(), strict=True)),
-        residual_velocity=Spread.of(estimates[velocity]),
-        deflection=Spread.of(estimates[deflection]),
-        tilt={at: Spread.of(estimates[measure]) for at, measure in zip(standoffs, tilt, strict=True)},
-        base_depth=None if depth is None else Spread.of(depth),
-        broken=None if broken is None else round(broken.value * broken.count) if broken.count else 0,
-    )
-
-
 _SAMPLINGS = {
     "sobol": "Intervals are those of independent shots, as a rule too wide; hits.replicates = 16 gives valid ones.",
     "grid": "Intervals are those of independent shots, which the hits of a grid are not.",
@@ -179,33 +96,42 @@ def sampling_note(dataset: Result) -> str:
 
 
 def summary_text(dataset: Result) -> str:
-    """The summary as text, without statuses that did not occur."""
-    result, hits = summary(dataset), dataset.sizes["hit"]
-    counts = {name.replace("_", " "): count for name, count in result.counts.items() if count}
-    if result.broken is not None:
-        counts["broken"] = result.broken
+    """The first numbers of a hit map as text: how the shots ended, without statuses that did not occur, and means;
+    velocity, deflection and tilt count only the cores that passed the plate."""
+    hits, standoffs = dataset.sizes["hit"], dataset[v.STANDOFF].values.tolist()
     shares = Table(
         (Column(), number(digits="d"), number(digits=".1%")),
-        [(name, count, count / hits) for name, count in counts.items()],
+        [(name, count, count / hits) for name, count in _counts(dataset).items()],
     )
-    spreads = [
-        ("residual velocity", "m/s", result.residual_velocity),
-        ("deflection", "°", result.deflection),
-        *((f"tilt at {standoff * 1e3:g} mm", "°", tilt) for standoff, tilt in result.tilt.items()),
-    ]
-    if (depth := result.base_depth) is not None and depth.count:
-        spreads.append(("depth in the base", "mm", depth.times(1e3)))
+    means = means_of((v.RESIDUAL_VELOCITY, v.DEFLECTION, v.TILT), standoffs)
+    means += [_DEPTH] if has_base(dataset) else []
     columns = (
         *(Column(), number("mean", digits=".2f"), Column()),
         *(Column("95 % interval"), number("spread", digits=".1f"), Column()),
     )
-    rows = [
-        (name, spread.mean, unit, _intervals(spread), spread.standard_deviation, _counted(spread.count, hits))
-        for name, unit, spread in spreads
-    ]
+    rows = []
+    for measure, estimate in estimated(dataset, means).items():
+        if estimate.count or measure != _DEPTH:
+            shown, unit = estimate.times(measure.display.factor), measure.display.shown
+            interval = intervals_text(ends_of(shown), "{:.2f}".format)
+            rows.append((measure.column.label, shown.value, unit, interval, shown.spread, _counted(shown.count, hits)))
     notes = (numerics_note(dataset), levels_note(dataset), draws_note(dataset))
     moved = assumptions_lines(dataset)
     return text_of([Section([shares, Table(columns, rows), *moved, *stop_lines(dataset), *filter(None, notes)])])
+
+
+def _counts(dataset: Result) -> dict[str, int]:
+    """Numbers of shots by status, for the statuses that occur; last the cores whose bending stress passed their
+    strength, whatever their status, if cores have one."""
+    counts = dict.fromkeys(status_codes(dataset), 0)
+    for part in slices(dataset[[v.STATUS]]):
+        for name, code in status_codes(dataset).items():
+            counts[name] += int((part[v.STATUS].values == code).sum())
+    told = {name.replace("_", " "): count for name, count in counts.items() if count}
+    if v.BROKEN in dataset:
+        broken = estimated(dataset, [_BROKEN])[_BROKEN]
+        told["broken"] = round(broken.value * broken.count) if broken.count else 0
+    return told
 
 
 def _counted(count: int, hits: int) -> str:
@@ -290,7 +216,3 @@ def symmetry_text(dataset: Result) -> str:
     if computed == hits:
         return f"all {hits} hits computed: plate and shot have no symmetry in common"
     return f"{computed} of {hits} hits computed, the others are their images by {dataset.attrs[attr.SYMMETRIES]}"
-
-
-def _intervals(spread: Spread) -> str:
-    return intervals_text(ends_of(spread.estimate), "{:.2f}".format)

@@ -149,18 +149,6 @@ def survival_of(
     return Survival(positive.share, positive.at_least, confidence[0], interval=_no_less(interval, by_hits[1:]))
 
 
-def why_not_by_draws(numbers: tuple[Array, Array], *, independent: str, by_ratio: bool) -> str:
-    """Why the numbers of two plates do not give the difference for each draw; empty where they do.
-
-    Args:
-        independent: why the plates are compared as independent; empty if they are not.
-        by_ratio: whether the numbers are ratios to the solid plate.
-    """
-    if not independent and by_ratio and len(numbers[0]) != len(numbers[1]):
-        return "a ratio to the solid plate needs as many hits of both plates"
-    return independent
-
-
 def survival_text(survival: Survival | None) -> str:
     """Words to append to a verdict."""
     if survival is None:

@@ -10,13 +10,12 @@ from typing import NamedTuple
 import numpy as np
 import xarray
 
-from warpimpact.analysis.estimates import estimated
+from warpimpact.analysis.estimates import asked_measures, estimated
 from warpimpact.analysis.evidence_lines import evidence_lines
 from warpimpact.analysis.numbers import ends_of, interval_text, intervals_text, number_text
 from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
 from warpimpact.results.dataset import failed
-from warpimpact.results.files import ResultError
 from warpimpact.results.measures import Measure
 from warpimpact.statistics.intervals import Estimate
 from warpimpact.view.view import Column, Section, Table, number
@@ -48,13 +47,7 @@ def measures_of(sweep: xarray.Dataset, texts: Sequence[str] = ()) -> list[Measur
     Raises:
         ResultError: a text is no measure, or the sweep lacks what it needs.
     """
-    try:
-        if texts:
-            return [Measure.parse(text).of(sweep) for text in texts]
-        measures = [Measure.parse(text) for text in SHOWN_OF_SWEEPS]
-        return [measure.of(sweep) for measure in measures if not measure.quantity.lacking(sweep)]
-    except ValueError as error:
-        raise ResultError(f"measure: {error}") from None
+    return asked_measures(sweep, texts, SHOWN_OF_SWEEPS)
 
 
 def inputs_of(sweep: xarray.Dataset) -> dict[str, list[str]]:

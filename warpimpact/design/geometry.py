@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from warpimpact.analysis.plate_text import plate_numbers
+from warpimpact.analysis.slabs import runs_of
 from warpimpact.plotting.dimensions import Dimension, hole_dimensions, smallest_ligament
 from warpimpact.plotting.fire import fire_of
 from warpimpact.plotting.plate import drawn_extent
@@ -93,10 +94,8 @@ def _section(target: Target, half: float) -> dict[str, Any]:
     layers, handles = [], list[dict[str, Any]]()
     for number, (layer, (front, rear)) in enumerate(zip(target.layers, target.faces * MM, strict=True)):
         offset = [target.value(f"offset_{axis}", number) for axis in "yz"]
-        solid = np.concatenate([[0], layer.is_solid(np.array(-offset[0]), z - offset[1]).astype(int), [0]])
-        edges = np.diff(solid)
-        starts, ends = z[np.flatnonzero(edges == 1)] * MM, z[np.flatnonzero(edges == -1) - 1] * MM
-        parts = np.round(np.stack([starts, ends], axis=-1), _COORDINATE_DIGITS).tolist()
+        runs = runs_of(layer.is_solid(np.array(-offset[0]), z - offset[1]))
+        parts = [_rounded(z[list(run)] * MM) for run in runs]
         name = "plate" if number == 0 else f"layer {number}"
         text = f"{name}, {layer.thickness * MM:.4g} mm"
         layers.append({"front": float(front), "rear": float(rear), "parts": parts, "text": text})

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import xarray
@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 from warpimpact.analysis.bursts import PASSED_ALONE, Bursts, bursts
 from warpimpact.plotting.cell import shots_text
 from warpimpact.plotting.heading import inscribe
-from warpimpact.plotting.style import BLUE, GREY, VERMILION, hide_sides
+from warpimpact.plotting.style import BLUE, GREY, VERMILION, all_bars, hide_sides
 from warpimpact.scene.display import MM
 
 if TYPE_CHECKING:
@@ -57,8 +57,8 @@ def _varies(result: Bursts, measure: Measure) -> bool:
 def _draw(axes: Axes, places: Sequence[float], groups: Sequence[Group], measure: Measure) -> None:
     """Draw the estimates of some groups with their intervals."""
     values, low, high = (np.array([getattr(g.estimates[measure], n) for g in groups]) for n in ("value", "low", "high"))
-    below, above = (np.nan_to_num(np.maximum(0.0, ends)) for ends in (values - low, high - values))
-    axes.errorbar(places, values, yerr=[below, above], fmt="o", color=BLUE, markersize=4.5, capsize=2.5, zorder=3)
+    style: dict[str, Any] = {"fmt": "o", "color": BLUE, "markersize": 4.5, "capsize": 2.5, "zorder": 3}
+    axes.errorbar(places, values, yerr=all_bars(values, low, high), **style)
     axes.grid(color="0.92")
     hide_sides(axes, "top", "right")
 

@@ -70,9 +70,7 @@ def comparison_figure(comparison: Comparison, *, every: bool = False) -> Figure:
         _draw_plates(left, comparison, measures)
         _furnish(left, labels)
         _draw_differences(right, comparison, measures, shown)
-    entries = [zip(*reversed(left.get_legend_handles_labels()), strict=True) for left in panels[:, 0]]
-    legend = {label: handle for entry in entries for label, handle in entry}  # each entry once
-    legend_below(figure, list(legend.values()), list(legend), 4)
+    legend_below(figure, 4)
     drawn = any(pair.parameters for pair in comparison.differences)
     both = " by hits (thin lines) and by parameters (broad ones)" if drawn else ""
     title = "Plates compared" if decides is None or every else f"Plates by {decides.measure.label}"

@@ -174,12 +174,10 @@ def averaged(dataset: xarray.Dataset, column: Shown) -> Shown:
     exists = np.isfinite(column.values)
     if not is_drawn(dataset) or exists.sum() < NEIGHBOURS:
         return column
-    period, points = np.asarray(dataset.attrs[attr.PLATE_PERIOD]), hit_points(dataset)[exists]
-    _, near = tree_of(dataset, exists).query((points + period / 2) % period, k=NEIGHBOURS)
-    offsets = points[near] - points[:, None]
-    offsets -= period * np.round(offsets / period)
+    period = np.asarray(dataset.attrs[attr.PLATE_PERIOD])
+    near = _neighbours(dataset, column.values, (hit_points(dataset)[exists] + period / 2) % period)
     values = np.full(len(exists), np.nan)
-    values[exists] = plane_fit(offsets, column.values[exists][near]).value
+    values[exists] = plane_fit(*near).value
     return column._replace(values=values, label=f"mean of {column.label}", title=f"{column.title}\nmean of hits nearby")
 
 
@@ -261,12 +259,20 @@ def _local(
     exists = np.isfinite(values)
     there = exists[nearest]
     if exists.sum() >= NEIGHBOURS:
-        period = np.asarray(dataset.attrs[attr.PLATE_PERIOD])
-        points = pixels(dataset, _FINE)[there]
-        _, near = tree_of(dataset, exists).query(points, k=NEIGHBOURS)
-        offsets = (hit_points(dataset)[exists] + period / 2)[near] - points[:, None]
-        images[:, there] = estimate((offsets - period * np.round(offsets / period), values[exists][near]))
+        images[:, there] = estimate(_neighbours(dataset, values, pixels(dataset, _FINE)[there]))
     return images
+
+
+def _neighbours(dataset: xarray.Dataset, values: Array, points: Array) -> tuple[Array, Array]:
+    """Offsets [m] and values of the hits with a value that are nearest to points of the cell, across its edges.
+
+    Args:
+        points: relative to the lower left corner of the cell [m], shape [points, 2].
+    """
+    exists, period = np.isfinite(values), np.asarray(dataset.attrs[attr.PLATE_PERIOD])
+    _, near = tree_of(dataset, exists).query(points, k=NEIGHBOURS)
+    offsets = (hit_points(dataset)[exists] + period / 2)[near] - points[:, None]
+    return offsets - period * np.round(offsets / period), values[exists][near]
 
 
 def _map_size(dataset: xarray.Dataset) -> Array:

@@ -14,7 +14,7 @@ from warpimpact.campaign.campaign import Campaign
 from warpimpact.campaign.text import CampaignError
 from warpimpact.plotting.heading import inscribe
 from warpimpact.plotting.plate import hole_patches
-from warpimpact.plotting.style import BLUE, GREEN, GREY, VERMILION, hide_sides
+from warpimpact.plotting.style import BLUE, GREEN, GREY, VERMILION, all_bars, hide_sides
 from warpimpact.results import front as f
 
 if TYPE_CHECKING:
@@ -121,11 +121,12 @@ def _draw_front(axes: Axes, dataset: xarray.Dataset, names: dict[int, str]) -> N
             order = np.argsort(solid[:, across])
             style: dict[str, Any] = {"color": GREY, "linestyle": "--", "marker": "D", "fillstyle": "none"}
             axes.plot(solid[order, across], solid[order, up], **style, label="solid, of the same weight", zorder=2)
+    reference = (f.REFERENCE_FOUND, f.REFERENCE_LOW, f.REFERENCE_HIGH)
+    ends = all_bars(*(dataset[column].values[:, up] for column in reference))
     for place, (name, mark) in enumerate(zip(dataset[f.REFERENCE].values, 4 * _MARKS, strict=False)):
         at = dataset[f.REFERENCE_FOUND].values[place]
-        ends = _bars(dataset, (f.REFERENCE_FOUND, f.REFERENCE_LOW, f.REFERENCE_HIGH), up)[:, place : place + 1]
         point: dict[str, Any] = {"color": VERMILION, "markersize": 11, "zorder": 5}
-        axes.errorbar(at[across], at[up], yerr=ends, fmt=mark, label=str(name), **point)
+        axes.errorbar(at[across], at[up], yerr=ends[:, place, None], fmt=mark, label=str(name), **point)
     for number, (place, letter) in enumerate(names.items()):
         at, above = (fresh[place, across], fresh[place, up]), number % 2 == 0  # neighbours may lie close together
         axes.annotate(letter, at, xytext=(6, 6 if above else -15), textcoords="offset points", weight="bold", zorder=6)
@@ -144,7 +145,7 @@ def _draw_fresh(axes: Axes, dataset: xarray.Dataset, shown: tuple[int, int], thi
     across, up = shown
     fresh, leaders = dataset[f.FRESH].values, front_leaders(dataset)
     others = np.setdiff1d(np.arange(len(fresh)), leaders)
-    ends = _bars(dataset, (f.FRESH, f.FRESH_LOW, f.FRESH_HIGH), up)
+    ends = all_bars(*(dataset[name].values[:, up] for name in (f.FRESH, f.FRESH_LOW, f.FRESH_HIGH)))
     groups = ((leaders, "o", "front, fresh hits, 95 %", BLUE), (others, "o", "not told from another design", "white"))
     for which, mark, label, face in groups:
         if len(which):
@@ -167,12 +168,6 @@ def _draw_assumptions(axes: Axes, dataset: xarray.Dataset, across: int, up: int)
             ends = np.nanmin(every, axis=1), np.nanmax(every, axis=1)
             label = "under other assumptions" if colour == BLUE else ""
             axes.vlines(at[:, across], *ends, color=colour, alpha=0.25, linewidth=4.0, zorder=2, label=label)
-
-
-def _bars(dataset: xarray.Dataset, names: tuple[str, str, str], asked: int) -> np.ndarray[Any, np.dtype[np.float64]]:
-    """Lengths of the bars below and above, shape [2, points]; 0 where there is no interval."""
-    value, low, high = (dataset[name].values[:, asked] for name in names)
-    return np.asarray(np.nan_to_num(np.maximum(np.array([value - low, high - value]), 0.0)))
 
 
 def _draw_variables(figure: SubFigure, dataset: xarray.Dataset, leaders: Any) -> None:

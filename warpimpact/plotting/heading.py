@@ -49,10 +49,20 @@ def inscribe(figure: Figure, dataset: xarray.Dataset, *notes: str, title: str = 
     add_heading(figure, title or run_title, *([run_title] if title else []), *notes, *names(dataset))
 
 
-def legend_below(figure: Figure, handles: Sequence[Artist], labels: Sequence[str], columns: int) -> None:
-    """Add the legend of a figure with a layout engine below its panels. Notes of the figure become its title, because
-    nothing else keeps both apart."""
-    figure.legend(handles, labels, loc="outside lower center", ncols=columns, frameon=False)
+def inscribe_hit(figure: Figure, history: xarray.Dataset, what: str) -> None:
+    """Write the number of a replayed hit and what is shown of it over a figure, its result's title and names below."""
+    inscribe(figure, history, title=f"hit {history.attrs[attr.HIT]}: {what}")
+
+
+def legend_below(figure: Figure, columns: int | None = None) -> None:
+    """Add one legend of all panels, each label once, below a figure with a layout engine; in one row without a number
+    of columns. Notes of the figure become its title, because nothing else keeps both apart."""
+    entries: dict[str, Artist] = {}
+    for axes in figure.axes:
+        for handle, label in zip(*axes.get_legend_handles_labels(), strict=True):
+            entries.setdefault(label, handle)
+    columns = columns or len(entries)
+    figure.legend(entries.values(), entries, loc="outside lower center", ncols=columns, frameon=False)
     if notes := figure.get_supxlabel():
         figure.supxlabel("")
         _write_notes(figure, notes)

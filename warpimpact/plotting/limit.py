@@ -131,11 +131,16 @@ def _mark_published(axes: Axes, dataset: xarray.Dataset) -> None:
         (beside for beside in published_beside(dataset) if not math.isnan(beside.computed)), cycle(_OTHERS)
     ):
         velocity, error = row.published.velocity, row.published.standard_deviation
-        axes.axvline(velocity, color=colour, linewidth=1.2, linestyle=":", label=row.label)
+        _draw_upright(axes, velocity, color=colour, linestyle=":", label=row.label)
         if error:
             axes.axvspan(velocity - error, velocity + error, color=colour, alpha=0.12)
-        low, high = axes.get_xlim()
-        axes.set_xlim(min(low, velocity - 0.03 * (high - low)), max(high, velocity + 0.03 * (high - low)))
+
+
+def _draw_upright(axes: Axes, at: float, **style: Any) -> None:
+    """Draw a vertical line, and widen the axes to it."""
+    axes.axvline(at, linewidth=1.2, **style)
+    low, high = axes.get_xlim()
+    axes.set_xlim(min(low, at - 0.03 * (high - low)), max(high, at + 0.03 * (high - low)))
 
 
 def _mark_measures(axes: Axes, dataset: xarray.Dataset, factor: float, unit: str) -> None:
@@ -176,10 +181,7 @@ def _draw_curve(axes: Axes, dataset: xarray.Dataset, quantity: str) -> None:
     for reference, label, style in references:
         mean = math.nan if reference is None else factor * float(np.nanmean(reference[v.LIMITS[quantity].value].values))
         if np.isfinite(mean):
-            axes.axvline(mean, color=GREY, linewidth=1.2, linestyle=style, label=label)
-            low, high = axes.get_xlim()
-            margin = 0.03 * (high - low)
-            axes.set_xlim(min(low, mean - margin), max(high, mean + margin))
+            _draw_upright(axes, mean, color=GREY, linestyle=style, label=label)
     _mark_published(axes, dataset)
     _mark_measures(axes, dataset, factor, unit)
     if axes.get_legend_handles_labels()[0]:

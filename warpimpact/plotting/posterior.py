@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 import xarray
@@ -116,17 +116,13 @@ def measured_figure(tree: xarray.DataTree) -> Figure:
         axes.set_xlabel({"m s-1": "m/s", "degree": "degrees"}.get(kind, kind))
         axes.grid(axis="x", color="0.9")
         axes.set_axisbelow(True)
-    handles = [_line(VERMILION, "measured, ±1 standard uncertainty", "o"), _line(BLUE, "computed at its hit")]
-    handles.append(_line(_GREY, "another such shot, measured"))
-    legend_below(figure, handles, [str(handle.get_label()) for handle in handles], 3)
+    first = panels[0]
+    first.plot([], [], "o", color=VERMILION, label="measured, ±1 standard uncertainty")
+    first.plot([], [], color=BLUE, lw=4, label="computed at its hit")
+    first.plot([], [], color=_GREY, lw=4, label="another such shot, measured")
+    legend_below(figure, 3)
     add_heading(figure, str(tree.attrs[attr.TITLE]), f"measured and computed, {_worth(tree)}")
     return figure
-
-
-def _line(colour: str, label: str, marker: str = "") -> Any:
-    from matplotlib.lines import Line2D
-
-    return Line2D([], [], color=colour, marker=marker or None, lw=0 if marker else 4, label=label)
 
 
 def hits_figure(tree: xarray.DataTree) -> Figure:
@@ -163,8 +159,7 @@ def hits_figure(tree: xarray.DataTree) -> Figure:
         axes.set_title(str(posterior["shot"].values[place]))
     for axes in panels[len(fit.shots) :]:
         axes.remove()
-    handles, labels = panels[0].get_legend_handles_labels()
-    legend_below(figure, handles, labels, 2)
+    legend_below(figure, 2)
     add_heading(figure, str(tree.attrs[attr.TITLE]), f"where the shots hit, {_worth(tree)}")
     return figure
 

@@ -11,8 +11,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
 from warpimpact.analysis.surface import POINTS_AROUND, largest_in_plate, pressed
-from warpimpact.plotting.heading import inscribe
-from warpimpact.results import attributes as attr
+from warpimpact.plotting.heading import inscribe_hit
 from warpimpact.results import variables as v
 
 _MM, _US = 1e3, 1e6
@@ -29,7 +28,7 @@ def pressure(dataset: xarray.Dataset) -> Figure:
     surface = pressed(dataset, step)
     figure = Figure(figsize=(9.0, 6.0), layout="constrained")
     when = f"at {float(dataset[v.TIME][step]) * _US:.1f} µs"
-    inscribe(figure, dataset, title=f"hit {dataset.attrs[attr.HIT]}: normal stress under the largest force, {when}")
+    inscribe_hit(figure, dataset, f"normal stress under the largest force, {when}")
     axes = figure.add_subplot(projection="3d")
     x, y, z = np.moveaxis(np.concatenate([surface.point, surface.point[:, :1]], axis=1) * _MM, -1, 0)
     axes.plot_wireframe(x, y, z, rcount=24, ccount=POINTS_AROUND // _SPOKES, color="0.75", linewidth=0.5)

@@ -5,8 +5,13 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+    from numpy.typing import NDArray
+
+    Array = NDArray[np.float64]
 
 BLUE, VERMILION, GREEN = "#0072B2", "#D55E00", "#009E73"
 """Colours of Okabe and Ito: they differ in every kind of colour blindness."""
@@ -26,3 +31,8 @@ def bars(value: float, low: float, high: float) -> list[list[float]] | None:
     if math.isnan(low) or math.isnan(high):
         return None
     return [[max(0.0, value - low)], [max(0.0, high - value)]]
+
+
+def all_bars(values: Array, low: Array, high: Array) -> Array:
+    """The bars of many intervals, shape [2, points]; 0 where there is no interval."""
+    return np.asarray(np.nan_to_num([values - low, high - values]).clip(0.0))

@@ -13,6 +13,7 @@ from matplotlib.figure import Figure
 from warpimpact.analysis.swept import Point, inputs_of, measures_of, points
 from warpimpact.plotting.cell import words
 from warpimpact.plotting.heading import inscribe, legend_below
+from warpimpact.plotting.style import all_bars
 from warpimpact.results.measures import Measure
 from warpimpact.scene.display import STORED
 
@@ -56,8 +57,7 @@ def sweep_figure(sweep: xarray.Dataset, texts: Sequence[str] = ()) -> Figure:
     for axes in panels[-1]:
         axes.set_xlabel(_axis_label(sweep[along]))
     if len(inputs) > 1:
-        handles, labels = panels[0, 0].get_legend_handles_labels()
-        legend_below(figure, handles, labels, 3)
+        legend_below(figure, 3)
     counted = "; beside a value: the share of the hits that it counts, where that is not all"
     left_out = len(lines) - _MOST_LINES
     note = f"; {left_out} more combinations are not shown" if left_out > 0 else ""
@@ -89,8 +89,7 @@ def _draw(
     value, low, high = factor * np.array([(estimate.value, estimate.low, estimate.high) for estimate in estimates]).T
     is_number = places.dtype.kind == "f"
     x = places.values * STORED[places.attrs["units"]].factor if is_number else np.arange(len(line))
-    bars = np.clip(np.nan_to_num([value - low, high - value]), 0.0, None)
-    axes.errorbar(x, value, yerr=bars, fmt="o-", capsize=3.0, **style)
+    axes.errorbar(x, value, yerr=all_bars(value, low, high), fmt="o-", capsize=3.0, **style)
     if not is_number:
         axes.set_xticks(x, places.values)
     for at, height, point, estimate in zip(x, value, line, estimates, strict=True):

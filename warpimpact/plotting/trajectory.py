@@ -17,15 +17,14 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Polygon
 from matplotlib.patheffects import Normal, Stroke
 
-from warpimpact.analysis.slabs import depth_of, slabs
+from warpimpact.analysis.slabs import depth_of, plate_field, slabs
 from warpimpact.analysis.surface import pressed
 from warpimpact.plotting.cell import struck, words
-from warpimpact.plotting.heading import inscribe, legend_below
-from warpimpact.plotting.layers import layers
+from warpimpact.plotting.heading import inscribe_hit, legend_below
+from warpimpact.plotting.layers import draw_left, layers, weakened_ranges
 from warpimpact.plotting.poses import Pose, pose_at_step, poses_behind, poses_in_plate, silhouette
 from warpimpact.plotting.pressure import pressure
 from warpimpact.plotting.style import BLUE, GREY, VERMILION
-from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
 
 if TYPE_CHECKING:
@@ -56,7 +55,7 @@ def passage(dataset: xarray.Dataset) -> Figure:
             axes.add_patch(Polygon(outline, facecolor=(*colour[:3], 0.3), edgecolor=colour, lw=1.4, label=label))
         path = dataset[v.PLATE_POSITION].sel(axis=["x", view]) * _MM
         axes.plot(path[:, 0], path[:, 1], color="black", lw=0.8, ls="--", label="centre of mass")
-    _add_legend(figure, views["y"])
+    legend_below(figure)
     return figure
 
 
@@ -99,7 +98,7 @@ def largest_load(dataset: xarray.Dataset) -> Figure:
         axes.add_patch(Polygon(silhouette(dataset, pose, view) * _MM, facecolor=GREY, edgecolor="black"))
         _draw_force(axes, dataset, step, view)
         _draw_moment(axes, dataset, step, view)
-    _add_legend(figure, views["y"])
+    legend_below(figure)
     return figure
 
 
@@ -142,7 +141,7 @@ def _draw_moment(axes: Axes, dataset: xarray.Dataset, step: int, view: str) -> N
 def course(dataset: xarray.Dataset) -> Figure:
     """Velocity, attitude, loads and energy against time."""
     figure = Figure(figsize=(10.0, 9.0), layout="constrained")
-    inscribe(figure, dataset, title=_title(dataset, f"course through the {struck(dataset)}"))
+    inscribe_hit(figure, dataset, f"course through the {struck(dataset)}")
     panels = figure.subplots(3, 2, sharex=True)
     time, axis = dataset[v.TIME] * _US, dataset[v.CORE_AXIS]
     velocity = dataset[v.VELOCITY]
@@ -169,19 +168,16 @@ def plate(dataset: xarray.Dataset) -> Figure:
     Each cell of the plate is shown as a share of its initial resistance, which is less for a cell at the edge of a
     hole.
     """
-    share = dataset[v.RESISTANCE_SHARE]
-    columns = min(3, share.sizes["snapshot"])
-    rows = -(-share.sizes["snapshot"] // columns)
-    limits = _touched(dataset)
-    tall = np.ptp(limits["z"]) / np.ptp(limits["y"])
+    field, times = plate_field(dataset), dataset[v.SNAPSHOT].values
+    columns = min(3, len(times))
+    rows = -(-len(times) // columns)
+    along_y, along_z = weakened_ranges(field)
+    tall = np.ptp(along_z) / np.ptp(along_y)
     figure = Figure(figsize=(3.3 * columns + 1.2, (3.1 * tall + 0.5) * rows + 0.7), layout="constrained")
-    inscribe(figure, dataset, title=_title(dataset, "resistance left in the plate, seen from behind"))
+    inscribe_hit(figure, dataset, "resistance left in the plate, seen from behind")
     panels = figure.subplots(rows, columns, sharex=True, sharey=True, squeeze=False)
-    y, z = (_cell_edges(dataset[v.CELL[axis]]) for axis in "yz")
-    for panel, snapshot in zip(panels.flat, (share / share[0]).where(share[0] >= 0.5), strict=False):
-        image = panel.imshow(
-            snapshot.T, origin="lower", extent=(*y, *z), cmap="viridis", vmin=0.0, vmax=1.0, interpolation="nearest"
-        )
+    for place, (panel, time) in enumerate(zip(panels.flat, times, strict=False)):
+        image = draw_left(panel, field, place)
         edge = [Stroke(linewidth=2.4, foreground="black"), Normal()]
         panel.plot(
             dataset[v.OUTLINE_Y].values * _MM,
@@ -191,7 +187,7 @@ def plate(dataset: xarray.Dataset) -> Figure:
             path_effects=edge,
         )
         panel.plot(dataset[v.HIT_Y] * _MM, dataset[v.HIT_Z] * _MM, "+", color=VERMILION, ms=10, mew=2)
-        panel.set(xlim=limits["y"], ylim=limits["z"], title=f"{float(snapshot[v.SNAPSHOT]) * _US:.1f} µs")
+        panel.set_title(f"{time * _US:.1f} µs")
     for panel in panels[-1]:
         panel.set_xlabel("y [mm]")
     for panel in panels[:, 0]:
@@ -212,10 +208,6 @@ def save_figures(dataset: xarray.Dataset, folder: Path, stem: str) -> list[Path]
     return paths
 
 
-def _title(dataset: xarray.Dataset, what: str) -> str:
-    return f"hit {dataset.attrs[attr.HIT]}: {what}"
-
-
 def two_views(
     dataset: xarray.Dataset, poses: Iterable[Pose], what: str, *, room: float
 ) -> tuple[Figure, dict[str, Axes]]:
@@ -231,7 +223,7 @@ def two_views(
     width = corners["y"][1][0] - corners["y"][0][0]
     inch = min(9.0 / width, 8.0 / sum(heights))  # per mm
     figure = Figure(figsize=(inch * width + 1.0, inch * sum(heights) + 2.0), layout="constrained")
-    inscribe(figure, dataset, title=_title(dataset, what))
+    inscribe_hit(figure, dataset, what)
     panels = figure.subplots(2, 1, height_ratios=heights)
     for axes, (view, (low, high)) in zip(panels, corners.items(), strict=True):
         axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), aspect="equal")
@@ -243,11 +235,6 @@ def two_views(
             )
         axes.autoscale(False)
     return figure, dict(zip(corners, panels, strict=True))
-
-
-def _add_legend(figure: Figure, axes: Axes) -> None:
-    handles, labels = axes.get_legend_handles_labels()
-    legend_below(figure, handles, labels, len(handles))
 
 
 def _draw_components(axes: Axes, time: xarray.DataArray, values: xarray.DataArray, label: str) -> None:
@@ -264,21 +251,3 @@ def _draw_energy(axes: Axes, time: xarray.DataArray, dataset: xarray.Dataset) ->
         side.plot(time, dataset[energy], color=colour)
         side.set_ylabel(f"{words(energy)} [J]", color=colour)
         side.tick_params(axis="y", colors=colour)
-
-
-def _cell_edges(centres: xarray.DataArray) -> tuple[float, float]:
-    """Outer edges [mm] of evenly spaced cells."""
-    half = 0.5 * float(centres[1] - centres[0])
-    return (float(centres[0]) - half) * _MM, (float(centres[-1]) + half) * _MM
-
-
-def _touched(dataset: xarray.Dataset) -> dict[str, tuple[float, float]]:
-    """Range [mm] along y and z that the core weakened, with a margin; the whole range if it weakened nothing."""
-    share = dataset[v.RESISTANCE_SHARE]
-    weaker = (share[-1] < share[0]).values
-    ranges = {}
-    for axis, across in (("y", 1), ("z", 0)):
-        low, high = _cell_edges(dataset[v.CELL[axis]])
-        there = dataset[v.CELL[axis]].values[weaker.any(axis=across)] * _MM
-        ranges[axis] = (max(low, there.min() - 2.0), min(high, there.max() + 2.0)) if there.size else (low, high)
-    return ranges

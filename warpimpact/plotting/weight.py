@@ -15,7 +15,6 @@ from warpimpact.plotting.style import BLUE, GREY, VERMILION, bars, hide_sides
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from matplotlib.artist import Artist
     from matplotlib.axes import Axes
 
     from warpimpact.analysis.comparison import Comparison
@@ -51,10 +50,7 @@ def weight_figure(comparison: Comparison) -> Figure | None:
     figure = Figure(figsize=(1.2 + 5.2 * len(wanted), 5.4), layout="constrained")
     for axes, name in zip(figure.subplots(1, len(wanted), squeeze=False)[0], wanted, strict=True):
         (_draw_needed if name == _THICKNESS else _draw_against_weight)(axes, comparison, name)
-    labels: dict[str, Artist] = {}
-    for axes in figure.axes:
-        labels |= {label: handle for handle, label in zip(*axes.get_legend_handles_labels(), strict=True)}
-    legend_below(figure, list(labels.values()), list(labels), 4)
+    legend_below(figure, 4)
     add_heading(figure, "Targets against their weight; 95 % intervals", *_solid_plates(comparison))
     return figure
 

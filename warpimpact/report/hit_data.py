@@ -12,7 +12,7 @@ from matplotlib import colormaps
 from matplotlib.colors import to_hex
 
 from warpimpact.analysis.hit_map import hit_points
-from warpimpact.analysis.slabs import slabs
+from warpimpact.analysis.slabs import runs_of, slabs
 from warpimpact.kernels.status import Status
 from warpimpact.plotting.cell import STATUS_COLOURS, Shown, limits, nearest_hits, shown, words
 from warpimpact.plotting.fire import common_fire
@@ -168,10 +168,7 @@ def _solid_boxes(history: xarray.Dataset, view: str) -> list[list[float]]:
     along = (history[v.SECTION].values + float(history[v.HIT_POINT[view]])) * MM
     boxes = []
     for front, rear, there in slabs(history, view):
-        edges = np.diff(np.concatenate([[0], there.astype(int), [0]]))
-        starts, ends = np.flatnonzero(edges == 1), np.flatnonzero(edges == -1) - 1
-        faces = [front * MM, rear * MM]
-        boxes += [[*faces, float(along[low]), float(along[high])] for low, high in zip(starts, ends, strict=True)]
+        boxes += [[front * MM, rear * MM, float(along[low]), float(along[high])] for low, high in runs_of(there)]
     return boxes
 
 
