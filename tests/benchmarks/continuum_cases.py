@@ -193,6 +193,16 @@ def written(path: Path) -> list[dict[str, str]]:
     return list(csv.DictReader(path.open(encoding="utf-8"))) if path.exists() else []
 
 
+def append(path: Path, row: dict[str, object]) -> None:
+    """Append a row to a table, which begins with the names of its columns."""
+    new = not path.exists()
+    with path.open("a", newline="", encoding="utf-8") as file:
+        writer = csv.DictWriter(file, tuple(row))
+        if new:
+            writer.writeheader()
+        writer.writerow(row)
+
+
 def measured(rows: list[dict[str, str]], plate: str, model: str) -> dict[int, np.ndarray]:
     """The measures of the hits of a plate that perforated it, by their numbers."""
     chosen = (row for row in rows if row["plate"] == plate and row["model"] == model and row["status"] == "0")

@@ -10,19 +10,17 @@ at normal incidence without yaw. The first one has the published velocity; while
 from __future__ import annotations
 
 import argparse
-import csv
 import time
 from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
-from continuum_cases import CASES, PUBLISHED
+from continuum_cases import CASES, PUBLISHED, append, written
 
 from warpimpact import Continuum, Impact, Shots, simulate
 from warpimpact.catalogue.flow_entries import flow_entry
 from warpimpact.kernels.status import Status
 
-FIELDS = ("plate", "friction", "spacing", "velocity", "status", "residual", "seconds")
 WIDTH, SHOTS, STEP = 0.025, 6, 1.04
 """A search ends at a bracket of this share of the velocity, or after so many shots; and the step from one that is held
 or has failed to the next, while none has passed."""
@@ -68,11 +66,10 @@ def shot_at(plate: str, friction: float, spacing: float | None, velocity: float)
 def search(path: Path, plate: str, friction: float, spacing: float | None) -> None:
     """Continue a search; its rows are in the file."""
     while True:
-        rows = list(csv.DictReader(path.open(encoding="utf-8"))) if path.exists() else []
         here = {"plate": plate, "friction": f"{friction:g}", "spacing": "draft" if spacing is None else f"{spacing:g}"}
         shots = [
             Shot(float(row["velocity"]), Status(int(row["status"])), float(row["residual"]))
-            for row in rows
+            for row in written(path)
             if here.items() <= row.items()
         ]
         velocity = next_velocity(shots, PUBLISHED[plate].velocity)
@@ -81,11 +78,7 @@ def search(path: Path, plate: str, friction: float, spacing: float | None) -> No
         begin = time.process_time()
         shot = shot_at(plate, friction, spacing, round(velocity, 1))
         row = {"velocity": shot.velocity, "status": int(shot.status), "residual": f"{shot.residual:.2f}"}
-        with path.open("a", newline="", encoding="utf-8") as file:
-            writer = csv.DictWriter(file, FIELDS)
-            if not rows:
-                writer.writeheader()
-            writer.writerow(here | row | {"seconds": f"{time.process_time() - begin:.1f}"})
+        append(path, {**here, **row, "seconds": f"{time.process_time() - begin:.1f}"})
 
 
 if __name__ == "__main__":

@@ -13,7 +13,6 @@ from these files (continuum_tables.py).
 from __future__ import annotations
 
 import argparse
-import csv
 import time
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager
@@ -23,14 +22,13 @@ from typing import Any
 from unittest import mock
 
 import numpy as np
-from continuum_cases import CASES, MEASURES, PLATES, Case, measured, written
+from continuum_cases import CASES, MEASURES, PLATES, Case, append, measured, written
 
 from warpimpact import Continuum, Numerics, Record, Scene, Shots, simulate
 from warpimpact.catalogue.flow_entries import flow_entry
 from warpimpact.continuum import meshing, one_hit, strikes
 from warpimpact.kernels.continuum import choices, hexahedra, passing
 
-FIELDS = ("plate", "friction", "model", "hit", "hit_y", "hit_z", "status", "velocity", "tilt_50", "tilt_130", "seconds")
 SCALES = np.array([5.0, 5.0, 10.0])
 """What the continuum's own numerics leave open of each measure, about: misfits count in these."""
 FEWEST = 8
@@ -63,16 +61,6 @@ EFFECTS: dict[str, Changes] = {
     "steps of 0.4 for 0.6 of a crossing": ((choices, "COURANT", choices.COURANT._replace(value=0.4)),),
 }
 """What is changed in the solver, by its words: module, name and value of a constant."""
-
-
-def append(path: Path, row: dict[str, object]) -> None:
-    """Append a row to a table, which begins with the names of its columns."""
-    new = not path.exists()
-    with path.open("a", newline="", encoding="utf-8") as file:
-        writer = csv.DictWriter(file, tuple(row))
-        if new:
-            writer.writeheader()
-        writer.writerow(row)
 
 
 def computed(compute: Callable[[Shots], Any], shots: Shots, hit: int) -> dict[str, object]:

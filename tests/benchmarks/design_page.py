@@ -10,7 +10,6 @@ server and the browser together, which tells more on a busy machine.
 
 from __future__ import annotations
 
-import argparse
 import os
 import shutil
 import statistics
@@ -111,21 +110,18 @@ def measured(driver: Any, between: Callable[[], Any], lengths: Sequence[float]) 
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--changes", type=int, default=CHANGES)
-    asked = parser.parse_args()
     load = os.getloadavg()[0]
     with page(str(CAMPAIGN)) as address, browser() as driver:
         driver.get(address)
         wait(lambda: is_complete(driver))
         first_map(driver, SHORTEST)  # loads what the first change needs
-        lengths = [SHORTEST + STEP * (1 + place) for place in range(2 * asked.changes)]
+        lengths = [SHORTEST + STEP * (1 + place) for place in range(2 * CHANGES)]
         seconds = {
             "rested": measured(driver, lambda: wait(lambda: is_complete(driver)), lengths[::2]),
             "refining": measured(driver, lambda: time.sleep(PAUSE), lengths[1::2]),
         }
     ahead = os.sched_getscheduler(0) != os.SCHED_OTHER
-    told = {"changes": asked.changes, "load_before": load, "ahead_of_other_work": ahead}
+    told = {"changes": CHANGES, "load_before": load, "ahead_of_other_work": ahead}
     store("design_page", {**told, "seconds": seconds, "machine": machine()})
 
 

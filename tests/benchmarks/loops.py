@@ -11,11 +11,10 @@
 
 from __future__ import annotations
 
-import argparse
 import multiprocessing
 import os
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -57,8 +56,8 @@ LIMITS = {  # the pilot of the ogive at round holes takes minutes
     "slotted plate": P80 + SLOTTED.replace("[plate]", BY_PATH) + NORMAL,
 }
 FIT = CHECKOUT / "campaigns" / "fits" / "paper_fit.toml"
-SLOTTED_HITS = 256
-"""Hits of the slotted plate that are timed."""
+SLOTTED_HITS, HITS, EACH, ROUNDS = 256, 64, 64, 3
+"""Hits of the slotted plate that are timed, hits whose limits are searched, hits of a draw, and rounds of the draws."""
 DRAWS, LEVEL = 64, Numerics(level=2)
 
 
@@ -69,34 +68,34 @@ def spent(work: Callable[[], Any]) -> tuple[Any, float]:
     return found, time.process_time() - begin
 
 
-def limit(text: str, hits: int, slotted: float) -> dict[str, Any]:
+def limit(text: str, slotted: float) -> dict[str, Any]:
     """A search of the limit velocities of some hits of a campaign, beside processor time per hit [s]."""
     campaign = campaign_of(text)
-    sought, shots = LimitMap.of(campaign).sought, campaign.sampler().shots(0, hits)
+    sought, shots = LimitMap.of(campaign).sought, campaign.sampler().shots(0, HITS)
     some = shots[: limits_pilot_size(campaign.numerics.asked)]
     pilot_of_limits(campaign.scene, some[:1], sought, campaign.numerics, ONE)  # builds the kernels
     found, pilot = spent(lambda: pilot_of_limits(campaign.scene, some, sought, campaign.numerics, ONE))
     searched, seconds = spent(lambda: limits(campaign.scene, shots, sought, found.numerics, ONE))
-    whole = seconds / hits + pilot / RUN
+    whole = seconds / HITS + pilot / RUN
     return {
         "ratio": whole / slotted,
         "runs": float(searched.runs.mean()),
-        "microseconds_per_hit": 1e6 * seconds / hits,
+        "microseconds_per_hit": 1e6 * seconds / HITS,
         "level": found.numerics.level,
         "kept": found.kept,
         "pilot_share": pilot / RUN / whole,
     }
 
 
-def drawn_scenes(each: int) -> dict[str, Scenes]:
+def drawn_scenes() -> dict[str, Scenes]:
     """Scenes with their shots: one, then what DRAWS draws make of it."""
-    ((scene, shots),) = scenes_of([P80 + SLOTTED + NORMAL], DRAWS * each)
+    ((scene, shots),) = scenes_of([P80 + SLOTTED + NORMAL], DRAWS * EACH)
     spacings = [SLOTTED.replace('["8 mm"', f'["{7.5 + k / DRAWS:.4f} mm"') for k in range(DRAWS)]
     return {
         "one scene": [(scene, shots)],
         "degradation lengths": [(scene, with_lengths(shots, DRAWS))],
         "laws of stress": [(scene, with_laws(shots))],
-        "spacings of the slots": scenes_of([P80 + plate + NORMAL for plate in spacings], each),
+        "spacings of the slots": scenes_of([P80 + plate + NORMAL for plate in spacings], EACH),
     }
 
 
@@ -106,15 +105,15 @@ def with_laws(shots: Shots) -> Shots:
     return replace(shots, static=draws[0], quadratic=draws[1])
 
 
-def draws(each: int, rounds: int) -> dict[str, Any]:
+def draws() -> dict[str, Any]:
     """Cost of a hit of every kind of draw over that of the one scene; the least of some rounds, in turn."""
-    kinds = drawn_scenes(each)
+    kinds = drawn_scenes()
     times: dict[str, list[float]] = {name: [] for name in kinds}
-    for number in range(rounds + 1):  # the first one builds the kernels
+    for number in range(ROUNDS + 1):  # the first one builds the kernels
         for name, scenes in kinds.items():
             forget_tiles()
             _, seconds = spent(lambda scenes=scenes: simulate_many(scenes, LEVEL, ONE))
-            times[name] += [seconds / (DRAWS * each)] if number else []
+            times[name] += [seconds / (DRAWS * EACH)] if number else []
     least = {name: min(of) for name, of in times.items()}
     one = least.pop("one scene")
     return {name: {"ratio": of / one, "hits_per_second": 1.0 / of} for name, of in least.items()}
@@ -136,24 +135,18 @@ def identified(folder: Path) -> dict[str, Any]:
     return {"seconds": seconds, "wall": wall, "effective": effective, "sets": sets}
 
 
-def main(argv: Sequence[str] | None = None) -> None:
+def main() -> None:
     """Measure, print, store."""
-    parser = argparse.ArgumentParser(description="what questions that take many computations cost")
-    parser.add_argument("--hits", type=int, default=64, help="whose limits are searched (default: 64)")
-    parser.add_argument("--each", type=int, default=64, help="hits of a draw (default: 64)")
-    parser.add_argument("--rounds", type=int, default=3, help="of the draws (default: 3)")
-    parser.add_argument("--posterior", type=Path, metavar="FOLDER", help="keep the posterior of the fit there")
-    given = parser.parse_args(argv)
     road = named(ROADS["slotted plate"], SLOTTED_HITS)
-    slotted = min(road.seconds() for _ in range(given.rounds)) + road.pilot / RUN
-    values: dict[str, Any] = {"machine": machine(), "hits": given.hits, "run": RUN, "draws": DRAWS, "each": given.each}
-    values |= {"rounds": given.rounds, "level": LEVEL.level}
-    values["limits"] = {name: limit(text, given.hits, slotted) for name, text in LIMITS.items()}
+    slotted = min(road.seconds() for _ in range(ROUNDS)) + road.pilot / RUN
+    values: dict[str, Any] = {"machine": machine(), "hits": HITS, "run": RUN, "draws": DRAWS, "each": EACH}
+    values |= {"rounds": ROUNDS, "level": LEVEL.level}
+    values["limits"] = {name: limit(text, slotted) for name, text in LIMITS.items()}
     print(values["limits"], flush=True)
-    values["drawn"] = draws(given.each, given.rounds)
+    values["drawn"] = draws()
     print(values["drawn"], flush=True)
     with TemporaryDirectory() as folder:
-        values["identify"] = identified(given.posterior or Path(folder))
+        values["identify"] = identified(Path(folder))
     print(values["identify"], flush=True)
     store("loops", values)
 

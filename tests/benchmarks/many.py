@@ -9,9 +9,8 @@ Processor time is that of one thread; wall time, on all cores, means something o
 
 from __future__ import annotations
 
-import argparse
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
@@ -70,20 +69,17 @@ def seconds(scenes: Scenes, anew: bool, threads: int | None, clock: Callable[[],
     return (clock() - begin) / sum(len(shots) for _, shots in scenes)
 
 
-def main(argv: Sequence[str] | None = None) -> None:
+def main() -> None:
     """Measure, print, store."""
-    parser = argparse.ArgumentParser(description="hits per second of many scenes in one call")
-    parser.add_argument("--rounds", type=int, default=ROUNDS, help=f"of every contender, in turn (default: {ROUNDS})")
-    rounds = parser.parse_args(argv).rounds
     all_of = contenders()
     times: dict[str, list[tuple[float, float]]] = {name: [] for name in all_of}
     for scenes, anew in all_of.values():
         seconds(scenes, anew, None, time.perf_counter)  # builds what is to be built
-    for _ in range(rounds):
+    for _ in range(ROUNDS):
         for name, (scenes, anew) in all_of.items():
             one = seconds(scenes, anew, 1, time.process_time)
             times[name].append((one, seconds(scenes, anew, None, time.perf_counter)))
-    values: dict[str, Any] = {"machine": machine(), "rounds": rounds, "level": LEVEL.level, "contenders": {}}
+    values: dict[str, Any] = {"machine": machine(), "rounds": ROUNDS, "level": LEVEL.level, "contenders": {}}
     reference = [min(of) for of in zip(*next(iter(times.values())), strict=True)]
     for name, rows in times.items():
         least = [min(of) for of in zip(*rows, strict=True)]

@@ -21,7 +21,7 @@ from typing import Any, NamedTuple
 HERE = Path(__file__).resolve().parent
 RESULTS = HERE / "results"
 RUNS: Mapping[str, Sequence[str]] = {
-    "peers": ("peers.py", "--hits", "256"),
+    "peers": ("peers.py",),
     "throughput": ("throughput.py",),
     "roads": ("roads.py",),
     "drawn": ("roads.py", "--seed", "1", "--scenes", "4", "--hits", "64"),
@@ -30,15 +30,7 @@ RUNS: Mapping[str, Sequence[str]] = {
     "overheads": ("overheads.py",),
     "continuum_speed": ("continuum_speed.py",),
     "design_page": ("design_page.py",),
-    "statistics_cost": (
-        "statistics_cost.py",
-        "--seeds",
-        "4",
-        "--hits",
-        "2048",
-        "--output",
-        "results/statistics_cost.json",
-    ),
+    "statistics_cost": ("statistics_cost.py",),
 }
 """The benchmarks behind the page, by the name of their result."""
 KNOWN = {**RUNS, "gpu": ("gpu.py",)}
@@ -74,21 +66,10 @@ def results(folder: Path = RESULTS) -> dict[str, Any]:
 
 def rows(found: Mapping[str, Any]) -> Iterator[Row]:
     """Every row of the table."""
-    for name, of in (
-        ("throughput", _throughput),
-        ("peers", _peers),
-        ("roads", _roads),
-        ("drawn", _drawn),
-        ("loops", _loops),
-        ("many", _many),
-        ("overheads", _overheads),
-        ("continuum_speed", _continuum),
-        ("design_page", _design_page),
-        ("statistics_cost", _statistics),
-        ("gpu", _gpu),
-    ):
-        if name in found:
-            yield from of(found[name])
+    parts = (_throughput, _peers, _roads, _drawn, _loops, _many, _overheads, _continuum_speed, _design_page)
+    for part in (*parts, _statistics_cost, _gpu):
+        if (name := part.__name__.removeprefix("_")) in found:
+            yield from part(found[name])
 
 
 def machines(found: Mapping[str, Any]) -> Iterator[str]:
@@ -241,7 +222,7 @@ def _overheads(values: Mapping[str, Any]) -> Iterator[Row]:
         )
 
 
-def _continuum(values: Mapping[str, Any]) -> Iterator[Row]:
+def _continuum_speed(values: Mapping[str, Any]) -> Iterator[Row]:
     scene, sample = "slotted plate, elements of 0.5 mm", f"median of {values['rounds']} hits at the same place"
     yield Row(
         "a hit by finite elements",
@@ -279,7 +260,7 @@ def _design_page(values: Mapping[str, Any]) -> Iterator[Row]:
         )
 
 
-def _statistics(values: Mapping[str, Any]) -> Iterator[Row]:
+def _statistics_cost(values: Mapping[str, Any]) -> Iterator[Row]:
     sample = f"root mean square over {values['seeds']} seeds, up to {values['hits']} hits"
     for title, questions in values["cost"].items():
         for question, costs in questions.items():

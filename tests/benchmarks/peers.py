@@ -13,7 +13,6 @@ half of these errors, so that it solves another law, or if the two programs of t
 
 from __future__ import annotations
 
-import argparse
 import itertools
 import sys
 import time
@@ -25,18 +24,17 @@ import numba
 import numba_peer
 import numpy as np
 import numpy_peer
-from bench import CHECKOUT, copied, machine, shots_of, store
+import page
+from bench import SCENES, campaign_of, copied, machine, scene_of, shots_of, store
 from floor import measured_peak, work_of
 from random_scenes import FINE, Answer, extrapolated, off, p90, stepped
 
-from warpimpact import Campaign, Numerics, Record, Scene, Shots
+from warpimpact import Campaign, Numerics, Shots
 from warpimpact.solver.pilot import pilot_size
 from warpimpact.solver.resolution import Level
 from warpimpact.solver.simulate import pilot_of, simulate
 from warpimpact.solver.worker import Worker
 
-SCENES = {"slotted plate": "slotted_plate", "round holes": "round_holes", "ogive with a shank": "ogive_core"}
-"""Campaigns by the name of their scene; the first one is that of the literal scheme, too."""
 LEVELS, STANDARD = 6, 2
 """Levels of LADDER, from the coarsest on, and the first one at which standard is looked for."""
 STATED = (1.0, 1.0)
@@ -49,7 +47,8 @@ degrees."""
 COARSEST = {"patches_axial": 8, "patches_around": 12, "travel": 1.0}
 """The setting, with 0.7 cells per degradation length, to compare with programs of the literal scheme. It is still far
 more accurate than they are."""
-LITERAL_HITS, FLOOR_HITS = 128, 8
+HITS, LITERAL_HITS, FLOOR_HITS = 256, 128, 8
+"""Sobol hits over the unit cell; those of the literal scheme, and those whose operations are counted."""
 TIMED = 0.15
 """Processor time of one timed run [s]."""
 ROUNDS = 7
@@ -103,24 +102,21 @@ class Bout(NamedTuple):
         return next(one for one in self.contenders if one.setting == _name(level))
 
 
-def main(argv: Sequence[str] | None = None) -> int:
+def main() -> int:
     """Measure, print, store; returns 1 if something disagrees."""
-    parser = argparse.ArgumentParser(description="warpimpact beside a Numba and a NumPy peer on the same hits")
-    parser.add_argument("--hits", type=int, default=256, help="Sobol hits over the unit cell (default: 256)")
-    hits = parser.parse_args(argv).hits
     peak = measured_peak()
-    bouts = [fight(name, file, hits, peak) for name, file in SCENES.items()]
-    for bout in bouts:
-        print(table(bout))
+    bouts = [fight(name, file, peak) for name, file in SCENES.items()]
     apart = literal_difference(_campaign(SCENES["slotted plate"]))
     print(f"literal scheme, warpimpact against NumPy: {apart[0]:.2g} m/s and {apart[1]:.2g}° apart (90 %)")
     values = {
         "machine": machine() | {"numba": numba.__version__, "numpy": np.__version__},
-        "hits": hits,
+        "hits": HITS,
         "peak_operations_per_second": peak,
         "scenes": {bout.name: summary(bout) for bout in bouts},
         "literal_difference": apart,
     }
+    for row in page.rows({"peers": values}):
+        print(*row, sep=" | ")
     store("peers", values)
     wrong = [bout.name for bout in bouts if excess(bout.ours(STANDARD).error, STATED) > SLACK]
     wrong += [f"Numba on {bout.name}" for bout in bouts if excess(bout.finest_peer.error, STATED) > 0.5]
@@ -131,10 +127,10 @@ def main(argv: Sequence[str] | None = None) -> int:
     return 1 if wrong else 0
 
 
-def fight(name: str, file: str, hits: int, peak: float) -> Bout:
+def fight(name: str, file: str, peak: float) -> Bout:
     """All contenders on one scene: errors, costs, and warpimpact's distance from the floor."""
     campaign = _campaign(file)
-    shots = shots_of(campaign, hits)
+    shots = shots_of(campaign, HITS)
     coarse, truth = (_converged(campaign, shots, level) for level in FINE)
     contenders = [*_warpimpact(campaign), *_numba(campaign)]
     for one in contenders:
@@ -143,7 +139,7 @@ def fight(name: str, file: str, hits: int, peak: float) -> Bout:
         contenders += _literal(campaign, shots, truth)
     measure(contenders, shots)
     pilot = shots_of(campaign, pilot_size(Numerics().asked))
-    taken = pilot_of(_scene(campaign), pilot, Numerics(), Worker("cpu")).numerics.level
+    taken = pilot_of(scene_of(campaign), pilot, Numerics(), Worker("cpu")).numerics.level
     assert taken is not None
     bout = Bout(name, contenders, taken, _error(coarse, truth), {})
     work = work_of(campaign.scene, shots[:FLOOR_HITS], Numerics(level=STANDARD))
@@ -153,19 +149,14 @@ def fight(name: str, file: str, hits: int, peak: float) -> Bout:
 
 def _campaign(file: str) -> Campaign:
     """A campaign whose plate weakens through its thickness, as the peers have no depth of weakening."""
-    campaign = Campaign.from_toml(CHECKOUT / "campaigns" / f"{file}.toml")
+    campaign = campaign_of(file)
     plate = campaign.plate
     through = max(plate.degradation_depth, plate.thickness)
     return campaign.model_copy(update={"plate": plate.model_copy(update={"degradation_depth": through})})
 
 
-def _scene(campaign: Campaign) -> Scene:
-    record = Record(standoffs=campaign.output.standoffs[-1:])
-    return Scene(core=campaign.core, target=campaign.plate, interaction=campaign.interaction, record=record)
-
-
 def _march(campaign: Campaign, numerics: Numerics) -> Callable[[Shots], Answer]:
-    scene = _scene(campaign)
+    scene = scene_of(campaign)
 
     def march(shots: Shots) -> Answer:
         found = simulate(scene, shots, numerics=numerics, device="cpu", threads=1)
@@ -306,22 +297,6 @@ def summary(bout: Bout) -> dict[str, Any]:
         "ratios": ratios(bout),
         "floor": bout.floor,
     }
-
-
-def table(bout: Bout) -> str:
-    """Contenders with errors and costs, the ratios, and the floor."""
-    lines = [f"\n{bout.name:44}{'m/s':>8}{'°':>8}{'µs/hit':>10}    (errors: 90 %)"]
-    for one in bout.contenders:
-        error = f"{one.error[0]:8.3f}{one.error[1]:8.3f}"
-        lines.append(f"{one.program + ' ' + one.setting:44}{error}{1e6 * one.cost:10.1f}")
-    lines.append(f"converged answer: uncertain by {bout.uncertainty[0]:.2g} m/s and {bout.uncertainty[1]:.2g}°")
-    for pair in ratios(bout):
-        errors = f"{pair['residual_velocity_error']:.2f} m/s and {pair['tilt_error']:.2f}°"
-        outside = "" if pair["enclosed"] else " (outside its settings)"
-        lines.append(f"{pair['warpimpact']}: {pair['ratio']:.3g} × Numba at {errors}, {pair['accuracy']}{outside}")
-    floor = bout.floor
-    work = f"{floor['operations']:.3g} operations and {floor['bytes']:.3g} bytes per hit"
-    return "\n".join([*lines, f"standard: {work}, {floor['above_floor']:.3g} times the floor"])
 
 
 if __name__ == "__main__":

@@ -4,18 +4,15 @@ Random points, Sobol points with replicates, those of the irreducible part of th
 draft, and the change to standard over few of them. A half width is that of the 95 % interval from 16 replicates (of
 random points: Student's over the hits), as root mean square over seeds. The cost to a stated half width is interpolated
 between the counts. Run it as a script:
-python tests/benchmarks/statistics_cost.py [CAMPAIGN.toml ...] [--seeds N] [--hits N] [--output FILE.json]
+python tests/benchmarks/statistics_cost.py          # writes results/statistics_cost.json
 """
 
-import argparse
-import json
 import time
 from collections.abc import Callable, Iterator
-from pathlib import Path
 from typing import Any
 
 import numpy as np
-from bench import CHECKOUT, machine
+from bench import campaign_of, machine, store
 from numpy.typing import NDArray
 
 from warpimpact import Campaign, make_shots
@@ -27,8 +24,8 @@ from warpimpact.statistics.tails import worst_tenth
 
 Array = NDArray[np.float64]
 
-CAMPAIGNS = [CHECKOUT / "campaigns" / f"{name}.toml" for name in ("slotted_plate", "round_holes", "oblique_shot")]
-REPLICATES = 16
+CAMPAIGNS = ("slotted_plate", "round_holes", "oblique_shot")
+REPLICATES, SEEDS, HITS = 16, 4, 2048
 FEWEST = 8
 """Fewest hits of a replicate at which a half width is looked at."""
 RATIOS = (2, 4, 8, 16, 32)
@@ -130,18 +127,17 @@ def cost_to(curves: list[dict[int, tuple[float, float]]], target: float) -> floa
     return float(np.exp(cost[first - 1] + share * (cost[first] - cost[first - 1])))
 
 
-def measured(campaign: Campaign, seeds: int, hits: int) -> dict[str, dict[str, float]]:
+def measured(campaign: Campaign) -> dict[str, dict[str, float]]:
     """Cost [s] of every way, by question."""
     simulate(campaign.scene, make_shots(campaign.impact, Hits(count=1), campaign.plate), device="cpu")  # builds kernels
     ways: dict[str, list[Hitting]] = {
-        "random": [Hitting(campaign, hits, seed, sampling="random") for seed in range(seeds)],
-        "sobol": [Hitting(campaign, hits, seed, sampling="sobol") for seed in range(seeds)],
+        way: [Hitting(campaign, HITS, seed, sampling=way) for seed in range(SEEDS)] for way in ("random", "sobol")
     }
     whole = ways["sobol"][0]
     group = symmetries_used(campaign.impact, Hits(count=8, irreducible=True), campaign.plate)
     if len(group) > 1:
         ways[f"irreducible (1 of {len(group)})"] = [
-            Hitting(campaign, hits * len(group), seed, sampling="sobol", irreducible=True) for seed in range(seeds)
+            Hitting(campaign, HITS * len(group), seed, sampling="sobol", irreducible=True) for seed in range(SEEDS)
         ]
     table: dict[str, dict[str, float]] = {}
     for name, (question, target, relative) in QUESTIONS.items():
@@ -160,27 +156,11 @@ def measured(campaign: Campaign, seeds: int, hits: int) -> dict[str, dict[str, f
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("campaigns", nargs="*", default=CAMPAIGNS)
-    parser.add_argument("--seeds", type=int, default=6)
-    parser.add_argument("--hits", type=int, default=4096)
-    parser.add_argument("--output", type=Path)
-    asked = parser.parse_args()
     tables: dict[str, Any] = {}
-    for path in asked.campaigns:
-        campaign = Campaign.from_toml(path)
-        tables[campaign.title] = measured(campaign, asked.seeds, asked.hits)
-        print(campaign.title)
-        for question, row in tables[campaign.title].items():
-            print(f"  {question}")
-            for way, cost in row.items():
-                unit = "" if "per" in way else " ms of processor time"
-                print(f"    {way:45} {cost if not unit else 1e3 * cost:9.4g}{unit}")
-    if asked.output:
-        about = {"machine": machine(), "seeds": asked.seeds, "hits": asked.hits}
-        asked.output.write_text(
-            json.dumps(about | {"cost": tables}, indent=1, ensure_ascii=False) + "\n", encoding="utf-8"
-        )
+    for campaign in map(campaign_of, CAMPAIGNS):
+        tables[campaign.title] = measured(campaign)
+        print(campaign.title, tables[campaign.title], flush=True)
+    store("statistics_cost", {"machine": machine(), "seeds": SEEDS, "hits": HITS, "cost": tables})
 
 
 if __name__ == "__main__":

@@ -9,45 +9,40 @@ cost beside the slotted plate: roads.py.
 
 from __future__ import annotations
 
-import argparse
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
-from bench import CHECKOUT, copied, cores, machine, shots_of, store
+from bench import SCENES, campaign_of, copied, cores, machine, scene_of, shots_of, store
 
 from warpimpact import Campaign, Numerics, Scene, Shots
 from warpimpact.solver.simulate import simulate
 
-SCENES = {"slotted plate": "slotted_plate", "round holes": "round_holes", "ogive with a shank": "ogive_core"}
-"""Campaigns by the name of their scene."""
 TIMED = 0.4
 """Processor time of one timed run [s]."""
 ROUNDS = 5
 """Runs of each contender, in turn with the others."""
-LEVELS = (0, 2, 6)
+LEVELS, HITS = (0, 2, 6), 1024
+"""Levels of LADDER, and Sobol hits over the unit cell."""
 FEWEST = 64
 """Hits of a timed run at least; the scenes are drawn over the unit cell."""
 
 Work = Callable[[Shots], Any]
 
 
-def main(argv: Sequence[str] | None = None) -> None:
+def main() -> None:
     """Measure, print, store."""
-    parser = argparse.ArgumentParser(description="hits per second of levels")
-    parser.add_argument("--hits", type=int, default=1024, help="Sobol hits over the unit cell (default: 1024)")
-    hits = parser.parse_args(argv).hits
-    values: dict[str, Any] = {"machine": machine(), "hits": hits, "rounds": ROUNDS, "scenes": {}}
+    values: dict[str, Any] = {"machine": machine(), "hits": HITS, "rounds": ROUNDS, "scenes": {}}
     for name, file in SCENES.items():
-        values["scenes"][name] = rates(_campaign(file), hits)
+        values["scenes"][name] = rates(campaign_of(file))
         print(name, values["scenes"][name])
     store("throughput", values)
 
 
-def rates(campaign: Campaign, hits: int) -> dict[str, dict[str, float]]:
+def rates(campaign: Campaign) -> dict[str, dict[str, float]]:
     """Hits per second of some levels: of one core, and on all cores."""
-    scene, shots = _scene(campaign), shots_of(campaign, hits)
+    scene, shots = scene_of(campaign), shots_of(campaign, HITS)
     found: dict[str, dict[str, float]] = {}
     for level in LEVELS:
         alone, together = (_march(scene, Numerics(level=level), threads) for threads in (1, None))
@@ -63,16 +58,6 @@ def rates(campaign: Campaign, hits: int) -> dict[str, dict[str, float]]:
             wall.append(_seconds(together, many, time.perf_counter) / len(many))
         found[f"level {level}"] = {"one_core": 1.0 / float(np.median(one)), "all_cores": 1.0 / float(np.median(wall))}
     return found
-
-
-def _campaign(file: str) -> Campaign:
-    return Campaign.from_toml(CHECKOUT / "campaigns" / f"{file}.toml")
-
-
-def _scene(campaign: Campaign) -> Scene:
-    """The scene with its last stand-off alone, as the peers have it."""
-    record = campaign.scene.record.model_copy(update={"standoffs": campaign.output.standoffs[-1:]})
-    return campaign.scene.model_copy(update={"record": record})
 
 
 def _march(scene: Scene, numerics: Numerics, threads: int | None) -> Work:

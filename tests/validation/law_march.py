@@ -30,27 +30,20 @@ class Near:
     """What is near a surface element. Lengths are in metres.
 
     Attributes:
-        face, edge: distance along the normal to a face of the plate, and to the edge of a hole.
-        nearest_face, nearest_edge: the same, at all.
         ahead: distance in the plane of the plate along the normal to the edge of a hole; 0 in a hole.
         gap: way back through a hole to material that the core has pushed into it; 0 in material, the radius or more
             where there is none.
         carried: length of material behind the element that the core has pushed ahead of it, at most the radius.
-        radius, widest: of the core there, and at most.
+        radius: of the core there.
         thickness: of the plate.
         closing: speed of the element along its normal [m/s].
         attack: closing speed over the speed of the core: the sine of the angle of attack, if the core does not turn.
     """
 
-    face: real
-    edge: real
-    nearest_face: real
-    nearest_edge: real
     ahead: real
     gap: real
     carried: real
     radius: real
-    widest: real
     thickness: real
     closing: real
     attack: real
@@ -67,19 +60,6 @@ def distance_at(tile: wp.array2d(dtype=real), cell: wp.vec2d, y: real, z: real):
     k, m = (i + 1) % rows, (j + 1) % columns
     one = real(1.0)
     return (one - b) * ((one - c) * tile[i, j] + c * tile[i, m]) + b * ((one - c) * tile[k, j] + c * tile[k, m])
-
-
-@wp.func
-def edge_along(tile: wp.array2d(dtype=real), cell: wp.vec2d, y: real, z: real, unit_y: real, unit_z: real):
-    """Distance in the plane of the plate from a point to an edge in a direction [m], at most FAR."""
-    way = wp.max(distance_at(tile, cell, y, z), real(0.0))
-    left = real(1.0) * way
-    tries = int(0)
-    while tries < 16 and way < real(FAR) and left > real(2e-5):
-        left = distance_at(tile, cell, y + way * unit_y, z + way * unit_z)
-        way += wp.max(left, real(2e-5))
-        tries += 1
-    return wp.where(left > real(2e-5), real(FAR), wp.min(way, real(FAR)))
 
 
 @wp.func
@@ -170,7 +150,6 @@ def built(law: Any, pushes: bool = False, lip: float = 0.0) -> Any:
                         share *= wp.clamp(half + half * (thickness + bulge - x[0]) / (length + bulge), zero, one)
                         y, z = x[1] + hits[i, 0], x[2] + hits[i, 1]
                         if share > zero:
-                            inside = distance_at(tile, cell, y, z)
                             near = Near()
                             if wp.static(pushes):
                                 wide = wp.max(wp.sqrt(normal[1] * normal[1] + normal[2] * normal[2]), real(1e-6))
@@ -188,16 +167,9 @@ def built(law: Any, pushes: bool = False, lip: float = 0.0) -> Any:
                                 )
                                 near.ahead = way_through(tile, cell, y, z, to_y, to_z, one, real(FAR))
                             else:
+                                inside = distance_at(tile, cell, y, z)
                                 share *= wp.clamp(inside / real(EDGE) + half, zero, one)
-                            depth = wp.clamp(x[0], zero, thickness)
-                            steep = wp.max(wp.abs(normal[0]), real(1e-3))
-                            flat = wp.max(wp.sqrt(normal[1] * normal[1] + normal[2] * normal[2]), real(1e-3))
-                            near.face = wp.where(normal[0] > zero, thickness - depth, depth) / steep
-                            near.edge = edge_along(tile, cell, y, z, normal[1] / flat, normal[2] / flat) / flat
-                            near.nearest_face = wp.min(depth, thickness - depth)
-                            near.nearest_edge = wp.max(inside, zero)
                             near.radius = radius
-                            near.widest = body[5]
                             near.thickness = thickness
                             near.closing = closing
                             near.attack = closing / speed

@@ -11,7 +11,7 @@ import pandas as pd
 from warpimpact.campaign.tested import nose_length
 from warpimpact.catalogue.catalogue import FOLDERS, HERE, file_name
 from warpimpact.catalogue.entries import Material
-from warpimpact.catalogue.strength import FIT_FILE, HEAVY, NINETY, Plates, limit_fit
+from warpimpact.catalogue.strength import FIT_FILE, NINETY, Plates, limit_fit
 
 from .limit_model import Fit, packaged
 from .limit_rows import PROJECTILES, Rows, core, published
@@ -85,13 +85,12 @@ def _entry(rows: Rows, found: Fit, name: str, predicted: pd.DataFrame) -> str:
 def figures(rows: Rows, predicted: pd.DataFrame) -> dict[str, dict[str, float]]:
     """Errors of what the model fails at, for the sentences of a campaign (warpimpact/campaign/tested.py)."""
     error = predicted["predicted"] / predicted["published"] - 1.0
-    of, steel = predicted["split"], rows.density[predicted["row"]] > HEAVY
+    of, steel = predicted["split"], rows.steel[predicted["row"]]
     in_steel, in_aluminium = (error[(of == CARBIDE) & which] for which in (steel, ~steel))
-    steel_plates = rows.density > HEAVY
     found = {
         "core": _cores(rows),
-        "steel": _range(rows[steel_plates]),
-        "aluminium": _range(rows[~steel_plates]),
+        "steel": _range(rows[rows.steel]),
+        "aluminium": _range(rows[~rows.steel]),
         "thin hard steel": thin_hard_steel(rows),
         "carbide": {
             "steel": in_steel.median(),
@@ -133,7 +132,7 @@ def _range(rows: Rows) -> dict[str, float]:
 
 def thin_hard_steel(rows: Rows) -> dict[str, float]:
     """Share of its Y at one calibre that hard steel has at the thickness of the thinnest row; the median of steels."""
-    thin = rows[(rows.density > HEAVY) & (rows.hardness >= HARD) & (rows.calibres < THIN)]
+    thin = rows[rows.steel & (rows.hardness >= HARD) & (rows.calibres < THIN)]
     shares = []
     for name in dict.fromkeys(thin.material.tolist()):
         of_it = thin[thin.material == name]

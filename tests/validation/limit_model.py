@@ -10,7 +10,7 @@ decomposition.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field, fields, replace
 from typing import Any
 
 import numpy as np
@@ -256,8 +256,8 @@ def fit(rows: Rows, law: Law = CHOSEN, *, rounds: int = 3) -> Fit:
 def plates_of(rows: Rows) -> Plates:
     """The plates of rows; flow stress and hardness are the means of their material."""
     flow, hardness = (_mean_of(rows.material, values) for values in (rows.flow_stress, rows.hardness))
-    names = ("projectile", "bare", "material", "source", "thickness", "calibres", "obliquity", "density")
-    return Plates(**{name: getattr(rows, name) for name in names}, flow_stress=flow, hardness=hardness)
+    plates = {field.name: getattr(rows, field.name) for field in fields(Plates)}
+    return Plates(**plates | {"flow_stress": flow, "hardness": hardness})
 
 
 def packaged(rows: Rows, found: Fit) -> dict[str, Any]:

@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline, PchipInterpolator
 
 from warpimpact.catalogue.catalogue import Catalogue
+from warpimpact.catalogue.strength import Plates
 from warpimpact.scene import Core, Interaction, Numerics, Plate, Scene, Shots
 from warpimpact.solver.limit import limit_velocity
 
@@ -49,32 +50,16 @@ HIGHEST_OBLIQUITY = 45.0
 
 
 @dataclass(frozen=True)
-class Rows:
-    """Rows of the table of limit velocities; arrays of shape [rows].
+class Rows(Plates):
+    """Rows of the table of limit velocities: plates as they are published; arrays of shape [rows].
 
     Attributes:
-        projectile: name in the catalogue; `bare` says of which rows it is the core alone.
-        material, source: as they are published.
-        thickness: of the plate [m].
-        obliquity: [rad].
         velocity: published limit velocity [m/s].
         deviation: its measured standard deviation [m/s]; NaN where there is none.
-        density: of the plate [kg/m³].
-        flow_stress: mean of yield and tensile strength of the plate [Pa].
-        hardness: of the plate, Vickers.
     """
 
-    projectile: NDArray[np.str_]
-    bare: NDArray[np.bool_]
-    material: NDArray[np.str_]
-    source: NDArray[np.str_]
-    thickness: Array
-    obliquity: Array
     velocity: Array
     deviation: Array
-    density: Array
-    flow_stress: Array
-    hardness: Array
 
     def __len__(self) -> int:
         """Number of rows."""
@@ -87,17 +72,17 @@ class Rows:
     @property
     def diameter(self) -> Array:
         """Of the cores [m]."""
-        return np.array([2.0 * core(name).max_radius for name in self.projectile])
+        return diameters(self.projectile)
 
     @property
     def mass(self) -> Array:
         """Of the cores [kg]."""
         return np.array([core(name).mass_properties.mass for name in self.projectile])
 
-    @property
-    def calibres(self) -> Array:
-        """Thickness over diameter of the core."""
-        return self.thickness / self.diameter
+
+def diameters(projectiles: NDArray[np.str_]) -> Array:
+    """Of the cores of projectiles [m]."""
+    return np.array([2.0 * core(name).max_radius for name in projectiles])
 
 
 @cache
@@ -122,12 +107,14 @@ def published(file: Path = PUBLISHED) -> Rows:
         raise ValueError(f'{file}: got the projectile "{foreign[0]}", but it must be one of {", ".join(PROJECTILES)}')
     if (data["obliquity_deg"] > HIGHEST_OBLIQUITY).any():
         raise ValueError(f"{file}: got an obliquity above {HIGHEST_OBLIQUITY:g} deg, which the table does not reach")
+    thickness = data["thickness_mm"].to_numpy(float) * 1e-3
     return Rows(
         projectile=names.to_numpy(np.str_),
         bare=bare,
         material=data["material"].to_numpy(np.str_),
         source=data["source"].to_numpy(np.str_),
-        thickness=data["thickness_mm"].to_numpy(float) * 1e-3,
+        thickness=thickness,
+        calibres=thickness / diameters(names.to_numpy(np.str_)),
         obliquity=np.radians(data["obliquity_deg"].to_numpy(float)),
         velocity=data["limit_velocity_m_s"].to_numpy(float),
         deviation=data["standard_deviation_m_s"].to_numpy(float),

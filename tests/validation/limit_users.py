@@ -38,8 +38,7 @@ def campaign_of(rows: Rows, row: int) -> Campaign:
 
 def predicted(rows: Rows, row: int) -> tuple[float, float, float]:
     """Limit velocity [m/s] and the ends of its 90 % interval, as a user gets them where the row is not known."""
-    whole, steel = strength.limit_fit, bool(rows.density[row] > strength.HEAVY)
-    without = _without(rows, row, steel)
+    whole, without = strength.limit_fit, _without(rows, row, bool(rows.steel[row]))
     strength.limit_fit = lambda material: without
     try:
         campaign = campaign_of(rows, row)
@@ -66,7 +65,7 @@ def every_row(rows: Rows) -> pd.DataFrame:
     several = [row for row in range(len(rows)) if (rows.material == rows.material[row]).sum() > 1]
     answers = np.array([predicted(rows, row) for row in several]).round(1)
     kept = replace(rows, **{name: values[np.array(several)] for name, values in vars(rows).items()})
-    metal = np.where(kept.density <= strength.HEAVY, "aluminium", np.where(kept.hardness < HARD, "steel", "hard steel"))
+    metal = np.where(~kept.steel, "aluminium", np.where(kept.hardness < HARD, "steel", "hard steel"))
     columns = {
         "row": several,
         "projectile": kept.projectile,

@@ -33,7 +33,9 @@ def found() -> Fit:
 
 def plate(projectile: str, calibres: float, angle: float) -> Rows:
     first = published()[np.array([0])]
-    row = replace(first, projectile=np.array([projectile]), obliquity=np.radians([angle]))
+    row = replace(
+        first, projectile=np.array([projectile]), obliquity=np.radians([angle]), calibres=np.array([calibres])
+    )
     return replace(row, thickness=calibres * row.diameter, density=row.mass / row.diameter**3)
 
 

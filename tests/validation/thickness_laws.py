@@ -18,8 +18,6 @@ import numpy as np
 from .limit_rows import Array, Rows, core, published
 
 DENSITY = {"steel": 7850.0, "aluminium": 2700.0}
-HEAVY = 5000.0
-"""Density that parts them [kg/m³]."""
 STATIONS, DEPTHS = 200, 160
 ALIKE, LEAST_ROWS, SPREAD = 0.05, 3, 1.3
 """Relative difference up to which thicknesses are one; rows of a group, and its largest thickness over its least."""
@@ -86,13 +84,12 @@ def limits(nose: Nose, form: Form, strengths: Array, thickness: float, cosine: f
 
 def groups(rows: Rows, metal: str) -> Iterator[Array]:
     """Rows of one projectile, material and angle of several thicknesses."""
-    steel = rows.density > HEAVY
     labels = [
         f"{a}|{b}|{c}|{d:.0f}"
         for a, b, c, d in zip(rows.projectile, rows.bare, rows.material, np.degrees(rows.obliquity), strict=True)
     ]
     for label in dict.fromkeys(labels):
-        chosen = np.flatnonzero((np.array(labels) == label) & (steel == (metal == "steel")))
+        chosen = np.flatnonzero((np.array(labels) == label) & (rows.steel == (metal == "steel")))
         if len(chosen) >= LEAST_ROWS and np.ptp(np.log(rows.thickness[chosen])) > np.log(SPREAD):
             yield chosen
 
