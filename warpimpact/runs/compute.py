@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import math
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, ClassVar
 
@@ -13,13 +13,13 @@ from warpimpact.campaign.campaign import Campaign
 from warpimpact.campaign.references import at_base_alone, at_solid
 from warpimpact.records.outcomes import Outcomes
 from warpimpact.results import attributes as attr
-from warpimpact.results.dataset import base_alone_columns, finer_columns, solid_columns
+from warpimpact.results.dataset import base_alone_columns, solid_columns
 from warpimpact.results.table import HitTable
 from warpimpact.runs.assumed import assumed
-from warpimpact.runs.describe import computed_by, described, found_attributes
+from warpimpact.runs.describe import described
 from warpimpact.runs.levels import aim_of, level_for, shifts_of
 from warpimpact.runs.pilot_hits import pilot_most, pilot_shots
-from warpimpact.runs.task import Task
+from warpimpact.runs.task import Report, Task
 from warpimpact.scene import Numerics, Scene, Shots
 from warpimpact.solver.device import find_device
 from warpimpact.solver.findings import Found, HitErrors
@@ -43,24 +43,24 @@ class HitMap:
     content: ClassVar[Mapping[str, str]] = {}
     measures: ClassVar[Sequence[str]] = ()
 
-    def compute(self, campaign: Campaign, task: Task, worker: Worker, progress: Progress | None = None) -> HitTable:
+    def compute(self, campaign: Campaign, task: Task, worker: Worker, report: Report = lambda done: None) -> HitTable:
         """See `compute`."""
-        return compute(campaign, task, worker, progress)
+        return compute(campaign, task, worker, report)
 
-    def assumed(self, campaign: Campaign, findings: Found | None, worker: Worker) -> HitTable:
+    def assumed(
+        self, campaign: Campaign, findings: Found | None, worker: Worker, report: Report = lambda done: None
+    ) -> HitTable:
         """See `Computation.assumed`."""
         numerics = numerics_of(campaign, findings)
         return assumed(campaign, numerics, lambda scenes: simulate_many(scenes, numerics, worker))
 
-    def pilot(
-        self, campaign: Campaign, worker: Worker, trying: Callable[[int], object] = lambda level: None
-    ) -> HitErrors | None:
-        """The findings of a pilot with hits of the campaign; None if the campaign fixes the resolution."""
+    def pilot(self, campaign: Campaign, worker: Worker, report: Report = lambda level: None) -> HitErrors | None:
+        """See `Computation.pilot`."""
         if campaign.numerics.explicit is not None:
             return None
         pilot, numbers = pilot_shots(campaign, pilot_most(campaign))
         hits = len(campaign.sampler()) // len(campaign.symmetries)
-        errors = pilot_of(campaign.scene, pilot, campaign.numerics, worker, trying, aim_of(campaign, hits), hits)
+        errors = pilot_of(campaign.scene, pilot, campaign.numerics, worker, report, aim_of(campaign, hits), hits)
         return replace(errors, shifts=shifts_of(campaign, pilot, errors), tried=(), numbers=numbers)
 
     def found_in(self, result: Result) -> HitErrors | None:
@@ -81,12 +81,9 @@ class HitMap:
 HIT_MAP = HitMap()
 
 
-def compute(campaign: Campaign, task: Task, worker: Worker, progress: Progress | None = None) -> HitTable:
+def compute(campaign: Campaign, task: Task, worker: Worker, report: Report = lambda done: None) -> HitTable:
     """Compute some shots of a campaign. If the campaign uses symmetry, only the first shot of each group of images is
     computed.
-
-    Args:
-        progress: as in `simulate`.
 
     Returns:
         The columns of results/dataset.py, one entry per shot. They are a complete result.
@@ -95,25 +92,14 @@ def compute(campaign: Campaign, task: Task, worker: Worker, progress: Progress |
         DeviceError: the device is absent.
     """
     images, numerics = len(campaign.symmetries), numerics_of(campaign, task.findings)
-    progress = of_images(progress, images)
-    outcomes, elapsed = _outcomes(campaign.scene, task.shots[::images], numerics, worker, progress)
-    beside = finer_hits(campaign, task.findings)
+    outcomes, elapsed = _outcomes(campaign.scene, task.shots[::images], numerics, worker, of_images(report, images))
+    beside = dict[str, Any]()
     if task.solid is not None:
         beside |= solid_columns(_outcomes(*at_solid(campaign, task.solid), numerics, worker)[0])
         if campaign.layer:
             beside |= base_alone_columns(_outcomes(*at_base_alone(campaign, task.solid), numerics, worker)[0])
-    attributes = computed_by(campaign, worker.device, len(outcomes), elapsed)
-    attributes |= found_attributes(campaign.numerics.asked, task.findings) | _errors(task.findings)
-    attributes |= {attr.LEVEL_FOR: what} if (what := level_for(campaign)) else {}
-    return described(campaign, task.shots, outcomes, numerics, attributes, beside)
-
-
-def finer_hits(campaign: Campaign, findings: Found | None) -> dict[str, Any]:
-    """Columns of the hits that a pilot computed at a finer level."""
-    if findings is None or findings.finer is None or findings.numbers is None:
-        return {}
-    finer = findings.finer.unfolded(campaign.symmetries)
-    return finer_columns(finer, findings.numbers[: len(finer)])
+    attributes = _errors(task.findings) | ({attr.LEVEL_FOR: what} if (what := level_for(campaign)) else {})
+    return described(campaign, task, outcomes, numerics, (worker.device, elapsed), attributes, beside)
 
 
 def numerics_of(campaign: Campaign, findings: Found | None) -> Numerics:
@@ -121,9 +107,9 @@ def numerics_of(campaign: Campaign, findings: Found | None) -> Numerics:
     return campaign.numerics if findings is None else findings.numerics
 
 
-def of_images(progress: Progress | None, images: int) -> Progress | None:
-    """Progress in hits, where each group of `images` hits is computed as one."""
-    return progress and (lambda done, total: progress(done * images, total * images))
+def of_images(report: Report, images: int) -> Progress:
+    """Reports hits where each group of `images` hits is computed as one."""
+    return lambda done, total: report(done * images)
 
 
 def found_in(result: Result) -> tuple[Numerics, bool, float]:

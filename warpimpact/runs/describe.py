@@ -13,8 +13,9 @@ from warpimpact.campaign.references import has_solid, solid_target
 from warpimpact.records.outcomes import Outcomes
 from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
-from warpimpact.results.dataset import to_table
+from warpimpact.results.dataset import finer_columns, to_table
 from warpimpact.results.table import HitTable
+from warpimpact.runs.task import Task
 from warpimpact.scene import Accuracy, Burst, Impact, Numerics, Shots, Target
 from warpimpact.scene.quantities import QUANTITIES
 from warpimpact.solver.device import find_device
@@ -25,26 +26,38 @@ from warpimpact.solver.resolution import Resolution, resolve
 
 def described(
     campaign: Campaign,
-    shots: Shots,
+    task: Task,
     outcomes: Outcomes,
     numerics: Numerics,
+    computed: tuple[str, float],
     attributes: Mapping[str, Any],
-    beside: Mapping[str, Any] | None = None,
+    beside: Mapping[str, Any],
 ) -> HitTable:
-    """The columns of some shots of a campaign.
+    """The columns of a task.
 
     Args:
-        shots: whole groups of images.
+        task: with whole groups of images.
         outcomes: outcomes of the first shot of every group.
         numerics: numerics of the computation.
-        attributes: attributes on how it was computed (`computed_by`), and further ones.
-        beside: columns of other shots, as in `to_table`.
+        computed: its device, and its time [s].
+        attributes: attributes of this kind of computation.
+        beside: columns of other shots, beside those that the pilot computed at a finer level.
     """
-    resolution = resolve(campaign.scene, numerics, weakens(campaign.target, shots))
+    resolution = resolve(campaign.scene, numerics, weakens(campaign.target, task.shots))
     told = _numerics(campaign.numerics, campaign.impact, campaign.target, resolution)
     told |= {attr.EVIDENCE: "\n".join(lines)} if (lines := evidence_of(campaign)) else {}
-    unfolded = outcomes.unfolded(campaign.symmetries)
-    return described_as(campaign, shots, unfolded, {**told, **attributes}, beside, double=is_double(campaign))
+    told |= computed_by(campaign, computed[0], len(outcomes), computed[1])
+    told |= _found(campaign.numerics.asked, task.findings)
+    unfolded, beside = outcomes.unfolded(campaign.symmetries), {**_finer_hits(campaign, task.findings), **beside}
+    return described_as(campaign, task.shots, unfolded, {**told, **attributes}, beside, double=is_double(campaign))
+
+
+def _finer_hits(campaign: Campaign, findings: Found | None) -> dict[str, Any]:
+    """Columns of the hits that a pilot computed at a finer level."""
+    if findings is None or findings.finer is None or findings.numbers is None:
+        return {}
+    finer = findings.finer.unfolded(campaign.symmetries)
+    return finer_columns(finer, findings.numbers[: len(finer)])
 
 
 def described_as(
@@ -52,7 +65,7 @@ def described_as(
     shots: Shots,
     outcomes: Outcomes,
     attributes: Mapping[str, Any],
-    beside: Mapping[str, Any] | None,
+    beside: Mapping[str, Any],
     *,
     double: bool,
 ) -> HitTable:
@@ -98,7 +111,7 @@ def computed_by(campaign: Campaign, device: str, computed: int, elapsed: float) 
     return attributes
 
 
-def found_attributes(asked: Accuracy, findings: Found | None) -> dict[str, Any]:
+def _found(asked: Accuracy, findings: Found | None) -> dict[str, Any]:
     """Attributes on the accuracy that a pilot was asked for, and on its findings; none without a pilot. The kind of
     computation adds the errors."""
     if findings is None:

@@ -9,12 +9,11 @@ import warnings
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from warpimpact.campaign.campaign import Campaign
-from warpimpact.campaign.continuum_settings import FiniteElements
 from warpimpact.campaign.references import at_solid
 from warpimpact.continuum.many_hits import MOST
 from warpimpact.continuum.strikes import check_continuum, struck
@@ -83,9 +82,12 @@ def _computed(
     campaign: Campaign, hits: tuple[int, ...] | None, device: str, progress: Callable[[int, int, int], object]
 ) -> Question[xarray.Dataset]:
     """The result of the hits of some numbers; where they are all, the first one of each group of images is computed."""
-    sampler, elements, images = campaign.sampler(), campaign.continuum, hits is None
+    sampler, elements = campaign.sampler(), campaign.continuum
     continuum, numbers = elements.solver, range(len(sampler)) if hits is None else hits
-    group, together = len(campaign.symmetries) if images else 1, 1 if device == "cpu" else MOST
+    unique = campaign  # of hits that are given by their numbers, none is an image of another
+    if hits is not None:
+        unique = campaign.model_copy(update={"hits": campaign.hits.model_copy(update={"irreducible": False})})
+    group, together = len(unique.symmetries), 1 if device == "cpu" else MOST
     shots = Shots.joined([sampler.shots(int(number), 1) for number in numbers])
     computed = shots[::group]
     asked = [(campaign.scene, computed[k : k + together], continuum) for k in range(0, len(computed), together)]
@@ -104,9 +106,7 @@ def _computed(
     outcomes = [Outcomes(**{name: values for name, values in row.items() if name != SECONDS}) for row in results]
     beside = {} if solid is None else solid_columns(outcomes.pop())
     elapsed = float(sum(float(row[SECONDS][0]) for row in results))
-    told = (
-        computed_by(campaign, "cpu", len(computed), elapsed) if images else _computed_alone(campaign, computed, elapsed)
-    )
+    told = computed_by(unique, "cpu", len(computed), elapsed)
     told |= {} if device == "cpu" else {attr.DEVICE: device}
     told |= {
         attr.CONTINUUM: json.dumps(
@@ -114,31 +114,21 @@ def _computed(
         ),
         attr.NUMERICS: elements.words,
         attr.PRECISION: "single",
-        attr.EVIDENCE: "\n".join([f"{attr.RESTS_ON}{elements.words}", *_evidence(elements)]),
+        attr.EVIDENCE: "\n".join(
+            [f"{attr.RESTS_ON}{elements.words}", *(f"{entry.name}: {entry.evidence}" for entry in elements.entries)]
+        ),
     }
     table = described_as(
         with_ligament(campaign, worker=Worker("cpu"), report=lambda now: None),
         shots,
-        Outcomes.joined(outcomes).unfolded(campaign.symmetries if images else campaign.symmetries[:1]),
+        Outcomes.joined(outcomes).unfolded(unique.symmetries),
         told,
         beside,
         double=True,
     )
-    if not images:
+    if hits is not None:
         table = table.assign_coords(stored_columns((v.HIT,), {v.HIT: np.array(numbers, dtype=np.int32)}))
     return in_memory(table.to_xarray())
-
-
-def _evidence(elements: FiniteElements) -> list[str]:
-    return [f"{entry.name}: {entry.evidence}" for entry in elements.entries]
-
-
-def _computed_alone(campaign: Campaign, shots: Shots, elapsed: float) -> dict[str, Any]:
-    """Who computed hits of which none is an image of another."""
-    told = computed_by(campaign, "cpu", len(shots), elapsed)
-    return {
-        name: value for name, value in told.items() if name not in (attr.SYMMETRIES, attr.IMAGES, attr.COMPUTED_HITS)
-    }
 
 
 def _key(scene: Scene, shots: Shots, continuum: Continuum) -> str:

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import warnings
+from collections.abc import Callable
+from functools import cache
 
 from warpimpact.campaign.campaign import Campaign
 from warpimpact.scene import Numerics
@@ -19,35 +21,31 @@ class Costly(UserWarning):
     """A computation that takes far longer than usual."""
 
 
-class Cost:
-    """Warns (`Costly`), once at each resolution, of hits or bursts that take more than SLOW on a CPU.
+def cost_warning(campaign: Campaign, device: str, passages: int = 1) -> Callable[[Numerics], None]:
+    """Return a function that warns (`Costly`), once for each numerics, of hits or bursts that are slow on a CPU.
 
     Args:
         device: kind of the device.
-        passages: as in `Computation`.
+
+    Raises:
+        TooManySteps, MemoryError: (the function) as in `prepare`.
     """
 
-    def __init__(self, campaign: Campaign, device: str, passages: int = 1) -> None:
-        self._campaign, self._told, self._by_cpu = campaign, list[Numerics](), device == "cpu"
-        self._passages = passages
-
-    def tell(self, numerics: Numerics) -> None:
-        """Warn of the cost of hits with numerics that fix the resolution. An unhindered first hit of the campaign
-        stands for all.
-
-        Raises:
-            TooManySteps, MemoryError: as in `prepare`.
-        """
-        if not self._by_cpu or numerics in self._told:
-            return
-        self._told.append(numerics)
-        sentence = cost_of(self._campaign, numerics, self._passages)
-        if sentence is not None:
+    @cache
+    def warn(numerics: Numerics) -> None:
+        if device == "cpu" and (sentence := cost_of(campaign, numerics, passages)) is not None:
             warnings.warn(sentence, Costly, stacklevel=2)
+
+    return warn
 
 
 def cost_of(campaign: Campaign, numerics: Numerics, passages: int = 1) -> str | None:
-    """A sentence about the cost of hits; None where it is low."""
+    """A sentence about the cost of hits on a CPU, with numerics that fix the resolution; None where it is low. An
+    unhindered first hit of the campaign stands for all.
+
+    Args:
+        passages: as in `Computation`.
+    """
     sampler, images = campaign.sampler(), len(campaign.symmetries)
     shots = sampler.shots(0, images * campaign.at_a_plate)[::images]
     prepared = prepare(campaign.scene, shots, numerics)

@@ -1,4 +1,4 @@
-"""The jobs of a run: its pilot, its hits under assumptions, and its tasks of shots."""
+"""The tasks of a run: which shots are computed together, and the shards that they give."""
 
 from __future__ import annotations
 
@@ -14,9 +14,7 @@ from warpimpact.results.dataset import images, numbered
 from warpimpact.results.table import HitTable
 from warpimpact.runs.executor import Executor
 from warpimpact.runs.shards import Shards
-from warpimpact.runs.task import Computation, Task
 from warpimpact.scene import Shots
-from warpimpact.solver.findings import Found
 from warpimpact.solver.worker import Worker
 
 CUDA_SHOTS = 2**17
@@ -31,36 +29,6 @@ def with_ligament(campaign: Campaign, *, worker: Worker, report: Callable[[int],
     states it."""
     _ = campaign.plate.ligament
     return campaign
-
-
-def pilot_job(
-    computation: Computation, campaign: Campaign, *, worker: Worker, report: Callable[[int], object]
-) -> Found | None:
-    """Run the pilot of a campaign; reports the levels that it computes."""
-    return computation.pilot(campaign, worker, report)
-
-
-def assumed_job(
-    computation: Computation,
-    campaign: Campaign,
-    findings: Found | None,
-    *,
-    worker: Worker,
-    report: Callable[[int], object],
-) -> HitTable:
-    """Compute some hits of a campaign under assumptions; reports nothing."""
-    return computation.assumed(campaign, findings, worker)
-
-
-def task_job(
-    computation: Computation, campaign: Campaign, task: Task, *, worker: Worker, report: Callable[[int], object]
-) -> HitTable:
-    """Compute the columns of the shots of a task; reports how many shots are done."""
-
-    def progress(done: int, total: int) -> None:
-        report(done)
-
-    return computation.compute(campaign, task, worker, progress)
 
 
 def task_size(executor: Executor, rate: float) -> int:
@@ -84,12 +52,12 @@ def solid_shots(campaign: Campaign, shots: Shots, most: int) -> Shots | None:
     return shots[: max(1, most // campaign.at_a_plate) * campaign.at_a_plate]
 
 
-def ranges(shards: Shards, total: int, shots: Callable[[], int]) -> Iterator[range]:
+def ranges(shards: Shards, shots: Callable[[], int]) -> Iterator[range]:
     """Ranges of missing shards. Each has about as many shots as `shots` returns when the range begins."""
-    there, count, first = frozenset(shards.there()), -(-total // shards.extent), 0
-    while first < count:
+    there, first = frozenset(shards.there()), 0
+    while first < shards.count:
         most, stop = max(1, shots() // shards.extent), first
-        while stop < min(first + most, count) and stop not in there:
+        while stop < min(first + most, shards.count) and stop not in there:
             stop += 1
         if stop > first:
             yield range(first, stop)

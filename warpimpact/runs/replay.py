@@ -154,7 +154,7 @@ def campaign_in(result: xarray.Dataset, folder: Path) -> Campaign:
     dealt = int(result.attrs[attr.REPLICATES])
     if campaign.replicates == dealt:
         return campaign
-        # If the default of the replicates has changed since, the result keeps its own hits.
+    # The default of the replicates has changed since; the result keeps its own hits.
     return campaign.model_copy(update={"hits": campaign.hits.model_copy(update={"replicates": dealt})})
 
 

@@ -18,18 +18,8 @@ from warpimpact.runs.assumed import has_assumptions
 from warpimpact.runs.choice import executor_for, opened
 from warpimpact.runs.compute import HIT_MAP, numerics_of
 from warpimpact.runs.executor import Executor, Job, completed, result_of
-from warpimpact.runs.foreseen import Cost
-from warpimpact.runs.jobs import (
-    assumed_job,
-    computed_hits,
-    pilot_job,
-    ranges,
-    solid_shots,
-    split,
-    task_job,
-    task_size,
-    with_ligament,
-)
+from warpimpact.runs.foreseen import cost_warning
+from warpimpact.runs.jobs import computed_hits, ranges, solid_shots, split, task_size, with_ligament
 from warpimpact.runs.parts import claimed, telling
 from warpimpact.runs.progress import Follow, followed
 from warpimpact.runs.shards import Shards, ShardsOnDisk, extent, manifest
@@ -68,7 +58,7 @@ def run(
     campaign = _read(campaign)
     total = len(campaign.sampler())
     with executor_for(device, cancel=cancel) as executor, followed(progress) as follow:
-        shards = Shards(extent(total, campaign.at_a_plate))
+        shards = Shards(total, extent(total, campaign.at_a_plate))
         end = _fill(campaign, HIT_MAP, shards, executor, follow)
     table = joined(shards.shard(index) for index in range(end.shards))
     return in_memory(table.assign_attrs(_attributes(table, end)).to_xarray())
@@ -84,7 +74,7 @@ def with_assumptions(
     """
     findings = HIT_MAP.found_in(dataset)
     with executor_for(device, cancel=cancel) as executor:
-        table = result_of(executor, assumed_job, HIT_MAP, campaign, None if findings is None else findings.told)
+        table = result_of(executor, HIT_MAP.assumed, campaign, None if findings is None else findings.told)
     assumed = in_memory(table.to_xarray())
     return dataset.assign(assumed.variables).assign_attrs(assumed.attrs)
 
@@ -139,11 +129,11 @@ def _read(campaign: Campaign | str | Path) -> Campaign:
 def _fill(campaign: Campaign, computation: Computation, shards: Shards, executor: Executor, follow: Follow) -> End:
     """Compute the missing shards until none is missing or the stop rule is met."""
     sampler = campaign.sampler()
-    watch = Watch(campaign, len(sampler), shards, computation.measures)
+    watch = Watch(campaign, shards, computation.measures)
     there = sorted(shards.there())
     for index in there:
         watch.add(index, shards.shard(index))
-    watch.resumed, cost = watch.done, Cost(campaign, executor.made_by[attr.DEVICE], computation.passages)
+    watch.resumed, warn = watch.done, cost_warning(campaign, executor.made_by[attr.DEVICE], computation.passages)
     if watch.end is None:
         campaign = result_of(executor, with_ligament, campaign)
     if 0 in there:  # shard 0 holds the pilot's findings, and its hits at a finer level
@@ -153,25 +143,25 @@ def _fill(campaign: Campaign, computation: Computation, shards: Shards, executor
         def piloting() -> None:
             level = next(iter(executor.reports()), None)
             if level is not None:
-                cost.tell(at_level(level, campaign.numerics))
+                warn(at_level(level, campaign.numerics))
             follow(replace(watch.progress(0), piloting=True, trying=level))
 
-        watch.found = result_of(executor, pilot_job, computation, campaign, tick=piloting)
-    cost.tell(numerics_of(campaign, watch.found))
+        watch.found = result_of(executor, computation.pilot, campaign, tick=piloting)
+    warn(numerics_of(campaign, watch.found))
 
     asks = 0 not in there and has_assumptions(campaign)
     found_alone = None if watch.found is None else watch.found.told
 
     def jobs() -> Iterator[tuple[range | None, Job]]:
         if asks:
-            yield None, Job(assumed_job, (computation, campaign, found_alone))
+            yield None, Job(computation.assumed, (campaign, found_alone))
         most = lambda: task_size(executor, 0.0 if campaign.stop else watch.rate)  # noqa: E731
-        for task in ranges(shards, len(sampler), most):
+        for task in ranges(shards, most):
             shots = sampler.shots(task.start * shards.extent, len(task) * shards.extent)
             first = shots[: shards.extent] if task.start == 0 else None
             solid = None if first is None else solid_shots(campaign, first, computation.most_solid)
             findings = watch.found if task.start == 0 else found_alone
-            yield task, Job(task_job, (computation, campaign, Task(shots, solid, findings)))
+            yield task, Job(computation.compute, (campaign, Task(shots, solid, findings)))
 
     def take(index: int, shard: HitTable) -> None:
         shards.save(index, shard)

@@ -51,10 +51,11 @@ def manifest(campaign: Campaign, made_by: Mapping[str, str]) -> dict[str, Any]:
 
 
 class Shards:
-    """The shards of one run in memory. Each holds the results of `extent` shots."""
+    """The shards of one run of `total` shots in memory. Each holds the results of `extent` shots."""
 
-    def __init__(self, extent: int) -> None:
-        self.extent = extent
+    def __init__(self, total: int, extent: int) -> None:
+        self.total, self.extent = total, extent
+        self.count = -(-total // extent)
         self._held: dict[int, HitTable] = {}
 
     def there(self) -> Collection[int]:
@@ -90,18 +91,12 @@ class ShardsOnDisk(Shards):
         *,
         grows: bool = False,
     ) -> None:
-        super().__init__(content["extent"])
-        self.total = total
+        super().__init__(total, content["extent"])
         form = Form("hits", ".nc", self.extent)
         self.parts = Parts(output, content, "run", form, lambda count: f"{count} of {self.count} shards", tell)
         self._written = time.monotonic()
         self._grows, self._grown = grows, 0
         self._growing: IncrementalFile | None = None
-
-    @property
-    def count(self) -> int:
-        """Number of shards of the whole campaign."""
-        return -(-self.total // self.extent)
 
     def there(self) -> Collection[int]:
         """Numbers of the finished shards."""

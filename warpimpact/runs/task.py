@@ -10,11 +10,14 @@ from warpimpact.campaign.campaign import Campaign
 from warpimpact.results.table import HitTable
 from warpimpact.scene import Shots
 from warpimpact.solver.findings import Found
-from warpimpact.solver.marching import Progress
 from warpimpact.solver.worker import Worker
 
 if TYPE_CHECKING:
     from warpimpact.results.table import Result
+
+
+Report = Callable[[int], None]
+"""Called with the progress of a job: the shots that are done, or the level that a pilot computes."""
 
 
 @dataclass(frozen=True)
@@ -33,7 +36,10 @@ class Task:
 
 
 class Computation(Protocol):
-    """What is computed for every hit of a campaign: its outcome (`HitMap`), or its limit (`studies.limit.LimitMap`)."""
+    """What is computed for every hit of a campaign: its outcome (`HitMap`), or its limit (`studies.limit.LimitMap`).
+
+    The methods with `worker` and `report` are the jobs of a run.
+    """
 
     @property
     def most_solid(self) -> int:
@@ -51,22 +57,16 @@ class Computation(Protocol):
     def measures(self) -> Sequence[str]:
         """Measures whose running estimates are shown; empty for those of a hit map."""
 
-    def compute(self, campaign: Campaign, task: Task, worker: Worker, progress: Progress | None = None) -> HitTable:
-        """Compute a task: the columns of results/dataset.py, one entry per shot. They are a complete result."""
+    def compute(self, campaign: Campaign, task: Task, worker: Worker, report: Report = ...) -> HitTable:
+        """Compute a task: the columns of results/dataset.py, one entry per shot. They are a complete result. Reports
+        how many shots are done."""
 
-    def assumed(self, campaign: Campaign, findings: Found | None, worker: Worker) -> HitTable:
-        """Some hits of the campaign under assumptions, by `runs.assumed.assumed`.
+    def assumed(self, campaign: Campaign, findings: Found | None, worker: Worker, report: Report = ...) -> HitTable:
+        """Some hits of the campaign under assumptions, by `runs.assumed.assumed`; reports nothing."""
 
-        Args:
-            findings: as in a task.
-        """
-
-    def pilot(self, campaign: Campaign, worker: Worker, trying: Callable[[int], object]) -> Found | None:
-        """The findings of a pilot with hits of the campaign; None if the campaign fixes the resolution.
-
-        Args:
-            trying: called with every level that the pilot computes.
-        """
+    def pilot(self, campaign: Campaign, worker: Worker, report: Report = ...) -> Found | None:
+        """The findings of a pilot with hits of the campaign; None if the campaign fixes the resolution. Reports every
+        level that it computes."""
 
     def found_in(self, result: Result) -> Found | None:
         """The findings of the pilot of a result."""

@@ -17,7 +17,7 @@ from warpimpact.runs.levels import OF_THE_NUMERICS
 from warpimpact.runs.progress import RunProgress
 from warpimpact.runs.shards import Shards
 from warpimpact.solver.findings import Found
-from warpimpact.statistics.intervals import Dealing, looks
+from warpimpact.statistics.intervals import looks
 
 
 @dataclass(frozen=True)
@@ -37,17 +37,19 @@ class Watch:
     with the same shots however it was computed.
     """
 
-    def __init__(self, campaign: Campaign, total: int, shards: Shards, measures: Sequence[str] = ()) -> None:
-        self._total, self._shards, self._load = total, -(-total // shards.extent), shards.shard
+    def __init__(self, campaign: Campaign, shards: Shards, measures: Sequence[str] = ()) -> None:
+        self._shards, self._stop = shards, campaign.stop
         tilts = [f"mean(tilt@{last * 1e3:.10g}mm)" for last in campaign.output.standoffs[-1:]]
-        dealt: Dealing = {"replicates": campaign.replicates, "images": campaign.group}
-        self._tallies = [
-            Tally(Measure.parse(measure), **dealt) for measure in measures or ("mean(residual_velocity)", *tilts)
-        ]
-        self._rule: _Rule | None = None
+        asked = [(Measure.parse(text), 0.95) for text in measures or ("mean(residual_velocity)", *tilts)]
+        self._looks = frozenset[int]()
         if campaign.stop is not None:
-            self._rule = _Rule(campaign.stop, total, self._shards, campaign.hits.sampling, dealt)
-            self._tallies.append(self._rule.tally)
+            asked.append((campaign.stop.measure, campaign.stop.confidence))
+            self._looks = frozenset(looks(campaign.hits.sampling, shards.count))
+        self._tallies = [
+            Tally(measure, replicates=campaign.replicates, images=campaign.group, confidence=confidence)
+            for measure, confidence in asked
+        ]
+        self._shift: float | None = None
         self._early: set[int] = set()
         self._next, self._hits, self._time = 0, 0, 0.0
         self.done, self.resumed, self.failed = 0, 0, 0
@@ -61,7 +63,7 @@ class Watch:
         self._early.add(index)
         while self.end is None and self._next in self._early:
             self._early.remove(self._next)
-            self._advance(shard if self._next == index else self._load(self._next))
+            self._advance(shard if self._next == index else self._shards.shard(self._next))
 
     @property
     def rate(self) -> float:
@@ -69,16 +71,37 @@ class Watch:
         return self._hits / self._time if self._time > 0.0 else 0.0
 
     def _advance(self, shard: HitTable) -> None:
+        if self._stop is not None and self._next == 0:  # the first shard has hits at two levels
+            self._shift = shift_of(self._stop.measure, finer_pair(shard), self._stop.confidence)
         self._next += 1
         self._hits += shard.sizes["hit"]
         self._time += shard.attrs[attr.COMPUTE_TIME]
         for tally in self._tallies:
             tally.add(shard)
-        if self._rule is not None and self._next == 1:
-            self._rule.learn_shift(shard)
-        stop = {} if self._rule is None else self._rule.look(self._next, self._hits)
-        if self._next == self._shards or stop:
+        is_last = self._next == self._shards.count
+        stop = self._stopped(self._stop, is_last) if self._stop is not None and self._next in self._looks else {}
+        if is_last or stop:
             self.end = End(self._next, self._hits, self._time, stop)
+
+    def _stopped(self, rule: Stop, is_last: bool) -> dict[str, Any]:
+        """Attributes that say how the stop rule ends the run after the hits so far; empty if it goes on."""
+        estimate, asked, shift = self._tallies[-1].estimate(), rule.measure.shown(rule.half_width), self._shift or 0.0
+        met = estimate.half_width + shift <= asked
+        left = max(asked - shift, 0.0)
+        # The half width is about proportional to 1/√hits.
+        in_reach = self._hits * estimate.half_width**2 <= left**2 * self._shards.total
+        no_use = not met and not in_reach and estimate.half_width <= (1.0 - OF_THE_NUMERICS) * asked
+        if not (met or no_use or is_last):
+            return {}
+        return {
+            attr.STOP_QUANTITY: rule.quantity,
+            attr.STOP_REASON: "half_width" if met else "numerics" if no_use else "max_count",
+            **({} if self._shift is None else {attr.ESTIMATE_NUMERICS: self._shift}),
+            attr.ESTIMATE: estimate.value,
+            attr.ESTIMATE_INTERVAL: [estimate.low, estimate.high],
+            attr.ESTIMATE_UNITS: rule.measure.units,
+            attr.CONFIDENCE: rule.confidence,
+        }
 
     def progress(self, underway: int) -> RunProgress:
         """The progress of the run, with shots of unfinished shards."""
@@ -87,47 +110,6 @@ class Watch:
             for tally in self._tallies
             if tally.measure.kind not in ("quantile", "worst_tenth")
         }
-        done = self.done if self.done == self._total else min(self.done + underway, self._total - 1)
-        return RunProgress(done, self._total, self.done, self.resumed, self.failed, estimates, found=self.found)
-
-
-class _Rule:
-    """Says after which shard a run ends by its stop rule.
-
-    Args:
-        total, shards: numbers of hits and of shards that end the run in any case.
-    """
-
-    def __init__(self, stop: Stop, total: int, shards: int, sampling: str, dealt: Dealing) -> None:
-        self._stop, self._measure, self._total, self._shards = stop, stop.measure, total, shards
-        self.tally = Tally(self._measure, **dealt, confidence=stop.confidence)
-        self._looks = looks(sampling, shards)
-        self._look = next(self._looks)
-        self._shift: float | None = None
-
-    def learn_shift(self, first: HitTable) -> None:
-        """Learn the shift of the measure by the numerics from the first shard, which holds hits at two levels."""
-        self._shift = shift_of(self._measure, finer_pair(first), self._stop.confidence)
-
-    def look(self, shards: int, hits: int) -> dict[str, Any]:
-        """Attributes that say how the rule ends the run after these numbers of shards and hits; empty if it goes on."""
-        if shards != self._look:
-            return {}
-        self._look = next(self._looks, self._shards)
-        estimate, asked, shift = self.tally.estimate(), self._measure.shown(self._stop.half_width), self._shift or 0.0
-        met = estimate.half_width + shift <= asked
-        left = max(asked - shift, 0.0)
-        # The half width is about proportional to 1/√hits.
-        in_reach = hits * estimate.half_width**2 <= left**2 * self._total
-        no_use = not met and not in_reach and estimate.half_width <= (1.0 - OF_THE_NUMERICS) * asked
-        if not met and not no_use and shards != self._shards:
-            return {}
-        return {
-            attr.STOP_QUANTITY: self._stop.quantity,
-            attr.STOP_REASON: "half_width" if met else "numerics" if no_use else "max_count",
-            **({} if self._shift is None else {attr.ESTIMATE_NUMERICS: self._shift}),
-            attr.ESTIMATE: estimate.value,
-            attr.ESTIMATE_INTERVAL: [estimate.low, estimate.high],
-            attr.ESTIMATE_UNITS: self._measure.units,
-            attr.CONFIDENCE: self._stop.confidence,
-        }
+        total = self._shards.total
+        done = self.done if self.done == total else min(self.done + underway, total - 1)
+        return RunProgress(done, total, self.done, self.resumed, self.failed, estimates, found=self.found)

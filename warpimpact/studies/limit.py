@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, ClassVar
 
@@ -22,11 +22,11 @@ from warpimpact.results.measures import Measure
 from warpimpact.results.table import HitTable
 from warpimpact.results.vocabulary import LIMIT_VELOCITY
 from warpimpact.runs.assumed import assumed
-from warpimpact.runs.compute import finer_hits, found_in, numerics_of, of_images
-from warpimpact.runs.describe import computed_by, described, found_attributes
+from warpimpact.runs.compute import found_in, numerics_of, of_images
+from warpimpact.runs.describe import described
 from warpimpact.runs.pilot_hits import pilot_shots
 from warpimpact.runs.shards import extent
-from warpimpact.runs.task import Task
+from warpimpact.runs.task import Report, Task
 from warpimpact.scene import Numerics, Scene, Shots, Target, exclusions
 from warpimpact.solver.findings import Found, LimitErrors
 from warpimpact.solver.limit import (
@@ -43,7 +43,7 @@ from warpimpact.solver.limit import (
     thickest,
 )
 from warpimpact.solver.many import side_by_side
-from warpimpact.solver.marching import Helpers, Progress
+from warpimpact.solver.marching import Helpers
 from warpimpact.solver.pilot import limits_pilot_size
 from warpimpact.solver.worker import Worker
 
@@ -118,21 +118,15 @@ class LimitMap:
         """The running estimates: the mean limit."""
         return (f"mean({v.LIMITS[self.sought.quantity].value})",)
 
-    def compute(self, campaign: Campaign, task: Task, worker: Worker, progress: Progress | None = None) -> HitTable:
-        """Search the limits of some shots. The table has the shots as they just perforate, with their limits.
-
-        Args:
-            progress: as in `simulate`.
-        """
+    def compute(self, campaign: Campaign, task: Task, worker: Worker, report: Report = lambda done: None) -> HitTable:
+        """Search the limits of some shots. The table has the shots as they just perforate, with their limits."""
         sought, images, findings = self.sought, len(campaign.symmetries), task.findings
         numerics, together = numerics_of(campaign, findings), extent(len(campaign.sampler())) // images
-        progress, shots = of_images(progress, images), task.shots[::images]
+        shots, progress = task.shots[::images], of_images(report, images)
         begin = time.perf_counter()
         searched = limits(campaign.scene, shots, sought, numerics, worker, progress, together)
         elapsed = time.perf_counter() - begin
         attributes = {
-            **computed_by(campaign, worker.device, len(shots), elapsed),
-            **found_attributes(campaign.numerics.asked, findings),
             **({attr.LIMIT_ERROR: findings.error} if isinstance(findings, LimitErrors) else {}),
             attr.HISTORY: attr.history_line(f"limit --quantity {sought.quantity}"),
             attr.LIMIT: sought.quantity,
@@ -143,13 +137,14 @@ class LimitMap:
         }
         if sought.quantity == "velocity" and (factors := limit_velocity_factors(campaign)) is not None:
             attributes[attr.LIMIT_FACTORS] = list(factors)
-        beside = finer_hits(campaign, findings)
+        beside = dict[str, Array]()
         if task.solid is not None:
             solid, of_solid = self._at_solid(campaign, task.solid, numerics, worker)
             attributes |= of_solid
-            beside |= solid | self._at_base_alone(campaign, task.solid, numerics, worker)
-        put, outcomes = self._put(campaign, task.shots, searched, images), searched.recorded(sought.quantity)
-        return described(campaign, put, outcomes, short_steps(numerics), attributes, beside)
+            beside = solid | self._at_base_alone(campaign, task.solid, numerics, worker)
+        put = replace(task, shots=self._put(campaign, task.shots, searched, images))
+        outcomes, by = searched.recorded(sought.quantity), (worker.device, elapsed)
+        return described(campaign, put, outcomes, short_steps(numerics), by, attributes, beside)
 
     def _at_solid(
         self, campaign: Campaign, shots: Shots, numerics: Numerics, worker: Worker
@@ -179,7 +174,9 @@ class LimitMap:
         searched = limits(*at_base_alone(campaign, shots), replace(sought, layer=0), numerics, worker)
         return {v.BASE_ALONE_LIMITS[sought.quantity]: searched.value}
 
-    def assumed(self, campaign: Campaign, findings: Found | None, worker: Worker) -> HitTable:
+    def assumed(
+        self, campaign: Campaign, findings: Found | None, worker: Worker, report: Report = lambda done: None
+    ) -> HitTable:
         """See `Computation.assumed`."""
         sought, numerics = self.sought, numerics_of(campaign, findings)
 
@@ -193,14 +190,12 @@ class LimitMap:
 
         return assumed(campaign, numerics, searched, limits=True)
 
-    def pilot(
-        self, campaign: Campaign, worker: Worker, trying: Callable[[int], object] = lambda level: None
-    ) -> LimitErrors | None:
-        """The findings of a pilot with hits of the campaign; None if the campaign fixes the resolution."""
+    def pilot(self, campaign: Campaign, worker: Worker, report: Report = lambda level: None) -> LimitErrors | None:
+        """See `Computation.pilot`."""
         if campaign.numerics.explicit is not None:
             return None
         pilot, numbers = pilot_shots(campaign, limits_pilot_size(campaign.numerics.asked))
-        errors = pilot_of_limits(campaign.scene, pilot, self.sought, campaign.numerics, worker, trying)
+        errors = pilot_of_limits(campaign.scene, pilot, self.sought, campaign.numerics, worker, report)
         return replace(errors, numbers=numbers)
 
     def found_in(self, result: Result) -> LimitErrors | None:

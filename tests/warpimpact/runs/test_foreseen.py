@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from warpimpact import Campaign, Numerics, SlotPattern
-from warpimpact.runs.foreseen import SLOW, Cost, Costly, cost_of
+from warpimpact.runs.foreseen import SLOW, Costly, cost_of, cost_warning
 from warpimpact.scene import Burst
 from warpimpact.solver.prepare import prepare
 from warpimpact.solver.resolution import MOST_STEPS, TooManySteps
@@ -25,12 +25,12 @@ def slow() -> Campaign:
 
 
 def test_hits_that_take_long_are_told_once_at_each_level() -> None:
-    cost = Cost(slow(), "cpu")
+    warn = cost_warning(slow(), "cpu")
     with pytest.warns(Costly, match=r"^at level 2 a hit takes about \d.* s of a core, and 4096 hits .* h: .* GiB"):
-        cost.tell(LEVEL)
+        warn(LEVEL)
     with warnings.catch_warnings():
         warnings.simplefilter("error")
-        cost.tell(LEVEL)
+        warn(LEVEL)
     assert cost_of(Campaign.from_toml(SLOTTED_PLATE), LEVEL) is None
 
 
@@ -68,7 +68,7 @@ def test_holes_that_take_long_are_told_before_they_are_built() -> None:
 
 @pytest.mark.filterwarnings("error")
 def test_what_a_gpu_takes_is_not_foreseen() -> None:
-    Cost(slow(), "NVIDIA").tell(LEVEL)
+    cost_warning(slow(), "NVIDIA")(LEVEL)
 
 
 def test_a_shot_of_too_many_steps_is_refused() -> None:

@@ -81,7 +81,7 @@ def test_the_stop_rule_keeps_its_promise(sampling: str, tmp_path: Path) -> None:
     held, ends = 0, []
     for seed in range(TRIALS):
         reseeded = scene.model_copy(update={"hits": scene.hits.model_copy(update={"seed": seed})})
-        watch = Watch(reseeded, 2**16, Shards(256))
+        watch = Watch(reseeded, Shards(2**16, 256))
         values = surface(reseeded, 0, 2**14)
         while watch.end is None:
             watch.add(watch._next, shard_of(values[watch._next * 256 : (watch._next + 1) * 256]))
@@ -103,7 +103,7 @@ def test_a_run_goes_on_as_long_as_hits_may_make_up_for_the_numerics(
 ) -> None:
     scene = campaign(tmp_path, "mean(residual_velocity)", "0.05 m/s", sampling='"random"')
     monkeypatch.setattr(sys.modules[Watch.__module__], "shift_of", lambda *_: shift)
-    watch = Watch(scene, 2**14, Shards(256))  # which leave ± 0.006 m/s
+    watch = Watch(scene, Shards(2**14, 256))  # which leave ± 0.006 m/s
     values = surface(scene, 0, 2**14)
     while watch.end is None:
         watch.add(watch._next, shard_of(values[watch._next * 256 : (watch._next + 1) * 256]))
