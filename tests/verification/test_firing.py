@@ -133,7 +133,7 @@ def test_a_plate_of_two_values_is_known_by_hand() -> None:
     shot perforates with 0.3, and steps of 10 m/s from 800 m/s on drift upwards to 900 m/s."""
     plate = known_response([700.0, 900.0], [3.0, 7.0])
     assert [plate.quantile(share) for share in (0.05, 0.25, 0.5, 0.99)] == [700.0, 700.0, 900.0, 900.0]
-    assert plate.share(np.array([650.0, 800.0, 950.0])) == pytest.approx([0.0, 0.3, 1.0])
+    assert [plate.estimate(speed).value for speed in (650.0, 800.0, 950.0)] == pytest.approx([0.0, 0.3, 1.0])
     by_place = plate.by_place(np.array([800.0]), np.zeros(1))
     assert acceptance(22, 0, by_place.mean(axis=1)) == pytest.approx(0.7**22)
     assert acceptance(22, 0, by_place).mean(axis=-1) == pytest.approx(0.7)

@@ -61,8 +61,8 @@ def _answers(test: FiringTest, responses: Mapping[str, Response]) -> dict[str, d
     shots."""
     test = test.model_copy(update={"tests": min(test.tests, MOST_TESTS)})
     told = {name: {f.ASSUMED_V50: response.quantile(0.5)} for name, response in responses.items()}
-    for add in (_add_reported, _add_proof):
-        add(test, responses, told)
+    _add_reported(test, responses, told)
+    _add_proof(test, responses, told)
     return told
 
 

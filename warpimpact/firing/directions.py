@@ -175,12 +175,16 @@ def protect(
     numerics = str(piloted["numerics"])
     open_, count = list(cells), directions.first_count
     while open_:
-        known = len(passed[open_[0]])
+        known, settled = len(passed[open_[0]]), len(cells) - len(open_)
+
+        def told(now: RoundProgress, settled: int = settled) -> None:
+            progress(settled + int(now.done), len(cells))
+
         more = sampler.shots(known, count - known)
         results = yield Round(
             [Job(_answers, (campaign.scene, toward(more, directions, cell), numerics)) for cell in open_],
             [f"{directions.azimuth[row]} {directions.elevation[column]} up to {count}" for row, column in open_],
-            _told_from(len(cells) - len(open_), len(cells), progress),
+            told,
         )
         for cell, answers in zip(open_, results, strict=True):
             passed[cell] = np.concatenate([passed[cell], answers["passed"]])
@@ -265,11 +269,6 @@ def _wanted(campaign: Campaign, passed: Array, directions: Directions) -> bool:
 
 def _estimate(campaign: Campaign, passed: Array) -> Estimate:
     return estimate_of("share", passed, replicates=campaign.replicates)
-
-
-def _told_from(settled: int, total: int, progress: Callable[[int, int], object]) -> Callable[[RoundProgress], object]:
-    """Return a function that reports the progress of a round after `settled` directions that need no more hits."""
-    return lambda now: progress(settled + int(now.done), total)
 
 
 def _sector(campaign: Campaign, directions: Directions, passed: dict[tuple[int, int], Array]) -> Sector:

@@ -50,13 +50,7 @@ class Firings:
 
     def first(self, shots: int) -> Firings:
         """The first shots of every test."""
-        return Firings(
-            self.aimed[:, :shots],
-            self.velocity[:, :shots],
-            self.perforated[:, :shots],
-            self.place[:, :shots],
-            self.used[:, :shots],
-        )
+        return Firings(**{name: values[:, :shots] for name, values in vars(self).items()})
 
 
 def uniform(seed: int, column: int, tests: int, most: int) -> Array:

@@ -1,4 +1,4 @@
-"""Reads a firing test from a TOML file and validates it. A mistake becomes one sentence."""
+"""Reads a firing test from a TOML file and validates it; the schema of such files. A mistake becomes one sentence."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ from typing import Any
 from pydantic import ValidationError
 
 from warpimpact.campaign.problems import sentence
+from warpimpact.campaign.schema import completed_schema
 from warpimpact.campaign.text import CampaignError, parsed, read_text
 from warpimpact.firing.plan import FiringTest
 from warpimpact.firing.requirements import with_requirement
@@ -36,3 +37,11 @@ def firing_test(text: str, name: str, folder: Path) -> FiringTest:
         return with_requirement(test)
     except CampaignError as error:
         raise CampaignError(f"{name}: {error}") from None
+
+
+def firing_schema() -> dict[str, Any]:
+    """The JSON schema (2020-12) of a test file, with the meaning, the default and the bounds of every key."""
+    return completed_schema(FiringTest) | {
+        "title": "warpimpact firing test",
+        "description": "A firing test of warpimpact: what is fired at, how, and what is asked of it.",
+    }

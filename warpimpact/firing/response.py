@@ -92,10 +92,6 @@ class Response:
         tried = np.asarray(velocity)[:, None] + errors
         return np.stack([self.perforates(places, of_one[:, None]).mean(axis=0) for of_one in tried])
 
-    def share(self, velocity: Array) -> Array:
-        """Probability of perforation of a shot at any place, shape [velocities]."""
-        return np.asarray(self.by_place(velocity, np.zeros(1)).mean(axis=1))
-
     def estimate(self, velocity: float) -> Estimate:
         """The probability of perforation with its 95 % interval over the places."""
         return estimate_of("share", self.answers(velocity), **self.dealt)
@@ -243,11 +239,16 @@ def response_of_sweep(sweep: xarray.Dataset, layer: int | None = None) -> Respon
 def _with_places(dataset: xarray.Dataset, changes: Array, sound: Flags) -> Response:
     if not np.isfinite(changes[sound]).any():
         raise ValueError("has no limit velocity: no hit perforates at any velocity that was tried")
-    columns = (dataset[v.HIT_Y].values, dataset[v.HIT_Z].values, np.degrees(inclination(dataset)))
-    cell = dataset.attrs[attr.PLATE_PERIOD]
-    holes = outlines(dataset)
-    outline = holes["y"], holes["z"]
-    note = "How far assumptions move these numbers is not known of a sweep; target.limits tells it."
-    place = (float(cell[0]), float(cell[1])), dealing(dataset), outline
-    response = Response(changes, *columns, *place, under_note=note, evidence=dataset.attrs.get(attr.EVIDENCE, ""))
+    cell, holes = dataset.attrs[attr.PLATE_PERIOD], outlines(dataset)
+    response = Response(
+        changes,
+        hit_y=dataset[v.HIT_Y].values,
+        hit_z=dataset[v.HIT_Z].values,
+        yaw=np.degrees(inclination(dataset)),
+        cell=(float(cell[0]), float(cell[1])),
+        dealt=dealing(dataset),
+        outline=(holes["y"], holes["z"]),
+        under_note="How far assumptions move these numbers is not known of a sweep; target.limits tells it.",
+        evidence=dataset.attrs.get(attr.EVIDENCE, ""),
+    )
     return response if sound.all() else response.only(sound)

@@ -33,7 +33,6 @@ def changes(observations: Sequence[Observation], aim: HitPoints, computed: Array
     Returns:
         Shape [sets, computed points, 2, observations], along y and z; 0 where too few neighbours have the numbers, and
         where the points do not cover a part of the unit cell evenly.
-        where the points do not cover a part of the unit cell evenly.
     """
     images = len(aim.group)
     sets, points, numbers = computed.shape

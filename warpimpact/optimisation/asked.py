@@ -1,4 +1,4 @@
-"""What a design file asks for: objectives and bounds, each a measure. Names of earlier versions are accepted, too."""
+"""What a design file asks for: objectives and bounds, each a measure."""
 
 from __future__ import annotations
 
@@ -10,34 +10,9 @@ from pydantic import field_validator, model_validator
 
 from warpimpact.campaign.needs import lacking
 from warpimpact.results.measures import Measure
-from warpimpact.results.vocabulary import QUANTITIES, WEIGHTS
+from warpimpact.results.vocabulary import WEIGHTS
 from warpimpact.scene.model import Model
 from warpimpact.scene.units import Number, quoted
-
-OLD_WORDS = {
-    "tilted_share": "P(inclination{at} > {angle})",
-    "base_perforated_share": "P(base_perforated)",
-    "base_pierced_share": "P(base_pierced)",
-    "stopped_share": "P(stopped)",
-    "broken_share": "P(broken)",
-    "stopped_or_broken_share": "P(stopped_or_broken)",
-}
-"""Measures by their names in earlier versions. A quantity alone meant its mean, with _worst_tenth its worst tenth."""
-
-
-def in_new_words(name: str, angle: object = "30 deg", standoff: object = "", layer: object = 0) -> str:
-    """The text of a measure that is given by its name in an earlier version, with angle [degree], stand-off [m] and
-    layer in keys of their own. Other texts stay unchanged."""
-    angle = f"{angle} deg" if isinstance(angle, int | float) else angle
-    at = f"@{standoff} m" if isinstance(standoff, int | float) else f"@{standoff}" if standoff else ""
-    if name in OLD_WORDS:
-        return OLD_WORDS[name].format(at=at, angle=angle)
-    bare = name.removesuffix("_worst_tenth")
-    if bare not in QUANTITIES:
-        return name
-    quantity = QUANTITIES[bare]
-    place = f"@layer {layer}" if quantity.has_layer else at if quantity.has_standoff else ""
-    return f"{'mean' if bare == name else 'worst_tenth'}({bare}{place})"
 
 
 class _Asked(Model):
@@ -55,17 +30,6 @@ class _Asked(Model):
     measure: str
     threats: Literal["worst", "mean"] = "worst"
     assumptions: Literal["given", "worst", "mean"] = "given"
-
-    @model_validator(mode="before")
-    @classmethod
-    def _in_new_words(cls, given: Any) -> Any:
-        """Translate a measure by its name in earlier versions, which had angle, stand-off and layer in keys of their
-        own."""
-        if not isinstance(given, dict) or not isinstance(name := given.get("measure"), str):
-            return given
-        places = {key: given[key] for key in ("angle", "standoff", "layer") if key in given}
-        text = in_new_words(name, **places)
-        return given if text == name else {k: v for k, v in given.items() if k not in places} | {"measure": text}
 
     @field_validator("measure")
     @classmethod

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,6 +30,7 @@ from warpimpact.statistics.comparisons import ROUNDED
 from warpimpact.statistics.random_effects import positive_share
 
 Array = NDArray[np.float64]
+Part = TypeVar("Part")
 
 CONFIRM_FIDELITY = "standard"
 """Fidelity of the pilots of the designs of the front, unless the campaign fixes a resolution."""
@@ -141,6 +142,10 @@ def _telling(follow: Follow, targets: int, jobs: int, what: str) -> Told:
     return lambda done, _: follow(int(targets * done / jobs), targets, what)
 
 
+def _batched(parts: Sequence[Part], count: int) -> list[tuple[Part, ...]]:
+    return [tuple(parts[first : first + count]) for first in range(0, len(parts), count)]
+
+
 def _fresh(
     design: Design, targets: Sequence[DesignRecord], follow: Follow
 ) -> Question[tuple[list[DesignRecord], Array, list[Array]]]:
@@ -152,34 +157,22 @@ def _fresh(
     ]
     if not design.keys:
         empty = np.zeros((len(situations), 0, count))
-        without_hits = [
-            DesignRecord(target.values, target.tables, target.weights, ("",) * len(threats), empty)
-            for target in targets
-        ]
+        without_hits = [replace(target, levels=("",) * len(threats), said=empty) for target in targets]
         return without_hits, np.zeros((len(targets), 2, 0)), [np.zeros(0)] * len(targets)
     whose = "the front and references" if design.references else "the front"
     piloting = _telling(follow, len(targets), len(asked), f"pilots for fresh hits of {whose}")
     levels = yield from levels_asked(design, asked, piloting)
-    of_targets = [tuple(levels[first : first + len(threats)]) for first in range(0, len(levels), len(threats))]
+    of_targets = _batched(levels, len(threats))
     jobs = [
         HitJob(target.tables, threat, 0, count, of_target[threat], seed, assumption=name)
         for target, of_target in zip(targets, of_targets, strict=True)
         for threat, name in situations
     ]
     said = yield from hits_asked(design, jobs, _telling(follow, len(targets), len(jobs), f"fresh hits of {whose}"))
-    records = []
-    for number, target in enumerate(targets):
-        jobs_of_target = slice(number * len(situations), (number + 1) * len(situations))
-        records.append(
-            DesignRecord(
-                values=target.values,
-                tables=target.tables,
-                weights=target.weights,
-                levels=of_targets[number],
-                said=np.array([part.values for part in said[jobs_of_target]]),
-                seconds=sum(part.seconds for part in said[jobs_of_target]),
-            )
-        )
+    records = [
+        replace(target, levels=levels_of_target, said=np.array([part.values for part in parts]))
+        for target, levels_of_target, parts in zip(targets, of_targets, _batched(said, len(situations)), strict=True)
+    ]
     of_first = said[:: len(situations)]
     return records, np.array([first.places for first in of_first]), [first.draws for first in of_first]
 
@@ -224,16 +217,10 @@ def _solids(design: Design, front: Sequence[DesignRecord], follow: Follow) -> Qu
     ]
     telling = _telling(follow, len(front), len(jobs), "solid plates of the same weight")
     said = yield from hits_asked(design, jobs, telling)
-    threats = len(design.threats)
+    parts = _batched(said, len(design.threats))
     return [
-        DesignRecord(
-            values=record.values,
-            tables=record.tables,
-            weights=record.weights,
-            levels=record.levels,
-            said=np.array([part.values for part in said[number * threats : (number + 1) * threats]]),
-        )
-        for number, record in enumerate(front)
+        replace(record, said=np.array([part.values for part in of_record]))
+        for record, of_record in zip(front, parts, strict=True)
     ]
 
 

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from functools import cache, partial
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -13,7 +14,7 @@ from warpimpact.campaign.tested import Standing, standings_of
 from warpimpact.campaign.text import CampaignError
 from warpimpact.catalogue.catalogue import Catalogue
 from warpimpact.catalogue.entries import Material
-from warpimpact.optimisation.design import Design
+from warpimpact.optimisation.design import Constraints, Design
 from warpimpact.optimisation.evaluate import campaign_of
 from warpimpact.optimisation.judged import weights_of
 from warpimpact.results.vocabulary import WEIGHTS
@@ -76,18 +77,17 @@ def checked(design: Design, tables: Mapping[str, Any]) -> Checked:
 
 
 def _violations(design: Design, campaign: Campaign) -> Iterator[Violation]:
-    limits, target = design.constraints, campaign.target
+    target = campaign.target
     for measure, density in weights_of(target).items():
-        what = WEIGHTS[measure].label
-        smallest, largest = (f"{end}_{measure}" for end in ("smallest", "largest"))
-        yield from _least(smallest, density, getattr(limits, smallest), what, "kg/m²")
-        yield from _most(largest, density, getattr(limits, largest), what, "kg/m²")
+        for key in (f"smallest_{measure}", f"largest_{measure}"):
+            yield from _broken(design.constraints, key, partial(float, density), WEIGHTS[measure].label, "kg/m²")
     if not design.search.allow_untested:
         yield from (Violation(NOT_TESTED, 1.0, standing.sentence) for standing in untested(campaign))
     for name, plate in target.named:
         if plate.open_area > 0.0:
-            for of_hole in _of_holes(design, plate):
-                yield of_hole._replace(text=f"{name}: {of_hole.text}")
+            for key, value, what, unit in _of_holes(plate):
+                for of_hole in _broken(design.constraints, key, value, what, unit):
+                    yield of_hole._replace(text=f"{name}: {of_hole.text}")
 
 
 def untested(campaign: Campaign) -> list[Standing]:
@@ -96,34 +96,31 @@ def untested(campaign: Campaign) -> list[Standing]:
     return [standing for standing in standings if standing.subject in _OF_PLATES]
 
 
-def _of_holes(design: Design, plate: Plate) -> Iterator[Violation]:
-    limits, mm = design.constraints, 1e3
-    yield from _least("smallest_open_area", plate.open_area, limits.smallest_open_area, "open area", "")
-    yield from _most("largest_open_area", plate.open_area, limits.largest_open_area, "open area", "")
-    if (least := limits.smallest_ligament) is not None:
-        yield from _least("smallest_ligament", mm * plate.ligament, mm * least, "ligament", "mm")
-    if limits.smallest_hole is not None or limits.largest_hole is not None:
-        narrow, wide = hole_sizes(plate)
-        yield from _least("smallest_hole", mm * narrow, _times(mm, limits.smallest_hole), "hole", "mm")
-        yield from _most("largest_hole", mm * wide, _times(mm, limits.largest_hole), "hole", "mm")
-    if (least := limits.smallest_corner_radius) is not None:
-        yield from _least("smallest_corner_radius", mm * corner_radius(plate), mm * least, "corner radius", "mm")
+def _of_holes(plate: Plate) -> tuple[tuple[str, Callable[[], float], str, str], ...]:
+    """Constraints of the holes of a plate: key, the bounded number in SI, and its name and unit in a sentence."""
+    sizes = cache(lambda: hole_sizes(plate))
+    return (
+        ("smallest_open_area", lambda: plate.open_area, "open area", ""),
+        ("largest_open_area", lambda: plate.open_area, "open area", ""),
+        ("smallest_ligament", lambda: plate.ligament, "ligament", "mm"),
+        ("smallest_hole", lambda: sizes()[0], "hole", "mm"),
+        ("largest_hole", lambda: sizes()[1], "hole", "mm"),
+        ("smallest_corner_radius", lambda: corner_radius(plate), "corner radius", "mm"),
+    )
 
 
-def _times(factor: float, value: float | None) -> float | None:
-    return None if value is None else factor * value
-
-
-def _least(key: str, value: float, least: float | None, what: str, unit: str) -> Iterator[Violation]:
-    if least is not None and value < least * (1.0 - 1e-9):
-        text = f"{what} of {value:.4g} {unit}, but it must be at least {least:.4g} {unit}"
-        yield Violation(key, (least - value) / least, " ".join(text.split()))
-
-
-def _most(key: str, value: float, most: float | None, what: str, unit: str) -> Iterator[Violation]:
-    if most is not None and value > most * (1.0 + 1e-9):
-        text = f"{what} of {value:.4g} {unit}, but it must be at most {most:.4g} {unit}"
-        yield Violation(key, (value - most) / most, " ".join(text.split()))
+def _broken(
+    constraints: Constraints, key: str, number: Callable[[], float], what: str, unit: str
+) -> Iterator[Violation]:
+    """The violation of a constraint by a number, which is computed only if the constraint is given."""
+    if (given := getattr(constraints, key)) is None:
+        return
+    scale = 1e3 if unit == "mm" else 1.0
+    value, limit, sign = scale * number(), scale * given, 1.0 if key.startswith("smallest") else -1.0
+    if sign * value < sign * limit * (1.0 - sign * 1e-9):
+        end = "least" if sign > 0.0 else "most"
+        text = f"{what} of {value:.4g} {unit}, but it must be at {end} {limit:.4g} {unit}"
+        yield Violation(key, sign * (limit - value) / limit, " ".join(text.split()))
 
 
 def hole_sizes(plate: Plate) -> tuple[float, float]:

@@ -68,18 +68,15 @@ def to_dataset(design: Design, searched: Searched, confirmed: Confirmed, made_by
         f.GROUP: confirmed.groups,
         f.SURVIVAL: confirmed.survival[..., 0],
         f.SURVIVAL_AT_LEAST: confirmed.survival[..., 1],
-        f.CAMPAIGN: _texts(
-            toml_text(campaign_tables(design, record.tables, record.values, design.threats[0]))
-            for record in confirmed.records
-        ),
+        f.CAMPAIGN: _texts(_campaign(design, record) for record in confirmed.records),
         f.FILE: _texts(f"design_{number:0{width}d}.toml" for number in range(len(confirmed.records))),
         f.FRESH_LEVELS: _texts(_levels(record) for record in confirmed.records),
         f.REFERENCE: _texts(reference.name for reference in design.references),
         f.REFERENCE_CAMPAIGN: _texts(_campaign(design, record) for record in confirmed.references),
         f.COMPUTED: searched.history[:, 0].astype(np.int64),
         f.VOLUME: searched.history[:, 1],
+        f.UNTESTED: _texts(_untested(design, record) for record in confirmed.records),
     }
-    columns[f.UNTESTED] = _texts(_untested(design, record) for record in confirmed.records)
     if confirmed.assumptions:
         columns[f.ASSUMPTION] = _texts(confirmed.assumptions)
         of_front, of_references = np.split(confirmed.under, [len(confirmed.records)])

@@ -4,8 +4,8 @@ decide."""
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Iterator, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -91,27 +91,19 @@ def search(design: Design, follow: Follow = lambda now: None) -> Question[Search
         for first in range(0, len(every), design.search.population):
             yield from state.generation(every[first : first + design.search.population])
     else:
-        for points, tell in _generations(design):
+        plan = design.search
+        searcher = Searcher(design.space, len(design.objectives), 1 + len(design.bounds), plan.population, plan.seed)
+        while asked := searcher.ask():
+            points = [design.space.at(coordinates) for coordinates in asked]
             yield from state.generation(points)
-            if state.done >= design.search.designs or state.idle >= IDLE:
+            if state.done >= plan.designs or state.idle >= IDLE:
                 break
-            tell(*state.told(points))
+            searcher.tell(*state.told(points))
     if not state.records:
         raise CampaignError(f"{design.name}: {state.why_none()}")
     state.total, state.certain = state.done, True
     state.tell("")
     return state.searched()
-
-
-Tell = Callable[[Array, Array], None]
-
-
-def _generations(design: Design) -> Iterator[tuple[list[Array], Tell]]:
-    """Points of the space, with a function that takes the results of each point."""
-    space, plan = design.space, design.search
-    searcher = Searcher(space, len(design.objectives), 1 + len(design.bounds), plan.population, plan.seed)
-    while asked := searcher.ask():
-        yield [space.at(point) for point in asked], searcher.tell
 
 
 @dataclass
@@ -189,8 +181,7 @@ class _State:
         """Compute hits of designs. Designs that may be on the front get the hits of the next rung."""
         levels = yield from self._levels(list(new.values()))
         for key, of_threats in zip(list(new), levels, strict=True):
-            old = new[key]
-            new[key] = DesignRecord(old.values, old.tables, old.weights, of_threats, old.said)
+            new[key] = replace(new[key], levels=of_threats)
         going, before = list(new), 0
         for hits in self.design.search.rungs if self.design.keys else [self.design.search.hits]:
             with_more = yield from self._more([new[key] for key in going], before, hits)

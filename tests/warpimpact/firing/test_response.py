@@ -39,7 +39,9 @@ def sweep(status: list[list[Status]]) -> xarray.Dataset:
 
 def test_limits_answer_as_a_map() -> None:
     response = response_of_limits(limits([800.0, 0.0, np.nan, np.inf]))
-    assert response.share(np.array([1.0, 799.0, 801.0, 5000.0])) == pytest.approx([1 / 3, 1 / 3, 2 / 3, 2 / 3])
+    assert [response.estimate(speed).value for speed in (1.0, 799.0, 801.0, 5000.0)] == pytest.approx(
+        [1 / 3, 1 / 3, 2 / 3, 2 / 3]
+    )
     assert response.yaw == pytest.approx([0.0, 1.0, 3.0])
     assert response.estimate(801.0).low < 2 / 3 < response.estimate(801.0).high
 
@@ -49,7 +51,7 @@ def test_a_sweep_may_have_several_changes() -> None:
     response = response_of_sweep(sweep([[STOP, STOP, PASS, STOP], [PASS, STOP, PASS, BROKE], [STOP, PASS, PASS, PASS]]))
     assert not response.unique
     assert response.changes == pytest.approx(np.array([[750.0, 850.0], [850.0, np.inf], [0.0, np.inf]]))
-    assert response.share(np.array([700.0, 800.0, 900.0])) == pytest.approx([1 / 3, 2 / 3, 2 / 3])
+    assert [response.estimate(speed).value for speed in (700.0, 800.0, 900.0)] == pytest.approx([1 / 3, 2 / 3, 2 / 3])
     assert [response.quantile(share) for share in (0.3, 0.5, 0.9)] == [0.0, 750.0, np.inf]
 
 

@@ -1,27 +1,8 @@
-"""Measures of a design file: the language of results, and the names of earlier versions."""
+"""Measures of a design file, in the language of results."""
 
 import pytest
 
 from warpimpact.campaign.text import CampaignError
-
-
-@pytest.mark.parametrize(
-    ("given", "text"),
-    [
-        ('"areal_density"', "areal_density"),
-        ('"residual_energy_density"\nstandoff = "50 mm"', "mean(residual_energy_density@50 mm)"),
-        ('"residual_energy_density_worst_tenth"', "worst_tenth(residual_energy_density)"),
-        ('"tilted_share"\nangle = "40 deg"\nstandoff = 0.13', "P(inclination@0.13 m > 40 deg)"),
-        ('"tilted_share"\nangle = 40', "P(inclination > 40 deg)"),
-        ('"stopped_share"', "P(stopped)"),
-        ('"limit_thickness"\nlayer = 1', "mean(limit_thickness@layer 1)"),
-        ('"limit_velocity_worst_tenth"', "worst_tenth(limit_velocity)"),
-    ],
-)
-def test_names_of_earlier_versions_are_measures(make, given: str, text: str) -> None:
-    old, new = (make(f"[[objectives]]\nmeasure = {measure}\n") for measure in (given, f'"{text}"'))
-    assert old.objectives[0].measure == text
-    assert (old.objectives, old.keys) == (new.objectives, new.keys)
 
 
 def test_all_statistics_of_a_quantity_share_its_column(make) -> None:

@@ -260,7 +260,7 @@ def test_a_search_with_another_catalogue_is_not_resumed(tmp_path: Path) -> None:
 
 
 def test_the_front_has_designs_that_keep_the_bounds_with_all_their_hits() -> None:
-    bound = '[[bounds]]\nmeasure = "residual_energy_fraction"\nat_most = 0.5\n'
+    bound = '[[bounds]]\nmeasure = "mean(residual_energy_fraction)"\nat_most = 0.5\n'
     plan = design(THICKNESS, WEIGHT_AND_ENERGY, bound, SEARCH)
 
     def planted(density: float, fraction: float, hits: int = 64) -> DesignRecord:
@@ -276,7 +276,7 @@ def test_the_front_has_designs_that_keep_the_bounds_with_all_their_hits() -> Non
 
 
 def test_no_design_within_the_bounds_is_an_outcome() -> None:
-    bound = '[[bounds]]\nmeasure = "stopped_share"\nat_least = 0.9\n'
+    bound = '[[bounds]]\nmeasure = "P(stopped)"\nat_least = 0.9\n'
     found = optimise(design(*SEARCHED, bound, SEARCH))
     assert found.attrs[f.OUTCOME] == f.NONE_FEASIBLE
     assert (found.sizes["design"], found.sizes["front"]) == (12, 0)
@@ -338,7 +338,7 @@ def test_a_limit_is_that_of_the_command(measure: str, tmp_path: Path) -> None:
 
 
 def test_a_limit_of_what_weakens_by_time_is_refused() -> None:
-    asked = '[[objectives]]\nmeasure = "limit_velocity"\n'
+    asked = '[[objectives]]\nmeasure = "mean(limit_velocity)"\n'
     with pytest.raises(CampaignError, match="weakens by time"):
         optimise(design("degradation = 0.8", HOLES, asked, SEARCH))
 
