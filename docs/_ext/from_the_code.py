@@ -239,7 +239,7 @@ class DesignReference(CampaignReference):
     """Every key of a design file beside those of a campaign, table by table, from its JSON schema."""
 
     def lines(self) -> Iterator[str]:
-        from warpimpact.optimisation.design_schema import asking_schema
+        from warpimpact.optimisation.design import asking_schema
 
         self.schema = asking_schema()
         yield from ["## Tables of the file", ""]

@@ -21,7 +21,7 @@ from scipy.stats import chisquare
 from warpimpact.identification.fit import Fit
 from warpimpact.identification.fit_file import fit_from
 from warpimpact.identification.likelihood import Compared, Data
-from warpimpact.identification.scoring import benches, data_of, discrepancies, evaluate, runs
+from warpimpact.identification.scoring import benches, computed, data_of, discrepancies, evaluate
 from warpimpact.solver.worker import Worker
 from warpimpact.statistics.importance import ImportanceSampler, Weights
 
@@ -86,15 +86,15 @@ def calibrate(fit: Fit, *, data_sets: int, library: int, device: str = "auto") -
     log_likelihood = np.zeros((data_sets, library))
     scales = discrepancies(fit, points)
     for bench in benches(fit):
-        for run in runs(fit, bench, points, Worker(device)):
-            (which,) = run.which.T
+        for run, outcomes in computed(fit, bench, points, Worker(device)):
+            (which,), unfolded = run.which.T, outcomes.unfolded(run.aim.group)
             some = {kind: scale[which] for kind, scale in scales.items()}
             for place in bench.which:
                 shot = fit.shots[place]
                 own = run.aim.of(shot.hit, run.scene.target.layers[0], run.scene.core)
                 known = None  # between the hits, which all data sets share
                 for row, values in enumerate(measured[place]):
-                    compared = Compared.of(_replaced(data_of(fit, shot), values), own, run.outcomes, known)
+                    compared = Compared.of(_replaced(data_of(fit, shot), values), own, unfolded, known)
                     log_likelihood[row, which] += compared.score(some, rng).log_likelihood
                     known = compared.changes
     weights = [Weights.of(row) for row in log_likelihood]

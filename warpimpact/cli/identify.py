@@ -51,9 +51,8 @@ def add_identify(commands: Commands) -> None:
 
 def _identify(arguments: argparse.Namespace) -> int:
     from warpimpact.identification.computed_shots import fit_of_result
-    from warpimpact.identification.extent import extent_of
     from warpimpact.identification.fit_file import read_fit
-    from warpimpact.identification.identify import identify_to_file
+    from warpimpact.identification.identify import extent_of, identify_to_file
     from warpimpact.identification.posterior_view import posterior_view
     from warpimpact.plotting.posterior import FIGURES
     from warpimpact.results import files, posterior_file

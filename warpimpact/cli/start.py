@@ -140,7 +140,7 @@ def _schema_text(kind: str) -> str:
         "campaign": ("campaign.schema", "campaign_schema"),
         "fit": ("identification.fit_schema", "fit_schema"),
         "test": ("firing.plan_file", "firing_schema"),
-        "design": ("optimisation.design_schema", "design_schema"),
+        "design": ("optimisation.design", "design_schema"),
     }[kind]  # the schemas of the other kinds would take seconds to import
     made = getattr(import_module(f"warpimpact.{room}"), name)
     return json.dumps(made(), indent=1, ensure_ascii=False) + "\n"

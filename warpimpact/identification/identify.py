@@ -11,17 +11,20 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from warpimpact.identification.aim import aim
 from warpimpact.identification.fit import Fit, Sampling
 from warpimpact.identification.likelihood import ShotScore
 from warpimpact.identification.parameters import FitError
 from warpimpact.identification.posterior import Sampled, to_datatree
-from warpimpact.identification.scoring import evaluate
+from warpimpact.identification.scoring import benches, evaluate
 from warpimpact.results import attributes as attr
 from warpimpact.results.files import write_tree
 from warpimpact.runs.choice import opened
 from warpimpact.runs.executor import Executor, Job
 from warpimpact.runs.questions import Arrays, Question, Round, RoundProgress, answered
 from warpimpact.runs.store import content_of, stored
+from warpimpact.solver.limit import PASSAGES
+from warpimpact.solver.prepare import prepare
 from warpimpact.solver.worker import Worker
 from warpimpact.statistics.importance import LARGEST_K, ImportanceSampler
 
@@ -35,6 +38,9 @@ DISCREPANCIES = 8
 """Scales of discrepancy per set of parameters. They need no runs of their own."""
 BATCH = 16
 """Sets per file."""
+SCORING = 1e-4
+"""Seconds of a core for a hit beside its march, for scenes, places and scores: 0.9e-4 and 1.3e-4 in the fits of
+campaigns/fits."""
 FARTHEST = 5.0
 """Largest miss of a number in the best set of the prior, in standard deviations including the discrepancy."""
 
@@ -132,15 +138,45 @@ def rounds(plan: Sampling) -> list[int]:
     return [count * plan.shared * DISCREPANCIES for count in counts]
 
 
+def core_seconds(fit: Fit) -> float:
+    """Approximate time that a core takes for all sets of a fit if the sampling does not end early [s]."""
+    of_a_set = 0.0
+    for bench in benches(fit):
+        scene = fit.scene_of(bench.shot)
+        hits = aim(bench.shot, scene.target.layers[0], scene.core, fit.sampling, np.zeros((1, 2))).computed
+        measured = (observation for place in bench.which for observation in fit.shots[place].observations)
+        passages = PASSAGES if any(observation.is_limit for observation in measured) else 1
+        of_a_set += len(hits) * (SCORING + passages * prepare(scene, hits[:1], fit.numerics).seconds)
+    return of_a_set * sets_of(fit)
+
+
+def sets_of(fit: Fit) -> int:
+    """Largest number of sets of parameters."""
+    return sum(rounds(fit.sampling)) // DISCREPANCIES
+
+
+def extent_of(fit: Fit, cores: int | None) -> str:
+    """A sentence about the most that a fit will compute.
+
+    Args:
+        cores: number of cores that will compute; None where unknown, and then no time is given.
+    """
+    sentence = f"computes at most {sets_of(fit)} sets of parameters, {fit.sampling.hits} hits of each shot"
+    if cores is None:
+        return sentence
+    seconds = core_seconds(fit) / cores
+    time = f"{seconds:.0f} s" if seconds < 90.0 else f"{seconds / 60.0:.2g} min"
+    return f"{sentence}: roughly {time} on {cores} core{'s' if cores > 1 else ''}"
+
+
 class _Scored:
     """Scores sets of parameters in batches. A batch is a job of a round."""
 
     def __init__(self, fit: Fit, follow: Follow) -> None:
         self._fit, self._follow = fit, follow
-        self._total = sum(rounds(fit.sampling)) // DISCREPANCIES
         self._batches: list[list[ShotScore]] = []
         self.done = 0
-        self._progress = FitProgress(0, self._total, 0, np.nan, np.nan, np.inf)
+        self._progress = FitProgress(0, sets_of(fit), 0, np.nan, np.nan, np.inf)
 
     def round(self, points: Array) -> Question[Array]:
         """Score the sets of one round; returns the logarithms of their likelihoods, shape [sets]."""

@@ -203,13 +203,6 @@ class Compared:
         return log.reshape(len(row), points)
 
 
-def score(
-    data: Data, aim: HitPoints, outcomes: Outcomes, discrepancy: Mapping[str, Array], rng: np.random.Generator
-) -> ShotScore:
-    """Score sets of parameters against one measured shot; the arguments are those of `Compared`."""
-    return Compared.of(data, aim, outcomes).score(discrepancy, rng)
-
-
 def _counted(data: Data, outcomes: Outcomes) -> Array:
     """1 where a shot would have been measured, shape [shots]: its computation did not fail, and the selection holds."""
     kept = ~failures(outcomes.status)

@@ -15,7 +15,6 @@ from numpy.typing import NDArray
 from warpimpact.campaign.drawn import OF_THE_MATERIAL
 from warpimpact.identification.fit import Fit
 from warpimpact.identification.likelihood import KEPT_HITS, ShotScore
-from warpimpact.identification.parameters import Parameter
 from warpimpact.identification.scoring import data_of, discrepancies
 from warpimpact.results import attributes as attr
 from warpimpact.results import posterior_file
@@ -121,62 +120,55 @@ def _parameters(fit: Fit, points: Array, dim: str) -> xarray.Dataset:
     columns = {}
     for column, parameter in enumerate(fit.parameters):
         values = parameter.at(points[:, column])
-        columns[parameter.name] = (
-            dim,
-            np.degrees(values) if parameter.unit == "rad" else values,
-            _described(parameter),
-        )
+        described = {
+            "units": UNITS[parameter.unit].stored,
+            posterior_file.PATH: json.dumps(parameter.path),
+            "prior": parameter.prior.model_dump_json(),
+        }
+        columns[parameter.name] = (dim, np.degrees(values) if parameter.unit == "rad" else values, described)
     return xarray.Dataset(columns)
 
 
-def _described(parameter: Parameter) -> dict[str, str]:
-    return {
-        "units": UNITS[parameter.unit].stored,
-        posterior_file.PATH: json.dumps(parameter.path),
-        "prior": parameter.prior.model_dump_json(),
-    }
-
-
-def _labels(fit: Fit) -> list[tuple[int, int]]:
-    """Shot, and place among its observations, of every measured number."""
-    return [(place, index) for place, shot in enumerate(fit.shots) for index in range(len(shot.observations))]
-
-
 def _along_observations(fit: Fit) -> dict[str, Any]:
-    names, measured = _names(fit), [fit.shots[place].observations[index] for place, index in _labels(fit)]
-    shots = [names[place] for place, _ in _labels(fit)]
+    measured = [
+        (name, number) for name, shot in zip(_names(fit), fit.shots, strict=True) for number in shot.observations
+    ]
     return {
-        "observation": [f"{shot}: {number.label}" for shot, number in zip(shots, measured, strict=True)],
-        posterior_file.SHOT_OF: ("observation", shots),
-        posterior_file.UNITS_OF: ("observation", [number.units for number in measured]),
+        "observation": [f"{shot}: {number.label}" for shot, number in measured],
+        posterior_file.SHOT_OF: ("observation", [shot for shot, _ in measured]),
+        posterior_file.UNITS_OF: ("observation", [number.units for _, number in measured]),
     }
 
 
 def _observed(fit: Fit) -> xarray.Dataset:
-    measured = [fit.shots[place].observations[index] for place, index in _labels(fit)]
+    columns = {
+        name: _numbers(fit, [np.array([getattr(number, of) for number in shot.observations]) for shot in fit.shots])
+        for name, of in ((posterior_file.MEASURED, "value"), (posterior_file.STD, "std"))
+    }
     return xarray.Dataset(
-        {
-            posterior_file.MEASURED: (
-                "observation",
-                np.array([float(number.shown(number.value)) for number in measured]),
-            ),
-            posterior_file.STD: ("observation", np.array([float(number.shown(number.std)) for number in measured])),
-        },
-        _along_observations(fit),
+        {name: ("observation", numbers) for name, numbers in columns.items()}, _along_observations(fit)
     )
 
 
-def _numbers(fit: Fit, of: Any) -> Array:
-    """Numbers of all observations side by side, in the units of the Dataset. `of` returns those of a shot, SI."""
-    columns = [fit.shots[place].observations[index].shown(of(place)[..., index]) for place, index in _labels(fit)]
-    return np.stack(columns, axis=-1) if columns else np.empty((*of(0).shape[:-1], 0))
+def _numbers(fit: Fit, of_shots: Sequence[Array]) -> Array:
+    """Numbers of all observations side by side, in the units of the Dataset.
+
+    Args:
+        of_shots: numbers of the observations of each shot, along the last axis, SI.
+    """
+    shown = [
+        observation.shown(numbers[..., [index]])
+        for shot, numbers in zip(fit.shots, of_shots, strict=True)
+        for index, observation in enumerate(shot.observations)
+    ]
+    return np.concatenate([of_shots[0][..., :0], *shown], axis=-1)
 
 
 def _computed(fit: Fit, sampled: Sampled, which: NDArray[np.int64], kept: NDArray[np.int64]) -> xarray.Dataset:
     """What another shot like each would show, and what each draw computes at its hit."""
     scores, over = sampled.scores, ("draw", "observation")
-    predicted = _numbers(fit, lambda place: scores[place].predicted[which, kept])
-    fitted = _numbers(fit, lambda place: scores[place].fitted[which, kept])
+    predicted = _numbers(fit, [score.predicted[which, kept] for score in scores])
+    fitted = _numbers(fit, [score.fitted[which, kept] for score in scores])
     return xarray.Dataset(
         {
             posterior_file.MEASURED: (over, predicted, {"long_name": "of another such shot, measured"}),
@@ -196,7 +188,7 @@ def _best(fit: Fit, sampled: Sampled) -> xarray.Dataset:
         misfit=("shot", misfit[best], {"long_name": "sum of (computed − measured)² over the squared uncertainty"}),
         hit_y=("shot", hits[:, 0], _place("hit_y")),
         hit_z=("shot", hits[:, 1], _place("hit_z")),
-        measured=("observation", _numbers(fit, lambda place: sampled.scores[place].best[best])),
+        measured=("observation", _numbers(fit, [score.best[best] for score in sampled.scores])),
     ).assign_coords(_along_observations(fit))
 
 

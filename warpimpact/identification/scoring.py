@@ -42,22 +42,21 @@ class Bench:
     which: tuple[int, ...]
 
 
-@dataclass(frozen=True)
-class Run:
-    """Outcomes of a bench at some sets of parameters.
+class Run(NamedTuple):
+    """Shots of a bench at some sets of parameters that share a scene.
 
     Attributes:
         which: numbers of the sets, shape [computed sets, equal sets]; equal sets differ in the scales of discrepancy
             alone.
         scene: the scene, with medians of the quantities that differ from set to set.
         aim: the points of the computed sets, without a class.
-        outcomes: outcomes, images included, shape [computed sets · points].
+        shots: the computed shots.
     """
 
     which: NDArray[np.int64]
     scene: Scene
     aim: HitPoints
-    outcomes: Outcomes
+    shots: Shots
 
 
 def benches(fit: Fit) -> list[Bench]:
@@ -70,21 +69,28 @@ def benches(fit: Fit) -> list[Bench]:
     return [Bench(fit.shots[places[0]], tuple(places)) for places in places_of.values()]
 
 
-def runs(fit: Fit, bench: Bench, points: Array, worker: Worker, *, seed: int = 0) -> Iterator[Run]:
-    """Compute a bench at sets of parameters.
+def computed(fit: Fit, bench: Bench, points: Array, worker: Worker, *, seed: int = 0) -> Iterator[tuple[Run, Outcomes]]:
+    """Compute a bench at sets of parameters: runs with the outcomes of their shots.
 
     Args:
         points: standard normal numbers, one column per parameter of the fit, shape [sets, parameters].
         seed: seed of the places of the hits.
     """
+    runs = list[Run]()
+    for run in _runs(fit, bench, points, seed):
+        runs.append(run)
+        if sum(len(some.shots) for some in runs) >= SHOTS_AT_A_TIME:
+            yield from zip(runs, _outcomes(fit, bench, runs, worker), strict=True)
+            runs = []
+    yield from zip(runs, _outcomes(fit, bench, runs, worker), strict=True)
+
+
+def _runs(fit: Fit, bench: Bench, points: Array, seed: int) -> Iterator[Run]:
     alike = _alike(points[:, [parameter.path[0] != "discrepancy" for parameter in fit.parameters]])
-    values = {
-        parameter.path: parameter.at(points[alike[:, 0], column]) for column, parameter in enumerate(fit.parameters)
-    }
     by_path = {
-        scene_parameter.path: values[scene_parameter.path]
-        for scene_parameter in fit.scene_parameters
-        if scene_parameter.path not in bench.shot.own
+        parameter.path: parameter.at(points[alike[:, 0], column])
+        for column, parameter in enumerate(fit.parameters)
+        if parameter.path[0] != "discrepancy" and parameter.path not in bench.shot.own
     }
     columns = _as_columns(fit, by_path)
     of_scene = {path: column for path, column in by_path.items() if path not in columns}
@@ -92,7 +98,6 @@ def runs(fit: Fit, bench: Bench, points: Array, worker: Worker, *, seed: int = 0
         (len(alike), 2)
     )
     per_call = max(1, SHOTS_AT_A_TIME // fit.sampling.hits)
-    jobs = list[_Job]()
     for rows in _of_one_scene(of_scene, len(alike)):
         own_scene = by_path if len(rows) == 1 else of_scene  # a single set needs no columns
         scene = fit.scene_of(bench.shot, {path: float(column[rows[0]]) for path, column in own_scene.items()})
@@ -103,11 +108,7 @@ def runs(fit: Fit, bench: Bench, points: Array, worker: Worker, *, seed: int = 0
                 {path: column[chosen] for path, column in by_path.items() if path not in own_scene},
                 scene.target.layers[0],
             )
-            jobs.append(_Job(alike[chosen], scene, targets, with_own(targets.computed, of_sets)))
-            if sum(len(job.shots) for job in jobs) >= SHOTS_AT_A_TIME:
-                yield from _run(fit, bench, jobs, worker)
-                jobs = []
-    yield from _run(fit, bench, jobs, worker)
+            yield Run(alike[chosen], scene, targets, with_own(targets.computed, of_sets))
 
 
 def _alike(points: Array) -> NDArray[np.int64]:
@@ -119,21 +120,7 @@ def _alike(points: Array) -> NDArray[np.int64]:
     return rows
 
 
-class _Job(NamedTuple):
-    """Shots of a bench, for sets that share a scene; see `Run`."""
-
-    which: NDArray[np.int64]
-    scene: Scene
-    aim: HitPoints
-    shots: Shots
-
-
-def _run(fit: Fit, bench: Bench, jobs: Sequence[_Job], worker: Worker) -> Iterator[Run]:
-    for job, outcomes in zip(jobs, _outcomes(fit, bench, jobs, worker), strict=True):
-        yield Run(job.which, job.scene, job.aim, outcomes.unfolded(job.aim.group))
-
-
-def _outcomes(fit: Fit, bench: Bench, jobs: Sequence[_Job], worker: Worker) -> list[Outcomes]:
+def _outcomes(fit: Fit, bench: Bench, runs: Sequence[Run], worker: Worker) -> list[Outcomes]:
     """The outcomes that the observations of a bench need: at impact velocity, limit velocities, or both."""
     measured = [fit.shots[place] for place in bench.which]
     observations = [observation for shot in measured for observation in shot.observations]
@@ -143,19 +130,19 @@ def _outcomes(fit: Fit, bench: Bench, jobs: Sequence[_Job], worker: Worker) -> l
         or any(shot.status for shot in measured)
         or not all(observation.is_limit for observation in observations)
     )
-    scenes = [(job.scene, job.shots) for job in jobs]
+    scenes = [(run.scene, run.shots) for run in runs]
     outcomes = simulate_many(scenes, fit.numerics, worker) if other or not limited else []
-    if not limited:
-        return outcomes
 
     def limit(number: int, share: Worker, _: Any) -> Limits:
         return limit_velocity(*scenes[number], numerics=fit.numerics, device=share.device, threads=share.threads)
 
-    limits = side_by_side(limit, len(scenes), worker)
-    return [
-        result.assign(limit_velocity=limit.value)
-        for result, limit in zip(outcomes or [limit.outcomes for limit in limits], limits, strict=True)
-    ]
+    if limited:
+        limits = side_by_side(limit, len(scenes), worker)
+        outcomes = [
+            result.assign(limit_velocity=limit.value)
+            for result, limit in zip(outcomes or [limit.outcomes for limit in limits], limits, strict=True)
+        ]
+    return outcomes
 
 
 def _as_columns(fit: Fit, columns: Mapping[Path, Array]) -> dict[Path, Array]:
@@ -213,8 +200,8 @@ def evaluate(fit: Fit, points: Array, worker: Worker, *, seed: int) -> list[Shot
     scored: dict[int, list[tuple[NDArray[np.int64], ShotScore]]] = {place: [] for place in range(len(fit.shots))}
     rng = np.random.default_rng(np.random.SeedSequence(fit.sampling.seed, spawn_key=(1, seed)))
     for bench in benches(fit):
-        for run in runs(fit, bench, points, worker, seed=seed):
-            changes = dict[tuple[Any, ...], Array]()
+        for run, outcomes in computed(fit, bench, points, worker, seed=seed):
+            unfolded, changes = outcomes.unfolded(run.aim.group), dict[tuple[Any, ...], Array]()
             for place in bench.which:
                 shot = fit.shots[place]
                 targets = run.aim.of(shot.hit, run.scene.target.layers[0], run.scene.core)
@@ -222,7 +209,7 @@ def evaluate(fit: Fit, points: Array, worker: Worker, *, seed: int) -> list[Shot
                     (observation.name, observation.standoff, observation.is_limit and place)
                     for observation in shot.observations
                 )
-                compared = Compared.of(data_of(fit, shot), targets, run.outcomes, changes.get(numbers))
+                compared = Compared.of(data_of(fit, shot), targets, unfolded, changes.get(numbers))
                 changes[numbers] = compared.changes
                 scored[place] += _scored(compared, run.which, scales, rng)
     return [_in_order(parts) for parts in scored.values()]

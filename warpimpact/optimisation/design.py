@@ -17,18 +17,14 @@ from pydantic import Field, ValidationError, model_validator
 from warpimpact.campaign.alternatives import Alternative, alternatives
 from warpimpact.campaign.campaign import Campaign
 from warpimpact.campaign.problems import sentence
+from warpimpact.campaign.schema import campaign_schema, completed_schema
 from warpimpact.campaign.text import CampaignError, parsed, read_text
 from warpimpact.optimisation.asked import Bound, Objective, check_needs
 from warpimpact.optimisation.space import Space, read_space
 from warpimpact.results.kinds import DESIGN
 from warpimpact.results.measures import Measure
 from warpimpact.scene.model import Model
-from warpimpact.scene.units import (
-    Number,
-    PositiveArealDensity,
-    PositiveLength,
-    Title,
-)
+from warpimpact.scene.units import Number, PositiveArealDensity, PositiveLength, Title
 
 Array = NDArray[np.float64]
 SCRAMBLINGS = 16
@@ -299,3 +295,29 @@ def _assumptions(design: Design) -> tuple[str, ...]:
 def alternatives_of(campaign: Campaign) -> dict[str, Alternative]:
     """The alternatives of a campaign that change its hits, by name."""
     return {alternative.name: alternative for alternative in alternatives(campaign) if not alternative.breaks}
+
+
+def asking_schema() -> dict[str, Any]:
+    """The JSON schema of the tables of a design file beside those of a campaign."""
+    schema = completed_schema(Asking)
+    schema["properties"]["variables"] = {
+        "description": 'Free variables by their places, such as "plate.pattern.width": a range with low, high and, '
+        "where it has one, a step; or a list of values, or of tables with names.",
+        "type": "object",
+        "additionalProperties": {"type": ["object", "array"]},
+    }
+    return schema
+
+
+def design_schema() -> dict[str, Any]:
+    """The JSON schema (2020-12) of a design file, with the meaning, the default and the bounds of every key."""
+    campaign, asking = campaign_schema(), asking_schema()
+    left_out = ("stop", "burst", "sweep", "published")
+    return campaign | {
+        "title": "warpimpact design",
+        "description": "A search for designs: a campaign, what is free in it, and what is sought.",
+        "properties": {key: key_schema for key, key_schema in campaign["properties"].items() if key not in left_out}
+        | asking["properties"],
+        "$defs": campaign["$defs"] | asking["$defs"],
+        "required": [*(key for key in campaign.get("required", ()) if key != "hits"), "objectives"],
+    }

@@ -15,18 +15,29 @@ from numpy.typing import NDArray
 
 from warpimpact.campaign.campaign import Campaign
 from warpimpact.campaign.references import at_solid
+from warpimpact.campaign.resistances import resistance_by_thickness
 from warpimpact.optimisation.design import SCRAMBLINGS, Design, FacedThreat, alternatives_of
-from warpimpact.optimisation.limits import limits_level, limits_said
+from warpimpact.records.group import failures
 from warpimpact.records.outcomes import Outcomes
 from warpimpact.results import variables as v
 from warpimpact.results.dataset import narrow_table
+from warpimpact.results.measures import Measure
 from warpimpact.results.table import HitTable
 from warpimpact.runs.executor import Job
 from warpimpact.runs.levels import aim_of
 from warpimpact.runs.questions import Arrays, Question, Round
 from warpimpact.scene import Numerics, Scene, Shots
+from warpimpact.solver.limit import (
+    HIGHEST_VELOCITY,
+    THICKNESS_TOLERANCE,
+    VELOCITY_TOLERANCE,
+    Sought,
+    limits,
+    pilot_of_limits,
+    thickest,
+)
 from warpimpact.solver.many import side_by_side, simulate_many
-from warpimpact.solver.pilot import pilot_size
+from warpimpact.solver.pilot import limits_pilot_size, pilot_size
 from warpimpact.solver.simulate import pilot_of
 from warpimpact.solver.worker import Worker
 
@@ -228,6 +239,37 @@ def level_of(design: Design, job: HitJob, worker: Worker) -> str:
     if len(found_levels) < len(design.keys):
         found_levels.append(pilot_of(campaign.scene, shots, asked, worker, aim=aim_of(campaign, job.count)).numerics)
     return max(found_levels, key=lambda numerics: numerics.level or 0).model_dump_json()
+
+
+def sought_by(campaign: Campaign, scene: Scene, key: Measure) -> Sought:
+    """The limit behind a measure, with the tolerance of `warpimpact limit`."""
+    if key.name == "limit_velocity":
+        return Sought("velocity", VELOCITY_TOLERANCE, HIGHEST_VELOCITY)
+    layer = key.layer or 0
+    highest = thickest(scene, layer)
+    curve = resistance_by_thickness(campaign, layer, highest)
+    return Sought("thickness", THICKNESS_TOLERANCE, highest, layer, curve)
+
+
+def limits_said(
+    campaign: Campaign, scene: Scene, shots: Shots, key: Measure, numerics: Numerics, worker: Worker
+) -> Array:
+    """The values of a measure of limits, in its display unit, shape [shots]; NaN where the computation failed."""
+    sought = sought_by(campaign, scene, key)
+    limits_found = limits(scene, shots, sought, numerics, worker)
+    value = np.minimum(limits_found.value, sought.highest)
+    value = np.where(failures(limits_found.outcomes.status), np.nan, value)
+    if key.name == "limit_areal_density":
+        layer = scene.target.layers[sought.layer]
+        value = scene.target.areal_density + layer.areal_density * (value / layer.thickness - 1.0)
+    return np.asarray(key.display.factor * key.counted(value))
+
+
+def limits_level(campaign: Campaign, shots: Shots, key: Measure, numerics: Numerics, worker: Worker) -> Numerics:
+    """The numerics that a pilot finds for a limit."""
+    some = shots[: limits_pilot_size(numerics.asked)]
+    sought = sought_by(campaign, campaign.scene, key)
+    return pilot_of_limits(campaign.scene, some, sought, numerics, worker).numerics
 
 
 def hits_asked(design: Design, jobs: Sequence[HitJob], tell: Told) -> Question[list[Said]]:

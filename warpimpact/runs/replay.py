@@ -148,14 +148,9 @@ def campaign_in(result: xarray.Dataset, folder: Path) -> Campaign:
     count = int(result.attrs[attr.COUNT]) if attr.COUNT in result.attrs else None  # a list of hits has none
     name = "the campaign in the result"
     is_sought = result.attrs.get(attr.LIMIT) == "velocity"
-    campaign = Campaign.from_text(
+    return Campaign.from_text(
         result.attrs[attr.CAMPAIGN], name=name, folder=folder, count=count, needs_velocity=not is_sought
     )
-    dealt = int(result.attrs[attr.REPLICATES])
-    if campaign.replicates == dealt:
-        return campaign
-    # The default of the replicates has changed since; the result keeps its own hits.
-    return campaign.model_copy(update={"hits": campaign.hits.model_copy(update={"replicates": dealt})})
 
 
 def _same(dataset: xarray.Dataset, other: xarray.Dataset, names: tuple[str, ...]) -> bool:

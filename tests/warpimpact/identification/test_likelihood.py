@@ -6,12 +6,13 @@ from typing import Any
 import numpy as np
 import pytest
 
+from warpimpact.identification import scoring
 from warpimpact.identification.aim import HitPoints, aim
 from warpimpact.identification.fit import Fit
 from warpimpact.identification.hit_places import CLASSES
-from warpimpact.identification.likelihood import Data, holds, score
+from warpimpact.identification.likelihood import Compared, Data, ShotScore, holds
 from warpimpact.identification.measured import Observation
-from warpimpact.identification.scoring import benches, data_of, evaluate, runs
+from warpimpact.identification.scoring import benches, data_of, evaluate
 from warpimpact.kernels.status import Status
 from warpimpact.records.exit import OUTCOME_VARIABLES
 from warpimpact.records.outcomes import Outcomes
@@ -41,6 +42,10 @@ def aim_of(weight: np.ndarray, replicates: int = 8, sets: int = 2) -> HitPoints:
         hit_z=zeros,
     )
     return HitPoints(shots, (IDENTITY,), np.tile(weight, (sets, 1)), replicates)
+
+
+def score(data: Data, aim: HitPoints, outcomes: Outcomes, scales: Any, rng: np.random.Generator) -> ShotScore:
+    return Compared.of(data, aim, outcomes).score(scales, rng)
 
 
 VELOCITY = Observation("residual_velocity", None, None, 600.0, 10.0)
@@ -175,13 +180,13 @@ def test_an_interval_of_degradation_is_a_degradation_of_the_shot(make_fit: FitMa
     column = [one.name for one in fit.parameters].index("degradation_interval")
     points = np.zeros((2, len(fit.parameters)))
     points[1, column] = 1.0
-    (run,) = runs(fit, bench, points, CPU)
+    ((run, outcomes),) = scoring.computed(fit, bench, points, CPU)
     values = {one.path: float(one.at(points[1:, i])[0]) for i, one in enumerate(fit.parameters)}
     scene = fit.scene_of(fit.shots[0], values)
     assert scene.target.layers[0].degradation_interval == values["plate", "degradation_interval"]
     own = run.aim.computed[fit.sampling.hits :]
     alone = simulate(scene, own, numerics=fit.numerics, device="cpu")
-    again = run.outcomes.residual_velocity.reshape(2, -1, len(run.aim.group))[1, :, 0]
+    again = outcomes.residual_velocity.reshape(2, -1)[1]
     assert again == pytest.approx(alone.residual_velocity, abs=0.02)
 
 
@@ -190,7 +195,7 @@ def test_sets_that_differ_in_discrepancy_alone_share_their_runs(make_fit: FitMak
     points = np.random.default_rng(0).standard_normal((4, len(fit.parameters)))
     points[[1, 3], :2] = points[[0, 2], :2]
     (bench,) = benches(fit)
-    assert sum(len(run.which) for run in runs(fit, bench, points, CPU)) == 2
+    assert sum(len(run.which) for run, _ in scoring.computed(fit, bench, points, CPU)) == 2
     together = evaluate(fit, points[:2], CPU, seed=0)  # each set has hits of its own
     for row in range(2):
         alone = evaluate(fit, points[[row]], CPU, seed=0)

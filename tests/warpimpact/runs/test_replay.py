@@ -1,6 +1,5 @@
 """A replayed hit ends with the bits of the stored one, and its history is consistent with that end."""
 
-import json
 from pathlib import Path
 from typing import Any
 
@@ -226,13 +225,3 @@ def test_command_writes_history_and_figures(
         assert main(again) == 2
         assert sentence in capsys.readouterr().err
     assert not (tmp_path / "a_hit9.nc").exists()
-
-
-def test_a_result_of_another_default_of_the_replicates_keeps_its_hits() -> None:
-    """The text of a campaign says nothing of them, the result does."""
-    former = campaign(hits=Hits(count=32, replicates=1))
-    result = run(former, device="cpu")
-    text = json.loads(former.text)
-    del text["hits"]["replicates"]
-    result.attrs["campaign"] = json.dumps(text)
-    assert replay(result, 20, folder=NOWHERE).attrs["agreement"] == "bit-identical"
