@@ -13,9 +13,9 @@ from .options import (
     add_command,
     add_computing,
     add_count,
+    add_earlier,
     add_measures,
     add_output,
-    add_overwrite,
     executor_of,
 )
 from .paths import check_picture, named
@@ -68,8 +68,8 @@ def add_compare(commands: Commands) -> None:
     )
     add_computing(parser)
     add_count(parser)
-    parser.add_argument("--resume", action="store_true", help="continue an interrupted campaign")
-    add_overwrite(parser, "an existing figure; of a campaign, compute all plates again")
+    replaced = "an existing figure; of a campaign, compute all plates again"
+    add_earlier(parser, "campaign", replaced, resume="continue an interrupted campaign")
 
 
 def _compare(arguments: argparse.Namespace) -> int:

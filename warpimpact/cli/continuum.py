@@ -10,11 +10,11 @@ from .options import (
     add_command,
     add_computing,
     add_count,
+    add_earlier,
     add_output,
-    add_overwrite,
     at_least,
 )
-from .paths import check_place, check_suffix
+from .paths import check_result
 from .progress import Step, show_progress, warn
 from .run import failure_code
 
@@ -71,10 +71,7 @@ def add_continuum(commands: Commands) -> None:
         "--element", metavar="LENGTH", help='size of the elements, such as "0.5 mm", in place of a fidelity'
     )
     add_computing(parser)
-    parser.add_argument(
-        "--resume", action="store_true", help="continue an interrupted computation; start a new one if there is none"
-    )
-    add_overwrite(parser, "an existing result or an interrupted computation")
+    add_earlier(parser, "computation", "an existing result or an interrupted computation")
 
 
 def _continuum(arguments: argparse.Namespace) -> int:
@@ -88,8 +85,7 @@ def _continuum(arguments: argparse.Namespace) -> int:
 
     campaign, hits = _asked(arguments)
     output = arguments.output or Path(f"{arguments.file.stem}_continuum.nc")
-    check_place(output)
-    check_suffix(output, "a result", ".nc")
+    check_result(output, "a result")
     campaign = campaign.computed_by(_elements(arguments, campaign))
     computing = executor_for(arguments.device, workers=arguments.workers, scheduler=arguments.scheduler, apart=True)
     with memory_told(arguments.file), show_progress() as show, computing as executor:

@@ -4,7 +4,7 @@ import argparse
 from pathlib import Path
 
 from .mistakes import memory_told
-from .options import Commands, add_command, add_computing, add_count, add_output, add_overwrite, executor_of
+from .options import Commands, add_command, add_computing, add_count, add_earlier, add_output, executor_of
 from .paths import check_output, check_picture, check_suffix
 from .progress import Step, show_progress, show_run, warn
 
@@ -25,10 +25,8 @@ def add_test(commands: Commands) -> None:
     add_output(parser, "TEST.nc", "result file (default: the test's name, in this folder); the figure is TEST.png")
     add_computing(parser)
     add_count(parser)
-    parser.add_argument(
-        "--resume", action="store_true", help="keep the limits that are computed, and continue what was interrupted"
-    )
-    add_overwrite(parser, "an existing result with its figure and its limits")
+    resume = "keep the limits that are computed, and continue what was interrupted"
+    add_earlier(parser, "test", "an existing result with its figure and its limits", resume=resume)
 
 
 def _test(arguments: argparse.Namespace) -> None:

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING
 from warpimpact.results.interrupts import terminated_as_interrupted
 
 from .mistakes import memory_told
-from .options import Commands, add_command, add_computing, add_output, add_overwrite
-from .paths import check_picture, check_place, check_suffix, replaces
+from .options import Commands, add_command, add_computing, add_earlier, add_output
+from .paths import check_picture, check_result, replaces
 from .plain import say
 from .progress import Step, show_progress, warn
 
@@ -43,10 +43,7 @@ def add_identify(commands: Commands) -> None:
     )
     add_output(parser, "POSTERIOR.nc", "file of the posterior (default: the fit's name, in this folder)")
     add_computing(parser)
-    parser.add_argument(
-        "--resume", action="store_true", help="continue an interrupted fit; start a new one if there is none"
-    )
-    add_overwrite(parser, "an existing posterior or an interrupted fit")
+    add_earlier(parser, "fit", "an existing posterior or an interrupted fit")
 
 
 def _identify(arguments: argparse.Namespace) -> int:
@@ -63,8 +60,7 @@ def _identify(arguments: argparse.Namespace) -> int:
     by_elements = arguments.fit.suffix == ".nc"
     fit = fit_of_result(arguments.fit) if by_elements else read_fit(arguments.fit)
     output = arguments.output or Path(f"{arguments.fit.stem}_fit.nc" if by_elements else f"{arguments.fit.stem}.nc")
-    check_place(output)
-    check_suffix(output, "a posterior", ".nc")
+    check_result(output, "a posterior")
     pictures = {output.with_name(f"{output.stem}_{name}.png"): draw for name, draw in FIGURES.items()}
     for picture in pictures:
         check_picture(picture, overwrite=replaces(arguments, output))

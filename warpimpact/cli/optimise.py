@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING
 from warpimpact.results.interrupts import terminated_as_interrupted
 
 from .mistakes import memory_told
-from .options import Commands, add_command, add_computing, add_output, add_overwrite, executor_of
-from .paths import check_picture, check_place, check_suffix, replaces
+from .options import Commands, add_command, add_computing, add_earlier, add_output, executor_of
+from .paths import check_picture, check_result, replaces
 from .plain import say
 from .progress import Step, show_progress, warn
 
@@ -35,10 +35,7 @@ def add_optimise(commands: Commands) -> None:
     parser.add_argument("design", type=Path, metavar="DESIGN.toml", help="design file: a campaign, and what is free")
     add_output(parser, "FRONT.nc", "result file (default: the design's name, in this folder)")
     add_computing(parser)
-    parser.add_argument(
-        "--resume", action="store_true", help="continue an interrupted search; start a new one if there is none"
-    )
-    add_overwrite(parser, "an existing result, its campaigns or an interrupted search")
+    add_earlier(parser, "search", "an existing result, its campaigns or an interrupted search")
 
 
 def _optimise(arguments: argparse.Namespace) -> int:
@@ -51,8 +48,7 @@ def _optimise(arguments: argparse.Namespace) -> int:
 
     design = read_design(arguments.design)
     output = arguments.output or Path(arguments.design.stem + ".nc")
-    check_suffix(output, "a search", ".nc")
-    check_place(output)
+    check_result(output, "a search")
     picture = output.with_suffix(".png")
     check_picture(picture, overwrite=replaces(arguments, output))
     say(design.search.extent)

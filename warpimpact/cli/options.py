@@ -60,6 +60,19 @@ def add_measures(parser: argparse.ArgumentParser, default: str = "the measures o
     )
 
 
+def add_earlier(parser: argparse.ArgumentParser, what: str, replaced: str, *, resume: str = "") -> None:
+    """Add `--resume` and `--overwrite`: what happens to an earlier computation.
+
+    Args:
+        what: name of the computation.
+        replaced: what `--overwrite` replaces.
+        resume: what `--resume` does, in other words than those for any computation.
+    """
+    usual = f"continue an interrupted {what}; start a new one if there is none"
+    parser.add_argument("--resume", action="store_true", help=resume or usual)
+    add_overwrite(parser, replaced)
+
+
 def add_overwrite(parser: argparse.ArgumentParser, replaced: str) -> None:
     parser.add_argument("--overwrite", action="store_true", help=f"replace {replaced}")
 

@@ -40,6 +40,12 @@ def check_picture(path: Path, *, overwrite: bool) -> None:
     check_output(path, overwrite=overwrite)
 
 
+def check_result(path: Path, what: str) -> None:
+    """Refuse a netCDF file that cannot be written, or with another suffix."""
+    check_place(path)
+    check_suffix(path, what, ".nc")
+
+
 def check_suffix(path: Path, what: str, *suffixes: str) -> None:
     """Refuse a name whose suffix belongs to another format."""
     from warpimpact.results.files import OutputError

@@ -13,12 +13,12 @@ from .options import (
     add_command,
     add_computing,
     add_count,
+    add_earlier,
     add_output,
-    add_overwrite,
     add_posterior,
     executor_of,
 )
-from .paths import check_place, check_suffix
+from .paths import check_result
 from .plain import say
 from .progress import show_run, warn
 
@@ -52,8 +52,7 @@ def _run(arguments: argparse.Namespace) -> int:
 
     campaign = Campaign.from_toml(arguments.campaign, count=arguments.count, posterior=arguments.posterior)
     output = arguments.output or Path(arguments.campaign.stem + ".nc")
-    check_place(output)
-    check_suffix(output, "a result", ".nc")
+    check_result(output, "a result")
     run_shown(campaign, output, arguments)
     with open_table(output) as dataset:
         print(summary_text(dataset))
@@ -76,10 +75,7 @@ def add_run_options(parser: argparse.ArgumentParser, what: str) -> None:
     add_computing(parser)
     add_count(parser)
     add_posterior(parser)
-    parser.add_argument(
-        "--resume", action="store_true", help=f"continue an interrupted {what}; start a new one if there is none"
-    )
-    add_overwrite(parser, f"an existing result or an interrupted {what}")
+    add_earlier(parser, what, f"an existing result or an interrupted {what}")
 
 
 def run_shown(

@@ -12,12 +12,12 @@ from .options import (
     add_command,
     add_computing,
     add_count,
+    add_earlier,
     add_measures,
     add_output,
-    add_overwrite,
     executor_of,
 )
-from .paths import check_picture, check_place, check_suffix, replaces
+from .paths import check_picture, check_result, replaces
 from .progress import show_run, warn
 
 
@@ -37,8 +37,8 @@ def add_sweep(commands: Commands) -> None:
     add_output(parser, "SWEEP.nc", "file of the sweep (default: the campaign's name, in this folder)")
     add_computing(parser)
     add_count(parser)
-    parser.add_argument("--resume", action="store_true", help="keep the points that are complete, and compute the rest")
-    add_overwrite(parser, "an existing sweep with its points and its figure")
+    resume = "keep the points that are complete, and compute the rest"
+    add_earlier(parser, "sweep", "an existing sweep with its points and its figure", resume=resume)
 
 
 def _sweep(arguments: argparse.Namespace) -> None:
@@ -53,8 +53,7 @@ def _sweep(arguments: argparse.Namespace) -> None:
     sweep.check(arguments.measure)
     output = arguments.output or Path(arguments.campaign.stem + ".nc")
     picture = output.with_suffix(".png")
-    check_place(output)
-    check_suffix(output, "a sweep", ".nc")
+    check_result(output, "a sweep")
     check_picture(picture, overwrite=replaces(arguments, output))
 
     with memory_told(arguments.campaign), show_run() as follow, executor_of(arguments) as executor:

@@ -5,14 +5,11 @@ from __future__ import annotations
 import json
 import math
 import time
-from base64 import b64encode
 from collections import OrderedDict
 from collections.abc import Mapping, Sequence
-from io import BytesIO
 from typing import Any
 
 import xarray
-from jinja2 import ChoiceLoader, Environment, PackageLoader, StrictUndefined
 
 from warpimpact.analysis.summary import breaks_promise, numerics_sentence
 from warpimpact.campaign.evidence import evidence_of
@@ -22,10 +19,11 @@ from warpimpact.design.controls import groups
 from warpimpact.design.designs import ROOT, Shelf, ValidDesign, stage_of, work_ahead
 from warpimpact.design.edits import choices
 from warpimpact.design.geometry import drawn
+from warpimpact.plotting.style import data_url
 from warpimpact.plotting.trajectory import FIGURES
 from warpimpact.report.hit_data import MOST_HITS, PAGE_PIXELS, page_data, thinned, trajectory_data
 from warpimpact.report.report import report_page
-from warpimpact.report.words import compared, result_content
+from warpimpact.report.words import compared, result_content, templates
 from warpimpact.results import attributes as attr
 from warpimpact.results.replayed_hit import hit_view
 from warpimpact.runs.assumed import has_assumptions
@@ -60,12 +58,7 @@ class Answers:
         self._pace = PACE
         self._results: OrderedDict[str, xarray.Dataset] = OrderedDict()
         self._histories: OrderedDict[tuple[str, int], xarray.Dataset] = OrderedDict()
-        self._environment = Environment(
-            loader=ChoiceLoader([PackageLoader("warpimpact.design", ""), PackageLoader("warpimpact.report", "")]),
-            autoescape=True,
-            undefined=StrictUndefined,
-            trim_blocks=True,
-        )
+        self._environment = templates("design", "report")
 
     def page(self, **content: Any) -> str:
         """The page without any design."""
@@ -196,9 +189,7 @@ class Answers:
         draw = next((draw for draw in FIGURES if draw.__name__.replace("_", " ") == name), None)
         if draw is None:
             raise CampaignError(f'got the figure "{name[:80]}", which replay does not draw')
-        history, buffer = self._history(stage_of(self.shelf, design, level, stage), hit, cancel), BytesIO()
-        draw(history).savefig(buffer, format="png", dpi=110)
-        return {"image": f"data:image/png;base64,{b64encode(buffer.getvalue()).decode()}"}
+        return {"image": data_url(draw(self._history(stage_of(self.shelf, design, level, stage), hit, cancel)))}
 
     def _history(self, design: ValidDesign, hit: int, cancel: Cancel) -> xarray.Dataset:
         key = (design.text, hit)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping
-from typing import Any, NamedTuple
+from typing import Any
 
 from pydantic import BaseModel
 
@@ -18,38 +18,30 @@ from warpimpact.scene.units import reader_in, typed
 Place = list[str | int]
 
 
-class _Range(NamedTuple):
-    """Ends and step of a slider, in the unit of a campaign file."""
-
-    low: float
-    high: float
-    step: float
-
-
 _UNITS = {"m": ("mm", 1e3), "Pa": ("MPa", 1e-6), "kg": ("g", 1e3), "rad": ("deg", math.degrees(1.0))}
 """Units in which the page writes, and their size. Others are written as they are."""
-_RANGES: Mapping[tuple[str, str], _Range] = {
-    ("plate", "thickness"): _Range(0.5, 30.0, 0.1),
-    ("plate", "areal_density"): _Range(2.0, 240.0, 0.5),
-    ("plate", "gap"): _Range(0.0, 300.0, 1.0),
-    ("plate", "resistance"): _Range(100.0, 8000.0, 10.0),
-    ("pattern", "spacing"): _Range(1.0, 60.0, 0.1),
-    ("pattern", "corner_radius"): _Range(0.0, 5.0, 0.05),
-    ("pattern", "rotation"): _Range(-90.0, 90.0, 1.0),
-    ("core", "length"): _Range(5.0, 80.0, 0.1),
-    ("core", "diameter"): _Range(3.0, 20.0, 0.05),
-    ("core", "cone_length"): _Range(1.0, 40.0, 0.1),
-    ("core", "crh"): _Range(0.5, 6.0, 0.1),
-    ("core", "mass"): _Range(0.5, 80.0, 0.05),
-    ("core", "density"): _Range(2000.0, 20000.0, 50.0),
-    ("impact", "velocity"): _Range(100.0, 1500.0, 5.0),
-    ("impact", "obliquity"): _Range(0.0, 75.0, 1.0),
-    ("impact", "azimuth"): _Range(0.0, 360.0, 5.0),
-    ("impact", "pitch"): _Range(-20.0, 20.0, 0.5),
-    ("impact", "yaw"): _Range(-20.0, 20.0, 0.5),
+_RANGES: Mapping[tuple[str, str], tuple[float, float, float]] = {
+    ("plate", "thickness"): (0.5, 30.0, 0.1),
+    ("plate", "areal_density"): (2.0, 240.0, 0.5),
+    ("plate", "gap"): (0.0, 300.0, 1.0),
+    ("plate", "resistance"): (100.0, 8000.0, 10.0),
+    ("pattern", "spacing"): (1.0, 60.0, 0.1),
+    ("pattern", "corner_radius"): (0.0, 5.0, 0.05),
+    ("pattern", "rotation"): (-90.0, 90.0, 1.0),
+    ("core", "length"): (5.0, 80.0, 0.1),
+    ("core", "diameter"): (3.0, 20.0, 0.05),
+    ("core", "cone_length"): (1.0, 40.0, 0.1),
+    ("core", "crh"): (0.5, 6.0, 0.1),
+    ("core", "mass"): (0.5, 80.0, 0.05),
+    ("core", "density"): (2000.0, 20000.0, 50.0),
+    ("impact", "velocity"): (100.0, 1500.0, 5.0),
+    ("impact", "obliquity"): (0.0, 75.0, 1.0),
+    ("impact", "azimuth"): (0.0, 360.0, 5.0),
+    ("impact", "pitch"): (-20.0, 20.0, 0.5),
+    ("impact", "yaw"): (-20.0, 20.0, 0.5),
 }
-"""Ranges of sliders, by table and key."""
-_HOLE = _Range(0.5, 30.0, 0.1)
+"""Lowest and highest value and step of sliders, in the unit of a campaign file, by table and key."""
+_HOLE = (0.5, 30.0, 0.1)
 """Range of any other length of a hole."""
 _SHOT = ("velocity", "obliquity", "azimuth", "yaw", "pitch")
 _AXES = ("along y", "along z")

@@ -9,7 +9,7 @@ from base64 import urlsafe_b64decode
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 from warpimpact.campaign.campaign import Campaign
 from warpimpact.campaign.plates import read_plates
@@ -63,13 +63,13 @@ class Shelf:
         """
         if not isinstance(tables, dict):
             raise CampaignError(f"{_DESIGN_NAME}: got {quoted(tables)}, but it must be a table")
-        for place, name in _files_of(tables, ""):
+        for place, name in _files_of(tables).items():
             if name not in self.files:
                 raise CampaignError(
                     f"{_DESIGN_NAME}: {place}: got {quoted(name)}, but a page reads only files that the campaigns "
                     "name which warpimpact design was started with"
                 )
-        if (null := _null_in(tables, "")) is not None:
+        if (null := next((place for place, _, value in _entries(tables) if value is None), None)) is not None:
             raise CampaignError(f"{_DESIGN_NAME}: {null}: got null, but it must be a value, or be left out")
         text = toml_text(tables)
         return ValidDesign(tables, text, Campaign.from_text(text, name=_DESIGN_NAME, folder=ROOT))
@@ -90,13 +90,6 @@ class ValidDesign:
     campaign: Campaign
 
 
-class Stage(NamedTuple):
-    """A design as it is computed at one stage of refinement: "first", "draft" or "full"."""
-
-    name: str
-    design: ValidDesign
-
-
 def shelf_of(paths: list[Path]) -> Shelf:
     """Designs in files: a campaign is one design per plate; a search of warpimpact optimise gives the designs of its
     front; a result gives its campaign.
@@ -110,7 +103,7 @@ def shelf_of(paths: list[Path]) -> Shelf:
             tables = _absolute(parsed(text, str(path)), path.parent)
             Campaign.from_text(toml_text(tables), name=str(path), folder=path.parent)
             designs[name if name not in designs else f"{name} ({path})"] = tables
-    files = {name for tables in designs.values() for _, name in _files_of(tables, "")}
+    files = {name for tables in designs.values() for name in _files_of(tables).values()}
     return Shelf(designs, frozenset(files))
 
 
@@ -144,13 +137,17 @@ def _texts_of_results(path: Path) -> Iterator[tuple[str, str]]:
         yield Path(str(name)).stem, str(text)
 
 
-def _files_of(part: Any, place: str) -> Iterator[tuple[str, str]]:
-    """Places and names of the files in tables."""
+def _entries(part: Any, place: str = "") -> Iterator[tuple[str, str | int, Any]]:
+    """Place, key and value of every entry of tables, and of what is in it."""
     for key, value in part.items() if isinstance(part, dict) else enumerate(part) if isinstance(part, list) else ():
         inner = f"{place}[{key}]" if isinstance(key, int) else f"{place}.{key}".removeprefix(".")
-        if key in FILE_KEYS and isinstance(value, str):
-            yield inner, value
-        yield from _files_of(value, inner)
+        yield inner, key, value
+        yield from _entries(value, inner)
+
+
+def _files_of(tables: Tables) -> dict[str, str]:
+    """Names of the files in tables, by their places."""
+    return {place: value for place, key, value in _entries(tables) if key in FILE_KEYS and isinstance(value, str)}
 
 
 def _absolute(part: Any, folder: Path, key: str = "") -> Any:
@@ -162,20 +159,11 @@ def _absolute(part: Any, folder: Path, key: str = "") -> Any:
     return str((folder / part).absolute()) if key in FILE_KEYS and isinstance(part, str) else part
 
 
-def _null_in(part: Any, place: str) -> str | None:
-    """Place of the first null, which TOML does not have."""
-    for key, value in part.items() if isinstance(part, dict) else enumerate(part) if isinstance(part, list) else ():
-        inner = f"{place}[{key}]" if isinstance(key, int) else f"{place}.{key}".removeprefix(".")
-        null_place = inner if value is None else _null_in(value, inner)
-        if null_place is not None:
-            return null_place
-    return None
-
-
-def stages(shelf: Shelf, design: ValidDesign, level: int) -> Iterator[Stage]:
-    """The stages in which a design is computed: few hits at one level of resolution, without a pilot; more hits at
-    draft; and the campaign as it is. A stage that the campaign cannot have is left out. So is the draft of several
-    layers if it has as many hits as the campaign, because measures need a lower level there than single hits at draft.
+def stages(shelf: Shelf, design: ValidDesign, level: int) -> Iterator[tuple[str, ValidDesign]]:
+    """The stages in which a design is computed, by name: "first", few hits at one level of resolution, without a pilot;
+    "draft", more hits at draft; and "full", the campaign as it is. A stage that the campaign cannot have is left out.
+    So is the draft of several layers if it has as many hits as the campaign, because measures need a lower level there
+    than single hits at draft.
 
     The hits of the first stage are those of the irreducible part of the cell with their images, if there is one: as
     many hits for a part of the time.
@@ -184,10 +172,10 @@ def stages(shelf: Shelf, design: ValidDesign, level: int) -> Iterator[Stage]:
         level: finest level of the first stage, as the last draft has found it.
     """
     if (first := _first(shelf, design, level)) is not None and first.text != design.text:
-        yield Stage("first", first)
+        yield "first", first
     if (draft := _draft(shelf, design)) is not None and draft.text != design.text:
-        yield Stage("draft", draft)
-    yield Stage("full", design)
+        yield "draft", draft
+    yield "full", design
 
 
 def _draft(shelf: Shelf, design: ValidDesign) -> ValidDesign | None:
@@ -290,7 +278,7 @@ def _of_few_hits(design: ValidDesign, most: int, *, irreducible: bool = False) -
 
 def stage_of(shelf: Shelf, design: ValidDesign, level: int, name: str) -> ValidDesign:
     """A design at a stage, or at its last stage if it does not have this one."""
-    every = {stage.name: stage.design for stage in stages(shelf, design, level)}
+    every = dict(stages(shelf, design, level))
     return every.get(name, every["full"])
 
 

@@ -70,12 +70,9 @@ def application(
         Route("/files/{name}", _file),
         Route("/start", pages.start),
         Route("/compute", pages.compute, methods=["POST"]),
-        Route("/change", pages.change, methods=["POST"]),
-        Route("/open", pages.open, methods=["POST"]),
-        Route("/trajectory", pages.trajectory, methods=["POST"]),
-        Route("/figure", pages.figure, methods=["POST"]),
-        Route("/report", pages.report, methods=["POST"]),
     ]
+    answers = (pages.change, pages.open, pages.trajectory, pages.figure, pages.report)
+    routes += [Route(f"/{one.__name__}", partial(_answered, one), methods=["POST"]) for one in answers]
     return Guard(Starlette(routes=[Mount(f"/{token}", routes=routes)]), token, port)
 
 
@@ -119,7 +116,7 @@ class _Pages:
         """The plate, and maps and numbers of each stage; then the numbers under assumptions. The first map is computed
         while the plate is drawn."""
         full = named(design, others)
-        every = [{stage.name: stage.design for stage in stages(self._shelf, other, level)} for _, other in others]
+        every = [dict(stages(self._shelf, other, level)) for _, other in others]
         plate = True
         for name, stage_design in stages(self._shelf, design, level):
             at = [
@@ -147,52 +144,28 @@ class _Pages:
             await self._desk.do(_LAST, partial(self._answers.assume, full))
             yield await self._desk.do(_LAST, partial(self._answers.numbers, full, True))
 
-    async def change(self, request: Request) -> Response:
-        async def answer(asked: Tables) -> Any:
-            design, _ = self._designs(asked)
-            layer = _whole(asked, "layer", 0, 64)
-            return await run_in_threadpool(
-                changed, design, self._shelf, str(asked.get("what", "")), layer, str(asked.get("value", ""))
-            )
+    async def change(self, asked: Tables) -> Any:
+        design, _ = self._designs(asked)
+        layer, what, value = _whole(asked, "layer", 0, 64), str(asked.get("what", "")), str(asked.get("value", ""))
+        return await run_in_threadpool(changed, design, self._shelf, what, layer, value)
 
-        return await _answered(request, answer)
-
-    async def open(self, request: Request) -> Response:
+    async def open(self, asked: Tables) -> Any:
         """The tables of a campaign file that the browser has read."""
+        text = str(asked.get("text", ""))
+        return self._shelf.checked(parsed(text, str(asked.get("name", "file"))[:80])).tables
 
-        async def answer(asked: Tables) -> Any:
-            text = str(asked.get("text", ""))
-            return self._shelf.checked(parsed(text, str(asked.get("name", "file"))[:80])).tables
+    async def trajectory(self, asked: Tables) -> Any:
+        design, _ = self._designs(asked)
+        return await self._desk.do(_ASKED, partial(self._answers.trajectory, design, *_hit(asked)))
 
-        return await _answered(request, answer)
+    async def figure(self, asked: Tables) -> Any:
+        design, _ = self._designs(asked)
+        name = str(asked.get("figure", ""))
+        return await self._desk.do(_ASKED, partial(self._answers.figure, design, *_hit(asked), name))
 
-    async def trajectory(self, request: Request) -> Response:
-        async def answer(asked: Tables) -> Any:
-            design, _ = self._designs(asked)
-            level, stage, hit = _hit(asked)
-            return await self._desk.do(
-                _ASKED, lambda cancel: self._answers.trajectory(design, level, stage, hit, cancel)
-            )
-
-        return await _answered(request, answer)
-
-    async def figure(self, request: Request) -> Response:
-        async def answer(asked: Tables) -> Any:
-            design, _ = self._designs(asked)
-            (level, stage, hit), name = _hit(asked), str(asked.get("figure", ""))
-            return await self._desk.do(
-                _ASKED, lambda cancel: self._answers.figure(design, level, stage, hit, name, cancel)
-            )
-
-        return await _answered(request, answer)
-
-    async def report(self, request: Request) -> Response:
-        async def answer(asked: Tables) -> Any:
-            design, others = self._designs(asked)
-            designs = named(design, others)
-            return {"html": await self._desk.do(_ASKED, lambda cancel: self._answers.report(designs, cancel))}
-
-        return await _answered(request, answer)
+    async def report(self, asked: Tables) -> Any:
+        designs = named(*self._designs(asked))
+        return {"html": await self._desk.do(_ASKED, partial(self._answers.report, designs))}
 
     def _designs(self, asked: Tables) -> tuple[ValidDesign, list[tuple[str, ValidDesign]]]:
         """The design in a request, and the designs to compare with."""
@@ -239,7 +212,7 @@ async def _asked(request: Request) -> Tables:
     return parsed(text, "request")
 
 
-async def _answered(request: Request, answer: Callable[[Tables], Awaitable[Any]]) -> Response:
+async def _answered(answer: Callable[[Tables], Awaitable[Any]], request: Request) -> Response:
     """The answer as JSON, or a sentence for a mistake. Closing the connection cancels the work."""
     try:
         asked = await _asked(request)

@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import math
+from base64 import b64encode
+from io import BytesIO
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
     from numpy.typing import NDArray
 
     Array = NDArray[np.float64]
@@ -18,6 +21,18 @@ BLUE, VERMILION, GREEN = "#0072B2", "#D55E00", "#009E73"
 GREY = "0.55"
 MAP_SIDE = 4.2
 """Longer side of a map on paper [inch]."""
+
+
+def data_url(figure: Figure, dpi: int = 110) -> str:
+    """A figure as a PNG picture in an address, for a page."""
+    buffer = BytesIO()
+    figure.savefig(buffer, format="png", dpi=dpi)
+    return png_url(buffer.getvalue())
+
+
+def png_url(picture: bytes) -> str:
+    """A PNG picture as an address."""
+    return f"data:image/png;base64,{b64encode(picture).decode()}"
 
 
 def hide_sides(axes: Axes, *sides: str) -> None:

@@ -3,14 +3,12 @@ campaign; it works without a network."""
 
 from __future__ import annotations
 
-from base64 import b64encode
 from io import BytesIO
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import xarray
-from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup
 from numpy.typing import NDArray
 
@@ -19,6 +17,8 @@ from warpimpact.campaign.text import CampaignError, parsed
 from warpimpact.optimisation.evaluate import is_even
 from warpimpact.optimisation.front_view import design_text, front_view, numbers_of_front, numbers_of_reference
 from warpimpact.plotting.front import front_figure, front_leaders, holding
+from warpimpact.plotting.style import data_url, png_url
+from warpimpact.report.words import templates
 from warpimpact.results import attributes as attr
 from warpimpact.results import front as f
 from warpimpact.results.files import aside
@@ -58,20 +58,21 @@ def write_front_report(dataset: xarray.Dataset, path: Path, folder: Path) -> Non
         | chart.at(dataset[f.REFERENCE_FOUND].values[place])
         for place, name in enumerate(dataset[f.REFERENCE].values)
     ]
-    environment = Environment(
-        loader=PackageLoader("warpimpact.report", ""), autoescape=True, undefined=StrictUndefined, trim_blocks=True
-    )
-    page = environment.get_template("front.html").render(
-        title=str(dataset.attrs[attr.TITLE]),
-        made=str(dataset.attrs[attr.HISTORY]),
-        version=str(dataset.attrs[attr.WARPIMPACT_VERSION]),
-        chart=chart.drawn(),
-        designs=designs,
-        side=f"{1e3 * _SIDE:.3g}",
-        references=references,
-        picture=_picture(dataset, folder),
-        view=Markup(html_of(front_view(dataset))),
-        design=str(dataset.attrs[f.DESIGN]),
+    page = (
+        templates("report")
+        .get_template("front.html")
+        .render(
+            title=str(dataset.attrs[attr.TITLE]),
+            made=str(dataset.attrs[attr.HISTORY]),
+            version=str(dataset.attrs[attr.WARPIMPACT_VERSION]),
+            chart=chart.drawn(),
+            designs=designs,
+            side=f"{1e3 * _SIDE:.3g}",
+            references=references,
+            picture=data_url(front_figure(dataset, folder), 90),
+            view=Markup(html_of(front_view(dataset))),
+            design=str(dataset.attrs[f.DESIGN]),
+        )
     )
     with aside(path) as file:
         file.write_text(page, encoding="utf-8")
@@ -178,9 +179,9 @@ def _map(dataset: xarray.Dataset, place: int, campaign: Campaign, text: str) -> 
     shown, low, high = _coloured(images, np.tile(values, len(group)), cell)
     buffer = BytesIO()
     Image.fromarray(shown).save(buffer, "PNG")
+    picture = png_url(buffer.getvalue())
     half = 0.5 * np.array(cell)
     holes = svg.Shape(campaign.plate.pattern.outlines((-half[0], half[0]), (-half[1], half[1])), "none", "white")
-    image = f"data:image/png;base64,{b64encode(buffer.getvalue()).decode()}"
     label = f"map of {dataset[f.FILE].values[place]}"
     effects = [
         str(label)
@@ -188,7 +189,7 @@ def _map(dataset: xarray.Dataset, place: int, campaign: Campaign, text: str) -> 
         if not str(name).startswith(tuple(WEIGHTS))
     ]
     return {
-        "drawing": Markup(svg.drawing([holes], -half, half, label, scale=0.36 / max(cell), image=image)),
+        "drawing": Markup(svg.drawing([holes], -half, half, label, scale=0.36 / max(cell), image=picture)),
         "label": effects[0].replace(", worst tenth", "").replace(", mean", ""),
         "low": low,
         "high": high,
@@ -210,9 +211,3 @@ def _coloured(places: Array, values: Array, cell: tuple[float, float]) -> tuple[
     share = (values[nearest] - low) / ((high - low) or 1.0)
     colours = colormaps["viridis"](np.ma.masked_invalid(share), bytes=True)[:, :3]
     return np.asarray(colours, dtype=np.uint8).reshape(counts[1], counts[0], 3), low, high
-
-
-def _picture(dataset: xarray.Dataset, folder: Path) -> str:
-    buffer = BytesIO()
-    front_figure(dataset, folder).savefig(buffer, format="png", dpi=90)
-    return f"data:image/png;base64,{b64encode(buffer.getvalue()).decode()}"

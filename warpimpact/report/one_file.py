@@ -5,11 +5,9 @@ A kind with a view of its own (`results.kind.Kind`) is shown without a line here
 
 from __future__ import annotations
 
-from base64 import b64encode
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from html import escape
-from io import BytesIO
 from pathlib import Path
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -20,6 +18,7 @@ from warpimpact.identification.posterior_view import posterior_view
 from warpimpact.optimisation.front_view import front_view
 from warpimpact.plotting.firing import directions_figure, firing_figure
 from warpimpact.plotting.posterior import hits_figure, measured_figure, pairs_figure
+from warpimpact.plotting.style import data_url
 from warpimpact.plotting.sweep import sweep_figure
 from warpimpact.plotting.trajectory import FIGURES
 from warpimpact.results import attributes as attr
@@ -122,7 +121,7 @@ def write_file_report(path: Path, kind: Kind, output: Path) -> None:
     title, (first, *others) = str(attributes.get(attr.TITLE, path.stem)), _view(kind, dataset)
     sections = [replace(first, title="") if first.title == title else first, *others]
     figures = "".join(
-        f"<h2>{name}</h2><img alt='{name}' src='{_picture(draw(dataset))}'>"
+        f"<h2>{name}</h2><img alt='{name}' src='{data_url(draw(dataset))}'>"
         for name, (needed, draw) in shown.figures.items()
         if not needed or needed in dataset
     )
@@ -142,10 +141,3 @@ def write_file_report(path: Path, kind: Kind, output: Path) -> None:
     )
     with files.aside(output) as file:
         file.write_text(page, encoding="utf-8")
-
-
-def _picture(figure: Figure) -> str:
-    """A figure as a data URL."""
-    buffer = BytesIO()
-    figure.savefig(buffer, format="png", dpi=110)
-    return f"data:image/png;base64,{b64encode(buffer.getvalue()).decode()}"

@@ -17,13 +17,12 @@ from typing import Any
 
 import numpy as np
 import xarray
-from jinja2 import Environment, PackageLoader, StrictUndefined
 from plotly.offline import get_plotlyjs
 
 import warpimpact
 from warpimpact.plotting.cell import words
 from warpimpact.report.hit_data import MOST_HITS, page_data, thinned, trajectory_data, worst_and_spread
-from warpimpact.report.words import cell_drawings, compared, conclusion, result_content
+from warpimpact.report.words import cell_drawings, compared, conclusion, result_content, templates
 from warpimpact.results import variables as v
 from warpimpact.results.dataset import hit_numbers
 from warpimpact.results.files import aside
@@ -138,17 +137,18 @@ def _first(keys: Sequence[str]) -> str:
 
 def _page(*, results: Sequence[dict[str, Any]], data: dict[str, Any], **content: Any) -> str:
     """Fill in page.html."""
-    environment = Environment(
-        loader=PackageLoader("warpimpact.report", ""), autoescape=True, undefined=StrictUndefined, trim_blocks=True
-    )
     plotly = re.sub(r"https?://(?!www\.w3\.org/)", "", get_plotlyjs())  # addresses of maps and of where charts go
-    return environment.get_template("page.html").render(
-        results=results,
-        plotly=_packed(plotly),
-        packed=_packed(json.dumps(data, separators=(",", ":"), allow_nan=False)),
-        variables=data["variables"],
-        first=_first([variable["key"] for variable in data["variables"]]),
-        made=f"{datetime.now(UTC):%Y-%m-%d %H:%M} UTC",
-        version=warpimpact.__version__,
-        **content,
+    return (
+        templates("report")
+        .get_template("page.html")
+        .render(
+            results=results,
+            plotly=_packed(plotly),
+            packed=_packed(json.dumps(data, separators=(",", ":"), allow_nan=False)),
+            variables=data["variables"],
+            first=_first([variable["key"] for variable in data["variables"]]),
+            made=f"{datetime.now(UTC):%Y-%m-%d %H:%M} UTC",
+            version=warpimpact.__version__,
+            **content,
+        )
     )

@@ -2,17 +2,16 @@
 
 from __future__ import annotations
 
-from base64 import b64encode
 from collections.abc import Iterator, Mapping, Sequence
-from io import BytesIO
 from typing import Any
 
 import numpy as np
 import xarray
+from jinja2 import ChoiceLoader, Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup
 
 from warpimpact.analysis.assumptions_view import assumptions_view
-from warpimpact.analysis.comparison import Comparison, compare
+from warpimpact.analysis.comparison import compare
 from warpimpact.analysis.comparison_short import short_view, verdict_of
 from warpimpact.analysis.comparison_text import comparison_view
 from warpimpact.analysis.effectiveness import depth_note, effectiveness, measures_table
@@ -26,6 +25,7 @@ from warpimpact.analysis.survival import draws_note
 from warpimpact.campaign.text import parsed
 from warpimpact.plotting.cell import range_text, words
 from warpimpact.plotting.comparison import comparison_figure
+from warpimpact.plotting.style import data_url
 from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
 from warpimpact.results.dataset import passed
@@ -52,6 +52,12 @@ _PROVENANCE = (
     attr.FINGERPRINT,
     attr.REFERENCES,
 )
+
+
+def templates(*rooms: str) -> Environment:
+    """The pages in some rooms, in which all text is escaped and every name must be known."""
+    loaders = [PackageLoader(f"warpimpact.{room}", "") for room in rooms]
+    return Environment(loader=ChoiceLoader(loaders), autoescape=True, undefined=StrictUndefined, trim_blocks=True)
 
 
 def result_content(name: str, dataset: xarray.Dataset) -> dict[str, Any]:
@@ -93,15 +99,8 @@ def compared(datasets: Mapping[str, xarray.Dataset], *, picture: bool = True) ->
         "view": Markup(html_of([short_view(comparison, evidence_of_all(datasets))])),
         "every": Markup(html_of(comparison_view(comparison))),
         "verdict": verdict_of(comparison),
-        "picture": _picture(comparison) if picture else "",
+        "picture": data_url(comparison_figure(comparison), 100) if picture else "",
     }
-
-
-def _picture(comparison: Comparison) -> str:
-    """The figure of a comparison as base64."""
-    buffer = BytesIO()
-    comparison_figure(comparison).savefig(buffer, dpi=100)
-    return b64encode(buffer.getvalue()).decode()
 
 
 def conclusion(results: Sequence[Mapping[str, Any]], comparison: Mapping[str, Any] | None) -> list[str]:

@@ -204,7 +204,7 @@ def test_a_page_reads_the_files_of_its_campaigns(small: Path, tmp_path: Path) ->
     shelf = shelf_of([path])
     tables = shelf.designs["listed"]
     assert tables["hits"]["file"] == str(hits)
-    assert [stage.name for stage in stages(shelf, shelf.checked(tables), 0)] == ["first", "draft", "full"]
+    assert [name for name, _ in stages(shelf, shelf.checked(tables), 0)] == ["first", "draft", "full"]
     (tmp_path / "other.csv").write_text(hits.read_text())
     tables["hits"]["file"] = str(tmp_path / "other.csv")
     with pytest.raises(CampaignError, match="a page reads only files that the campaigns name"):
@@ -237,7 +237,7 @@ def test_a_first_map_takes_little(small: Path) -> None:
     for thickness, velocity, obliquity in (("4 mm", "825 m/s", 0), ("8 mm", "825 m/s", 30), ("40 mm", "400 m/s", 60)):
         tables["plate"]["thickness"] = thickness
         tables["impact"] |= {"velocity": velocity, "obliquity": f"{obliquity} deg"}
-        campaign = next(stages(shelf, shelf.checked(tables), 4)).design.campaign
+        campaign = next(stages(shelf, shelf.checked(tables), 4))[1].campaign
         first.append((campaign.numerics.level, campaign.hits.count, work(campaign)))
     (straight, all_hits, _), (oblique, half, seconds), (last, few, _) = first
     assert (straight, all_hits, half) == (4, 1024, 1024)
