@@ -89,6 +89,7 @@ def make_result() -> ResultMaker:
                 "history": "2026-01-01T00:00:00Z",
                 "campaign": "[core]\n",
                 "seed": 7,
+                "plate": plate.model_dump_json(),
             },
             double=double,
         )

@@ -134,7 +134,7 @@ def _front_table(dataset: xarray.Dataset) -> Table:
             notes.append(f"cannot be told from {dataset[f.FILE].values[group]}")
         if not int(dataset[f.KEPT][place]):
             notes.append("not on the front by fresh hits")
-        if f.UNTESTED in dataset and (beyond := str(dataset[f.UNTESTED].values[place])):
+        if beyond := str(dataset[f.UNTESTED].values[place]):
             notes.append(f"untested: {beyond}")
         rows.append((file, *_cells(dataset, _OF_FRONT, place), "; ".join(notes)))
     for place, name in enumerate(dataset[f.REFERENCE].values):

@@ -129,8 +129,7 @@ OPEN_AREA = _declared("open_area", "number", "1")
 AREAL_DENSITY = _declared("areal_density", "number", "kg m-2")
 """Areal density of the whole target."""
 ADD_ON_DENSITY = _declared("add_on_areal_density", "number", "kg m-2")
-"""Areal density of the layers in front of the base; only with a base. A file of layers without this attribute is from a
-version whose solid plate replaced the whole target."""
+"""Areal density of the layers in front of the base; only with a base."""
 SOLID_ADD_ON = _declared("solid_add_on")
 """JSON of the plates of the solid reference: the plate's, or that of the layers in front of the base."""
 LIGAMENT = _declared("ligament", "number", "m")
@@ -162,19 +161,16 @@ LIMIT_DENSITY = _declared("limit_density", "number", "kg m-3")
 LIMIT_ELSEWHERE = _declared("limit_elsewhere", "number", "kg m-2")
 """Areal density of all other layers."""
 SOLID_LIMIT_TIME = _declared("solid_limit_time", "number", "s")
-"""Time of the search at the solid plate [s]."""
 SOLID_LIMIT_DENSITY = _declared("solid_limit_density", "number", "kg m-3")
 SOLID_LIMIT_ELSEWHERE = _declared("solid_limit_elsewhere", "number", "kg m-2")
-"""`LIMIT_DENSITY` and `LIMIT_ELSEWHERE` of the solid reference. A file without the second one is from a version whose
-solid plate replaced the whole target."""
 SOLID_LIMIT_HIGHEST = _declared("solid_limit_highest", "number")
-"""Mass per volume of the solid plate that replaces the whole target, and the largest value tried."""
+"""`LIMIT_DENSITY`, `LIMIT_ELSEWHERE` and `LIMIT_HIGHEST` of the solid reference."""
 LIMIT_TOLERANCE = _declared("limit_tolerance", "number")
 LIMIT_HIGHEST = _declared("limit_highest", "number")
 LIMIT_ERROR = _declared("limit_error", "number")
-LIMIT_FACTORS = _declared("limit_material_factors", "pair", "1")
-"""Ends of the 90 % interval of a limit velocity over the velocity, from the evidence on the material"""
 """Of a limit velocity [m/s] or of a limit thickness [m]."""
+LIMIT_FACTORS = _declared("limit_material_factors", "pair", "1")
+"""Ends of the 90 % interval of a limit velocity over the velocity, from the evidence on the material."""
 
 # A replayed hit
 HIT = _declared("hit", "number")

@@ -49,8 +49,8 @@ def base_depth(dataset: Result) -> Array:
 def is_pierced(dataset: Result) -> Array:
     """1 where a core comes out of the rear face of the base, whether it rests in the base or passes it, else 0; shape
     [hits]. NaN as in `base_depth`."""
-    depth = base_depth(dataset)
-    return np.where(np.isnan(depth), np.nan, depth >= base_thickness(dataset) if has_base(dataset) else np.nan)
+    margin = piercing_margin(dataset)
+    return np.where(np.isnan(margin), np.nan, margin >= 0.0)
 
 
 def piercing_margin(dataset: Result) -> Array:

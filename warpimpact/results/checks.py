@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -10,11 +10,7 @@ import numpy as np
 from warpimpact.kernels.status import Status
 from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
-from warpimpact.results.declared import (
-    attribute_faults,
-    metadata_faults,
-    missing_fault,
-)
+from warpimpact.results.declared import attribute_faults, metadata_faults, missing_fault
 from warpimpact.results.kind import Kind
 from warpimpact.scene.display import STORED
 from warpimpact.scene.shots import FARTHEST_HIT
@@ -40,14 +36,22 @@ _CHECKED_AT_ONCE = 2**22
 """Hits that are checked at a time."""
 
 
-def _of_columns(dataset: xarray.Dataset, known: Sequence[v.Variable]) -> Iterator[str]:
-    """Faults of the variables of hits. Their values are not read."""
+def _of_columns(
+    dataset: xarray.Dataset, known: Sequence[v.Variable], inputs: Collection[str], along: tuple[str, ...] = ()
+) -> Iterator[str]:
+    """Faults of the variables of hits, whose values are not read. An input of a sweep has its own dimension, or none
+    at a point of the sweep; all others may be `along` the inputs."""
     for variable in known:
-        if variable in dataset.variables and variable is not v.AXIS:
-            array = dataset.variables[variable]
+        if variable not in dataset.variables:
+            continue
+        array = dataset.variables[variable]
+        if variable is not v.AXIS:
             if array.dtype.kind not in "iuf":
                 yield f'its variable "{variable}" has no numbers'
             yield from metadata_faults(array, variable)
+        allowed = {variable.dims, along + variable.dims} | ({(), (variable,)} if variable in inputs else set())
+        if array.dims not in allowed:
+            yield f'its variable "{variable}" is along {array.dims}, not {along + variable.dims}'
 
 
 def _attribute_faults(attributes: Mapping[Any, Any]) -> Iterator[str]:
@@ -59,23 +63,13 @@ def _attribute_faults(attributes: Mapping[Any, Any]) -> Iterator[str]:
             yield f'it has "{first}", but no attribute "{missing[0]}"'
 
 
-def _hit_variables() -> list[v.Variable]:
-    in_groups = (name for names in v.GROUPS.values() for name in names)
-    return [*v.COORDINATES, *v.hit_variables(), *in_groups]
-
-
 def _map_faults(dataset: xarray.Dataset) -> Iterator[str]:
     """What keeps a Dataset from being a map of hits, as phrases. Only the values on which readers rely are checked, a
     part at a time."""
-    known = _hit_variables()
-    yield from _of_columns(dataset, known)
+    in_groups = (name for names in v.GROUPS.values() for name in names)
+    known = [*v.COORDINATES, *v.hit_variables(), *in_groups]
+    yield from _of_columns(dataset, known, parsed_json(dataset.attrs.get(attr.SWEEP)) or ())
     yield from _attribute_faults(dataset.attrs)
-    chosen = parsed_json(dataset.attrs.get(attr.SWEEP)) or ()  # inputs of a point of a sweep
-    for variable in known:
-        if variable in dataset.variables and dataset.variables[variable].dims not in (
-            (variable.dims, ()) if variable in chosen else (variable.dims,)
-        ):
-            yield f'its variable "{variable}" is along {dataset.variables[variable].dims}, not {variable.dims}'
     yield from filter(None, (missing_fault(dataset, names) for names in v.whole_groups()))
     yield from _of_hits(dataset)
 
@@ -107,9 +101,10 @@ def _ended(status: np.ndarray[Any, Any], codes: np.ndarray[Any, Any]) -> bool:
 
 
 def _sweep_faults(dataset: xarray.Dataset) -> Iterator[str]:
-    yield from _of_columns(dataset, [*v.COORDINATES, *v.hit_variables()])
-    yield from _attribute_faults(dataset.attrs)
     inputs = parsed_json(dataset.attrs[attr.SWEEP])
+    along = tuple(name for name in inputs if name in dataset.dims)
+    yield from _of_columns(dataset, [*v.COORDINATES, *v.hit_variables()], inputs, along)
+    yield from _attribute_faults(dataset.attrs)
     for name, labels in inputs.items():
         if name not in dataset.coords or dataset[name].dims not in ((), (name,)):
             yield f'it has no coordinate "{name}", which it sweeps'
@@ -117,20 +112,12 @@ def _sweep_faults(dataset: xarray.Dataset) -> Iterator[str]:
             yield f'it has {dataset.sizes[name]} values of "{name}", but names {len(labels)}'
         elif dataset[name].dtype.kind == "f" and dataset[name].attrs.get("units") not in STORED:
             yield f'its coordinate "{name}" has an unknown unit'
-    along = tuple(name for name in inputs if name in dataset.dims)
-    for variable in (*v.COORDINATES, *v.hit_variables()):
-        if (
-            variable in dataset.variables
-            and variable not in inputs
-            and dataset[variable].dims not in (variable.dims, along + variable.dims)
-        ):
-            yield f'its variable "{variable}" is along {dataset[variable].dims}, not {along + variable.dims}'
     yield from _of_hits(dataset)
 
 
-def _missing(dataset: xarray.Dataset, *names: str) -> str | None:
+def _missing(dataset: xarray.Dataset) -> str | None:
     """A sentence about a variable or attribute that every result has and this one lacks; None if nothing is missing."""
-    missing = {*names, *v.COORDINATES, *v.VARIABLES} - {v.HIT} - dataset.variables.keys()
+    missing = {*v.COORDINATES, *v.VARIABLES} - dataset.variables.keys()
     if missing:
         return f'not a warpimpact result, it has no variable "{min(missing)}"'
     if attr.PLATE_PERIOD in dataset.attrs:
@@ -176,6 +163,6 @@ SWEEP = Kind(
     "warpimpact inspect and report take it; its points, in the folder beside it, are results, as is what isel(INPUT=0) "
     "chooses of it",
     maker="warpimpact sweep",
-    misuse=lambda dataset: _missing(dataset, *v.COORDINATES),
+    misuse=_missing,
     fault=lambda dataset: next(_sweep_faults(dataset), None),
 )

@@ -86,11 +86,8 @@ def to_table(
     coordinates |= labels(scene.target)
     of_layers = (*v.LAYER_LABELS, *v.LAYER_COORDINATES)
     along = (*v.COORDINATES, *v.OUTLINE_VARIABLES, *of_layers, *beside_the_hits)
-    values: dict[str, Any] = {variable: getattr(shots, variable.field) for variable in v.SHOT_VARIABLES}
-    columns = own_columns(scene.target, shots)
-    values |= {name: columns[name] for name in v.OPTIONAL_SHOT_VARIABLES if name in columns}
+    values = _values(scene, shots, outcomes)
     values[v.EDGE_DISTANCE] = scene.target.layers[0].edge_distance(shots.hit_y, shots.hit_z)
-    values |= vars(outcomes) | faces(scene.target)
     zero = np.zeros(len(shots))
     values[v.EXIT_POSITION] = outcomes.exit_position + np.stack([zero, shots.hit_y, shots.hit_z], axis=-1)
     variables = (name for name in v.hit_variables() if name in values and name not in left_out)
@@ -105,14 +102,19 @@ def to_table(
 def narrow_table(scene: Scene, shots: Shots, outcomes: Outcomes, names: Collection[str]) -> HitTable:
     """Some columns of `to_table`, if the outcomes have them, with stand-offs and the core, for computations with many
     small results at once."""
-    columns = own_columns(scene.target, shots)
-    values: dict[str, Any] = {variable: getattr(shots, variable.field) for variable in v.SHOT_VARIABLES}
-    values |= {name: columns[name] for name in v.OPTIONAL_SHOT_VARIABLES if name in columns}
-    values |= vars(outcomes) | faces(scene.target)
+    values = _values(scene, shots, outcomes)
     kept = [name for name in (*v.hit_variables(), *v.LAYER_FACES) if name in names and name in values]
     coordinates: dict[Any, Any] = {v.HIT: np.arange(len(shots)), v.STANDOFF: np.array(scene.record.standoffs)}
     attributes = {attr.CORE: scene.core.model_dump_json()}
     return HitTable.of(stored_columns(kept, values), stored_columns(coordinates, coordinates), attributes)
+
+
+def _values(scene: Scene, shots: Shots, outcomes: Outcomes) -> dict[str, Any]:
+    """Conditions, outcomes and faces of the layers by their names in a result, SI and radians."""
+    conditions: dict[str, Any] = {variable: getattr(shots, variable.field) for variable in v.SHOT_VARIABLES}
+    columns = own_columns(scene.target, shots)
+    conditions |= {name: columns[name] for name in v.OPTIONAL_SHOT_VARIABLES if name in columns}
+    return conditions | vars(outcomes) | faces(scene.target)
 
 
 def to_dataset(scene: Scene, shots: Shots, outcomes: Outcomes, **arguments: Any) -> xarray.Dataset:
@@ -120,28 +122,10 @@ def to_dataset(scene: Scene, shots: Shots, outcomes: Outcomes, **arguments: Any)
     return in_memory(to_table(scene, shots, outcomes, **arguments).to_xarray())
 
 
-def solid_columns(outcomes: Outcomes) -> dict[str, Any]:
-    """Stored columns of the first shots at the solid reference, SI and radians."""
-    stored = (v.SOLID_VARIABLES | v.SOLID_DEPTHS).items()
-    return {name: getattr(outcomes, of_hits) for name, of_hits in stored if of_hits in outcomes}
-
-
-def base_alone_columns(outcomes: Outcomes) -> dict[str, Any]:
-    """Stored columns of the same shots at the base alone, SI and radians."""
-    return {name: getattr(outcomes, of_hits) for name, of_hits in v.BASE_ALONE_VARIABLES.items()}
-
-
-def finer_columns(outcomes: Outcomes, numbers: NDArray[np.int64]) -> dict[str, Any]:
-    """Stored columns of the hits with these numbers that were computed at a finer level, too; SI and radians."""
-    stored = {name: of_hits for name, of_hits in v.FINER_VARIABLES.items() if of_hits in outcomes}
-    return {v.FINER_HIT: numbers.astype(np.int32)} | {name: getattr(outcomes, stored[name]) for name in stored}
-
-
-def assumed_columns(outcomes: Outcomes, numbers: NDArray[np.int64], assumptions: NDArray[np.int64]) -> dict[str, Any]:
-    """Stored columns of hits under assumptions, by the numbers of hits and assumptions; SI and radians."""
-    told = {v.ASSUMED_HIT: numbers.astype(np.int32), v.ASSUMPTION: assumptions.astype(np.int8)}
-    stored = {name: of_hits for name, of_hits in v.ASSUMED_VARIABLES.items() if of_hits in outcomes}
-    return told | {name: getattr(outcomes, of_hits) for name, of_hits in stored.items()}
+def columns_beside(outcomes: Outcomes, variables: Mapping[v.Variable, v.Variable]) -> dict[str, Any]:
+    """Stored columns of other shots than the hits, SI and radians: `variables` with those of the hits, as in
+    v.SOLID_VARIABLES, of which the outcomes have values."""
+    return {name: getattr(outcomes, of_hits) for name, of_hits in variables.items() if of_hits in outcomes}
 
 
 def assumed_table(columns: Mapping[str, Any], attributes: Mapping[str, Any], *, double: bool) -> HitTable:
@@ -205,7 +189,7 @@ def numbered(dataset: AResult, first: int = 0) -> AResult:
 
 
 def hit_numbers(dataset: Result) -> NDArray[np.int64]:
-    """Numbers of the hits in their campaign, shape (hit,). In a file without numbers they count from 0."""
+    """Numbers of the hits in their campaign, shape (hit,)."""
     return np.asarray(dataset[v.HIT].values)
 
 

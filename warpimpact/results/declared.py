@@ -209,8 +209,6 @@ def attribute_faults(attributes: Mapping[Any, Any]) -> Iterator[str]:
 
 
 def _is_allowed(name: str, value: Any) -> bool:
-    if name in v.OUTLINE_VARIABLES:
-        return np.asarray(value).dtype.kind == "f"
     if name in attr.ATTRIBUTES:
         return _fits(value, _type_of(name))
     return isinstance(value, str) or name.removesuffix("_units") not in attr.ATTRIBUTES

@@ -14,7 +14,6 @@ import netCDF4
 from warpimpact.results import kinds
 from warpimpact.results import variables as v
 from warpimpact.results.checks import RESULT, SWEEP, packing_fault
-from warpimpact.results.dataset import numbered
 from warpimpact.results.interrupts import uninterrupted
 from warpimpact.results.kind import Kind
 from warpimpact.results.netcdf import write_table
@@ -112,7 +111,7 @@ def read(path: Path, kind: Kind = RESULT) -> xarray.Dataset:
     """
     with uninterrupted(), opened(path, kind) as dataset:
         loaded = dataset.load()
-    return _numbered(loaded) if kind in (RESULT, SWEEP) else loaded
+    return loaded.set_xindex(v.HIT) if kind in (RESULT, SWEEP) else loaded
 
 
 def read_tree(path: Path, kind: Kind) -> xarray.DataTree:
@@ -144,13 +143,9 @@ def open_result(path: str | Path) -> xarray.Dataset:
     with opened(Path(path)):
         pass  # the file is checked here; the one that is returned stays open
     dataset = _joined(Path(path))
-    result = _numbered(dataset)
+    result = dataset.set_xindex(v.HIT)
     result.set_close(dataset.close)
     return result
-
-
-def _numbered(dataset: xarray.Dataset) -> xarray.Dataset:
-    return dataset.set_xindex(v.HIT) if v.HIT in dataset.coords else numbered(dataset)
 
 
 @contextmanager

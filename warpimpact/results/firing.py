@@ -39,10 +39,9 @@ CHANGES = Variable(
 )
 HIT_Y = Variable("hit_y", ("place",), "m", "hit point, y")
 HIT_Z = Variable("hit_z", ("place",), "m", "hit point, z")
-YAW = Variable("yaw", ("place",), "degree", "angle between core axis and line of fire at impact")
-
 OUTLINE_Y = Variable("outline_y", ("vertex",), "m", "hole outlines in the unit cell, y, separated by NaN")
 OUTLINE_Z = Variable("outline_z", ("vertex",), "m", "hole outlines in the unit cell, z, separated by NaN")
+YAW = Variable("yaw", ("place",), "degree", "angle between core axis and line of fire at impact")
 
 SHOT_VELOCITY = Variable("shot_velocity", _SHOTS, "m s-1", "velocity of the shot; no value where the test had ended")
 SHOT_PERFORATED = Variable("shot_perforated", _SHOTS, "1", "1 perforated, 0 stopped, -1 where the test had ended")
@@ -93,14 +92,8 @@ ASSUMED_MEAN = Variable(
 )
 ASSUMED_ANSWERS = (ASSUMED_V50, ASSUMED_REPORTED, ASSUMED_REQUIRED, ASSUMED_STOP, ASSUMED_PASS, ASSUMED_MEAN)
 
-VARIABLES = (
-    *(VELOCITY, SHARE, SHARE_LOW, SHARE_HIGH, QUANTILE, QUANTILE_VELOCITY, QUANTILE_LOW, QUANTILE_HIGH),
-    *(CHANGES, HIT_Y, HIT_Z, YAW, OUTLINE_Y, OUTLINE_Z),
-    *(SHOT_VELOCITY, SHOT_PERFORATED, SHOT_PLACE, V50, SPREAD, V50_LOW, V50_HIGH, SHOTS),
-    *(SIZE, SIZE_SHOTS, SIZE_WITHIN, SIZE_BIAS, SIZE_DEVIATION, PROOF_PERFORATION, PASS, PASS_SAME_PLACE),
-    *(AZIMUTH, ELEVATION, DIRECTION_SHARE, DIRECTION_LOW, DIRECTION_HIGH, DIRECTION_OBLIQUITY, DIRECTION_WEIGHT),
-    *(DIRECTION_HITS, DIRECTION_FAILED, ASSUMPTION, *ASSUMED_ANSWERS),
-)
+VARIABLES = tuple(one for one in [*globals().values()] if isinstance(one, Variable))
+"""All of the above."""
 TEST = attr.FIRING_TEST
 SETTINGS = "firing_test_settings"
 """Attribute: all settings in SI, including defaults, as JSON."""

@@ -84,26 +84,8 @@ VOLUME = Variable(
     "hypervolume of the front so far, as a share of the box of the first generation",
 )
 
-VARIABLES = (
-    *(NAME, UNIT, LABELS, ASKED, LABEL, SIGN, ASKED_LIMIT, VALUE, FOUND, FOUND_LOW, FOUND_HIGH, HITS, LEVELS, COST),
-    *(
-        ON_FRONT,
-        NUMBER,
-        FRESH,
-        FRESH_LOW,
-        FRESH_HIGH,
-        KEPT,
-        GROUP,
-        SURVIVAL,
-        SURVIVAL_AT_LEAST,
-        CAMPAIGN,
-        FILE,
-        SOLID,
-        FRESH_LEVELS,
-    ),
-    *(HIT_Y, HIT_Z, HIT_VALUE, REFERENCE, REFERENCE_FOUND, REFERENCE_LOW, REFERENCE_HIGH, REFERENCE_CAMPAIGN),
-    *(UNTESTED, ASSUMPTION, UNDER, REFERENCE_UNDER, COMPUTED, VOLUME),
-)
+VARIABLES = tuple(one for one in [*globals().values()] if isinstance(one, Variable))
+"""All of the above."""
 DESIGN = attr.DESIGN_FILE
 OUTCOME, FEASIBLE, NONE_FEASIBLE = "outcome", "front", "no design within the bounds"
 """Attribute: how the search ended, one of FEASIBLE and NONE_FEASIBLE."""
@@ -134,24 +116,14 @@ def _more(dataset: xarray.Dataset) -> str | None:
 
 
 _OF_ASSUMPTIONS = (ASSUMPTION, UNDER, REFERENCE_UNDER)
-"""Variables that files of earlier versions lack."""
+"""Present only where something was computed under assumptions."""
 _TEXTS = (
-    UNTESTED,
-    ASSUMPTION,
-    NAME,
-    UNIT,
-    ASKED,
-    LABEL,
-    LEVELS,
-    CAMPAIGN,
-    FILE,
-    FRESH_LEVELS,
-    REFERENCE,
-    REFERENCE_CAMPAIGN,
+    *(UNTESTED, ASSUMPTION, NAME, UNIT, ASKED, LABEL, LEVELS, CAMPAIGN, FILE, FRESH_LEVELS),
+    *(REFERENCE, REFERENCE_CAMPAIGN),
 )
 _DECLARED = Declaration(
     {variable: variable.dims for variable in VARIABLES},
-    optional=(HIT_Y, HIT_Z, HIT_VALUE, UNTESTED, *_OF_ASSUMPTIONS),
+    optional=(HIT_Y, HIT_Z, HIT_VALUE, *_OF_ASSUMPTIONS),
     whole=((HIT_Y, HIT_Z, HIT_VALUE), _OF_ASSUMPTIONS),
     rules={
         **dict.fromkeys(_TEXTS, texts),

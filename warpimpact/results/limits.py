@@ -20,12 +20,12 @@ def solid_limits(dataset: xarray.Dataset) -> xarray.Dataset | None:
     """The limits at the solid plate as a result of limits, along "hit", with the attributes of this plate; None if the
     result has none. They belong to the first hits, or one shot stands for all hits."""
     attributes = dataset.attrs
-    if not {attr.LIMIT, attr.SOLID_LIMIT_DENSITY, attr.SOLID_LIMIT_HIGHEST} <= attributes.keys():
+    if not {attr.LIMIT, attr.SOLID_LIMIT_DENSITY, attr.SOLID_LIMIT_ELSEWHERE} <= attributes.keys():
         return None
     of_solid = {
-        attr.LIMIT_LAYER: attributes[attr.LIMIT_LAYER] if attr.SOLID_LIMIT_ELSEWHERE in attributes else 0,
+        attr.LIMIT_LAYER: attributes[attr.LIMIT_LAYER],
         attr.LIMIT_HIGHEST: attributes[attr.SOLID_LIMIT_HIGHEST],
-        attr.LIMIT_ELSEWHERE: attributes.get(attr.SOLID_LIMIT_ELSEWHERE, 0.0),
+        attr.LIMIT_ELSEWHERE: attributes[attr.SOLID_LIMIT_ELSEWHERE],
         attr.LIMIT_DENSITY: attributes[attr.SOLID_LIMIT_DENSITY],
     }
     return _limits_in(dataset, v.SOLID_LIMITS, of_solid)

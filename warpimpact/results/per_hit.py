@@ -94,8 +94,8 @@ class PerHit:
 def place_of_standoff(distances: Sequence[float] | Array, standoff: float) -> int:
     """Index of a stand-off [m] among the distances of a result.
 
-    ValueError: the stand-off is none of them.
-    ValueError: it is none of them.
+    Raises:
+        ValueError: it is none of them.
     """
     places = np.flatnonzero(np.isclose(distances, standoff, rtol=1e-9, atol=0.0))
     if not len(places):

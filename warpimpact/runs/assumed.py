@@ -19,7 +19,8 @@ from warpimpact.campaign.alternatives import Alternative, alternatives
 from warpimpact.campaign.campaign import Campaign
 from warpimpact.records.outcomes import Outcomes
 from warpimpact.results import attributes as attr
-from warpimpact.results.dataset import assumed_columns, assumed_table
+from warpimpact.results import variables as v
+from warpimpact.results.dataset import assumed_table, columns_beside
 from warpimpact.results.table import HitTable
 from warpimpact.runs.describe import is_double
 from warpimpact.runs.pilot_hits import hits_at, places_of, shots_at
@@ -96,7 +97,8 @@ def _columns(possible: list[Alternative], outcomes: list[Outcomes], numbers: NDA
     if not moving:
         return {}
     which = np.repeat(np.arange(len(moving)), len(numbers))
-    return assumed_columns(Outcomes.joined(moving), np.tile(numbers, len(moving)), which)
+    told = {v.ASSUMED_HIT: np.tile(numbers, len(moving)).astype(np.int32), v.ASSUMPTION: which.astype(np.int8)}
+    return told | columns_beside(Outcomes.joined(moving), v.ASSUMED_VARIABLES)
 
 
 def _attributes(possible: list[Alternative], outcomes: list[Outcomes]) -> dict[str, Any]:

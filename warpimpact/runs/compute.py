@@ -13,7 +13,8 @@ from warpimpact.campaign.campaign import Campaign
 from warpimpact.campaign.references import at_base_alone, at_solid
 from warpimpact.records.outcomes import Outcomes
 from warpimpact.results import attributes as attr
-from warpimpact.results.dataset import base_alone_columns, solid_columns
+from warpimpact.results import variables as v
+from warpimpact.results.dataset import columns_beside
 from warpimpact.results.table import HitTable
 from warpimpact.runs.assumed import assumed
 from warpimpact.runs.describe import described
@@ -95,9 +96,13 @@ def compute(campaign: Campaign, task: Task, worker: Worker, report: Report = lam
     outcomes, elapsed = _outcomes(campaign.scene, task.shots[::images], numerics, worker, of_images(report, images))
     beside = dict[str, Any]()
     if task.solid is not None:
-        beside |= solid_columns(_outcomes(*at_solid(campaign, task.solid), numerics, worker)[0])
+        beside |= columns_beside(
+            _outcomes(*at_solid(campaign, task.solid), numerics, worker)[0], v.SOLID_VARIABLES | v.SOLID_DEPTHS
+        )
         if campaign.layer:
-            beside |= base_alone_columns(_outcomes(*at_base_alone(campaign, task.solid), numerics, worker)[0])
+            beside |= columns_beside(
+                _outcomes(*at_base_alone(campaign, task.solid), numerics, worker)[0], v.BASE_ALONE_VARIABLES
+            )
     attributes = _errors(task.findings) | ({attr.LEVEL_FOR: what} if (what := level_for(campaign)) else {})
     return described(campaign, task, outcomes, numerics, (worker.device, elapsed), attributes, beside)
 

@@ -13,7 +13,7 @@ from warpimpact.campaign.references import has_solid, solid_target
 from warpimpact.records.outcomes import Outcomes
 from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
-from warpimpact.results.dataset import finer_columns, to_table
+from warpimpact.results.dataset import columns_beside, to_table
 from warpimpact.results.table import HitTable
 from warpimpact.runs.task import Task
 from warpimpact.scene import Accuracy, Burst, Impact, Numerics, Shots, Target
@@ -57,7 +57,8 @@ def _finer_hits(campaign: Campaign, findings: Found | None) -> dict[str, Any]:
     if findings is None or findings.finer is None or findings.numbers is None:
         return {}
     finer = findings.finer.unfolded(campaign.symmetries)
-    return finer_columns(finer, findings.numbers[: len(finer)])
+    numbers = findings.numbers[: len(finer)].astype("int32")
+    return {v.FINER_HIT: numbers} | columns_beside(finer, v.FINER_VARIABLES)
 
 
 def described_as(

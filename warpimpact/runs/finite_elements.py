@@ -21,7 +21,7 @@ from warpimpact.records.outcomes import Outcomes
 from warpimpact.results import attributes as attr
 from warpimpact.results import files
 from warpimpact.results import variables as v
-from warpimpact.results.dataset import solid_columns, stored_columns
+from warpimpact.results.dataset import columns_beside, stored_columns
 from warpimpact.results.outlines import in_memory
 from warpimpact.runs.describe import computed_by, described_as
 from warpimpact.runs.executor import Executor, Job
@@ -104,7 +104,7 @@ def _computed(
         [Job(_hits, arguments) for arguments in asked], [_key(*arguments) for arguments in asked], tell
     )
     outcomes = [Outcomes(**{name: values for name, values in row.items() if name != SECONDS}) for row in results]
-    beside = {} if solid is None else solid_columns(outcomes.pop())
+    beside = {} if solid is None else columns_beside(outcomes.pop(), v.SOLID_VARIABLES | v.SOLID_DEPTHS)
     elapsed = float(sum(float(row[SECONDS][0]) for row in results))
     told = computed_by(unique, "cpu", len(computed), elapsed)
     told |= {} if device == "cpu" else {attr.DEVICE: device}

@@ -2,7 +2,6 @@
 
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -156,13 +155,3 @@ def test_results_of_different_plates_are_joined(result: xarray.Dataset, tmp_path
     assert len(effectiveness(along_hits)) == len(effectiveness(result))
     assert by_plate["residual_velocity"].shape == (2, 128)
     np.testing.assert_array_equal(by_plate["residual_velocity"][1], other["residual_velocity"])
-
-
-def test_outlines_that_do_not_follow_from_the_plate_are_kept(make_result: Any, tmp_path: Path) -> None:
-    one = make_result()  # no attribute tells its plate
-    assert one.attrs[v.OUTLINE_Y].shape == (5,)
-    files.write(one, tmp_path / "a.nc")
-    read = files.read(tmp_path / "a.nc")
-    np.testing.assert_array_equal(outlines(read)["y"], one.attrs[v.OUTLINE_Y])
-    read.isel(hit=[1, 3]).to_netcdf(tmp_path / "few.nc")
-    np.testing.assert_array_equal(outlines(files.read(tmp_path / "few.nc"))["z"], one.attrs[v.OUTLINE_Z])

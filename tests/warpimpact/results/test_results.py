@@ -139,8 +139,7 @@ def test_file_opens_with_plain_xarray_and_is_identical(make_result, tmp_path, pa
     path = tmp_path / "out.nc"
     files.write(dataset, path)
     with xarray.open_dataset(path) as file:
-        kept = {name: value for name, value in dataset.attrs.items() if not name.startswith("outline")}
-        xarray.testing.assert_identical(file.load(), dataset.drop_attrs(deep=False).assign_attrs(kept))
+        xarray.testing.assert_identical(file.load(), dataset)
     with xarray.open_datatree(path) as tree:
         assert tree["plate"]["outline_y"].dims == ("vertex",)
     xarray.testing.assert_identical(files.read(path), dataset)
