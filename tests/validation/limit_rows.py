@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline, PchipInterpolator
 
 from warpimpact.catalogue.catalogue import Catalogue
+from warpimpact.catalogue.entries import Threat
 from warpimpact.catalogue.strength import Plates
 from warpimpact.scene import Core, Interaction, Numerics, Plate, Scene, Shots
 from warpimpact.solver.limit import limit_velocity
@@ -88,7 +89,7 @@ def diameters(projectiles: NDArray[np.str_]) -> Array:
 @cache
 def core(projectile: str) -> Core:
     """The core of a projectile, from the catalogue."""
-    found = Catalogue().threat(str(projectile)).shape
+    found = Catalogue().named(Threat, str(projectile)).shape
     assert found is not None
     return found
 

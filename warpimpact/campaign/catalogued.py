@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -88,7 +88,7 @@ def _threat(core: Any, catalogue: Catalogue, place: str) -> Threat | None:
     if not isinstance(core, dict) or not isinstance(core.get("threat"), str):
         return None
     try:
-        return catalogue.threat(core["threat"])
+        return catalogue.named(Threat, core["threat"])
     except ValueError as error:
         raise CampaignError(f"{place}.threat: {error}") from None
 
@@ -141,32 +141,26 @@ def with_materials(data: _Table, catalogue: Catalogue, name: str) -> _Table:
     Raises:
         CampaignError: the catalogue has no such material, or the laws of two materials differ.
     """
-    materials, resolved = dict[str, Material](), dict(data)
-    for place, key, number, table in _plates(data):
+    materials: dict[str, Material] = {}
+
+    def filled(place: str, table: Any) -> Any:
+        if not isinstance(table, dict) or not isinstance(table.get("material"), str):
+            return table
         try:
-            material = catalogue.material(table["material"])
+            materials[place] = material = catalogue.named(Material, table["material"])
         except ValueError as error:
             raise CampaignError(f"{name}: {place}.material: {error}") from None
-        materials[place] = material
-        filled = material.table(table, _resistance(data, material, table, catalogue))
-        if number is None:
-            resolved[key] = filled
-        else:
-            resolved[key] = [filled if k == number else layer for k, layer in enumerate(resolved[key])]
+        return material.table(table, _resistance(data, material, table, catalogue))
+
+    resolved = dict(data)
+    if "plate" in data:
+        resolved["plate"] = filled("plate", data["plate"])
+    if isinstance(layers := data.get("layer"), list):
+        resolved["layer"] = [filled(layer_name(k), table) for k, table in enumerate(layers, start=1)]
     interaction = data.get("interaction", {})
     if not materials or not isinstance(interaction, dict):
         return resolved
     return resolved | {"interaction": _law(materials, interaction, name) | interaction}
-
-
-def _plates(data: Mapping[str, Any]) -> Iterator[tuple[str, str, int | None, _Table]]:
-    """Place, key, number in a list, and table of every plate that names a material."""
-    plate, layers = data.get("plate"), data.get("layer")
-    if isinstance(plate, dict) and isinstance(plate.get("material"), str):
-        yield "plate", "plate", None, plate
-    for k, layer in enumerate(layers if isinstance(layers, list) else []):
-        if isinstance(layer, dict) and isinstance(layer.get("material"), str):
-            yield layer_name(k + 1), "layer", k, layer
 
 
 def _resistance(data: Mapping[str, Any], material: Material, plate: Mapping[str, Any], catalogue: Catalogue) -> float:

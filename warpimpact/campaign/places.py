@@ -19,8 +19,7 @@ _TABLES: Mapping[str, Any] = {"impact": Impact, "plate": Plate, "interaction": I
 _WHOLE = ("core", "plate", "plate.pattern", "interaction")
 _WHOLE_OF_A_LAYER = re.compile(r"layer \d+(\.pattern)?")
 """Tables that may be given as a whole."""
-_LAYER, _BEFORE = re.compile(r"layer (\d{1,3})"), re.compile(r"layer\.(\d{1,3})(.*)")
-"""The number of a layer in a place; and the form of earlier versions, which counted the tables [[layer]] from 0."""
+_LAYER = re.compile(r"layer (\d{1,3})")
 _NAMES_A_FILE = ("file", "posterior", "catalogue")
 
 
@@ -38,15 +37,11 @@ def resolved(key: str, name: str) -> str:
     Raises:
         CampaignError: there is no such key.
     """
-    if before := _BEFORE.fullmatch(key):
-        now = f"layer {int(before[1]) + 1}{before[2]}"
-        raise CampaignError(
-            f"{name}: got {quoted(key)}, as earlier versions counted; layer 0 is the plate, so write {quoted(now)} for "
-            f"table {int(before[1]) + 1} of [[layer]]"
-        )
+    if key.startswith("layer."):
+        raise CampaignError(f'{name}: got {quoted(key)}; write "layer 1" for the first table [[layer]]')
     if re.match(r"layer 0(\.|$)", key):
         return f"plate{key.removeprefix('layer 0')}"
-    if "." in key or key in _WHOLE or is_table(key):
+    if "." in key or is_table(key):
         return key
     for table, model in _TABLES.items():
         if key in model._keys():

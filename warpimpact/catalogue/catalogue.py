@@ -51,22 +51,6 @@ class Catalogue:
         kinds: dict[type[Any], str] = {Threat: "threat", Material: "material"}
         return cls({kind: _entries(kind, data.get(key, []), f"{path.name}: {key}") for kind, key in kinds.items()})
 
-    def threat(self, name: str) -> Threat:
-        """The threat of this name or alias.
-
-        Raises:
-            ValueError: there is none, or an alias stands for several.
-        """
-        return self.named(Threat, name)
-
-    def material(self, name: str) -> Material:
-        """The material of this name or alias.
-
-        Raises:
-            ValueError: there is none, or an alias stands for several.
-        """
-        return self.named(Material, name)
-
     def resistance(self, material: Material, core: Core, thickness: float, obliquity: float) -> Resistance:
         """What is known of the resistance of a plate of a material against a core.
 

@@ -2,7 +2,9 @@
 
 import json
 import math
+import operator
 import re
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache
 from itertools import islice
@@ -34,6 +36,17 @@ else:
     Read = float
 
 
+def _of_angles(operate: Callable[[float, Any], Any], *, with_angles: bool) -> Any:
+    """An operator whose number is an angle, with another angle only if `with_angles`."""
+
+    def applied(angle: "Radians", other: Any) -> Any:
+        value = operate(float(angle), other)
+        is_angle = isinstance(value, Real) and (with_angles or not isinstance(other, Radians))
+        return Radians(value) if is_angle else value
+
+    return applied
+
+
 class Radians(float):
     """An angle that was read [rad]; it is not converted again, unlike plain numbers, which are degrees.
 
@@ -42,27 +55,11 @@ class Radians(float):
     """
 
     __array_priority__ = 1000.0  # numpy's numbers then use the operators of this class
-
-    def __add__(self, other: Any) -> Any:
-        return _angle(float(self) + other)
-
-    __radd__ = __add__
-
-    def __sub__(self, other: Any) -> Any:
-        return _angle(float(self) - other)
-
-    def __rsub__(self, other: Any) -> Any:
-        return _angle(other - float(self))
-
-    def __mul__(self, other: Any) -> Any:
-        product = float(self) * other
-        return product if isinstance(other, Radians) else _angle(product)
-
-    __rmul__ = __mul__
-
-    def __truediv__(self, other: Any) -> Any:
-        quotient = float(self) / other
-        return quotient if isinstance(other, Radians) else _angle(quotient)
+    __add__ = __radd__ = _of_angles(operator.add, with_angles=True)
+    __sub__ = _of_angles(operator.sub, with_angles=True)
+    __rsub__ = _of_angles(lambda angle, other: other - angle, with_angles=True)
+    __mul__ = __rmul__ = _of_angles(operator.mul, with_angles=False)
+    __truediv__ = _of_angles(operator.truediv, with_angles=False)
 
     def __neg__(self) -> "Radians":
         return Radians(-float(self))
@@ -71,11 +68,7 @@ class Radians(float):
         return Radians(abs(float(self)))
 
     def __round__(self, digits: int | None = None) -> Any:  # type: ignore[override]  # a float would lose the unit
-        return _angle(round(float(self), digits))
-
-
-def _angle(value: Any) -> Any:
-    return Radians(value) if isinstance(value, Real) else value
+        return Radians(round(float(self), digits))
 
 
 @dataclass(frozen=True)

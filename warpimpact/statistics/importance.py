@@ -126,14 +126,10 @@ class Weights:
         return _effective(self.values, block)
 
 
-def effective_size(weights: Array) -> float:
-    """Number of equally weighted draws with the same variance of a mean (Kish)."""
-    return float(weights.sum() ** 2 / (weights**2).sum())
-
-
 def _effective(weights: Array, block: int) -> float:
-    """Effective size of the blocks of draws."""
-    return effective_size(np.add.reduceat(weights, np.arange(0, len(weights), block)))
+    """Number of equally weighted blocks of draws with the same variance of a mean (Kish)."""
+    of_blocks = np.add.reduceat(weights, np.arange(0, len(weights), block))
+    return float(of_blocks.sum() ** 2 / (of_blocks**2).sum())
 
 
 def resampled(weights: Array, count: int, rng: np.random.Generator) -> NDArray[np.int64]:

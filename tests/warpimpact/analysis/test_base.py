@@ -257,7 +257,7 @@ def test_what_the_solid_plate_is_stands_beside_the_ratios(make_plate_result) -> 
 
 def test_the_figure_of_limits_stands_over_the_weight_that_the_target_needs(make_plate_result) -> None:
     result, thickness = make_plate_result(np.zeros(400)), np.random.default_rng(2).uniform(4e-3, 6e-3, 400)
-    told = {"solid_limit_density": 7850.0, "solid_limit_highest": 0.1}
+    told = {"solid_limit_density": 7850.0, "solid_limit_elsewhere": 0.0, "solid_limit_highest": 0.1}
     one, other = (
         limits(result, thickness, elsewhere)
         .assign_coords(solid_limit_thickness=("solid_hit", [9e-3]))

@@ -82,12 +82,12 @@ def test_a_profile_is_drawn_to_scale() -> None:
 
 def test_own_entries(own: Path) -> None:
     catalogue = Catalogue.of(own)
-    plate = catalogue.material("plate A")
+    plate = catalogue.named(Material, "plate A")
     assert plate.resistance_at(16.0).median == pytest.approx(4e9)
     assert "12 limit velocities" in plate.evidence
     assert "steel cone" in text_of(catalogue_view(catalogue))
     assert "3 to 12 mm" in text_of(material_view(plate, is_own=catalogue.is_own(plate)))
-    assert catalogue.threat("7.62x51 P80 AP") == THREATS["7.62x51 P80 AP"]
+    assert catalogue.named(Threat, "7.62x51 P80 AP") == THREATS["7.62x51 P80 AP"]
 
 
 @pytest.mark.parametrize(

@@ -9,6 +9,7 @@ import pytest
 from warpimpact import Campaign, run
 from warpimpact.campaign.catalogued import with_materials
 from warpimpact.catalogue.catalogue import Catalogue
+from warpimpact.catalogue.entries import Material
 from warpimpact.cli import main
 from warpimpact.identification.computed_shots import PRIORS, fit_of_result
 from warpimpact.identification.hit_places import HitPlace
@@ -59,7 +60,7 @@ def test_what_was_found_is_a_material_that_a_campaign_takes(
     assert main(["export", str(posterior), "-o", str(own)]) == 0
     draws = files.read_tree(posterior, POSTERIOR)["posterior"].to_dataset()
     name = "Two shots at a thin plate with round holes"
-    entry = Catalogue.of(own).material(name)
+    entry = Catalogue.of(own).named(Material, name)
     low, middle, high = np.quantile(draws["resistance"].values, [0.05, 0.5, 0.95])
     assert (entry.resistance_low, entry.resistance, entry.resistance_high) == pytest.approx((low, middle, high))
     assert entry.shear_coefficient == pytest.approx(np.median(draws["shear_coefficient"].values))

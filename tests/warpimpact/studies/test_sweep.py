@@ -64,7 +64,7 @@ def test_a_layer_is_swept_by_its_number(tmp_path: Path) -> None:
     with pytest.raises(CampaignError, match=r'got "layer 2.thickness", but the campaign has no \[\[layer\]\]'):
         read_sweep(tmp_path / "a.toml")
     (tmp_path / "a.toml").write_text(TEXT + given.replace("layer 2.", "layer.1."), encoding="utf-8")
-    with pytest.raises(CampaignError, match=r'layer 0 is the plate, so write "layer 2.thickness" for table 2 of'):
+    with pytest.raises(CampaignError, match=r'got "layer.1.thickness"; write "layer 1" for the first table'):
         read_sweep(tmp_path / "a.toml")
     assert resolved("layer 0.thickness", "a.toml") == "plate.thickness"
 
