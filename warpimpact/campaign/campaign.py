@@ -158,8 +158,6 @@ class Campaign(Model):
             text: TOML, or the JSON of a campaign made in Python.
             name: name of the text in errors.
             folder: folder of the files that it names.
-            count: number of hits, instead of the text's.
-            needs_velocity: as in `from_toml`.
 
         Raises:
             CampaignError: the text is not TOML, or has a value that is not allowed.

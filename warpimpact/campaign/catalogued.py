@@ -42,10 +42,8 @@ def catalogue_of(data: Mapping[str, Any], name: str, folder: Path) -> Catalogue:
 
 
 def with_threat(data: _Table, catalogue: Catalogue, name: str, *, needs_velocity: bool = True) -> _Table:
-    """Tables with the core of their threat, and with its velocity unless they give one.
-
-    Args:
-        needs_velocity: whether a threat without a velocity is refused; otherwise the shot gets `SEARCHED_FROM`.
+    """Tables with the core of their threat, and with its velocity unless they give one. Unless it needs a velocity, a
+    shot of a threat without one gets `SEARCHED_FROM`.
 
     Raises:
         CampaignError: the catalogue has no such threat, or its entry lacks a needed value.
@@ -192,9 +190,7 @@ def resistance_under(
     The catalogue has it under the law and the friction of the material. Under others Y is such that the limit velocity
     of a solid plate stays (docs/model.md §6.2).
 
-    Args:
-        plate: whose thickness, friction and density count.
-        obliquity: of the shot [rad].
+    Of the plate thickness, friction and density count. The obliquity is that of the shot [rad].
     """
     known = catalogue.resistance(material, core, plate.thickness, obliquity)
     of_material = law_of(material)

@@ -16,11 +16,8 @@ def lacking(
 ) -> str:
     """Keys that a campaign needs for a measure of its hits and does not have; empty if it lacks none.
 
-    Args:
-        standoffs: stand-offs of the campaign [m]; None where they are not known yet, but some are computed.
-        layered: whether it has layers behind the plate.
-        bending: whether it records bending.
-        breakable: whether its cores have a strength.
+    It may have layers behind the plate, record bending, and have cores with a strength. Its stand-offs [m] are None
+    where they are not known yet, but some are computed.
     """
     quantity = measure.quantity
     needed = "" if quantity.need is None else quantity.need.name

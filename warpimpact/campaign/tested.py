@@ -78,11 +78,7 @@ def summary_of(campaign: Campaign, standings: Sequence[Standing]) -> str:
 
 
 def summary_of_all(campaigns: Iterable[Campaign], what: str) -> str:
-    """One sentence on what answers for several campaigns rest on.
-
-    Args:
-        what: name for the campaigns, such as "designs".
-    """
+    """One sentence on what answers for several campaigns, called `what`, such as "designs", rest on."""
     several = list(campaigns)
     materials = [Catalogue.of(campaign.catalogue).all(Material) for campaign in several]
     subjects = [

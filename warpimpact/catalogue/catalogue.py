@@ -52,11 +52,7 @@ class Catalogue:
         return cls({kind: _entries(kind, data.get(key, []), f"{path.name}: {key}") for kind, key in kinds.items()})
 
     def resistance(self, material: Material, core: Core, thickness: float, obliquity: float) -> Resistance:
-        """What is known of the resistance of a plate of a material against a core.
-
-        Args:
-            thickness, obliquity: of the plate [m], and of the shot [rad].
-        """
+        """What is known of the resistance of a plate of this thickness [m] against a core at an obliquity [rad]."""
         diameter = 2.0 * core.max_radius
         if self.is_own(material):
             return material.resistance_at(thickness / diameter)

@@ -52,11 +52,8 @@ def threat_view(threat: Threat) -> list[Section]:
 
 
 def material_view(material: Material, *, is_own: bool = False) -> list[Section]:
-    """A material: its strength and law with their uncertainty, the rows that they come from, and its evidence.
-
-    Args:
-        is_own: whether it is from a user's file, whose numbers are the whole evidence.
-    """
+    """A material: its strength and law with their uncertainty, the rows that they come from, and its evidence. The
+    numbers of a user's own one are the whole evidence."""
     law = (
         f"Y = {material.resistance / 1e9:.3g} GPa · (h / d)^{material.thickness_exponent:.3g}, "
         f"η = {material.shear_coefficient:g}, B = {material.quadratic:g}, C = {material.linear:g}, "

@@ -188,13 +188,8 @@ class LimitFit:
     def of(
         cls, rows: Plates, sizes: Mapping[str, float], test: Mapping[str, float], residual: Array, noise: Array
     ) -> LimitFit:
-        """The fit of rows.
-
-        Args:
-            sizes, test: as in the attributes.
-            residual: ln Y of a row minus the prediction by indentation, shape [rows].
-            noise: variance of ln Y of a row on its own, shape [rows].
-        """
+        """The fit of rows with these residuals, ln Y minus the prediction by indentation, and noise, the variance of
+        ln Y of a row on its own; shape [rows] each."""
         precision = np.asarray(np.linalg.inv(covariance(rows, rows, sizes) + np.diag(noise)), dtype=np.float64)
         return cls(rows, sizes, test, precision @ residual, precision)
 

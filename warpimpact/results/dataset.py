@@ -60,16 +60,13 @@ def to_table(
     Hits are numbered from 0. The outlines of the holes are coordinates, so that no choice of hits repeats them per hit.
 
     Args:
-        scene: The scene, which records m stand-offs.
-        shots: n shots, SI and radians.
-        outcomes: Their outcomes, of shape (n,) or (n, m), SI and radians; NaN where there is no value.
-        period: Extent (y, z) of the unit cell [m], centred on the origin, over which hits and holes are drawn.
-        attributes: Global attributes of the run: title, history, campaign, versions, device, seed, ...
-        double: Whether the outcomes were computed in double precision. If not, they are stored in single precision;
+        outcomes: of the shots, SI and radians; NaN where there is no value.
+        period: extent (y, z) of the unit cell [m], centred on the origin, over which hits and holes are drawn.
+        attributes: global attributes of the run.
+        double: whether the outcomes were computed in double precision. If not, they are stored in single precision;
             shots are always double.
-        beside: Columns of other shots: at the solid plate (v.SOLID_VARIABLES, v.SOLID_LIMITS), and at a finer level
-            (`finer_columns`); SI and radians.
-        left_out: Variables that are not stored.
+        beside: columns of other shots, such as v.SOLID_VARIABLES, SI and radians.
+        left_out: variables that are not stored.
     """
     coordinates: dict[str, Any] = {
         v.HIT: np.arange(len(shots), dtype=np.int32),
@@ -211,12 +208,8 @@ def history_dataset(
 ) -> xarray.Dataset:
     """Gather a replayed shot into the Dataset of its history, with the data of core and plate that drawings need.
 
-    Args:
-        scene: scene of the shot.
-        hit: one hit of a Dataset of `to_dataset`. Its values become scalars; its angular velocity becomes
-            `residual_angular_velocity`.
-        replay: history of the shot.
-        attributes: global attributes, which override those of `hit`.
+    The values of the hit become scalars, and its angular velocity `residual_angular_velocity`. The attributes override
+    those of the hit.
     """
     core, plate = scene.core, scene.target.layers[0]
     hit_y, hit_z = float(hit[v.HIT_Y]), float(hit[v.HIT_Z])
@@ -258,11 +251,8 @@ def history_dataset(
 
 
 def dataset_of(columns: Mapping[v.Variable, Any], attributes: Mapping[str, Any]) -> xarray.Dataset:
-    """The Dataset of a result that is no map of hits. Variables named as their dimension become coordinates.
-
-    Args:
-        columns: values in the units of their variables.
-    """
+    """The Dataset of a result that is no map of hits, from values in the units of their variables. Variables named as
+    their dimension become coordinates."""
     import xarray
 
     def stored(values: Any) -> NDArray[Any]:
@@ -276,11 +266,8 @@ def dataset_of(columns: Mapping[v.Variable, Any], attributes: Mapping[str, Any])
 def stored_columns(
     variables: Iterable[v.Variable], values: Mapping[str, Any], single: Collection[str] = ()
 ) -> dict[str, tuple[Any, ...]]:
-    """Values in the units of the Dataset, with dimensions and attributes, as xarray takes them.
-
-    Args:
-        single: variables whose numbers are stored in single precision.
-    """
+    """Values in the units of the Dataset, with dimensions and attributes, as xarray takes them; those of the variables
+    in `single` in single precision."""
     return {
         str(variable): (variable.dims, _stored(variable, values[variable], variable in single), variable.attributes)
         for variable in variables

@@ -40,10 +40,8 @@ class IncrementalFile:
                 self._write()
 
     def complete(self, attributes: Mapping[str, Any]) -> None:
-        """Rename the file to its final name, which replaces an existing file.
-
-        Args:
-            attributes: global attributes that replace those of the first part.
+        """Rename the file to its final name, which replaces an existing file. The attributes replace global attributes
+        of the first part.
 
         Raises:
             OutputError: The file cannot be written; what was there before is untouched.

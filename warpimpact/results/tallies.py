@@ -23,10 +23,8 @@ if TYPE_CHECKING:
 class Tally:
     """Gathers a measure over shots, in the order of their numbers.
 
-    Means and probabilities keep a few numbers in all. A quantile and a worst tenth keep one number per shot.
-
-    Args:
-        dealt: `replicates`, `images` and `confidence` as in `Dealt`.
+    Means and probabilities keep a few numbers in all. A quantile and a worst tenth keep one number per shot. How shots
+    are dealt is as in `Dealt`.
     """
 
     def __init__(self, measure: Measure, **dealt: Unpack[Estimating]) -> None:

@@ -26,7 +26,6 @@ from .patterns import (
     Wave,
 )
 from .plate import Plate
-from .quantities import OF_THE_SCENE
 from .sampling import Sampler, make_shots
 from .scatter import Scatter
 from .scene import Record, Scene

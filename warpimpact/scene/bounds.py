@@ -113,12 +113,8 @@ def hit_bounds(period: tuple[float, float], size: tuple[float, float] | None) ->
 
 
 def implausible(values: Iterable[tuple[str, str, float]], usual: Mapping[str, Bounds] = USUAL) -> list[str]:
-    """A sentence for every value that is probably a mistake.
-
-    Args:
-        values: the place that the sentence names, the key in `usual`, and the value.
-        usual: bounds.
-    """
+    """A sentence for every value that is probably a mistake: of the place that it names, the key in `usual`, and the
+    value."""
     warnings = (usual[kind].warning(place, value) for place, kind, value in values if kind in usual)
     return [warning for warning in warnings if warning is not None]
 

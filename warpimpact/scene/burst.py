@@ -85,13 +85,8 @@ class Burst(Scattering):
         return placed + float(normal_quantile(np.array(1.0 - EDGE))) * max(self.scatter or (0.0,))
 
     def places(self, seed: int, first: int, samples: int) -> tuple[Array, Array]:
-        """Places of the hits relative to their aims, y and z [m], shape [samples, count] each.
-
-        Args:
-            seed: of the random numbers.
-            first: number of the first sample.
-            samples: number of samples.
-        """
+        """Places of the hits of some samples, from number `first` on, relative to their aims, y and z [m], shape
+        [samples, count] each."""
         shape = samples, self.count
 
         def drawn(column: int) -> Array:

@@ -58,13 +58,6 @@ NEAR_EDGES = Interaction(quadratic=1.0, free_surface=FreeSurface())
 
 
 def coefficients(static: Any, linear: Any, quadratic: Any, resistance: Any, density: float) -> tuple[Any, Any, Any]:
-    """(a0 [Pa], a1 [Pa s/m], a2 [Pa s²/m²]) of σ = a0 + a1·v_n + a2·v_n² in undegraded material.
-
-    All but the density may be arrays of shapes that broadcast.
-
-    Args:
-        static, linear, quadratic: as in `Interaction`.
-        resistance: Y [Pa].
-        density: ρ [kg/m³].
-    """
+    """(a0 [Pa], a1 [Pa s/m], a2 [Pa s²/m²]) of σ = a0 + a1·v_n + a2·v_n² in undegraded material, from A, C, B, Y [Pa]
+    and ρ [kg/m³]. All but the density may be arrays of shapes that broadcast."""
     return static * resistance, linear * np.sqrt(density * resistance), quadratic * density

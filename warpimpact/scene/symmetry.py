@@ -47,12 +47,7 @@ class Symmetry:
         return self.along_y * self.along_z * self.polar
 
     def image(self, y: Array, z: Array, cell: tuple[float, float]) -> tuple[Array, Array]:
-        """Images of points of a unit cell centred on the origin, in the same cell [m].
-
-        Args:
-            y, z: the points [m].
-            cell: extent of the cell along y and z [m].
-        """
+        """Images of points y, z [m] of a unit cell of this extent [m], centred on the origin, in the same cell."""
         y, z = self.along_y * y, self.along_z * z
         return (y - np.copysign(0.5 * cell[0], y), z - np.copysign(0.5 * cell[1], z)) if self.centred else (y, z)
 

@@ -29,13 +29,8 @@ def cluster_numbers(values: Array) -> Array:
 
 
 def cluster_estimate(values: Array, *, binary: bool = False, **dealt: Unpack[Estimating]) -> Estimate:
-    """Mean of all values with its interval; `count` is the number of values.
-
-    Args:
-        values: as in `cluster_numbers`.
-        binary: whether the values are 0 and 1. If all are equal, the interval is that of a share of the clusters.
-        dealt: `replicates`, to which clusters are dealt, and `confidence`, as in `intervals.Dealt`.
-    """
+    """Mean of all values, shape [clusters, members], with its interval; `count` is the number of values. Clusters are
+    dealt to the replicates. If binary values, 0 and 1, are all equal, it is the interval of a share of the clusters."""
     known = ~np.isnan(values)
     mean = estimate_of("mean", cluster_numbers(values), **dealt)
     low, high = mean.low, mean.high

@@ -43,11 +43,7 @@ class QuantalFit:
 
 
 def fit_quantal(levels: Array, answers: Flags, used: Flags, link: str = "probit") -> QuantalFit:
-    """Fit of maximum likelihood of every test.
-
-    Args:
-        levels, answers, used: shape [tests, shots].
-    """
+    """Fit of maximum likelihood of every test, from arrays of shape [tests, shots]."""
     below, above = _ends(levels, answers, used)
     overlap = below > above
     apart = np.isfinite(below) & np.isfinite(above) & ~overlap

@@ -38,45 +38,18 @@ fidelity = "standard"
 standoffs = ["50 mm", "130 mm"]
 """
 SLOT = CAMPAIGN[CAMPAIGN.index("[plate.pattern]") : CAMPAIGN.index("[impact]")]
-CIRCLE = '[plate.pattern]\nshape = "circle"\ndiameter = "9 mm"\nspacing = ["8 mm", "16 mm"]\n'
 SAMPLING = 'sampling = "sobol"\ncount = 16'
 
 MISTAKES = {
-    "missing key": (
-        'thickness = "4 mm"\n',
-        "",
-        "plate.thickness: is missing, but must be given",
-    ),
-    "missing table": (
-        '[impact]\nvelocity = "825 m/s"\n',
-        "",
-        "impact: is missing, but must be given",
-    ),
-    "missing key of a shape": (
-        'width = "4 mm"\n',
-        "",
-        "plate.pattern.width: is missing, but must be given",
-    ),
-    "missing shape": (
-        'shape = "slot"\n',
-        "",
-        "plate.pattern.shape: is missing, but must be given",
-    ),
-    "misspelt key": (
-        "thickness",
-        "thicknes",
-        'plate: got the unknown key "thicknes"; did you mean "thickness"?',
-    ),
+    "missing key": ('thickness = "4 mm"\n', "", "plate.thickness: is missing, but must be given"),
+    "missing table": ('[impact]\nvelocity = "825 m/s"\n', "", "impact: is missing, but must be given"),
+    "missing shape": ('shape = "slot"\n', "", "plate.pattern.shape: is missing, but must be given"),
     "misspelt key of a shape": (
         "staggered",
         "stagered",
         'plate.pattern: got the unknown key "stagered"; did you mean "staggered"?',
     ),
-    "misspelt table": (
-        "[numerics]",
-        "[numeric]",
-        'got the unknown key "numeric"; did you mean "numerics"?',
-    ),
+    "misspelt table": ("[numerics]", "[numeric]", 'got the unknown key "numeric"; did you mean "numerics"?'),
     "foreign key": (
         "velocity",
         "colour",
@@ -93,50 +66,20 @@ MISTAKES = {
         '"fast"',
         "numerics.fidelity: got \"fast\", but it must be 'draft', 'standard' or 'reference'",
     ),
-    "value in place of a table": (
-        '[impact]\nvelocity = "825 m/s"\n',
-        "[impact]\n[[impacts]]\n",
-        'got the unknown key "impacts"; did you mean "impact"?',
-    ),
     "wrong unit": (
         '"4 mm"\nres',
         '"4 kg"\nres',
         'plate.thickness: got "4 kg", which is not a length; give a number in m or a string such as "4 mm"',
-    ),
-    "no unit": (
-        '"825 m/s"',
-        '"825"',
-        'impact.velocity: got "825", which has no unit; give a number in m/s or a string such as "825 m/s"',
-    ),
-    "negative mass": (
-        '"4 g"',
-        '"-4 g"',
-        'core.mass: got "-4 g", but it must be greater than 0',
-    ),
-    "zero mass": (
-        '"4 g"',
-        "0",
-        "core.mass: got 0, but it must be greater than 0",
     ),
     "negative thickness": (
         '"4 mm"\nres',
         "-0.004\nres",
         "plate.thickness: got -0.004, but it must be greater than 0",
     ),
-    "zero velocity": (
-        '"825 m/s"',
-        '"0 km/s"',
-        'impact.velocity: got "0 km/s", but it must be greater than 0',
-    ),
     "NaN": (
         "0.05",
         "nan",
         'plate.shear_coefficient: got NaN, which is not finite; give a number or a string such as "0.05"',
-    ),
-    "infinity": (
-        '"2600 MPa"',
-        "inf",
-        'plate.resistance: got Infinity, which is not finite; give a number in Pa or a string such as "2600 MPa"',
     ),
     "radius not positive": (
         "3.0e-4",
@@ -144,37 +87,10 @@ MISTAKES = {
         "core: got coefficients with a radius of -0.0003 m at s = 0 m, "
         "but the radius must be positive from nose to base, 0 to 0.02786 m",
     ),
-    "holes that overlap into no plate": (
-        SLOT,
-        CIRCLE,
-        "plate.pattern: got spacing = (8, 16) mm, which lets the holes at (0, 0) mm and (-8, 0) mm overlap or touch, "
-        "but a ligament must be left between them",
-    ),
-    "spacing smaller than the hole": (
-        '"16 mm"',
-        '"11 mm"',
-        "plate.pattern: got spacing = (8, 11) mm, which lets the holes at (0, 0) mm and (0, -11) mm overlap or touch, "
-        "but a ligament must be left between them",
-    ),
     "negative spacing": (
         '"16 mm"',
         '"-16 mm"',
         'plate.pattern.spacing[1]: got "-16 mm", but it must be greater than 0',
-    ),
-    "beta above 1": (
-        "= 0.8",
-        "= 1.2",
-        "plate.degradation: got 1.2, but it must be less than or equal to 1",
-    ),
-    "beta below 0": (
-        "= 0.8",
-        "= -0.2",
-        "plate.degradation: got -0.2, but it must be greater than or equal to 0",
-    ),
-    "eta below 0": (
-        "0.05",
-        "-0.05",
-        "plate.shear_coefficient: got -0.05, but it must be greater than or equal to 0",
     ),
     "hit list with a bad row": (
         SAMPLING,
@@ -186,27 +102,13 @@ MISTAKES = {
         'sampling = "list"\nfile = "none.csv"',
         'hits.file: got "none.csv", but there is no file {folder}/none.csv',
     ),
-    "count 0": (
-        "count = 16",
-        "count = 0",
-        "hits.count: got 0, but it must be greater than or equal to 1",
-    ),
-    "stand-offs that do not increase": (
-        '["50 mm", "130 mm"]',
-        '["130 mm", "50 mm"]',
-        "output.standoffs: got 0.05 m after 0.13 m, but stand-offs must increase",
-    ),
     "stand-off within the plate": (
         '["50 mm", "130 mm"]',
         '["10 mm"]',
         "got output.standoffs of 0.01 m, but a core of this size is certain to be out of the target only from "
         "0.01805 m",
     ),
-    "a number in place of a table": (
-        SLOT,
-        "pattern = 3\n",
-        "plate.pattern: got 3, but it must be a table",
-    ),
+    "a number in place of a table": (SLOT, "pattern = 3\n", "plate.pattern: got 3, but it must be a table"),
     "a number in place of a list": (
         '["50 mm", "130 mm"]',
         '"50 mm"',
@@ -305,7 +207,7 @@ def test_a_campaign_needs_no_file() -> None:
 def test_hits_too_far_to_be_exact_are_refused(tmp_path: Path, hit: str, more: str, allowed: str | None) -> None:
     """Cells of 0.02 mm have 32-bit numbers up to 43 km from the origin; a million metres were off by 55 m/s."""
     (tmp_path / "hits.csv").write_text(f"hit_y,hit_z\n0,0\n{hit}\n", encoding="utf-8")
-    text = (Path(__file__).parents[3] / "campaigns" / "slotted_plate.toml").read_text(encoding="utf-8")
+    text = SLOTTED_PLATE.read_text(encoding="utf-8")
     head, tail = text.split("[hits]")[0], text.split("[numerics]")[1]
     text = f'{head}[hits]\nsampling = "list"\nfile = "hits.csv"\n\n[numerics]\n{more}{tail}'
     if allowed is None:

@@ -16,7 +16,6 @@ from warpimpact.campaign.references import at_base_alone, at_solid, solid_target
 from warpimpact.campaign.text import CampaignError
 from warpimpact.kernels.status import Status
 from warpimpact.runs.replay import replay
-from warpimpact.scene import Layer
 
 CAMPAIGN = """
 title = "two layers"
@@ -176,9 +175,7 @@ def test_a_solid_add_on_of_the_catalogue_has_the_resistance_of_its_thickness() -
 
 def test_layers_of_a_result_have_names_and_their_status_is_a_word(result: xarray.Dataset) -> None:
     assert result["layer"].values.tolist() == [0, 1, 2]
-    assert result["layer_name"].values.tolist() == [name for name, _ in campaign().target.named]
     assert result["layer_name"].values.tolist() == ["plate", "layer 1", "layer 2"]
-    assert result["layer"].values.tolist() == [0, 1, 2]
     assert result["layer_material"].values.tolist() == ["", "", ""]
     frame = to_dataframe(result)
     codes = result["layer_status"].values[:, 2].tolist()
@@ -216,9 +213,3 @@ def test_replay_gives_the_stored_end_and_every_layer(result: xarray.Dataset, hit
     np.testing.assert_array_equal(history["layer_solid_along_y"].values[1], solid)
     assert (np.diff(history["time"]) > 0.0).all()
     assert history["resistance_share"].max() <= 1.0
-
-
-def test_a_layer_is_a_plate_with_a_place() -> None:
-    layer = Layer(thickness="3 mm", resistance="2 GPa", gap="1 cm")
-    assert (layer.gap, layer.offset) == (0.01, (0.0, 0.0))
-    assert Layer.model_validate(layer.model_dump()) == layer

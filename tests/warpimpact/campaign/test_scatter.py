@@ -174,16 +174,6 @@ def test_a_mistake_is_told_in_one_sentence(tmp_path: Path, distribution: str, se
     assert "\n" not in shown
 
 
-def test_attitude_does_not_scatter_beside_irreducible_hits(tmp_path: Path) -> None:
-    irreducible = ("seed = 1", "seed = 1\nirreducible = true")
-    assert campaign_with(tmp_path, (VELOCITY, NORMAL), irreducible).symmetries[1:]
-    yaw = '"825 m/s"\nyaw = { distribution = "normal", mean = 0, std = "1 deg" }'
-    with pytest.raises(
-        CampaignError, match=r"campaign.toml: hits.irreducible = true cannot be combined with .* of impact.yaw: a"
-    ):
-        campaign_with(tmp_path, (VELOCITY, yaw), irreducible)
-
-
 def test_axes_that_would_flip_are_refused(tmp_path: Path) -> None:
     steep = '825\nobliquity = { distribution = "uniform", low = 0, high = "60 deg" }\nyaw = "40 deg"'
     with pytest.raises(CampaignError, match="yaw up to 40 deg and obliquity up to 60 deg, but their sum must"):

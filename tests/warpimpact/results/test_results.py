@@ -3,11 +3,11 @@
 import dataclasses
 import os
 
-import netCDF4
 import numpy as np
 import pytest
 import xarray
 
+from warpimpact import open_result
 from warpimpact.kernels.status import OF_SHOTS, Status
 from warpimpact.results import files
 from warpimpact.results.dataset import status_codes
@@ -98,32 +98,10 @@ def test_what_does_not_exist_stays_nan_in_the_file(make_result, tmp_path):
 
 
 def test_status_carries_its_flags(make_result, tmp_path):
-    path = tmp_path / "out.nc"
-    files.write(make_result(), path)
-    with netCDF4.Dataset(path) as file:
-        attributes = file["status"].__dict__
-    assert attributes["flag_values"].dtype == np.int8
-    assert attributes["flag_values"].tolist() == list(OF_SHOTS)
-    meanings = attributes["flag_meanings"].split()
-    assert meanings[:4] == ["perforated", "arrested", "ricocheted", "missed"]
-    assert len(meanings) == len(OF_SHOTS)
-
-
-def test_status_codes_reads_the_flags(make_result):
-    codes = status_codes(make_result())
-    assert codes["arrested"] == Status.ARRESTED
-    assert codes["not_finite"] == Status.NOT_FINITE
-    assert codes["gained_energy"] == Status.GAINED_ENERGY
-    assert len(codes) == len(OF_SHOTS)
-
-
-def test_attributes_follow_cf_and_carry_the_run(make_result):
-    attributes = make_result().attrs
-    assert attributes["Conventions"] == "CF-1.11"
-    assert {"title", "source", "history", "references", "comment"} <= attributes.keys()
-    assert attributes["campaign"] == "[core]\n"
-    assert attributes["seed"] == 7
-    np.testing.assert_array_equal(attributes["plate_period"], [16e-3, 8e-3])
+    files.write(make_result(), tmp_path / "out.nc")
+    with xarray.open_dataset(tmp_path / "out.nc") as file:
+        assert file["status"].attrs["flag_values"].dtype == np.int8
+        assert status_codes(file) == {status.name.lower(): status for status in OF_SHOTS}
 
 
 def test_outlines_are_separated_by_nan(make_result):
@@ -143,13 +121,6 @@ def test_file_opens_with_plain_xarray_and_is_identical(make_result, tmp_path, pa
     with xarray.open_datatree(path) as tree:
         assert tree["plate"]["outline_y"].dims == ("vertex",)
     xarray.testing.assert_identical(files.read(path), dataset)
-
-
-def test_coordinates_have_no_fill_value(make_result, tmp_path):
-    path = tmp_path / "out.nc"
-    files.write(make_result(), path)
-    with netCDF4.Dataset(path) as file:
-        assert not any("_FillValue" in file[name].ncattrs() for name in ("hit", "hit_y", "hit_z", "standoff", "axis"))
 
 
 def test_write_replaces_an_existing_file(make_result, tmp_path):
@@ -196,35 +167,11 @@ def test_failure_inside_netcdf_leaves_nothing_behind(make_result, tmp_path):
 
 
 def test_failing_rename_keeps_the_existing_file(make_result, tmp_path):
-    path = tmp_path / "out.nc"
-    path.mkdir()
-    with pytest.raises(files.OutputError, match=r"out\.nc: cannot be written"):
-        files.write(make_result(), path)
+    (tmp_path / "out.nc").mkdir()
+    for place in (tmp_path, tmp_path / "absent"):
+        with pytest.raises(files.OutputError, match=r"out\.nc: cannot be written"):
+            files.write(make_result(), place / "out.nc")
     assert os.listdir(tmp_path) == ["out.nc"]
-
-
-def test_absent_folder_is_an_output_error(make_result, tmp_path):
-    with pytest.raises(files.OutputError, match="cannot be written"):
-        files.write(make_result(), tmp_path / "absent" / "out.nc")
-
-
-def test_reading_an_absent_file_says_so(tmp_path):
-    with pytest.raises(files.ResultError, match=r"absent\.nc: cannot be read"):
-        files.read(tmp_path / "absent.nc")
-
-
-def test_reading_a_text_file_says_so(tmp_path):
-    path = tmp_path / "notes.nc"
-    path.write_text("not netCDF")
-    with pytest.raises(files.ResultError, match=r"notes\.nc: cannot be read"):
-        files.read(path)
-
-
-def test_reading_another_dataset_names_what_is_missing(make_result, tmp_path):
-    path = tmp_path / "other.nc"
-    make_result().drop_vars("tilt").to_netcdf(path)
-    with pytest.raises(files.ResultError, match='not a warpimpact result, it has no variable "tilt"'):
-        files.read(path)
 
 
 def test_every_field_of_shots_has_a_variable():
@@ -232,6 +179,28 @@ def test_every_field_of_shots_has_a_variable():
     of_layers = {name.removeprefix("layer_") for name in OPTIONAL_SHOT_VARIABLES}
     # `posterior_draw` says what shots of a posterior have of those.
     assert {field.name for field in dataclasses.fields(Shots)} == shot_names | of_layers | {*OF_A_DRAW}
+
+
+def test_a_result_is_opened_by_its_name(make_result, tmp_path):
+    written = make_result(5)
+    files.write(written, tmp_path / "a.nc")
+    for name in (tmp_path / "a.nc", str(tmp_path / "a.nc")):
+        with open_result(name) as result:
+            assert not result.residual_velocity.variable._in_memory  # read when it is used
+            assert np.array_equal(result.residual_velocity, written.residual_velocity)
+
+
+def test_what_is_no_result_is_told(make_result, tmp_path):
+    (tmp_path / "notes.nc").write_text("not netCDF")
+    make_result().drop_vars("tilt").to_netcdf(tmp_path / "other.nc")
+    for name, told in (
+        ("absent", r"cannot be read \(it is not there\)"),
+        ("notes", "cannot be read as a netCDF file"),
+        ("other", 'not a warpimpact result, it has no variable "tilt"'),
+    ):
+        for read in (files.read, open_result):
+            with pytest.raises(files.ResultError, match=rf"{name}\.nc: {told}"):
+                read(tmp_path / f"{name}.nc")
 
 
 @pytest.mark.parametrize("standoff", [np.nan, 130e-3])

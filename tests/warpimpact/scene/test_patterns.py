@@ -114,15 +114,6 @@ def test_an_edge_is_as_far_as_the_nearest_outline(pattern: LatticePattern) -> No
     assert np.allclose(abs(found), shapely.distance(around, shapely.points(y, z)), rtol=0, atol=1e-12)
 
 
-def test_distances_from_the_edge_have_closed_forms() -> None:
-    at = np.array([0, 1, 4, 5]) * MM
-    circle = CirclePattern(diameter="5 mm", spacing=["9 mm", "9 mm"])
-    chord = 2.51 * (1 - np.cos(np.pi / 64))
-    assert np.allclose(circle.edge_distance(at, 0 * at) / MM, [-2.5, -1.5, 1.5, 1.5], rtol=0, atol=chord)
-    assert np.allclose(SLOT.edge_distance(0 * at, at) / MM, [-2, -2, -2, -1], rtol=0, atol=chord)
-    assert np.isinf(NoPattern().edge_distance(at, at)).all()
-
-
 def test_a_solid_plate_has_no_hole() -> None:
     solid = NoPattern()
     assert not solid.is_hole(np.zeros((3, 1)), np.zeros(4)).any()
@@ -148,8 +139,6 @@ def circles(holes: list[Any]) -> CirclePattern:
         ),
         (lambda: SlotPattern(length="3 mm", width="4 mm", spacing=[1, 1]), "must be at least the width, 4 mm"),
         (lambda: CirclePattern(diameter="5 m", spacing=["1 um", "1 um"]), "the cell must be larger than its holes"),
-        (lambda: TrianglePattern(side="-1 mm", spacing=[1, 1]), "greater than 0"),
-        (lambda: CirclePattern(diameter="5 mm", spacing=["8 mm"]), "Field required"),
         (
             lambda: TrianglePattern(side="6 mm", corner_radius="1.8 mm", spacing=[1, 1]),
             "must be smaller than the inradius of the hole",
@@ -162,7 +151,6 @@ def circles(holes: list[Any]) -> CirclePattern:
             lambda: circles([["0 mm", "0 mm"], ["3 mm", "0 mm"]]),
             r"the holes at \(0, 0\) mm and \(3, 0\) mm overlap or touch",
         ),
-        (lambda: circles([[0, 0], [0, 0]]), r"the holes at \(0, 0\) mm and \(0, 0\) mm overlap or touch"),
         (lambda: circles([["0 mm", "0 mm"], ["160 mm", "80 mm"]]), "overlap or touch"),
         (lambda: circles([]), "at least 1 item"),
     ],
@@ -193,37 +181,22 @@ def test_areas_are_exact(pattern: LatticePattern, area: float) -> None:
 @pytest.mark.parametrize(
     ("pattern", "ligament"),
     [
-        (SLOT, 4 * MM),
-        (CIRCLE, 2 * MM),
         # A hexagonal lattice of 12.5 mm: all six neighbours leave as much.
         (CirclePattern(diameter="9 mm", spacing=[12.5 * MM * math.sqrt(0.75), 12.5 * MM], staggered=True), 3.5 * MM),
         # Across the corner of the cell.
         (CirclePattern(diameter=4 * MM, spacing=(4 * MM, 6 * MM), staggered=True), 1 * MM),
-        (SquarePattern(side=4 * MM, rotation=45, spacing=(7 * MM, 9 * MM)), (7 - 4 * math.sqrt(2)) * MM),
         # Corner to corner, both rounded: each is a square of 3 mm and half a millimetre around it.
         (
             SquarePattern(side=4 * MM, corner_radius=0.5 * MM, spacing=(6 * MM, 11 * MM), staggered=True),
             (math.hypot(3, 2.5) - 1) * MM,
         ),
-        (HexagonPattern(width=5 * MM, spacing=(6 * MM, 7 * MM)), 1 * MM),
         # Between the flanks, which are 60 degrees off the y axis.
         (UP_AND_DOWN, (math.sqrt(0.75) * 10.62 + 0.5 * 3.46 - 12 / math.sqrt(3)) * MM),
         # Side by side along both lattice vectors, end past end along their difference.
         (DIAGONAL, (math.hypot(7 * (0.5 + math.sqrt(0.75)) - 9, 7 * (math.sqrt(0.75) - 0.5)) - 1) * MM),
         (EllipsePattern(length="7 mm", width="3 mm", spacing=["5 mm", "8 mm"]), 1 * MM),
     ],
-    ids=[
-        "slot",
-        "circle",
-        "hexagonal",
-        "corner",
-        "diamonds",
-        "squares",
-        "hexagons",
-        "triangles",
-        "diagonal",
-        "ellipse",
-    ],
+    ids=["hexagonal", "corner", "squares", "triangles", "diagonal", "ellipse"],
 )
 def test_ligaments_have_closed_forms(pattern: LatticePattern, ligament: float) -> None:
     near = 7e-5 if pattern.shape == "ellipse" else 1e-12  # an ellipse is a polygon here

@@ -102,13 +102,6 @@ def test_a_plate_with_a_margin_is_read_back_as_it_was() -> None:
     assert Plate.model_validate_json(without.model_dump_json()) == without == Plate(**STEEL, pattern=SLOTS)
 
 
-def test_a_margin_needs_a_rim() -> None:
-    with pytest.raises(ValidationError, match="margin needs size of the plate: only a finite plate has a rim"):
-        Plate(**STEEL, pattern=SLOTS, margin="3 mm")
-    with pytest.raises(ValidationError, match="greater than 0"):
-        Plate(**STEEL, pattern=SLOTS, size=[1, 1], margin=0)
-
-
 def test_a_margin_keeps_the_mirror_images_that_it_leaves() -> None:
     impact = Impact(velocity=825)
     assert len(symmetries(Plate(**STEEL, pattern=SLOTS, **RIMMED), impact)) == 4  # a rim has no centring

@@ -31,12 +31,6 @@ def test_hits_fill_the_cell_around_the_origin(sampling: str) -> None:
     assert in_quarters == pytest.approx(2048, abs=160 if sampling == "random" else 0)
 
 
-def test_sobol_points_are_a_net() -> None:
-    points = _points(sampling="sobol", count=1024, seed=7, replicates=1) / PERIOD
-    strips = np.histogram2d(*points.T, bins=32, range=[[-0.5, 0.5]] * 2)[0]
-    assert (strips == 1).all()  # a (0, 10, 2)-net: one point in each of 32 × 32 cells
-
-
 @pytest.mark.parametrize(("count", "shape"), [(2, (2, 1)), (128, (16, 8)), (130, (16, 8)), (1, (1, 1))])
 def test_a_grid_has_nearly_square_cells(count: int, shape: tuple[int, int]) -> None:
     points = _points(sampling="grid", count=count)
