@@ -49,7 +49,7 @@ def outlines_in(
 
 def in_memory(dataset: xarray.Dataset) -> xarray.Dataset:
     """A map of hits without outlines along "vertex"."""
-    return dataset.drop_vars(v.OUTLINE_VARIABLES, errors="ignore")
+    return dataset.drop_vars([name for name in v.OUTLINE_VARIABLES if name in dataset.coords])
 
 
 def in_a_file(table: HitTable) -> HitTable:
