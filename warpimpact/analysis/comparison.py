@@ -35,8 +35,8 @@ from warpimpact.analysis.plate_text import common_name, plate_text, reference_na
 from warpimpact.analysis.summary import breaks_promise, hits_at_two_levels, sampling_note
 from warpimpact.analysis.survival import draws_note, survival_of
 from warpimpact.results import attributes as attr
-from warpimpact.results.bases import base_thickness, has_base
 from warpimpact.results.measures import Measure
+from warpimpact.results.per_hit import base_thickness, has_base
 from warpimpact.results.tallies import dealing, estimate_from
 from warpimpact.runs.manifests import first_difference
 from warpimpact.scene.quantities import QUANTITIES

@@ -20,10 +20,9 @@ from warpimpact.analysis.plate_text import plate_text, reference_name, solid_not
 from warpimpact.analysis.survival import by_draws, over_draws
 from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
-from warpimpact.results.limits import base_alone_limits, solid_limits
 from warpimpact.results.measures import Measure
 from warpimpact.results.per_hit import Array
-from warpimpact.results.solid_reference import base_alone, solid_reference
+from warpimpact.results.solid_reference import base_alone, base_alone_limits, solid_limits, solid_reference
 from warpimpact.results.tallies import dealing, estimate_from
 from warpimpact.statistics.comparisons import Ratio, ratio_numbers
 from warpimpact.statistics.intervals import Estimate

@@ -13,9 +13,9 @@ from warpimpact.analysis.numbers import ends_of, interval_text, intervals_text
 from warpimpact.analysis.survival import draws_note
 from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
-from warpimpact.results.bases import has_base
 from warpimpact.results.dataset import finer_pair, is_choice, status_codes
 from warpimpact.results.measures import Measure
+from warpimpact.results.per_hit import has_base
 from warpimpact.scene.display import STORED
 from warpimpact.solver.findings import accuracy_text, errors_text
 from warpimpact.view.view import Column, Section, Table, number, text_of

@@ -19,7 +19,7 @@ from warpimpact.plotting.heading import inscribe
 from warpimpact.plotting.style import BLUE, GREY, MAP_SIDE, VERMILION
 from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
-from warpimpact.results.limits import base_alone_limits, solid_limits
+from warpimpact.results.solid_reference import base_alone_limits, solid_limits
 from warpimpact.studies.limit_view import measures_of, promise_line, shown_unit
 from warpimpact.studies.published_limits import published_beside
 

@@ -14,23 +14,26 @@ import numpy as np
 
 from warpimpact.kernels.status import OF_SHOTS
 from warpimpact.results import attributes as attr
-from warpimpact.results import bases
 from warpimpact.results import variables as v
 from warpimpact.results.dataset import failed, passed
 from warpimpact.results.per_hit import (
+    DEPTH_VARIABLES,
     Array,
     Need,
     PerHit,
     at,
+    base_depth,
     ended_as,
     energy,
     energy_density,
     energy_fraction,
     inclination,
+    is_pierced,
     is_so,
     limit,
     needed_density,
     of_all,
+    piercing_margin,
 )
 
 if TYPE_CHECKING:
@@ -58,8 +61,8 @@ _DERIVED = (
         "passes the base counts with this thickness, too: the numbers are lower bounds if any core pierces the base.",
         source=f"residual depth of penetration in a backing: {_ROSENBERG}",
         higher_is_better=False,
-        values=lambda part, _: bases.base_depth(part),
-        of=bases.DEPTH_VARIABLES,
+        values=lambda part, _: base_depth(part),
+        of=DEPTH_VARIABLES,
         need=BASE,
     ),
     PerHit(
@@ -175,10 +178,10 @@ EVENTS: Mapping[str, PerHit] = {
             source="Army criterion; P(base perforated) is that of the Navy: J. A. Zukas and others, Impact Dynamics, "
             "Wiley 1982",
             higher_is_better=False,
-            values=lambda part, _: bases.is_pierced(part),
-            of=bases.DEPTH_VARIABLES,
+            values=lambda part, _: is_pierced(part),
+            of=DEPTH_VARIABLES,
             need=BASE,
-            margin=bases.piercing_margin,
+            margin=piercing_margin,
         ),
         PerHit(
             name="stopped",

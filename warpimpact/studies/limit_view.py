@@ -20,9 +20,9 @@ from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
 from warpimpact.results.dataset import hit_numbers
 from warpimpact.results.files import ResultError
-from warpimpact.results.limits import base_alone_limits, solid_limits
 from warpimpact.results.measures import NAMES, Measure
 from warpimpact.results.per_hit import needed_density
+from warpimpact.results.solid_reference import base_alone_limits, solid_limits
 from warpimpact.scene.quantities import QUANTITIES
 from warpimpact.scene.units import quantity as reader_of
 from warpimpact.solver.findings import hits_text, limit_error_text

@@ -19,10 +19,10 @@ from warpimpact.campaign.plates import read_plates
 from warpimpact.kernels.status import Status
 from warpimpact.plotting import comparison_figure, weight_figure
 from warpimpact.results import attributes as attr
-from warpimpact.results.bases import is_pierced, piercing_margin
 from warpimpact.results.dataset import stored_columns
 from warpimpact.results.files import ResultError
 from warpimpact.results.measures import Measure
+from warpimpact.results.per_hit import is_pierced, piercing_margin
 from warpimpact.results.tallies import shift_of
 from warpimpact.results.variables import LIMITS, STATUS
 from warpimpact.runs.task import Task
