@@ -37,6 +37,7 @@ from ..scene.distributions import EDGE
 from ..scene.exclusions import check_together
 from ..scene.input_files import InputFile
 from ..scene.model import Model
+from ..scene.problems import sentence
 from ..scene.quantities import SCATTERED
 from ..scene.scatter import check_range
 from ..scene.shots import FARTHEST_HIT
@@ -49,7 +50,6 @@ from .continuum_settings import FiniteElements
 from .drawn import DrawnSampler, Posterior, read_posterior
 from .needs import lacking
 from .plausible import check_plausible, warn_of
-from .problems import sentence
 from .published import Published
 from .scatter_tables import with_scatter_apart
 from .stop import Stop

@@ -8,10 +8,10 @@ from pydantic import ValidationError
 
 from ..scene import Scatter
 from ..scene.distributions import Distribution
+from ..scene.problems import sentence
 from ..scene.quantities import SCATTERED
 from ..scene.target import layer_name
 from ..scene.units import quantity
-from .problems import sentence
 from .text import CampaignError
 
 

@@ -12,10 +12,11 @@ from typing import Any, TypeVar
 
 from pydantic import ValidationError
 
-from warpimpact.catalogue.entries import Material, Threat, reason
+from warpimpact.catalogue.entries import Material, Threat
 from warpimpact.catalogue.spelling import the_entry
 from warpimpact.catalogue.strength import Resistance, resistance_of
 from warpimpact.scene import Core
+from warpimpact.scene.problems import complaint
 from warpimpact.scene.toml_text import parsed, read_text
 from warpimpact.scene.units import quoted
 
@@ -117,7 +118,7 @@ def _entries(kind: type[Entry], tables: Any, place: str) -> dict[str, Entry]:
         except ValidationError as error:
             first = error.errors(include_url=False)[0]
             where = ".".join(map(str, first["loc"]))
-            raise ValueError(f"{place}[{number}]{f'.{where}' if where else ''}: {reason(first)}") from None
+            raise ValueError(f"{place}[{number}]{f'.{where}' if where else ''}: {complaint(first)}") from None
         if entry.name in entries:
             raise ValueError(f"{place}[{number}].name: got {quoted(entry.name)} again, but each entry needs its own")
         entries[entry.name] = entry

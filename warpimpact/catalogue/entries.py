@@ -11,6 +11,7 @@ from pydantic import Field, TypeAdapter, ValidationError, ValidationInfo, field_
 from warpimpact.catalogue.strength import NINETY, Resistance
 from warpimpact.scene import AnyCore, Core
 from warpimpact.scene.model import Model
+from warpimpact.scene.problems import complaint
 from warpimpact.scene.units import (
     Length,
     NonNegativeNumber,
@@ -24,7 +25,6 @@ from warpimpact.scene.units import (
     PositiveTime,
     Speed,
     Title,
-    quoted,
 )
 
 CORE: TypeAdapter[Core] = TypeAdapter(AnyCore)
@@ -87,7 +87,7 @@ class Threat(Model):
         except ValidationError as error:
             problem = error.errors(include_url=False)[0]
             place = ".".join(map(str, problem["loc"][1:]))
-            raise ValueError(f"{place}: {reason(problem)}" if place else reason(problem)) from None
+            raise ValueError(f"{place}: {complaint(problem)}" if place else complaint(problem)) from None
 
     @classmethod
     def _keys(cls) -> list[str]:
@@ -212,15 +212,6 @@ class Material(Model):
         rows = f"{self.count} {kind}{misfit}; " if self.count else ""
         fits = "".join(f"fitted to {plate}; " for plate in self.found)
         return rows + fits + evidence(self.known, self.assumed)
-
-
-def reason(problem: Any) -> str:
-    """The sentence for an error of pydantic in an entry."""
-    if problem["type"] in ("missing", "union_tag_not_found"):
-        return "is missing, but must be given"
-    if problem["type"] == "value_error":
-        return str(problem["ctx"]["error"])
-    return f"got {quoted(problem['input'])}, but {problem['msg'].replace('Input should', 'it must')}"
 
 
 def evidence(known: dict[str, str], assumed: dict[str, str]) -> str:

@@ -9,9 +9,10 @@ from typing import Any
 
 from pydantic import Field, ValidationError
 
-from warpimpact.catalogue.entries import Name, evidence, reason
+from warpimpact.catalogue.entries import Name, evidence
 from warpimpact.catalogue.spelling import the_entry
 from warpimpact.scene.flow import Flow
+from warpimpact.scene.problems import complaint
 from warpimpact.scene.toml_text import parsed, read_text
 from warpimpact.scene.units import Title
 
@@ -76,4 +77,4 @@ def _entry(table: dict[str, Any], place: str) -> FlowEntry:
     except ValidationError as error:
         first = error.errors(include_url=False)[0]
         where = ".".join(map(str, first["loc"]))
-        raise ValueError(f"{place}{f': {where}' if where else ''}: {reason(first)}") from None
+        raise ValueError(f"{place}{f': {where}' if where else ''}: {complaint(first)}") from None

@@ -150,8 +150,8 @@ def _elements(arguments: argparse.Namespace, campaign: "Campaign") -> "FiniteEle
     from pydantic import ValidationError
 
     from warpimpact.campaign.continuum_settings import FiniteElements
-    from warpimpact.campaign.problems import complaint
     from warpimpact.campaign.text import CampaignError
+    from warpimpact.scene.problems import complaint
 
     named = campaign.plate.material
     given: dict[str, Any] = {"materials": (named,)} if named and not campaign.continuum.materials else {}

@@ -7,12 +7,12 @@ from typing import Any
 
 from pydantic import ValidationError
 
-from warpimpact.campaign.problems import sentence
 from warpimpact.campaign.schema import completed_schema
 from warpimpact.campaign.text import CampaignError, parsed, read_text
 from warpimpact.firing.plan import FiringTest
 from warpimpact.firing.requirements import with_requirement
 from warpimpact.results.kinds import TEST
+from warpimpact.scene.problems import sentence
 
 
 def read_test(path: str | Path) -> FiringTest:

@@ -13,7 +13,6 @@ from pydantic import BeforeValidator, Field, ValidationError
 
 from warpimpact.campaign.catalogued import catalogue_of, with_cores, with_materials
 from warpimpact.campaign.plausible import check_plausible
-from warpimpact.campaign.problems import sentence
 from warpimpact.campaign.text import parsed, read_text
 from warpimpact.catalogue.catalogue import Catalogue
 from warpimpact.identification.fit import Fit, MeasuredShot, Sampling
@@ -35,6 +34,7 @@ from warpimpact.results.per_hit import place_of_standoff
 from warpimpact.scene import Core, Impact, Numerics, Plate, Record, Scatter, exclusions
 from warpimpact.scene.distributions import EDGE, Distribution
 from warpimpact.scene.model import Model
+from warpimpact.scene.problems import sentence
 from warpimpact.scene.quantities import QUANTITIES
 from warpimpact.scene.units import Angle, Speed, Title, quantity, quoted
 from warpimpact.solver.columns import Path

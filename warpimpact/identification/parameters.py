@@ -10,11 +10,11 @@ from typing import Any, get_args, get_origin
 import numpy as np
 from pydantic import TypeAdapter, ValidationError
 
-from warpimpact.campaign.problems import complaint
 from warpimpact.campaign.text import CampaignError
 from warpimpact.scene import AnyCore, Interaction, Plate
 from warpimpact.scene.distributions import EDGE, AnyDistribution, Distribution
 from warpimpact.scene.model import Array, Model
+from warpimpact.scene.problems import complaint
 from warpimpact.scene.scatter import in_si
 from warpimpact.scene.units import quoted, reader_in, typed
 from warpimpact.solver.columns import COLUMN_OF, UNITS_OF_EXPOSURE, Path

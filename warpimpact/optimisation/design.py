@@ -16,7 +16,6 @@ from pydantic import Field, ValidationError, model_validator
 
 from warpimpact.campaign.alternatives import Alternative, alternatives
 from warpimpact.campaign.campaign import Campaign
-from warpimpact.campaign.problems import sentence
 from warpimpact.campaign.schema import campaign_schema, completed_schema
 from warpimpact.campaign.text import CampaignError, parsed, read_text
 from warpimpact.optimisation.asked import Bound, Objective, check_needs
@@ -24,6 +23,7 @@ from warpimpact.optimisation.space import Space, read_space
 from warpimpact.results.kinds import DESIGN
 from warpimpact.results.measures import Measure
 from warpimpact.scene.model import Model
+from warpimpact.scene.problems import sentence
 from warpimpact.scene.units import Number, PositiveArealDensity, PositiveLength, Title
 
 Array = NDArray[np.float64]

@@ -22,6 +22,8 @@ if TYPE_CHECKING:
 Rule: TypeAlias = Callable[[np.ndarray[Any, Any], Mapping[str, int]], bool]
 """Check of the values of a variable, given the sizes of all dimensions."""
 
+_ENDS = {"low": "lower", "high": "upper"}
+
 Number = Annotated[float, Field(strict=True)]
 Finite = Annotated[Number, Field(ge=-LARGEST, le=LARGEST)]
 Positive = Annotated[Finite, Field(gt=0.0)]
@@ -100,6 +102,12 @@ _SHAPES: Mapping[str, Any] = {
     attr.PLATE_PERIOD: tuple[Positive, Positive],
 }
 """Types of attributes on whose contents readers rely."""
+
+
+def with_interval(name: str, dims: tuple[str, ...], units: str, meaning: str) -> tuple[v.Variable, ...]:
+    """A variable, and the lower and the upper end of its interval."""
+    ends = (v.Variable(f"{name}_{end}", dims, units, f"{what} end of its 95 % interval") for end, what in _ENDS.items())
+    return (v.Variable(name, dims, units, meaning), *ends)
 
 
 def numbers(values: np.ndarray[Any, Any], _: Mapping[str, int]) -> bool:

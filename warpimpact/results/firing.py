@@ -16,21 +16,19 @@ from pydantic import Json
 
 from warpimpact.records.variable import Variable
 from warpimpact.results import attributes as attr
-from warpimpact.results.declared import Declaration, Text, among, finite, texts
+from warpimpact.results.declared import Declaration, Text, among, finite, texts, with_interval
 from warpimpact.results.kind import Kind
 
 _TESTS, _SHOTS, _SIZES, _ENDS = ("test",), ("test", "shot"), ("size",), ("bound",)
 
 VELOCITY = Variable("velocity", ("velocity",), "m s-1", "impact velocity")
-SHARE = Variable("perforation_probability", ("velocity",), "1", "probability that a shot at any place perforates")
-SHARE_LOW = Variable("perforation_probability_low", ("velocity",), "1", "lower end of its 95 % interval")
-SHARE_HIGH = Variable("perforation_probability_high", ("velocity",), "1", "upper end of its 95 % interval")
+SHARE, SHARE_LOW, SHARE_HIGH = with_interval(
+    "perforation_probability", ("velocity",), "1", "probability that a shot at any place perforates"
+)
 QUANTILE = Variable("quantile", ("quantile",), "1", "share of the places that perforate")
-QUANTILE_VELOCITY = Variable(
+QUANTILE_VELOCITY, QUANTILE_LOW, QUANTILE_HIGH = with_interval(
     "quantile_velocity", ("quantile",), "m s-1", "velocity at which this share of the places perforates"
 )
-QUANTILE_LOW = Variable("quantile_velocity_low", ("quantile",), "m s-1", "lower end of its 95 % interval")
-QUANTILE_HIGH = Variable("quantile_velocity_high", ("quantile",), "m s-1", "upper end of its 95 % interval")
 CHANGES = Variable(
     "change_velocity",
     ("place", "change"),
@@ -72,9 +70,9 @@ PASS_SAME_PLACE = Variable(
 AZIMUTH = Variable("azimuth", ("azimuth",), "degree", "direction of the threat about the vertical, from the normal")
 ELEVATION = Variable("elevation", ("elevation",), "degree", "direction of the threat above the horizon")
 _DIRECTIONS = ("azimuth", "elevation")
-DIRECTION_SHARE = Variable("direction_perforation_probability", _DIRECTIONS, "1", "probability of perforation")
-DIRECTION_LOW = Variable("direction_perforation_probability_low", _DIRECTIONS, "1", "lower end of its 95 % interval")
-DIRECTION_HIGH = Variable("direction_perforation_probability_high", _DIRECTIONS, "1", "upper end of its 95 % interval")
+DIRECTION_SHARE, DIRECTION_LOW, DIRECTION_HIGH = with_interval(
+    "direction_perforation_probability", _DIRECTIONS, "1", "probability of perforation"
+)
 DIRECTION_OBLIQUITY = Variable("direction_obliquity", _DIRECTIONS, "degree", "angle between line of fire and normal")
 DIRECTION_WEIGHT = Variable("direction_weight", _DIRECTIONS, "1", "weight of the direction in the mean")
 DIRECTION_HITS = Variable("direction_hits", _DIRECTIONS, "1", "hits computed in the direction")

@@ -17,7 +17,17 @@ import numpy as np
 
 from warpimpact.records.variable import Variable
 from warpimpact.results import attributes as attr
-from warpimpact.results.declared import Declaration, Size, Text, among, finite, not_negative, place_in, texts
+from warpimpact.results.declared import (
+    Declaration,
+    Size,
+    Text,
+    among,
+    finite,
+    not_negative,
+    place_in,
+    texts,
+    with_interval,
+)
 from warpimpact.results.kind import Kind
 from warpimpact.scene.toml_text import parsed_json
 
@@ -25,7 +35,6 @@ if TYPE_CHECKING:
     import xarray
 
 _BY_DESIGN, _BY_FRONT, _BY_REFERENCE = ("design", "asked"), ("front", "asked"), ("reference", "asked")
-_LOW, _HIGH = "lower end of its 95 % interval", "upper end of its 95 % interval"
 
 NAME = Variable("variable", ("variable",), "1", "free variable")
 UNIT = Variable("variable_unit", ("variable",), "1", "unit of the variable, as the design file has it")
@@ -36,18 +45,16 @@ SIGN = Variable("asked_sign", ("asked",), "1", "1 where less is sought, -1 where
 ASKED_LIMIT = Variable("asked_limit", ("asked",), "1", "limit of a bound in its own units; no value of an objective")
 
 VALUE = Variable("value", ("design", "variable"), "1", "value in its unit; number of a choice; none where unused")
-FOUND = Variable("found", _BY_DESIGN, "1", "objective or bound in its own units")
-FOUND_LOW = Variable("found_low", _BY_DESIGN, "1", _LOW)
-FOUND_HIGH = Variable("found_high", _BY_DESIGN, "1", _HIGH)
+FOUND, FOUND_LOW, FOUND_HIGH = with_interval("found", _BY_DESIGN, "1", "objective or bound in its own units")
 HITS = Variable("hits", ("design",), "1", "hits that were computed by each threat")
 LEVELS = Variable("numerics", ("design",), "1", "numerics by threat, as JSON")
 COST = Variable("cost", ("design",), "s", "processor time that its hits took")
 ON_FRONT = Variable("on_front", ("design",), "1", "1 on the front of the search, else 0")
 
 NUMBER = Variable("front_design", ("front",), "1", "number of the design")
-FRESH = Variable("front_found", _BY_FRONT, "1", "objective or bound by fresh hits, in its own units")
-FRESH_LOW = Variable("front_found_low", _BY_FRONT, "1", _LOW)
-FRESH_HIGH = Variable("front_found_high", _BY_FRONT, "1", _HIGH)
+FRESH, FRESH_LOW, FRESH_HIGH = with_interval(
+    "front_found", _BY_FRONT, "1", "objective or bound by fresh hits, in its own units"
+)
 KEPT = Variable("front_kept", ("front",), "1", "1 where fresh hits leave it on the front and within the bounds, else 0")
 GROUP = Variable("front_group", ("front",), "1", "first design than which it is not certainly better at 95 %")
 SURVIVAL = Variable(
@@ -63,9 +70,9 @@ HIT_Z = Variable("front_hit_z", ("front", "hit"), "m", "hit point in the irreduc
 HIT_VALUE = Variable("front_hit_value", ("front", "effect", "hit"), "1", "what the hit says, of the first threat")
 
 REFERENCE = Variable("reference", ("reference",), "1", "target to compare with")
-REFERENCE_FOUND = Variable("reference_found", _BY_REFERENCE, "1", "objective or bound, in its own units")
-REFERENCE_LOW = Variable("reference_found_low", _BY_REFERENCE, "1", _LOW)
-REFERENCE_HIGH = Variable("reference_found_high", _BY_REFERENCE, "1", _HIGH)
+REFERENCE_FOUND, REFERENCE_LOW, REFERENCE_HIGH = with_interval(
+    "reference_found", _BY_REFERENCE, "1", "objective or bound, in its own units"
+)
 REFERENCE_CAMPAIGN = Variable("reference_campaign", ("reference",), "1", "campaign of the first threat, as TOML")
 
 ASSUMPTION = Variable("assumption_name", ("assumption",), "1", "what nobody measured, chosen otherwise")

@@ -10,12 +10,12 @@ import xarray
 from pydantic import ValidationError
 
 from warpimpact.analysis.estimates import estimated
-from warpimpact.campaign.problems import sentence
 from warpimpact.campaign.published import Published
 from warpimpact.campaign.text import CampaignError, parsed
 from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
 from warpimpact.results.measures import Measure
+from warpimpact.scene.problems import sentence
 from warpimpact.view.view import Column, Section, Table, number
 
 _MEDIAN = Measure.parse("V50")

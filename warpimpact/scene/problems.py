@@ -1,11 +1,11 @@
-"""The reason why a campaign is not valid, as a sentence."""
+"""The reason why the tables of a file are not valid, as a sentence."""
 
 from typing import Any
 
 from pydantic import ValidationError
 from pydantic_core import ErrorDetails
 
-from ..scene.units import brief, quoted
+from .units import brief, quoted
 
 _CHOICES = ("shape", "distribution", "name")
 _MOST_PROBLEMS = 8
