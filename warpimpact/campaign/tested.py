@@ -138,8 +138,7 @@ def _of_shot(campaign: Campaign, figures: Figures) -> Iterator[Standing]:
         yield Standing("several layers", "no published shot was at more than one")
     if any(layer.degradation < 1.0 for layer in layers):
         yield Standing(
-            "weakening",
-            "β is below 1, which rests on the two shots alone; solid plates were fitted without it",
+            "weakening", "β is below 1, which rests on the two shots alone; solid plates were fitted without it"
         )
         if impact.obliquity > _STRAIGHT:
             yield Standing(

@@ -49,11 +49,7 @@ EXCLUDED = (
     Rule(BY_TIME, BY_PATH, "exposure counts either time or path"),
     Rule(THICKNESS, AREAL_DENSITY, "with the holes each gives the other"),
     Rule(STAGGERED, HOLES, "it stands for two holes; list all holes of the cell"),
-    Rule(
-        MARGIN,
-        CELLS,
-        "it has no single holes to leave out; give polygons in a cell as large as the plate",
-    ),
+    Rule(MARGIN, CELLS, "it has no single holes to leave out; give polygons in a cell as large as the plate"),
     Rule(LAYERS, NODAL, "the nodal scheme knows one plate and no layers behind it"),
     Rule(BY_PATH, NODAL, "the nodal scheme weakens the plate once per time step"),
     Rule(BENDING, NODAL, "the nodal scheme has no bending moment"),

@@ -71,11 +71,7 @@ MISTAKES = {
         '"4 kg"\nres',
         'plate.thickness: got "4 kg", which is not a length; give a number in m or a string such as "4 mm"',
     ),
-    "negative thickness": (
-        '"4 mm"\nres',
-        "-0.004\nres",
-        "plate.thickness: got -0.004, but it must be greater than 0",
-    ),
+    "negative thickness": ('"4 mm"\nres', "-0.004\nres", "plate.thickness: got -0.004, but it must be greater than 0"),
     "NaN": (
         "0.05",
         "nan",

@@ -131,10 +131,7 @@ def test_the_tolerance_of_a_standard_scatters(folder: Path) -> None:
     [
         ({"core": {"threat": "30 AP M2"}}, r'core.threat: got "30 AP M2".* did you mean "\.30 AP M2"'),
         ({"core": {"threat": "7.62x39 API BZ"}}, "core.threat: the catalogue does not know the core"),
-        (
-            {"core": {"threat": ".50 AP M2"}},
-            'core.threat: .*has no velocity of "\\.50 AP M2"; give impact.velocity',
-        ),
+        ({"core": {"threat": ".50 AP M2"}}, 'core.threat: .*has no velocity of "\\.50 AP M2"; give impact.velocity'),
         ({"core": {"threat": ".30 AP M2", "standard": "VPAM 9"}}, "core.standard: .*must be one of NIJ RF3"),
         ({"plate": {"material": "plate C", "thickness": 5e-3}}, r'plate.material: got "plate C".*did you mean "plate'),
         ({"plate": {"material": "plate A"}}, "plate.thickness: is missing"),

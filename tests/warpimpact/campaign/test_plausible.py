@@ -125,10 +125,7 @@ def test_thin_webs_and_large_holes_get_a_word(folder: Path) -> None:
         return [sentence.split(",")[0].split(":", 2)[1] for sentence in doubted_holes(campaign.target)]
 
     assert told(("", "")) == []
-    assert told(('diameter = "5 mm"', 'diameter = "7.9 mm"')) == [
-        " open area of 77%",
-        " ligaments of 0.1 mm",
-    ]
+    assert told(('diameter = "5 mm"', 'diameter = "7.9 mm"')) == [" open area of 77%", " ligaments of 0.1 mm"]
     assert told(('thickness = "4 mm"', 'thickness = "13 mm"')) == [" ligaments of 3 mm"]
 
 

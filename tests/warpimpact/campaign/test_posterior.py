@@ -246,10 +246,7 @@ def test_shots_of_all_draws_are_computed_together(tmp_path: Path, name: str, siz
     ("change", "sentence"),
     [
         (("degradation = 0.8", "degradation = 0.7"), "found with plate.degradation = 0.8, but the campaign has 0.7"),
-        (
-            ("[impact]", "[interaction]\nonset = 0.01\n[impact]"),
-            "interaction.onset = 0.005, but the campaign has 0.01",
-        ),
+        (("[impact]", "[interaction]\nonset = 0.01\n[impact]"), "interaction.onset = 0.005, but the campaign has 0.01"),
         (
             ("[impact]", "[interaction.free_surface]\n[impact]"),
             "found with interaction.free_surface = None, but the campaign has",

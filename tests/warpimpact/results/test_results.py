@@ -12,12 +12,7 @@ from warpimpact.kernels.status import OF_SHOTS, Status
 from warpimpact.results import files
 from warpimpact.results.dataset import status_codes
 from warpimpact.results.outlines import outlines
-from warpimpact.results.variables import (
-    EXIT_VARIABLES,
-    OPTIONAL_SHOT_VARIABLES,
-    OUTCOME_VARIABLES,
-    SHOT_VARIABLES,
-)
+from warpimpact.results.variables import EXIT_VARIABLES, OPTIONAL_SHOT_VARIABLES, OUTCOME_VARIABLES, SHOT_VARIABLES
 from warpimpact.scene import NoPattern, Shots, SquarePattern
 from warpimpact.scene.quantities import OF_A_DRAW
 

@@ -20,12 +20,6 @@ def test_a_plain_plate_is_solid_steel_that_neither_rubs_nor_degrades() -> None:
     assert plate.areal_density == pytest.approx(31.4, rel=1e-14)
 
 
-def test_holes_take_their_share_of_the_weight() -> None:
-    plate = Plate(**STEEL, pattern=CirclePattern(diameter="5 mm", spacing=["10 mm", "10 mm"]))
-    assert plate.open_area == pytest.approx(math.pi / 16, rel=1e-14)
-    assert plate.areal_density == pytest.approx(31.4 * (1 - math.pi / 16), rel=1e-14)
-
-
 @pytest.mark.parametrize("margin", [{}, {"size": ["80 mm", "90 mm"], "margin": "3 mm"}])
 def test_a_plate_may_be_given_by_its_weight(margin: dict) -> None:
     holes = CirclePattern(diameter="5 mm", spacing="10 mm")

@@ -6,13 +6,7 @@ import statsmodels.api as sm
 from numpy.typing import NDArray
 from scipy import optimize, special, stats
 
-from warpimpact.statistics.quantal import (
-    d_optimal,
-    fit_quantal,
-    likelihood_interval,
-    wald_interval,
-    weight,
-)
+from warpimpact.statistics.quantal import d_optimal, fit_quantal, likelihood_interval, wald_interval, weight
 
 Array = NDArray[np.float64]
 MODELS = {"probit": sm.Probit, "logit": sm.Logit}
