@@ -8,7 +8,7 @@ from functools import cache
 from typing import TYPE_CHECKING, Annotated, Any, Literal, TypeAlias
 
 import numpy as np
-from pydantic import AfterValidator, BaseModel, Field, Json, RootModel, TypeAdapter, ValidationError
+from pydantic import AfterValidator, BaseModel, Field, Json, TypeAdapter, ValidationError
 
 from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
@@ -50,10 +50,6 @@ def _at_a_level(numerics: Numerics) -> Numerics:
 _Resolution = Annotated[Numerics, AfterValidator(_at_a_level)]
 
 
-class _Core(RootModel[AnyCore]):
-    pass
-
-
 class _Accuracy(BaseModel):
     share: Finite
 
@@ -86,7 +82,7 @@ _TYPES: Mapping[str, Any] = {
 }
 """Types of attributes by their kind."""
 _SHAPES: Mapping[str, Any] = {
-    attr.CORE: Json[_Core],
+    attr.CORE: Annotated[AnyCore, Json],
     attr.RESOLUTION: Json[_Resolution],
     attr.ACCURACY: Json[_Accuracy],
     attr.MATERIAL: Json[_DeclaredMaterial],

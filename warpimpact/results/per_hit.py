@@ -72,7 +72,7 @@ class PerHit:
     label: str
     units: str = "1"
     definition: str
-    source: str
+    source: str = "docs/glossary.md"
     higher_is_better: bool | None
     values: Values
     of: tuple[v.Variable, ...] = ()

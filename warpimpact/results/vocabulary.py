@@ -216,7 +216,6 @@ EVENTS: Mapping[str, PerHit] = {
                 name=status.name.lower(),
                 label=status.name.lower(),
                 definition=f"Share of the shots whose status is {status.name.lower()}.",
-                source="docs/glossary.md",
                 higher_is_better=status.name in ("ARRESTED", "RICOCHETED"),
                 values=ended_as(status),
             )
@@ -246,7 +245,6 @@ def _recorded() -> Iterator[PerHit]:
             units=variable.units,
             definition=f"{variable.long_name[0].upper()}{variable.long_name[1:]}"
             + ("." if every else ", of the cores that passed the target."),
-            source="docs/glossary.md",
             higher_is_better=better.get(variable),
             values=values,
             of=(variable,),

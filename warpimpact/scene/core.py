@@ -113,9 +113,9 @@ class Core(Model, ABC):
         density = self.density if self.mass is None else self.mass / volume
         return MassProperties(
             mass=float(density * volume),
-            centre_of_mass=float(_first_given(self.centre_of_mass, centroid)),
-            inertia_axial=float(_first_given(self.inertia_axial, density * axial)),
-            inertia_transverse=float(_first_given(self.inertia_transverse, density * transverse)),
+            centre_of_mass=float(self.centre_of_mass or centroid),  # none of the overrides is 0
+            inertia_axial=float(self.inertia_axial or density * axial),
+            inertia_transverse=float(self.inertia_transverse or density * transverse),
         )
 
     @cached_property
@@ -343,7 +343,3 @@ class ProfileCore(Core):
 
 
 AnyCore = Annotated[PolynomialCore | OgiveCore | ConeCore | ProfileCore, Field(discriminator="shape")]
-
-
-def _first_given(override: float | None, computed: float) -> float:
-    return computed if override is None else override

@@ -126,11 +126,10 @@ class _Quantity:
         number, unit = float(match[1]), (match[2] or "").strip()
         if not unit and self.unit:
             raise self._error(text, "which has no unit")
-        return number * self._to_si(text, unit) if unit else number
-
-    def _to_si(self, text: str, unit: str) -> float:
+        if not unit:
+            return number
         try:
-            return _factor(unit, self.unit)
+            return number * (COMMON.get((unit, self.unit)) or _by_pint(unit, self.unit))
         except LookupError:
             raise self._error(text, f'whose unit "{brief(unit)}" is unknown') from None
         except ValueError:
@@ -183,19 +182,13 @@ test compares each factor with pint."""
 
 
 @cache
-def _factor(unit: str, si_unit: str) -> float:
+def _by_pint(unit: str, si_unit: str) -> float:
     """Factor from `unit` to `si_unit`.
 
     Raises:
         LookupError: the unit is unknown.
         ValueError: it is the unit of another quantity.
     """
-    if (unit, si_unit) in COMMON:
-        return COMMON[unit, si_unit]
-    return _by_pint(unit, si_unit)
-
-
-def _by_pint(unit: str, si_unit: str) -> float:
     import pint
 
     if _TOWER.search(unit):
@@ -206,10 +199,10 @@ def _by_pint(unit: str, si_unit: str) -> float:
         raise LookupError(unit) from error
     try:
         factor = float(_registry().Quantity(1.0, parsed).to(si_unit).magnitude)
-        turns = si_unit == "rad/s" and "radian" not in _registry().get_root_units(parsed)[1]._units
-        return 2.0 * math.pi * factor if turns else factor  # a frequency counts turns
     except pint.DimensionalityError:
         raise ValueError(unit) from None
+    turns = si_unit == "rad/s" and "radian" not in _registry().get_root_units(parsed)[1]._units
+    return 2.0 * math.pi * factor if turns else factor  # a frequency counts turns
 
 
 def brief(text: str, most: int = MOST_QUOTED) -> str:

@@ -65,7 +65,7 @@ def test_a_stop_by_bending_needs_it(tmp_path: Path) -> None:
 
 def test_the_nodal_scheme_has_no_bending(tmp_path: Path) -> None:
     path = written(tmp_path, "bending = true\n", ('"consistent"', '"nodal"'), ("seed = 1", "seed = 1\ncount = 64"))
-    with pytest.raises(CampaignError, match='bending = true cannot be combined with numerics.scheme = "nodal"'):
+    with pytest.raises(CampaignError, match=r'bending = true cannot be combined with numerics.scheme = "nodal"'):
         Campaign.from_toml(path)
 
 
