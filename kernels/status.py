@@ -4,6 +4,8 @@ from enum import IntEnum
 
 RUNNING = -1
 """Stands in place of a status while a shot has not ended."""
+WAITING = -2
+"""Stands in its place while a core of the continuum is in front of a layer that has no mesh yet."""
 
 
 class Status(IntEnum):

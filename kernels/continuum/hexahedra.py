@@ -26,7 +26,8 @@ def build(variant: Variant) -> SimpleNamespace:
     zero, half, one, two, three = (real(value) for value in (0.0, 0.5, 1.0, 2.0, 3.0))
     third, eighth, of_volume, of_force = (real(value) for value in (1 / 3, 1 / 8, 1 / 64, 1 / 64))
     quadratic, linear = real(choices.QUADRATIC.value), real(choices.LINEAR.value)
-    hourglass, tiny = real(choices.HOURGLASS.value / 4.0), real(choices.NOTHING.value)
+    hourglass, firm = real(choices.HOURGLASS.value / 4.0), real(choices.FIRM.value)
+    tiny = real(choices.NOTHING.value)
     thinnest, widest, least = (real(share.value) for share in (choices.THINNEST, choices.WIDEST, choices.LEAST_VOLUME))
 
     @wp.struct
@@ -213,7 +214,8 @@ def build(variant: Variant) -> SimpleNamespace:
         drag_1 = drag(gradient_x, gradient_y, gradient_z, x.zeta_xi - back * v.zeta_xi, v.zeta_xi)
         drag_2 = drag(gradient_x, gradient_y, gradient_z, x.xi_eta - back * v.xi_eta, v.xi_eta)
         drag_3 = drag(gradient_x, gradient_y, gradient_z, x.all - back * v.all, v.all)
-        resistance = hourglass * sheet.density * sheet.wave_speed * rest_length * rest_length
+        firmness = wp.min(real(1.0), sheet.yield_stress / (firm * sheet.density * sheet.wave_speed))
+        resistance = hourglass * firmness * sheet.density * sheet.wave_speed * rest_length * rest_length
         drag_0 = kept(live, drag_0)
         drag_1 = kept(live, drag_1)
         drag_2 = kept(live, drag_2)

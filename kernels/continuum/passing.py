@@ -7,7 +7,7 @@ from types import SimpleNamespace
 import warp as wp
 
 from .. import constants, memory, rigid_body, structs
-from ..status import RUNNING, Status
+from ..status import RUNNING, WAITING, Status
 from ..variant import Variant
 from . import choices, fields, hexahedra, nodes, penalty
 
@@ -29,11 +29,11 @@ def build(variant: Variant) -> SimpleNamespace:
     PERFORATED, ARRESTED = wp.constant(int(Status.PERFORATED)), wp.constant(int(Status.ARRESTED))
     RICOCHETED, MISSED = wp.constant(int(Status.RICOCHETED)), wp.constant(int(Status.MISSED))
     UNFINISHED, NOT_FINITE = wp.constant(int(Status.UNFINISHED)), wp.constant(int(Status.NOT_FINITE))
-    running = wp.constant(RUNNING)
+    running, waiting = wp.constant(RUNNING), wp.constant(WAITING)
 
     @wp.func
     def status_of(core: struct.Core, limits: struct.Limits, flight: struct.Flight):
-        """How a hit has ended; RUNNING if it has not."""
+        """How a hit has ended; RUNNING if it has not, WAITING if its next layer needs a mesh."""
         state = flight.state
         rearmost, foremost = contact.ends_of(core, state)
         energy = move.kinetic_energy(core.body, move.axis_of(state.attitude), state.velocity, state.angular_momentum)
@@ -53,6 +53,8 @@ def build(variant: Variant) -> SimpleNamespace:
             status = ARRESTED
         elif flight.time > limits.longest:
             status = UNFINISHED
+        elif foremost > limits.unmeshed - behind:
+            status = waiting
         return status
 
     @wp.func

@@ -165,7 +165,11 @@ FRONT = {
 }
 """Designs of two fronts of campaigns/designs/lightest_plate.toml, searched with the paper's parameters and with free
 surfaces (continuum_front.py)."""
-PLATES = {**CASES, **KEPT, **FRONT}
+LIMITED = {
+    "solid_20_7075": solid("20 mm of AA7075-T651, solid", 20e-3, 1.178e9, 0.039, "AA7075-T651", (700.0, 900.0)),
+}
+"""Plates of which the limit velocity alone is computed (continuum_limits.py)."""
+PLATES = {**CASES, **KEPT, **FRONT, **LIMITED}
 
 
 class Published(NamedTuple):
@@ -182,6 +186,7 @@ PUBLISHED = {
     "solid_6.5": Published(525.0, "complete bullet", "SECURE400, 405 HV", "kaiser_11_isb"),
     "solid_12": Published(871.0, "complete bullet", "ARMOX560, 560 HV", "borvik_09_ijie"),
     "solid_20": Published(514.0, "bare core", "AA6082-T6", "forrestal_14_expmech"),
+    "solid_20_7075": Published(633.0, "bare core", "AA7075-T651", "forrestal_10_expmech"),
 }
 
 MEASURES = {"velocity": "m/s", "tilt_50": "°", "tilt_130": "°"}

@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
-from continuum_cases import CASES, PUBLISHED, append, written
+from continuum_cases import PLATES, PUBLISHED, append, written
 
 from warpimpact import Continuum, Impact, Shots, simulate
 from warpimpact.catalogue.flow_entries import flow_entry
@@ -53,7 +53,7 @@ def next_velocity(shots: list[Shot], published: float) -> float | None:
 
 def shot_at(plate: str, friction: float, spacing: float | None, velocity: float) -> Shot:
     """Compute one shot; without a spacing the elements are those of a draft."""
-    case = CASES[plate]
+    case = PLATES[plate]
     impact = Impact(velocity=velocity)
     columns = {name: np.array([getattr(impact, name)]) for name in Impact.model_fields}
     shots = Shots(hit_y=np.zeros(1), hit_z=np.zeros(1), **columns)

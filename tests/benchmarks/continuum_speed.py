@@ -16,7 +16,8 @@ from continuum_cases import CASES
 
 from warpimpact import Continuum, Numerics, Shots, simulate
 from warpimpact.catalogue.flow_entries import flow_entry
-from warpimpact.continuum.strikes import march_of, memory_of
+from warpimpact.continuum.meeting import march_of
+from warpimpact.continuum.strikes import memory_of
 from warpimpact.solver.worker import Worker
 
 CASE = CASES["slotted"]
@@ -31,7 +32,7 @@ def main() -> None:
     times, elements, steps = [], 0, 0
     for _ in range(ROUNDS):
         march = march_of(CASE.scene, shots[:1], 0, continuum, conditions)
-        elements = sum(int(sheet.alive.sum()) for sheet in march.sheets)
+        elements = sum(int(sheet.alive.sum()) for sheet in march.hit.sheets)
         begin = time.process_time()
         steps = int(march.ended().flight["steps"])
         times.append(time.process_time() - begin)

@@ -12,7 +12,7 @@ from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
-from continuum_cases import CASES, CORE, MEASURES, PUBLISHED, measured, written
+from continuum_cases import CASES, CORE, MEASURES, PLATES, PUBLISHED, measured, written
 from numpy.typing import NDArray
 from scipy.stats import spearmanr
 
@@ -255,7 +255,7 @@ def limits() -> Table:
             cells.append(f"{bracket}, {np.sqrt(slowest**2 - left**2):.0f}")
         if any(cells):
             words = f"{published.velocity:.0f} ({published.projectile}, {published.material})"
-            rows.append((CASES[plate].title, *cells, words))
+            rows.append((PLATES[plate].title, *cells, words))
     return ("plate", "without friction, m/s", "friction 0.03, m/s", "published, m/s"), rows
 
 

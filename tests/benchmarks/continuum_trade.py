@@ -26,7 +26,7 @@ from continuum_cases import CASES, MEASURES, PLATES, Case, append, measured, wri
 
 from warpimpact import Continuum, Numerics, Record, Scene, Shots, simulate
 from warpimpact.catalogue.flow_entries import flow_entry
-from warpimpact.continuum import meshing, one_hit, strikes
+from warpimpact.continuum import meeting, meshing, one_hit
 from warpimpact.kernels.continuum import choices, hexahedra, passing
 
 SCALES = np.array([5.0, 5.0, 10.0])
@@ -45,14 +45,14 @@ SHARED = meshing._shared
 Changes = tuple[tuple[Any, str, Any], ...]
 EFFECTS: dict[str, Changes] = {
     "as it is": (),
-    "patch of 10 radii for 5": ((strikes, "PATCH", 10.0),),
-    "patch of 4 radii for 5": ((strikes, "PATCH", 4.0),),
+    "patch of 10 radii for 5": ((meeting, "PATCH", 10.0),),
+    "patch of 4 radii for 5": ((meeting, "PATCH", 4.0),),
     "edge held": ((meshing, "_shared", lambda lengths: 1.0e6 * SHARED(lengths)),),
     "edge held, patch of 7 radii": (
         (meshing, "_shared", lambda lengths: 1.0e6 * SHARED(lengths)),
-        (strikes, "PATCH", 7.0),
+        (meeting, "PATCH", 7.0),
     ),
-    "fine part of 3.5 radii for 2.5": ((strikes, "FINE", 3.5),),
+    "fine part of 3.5 radii for 2.5": ((meeting, "FINE", 3.5),),
     "contact four times as stiff": ((one_hit, "PENALTY", 2.0),),
     "contact a quarter as stiff": ((one_hit, "PENALTY", 0.125),),
     "hourglass coefficient 0.05 for 0.02": ((choices, "HOURGLASS", choices.HOURGLASS._replace(value=0.05)),),

@@ -37,7 +37,8 @@ from roads import OBLIQUE as OBLIQUE_IMPACT
 from warpimpact.campaign.campaign import Campaign
 from warpimpact.catalogue.flow_entries import flow_entry
 from warpimpact.continuum.many_hits import MOST, ManyHits
-from warpimpact.continuum.strikes import Struck, march_of, memory_of, outcomes_of, simulate, together
+from warpimpact.continuum.meeting import Struck, march_of
+from warpimpact.continuum.strikes import memory_of, outcomes_of, simulate, together
 from warpimpact.kernels import lanes, march
 from warpimpact.runs.run import run_to_file
 from warpimpact.scene import Numerics, Scene, Shots
@@ -306,7 +307,7 @@ def elements(values: dict[str, Any], asked: Asked) -> None:
         for number in [0, *range(len(shots))]
     ]
     ManyHits([begun.pop(0).hit]).advance(1)  # compiles
-    counts = np.array([sum(int(sheet.alive.sum()) for sheet in march.sheets) for march in begun])
+    counts = np.array([sum(int(sheet.alive.sum()) for sheet in march.hit.sheets) for march in begun])
     hits: dict[int, Struck] = {}
     taken = seconds(lambda: hits.update(together(begun)))
     there = outcomes_of(memory, [hits[number] for number in range(len(shots))])

@@ -23,7 +23,7 @@ from warpimpact import (
     Shots,
     simulate,
 )
-from warpimpact.continuum import many_hits, strikes
+from warpimpact.continuum import many_hits, meeting, strikes
 from warpimpact.kernels.status import Status
 from warpimpact.solver.worker import Worker
 
@@ -63,8 +63,8 @@ def computed(plate: Plate, shots: Shots, **settings: Any) -> Outcomes:
 def _small_patch() -> Iterator[None]:
     """Patches that are too small for a result: what these tests show does not depend on that, and they take half."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(strikes, "FINE", 1.7)
-        patch.setattr(strikes, "PATCH", 4.0)
+        patch.setattr(meeting, "FINE", 1.7)
+        patch.setattr(meeting, "PATCH", 4.0)
         yield
 
 
@@ -72,7 +72,7 @@ def _small_patch() -> Iterator[None]:
 def coarse(monkeypatch: pytest.MonkeyPatch) -> float:
     """Elements that are too coarse for a result [m], whose hourglasses take much; what they show does not depend on
     that."""
-    monkeypatch.setattr(strikes, "LARGEST_HOURGLASS_SHARE", 1.0)
+    monkeypatch.setattr(meeting, "LARGEST_HOURGLASS_SHARE", 1.0)
     return 1.0e-3
 
 
@@ -155,6 +155,30 @@ def test_layers_apart_are_the_chain_of_their_plates(coarse: float) -> None:
     assert both.layer_residual_velocity[0, 1] == pytest.approx(both.residual_velocity[0], abs=1.0)
 
 
+def test_a_layer_has_its_mesh_where_the_core_crosses_it(coarse: float) -> None:
+    """A core that the edge of a hole has turned aside meets the second plate more than a radius beside its line of
+    fire: there is the middle of the fine part, up to half an element."""
+    scene = Scene(core=CORE, target=(HOLES, Layer(thickness=2e-3, resistance=2.6e9, gap=100e-3)))
+    shots = shots_at((2e-3, 0.0), velocity=600.0)
+    conditions = strikes.memory_of(scene, shots, Worker("cpu", 1)).prepared.conditions
+    march = meeting.march_of(scene, shots, 0, Continuum(flows=(STEEL,), spacing=coarse), conditions)
+    list(march.hit.steps())
+    assert march.hit.waits
+    state, first = march.hit.flight["state"], march.hit.mesh.position.numpy().reshape(3, -1)
+    position, velocity = np.array(state["position"]), np.array(state["velocity"])
+    crossing = position[1] + velocity[1] / velocity[0] * (104e-3 - position[0])
+    assert abs(crossing) > CORE.max_radius
+    hit = march.extended()
+    along = hit.sheets[1].edges[0]
+    fine = np.diff(along) < 1.01 * coarse
+    assert 0.5 * (along[:-1][fine].min() + along[1:][fine].max()) == pytest.approx(crossing, abs=0.5 * coarse)
+    assert np.array_equal(hit.mesh.position.numpy().reshape(3, -1)[:, : first.shape[1]], first)
+    struck = march.ended()
+    assert struck.status == Status.PERFORATED
+    assert struck.touched.tolist() == [True, True]
+    assert struck.energies.imbalance < 0.01
+
+
 def test_hits_that_march_together_end_as_those_that_march_alone(
     coarse: float, monkeypatch: pytest.MonkeyPatch, device: str
 ) -> None:
@@ -164,7 +188,7 @@ def test_hits_that_march_together_end_as_those_that_march_alone(
     scene, continuum = Scene(core=CORE, target=target), Continuum(flows=(STEEL,), spacing=coarse)
     shots = replace(shots_at(*[(1e-3, 2e-3)] * 3, yaw=0.02, spin=1.7e4), velocity=np.array([500.0, 825.0, 650.0]))
     conditions = strikes.memory_of(scene, shots, Worker("cpu", 1)).prepared.conditions
-    march = partial(strikes.march_of, scene, shots, continuum=continuum, conditions=conditions)
+    march = partial(meeting.march_of, scene, shots, continuum=continuum, conditions=conditions)
     together = dict(strikes.together(march(number=k, device=device) for k in range(3)))
     assert sorted(together) == [0, 1, 2]
     for number, other in together.items():

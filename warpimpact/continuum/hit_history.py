@@ -7,9 +7,11 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from warpimpact.continuum.meeting import WIDER, March, Struck, march_of
 from warpimpact.continuum.meshing import SheetMesh
 from warpimpact.continuum.one_hit import OneHit
-from warpimpact.continuum.strikes import March, check_continuum, march_of, memory_of, outcomes_of
+from warpimpact.continuum.strikes import check_continuum, memory_of, outcomes_of
+from warpimpact.kernels.status import Status
 from warpimpact.kernels.trace import WIDTH
 from warpimpact.scene import Scene, Shots
 from warpimpact.scene.flow import Continuum
@@ -36,22 +38,17 @@ def replay_continuum(scene: Scene, shots: Shots, continuum: Continuum, snapshots
     """
     check_continuum(scene, shots, continuum)
     memory = memory_of(scene, shots, Worker("cpu", 1))
-    march = march_of(scene, shots, 0, continuum, memory.prepared.conditions)
-    rows, frames = list[Array](), Frames(march)
-
-    def follow(hit: OneHit) -> None:
-        rows.append(_row(hit, rows[-1] if rows else None))
-        if snapshots:
-            frames.see(len(rows) - 1)
-
-    follow(march.hit)
-    struck = march.ended(every=STRIDE, follow=follow)
+    for wider in WIDER:
+        march = march_of(scene, shots, 0, continuum, memory.prepared.conditions, wider=wider)
+        struck, rows, frames = _followed(march, has_frames=snapshots > 0)
+        if struck.status is not Status.LEFT_WINDOW:
+            break
     start = march.hit.start
     body = scene.core.mass_properties._replace(
         mass=start.mass, inertia_axial=start.inertia_axial, inertia_transverse=start.inertia_transverse
     )
     history = History.from_trace(_trace(rows), body)
-    sheet = march.sheets[0]
+    sheet = march.hit.sheets[0]
     places = cells_of(sheet)
     shown = frames.spread(len(rows) - 1, snapshots) if snapshots else []
     share = [_left(frame.alive, sheet, march.hit.firsts[0])[places] for _, frame in shown]
@@ -68,6 +65,19 @@ def replay_continuum(scene: Scene, shots: Shots, continuum: Continuum, snapshots
         behind={},
         deformed=frames.deformed([frame for _, frame in shown]) if shown else None,
     )
+
+
+def _followed(march: March, *, has_frames: bool) -> tuple[Struck, list[Array], Frames]:
+    """What became of a hit, the rows of its trace, and frames of its meshes."""
+    rows, frames = list[Array](), Frames(march)
+
+    def follow(hit: OneHit) -> None:
+        rows.append(_row(hit, rows[-1] if rows else None))
+        if has_frames:
+            frames.see(len(rows) - 1)
+
+    follow(march.hit)
+    return march.ended(every=STRIDE, follow=follow), rows, frames
 
 
 class Frame(NamedTuple):
@@ -107,21 +117,34 @@ class Frames:
 
     def deformed(self, frames: list[Frame]) -> Deformed:
         """The elements that there were at the beginning, and their nodes."""
-        hit, sheets = self._march.hit, self._march.sheets
+        hit = self._march.hit
         elements, corners = list[NDArray[np.intp]](), list[NDArray[np.intp]]()
-        for sheet, first in zip(sheets, hit.firsts, strict=True):
+        for sheet, first in zip(hit.sheets, hit.firsts, strict=True):
             present = first + np.flatnonzero(sheet.alive)
             offsets = [x * sheet.plane + y * sheet.row + z for x, y, z in CORNERS]
             elements.append(present)
             corners.append(present[:, None] + np.array(offsets))
         numbers, chosen = np.concatenate(elements), np.concatenate(corners)
         nodes, renumbered = np.unique(chosen, return_inverse=True)
+        frames = [whole(frame, hit) for frame in frames]
         return Deformed(
             corners=renumbered.reshape(chosen.shape).astype(np.int32),
             position=np.array([frame.position.reshape(3, -1)[:, nodes].T for frame in frames]),
             left=np.array([frame.alive[numbers] > 0.0 for frame in frames]),
             strain=np.array([frame.strain[numbers] for frame in frames]),
         )
+
+
+def whole(frame: Frame, hit: OneHit) -> Frame:
+    """A frame with the layers that had no mesh yet, at rest."""
+    size, there = int(hit.mesh.size), len(frame.alive)
+    position, alive, strain = np.zeros((3, size), np.float32), np.zeros(size, np.float32), np.zeros(size, np.float32)
+    for sheet, first in zip(hit.sheets, hit.firsts, strict=True):
+        position[:, first : first + sheet.nodes] = sheet.positions
+        alive[first : first + sheet.nodes] = sheet.alive
+    position[:, :there], alive[:there] = frame.position.reshape(3, -1), frame.alive
+    strain[:there] = frame.strain
+    return Frame(position, alive, strain)
 
 
 def cells_of(sheet: SheetMesh) -> tuple[NDArray[np.intp], NDArray[np.intp]]:

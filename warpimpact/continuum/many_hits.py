@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from functools import partial
 from typing import Any, TypeVar
 
@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from warpimpact.continuum.one_hit import STEPS, OneHit, built
 from warpimpact.kernels.continuum import abreast
 from warpimpact.kernels.continuum.fields import PIECE
-from warpimpact.kernels.status import RUNNING
+from warpimpact.kernels.status import RUNNING, WAITING
 from warpimpact.solver.device import block_size, load
 from warpimpact.solver.memory import MEMORY_SHARE
 from warpimpact.solver.worker import NEVER, Cancel
@@ -113,13 +113,16 @@ def pieces_of(runs: NDArray[np.int32]) -> NDArray[np.int32]:
     return np.stack([np.repeat(runs[:, 0], counts) + PIECE * within, np.repeat(runs[:, 2], counts)], axis=1)
 
 
-def ended(coming: Iterable[tuple[Key, OneHit]], cancel: Cancel = NEVER) -> Iterator[tuple[Key, bool]]:
+def ended(
+    coming: Iterable[tuple[Key, OneHit]], extended: Callable[[Key], OneHit], cancel: Cancel = NEVER
+) -> Iterator[tuple[Key, bool]]:
     """The key of each hit when it has ended, and whether its core had come near the outer edge of a mesh. The next hit
     takes its place.
 
     Args:
         coming: hits of one device and one precision, with their keys; as many march at a time as fit half of the free
             memory of a GPU, but at most MOST.
+        extended: gives the next layer of a hit its mesh.
     """
     keyed, running, hits = iter(coming), dict[int, Key](), list[OneHit]()
     while len(hits) < MOST and _has_room(hits) and (one := next(keyed, None)) is not None:
@@ -133,7 +136,9 @@ def ended(coming: Iterable[tuple[Key, OneHit]], cancel: Cancel = NEVER) -> Itera
         cancel.check()
         many.advance()
         for place, (status, at_edge) in enumerate(many.look()):
-            if place in running and (status != RUNNING or at_edge):
+            if place in running and status == WAITING and not at_edge:
+                many.put(place, extended(running[place]))
+            elif place in running and (status != RUNNING or at_edge):
                 yield running.pop(place), bool(at_edge)
                 if (one := next(keyed, None)) is not None:
                     running[place] = one[0]

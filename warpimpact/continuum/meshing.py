@@ -107,12 +107,23 @@ def meshed(
     y, z = np.meshgrid(along_y, along_z, indexing="ij")
     centre_y, centre_z = (0.25 * (at[:-1, :-1] + at[1:, :-1] + at[:-1, 1:] + at[1:, 1:]) for at in (y, z))
     solid = np.asarray(plate.is_solid(centre_y + hit[0], centre_z + hit[1]))
-    planes = max(2, round(plate.thickness / spacing))
+    planes = _planes(plate.thickness, spacing)
     if not solid.all():
         y, z = _onto_edges(plate, hit, y, z, solid)
         cells = np.outer(np.diff(along_y), np.diff(along_z))
         solid = solid & (_areas(y, z) > SLIVER * cells)
     return SheetMesh(y, z, solid, front + np.linspace(0.0, plate.thickness, planes + 1), spacing, (along_y, along_z))
+
+
+def nodes_of(thickness: float, spacing: float, extents: tuple[Extent, Extent]) -> int:
+    """Nodes of such a mesh."""
+    along_y, along_z = (len(_line(extent, spacing)) for extent in extents)
+    return (_planes(thickness, spacing) + 1) * along_y * along_z
+
+
+def _planes(thickness: float, spacing: float) -> int:
+    """Layers of elements through the thickness."""
+    return max(2, round(thickness / spacing))
 
 
 def _line(extent: Extent, spacing: float) -> Array:
@@ -167,6 +178,28 @@ def _areas(y: Array, z: Array) -> Array:
     dy, dz = (at[1:, 1:] - at[:-1, :-1] for at in (y, z))
     ey, ez = (at[:-1, 1:] - at[1:, :-1] for at in (y, z))
     return np.asarray(0.5 * (dy * ez - dz * ey))
+
+
+def volumes_of(sheet: SheetMesh) -> tuple[Array, Array]:
+    """Volume [m³] and length [m] of the elements at rest by one point of integration, shape [nodes] each; 0 and 1
+    beside the mesh."""
+    x = sheet.positions.reshape(3, len(sheet.x), *sheet.y.shape)
+    low, high = slice(None, -1), slice(1, None)
+    modes = []
+    for axis in range(3):
+        total = np.zeros((3, len(sheet.x) - 1, sheet.y.shape[0] - 1, sheet.y.shape[1] - 1))
+        for corner in np.ndindex(2, 2, 2):
+            sign = 1.0 if corner[axis] else -1.0
+            total += sign * x[(slice(None), *(high if at else low for at in corner))]
+        modes.append(total)
+    areas = [np.cross(modes[(k + 1) % 3], modes[(k + 2) % 3], axis=0) for k in range(3)]
+    volume = np.einsum("kabc,kabc->abc", modes[0], areas[0]) / 64.0
+    faces = np.max([np.sqrt((area**2).sum(axis=0)) for area in areas], axis=0)
+    shape = (len(sheet.x), *sheet.y.shape)
+    volumes, lengths = np.zeros(shape), np.ones(shape)
+    volumes[:-1, :-1, :-1] = np.where(sheet.solid, volume, 0.0)
+    lengths[:-1, :-1, :-1] = np.where(sheet.solid, 16.0 * volume / faces, 1.0)
+    return volumes.ravel(), lengths.ravel()
 
 
 def runs_of(present: NDArray[np.bool_], first: int, lanes: int = PIECE) -> NDArray[np.int32]:

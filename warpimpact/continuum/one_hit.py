@@ -4,18 +4,18 @@ from __future__ import annotations
 
 import math
 import threading
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from types import ModuleType
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import warp as wp
 from numpy.typing import NDArray
 
-from warpimpact.continuum.meshing import SheetMesh, runs_of
+from warpimpact.continuum.meshing import SheetMesh, runs_of, volumes_of
 from warpimpact.kernels.continuum import choices, fields, passing
-from warpimpact.kernels.status import RUNNING
+from warpimpact.kernels.status import RUNNING, WAITING
 from warpimpact.kernels.variant import Variant
 from warpimpact.scene import Core
 from warpimpact.scene.flow import Flow
@@ -30,6 +30,11 @@ STEPS = 100
 """Of a launch: between two of them a computation can be broken off."""
 PENALTY = 0.5
 """Share of the stiffness of an element that the contact has."""
+STATE = (
+    *("position", "velocity", "contact", "contact_work", "near", "alive", "stress", "strain", "damage", "heat"),
+    *("work", "hourglass_work", "radiated", "crossing", "force"),
+)
+"""Arrays of a mesh that a march changes."""
 
 
 @dataclass(frozen=True)
@@ -45,6 +50,14 @@ class Start:
     inertia_axial: float
     inertia_transverse: float
     friction: float
+
+
+class Unmeshed(NamedTuple):
+    """A layer that has no mesh yet: its front and rear face [m], and about as many nodes as its mesh will have."""
+
+    front: float
+    rear: float
+    nodes: int
 
 
 @dataclass(frozen=True)
@@ -94,7 +107,12 @@ def built(march: ModuleType, variant: Variant) -> Any:
 
 
 class OneHit:
-    """A hit in memory.
+    """A hit in memory. A layer may have its mesh later, where the core will meet it (`extend`).
+
+    Args:
+        sheets: meshes of the first layers, or of all.
+        flows: materials of all layers.
+        unmeshed: the layers behind them, which have no mesh yet.
 
     Attributes:
         device: that its arrays are on; `advance` marches it on the CPU only.
@@ -110,6 +128,7 @@ class OneHit:
         flows: list[Flow],
         double: bool = False,
         device: str = "cpu",
+        unmeshed: Sequence[Unmeshed] = (),
     ) -> None:
         self.device, self.variant = find_device(device), Variant(double=double)
         self.stage = built(passing, self.variant)
@@ -117,15 +136,43 @@ class OneHit:
         if self.device.is_cpu:
             load(self.stage.kernel, self.device)
         self.real, self.dtype = self.variant.real, np.dtype("f8" if double else "f4")
-        self.sheets, self.flows = sheets, flows
+        self.sheets, self.flows, self.unmeshed = sheets, flows, list(unmeshed)
         self.speed = float(np.linalg.norm(start.velocity))
         self.mesh = self._mesh()
         self.core = self._core(core, start)
-        self.limits, rear = self.struct.Limits(), max(float(sheet.x[-1]) for sheet in sheets)
+        self.limits, rear = self.struct.Limits(), max([*(layer.rear for layer in unmeshed), float(sheets[-1].x[-1])])
         self.limits.rear, self.limits.longest = rear, 30.0 * (rear + core.length) / self.speed
-        self.left = self._put(np.full((len(sheets), 7), np.nan), wp.float64)
+        self.limits.unmeshed = self._next_front
+        self.left = self._put(np.full((len(sheets) + len(unmeshed), 7), np.nan), wp.float64)
         self.flights = self._flights(start)
         self.limits.impact_energy = self.core_energy
+
+    @property
+    def _next_front(self) -> float:
+        """Front face of the next layer that has no mesh [m]; infinite if all have one."""
+        return self.unmeshed[0].front if self.unmeshed else math.inf
+
+    @property
+    def waits(self) -> bool:
+        """Whether the core is in front of a layer that has no mesh yet."""
+        return bool(self.flight["status"] == WAITING)
+
+    def extend(self, sheet: SheetMesh) -> None:
+        """Give the next layer its mesh, at rest; all else stays as it is, and the march can go on."""
+        before, self.sheets = self.mesh, [*self.sheets, sheet]
+        self.mesh = mesh = self._mesh()
+        for name in STATE:
+            values = getattr(mesh, name).numpy().reshape(-1, mesh.size)
+            values[:, : before.size] = getattr(before, name).numpy().reshape(-1, before.size)
+            getattr(mesh, name).assign(values.ravel())
+        mesh.awake = self._put([*before.awake.numpy(), 1], wp.int32)
+        mesh.touched = self._put([*before.touched.numpy(), -1.0], wp.float64)
+        mesh.cylinder, mesh.kick = before.cylinder, before.kick
+        del self.unmeshed[0]
+        self.limits.unmeshed = self._next_front
+        flights = self.flights.numpy()
+        flights["status"] = RUNNING
+        self.flights.assign(flights)
 
     def _put(self, values: Any, dtype: Any) -> Any:
         return wp.array(np.ascontiguousarray(values), dtype=dtype, device=self.device)
@@ -141,7 +188,7 @@ class OneHit:
         position, inverse_mass, alive = np.zeros((3, size)), np.zeros(size), np.zeros(size)
         impedance = np.zeros((3, size))
         volume, length, runs, node_runs, masses = np.zeros(size), np.ones(size), [], [], []
-        for k, (sheet, at, flow) in enumerate(zip(self.sheets, firsts, self.flows, strict=True)):
+        for k, (sheet, at, flow) in enumerate(zip(self.sheets, firsts, self.flows, strict=False)):
             inside = slice(at, at + sheet.nodes)
             position[:, inside], present = sheet.positions, sheet.alive
             alive[inside] = present
@@ -160,7 +207,7 @@ class OneHit:
             node_runs += [(*run, k) for run in runs_of(mass[inside] > 0.0, at)]
         self.inverse_mass, self._masses = inverse_mass, masses
         mesh.sheets = wp.array(
-            [self._sheet(sheet, flow) for sheet, flow in zip(self.sheets, self.flows, strict=True)],
+            [self._sheet(sheet, flow) for sheet, flow in zip(self.sheets, self.flows, strict=False)],
             dtype=self.struct.Sheet,
             device=self.device,
         )
@@ -216,7 +263,7 @@ class OneHit:
         shortest = min(
             float((self.mesh.length.numpy()[at : at + sheet.nodes][sheet.alive]).min()) / flow.wave_speed
             for sheet, at, flow, awake in zip(
-                self.sheets, self.firsts, self.flows, self.mesh.awake.numpy(), strict=True
+                self.sheets, self.firsts, self.flows, self.mesh.awake.numpy(), strict=False
             )
             if awake
         )
@@ -225,8 +272,8 @@ class OneHit:
 
     @property
     def bytes(self) -> int:
-        """That its mesh takes: 55 numbers of its precision for each node of the grid."""
-        return 55 * self.dtype.itemsize * int(self.mesh.size)
+        """That its mesh takes with those to come: 55 numbers of its precision for each node of the grid."""
+        return 55 * self.dtype.itemsize * (int(self.mesh.size) + sum(layer.nodes for layer in self.unmeshed))
 
     @property
     def flight(self) -> Any:
@@ -244,7 +291,7 @@ class OneHit:
         )
 
     def steps(self, every: int = STEPS, cancel: Cancel = NEVER) -> Iterator[None]:
-        """March to the end; yields at regular numbers of steps."""
+        """March to the end, or to the next layer that has no mesh; yields at regular numbers of steps."""
         while self.flight["status"] == RUNNING:
             cancel.check()
             self.advance(every)
@@ -257,15 +304,14 @@ class OneHit:
     @property
     def touched(self) -> NDArray[np.bool_]:
         """Whether the core touched each layer."""
-        work = self.mesh.contact_work.numpy()
-        return np.array([work[at : at + sheet.nodes].any() for sheet, at in zip(self.sheets, self.firsts, strict=True)])
+        work, parts = self.mesh.contact_work.numpy(), zip(self.sheets, self.firsts, strict=True)
+        return np.array([*(work[at : at + sheet.nodes].any() for sheet, at in parts), *[False] * len(self.unmeshed)])
 
     @property
     def core_energy(self) -> float:
         """Of the core's translation and rotation [J]."""
         state, start = self.flight["state"], self.start
-        x, y, z, w = (float(value) for value in state["attitude"])
-        axis = np.array([1 - 2 * (y * y + z * z), 2 * (x * y + z * w), 2 * (x * z - y * w)])
+        axis = axis_of(state["attitude"])
         momentum, velocity = np.array(state["angular_momentum"]), np.array(state["velocity"])
         along = float(momentum @ axis)
         across = float(momentum @ momentum) - along**2
@@ -288,26 +334,10 @@ class OneHit:
         )
 
 
-def volumes_of(sheet: SheetMesh) -> tuple[Array, Array]:
-    """Volume [m³] and length [m] of the elements at rest by one point of integration, shape [nodes] each; 0 and 1
-    beside the mesh."""
-    x = sheet.positions.reshape(3, len(sheet.x), *sheet.y.shape)
-    low, high = slice(None, -1), slice(1, None)
-    modes = []
-    for axis in range(3):
-        total = np.zeros((3, len(sheet.x) - 1, sheet.y.shape[0] - 1, sheet.y.shape[1] - 1))
-        for corner in np.ndindex(2, 2, 2):
-            sign = 1.0 if corner[axis] else -1.0
-            total += sign * x[(slice(None), *(high if at else low for at in corner))]
-        modes.append(total)
-    areas = [np.cross(modes[(k + 1) % 3], modes[(k + 2) % 3], axis=0) for k in range(3)]
-    volume = np.einsum("kabc,kabc->abc", modes[0], areas[0]) / 64.0
-    faces = np.max([np.sqrt((area**2).sum(axis=0)) for area in areas], axis=0)
-    shape = (len(sheet.x), *sheet.y.shape)
-    volumes, lengths = np.zeros(shape), np.ones(shape)
-    volumes[:-1, :-1, :-1] = np.where(sheet.solid, volume, 0.0)
-    lengths[:-1, :-1, :-1] = np.where(sheet.solid, 16.0 * volume / faces, 1.0)
-    return volumes.ravel(), lengths.ravel()
+def axis_of(attitude: Any) -> Array:
+    """The axis of a core, from its base to its nose."""
+    x, y, z, w = (float(part) for part in attitude)
+    return np.array([1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y + z * w), 2.0 * (x * z - y * w)])
 
 
 def _total(values: Any) -> float:

@@ -10,7 +10,7 @@ import pytest
 
 from warpimpact import CirclePattern, Continuum, Layer, Plate, PolynomialCore, Record, Scene, Shots, simulate
 from warpimpact.catalogue.flow_entries import flow_entry, flow_names
-from warpimpact.continuum import many_hits, strikes
+from warpimpact.continuum import many_hits, meeting, strikes
 from warpimpact.continuum.one_hit import Energies
 from warpimpact.kernels.status import Status
 from warpimpact.scene.flow import FINENESS
@@ -58,8 +58,8 @@ def test_what_is_not_computed_is_refused(scene: Scene, shots: Shots, continuum: 
     ],
 )
 def test_a_hit_that_loses_energy_to_its_numerics_is_a_failure(energies: Energies, status: Status) -> None:
-    assert strikes.judged(Status.PERFORATED, energies) is status
-    assert strikes.judged(Status.NOT_FINITE, energies) is Status.NOT_FINITE
+    assert meeting.judged(Status.PERFORATED, energies) is status
+    assert meeting.judged(Status.NOT_FINITE, energies) is Status.NOT_FINITE
 
 
 def test_a_device_that_is_not_there_is_refused() -> None:
@@ -69,7 +69,7 @@ def test_a_device_that_is_not_there_is_refused() -> None:
 
 def test_a_gpu_computes_the_hits_of_a_scene_together(monkeypatch: pytest.MonkeyPatch) -> None:
     """The CPU stands in for it. The slower hit ends last, and the outcomes have the order of the shots."""
-    monkeypatch.setattr(strikes, "LARGEST_HOURGLASS_SHARE", 1.0)
+    monkeypatch.setattr(meeting, "LARGEST_HOURGLASS_SHARE", 1.0)
     gpu = SimpleNamespace(is_cpu=False, alias="cpu")
     monkeypatch.setattr(strikes, "find_device", lambda name: gpu if name == "gpu" else find_device(name))
     shots = replace(Shots.joined([SHOT, SHOT]), velocity=np.array([500.0, 825.0]))
@@ -123,10 +123,11 @@ def test_a_march_has_what_belongs_to_its_shot_and_its_layers() -> None:
     soft = flow_entry("AA6082-T6").flow
     continuum = Continuum(flows=(STEEL, soft), spacing=1e-3, friction=0.07)
     conditions = strikes.memory_of(scene, shot, Worker("cpu", 1)).prepared.conditions
-    march = strikes.march_of(scene, shot, 0, continuum, conditions)
+    march = meeting.march_of(scene, shot, 0, continuum, conditions)
     assert march.hit.start.friction == 0.07
     assert march.hit.flows == [STEEL, soft]
-    first, second = march.sheets
+    march.extended()
+    first, second = march.hit.sheets
     assert first.x[[0, -1]] == pytest.approx([0.0, 3e-3])
     assert second.x[[0, -1]] == pytest.approx([13e-3, 15e-3])
     assert not first.solid.all()
@@ -137,13 +138,18 @@ def test_a_march_has_what_belongs_to_its_shot_and_its_layers() -> None:
 
 
 def test_a_core_that_reaches_the_edge_of_the_mesh_has_left_it(monkeypatch: pytest.MonkeyPatch, device: str) -> None:
-    monkeypatch.setattr(strikes, "FINE", 0.5)
-    monkeypatch.setattr(strikes, "PATCH", 0.6)
-    narrow = Continuum(flows=(STEEL,), spacing=1e-3)
-    scene = Scene(core=CORE, target=PLATE)
+    """It is computed again with wider meshes, and has left the widest one, if that is narrow. One hit is told once."""
+    monkeypatch.setattr(meeting, "FINE", 0.5)
+    monkeypatch.setattr(meeting, "PATCH", 0.6)
+    told: list[tuple[int, int]] = []
+    narrow, scene = Continuum(flows=(STEEL,), spacing=1e-3), Scene(core=CORE, target=PLATE)
+    again = simulate(scene, SHOT, numerics=narrow, progress=lambda done, total: told.append((done, total)))
+    assert again.status[0] == Status.HOURGLASSED
+    assert told == [(1, 1)]
+    monkeypatch.setattr(strikes, "WIDER", (1.0,))
     assert simulate(scene, SHOT, numerics=narrow).status[0] == Status.LEFT_WINDOW
     conditions = strikes.memory_of(scene, SHOT, Worker("cpu", 1)).prepared.conditions
-    ((number, together),) = strikes.together([strikes.march_of(scene, SHOT, 0, narrow, conditions, device)])
+    ((number, together),) = strikes.together([meeting.march_of(scene, SHOT, 0, narrow, conditions, device)])
     assert (number, together.status) == (0, Status.LEFT_WINDOW)
 
 
