@@ -44,7 +44,7 @@ PILOT = 'numerics = { fidelity = "draft" }\n'
 FIXED = "numerics = { level = 0 }\n"
 SWEEP = '[sweep]\nvelocity = ["200 m/s", "500 m/s", "800 m/s"]\n'
 ASKED = """
-objectives = [{ measure = "areal_density" }, { measure = "residual_energy_fraction" }]
+objectives = [{ measure = "areal_density" }, { measure = "mean(residual_energy_fraction)" }]
 search = { designs = 4, hits = 16, most_hits = 16, confirm_hits = 64 }
 """
 FREE = """

@@ -253,7 +253,7 @@ core = { shape = "cone", diameter = "6 mm", length = "20 mm", cone_length = "8 m
 impact = { velocity = "825 m/s" }
 numerics = { level = 0 }
 plate = { thickness = "4 mm", resistance = "2600 MPa" }
-objectives = [{ measure = "areal_density" }, { measure = "residual_energy_fraction" }]
+objectives = [{ measure = "areal_density" }, { measure = "mean(residual_energy_fraction)" }]
 search = { designs = 6, hits = 16, most_hits = 16, confirm_hits = 64, assumed_hits = 16, allow_untested = true }
 [[references]]
 name = "published"

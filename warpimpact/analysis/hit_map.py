@@ -79,7 +79,13 @@ def hit_map(
     on_grid = _on_grid(result, hits, values) if pixels is None else None
     if on_grid is None:
         y, z = axes_of(period, pixels or PIXELS)
-        on_grid = y, z, _between(hits, values, _places(y, z), period, wraps=_is_periodic(result), method=method)
+        on_grid = (
+            y,
+            z,
+            _between(
+                hits, values, np.stack(np.meshgrid(y, z), axis=-1), period, wraps=_is_periodic(result), method=method
+            ),
+        )
     y, z, image = on_grid
     coordinates = {name: (name, along, name.attributes) for name, along in ((v.HIT_Z, z), (v.HIT_Y, y))}
     known = {name: array[name] for name in (v.STANDOFF,) if name in array.coords}
@@ -139,10 +145,6 @@ def axes_of(period: Array, count: int) -> tuple[Array, Array]:
     counts = np.ceil(count * period / period.max()).astype(int)
     y, z = (((np.arange(n) + 0.5) / n - 0.5) * length for n, length in zip(counts, period, strict=True))
     return y, z
-
-
-def _places(y: Array, z: Array) -> Array:
-    return np.stack(np.meshgrid(y, z), axis=-1)
 
 
 def _is_periodic(result: xarray.Dataset) -> bool:

@@ -141,10 +141,9 @@ def failures(dataset: xarray.Dataset) -> Section:
         return Section([f"0 of {dataset.sizes['hit']} shots failed"])
     columns = [
         *(number("hit", digits="d"), Column("status")),
-        *(number(_name(name, layer), str(dataset[name].attrs["units"]), ".6g") for name, layer in places),
+        *(
+            number(name if layer is None else f"{name}_{layer}", str(dataset[name].attrs["units"]), ".6g")
+            for name, layer in places
+        ),
     ]
     return Section([Table(columns, rows)], f"{len(rows)} of {dataset.sizes['hit']} shots failed")
-
-
-def _name(variable: str, layer: int | None) -> str:
-    return variable if layer is None else f"{variable}_{layer}"

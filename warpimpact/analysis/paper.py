@@ -93,13 +93,9 @@ def computed_row(dataset: xarray.Dataset, hit: int) -> Row:
     The hit's mirror images turn the other way, so the paper's signs are always possible.
     """
     shot = dataset.isel(hit=hit).sel(standoff=list(STANDOFFS), method="nearest")
-    angles = [_positive_at_last(shot[name].values.tolist()) for name in (v.YAW, v.PITCH)]
-    (pitch_50, pitch_130), (yaw_50, yaw_130) = angles
+    angles = (shot[name].values for name in (v.YAW, v.PITCH))
+    (pitch_50, pitch_130), (yaw_50, yaw_130) = (np.where(own[-1] < 0.0, -own, own).tolist() for own in angles)
     return Row(float(shot[v.RESIDUAL_VELOCITY]), pitch_50, yaw_50, pitch_130, yaw_130)
-
-
-def _positive_at_last(angles: list[float]) -> list[float]:
-    return [-angle for angle in angles] if angles[-1] < 0.0 else angles
 
 
 def validation_table(dataset: xarray.Dataset) -> str:

@@ -76,14 +76,11 @@ def solid_plate(dataset: Result) -> str:
         materials = json.loads(attributes[attr.CONTINUUM])["materials"]
         pairs = zip(plates, materials, strict=False)
         return " and ".join(f"{1e3 * plate['thickness']:.3g} mm of {name} by finite elements" for plate, name in pairs)
+    names = [f"{plate['material']}, " if plate.get("material") else "" for plate in plates]
     return " and ".join(
-        f"{1e3 * plate['thickness']:.3g} mm of {_named(plate)}{1e-9 * plate['resistance']:.3g} GPa, {_weakens(plate)}"
-        for plate in plates
+        f"{1e3 * plate['thickness']:.3g} mm of {name}{1e-9 * plate['resistance']:.3g} GPa, {_weakens(plate)}"
+        for plate, name in zip(plates, names, strict=True)
     )
-
-
-def _named(plate: Mapping[str, Any]) -> str:
-    return f"{plate['material']}, " if plate.get("material") else ""
 
 
 def _weakens(material: Mapping[str, Any]) -> str:

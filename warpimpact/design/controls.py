@@ -111,7 +111,7 @@ def _slider(
         value: value in the unit of the slider, if the campaign does not have it at this place.
     """
     name = key or str(path[-1])
-    owner = _owner(campaign, path if key is None else path[: path.index(key) + 1])
+    owner: BaseModel = _value(campaign, path[:-1] if key is None else path[: path.index(key)])
     field = type(owner).model_fields.get(name)
     reader = None if field is None else reader_in(typed(field))
     si = "m" if name == "spacing" else "kg/m^2" if name == "areal_density" else reader.unit if reader else ""
@@ -132,12 +132,6 @@ def _slider(
         "scatters": isinstance(_value(tables, path), dict),
         "meaning": read_docstring(type(owner))[1].get(name, ""),
     }
-
-
-def _owner(campaign: Campaign, path: Place) -> BaseModel:
-    """The model that has the last key of a place."""
-    owner: BaseModel = _value(campaign, path[:-1])
-    return owner
 
 
 def _value(holder: Any, path: Place) -> Any:

@@ -49,6 +49,7 @@ _MISTAKES = (CampaignError, ResultError, DeviceError, TooManySteps, MemoryError)
 _FIRST, _ASKED, _REFINE, _LAST = 0, 1, 2, 3
 """Urgencies: the first map after a change, a click of the user, the later stages, and hits under assumptions."""
 _LINES = "application/x-ndjson"
+_PLOTLY = cache(get_plotlyjs)
 _STAGES = {"first": _FIRST, "draft": _REFINE, "full": _LAST}
 
 
@@ -179,17 +180,12 @@ class _Pages:
 async def _file(request: Request) -> Response:
     name = request.path_params["name"]
     if name == "plotly.js":
-        return Response(_plotly(), media_type="text/javascript")
+        return Response(_PLOTLY(), media_type="text/javascript")
     room = next((room for room, names in _FILES.items() if name in names), None)
     if room is None:
         return PlainTextResponse("There is no such file.", status_code=404)
     text = files(f"warpimpact.{room}").joinpath(name).read_text(encoding="utf-8")
     return Response(text, media_type="text/css" if name.endswith("css") else "text/javascript")
-
-
-@cache
-def _plotly() -> str:
-    return str(get_plotlyjs())
 
 
 async def _asked(request: Request) -> Tables:

@@ -18,8 +18,7 @@ import numpy as np
 import xarray
 from scipy.spatial.transform import Rotation
 
-from warpimpact.analysis.slabs import LayerField, fields_behind
-from warpimpact.results import attributes as attr
+from warpimpact.analysis.slabs import LayerField, fields_behind, plate_field, slabs
 from warpimpact.results import variables as v
 from warpimpact.results.files import OutputError
 
@@ -52,7 +51,11 @@ def write_vtk(history: xarray.Dataset, folder: Path) -> list[Path]:
             pieces = Path(aside) / "vtk"
             pieces.mkdir()
             _write_series(pieces, "core", "vtp", history[v.TIME].values, cores(history))
-            kind, meshes = ("vtu", deformed(history)) if v.NODE_POSITION in history else ("vti", plates(history))
+            kind, meshes = (
+                ("vtu", deformed(history))
+                if v.NODE_POSITION in history
+                else ("vti", layers_of(history, plate_field(history)))
+            )
             _write_series(pieces, "plate", kind, history[v.SNAPSHOT].values, meshes)
             for field in fields_behind(history):
                 layers = layers_of(history, field)
@@ -96,12 +99,6 @@ def _faces(rings: int) -> NDArray[np.int64]:
     return np.concatenate([sides, [SIDES], here[::-1], [SIDES], base])
 
 
-def plates(history: xarray.Dataset) -> Iterator[pyvista.ImageData]:
-    """The plate within reach of the core at every snapshot: a layer of cells with the share of the resistance left."""
-    cells = history[v.CELL_Y].values, history[v.CELL_Z].values
-    return _slices(cells, 0.0, history.attrs[attr.PLATE_THICKNESS], history[v.RESISTANCE_SHARE].values)
-
-
 def deformed(history: xarray.Dataset) -> Iterator[pyvista.DataSet]:
     """The elements that are left of all layers at every snapshot, with their plastic strain."""
     import pyvista
@@ -116,20 +113,16 @@ def deformed(history: xarray.Dataset) -> Iterator[pyvista.DataSet]:
 
 
 def layers_of(history: xarray.Dataset, field: LayerField) -> Iterator[pyvista.ImageData]:
-    """The same of a layer behind the plate."""
-    front, rear = (float(history[name][field.number]) for name in (v.LAYER_FRONT, v.LAYER_REAR))
-    return _slices((field.cell_y, field.cell_z), front, rear - front, field.share)
-
-
-def _slices(cells: tuple[Array, Array], front: float, thickness: float, shares: Array) -> Iterator[pyvista.ImageData]:
+    """A layer within reach of the core at every snapshot: a layer of cells with the share of the resistance left."""
     import pyvista
 
-    y, z = cells
+    front, rear, _ = slabs(history, "y")[field.number]
+    y, z = field.cell_y, field.cell_z
     dy, dz = y[1] - y[0], z[1] - z[0]
-    for share in shares:
+    for share in field.share:
         grid = pyvista.ImageData(
             dimensions=(2, len(y) + 1, len(z) + 1),
-            spacing=(thickness, dy, dz),
+            spacing=(rear - front, dy, dz),
             origin=(front, y[0] - 0.5 * dy, z[0] - 0.5 * dz),
         )
         grid.cell_data[v.RESISTANCE_SHARE] = share.ravel(order="F")

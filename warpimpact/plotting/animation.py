@@ -28,7 +28,8 @@ def animation(dataset: xarray.Dataset) -> FuncAnimation:
     """
     times = np.linspace(float(dataset[v.TIME][0]), float(dataset[v.TIME][-1]), FRAMES)
     between = dataset[[v.PLATE_POSITION, v.CORE_AXIS, v.VELOCITY]].interp(time=times)
-    poses = [_unit(pose_at_step(between, frame)) for frame in range(FRAMES)]
+    every = (pose_at_step(between, frame) for frame in range(FRAMES))
+    poses = [Pose(pose.position, pose.axis / np.linalg.norm(pose.axis)) for pose in every]
     speeds = np.linalg.norm(between[v.VELOCITY], axis=1)
     figure, panels = two_views(dataset, poses, "", room=4.0)
     FigureCanvasAgg(figure)
@@ -74,10 +75,6 @@ def writer_for(path: Path) -> AbstractMovieWriter:
         case ".mp4":
             raise OutputError(f"{path}: an MP4 needs the program ffmpeg, which was not found; a GIF does not need it")
     raise OutputError(f"{path}: the name of a film must end in .gif or .mp4")
-
-
-def _unit(pose: Pose) -> Pose:
-    return Pose(pose.position, pose.axis / np.linalg.norm(pose.axis))
 
 
 def _line_of_fire(dataset: xarray.Dataset) -> np.ndarray:

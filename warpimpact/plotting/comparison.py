@@ -105,7 +105,8 @@ def _draw_plates(axes: Axes, comparison: Comparison, measures: Sequence[Score]) 
                     markersize=10.0,
                     label=f"{comparison.reference} of equal weight",
                 )
-    axes.set_title(_title(measures[0]), fontsize="medium", loc="left")
+    measure = measures[0].measure
+    axes.set_title(f"{measure.axis}; {measure.better}", fontsize="medium", loc="left")
 
 
 def _draw_differences(
@@ -169,7 +170,3 @@ def _furnish(axes: Axes, lines: Sequence[str]) -> None:
     axes.ticklabel_format(axis="x", useOffset=False)
     hide_sides(axes, "top", "right", "left")
     axes.tick_params(axis="y", length=0.0)
-
-
-def _title(score: Score) -> str:
-    return f"{score.measure.axis}; {score.measure.better}"

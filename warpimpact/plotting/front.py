@@ -22,7 +22,6 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import SubFigure
 
-    from warpimpact.scene import Plate
 
 MOST_DRAWN = 6
 """Most plates that are drawn."""
@@ -87,11 +86,12 @@ def holding(dataset: xarray.Dataset) -> np.ndarray[Any, np.dtype[np.bool_]]:
 def _draw_plates(figure: SubFigure, dataset: xarray.Dataset, names: dict[int, str], folder: Path) -> None:
     panels = figure.subplots(1, len(names), squeeze=False)[0]
     for axes, (place, letter) in zip(panels, names.items(), strict=True):
-        plate = _plate(str(dataset[f.CAMPAIGN].values[place]), folder)
+        campaign = campaign_at(dataset, place, folder)
         axes.set(xticks=[], yticks=[], aspect="equal")
-        if plate is None:
+        if campaign is None:
             axes.set_axis_off()
             continue
+        plate = campaign.plate
         half = 0.5 * _THUMBNAIL
         axes.set(xlim=(-half, half), ylim=(-half, half), facecolor="0.72")
         for patch in hole_patches(plate, axes):
@@ -99,10 +99,10 @@ def _draw_plates(figure: SubFigure, dataset: xarray.Dataset, names: dict[int, st
         axes.set_title(f"{letter}: {1e3 * plate.thickness:.3g} mm, {plate.open_area:.0%} open", fontsize="medium")
 
 
-def _plate(text: str, folder: Path) -> Plate | None:
-    """The plate of a campaign; None if a file that it names is gone."""
+def campaign_at(dataset: xarray.Dataset, place: int, folder: Path) -> Campaign | None:
+    """The campaign of a design of the front; None if a file that it names is gone."""
     try:
-        return Campaign.from_text(text, name="front", folder=folder).plate
+        return Campaign.from_text(str(dataset[f.CAMPAIGN].values[place]), name="front", folder=folder)
     except CampaignError:
         return None
 

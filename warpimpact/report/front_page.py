@@ -13,10 +13,10 @@ from markupsafe import Markup
 from numpy.typing import NDArray
 
 from warpimpact.campaign.campaign import Campaign
-from warpimpact.campaign.text import CampaignError, parsed
+from warpimpact.campaign.text import parsed
 from warpimpact.optimisation.evaluate import is_even
 from warpimpact.optimisation.front_view import design_text, front_view, numbers_of_front, numbers_of_reference
-from warpimpact.plotting.front import front_figure, front_leaders, holding
+from warpimpact.plotting.front import campaign_at, front_figure, front_leaders, holding
 from warpimpact.plotting.style import data_url, png_url
 from warpimpact.report.words import templates
 from warpimpact.results import attributes as attr
@@ -143,11 +143,7 @@ class _Chart:
 
 def _design(dataset: xarray.Dataset, place: int, chart: _Chart, folder: Path) -> dict[str, Any]:
     """The content of the page for a design of the front; without a drawing if a file of its campaign is gone."""
-    text = str(dataset[f.CAMPAIGN].values[place])
-    try:
-        campaign: Campaign | None = Campaign.from_text(text, name="front", folder=folder)
-    except CampaignError:
-        campaign = None
+    text, campaign = str(dataset[f.CAMPAIGN].values[place]), campaign_at(dataset, place, folder)
     return {
         "file": str(dataset[f.FILE].values[place]),
         "numbers": numbers_of_front(dataset, place),

@@ -33,6 +33,8 @@ from warpimpact.studies.limit import LimitMap
 from warpimpact.studies.limit_view import limit_view
 from warpimpact.view.view import text_of
 
+from .references import with_solid
+
 CAMPAIGNS = Path(__file__).parents[3] / "campaigns"
 
 
@@ -70,6 +72,14 @@ def mixed(make_plate_result) -> xarray.Dataset:
     depth = np.array([nan, 6e-3, 17e-3, 25e-3, nan, nan])
     result["status"].attrs, result["deflection"] = STATUS.attributes, result["residual_velocity"]
     return layered(result, np.array([-1, 1, 1, 0, -1, -1]), depth)
+
+
+@pytest.fixture
+def quarter(make_plate_result) -> xarray.Dataset:
+    """A base that a quarter of the cores pass; the solid plate is perforated."""
+    status = np.where(np.arange(400) % 4 == 0, Status.PERFORATED, Status.ARRESTED)
+    result = make_plate_result(np.full(400, 100.0), 0.0, status)
+    return with_solid(layered(result, np.ones(400, dtype=int), np.full(400, 5e-3)), 300.0)
 
 
 def test_the_margin_of_piercing_has_the_sign_of_the_event(mixed) -> None:
@@ -132,17 +142,10 @@ def test_worst_tenth_and_intervals(make_plate_result) -> None:
     assert worst.low < worst.value < worst.high
 
 
-def test_the_solid_plate_of_the_whole_target_is_perforated_or_not(make_plate_result) -> None:
-    status = np.where(np.arange(400) % 4 == 0, Status.PERFORATED, Status.ARRESTED)
-    result = layered(make_plate_result(np.full(400, 100.0), 0.0, status), np.ones(400, dtype=int), np.full(400, 5e-3))
-    solid = result.assign(
-        solid_status=("solid_hit", [np.int8(0)]),
-        solid_residual_velocity=("solid_hit", [300.0]),
-        solid_tilt=(("solid_hit", "standoff"), np.zeros((1, 2))),
-    )
-    measure = named(solid)["P(base_perforated)"]
+def test_the_solid_plate_of_the_whole_target_is_perforated_or_not(quarter) -> None:
+    measure = named(quarter)["P(base_perforated)"]
     assert (measure.value, measure.solid, measure.ratio) == (pytest.approx(0.25), 1.0, pytest.approx(0.25))
-    assert math.isnan(named(solid)["mean(base_depth)"].solid)
+    assert math.isnan(named(quarter)["mean(base_depth)"].solid)
 
 
 def test_targets_are_ranked_by_the_depth_in_bases_that_hold(make_plate_result) -> None:
@@ -207,15 +210,8 @@ def test_targets_are_ranked_by_the_weight_that_they_need(make_plate_result) -> N
         compare([front, result], ["limits", "run"])
 
 
-def test_the_figure_against_weight_shows_the_base_beside_the_solid_plate(make_plate_result) -> None:
-    status = np.where(np.arange(400) % 4 == 0, Status.PERFORATED, Status.ARRESTED)
-    result = layered(make_plate_result(np.full(400, 100.0), 0.0, status), np.ones(400, dtype=int), np.full(400, 5e-3))
-    solid = result.assign(
-        solid_status=("solid_hit", [np.int8(0)]),
-        solid_residual_velocity=("solid_hit", [300.0]),
-        solid_tilt=(("solid_hit", "standoff"), np.zeros((1, 2))),
-    )
-    comparison = compare([solid, solid.assign_attrs(areal_density=60.0)], ["a", "b"])
+def test_the_figure_against_weight_shows_the_base_beside_the_solid_plate(quarter, make_plate_result) -> None:
+    comparison = compare([quarter, quarter.assign_attrs(areal_density=60.0)], ["a", "b"])
     figure = weight_figure(comparison)
     share, depth = figure.axes
     assert share.get_ylabel() == "P(base perforated)"
@@ -228,18 +224,12 @@ def test_the_figure_against_weight_shows_the_base_beside_the_solid_plate(make_pl
     assert weight_figure(compare([alone, alone], ["a", "b"])) is None
 
 
-def test_what_the_solid_plate_is_stands_beside_the_ratios(make_plate_result) -> None:
-    result = layered(make_plate_result(np.zeros(6), 0.0, Status.ARRESTED), np.ones(6, dtype=int), np.full(6, 5e-3))
-    solid = result.assign_coords(
-        solid_status=("solid_hit", [np.int8(0)]),
-        solid_residual_velocity=("solid_hit", [300.0]),
-        solid_tilt=(("solid_hit", "standoff"), np.zeros((1, 2))),
-    )
+def test_what_the_solid_plate_is_stands_beside_the_ratios(quarter) -> None:
 
     def of(**material: float) -> xarray.Dataset:
         steel = {"resistance": 2.6e9, "density": 7850.0} | material
         reference = json.dumps([steel | {"thickness": 3e-3}])
-        return solid.assign_attrs({attr.MATERIAL: json.dumps(steel), attr.SOLID_ADD_ON: reference})
+        return quarter.assign_attrs({attr.MATERIAL: json.dumps(steel), attr.SOLID_ADD_ON: reference})
 
     plate, by_time = "The solid plate is 3 mm of 2.6 GPa, which ", of(degradation=0.8, degradation_interval=1e-6)
     whole, never = "weakens, through its whole thickness at once, to 0.8 in 1", "it stops no core, however slow"

@@ -30,6 +30,8 @@ from warpimpact.runs.progress import RunProgress
 from warpimpact.runs.replay import replay
 from warpimpact.view.view import text_of
 
+from .references import with_solid
+
 pytestmark = pytest.mark.usefixtures("small_shards")
 TWO_PLATES = Path(__file__).parents[3] / "campaigns" / "two_plates.toml"
 TRIALS = 40
@@ -49,7 +51,7 @@ def difference(comparison: Comparison, measure: str, one: str, other: str) -> Di
     return found
 
 
-def velocities(fraction: np.ndarray) -> np.ndarray:
+def velocities(fraction: np.ndarray | float) -> np.ndarray:
     """Residual velocities of energy fractions [m/s]."""
     return 1000.0 * np.sqrt(fraction)
 
@@ -106,7 +108,7 @@ def test_rounding_tells_no_plates_apart(apart: float, told: bool, make_plate_res
     for comparison in (
         compare([one, other], ["a", "b"]),
         compare(
-            [with_solid(one, 0.9), with_solid(other.assign_attrs(areal_density=40.0), 0.9)], ["a", "b"]
+            [with_solid(one, 900.0), with_solid(other.assign_attrs(areal_density=40.0), 900.0)], ["a", "b"]
         ),  # by the ratio
     ):
         for measure in (MEAN, TAIL, "mean(residual_energy_density@130mm)"):
@@ -210,8 +212,8 @@ def test_only_the_pairs_of_other_shots_are_independent(make_plate_result) -> Non
 def test_plates_of_different_weight_are_ranked_by_the_ratio_to_the_solid_plate(make_plate_result) -> None:
     """The heavier plate lets less through, but more than a solid plate of its weight would suggest."""
     light, heavy = (make_plate_result(velocities(NUMBERS.uniform(low, low + 0.1, 500))) for low in (0.7, 0.5))
-    light = with_solid(light.assign_attrs(areal_density=20.0), 0.9)
-    heavy = with_solid(heavy.assign_attrs(areal_density=40.0), 0.5)
+    light = with_solid(light.assign_attrs(areal_density=20.0), velocities(0.9))
+    heavy = with_solid(heavy.assign_attrs(areal_density=40.0), velocities(0.5))
     comparison = compare([light, heavy], ["light", "heavy"])
     assert comparison.at_equal_weight is not None
     assert {MEAN, TAIL} <= comparison.at_equal_weight
@@ -241,23 +243,13 @@ def test_differences_at_equal_weight_hold_as_often_as_they_say(fewest: int, make
             tilt = np.where(numbers.random(400) < 0.4 + shift, 60.0, 10.0)
             plate = make_plate_result(velocities(fraction), tilt, areal_density=weight)
             solid = 0.2 * common + 0.2 * numbers.random(400) + 0.4  # of mean 0.6
-            plates.append(with_solid(plate, solid, np.where(numbers.random(400) < 0.5, 60.0, 10.0)))
+            plates.append(with_solid(plate, velocities(solid), np.where(numbers.random(400) < 0.5, 60.0, 10.0)))
         plates[1] = plates[1].isel(hit=slice(fewest), solid_hit=slice(fewest))
         comparison = compare(plates, ["a", "b"])
         for measure, truth in ((MEAN, 0.1 / 0.6), (TILTED, 0.1 / 0.5)):
             pair = difference(comparison, measure, "a", "b")
             held[measure] += pair.low <= truth <= pair.high
     assert min(held.values()) >= LEAST, held
-
-
-def with_solid(dataset: xarray.Dataset, fraction: np.ndarray | float, tilt: np.ndarray | float = 0.0) -> xarray.Dataset:
-    """Beside a solid plate that leaves these energy fractions and tilts [degree] at 130 mm, one or one per shot."""
-    fraction, tilt = np.broadcast_arrays(np.atleast_1d(fraction), tilt)
-    columns = {"solid_status": 0.0 * fraction, "solid_residual_velocity": velocities(fraction)}
-    return dataset.assign(
-        {name: ("solid_hit", values) for name, values in columns.items()}
-        | {"solid_tilt": (("solid_hit", "standoff"), np.stack([0.0 * tilt, tilt], axis=1))}
-    )
 
 
 def test_differences_of_material_are_named(make_plate_result) -> None:
@@ -377,18 +369,11 @@ def test_the_weights_of_add_ons_have_their_names_and_do_not_lie_on_each_other(ma
         assert all(upper.y0 > lower.y1 for upper, lower in itertools.pairwise(boxes))
 
 
-@pytest.fixture
-def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """An empty working folder."""
-    monkeypatch.chdir(tmp_path)
-    return tmp_path
-
-
 SMALL = TWO_PLATES.read_text(encoding="utf-8") + '[numerics]\nfidelity = "draft"\n'
 
 
 def test_a_campaign_with_plates_is_run_compared_and_not_run_again(
-    folder: Path, capsys: pytest.CaptureFixture[str]
+    in_tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     Path("two.toml").write_text(SMALL, encoding="utf-8")
     command = ["compare", "two.toml", "--count", "256", "--device", "cpu"]
@@ -401,7 +386,7 @@ def test_a_campaign_with_plates_is_run_compared_and_not_run_again(
     assert "\n   1   round holes   " in shown
     assert "\n256 hits of each plate, the same shots\n" in shown
     assert "evidence: " in shown
-    assert sorted(path.name for path in folder.iterdir()) == ["round holes.nc", "slots.nc", "two.png", "two.toml"]
+    assert sorted(path.name for path in in_tmp_path.iterdir()) == ["round holes.nc", "slots.nc", "two.png", "two.toml"]
     before = Path("slots.nc").stat()
     assert main([*command, "-o", "two.svg", "--measure", "P(inclination@50mm > 45 deg)"]) == 0
     assert "P(inclination at 50 mm > 45°, or stopped)" in capsys.readouterr().out
@@ -414,7 +399,7 @@ def test_a_campaign_with_plates_is_run_compared_and_not_run_again(
     assert "round holes better than slots by" in every
     stored = files.read(Path("slots.nc"))
     assert stored.attrs["title"].endswith(": slots")
-    assert replay(stored, 3, folder=folder).attrs["agreement"] == "bit-identical"
+    assert replay(stored, 3, folder=in_tmp_path).attrs["agreement"] == "bit-identical"
     assert effectiveness(stored)[0].ratio > 0.0
     Path("two.toml").write_text(SMALL.replace("seed = 1", "seed = 2"), encoding="utf-8")
     assert main(command) == 2
@@ -423,7 +408,7 @@ def test_a_campaign_with_plates_is_run_compared_and_not_run_again(
 
 
 def test_a_comparison_that_was_broken_off_goes_on(
-    folder: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+    in_tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """After the first plate, and one shard of two into the second."""
     Path("two.toml").write_text(SMALL, encoding="utf-8")
@@ -500,10 +485,10 @@ def test_one_plate_is_run_and_several_are_compared(tmp_path: Path) -> None:
     ],
 )
 def test_a_wrong_command_is_told_in_one_sentence_and_writes_nothing(
-    arguments: list[str], sentence: str, folder: Path, capsys: pytest.CaptureFixture[str]
+    arguments: list[str], sentence: str, in_tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     assert main(["compare", *arguments]) == 2
     shown = capsys.readouterr()
     assert shown.err.startswith(f"warpimpact: error: {sentence}")
     assert shown.err.count("\n") == 1
-    assert not list(folder.iterdir())
+    assert not list(in_tmp_path.iterdir())

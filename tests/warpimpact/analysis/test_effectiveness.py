@@ -12,18 +12,10 @@ from warpimpact.analysis.inspect import inspect_text
 from warpimpact.kernels.status import Status
 from warpimpact.results.files import ResultError
 
+from .references import with_solid
+
 TRIALS = 100
 LEAST = 88  # 95 % of 100 trials: 95 ± 2.2, three standard deviations below
-
-
-def with_solid(dataset: xarray.Dataset, velocity: np.ndarray) -> xarray.Dataset:
-    """The same with these residual velocities of the solid plate [m/s]."""
-    shots = len(velocity)
-    return dataset.assign(
-        solid_status=("solid_hit", np.zeros(shots, dtype=np.int8)),
-        solid_residual_velocity=("solid_hit", velocity),
-        solid_tilt=(("solid_hit", "standoff"), np.zeros((shots, 2))),
-    )
 
 
 def named(dataset: xarray.Dataset, *texts: str) -> dict[str, Score]:

@@ -13,6 +13,7 @@ import xarray
 from warpimpact.cli import main
 from warpimpact.results import files
 
+Refusal = Callable[[list[str]], str]
 SLOTTED_PLATE = Path(__file__).parents[3] / "campaigns" / "slotted_plate.toml"
 
 
@@ -68,32 +69,22 @@ def test_a_wrong_command_line_ends_with_2(arguments: list[str]) -> None:
     assert ended.value.code == 2
 
 
-def _refusal(arguments: list[str], capsys: pytest.CaptureFixture[str]) -> str:
-    """The sentence of a command that must end with 2 and say one thing only."""
-    assert main(arguments) == 2
-    shown = capsys.readouterr()
-    assert shown.out == ""
-    assert shown.err.startswith("warpimpact: error: ")
-    assert shown.err.count("\n") == 1
-    return shown.err.removeprefix("warpimpact: error: ").rstrip("\n")
-
-
-def test_a_bad_campaign_is_refused(in_tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_bad_campaign_is_refused(in_tmp_path: Path, refusal: Refusal) -> None:
     Path("wrong.toml").write_text(SLOTTED_PLATE.read_text().replace("= 0.8 ", "= 1.8 "))
-    sentence = _refusal(["run", "wrong.toml"], capsys)
+    sentence = refusal(["run", "wrong.toml"])
     assert sentence == "wrong.toml: plate.degradation: got 1.8, but it must be less than or equal to 1"
     assert [path.name for path in in_tmp_path.iterdir()] == ["wrong.toml"]
 
 
-def test_a_count_of_0_is_refused(in_tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    sentence = _refusal(["run", str(SLOTTED_PLATE), "--count", "0"], capsys)
+def test_a_count_of_0_is_refused(in_tmp_path: Path, refusal: Refusal) -> None:
+    sentence = refusal(["run", str(SLOTTED_PLATE), "--count", "0"])
     assert sentence == f"{SLOTTED_PLATE}: hits.count: got 0, but it must be greater than or equal to 1"
     assert not list(in_tmp_path.iterdir())
 
 
-def test_an_existing_output_is_kept(in_tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_an_existing_output_is_kept(in_tmp_path: Path, refusal: Refusal) -> None:
     Path("slotted_plate.nc").write_text("precious")
-    sentence = _refusal(["run", str(SLOTTED_PLATE)], capsys)
+    sentence = refusal(["run", str(SLOTTED_PLATE)])
     assert sentence == "slotted_plate.nc: exists already; name another file or give --overwrite"
     assert Path("slotted_plate.nc").read_text() == "precious"
 
@@ -107,38 +98,38 @@ def test_an_existing_output_is_kept(in_tmp_path: Path, capsys: pytest.CaptureFix
     ],
 )
 def test_an_output_that_cannot_be_written_is_refused_before_computing(
-    in_tmp_path: Path, capsys: pytest.CaptureFixture[str], output: str, sentence: str
+    in_tmp_path: Path, refusal: Refusal, output: str, sentence: str
 ) -> None:
     Path("file").touch()
-    assert _refusal(["run", str(SLOTTED_PLATE), "-o", output, "--overwrite"], capsys) == sentence
+    assert refusal(["run", str(SLOTTED_PLATE), "-o", output, "--overwrite"]) == sentence
     assert [path.name for path in in_tmp_path.iterdir()] == ["file"]
 
 
-def test_an_absent_device_is_refused(in_tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    sentence = _refusal(["run", str(SLOTTED_PLATE), "--count", "4", "--device", "cuda:99"], capsys)
+def test_an_absent_device_is_refused(in_tmp_path: Path, refusal: Refusal) -> None:
+    sentence = refusal(["run", str(SLOTTED_PLATE), "--count", "4", "--device", "cuda:99"])
     assert 'got "cuda:99"' in sentence
     assert not list(in_tmp_path.iterdir())
 
 
 def test_memory_that_cannot_be_had_is_told(
-    in_tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+    in_tmp_path: Path, refusal: Refusal, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def no_memory(*_: object, **__: object) -> None:
         raise MemoryError("Unable to allocate 8 TiB")
 
     monkeypatch.setattr("warpimpact.runs.run.run_to_file", no_memory)
-    assert _refusal(["run", str(SLOTTED_PLATE)], capsys) == f"{SLOTTED_PLATE}: Unable to allocate 8 TiB"
+    assert refusal(["run", str(SLOTTED_PLATE)]) == f"{SLOTTED_PLATE}: Unable to allocate 8 TiB"
     assert not list(in_tmp_path.iterdir())
 
 
-def test_what_is_no_result_is_not_plotted(in_tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_what_is_no_result_is_not_plotted(in_tmp_path: Path, refusal: Refusal) -> None:
     Path("a.nc").write_text("no netCDF")
-    assert _refusal(["plot", "a.nc"], capsys).startswith("a.nc: cannot be read as a netCDF file")
+    assert refusal(["plot", "a.nc"]).startswith("a.nc: cannot be read as a netCDF file")
     assert [path.name for path in in_tmp_path.iterdir()] == ["a.nc"]
 
 
 def test_results_are_drawn_beside_each_other(
-    in_tmp_path: Path, capsys: pytest.CaptureFixture[str], make_result: Callable[..., xarray.Dataset]
+    in_tmp_path: Path, capsys: pytest.CaptureFixture[str], refusal: Refusal, make_result: Callable[..., xarray.Dataset]
 ) -> None:
     Path("b").mkdir()
     for path in ("a.nc", "b/a.nc"):
@@ -147,4 +138,4 @@ def test_results_are_drawn_beside_each_other(
     assert capsys.readouterr().out.split() == [
         f"a_a_{name}.png" for name in ("residual_velocity", "deflection", "tilt")
     ]
-    assert _refusal(["plot", "a.nc", "a.nc"], capsys) == "a.nc: got this result 2 times, but each result counts once"
+    assert refusal(["plot", "a.nc", "a.nc"]) == "a.nc: got this result 2 times, but each result counts once"

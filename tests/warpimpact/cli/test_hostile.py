@@ -151,15 +151,10 @@ def test_hostile_campaigns_are_refused_within_a_gibibyte(tmp_path: Path) -> None
         assert (CAMPAIGNS | FILES)[case][-1] in said
 
 
+@pytest.mark.parametrize("command", ["plate", "inspect"])
 @pytest.mark.parametrize("name", ["/dev/zero", "x" * 5000, "y" * 300, "."])
-def test_what_is_no_campaign_file_is_refused_in_a_sentence(name: str, capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["plate", name]) == 2
-    assert capsys.readouterr().err.count("\n") == 1
-
-
-@pytest.mark.parametrize("name", ["/dev/zero", "x" * 5000, "."])
-def test_what_is_no_result_is_refused_in_a_sentence(name: str, capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["inspect", name]) == 2
+def test_what_is_no_file_is_refused_in_a_sentence(command: str, name: str, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main([command, name]) == 2
     assert capsys.readouterr().err.count("\n") == 1
 
 

@@ -31,14 +31,8 @@ TEXTS: dict[str, tuple[str, str]] = {
     "a test file": ("[target]\nmean = 800", "warpimpact test takes it"),
     "a catalogue": ("[[material]]\nname = 'a'", "warpimpact catalogue --file takes it"),
 }
+Refusal = Callable[[list[str]], str]
 ResultMaker = Callable[..., xarray.Dataset]
-
-
-def _said(arguments: list[str], capsys: pytest.CaptureFixture[str]) -> str:
-    assert main(arguments) == 2
-    said = capsys.readouterr().err
-    assert said.count("\n") == 1
-    return said.removeprefix("warpimpact: error: ").strip()
 
 
 @pytest.mark.parametrize("path", ["/dev/zero", "pipe"])
@@ -52,10 +46,10 @@ def _said(arguments: list[str], capsys: pytest.CaptureFixture[str]) -> str:
     ids=lambda arguments: arguments[0],
 )
 def test_what_may_have_no_end_is_not_opened(
-    arguments: list[str], path: str, in_tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    arguments: list[str], path: str, in_tmp_path: Path, refusal: Refusal
 ) -> None:
     os.mkfifo("pipe")
-    assert _said([one.format(path) for one in arguments], capsys) == f"{path}: cannot be read (it is no file)"
+    assert refusal([one.format(path) for one in arguments]) == f"{path}: cannot be read (it is no file)"
 
 
 @pytest.mark.parametrize("path", ["/dev/zero", "pipe"])
@@ -68,18 +62,18 @@ def test_what_may_have_no_end_is_not_opened(
     ],
 )
 def test_nor_is_it_where_a_campaign_names_it(
-    before: str, after: str, key: str, path: str, in_tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    before: str, after: str, key: str, path: str, in_tmp_path: Path, refusal: Refusal
 ) -> None:
     os.mkfifo("pipe")
     Path("a.toml").write_text(SLOTTED.replace(before, after.format(path), 1), encoding="utf-8")
-    assert f'{key}: got "{path}", but there is no file' in _said(["run", "a.toml", "-o", "a.nc"], capsys)
+    assert f'{key}: got "{path}", but there is no file' in refusal(["run", "a.toml", "-o", "a.nc"])
 
 
-def test_a_large_file_is_read_up_to_its_bound(in_tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_large_file_is_read_up_to_its_bound(in_tmp_path: Path, refusal: Refusal) -> None:
     with Path("large.toml").open("wb") as file:
         file.truncate(2**32)
     for arguments in (["catalogue", "--file", "large.toml"], ["run", "large.toml"]):
-        assert "large.toml: at most 1048576 characters are read" in _said(arguments, capsys)
+        assert "large.toml: at most 1048576 characters are read" in refusal(arguments)
 
 
 @pytest.mark.parametrize(
@@ -112,46 +106,44 @@ def test_a_cache_that_cannot_be_written_is_named(monkeypatch: pytest.MonkeyPatch
 
 
 @pytest.mark.parametrize("kind", TEXTS)
-def test_a_text_is_named_as_what_it_is(kind: str, in_tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_text_is_named_as_what_it_is(kind: str, in_tmp_path: Path, refusal: Refusal) -> None:
     text, use = TEXTS[kind]
     Path("a.toml").write_text(text, encoding="utf-8")
     for arguments in (["inspect", "a.toml"], ["report", "a.toml", "-o", "a.html"]):
-        assert _said(arguments, capsys) == f"a.toml: is {kind}, not a map of hits; {use}"
+        assert refusal(arguments) == f"a.toml: is {kind}, not a map of hits; {use}"
     commands = {"run": "a campaign", "optimise": "a design file", "identify": "a fit", "test": "a test file"}
     for command, wanted in commands.items():
         if wanted != kind:
-            assert _said([command, "a.toml"], capsys) == f"a.toml: is {kind}, not {wanted}; {use}"
+            assert refusal([command, "a.toml"]) == f"a.toml: is {kind}, not {wanted}; {use}"
 
 
-def test_a_result_is_named_where_a_text_is_taken(
-    make_result: ResultMaker, in_tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_result_is_named_where_a_text_is_taken(make_result: ResultMaker, in_tmp_path: Path, refusal: Refusal) -> None:
     files.write(make_result(20), Path("a.nc"))
     files.write(make_result(20), Path("b.toml"))
     told = RESULT.told("", "a TOML file").removeprefix(": ")
     for command in ("run", "plate", "sweep", "optimise", "test", "limit"):
-        assert _said([command, "a.nc"], capsys) == f"a.nc: {told}"
-    assert _said(["export", "b.toml"], capsys) == f"b.toml: {told}"
+        assert refusal([command, "a.nc"]) == f"a.nc: {told}"
+    assert refusal(["export", "b.toml"]) == f"b.toml: {told}"
     for read in (run, read_design, read_fit):
         with pytest.raises(CampaignError, match="a map of hits, as warpimpact run or limit writes, not a TOML file"):
             read("a.nc")
 
 
-def test_a_picture_is_neither(in_tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_picture_is_neither(in_tmp_path: Path, refusal: Refusal) -> None:
     Image.new("1", (2, 2)).save("a.png")
-    assert _said(["inspect", "a.png"], capsys) == "a.png: cannot be read as a netCDF file"
-    assert "a.png: is not valid TOML" in _said(["run", "a.png"], capsys)
+    assert refusal(["inspect", "a.png"]) == "a.png: cannot be read as a netCDF file"
+    assert "a.png: is not valid TOML" in refusal(["run", "a.png"])
 
 
 def test_a_flipped_bit_of_the_header_is_told(
-    make_result: ResultMaker, in_tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    make_result: ResultMaker, in_tmp_path: Path, monkeypatch: pytest.MonkeyPatch, refusal: Refusal
 ) -> None:
     def broken(*_: object, **__: object) -> None:
         raise AttributeError("NetCDF: Attribute not found")
 
     files.write(make_result(20), Path("a.nc"))
     monkeypatch.setattr(netCDF4, "Dataset", broken)
-    assert _said(["report", "a.nc"], capsys).startswith("a.nc: cannot be read as a netCDF file")
+    assert refusal(["report", "a.nc"]).startswith("a.nc: cannot be read as a netCDF file")
 
 
 def test_a_run_takes_the_name_of_a_campaign(in_tmp_path: Path) -> None:
@@ -163,10 +155,10 @@ def test_a_run_takes_the_name_of_a_campaign(in_tmp_path: Path) -> None:
     assert np.array_equal(files.read(Path("a.nc"))["tilt"], expected["tilt"], equal_nan=True)
 
 
-def test_a_posterior_that_links_to_itself_is_told(in_tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_posterior_that_links_to_itself_is_told(in_tmp_path: Path, refusal: Refusal) -> None:
     Path("loop.nc").symlink_to("loop.nc")
     Path("a.toml").write_text(SLOTTED, encoding="utf-8")
-    assert "but there is no file" in _said(["run", "a.toml", "--posterior", "loop.nc", "-o", "a.nc"], capsys)
+    assert "but there is no file" in refusal(["run", "a.toml", "--posterior", "loop.nc", "-o", "a.nc"])
 
 
 def test_a_target_without_limits_is_told(make_result: ResultMaker) -> None:
@@ -187,10 +179,10 @@ def test_a_target_without_limits_is_told(make_result: ResultMaker) -> None:
     ],
 )
 def test_a_variable_without_a_number_or_a_name_is_told(
-    variables: str, said: str, in_tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    variables: str, said: str, in_tmp_path: Path, refusal: Refusal
 ) -> None:
     Path("a.toml").write_text(f'title = "a"\n[variables]\n{variables}\n', encoding="utf-8")
-    assert said in _said(["optimise", "a.toml"], capsys)
+    assert said in refusal(["optimise", "a.toml"])
 
 
 def test_a_table_has_no_formulas(make_result: ResultMaker, tmp_path: Path) -> None:

@@ -4,6 +4,7 @@ import json
 import subprocess
 import sys
 import tomllib
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -45,22 +46,18 @@ def test_a_new_campaign_can_be_read(name: str, capsys: pytest.CaptureFixture[str
     )
 
 
-def test_a_new_fit_can_be_read() -> None:
-    assert main(["new", "paper_fit"]) == 0
-    assert read_fit("paper_fit.toml").observed == 10
-    assert [path.name for path in Path().glob("*.json")] == ["warpimpact.fit.schema.json"]
-
-
-def test_a_new_design_can_be_read() -> None:
-    assert main(["new", "lightest_plate"]) == 0
-    assert len(read_design("lightest_plate.toml").objectives) == 2
-    assert [path.name for path in Path().glob("*.json")] == ["warpimpact.design.schema.json"]
-
-
-def test_a_new_firing_test_can_be_read_with_its_target() -> None:
-    assert main(["new", "v50_test"]) == 0
-    assert read_test("v50_test.toml").target.campaign == Path("plate_and_base.toml").absolute()
-    assert [path.name for path in Path().glob("*.json")] == ["warpimpact.test.schema.json"]
+@pytest.mark.parametrize(
+    ("name", "kind", "is_read"),
+    [
+        ("paper_fit", "fit", lambda path: read_fit(path).observed == 10),
+        ("lightest_plate", "design", lambda path: len(read_design(path).objectives) == 2),
+        ("v50_test", "test", lambda path: read_test(path).target.campaign == Path("plate_and_base.toml").absolute()),
+    ],
+)
+def test_another_new_file_can_be_read(name: str, kind: str, is_read: Callable[[str], bool]) -> None:
+    assert main(["new", name]) == 0
+    assert is_read(f"{name}.toml")
+    assert [path.name for path in Path().glob("*.json")] == [f"warpimpact.{kind}.schema.json"]
 
 
 def test_new_overwrites_nothing_unasked(capsys: pytest.CaptureFixture[str]) -> None:
