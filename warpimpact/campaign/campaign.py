@@ -152,12 +152,8 @@ class Campaign(Model):
     def from_text(
         cls, text: str, *, name: str, folder: Path, count: int | None = None, needs_velocity: bool = True
     ) -> Self:
-        """Read a campaign from its text.
-
-        Args:
-            text: TOML, or the JSON of a campaign made in Python.
-            name: name of the text in errors.
-            folder: folder of the files that it names.
+        """Read a campaign from its text, TOML, or the JSON of a campaign made in Python. Errors have its name; files
+        that it names count from the folder.
 
         Raises:
             CampaignError: the text is not TOML, or has a value that is not allowed.

@@ -29,10 +29,8 @@ def is_table(place: str) -> bool:
 
 
 def resolved(key: str, name: str) -> str:
-    """The dotted place of a key, which may be that of an input of [impact], [plate] or [interaction] alone.
-
-    Args:
-        name: name of the table of keys in errors, such as "sweep.toml: sweep".
+    """The dotted place of a key, which may be that of an input of [impact], [plate] or [interaction] alone. Errors have
+    the name of the table of keys, such as "sweep.toml: sweep".
 
     Raises:
         CampaignError: there is no such key.

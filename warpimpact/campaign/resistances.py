@@ -28,11 +28,7 @@ Linear interpolation is wrong by at most 0.1 %."""
 
 
 def catalogue_resistance(campaign: Campaign, plate: Plate, thickness: float | None = None) -> Resistance | None:
-    """The resistance of a plate by the catalogue; None where Y is the user's.
-
-    Args:
-        thickness: another thickness of the plate [m].
-    """
+    """The resistance of a plate, or of one of another thickness [m], by the catalogue; None where Y is the user's."""
     catalogue = Catalogue.of(campaign.catalogue)
     material = catalogue.all(Material).get(str(plate.material))
     if material is None:
@@ -49,12 +45,8 @@ def catalogue_resistance(campaign: Campaign, plate: Plate, thickness: float | No
 
 
 def resistance_by_thickness(campaign: Campaign, layer: int, thickest: float, unit: float | None = None) -> Curve | None:
-    """Thicknesses of a layer, ascending [m], and its resistance there, where the catalogue gives it; None elsewhere.
-
-    Args:
-        thickest: the largest thickness [m].
-        unit: thickness whose resistance is 1 [m]; that of the layer in the campaign if None.
-    """
+    """Thicknesses of a layer, ascending to the thickest [m], and its resistance there, where the catalogue gives it;
+    None elsewhere. The resistance of the thickness `unit` [m], by default that of the layer, is 1."""
     plate = campaign.target.layers[layer]
     known = None if is_drawn(campaign, "resistance", [layer]) else catalogue_resistance(campaign, plate, unit)
     if known is None:

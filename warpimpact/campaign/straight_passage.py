@@ -1,8 +1,8 @@
 """A core that goes straight through a solid plate: its equivalent resistance under another law (docs/model.md §6.2).
 
 A resistance belongs to the law with which it was determined. Under another law the observation stays: the limit
-velocity
-of a solid plate, or the velocity that it takes from a core.
+velocity of a
+solid plate, or the velocity that it takes from a core.
 """
 
 from __future__ import annotations
@@ -49,11 +49,7 @@ class StraightPassage:
 
     def entry(self, resistance: ArrayLike, leaving: ArrayLike = 0.0) -> Array:
         """Velocity with which the core enters [m/s], of the broadcast shape of the arguments. The motion is followed
-        from the rear face back to the front face.
-
-        Args:
-            resistance: Y [Pa].
-            leaving: velocity behind the plate [m/s]; 0 gives the limit velocity.
+        from the rear face back to the front face. `leaving` is the velocity behind the plate [m/s], 0 at the limit.
         """
         station, radius, slope = self._nose()
         facing, law, free = slope / np.sqrt(1.0 + slope * slope), self.law, self.law.free_surface
@@ -81,13 +77,8 @@ class StraightPassage:
         return np.asarray(np.sqrt(square))
 
     def resistance_under(self, law: Interaction, friction: float, resistance: float, velocity: float = 0.0) -> float:
-        """Resistance Y [Pa] with which the plate takes as much from the core under another law.
-
-        Args:
-            law, friction: the other law and friction.
-            resistance: Y under this law [Pa].
-            velocity: velocity with which the core arrives [m/s]. If the limit velocity is not less, it is kept instead.
-        """
+        """Resistance Y [Pa] with which the plate takes as much from the core, which arrives with this velocity [m/s],
+        under another law and friction. If the limit velocity is not less, it is kept instead."""
         limit, leaving = float(self.entry(resistance)), 0.0
         if velocity > limit:
             behind = np.linspace(0.0, velocity, _SPEEDS)

@@ -27,11 +27,8 @@ def _as_campaign() -> Iterator[None]:
 def parsed(text: str, name: str, kind: Kind | None = None) -> dict[str, Any]:
     """The tables of a campaign, TOML or JSON, not yet validated.
 
-    Args:
-        kind: kind of file that it must be.
-
     Raises:
-        CampaignError: the text is neither, or is of another kind; `name` is its name in the message.
+        CampaignError: the text is neither, or is not of this kind of file; `name` is its name in the message.
     """
     with _as_campaign():
         tables = toml_text.parsed(text, name)

@@ -28,10 +28,7 @@ def key(name: str) -> str:
 
 
 def the_entry(name: str, spellings: Mapping[str, Sequence[str]]) -> str:
-    """Name of the entry that a name or an alias stands for.
-
-    Args:
-        spellings: aliases by the names of the entries.
+    """Name of the entry that a name or an alias stands for; `spellings` are aliases by the names of the entries.
 
     Raises:
         ValueError: there is none, or an alias stands for several; the message lists whom it may mean.

@@ -14,13 +14,8 @@ from warpimpact.results.table import HitTable, joined
 
 
 class IncrementalFile:
-    """A result file that is written part by part under another name, and renamed when it is complete.
-
-    Args:
-        path: the file.
-        written: file on the same disk to which parts are written. An existing file is replaced.
-        hits: number of all hits.
-    """
+    """A result file of this number of hits in all. Parts are `written` to a file on the same disk, which is renamed to
+    `path` when it is complete. Existing files are replaced."""
 
     def __init__(self, path: Path, written: Path, hits: int) -> None:
         self._path, self._written, self._chunk = path, written, min(hits, FILE_CHUNK)

@@ -32,19 +32,17 @@ class Bounds(NamedTuple):
 
     def warning(self, place: str, value: float) -> str | None:
         """A sentence about an unusual value, None for a usual one; zero is usual."""
-        if value == 0.0 or self.low <= abs(value) <= self.high:
-            return None
-        return f"{self._read(place, value)}, but {self._range(self.low, self.high)} is usual{self._slip(place, value)}"
+        return self._beyond(place, value, (self.low, self.high), "usual")
 
     def refusal(self, place: str, value: float) -> str | None:
         """A sentence about an impossible value, None for a possible one; zero is possible."""
-        if value == 0.0 or self.least <= abs(value) <= self.most:
-            return None
-        allowed = self._range(self.least, self.most)
-        return f"{self._read(place, value)}, but {allowed} is allowed: {self.why}{self._slip(place, value)}"
+        return self._beyond(place, value, (self.least, self.most), f"allowed: {self.why}")
 
-    def _read(self, place: str, value: float) -> str:
-        return f"{place}: read as {self._shown(value) if self.unit == 'rad' else f'{value:g} {self.unit}'.rstrip()}"
+    def _beyond(self, place: str, value: float, ends: tuple[float, float], what: str) -> str | None:
+        if value == 0.0 or ends[0] <= abs(value) <= ends[1]:
+            return None
+        read = self._shown(value) if self.unit == "rad" else f"{value:g} {self.unit}".rstrip()
+        return f"{place}: read as {read}, but {self._range(*ends)} is {what}{self._slip(place, value)}"
 
     def _range(self, low: float, high: float) -> str:
         if low == 0.0:

@@ -125,16 +125,11 @@ class Core(Model, ABC):
         return float(np.hypot(s - self.mass_properties.centre_of_mass, self.radius(s)).max())
 
     def presented_area(self, inclination: Array) -> Array:
-        """Area of the silhouette along a line of sight [m²].
+        """Area of the silhouette along a line of sight at this inclination to the axis [rad], of the same shape [m²].
 
         The silhouette of a convex body has the area ½ ∮ |n·d| dS (Cauchy). Between stations the body is a frustum,
-        whose normals make one angle with the axis. The convex hull of the profile is used: hollows count as filled.
-
-        Args:
-            inclination: angle between axis and line of sight [rad]; the view from the nose equals that from the base.
-
-        Returns:
-            The area, of the same shape.
+        whose normals make one angle with the axis. The convex hull of the profile is used: hollows count as filled. The
+        view from the nose equals that from the base.
         """
         from scipy.spatial import ConvexHull  # half a second to import
 

@@ -74,11 +74,8 @@ NEEDS = (
 
 
 def check_together(given: Mapping[str, str | bool]) -> None:
-    """Refuse options that cannot be combined.
-
-    Args:
-        given: whether each option is in use, or the text that names it in the message. Options without an entry are not
-            checked.
+    """Refuse options that cannot be combined. `given` has whether each option is in use, or the text that names it in
+    the message. Options without an entry are not checked.
 
     Raises:
         ValueError: the message names both options and the reason.

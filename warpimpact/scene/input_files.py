@@ -90,11 +90,8 @@ def read_columns(
     """Columns of a CSV file by name: the required ones first in its header, then any of the optional ones.
 
     A unit may follow a name, as in "hit_y [mm]". A file whose first column is "hit" comes from `warpimpact export`: its
-    columns may have any order, and columns that are neither required nor optional are ignored.
-
-    Args:
-        required, optional: names of columns.
-        exported: name in an exported file → name here.
+    columns may have any order and names as keys of `exported`, and columns that are neither required nor optional are
+    ignored.
 
     Raises:
         ValueError: the message names the file, the line and its fault.

@@ -14,11 +14,8 @@ def cluster_numbers(values: Array) -> Array:
 
     The mean is a ratio of two sums over clusters (W. G. Cochran, Sampling Techniques, 3rd edition, 1977, section 6.3).
 
-    Args:
-        values: shape [clusters, members]; NaN marks a member that does not count.
-
-    Returns:
-        Shape [clusters]; NaN if no member counts.
+    The values have the shape [clusters, members], the numbers [clusters]. NaN marks a member that does not count; the
+    numbers are NaN if none counts.
     """
     known = ~np.isnan(values)
     if not known.any():

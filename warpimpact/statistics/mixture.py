@@ -110,14 +110,9 @@ def normal_numbers(normal: Array, shared: Shared, rng: np.random.Generator) -> A
 
 
 def fitted(points: Array, weights: Array, effective: float, rng: np.random.Generator) -> Mixture:
-    """Mixture fitted to weighted draws by expectation and maximisation. Fewer effective draws give fewer components.
-
-    Args:
-        points: shape [draws, dimensions].
-        weights: normalised, shape [draws].
-        effective: effective number of draws.
-        rng: chooses the draws that are fitted, and the first centres.
-    """
+    """Mixture fitted to draws, shape [draws, dimensions], with normalised weights, shape [draws], by expectation and
+    maximisation. Fewer effective draws give fewer components. `rng` chooses the draws that are fitted, and the first
+    centres."""
     from scipy.special import softmax
 
     middle = weights @ points

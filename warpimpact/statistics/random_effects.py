@@ -50,7 +50,7 @@ class _Groups(NamedTuple):
 def positive_share(
     numbers: Array, groups: NDArray[np.number], *, images: int = 1, confidence: float = 0.95
 ) -> Positive | None:
-    """Share of the groups with a positive true mean.
+    """Share of the groups with a positive true mean; None if fewer than `FEWEST_GROUPS` groups have two numbers.
 
     The true mean of a group has a normal distribution about its sample mean, which is shrunk towards the mean over all
     (empirical Bayes). The lower end assumes normally distributed true means, with mean and variance at the unfavourable
@@ -60,9 +60,6 @@ def positive_share(
         numbers: shape [shots]; NaN marks a shot that does not count.
         groups: group of each shot, same shape.
         images: number of consecutive shots that are images of each other; together they count as one.
-
-    Returns:
-        None if fewer than `FEWEST_GROUPS` groups have two numbers.
     """
     from scipy.special import chdtri, ndtr, stdtrit
 
@@ -89,10 +86,8 @@ def interval_of_means(
     of the American Statistical Association 79 (1984) 393). Student's quantile replaces the normal one to allow for the
     error of that variance, with the degrees of freedom of F. E. Satterthwaite, Biometrics Bulletin 2 (1946) 110.
 
-    Args:
-        numbers, groups, images: as in `positive_share`.
-        confidence: share of the true means.
-        beside: standard deviation of an independent error that adds to every true mean.
+    The arguments are those of `positive_share`, and the standard deviation of an independent error that adds to every
+    true mean.
     """
     from scipy.special import ndtri, stdtrit
 

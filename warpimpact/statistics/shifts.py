@@ -23,14 +23,11 @@ Silverman, Density Estimation, 1986, section 3.4.2)."""
 
 
 def shift_of_mean(coarse: Array, fine: Array, **dealt: Unpack[Estimating]) -> float:
-    """Largest probable error of a mean over the shots that count.
+    """Largest probable error of a mean over the shots that count; NaN if none counts.
 
     Args:
         coarse, fine: numbers of the same shots at both levels, shape [shots]; NaN marks a shot that does not count.
         dealt: arguments of `Dealt`.
-
-    Returns:
-        NaN if no shot counts.
     """
     return _largest(change_of_mean(coarse, fine, **dealt))
 

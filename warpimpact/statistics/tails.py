@@ -61,16 +61,11 @@ def quantile_weights(share: float) -> OrderWeights:
 
 
 def pseudo_values(numbers: Array, groups: NDArray[np.number], weights: OrderWeights, *, images: int = 1) -> Array:
-    """Numbers of the shots whose mean over a group is a weighted sum of the group's ordered numbers.
+    """Numbers of the shots whose mean over a group is a weighted sum of the group's ordered numbers; NaN in groups of
+    fewer than `FEWEST_SHOTS`.
 
-    Args:
-        numbers: shape [shots]; NaN marks a shot that does not count. Infinite numbers count as the finite extreme.
-        groups: group of each shot, same shape.
-        weights: of the ordered numbers.
-        images: number of consecutive shots that are images of each other; together they count as one.
-
-    Returns:
-        Shape [shots]; NaN in groups of fewer than `FEWEST_SHOTS`.
+    Numbers, groups and result have the shape [shots]. NaN marks a shot that does not count. Infinite numbers count as
+    the finite extreme, and `images` in a row as one.
     """
     finite = numbers[np.isfinite(numbers)]
     if not len(finite):

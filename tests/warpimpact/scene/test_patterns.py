@@ -364,20 +364,6 @@ def test_away_from_edges_all_points_within_reach_are_alike(
     assert clear.mean() > 0.2 or reach > 0.1 * 2 * MM  # a tenth of the narrowest hole is as far as it looks
 
 
-@settings(deadline=None, max_examples=25)
-@given(pattern=lattices(), along=st.sampled_from([(1, -1), (-1, 1), (-1, -1)]), centred=st.booleans())
-def test_symmetry_is_what_the_holes_say(pattern: LatticePattern, along: tuple[int, int], centred: bool) -> None:
-    y, z = np.random.default_rng(6).uniform(-20 * MM, 20 * MM, (2, 20000))
-    shift = 0.5 * np.array(pattern.period) * centred
-    image = pattern.is_hole(along[0] * y + shift[0], along[1] * z + shift[1])
-    same = np.array_equal(image, pattern.is_hole(y, z))
-    # Drawn numbers are hardly ever symmetric; where they nearly are, 20000 points may not tell.
-    if pattern.is_symmetric(*along, centred=centred):
-        assert np.mean(image != pattern.is_hole(y, z)) < 1e-3
-    elif same:
-        assert not pattern.model_copy(update={"rotation": 5}).is_symmetric(*along, centred=centred)
-
-
 def two_slots(*turns: float, **changes: Any) -> SlotPattern:
     holes = [[0, 0, turns[0]], [8 * MM, 4 * MM, turns[1]]]
     return SlotPattern(**{"length": 5 * MM, "width": 2 * MM, "spacing": (16 * MM, 8 * MM), "holes": holes} | changes)

@@ -32,11 +32,8 @@ def half_shares(
     of a hole are exact anywhere in a cell: sides along z end lines, and sides along y end the strip of the lines.
 
     Args:
-        chords: ends of lines in the holes.
         extents: lowest and highest z of every hole, shape [holes, 2] [m].
-        counts: number of cells along y and z, from the origin on.
-        sides: of a cell [m].
-        check: as in `Pattern.shares_in_holes`.
+        counts, sides, check: as in `Pattern.shares_in_holes`.
     """
     inside = np.zeros((counts[0] + 2, counts[1]), dtype=np.int16)
     ends = extents / sides[1]

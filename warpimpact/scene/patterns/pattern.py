@@ -73,13 +73,8 @@ class Pattern(Model, ABC):
 
     @abstractmethod
     def shares_in_holes(self, counts: tuple[int, int], sides: tuple[float, float], check: Check = no_end) -> Counts:
-        """Share of every cell that lies in holes, in parts of WHOLE_CELL, shape `counts`.
-
-        Args:
-            counts: cells of a period along y and z, from the origin on.
-            sides: of a cell [m].
-            check: called often; it raises to end the work.
-        """
+        """Share of every cell that lies in holes, in parts of WHOLE_CELL, shape `counts`: cells of a period along y and
+        z with these sides [m], from the origin on. `check` is called often, and raises to end the work."""
 
     def edge_distance(self, y: Array, z: Array) -> Array:
         """Distance of points y, z [m] from the nearest outline of a hole, of their broadcast shape: negative in a hole,
@@ -111,11 +106,8 @@ class Pattern(Model, ABC):
 
     @abstractmethod
     def is_symmetric(self, along_y: int, along_z: int, *, centred: bool) -> bool:
-        """Whether (y, z) → (along_y·y, along_z·z), then half a period along both if `centred`, changes nothing.
-
-        Args:
-            along_y, along_z: 1, or −1 for a mirror image.
-        """
+        """Whether (y, z) → (along_y·y, along_z·z), with 1, or −1 for a mirror image, then half a period along both if
+        `centred`, changes nothing."""
 
     @property
     def unbounded(self) -> Self:

@@ -123,13 +123,11 @@ def neighbours(geometries: Any, first: int) -> tuple[float, int, int]:
 
 
 def smallest_gap(shapes: Sequence[Sequence[Array]]) -> float:
-    """Smallest distance [m] between two shapes that do not overlap; inf if there are fewer than two.
+    """Smallest distance [m] between two shapes that do not overlap; inf if there are fewer than two. A shape is its
+    closed outlines, each of shape [points, 2] [m].
 
     A tree finds the nearest of short pieces of the outlines. The numbers of two shapes differ in a binary digit; so for
     every digit, the pieces of the shapes with 1 are compared with the pieces of the shapes with 0.
-
-    Args:
-        shapes: closed outlines of each shape; an outline has the shape [points, 2] [m].
     """
     import shapely
 
