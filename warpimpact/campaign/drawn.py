@@ -20,10 +20,9 @@ from pydantic import ValidationError
 from warpimpact.results import posterior_file
 from warpimpact.results.files import read_tree
 from warpimpact.scene import Interaction, Plate, Sampler, Shots
+from warpimpact.scene.model import Array
 from warpimpact.scene.quantities import QUANTITIES
 from warpimpact.solver.columns import Path, columns_of
-
-Array = NDArray[np.float64]
 
 OF_THE_MATERIAL: tuple[Path, ...] = tuple(
     (quantity.table, name) for name, quantity in QUANTITIES.items() if quantity.drawn

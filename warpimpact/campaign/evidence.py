@@ -25,7 +25,7 @@ _EQUAL = 1e-6
 def evidence_of(campaign: Campaign) -> list[str]:
     """Lines on what an answer rests on: a summary, a line for every name, and a sentence for each assumption."""
     catalogue = Catalogue.of(campaign.catalogue)
-    standings = standings_of(campaign, catalogue.all(Material))
+    standings = standings_of(campaign)
     lines = [summary_of(campaign, standings)]
     lines += [] if campaign.core.threat is None else [_of_threat(campaign.core, catalogue)]
     for place, plate in campaign.target.named:
@@ -87,14 +87,12 @@ def _of_material(campaign: Campaign, place: str, plate: Plate, catalogue: Catalo
         "free_surface": (campaign.interaction.free_surface, None),
     }
     differing = [name for name, pair in expected.items() if not _same(*pair)]
-    interval = "" if "resistance" in differing or not known.deviation else _interval(*known.ends)
+    low, high = (end / 1e9 for end in known.ends)
+    is_known = known.deviation and "resistance" not in differing
+    interval = f", {low:.3g} to {high:.3g} with 90 %" if is_known else ""
     return (
         f"{place}: {material.name}{_own(differing)}, Y {plate.resistance / 1e9:.3g} GPa{interval} ({material.evidence})"
     )
-
-
-def _interval(low: float, high: float) -> str:
-    return f", {low / 1e9:.3g} to {high / 1e9:.3g} with 90 %"
 
 
 def _own(names: list[str]) -> str:

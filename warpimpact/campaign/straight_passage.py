@@ -11,11 +11,10 @@ import math
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from ..scene import Core, Interaction
-
-Array = NDArray[np.float64]
+from ..scene.model import Array
 
 _STATIONS, _DEPTHS = 1001, 200
 """Points along a core, and steps of its way."""

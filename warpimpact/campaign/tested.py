@@ -59,9 +59,9 @@ class Standing(NamedTuple):
         return f"{self.subject}{f' ({self.place})' if self.place else ''}: {self.text}"
 
 
-def standings_of(campaign: Campaign, materials: Mapping[str, Material]) -> list[Standing]:
+def standings_of(campaign: Campaign) -> list[Standing]:
     """Everything of a campaign that lies beyond what was measured. Layers with the same text are named together."""
-    figures = _figures()
+    figures, materials = _figures(), Catalogue.of(campaign.catalogue).all(Material)
     standings = list(_of_shot(campaign, figures))
     for place, plate in campaign.target.named:
         material = None if plate.material is None else materials.get(plate.material)
@@ -80,11 +80,7 @@ def summary_of(campaign: Campaign, standings: Sequence[Standing]) -> str:
 def summary_of_all(campaigns: Iterable[Campaign], what: str) -> str:
     """One sentence on what answers for several campaigns, called `what`, such as "designs", rest on."""
     several = list(campaigns)
-    materials = [Catalogue.of(campaign.catalogue).all(Material) for campaign in several]
-    subjects = [
-        [standing.subject for standing in standings_of(campaign, known)]
-        for campaign, known in zip(several, materials, strict=True)
-    ]
+    subjects = [[standing.subject for standing in standings_of(campaign)] for campaign in several]
     return _summary(several, subjects, what)
 
 

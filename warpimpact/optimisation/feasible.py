@@ -12,8 +12,6 @@ import numpy as np
 from warpimpact.campaign.campaign import Campaign
 from warpimpact.campaign.tested import Standing, standings_of
 from warpimpact.campaign.text import CampaignError
-from warpimpact.catalogue.catalogue import Catalogue
-from warpimpact.catalogue.entries import Material
 from warpimpact.optimisation.design import Constraints, Design
 from warpimpact.optimisation.evaluate import campaign_of
 from warpimpact.optimisation.judged import weights_of
@@ -92,7 +90,7 @@ def _violations(design: Design, campaign: Campaign) -> Iterator[Violation]:
 
 def untested(campaign: Campaign) -> list[Standing]:
     """The properties of a campaign's plates that lie beyond every published test."""
-    standings = standings_of(campaign, Catalogue.of(campaign.catalogue).all(Material))
+    standings = standings_of(campaign)
     return [standing for standing in standings if standing.subject in _OF_PLATES]
 
 
