@@ -9,36 +9,10 @@ from warpimpact.campaign.campaign import CampaignError
 
 SLOTTED_PLATE = Path(__file__).parents[3] / "campaigns" / "slotted_plate.toml"
 
-CAMPAIGN = """\
-title = "test"
-[core]
-shape = "polynomial"
-coefficients = [3.0e-4, 0.24, -5.29]
-length = "27.86 mm"
-mass = "4 g"
-[plate]
-thickness = "4 mm"
-resistance = "2600 MPa"
-shear_coefficient = 0.05
-degradation = 0.8
-[plate.pattern]
-shape = "slot"
-length = "12 mm"
-width = "4 mm"
-spacing = ["8 mm", "16 mm"]
-staggered = true
-[impact]
-velocity = "825 m/s"
-[hits]
-sampling = "sobol"
-count = 16
-[numerics]
-fidelity = "standard"
-[output]
-standoffs = ["50 mm", "130 mm"]
-"""
+UNCOMMENTED = (line.partition("#")[0].rstrip() for line in SLOTTED_PLATE.read_text(encoding="utf-8").splitlines())
+CAMPAIGN = "".join(f"{line}\n" for line in UNCOMMENTED if line)
 SLOT = CAMPAIGN[CAMPAIGN.index("[plate.pattern]") : CAMPAIGN.index("[impact]")]
-SAMPLING = 'sampling = "sobol"\ncount = 16'
+SAMPLING = 'sampling = "sobol"\ncount = 4096'
 
 MISTAKES = {
     "missing key": ('thickness = "4 mm"\n', "", "plate.thickness: is missing, but must be given"),
