@@ -75,22 +75,8 @@ class Alternative:
 
 def alternatives(campaign: Campaign) -> list[Alternative]:
     """All alternatives that [assumptions] asks for and that differ from the campaign, in the order of its keys."""
-    return [
-        alternative
-        for asked in (
-            _resistances,
-            _degradations,
-            _rates,
-            _reaches,
-            _frictions,
-            _onsets,
-            _edges,
-            _turns,
-            _standoffs,
-            _breaks,
-        )
-        for alternative in asked(campaign)
-    ]
+    asked = (_resistances, _degradations, _rates, _reaches, _frictions, _onsets, _edges, _turns, _standoffs, _breaks)
+    return [alternative for alternatives_of in asked for alternative in alternatives_of(campaign)]
 
 
 def _resistances(campaign: Campaign) -> Iterator[Alternative]:

@@ -335,7 +335,8 @@ def test_a_figure_says_of_how_many_hits_and_whether_a_promise_is_broken(covered,
 
 def test_a_layer_has_its_own_holes(perforated):
     assert np.isfinite(outlines(perforated)["y"]).any()
-    behind = {"thickness": 1e-3, "resistance": 1e9, "pattern": {"shape": "none"}, "gap": 0.1, "offset": [0.0, 0.0]}
+    scattered = {"distribution": "uniform", "low": 1e-3, "high": 2e-3}  # as the thickness of a layer that scatters
+    behind = {"thickness": scattered, "resistance": 1e9, "pattern": {"shape": "none"}, "gap": 0.1, "offset": [0.0, 0.0]}
     holed = behind | {"pattern": {"shape": "circle", "diameter": 1e-3, "spacing": [4e-3, 4e-3]}, "offset": [1e-3, 0.0]}
     layered = perforated.assign_attrs(layers=json.dumps({"1": behind, "2": holed}))
     assert len(outlines(layered, 1)["y"]) == 0
