@@ -9,7 +9,6 @@ from ..results import kinds
 from ..results.files import kind_of
 from ..results.kind import Kind
 from ..scene import toml_text
-from ..scene.input_files import check_file
 
 
 class CampaignError(ValueError):
@@ -45,7 +44,8 @@ def read_text(path: Path) -> str:
         CampaignError: the file is missing, cannot be read, or is a netCDF file.
     """
     with _as_campaign():
-        check_file(path)
-        if kinds.is_netcdf(path) and (kind := kind_of(path)) is not None:
-            raise CampaignError(kind.told(path, "a TOML file"))
-        return toml_text.read_text(path)
+        try:
+            return toml_text.read_text(path)
+        except toml_text.NoTextError as error:
+            kind = kind_of(path)
+            raise CampaignError(str(error) if kind is None else kind.told(path, "a TOML file")) from None

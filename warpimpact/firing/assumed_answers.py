@@ -10,7 +10,6 @@ from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from warpimpact.analysis.assumptions import AS_GIVEN
 from warpimpact.firing.directions import Sector
@@ -21,9 +20,9 @@ from warpimpact.firing.plan import FiringTest
 from warpimpact.firing.response import Response
 from warpimpact.records.variable import Variable
 from warpimpact.results import firing as f
+from warpimpact.scene.model import Array
 from warpimpact.statistics.acceptance import acceptance
 
-Array = NDArray[np.float64]
 Answers = Mapping[Variable, Array]
 
 MOST_TESTS = 1000

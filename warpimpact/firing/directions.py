@@ -26,7 +26,7 @@ from warpimpact.runs.assumed import has_assumptions
 from warpimpact.runs.executor import Job
 from warpimpact.runs.questions import Arrays, Question, Round, RoundProgress
 from warpimpact.scene import Numerics, Scene, Shots
-from warpimpact.scene.model import Model
+from warpimpact.scene.model import Array, Model
 from warpimpact.scene.units import Angle, Number, PositiveSpeed
 from warpimpact.solver.prepare import prepare
 from warpimpact.solver.simulate import computed, numerics_for
@@ -34,7 +34,6 @@ from warpimpact.solver.worker import Worker
 from warpimpact.statistics.intervals import Estimate, estimate_of
 from warpimpact.statistics.student import student_quantile
 
-Array = NDArray[np.float64]
 Angles = Annotated[tuple[Angle, ...], Field(min_length=1, max_length=64)]
 
 _LARGEST_OBLIQUITY = math.radians(89.0)

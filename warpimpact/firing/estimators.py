@@ -11,11 +11,10 @@ from pydantic import Field
 
 from warpimpact.firing.fire import Firings
 from warpimpact.firing.procedures import MilStd662F, Procedure, within_span
-from warpimpact.scene.model import Model
+from warpimpact.scene.model import Array, Model
 from warpimpact.scene.units import Number
 from warpimpact.statistics.quantal import fit_quantal, likelihood_interval, wald_interval
 
-Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 
 

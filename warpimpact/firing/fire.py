@@ -14,10 +14,10 @@ from numpy.typing import NDArray
 
 from warpimpact.firing.procedures import Procedure
 from warpimpact.firing.steps import Estimated, Optimal, Shot, StepEstimate, Steps
+from warpimpact.scene.model import Array
 from warpimpact.scene.sampling import stream
 from warpimpact.statistics.quantal import d_optimal, fit_quantal, information
 
-Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 
 _LEAST = 1.0

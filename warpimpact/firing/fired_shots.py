@@ -10,9 +10,8 @@ from warpimpact.firing.plan import FiringTest, Proof
 from warpimpact.firing.procedures import Procedure
 from warpimpact.firing.response import Response
 from warpimpact.firing.rules import drawn_places, fair_places
+from warpimpact.scene.model import Array
 from warpimpact.statistics.acceptance import fewest_shots
-
-Array = NDArray[np.float64]
 
 _PLACES, _VELOCITIES, _NODES = 1, 2, 64
 """Keys of the random numbers of places and of velocities; number of equally probable velocities of a proof's shot."""

@@ -103,7 +103,6 @@ def response_of(
     Args:
         output: the file of the test.
         count: number of hits of the campaign, instead of that in the file.
-        executor, resume, overwrite, progress, tell: as in `run_to_file`.
 
     Returns:
         The response, and attributes on the cost of the search.
@@ -142,11 +141,7 @@ def directions_of(
     tell: Callable[[str], object] = warnings.warn,
 ) -> Iterator[Sector | None]:
     """Compute the directions of a test; None if it asks for none. Results are saved in `output`.parts as they come. The
-    caller writes the output before the block ends.
-
-    Args:
-        progress: as in `protect`.
-        executor, resume, overwrite, tell: as in `run_to_file`; `resume` replaces the output, too.
+    caller writes the output before the block ends; `resume` replaces it, too.
     """
     if test.directions is None:
         yield None

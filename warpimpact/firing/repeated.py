@@ -6,7 +6,6 @@ from typing import Any
 
 import numpy as np
 import xarray
-from numpy.typing import NDArray
 
 from warpimpact.firing.assumed_answers import assumed
 from warpimpact.firing.directions import Sector
@@ -22,9 +21,8 @@ from warpimpact.records.variable import Variable
 from warpimpact.results import attributes as attr
 from warpimpact.results import firing as f
 from warpimpact.results.dataset import dataset_of
+from warpimpact.scene.model import Array
 from warpimpact.statistics.acceptance import acceptance
-
-Array = NDArray[np.float64]
 
 QUANTILES = (0.5, 0.05, 0.01)
 """Shares of perforations whose velocities are given: V50, V05, V01."""

@@ -29,9 +29,9 @@ from warpimpact.results.dataset import failed, hit_numbers
 from warpimpact.results.measures import Measure
 from warpimpact.results.outlines import outlines
 from warpimpact.results.tallies import dealing
+from warpimpact.scene.model import Array
 from warpimpact.statistics.intervals import Dealing, Estimate, estimate_of
 
-Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 
 _KNOWN_PLACES = 4000

@@ -10,10 +10,9 @@ from pydantic import Field, model_validator
 from scipy import special
 
 from warpimpact.firing.response import Response
-from warpimpact.scene.model import Model
+from warpimpact.scene.model import Array, Model
 from warpimpact.scene.units import NonNegativeLength, PositiveAngle, PositiveLength, PositiveSpeed, Speed
 
-Array = NDArray[np.float64]
 Places = NDArray[np.int64]
 
 _TRIALS, _ROUNDS = 64, 16

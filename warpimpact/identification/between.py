@@ -5,13 +5,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from warpimpact.identification.aim import HitPoints
 from warpimpact.identification.measured import MEASURABLE, Observation
 from warpimpact.scene import Symmetry
-
-Array = NDArray[np.float64]
+from warpimpact.scene.model import Array
 
 PLANE_NEIGHBOURS = 6
 """Number of neighbours, images included, through which the plane of a point is fitted by least squares."""

@@ -111,11 +111,9 @@ class Fit:
             ValidationError: such a scene is not possible.
         """
         tables: Mapping[str, Any] = shot.tables
-        for scene_parameter in self.scene_parameters:
-            if values is not None and scene_parameter.path in values and scene_parameter.path not in shot.own:
-                tables = put(
-                    tables, scene_parameter.path, as_read(scene_parameter, float(values[scene_parameter.path]))
-                )
+        for unknown in self.scene_parameters:
+            if values is not None and unknown.path in values and unknown.path not in shot.own:
+                tables = put(tables, unknown.path, as_read(unknown, float(values[unknown.path])))
         return scene_from(tables, self.record, self.folder)
 
 

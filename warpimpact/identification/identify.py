@@ -5,11 +5,10 @@ from __future__ import annotations
 import hashlib
 import warnings
 from collections.abc import Callable
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from warpimpact.identification.aim import aim
 from warpimpact.identification.fit import Fit, Sampling
@@ -21,14 +20,13 @@ from warpimpact.results import attributes as attr
 from warpimpact.results.files import write_tree
 from warpimpact.runs.choice import opened
 from warpimpact.runs.executor import Executor, Job
-from warpimpact.runs.questions import Arrays, Question, Round, RoundProgress, answered
+from warpimpact.runs.questions import Arrays, Question, Round, RoundProgress, answered, packed, unpacked
 from warpimpact.runs.store import content_of, stored
+from warpimpact.scene.model import Array
 from warpimpact.solver.limit import PASSAGES
 from warpimpact.solver.prepare import prepare
 from warpimpact.solver.worker import Worker
 from warpimpact.statistics.importance import LARGEST_K, ImportanceSampler
-
-Array = NDArray[np.float64]
 
 FIRST, FIRST_SHARE = 192, 0.25
 """Sets of the first round, which is drawn from the prior, and their largest share of all sets."""
@@ -78,10 +76,6 @@ def identify_to_file(
     tell: Callable[[str], object] = warnings.warn,
 ) -> None:
     """Compute the posterior of a fit into a file. Computed sets are on the disk at once, in `output`.parts.
-
-    Args:
-        device: as in `run_to_file`.
-        tell: called with a sentence for each damaged part, which is computed again.
 
     Raises:
         OutputError: a file cannot be written, must not be overwritten or belongs to another fit.
@@ -185,7 +179,10 @@ class _Scored:
         sets = [len(batch) // DISCREPANCIES for batch in batches]
 
         def tell(now: RoundProgress) -> None:
-            misfits = [self._misfit(arrays) for arrays in now.results.copy().values()]
+            misfits = [
+                float(np.sum([shot.misfit for shot in unpacked(ShotScore, arrays)], axis=0).min())
+                for arrays in now.results.copy().values()
+            ]
             self._progress = replace(
                 before,
                 done=before.done + sum(sets[place] for place in now.results),
@@ -200,19 +197,9 @@ class _Scored:
             tell,
         )
         self.done += len(points) // DISCREPANCIES
-        scores = [self._scores_in(arrays) for arrays in results]
+        scores = [unpacked(ShotScore, arrays) for arrays in results]
         self._batches += scores
         return np.concatenate([np.sum([shot.log_likelihood for shot in batch], axis=0) for batch in scores])
-
-    def _misfit(self, arrays: Arrays) -> float:
-        """The smallest misfit of a batch, over all shots."""
-        return float(np.sum([arrays[f"misfit_{place}"] for place in range(len(self._fit.shots))], axis=0).min())
-
-    def _scores_in(self, arrays: Arrays) -> list[ShotScore]:
-        return [
-            ShotScore(**{f.name: arrays[f"{f.name}_{place}"] for f in fields(ShotScore)})
-            for place in range(len(self._fit.shots))
-        ]
 
     def scores(self) -> list[ShotScore]:
         """One score per shot over all sets so far."""
@@ -226,10 +213,7 @@ class _Scored:
 
 def _batch_scored(fit: Fit, points: Array, number: int, *, worker: Worker, report: Callable[[float], object]) -> Arrays:
     """Scores of the sets of a batch. Its number is the seed of the places of its hits."""
-    scores = evaluate(fit, points, worker, seed=number)
-    return {
-        f"{f.name}_{place}": getattr(score, f.name) for place, score in enumerate(scores) for f in fields(ShotScore)
-    }
+    return packed(evaluate(fit, points, worker, seed=number))
 
 
 def _check_reach(fit: Fit, scores: list[ShotScore]) -> None:

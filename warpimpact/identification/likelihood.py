@@ -30,8 +30,7 @@ from warpimpact.records.outcomes import Outcomes
 from warpimpact.results import variables as v
 from warpimpact.results.measures import STATUSES, Measure
 from warpimpact.results.per_hit import place_of_standoff
-
-Array = NDArray[np.float64]
+from warpimpact.scene.model import Array
 
 KEPT_HITS = 4
 """Number of hit points per set and shot that are kept for the posterior and for the prediction."""
@@ -180,12 +179,7 @@ class Compared:
         )
 
     def _log_density(self, spread: Array, row: NDArray[np.int64]) -> Array:
-        """ln N(measured | about each point), shape [sets, points].
-
-        Args:
-            spread: shape [sets, observations].
-            row: as `of` in `score`.
-        """
+        """ln N(measured | about each point), shape [sets, points], for spreads of shape [sets, observations]."""
         points, numbers = self.missed.shape[1:]
         images = len(self.aim.group)
         scaled = self.changes[row] / spread[:, None, None]

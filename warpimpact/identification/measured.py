@@ -9,15 +9,13 @@ from difflib import get_close_matches
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from warpimpact.identification.parameters import FitError
 from warpimpact.records.outcomes import Outcomes
 from warpimpact.results import variables as v
 from warpimpact.results.measures import STATUSES
+from warpimpact.scene.model import Array
 from warpimpact.scene.units import Angle, Speed, quantity, quoted
-
-Array = NDArray[np.float64]
 
 KINDS = {"m s-1": ("velocity", Speed), "degree": ("angle", Angle)}
 """Kind of discrepancy and type of a number, by the units of its variable."""
@@ -96,7 +94,9 @@ def read_measured(given: Any, standoffs: Sequence[float], place: str) -> tuple[t
     status = None
     for name, value in given.items():
         if name == "status":
-            status = _status(value, f"{place}.status")
+            if not isinstance(value, str) or value not in STATUSES:
+                raise FitError(f"{place}.status: got {quoted(value)}, but it must be one of {', '.join(STATUSES)}")
+            status = value
             continue
         if name not in MEASURABLE:
             allowed = (*MEASURABLE, "status")
@@ -110,12 +110,6 @@ def read_measured(given: Any, standoffs: Sequence[float], place: str) -> tuple[t
             "plate has that number"
         )
     return tuple(observations), status
-
-
-def _status(value: Any, place: str) -> str:
-    if value not in STATUSES:
-        raise FitError(f"{place}: got {quoted(value)}, but it must be one of {', '.join(STATUSES)}")
-    return str(value)
 
 
 def _numbers(name: str, given: Any, standoffs: Sequence[float], place: str) -> list[Observation]:

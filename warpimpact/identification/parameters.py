@@ -75,17 +75,15 @@ def read_priors(prior: Mapping[str, Any], tables: Mapping[str, Any], name: str) 
     Raises:
         FitError: the message names the key.
     """
-    parameters: list[Parameter] = []
+    known = list[tuple[Path, str, Distribution]]()
     for path, given in _distributions(prior, (), name):
         place = f"{name}: prior.{dotted(path)}"
         read = _reader(path, tables, place)
-        parameters.append(Parameter(path, "", read.unit, read_distribution(read, given, place)))
-    names = [_short(parameter.path) for parameter in parameters]
-    full = ["_".join(map(str, parameter.path)) for parameter in parameters]
-    chosen = [short if names.count(short) == 1 else long for short, long in zip(names, full, strict=True)]
+        known.append((path, read.unit, read_distribution(read, given, place)))
+    names = [_short(path) for path, *_ in known]
     return [
-        Parameter(parameter.path, name, parameter.unit, parameter.prior)
-        for parameter, name in zip(parameters, chosen, strict=True)
+        Parameter(path, short if names.count(short) == 1 else "_".join(map(str, path)), unit, law)
+        for short, (path, unit, law) in zip(names, known, strict=True)
     ]
 
 

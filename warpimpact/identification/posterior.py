@@ -20,9 +20,8 @@ from warpimpact.results import attributes as attr
 from warpimpact.results import posterior_file
 from warpimpact.results.variables import HIT_Y, HIT_Z
 from warpimpact.scene.display import UNITS
+from warpimpact.scene.model import Array
 from warpimpact.statistics.importance import LARGEST_K, Weights, resampled
-
-Array = NDArray[np.float64]
 
 LARGEST_NOISE = 0.5
 """Largest standard error of ln L, over all shots, at which the hits count as integrated out."""
@@ -58,11 +57,7 @@ class Sampled:
 
 
 def to_datatree(fit: Fit, sampled: Sampled, made: Mapping[str, str]) -> xarray.DataTree:
-    """Gather a posterior, in the units of the Datasets.
-
-    Args:
-        made: versions and device.
-    """
+    """Gather a posterior, in the units of the Datasets."""
     rng = np.random.default_rng(np.random.SeedSequence(fit.sampling.seed, spawn_key=(2,)))
     which = resampled(sampled.weights.values, fit.sampling.draws, rng)
     kept = rng.integers(KEPT_HITS, size=len(which))
@@ -85,15 +80,9 @@ def to_datatree(fit: Fit, sampled: Sampled, made: Mapping[str, str]) -> xarray.D
         "observed_data": _observed(fit),
         "posterior_predictive": _computed(fit, sampled, which, kept),
     }
-    with_chain = {"posterior", "prior", "sample_stats", "log_likelihood", "posterior_predictive"}
-    groups = {
-        name: (
-            group.expand_dims(chain=[0]).assign_coords(draw=np.arange(group.sizes["draw"]))
-            if name in with_chain
-            else group
-        )
-        for name, group in groups.items()
-    }
+    for name, group in groups.items():
+        if "draw" in group.dims:
+            groups[name] = group.expand_dims(chain=[0]).assign_coords(draw=np.arange(group.sizes["draw"]))
     groups["sets"] = _parameters(fit, sampled.points, "set").assign(
         weight=("set", sampled.weights.values, {"long_name": "normalised importance weight"}),
         log_likelihood=(("set", "shot"), likelihood),

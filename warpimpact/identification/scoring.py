@@ -15,12 +15,11 @@ from warpimpact.identification.hit_places import HitPlace
 from warpimpact.identification.likelihood import Compared, Data, ShotScore
 from warpimpact.records.outcomes import Outcomes
 from warpimpact.scene import Scene, Shots
+from warpimpact.scene.model import Array
 from warpimpact.solver.columns import COLUMN_OF, UNITS_OF_EXPOSURE, Path, columns_of
 from warpimpact.solver.limit import Limits, limit_velocity
 from warpimpact.solver.many import side_by_side, simulate_many
 from warpimpact.solver.worker import Worker
-
-Array = NDArray[np.float64]
 
 SHOTS_AT_A_TIME = 2**15
 """Most shots of a computation, images not counted. Their outcomes take some ten megabytes."""
@@ -92,8 +91,8 @@ def _runs(fit: Fit, bench: Bench, points: Array, seed: int) -> Iterator[Run]:
         for column, parameter in enumerate(fit.parameters)
         if parameter.path[0] != "discrepancy" and parameter.path not in bench.shot.own
     }
-    columns = _as_columns(fit, by_path)
-    of_scene = {path: column for path, column in by_path.items() if path not in columns}
+    varying = _as_columns(fit, by_path)
+    of_scene = {path: column for path, column in by_path.items() if path not in varying}
     shifts = np.random.default_rng(np.random.SeedSequence(fit.sampling.seed, spawn_key=(4, seed))).random(
         (len(alike), 2)
     )
@@ -104,11 +103,11 @@ def _runs(fit: Fit, bench: Bench, points: Array, seed: int) -> Iterator[Run]:
         for first in range(0, len(rows), per_call):
             chosen = rows[first : first + per_call]
             targets = aim(bench.shot, scene.target.layers[0], scene.core, fit.sampling, shifts[chosen])
-            of_sets = columns_of(
-                {path: column[chosen] for path, column in by_path.items() if path not in own_scene},
-                scene.target.layers[0],
-            )
-            yield Run(alike[chosen], scene, targets, with_own(targets.computed, of_sets))
+            own = {path: column[chosen] for path, column in by_path.items() if path not in own_scene}
+            columns = columns_of(own, scene.target.layers[0])
+            each = len(targets.computed) // len(chosen)  # sets have equal numbers of shots, one set after the other
+            of_shots: dict[str, Any] = {name: np.repeat(column, each) for name, column in columns.items()}
+            yield Run(alike[chosen], scene, targets, replace(targets.computed, **of_shots))
 
 
 def _alike(points: Array) -> NDArray[np.int64]:
@@ -162,16 +161,6 @@ def _of_one_scene(of_scene: Mapping[Path, Array], count: int) -> Iterator[NDArra
         yield np.flatnonzero(which == scene_number)
 
 
-def with_own(shots: Shots, columns: Mapping[str, Array]) -> Shots:
-    """Give shots the quantities of their sets. All sets have the same number of shots, one set after the other.
-
-    Args:
-        columns: values by the name of the quantity, each of shape [sets].
-    """
-    of_shots: dict[str, Any] = {name: np.repeat(column, len(shots) // len(column)) for name, column in columns.items()}
-    return replace(shots, **of_shots)
-
-
 def data_of(fit: Fit, shot: MeasuredShot) -> Data:
     """The measurements of a shot, with the condition under which it was measured."""
     return Data(shot.observations, shot.status, fit.selection, fit.record.standoffs)
@@ -218,12 +207,7 @@ def evaluate(fit: Fit, points: Array, worker: Worker, *, seed: int) -> list[Shot
 def _scored(
     compared: Compared, which: NDArray[np.int64], scales: Mapping[str, Array], rng: np.random.Generator
 ) -> Iterator[tuple[NDArray[np.int64], ShotScore]]:
-    """Score the sets of a run in parts that fit into a cache; yield their indices and their score.
-
-    Args:
-        which: as in `Run`.
-        scales: standard deviations of all sets, by kind.
-    """
+    """Score the sets of a run in parts that fit into a cache; yield their indices and their score."""
     alike, at_a_time = which.shape[1], max(1, SCORED // compared.counts.shape[1])
     for first in range(0, which.size, at_a_time):
         chosen = which.reshape(-1)[first : first + at_a_time]

@@ -26,10 +26,10 @@ from warpimpact.optimisation.judged import (
 from warpimpact.optimisation.search import Searched
 from warpimpact.optimisation.searcher import front_of
 from warpimpact.runs.questions import Question
+from warpimpact.scene.model import Array
 from warpimpact.statistics.comparisons import ROUNDED
 from warpimpact.statistics.random_effects import positive_share
 
-Array = NDArray[np.float64]
 Part = TypeVar("Part")
 
 CONFIRM_FIDELITY = "standard"

@@ -10,8 +10,6 @@ from functools import lru_cache
 from pathlib import Path
 from typing import Annotated, Any
 
-import numpy as np
-from numpy.typing import NDArray
 from pydantic import Field, ValidationError, model_validator
 
 from warpimpact.campaign.alternatives import Alternative, alternatives
@@ -22,11 +20,10 @@ from warpimpact.optimisation.asked import Bound, Objective, check_needs
 from warpimpact.optimisation.space import Space, read_space
 from warpimpact.results.kinds import DESIGN
 from warpimpact.results.measures import Measure
-from warpimpact.scene.model import Model
+from warpimpact.scene.model import Array, Model
 from warpimpact.scene.problems import sentence
 from warpimpact.scene.units import Number, PositiveArealDensity, PositiveLength, Title
 
-Array = NDArray[np.float64]
 SCRAMBLINGS = 16
 """Number of scramblings of the hits of a search: hit k belongs to scrambling k modulo this number."""
 _TRIED = 64

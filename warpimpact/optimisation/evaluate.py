@@ -8,10 +8,9 @@ import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from itertools import count
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from warpimpact.campaign.campaign import Campaign
 from warpimpact.campaign.references import at_solid
@@ -25,8 +24,9 @@ from warpimpact.results.measures import Measure
 from warpimpact.results.table import HitTable
 from warpimpact.runs.executor import Job
 from warpimpact.runs.levels import aim_of
-from warpimpact.runs.questions import Arrays, Question, Round
+from warpimpact.runs.questions import Arrays, Question, Round, packed, unpacked
 from warpimpact.scene import Numerics, Scene, Shots
+from warpimpact.scene.model import Array
 from warpimpact.solver.limit import (
     HIGHEST_VELOCITY,
     THICKNESS_TOLERANCE,
@@ -40,8 +40,6 @@ from warpimpact.solver.many import side_by_side, simulate_many
 from warpimpact.solver.pilot import limits_pilot_size, pilot_size
 from warpimpact.solver.simulate import pilot_of
 from warpimpact.solver.worker import Worker
-
-Array = NDArray[np.float64]
 
 SAMPLER_HITS = 2**20
 """Number of hits, images counted, of the sampler of a search. Far fewer are computed."""
@@ -75,7 +73,8 @@ class HitJob:
     assumption: str = ""
 
 
-class Said(NamedTuple):
+@dataclass(frozen=True)
+class Said:
     """The numbers of the hits of a job.
 
     Attributes:
@@ -131,16 +130,10 @@ Told = Callable[[float, bool], object]
 """Called with the number of jobs done, fractions included, and with whether all of them come from the disk."""
 
 
-Share = Callable[[float], object]
-"""Called with the share that is done, by any thread."""
-
-
-def said_by(design: Design, jobs: Sequence[HitJob], worker: Worker, told: Share = lambda done: None) -> list[Said]:
-    """Compute jobs side by side. The result of a job does not depend on the other jobs.
-
-    Raises:
-        DeviceError: the device is absent.
-    """
+def _hits_computed(
+    design: Design, jobs: Sequence[HitJob], *, worker: Worker, report: Callable[[float], object]
+) -> Arrays:
+    """Compute jobs side by side, `packed`. The result of a job does not depend on the other jobs."""
     scenes = [_scene_of(design, job) for job in jobs]
     limits = [
         (number, row)
@@ -149,9 +142,7 @@ def said_by(design: Design, jobs: Sequence[HitJob], worker: Worker, told: Share 
         if key.is_limit and not (job.solid and key.layer)
     ]
     steps = 1 + len(limits)
-    outcomes, seconds = _marched(
-        [job.level for job in jobs], scenes, worker, lambda share: told(share * len(jobs) / steps)
-    )
+    outcomes, seconds = _marched([job.level for job in jobs], scenes, worker, lambda share: report(share / steps))
     said = []
     needed = {v.STATUS, v.STOPPED_IN, *(name for measure in design.keys for name in measure.quantity.of)}
     for outcome, (_, scene, shots) in zip(outcomes, scenes, strict=True):
@@ -165,12 +156,12 @@ def said_by(design: Design, jobs: Sequence[HitJob], worker: Worker, told: Share 
         number, row = limits[which]
         numerics = Numerics.model_validate_json(jobs[number].level)
         values = limits_said(*scenes[number], design.keys[row], numerics, share)
-        told((1 + next(ended)) * len(jobs) / steps)
+        report((1 + next(ended)) / steps)
         return values
 
     for (number, row), values in zip(limits, side_by_side(limit, len(limits), worker), strict=True):
         said[number].values[row] = values
-    return said
+    return packed(said)
 
 
 def _scene_of(design: Design, job: HitJob) -> tuple[Campaign, Scene, Shots]:
@@ -282,22 +273,7 @@ def hits_asked(design: Design, jobs: Sequence[HitJob], tell: Told) -> Question[l
         [_key(group) for group in groups],
         lambda now: tell(min(now.done * JOBS_TOGETHER, len(jobs)), now.resumed == len(groups)),
     )
-    return [
-        Said(arrays[f"values_{k}"], arrays[f"places_{k}"], arrays[f"draws_{k}"], float(arrays[f"seconds_{k}"]))
-        for group, arrays in zip(groups, results, strict=True)
-        for k in range(len(group))
-    ]
-
-
-def _hits_computed(
-    design: Design, jobs: Sequence[HitJob], *, worker: Worker, report: Callable[[float], object]
-) -> Arrays:
-    said = said_by(design, jobs, worker, lambda done: report(done / len(jobs)))
-    return {
-        f"{name}_{k}": np.asarray(part)
-        for k, hits_said in enumerate(said)
-        for name, part in hits_said._asdict().items()
-    }
+    return [said for arrays in results for said in unpacked(Said, arrays)]
 
 
 def levels_asked(design: Design, jobs: Sequence[HitJob], tell: Told) -> Question[list[str]]:

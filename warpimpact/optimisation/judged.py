@@ -14,19 +14,17 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from warpimpact.optimisation.asked import Bound, Objective
 from warpimpact.optimisation.design import SCRAMBLINGS, Design
 from warpimpact.results import attributes as attr
 from warpimpact.results.measures import Measure
 from warpimpact.scene import Target
+from warpimpact.scene.model import Array
 from warpimpact.statistics.comparisons import ROUNDED
 from warpimpact.statistics.intervals import Estimate, estimate_of
 from warpimpact.statistics.student import student_quantile
 from warpimpact.statistics.tails import pseudo_values, quantile_weights
-
-Array = NDArray[np.float64]
 
 DIFFERENCE_CONFIDENCE = 0.95
 

@@ -60,7 +60,6 @@ def optimise_to_file(
     Computed designs are on the disk at once, in `output`.parts.
 
     Args:
-        device: as in `run_to_file`.
         resume: continue what is in `output`.parts; for a complete search, write the missing campaigns.
         overwrite: replace an existing result with its campaigns, and begin anew in place of an unfinished search.
         tell: called with a sentence for each damaged part, which is computed again, and for each changed campaign,

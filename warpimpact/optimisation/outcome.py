@@ -9,7 +9,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from warpimpact.campaign.places import relocated
 from warpimpact.campaign.tested import summary_of_all
@@ -26,11 +25,10 @@ from warpimpact.results import front as f
 from warpimpact.results.dataset import dataset_of
 from warpimpact.results.files import OutputError, aside
 from warpimpact.runs.parts import remove
+from warpimpact.scene.model import Array
 
 if TYPE_CHECKING:
     import xarray
-
-Array = NDArray[np.float64]
 
 _LONGEST_ENDING = 80
 """Most bytes of a threat's name in a file name. File systems allow 255 in all."""
@@ -174,7 +172,12 @@ def check_campaigns(folder: Path, *, overwrite: bool) -> None:
 
 
 def write_campaigns(
-    design: Design, dataset: xarray.Dataset, folder: Path, *, overwrite: bool, tell: Tell = warnings.warn
+    design: Design,
+    dataset: xarray.Dataset,
+    folder: Path,
+    *,
+    overwrite: bool,
+    tell: Callable[[str], object] = warnings.warn,
 ) -> list[Path]:
     """Write a campaign file per design of the front, and per threat if there are several.
 
@@ -204,21 +207,12 @@ def write_campaigns(
     if texts:
         folder.mkdir(parents=True, exist_ok=True)
     for path, text in texts.items():
-        _write_campaign(path, text, tell if not overwrite else None)
-    return list(texts)
-
-
-Tell = Callable[[str], object]
-
-
-def _write_campaign(path: Path, text: str, tell: Tell | None) -> None:
-    """Write a campaign. If `tell` is given, an existing file with another content is kept and reported."""
-    if tell is not None and path.exists():
-        if not path.is_file() or path.read_bytes() != text.encode():
+        if overwrite or not path.exists():
+            with aside(path) as file:
+                file.write_text(text, encoding="utf-8")
+        elif not path.is_file() or path.read_bytes() != text.encode():
             tell(f"{path}: differs from the design of the front and is kept; --overwrite replaces it")
-        return
-    with aside(path) as file:
-        file.write_text(text, encoding="utf-8")
+    return list(texts)
 
 
 def endings(threats: Sequence[FacedThreat]) -> list[str]:

@@ -17,8 +17,7 @@ from warpimpact.optimisation.feasible import Checked, checked
 from warpimpact.optimisation.judged import DesignRecord, excesses, objectives, undecided, weights_of
 from warpimpact.optimisation.searcher import Searcher, front_of, hypervolume
 from warpimpact.runs.questions import Question
-
-Array = NDArray[np.float64]
+from warpimpact.scene.model import Array
 
 IDLE = 25
 """Generations without a new feasible design after which a search ends."""

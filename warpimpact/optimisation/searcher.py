@@ -15,8 +15,7 @@ from numpy.typing import NDArray
 
 from warpimpact.campaign.text import CampaignError
 from warpimpact.optimisation.space import Space
-
-Array = NDArray[np.float64]
+from warpimpact.scene.model import Array
 
 
 def check_installed() -> None:

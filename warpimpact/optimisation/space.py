@@ -10,13 +10,11 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from warpimpact.campaign.places import is_table, put, resolved
 from warpimpact.campaign.text import CampaignError
+from warpimpact.scene.model import Array
 from warpimpact.scene.units import LARGEST, float_of, quoted
-
-Array = NDArray[np.float64]
 
 MOST_VARIABLES = 64
 MOST_VALUES = 100_000

@@ -13,9 +13,8 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from warpimpact.campaign.alternatives import Alternative, alternatives
+from warpimpact.campaign.alternatives import alternatives
 from warpimpact.campaign.campaign import Campaign
 from warpimpact.records.outcomes import Outcomes
 from warpimpact.results import attributes as attr
@@ -51,7 +50,8 @@ def has_assumptions(campaign: Campaign) -> bool:
 
 
 def assumed(campaign: Campaign, numerics: Numerics, compute: Computed, *, limits: bool = False) -> HitTable:
-    """Hits under assumptions, with their attributes; an empty table for a campaign without alternatives.
+    """Hits under assumptions, with the number of each alternative by name, and the share of the cores that would break
+    by their strength; an empty table for a campaign without alternatives.
 
     Args:
         numerics: numerics of the run, which fix a resolution.
@@ -75,8 +75,20 @@ def assumed(campaign: Campaign, numerics: Numerics, compute: Computed, *, limits
         outcomes_of_one if alternative.turned else outcomes_of_one.unfolded(campaign.symmetries)
         for alternative, outcomes_of_one in zip(possible, compute(scenes), strict=True)
     ]
-    columns = _columns(possible, outcomes, hits_at(campaign, places))
-    attributes = _attributes(possible, outcomes) | {attr.ASSUMED_TIME: time.perf_counter() - begin}
+    moving, broken = dict[str, Outcomes](), dict[str, float]()
+    for alternative, outcome in zip(possible, outcomes, strict=True):
+        if alternative.breaks:
+            broken[alternative.name] = float(np.mean(outcome.broken))
+        else:
+            moving[alternative.name] = outcome
+    numbers, columns = hits_at(campaign, places), dict[str, Any]()
+    if moving:
+        which = np.repeat(np.arange(len(moving)), len(numbers))
+        columns = {v.ASSUMED_HIT: np.tile(numbers, len(moving)).astype(np.int32), v.ASSUMPTION: which.astype(np.int8)}
+        columns |= columns_beside(Outcomes.joined([*moving.values()]), v.ASSUMED_VARIABLES)
+    told = {attr.ASSUMPTIONS: {name: number for number, name in enumerate(moving)}, attr.WOULD_BREAK: broken}
+    attributes: dict[str, Any] = {name: json.dumps(value, ensure_ascii=False) for name, value in told.items() if value}
+    attributes[attr.ASSUMED_TIME] = time.perf_counter() - begin
     return assumed_table(columns, attributes, double=is_double(campaign))
 
 
@@ -90,24 +102,3 @@ def _groups(campaign: Campaign, numerics: Numerics, others: int, fewest: int) ->
         in_time = int(ASSUMED_SECONDS / (max(others, 1) * prepare(campaign.scene, first, numerics).seconds))
         hits = min(max(min(fewest, in_time), int(SHARE_OF_RUN * total)), MOST)
     return min(max(FEWEST_GROUPS, hits // group), total // group)
-
-
-def _columns(possible: list[Alternative], outcomes: list[Outcomes], numbers: NDArray[np.int64]) -> dict[str, Any]:
-    moving = [outcome for alternative, outcome in zip(possible, outcomes, strict=True) if not alternative.breaks]
-    if not moving:
-        return {}
-    which = np.repeat(np.arange(len(moving)), len(numbers))
-    told = {v.ASSUMED_HIT: np.tile(numbers, len(moving)).astype(np.int32), v.ASSUMPTION: which.astype(np.int8)}
-    return told | columns_beside(Outcomes.joined(moving), v.ASSUMED_VARIABLES)
-
-
-def _attributes(possible: list[Alternative], outcomes: list[Outcomes]) -> dict[str, Any]:
-    """Attributes: number of each alternative by name, and share of the cores that would break by their strength."""
-    names = [alternative.name for alternative in possible if not alternative.breaks]
-    broken = {
-        alternative.name: float(np.mean(outcome.broken))
-        for alternative, outcome in zip(possible, outcomes, strict=True)
-        if alternative.breaks
-    }
-    told = {attr.ASSUMPTIONS: {name: number for number, name in enumerate(names)}, attr.WOULD_BREAK: broken}
-    return {name: json.dumps(value, ensure_ascii=False) for name, value in told.items() if value}

@@ -23,11 +23,7 @@ Entered = TypeVar("Entered")
 
 @contextmanager
 def cluster(address: str, device: str = "auto") -> Iterator[Cluster]:
-    """The workers of a scheduler.
-
-    Args:
-        address: address of the scheduler.
-        device: device of every worker.
+    """The workers of a scheduler, each of which computes on a device of this name.
 
     Raises:
         ClusterError: Dask is not installed; the scheduler cannot be reached, is lost or has no worker for LONELY
@@ -68,11 +64,7 @@ def _ended(part: AbstractContextManager[Entered]) -> Iterator[Entered]:
 
 @contextmanager
 def _starting() -> Iterator[None]:
-    """Turn an error of a start of Dask into a ClusterError that names the settings.
-
-    Raises:
-        ClusterError: it is not installed, or does not start.
-    """
+    """Turn an error of a start of Dask into a ClusterError that names the settings."""
     try:
         yield
     except ClusterError:
@@ -142,10 +134,7 @@ def _made_by(*, worker: Worker, report: Callable[[Any], object]) -> dict[str, st
 
 
 def _on_worker(job: Job, device: str, kind: dict[str, str]) -> Any:
-    """Compute a job on a worker.
-
-    Args:
-        kind: `made_by` of the other workers; empty if no worker was asked before.
+    """Compute a job on a worker, of the `kind` of the other workers; this is empty if none was asked before.
 
     Raises:
         DeviceError: the worker computes other bits.

@@ -16,7 +16,7 @@ from warpimpact.results import variables as v
 from warpimpact.results.dataset import columns_beside, to_table
 from warpimpact.results.table import HitTable
 from warpimpact.runs.task import Task
-from warpimpact.scene import Accuracy, Burst, Impact, Numerics, Shots, Target
+from warpimpact.scene import Accuracy, Impact, Numerics, Shots, Target
 from warpimpact.scene.quantities import QUANTITIES
 from warpimpact.solver.device import find_device
 from warpimpact.solver.findings import Found
@@ -36,12 +36,10 @@ def described(
     """The columns of a task.
 
     Args:
-        task: with whole groups of images.
-        outcomes: outcomes of the first shot of every group.
-        numerics: numerics of the computation.
-        computed: its device, and its time [s].
+        outcomes: outcomes of the first shot of every group of images.
+        computed: the device, and the time [s].
         attributes: attributes of this kind of computation.
-        beside: columns of other shots, beside those that the pilot computed at a finer level.
+        beside: columns of other shots than those of the pilot.
     """
     resolution = resolve(campaign.scene, numerics, weakens(campaign.target, task.shots))
     told = _numerics(campaign.numerics, campaign.impact, campaign.target, resolution)
@@ -70,12 +68,8 @@ def described_as(
     *,
     double: bool,
 ) -> HitTable:
-    """The columns of shots of a campaign with the outcomes of all of them.
-
-    Args:
-        attributes: attributes that do not follow from the campaign alone.
-        beside, double: as in `to_table`.
-    """
+    """The columns of shots of a campaign with the outcomes of all of them, and attributes that do not follow from the
+    campaign alone."""
     return to_table(
         campaign.scene,
         shots,
@@ -145,7 +139,7 @@ def _campaign(campaign: Campaign) -> dict[str, Any]:
         attr.OPEN_AREA: campaign.plate.open_area,
         attr.AREAL_DENSITY: campaign.target.areal_density,
         attr.CORE: campaign.core.model_dump_json(),
-        attr.PLATE: _plate(campaign),
+        attr.PLATE: json.dumps(campaign.plate.model_dump(mode="json")),
         attr.IMPACT: _impact(campaign),
         attr.MATERIAL: _material(campaign),
         attr.FAILED_SHARE: campaign.output.failed_share,
@@ -158,8 +152,12 @@ def _campaign(campaign: Campaign) -> dict[str, Any]:
         solid = solid_target(campaign).add_on
         attributes[attr.SOLID_ADD_ON] = json.dumps([plate.model_dump(mode="json") for plate in solid])
     attributes |= {attr.LIGAMENT: ligament} if math.isfinite(ligament) else {}
-    attributes |= {} if campaign.drawn is None else {attr.DISCREPANCY: json.dumps(campaign.drawn.discrepancy)}
-    return attributes | ({} if campaign.burst is None else _burst(campaign.burst))
+    if campaign.drawn is not None:
+        attributes[attr.DISCREPANCY] = json.dumps(campaign.drawn.discrepancy)
+    if campaign.burst is not None:
+        attributes[attr.BURST] = campaign.burst.model_dump_json(exclude_none=True)
+        attributes[attr.SHOTS_AT_A_PLATE] = campaign.burst.count
+    return attributes
 
 
 def _impact(campaign: Campaign) -> str:
@@ -178,10 +176,6 @@ def _material(campaign: Campaign) -> str:
     return json.dumps(of_plate | law | of_surfaces)
 
 
-def _plate(campaign: Campaign) -> str:
-    return json.dumps(campaign.plate.model_dump(mode="json"))
-
-
 def _layers(campaign: Campaign) -> str:
     """The layers behind the plate as JSON: each by its number, with its scattered quantities."""
     layers = {str(k + 1): json.loads(layer.model_dump_json()) for k, layer in enumerate(campaign.layer)}
@@ -189,11 +183,6 @@ def _layers(campaign: Campaign) -> str:
         if k:
             layers[str(k)][name] = given.model_dump()
     return json.dumps(layers)
-
-
-def _burst(burst: Burst) -> dict[str, Any]:
-    """The burst as attributes: number of shots at a plate, and their places."""
-    return {attr.BURST: burst.model_dump_json(exclude_none=True), attr.SHOTS_AT_A_PLATE: burst.count}
 
 
 def _numerics(numerics: Numerics, impact: Impact, target: Target, resolution: Resolution) -> dict[str, Any]:

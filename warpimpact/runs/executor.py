@@ -161,15 +161,10 @@ class Threads:
 
 
 class Processes:
-    """Processes of this machine, which share its cores.
+    """Processes of this machine, which share its cores; arguments as in `choice.executor_for`.
 
-    If a process was killed or failed, the threads of this process compute its job or raise the error.
-
-    Args:
-        count: number of processes.
-        device: device of every process.
-        threads: threads of this process.
-        after: seconds that the threads compute before processes are started. A start takes some two seconds and 0.4 GB.
+    If a process was killed or failed, the threads of this process compute its job or raise the error. The threads
+    compute alone for `after` seconds: a start takes some two seconds and 0.4 GB.
     """
 
     is_remote = True

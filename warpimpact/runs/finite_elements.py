@@ -61,7 +61,6 @@ def continuum_to_file(
 
     Raises:
         ValueError: the continuum does not compute this campaign.
-        OutputError, Interrupted: as in `run_to_file`.
     """
     solver = campaign.continuum.solver
     content = manifest(campaign, device.made_by) | {

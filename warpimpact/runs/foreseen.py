@@ -22,14 +22,8 @@ class Costly(UserWarning):
 
 
 def cost_warning(campaign: Campaign, device: str, passages: int = 1) -> Callable[[Numerics], None]:
-    """Return a function that warns (`Costly`), once for each numerics, of hits or bursts that are slow on a CPU.
-
-    Args:
-        device: kind of the device.
-
-    Raises:
-        TooManySteps, MemoryError: (the function) as in `prepare`.
-    """
+    """Return a function that warns (`Costly`), once for each numerics, of hits or bursts that are slow on a CPU. It
+    raises what `prepare` does: TooManySteps, MemoryError."""
 
     @cache
     def warn(numerics: Numerics) -> None:
@@ -41,11 +35,7 @@ def cost_warning(campaign: Campaign, device: str, passages: int = 1) -> Callable
 
 def cost_of(campaign: Campaign, numerics: Numerics, passages: int = 1) -> str | None:
     """A sentence about the cost of hits on a CPU, with numerics that fix the resolution; None where it is low. An
-    unhindered first hit of the campaign stands for all.
-
-    Args:
-        passages: as in `Computation`.
-    """
+    unhindered first hit of the campaign stands for all."""
     sampler, images = campaign.sampler(), len(campaign.symmetries)
     shots = sampler.shots(0, images * campaign.at_a_plate)[::images]
     prepared = prepare(campaign.scene, shots, numerics)

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
 from warpimpact.campaign.campaign import Campaign
 from warpimpact.campaign.stop import Stop
@@ -16,11 +15,10 @@ from warpimpact.results.measures import Measure
 from warpimpact.results.table import HitTable
 from warpimpact.results.tallies import shift_of
 from warpimpact.scene import Shots
+from warpimpact.scene.model import Array
 from warpimpact.solver.findings import HitErrors
 from warpimpact.solver.pilot import Aim, Excess
 from warpimpact.statistics.shifts import SHIFT_MARGIN
-
-Array = NDArray[np.float64]
 
 OF_THE_NUMERICS = 0.5
 """Largest shift by the numerics, as a share of an interval's half width."""

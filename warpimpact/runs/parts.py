@@ -128,15 +128,12 @@ class Parts:
     """The parts of one computation, in a folder that is `claimed`.
 
     Args:
-        output: the result file.
         content: everything that determines the bits of the result.
         kind: the computation in messages: "run", "search" or "fit".
-        form: names of the parts.
         counted: returns words for a number of parts, for example "3 of 32 shards".
         tell: called with a sentence for each damaged part, which is computed again.
 
     Attributes:
-        folder: folder of the parts.
         saved: parts on the disk, by their numbers.
         fingerprint: short hash of the content.
     """
@@ -273,9 +270,6 @@ class Parts:
 
     def save(self, number: int, write: Callable[[Path], object]) -> None:
         """Put a part on the disk, whole or not at all, in place of an older part with this number.
-
-        Args:
-            write: writes the file at a path.
 
         Raises:
             OutputError: the part cannot be written.

@@ -34,13 +34,10 @@ def pilot_most(campaign: Campaign) -> int:
 
 
 def places_of(campaign: Campaign, most: int) -> NDArray[np.int64]:
-    """Numbers of groups of images, or bursts with their images, that stand for all of them.
+    """Numbers of at most so many groups of images, or bursts with their images, that stand for all of them.
 
     They depend on the campaign alone: the first ones of a Sobol or random sampling, or ones at even distances of a grid
     or list.
-
-    Args:
-        most: most groups.
     """
     groups = len(campaign.sampler()) // campaign.group
     count = min(most, groups)

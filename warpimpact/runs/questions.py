@@ -8,8 +8,8 @@ from __future__ import annotations
 
 from collections.abc import Callable, Generator, Sequence
 from contextlib import closing
-from dataclasses import dataclass
-from typing import Any, NamedTuple, TypeVar
+from dataclasses import dataclass, fields
+from typing import Any, NamedTuple, TypeVar, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -49,6 +49,20 @@ class Round:
     jobs: Sequence[Job]
     keys: Sequence[str]
     tell: Callable[[RoundProgress], object] = lambda now: None
+
+
+Part = TypeVar("Part")
+
+
+def packed(parts: Sequence[Any]) -> Arrays:
+    """Dataclasses of arrays and numbers as the result of a job."""
+    return {f"{name}_{k}": np.asarray(value) for k, part in enumerate(parts) for name, value in vars(part).items()}
+
+
+def unpacked(kind: type[Part], arrays: Arrays) -> list[Part]:
+    """The dataclasses of one kind that are `packed` in the result of a job."""
+    names = [field.name for field in fields(cast("Any", kind))]
+    return [kind(**{name: arrays[f"{name}_{k}"] for name in names}) for k in range(len(arrays) // len(names))]
 
 
 Question = Generator[Round, list[Arrays], Answer]

@@ -134,10 +134,7 @@ def _numerics(campaign: Campaign, result: xarray.Dataset) -> Numerics:
 
 
 def campaign_in(result: xarray.Dataset, folder: Path) -> Campaign:
-    """The campaign in a result.
-
-    Args:
-        folder: folder of the files that the campaign names, if it names any.
+    """The campaign in a result; the files that it names are in a folder.
 
     Raises:
         ResultError: the result has no campaign.

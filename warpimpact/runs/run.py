@@ -67,11 +67,7 @@ def run(
 def with_assumptions(
     dataset: xarray.Dataset, campaign: Campaign, *, device: str = "auto", cancel: Cancel | None = None
 ) -> xarray.Dataset:
-    """Add the hits under assumptions to a result whose campaign left them out, as `run` would compute them.
-
-    Args:
-        device, cancel: as in `run`.
-    """
+    """Add the hits under assumptions to a result whose campaign left them out, as `run` would compute them."""
     findings = HIT_MAP.found_in(dataset)
     with executor_for(device, cancel=cancel) as executor:
         table = result_of(executor, HIT_MAP.assumed, campaign, None if findings is None else findings.told)
@@ -93,20 +89,17 @@ def run_to_file(
     """Compute every hit of a campaign into a file. Computed hits are on the disk at once, in `output`.parts.
 
     Args:
-        campaign: the campaign, or its file.
         output: the netCDF file. It appears when it is complete.
-        device: as in `run`, or an executor.
-        progress: as in `run`.
+        campaign, device, progress: as in `run`; or an executor for the device.
         computation: what is computed of every hit.
         resume: continue what is in `output`.parts; begin if there is nothing.
         overwrite: replace an existing file, and begin anew in place of an unfinished run.
         tell: called with a sentence for each damaged part, which is computed again.
 
     Raises:
-        CampaignError: as in `run`.
         OutputError: a file cannot be written, must not be overwritten or belongs to another campaign, or another run is
             at work on it.
-        DeviceError: the device is absent.
+        CampaignError, DeviceError: as in `run`.
         Interrupted: the user interrupted the run; what is saved can be resumed.
     """
     campaign, output = _read(campaign), Path(output)

@@ -77,9 +77,6 @@ class ShardsOnDisk(Shards):
     Args:
         grows: whether the result file grows while shards come, so that little is left to do at the end. This needs a
             known number of shards.
-
-    Attributes:
-        parts: the folder with the shards.
     """
 
     def __init__(

@@ -23,12 +23,7 @@ from warpimpact.runs.parts import Form, Parts, claimed, telling
 
 def content_of(text: str, name: str, folder: Path, made_by: Mapping[str, str]) -> dict[str, Any]:
     """What determines every bit of a result: the tables of a design or fit file, the contents of the files that it
-    names, versions and kind of device.
-
-    Args:
-        name: name of the file in errors.
-        folder: folder from which file names in it count.
-    """
+    names, versions and kind of device. `name` is that of the file in errors; names in it count from `folder`."""
     tables = json.loads(json.dumps(parsed(text, name), default=str))
     named = {file: folder / file for file in files_in(tables)}
     return {**tables, "files": {file: digest(path) for file, path in named.items() if path.is_file()}, **made_by}
@@ -47,9 +42,6 @@ def stored(
     """The `Store` of a computation while it runs; None if its result is already complete. The store is emptied when the
     result is written. If the computation ends before, the store can be resumed.
 
-    Args:
-        content, kind, tell: as in `Parts`.
-
     Raises:
         OutputError: something there must be neither resumed nor overwritten, another computation is at work, or the
             disk is full; the message says what is saved.
@@ -66,12 +58,7 @@ def stored(
 
 
 class Store:
-    """Batches of one computation, in a folder that is `claimed`.
-
-    Args:
-        output: the file of the result.
-        content, kind, tell: as in `Parts`.
-    """
+    """Batches of one computation as `Parts`, in a folder that is `claimed`."""
 
     def __init__(
         self, output: Path, content: Mapping[str, Any], kind: str, tell: Callable[[str], object] = warnings.warn

@@ -41,14 +41,13 @@ class Watch:
         self._shards, self._stop = shards, campaign.stop
         tilts = [f"mean(tilt@{last * 1e3:.10g}mm)" for last in campaign.output.standoffs[-1:]]
         asked = [(Measure.parse(text), 0.95) for text in measures or ("mean(residual_velocity)", *tilts)]
-        self._looks = frozenset[int]()
         if campaign.stop is not None:
             asked.append((campaign.stop.measure, campaign.stop.confidence))
-            self._looks = frozenset(looks(campaign.hits.sampling, shards.count))
         self._tallies = [
             Tally(measure, replicates=campaign.replicates, images=campaign.group, confidence=confidence)
             for measure, confidence in asked
         ]
+        self._looks = {*looks(campaign.hits.sampling, shards.count)} if campaign.stop is not None else set[int]()
         self._shift: float | None = None
         self._early: set[int] = set()
         self._next, self._hits, self._time = 0, 0, 0.0

@@ -13,18 +13,22 @@ _MOST_TEXT, _MOST_DOTS, _MOST_DEEP = 2**20, 16, 16
 _BESIDE_A_KEY = re.compile("([#=\n,])")
 
 
+class NoTextError(ValueError):
+    """A file that is no text; the message is one sentence."""
+
+
 def read_text(path: Path) -> str:
     """The text of a file, cut after the length that `parsed` refuses.
 
     Raises:
-        ValueError: the file is missing or cannot be read.
+        ValueError: the file is missing or cannot be read; NoTextError if it is no text.
     """
     check_file(path)
     try:
         with path.open(encoding="utf-8") as file:
             return file.read(_MOST_TEXT + 1)
     except UnicodeDecodeError as error:
-        raise ValueError(f"{path}: is not valid TOML: {error}") from None
+        raise NoTextError(f"{path}: is not valid TOML: {error}") from None
     except OSError as error:
         raise ValueError(f"{path}: cannot be read ({error.strerror})") from None
 

@@ -8,7 +8,6 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 
 from warpimpact.campaign.campaign import Campaign
 from warpimpact.campaign.evidence import limit_velocity_factors
@@ -28,13 +27,13 @@ from warpimpact.runs.pilot_hits import pilot_shots
 from warpimpact.runs.shards import extent
 from warpimpact.runs.task import Report, Task
 from warpimpact.scene import Numerics, Scene, Shots, Target, exclusions
+from warpimpact.scene.model import Array
 from warpimpact.solver.findings import Found, LimitErrors
 from warpimpact.solver.limit import (
     HIGHEST_VELOCITY,
     PASSAGES,
     THICKNESS_TOLERANCE,
     VELOCITY_TOLERANCE,
-    Limits,
     Sought,
     check_arrests,
     limits,
@@ -49,8 +48,6 @@ from warpimpact.solver.worker import Worker
 
 if TYPE_CHECKING:
     from warpimpact.results.table import Result
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -142,7 +139,10 @@ class LimitMap:
             solid, of_solid = self._at_solid(campaign, task.solid, numerics, worker)
             attributes |= of_solid
             beside = solid | self._at_base_alone(campaign, task.solid, numerics, worker)
-        put = replace(task, shots=self._put(campaign, task.shots, searched, images))
+        tried = searched.shots.velocity
+        if sought.quantity == "thickness":
+            tried = searched.shots.own_of(campaign.target, "thickness", sought.layer)
+        put = replace(task, shots=sought.put(campaign.target, task.shots, np.repeat(tried, images)))
         outcomes, by = searched.recorded(sought.quantity), (worker.device, elapsed)
         return described(campaign, put, outcomes, short_steps(numerics), by, attributes, beside)
 
@@ -214,13 +214,6 @@ class LimitMap:
             attr.LIMIT_DENSITY: layer.areal_density / layer.thickness,
             attr.LIMIT_ELSEWHERE: target.areal_density - layer.areal_density,
         }
-
-    def _put(self, campaign: Campaign, shots: Shots, limits: Limits, images: int) -> Shots:
-        """Shots, with their images, as they just perforate."""
-        target, layer = campaign.target, self.sought.layer
-        of_velocity = self.sought.quantity == "velocity"
-        tried = limits.shots.velocity if of_velocity else limits.shots.own_of(target, "thickness", layer)
-        return self.sought.put(target, shots, np.repeat(tried, images))
 
 
 def warning_of(campaign: Campaign, quantity: str) -> str | None:

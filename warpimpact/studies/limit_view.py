@@ -188,9 +188,7 @@ def _of_solid(dataset: xarray.Dataset, reference: xarray.Dataset) -> str:
         limit += f", of {density:.4g} kg/m² as the target"
     hits = f"{hit_count} hit{'s' if hit_count > 1 else ''}"
     seconds = float(dataset.attrs[attr.SOLID_LIMIT_TIME])
-    whole = attr.LAYERS in dataset.attrs and attr.ADD_ON_DENSITY not in dataset.attrs
-    name = reference_name(dataset) + (" in place of the whole target" if whole else "")
-    return f"{name}: limit {quantity} {limit}; {hits} searched in {seconds:.2g} s"
+    return f"{reference_name(dataset)}: limit {quantity} {limit}; {hits} searched in {seconds:.2g} s"
 
 
 def _proxies(dataset: xarray.Dataset) -> list[Section]:

@@ -113,7 +113,6 @@ def read_sweep(path: str | Path, *, count: int | None = None) -> Sweep:
     "plate.pattern.width". A whole core, plate or pattern is swept by a list of tables, each with a `name`.
 
     Args:
-        path: the TOML file.
         count: number of hits of every point, instead of the file's.
 
     Raises:
@@ -182,17 +181,13 @@ def run_sweep(
     progress: Callable[[str], Any] | None = None,
     tell: Callable[[str], object] = warnings.warn,
 ) -> None:
-    """Compute every point of a sweep into a file of its own, and join them into one.
+    """Compute every point of a sweep by `run_to_file`, and join their files into one.
 
     Args:
         output: the file of the sweep; the results of the points go to the folder `folder_of(output)` and stay there.
-        device, tell: as in `run_to_file`.
         resume: keep complete points, and continue an incomplete one.
         overwrite: replace an existing file and its points.
         progress: returns the function that follows the point with a name.
-
-    Raises:
-        OutputError, DeviceError, Interrupted: as in `run_to_file`.
     """
     folder = folder_of(output)
     if not (resume or overwrite):
@@ -222,10 +217,7 @@ def joined(sweep: Sweep, points: Sequence[xarray.Dataset]) -> xarray.Dataset:
     """Results of all points as one Dataset.
 
     A variable has the dimensions of the swept inputs in front of its own if it differs from point to point. Outcomes
-    always have them. Hits that a point does not have are NaN.
-
-    Args:
-        points: results in the order of `sweep.campaigns`.
+    always have them. Hits that a point does not have are NaN. Points are in the order of `sweep.campaigns`.
     """
     every: dict[str, Any] = {v.HIT: np.arange(max(point.sizes["hit"] for point in points), dtype=np.int32)}
     for along in (v.STANDOFF, v.LAYER_STANDOFF):

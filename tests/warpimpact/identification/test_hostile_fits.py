@@ -28,6 +28,7 @@ CASES: dict[str, tuple[tuple[Any, ...], Any, str]] = {
         "is no number",
     ),
     "an impact": (("shot", 0, "impact"), [1, 2], "shot[0].impact: got [1, 2], but it must be a table"),
+    "a status": (("shot", 0, "measured"), {"status": ["perforated"]}, "shot[0].measured.status: got ["),
     "a plate of a shot": (("shot", 0, "plate"), 7, "shot[0].plate: got 7, but it must be a table"),
     "a core": (("core",), 5, "core: got 5, but it must be a table"),
     "numerics": (("numerics",), "fine", 'numerics: got "fine", but it must be a table'),

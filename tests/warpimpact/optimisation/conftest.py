@@ -9,11 +9,7 @@ from warpimpact.optimisation.design import Design, design_from
 
 CORE = """
 title = "a plate"
-[core]
-shape = "polynomial"
-coefficients = [3.0e-4, 0.24, -5.29]
-length = "27.86 mm"
-mass = "4 g"
+core = { shape = "polynomial", coefficients = [3.0e-4, 0.24, -5.29], length = "27.86 mm", mass = "4 g" }
 [impact]
 velocity = "825 m/s"
 [numerics]

@@ -117,16 +117,6 @@ def test_workers_that_do_not_end_in_time_hide_no_interrupt(cluster: object, monk
         raise KeyboardInterrupt
 
 
-def test_the_command_starts_workers_and_a_local_run_resumes_them(
-    campaign: Campaign, tmp_path: Path, assert_same_bits: Callable[[Path, Path], None]
-) -> None:
-    path, output, local = tmp_path / "campaign.toml", tmp_path / "a.nc", tmp_path / "local.nc"
-    path.write_text(campaign.text.replace("count = 3000", "count = 400"), encoding="utf-8")
-    assert main(["run", str(path), "-o", str(output), "--device", "cpu", "--workers", "1"]) == 0
-    assert main(["run", str(path), "-o", str(local), "--device", "cpu"]) == 0
-    assert_same_bits(output, local)
-
-
 def test_limits_on_workers_are_those_of_a_local_search(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, assert_same_bits: Callable[[Path, Path], None]
 ) -> None:

@@ -20,20 +20,11 @@ from warpimpact.runs.finite_elements import continuum_to_file
 
 CAMPAIGN = """
 title = "slots"
-[core]
-shape = "polynomial"
-coefficients = [3.0e-4, 0.24, -5.29]
-length = "27.86 mm"
-mass = "4 g"
+core = { shape = "polynomial", coefficients = [3.0e-4, 0.24, -5.29], length = "27.86 mm", mass = "4 g" }
 [plate]
 thickness = "4 mm"
 resistance = "2600 MPa"
-[plate.pattern]
-shape = "slot"
-length = "12 mm"
-width = "4 mm"
-spacing = ["8 mm", "16 mm"]
-staggered = true
+pattern = { shape = "slot", length = "12 mm", width = "4 mm", spacing = ["8 mm", "16 mm"], staggered = true }
 [impact]
 velocity = "825 m/s"
 [hits]

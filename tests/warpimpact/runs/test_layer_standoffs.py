@@ -20,11 +20,7 @@ from warpimpact.runs.replay import replay
 
 CAMPAIGN = """
 title = "two layers"
-[core]
-shape = "polynomial"
-coefficients = [3.0e-4, 0.24, -5.29]
-length = "27.86 mm"
-mass = "4 g"
+core = { shape = "polynomial", coefficients = [3.0e-4, 0.24, -5.29], length = "27.86 mm", mass = "4 g" }
 [plate]
 thickness = "4 mm"
 resistance = "2600 MPa"

@@ -23,12 +23,7 @@ from warpimpact.runs.store import Store
 
 TARGET = """
 title = "small"
-[core]
-shape = "ogive"
-diameter = "6 mm"
-crh = 3.0
-length = "27 mm"
-mass = "4 g"
+core = { shape = "ogive", diameter = "6 mm", crh = 3.0, length = "27 mm", mass = "4 g" }
 [impact]
 velocity = "825 m/s"
 [numerics]

@@ -340,56 +340,6 @@ def test_shards_that_lie_are_computed_again_and_told(
     assert not folder_of(output).exists()
 
 
-def test_a_shard_of_another_campaign_is_computed_again(
-    broken_off: Path, campaign: Campaign, tmp_path: Path, finished: Callable[..., None]
-) -> None:
-    slower = campaign.model_copy(update={"impact": campaign.impact.model_copy(update={"velocity": 500.0})})
-    other = tmp_path / "other.nc"
-    with pytest.raises(Interrupted):
-        run_to_file(slower, other, device="cpu", progress=stopped_after(2, KeyboardInterrupt()))
-    mine, foreign = _shards(broken_off)[0], _shards(other)[0]
-    mine.unlink()
-    shutil.copy(foreign, mine.with_name(foreign.name))
-    with pytest.warns(UserWarning, match="computed again"):
-        finished(broken_off)
-
-
-def _folder_as_manifest(manifest: Path) -> None:
-    manifest.unlink()
-    manifest.mkdir()
-
-
-def _flipped_manifest(manifest: Path) -> None:
-    text = manifest.read_text(encoding="utf-8")
-    assert "0.8" in text
-    manifest.write_text(text.replace("0.8", "0.9"), encoding="utf-8")
-
-
-@pytest.mark.parametrize(
-    "harm",
-    [
-        lambda manifest: manifest.write_text("[]"),
-        lambda manifest: manifest.write_text("{}"),
-        lambda manifest: manifest.write_text("7"),
-        lambda manifest: manifest.write_text("[" * 100_000),
-        lambda manifest: manifest.write_bytes(b"\xff\x00junk"),
-        _folder_as_manifest,
-        _flipped_manifest,
-    ],
-    ids=["list", "empty", "number", "deep", "junk", "folder", "flipped"],
-)
-def test_a_damaged_manifest_is_written_again_and_told(
-    harm: Callable[[Path], object], broken_off: Path, campaign: Campaign, finished: Callable[..., None]
-) -> None:
-    harm(folder_of(broken_off) / "manifest.json")
-    with pytest.raises(OutputError, match="contains an unfinished run"):
-        run_to_file(campaign, broken_off, device="cpu")
-    standings: list[RunProgress] = []
-    with pytest.warns(UserWarning, match=r"manifest.json: is missing or damaged; it is written again"):
-        finished(broken_off, progress=standings.append)
-    assert standings[0].resumed >= 256  # a shard tells itself which campaign it is of
-
-
 def test_a_shard_that_is_damaged_during_the_run_ends_it_in_a_sentence(
     campaign: Campaign, tmp_path: Path, finished: Callable[..., None]
 ) -> None:

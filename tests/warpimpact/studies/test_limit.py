@@ -127,20 +127,16 @@ def test_a_limit_beyond_reach_makes_a_quantile_infinite_and_no_mean(result: xarr
     limit_figure(beyond)
 
 
-class StopsAfter:
-    def __init__(self, hits: int) -> None:
-        self.hits = hits
-
-    def __call__(self, standing: RunProgress) -> None:
-        if standing.saved >= self.hits:
-            raise KeyboardInterrupt
-
-
 def test_another_quantity_is_not_resumed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("warpimpact.runs.shards.FEWEST", 16)
     text = TEXT.replace(PROMISED, GIVEN)
+
+    def stop(standing: RunProgress) -> None:
+        if standing.saved >= 16:
+            raise KeyboardInterrupt
+
     with pytest.raises(Interrupted):
-        search(campaign(text), tmp_path / "broken.nc", progress=StopsAfter(16))
+        search(campaign(text), tmp_path / "broken.nc", progress=stop)
     with pytest.raises(OSError, match=r"limit was .*velocity.* and is .*thickness"):
         search(campaign(text), tmp_path / "broken.nc", resume=True, quantity="thickness")
 
