@@ -164,12 +164,12 @@ def protect(
     if directions.velocity is not None:
         impact = campaign.impact.model_copy(update={"velocity": directions.velocity})
         campaign = campaign.model_copy(update={"impact": impact})
-    cells = [(row, column) for row in range(len(directions.azimuth)) for column in range(len(directions.elevation))]
-    passed: dict[tuple[int, int], Array] = {cell: np.empty(0) for cell in cells}
+    cells = [(azimuth, elevation) for azimuth in directions.azimuth for elevation in directions.elevation]
+    passed: dict[tuple[float, float], Array] = dict.fromkeys(cells, np.empty(0))
     hits = campaign.hits.model_copy(update={"count": directions.max_count})
     sampler = campaign.model_copy(update={"hits": hits}).sampler()
     first = sampler.shots(0, directions.first_count)
-    every = Shots.joined([toward(first, directions, cell) for cell in cells])
+    every = Shots.joined([toward(first, *cell) for cell in cells])
     (piloted,) = yield Round([Job(_piloted, (campaign, every))], ["pilot"])
     numerics = str(piloted["numerics"])
     open_, count = list(cells), directions.first_count
@@ -181,8 +181,8 @@ def protect(
 
         more = sampler.shots(known, count - known)
         results = yield Round(
-            [Job(_answers, (campaign.scene, toward(more, directions, cell), numerics)) for cell in open_],
-            [f"{directions.azimuth[row]} {directions.elevation[column]} up to {count}" for row, column in open_],
+            [Job(_answers, (campaign.scene, toward(more, *cell), numerics)) for cell in open_],
+            [f"{azimuth} {elevation} up to {count}" for azimuth, elevation in open_],
             told,
         )
         for cell, answers in zip(open_, results, strict=True):
@@ -199,7 +199,7 @@ def _under_assumptions(
     sector: Sector,
     first: Shots,
     numerics: str,
-    passed: dict[tuple[int, int], Array],
+    passed: dict[tuple[float, float], Array],
 ) -> Question[Sector]:
     """The mean over directions under each assumption, from some of the hits. The number of hits in a direction is
     proportional to its weight, so their plain mean is the weighted one.
@@ -214,9 +214,7 @@ def _under_assumptions(
     edges = np.cumsum(directions.weights().ravel())
     which = np.minimum(np.searchsorted(edges, (np.arange(count) + 0.5) / count), len(edges) - 1)
     numbers, cells = np.arange(count) % len(first), list(passed)
-    shots = Shots.joined(
-        [toward(first[numbers[which == place]], directions, cells[place]) for place in np.unique(which)]
-    )
+    shots = Shots.joined([toward(first[numbers[which == place]], *cells[place]) for place in np.unique(which)])
     given = np.concatenate([passed[cells[place]][numbers[which == place]] for place in np.unique(which)])
     possible = [
         candidate for candidate in alternatives(campaign) if candidate.moves_limits and candidate.is_possible(shots)
@@ -247,9 +245,8 @@ def _answers(scene: Scene, shots: Shots, numerics: str, *, worker: Worker, repor
     return {"passed": np.where(failures(status), np.nan, answers)}
 
 
-def toward(shots: Shots, directions: Directions, cell: tuple[int, int]) -> Shots:
-    """Shots that come from a direction."""
-    azimuth, elevation = directions.azimuth[cell[0]], directions.elevation[cell[1]]
+def toward(shots: Shots, azimuth: float, elevation: float) -> Shots:
+    """Shots that come from a direction [rad]."""
     ones = np.ones(len(shots))
     return replace(
         shots, obliquity=obliquity(azimuth, elevation) * ones, azimuth=impact_azimuth(azimuth, elevation) * ones
@@ -270,7 +267,7 @@ def _estimate(campaign: Campaign, passed: Array) -> Estimate:
     return estimate_of("share", passed, replicates=campaign.replicates)
 
 
-def _sector(campaign: Campaign, directions: Directions, passed: dict[tuple[int, int], Array]) -> Sector:
+def _sector(campaign: Campaign, directions: Directions, passed: dict[tuple[float, float], Array]) -> Sector:
     shape = len(directions.azimuth), len(directions.elevation)
     estimates = [_estimate(campaign, answers) for answers in passed.values()]
     share, low, high = (

@@ -176,22 +176,18 @@ def _shot(
     limits = [observation.value for observation in observations if observation.is_limit]
     if limits:  # the search of limits begins at these values
         impact.setdefault("velocity", limits[0])
+    # The known values of the plate's material; a prior overrides them.
+    resolved = with_materials(_merged(tables, given.tables) | {"impact": impact}, catalogue, place)
     return MeasuredShot(
         name=given.name or place.partition(": ")[2],
         hit=given.hit,
         impact=_model(Impact, impact, f"{place}.impact"),
         scatter=_model(Scatter, scattered, f"{place}.impact"),
-        tables=_with_material(_merged(tables, given.tables), impact, catalogue, place),
+        tables={name: resolved[name] for name in given.tables},
         own=frozenset(parameter.path for parameter in parameters if _gives(given.tables, parameter.path)),
         observations=observations,
         status=status,
     )
-
-
-def _with_material(tables: _Table, impact: _Table, catalogue: Catalogue, place: str) -> _Table:
-    """Tables with the known values of the plate's material. A prior overrides them."""
-    resolved = with_materials(tables | {"impact": impact}, catalogue, place)
-    return {name: table for name, table in resolved.items() if name in tables}
 
 
 def _merged(tables: Any, of_shot: Any) -> Any:

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import xarray
 
+from warpimpact.campaign.toml import toml_text
 from warpimpact.catalogue.entries import Weakening
 from warpimpact.identification.fit_file import fit_from
 from warpimpact.identification.parameters import FitError
@@ -60,15 +61,11 @@ def material_entry(path: Path) -> str:
     }
     weakening = plate.model_dump(include=set(Weakening.model_fields), exclude_none=True)
     words = _found(tree, len(fit.shots), {place[-1]: of for place, of in quantiles.items() if place[0] == "plate"})
-    tables = {
-        "weakening": weakening if plate.degradation < 1.0 else {},
-        "found": {title: words},
-        "assumed": {"resistance": "of this plate and this core; no other thickness was fitted"},
-    }
-    lines = ["[[material]]", *_lines(entry)]
-    for name, table in tables.items():
-        lines += ["", f"[material.{name}]", *_lines(table)] if table else []
-    return "\n".join(lines) + "\n"
+    tables = {"weakening": weakening} if plate.degradation < 1.0 else {}
+    tables["found"] = {title: words}
+    tables["assumed"] = {"resistance": "of this plate and this core; no other thickness was fitted"}
+    below = [f"\n[material.{name}]\n{toml_text(table)}" for name, table in tables.items()]
+    return toml_text({"material": [entry]}) + "".join(below)
 
 
 def _quantiles(tree: xarray.DataTree) -> dict[tuple[Any, ...], tuple[float, float, float]]:
@@ -104,15 +101,3 @@ def _found(tree: xarray.DataTree, shots: int, quantiles: dict[Any, tuple[float, 
     return (
         f"{shots} shots; 90 %: {', '.join(intervals)}; missed (rms): {', '.join(residuals) or 'no number'}{converged}"
     )
-
-
-def _lines(table: dict[str, Any]) -> list[str]:
-    """Keys and values in TOML; a string of JSON is one of TOML, too."""
-    return [
-        f"{key if key.isidentifier() and key.isascii() else _quoted(key)} = {_quoted(value)}"
-        for key, value in table.items()
-    ]
-
-
-def _quoted(value: Any) -> str:
-    return json.dumps(value, ensure_ascii=False)

@@ -91,7 +91,8 @@ def _runs(fit: Fit, bench: Bench, points: Array, seed: int) -> Iterator[Run]:
         for column, parameter in enumerate(fit.parameters)
         if parameter.path[0] != "discrepancy" and parameter.path not in bench.shot.own
     }
-    varying = _as_columns(fit, by_path)
+    # The literal scheme counts steps, so its interval may not differ from shot to shot.
+    varying = {*COLUMN_OF} if fit.numerics.scheme == "nodal" else {*COLUMN_OF, *UNITS_OF_EXPOSURE}
     of_scene = {path: column for path, column in by_path.items() if path not in varying}
     shifts = np.random.default_rng(np.random.SeedSequence(fit.sampling.seed, spawn_key=(4, seed))).random(
         (len(alike), 2)
@@ -142,12 +143,6 @@ def _outcomes(fit: Fit, bench: Bench, runs: Sequence[Run], worker: Worker) -> li
             for result, limit in zip(outcomes or [limit.outcomes for limit in limits], limits, strict=True)
         ]
     return outcomes
-
-
-def _as_columns(fit: Fit, columns: Mapping[Path, Array]) -> dict[Path, Array]:
-    """Parameters that may differ from shot to shot. The literal scheme counts steps, so its interval may not."""
-    nodal = fit.numerics.scheme == "nodal"
-    return {path: columns[path] for path in columns if path in COLUMN_OF or (path in UNITS_OF_EXPOSURE and not nodal)}
 
 
 def _of_one_scene(of_scene: Mapping[Path, Array], count: int) -> Iterator[NDArray[np.int64]]:

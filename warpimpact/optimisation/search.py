@@ -229,7 +229,7 @@ class _State:
         jobs, count = [], self.design.search.most_hits
         for record, place in zip(records, places, strict=True):
             for threat in range(len(self.design.threats)):
-                if not any(of == threat and _near(place, centre) for centre, of in centres):
+                if not any(of == threat and _apart(place, centre) <= NEIGHBOURHOOD for centre, of in centres):
                     centres.append((place, threat))
                     jobs.append(HitJob(record.tables, threat, 0, count, SEARCH_FIDELITY, self.design.search.seed))
         tell = lambda done, _: self.tell(f"{done:.0f} of {len(jobs)} pilots")  # noqa: E731
@@ -334,7 +334,3 @@ class _State:
 
 def _apart(place: Array, other: Array) -> float:
     return float(np.abs(place - other).max(initial=0.0))
-
-
-def _near(place: Array, other: Array) -> bool:
-    return _apart(place, other) <= NEIGHBOURHOOD

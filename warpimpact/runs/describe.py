@@ -127,7 +127,9 @@ def made_by(device: str) -> dict[str, str]:
 
 
 def _campaign(campaign: Campaign) -> dict[str, Any]:
-    ligament = campaign.plate.ligament
+    ligament, scatter = campaign.plate.ligament, campaign.scatter.given.items()
+    # Impact quantities with their value or distribution, and the distribution of the core's mass.
+    scattered = {name: law.model_dump() for (name, _), law in scatter if not QUANTITIES[name].by_layer}
     attributes = {
         attr.TITLE: campaign.title,
         attr.HISTORY: attr.history_line("run"),
@@ -140,7 +142,7 @@ def _campaign(campaign: Campaign) -> dict[str, Any]:
         attr.AREAL_DENSITY: campaign.target.areal_density,
         attr.CORE: campaign.core.model_dump_json(),
         attr.PLATE: json.dumps(campaign.plate.model_dump(mode="json")),
-        attr.IMPACT: _impact(campaign),
+        attr.IMPACT: json.dumps(dict(campaign.impact) | scattered),
         attr.MATERIAL: _material(campaign),
         attr.FAILED_SHARE: campaign.output.failed_share,
     }
@@ -158,13 +160,6 @@ def _campaign(campaign: Campaign) -> dict[str, Any]:
         attributes[attr.BURST] = campaign.burst.model_dump_json(exclude_none=True)
         attributes[attr.SHOTS_AT_A_PLATE] = campaign.burst.count
     return attributes
-
-
-def _impact(campaign: Campaign) -> str:
-    """Impact quantities as JSON, each with its value or its distribution, and the distribution of the core's mass."""
-    scatter = campaign.scatter.given.items()
-    given = {name: law.model_dump() for (name, _), law in scatter if not QUANTITIES[name].by_layer}
-    return json.dumps(dict(campaign.impact) | given)
 
 
 def _material(campaign: Campaign) -> str:

@@ -49,14 +49,11 @@ def cost_of(campaign: Campaign, numerics: Numerics, passages: int = 1) -> str | 
             if before >= SLOW_BEFORE
             else None
         )
+    total = seconds * hits
+    time = f"{total:.2g} s" if total < 120.0 else f"{total / 3600.0:.2g} h"
     return (
-        f"{level}a hit takes about {seconds:.2g} s of a core, and {hits} hits {_long(seconds * hits)}: at "
+        f"{level}a hit takes about {seconds:.2g} s of a core, and {hits} hits {time}: at "
         f"least {prepared.steps} steps, and windows of {prepared.window_nodes:.2g} nodes, "
         f"{prepared.window_bytes / 2**30:.2g} GiB; a lower level, and a longer degradation_length or "
         "degradation_depth, take less"
     )
-
-
-def _long(seconds: float) -> str:
-    """A time in the unit that suits it."""
-    return f"{seconds:.2g} s" if seconds < 120.0 else f"{seconds / 3600.0:.2g} h"

@@ -201,14 +201,9 @@ def run_sweep(
     paths = [folder / f"{name}.nc" for name in sweep.campaigns]
     with opened(device) as computing:
         for (name, campaign), path in zip(sweep.campaigns.items(), paths, strict=True):
+            follow = progress(name) if progress else None
             run_to_file(
-                campaign,
-                path,
-                device=computing,
-                resume=resume,
-                overwrite=overwrite,
-                progress=progress(name) if progress else None,
-                tell=tell,
+                campaign, path, device=computing, resume=resume, overwrite=overwrite, progress=follow, tell=tell
             )
     files.write(joined(sweep, [files.read(path) for path in paths]), output)
 
@@ -236,7 +231,8 @@ def joined(sweep: Sweep, points: Sequence[xarray.Dataset]) -> xarray.Dataset:
         if len(columns) < len(same) or len({column.shape for column in columns}) > 1:
             continue
         into = coordinates if name in first.coords else data
-        if str(name) not in outcomes and all(_equal(array, column) for column in columns):
+        alike = (np.array_equal(array, column, equal_nan=array.dtype.kind == "f") for column in columns)
+        if str(name) not in outcomes and all(alike):
             into[str(name)] = array
         else:
             stacked = np.stack([column.values for column in columns]).reshape(sweep.shape + array.shape)
@@ -248,10 +244,6 @@ def _with(every: Mapping[str, Any], point: xarray.Dataset) -> xarray.Dataset:
     """A point with these values along its dimensions where they differ."""
     other = {name: values for name, values in every.items() if not np.array_equal(point[name].values, values)}
     return point.reindex(other) if other else point
-
-
-def _equal(value: xarray.Variable, other: xarray.Variable) -> bool:
-    return np.array_equal(value.values, other.values, equal_nan=value.dtype.kind == "f")
 
 
 def _coordinate(swept: Input, sweep: Sweep) -> tuple[Any, ...]:
