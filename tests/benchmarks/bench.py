@@ -91,6 +91,13 @@ def tilt_behind(
     return np.arctan2(np.linalg.norm(np.cross(then, flight), axis=1), (then * flight).sum(axis=1))
 
 
+def spent(work: Callable[[], Any]) -> tuple[Any, float]:
+    """What a call gives, and its processor time [s]."""
+    begin = time.process_time()
+    found = work()
+    return found, time.process_time() - begin
+
+
 def seconds(work: Callable[[], Any]) -> float:
     """How long one call takes [s]."""
     begin = time.perf_counter()

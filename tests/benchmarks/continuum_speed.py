@@ -5,16 +5,15 @@ python tests/benchmarks/continuum_speed.py          # writes results/continuum_s
 
 from __future__ import annotations
 
-import time
 from functools import partial
 from statistics import median
 from typing import Any
 
 import numpy as np
-from bench import cores, machine, store
+from bench import cores, machine, seconds, spent, store
 from continuum_cases import CASES
 
-from warpimpact import Continuum, Numerics, Shots, simulate
+from warpimpact import Continuum, Numerics, simulate
 from warpimpact.catalogue.flow_entries import flow_entry
 from warpimpact.continuum.meeting import march_of
 from warpimpact.continuum.strikes import memory_of
@@ -33,16 +32,15 @@ def main() -> None:
     for _ in range(ROUNDS):
         march = march_of(CASE.scene, shots[:1], 0, continuum, conditions)
         elements = sum(int(sheet.alive.sum()) for sheet in march.hit.sheets)
-        begin = time.process_time()
-        steps = int(march.ended().flight["steps"])
-        times.append(time.process_time() - begin)
+        ended, took = spent(march.ended)
+        steps = int(ended.flight["steps"])
+        times.append(took)
     fast = partial(simulate, CASE.scene, numerics=Numerics(level=LEVEL), device="cpu", threads=1)
     fast(shots[:1])
-    begin = time.process_time()
-    fast(shots)
-    per_fast = (time.process_time() - begin) / FAST_HITS
+    per_fast = spent(lambda: fast(shots))[1] / FAST_HITS
     together = 2 * cores()
-    walls = [wall_time(continuum, shots[np.zeros(together, dtype=int)], threads) for threads in (1, cores())]
+    same = partial(simulate, CASE.scene, shots[np.zeros(together, dtype=int)], numerics=continuum)
+    walls = [seconds(partial(same, threads=threads)) for threads in (1, cores())]
     values: dict[str, Any] = {
         "machine": machine(),
         "rounds": ROUNDS,
@@ -59,13 +57,6 @@ def main() -> None:
     }
     print(values)
     store("continuum_speed", values)
-
-
-def wall_time(continuum: Continuum, shots: Shots, threads: int) -> float:
-    """Of some hits by some threads [s]."""
-    begin = time.perf_counter()
-    simulate(CASE.scene, shots, numerics=continuum, threads=threads)
-    return time.perf_counter() - begin
 
 
 if __name__ == "__main__":

@@ -14,15 +14,14 @@ from __future__ import annotations
 import multiprocessing
 import os
 import time
-from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
 import numpy as np
-from bench import CHECKOUT, machine, store
-from many import with_lengths
+from bench import CHECKOUT, machine, spent, store
+from many import seconds, with_lengths
 from roads import (
     BY_PATH,
     NORMAL,
@@ -45,9 +44,7 @@ from warpimpact.results.files import read_tree
 from warpimpact.runs.choice import executor_for
 from warpimpact.solver.device import cores
 from warpimpact.solver.limit import limits, pilot_of_limits
-from warpimpact.solver.many import simulate_many
 from warpimpact.solver.pilot import limits_pilot_size
-from warpimpact.solver.tile import forget_tiles
 from warpimpact.solver.worker import Worker
 from warpimpact.studies.limit import LimitMap
 
@@ -61,13 +58,6 @@ SLOTTED_HITS, HITS, EACH, ROUNDS = 256, 64, 64, 3
 DRAWS, LEVEL = 64, Numerics(level=2)
 
 
-def spent(work: Callable[[], Any]) -> tuple[Any, float]:
-    """What a call gives, and its processor time [s]."""
-    begin = time.process_time()
-    found = work()
-    return found, time.process_time() - begin
-
-
 def limit(text: str, slotted: float) -> dict[str, Any]:
     """A search of the limit velocities of some hits of a campaign, beside processor time per hit [s]."""
     campaign = campaign_of(text)
@@ -75,12 +65,12 @@ def limit(text: str, slotted: float) -> dict[str, Any]:
     some = shots[: limits_pilot_size(campaign.numerics.asked)]
     pilot_of_limits(campaign.scene, some[:1], sought, campaign.numerics, ONE)  # builds the kernels
     found, pilot = spent(lambda: pilot_of_limits(campaign.scene, some, sought, campaign.numerics, ONE))
-    searched, seconds = spent(lambda: limits(campaign.scene, shots, sought, found.numerics, ONE))
-    whole = seconds / HITS + pilot / RUN
+    searched, took = spent(lambda: limits(campaign.scene, shots, sought, found.numerics, ONE))
+    whole = took / HITS + pilot / RUN
     return {
         "ratio": whole / slotted,
         "runs": float(searched.runs.mean()),
-        "microseconds_per_hit": 1e6 * seconds / HITS,
+        "microseconds_per_hit": 1e6 * took / HITS,
         "level": found.numerics.level,
         "kept": found.kept,
         "pilot_share": pilot / RUN / whole,
@@ -111,9 +101,8 @@ def draws() -> dict[str, Any]:
     times: dict[str, list[float]] = {name: [] for name in kinds}
     for number in range(ROUNDS + 1):  # the first one builds the kernels
         for name, scenes in kinds.items():
-            forget_tiles()
-            _, seconds = spent(lambda scenes=scenes: simulate_many(scenes, LEVEL, ONE))
-            times[name] += [seconds / (DRAWS * EACH)] if number else []
+            took = seconds(scenes, True, 1, time.process_time)
+            times[name] += [took] if number else []
     least = {name: min(of) for name, of in times.items()}
     one = least.pop("one scene")
     return {name: {"ratio": of / one, "hits_per_second": 1.0 / of} for name, of in least.items()}

@@ -269,7 +269,6 @@ class Row:
         level: of LADDER.
         kept: whether the promise is kept by its own word.
         told, error: errors of 90 % of the hits as told and as found, in residual velocity [m/s] and tilt [degree].
-        within: share of the hits that are within both errors of the name.
         mean, worst_tenth: error of the mean residual velocity and of that of the fastest tenth [m/s].
         tilted: error of the share of the hits that are tilted by more than 30 degrees.
         cost: processor time of one core per hit [s].
@@ -279,7 +278,6 @@ class Row:
     kept: bool
     told: tuple[float, float]
     error: tuple[float, float]
-    within: float
     mean: float
     worst_tenth: float
     tilted: float
@@ -292,14 +290,10 @@ def named(bench: Bench, case: Case, truth: Answer, name: str) -> Row:
     promise = pilot_of(case.scene, pilot, Numerics(fidelity=name), Worker("cpu"), hits=RUN)
     answer, cost = bench.run(case, promise.numerics)
     velocity, tilt = off(answer, truth)
-    allowed = PRESETS[name]
-    within = (velocity <= allowed.residual_velocity) & (tilt <= math.degrees(allowed.tilt))
     told = (promise.residual_velocity_error, math.degrees(promise.tilt_error))
     found = (p90(velocity), p90(tilt))
     assert promise.numerics.level is not None
-    return Row(
-        promise.numerics.level, promise.kept, told, found, float(within.mean()), *aggregates(answer, truth), cost
-    )
+    return Row(promise.numerics.level, promise.kept, told, found, *aggregates(answer, truth), cost)
 
 
 def aggregates(answer: Answer, truth: Answer) -> tuple[float, float, float]:

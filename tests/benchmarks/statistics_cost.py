@@ -7,12 +7,12 @@ between the counts. Run it as a script:
 python tests/benchmarks/statistics_cost.py          # writes results/statistics_cost.json
 """
 
-import time
 from collections.abc import Callable, Iterator
+from functools import partial
 from typing import Any
 
 import numpy as np
-from bench import campaign_of, machine, store
+from bench import campaign_of, machine, spent, store
 from numpy.typing import NDArray
 
 from warpimpact import Campaign, make_shots
@@ -72,10 +72,9 @@ class Hitting:
     @staticmethod
     def _answers(campaign: Campaign, shots: Shots, level: int) -> tuple[Array, float]:
         """Residual velocity [m/s] and last tilt [degree], shape [2, hits], and processor time per hit [s]."""
-        begin = time.process_time()
-        outcomes = simulate(campaign.scene, shots, numerics=Numerics(level=level), device="cpu", threads=1)
-        cost = (time.process_time() - begin) / len(shots)
-        return np.array([outcomes.residual_velocity, np.degrees(outcomes.tilt[:, -1])]), cost
+        march = partial(simulate, campaign.scene, shots, numerics=Numerics(level=level), device="cpu", threads=1)
+        outcomes, took = spent(march)
+        return np.array([outcomes.residual_velocity, np.degrees(outcomes.tilt[:, -1])]), took / len(shots)
 
 
 def counts(total: int) -> Iterator[int]:

@@ -23,11 +23,7 @@ MOST_NAMED = 3
 
 def assumptions_view(dataset: Result, measures: Sequence[Measure] = ()) -> Section:
     """How much each number changes if one thing that nobody measured is otherwise, and the assumptions of the largest
-    changes.
-
-    Args:
-        measures: measures to show; by default those of `_first`.
-    """
+    changes. Without measures they are those of `_first`."""
     estimates = estimated(dataset, measures or _first(dataset))
     table = assumptions_table(
         {measure.title: estimate.times(measure.display.factor) for measure, estimate in estimates.items()}

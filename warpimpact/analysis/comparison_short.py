@@ -58,11 +58,8 @@ def _reversed(pair: Difference) -> Difference:
 
 
 def short_view(comparison: ComparedPlates, evidence: Sequence[str] = ()) -> Section:
-    """The deciding measure with its ranks and differences, what is not told apart, and what the answer rests on.
-
-    Args:
-        evidence: lines on what the results rest on (`evidence_lines.evidence_of_all`).
-    """
+    """The deciding measure with its ranks and differences, what is not told apart, what the answer rests on, and last
+    the lines of evidence."""
     score = deciding(comparison)
     if score is None:
         return Section([*hits_used(comparison), "no measure ranks these plates", *evidence])
@@ -94,20 +91,17 @@ def _title(comparison: ComparedPlates, score: Score) -> str:
 
 
 def _ranks(comparison: ComparedPlates, score: Score) -> Table:
-    place = [other.name for other in comparison.plates[0].measures].index(score.name)
-    plates = {plate.name: plate for plate in comparison.plates}
     differences = {pair.one: pair for pair in from_best(comparison, score.name)}
     by_ratio = score.name in (comparison.at_equal_weight or ())
     parted = all("add-on" in plate.weights for plate in comparison.plates)
     rows = []
-    for name, rank in comparison.ranks(score.name).items():
-        plate, shown = plates[name], plates[name].measures[place]
+    for rank, plate, shown in comparison.ranked(score.name):
         value = (shown.value, intervals_text(Ends(shown.low, shown.high)))
         ratio = (shown.ratio,) if by_ratio else ()
-        pair = differences.get(name)
+        pair = differences.get(plate.name)
         apart = (None, "") if pair is None else (pair.value, intervals_text(Ends(pair.low, pair.high, pair.parameters)))
         add_on = (plate.weights["add-on"],) if parted else ()
-        rows.append((rank, name, *add_on, plate.areal_density, *value, *ratio, *apart))
+        rows.append((rank, plate.name, *add_on, plate.areal_density, *value, *ratio, *apart))
     best = comparison.ordered(score.name)[0]
     columns = (
         *(number("rank", digits="d"), Column("plate")),

@@ -59,12 +59,17 @@ class ComparedPlates:
             ranks[name] = rank
         return ranks
 
+    def ranked(self, measure: str) -> list[tuple[int, Contestant, Score]]:
+        """Rank, plate and score, the best plate first."""
+        plates = {plate.name: plate for plate in self.plates}
+        return [(rank, plates[name], plates[name].score(measure)) for name, rank in self.ranks(measure).items()]
+
     def ordered(self, measure: str) -> list[str]:
         """Names of the plates, the best value first (or the best ratio to the solid plate, where that counts)."""
         by_ratio = measure in (self.at_equal_weight or ())
 
         def worse(plate: Contestant) -> float:
-            (told,) = (score for score in plate.measures if score.name == measure)
+            told = plate.score(measure)
             value = told.ratio if by_ratio else told.value
             return math.inf if math.isnan(value) else -value if told.measure.higher_is_better else value
 
@@ -184,16 +189,14 @@ def listed(names: Sequence[str]) -> str:
 
 def _ranking(comparison: ComparedPlates, measure: Score) -> Section:
     """One measure of all plates, the best first, and a sentence for every pair."""
-    place = comparison.plates[0].measures.index(measure)
-    ranks = comparison.ranks(measure.name)
     ranked = is_ranked(comparison, measure.name)
-    plates = {plate.name: plate for plate in comparison.plates}
     reference, parted = comparison.reference, all("add-on" in plate.weights for plate in comparison.plates)
     rows = []
-    for name, rank in ranks.items():
-        plate, shown = plates[name], plates[name].measures[place]
+    for rank, plate, shown in comparison.ranked(measure.name):
         value = (plate.areal_density, shown.value, intervals_text(shown.ends), shown.ratio, shown.ratio_text)
-        rows.append((rank if ranked else "-", name, *value, plate.weights.get("add-on"), shown.alone)[: 7 + 2 * parted])
+        rows.append(
+            (rank if ranked else "-", plate.name, *value, plate.weights.get("add-on"), shown.alone)[: 7 + 2 * parted]
+        )
     columns = [
         *(number("rank", digits="d"), Column("plate"), number("whole kg/m²" if parted else "kg/m²", digits=".2f")),
         *(number("value"), Column("95 % interval"), number(f"ratio to the {reference}"), Column("95 % interval")),
@@ -245,7 +248,7 @@ def assumptions_view(comparison: ComparedPlates) -> list[Section]:
     """Every measure of all plates under every assumption."""
     sections = []
     for score in compared_scores(comparison):
-        of_plates = [next(s for s in plate.measures if s.name == score.name) for plate in comparison.plates]
+        of_plates = [plate.score(score.name) for plate in comparison.plates]
         names = dict.fromkeys(name for of_plate in of_plates for name in of_plate.assumptions)
         if names:
             given = (AS_GIVEN, *(of_plate.value for of_plate in of_plates))

@@ -23,6 +23,10 @@ class Contestant:
     reference: str = "solid plate"
     weights: Mapping[str, float] = field(default_factory=dict)
 
+    def score(self, measure: str) -> Score:
+        """The score in a measure of this text."""
+        return next(score for score in self.measures if score.name == measure)
+
 
 @dataclass(frozen=True)
 class Difference:

@@ -129,11 +129,8 @@ def measures_of(dataset: xarray.Dataset, texts: Sequence[str] = ()) -> list[Meas
 
 
 def effectiveness(dataset: xarray.Dataset, texts: Sequence[str] = ()) -> list[Score]:
-    """How well the plate of a result protects.
-
-    Args:
-        dataset: a hit map. Of an open file, one slice at a time and one number per hit are in memory.
-        texts: texts of measures; by default the measures that `inspect` shows.
+    """How well the plate of a hit map protects, in measures with these texts, by default those that `inspect` shows. Of
+    an open file, one slice at a time and one number per hit are in memory.
 
     Raises:
         ResultError: a text is no measure, or the result lacks what it needs.

@@ -13,11 +13,7 @@ if TYPE_CHECKING:
 
 def evidence_lines(dataset: Result, *, file: str | None = None) -> list[str]:
     """A line on what a result rests on, with names and the state of their evidence. What was not measured is only
-    counted.
-
-    Args:
-        file: file of the result, whose `inspect` says more.
-    """
+    counted; `inspect` of the file of the result says more."""
     lines = str(dataset.attrs.get(attr.EVIDENCE, "")).splitlines()
     shown = [line for line in lines if not line.startswith(attr.NOT_TESTED)]
     if len(shown) < len(lines) and file is not None:

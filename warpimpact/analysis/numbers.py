@@ -71,11 +71,8 @@ def intervals_text(
 
 
 def plus_minus(estimate: Estimate, number: str, half_width: str) -> str:
-    """A mean ± half the width of its confidence interval (± means nothing else here); without ± if it has none.
-
-    Args:
-        number, half_width: formats of both, such as ".5g".
-    """
+    """A mean ± half the width of its confidence interval (± means nothing else here), in formats such as ".5g"; no ± if
+    it has none."""
     value = format(estimate.value, number)
     return value if math.isnan(estimate.half_width) else f"{value} ± {format(estimate.half_width, half_width)}"
 

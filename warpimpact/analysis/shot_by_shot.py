@@ -25,11 +25,7 @@ FEWEST_RANKED = 3
 
 def shared_hits(datasets: Mapping[str, xarray.Dataset]) -> dict[str, xarray.Dataset] | None:
     """The hits that both results have, in memory, the result by finite elements last; None unless there are two results
-    of the same shots, one of them by finite elements.
-
-    Args:
-        datasets: results by their names.
-    """
+    of the same shots, one of them by finite elements. Results are given and returned by their names."""
     by_elements = [name for name, dataset in datasets.items() if attr.CONTINUUM in dataset.attrs]
     if len(datasets) != 2 or len(by_elements) != 1:
         return None
@@ -48,9 +44,6 @@ def shared_hits(datasets: Mapping[str, xarray.Dataset]) -> dict[str, xarray.Data
 def shot_by_shot(shared: Mapping[str, xarray.Dataset]) -> Section:
     """How two results differ, hit by hit: bias, root mean square, correlation of ranks and the worst hits by quantity.
     The numbers describe these hits and have no intervals. Hits that failed in either result are left out, and counted.
-
-    Args:
-        shared: as `shared_hits` gives them.
     """
     (name, compared), (reference, other) = shared.items()
     numbers, sound = hit_numbers(compared), ~(failed(compared) | failed(other))

@@ -57,12 +57,8 @@ class Survival:
 
 
 def by_draws(dataset: Result, values: Array, weights: OrderWeights) -> Array:
-    """Numbers of shots whose mean over the shots of a draw is the worst tenth, or the quantile, of this draw.
-
-    Args:
-        values: values of the first shots, shape [shots].
-        weights: as in `tails.pseudo_values`.
-    """
+    """Numbers of shots whose mean over the shots of a draw is the worst tenth, or the quantile, of this draw, from
+    values of the first shots, shape [shots]."""
     if v.POSTERIOR_DRAW not in dataset:
         return values
     draws = np.asarray(dataset[v.POSTERIOR_DRAW].values)[: len(values)]

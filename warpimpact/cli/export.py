@@ -7,7 +7,7 @@ from pathlib import Path
 from .mistakes import folder_told
 from .options import Commands, add_campaign_folder, add_command, add_output, add_overwrite, add_results, at_least
 from .paths import check_folder, check_output, check_suffix, named
-from .progress import show_count
+from .progress import Step, show_progress
 
 
 def add_export(commands: Commands) -> None:
@@ -143,13 +143,13 @@ def _report(arguments: argparse.Namespace) -> None:
     by_name = named(paths)
     with ExitStack() as stack:
         datasets = {name: stack.enter_context(files.opened(path)) for name, path in by_name.items()}
-        progress = stack.enter_context(show_count())
+        show = stack.enter_context(show_progress())
         with folder_told(", or --trajectories 0, which needs none of them"):
             write_report(
                 datasets,
                 output,
                 folders={name: arguments.campaign_folder or path.parent for name, path in by_name.items()},
                 trajectories=arguments.trajectories,
-                progress=progress,
+                progress=lambda done, total: show(Step(done, total)),
             )
     print(output)

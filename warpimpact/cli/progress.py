@@ -188,13 +188,6 @@ def show_run() -> "Iterator[Callable[[RunProgress], None]]":
         yield follow
 
 
-@contextmanager
-def show_count() -> Iterator[Callable[[int, int], None]]:
-    """Show how many of the hits are done."""
-    with show_progress() as show:
-        yield lambda done, total: show(Step(done, total))
-
-
 def _pilot(run: "RunProgress") -> str:
     if not run.piloting:
         return ""

@@ -31,9 +31,7 @@ class Guard:
     name. Neither knows the token, and neither has this origin.
 
     Args:
-        app: application that answers.
         token: first part of every path.
-        port: port of the server.
     """
 
     def __init__(self, app: Any, token: str, port: int) -> None:

@@ -53,11 +53,7 @@ def animation(dataset: xarray.Dataset) -> FuncAnimation:
 
 
 def save_animation(dataset: xarray.Dataset, path: Path) -> None:
-    """Write the film of a history as GIF, or as MP4 if FFmpeg is installed.
-
-    Raises:
-        OutputError: as in `writer_for`.
-    """
+    """Write the film of a history in the format that its name asks for (`writer_for`)."""
     animation(dataset).save(path, writer=writer_for(path), dpi=80)
 
 

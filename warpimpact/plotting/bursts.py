@@ -26,11 +26,7 @@ if TYPE_CHECKING:
 
 def bursts_figure(dataset: xarray.Dataset) -> Figure:
     """Mean of every measure by the order of the hit (left), and by the distance to the nearest earlier hit (right),
-    each with its 95 % interval. A measure that is the same for all groups has no panel.
-
-    Args:
-        dataset: a result of bursts.
-    """
+    each with its 95 % interval. A measure that is the same for all groups has no panel."""
     result = bursts(dataset)
     shown = [measure for measure in result.measures if _varies(result, measure)] or [result.measures[0]]
     figure = Figure(figsize=(10.0, 1.3 + 2.9 * len(shown)), layout="constrained")

@@ -46,7 +46,6 @@ def comparison_figure(comparison: Comparison, *, every: bool = False) -> Figure:
     A hollow marker means that the interval of a difference contains 0: the plates cannot be told apart.
 
     Args:
-        comparison: the result of `analysis.comparison.compare`.
         every: whether to draw every measure, and the differences of all pairs.
     """
     decides = deciding(comparison)

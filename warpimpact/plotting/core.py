@@ -18,12 +18,7 @@ _WIDTH = 7.5  # of the figure [inch]
 
 
 def core_figure(core: Core, title: str, evidence: str) -> Figure:
-    """Draw a core in its section, nose to the left.
-
-    Args:
-        title: name of the core.
-        evidence: text below the figure.
-    """
+    """Draw a core in its section, nose to the left, with its evidence below."""
     lines = note_lines(_WIDTH, "", [evidence])
     s = np.linspace(0.0, core.length, _PROFILE_STATIONS)
     r = core.radius(s)

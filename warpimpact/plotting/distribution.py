@@ -131,12 +131,8 @@ def uncertainty(dataset: xarray.Dataset, variable: str, standoff: float | None =
 
     Shots must scatter, so that two shots at one place differ; otherwise neighbours say nothing about uncertainty.
 
-    Args:
-        dataset: a result whose hits cover the cell.
-        variable, standoff: as in `cell.shown`.
-
     Raises:
-        ValueError: nothing is uncertain, or the hits do not cover the cell; and as in `cell.shown`.
+        ValueError: nothing is uncertain, the hits do not cover the cell, or the variable cannot be mapped.
     """
     column = shown(dataset, variable, standoff)
     unit = f"[{column.label.partition('[')[2]}"
@@ -151,12 +147,7 @@ def uncertainty(dataset: xarray.Dataset, variable: str, standoff: float | None =
 
 
 def mean_and_spread(dataset: xarray.Dataset, variable: str, standoff: float | None = None) -> Figure:
-    """A map of the mean over the draws of a posterior, and of their standard deviation about it, from nearby hits.
-
-    Args:
-        dataset: a result whose hits cover the cell, each with a draw of its own.
-        variable, standoff: as in `cell.shown`.
-    """
+    """A map of the mean over the draws of a posterior, and of their standard deviation about it, from nearby hits."""
     column = shown(dataset, variable, standoff)
     images = _local(dataset, column.values, _covered(dataset), lambda near: plane_fit(*near)[::2])
     labels = f"mean of {column.label}", f"spread over draws and conditions [{column.label.partition('[')[2]}"

@@ -29,11 +29,7 @@ _Settings = Mapping[str, Any]
 def firing_figure(dataset: xarray.Dataset) -> Figure:
     """The response of the target with V50, V05 and V01, the map of limits with its weakest places, the distribution of
     the reported V50 beside the true one, shots against precision, and the operating characteristic of a proof; each if
-    the file has it.
-
-    Args:
-        dataset: the result of `warpimpact test`.
-    """
+    the file has it."""
     settings = json.loads(dataset.attrs[f.SETTINGS])
     panels: list[Callable[[Axes, xarray.Dataset, _Settings], None]] = [_draw_response]
     panels += [_draw_map] if f.CHANGES in dataset else []
@@ -176,11 +172,7 @@ def _draw_proof(axes: Axes, dataset: xarray.Dataset, settings: _Settings) -> Non
 
 def directions_figure(dataset: xarray.Dataset) -> Figure:
     """P(perforation) over the directions of fire, as a polar map: the angle from the normal of the plate outwards, and
-    the direction to the side and upwards about it.
-
-    Args:
-        dataset: the result of `warpimpact test` with directions.
-    """
+    the direction to the side and upwards about it."""
     figure = Figure(figsize=(8.2, 7.6), layout=ConstrainedLayoutEngine(w_pad=0.3))  # room for "left"
     axes: Any = figure.add_subplot(projection="polar")
     azimuth, elevation = np.meshgrid(

@@ -35,12 +35,7 @@ _MARKS: tuple[Any, ...] = ("*", "P", "X", "^", "v")
 
 def front_figure(dataset: xarray.Dataset, folder: Path = Path()) -> Figure:
     """The front of a search by fresh hits with 95 % intervals, beside all computed designs; plates along it; and their
-    variables.
-
-    Args:
-        dataset: the result of `warpimpact optimise`.
-        folder: folder of the files that the design file names.
-    """
+    variables. `folder` has the files that the design file names."""
     leaders = front_leaders(dataset)
     drawn = leaders[np.unique(np.round(np.linspace(0, len(leaders) - 1, min(MOST_DRAWN, len(leaders)))).astype(int))]
     names = {int(place): _LETTERS[number] for number, place in enumerate(drawn)}

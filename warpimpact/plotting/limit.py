@@ -37,11 +37,7 @@ _LOW_SHARE = 0.15
 
 def limit_figure(dataset: xarray.Dataset) -> Figure:
     """The map of the limits beside their cumulative distribution, with V50 and V05 and their 95 % intervals. For hits
-    at one place, the limits against the obliquity.
-
-    Args:
-        dataset: the result of `warpimpact limit`.
-    """
+    at one place, the limits against the obliquity."""
     quantity = dataset.attrs[attr.LIMIT]
     if len(dataset[v.OBLIQUITY]) > 1 and not np.ptp(hit_points(dataset), axis=0).any():
         return _over_obliquity(dataset, quantity)

@@ -80,11 +80,8 @@ def measure_map(dataset: xarray.Dataset, text: str) -> Figure:
 
 
 def variable_maps(datasets: Mapping[str, xarray.Dataset], variable: str, standoff: float | None = None) -> Figure:
-    """A map of one variable for several results side by side, in the same colours and to the same scale.
-
-    Args:
-        datasets: results by the names of their maps; the other arguments are those of `variable_map`.
-    """
+    """A map of one variable for several results, by the names of their maps, side by side, in the same colours and to
+    the same scale."""
     columns = [averaged(dataset, shown(dataset, variable, standoff)) for dataset in datasets.values()]
     scale = scale_of([column.values for column in columns], signed=columns[0].signed)
     title, *_ = columns[0].title.splitlines()
@@ -128,11 +125,7 @@ def overview(dataset: xarray.Dataset) -> Figure:
 
 def layers_figure(dataset: xarray.Dataset) -> Figure:
     """A row of maps for each layer: how the cores ended in it, their velocity behind it, and their tilt at the farthest
-    stand-off that they reach in free flight, or on leaving the layer. A layer that no core left shows their depth.
-
-    Args:
-        dataset: a result with layers behind the plate.
-    """
+    stand-off that they reach in free flight, or on leaving the layer. A layer that no core left shows their depth."""
     layers = dataset.sizes["layer"]
     figure, panels = _sheet_of_one(dataset, maps=3 * layers, columns=3, note="; layer 0 is the plate")
     for layer, (status, *others) in enumerate(zip(*[iter(panels)] * 3, strict=True)):

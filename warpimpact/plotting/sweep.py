@@ -28,14 +28,10 @@ _PANEL = (5.0, 3.75)
 
 def sweep_figure(sweep: xarray.Dataset, texts: Sequence[str] = ()) -> Figure:
     """A panel for every measure, with 95 % intervals, against the first input that is a number; a line for every
-    combination of the others.
-
-    Args:
-        sweep: a Dataset of `studies.sweep.joined`.
-        texts: of measures; by default those of `analysis.swept.SHOWN_OF_SWEEPS`.
+    combination of the others. Without texts of measures they are those of `analysis.swept.SHOWN_OF_SWEEPS`.
 
     Raises:
-        ResultError: as in `analysis.swept.measures_of`.
+        ResultError: a text is no measure, or the sweep lacks what it needs.
     """
     measures, inputs = measures_of(sweep, texts), list(inputs_of(sweep))
     along = next((name for name in inputs if sweep[name].dtype.kind == "f"), inputs[0])

@@ -36,11 +36,7 @@ def weight_figure(comparison: Comparison) -> Figure | None:
     if the plates have none of them.
 
     A limit thickness is drawn at the areal density that the target then has. A hollow diamond is the solid reference of
-    the same areal density; a line is the need of a target with it.
-
-    Args:
-        comparison: the result of `analysis.comparison.compare`.
-    """
+    the same areal density; a line is the need of a target with it."""
     known = {score.measure.name for score in comparison.plates[0].measures if score.measure.kind in ("mean", "share")}
     wanted = [name for name in (*_AGAINST_WEIGHT, _THICKNESS) if name in known]
     if _NEEDED not in known:

@@ -39,11 +39,7 @@ def write_report(
     trajectories: int = 32,
     progress: Progress | None = None,
 ) -> None:
-    """Write the report of some results, whole or not at all.
-
-    Args:
-        path: the HTML file; an existing one is replaced.
-        datasets, folders, trajectories, progress: as in `report_page`.
+    """Write `report_page` of some results into a file, whole or not at all.
 
     Raises:
         OutputError: the file cannot be written.
