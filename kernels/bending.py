@@ -25,15 +25,13 @@ def build(variant: Variant) -> SimpleNamespace:
     @wp.func
     def mean_force(sums: struct.Sums, dv: vec3, dw: vec3):
         """Mean force on a ring over the step [N], if the velocities change by (dv, dw) more than foreseen."""
-        slopes = sums.slopes
-        return sums.force - half * (use.damping.damping_vv(slopes) * dv + use.damping.damping_vw(slopes) * dw)
+        return sums.force - half * (use.damping.damping_vv(sums) * dv + use.damping.damping_vw(sums) * dw)
 
     @wp.func
     def mean_moment(sums: struct.Sums, dv: vec3, dw: vec3):
         """Mean moment of a ring about the centre of mass over the step [N m], for the same change."""
-        slopes = sums.slopes
-        coupled = wp.transpose(use.damping.damping_vw(slopes)) * dv
-        return sums.moment - half * (coupled + use.damping.damping_ww(slopes) * dw)
+        coupled = wp.transpose(use.damping.damping_vw(sums)) * dv
+        return sums.moment - half * (coupled + use.damping.damping_ww(sums) * dw)
 
     @wp.func
     def across(vector: vec3):
@@ -62,7 +60,7 @@ def build(variant: Variant) -> SimpleNamespace:
         dt = clock.step
         worst = before
         dv, dw, felt_v, felt_w = use.rigid_body.velocity_change(body, load, dt)
-        share = use.rigid_body.restraint_of(body, state, dv, dw)
+        share = use.rigid_body.restraint(body, state, dv, dw)
         gyration = (pose.omega[0] * (body.inertia_axial / body.inertia_transverse - one)) * across(pose.omega)
         spun = pose.omega[0] * across(pose.omega)
         turning = (share / dt) * dw + gyration

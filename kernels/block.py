@@ -92,18 +92,10 @@ def build(variant: Variant) -> SimpleNamespace:
         return part
 
     @wp.func
-    def open_window(
-        plate: struct.Plate,
-        thickness: real,
-        fields: struct.Fields,
-        layer: wp.int32,
-        hit_y: wp.float64,
-        hit_z: wp.float64,
-    ):
+    def open_window(plate: struct.Plate, thickness: real, fields: struct.Fields, layer: wp.int32, hit: wp.vec2d):
         """The window of a layer about a hit, on an untouched plate; `fields` are those of the block."""
-        window = use.exposure.open_window(
-            plate, thickness, fields_of_window(fields, fields.first[layer]), layer, hit_y, hit_z
-        )
+        part = fields_of_window(fields, fields.first[layer])
+        window = use.exposure.open_window(plate, thickness, part, layer, hit)
         if wp.static(variant.degrades):
             use.lanes.barrier()
         return window
@@ -140,12 +132,12 @@ def build(variant: Variant) -> SimpleNamespace:
         total = struct.Sums()
         total.force = use.lanes.total_triple(sums.force)
         total.moment = use.lanes.total_triple(sums.moment)
-        total.slopes.aa = use.lanes.total(sums.slopes.aa)
-        total.slopes.ar = use.lanes.total_pair(sums.slopes.ar)
-        total.slopes.rr = use.lanes.total_triple(sums.slopes.rr)
-        total.slopes.al = use.lanes.total_pair(sums.slopes.al)
-        total.slopes.rl = use.lanes.total_triple(sums.slopes.rl)
-        total.slopes.ll = use.lanes.total_triple(sums.slopes.ll)
+        total.aa = use.lanes.total(sums.aa)
+        total.ar = use.lanes.total_pair(sums.ar)
+        total.rr = use.lanes.total_triple(sums.rr)
+        total.al = use.lanes.total_pair(sums.al)
+        total.rl = use.lanes.total_triple(sums.rl)
+        total.ll = use.lanes.total_triple(sums.ll)
         return total
 
     @wp.func
@@ -168,7 +160,7 @@ def build(variant: Variant) -> SimpleNamespace:
                 if use.contact.weakens(window):
                     coarsest = zero
                     for index in range(first, last + 1):
-                        coarsest = wp.max(coarsest, read(surface.area, index))
+                        coarsest = wp.max(coarsest, use.core_surface.ring_at(surface, slab.pose, index).area)
                     units = use.fixed_point.units(law, window, coarsest, wp.length(slab.pose.velocity), slab.dt)
                     box = use.contact.gained_box(touches, footprint.box, base + begin, end - begin)
                     weakened = box.y_high > box.y_low
@@ -190,7 +182,7 @@ def build(variant: Variant) -> SimpleNamespace:
 
     @wp.func
     def load_on(context: struct.Context, slab: struct.Slab):
-        """The load of one step by all lanes of a block (kernels/contracts.py)."""
+        """The load of one step by all lanes of a block."""
         if wp.static(variant.layered and not variant.deep):  # two calls, so that none goes through generic addresses
             if slab.window.first == 0:
                 return load_in(context, slab, in_front(context.fields))

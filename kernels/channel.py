@@ -19,7 +19,7 @@ from .variant import Variant
 @cache
 def build(variant: Variant) -> SimpleNamespace:
     """Device functions of the channels for one variant."""
-    struct, real, vec3 = structs.build(variant), variant.real, variant.vec3
+    struct, real, reals, vec3 = structs.build(variant), variant.real, variant.reals, variant.vec3
     zero, one = real(0.0), real(1.0)
     outside, wall = real(constants.NO_CHANNEL.value), real(constants.WALL.value)
     steepest, spared = real(constants.STEEPEST.value), real(constants.SPARED.value)
@@ -55,9 +55,9 @@ def build(variant: Variant) -> SimpleNamespace:
         """
         )
         def combine(
-            target: wp.array(dtype=real),
+            target: reals,
             start: wp.int32,
-            source: wp.array(dtype=real),
+            source: reals,
             first: wp.int32,
             rows: wp.int32,
             columns: wp.int32,
@@ -99,7 +99,7 @@ def build(variant: Variant) -> SimpleNamespace:
     """
     )
     def cut(
-        field: wp.array(dtype=real),
+        field: reals,
         start: wp.int32,
         rows: wp.int32,
         columns: wp.int32,
@@ -355,16 +355,16 @@ def build(variant: Variant) -> SimpleNamespace:
     """
     )
     def spare_channels(
-        area: wp.array(dtype=real),
-        slope: wp.array(dtype=real),
-        gain: wp.array(dtype=real),
+        area: reals,
+        slope: reals,
+        gain: reals,
         at: wp.array(dtype=wp.int32),
-        x: wp.array(dtype=real),
-        y: wp.array(dtype=real),
-        z: wp.array(dtype=real),
+        x: reals,
+        y: reals,
+        z: reals,
         start: wp.int32,
         count: wp.int32,
-        field: wp.array(dtype=real),
+        field: reals,
         nodes: wp.int32,
         stride: wp.int32,
         per_wall: real,

@@ -34,7 +34,7 @@ from .variant import Variant
 def build(variant: Variant) -> SimpleNamespace:
     """Device functions of a step's load for one variant."""
     struct = structs.build(variant)
-    real, vec2, vec3 = variant.real, variant.vec2, variant.vec3
+    real, reals, vec2, vec3 = variant.real, variant.reals, variant.vec2, variant.vec3
     zero, half, one = real(0.0), real(0.5), real(1.0)
     use = variant.use(channel, core_surface, damping, exposure, free_edges, grip, interaction, lanes, plate_grid)
     far = constants.FAR_NODES.value
@@ -135,7 +135,7 @@ def build(variant: Variant) -> SimpleNamespace:
     def largest_of(
         sign: wp.int32,
         least: wp.int32,
-        gain: wp.array(dtype=real),
+        gain: reals,
         place: wp.array(dtype=wp.int32),
         start: wp.int32,
         count: wp.int32,
@@ -252,12 +252,12 @@ def build(variant: Variant) -> SimpleNamespace:
             sums = struct.Sums()
             sums.force = vec3(axial, right, up)
             sums.moment = vec3(roll, pitch, yaw)
-            sums.slopes.aa = aa
-            sums.slopes.ar = vec2(ac, as_)
-            sums.slopes.rr = vec3(cc, cs, ss)
-            sums.slopes.al = vec2(lc, ls)
-            sums.slopes.rl = vec3(lcc, lcs, lss)
-            sums.slopes.ll = vec3(llcc, llcs, llss)
+            sums.aa = aa
+            sums.ar = vec2(ac, as_)
+            sums.rr = vec3(cc, cs, ss)
+            sums.al = vec2(lc, ls)
+            sums.rl = vec3(lcc, lcs, lss)
+            sums.ll = vec3(llcc, llcs, llss)
             return sums
 
         return sum_patches
@@ -307,19 +307,19 @@ def build(variant: Variant) -> SimpleNamespace:
     def load_of(sums: struct.Sums):
         """The load of the touching patches. Its damping is half of the slope of the traction. So the step is of second
         order where the stress depends on the rate, and stable where a wall lies on the steep ramp of the contact."""
-        load, slopes = struct.Load(), sums.slopes
+        load = struct.Load()
         load.touching = True
         load.force = sums.force
         load.moment = sums.moment
-        load.damped = slopes.aa + slopes.rr[0] + slopes.rr[2] > zero
-        load.damping_vv = half * use.damping.damping_vv(slopes)
-        load.damping_vw = half * use.damping.damping_vw(slopes)
-        load.damping_ww = half * use.damping.damping_ww(slopes)
+        load.damped = sums.aa + sums.rr[0] + sums.rr[2] > zero
+        load.damping_vv = half * use.damping.damping_vv(sums)
+        load.damping_vw = half * use.damping.damping_vw(sums)
+        load.damping_ww = half * use.damping.damping_ww(sums)
         return load
 
     @wp.func
     def load_on(context: struct.Context, slab: struct.Slab):
-        """The load of one step by one thread (kernels/contracts.py)."""
+        """The load of one step by one thread."""
         surface, fields, touches = context.surface, context.fields, context.touches
         plate, window, footprint = slab.plate, slab.window, slab.footprint
         load = struct.Load()

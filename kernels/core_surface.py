@@ -14,7 +14,7 @@ from .variant import Variant
 def build(variant: Variant) -> SimpleNamespace:
     """Device functions of the surface for one variant."""
     struct = structs.build(variant)
-    real, vec3, quat = variant.real, variant.vec3, variant.quat
+    real, reals, vec3, quat = variant.real, variant.reals, variant.vec3, variant.quat
     zero, half, one = real(0.0), real(0.5), real(1.0)
     read, use = memory.build(real).read, variant.use(lanes)
     quarter, half_turn = real(0.25), real(math.pi)
@@ -45,40 +45,31 @@ def build(variant: Variant) -> SimpleNamespace:
         return pose
 
     @wp.func
-    def ring_at(surface: struct.Surface, pose: struct.Pose, index: wp.int32):
-        """Ring number `index`, from the nose on."""
+    def ring_in(table: reals, surface: struct.Surface, pose: struct.Pose, number: wp.int32, apart: wp.int32):
+        """The ring of a number in a table of the members of rings, which lie `apart` from each other."""
         ring = struct.Ring()
-        ring.station = read(surface.station, index)
-        ring.radius = read(surface.radius, index)
-        ring.area = read(surface.area, index)
-        ring.normal_axial = read(surface.normal_axial, index)
-        ring.normal_radial = read(surface.normal_radial, index)
-        ring.half_axial = read(surface.half_axial, index)
-        ring.half_radial = read(surface.half_radial, index)
-        ring.turn_axial = read(surface.turn_axial, index)
-        ring.turn_radial = read(surface.turn_radial, index)
+        ring.station = read(table, number)
+        ring.radius = read(table, number + apart)
+        ring.area = read(table, number + 2 * apart)
+        ring.normal_axial = read(table, number + 3 * apart)
+        ring.normal_radial = read(table, number + 4 * apart)
+        ring.half_axial = read(table, number + 5 * apart)
+        ring.half_radial = read(table, number + 6 * apart)
+        ring.turn_axial = read(table, number + 7 * apart)
+        ring.turn_radial = read(table, number + 8 * apart)
         ring.centre = pose.position + ring.station * pose.axis
         ring.sector = half_turn / real(surface.around)
-        ring.first = index * surface.around
         return ring
 
     @wp.func
+    def ring_at(surface: struct.Surface, pose: struct.Pose, index: wp.int32):
+        """Ring number `index`, from the nose on."""
+        return ring_in(surface.of_rings, surface, pose, index, surface.rings)
+
+    @wp.func
     def ring_of(surface: struct.Surface, pose: struct.Pose, patch: wp.int32):
-        """The ring of a patch. It equals `ring_at`, but neighbours in memory belong to neighbouring patches."""
-        apart = surface.rings * surface.around
-        ring = struct.Ring()
-        ring.station = read(surface.patches, patch)
-        ring.radius = read(surface.patches, patch + apart)
-        ring.area = read(surface.patches, patch + 2 * apart)
-        ring.normal_axial = read(surface.patches, patch + 3 * apart)
-        ring.normal_radial = read(surface.patches, patch + 4 * apart)
-        ring.half_axial = read(surface.patches, patch + 5 * apart)
-        ring.half_radial = read(surface.patches, patch + 6 * apart)
-        ring.turn_axial = read(surface.patches, patch + 7 * apart)
-        ring.turn_radial = read(surface.patches, patch + 8 * apart)
-        ring.centre = pose.position + ring.station * pose.axis
-        ring.sector = half_turn / real(surface.around)
-        return ring
+        """The ring of a patch, from a table in which neighbours in memory belong to neighbouring patches."""
+        return ring_in(surface.of_patches, surface, pose, patch, surface.rings * surface.around)
 
     @wp.func
     def broadside(pose: struct.Pose):

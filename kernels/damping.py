@@ -17,7 +17,7 @@ def build(variant: Variant) -> SimpleNamespace:
     zero = real(0.0)
 
     @wp.func
-    def damping_vv(s: struct.Slopes):
+    def damping_vv(s: struct.Sums):
         """Σ slope n nᵀ."""
         return mat33(
             s.aa, s.ar[0], s.ar[1],
@@ -26,7 +26,7 @@ def build(variant: Variant) -> SimpleNamespace:
         )  # fmt: skip
 
     @wp.func
-    def damping_vw(s: struct.Slopes):
+    def damping_vw(s: struct.Sums):
         """Σ slope n (arm × n)ᵀ."""
         return mat33(
             zero, -s.al[1], s.al[0],
@@ -35,7 +35,7 @@ def build(variant: Variant) -> SimpleNamespace:
         )  # fmt: skip
 
     @wp.func
-    def damping_ww(s: struct.Slopes):
+    def damping_ww(s: struct.Sums):
         """Σ slope (arm × n)(arm × n)ᵀ."""
         return mat33(
             zero, zero, zero,
@@ -44,22 +44,16 @@ def build(variant: Variant) -> SimpleNamespace:
         )  # fmt: skip
 
     @wp.func
-    def added(a: struct.Slopes, b: struct.Slopes):
-        """Sum of the slopes of two sets of rings."""
+    def joined(a: struct.Sums, b: struct.Sums):
+        """Sums over two sets of patches."""
+        a.force += b.force
+        a.moment += b.moment
         a.aa += b.aa
         a.ar += b.ar
         a.rr += b.rr
         a.al += b.al
         a.rl += b.rl
         a.ll += b.ll
-        return a
-
-    @wp.func
-    def joined(a: struct.Sums, b: struct.Sums):
-        """Sums over two sets of patches."""
-        a.force += b.force
-        a.moment += b.moment
-        a.slopes = added(a.slopes, b.slopes)
         return a
 
     return SimpleNamespace(**locals())

@@ -19,7 +19,7 @@ from .variant import Variant
 @cache
 def build(variant: Variant) -> SimpleNamespace:
     """Device functions of earlier hits for one variant."""
-    struct, real = structs.build(variant), variant.real
+    struct, real, reals = structs.build(variant), variant.real, variant.reals
     use, share = variant.use(channel, exposure, lanes), lanes.share(variant)
 
     def filled_with(value: str) -> Any:
@@ -36,9 +36,9 @@ def build(variant: Variant) -> SimpleNamespace:
         """
         )
         def fill(
-            target: wp.array(dtype=real),
+            target: reals,
             start: wp.int32,
-            source: wp.array(dtype=real),
+            source: reals,
             first: wp.int32,
             count: wp.int32,
         ): ...
@@ -78,10 +78,9 @@ def build(variant: Variant) -> SimpleNamespace:
         slot: wp.int32,
         shot: wp.int32,
         layer: wp.int32,
-        y: wp.float64,
-        z: wp.float64,
+        hit: wp.vec2d,
     ):
-        """Fill a shot's blank window about (y, z) [m] with the exposure and the channels of the earlier shots in this
+        """Fill a shot's blank window about a hit [m] with the exposure and the channels of the earlier shots in this
         layer; returns whether a core went through it."""
         place, pierced = place_of(earlier, slot, shot, layer), bool(False)
         row, nodes = place.window + window.first, window.planes * window.nodes
@@ -95,8 +94,8 @@ def build(variant: Variant) -> SimpleNamespace:
         for order in range(place.order):
             other = place_of(earlier, slot, order, layer)
             if earlier.open[other.index]:
-                across = (y - earlier.y[other.index]) / wp.float64(plate.spacing)
-                along = (z - earlier.z[other.index]) / wp.float64(plate.spacing)
+                apart = (hit - earlier.hit[other.index]) / wp.float64(plate.spacing)
+                across, along = apart[0], apart[1]
                 near_y = wp.abs(across) < wp.float64(window.cells_y)
                 near_z = wp.abs(along) < wp.float64(window.cells_z)
                 if near_y and near_z:
@@ -130,8 +129,7 @@ def build(variant: Variant) -> SimpleNamespace:
         if window.weakens:
             copy(fields.exposure, window.first, earlier.exposure, row, nodes)
         use.lanes.barrier()
-        earlier.y[place.index] = y
-        earlier.z[place.index] = z
+        earlier.hit[place.index] = hit
         earlier.open[place.index] = True
         return pierced
 

@@ -20,10 +20,10 @@ from .variant import Variant
 @cache
 def build(variant: Variant) -> SimpleNamespace:
     """Device functions of the exposure for one variant."""
-    struct, real = structs.build(variant), variant.real
+    struct, real, reals = structs.build(variant), variant.real, variant.reals
     zero, half, one = real(0.0), real(0.5), real(1.0)
     vector = constants.VECTOR.value
-    read, write, part_of = memory.build(real).read, memory.build(real).write, memory.build(real).part_of
+    part_of = memory.build(real).part_of
     use, share = variant.use(lanes, plate_grid), lanes.share(variant)
 
     @wp.func_native(
@@ -33,51 +33,32 @@ def build(variant: Variant) -> SimpleNamespace:
     return across(field.data + index, z);
     """
     )
-    def across(field: wp.array(dtype=real), index: wp.int32, z: real) -> real:
+    def across(field: reals, index: wp.int32, z: real) -> real:
         """Linear interpolation between the node `index` and the next one."""
         ...
 
     @wp.func
-    def gather(field: wp.array(dtype=real), stride: wp.int32, index: wp.int32, y: real, z: real):
+    def gather(field: reals, stride: wp.int32, index: wp.int32, y: real, z: real):
         """Bilinear interpolation between the four nodes from `index` on."""
         low, high = across(field, index, z), across(field, index + stride, z)
         return low + y * (high - low)
-
-    @wp.func
-    def scatter_plain(field: wp.array(dtype=real), stride: wp.int32, index: wp.int32, y: real, z: real, amount: real):
-        """Distribute an amount over the four nodes by the weights of the interpolation."""
-        high = amount * y
-        low = amount - high
-        next = index + stride
-        write(field, index, read(field, index) + (low - low * z))
-        write(field, index + 1, read(field, index + 1) + low * z)
-        write(field, next, read(field, next) + (high - high * z))
-        write(field, next + 1, read(field, next + 1) + high * z)
 
     # Native and volatile, because a compiler would store neighbours in pairs. The pair of the next patch overlaps with
     # this pair, so the next patch would wait for the memory.
     @wp.func_native("""
     assert(index >= 0 && index + stride + 1 < field.shape[0]);
-    volatile float* const at = field.data + index;
-    const float a = at[0], b = at[1], c = at[stride], d = at[stride + 1];
-    const float high = amount * y, low = amount - high;
+    using Real = decltype(0 * amount);
+    volatile Real* const at = field.data + index;
+    const Real a = at[0], b = at[1], c = at[stride], d = at[stride + 1];
+    const Real high = amount * y, low = amount - high;
     at[0] = a + (low - low * z);
     at[1] = b + low * z;
     at[stride] = c + (high - high * z);
     at[stride + 1] = d + high * z;
     """)
-    def scatter_single(
-        field: wp.array(dtype=wp.float32),
-        stride: wp.int32,
-        index: wp.int32,
-        y: wp.float32,
-        z: wp.float32,
-        amount: wp.float32,
-    ):
-        """`scatter_plain` in float32."""
+    def scatter(field: reals, stride: wp.int32, index: wp.int32, y: real, z: real, amount: real):
+        """Distribute an amount over the four nodes from `index` on by the weights of the interpolation."""
         ...
-
-    scatter = scatter_plain if variant.double else scatter_single
 
     # Native, because a compiler vectorises the loops of strips only if the pointers do not alias.
 
@@ -89,7 +70,7 @@ def build(variant: Variant) -> SimpleNamespace:
     for (int j = lane; j < count; j += lanes) into[j] = value;
     """
     )
-    def fill(field: wp.array(dtype=real), start: wp.int32, count: wp.int32, value: real):
+    def fill(field: reals, start: wp.int32, count: wp.int32, value: real):
         """field[start + j] = value for j < count."""
         ...
 
@@ -114,14 +95,7 @@ def build(variant: Variant) -> SimpleNamespace:
     for (int j = lane; j < count; j += lanes) into[j] = middle * from[j] + side * (before[j] + after[j]);
     """)
     )
-    def filter_near(
-        target: wp.array(dtype=real),
-        source: wp.array(dtype=real),
-        strip: struct.Strip,
-        step: wp.int32,
-        middle: real,
-        side: real,
-    ):
+    def filter_near(target: reals, source: reals, strip: struct.Strip, step: wp.int32, middle: real, side: real):
         """target[j] = middle × source[j] + side × (source[j − step] + source[j + step]) in a strip."""
         ...
 
@@ -134,9 +108,7 @@ def build(variant: Variant) -> SimpleNamespace:
     for (int j = lane; j < count; j += lanes) into[j] += side * (before[j] + after[j]);
     """)
     )
-    def filter_far(
-        target: wp.array(dtype=real), source: wp.array(dtype=real), strip: struct.Strip, step: wp.int32, side: real
-    ):
+    def filter_far(target: reals, source: reals, strip: struct.Strip, step: wp.int32, side: real):
         """target[j] += side × (source[j − step] + source[j + step]) in a strip."""
         ...
 
@@ -148,7 +120,7 @@ def build(variant: Variant) -> SimpleNamespace:
     for (int j = lane; j < count; j += lanes) into[j] += factor * from[j];
     """)
     )
-    def add_scaled(target: wp.array(dtype=real), source: wp.array(dtype=real), strip: struct.Strip, factor: real):
+    def add_scaled(target: reals, source: reals, strip: struct.Strip, factor: real):
         """target[j] += factor × source[j] in a strip; target and source are different arrays."""
         ...
 
@@ -160,7 +132,7 @@ def build(variant: Variant) -> SimpleNamespace:
     for (int j = lane; j < count; j += lanes) { into[j] += factor * from[j]; from[j] = 0; }
     """)
     )
-    def take_scaled(target: wp.array(dtype=real), source: wp.array(dtype=real), strip: struct.Strip, factor: real):
+    def take_scaled(target: reals, source: reals, strip: struct.Strip, factor: real):
         """target[j] += factor × source[j], and then source[j] = 0, in a strip."""
         ...
 
@@ -170,7 +142,7 @@ def build(variant: Variant) -> SimpleNamespace:
     for (int j = lane; j < count; j += lanes) into[j] = 0;
     """)
     )
-    def clear_strip(target: wp.array(dtype=real), strip: struct.Strip):
+    def clear_strip(target: reals, strip: struct.Strip):
         """target[j] = 0 in a strip."""
         ...
 
@@ -178,7 +150,10 @@ def build(variant: Variant) -> SimpleNamespace:
     def fields_of_slot(fields: struct.Fields, slot: wp.int32):
         """The fields of one slot."""
         part = fields
-        if wp.static(variant.degrades):
+        if wp.static(variant.nodal):
+            part.share = part_of(fields.share, slot * fields.nodes, fields.nodes)
+            part.touched = part_of(fields.touched, slot * fields.nodes, fields.nodes)
+        elif wp.static(variant.degrades):
             part.exposure = part_of(fields.exposure, slot * fields.nodes, fields.nodes)
             part.gain = part_of(fields.gain, slot * fields.nodes, fields.nodes)
             part.filtered = part_of(fields.filtered, slot * fields.nodes, fields.nodes)
@@ -192,17 +167,10 @@ def build(variant: Variant) -> SimpleNamespace:
         return fields
 
     @wp.func
-    def open_window(
-        plate: struct.Plate,
-        thickness: real,
-        fields: struct.Fields,
-        layer: wp.int32,
-        hit_y: wp.float64,
-        hit_z: wp.float64,
-    ):
+    def open_window(plate: struct.Plate, thickness: real, fields: struct.Fields, layer: wp.int32, hit: wp.vec2d):
         """The window of a layer about a hit, on an untouched plate: no exposure."""
         cells_y, cells_z = fields.cells_y[layer], fields.cells_z[layer]
-        window = use.plate_grid.window_at(plate, thickness, fields.first[layer], cells_y, cells_z, hit_y, hit_z)
+        window = use.plate_grid.window_at(plate, thickness, fields.first[layer], cells_y, cells_z, hit)
         if wp.static(variant.degrades):
             fill(fields.exposure, window.first, window.planes * window.nodes, zero)
             fill(fields.gain, window.first, window.planes * window.nodes, zero)
@@ -227,7 +195,7 @@ def build(variant: Variant) -> SimpleNamespace:
     }
     """)
     def slide_nodes(
-        field: wp.array(dtype=real),
+        field: reals,
         start: wp.int32,
         planes: wp.int32,
         cells_y: wp.int32,
@@ -263,13 +231,7 @@ def build(variant: Variant) -> SimpleNamespace:
         return later
 
     @wp.func
-    def filter_(
-        target: wp.array(dtype=real),
-        source: wp.array(dtype=real),
-        plate: struct.Plate,
-        strip: struct.Strip,
-        step: wp.int32,
-    ):
+    def filter_(target: reals, source: reals, plate: struct.Plate, strip: struct.Strip, step: wp.int32):
         """Apply the tent's taps along one direction, `step` apart, to `source` in a strip, and put the result in
         `target`."""
         filter_near(target, source, strip, step, plate.taps[0], plate.taps[1])
@@ -351,9 +313,9 @@ def build(variant: Variant) -> SimpleNamespace:
         + "}"
     )
     def add_half_of_planes(
-        exposure: wp.array(dtype=real),
-        later: wp.array(dtype=real),
-        gain: wp.array(dtype=real),
+        exposure: reals,
+        later: reals,
+        gain: reals,
         strip: struct.Strip,
         nodes: wp.int32,
         planes: wp.int32,

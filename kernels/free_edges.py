@@ -18,7 +18,7 @@ from .variant import Variant
 def build(variant: Variant) -> SimpleNamespace:
     """Device functions of the cover for one variant."""
     struct = structs.build(variant)
-    real = variant.real
+    real, reals = variant.real, variant.reals
     zero, half, one, two = real(0.0), real(0.5), real(1.0), real(2.0)
     three = one + two
     use = variant.use(core_surface, lanes)
@@ -115,17 +115,17 @@ def build(variant: Variant) -> SimpleNamespace:
     """
     )
     def weigh(
-        area: wp.array(dtype=real),
-        slope: wp.array(dtype=real),
-        gain: wp.array(dtype=real),
+        area: reals,
+        slope: reals,
+        gain: reals,
         at: wp.array(dtype=wp.int32),
-        tile: wp.array(dtype=real),
+        tile: reals,
         first: wp.array(dtype=wp.int32),
-        y: wp.array(dtype=real),
-        z: wp.array(dtype=real),
-        turn: wp.array(dtype=real),
-        decay: wp.array(dtype=real),
-        cover: wp.array(dtype=real),
+        y: reals,
+        z: reals,
+        turn: reals,
+        decay: reals,
+        cover: reals,
         row: wp.int32,
         direction: wp.int32,
         start: wp.int32,
@@ -170,7 +170,7 @@ def build(variant: Variant) -> SimpleNamespace:
     return total;
     """
     )
-    def sum_of(area: wp.array(dtype=real), start: wp.int32, count: wp.int32) -> real:
+    def sum_of(area: reals, start: wp.int32, count: wp.int32) -> real:
         """Sum of a list, from `start` on."""
         ...
 

@@ -18,8 +18,6 @@ def build(variant: Variant) -> SimpleNamespace:
     zero, undefined = real(0.0), real(wp.nan)
     use = variant.use(rigid_body, shots, target)
     angle_between, axis_at = use.rigid_body.angle_between, use.rigid_body.axis_at
-    PERFORATED, ARRESTED = wp.constant(int(Status.PERFORATED)), wp.constant(int(Status.ARRESTED))
-    MISSED, UNFINISHED = wp.constant(int(Status.MISSED)), wp.constant(int(Status.UNFINISHED))
 
     def free_flight(
         # inputs
@@ -43,9 +41,9 @@ def build(variant: Variant) -> SimpleNamespace:
         flight = vec3(real(direction[0]), real(direction[1]), real(direction[2]))
         velocity, axis = contact.velocity[shot], contact.axis[shot]
         momentum = contact.angular_momentum[shot]
-        failed = status >= UNFINISHED
-        moves = not failed and status != ARRESTED
-        passes = status == PERFORATED or (status == MISSED and velocity[0] > zero)
+        failed = status >= Status.UNFINISHED
+        moves = not failed and status != Status.ARRESTED
+        passes = status == Status.PERFORATED or (status == Status.MISSED and velocity[0] > zero)
         nothing = vec3(undefined, undefined, undefined)
 
         report.residual_velocity[shot] = wp.where(moves, wp.length(velocity), wp.where(failed, undefined, zero))

@@ -63,7 +63,7 @@ def _butterfly(variant: Variant, kind: str, both: str) -> str:
 @cache
 def build(variant: Variant) -> SimpleNamespace:
     """Device functions of the lanes for one variant."""
-    real, vec2, vec3 = variant.real, variant.vec2, variant.vec3
+    real, reals, vec2, vec3 = variant.real, variant.reals, variant.vec2, variant.vec3
     kind = "double" if variant.double else "float"
 
     @wp.func_native(f"{share(variant)} return lane;")
@@ -148,7 +148,7 @@ def build(variant: Variant) -> SimpleNamespace:
             return wp::array_t<{kind}>(field.data + first, left < {variant.window} ? left : {variant.window});
         #endif
         """)
-        def place(field: wp.array(dtype=real), first: wp.int32) -> wp.array(dtype=real):
+        def place(field: reals, first: wp.int32) -> reals:
             """The nodes of the front window. Without shared memory they are those of a field from number `first` on."""
             ...
 

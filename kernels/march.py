@@ -21,7 +21,6 @@ from . import (
     target,
     trace,
 )
-from .contracts import TargetKind, checked
 from .lanes import BLOCKS, LANES
 from .status import RUNNING, Status
 from .variant import Variant
@@ -36,7 +35,7 @@ def build(variant: Variant) -> SimpleNamespace:
     barrier_share, gained = real(constants.BARRIER_SHARE.value), real(constants.GAINED.value)
     steadied = real(constants.STEADIED.value)
     use = variant.use(bending, clock, core_surface, interaction, lanes, rigid_body, scheme, shots, target, trace)
-    kind = checked(TargetKind, variant, (layers if variant.layered else one_plate).build(variant))
+    kind = (layers if variant.layered else one_plate).build(variant)
     shot_value = use.shots.shot_value
 
     @wp.func
@@ -96,7 +95,7 @@ def build(variant: Variant) -> SimpleNamespace:
         if wp.static(variant.tabled):
             context.surface = inputs.surfaces[shot_value(shots.surface, shot)]
             context.sections = inputs.all_sections[shot_value(shots.surface, shot)]
-            context.target = use.target.with_plates_of(inputs.target, shots, shot)
+            context.target.first = shot_value(shots.plates, shot) * inputs.target.count
         context.body = use.shots.body_of(shots, shot)
         context.law = use.target.law_of(context.target, inputs.law, 0, shot)
         context.law.onset_share = shot_value(shots.onset_share, shot)

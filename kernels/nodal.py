@@ -11,7 +11,7 @@ from types import SimpleNamespace
 
 import warp as wp
 
-from . import core_surface, memory, plate_grid, structs
+from . import core_surface, exposure, plate_grid, structs
 from .variant import Variant
 
 
@@ -21,8 +21,7 @@ def build(variant: Variant) -> SimpleNamespace:
     struct = structs.build(variant)
     real, vec3 = variant.real, variant.vec3
     zero, half, one = real(0.0), real(0.5), real(1.0)
-    use = variant.use(core_surface, plate_grid)
-    part_of = memory.build(real).part_of
+    use = variant.use(core_surface, exposure, plate_grid)
 
     @wp.func
     def outward_of(surface: struct.Surface, pose: struct.Pose, index: wp.int32):
@@ -30,35 +29,15 @@ def build(variant: Variant) -> SimpleNamespace:
         return surface.cosine[index] * pose.right + surface.sine[index] * pose.up
 
     @wp.func
-    def fields_of_slot(fields: struct.Fields, slot: wp.int32):
-        """The fields of one slot."""
-        part = fields
-        part.share = part_of(fields.share, slot * fields.nodes, fields.nodes)
-        part.touched = part_of(fields.touched, slot * fields.nodes, fields.nodes)
-        return part
-
-    @wp.func
-    def fields_of_window(fields: struct.Fields, first: wp.int32):
-        """The fields of a window that begins at node `first` of its slot: those of the slot."""
-        return fields
-
-    @wp.func
-    def open_window(
-        plate: struct.Plate,
-        thickness: real,
-        fields: struct.Fields,
-        layer: wp.int32,
-        hit_y: wp.float64,
-        hit_z: wp.float64,
-    ):
+    def open_window(plate: struct.Plate, thickness: real, fields: struct.Fields, layer: wp.int32, hit: wp.vec2d):
         """The window of a layer about a hit, untouched. Its nodes are the centres of the tile's cells, each with its
         share of the resistance."""
         cells_y, cells_z = fields.cells_y[layer], fields.cells_z[layer]
-        window = use.plate_grid.window_at(plate, thickness, fields.first[layer], cells_y, cells_z, hit_y, hit_z)
+        window = use.plate_grid.window_at(plate, thickness, fields.first[layer], cells_y, cells_z, hit)
         dy, dz = plate.period_y / wp.float64(plate.tile_y), plate.period_z / wp.float64(plate.tile_z)
-        home_y, home_z = wp.int32(wp.floor(hit_y / dy)), wp.int32(wp.floor(hit_z / dz))
-        window.y0 = real((wp.float64(home_y) + wp.float64(0.5)) * dy - hit_y)
-        window.z0 = real((wp.float64(home_z) + wp.float64(0.5)) * dz - hit_z)
+        home_y, home_z = wp.int32(wp.floor(hit[0] / dy)), wp.int32(wp.floor(hit[1] / dz))
+        window.y0 = real((wp.float64(home_y) + wp.float64(0.5)) * dy - hit[0])
+        window.z0 = real((wp.float64(home_z) + wp.float64(0.5)) * dz - hit[1])
         index = window.first
         for i in range(cells_y):
             row = use.plate_grid.within(real(home_y % plate.tile_y + i - cells_y // 2), plate.tile_y) * plate.tile_z
@@ -127,10 +106,11 @@ def build(variant: Variant) -> SimpleNamespace:
 
     @wp.func
     def load_on(context: struct.Context, slab: struct.Slab):
-        """The load of one step in the literal scheme (kernels/contracts.py); touched nodes weaken."""
+        """The load of one step in the literal scheme; touched nodes weaken."""
         load = total_load(context, slab)
         if wp.static(variant.degrades):
             degrade(context, slab)
         return load
 
+    fields_of_slot, fields_of_window = use.exposure.fields_of_slot, use.exposure.fields_of_window
     return SimpleNamespace(**locals())

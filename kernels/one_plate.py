@@ -1,4 +1,5 @@
-"""A target of one plate: its footprint in a step, and its load (kernels/contracts.py, TargetKind)."""
+"""A target of one plate: its footprint in a step, and its load. It has the functions of a target of several layers
+(layers.py)."""
 
 from functools import cache
 from types import SimpleNamespace

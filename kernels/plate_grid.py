@@ -17,7 +17,7 @@ from .variant import Variant
 def build(variant: Variant) -> SimpleNamespace:
     """Device functions of the plate for one variant."""
     struct = structs.build(variant)
-    real = variant.real
+    real, reals = variant.real, variant.reals
     zero, half, one = real(0.0), real(0.5), real(1.0)
 
     @wp.func
@@ -27,8 +27,7 @@ def build(variant: Variant) -> SimpleNamespace:
         first: wp.int32,
         cells_y: wp.int32,
         cells_z: wp.int32,
-        hit_y: wp.float64,
-        hit_z: wp.float64,
+        hit: wp.vec2d,
     ):
         """The window about a hit, from node `first` of its slot on. It is computed in float64, so a hit far from the
         origin loses no accuracy."""
@@ -45,20 +44,19 @@ def build(variant: Variant) -> SimpleNamespace:
         window.per_cell = one / plate.spacing
         window.per_plane = plate.per_plane
         # Whole cells of the tile are kept apart from the rest, so two hits that differ by a lattice vector of whole
-        # cells
-        # compute the same bits.
-        across = hit_y * wp.float64(plate.tile_y) / plate.period_y
-        along = hit_z * wp.float64(plate.tile_z) / plate.period_z
+        # cells compute the same bits.
+        across = hit[0] * wp.float64(plate.tile_y) / plate.period_y
+        along = hit[1] * wp.float64(plate.tile_z) / plate.period_z
         window.row = wp.int32(wp.floor(across)) % plate.tile_y
         window.column = wp.int32(wp.floor(along)) % plate.tile_z
         window.tile_y = real(across - wp.floor(across))
         window.tile_z = real(along - wp.floor(along))
         window.per_row = real(wp.float64(plate.tile_y) / plate.period_y)
         window.per_column = real(wp.float64(plate.tile_z) / plate.period_z)
-        window.low_y = real(-plate.half_y - hit_y)
-        window.high_y = real(plate.half_y - hit_y)
-        window.low_z = real(-plate.half_z - hit_z)
-        window.high_z = real(plate.half_z - hit_z)
+        window.low_y = real(-plate.half_y - hit[0])
+        window.high_y = real(plate.half_y - hit[0])
+        window.low_z = real(-plate.half_z - hit[1])
+        window.high_z = real(plate.half_z - hit[1])
         return window
 
     @wp.func
@@ -96,11 +94,11 @@ def build(variant: Variant) -> SimpleNamespace:
     """
     )
     def meet(
-        area: wp.array(dtype=real),
-        slope: wp.array(dtype=real),
-        gain: wp.array(dtype=real),
+        area: reals,
+        slope: reals,
+        gain: reals,
         at: wp.array(dtype=wp.int32),
-        tile: wp.array(dtype=real),
+        tile: reals,
         start: wp.int32,
         count: wp.int32,
     ) -> real:

@@ -145,27 +145,23 @@ def build(variant: Variant) -> SimpleNamespace:
         return dv, dw, felt_v, felt_w
 
     @wp.func
-    def restraint(body: struct.Body, axis: vec3, state: struct.State, dv: vec3, dw: vec3):
-        """Largest share, at most 1, of a change of velocities in the plate frame that does not raise the kinetic
+    def restraint(body: struct.Body, state: struct.State, dv: vec3, dw: vec3):
+        """Largest share, at most 1, of a change of velocities along the body axes that does not raise the kinetic
         energy.
 
         Every surface element takes power from the core, so the energy cannot grow in continuous time. A finite step may
         overshoot where a core comes to rest. Then the step ends at the least energy along its direction.
         """
+        axis = axis_of(state.attitude)
+        dv_plate, dw_plate = wp.quat_rotate(state.attitude, dv), wp.quat_rotate(state.attitude, dw)
         omega = angular_velocity(body, axis, state.angular_momentum)
-        dl = angular_momentum(body, axis, dw)
-        slope = body.mass * wp.dot(dv, state.velocity) + wp.dot(dl, omega)
-        curvature = body.mass * wp.dot(dv, dv) + wp.dot(dl, dw)
+        dl = angular_momentum(body, axis, dw_plate)
+        slope = body.mass * wp.dot(dv_plate, state.velocity) + wp.dot(dl, omega)
+        curvature = body.mass * wp.dot(dv_plate, dv_plate) + wp.dot(dl, dw_plate)
         share = one
         if slope + curvature > zero:
             share = wp.max(zero, -slope / wp.max(curvature, least_normal))
         return share
-
-    @wp.func
-    def restraint_of(body: struct.Body, state: struct.State, dv: vec3, dw: vec3):
-        """The restraint for a change of velocities along the body axes."""
-        dv_plate, dw_plate = wp.quat_rotate(state.attitude, dv), wp.quat_rotate(state.attitude, dw)
-        return restraint(body, axis_of(state.attitude), state, dv_plate, dw_plate)
 
     @wp.func
     def kick(body: struct.Body, state: struct.State, load: struct.Load, dt: real):
@@ -173,7 +169,7 @@ def build(variant: Variant) -> SimpleNamespace:
         axis = axis_of(state.attitude)
         dv_body, dw_body, _, _ = velocity_change(body, load, dt)
         dv, dw = wp.quat_rotate(state.attitude, dv_body), wp.quat_rotate(state.attitude, dw_body)
-        share = restraint(body, axis, state, dv, dw)
+        share = restraint(body, state, dv_body, dw_body)
         kicked = struct.State()
         kicked.position = state.position
         kicked.attitude = state.attitude
@@ -211,7 +207,7 @@ def build(variant: Variant) -> SimpleNamespace:
     def mean_load(body: struct.Body, state: struct.State, load: struct.Load, dt: real):
         """The mean force and moment of a kick over its step, in the plate frame."""
         dv, dw, _, _ = velocity_change(body, load, dt)
-        share = restraint_of(body, state, dv, dw)
+        share = restraint(body, state, dv, dw)
         spin = body.inertia_axial / body.inertia_transverse * dw[0]
         force, moment = (body.mass / dt) * dv, (body.inertia_transverse / dt) * vec3(spin, dw[1], dw[2])
         return share * wp.quat_rotate(state.attitude, force), share * wp.quat_rotate(state.attitude, moment)

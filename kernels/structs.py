@@ -2,8 +2,7 @@
 
 A struct is what functions of several stages, or the host and a kernel, pass to each other. Its docstring gives the
 meaning, the unit and the shape of each member. Numbers are SI, angles in radians. Arrays lie in the memory of the
-device;
-the host fills those of the inputs (solver/structs.py, solver/memory.py).
+device; the host fills those of the inputs (solver/structs.py, solver/memory.py).
 
 Long because all structs stand in one place.
 """
@@ -33,30 +32,21 @@ def _build(double: bool, many_plates: bool) -> SimpleNamespace:
     class Surface:
         """The surface of a core: rings from nose to base, the discs that close them included.
 
-        Per ring: station ahead of the centre of mass and radius [m], area of one patch [m²], the patch's normal along
-        the axis and outwards, half of the ring's extent along the meridian, axially and radially [m], and half of the
-        change of the normal over it.
+        `of_rings` has, one array behind the other, of every ring: station ahead of the centre of mass and radius [m];
+        area of one patch [m²]; the patch's normal along the axis and outwards; half of the ring's extent along the
+        meridian, axially and radially [m]; and half of the change of the normal over it. `of_patches` repeats each
+        number for all patches of the ring, so that a CPU goes through the patches of all rings in one loop.
         `cosine` and `sine` belong to the azimuths of all patches, ring by ring. Odd rings are turned by half a patch,
-        so
-        that neighbouring rings do not all miss the same edge. The number of patches around a ring is a multiple of 4.
-        `profile` has radii [m] at equidistant stations, `per_station` of them per metre, from the base's station `base`
-        [m] on. `patches` repeats the members of a ring for each of its patches, one array behind the other, so that a
-        CPU goes through the patches of all rings in one loop. A slot has room for `most_rings` and `most_patches`, the
-        numbers of the largest surface of a launch.
+        so that neighbouring rings do not all miss the same edge. The number of patches around a ring is a multiple of
+        4. `profile` has radii [m] at equidistant stations, `per_station` of them per metre, from the base's station
+        `base` [m] on. A slot has room for `most_rings` and `most_patches`, the numbers of the largest surface of a
+        launch.
         """
 
-        station: wp.array(dtype=real)
-        radius: wp.array(dtype=real)
-        area: wp.array(dtype=real)
-        normal_axial: wp.array(dtype=real)
-        normal_radial: wp.array(dtype=real)
-        half_axial: wp.array(dtype=real)
-        half_radial: wp.array(dtype=real)
-        turn_axial: wp.array(dtype=real)
-        turn_radial: wp.array(dtype=real)
+        of_rings: wp.array(dtype=real)
+        of_patches: wp.array(dtype=real)
         cosine: wp.array(dtype=real)
         sine: wp.array(dtype=real)
-        patches: wp.array(dtype=real)
         profile: wp.array(dtype=real)
         base: real
         per_station: real
@@ -119,7 +109,7 @@ def _build(double: bool, many_plates: bool) -> SimpleNamespace:
 
     @wp.struct
     class Ring:
-        """One ring in a pose; `first` is the index of its first azimuth, `sector` half the angle of a patch."""
+        """One ring in a pose; `sector` is half the angle of a patch."""
 
         centre: vec3
         station: real
@@ -132,7 +122,6 @@ def _build(double: bool, many_plates: bool) -> SimpleNamespace:
         turn_axial: real
         turn_radial: real
         sector: real
-        first: wp.int32
 
     @wp.struct
     class Patch:
@@ -175,7 +164,6 @@ def _build(double: bool, many_plates: bool) -> SimpleNamespace:
         the spacing of the exposure's grid [m]. `taps` is half of the tent filter on this grid, and `reach` is its reach
         in nodes, at least 1. A window has `planes` of the grid through the thickness, `per_plane` of them per metre. A
         contact weakens those up to `plane_reach` planes away. One plane stands for the whole thickness.
-        contact weakens those up to `plane_reach` planes away; one plane stands for the whole thickness.
 
         `cover` has the material along a normal [m] (kernels/free_edges.py), shape [radii × (directions + 1) × (cover_y
         + 1) × (cover_z + 1)]: classes of the core's radius; directions, where the last repeats the first; the nodes of
@@ -216,11 +204,10 @@ def _build(double: bool, many_plates: bool) -> SimpleNamespace:
         `per_cell` is nodes per metre. `row` and `column` are the cell of the tile that holds the hit, `tile_y` and
         `tile_z` are the hit's place in this cell, `per_row` and `per_column` are cells of the tile per metre.
         `thickness` is the thickness of the plate. Its front face is `behind` [m] the first of `planes` planes of
-        `nodes`
-        nodes each; `low_y`, `high_y`, `low_z` and `high_z` are its rims relative to the hit [m]. (y0, z0) is the place
-        of the node `home` in the literal scheme [m]. `weakens` says whether the fields hold this window. `channel` is
-        the first node of its `channel_planes` planes with the channels of earlier hits (kernels/channel.py), `pierced`
-        says whether there are any.
+        `nodes` nodes each; `low_y`, `high_y`, `low_z` and `high_z` are its rims relative to the hit [m]. (y0, z0) is
+        the place of the node `home` in the literal scheme [m]. `weakens` says whether the fields hold this window.
+        `channel` is the first node of its `channel_planes` planes with the channels of earlier hits
+        (kernels/channel.py), `pierced` says whether there are any.
         """
 
         first: wp.int32
@@ -330,8 +317,8 @@ def _build(double: bool, many_plates: bool) -> SimpleNamespace:
         or one per shot: shape [layers, 1] or [layers, shots]. The layers that a step can touch add their `onset_jump`,
         up to `most_jump`, as if they were one plate. `weakens` says whether the layer keeps a field.
         Layers that touch each other and have the same memory form a laminate: a contact in one weakens the others, and
-            they share a field. `laminate` is the number of its first layer. `deep` is 1 where the laminate is thicker
-            than the depth over which it weakens together, else 0.
+        they share a field. `laminate` is the number of its first layer. `deep` is 1 where the laminate is thicker than
+        the depth over which it weakens together, else 0.
         `stretch` is the ratio of the longest allowed step to the shortest one while a core touches nothing but the
         layer, and `slowing` is the share of its speed that a longer step may take. Where there are several layers,
         windows that `slide` follow a core that leaves them.
@@ -496,26 +483,20 @@ def _build(double: bool, many_plates: bool) -> SimpleNamespace:
         shift: real
 
     @wp.struct
-    class Slopes:
-        """Σ slope × two factors. The factors are the normal's components along the axis (a) and outwards (r), and its
-        lever about the centre of mass (l). Each r or l brings a cos or sin of the azimuth: (cos, sin) for one of them,
-        (cos², cos sin, sin²) for two."""
+    class Sums:
+        """Sums over some patches: force [N] and moment [N m] along the body axes, and Σ slope of the traction [N s/m] ×
+        two factors. The factors are the normal's components along the axis (a) and outwards (r), and its lever about
+        the centre of mass (l). Each r or l brings a cos or sin of the azimuth: (cos, sin) for one of them, (cos², cos
+        sin, sin²) for two."""
 
+        force: vec3
+        moment: vec3
         aa: real
         ar: vec2
         rr: vec3
         al: vec2
         rl: vec3
         ll: vec3
-
-    @wp.struct
-    class Sums:
-        """Sums over some patches: force [N] and moment [N m] along the body axes, and the slopes of the tractions
-        [N s/m]."""
-
-        force: vec3
-        moment: vec3
-        slopes: Slopes
 
     @wp.struct
     class Load:
@@ -610,10 +591,10 @@ def _build(double: bool, many_plates: bool) -> SimpleNamespace:
         """State of several layers in each slot; shape [slots × layers], empty for one plate.
 
         For each layer: the footprint of the step, the layer's window, the place of the window's home relative to the
-            hit [m], whether the window is open, whether the core was near the layer in the last step, and the nodes
-            that the window has held, from its home (`known`). `first_cells` are the nodes, in each direction, of the
-            first window that a shot alone needs, shape [layers, 1] or [layers, shots]: the windows of shots that are
-            computed with it may be wider, and its outcome must not depend on them.
+        hit [m], whether the window is open, whether the core was near the layer in the last step, and the nodes that
+        the window has held, from its home (`known`). `first_cells` are the nodes, in each direction, of the first
+        window that a shot alone needs, shape [layers, 1] or [layers, shots]: the windows of shots that are computed
+        with it may be wider, and its outcome must not depend on them.
         """
 
         footprint: wp.array(dtype=Footprint)
@@ -639,9 +620,9 @@ def _build(double: bool, many_plates: bool) -> SimpleNamespace:
         """What the `count` shots at a slot's plate leave to each other, in all slots.
 
         Of the windows: `exposure` has the `nodes` of all layers of every shot, shape [slots × count × nodes]: while a
-            shot is under way the exposure before it, afterwards the exposure that it added [s]. `y` and `z` are the
-            centres of the windows in the frames of their layers [m], `open` says whether a shot has opened its window;
-            shape [slots × count × layers].
+        shot is under way the exposure before it, afterwards the exposure that it added [s]. `hit` is the centre of the
+        window in the frame of its layer [m], `open` says whether a shot has opened its window; shape [slots × count ×
+        layers].
 
         Of the channels (kernels/channel.py): `inside` has the `channel_nodes` of all layers of every shot, the depth of
         each inside its channel [m], negative outside; shape [slots × count × channel_nodes]. `box` has all nodes that a
@@ -657,8 +638,7 @@ def _build(double: bool, many_plates: bool) -> SimpleNamespace:
         channel_nodes: wp.int32
         planes: wp.int32
         exposure: wp.array(dtype=real)
-        y: wp.array(dtype=wp.float64)
-        z: wp.array(dtype=wp.float64)
+        hit: wp.array(dtype=wp.vec2d)
         open: wp.array(dtype=wp.bool)
         inside: wp.array(dtype=real)
         box: wp.array(dtype=Box)

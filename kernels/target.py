@@ -23,13 +23,6 @@ def build(variant: Variant) -> SimpleNamespace:
         return values[layer, wp.min(shot, values.shape[1] - 1)]
 
     @wp.func
-    def with_plates_of(target: struct.Target, shots: struct.Shots, shot: wp.int32):
-        """The target with the plates of a shot, where these come from a table."""
-        chosen = target
-        chosen.first = use.shots.shot_value(shots.plates, shot) * target.count
-        return chosen
-
-    @wp.func
     def plate_of(target: struct.Target, layer: wp.int32):
         """The pattern of a layer."""
         if wp.static(variant.tabled):
@@ -73,8 +66,8 @@ def build(variant: Variant) -> SimpleNamespace:
         target, shots, shot = context.target, context.shots, context.shot
         y = use.shots.shot_value(shots.hit_y, shot) + wp.float64(home[1]) - layer_value(target.offset_y, layer, shot)
         z = use.shots.shot_value(shots.hit_z, shot) + wp.float64(home[2]) - layer_value(target.offset_z, layer, shot)
-        plate, thickness = plate_of(target, layer), layer_value(target.thickness, layer, shot)
-        window = use.scheme.open_window(plate, real(thickness), context.fields, layer, y, z)
+        hit, plate, thickness = wp.vec2d(y, z), plate_of(target, layer), layer_value(target.thickness, layer, shot)
+        window = use.scheme.open_window(plate, real(thickness), context.fields, layer, hit)
         window.weakens = target.weakens[layer]
         if wp.static(variant.deep):
             if layer_value(target.deep, layer, shot) > zero:
@@ -88,7 +81,7 @@ def build(variant: Variant) -> SimpleNamespace:
         if wp.static(variant.burst):
             fields = use.scheme.fields_of_window(context.fields, window.first)
             window = use.channel.open_window(context.earlier, window, thickness, layer)
-            window.pierced = use.earlier.recall(context.earlier, fields, plate, window, context.slot, shot, layer, y, z)
+            window.pierced = use.earlier.recall(context.earlier, fields, plate, window, context.slot, shot, layer, hit)
         return window
 
     # These functions keep what a shot leaves to later shots at the same target, and do nothing if it has no later

@@ -57,6 +57,11 @@ class Variant:
         """The floating-point type of positions, velocities and fields."""
         return wp.float64 if self.double else wp.float32
 
+    @property
+    def reals(self) -> Any:
+        """An array of these."""
+        return wp.array(dtype=self.real)
+
     @cached_property
     def vec2(self) -> Any:
         return wp.types.vector(2, self.real)

@@ -13,7 +13,7 @@ import warp as wp
 from .. import memory
 from ..variant import Variant
 from . import choices, fields, plasticity
-from .side_by_side import in_lanes
+from .side_by_side import over_runs
 
 
 @cache
@@ -274,20 +274,5 @@ def build(variant: Variant) -> SimpleNamespace:
         crossing = length / (speeds + wp.sqrt(speeds * speeds + sheet.wave_speed * sheet.wave_speed))
         write(mesh.crossing, element, wp.where(live, crossing, one))
 
-    @wp.func_native(in_lanes(deform))
-    def deform_all(mesh: struct.Mesh, sheet: struct.Sheet, first: wp.int32, last: wp.int32, dt: real):
-        """`deform` of every element from `first` to `last`."""
-        ...
-
-    @wp.func
-    def deform_elements(mesh: struct.Mesh, dt: real):
-        """`deform` the elements of the sheets that are awake, run by run."""
-        for run in range(mesh.runs.shape[0] // 3):
-            first, last, layer = mesh.runs[3 * run], mesh.runs[3 * run + 1], mesh.runs[3 * run + 2]
-            sheet = mesh.sheets[layer]
-            if last < first:  # never: it names the function, so that it is compiled before the loop that calls it
-                deform(mesh, sheet, first, dt)
-            if mesh.awake[layer] != 0:
-                deform_all(mesh, sheet, first, last, dt)
-
+    deform_all = over_runs(struct, real, deform)
     return SimpleNamespace(**locals())

@@ -13,7 +13,7 @@ import warp as wp
 from .. import memory
 from ..variant import Variant
 from . import fields
-from .side_by_side import in_lanes
+from .side_by_side import over_runs
 
 
 @cache
@@ -85,20 +85,5 @@ def build(variant: Variant) -> SimpleNamespace:
         write(mesh.contact, z, zero)
         write(mesh.near, node, wp.where(outside < zero, one, zero))
 
-    @wp.func_native(in_lanes(move))
-    def move_all(mesh: struct.Mesh, sheet: struct.Sheet, first: wp.int32, last: wp.int32, dt: real):
-        """`move` every node from `first` to `last`."""
-        ...
-
-    @wp.func
-    def move_nodes(mesh: struct.Mesh, dt: real):
-        """`move` the nodes of the sheets that are awake, run by run."""
-        for run in range(mesh.node_runs.shape[0] // 3):
-            first, last, layer = mesh.node_runs[3 * run], mesh.node_runs[3 * run + 1], mesh.node_runs[3 * run + 2]
-            sheet = mesh.sheets[layer]
-            if last < first:  # never: it names the function, so that it is compiled before the loop that calls it
-                move(mesh, sheet, first, dt)
-            if mesh.awake[layer] != 0:
-                move_all(mesh, sheet, first, last, dt)
-
+    move_all = over_runs(struct, real, move)
     return SimpleNamespace(**locals())

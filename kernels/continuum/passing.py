@@ -26,9 +26,6 @@ def build(variant: Variant) -> SimpleNamespace:
         for constant in (choices.COURANT, choices.GROWTH, choices.BEHIND, choices.QUIET, choices.UNBOUNDED)
     )
     still, spent = wp.float64(constants.STILL.value), wp.float64(constants.SPENT.value)
-    PERFORATED, ARRESTED = wp.constant(int(Status.PERFORATED)), wp.constant(int(Status.ARRESTED))
-    RICOCHETED, MISSED = wp.constant(int(Status.RICOCHETED)), wp.constant(int(Status.MISSED))
-    UNFINISHED, NOT_FINITE = wp.constant(int(Status.UNFINISHED)), wp.constant(int(Status.NOT_FINITE))
     running, waiting = wp.constant(RUNNING), wp.constant(WAITING)
 
     @wp.func
@@ -42,17 +39,17 @@ def build(variant: Variant) -> SimpleNamespace:
         swings = state.velocity[0] <= zero and energy < spent * limits.impact_energy  # on, in its hole
         status = running
         if not (energy < unbounded * limits.impact_energy):  # what is no number, too
-            status = NOT_FINITE
+            status = Status.NOT_FINITE
         elif rearmost > limits.rear and untouched:
-            status = MISSED
+            status = Status.MISSED
         elif rearmost > limits.rear + behind and free:
-            status = PERFORATED
+            status = Status.PERFORATED
         elif foremost < -behind and state.velocity[0] < zero and free:
-            status = wp.where(untouched, MISSED, RICOCHETED)
+            status = wp.where(untouched, Status.MISSED, Status.RICOCHETED)
         elif swings or energy < still * limits.impact_energy:
-            status = ARRESTED
+            status = Status.ARRESTED
         elif flight.time > limits.longest:
-            status = UNFINISHED
+            status = Status.UNFINISHED
         elif foremost > limits.unmeshed - behind:
             status = waiting
         return status
@@ -155,8 +152,8 @@ def build(variant: Variant) -> SimpleNamespace:
             load = contact.load_on(mesh, core, flight.state, flight.time, dt)
             flight = pushed(core, flight, load.force, load.moment, load.touching)
             mesh.cylinder = cylinder_about(core, flight.state)
-            mesh_nodes.move_nodes(mesh, real(dt))
-            elements.deform_elements(mesh, real(dt))
+            mesh_nodes.move_all(mesh, mesh.node_runs, real(dt))
+            elements.deform_all(mesh, mesh.runs, real(dt))
             flight = stepped(core, limits, mesh, flight, shortest_crossing(mesh), left)
         flights[0] = flight
 

@@ -39,7 +39,7 @@ def bend(
     """One step under a force across the axis, along the body's y, on one ring."""
     load = Load()
     load.force = wp.vec3d(wp.float64(0.0), force, wp.float64(0.0))
-    load.moment = wp.vec3d(wp.float64(0.0), wp.float64(0.0), surface.station[struck] * force)
+    load.moment = wp.vec3d(wp.float64(0.0), wp.float64(0.0), surface.of_rings[struck] * force)
     load.touching = True
     touches.total_area[struck] = wp.float64(1.0)
     sums = touches.sums[struck]

@@ -23,7 +23,7 @@ OUTSIDE = [0.0, 0.025, 0.05, 1.0]
 def touch_walls(plate: Plate, fields: Fields, earlier: Earlier, touches: Touches) -> None:
     """One touch in a channel that is everywhere as deep as at its first node."""
     fields = use.exposure.fields_of_slot(fields, SLOT)
-    window = use.exposure.open_window(plate, wp.float64(THICKNESS), fields, 0, wp.float64(0.0), wp.float64(0.0))
+    window = use.exposure.open_window(plate, wp.float64(THICKNESS), fields, 0, wp.vec2d())
     window = use.channel.open_window(earlier, window, wp.float64(THICKNESS), 0)
     touches.place[0] = window.channel
     use.channel.spare(fields, window, touches, 0, 1)
@@ -43,7 +43,7 @@ def follow_core(
 ) -> None:
     """The channel on the front face after the core of the first shot was there once."""
     fields = use.exposure.fields_of_slot(fields, SLOT)
-    window = use.exposure.open_window(plate, wp.float64(THICKNESS), fields, 0, wp.float64(0.0), wp.float64(0.0))
+    window = use.exposure.open_window(plate, wp.float64(THICKNESS), fields, 0, wp.vec2d())
     window = use.channel.open_window(earlier, window, wp.float64(THICKNESS), 0)
     use.earlier.begin(earlier, SLOT, 0)
     place = use.earlier.place_of(earlier, SLOT, 0, 0)

@@ -9,24 +9,18 @@ import warp as wp
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from warpimpact.kernels import contact, core_surface, footprint, plate_grid, structs
+from warpimpact.kernels import contact, structs
 from warpimpact.kernels.variant import Variant
 from warpimpact.scene import ConeCore, OgiveCore, ProfileCore
 
-from .probes import astride, plate_of, poisoned, poisoned_fields, poisoned_touches, surface_of
+from .probes import astride, plate_of, poisoned, poisoned_fields, poisoned_touches, stepping, surface_of
 
 Array = NDArray[np.float64]
 
 VARIANT = Variant(double=True, rate_dependent=True)
-real, vec3, quat = VARIANT.real, VARIANT.vec3, VARIANT.quat
-use, struct = VARIANT.use(contact, core_surface, footprint, plate_grid), structs.build(VARIANT)
-Surface, Plate, Fields, Law, Load = (
-    struct.Surface,
-    struct.Plate,
-    struct.Fields,
-    struct.Law,
-    struct.Load,
-)
+vec3, quat = VARIANT.vec3, VARIANT.quat
+struct = structs.build(VARIANT)
+Surface, Plate, Fields, Law, Load = struct.Surface, struct.Plate, struct.Fields, struct.Law, struct.Load
 Touches = struct.Touches
 
 CELL = 0.25e-3
@@ -37,42 +31,7 @@ SOLID, HOLE = np.ones((1, 1)), np.zeros((1, 1))  # tiles of a single cell
 ALIGNED = np.array([[0.0, 0.0, 0.0, 1.0]])
 
 
-def loads(
-    surface: Surface,
-    plate: Plate,
-    thickness: real,
-    law: Law,
-    fields: Fields,
-    touches: Touches,
-    first: wp.int32,
-    position: wp.array(dtype=vec3),
-    attitude: wp.array(dtype=quat),
-    velocity: wp.array(dtype=vec3),
-    omega: wp.array(dtype=vec3),
-    dt: real,
-    inside: wp.array(dtype=wp.bool),
-    loads: wp.array(dtype=Load),
-) -> None:
-    """The load of one step of every pose, each on its own plate, from slot `first` on; none if the window is too
-    small."""
-    i = wp.tid()
-    context, slab = struct.Context(), struct.Slab()
-    context.slot = first + i
-    context.surface = surface
-    context.touches = touches
-    context.fields = use.contact.fields_of_slot(fields, first + i)
-    slab.plate = plate
-    slab.law = law
-    slab.dt = dt
-    slab.window = use.contact.open_window(plate, thickness, context.fields, 0, wp.float64(0.0), wp.float64(0.0))
-    slab.pose = use.core_surface.pose_of(surface, position[i], attitude[i], velocity[i], omega[i])
-    slab.footprint = use.footprint.footprint_of(surface, plate, slab.window, slab.pose, dt)
-    inside[i] = slab.footprint.inside
-    if slab.footprint.inside:
-        loads[i] = use.contact.load_on(context, slab)
-
-
-LOADS = VARIANT.kernel(loads)
+LOADS = stepping(VARIANT, contact)
 
 
 def law_of(*, a0: float = STRENGTH, a1: float = 0.0, a2: float = 0.0, **others: float) -> Any:

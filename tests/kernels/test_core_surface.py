@@ -87,7 +87,7 @@ def patches(
         low[i, k] = ring.centre[0] - reach
         high[i, k] = ring.centre[0] + reach
         for j in range(surface.around):
-            cosine, sine = surface.cosine[ring.first + j], surface.sine[ring.first + j]
+            cosine, sine = surface.cosine[k * surface.around + j], surface.sine[k * surface.around + j]
             outward = cosine * pose.right + sine * pose.up
             around = cosine * pose.up - sine * pose.right
             patch = use.core_surface.patch_at(pose, ring, cosine, sine)

@@ -24,17 +24,16 @@ def hit(
     fields: Fields,
     earlier: Earlier,
     shot: wp.int32,
-    y: wp.array(dtype=wp.float64),
-    z: wp.array(dtype=wp.float64),
+    hits: wp.array(dtype=wp.vec2d),
     added: wp.array(dtype=wp.float64),
     found: wp.array(dtype=wp.float64),
 ) -> None:
     fields = use.exposure.fields_of_slot(fields, SLOT)
-    window = use.exposure.open_window(plate, wp.float64(4.0e-3), fields, 0, y[shot], z[shot])
+    window = use.exposure.open_window(plate, wp.float64(4.0e-3), fields, 0, hits[shot])
     window.weakens = True
     window = use.channel.open_window(earlier, window, wp.float64(4.0e-3), 0)
     use.earlier.begin(earlier, SLOT, shot)
-    use.earlier.recall(earlier, fields, plate, window, SLOT, shot, 0, y[shot], z[shot])
+    use.earlier.recall(earlier, fields, plate, window, SLOT, shot, 0, hits[shot])
     for k in range(NODES):
         found[k] = fields.exposure[window.first + k]
         fields.exposure[window.first + k] = found[k] + added[shot * NODES + k]
@@ -49,11 +48,10 @@ def scratch(device: str) -> Earlier:
     earlier = Earlier()
     earlier.count, earlier.nodes, earlier.layers = COUNT, NODES, 1
     earlier.exposure = poisoned(SLOTS * COUNT * NODES, wp.float64, device)
-    earlier.y, earlier.z = (poisoned(SLOTS * COUNT, wp.float64, device) for _ in range(2))
     earlier.channel_nodes, earlier.planes = 2 * NODES, 2
     earlier.inside = poisoned(SLOTS * COUNT * earlier.channel_nodes, wp.float64, device)
     earlier.sections = poisoned(SLOTS * earlier.planes, struct.Section, device)
-    for name, kind in (("open", wp.bool), ("box", struct.Box), ("through", wp.bool)):
+    for name, kind in (("hit", wp.vec2d), ("open", wp.bool), ("box", struct.Box), ("through", wp.bool)):
         setattr(earlier, name, poisoned(SLOTS * COUNT, kind, device))
     earlier.first, earlier.first_plane = (wp.zeros(1, dtype=wp.int32, device=device) for _ in range(2))
     earlier.apart = wp.array([4.0e-3], dtype=wp.float64, device=device)
@@ -64,7 +62,8 @@ def shoot(y: list[float], z: list[float], added: np.ndarray, device: str) -> tup
     """What every shot found, and what is kept of all."""
     plate = plate_of(Plate, np.ones((4, 4)), (1e-3, 1e-3), CELL, device)
     fields, earlier = poisoned_fields(Fields, SLOTS, CELLS_Y, CELLS_Z, device), scratch(device)
-    put = [wp.array(values, dtype=wp.float64, device=device) for values in (y, z, added.ravel())]
+    hits = wp.array(np.stack([y, z], axis=1), dtype=wp.vec2d, device=device)
+    put = [hits, wp.array(added.ravel(), dtype=wp.float64, device=device)]
     found = []
     for shot in range(COUNT):
         found.append(poisoned(NODES, wp.float64, device))

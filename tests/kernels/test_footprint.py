@@ -47,14 +47,16 @@ def footprints(
     """The footprints of poses; for each ring, whether it is immersed; for each patch, its first cell."""
     i = wp.tid()
     fields = use.exposure.fields_of_slot(fields, i)
-    window = use.exposure.open_window(plate, real(THICKNESS), fields, 0, wp.float64(0.0), wp.float64(0.0))
+    window = use.exposure.open_window(plate, real(THICKNESS), fields, 0, wp.vec2d())
     pose = use.core_surface.pose_of(surface, position[i], attitude[i], velocity, omega)
     found[i] = use.footprint.footprint_of(surface, plate, window, pose, dt)
     for k in range(surface.rings):
         ring = use.core_surface.ring_at(surface, pose, k)
         immersed[i, k] = 0
         for j in range(surface.around):
-            patch = use.core_surface.patch_at(pose, ring, surface.cosine[ring.first + j], surface.sine[ring.first + j])
+            patch = use.core_surface.patch_at(
+                pose, ring, surface.cosine[k * surface.around + j], surface.sine[k * surface.around + j]
+            )
             if use.core_surface.immersed_area(pose, ring, patch, window.thickness, dt) > real(0.0):
                 immersed[i, k] = 1
             cell = use.plate_grid.cell_at(window, patch.y, patch.z)

@@ -36,12 +36,11 @@ HITS = np.array([[1.1e-4, 3.9e-4], [-2.3e-3, -7.7e-4], [5.05e-3, -1.03e-3]])
 def lay(
     plate: Plate,
     fields: Fields,
-    hit_y: wp.array(dtype=wp.float64),
-    hit_z: wp.array(dtype=wp.float64),
+    hits: wp.array(dtype=wp.vec2d),
     windows: wp.array(dtype=Window),
 ) -> None:
     slot = wp.tid()
-    windows[slot] = use.exposure.open_window(plate, real(THICKNESS), fields, slot, hit_y[slot], hit_z[slot])
+    windows[slot] = use.exposure.open_window(plate, real(THICKNESS), fields, slot, hits[slot])
 
 
 def look_up(
@@ -64,12 +63,10 @@ def scatters(
     y: wp.array(dtype=wp.float32),
     z: wp.array(dtype=wp.float32),
     amount: wp.array(dtype=wp.float32),
-    plain: wp.array(dtype=wp.float32),
-    native: wp.array(dtype=wp.float32),
+    field: wp.array(dtype=wp.float32),
 ) -> None:
     for i in range(len(index)):
-        single.exposure.scatter_plain(plain, stride, index[i], y[i], z[i], amount[i])
-        single.exposure.scatter(native, stride, index[i], y[i], z[i], amount[i])
+        single.exposure.scatter(field, stride, index[i], y[i], z[i], amount[i])
 
 
 def meet(
@@ -115,15 +112,14 @@ def beneath_kernel(variant: Variant) -> Any:
 
     def beneath(
         plate: Plate,
-        hit_y: wp.float64,
-        hit_z: wp.float64,
+        hit: wp.vec2d,
         y: wp.array(dtype=real),
         z: wp.array(dtype=real),
         material: wp.array(dtype=real),
         shares: wp.array(dtype=real),
     ) -> None:
         i = wp.tid()
-        window = part.window_at(plate, real(THICKNESS), 0, 2, 2, hit_y, hit_z)
+        window = part.window_at(plate, real(THICKNESS), 0, 2, 2, hit)
         material[i] = plate.tile[part.tile_at(plate, window, y[i], z[i])]
         shares[i] = part.on_plate(plate, window, y[i], z[i])
 
@@ -162,8 +158,8 @@ def lay_windows(device: str, *, length: float = 0.5e-3) -> Laid:
     plate = plate_of(Plate, TILE, PERIOD, CELL, device, length=length)
     fields = poisoned_fields(Fields, SLOTS, CELLS_Y, CELLS_Z, device)
     windows = poisoned(SLOTS, Window, device)
-    hit_y, hit_z = (wp.array(np.ascontiguousarray(h), dtype=wp.float64, device=device) for h in HITS.T)
-    wp.launch(LAY, SLOTS, inputs=[plate, fields, hit_y, hit_z], outputs=[windows], device=device)
+    hits = wp.array(HITS, dtype=wp.vec2d, device=device)
+    wp.launch(LAY, SLOTS, inputs=[plate, fields, hits], outputs=[windows], device=device)
     return Laid(plate, fields, windows, device)
 
 
@@ -172,7 +168,7 @@ def beneath(variant: Variant, hit: Array, y: Array, z: Array, device: str, **pla
     outputs = [poisoned(len(y), variant.real, device) for _ in range(2)]
     inputs = [
         plate_of(structs.build(variant).Plate, TILE, PERIOD, CELL, device, real=variant.real, **plate),
-        *hit,
+        wp.vec2d(*hit),
         *(wp.array(a, dtype=variant.real, device=device) for a in (y, z)),
     ]
     wp.launch(BENEATH[variant], len(y), inputs=inputs, outputs=outputs, device=device)
@@ -260,12 +256,6 @@ def test_hit_is_a_node_of_its_window(device: str) -> None:
         np.testing.assert_allclose(found.numpy()["z"], 0.75 * k, atol=1e-15)
 
 
-def test_fresh_window_has_no_exposure(device: str) -> None:
-    laid = lay_windows(device)
-    for name in ("exposure", "gain"):
-        np.testing.assert_array_equal(laid.read(name), 0.0)
-
-
 def test_interpolation_reproduces_a_linear_field(device: str) -> None:
     laid, slot = lay_windows(device), 1
     y, z = NODES
@@ -281,31 +271,19 @@ def test_interpolation_reproduces_a_linear_field(device: str) -> None:
     np.testing.assert_allclose(found.numpy(), 3.0 + 2e3 * at_y - 5e3 * at_z, rtol=1e-12, atol=1e-12)
 
 
-def test_native_scatter_is_the_plain_one(device: str) -> None:
+def test_scatter_gives_each_node_its_weight(device: str) -> None:
     # Neighbours, too: each adds to the value of the last one.
     rng = np.random.default_rng(5)
     stride, count = 37, 1000
     index = rng.integers(0, 60, count).astype(np.int32)
     y, z, amount = rng.random((3, count)).astype(np.float32)
     inputs = [stride, *(wp.array(a, device=device) for a in (index, y, z, amount))]
-    plain, native = (wp.zeros(37 * 4, dtype=wp.float32, device=device) for _ in range(2))
-    wp.launch(SCATTERS, 1, inputs=inputs, outputs=[plain, native], device=device)
-    np.testing.assert_allclose(native.numpy(), plain.numpy(), rtol=1e-5)
-    assert native.numpy().sum() == pytest.approx(amount.sum(), rel=1e-5)
-
-
-def test_scatter_conserves_amount_and_place(device: str) -> None:
-    laid, slot, amount = lay_windows(device), 2, 0.7
-    y, z = 1.234e-3, -0.815e-3
-    for _ in range(2):  # adds to the values
-        laid.launch(GAIN, laid.fields, laid.windows, slot, y, z, amount)
-    gained = laid.read("gain")
-    at_y, at_z = NODES
-    assert np.count_nonzero(gained) == np.count_nonzero(gained[slot]) == 4
-    assert gained.min() >= 0.0
-    assert gained.sum() == pytest.approx(2 * amount, rel=1e-14)
-    assert (gained[slot].sum(axis=1) @ at_y) / (2 * amount) == pytest.approx(y, rel=1e-12)
-    assert (gained[slot].sum(axis=0) @ at_z) / (2 * amount) == pytest.approx(z, rel=1e-12)
+    field, expected = wp.zeros(37 * 4, dtype=wp.float32, device=device), np.zeros(37 * 4)
+    wp.launch(SCATTERS, 1, inputs=inputs, outputs=[field], device=device)
+    for row, along_y in ((0, 1.0 - y), (1, y)):
+        for column, along_z in ((0, 1.0 - z), (1, z)):
+            np.add.at(expected, index + row * stride + column, amount.astype(float) * along_y * along_z)
+    np.testing.assert_allclose(field.numpy(), expected, rtol=1e-5)
 
 
 # --- Filter ---
@@ -413,11 +391,3 @@ def test_mid_step_has_half_of_the_exposure_and_the_step_clears_its_gain(device: 
     np.testing.assert_array_equal(laid.read("gain"), 0.0)
     _, twice = exposed_at_a_point(laid, 0, *POINTS[1])
     np.testing.assert_allclose(twice, 2 * end, rtol=1e-14)
-
-
-def test_length_below_the_cells_leaves_the_interpolation_alone(device: str) -> None:
-    laid = lay_windows(device, length=0.1e-3)
-    laid.launch(GAIN, laid.fields, laid.windows, 1, *POINTS[1], 1.0)
-    gained = laid.read("gain")[1]
-    _, exposure = exposed_at_a_point(lay_windows(device, length=0.1e-3), 1, *POINTS[1])
-    np.testing.assert_allclose(exposure, gained, atol=1e-15)

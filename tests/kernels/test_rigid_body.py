@@ -207,21 +207,6 @@ def test_drift_is_the_closed_form_of_the_symmetric_top(dt: float, device: str) -
     )
 
 
-def test_drift_without_rotation_is_a_straight_line(device: str) -> None:
-    start = random_motion()
-    start.angular_momentum = np.zeros((COUNT, 3))
-    after = drifted(start, 1e-3, device)
-    np.testing.assert_allclose(after["attitude"], start.attitude, atol=1e-15)
-    np.testing.assert_allclose(after["position"], start.position + 1e-3 * start.velocity, rtol=1e-14)
-
-
-def test_two_half_drifts_make_one(device: str) -> None:
-    start, dt = random_motion(), 1e-4
-    once, twice = drifted(start, dt, device), drifted(start, dt / 2, device, repeats=2)
-    for name in State.numpy_dtype()["names"]:
-        np.testing.assert_allclose(twice[name], once[name], atol=1e-13)
-
-
 def test_attitude_stays_a_unit_quaternion(device: str) -> None:
     # Unnormalised, 1e4 products in float64 drift by some 1e-14.
     after = drifted(random_motion(), STEP, device, repeats=10_000)

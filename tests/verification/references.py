@@ -6,7 +6,6 @@ tip, and section s lies at depth X − s. Plates take the keywords of a scene: t
 shear_coefficient η, degradation β, degradation_interval Δt_β [s], degradation_length ℓ [m].
 """
 
-from bisect import bisect
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property, partial
@@ -92,51 +91,6 @@ def share_of_contact(slope: float, onset: float) -> float:
     """Share of a ring of slope r' in straight flight that is in contact (§4): min(1, n_x/κ), n_x = r'/√(1 + r'²)."""
     normal = max(slope, 0.0) / sqrt(1 + slope**2)
     return 1.0 if normal >= onset and normal > 0.0 else normal / onset if onset else 0.0
-
-
-def local_degradation_residual(
-    *,
-    velocity: float,
-    thickness: float,
-    resistance: float,
-    shear_coefficient: float,
-    degradation: float,
-    degradation_interval: float,
-) -> float:
-    """Residual velocity [m/s] with degradation in the limit ℓ → 0 (§6.3), to 1e-4 m/s; 0 < β ≤ 1.
-
-    The column under station s is touched from X = s on, so T = t(X) − t(s). With k = −ln β/Δt_β and the axial
-    force per Y and station w(s) = 2πr (dr/ds + η), the nose disc a lump πr(0)² at s = 0,
-
-        F(X) = Y ∫_{X−h}^{X} w(s) exp(−k (t(X) − t(s))) ds = Y [J(X) − J(X−h) exp(−k (t(X) − t(X−h)))],
-
-    where J, the same integral from s = 0, obeys dJ/dX = w − k J/v. So (v, t, J) obey ordinary differential
-    equations in X with the delay h, solved by the method of steps.
-
-    Raises ValueError where the core is arrested.
-    """
-    decay = -log(degradation) / degradation_interval
-
-    def rate(depth: float, state: Array, advancing: bool, earlier: Callable | None) -> list[float]:
-        v, t, area = state
-        growth = _paper_force_per_station(depth, shear_coefficient) if advancing else 0.0
-        touched = area
-        if earlier is not None:
-            _, t_earlier, area_earlier = earlier(depth - thickness)
-            touched = area - area_earlier * exp(-decay * (t - t_earlier))
-        return [-resistance * touched / (PAPER_MASS * v), 1 / v, growth - decay * area / v]
-
-    end = PAPER_SHOULDER + thickness
-    breaks = sorted({*np.arange(0, end, thickness).tolist(), PAPER_SHOULDER, end})
-    state = np.array([velocity, 0.0, pi * paper_radius(0.0) ** 2])
-    solved: list[Callable] = []
-    for start, stop in pairwise(breaks):
-        delayed = bisect(breaks, (start + stop) / 2 - thickness) - 1
-        earlier = solved[delayed] if delayed >= 0 else None
-        panel = partial(rate, advancing=stop <= PAPER_SHOULDER, earlier=earlier)
-        state, solution = _march(panel, (start, stop), state, rtol=1e-9)
-        solved.append(solution)
-    return float(state[0])
 
 
 def nonlocal_degradation_residual(

@@ -120,17 +120,26 @@ def test_threads_and_chunks_change_no_bit(name: str, threads: int, chunk: int, m
     assert_expected(computed(name, threads=threads), name, "cpu")
 
 
-# The last core may come again beyond its window, so that the width of its own first one counts.
-@pytest.mark.parametrize("name", [name for name in CASES if name != "turned back at two layers"])
-def test_shots_that_leave_narrow_windows_have_the_bits_of_wide_ones(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    marched, march_some = [], marching.Marching._march_some
+@pytest.fixture
+def marched(monkeypatch: pytest.MonkeyPatch) -> list[int]:
+    """Numbers of shots that march in windows of one size."""
+    counts, march_some = list[int](), marching.Marching._march_some
 
     def counted(self: marching.Marching, pending: Any, *rest: Any) -> None:
-        marched.append(len(pending))
+        counts.append(len(pending))
         march_some(self, pending, *rest)
 
-    expected(name, "cpu")
     monkeypatch.setattr(marching.Marching, "_march_some", counted)
+    return counts
+
+
+# The last core may come again beyond its window, so that the width of its own first one counts.
+@pytest.mark.parametrize("name", [name for name in CASES if name != "turned back at two layers"])
+def test_shots_that_leave_narrow_windows_have_the_bits_of_wide_ones(
+    name: str, marched: list[int], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    expected(name, "cpu")
+    marched.clear()
     for width in ("SLACK", "NODAL_SLACK"):
         monkeypatch.setattr(windows, width, 0.3 * getattr(windows, width))
     assert_expected(computed(name), name, "cpu")
@@ -138,16 +147,9 @@ def test_shots_that_leave_narrow_windows_have_the_bits_of_wide_ones(name: str, m
     assert not any(count % CASES[name].at_a_plate for count in marched)  # whole bursts are repeated
 
 
-def test_first_window_is_wide_enough(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_first_window_is_wide_enough(marched: list[int]) -> None:
     # A hit that leaves it is computed again: this is right, but twice the work. 9 % of these hits leave windows of 1.2
     # radii.
-    marched, march_some = [], marching.Marching._march_some
-
-    def counted(self: marching.Marching, pending: Any, *rest: Any) -> None:
-        marched.append(len(pending))
-        march_some(self, pending, *rest)
-
-    monkeypatch.setattr(marching.Marching, "_march_some", counted)
     scene = Scene(core=PAPER_CORE, target=paper_plate(), record=Record(standoffs=STANDOFFS))
     simulate(scene, shots_at(*scattered_hits(100)), numerics=Numerics(level=2), device="cpu")
     assert marched == [100]

@@ -43,22 +43,20 @@ def assert_same(got: Outcomes, expected: Outcomes, precision: str) -> None:
 
 
 @PRECISIONS
-def test_mirror_image_in_y(precision: str, device: str) -> None:
+@pytest.mark.parametrize(
+    ("image", "turned", "axial"),
+    [
+        ({"y": -Y, "azimuth": 150.0, "yaw": 3.0, "spin": -1.7e4}, "yaw", [-1, 1, -1]),
+        ({"z": -Z, "azimuth": -30.0, "pitch": -2.0, "spin": -1.7e4}, "pitch", [-1, -1, 1]),
+    ],
+    ids=["y", "z"],
+)
+def test_mirror_image(image: dict[str, Any], turned: str, axial: list[int], precision: str, device: str) -> None:
     scene: dict[str, Any] = {"precision": precision, "device": device}
-    plain = simulate(paper_plate(), shots(), **scene)
-    mirrored = simulate(paper_plate(), shots(y=-Y, azimuth=150.0, yaw=3.0, spin=-1.7e4), **scene)
+    plain, mirrored = (simulate(paper_plate(), one, **scene) for one in (shots(), shots(**image)))
     # ω is an axial vector: its components in the mirror plane change sign.
-    expected = plain.assign(yaw=-plain.yaw, angular_velocity=plain.angular_velocity * [-1, 1, -1])
-    assert_same(mirrored, expected, precision)
-
-
-@PRECISIONS
-def test_mirror_image_in_z(precision: str, device: str) -> None:
-    scene: dict[str, Any] = {"precision": precision, "device": device}
-    plain = simulate(paper_plate(), shots(), **scene)
-    mirrored = simulate(paper_plate(), shots(z=-Z, azimuth=-30.0, pitch=-2.0, spin=-1.7e4), **scene)
-    expected = plain.assign(pitch=-plain.pitch, angular_velocity=plain.angular_velocity * [-1, -1, 1])
-    assert_same(mirrored, expected, precision)
+    changed = {turned: -getattr(plain, turned), "angular_velocity": plain.angular_velocity * axial}
+    assert_same(mirrored, plain.assign(**changed), precision)
 
 
 # Lattice, hits and cells in binary fractions of a metre, so that moving a hit by a period rounds nothing.

@@ -187,14 +187,13 @@ class OneHit:
         size = mesh.size = first
         position, inverse_mass, alive = np.zeros((3, size)), np.zeros(size), np.zeros(size)
         impedance = np.zeros((3, size))
-        volume, length, runs, node_runs, masses = np.zeros(size), np.ones(size), [], [], []
+        volume, length, runs, node_runs = np.zeros(size), np.ones(size), [], []
         for k, (sheet, at, flow) in enumerate(zip(self.sheets, firsts, self.flows, strict=False)):
             inside = slice(at, at + sheet.nodes)
             position[:, inside], present = sheet.positions, sheet.alive
             alive[inside] = present
             volume[inside], length[inside] = volumes_of(sheet)
             mass = np.zeros(size)
-            masses.append(mass[inside])
             for corner in (0, 1):
                 for offset in (0, sheet.row, sheet.plane, sheet.row + sheet.plane):
                     mass[at + corner + offset : at + corner + offset + sheet.nodes] += (
@@ -205,7 +204,7 @@ class OneHit:
             impedance[:, inside] = np.array([[along, along], [upright, along], [along, upright]]) @ sheet.outer_faces
             runs += [(*run, k) for run in runs_of(present, at)]
             node_runs += [(*run, k) for run in runs_of(mass[inside] > 0.0, at)]
-        self.inverse_mass, self._masses = inverse_mass, masses
+        self.inverse_mass = inverse_mass
         mesh.sheets = wp.array(
             [self._sheet(sheet, flow) for sheet, flow in zip(self.sheets, self.flows, strict=False)],
             dtype=self.struct.Sheet,
@@ -296,10 +295,6 @@ class OneHit:
             cancel.check()
             self.advance(every)
             yield
-
-    def mass_at(self, layer: int) -> Array:
-        """Of the nodes of a layer [kg]."""
-        return np.asarray(self._masses[layer])
 
     @property
     def touched(self) -> NDArray[np.bool_]:

@@ -63,7 +63,7 @@ def scratch(
     earlier.first, earlier.first_plane = (put(np.cumsum([0, *counts[:-1]]), wp.int32) for counts in (pierced, through))
     earlier.apart = put(_apart(prepared), wp.float64)
     boxes, kept = slots * count * layers, nodes if prepared.variant.degrades else 0
-    sizes = dict.fromkeys(("y", "z", "open", "box", "through"), boxes) | {
+    sizes = dict.fromkeys(("hit", "open", "box", "through"), boxes) | {
         "exposure": slots * count * kept,
         "inside": slots * count * sum(pierced),
         "sections": slots * sum(through),

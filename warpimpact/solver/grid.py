@@ -106,45 +106,29 @@ def grids_of(
         shared: whether plates with similar degradation lengths share a tile, whose cells are then finer than needed.
         cover: what the covers depend on; None without a free surface.
     """
-    return [
-        _grid(plate, resolution, reach, reach.length / lengths[0].length, material if deep else None, shared, cover)
-        for plate, reach, material in zip(layers, lengths, materials, strict=True)
-    ]
-
-
-def _grid(
-    plate: Plate,
-    resolution: Resolution,
-    lengths: Lengths,
-    wider: float,
-    deep: Materials | None,
-    shared: bool,
-    cover: Pushed | None,
-) -> Grid:
-    """The grid of a layer with these degradation lengths. Its cells are `wider` times as wide as those of the plate.
-
-    Args:
-        deep: material of the layer, where windows have planes through the thickness; else None.
-    """
-    nodal, spacing = resolution.nodal, wider * resolution.grid_spacing
-    cells = spacing if nodal else min(spacing / FINER, lengths.length / FINEST)
-    if shared:
-        cells = 2.0 ** (math.floor(SHARED * math.log2(cells)) / SHARED)
-    taps = half_taps(0.0 if nodal else lengths.length, spacing)
-    planes = WHOLE if deep is None else _planes(lengths.depth, deep, resolution)
-    tile = tile_of(plate, cells, sharp=nodal, double=resolution.double)
-    if nodal:  # its nodes are the tile's cells, which fit the period
-        spacing = min(tile.dy, tile.dz)
-    size_y, size_z = plate.size or (math.inf, math.inf)
-    return Grid(
-        tile=tile,
-        period=plate.pattern.period,
-        half_size=(0.5 * size_y, 0.5 * size_z),
-        spacing=spacing,
-        taps=taps,
-        planes=planes,
-        cover=None if cover is None else cover_of(plate, cells, cover, double=resolution.double),
-    )
+    grids, nodal = [], resolution.nodal
+    for plate, reach, material in zip(layers, lengths, materials, strict=True):
+        spacing = reach.length / lengths[0].length * resolution.grid_spacing
+        cells = spacing if nodal else min(spacing / FINER, reach.length / FINEST)
+        if shared:
+            cells = 2.0 ** (math.floor(SHARED * math.log2(cells)) / SHARED)
+        taps = half_taps(0.0 if nodal else reach.length, spacing)
+        tile = tile_of(plate, cells, sharp=nodal, double=resolution.double)
+        if nodal:  # its nodes are the tile's cells, which fit the period
+            spacing = min(tile.dy, tile.dz)
+        size_y, size_z = plate.size or (math.inf, math.inf)
+        grids.append(
+            Grid(
+                tile=tile,
+                period=plate.pattern.period,
+                half_size=(0.5 * size_y, 0.5 * size_z),
+                spacing=spacing,
+                taps=taps,
+                planes=_planes(reach.depth, material, resolution) if deep else WHOLE,
+                cover=None if cover is None else cover_of(plate, cells, cover, double=resolution.double),
+            )
+        )
+    return grids
 
 
 def half_taps(length: float, spacing: float) -> Array:

@@ -1,8 +1,7 @@
 """Limits: the impact velocity at which each shot just perforates, or the thickness of plate that it just perforates.
 
 A few shots are searched first. Their limits say where the searches of the others begin (solver/limit_near.py). Then
-each
-search follows its own runs (solver/limit_search.py).
+each search follows its own runs (solver/limit_search.py).
 """
 
 from __future__ import annotations
@@ -19,7 +18,7 @@ from warpimpact.records.outcomes import Outcomes
 from warpimpact.scene import Numerics, Plate, Scene, Shots, Target
 from warpimpact.solver.findings import LimitErrors
 from warpimpact.solver.limit_near import Neighbours
-from warpimpact.solver.limit_search import Guess, LimitSearch
+from warpimpact.solver.limit_search import LimitSearch
 from warpimpact.solver.marching import Progress
 from warpimpact.solver.pilot import limits_pilot_size, pilot_limits
 from warpimpact.solver.prepare import prepare
@@ -232,72 +231,54 @@ def limits(
 
         some = shots[first : first + size]
         parts.append(_limits_of(scene, some, sought, short_steps(numerics), worker, told))
-    return _joined(parts, np.arange(total))
+    return _joined(parts)
 
 
 def _limits_of(
     scene: Scene, shots: Shots, sought: Sought, numerics: Numerics, worker: Worker, progress: Progress
 ) -> Limits:
     """The limits of shots that are searched together, at fixed numerics, in batches: first FIRST shots, then up to
-    twice that number in all, and so on."""
-    near = Neighbours(scene, shots, (sought.quantity, sought.layer), sought.tolerance)
-    order, parts, done = spread_places(len(shots), len(shots)), list[Limits](), 0
-    while done < len(shots):
-        which = order[done : max(FIRST, 2 * done)]
-
-        def told(ended: int, before: int = done) -> None:
-            progress(before + ended, len(shots))
-
-        search, batch = _searched(scene, shots[which], sought, numerics, worker, near.guess(which), told)
-        near.learn(which, search)
-        parts.append(batch)
-        done += len(which)
-    return _joined(parts, np.argsort(order))
-
-
-def _searched(
-    scene: Scene,
-    shots: Shots,
-    sought: Sought,
-    numerics: Numerics,
-    worker: Worker,
-    guess: Guess,
-    progress: Callable[[int], object],
-) -> tuple[LimitSearch, Limits]:
-    """Search the limits of a batch, one run of each pending shot at a time; returns the limits and the search."""
-    search, target = _begun(scene, shots, sought, guess), scene.target
-    total = len(shots)
+    twice that number in all, and so on. Each run computes all pending shots of a batch."""
+    search, near = (
+        _search_of(scene, shots, sought),
+        Neighbours(scene, shots, (sought.quantity, sought.layer), sought.tolerance),
+    )
+    total, done, order = len(shots), 0, spread_places(len(shots), len(shots))
     kept, failing = _Kept(total), _Kept(total)
-    while len(which := search.pending):
-        tried = search.trial(which)
-        ended = computed(prepare(scene, sought.put(target, shots[which], tried), numerics), worker)
-        kept.take(search.learn(which, tried, ended), which, tried, ended)
-        failing.take(np.flatnonzero(failures(ended.status)), which, tried, ended)
-        progress(total - len(search.pending))
+    while done < total:
+        batch = order[done : max(FIRST, 2 * done)]
+        search.expect(batch, near.guess(batch))
+        while len(which := batch[search.pending[batch]]):
+            tried = search.trial(which)
+            ended = computed(prepare(scene, sought.put(scene.target, shots[which], tried), numerics), worker)
+            kept.take(search.learn(which, tried, ended), which, tried, ended)
+            failing.take(np.flatnonzero(failures(ended.status)), which, tried, ended)
+            progress(done + len(batch) - int(search.pending[batch].sum()), total)
+        near.learn(batch, search)
+        done += len(batch)
     failed = np.flatnonzero(search.failed)
     if len(failed):
         kept.take(failed, np.arange(total), failing.values, failing.outcomes)
-    shots, outcomes = sought.put(target, shots, kept.values), kept.outcomes
-    return search, Limits(search.value(), *search.ends(), search.runs, search.converged, shots, outcomes)
+    searched = sought.put(scene.target, shots, kept.values)
+    return Limits(search.value(), *search.ends(), search.runs, search.converged, searched, kept.outcomes)
 
 
-def _joined(parts: list[Limits], order: NDArray[np.int64]) -> Limits:
-    """Concatenate limits, then put them in this order."""
+def _joined(parts: list[Limits]) -> Limits:
+    """Limits of some shots, one after the other."""
     numbers = ("value", "lower", "upper", "runs", "converged")
     return Limits(
-        **{name: np.concatenate([getattr(part, name) for part in parts])[order] for name in numbers},
-        shots=Shots.joined([part.shots for part in parts])[order],
-        outcomes=Outcomes.joined([part.outcomes for part in parts])[order],
+        **{name: np.concatenate([getattr(part, name) for part in parts]) for name in numbers},
+        shots=Shots.joined([part.shots for part in parts]),
+        outcomes=Outcomes.joined([part.outcomes for part in parts]),
     )
 
 
-def _begun(scene: Scene, shots: Shots, sought: Sought, guess: Guess) -> LimitSearch:
-    """A search of limits."""
-    tolerance, highest = sought.tolerance, sought.highest
+def _search_of(scene: Scene, shots: Shots, sought: Sought) -> LimitSearch:
+    """A search of the limits of all shots."""
     if sought.quantity == "velocity":
-        return LimitSearch(shots.velocity, np.inf, np.zeros(len(shots)), tolerance, highest, guess)
+        return LimitSearch(shots.velocity, np.inf, np.zeros(len(shots)), sought.tolerance, sought.highest)
     start = np.broadcast_to(shots.own_of(scene.target, "thickness", sought.layer), len(shots))
-    return LimitSearch(start, 0.0, shots.velocity, tolerance, highest, guess)
+    return LimitSearch(start, 0.0, shots.velocity, sought.tolerance, sought.highest)
 
 
 def short_steps(numerics: Numerics) -> Numerics:
@@ -343,8 +324,8 @@ class _Kept:
         self.values = np.empty(count)
 
     def take(self, places: NDArray[np.int64], which: NDArray[np.int64], tried: Array, ended: Outcomes) -> None:
-        """Keep the runs at some places of `which`. The first call has all shots."""
+        """Keep the runs at some places of `which`."""
         if not hasattr(self, "outcomes"):
-            self.outcomes = ended
+            self.outcomes = ended[np.zeros(len(self.values), dtype=np.int64)]  # until a shot has its own
         self.outcomes = self.outcomes.with_rows(which[places], ended[places])
         self.values[which[places]] = tried[places]

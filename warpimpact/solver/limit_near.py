@@ -8,21 +8,15 @@ from numpy.typing import NDArray
 from warpimpact.scene import IDENTITY, Scene, Shots, Symmetry
 from warpimpact.scene.shots import OF_A_SHOT
 from warpimpact.scene.symmetry import SYMMETRIES, of_plate
-from warpimpact.solver.limit_search import DOUBT, Guess, LimitSearch
-from warpimpact.solver.simulate import spread_places
+from warpimpact.solver.limit_search import LimitSearch
 
 Array = NDArray[np.float64]
 
 NEAREST = 4
 """Number of nearest hits from which a limit is guessed."""
-WITHIN = 0.75
-"""Share of the limits that shall lie within their stated doubt."""
-LEAST, MOST = 0.02, 0.5
-"""Bounds of the doubt of a limit (solver/limit_search.py)."""
-TRIED = 256
-"""Most known limits that are compared with their guesses from the others."""
-PLACES = 0.0, 0.1, 0.3, 1.0, 3.0, 10.0
-"""Candidate weights of the distance of hit points beside that of the other conditions."""
+PLACE = 3.0
+"""Weight of the distance of hit points, in cells of the plate, beside that of the other conditions. Searches take as
+many runs with 2 to 5."""
 
 
 class Neighbours:
@@ -30,11 +24,9 @@ class Neighbours:
 
     Two shots are near by their hit points and by all conditions in which shots differ. A known limit also holds for the
     images of its shot under the symmetries of the plate (scene/symmetry.py), and the map of hit points repeats with the
-    cell of the plate. A condition is weighed by how much the limit changes with it. The hit points get the weight with
-    which the known limits predict each other best.
+    cell of the plate. A condition is weighed by how much the limit changes with it.
 
     Args:
-        scene, shots: scene and its shots.
         sought: quantity and layer whose limit is searched; the quantity is no condition.
         tolerance: tolerance of the search.
     """
@@ -51,81 +43,37 @@ class Neighbours:
         mean, scale = columns[0].mean(axis=0), np.where(moved, scale, 1.0)
         self._conditions = [((column - mean) / scale)[:, moved] for column in columns]
         self._value, self._sums = np.full(len(shots), np.nan), np.zeros((5, len(shots)))
-        self._errors = np.full((3, len(shots)), np.nan)
 
     def learn(self, which: NDArray[np.int64], search: LimitSearch) -> None:
         """Take in known limits."""
-        self._value[which], self._sums[:, which] = search.value(), search.curve_sums()
-        self._errors[:, which] = search.errors()
+        self._value[which], self._sums[:, which] = search.value()[which], search.curve_sums()[:, which]
 
-    def guess(self, which: NDArray[np.int64]) -> Guess:
-        """Guess the limits of some shots."""
+    def guess(self, which: NDArray[np.int64]) -> Array:
+        """What is known of the limits of some shots (`LimitSearch.guess`), shape [4, shots]."""
         known = np.flatnonzero(np.isfinite(self._value) & (self._value > 0.0))
         if len(known) <= NEAREST:
-            return Guess.nothing(len(which))
-        value, least = self._value[known], 1e-3 * self._tolerance
-        slopes = _slopes(self._conditions[0][known], value)
-        trend = [condition @ slopes for condition in self._conditions]
-        rest = np.concatenate([value - column[known] for column in trend])
-        weights = np.abs(slopes) / (np.std(value) + least)
-        some, best = spread_places(len(known), min(len(known), TRIED)), np.inf
-        for place in PLACES:
-            near = _Near(self._places(known, weights, place), place, len(known))
-            told, sure, _ = near.told(self._places(known[some], weights, place, images=1), rest, some)
-            off = np.abs(told - rest[some])
-            if off.mean() < best:
-                best, chosen, nearest = float(off.mean()), place, near
-                scale = np.quantile(off / (sure + least), WITHIN)
-        told, sure, who = nearest.told(self._places(which, weights, chosen, images=1), rest)
-        linear, square = _curve(self._sums[:, known[who]].sum(axis=2))
-        errors = [np.append(error[np.isfinite(error)], first) for error, first in zip(self._errors, DOUBT, strict=True)]
-        doubt = np.array([np.clip(np.quantile(error, WITHIN), LEAST, MOST) for error in errors])
-        expected = np.maximum(trend[0][which] + told, 0.1 * value.min())
-        return Guess(expected, np.minimum(scale * (sure + least), 0.5 * expected), linear, square, doubt)
-
-    def _places(self, which: NDArray[np.int64], weights: Array, place: float, images: int | None = None) -> Array:
-        """Coordinates of some shots, then of their images, shape [shots × images, 2 + conditions]. The first two
-        columns are periodic with `place`."""
-        pairs = list(zip(self._points, self._conditions, strict=True))[:images]
-        at = [np.column_stack([point[which] * place, other[which] * weights]) for point, other in pairs]
-        return np.concatenate(at)
-
-
-class _Near:
-    """Finds the nearest shots among some shots and their images.
-
-    Args:
-        places: coordinates of the shots, then of the images.
-        period: period of the first two columns.
-        count: number of shots.
-    """
-
-    def __init__(self, places: Array, period: float, count: int) -> None:
+            return np.full((4, len(which)), np.nan)
         from scipy.spatial import KDTree  # a fifth of a second to import
 
-        self._count, self._images = count, len(places) // count
-        self._tree = KDTree(places, boxsize=[period, period, *np.zeros(places.shape[1] - 2)])
-
-    def told(
-        self, places: Array, values: Array, left_out: NDArray[np.int64] | None = None
-    ) -> tuple[Array, Array, NDArray[np.int64]]:
-        """Predict values at places from the nearest shots: the values, their doubt, and the numbers of the nearest.
-
-        Args:
-            values: values at the shots and their images.
-            left_out: number of the shot at each place, which is left out of its own prediction.
-        """
-        count = NEAREST if left_out is None else NEAREST + self._images
-        distance, near = self._tree.query(places, min(count, self._count * self._images))
-        if left_out is not None:
-            distance = np.where(near % self._count == left_out[:, None], np.inf, distance)
-            order = np.argsort(distance, axis=1)[:, :NEAREST]
-            distance, near = (np.take_along_axis(array, order, axis=1) for array in (distance, near))
-        weight = 1.0 / (distance + 1e-9 + 0.1 * distance[:, -1:]) ** 2
-        weight /= weight.sum(axis=1, keepdims=True)
-        predicted = (weight * values[near]).sum(axis=1)
-        spread = np.sqrt((weight * (values[near] - predicted[:, None]) ** 2).sum(axis=1))
-        return predicted, spread + 0.3 * np.median(spread), near % self._count
+        value, least = self._value[known], 1e-3 * self._tolerance
+        slopes = _slopes(self._conditions[0][known], value)
+        weights = np.abs(slopes) / (np.std(value) + least)
+        trend = [condition @ slopes for condition in self._conditions]
+        rest = np.concatenate([value - image[known] for image in trend])
+        places = [
+            np.column_stack([PLACE * point, condition * weights])
+            for point, condition in zip(self._points, self._conditions, strict=True)
+        ]
+        tree = KDTree(np.concatenate([image[known] for image in places]), boxsize=[PLACE, PLACE, *(0.0 * weights)])
+        distance, near = tree.query(places[0][which], NEAREST)
+        share = 1.0 / (distance + 1e-9 + 0.1 * distance[:, -1:]) ** 2
+        share /= share.sum(axis=1, keepdims=True)
+        told = (share * rest[near]).sum(axis=1)
+        spread = np.sqrt((share * (rest[near] - told[:, None]) ** 2).sum(axis=1))
+        linear, square = _curve(self._sums[:, known[near % len(known)]].sum(axis=2))
+        expected = np.maximum(trend[0][which] + told, 0.1 * value.min())
+        doubt = np.minimum(spread + 0.3 * np.median(spread) + least, 0.5 * expected)
+        return np.stack([expected, doubt, linear, square])
 
 
 def _coordinates(shots: Shots, sought: tuple[str, int]) -> tuple[Array, Array, Array]:

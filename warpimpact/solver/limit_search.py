@@ -3,14 +3,11 @@
 A search keeps two ends: a value at which the core passes, and one at which it does not. The residual velocities r of
 passing cores determine the limit: with the drive D, which is v² or a thickness, |D − D_limit| = b r + c r². In a solid
 plate that does not weaken, b = 0, because the work of a straight passage is constant (docs/model.md §6.1). Where a slow
-core meets less resistance, b > 0. Three passages give D_limit, b and c. Two give D_limit and the scale of the curve,
-one
-gives D_limit, with b and c of other hits. Bisection takes over where this does not help.
+core meets less resistance, b > 0. Three passages give D_limit, b and c. Two give D_limit and the scale of the curve.
+One gives D_limit, with b and c of other hits. Bisection takes over where this does not help.
 """
 
 from __future__ import annotations
-
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,13 +20,9 @@ Array = NDArray[np.float64]
 
 MOST_RUNS = 14
 """Most runs of a shot."""
-STAGES = 3
-"""Passages beyond which a further one no longer changes how the limit is determined."""
-DOUBT = 0.35, 0.2, 0.12
-"""Default doubt of a limit that follows from one, two and three passages, as a share of its distance from the nearest
-passage. Known limits of other hits replace it."""
-TELLING = 5.0
-"""Distance [tolerances] of a passage from the limit above which it counts for the error of predictions."""
+DOUBT = 0.15, 0.08, 0.05
+"""Doubt of a limit that follows from one, two and three passages, as a share of its distance from the nearest
+passage."""
 BESIDE = 0.4
 """Distance [tolerances] from the expected limit of a run that shall come close to it."""
 SETTLING = 0.98
@@ -43,30 +36,6 @@ PATIENT = 5
 """Runs after which the steps grow with each run, if all runs have stopped or all have passed."""
 
 
-@dataclass(frozen=True)
-class Guess:
-    """What is known of some limits before any run; arrays of shape [shots].
-
-    Attributes:
-        value: expected limits; NaN where nothing is known.
-        sure: doubt of the expected limits.
-        linear, square: b and c of other hits; NaN where there are none.
-        doubt: doubts that replace DOUBT, shape [STAGES].
-    """
-
-    value: Array
-    sure: Array
-    linear: Array
-    square: Array
-    doubt: Array
-
-    @classmethod
-    def nothing(cls, count: int) -> Guess:
-        """The guess where no other limits are known."""
-        unknown = np.full(count, np.nan)
-        return cls(unknown, unknown, unknown, unknown, np.array(DOUBT))
-
-
 class LimitSearch:
     """The state of all searches; arrays of shape [shots].
 
@@ -77,24 +46,32 @@ class LimitSearch:
         start: first values to try where nothing is known.
         passed: initial `passed`: infinite for a velocity, 0 for a thickness.
         speed: residual velocity of a core that passes there.
-        tolerance, highest: as in `limit_velocity`.
-        guess: what is known of the limits.
+        tolerance: largest distance of the ends that are asked for.
+        highest: largest value tried.
+
+    Attributes:
+        guess: what is known of the limits before any run: expected limits and their doubt, b and c of other hits, shape
+            [4, shots]; NaN where nothing is known.
     """
 
-    def __init__(
-        self, start: Array, passed: float, speed: Array, tolerance: float, highest: float, guess: Guess
-    ) -> None:
+    def __init__(self, start: Array, passed: float, speed: Array, tolerance: float, highest: float) -> None:
         count = len(start)
-        self.tolerance, self.highest, self.rising, self.guess = tolerance, highest, passed > 0.0, guess
+        self.tolerance, self.highest, self.rising = tolerance, highest, passed > 0.0
+        self.guess = np.full((4, count), np.nan)
         self.start = np.minimum(start, highest)
         self.passed, self.stopped = np.full(count, passed), np.full(count, 0.0 if self.rising else np.inf)
         self.drives, self.speeds = np.full((2, MOST_RUNS + 1, count), np.nan)  # of passages, the nearest first
         if not self.rising:
-            unknown = ~np.isfinite(guess.value)
-            self.drives[0, unknown], self.speeds[0, unknown] = 0.0, speed[unknown]
-        self.foreseen, self.distance = np.full((2, STAGES, count), np.nan)
+            self.drives[0], self.speeds[0] = 0.0, speed
         self.runs = np.zeros(count, dtype=np.int8)
         self.beyond, self.failed = np.zeros((2, count), dtype=bool)  # failed: at `stopped`
+
+    def expect(self, which: NDArray[np.int64], guess: Array) -> None:
+        """Take in what is known of some limits before their first run."""
+        self.guess[:, which] = guess
+        if not self.rising:  # a guess tells more than that no plate stops no core
+            known = which[np.isfinite(guess[0])]
+            self.drives[0, known] = self.speeds[0, known] = np.nan
 
     @property
     def width(self) -> Array:
@@ -108,9 +85,9 @@ class LimitSearch:
         return ~self.failed & self._ended
 
     @property
-    def pending(self) -> NDArray[np.int64]:
-        """The shots that need another run."""
-        return np.flatnonzero(~self._ended & (self.runs < MOST_RUNS))
+    def pending(self) -> NDArray[np.bool_]:
+        """Whether a shot needs another run."""
+        return ~self._ended & (self.runs < MOST_RUNS)
 
     @property
     def _ended(self) -> NDArray[np.bool_]:
@@ -122,7 +99,7 @@ class LimitSearch:
         low, high = np.minimum(passed, stopped), np.maximum(passed, stopped)
         aimed = self._aimed()[which]
         wild = np.logical_not((aimed > low) & (aimed < high))
-        blind = runs - np.where(np.isfinite(self.guess.value[which]), PATIENT, 1)
+        blind = runs - np.where(np.isfinite(self.guess[0, which]), PATIENT, 1)
         further = np.array(OUTWARD)[np.clip(blind, 0, 2)] * low
         farthest = np.where(low > 0.0, OUTWARD[-1] * low, np.inf)
         misled = (low == stopped) & (runs >= PATIENT)
@@ -132,7 +109,7 @@ class LimitSearch:
         hurried = (low > 0.0) & (MOST_RUNS - runs <= needed)
         inward = np.where(wild | hurried, 0.5 * (low + high), aimed)
         chosen = np.where(np.isinf(high), outward, inward)
-        unknown = (runs == 0) & ~np.isfinite(self.guess.value[which])
+        unknown = (runs == 0) & ~np.isfinite(self.guess[0, which])
         return np.asarray(np.minimum(np.where(unknown, self.start[which], chosen), self.highest))
 
     def learn(self, which: NDArray[np.int64], tried: Array, outcomes: Outcomes) -> NDArray[np.int64]:
@@ -145,7 +122,6 @@ class LimitSearch:
             known[1:, through] = known[:-1, through]
             known[0, through] = new[passes]
         self.passed[through], self.stopped[back] = tried[passes], tried[~passes]
-        self._foresee(through)
         self.failed[back] = failed[~passes]
         self.passed[which[untouched]] = self.stopped[which[untouched]] = 0.0 if self.rising else np.inf
         self.beyond[which] = (tried >= self.highest) & (passes != self.rising)
@@ -155,7 +131,7 @@ class LimitSearch:
     def value(self) -> Array:
         """The expected limits, or the middles between the ends where none is expected there."""
         lower, upper = self.ends()
-        expected = self._value(self.curve()[0])
+        expected = self._value(self._limit_drive())
         inside = (expected > lower) & (expected < upper)
         limit = np.where(inside, expected, 0.5 * (lower + upper))
         return np.where(self.failed, np.nan, np.where(self.beyond, np.inf, limit))
@@ -164,12 +140,13 @@ class LimitSearch:
         """The lower and the upper end."""
         return np.minimum(self.passed, self.stopped), np.maximum(self.passed, self.stopped)
 
-    def curve(self) -> tuple[Array, Array, Array]:
-        """The drive at which no speed is left, b and c, from the passages; NaN where there are none."""
+    def _limit_drive(self) -> Array:
+        """The drive at which no speed is left, from the passages; NaN where there are none."""
         sign = 1.0 if self.rising else -1.0
         drive, (r1, r2, r3) = sign * self.drives, self.speeds[:3]
-        linear = np.where(np.isfinite(self.guess.linear), self.guess.linear, 0.0)
-        square = np.where(np.isfinite(self.guess.square), self.guess.square, 1.0 if self.rising else np.nan)
+        linear, square = self.guess[2:]
+        linear = np.where(np.isfinite(linear), linear, 0.0)
+        square = np.where(np.isfinite(square), square, 1.0 if self.rising else np.nan)
         with np.errstate(invalid="ignore", divide="ignore"):
             near, far = (drive[0] - drive[1]) / (r1 - r2), (drive[1] - drive[2]) / (r2 - r3)
             times = near / (linear + square * (r1 + r2))
@@ -180,7 +157,7 @@ class LimitSearch:
             steep = near - bent * (r1 + r2)
             three = (bent >= 0.0) & (steep >= 0.0)
             linear, square = np.where(three, steep, linear), np.where(three, bent, square)
-        return sign * (drive[0] - r1 * (linear + square * r1)), linear, square
+        return np.asarray(sign * (drive[0] - r1 * (linear + square * r1)))
 
     def curve_sums(self) -> Array:
         """Sums over the passages of a shot from which b and c follow by least squares of (b r + c r²) / d − 1.
@@ -196,14 +173,6 @@ class LimitSearch:
             terms = np.stack([x * x, x * y, y * y, x, y])
         return np.asarray(np.where(np.isfinite(x) & (d > least), terms, 0.0).sum(axis=1))
 
-    def errors(self) -> Array:
-        """Errors of the limits predicted from one, two and three passages, as shares of the distance from the nearest
-        passage, shape [STAGES, shots]; NaN without a prediction, or where that passage was within TELLING
-        tolerances."""
-        with np.errstate(invalid="ignore", divide="ignore"):
-            share = np.abs(self.foreseen - self.value()) / self.distance
-        return np.where(self.distance > TELLING * self.tolerance, share, np.nan)
-
     def _drive(self, value: Array) -> Array:
         return value**2 if self.rising else value
 
@@ -211,19 +180,12 @@ class LimitSearch:
         with np.errstate(invalid="ignore"):
             return np.asarray(np.sqrt(drive) if self.rising else drive)
 
-    def _foresee(self, which: NDArray[np.int64]) -> None:
-        """Keep the limits predicted from the first passages of some shots."""
-        stage = np.isfinite(self.drives[:, which]).sum(axis=0) - 1
-        which, stage = which[stage < STAGES], stage[stage < STAGES]
-        value = self._value(self.curve()[0])[which]
-        self.foreseen[stage, which], self.distance[stage, which] = value, np.abs(self.passed[which] - value)
-
     def _expected(self) -> tuple[Array, Array]:
         """The expected limits and their doubt."""
-        value, count = self._value(self.curve()[0]), np.isfinite(self.drives).sum(axis=0)
-        doubt = self.guess.doubt[np.clip(count - 1, 0, STAGES - 1)] * np.abs(self.passed - value)
+        value, count = self._value(self._limit_drive()), np.isfinite(self.drives).sum(axis=0)
+        doubt = np.array(DOUBT)[np.clip(count - 1, 0, len(DOUBT) - 1)] * np.abs(self.passed - value)
         known = np.isfinite(value)
-        return np.where(known, value, self.guess.value), np.where(known, doubt, self.guess.sure)
+        return np.where(known, value, self.guess[0]), np.where(known, doubt, self.guess[1])
 
     def _aimed(self) -> Array:
         """The next values; NaN or beyond the ends where nothing is expected.

@@ -77,10 +77,46 @@ def materials_of(scene: Scene, shots: Shots) -> list[Materials]:
     thickness = [shots.own_of(target, "thickness", k) for k in range(len(target.layers))]
     fronts, laminates = target.fronts(thickness), _laminates(target, weakening, shots)
     rears = {k: front + h for k, front, h in zip(laminates, fronts, thickness, strict=True)}  # last layers
-    return [
-        _material(scene, shots, k, fronts[k], thickness[k], rears[first] - fronts[first], first, weakens)
-        for k, (first, weakens) in enumerate(zip(laminates, weakening, strict=True))
-    ]
+    core, interaction, free = scene.core, scene.interaction, scene.interaction.free_surface
+    mass = shots.own("mass", core.mass_properties.mass)
+    static, linear, quadratic = (
+        shots.own(name, getattr(interaction, name)) for name in ("static", "linear", "quadratic")
+    )
+    materials = []
+    for k, (plate, first) in enumerate(zip(target.layers, laminates, strict=True)):
+        resistance, friction, degradation, offset_y, offset_z = (
+            shots.own_of(target, name, k)
+            for name in ("resistance", "shear_coefficient", "degradation", "offset_y", "offset_z")
+        )
+        a0, a1, a2 = coefficients(static, linear, quadratic, resistance, plate.density)
+        depth, together = np.array([plate.degradation_depth]), rears[first] - fronts[first]
+        if k == 0:
+            depth = shots.own("degradation_depth", plate.degradation_depth)
+        deep = weakening[k] & (together > (1.0 + THICKNESS_ROUNDING) * depth)
+        materials.append(
+            Materials(
+                front=fronts[k],
+                thickness=thickness[k],
+                together=together,
+                depth=depth,
+                deep=np.asarray(deep, dtype=np.float64),
+                offset_y=offset_y,
+                offset_z=offset_z,
+                a0=a0,
+                a1=a1,
+                a2=a2,
+                friction=friction,
+                degradation=degradation,
+                decay_rate=decay_rate(degradation, plate.degradation_unit),
+                onset_jump=onset_jump(core, thickness[k], mass, a0),
+                most_jump=onset_jump(core, np.array([core.length]), mass, a0),
+                per_reach=np.zeros(1) if free is None else 1.0 / (free.reach * thickness[k]),
+                by_path=plate.degradation_distance is not None,
+                laminate=first,
+                weakens=weakening[k],
+            )
+        )
+    return materials
 
 
 def weakens(target: Target, shots: Shots | None = None) -> list[bool]:
@@ -105,51 +141,6 @@ def _laminates(target: Target, weakening: Sequence[bool], shots: Shots) -> list[
 
 def _memory(plate: Plate) -> tuple[float, float, bool]:
     return plate.degradation_length, plate.degradation_depth, plate.degradation_distance is None
-
-
-def _material(
-    scene: Scene,
-    shots: Shots,
-    layer: int,
-    front: Array,
-    thickness: Array,
-    together: Array,
-    laminate: int,
-    weakens: bool,
-) -> Materials:
-    core, plate, mass = scene.core, scene.target.layers[layer], shots.own("mass", scene.core.mass_properties.mass)
-    resistance, friction, degradation, offset_y, offset_z = (
-        shots.own_of(scene.target, name, layer)
-        for name in ("resistance", "shear_coefficient", "degradation", "offset_y", "offset_z")
-    )
-    interaction, is_plate = scene.interaction, layer == 0
-    free = interaction.free_surface
-    static, linear, quadratic = (
-        shots.own(name, getattr(interaction, name)) for name in ("static", "linear", "quadratic")
-    )
-    a0, a1, a2 = coefficients(static, linear, quadratic, resistance, plate.density)
-    depth = shots.own("degradation_depth", plate.degradation_depth) if is_plate else np.array([plate.degradation_depth])
-    return Materials(
-        front=front,
-        thickness=thickness,
-        together=together,
-        depth=depth,
-        deep=np.asarray(weakens & (together > (1.0 + THICKNESS_ROUNDING) * depth), dtype=np.float64),
-        offset_y=offset_y,
-        offset_z=offset_z,
-        a0=a0,
-        a1=a1,
-        a2=a2,
-        friction=friction,
-        degradation=degradation,
-        decay_rate=decay_rate(degradation, plate.degradation_unit),
-        onset_jump=onset_jump(core, thickness, mass, a0),
-        most_jump=onset_jump(core, np.array([core.length]), mass, a0),
-        per_reach=np.zeros(1) if free is None else 1.0 / (free.reach * thickness),
-        by_path=plate.degradation_distance is not None,
-        laminate=laminate,
-        weakens=weakens,
-    )
 
 
 def onset_jump(core: Core, thickness: Array, mass: Array, static_stress: Array) -> Array:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -134,21 +134,15 @@ class Prepared:
     @property
     def seconds(self) -> float:
         """Rough time that a core takes for a shot that passes all layers [s]; the same on every machine."""
-        patches = len(self.surfaces[0].rings.station) * self.resolution.patches_around
-        steps = sum(steps * (PER_PATCH * patches + PER_NODE * nodes) for steps, nodes in self._passages())
-        alone = PER_BYTE * self.window_bytes + steps
-        return AFTER_OTHERS * alone if self.variant.burst else alone
-
-    def _passages(self) -> Iterator[tuple[float, float]]:
-        """For each layer, the steps of a passage and the nodes below the core's largest section."""
         core, shots = self.scene.core, self.shots
+        patches, steps = len(self.surfaces[0].rings.station) * self.resolution.patches_around, 0.0
         for material, grid, stretch in zip(self.materials, self.grids, self.stretch, strict=True):
             way = stretch * self.conditions["time_step"] * shots.velocity * np.cos(shots.obliquity)
-            across = (2.0 * core.max_radius / grid.spacing) ** 2
-            yield (
-                float(np.mean((material.thickness + core.length) / way)),
-                grid.planes.number * across if material.weakens else 0.0,
-            )
+            below = grid.planes.number * (2.0 * core.max_radius / grid.spacing) ** 2 if material.weakens else 0.0
+            passage = float(np.mean((material.thickness + core.length) / way))
+            steps += passage * (PER_PATCH * patches + PER_NODE * below)
+        alone = PER_BYTE * self.window_bytes + steps
+        return AFTER_OTHERS * alone if self.variant.burst else alone
 
 
 def prepare(scene: Scene, shots: Shots, numerics: Numerics) -> Prepared:

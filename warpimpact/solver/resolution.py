@@ -128,13 +128,6 @@ class Resolution:
     """Way per step at impact velocity, as a share of the passage, which is the thickness of the plate or, if less,
     `slender` [m]. A step longer than the passage, also a given one, jumps over what happens in the plate."""
     slender: float
-    along: float
-    """Largest part of a step's way in the plane of a plate, in degradation lengths. It shortens a step to a quarter at
-    most."""
-    weakening: float
-    """Largest decrease of ln(resistance) by contact in a step. It shortens a step to a quarter at most."""
-    slowing: float
-    """Largest share of the speed that contact may take in a step. It shortens a step to a quarter at most."""
     section: float
     """The core's largest cross section [m²]."""
     mass: float
@@ -151,6 +144,11 @@ class Resolution:
     patch_width: float
     """Largest radial width of a ring [m]."""
 
+    @property
+    def slowing(self) -> float:
+        """Largest share of the speed that contact may take in a step."""
+        return 0.5 * SLOWING * self.travel
+
     def passage(self, thickness: ArrayLike, depth: ArrayLike, *, weakens: bool) -> Array:
         """Way on which a plate acts on a core [m], for thicknesses and degradation depths [m] of the same shape."""
         acting = np.minimum(thickness, ACTING_DEPTHS * np.asarray(depth)) if weakens else thickness
@@ -161,14 +159,14 @@ class Resolution:
         infinite for a layer behind another one that is and stays homogeneous."""
         if behind and isinstance(plate.pattern, NoPattern) and plate.size is None and not weakens:
             return np.full(np.shape(length), math.inf)
-        return self.along * np.asarray(length)
+        return ALONG * self.travel * np.asarray(length)
 
     def longest_time(
         self, decay: Array, plate: Plate, velocity: ArrayLike, mass: ArrayLike, static_stress: ArrayLike
     ) -> Array:
         """Time [s] in which contact weakens a plate, or slows down a core, by as much as a step may, for rates of decay
         (`decay_rate`), impact velocities [m/s], masses [kg] and static stresses [Pa] of the same shape."""
-        longest = self.weakening / np.maximum(-decay, SLOWEST_DECAY)
+        longest = WEAKENING * self.travel / np.maximum(-decay, SLOWEST_DECAY)
         weakened = longest if plate.degradation_distance is None else longest / np.asarray(velocity)
         stopping = self.section * np.maximum(static_stress, SMALLEST_STRESS)
         slowed = self.slowing * np.asarray(mass) * np.asarray(velocity) / stopping
@@ -236,9 +234,6 @@ def resolve(
         block=numerics.layout == "block",
         travel=travel,
         slender=SLENDER * core.length,
-        along=ALONG * travel,
-        weakening=WEAKENING * travel,
-        slowing=0.5 * SLOWING * travel,
         section=math.pi * core.max_radius**2,
         mass=core.mass_properties.mass,
         static=scene.interaction.static,

@@ -16,7 +16,6 @@ from warpimpact.solver.keys import Key
 
 if TYPE_CHECKING:
     from warpimpact.scene import Core
-    from warpimpact.solver.cover import Cover
     from warpimpact.solver.grid import Grid
     from warpimpact.solver.prepare import Prepared
     from warpimpact.solver.rings import Rings
@@ -129,15 +128,19 @@ def _surface(struct: Any, key: Key[Core], rings: Rings, azimuth: bytes, put: Put
     core, azimuths = key.value, np.frombuffer(azimuth)
     surface, area, around = struct(), np.hypot(rings.area_axial, rings.area_radial), len(azimuths) // 2
     azimuth_of = np.resize(azimuths, len(area) * around)  # of even and odd rings in turn
-    values = {name: getattr(rings, name) for name in _OF_A_RING} | {
-        "area": area,
-        "normal_axial": rings.area_axial / area,
-        "normal_radial": rings.area_radial / area,
+    of_rings = np.stack(
+        [
+            *(rings.station, rings.radius, area, rings.area_axial / area, rings.area_radial / area),
+            *(rings.half_axial, rings.half_radial, rings.turn_axial, rings.turn_radial),
+        ]
+    )
+    values = {
+        "of_rings": of_rings.ravel(),
+        "of_patches": np.repeat(of_rings, around),
         "cosine": np.cos(azimuth_of),
         "sine": np.sin(azimuth_of),
+        "profile": core.radius(core.length * np.linspace(1.0, 0.0, PROFILE + 1)),
     }
-    values["patches"] = np.repeat(np.stack([values[name] for name in _OF_A_PATCH]), around)
-    values["profile"] = core.radius(core.length * np.linspace(1.0, 0.0, PROFILE + 1))
     for name, array in values.items():
         setattr(surface, name, put(array, aligned=True))
     surface.base, surface.per_station = core.mass_properties.centre_of_mass - core.length, PROFILE / core.length
@@ -145,20 +148,6 @@ def _surface(struct: Any, key: Key[Core], rings: Rings, azimuth: bytes, put: Put
     surface.most_rings, surface.most_patches = len(area), len(area) * around
     surface.max_radius, surface.bounding_radius = core.max_radius, core.bounding_radius
     return surface
-
-
-_OF_A_PATCH = (
-    "station",
-    "radius",
-    "area",
-    "normal_axial",
-    "normal_radial",
-    "half_axial",
-    "half_radial",
-    "turn_axial",
-    "turn_radial",
-)
-_OF_A_RING = ("station", "radius", "half_axial", "half_radial", "turn_axial", "turn_radial")
 
 
 def table_of(struct: Any, values: Sequence[Any], put: Put, **members: Any) -> Any:
@@ -200,7 +189,7 @@ def plates_of(struct: Any, grids: Sequence[Grid], put: Put) -> tuple[Any, Any]:
 def plate_of(struct: Any, grid: Grid, put: Put) -> Any:
     """The Plate (kernels/structs.py) of a grid."""
     plate = struct()
-    plate.tile, plate.clear = _on_device(grid.tile, put)
+    plate.tile, plate.clear = _on_device(grid.tile, put, "material", "clearance")
     plate.tile_y, plate.tile_z = grid.tile.shape
     plate.period_y, plate.period_z = grid.period
     plate.half_y, plate.half_z = grid.half_size
@@ -208,7 +197,7 @@ def plate_of(struct: Any, grid: Grid, put: Put) -> Any:
     plate.taps, plate.reach = put(grid.taps, aligned=True), grid.reach
     plate.planes, plate.per_plane, plate.plane_reach = grid.planes.number, 1.0 / grid.planes.spacing, grid.planes.reach
     if grid.cover is not None:
-        plate.cover = _cover_on_device(grid.cover, put)
+        (plate.cover,) = _on_device(grid.cover, put, "material")
         plate.cover_y, plate.cover_z = grid.cover.shape
         plate.radii, plate.directions = grid.cover.radii, grid.cover.directions
         plate.cover_per_y, plate.cover_per_z = 1.0 / grid.cover.dy, 1.0 / grid.cover.dz
@@ -221,17 +210,9 @@ def plate_of(struct: Any, grid: Grid, put: Put) -> Any:
 _ON_DEVICE: WeakKeyDictionary[Tile, dict[Put, tuple[Any, ...]]] = WeakKeyDictionary()
 
 
-def _cover_on_device(cover: Cover, put: Put) -> Any:
-    """The table of a cover, cached as that of a tile is."""
-    kept = _ON_DEVICE.setdefault(cover, {})
-    if put not in kept:
-        kept[put] = (put(cover.material.reshape(-1)),)
-    return kept[put][0]
-
-
-def _on_device(tile: Tile, put: Put) -> tuple[Any, Any]:
-    """Material and clearance of a tile, cached as long as the tile is, because no kernel changes them."""
+def _on_device(tile: Tile, put: Put, *names: str) -> tuple[Any, ...]:
+    """Arrays of a tile, cached as long as the tile is, because no kernel changes them."""
     kept = _ON_DEVICE.setdefault(tile, {})
     if put not in kept:
-        kept[put] = put(tile.material.reshape(-1)), put(tile.clearance.reshape(-1))
+        kept[put] = tuple(put(getattr(tile, name).reshape(-1)) for name in names)
     return kept[put]
