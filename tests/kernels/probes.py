@@ -10,11 +10,15 @@ from numpy.typing import NDArray
 from warpimpact.kernels import core_surface, footprint, lanes
 from warpimpact.kernels import structs as device_structs
 from warpimpact.kernels.variant import Variant
-from warpimpact.scene import Core
+from warpimpact.scene import ConeCore, Core, OgiveCore, PolynomialCore
 from warpimpact.solver import structs
 from warpimpact.solver.grid import Grid, half_taps
 from warpimpact.solver.rings import azimuths_of, rings_of
 from warpimpact.solver.tile import Tile
+
+PAPER = PolynomialCore(coefficients=(3.0e-4, 0.24, -5.29), length=27.86e-3, density=7850.0)
+OGIVE = OgiveCore(diameter=6.17e-3, crh=3.0, length=27.0e-3, mass=5.25e-3)
+CONE = ConeCore(diameter=6.0e-3, length=20.0e-3, cone_length=12.0e-3, mass=3.0e-3)
 
 
 def records(struct: Any, device: str, **columns: Any) -> wp.array:

@@ -24,32 +24,21 @@ from warpimpact.scene import (
     Interaction,
     Layer,
     Numerics,
-    OgiveCore,
     Plate,
-    PolynomialCore,
     Record,
     Scene,
     Shots,
-    SlotPattern,
     Target,
 )
 from warpimpact.solver import simulate, structs, windows
 from warpimpact.solver.rings import azimuths_of, rings_of
 
-from .probes import astride, plate_of, poisoned, poisoned_fields, stepping
+from ..verification.scenes import paper_plate
+from .probes import OGIVE, PAPER, astride, plate_of, poisoned, poisoned_fields, stepping
 
 Array = NDArray[np.float64]
 
-CORE = PolynomialCore(coefficients=(3.0e-4, 0.24, -5.29), length=27.86e-3, density=7850.0)
-SHANK = OgiveCore(diameter=6.17e-3, crh=3.0, length=27.0e-3, mass=5.25e-3)
-SLOTTED = Plate(
-    thickness=4e-3,
-    resistance=2.6e9,
-    shear_coefficient=0.05,
-    degradation=0.8,
-    degradation_interval=1e-6,
-    pattern=SlotPattern(length=12e-3, width=4e-3, spacing=(8e-3, 16e-3), staggered=True),
-)
+SLOTTED = paper_plate()
 ROUND = SLOTTED.model_copy(update={"pattern": CirclePattern(diameter=5e-3, spacing=(8e-3, 8e-3))})
 BY_PATH = SLOTTED.model_copy(update={"degradation_interval": None, "degradation_distance": 0.825e-3})
 SIMPLE, BLOCK = Numerics(level=2), Numerics(level=2, layout="block")
@@ -59,7 +48,7 @@ NORMAL, OBLIQUE = {}, {"obliquity": 0.35, "azimuth": 0.7, "yaw": 0.1, "pitch": 0
 class Case(NamedTuple):
     """A core, the plate and the layers behind it, the impact, the interaction, and how many shots hit one plate."""
 
-    core: Core = CORE
+    core: Core = PAPER
     plate: Plate = SLOTTED
     impact: dict[str, float] = NORMAL
     interaction: dict[str, Any] = NORMAL
@@ -74,7 +63,7 @@ LAMINATE = Layer(**ROUND.model_copy(update={"thickness": 1.5e-3}).model_dump())
 SCENES = {
     "slots": Case(),
     "oblique and yawed": Case(impact=OBLIQUE),
-    "a shank in round holes": Case(SHANK, ROUND, {"pitch": 0.015}),
+    "a shank in round holes": Case(OGIVE, ROUND, {"pitch": 0.015}),
     "degradation by path": Case(plate=BY_PATH, impact={"velocity": 350.0}),
     "no degradation": Case(plate=SOUND),
     "stress that depends on the rate, beside the rim": Case(
@@ -217,7 +206,7 @@ def stepped(variant: Variant, count: int) -> tuple[Any, Array]:
     kernel, struct = stepping(variant, block if variant.window else contact, 2), device_structs.build(variant)
     put = structs.Put("cpu", variant.real)
     around = 36  # so that a round of the lanes spans two rings
-    surface = structs.surface_of(struct.Surface, CORE, rings_of(CORE, 23, around), azimuths_of(around), put)
+    surface = structs.surface_of(struct.Surface, PAPER, rings_of(PAPER, 23, around), azimuths_of(around), put)
     plate = plate_of(struct.Plate, np.ones((1, 1)), np.array([CELL, CELL]), CELL, "cpu", real=variant.real)
     law = struct.Law()
     law.a0, law.friction, law.onset, law.decay_rate = 2.6e9, 0.05, 2.0, np.log(0.8) / 1e-6

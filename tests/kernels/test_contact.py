@@ -11,9 +11,9 @@ from scipy.spatial.transform import Rotation
 
 from warpimpact.kernels import contact, structs
 from warpimpact.kernels.variant import Variant
-from warpimpact.scene import ConeCore, OgiveCore, ProfileCore
+from warpimpact.scene import ProfileCore
 
-from .probes import astride, plate_of, poisoned, poisoned_fields, poisoned_touches, stepping, surface_of
+from .probes import CONE, OGIVE, astride, plate_of, poisoned, poisoned_fields, poisoned_touches, stepping, surface_of
 
 Array = NDArray[np.float64]
 
@@ -24,8 +24,6 @@ Surface, Plate, Fields, Law, Load = struct.Surface, struct.Plate, struct.Fields,
 Touches = struct.Touches
 
 CELL = 0.25e-3
-OGIVE = OgiveCore(diameter=6.17e-3, crh=3.0, length=27.0e-3, mass=5.25e-3)
-CONE = ConeCore(diameter=6.0e-3, length=20.0e-3, cone_length=12.0e-3, mass=3.0e-3)
 STRENGTH = 2.6e9
 SOLID, HOLE = np.ones((1, 1)), np.zeros((1, 1))  # tiles of a single cell
 ALIGNED = np.array([[0.0, 0.0, 0.0, 1.0]])

@@ -10,9 +10,8 @@ from scipy.spatial.transform import Rotation
 
 from warpimpact.kernels import core_surface, structs
 from warpimpact.kernels.variant import Variant
-from warpimpact.scene import ConeCore, Core, OgiveCore, PolynomialCore
 
-from .probes import attitudes, poisoned, surface_of
+from .probes import CONE, PAPER, attitudes, poisoned, surface_of
 
 Array = NDArray[np.float64]
 
@@ -21,9 +20,6 @@ real, vec3, quat = VARIANT.real, VARIANT.vec3, VARIANT.quat
 use, struct = VARIANT.use(core_surface), structs.build(VARIANT)
 Surface = struct.Surface
 
-PAPER = PolynomialCore(coefficients=(3.0e-4, 0.24, -5.29), length=27.86e-3, density=7850.0)
-OGIVE = OgiveCore(diameter=6.17e-3, crh=3.0, length=27.0e-3, mass=5.25e-3)
-CONE = ConeCore(diameter=6.0e-3, length=20.0e-3, cone_length=12.0e-3, mass=3.0e-3)
 THICKNESS = 4.0e-3
 PER_PATCH = {
     "arm": vec3,
@@ -183,25 +179,6 @@ def test_steps_through_a_slab_add_up_to_its_thickness(ratio: float, device: str)
 
 
 # --- Patches in a pose ---
-
-
-@pytest.mark.parametrize("core", [PAPER, OGIVE, CONE])
-def test_closed_surface_has_no_net_area(core: Core, device: str) -> None:
-    surface = surface_of(Surface, core, 24, 48, device)
-    found = posed(surface, device, **random_poses(3, 0.1), thickness=EVERYWHERE)
-    area = found["area"][:, :, None, None] * found["normal"]
-    np.testing.assert_allclose(area.sum(axis=(1, 2)), 0.0, atol=1e-12 * found["area"].max())
-    np.testing.assert_allclose(np.linalg.norm(found["normal"], axis=-1), 1.0, rtol=1e-13)
-
-
-@pytest.mark.parametrize(("core", "tolerance"), [(OGIVE, 1e-12), (CONE, 1e-12), (PAPER, 1e-3)])
-def test_forward_facing_area_is_the_disc_of_the_largest_radius(core: Core, tolerance: float, device: str) -> None:
-    # Exact where the shoulder is the edge of a ring. A ring across the paper's smooth shoulder cancels in part.
-    surface = surface_of(Surface, core, 24, 48, device)
-    deep = {"position": np.array([[1.0, 0, 0]]), "attitude": np.array([[0.0, 0, 0, 1]])}
-    found = posed(surface, device, **deep, thickness=EVERYWHERE)
-    projected = found["immersed"] * found["normal"][..., 0]
-    assert projected[projected > 0].sum() == pytest.approx(np.pi * core.max_radius**2, rel=tolerance)
 
 
 def test_patches_turn_with_the_body_and_move_as_rigid_points_do(device: str) -> None:

@@ -9,9 +9,8 @@ from numpy.typing import NDArray
 
 from warpimpact.kernels import core_surface, exposure, footprint, plate_grid, structs
 from warpimpact.kernels.variant import Variant
-from warpimpact.scene import ConeCore
 
-from .probes import astride, plate_of, poisoned, poisoned_fields, surface_of
+from .probes import CONE, astride, plate_of, poisoned, poisoned_fields, surface_of
 
 Array = NDArray[np.float64]
 
@@ -27,7 +26,6 @@ Surface, Plate, Fields, Footprint = (
 
 CELL = 0.25e-3
 THICKNESS = wp.constant(4.0e-3)
-CONE = ConeCore(diameter=6.0e-3, length=20.0e-3, cone_length=12.0e-3, mass=3.0e-3)
 
 
 def footprints(

@@ -14,9 +14,7 @@ from warpimpact.scene import (
     Core,
     Impact,
     Numerics,
-    OgiveCore,
     Plate,
-    PolynomialCore,
     Record,
     Scene,
     Shots,
@@ -24,11 +22,10 @@ from warpimpact.scene import (
 )
 from warpimpact.solver import replay, resolution, simulate
 
+from .probes import CONE, OGIVE, PAPER
+
 Array = NDArray[np.float64]
 
-PAPER = PolynomialCore(coefficients=(3.0e-4, 0.24, -5.29), length=27.86e-3, density=7850.0)
-OGIVE = OgiveCore(diameter=6.17e-3, crh=3.0, length=27.0e-3, mass=5.25e-3)
-CONE = ConeCore(diameter=6.0e-3, length=20.0e-3, cone_length=12.0e-3, mass=3.0e-3)
 SOLID = Plate(thickness=4e-3, resistance=2.6e9, shear_coefficient=0.05, degradation=0.8, degradation_interval=1e-6)
 SMALL = SOLID.model_copy(update={"size": (10e-3, 10e-3)})
 HARD = SOLID.model_copy(update={"resistance": 1e11})
@@ -183,15 +180,3 @@ def test_energy_that_rises_is_told(device: str) -> None:
     assert np.isnan(outcomes.residual_velocity[0])
     double = Numerics(level=0, precision="double")
     assert not Status(simulate.simulate(scene, shots, numerics=double, device=device).status[0]).failed
-
-
-def test_trace_adds_up_to_the_motion() -> None:
-    # Mean force and moment of every step times its duration are the change of the momenta.
-    shots = shots_of(hit_y=5.0e-3, hit_z=2.0e-3, velocity=800.0, pitch=0.05)
-    (history,) = replay.trace(at(HOLES), shots, numerics=Numerics(level=0, precision="double"))
-    mass, dt = PAPER.mass_properties.mass, history[1, 0] - history[0, 0]
-    assert np.abs(history[:, 14:17]).max() > 1e3
-    np.testing.assert_allclose(dt * history[1:, 14:17], mass * np.diff(history[:, 8:11], axis=0), atol=1e-12)
-    np.testing.assert_allclose(dt * history[1:, 17:20], np.diff(history[:, 11:14], axis=0), atol=1e-14)
-    drift = np.diff(history[:, 1:4], axis=0) - dt * history[:-1, 8:11]
-    np.testing.assert_allclose(drift, 0.0, atol=1e-15)

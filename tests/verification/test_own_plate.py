@@ -127,7 +127,7 @@ def test_history_and_plate_of_a_replay_are_those_of_the_shot() -> None:
     own, plain = shown
     for name in ("translational_energy", "rotational_energy", "angular_velocity", "force"):
         np.testing.assert_allclose(getattr(own.history, name), getattr(plain.history, name), rtol=1e-7, atol=1e-6)
-    np.testing.assert_allclose(own.resistance_share, plain.resistance_share, rtol=1e-9)
+    np.testing.assert_allclose(own.plate.share, plain.plate.share, rtol=1e-9)
     lost = own.history.translational_energy + own.history.rotational_energy
     start = 0.5 * core.mass_properties.mass * SHOTS.velocity[5] ** 2
     start += 0.5 * core.mass_properties.inertia_axial * SHOTS.spin[5] ** 2

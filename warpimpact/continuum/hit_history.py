@@ -16,7 +16,7 @@ from warpimpact.kernels.trace import WIDTH
 from warpimpact.scene import Scene, Shots
 from warpimpact.scene.flow import Continuum
 from warpimpact.solver.history import History
-from warpimpact.solver.replay import Deformed, Replay
+from warpimpact.solver.replay import Deformed, Replay, Weakened
 from warpimpact.solver.worker import Worker
 
 Array = NDArray[np.float64]
@@ -51,17 +51,15 @@ def replay_continuum(scene: Scene, shots: Shots, continuum: Continuum, snapshots
     sheet = march.hit.sheets[0]
     places = cells_of(sheet)
     shown = frames.spread(len(rows) - 1, snapshots) if snapshots else []
-    share = [_left(frame.alive, sheet, march.hit.firsts[0])[places] for _, frame in shown]
     y, z = (0.5 * (edges[1:] + edges[:-1]) for edges in sheet.edges)
-    home = float(shots.hit_y[0]), float(shots.hit_z[0])
-    cell_y, cell_z = home[0] + y[places[0][:, 0]], home[1] + z[places[1][0]]
+    cell_y, cell_z = float(shots.hit_y[0]) + y[places[0][:, 0]], float(shots.hit_z[0]) + z[places[1][0]]
+    material = np.asarray(sheet.solid[places], dtype=np.float64)
+    share = np.array([_left(frame.alive, sheet, march.hit.firsts[0])[places] for _, frame in shown])
     return Replay(
         outcomes=outcomes_of(memory, [struck]),
         history=history,
         plate_time=np.array([rows[row][0] for row, _ in shown]),
-        resistance_share=np.array(share).reshape(-1, len(cell_y), len(cell_z)),
-        cell_y=cell_y,
-        cell_z=cell_z,
+        plate=Weakened(cell_y, cell_z, material, share.reshape(-1, *material.shape)),
         behind={},
         deformed=frames.deformed([frame for _, frame in shown]) if shown else None,
     )

@@ -219,21 +219,20 @@ def history_dataset(
     values: dict[str, Any] = {name: getattr(history, name) for name in v.HISTORY_VARIABLES if hasattr(history, name)}
     values |= {
         v.PLATE_POSITION: history.position + np.array([0.0, hit_y, hit_z]),
-        v.RESISTANCE_SHARE: replay.resistance_share,
+        v.RESISTANCE_SHARE: replay.plate.share,
         v.CORE_RADIUS: core.radius(stations),
         v.SOLID_ALONG_Y: plate.is_solid(hit_y + section, np.array(hit_z)).astype(np.int8),
         v.SOLID_ALONG_Z: plate.is_solid(np.array(hit_y), hit_z + section).astype(np.int8),
     }
-    cells = (replay.cell_y, replay.cell_z)
     behind = fields(scene, replay.behind)
     values |= sections(scene, hit, section) | behind
-    values |= outlines_in(plate, *((float(column.min()), float(column.max())) for column in cells))
+    values |= outlines_in(plate, *((float(column.min()), float(column.max())) for column in replay.plate[:2]))
     coordinates: dict[str, Any] = {
         v.TIME: history.time,
         v.QUATERNION: ["x", "y", "z", "w"],
         v.SNAPSHOT: replay.plate_time,
-        v.CELL_Y: replay.cell_y,
-        v.CELL_Z: replay.cell_z,
+        v.CELL_Y: replay.plate.cell_y,
+        v.CELL_Z: replay.plate.cell_z,
         v.SECTION: section,
         v.STATION: core.mass_properties.centre_of_mass - stations,
     }

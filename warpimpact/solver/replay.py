@@ -38,8 +38,6 @@ SNAPSHOT_COPIES, OTHER_COPIES = 3, 8
 """Numbers per cell until the file is written: those of each snapshot, and those of the computation."""
 THROUGH = 16
 """Depths over which the mean through a layer is taken."""
-
-
 NODES_AT_A_TIME = 2**13
 """Nodes of a window that are computed together."""
 SAMPLES, MOST_POINTS = 16, 2**24
@@ -48,12 +46,13 @@ has fewer points along a side, because it would take minutes."""
 
 
 class Weakened(NamedTuple):
-    """Resistance left of a layer behind the plate, in the window where a core reached it.
+    """Resistance left of a layer in the window where a core reached it.
 
     Attributes:
         cell_y, cell_z: centres of the cells in the plane of the plate [m], shapes [cells_y] and [cells_z].
         material: share of material in each cell, shape [cells_y, cells_z].
-        share: remaining share of the resistance Y, mean through the thickness, of the same shape; 0 in holes.
+        share: remaining share of the resistance Y, mean through the thickness, 0 in holes; of this shape, or of shape
+            [snapshots, cells_y, cells_z].
     """
 
     cell_y: Array
@@ -86,20 +85,15 @@ class Replay:
         outcomes: outcomes of the one shot.
         history: state of the core at every step, and at the end.
         plate_time: instants at which the plate is shown [s], shape [snapshots]; 0 is the first touch.
-        resistance_share: remaining share of the resistance Y in the cells of the plate that the core may reach, shape
-            [snapshots, cells_y, cells_z]; 0 in holes.
-        cell_y, cell_z: centres of these cells in the plane of the plate [m], shapes [cells_y] and [cells_z].
-        behind: the Weakened of every layer behind the plate that weakens and is reached, by its number; `share` has the
-            shape [snapshots, cells_y, cells_z].
+        plate: the plate at these instants.
+        behind: every layer behind the plate that weakens and is reached, by its number.
         deformed: the layers of a hit by finite elements.
     """
 
     outcomes: Outcomes
     history: History
     plate_time: Array
-    resistance_share: Array
-    cell_y: Array
-    cell_z: Array
+    plate: Weakened
     behind: dict[int, Weakened]
     deformed: Deformed | None = None
 
@@ -130,20 +124,22 @@ def replay(scene: Scene, shots: Shots, *, numerics: Numerics, snapshots: int = 6
     steps = np.unique(np.linspace(0, len(trace) - 1, snapshots).round().astype(int))
     home, spacing = _hit(memory.prepared), memory.prepared.grid.spacing
     cell_y, cell_z = nodes_about(home, march.cells, spacing)
-    material = material_about(scene.target.layers[0], cell_y, cell_z, spacing) if len(steps) else np.empty((0, 0))
-    scratch = memory.scratch(1, march.cells) if len(steps) else None
-    if scratch and memory.variant.layered and memory.variant.degrades:  # the window of a layer opens with a step
-        scratch.fields.exposure.zero_()
-    history = History.from_trace(trace, _body(memory.prepared))
-    left = [_left_after(memory, march.cells, scratch, count, time_step, material) for count in steps]
+    empty = Weakened(cell_y, cell_z, np.empty((0, 0)), np.empty((0, len(cell_y), len(cell_z))))
+    layers, history = {0: empty}, History.from_trace(trace, _body(memory.prepared))
+    if len(steps):
+        material = material_about(scene.target.layers[0], cell_y, cell_z, spacing)
+        scratch = memory.scratch(1, march.cells)
+        if memory.variant.layered and memory.variant.degrades:  # the window of a layer opens with a step
+            scratch.fields.exposure.zero_()
+        plate = Weakened(cell_y, cell_z, material, material)
+        left = [_left_after(memory, march.cells, scratch, count, time_step, plate) for count in steps]
+        layers = {number: _over_time(number, left) for number in left[-1]}
     return Replay(
         outcomes=outcomes,
         history=history,
         plate_time=history.time[steps] - 0.5 * history.step[steps] if memory.variant.layered else steps * time_step,
-        resistance_share=np.array([share for share, _ in left]).reshape(-1, len(cell_y), len(cell_z)),
-        cell_y=cell_y,
-        cell_z=cell_z,
-        behind={number: _over_time(number, [behind for _, behind in left]) for number in (left[-1][1] if left else ())},
+        plate=layers.pop(0),
+        behind=layers,
     )
 
 
@@ -212,15 +208,14 @@ def _body(prepared: Prepared) -> MassProperties:
 
 
 def _left_after(
-    memory: Memory, cells: Cells, scratch: Any, steps: int, time_step: float, material: Array
-) -> tuple[Array, dict[int, Weakened]]:
-    """Share of the plate's resistance that is left after some steps of the last shot on the CPU, in the window of its
-    march, and the layers behind it by number. All shots hit one plate.
+    memory: Memory, cells: Cells, scratch: Any, steps: int, time_step: float, plate: Weakened
+) -> dict[int, Weakened]:
+    """What is left of the layers, by number, after some steps of the last shot on the CPU. All shots hit one plate.
 
     Args:
         cells: cells of the plate's window.
         scratch: scratch of one slot.
-        material: share of material about every node.
+        plate: the plate in this window, intact.
     """
     prepared, variant = memory.prepared, memory.variant
     before, outcomes = len(prepared.shots) - 1, memory.outcomes()
@@ -234,9 +229,9 @@ def _left_after(
         scratch.fields.channel.fill_(constants.NO_CHANNEL.value)
     apart(memory.launch, order, outcomes, scratch, 1, before, 1)
     if variant.nodal:
-        return np.array(scratch.fields.share.numpy().reshape(cells), dtype=np.float64), {}
+        return {0: plate._replace(share=np.array(scratch.fields.share.numpy().reshape(cells), dtype=np.float64))}
     behind = _behind(memory, scratch, cells) if variant.layered and (variant.degrades or variant.burst) else {}
-    return np.asarray(material * _share_left(memory, 0, scratch.fields, cells)), behind
+    return {0: plate._replace(share=plate.material * _share_left(memory, 0, scratch.fields, cells))} | behind
 
 
 def _behind(memory: Memory, scratch: Any, plate: Cells) -> dict[int, Weakened]:

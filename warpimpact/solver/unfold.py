@@ -5,12 +5,9 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from warpimpact.scene import Symmetry
 from warpimpact.solver.replay import Deformed, Replay, Weakened
-
-Array = NDArray[np.float64]
 
 
 def image_of(replay: Replay, symmetry: Symmetry, *, home: tuple[float, float], image: tuple[float, float]) -> Replay:
@@ -23,18 +20,14 @@ def image_of(replay: Replay, symmetry: Symmetry, *, home: tuple[float, float], i
     history, polar, axial = replay.history, symmetry.polar, symmetry.axial
     signs = symmetry.along_y, symmetry.along_z
 
-    def moved(cells: tuple[Array, Array]) -> list[Array]:
-        return [
-            (sign * along + (to - sign * at))[::sign]  # increasing again
-            for along, sign, at, to in zip(cells, signs, home, image, strict=True)
-        ]
-
     def turned(layer: Weakened) -> Weakened:
-        y, z = moved((layer.cell_y, layer.cell_z))
+        y, z = (
+            (sign * along + (to - sign * at))[::sign]  # increasing again
+            for along, sign, at, to in zip((layer.cell_y, layer.cell_z), signs, home, image, strict=True)
+        )
         fields = (field[..., :: signs[0], :: signs[1]] for field in (layer.material, layer.share))
         return Weakened(y, z, *fields)
 
-    cells = moved((replay.cell_y, replay.cell_z))
     return replace(
         replay,
         outcomes=replay.outcomes.unfolded([symmetry]),
@@ -48,9 +41,7 @@ def image_of(replay: Replay, symmetry: Symmetry, *, home: tuple[float, float], i
             force=history.force * polar,
             moment=history.moment * axial,
         ),
-        resistance_share=replay.resistance_share[:, :: signs[0], :: signs[1]],
-        cell_y=cells[0],
-        cell_z=cells[1],
+        plate=turned(replay.plate),
         behind={number: turned(layer) for number, layer in replay.behind.items()},
         deformed=replay.deformed and _mirrored(replay.deformed, symmetry),
     )

@@ -160,9 +160,9 @@ def test_the_history_of_an_image_is_that_of_its_own_shot(impact: Impact) -> None
             got, expected = (getattr(one.history, name) for one in (folded, alone[k]))
             scale = np.abs(expected).max()
             np.testing.assert_allclose(got, expected, rtol=0.0, atol=1e-8 * scale + 1e-9, err_msg=name)
-        cells = [common(getattr(folded, axis), getattr(alone[k], axis)) for axis in ("cell_y", "cell_z")]
+        cells = [common(getattr(folded.plate, axis), getattr(alone[k].plate, axis)) for axis in ("cell_y", "cell_z")]
         shares = [
-            one.resistance_share[:, y[:, None], z]
+            one.plate.share[:, y[:, None], z]
             for one, y, z in zip((folded, alone[k]), *([axis[0], axis[1]] for axis in cells), strict=True)
         ]
         np.testing.assert_allclose(*shares, rtol=0.0, atol=1e-9)

@@ -82,19 +82,6 @@ def test_tile_is_kept_for_the_next_shots_but_not_for_another_pattern() -> None:
     assert (tile_of(one, 0.5e-3).material != tile_of(other, 0.5e-3).material).any()
 
 
-def test_tile_tells_material_from_holes_by_area() -> None:
-    # A 5 mm hole on the origin, which is a corner of cell (0, 0); cells near the edge are fractions.
-    plate = PLATE.model_copy(update={"pattern": CirclePattern(diameter=5e-3, spacing=(8e-3, 10e-3))})
-    tile = tile_of(plate, 0.5e-3)
-    y, z = ((np.arange(n) + 0.5) * 0.5e-3 for n in tile.material.shape)
-    distance = np.hypot(np.minimum(y, 8e-3 - y)[:, None], np.minimum(z, 10e-3 - z))
-    diagonal = BLUR * 0.5e-3 / np.sqrt(2)
-    assert (tile.material[distance < 2.5e-3 - diagonal] == 0).all()
-    assert (tile.material[distance > 2.5e-3 + diagonal] == 1).all()
-    assert ((tile.material > 0) & (tile.material < 1)).sum() > 8
-    np.testing.assert_array_equal(tile.material, tile.material[::-1, ::-1])  # the pattern's own symmetry
-
-
 @pytest.mark.parametrize("shape", [(1, 1), (1, 7), (12, 1), (5, 4), (40, 31)])
 @pytest.mark.parametrize("share", [0.01, 0.3])
 def test_distances_from_walls_are_those_of_scipy(shape: tuple[int, int], share: float) -> None:
@@ -116,14 +103,6 @@ def test_spacing_that_fits_the_period_is_kept() -> None:
     plate = PLATE.model_copy(update={"pattern": CirclePattern(diameter=5e-3, spacing=(7e-3, 9.1e-3))})
     assert tile_of(plate, 0.1e-3, sharp=True).material.shape == (70, 91)
     assert tile_of(plate, 0.1e-3).material.shape == (70, 92)  # even, for a lattice staggered by half a period
-
-
-@pytest.mark.parametrize("ratio", [2, 3, 8])
-def test_taps_are_a_tent_of_the_half_width_that_scattering_and_reading_leave(ratio: int) -> None:
-    # A tent of half-width m cells has (m² − 1)/6 at the nodes and, scattered into and read bilinearly, (m² + 1)/6.
-    length = np.sqrt(ratio**2 + 1.0)
-    offsets = np.arange(-ratio + 1, ratio)
-    np.testing.assert_allclose(tent_taps(length * 0.1, 0.1), (1 - np.abs(offsets) / ratio) / ratio, rtol=1e-9)
 
 
 @pytest.mark.parametrize("ratio", [1.415, 1.5, 1.9, 2.5, 3.7, 7.99])
