@@ -35,11 +35,6 @@ def test_a_signal_waits_for_the_end_of_the_block(number: signal.Signals, interru
     assert signal.getsignal(number) is handler
 
 
-def test_what_goes_wrong_inside_is_told() -> None:
-    with pytest.raises(OSError, match="full"), uninterrupted():
-        raise OSError("full")
-
-
 def test_other_threads_need_no_signals() -> None:
     def work() -> None:
         with uninterrupted():
