@@ -8,21 +8,12 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from ..scene import Core, Hits, Impact, Record, Scene, Target
+from ..scene import Core, Hits, Impact, Plate, Record, Scene, Target
 from ..scene.bounds import USUAL, Implausible, hit_bounds, implausible, impossible
 from ..scene.quantities import SCATTERED
 from ..scene.target import layer_name
 
-_OF_A_PLATE = (
-    "thickness",
-    "resistance",
-    "shear_coefficient",
-    "degradation_interval",
-    "degradation_length",
-    "degradation_depth",
-    "density",
-)
-
+_OF_A_PLATE = [name for name in Plate.model_fields if f"plate.{name}" in USUAL and name != "size"]
 _MOST_OPEN = 0.6
 """Open area of a plate above which a warning says that hits meet little."""
 _THIN = 0.25
