@@ -95,11 +95,7 @@ STEEL_ALONE = ("curve in calibres", "curve in calibres of a projectile")
 
 
 def part_names(*, by_thickness: bool = True) -> list[str]:
-    """All parts with their metal.
-
-    Args:
-        by_thickness: whether Y depends on h/d.
-    """
+    """All parts with their metal; those of Y that depends on h/d if `by_thickness`."""
     metals = {name: ("steel",) if name in STEEL_ALONE else ("steel", "aluminium") for name in PART_SCALES}
     kept = [name for name in PART_SCALES if by_thickness or ("calibres" not in name and "exponent" not in name)]
     return [f"{name}, {metal}" for name in kept for metal in metals[name]]
@@ -107,10 +103,7 @@ def part_names(*, by_thickness: bool = True) -> list[str]:
 
 def shared(plates: Plates, others: Plates, *, by_thickness: bool = True) -> tuple[Array, dict[str, Array]]:
     """The common part of ln Y of plates and of others: the covariance of the parts of known size, and that of each
-    fitted part at size 1, of shape [plates, others] each.
-
-    Args:
-        by_thickness: as in `part_names`.
+    fitted part at size 1, of shape [plates, others] each; `by_thickness` as in `part_names`.
     """
     metals = {
         "steel": np.outer(plates.steel, others.steel).astype(float),
@@ -213,12 +206,8 @@ def covariance(plates: Plates, others: Plates, sizes: Mapping[str, float]) -> Ar
 def resistance_of(
     material: str, *, projectile: str | None, diameter: float, thickness: float, obliquity: float
 ) -> Resistance:
-    """Resistance of a plate of a material of the package, by all published rows of its metal.
-
-    Args:
-        projectile: name of the threat; None, or one without rows, for any other.
-        diameter: of the core [m].
-        thickness, obliquity: of the plate [m], and of the shot [rad].
+    """Resistance of a plate of a material of the package, by all published rows of its metal, against the core of a
+    threat; None, or one without rows, is any other. Diameter of the core and thickness in m, obliquity in rad.
 
     Raises:
         KeyError: no row is of the material.

@@ -26,14 +26,8 @@ class Sampler:
     """The shots of a campaign; any part of them can be drawn at any time.
 
     With hits.irreducible, the images of a shot under `symmetries_used` are consecutive, the shot itself first. They
-    differ in their hit points only.
-
-    Args:
-        impact: velocity and attitude unless hits or scatter give them.
-        hits: where the shots hit, and how random numbers are drawn.
-        plate: hits cover one unit cell of it, or the whole plate (`Hits.area`).
-        scatter: distributions of quantities that differ from shot to shot.
-        replicates: independent scramblings of a sobol sampling.
+    differ in their hit points only. Hits cover one unit cell of the plate, or the whole plate (`Hits.area`). The impact
+    has velocity and attitude unless hits or scatter give them.
 
     Raises:
         ValueError: scatter that removes the symmetry of hits.irreducible; hits on the whole of an unbounded plate.

@@ -35,12 +35,8 @@ MOST_DIMENSIONS = 1 + len(_STARTS)
 class Sobol:
     """One scrambled sequence; its points can be read in any order.
 
-    Args:
-        dimensions: of the unit cube, at most MOST_DIMENSIONS.
-        seed: of the scrambling.
-
     Raises:
-        ValueError: more dimensions than there are direction numbers here.
+        ValueError: more than MOST_DIMENSIONS dimensions.
     """
 
     def __init__(self, dimensions: int, seed: np.random.SeedSequence) -> None:

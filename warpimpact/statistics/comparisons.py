@@ -32,11 +32,8 @@ def difference_numbers(first: Array, second: Array) -> Array:
     β is the slope of a − b against a: additional shots count less, the stronger a and b correlate (double sampling with
     regression: W. G. Cochran, Sampling Techniques, 3rd edition, 1977, section 12.6).
 
-    Args:
-        first, second: shape [shots] each, NaN where a shot does not count; number k of both belongs to shot k.
-
-    Returns:
-        Shape of the longer sample; NaN where a shot does not count.
+    Both have the shape [shots], NaN where a shot does not count; number k of both belongs to shot k. The numbers have
+    the shape of the longer sample.
     """
     if len(first) < len(second):
         return -difference_numbers(second, first)
@@ -73,14 +70,8 @@ class Ratio(NamedTuple):
 
     @classmethod
     def of(cls, estimate: Estimate, numbers: Array, reference: Array | None, dealt: Estimating) -> Ratio:
-        """Ratio to the mean of other numbers.
-
-        Args:
-            estimate: the numerator.
-            numbers: their mean is the estimate, shape [shots].
-            reference: numbers of the first shots, or one number for all; None without a reference.
-            dealt: the arguments of `Dealt` after the kind.
-        """
+        """Ratio of the estimate, the mean of numbers of shape [shots], to the mean of a reference: numbers of the first
+        shots, or one number for all; None without a reference."""
         known = np.empty(0) if reference is None else reference[~np.isnan(reference)]
         if reference is None or not len(known):
             return cls()
