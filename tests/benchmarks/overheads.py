@@ -1,7 +1,6 @@
 """Costs of a campaign besides the march: start, compilation, file, memory.
 
     python tests/benchmarks/overheads.py --largest 1000000    # writes results/overheads.json
-    python tests/benchmarks/overheads.py --ratios             # the two ratios alone, printed
 
 The commands are run as a user runs them. A slow result is no failure; the targets stand beside the figures. The two
 ratios are of commands that run in turn: a run of 100 hits to the bare imports, and a run less such a small one to
@@ -47,7 +46,8 @@ START_TARGET, CAMPAIGN_TARGET = 1.5, 1.1
 SMALL, COUNTS = 100, (16_384, 65_536)
 """Hits of a run that is all start, and of those whose time is compared with `simulate`."""
 SMALLEST, PER_DECADE = 1000, 2
-REPEATS = 3
+REPEATS, TURNS = 3, 5
+"""Repetitions of a start, and of the ratios."""
 
 
 class Usage(NamedTuple):
@@ -60,12 +60,12 @@ class Usage(NamedTuple):
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Measure, print, store."""
-    arguments = _parser().parse_args(argv)
+    parser = argparse.ArgumentParser(description="costs of a campaign besides the march")
+    parser.add_argument("--largest", type=int, default=30_000, metavar="N", help="hits at most (default: 30000)")
+    arguments = parser.parse_args(argv)
     values: dict[str, Any] = {"machine": machine()}
     with tempfile.TemporaryDirectory() as folder:
-        values |= _ratios(Path(folder), arguments.repeats)
-        if arguments.ratios:
-            return 0
+        values |= _ratios(Path(folder))
         values |= _starts(Path(folder))
         values["hits"] = _hits(Path(folder), arguments.largest)
     for name, target in TARGETS.items():
@@ -76,14 +76,6 @@ def main(argv: Sequence[str] | None = None) -> int:
         print(f"{row['count']} hits: {rate:.4g} hits/s, {share:.1%} of the time computing, {memory:.0f} MiB at most")
     store("overheads", values)
     return 0
-
-
-def _parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(description="costs of a campaign besides the march")
-    parser.add_argument("--largest", type=int, default=30_000, metavar="N", help="hits at most (default: 30000)")
-    parser.add_argument("--ratios", action="store_true", help="measure and print the two ratios alone")
-    parser.add_argument("--repeats", type=int, default=5, metavar="N", help="repetitions of the ratios (default: 5)")
-    return parser
 
 
 def command(*arguments: str, **environment: str) -> Usage:
@@ -109,10 +101,10 @@ def _run(folder: Path, count: int, **environment: str) -> Usage:
     return command("run", str(CAMPAIGN), "-o", output, "--overwrite", f"--count={count}", "--device=cpu", **environment)
 
 
-def _ratios(folder: Path, repeats: int) -> dict[str, Any]:
+def _ratios(folder: Path) -> dict[str, Any]:
     """Small runs to bare imports, and runs less a small one to `simulate`: medians over repetitions in turn."""
     _run(folder, SMALL)  # the first may build the kernels
-    starts = [(used(IMPORTS), _run(folder, SMALL)) for _ in range(repeats)]
+    starts = [(used(IMPORTS), _run(folder, SMALL)) for _ in range(TURNS)]
     start = {
         "imports_seconds": statistics.median(imports.seconds for imports, _ in starts),
         "run_seconds": statistics.median(small.seconds for _, small in starts),
@@ -123,7 +115,7 @@ def _ratios(folder: Path, repeats: int) -> dict[str, Any]:
     print(f"run of {SMALL} hits / imports: {elapsed:.2f}, processor {processor:.2f} (target: {START_TARGET})")
     rows = []
     for count in COUNTS:
-        turns = [(_run(folder, SMALL), _simulated(count), _run(folder, count)) for _ in range(repeats)]
+        turns = [(_run(folder, SMALL), _simulated(count), _run(folder, count)) for _ in range(TURNS)]
         ratios = [(large.seconds - small.seconds) / alone[0] for small, alone, large in turns]
         of_processor = [(large.processor - small.processor) / alone[1] for small, alone, large in turns]
         row = {

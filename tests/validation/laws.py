@@ -4,7 +4,7 @@
 
 A law gives the normal stress of a surface element from what is near: the material ahead, what the core has pushed
 ahead, the thickness, and the closing speed (law_march.py). With a constant stress the march agrees with the
-package at β = 1 (`--check`). The rows are those of tests/benchmarks/continuum_trade.py; what was found is in
+package at β = 1 (test_laws.py). The rows are those of tests/benchmarks/continuum_trade.py; what was found is in
 tests/benchmarks/NOTES.md.
 """
 
@@ -25,8 +25,6 @@ sys.path.insert(0, str(BENCHMARKS))
 
 from bench import launch_state, tilt_behind  # noqa: E402
 from continuum_cases import PLATES, measured, written  # noqa: E402
-
-from warpimpact import Numerics, Scene, simulate  # noqa: E402
 
 from .law_march import FAR, Array, Near, built, real, rings_of  # noqa: E402
 
@@ -199,22 +197,6 @@ def fitted(law: Law, march: Any, plates: list[Plate]) -> Array:
     return parameters(minimize(misfit, simplex[0], method="Nelder-Mead", options=options).x)
 
 
-def check(plates: list[Plate]) -> None:
-    """Print how far the march is from the package, with a constant stress and no weakening."""
-    march = built(constant)
-    for plate in plates:
-        given = plate.plate.model_copy(
-            update={"resistance": 1.8e9 if not plate.solid else 4e9, "shear_coefficient": 0.05, "degradation": 1.0}
-        )
-        scene = Scene(core=plate.case.core, target=(given,), record=plate.case.scene.record)
-        outcomes = simulate(scene, plate.shots, numerics=Numerics(level=5), device="cpu")
-        truth = np.column_stack([outcomes.residual_velocity, np.degrees(outcomes.tilt)])
-        apart = plate(march, np.array([0.05, given.resistance / 1e9])) - np.where(
-            outcomes.status[:, None] == 0, truth, np.nan
-        )
-        print(plate.name, "rms", np.sqrt(np.nanmean(apart**2, axis=0)).round(2))
-
-
 def main() -> None:
     """Fit laws to some plates, and print what each gives at all of them."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
@@ -222,15 +204,11 @@ def main() -> None:
     parser.add_argument("--fit", default="slotted,thin,solid_12")
     parser.add_argument("--plates", default="slotted,thin,solid_12,thick,oblique", help="any of PLATES")
     parser.add_argument("--every", type=int, default=1, help="fit to every such hit (default: 1)")
-    parser.add_argument("--check", action="store_true", help="compare the march with the package, and fit nothing")
     given = parser.parse_args()
     wp.config.quiet = True
     results = BENCHMARKS / "results"
     rows = [row for name in ("trade", "kept", "front") for row in written(results / f"continuum_{name}.csv")]
     plates = [Plate(name, rows) for name in given.plates.split(",")]
-    if given.check:
-        check(plates)
-        return
     inside = given.fit.split(",")
     for name in given.laws or LAWS:
         law = LAWS[name]

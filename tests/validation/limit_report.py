@@ -1,6 +1,7 @@
 """Summary, figure and tables of the published limit velocities beside their predictions."""
 
 import json
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -84,54 +85,54 @@ def tables(summary: dict[str, Any]) -> dict[str, str]:
     return {"splits": _splits(summary), "plates": _plates(summary), "laws": _laws(summary), "parts": _parts(summary)}
 
 
+def markdown(head: Sequence[str], rows: Iterable[Sequence[object]]) -> str:
+    """A table of a page."""
+    lines = ["| " + " | ".join(map(str, row)) + " |" for row in (head, *rows)]
+    return "\n".join([lines[0], "|" + "---|" * len(head), *lines[1:]])
+
+
 def _splits(summary: dict[str, Any]) -> str:
     by = {(one["split"], one["method"]): one for one in summary["splits"]}
-    lines = [
-        "| question | rows | model | bias | inside 90 % | " + " | ".join(RIVALS) + " |",
-        "|---|---|---|---|---|---|---|",
-    ]
+    rows = []
     for split in dict.fromkeys(one["split"] for one in summary["splits"]):
         own = by[split, LAW]
         cells = [_percents(own), f"{100 * own['bias']:+.1f}", f"{100 * own['inside']:.0f} %"]
         cells += [_percents(by[split, name]) for name in RIVALS]
-        lines.append(f"| {split} | {own['rows']} | " + " | ".join(cells) + " |")
-    return "\n".join(lines)
+        rows.append((split, own["rows"], *cells))
+    return markdown(("question", "rows", "model", "bias", "inside 90 %", *RIVALS), rows)
 
 
 def _plates(summary: dict[str, Any]) -> str:
     own = [one for one in summary["plates"] if one["split"] == "one row out"]
     by = {(one["projectile"], one["material"], one["method"]): one for one in own}
-    lines = [
-        "| projectile | material | rows | model | inside 90 % | " + " | ".join(RIVALS) + " |",
-        "|---|---|---|---|---|---|---|",
-    ]
+    rows = []
     for projectile, material, method in by:
         one = by[projectile, material, method]
         if method == LAW and one["rows"] >= LEAST_ROWS:
-            rivals = " | ".join(_percents(by[projectile, material, name]) for name in RIVALS)
+            rivals = (_percents(by[projectile, material, name]) for name in RIVALS)
             inside = f"{100 * one['inside']:.0f} %"
-            lines.append(f"| {projectile} | {material} | {one['rows']} | {_percents(one)} | {inside} | {rivals} |")
-    return "\n".join(lines)
+            rows.append((projectile, material, one["rows"], _percents(one), inside, *rivals))
+    return markdown(("projectile", "material", "rows", "model", "inside 90 %", *RIVALS), rows)
 
 
 def _laws(summary: dict[str, Any]) -> str:
     by = {(one["law"], one["split"]): one for one in summary["laws"]}
     splits = list(dict.fromkeys(one["split"] for one in summary["laws"]))
-    lines = ["| law | η | " + " | ".join(splits) + " |", "|---|---|" + "---|" * len(splits)]
+    rows = []
     for law, one in summary["fits"].items():
         cells = [f"{100 * by[law, split]['median']:.1f}, {by[law, split]['elpd']:.0f}" for split in splits]
-        lines.append(f"| {law} | {one['coefficients']['friction']:.3f} | " + " | ".join(cells) + " |")
-    return "\n".join(lines)
+        rows.append((law, f"{one['coefficients']['friction']:.3f}", *cells))
+    return markdown(("law", "η", *splits), rows)
 
 
 def _parts(summary: dict[str, Any]) -> str:
     parts = summary["fits"][CHOSEN.name]["parts"]
     names = dict.fromkeys(name.rpartition(", ")[0] for name in parts)
-    lines = ["| part of ln Y | steel, % of the limit velocity | aluminium |", "|---|---|---|"]
+    rows = []
     for name in names:
         cells = (f"{50 * parts[of]:.1f}" if (of := f"{name}, {metal}") in parts else "-" for metal in METALS)
-        lines.append(f"| {name} | {' | '.join(cells)} |")
-    return "\n".join(lines)
+        rows.append((name, *cells))
+    return markdown(("part of ln Y", "steel, % of the limit velocity", "aluminium"), rows)
 
 
 def with_tables(page: str, parts: dict[str, str]) -> str:

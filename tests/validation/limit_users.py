@@ -16,7 +16,7 @@ from warpimpact.campaign.evidence import limit_velocity_factors
 from warpimpact.catalogue import strength
 from warpimpact.solver.limit import limit_velocity
 
-from .limit_report import PAGE, with_tables
+from .limit_report import PAGE, markdown, with_tables
 from .limit_rows import STORED, Rows, published
 
 USERS = STORED / "limit_users.csv"
@@ -78,15 +78,15 @@ def every_row(rows: Rows) -> pd.DataFrame:
 
 def users_table(answers: pd.DataFrame) -> str:
     """The table of the page, as Markdown."""
-    lines = ["| plates | rows | error, median / 90 % | bias | inside their 90 % interval |", "|---|---|---|---|---|"]
+    rows = []
     groups = {"all": answers, **dict(iter(answers.groupby("metal")))}
     for name, group in groups.items():
         error = group["predicted"] / group["published"] - 1.0
         inside = group["published"].between(group["low"], group["high"]).mean()
         size = error.abs()
-        cells = f"{100 * size.median():.1f} / {100 * size.quantile(0.9):.1f} % | {100 * error.median():+.1f} %"
-        lines.append(f"| {name} | {len(group)} | {cells} | {100 * inside:.0f} % |")
-    return "\n".join(lines)
+        off = f"{100 * size.median():.1f} / {100 * size.quantile(0.9):.1f} %", f"{100 * error.median():+.1f} %"
+        rows.append((name, len(group), *off, f"{100 * inside:.0f} %"))
+    return markdown(("plates", "rows", "error, median / 90 %", "bias", "inside their 90 % interval"), rows)
 
 
 def main() -> None:
