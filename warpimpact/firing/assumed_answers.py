@@ -20,10 +20,7 @@ from warpimpact.firing.plan import FiringTest
 from warpimpact.firing.response import Response
 from warpimpact.records.variable import Variable
 from warpimpact.results import firing as f
-from warpimpact.scene.model import Array
 from warpimpact.statistics.acceptance import acceptance
-
-Answers = Mapping[Variable, Array]
 
 MOST_TESTS = 1000
 """Most tests that are fired again under each assumption."""

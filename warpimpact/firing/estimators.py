@@ -15,8 +15,6 @@ from warpimpact.scene.model import Array, Model
 from warpimpact.scene.units import Number
 from warpimpact.statistics.quantal import fit_quantal, likelihood_interval, wald_interval
 
-Flags = NDArray[np.bool_]
-
 
 class Estimator(Model):
     """How V50 and spread follow from the shots.

@@ -7,12 +7,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from warpimpact.firing.procedures import Procedure
+from warpimpact.firing.response import Response
 from warpimpact.firing.steps import Estimated, Optimal, Shot, StepEstimate, Steps
 from warpimpact.scene.model import Array
 from warpimpact.scene.sampling import stream
@@ -22,13 +22,6 @@ Flags = NDArray[np.bool_]
 
 _LEAST = 1.0
 """Slowest velocity of a gun [m/s]."""
-
-
-class Answering(Protocol):
-    """A target that answers shots, as `response.Response` does."""
-
-    def perforates(self, place: NDArray[np.int64], velocity: Array) -> Flags:
-        """Whether shots perforate, in the shape of the arguments."""
 
 
 @dataclass(frozen=True)
@@ -58,7 +51,7 @@ def uniform(seed: int, column: int, tests: int, most: int) -> Array:
     return np.stack([stream(seed, (column, shot), 0, tests) for shot in range(most)], axis=1)
 
 
-def fire(procedure: Procedure, response: Answering, places: NDArray[np.int64], errors: Array) -> Firings:
+def fire(procedure: Procedure, response: Response, places: NDArray[np.int64], errors: Array) -> Firings:
     """Fire all tests.
 
     Args:

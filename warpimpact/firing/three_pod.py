@@ -46,16 +46,14 @@ class ThreePod(InRange):
 
     def steps(self) -> Steps:
         """The velocities of one test."""
-        search, aim, fired = self._search(), None, list[Shot]()
+        search, shot = self._search(), None
         for _ in range(self.shots):
-            if aim is None or not isinstance(aim, Optimal):
-                aim = next(search, Optimal()) if aim is None else _sent(search, fired[-1])
-            fired.append((yield aim))
+            shot = yield search.send(shot)
         if self.quantile_shots:
             yield from self._approach((yield Estimated()))
 
-    def _search(self) -> Generator[float, Shot, None]:
-        """Phase I: until the answers overlap, and one or two shots in the middle of the overlap."""
+    def _search(self) -> Steps:
+        """Phase I: until the answers overlap, and one or two shots in the middle of the overlap; then phase II."""
         low, high, spread = self.lowest, self.highest, self.spread
         fired = list[Shot]()
         for aim in (0.75 * low + 0.25 * high, 0.25 * low + 0.75 * high):
@@ -70,6 +68,8 @@ class ThreePod(InRange):
             for aim in (low - 3.0 * spread, high + 3.0 * spread):
                 fired.append((yield aim))
         yield from self._overlap(fired, spread)
+        while True:
+            yield Optimal()
 
     def _overlap(self, fired: list[Shot], spread: float) -> Generator[float, Shot, None]:
         while True:
@@ -111,10 +111,3 @@ class ThreePod(InRange):
             gain = 0.5 * variance / root * density / (share * (1.0 - share))
             aim = aim - gain * estimate.scale * (float(shot.perforated) - share)
             variance -= share * (1.0 - share) * gain**2
-
-
-def _sent(search: Generator[float, Shot, None], shot: Shot) -> float | Optimal:
-    try:
-        return search.send(shot)
-    except StopIteration:
-        return Optimal()

@@ -123,13 +123,10 @@ def _fill(campaign: Campaign, computation: Computation, shards: Shards, executor
     """Compute the missing shards until none is missing or the stop rule is met."""
     sampler = campaign.sampler()
     watch = Watch(campaign, shards, computation.measures)
-    there = sorted(shards.there())
-    for index in there:
-        watch.add(index, shards.shard(index))
-    watch.resumed, warn = watch.done, cost_warning(campaign, executor.made_by[attr.DEVICE], computation.passages)
+    is_new, warn = 0 not in shards.there(), cost_warning(campaign, executor.made_by[attr.DEVICE], computation.passages)
     if watch.end is None:
         campaign = result_of(executor, with_ligament, campaign)
-    if 0 in there:  # shard 0 holds the pilot's findings, and its hits at a finer level
+    if not is_new:  # shard 0 holds the pilot's findings, and its hits at a finer level
         watch.found = computation.found_in(shards.shard(0))
     else:
 
@@ -142,7 +139,7 @@ def _fill(campaign: Campaign, computation: Computation, shards: Shards, executor
         watch.found = result_of(executor, computation.pilot, campaign, tick=piloting)
     warn(numerics_of(campaign, watch.found))
 
-    asks = 0 not in there and has_assumptions(campaign)
+    asks = is_new and has_assumptions(campaign)
     found_alone = None if watch.found is None else watch.found.told
 
     def jobs() -> Iterator[tuple[range | None, Job]]:

@@ -33,8 +33,8 @@ class End:
 class Watch:
     """Follows a run: finished and failed shots, estimates, and whether the stop rule is met.
 
-    Counts include each shard as it comes. Estimates take the shards in the order of their shots, so that a run ends
-    with the same shots however it was computed.
+    Counts include each shard as it comes, first those that an earlier run has computed. Estimates take the shards in
+    the order of their shots, so that a run ends with the same shots however it was computed.
     """
 
     def __init__(self, campaign: Campaign, shards: Shards, measures: Sequence[str] = ()) -> None:
@@ -54,6 +54,9 @@ class Watch:
         self.done, self.resumed, self.failed = 0, 0, 0
         self.end: End | None = None
         self.found: Found | None = None
+        for index in sorted(shards.there()):
+            self.add(index, shards.shard(index))
+        self.resumed = self.done
 
     def add(self, index: int, shard: HitTable) -> None:
         """Take in a finished shard. A shard that comes before its turn is loaded again when its turn comes."""

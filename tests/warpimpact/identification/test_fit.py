@@ -27,11 +27,6 @@ def test_priors_are_read_in_si(make_fit: FitMaker) -> None:
     assert fit.scene_of(fit.shots[0]).target.layers[0].resistance == pytest.approx(2.5e9)
 
 
-def test_what_no_target_has_is_refused(make_fit: FitMaker) -> None:
-    with pytest.raises(FitError, match=r"shot\[0\]: plate.thickness: read as 6 m, but up to 1000 mm is allowed"):
-        make_fit(('thickness = "3 mm"', "thickness = 6"))
-
-
 def test_observations_are_in_si_and_have_their_standoff(make_fit: FitMaker) -> None:
     velocity, tilt = make_fit().shots[0].observations
     assert (velocity.name, velocity.value, velocity.std) == ("residual_velocity", 600.0, 10.0)
@@ -74,6 +69,10 @@ def test_a_shot_may_have_its_own_plate(make_fit: FitMaker) -> None:
         (
             ("[prior.plate]", "[prior.plat]"),
             'prior.plat.resistance: got the table "plat", but a prior belongs in one of',
+        ),
+        (
+            ('thickness = "3 mm"', "thickness = 6"),
+            "shot[0]: plate.thickness: read as 6 m, but up to 1000 mm is allowed",
         ),
         (("[prior.plate]\nres", "[prior.plate]\nrez"), 'got the unknown key "rezistance"; did you mean "resistance"?'),
         (('low = "1 GPa"', 'low = "1 mm"'), 'low: got "1 mm", which is not a stress'),

@@ -17,7 +17,7 @@ from warpimpact.identification.posterior import learnt, parameters_of
 from warpimpact.identification.posterior_view import posterior_view
 from warpimpact.plotting.posterior import hits_figure, measured_figure, pairs_figure
 from warpimpact.results import posterior_file
-from warpimpact.results.files import ResultError, read_tree
+from warpimpact.results.files import read_tree
 from warpimpact.view.view import text_of
 
 FitMaker = Callable[..., Fit]
@@ -77,13 +77,6 @@ def test_rounds_are_whole_blocks(make_fit: FitMaker, small: tuple[str, str]) -> 
     plan = make_fit(small).sampling
     assert sum(rounds(plan)) <= plan.sets * identify.DISCREPANCIES
     assert all(count % (plan.shared * identify.DISCREPANCIES) == 0 for count in rounds(plan))
-
-
-def test_another_file_is_no_posterior(tmp_path: Path) -> None:
-    path = tmp_path / "other.nc"
-    xarray.Dataset({"a": 1}).to_netcdf(path)
-    with pytest.raises(ResultError, match="not a posterior of warpimpact"):
-        read_tree(path, posterior_file.POSTERIOR)
 
 
 @pytest.mark.usefixtures("in_tmp_path")

@@ -1,9 +1,6 @@
 """Designs that are small enough to search in a second."""
 
 from pathlib import Path
-from typing import Any
-
-import pytest
 
 from warpimpact.optimisation.design import Design, design_from
 
@@ -46,8 +43,3 @@ assumed_hits = 0
 def design(*parts: str, folder: Path = Path()) -> Design:
     """A design of a plate with these tables behind it."""
     return design_from("\n".join([CORE, *parts]), "design.toml", folder)
-
-
-@pytest.fixture
-def make() -> Any:
-    return design

@@ -4,10 +4,12 @@ import pytest
 
 from warpimpact.campaign.text import CampaignError
 
+from .conftest import design
 
-def test_all_statistics_of_a_quantity_share_its_column(make) -> None:
+
+def test_all_statistics_of_a_quantity_share_its_column() -> None:
     measures = ("mean(residual_velocity)", "worst_tenth(residual_velocity)", "P(residual_velocity > 500 m/s)")
-    keys = make(*(f'[[objectives]]\nmeasure = "{measure}"\n' for measure in measures)).keys
+    keys = design(*(f'[[objectives]]\nmeasure = "{measure}"\n' for measure in measures)).keys
     assert [key.text for key in keys] == ["residual_velocity", measures[2]]
 
 
@@ -25,7 +27,7 @@ def test_all_statistics_of_a_quantity_share_its_column(make) -> None:
         ('"P(stopped)"\nangle = "30 deg"', 'got the unknown key "angle"'),
     ],
 )
-def test_what_cannot_be_sought_is_refused(make, measure: str, sentence: str) -> None:
+def test_what_cannot_be_sought_is_refused(measure: str, sentence: str) -> None:
     with pytest.raises(CampaignError) as refused:
-        make(f"[[objectives]]\nmeasure = {measure}\n")
+        design(f"[[objectives]]\nmeasure = {measure}\n")
     assert sentence in str(refused.value)

@@ -149,13 +149,10 @@ def test_a_replay_shows_the_core_between_the_layers(result: xarray.Dataset) -> N
     assert tilt == pytest.approx(float(result["layer_standoff_tilt"][3, 0, 1]), abs=1e-3)
 
 
-def test_a_plate_alone_has_no_stand_offs_behind_layers() -> None:
+def test_a_plate_alone_and_distances_that_no_gap_holds_are_refused() -> None:
     front, _, behind = CAMPAIGN.partition("[[layer]]")
     alone = front + behind[behind.index("[impact]") :]
     with pytest.raises(CampaignError, match=r"output.layer_standoffs needs \[\[layer\]\]"):
         campaign(alone)
-
-
-def test_distances_that_no_gap_holds_are_refused() -> None:
     with pytest.raises(CampaignError, match=r"got output.layer_standoffs of 0.07 m, but the widest gap is 0.08 m"):
         campaign(CAMPAIGN.replace('"40 mm", "50 mm"]', '"70 mm"]'))
