@@ -3,6 +3,7 @@ that its tables name. Layer 0 is the plate, and layer 1 the first table [[layer]
 
 from __future__ import annotations
 
+import json
 import os
 import re
 from collections.abc import Iterator, Mapping
@@ -49,6 +50,29 @@ def resolved(key: str, name: str) -> str:
         f"{name}: got the unknown input {quoted(key)}; give one of {', '.join(_WHOLE)}, {known}, or a dotted "
         'place such as "core.mass"'
     )
+
+
+def labels_of(options: list[Any], where: str, *, whole: bool) -> tuple[str, ...]:
+    """Labels of the values of an input as written, or the names of tables.
+
+    Args:
+        where: place of the list in errors.
+        whole: whether they are tables, each with a name.
+
+    Raises:
+        CampaignError: a table has no name, or a label is not one line or is given twice.
+    """
+    if whole and not all(isinstance(option, dict) and isinstance(option.get("name"), str) for option in options):
+        raise CampaignError(f"{where}: must be a list of tables, each with a name")
+    labels = tuple(
+        option["name"] if whole else option if isinstance(option, str) else json.dumps(option, default=str)
+        for option in options
+    )
+    if wrong := next((label for label in labels if not label.isprintable()), None):
+        raise CampaignError(f"{where}: got {quoted(wrong)}, but it must be one line without control characters")
+    if len(set(labels)) < len(labels):
+        raise CampaignError(f"{where}: got a value twice, but each must differ")
+    return labels
 
 
 def put(data: dict[str, Any], key: str, value: Any, name: str) -> None:

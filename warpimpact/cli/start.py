@@ -53,16 +53,14 @@ def add_new(commands: Commands) -> None:
 
 def _new(arguments: argparse.Namespace) -> None:
     import tomllib
-    from difflib import get_close_matches
 
     from warpimpact.campaign.text import CampaignError
     from warpimpact.results import kinds
+    from warpimpact.scene.units import meant
 
     paths, name = _paths(), arguments.name.removesuffix(".toml")
     if name not in paths:
-        meant = get_close_matches(name, paths, n=1)
-        hint = f'did you mean "{meant[0]}"?' if meant else f"allowed are {', '.join(paths)}"
-        raise CampaignError(f'got the unknown example "{name}"; {hint}')
+        raise CampaignError(f'got the unknown example "{name}"; {meant(name, paths)}')
     source, output = paths[name], arguments.output or Path(f"{name}.toml")
     # Commands in the comments name the file by its place in the checkout.
     text = re.sub(

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from difflib import get_close_matches
 
 from warpimpact.campaign.campaign import Campaign
 from warpimpact.campaign.text import CampaignError
@@ -16,7 +15,7 @@ from warpimpact.catalogue.catalogue import Catalogue
 from warpimpact.catalogue.entries import Threat, Velocity
 from warpimpact.firing.directions import Directions
 from warpimpact.firing.plan import FiringTest
-from warpimpact.scene.units import quoted
+from warpimpact.scene.units import meant, quoted
 
 
 @dataclass(frozen=True)
@@ -71,11 +70,9 @@ def named_requirement(name: str) -> Requirement:
         CampaignError: there is none.
     """
     known = {requirement.name: requirement for requirement in REQUIREMENTS}
-    if name in known:
-        return known[name]
-    meant = get_close_matches(name, known, n=1)
-    hint = f'did you mean "{meant[0]}"?' if meant else f"allowed are {', '.join(known)}"
-    raise CampaignError(f"requirement: got {quoted(name)}, which is not known; {hint}")
+    if name not in known:
+        raise CampaignError(f"requirement: got {quoted(name)}, which is not known; {meant(name, known)}")
+    return known[name]
 
 
 def threat_of(requirement: Requirement, name: str | None) -> tuple[Threat, Velocity]:

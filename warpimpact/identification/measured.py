@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from difflib import get_close_matches
 from typing import Any
 
 import numpy as np
@@ -15,7 +14,7 @@ from warpimpact.records.outcomes import Outcomes
 from warpimpact.results import variables as v
 from warpimpact.results.measures import STATUSES
 from warpimpact.scene.model import Array
-from warpimpact.scene.units import Angle, Speed, quantity, quoted
+from warpimpact.scene.units import Angle, Speed, meant, quantity, quoted
 
 KINDS = {"m s-1": ("velocity", Speed), "degree": ("angle", Angle)}
 """Kind of discrepancy and type of a number, by the units of its variable."""
@@ -99,9 +98,7 @@ def read_measured(given: Any, standoffs: Sequence[float], place: str) -> tuple[t
             status = value
             continue
         if name not in MEASURABLE:
-            allowed = (*MEASURABLE, "status")
-            meant = get_close_matches(name, allowed, n=1)
-            hint = f'did you mean "{meant[0]}"?' if meant else f"allowed are {', '.join(allowed)}"
+            hint = meant(name, (*MEASURABLE, "status"))
             raise FitError(f"{place}: got the unknown key {quoted(name)}; {hint}")
         observations += _numbers(name, value, standoffs, f"{place}.{name}")
     if status not in (None, "perforated", "missed") and observations:

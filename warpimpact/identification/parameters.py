@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from difflib import get_close_matches
 from typing import Any, get_args, get_origin
 
 import numpy as np
@@ -16,7 +15,7 @@ from warpimpact.scene.distributions import EDGE, AnyDistribution, Distribution
 from warpimpact.scene.model import Array, Model
 from warpimpact.scene.problems import complaint
 from warpimpact.scene.scatter import in_si
-from warpimpact.scene.units import quoted, reader_in, typed
+from warpimpact.scene.units import meant, quoted, reader_in, typed
 from warpimpact.solver.columns import COLUMN_OF, UNITS_OF_EXPOSURE, Path
 
 TABLES: dict[str, Any] = {"plate": Plate, "interaction": Interaction, "core": AnyCore}
@@ -150,9 +149,7 @@ def _reader(path: Path, tables: Mapping[str, Any], place: str) -> Any:
         model = _model(annotation, node)
         fields = {} if model is None else model.model_fields
         if part not in fields:
-            meant = get_close_matches(part, fields, n=1)
-            hint = f'did you mean "{meant[0]}"?' if meant else f"allowed are {', '.join(fields)}"
-            raise FitError(f'{place}: got the unknown key "{part}"; {hint}')
+            raise FitError(f'{place}: got the unknown key "{part}"; {meant(part, fields)}')
         annotation = typed(fields[part])
         node = node.get(part, {}) if isinstance(node, Mapping) else {}
     reader = reader_in(annotation)

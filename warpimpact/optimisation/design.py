@@ -199,12 +199,8 @@ class Design:
         """The tables of the campaign of a point of the space."""
         return self.space.tables(self.base, values, self.name)
 
-    def campaign(self, tables: Mapping[str, Any], threat: FacedThreat, **replaced: Any) -> Campaign:
-        """The campaign of a target and a threat.
-
-        Args:
-            tables: tables of the target.
-            replaced: keys of [hits] and [numerics], by table.
+    def campaign(self, tables: Mapping[str, Any], threat: FacedThreat) -> Campaign:
+        """The campaign of a target with these tables and a threat.
 
         Raises:
             CampaignError: the campaign is not valid.
@@ -213,8 +209,6 @@ class Design:
         for table in ("core", "impact"):
             overrides = getattr(threat, table)
             data[table] = dict(overrides) if table == "core" and overrides else data.get(table, {}) | overrides
-        for table, given in replaced.items():
-            data[table] = data.get(table, {}) | given
         return _campaign(json.dumps(data, ensure_ascii=False), self.name, self.folder)
 
 

@@ -136,14 +136,14 @@ def _front_table(dataset: xarray.Dataset) -> Table:
             notes.append("not on the front by fresh hits")
         if beyond := str(dataset[f.UNTESTED].values[place]):
             notes.append(f"untested: {beyond}")
-        rows.append((file, *_cells(dataset, _OF_FRONT, place), "; ".join(notes)))
+        rows.append((file, *_cells(dataset, OF_FRONT, place), "; ".join(notes)))
     for place, name in enumerate(dataset[f.REFERENCE].values):
-        rows.append((name, *_cells(dataset, _OF_REFERENCE, place), ""))
+        rows.append((name, *_cells(dataset, OF_REFERENCE, place), ""))
     return Table([*columns, Column("note")], rows)
 
 
-_OF_FRONT = (f.FRESH, f.FRESH_LOW, f.FRESH_HIGH)
-_OF_REFERENCE = (f.REFERENCE_FOUND, f.REFERENCE_LOW, f.REFERENCE_HIGH)
+OF_FRONT = (f.FRESH, f.FRESH_LOW, f.FRESH_HIGH)
+OF_REFERENCE = (f.REFERENCE_FOUND, f.REFERENCE_LOW, f.REFERENCE_HIGH)
 
 
 def _cells(dataset: xarray.Dataset, names: tuple[str, str, str], place: int) -> Iterator[Any]:
@@ -198,17 +198,8 @@ def _against(dataset: xarray.Dataset, reference: int) -> Iterator[str]:
             )
 
 
-def numbers_of_front(dataset: xarray.Dataset, place: int) -> list[str]:
-    """Objectives and bounds of a design of the front by fresh hits, with their intervals."""
-    return _numbers(dataset, _OF_FRONT, place)
-
-
-def numbers_of_reference(dataset: xarray.Dataset, place: int) -> list[str]:
-    """Objectives and bounds of a target to compare with."""
-    return _numbers(dataset, _OF_REFERENCE, place)
-
-
-def _numbers(dataset: xarray.Dataset, names: tuple[str, str, str], place: int) -> list[str]:
+def numbers_of(dataset: xarray.Dataset, names: tuple[str, str, str], place: int) -> list[str]:
+    """Objectives and bounds of a target with their intervals, by the `names` of their variables."""
     cells = list(_cells(dataset, names, place))
     numbers = []
     for label, value, interval in zip(dataset[f.LABEL].values, cells[::2], cells[1::2], strict=True):

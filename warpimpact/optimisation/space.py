@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from warpimpact.campaign.places import is_table, put, resolved
+from warpimpact.campaign.places import is_table, labels_of, put, resolved
 from warpimpact.campaign.text import CampaignError
 from warpimpact.scene.model import Array
 from warpimpact.scene.units import LARGEST, float_of, quoted
@@ -212,18 +212,9 @@ def _read_choice(
 ) -> None:
     """A list of values, or of tables with names. Ranges and lists in a table are variables below the choice."""
     whole = is_table(place) or place == "layer" or all(isinstance(option, dict) for option in given)
-    if whole and not all(isinstance(option, dict) and isinstance(option.get("name"), str) for option in given):
-        raise CampaignError(f"{where}: must be a list of tables, each with a name")
     if not whole and any(isinstance(option, dict | list) for option in given):
         raise CampaignError(f"{where}: got {quoted(given)}, but it must be a list of values")
-    labels = tuple(
-        option["name"] if whole else option if isinstance(option, str) else json.dumps(option, default=str)
-        for option in given
-    )
-    if wrong := next((label for label in labels if not label.isprintable()), None):
-        raise CampaignError(f"{where}: got {quoted(wrong)}, but it must be one line without control characters")
-    if len(set(labels)) < len(labels):
-        raise CampaignError(f"{where}: got a value twice, but each must differ")
+    labels = labels_of(given, where, whole=whole)
     number, values, below = len(variables), [], []
     for option, option_value in enumerate(given):
         if not whole:

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from warpimpact.campaign.campaign import Campaign
 from warpimpact.campaign.text import parsed
 from warpimpact.optimisation.evaluate import is_even
-from warpimpact.optimisation.front_view import design_text, front_view, numbers_of_front, numbers_of_reference
+from warpimpact.optimisation.front_view import OF_FRONT, OF_REFERENCE, design_text, front_view, numbers_of
 from warpimpact.plotting.front import campaign_at, front_figure, front_leaders, holding
 from warpimpact.plotting.style import data_url, png_url
 from warpimpact.report.words import templates
@@ -54,7 +54,7 @@ def write_front_report(dataset: xarray.Dataset, path: Path, folder: Path) -> Non
         _design(dataset, place, chart, folder) | {"leads": place in leaders} for place in range(dataset.sizes["front"])
     ]
     references = [
-        {"name": str(name), "numbers": numbers_of_reference(dataset, place)}
+        {"name": str(name), "numbers": numbers_of(dataset, OF_REFERENCE, place)}
         | chart.at(dataset[f.REFERENCE_FOUND].values[place])
         for place, name in enumerate(dataset[f.REFERENCE].values)
     ]
@@ -146,7 +146,7 @@ def _design(dataset: xarray.Dataset, place: int, chart: _Chart, folder: Path) ->
     text, campaign = str(dataset[f.CAMPAIGN].values[place]), campaign_at(dataset, place, folder)
     return {
         "file": str(dataset[f.FILE].values[place]),
-        "numbers": numbers_of_front(dataset, place),
+        "numbers": numbers_of(dataset, OF_FRONT, place),
         "variables": design_text(dataset, int(dataset[f.NUMBER][place])),
         "campaign": text,
         "bar": chart.bar(place),

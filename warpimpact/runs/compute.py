@@ -94,15 +94,13 @@ def compute(campaign: Campaign, task: Task, worker: Worker, report: Report = lam
     """
     images, numerics = len(campaign.symmetries), numerics_of(campaign, task.findings)
     outcomes, elapsed = _outcomes(campaign.scene, task.shots[::images], numerics, worker, of_images(report, images))
-    beside = dict[str, Any]()
+    references, beside = list[tuple[Scene, Shots, Mapping[v.Variable, v.Variable]]](), dict[str, Any]()
     if task.solid is not None:
-        beside |= columns_beside(
-            _outcomes(*at_solid(campaign, task.solid), numerics, worker)[0], v.SOLID_VARIABLES | v.SOLID_DEPTHS
-        )
+        references.append((*at_solid(campaign, task.solid), v.SOLID_VARIABLES | v.SOLID_DEPTHS))
         if campaign.layer:
-            beside |= columns_beside(
-                _outcomes(*at_base_alone(campaign, task.solid), numerics, worker)[0], v.BASE_ALONE_VARIABLES
-            )
+            references.append((*at_base_alone(campaign, task.solid), v.BASE_ALONE_VARIABLES))
+    for scene, shots, variables in references:
+        beside |= columns_beside(_outcomes(scene, shots, numerics, worker)[0], variables)
     attributes = _errors(task.findings) | ({attr.LEVEL_FOR: what} if (what := level_for(campaign)) else {})
     return described(campaign, task, outcomes, numerics, (worker.device, elapsed), attributes, beside)
 

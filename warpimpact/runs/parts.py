@@ -220,9 +220,14 @@ class Parts:
         if not begun:
             self._tell(f"{self._manifest}: is missing or damaged; it is written again")
             self._write_manifest(replaces=replaces)
-        damaged = [path for path in self.paths() if not self._take(path)]
-        for path in damaged:
-            remove(path)
+        damaged = []
+        for path in self.paths():
+            number = self._form.number_in(path.name)
+            if number in self.saved or not self._is_whole(number, path):
+                damaged.append(path)
+                remove(path)
+            else:
+                self.saved[number] = path
         if damaged:
             more = f" and {len(damaged) - 1} more" if len(damaged) > 1 else ""
             self._tell(
@@ -235,14 +240,6 @@ class Parts:
         with files.aside(self._manifest) as file:
             content = {**self._content, "replaces": replaces, "fingerprint": self.fingerprint}
             file.write_text(json.dumps(content, indent=1), encoding="utf-8")
-
-    def _take(self, path: Path) -> bool:
-        """Count a part as saved if its seal is right and its place is still free."""
-        number = self._form.number_in(path.name)
-        if number in self.saved or not self._is_whole(number, path):
-            return False
-        self.saved[number] = path
-        return True
 
     def _is_whole(self, number: int, path: Path) -> bool:
         try:

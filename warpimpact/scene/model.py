@@ -3,7 +3,6 @@
 import inspect
 from collections.abc import Mapping
 from copy import deepcopy
-from difflib import get_close_matches
 from typing import Any, ClassVar, Self
 
 import numpy as np
@@ -11,7 +10,7 @@ from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, model_validator
 
 from .notebook import html_of
-from .units import MOST_QUOTED, quoted
+from .units import meant, quoted
 
 Array = NDArray[np.float64]
 
@@ -37,9 +36,7 @@ class Model(BaseModel):
         allowed = cls._keys()
         unknown = [key for key in values if key not in allowed] if isinstance(values, dict) else []
         if unknown:
-            meant = get_close_matches(str(unknown[0])[:MOST_QUOTED], allowed, n=1)
-            hint = f'did you mean "{meant[0]}"?' if meant else f"allowed are {', '.join(allowed)}"
-            raise ValueError(f"got the unknown key {quoted(unknown[0])}; {hint}")
+            raise ValueError(f"got the unknown key {quoted(unknown[0])}; {meant(str(unknown[0]), allowed)}")
         return values
 
     def model_copy(self, *, update: Mapping[str, Any] | None = None, deep: bool = False) -> Self:

@@ -4,8 +4,9 @@ import json
 import math
 import operator
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
+from difflib import get_close_matches
 from functools import cache
 from itertools import islice
 from numbers import Real
@@ -203,6 +204,13 @@ def _by_pint(unit: str, si_unit: str) -> float:
         raise ValueError(unit) from None
     turns = si_unit == "rad/s" and "radian" not in _registry().get_root_units(parsed)[1]._units
     return 2.0 * math.pi * factor if turns else factor  # a frequency counts turns
+
+
+def meant(name: str, allowed: Iterable[str]) -> str:
+    """What an unknown name probably means, or what is allowed in its place."""
+    known = list(allowed)
+    close = get_close_matches(name[:MOST_QUOTED], known, n=1)
+    return f'did you mean "{close[0]}"?' if close else f"allowed are {', '.join(known)}"
 
 
 def brief(text: str, most: int = MOST_QUOTED) -> str:

@@ -16,7 +16,7 @@ import numpy as np
 import xarray
 
 from warpimpact.campaign.campaign import Campaign
-from warpimpact.campaign.places import is_table, put, resolved, type_at, value_at
+from warpimpact.campaign.places import is_table, labels_of, put, resolved, type_at, value_at
 from warpimpact.campaign.tested import summary_of_all
 from warpimpact.campaign.text import CampaignError, parsed, read_text
 from warpimpact.results import attributes as attr
@@ -149,21 +149,10 @@ def _input(key: str, values: Any, path: str) -> Input:
     place = resolved(key, f"{path}: sweep")
     if not isinstance(values, list) or not values:
         raise CampaignError(f"{path}: sweep.{key}: got {quoted(values)}, but it must be a list of values")
-    if not is_table(place):
-        labels = tuple(value if isinstance(value, str) else json.dumps(value, default=str) for value in values)
-        given = tuple(values)
-    else:
-        if not all(isinstance(value, dict) and isinstance(value.get("name"), str) for value in values):
-            raise CampaignError(f"{path}: sweep.{key}: must be a list of tables, each with a name")
-        labels = tuple(value["name"] for value in values)
-        given = tuple({name: part for name, part in value.items() if name != "name"} for value in values)
-    if wrong := next((label for label in labels if not label.isprintable()), None):
-        raise CampaignError(
-            f"{path}: sweep.{key}: got {quoted(wrong)}, but it must be one line without control characters"
-        )
-    if len(set(labels)) < len(labels):
-        raise CampaignError(f"{path}: sweep.{key}: got a value twice, but each must differ")
-    return Input(place, labels, given)
+    labels = labels_of(values, f"{path}: sweep.{key}", whole=is_table(place))
+    if is_table(place):
+        values = [{name: part for name, part in value.items() if name != "name"} for value in values]
+    return Input(place, labels, tuple(values))
 
 
 def folder_of(output: Path) -> Path:
