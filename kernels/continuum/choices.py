@@ -26,7 +26,8 @@ FIRM = Constant(
     40.0,
     "m/s",
     "Speed at which a material yields, its yield stress over density and speed of sound. That of armour steel is as "
-    "high; in a softer material the resistance is less by the share, so that it takes as much of the energy.",
+    "high; in a softer material the resistance is less by the root of the share: more takes too much of the energy, "
+    "and with less the hourglasses grow and do.",
     test="verification/test_continuum.py::test_an_hourglass_is_braked_at_the_rate_of_its_resistance",
 )
 THINNEST = Constant(

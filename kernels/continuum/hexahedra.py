@@ -214,7 +214,7 @@ def build(variant: Variant) -> SimpleNamespace:
         drag_1 = drag(gradient_x, gradient_y, gradient_z, x.zeta_xi - back * v.zeta_xi, v.zeta_xi)
         drag_2 = drag(gradient_x, gradient_y, gradient_z, x.xi_eta - back * v.xi_eta, v.xi_eta)
         drag_3 = drag(gradient_x, gradient_y, gradient_z, x.all - back * v.all, v.all)
-        firmness = wp.min(real(1.0), sheet.yield_stress / (firm * sheet.density * sheet.wave_speed))
+        firmness = wp.sqrt(wp.min(real(1.0), sheet.yield_stress / (firm * sheet.density * sheet.wave_speed)))
         resistance = hourglass * firmness * sheet.density * sheet.wave_speed * rest_length * rest_length
         drag_0 = kept(live, drag_0)
         drag_1 = kept(live, drag_1)

@@ -4,7 +4,7 @@
 
 Every shot is a row, appended when it has ended, so that a search may be ended at any time and continued. All shots hit
 at normal incidence without yaw. The first one has the published velocity; while every shot has passed, the next one has
-99 % of the velocity that the energy of the slowest one asks for.
+99 % of the velocity that the energy of the slowest one asks for; then it is halfway to the next lower one.
 """
 
 from __future__ import annotations
@@ -47,8 +47,9 @@ def next_velocity(shots: list[Shot], published: float) -> float | None:
     slowest = min(passed)
     if slowest.velocity - held <= WIDTH * slowest.velocity:
         return None
+    below = max((shot.velocity for shot in shots if shot.velocity < slowest.velocity), default=0.0)
     by_energy = 0.99 * float(np.sqrt(slowest.velocity**2 - slowest.residual**2))
-    return 0.5 * (held + slowest.velocity) if held else by_energy
+    return 0.5 * (below + slowest.velocity) if below else by_energy
 
 
 def shot_at(plate: str, friction: float, spacing: float | None, velocity: float) -> Shot:
