@@ -191,6 +191,12 @@ def march_of(
     return March(hit, meetings[1:])
 
 
+def line_of_flight(obliquity: float, azimuth: float) -> Array:
+    """Unit vector along the line of fire."""
+    across = math.sin(obliquity)
+    return np.array([math.cos(obliquity), across * math.cos(azimuth), across * math.sin(azimuth)])
+
+
 def start_of(scene: Scene, shots: Shots, number: int, friction: float, conditions: dict[str, NDArray[Any]]) -> Start:
     """How the core of a shot begins: its foremost point at the front face, as kernels/shots.py has it."""
     core = scene.core
@@ -203,16 +209,9 @@ def start_of(scene: Scene, shots: Shots, number: int, friction: float, condition
             *("velocity", "obliquity", "azimuth", "pitch", "yaw", "spin"),
         )
     )
-    flight = np.array(
-        [math.cos(obliquity), math.sin(obliquity) * math.cos(azimuth), math.sin(obliquity) * math.sin(azimuth)]
-    )
-    axis = np.array(
-        [
-            1.0,
-            math.tan(math.atan2(flight[1], flight[0]) + yaw),
-            math.tan(math.atan2(flight[2], flight[0]) + pitch),
-        ]
-    )
+    flight = line_of_flight(obliquity, azimuth)
+    turned = math.atan2(flight[1], flight[0]) + yaw, math.atan2(flight[2], flight[0]) + pitch
+    axis = np.array([1.0, math.tan(turned[0]), math.tan(turned[1])])
     axis /= np.linalg.norm(axis)
     attitude = np.array([0.0, -axis[2], axis[1], 1.0 + axis[0]])
     stations = np.linspace(0.0, core.length, 1001)

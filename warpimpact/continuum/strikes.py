@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpimpact.continuum.many_hits import ended
-from warpimpact.continuum.meeting import WIDER, March, Struck, march_of
+from warpimpact.continuum.meeting import WIDER, March, Struck, line_of_flight, march_of
 from warpimpact.continuum.one_hit import axis_of
 from warpimpact.kernels.status import Status
 from warpimpact.records.continuum_variables import ENERGY_IMBALANCE, ERODED_ELEMENTS, HOURGLASS_SHARE
@@ -169,10 +169,7 @@ def _fill_passage(memory: Memory, hits: list[Struck]) -> None:
     for values in columns.values():
         values[...] = np.nan if values.dtype.kind == "f" else -1
     for k, hit in enumerate(hits):
-        obliquity, azimuth = float(shots.obliquity[k]), float(shots.azimuth[k])
-        flight = np.array(
-            [math.cos(obliquity), math.sin(obliquity) * math.cos(azimuth), math.sin(obliquity) * math.sin(azimuth)]
-        )
+        flight = line_of_flight(float(shots.obliquity[k]), float(shots.azimuth[k]))
         for layer in range(layers):
             velocity, axis, time = hit.left[layer, :3], hit.left[layer, 3:6], hit.left[layer, 6]
             has_left = not math.isnan(time)

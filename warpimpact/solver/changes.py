@@ -63,7 +63,6 @@ def compared(
         outcomes: outcomes of the shots with these numerics, at the level itself (the same if no setting is coarser),
             and at a finer level.
         margin: error of the level over its change to the finer one. The part beyond 1 is the error of the finer level.
-        free: as in `changes`.
     """
     coarse, between, fine = outcomes
     layered = LAYER_RESIDUAL_VELOCITY in fine

@@ -133,7 +133,7 @@ def _first_two_edges(
 
     Args:
         inside: distance of the nodes from the nearest edge, negative in a hole; periodic.
-        ray: rows and columns from a node to the next one on the ray, in this number of `parts`.
+        ray: rows and columns from a node to the next one on it, in this number of `parts`.
     """
     part = math.hypot(ray[0] * sides[0], ray[1] * sides[1]) / parts
     places = [_between(inside, ray[0] * k, ray[1] * k, parts) for k in range(parts + 1)]

@@ -47,14 +47,8 @@ def channel_nodes(prepared: Prepared, windows: Sequence[tuple[int, int]]) -> lis
 def scratch(
     prepared: Prepared, stage: Any, put: Any, fields: Any, slots: int, nodes: int, windows: Sequence[tuple[int, int]]
 ) -> Any:
-    """The Earlier of some slots. The channels that a shot finds are put in its fields.
-
-    Args:
-        stage: build of the march.
-        put: puts values on the device (`solver.structs.Put`).
-        nodes: nodes of the exposure in a slot.
-        windows: numbers of cells of the windows of all layers.
-    """
+    """The Earlier of some slots, with `nodes` of the exposure in a slot and windows of these numbers of cells in the
+    layers. The channels that a shot finds are put in its fields."""
     earlier = stage.Earlier()
     count, layers = prepared.shots.at_a_plate, len(prepared.grids)
     pierced, through = channel_nodes(prepared, windows), planes(prepared)

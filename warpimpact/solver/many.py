@@ -11,10 +11,10 @@ from typing import TypeVar
 from warpimpact.records.outcomes import Outcomes
 from warpimpact.scene import Numerics, Scene, Shots
 from warpimpact.solver.device import find_device, launching
-from warpimpact.solver.marching import Helpers, Marching, Progress
+from warpimpact.solver.marching import Helpers, Progress
 from warpimpact.solver.memory import Memory
 from warpimpact.solver.prepare import prepare
-from warpimpact.solver.simulate import outcomes_of
+from warpimpact.solver.simulate import marched
 from warpimpact.solver.worker import Cancel, Cancelled, Worker
 
 Value = TypeVar("Value")
@@ -54,11 +54,8 @@ def simulate_many(
                 if progress is not None:
                     progress(sum(done), total)
 
-        prepared = prepare(*scenes[number], numerics)
-        memory = Memory(prepared, device, share.cancel)
-        march = Marching(memory, 1, helpers)
-        contact = march.march(told, share.cancel)
-        return outcomes_of(march.memory, contact)
+        memory = Memory(prepare(*scenes[number], numerics), device, share.cancel)
+        return marched(memory, replace(share, threads=1), told, helpers)
 
     return side_by_side(outcomes, len(scenes), worker)
 

@@ -352,7 +352,6 @@ def pilot_limits(limits_at: Callable[[int], Array], numerics: Numerics, quantity
 
     Args:
         limits_at: computes the limits of a pilot's shots on a level of LADDER.
-        numerics: as in `pilot_hits`.
         quantity: "velocity" or "thickness". A thickness goes with the square of the velocity.
 
     Raises:

@@ -213,8 +213,8 @@ def _left_after(
     """What is left of the layers, by number, after some steps of the last shot on the CPU. All shots hit one plate.
 
     Args:
-        cells: cells of the plate's window.
-        scratch: scratch of one slot.
+        cells: of the plate's window.
+        scratch: of one slot.
         plate: the plate in this window, intact.
     """
     prepared, variant = memory.prepared, memory.variant
@@ -236,12 +236,7 @@ def _left_after(
 
 def _behind(memory: Memory, scratch: Any, plate: Cells) -> dict[int, Weakened]:
     """The layers behind the plate that the last shot reached and that weaken or are pierced by earlier hits, after a
-    march of one slot.
-
-    Args:
-        scratch: scratch of the slot.
-        plate: cells of the plate's window.
-    """
+    march of one slot with its scratch, in which the plate's window has these cells."""
     prepared, hit = memory.prepared, _hit(memory.prepared)
     is_open, homes = scratch.stack.open.numpy(), scratch.stack.home.numpy()
     layers = {}
@@ -256,12 +251,8 @@ def _behind(memory: Memory, scratch: Any, plate: Cells) -> dict[int, Weakened]:
 
 
 def _share_left(memory: Memory, layer: int, fields: Any, plate: Cells) -> Array:
-    """Share of a layer's resistance that the last shot leaves in its window, mean through the thickness.
-
-    Args:
-        fields: fields of one slot.
-        plate: cells of the plate's window.
-    """
+    """Share of a layer's resistance that the last shot leaves in its window, mean through the thickness, by the fields
+    of one slot and the cells of the plate's window."""
     material, cells = memory.prepared.materials[layer], memory.prepared.windows(plate)[layer]
     through, total = (np.arange(THROUGH) + 0.5) / THROUGH, np.zeros(cells)
     if material.weakens:

@@ -245,11 +245,8 @@ def resolve(
 def layer_steps(
     scene: Scene, shots: Shots, materials: Sequence[Materials], resolution: Resolution, lengths: Sequence[Array]
 ) -> list[Array]:
-    """Time steps in all layers [s], each of shape [shots].
-
-    Args:
-        lengths: degradation lengths of the layers [m], each of shape [1] or [shots].
-    """
+    """Time steps in all layers [s], each of shape [shots], for their degradation lengths [m], each of shape [1] or
+    [shots]."""
     mass = shots.own("mass", scene.core.mass_properties.mass)
     return [
         resolution.step_at(
@@ -266,11 +263,7 @@ def layer_steps(
 def conditions_of(
     scene: Scene, shots: Shots, materials: Sequence[Materials], steps: Sequence[Array]
 ) -> dict[str, Array]:
-    """The conditions of every shot, under the names of the kernels' Shots; of shape [1] where all shots share one.
-
-    Args:
-        steps: as `layer_steps` gives them.
-    """
+    """The conditions of every shot, under the names of the kernels' Shots; of shape [1] where all shots share one."""
     core, target = scene.core, scene.target
     body = core.mass_properties
     mass, depth = shots.own("mass", body.mass), materials[-1].front + materials[-1].thickness
@@ -288,10 +281,7 @@ def conditions_of(
 
 
 def steps_of(shots: Shots, conditions: dict[str, Array]) -> Array:
-    """Numbers of steps of unhindered passages, shape [shots].
-
-    Args:
-        conditions: as `conditions_of` gives them.
+    """Numbers of steps of unhindered passages, shape [shots], for the `conditions_of` the shots.
 
     Raises:
         TooManySteps: a passage takes more than MOST_STEPS.

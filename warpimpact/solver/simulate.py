@@ -15,7 +15,7 @@ from warpimpact.records.outcomes import Outcomes
 from warpimpact.scene import Numerics, Scene, Shots
 from warpimpact.solver.device import find_device
 from warpimpact.solver.findings import HitErrors, LevelCost
-from warpimpact.solver.marching import Marching, Progress
+from warpimpact.solver.marching import Helpers, Marching, Progress
 from warpimpact.solver.memory import Memory
 from warpimpact.solver.pilot import Aim, pilot_hits, pilot_size
 from warpimpact.solver.prepare import Prepared, prepare
@@ -63,9 +63,11 @@ def computed(prepared: Prepared, worker: Worker, progress: Progress | None = Non
     return marched(memory, worker, progress)
 
 
-def marched(memory: Memory, worker: Worker, progress: Progress | None = None) -> Outcomes:
-    """Compute a scene in the memory of a device; see `simulate`."""
-    march = Marching(memory, worker.threads)
+def marched(
+    memory: Memory, worker: Worker, progress: Progress | None = None, helpers: Helpers | None = None
+) -> Outcomes:
+    """Compute a scene in the memory of a device, with threads that may help."""
+    march = Marching(memory, worker.threads, helpers)
     contact = march.march(progress, worker.cancel)
     return outcomes_of(march.memory, contact)
 
@@ -92,7 +94,6 @@ def pilot_of(
     Args:
         pilot: some of the shots.
         trying: called with every level that is computed.
-        aim, hits: as in `pilot_hits`.
     """
     prepared_of, seconds = partial(prepare, scene), dict[Numerics, float]()
 

@@ -62,12 +62,8 @@ def empty(struct: Any, device: Any, *shapes: tuple[int, ...]) -> Any:
 
 
 def inputs_of(stage: Any, prepared: Prepared, put: Put) -> tuple[Any, list[Any]]:
-    """The Inputs of the march, and the arrays that must be kept alive with them: an array of structs does not keep the
-    arrays that its members point to.
-
-    Args:
-        stage: build of the march.
-    """
+    """The Inputs of a build of the march, and the arrays that must be kept alive with them: an array of structs does
+    not keep the arrays that its members point to."""
     core, variant = prepared.scene.core, prepared.variant
     surfaces = [surface_of(stage.Surface, core, surface.rings, surface.azimuths, put) for surface in prepared.surfaces]
     sections = [

@@ -65,7 +65,6 @@ def windows_behind(
     layer that earlier hits pierce keeps their channels.
 
     Args:
-        plates, which: as in `first_windows`.
         plate: nodes of the plate's windows in each direction, shape [1] or [shots].
     """
     steep, counts = np.tan(shots.obliquity), [np.broadcast_to(plate, len(shots))]
