@@ -6,35 +6,24 @@ from typing import Any
 import numpy as np
 import pytest
 
-from warpimpact.scene import (
-    Impact,
-    Layer,
-    Numerics,
-    Plate,
-    PolynomialCore,
-    Record,
-    Scene,
-    Shots,
-    SlotPattern,
-    Target,
-)
+from warpimpact.scene import Layer, Numerics, Plate, Record, Scene, Target
 from warpimpact.solver import replay, simulate, windows
 from warpimpact.solver.prepare import prepare
 from warpimpact.solver.resolution import LADDER, at_level
 
-CORE = PolynomialCore(coefficients=(3.0e-4, 0.24, -5.29), length=27.86e-3, density=7850.0)
+from ...verification.scenes import PAPER_CORE, SLOTS, shots_at
+
 PLATE = Plate(thickness=4e-3, resistance=2.6e9, degradation=0.8, degradation_interval=1e-6)
+SCENE = Scene(core=PAPER_CORE, target=PLATE)
 SIMPLE, BLOCK = Numerics(level=2), Numerics(level=2, layout="block")
 
 
-def shots_of(count: int = 3, **columns: Any) -> Shots:
-    values = dict.fromkeys(("hit_y", "hit_z", *Impact.model_fields), 0.0) | {"velocity": 825.0} | columns
-    return Shots(**{name: np.full(count, value) for name, value in values.items()})
+THREE = np.zeros(3)
 
 
 @pytest.mark.parametrize("index", [0, 2, 4])
 def test_a_window_is_in_the_smallest_block_that_holds_it(index: int) -> None:
-    prepared = prepare(Scene(core=CORE, target=PLATE), shots_of(), at_level(index, BLOCK))
+    prepared = prepare(SCENE, shots_at(THREE), at_level(index, BLOCK))
     assert prepared.variant.window == min(size for size in windows.SIZES if size >= prepared.cells**2)
     assert 2 * 4 * max(windows.SIZES) <= 48 * 1024
 
@@ -42,20 +31,20 @@ def test_a_window_is_in_the_smallest_block_that_holds_it(index: int) -> None:
 def test_levels_of_a_pilot_keep_the_layout() -> None:
     assert at_level(2, BLOCK).layout == "block"
     assert at_level(2, SIMPLE).layout == "simple"
-    assert prepare(Scene(core=CORE, target=PLATE), shots_of(), at_level(3, BLOCK)).variant.window
+    assert prepare(SCENE, shots_at(THREE), at_level(3, BLOCK)).variant.window
 
 
 def test_windows_that_do_not_fit_a_block_are_for_the_simple_layout() -> None:
-    shots = shots_of(obliquity=1.2)
-    assert not prepare(Scene(core=CORE, target=PLATE), shots, BLOCK).variant.window
-    assert not prepare(Scene(core=CORE, target=PLATE), shots_of(), at_level(len(LADDER) - 1, BLOCK)).variant.window
-    simple, block = (simulate.simulate(Scene(core=CORE, target=PLATE), shots, numerics=n) for n in (SIMPLE, BLOCK))
+    shots = shots_at(THREE, obliquity=69.0)
+    assert not prepare(SCENE, shots, BLOCK).variant.window
+    assert not prepare(SCENE, shots_at(THREE), at_level(len(LADDER) - 1, BLOCK)).variant.window
+    simple, block = (simulate.simulate(SCENE, shots, numerics=n) for n in (SIMPLE, BLOCK))
     np.testing.assert_array_equal(block.residual_velocity, simple.residual_velocity)
 
 
 def test_only_the_front_window_has_to_fit_a_block() -> None:
     behind = Layer(**PLATE.model_dump(), gap=20e-3)
-    prepared = prepare(Scene(core=CORE, target=Target(layers=(PLATE, behind))), shots_of(), BLOCK)
+    prepared = prepare(Scene(core=PAPER_CORE, target=Target(layers=(PLATE, behind))), shots_at(THREE), BLOCK)
     front, base = prepared.nodes((prepared.cells,) * 2)
     assert front <= prepared.variant.window <= max(windows.SIZES) < base
 
@@ -64,8 +53,8 @@ def test_shots_that_leave_the_window_of_their_block_are_computed_in_the_simple_l
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     monkeypatch.setattr(windows, "SLACK", 0.8)
-    shots = shots_of(pitch=0.03)
-    simple, block = (simulate.simulate(Scene(core=CORE, target=PLATE), shots, numerics=n) for n in (SIMPLE, BLOCK))
+    shots = shots_at(THREE, pitch=1.72)
+    simple, block = (simulate.simulate(SCENE, shots, numerics=n) for n in (SIMPLE, BLOCK))
     np.testing.assert_array_equal(block.status, simple.status)
     np.testing.assert_array_equal(block.residual_velocity, simple.residual_velocity)
 
@@ -74,10 +63,9 @@ def test_shots_that_do_not_leave_theirs_keep_what_layers_and_histories_have_of_t
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     monkeypatch.setattr(windows, "WIDER_BEHIND", 0.2)  # so that a core leaves its window of the base if it is turned
-    slots = SlotPattern(length=12e-3, width=4e-3, spacing=(8e-3, 16e-3), staggered=True)
     base = Layer(**PLATE.model_dump(), gap=0.1)
-    scene = Scene(core=CORE, target=Target(layers=(PLATE.model_copy(update={"pattern": slots}), base)))
-    shots = shots_of(hit_y=np.array([0.0, 2e-3, 0.0]))
+    scene = Scene(core=PAPER_CORE, target=Target(layers=(PLATE.model_copy(update={"pattern": SLOTS}), base)))
+    shots = shots_at([0.0, 2e-3, 0.0])
     simple, block = (simulate.simulate(scene, shots, numerics=n) for n in (SIMPLE, BLOCK))
     np.testing.assert_allclose(block.layer_residual_velocity, simple.layer_residual_velocity, atol=1e-3)
     for here, there in zip(*(replay.trace(scene, shots, numerics=n) for n in (SIMPLE, BLOCK)), strict=True):
@@ -93,6 +81,6 @@ def test_shots_that_do_not_leave_theirs_keep_what_layers_and_histories_have_of_t
     ],
 )
 def test_what_a_block_does_not_compute_is_refused(scene: dict[str, Any], numerics: dict[str, Any], words: str) -> None:
-    whole = Scene(**{"core": CORE, "target": PLATE} | scene)
+    whole = Scene(**{"core": PAPER_CORE, "target": PLATE} | scene)
     with pytest.raises(ValueError, match=re.escape(f'numerics.layout = "block" cannot be combined with {words}: a')):
-        simulate.simulate(whole, shots_of(), numerics=Numerics(layout="block", **numerics))
+        simulate.simulate(whole, shots_at(THREE), numerics=Numerics(layout="block", **numerics))
