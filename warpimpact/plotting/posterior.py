@@ -45,24 +45,24 @@ def pairs_figure(tree: xarray.DataTree) -> Figure:
     figure = Figure(figsize=(size + 1.2, size + 0.9), layout="constrained")
     panels = figure.subplots(len(names), len(names), squeeze=False)
     knowledge = learnt(tree)
+    drawn, priors = ({name: _values(tree, group, name) for name in names} for group in ("posterior", "prior"))
     for row, below in enumerate(names):
         for column, across in enumerate(names):
             axes = panels[row, column]
             if column > row:
                 axes.remove()
                 continue
-            x, label_x = _values(tree, "posterior", across)
-            y, label_y = _values(tree, "posterior", below)
-            prior = _values(tree, "prior", across)[0]
+            (x, label_x), (y, label_y) = drawn[across], drawn[below]
+            prior, prior_below = priors[across][0], priors[below][0]
             if row == column:
                 _density(axes, prior, x)
                 axes.set_title(knowledge[across].verdict.replace(" by these shots", ""), fontsize="x-small")
                 axes.set_yticks([])
             else:
                 shown = slice(None, None, max(1, len(x) // _POINTS))
-                axes.scatter(prior[shown], _values(tree, "prior", below)[0][shown], s=2, color=_GREY, alpha=0.25, lw=0)
+                axes.scatter(prior[shown], prior_below[shown], s=2, color=_GREY, alpha=0.25, lw=0)
                 axes.scatter(x[shown], y[shown], s=4, color=BLUE, alpha=0.45, lw=0)
-                axes.set_ylim(_limits(_values(tree, "prior", below)[0], y))
+                axes.set_ylim(_limits(prior_below, y))
             axes.set_xlim(_limits(prior, x))
             axes.tick_params(labelsize="x-small", labelbottom=row == len(names) - 1, labelleft=column == 0 and row > 0)
             if row == len(names) - 1:

@@ -10,7 +10,7 @@ import gzip
 import json
 import re
 from base64 import b64encode
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
@@ -76,13 +76,15 @@ def report_page(
     most = MOST_HITS // len(datasets)
     shown = [thinned(dataset, most, keep=hits) for dataset, hits in zip(datasets.values(), worst, strict=True)]
     chosen = [worst_and_spread(few, trajectories, first=hits) for few, hits in zip(shown, worst, strict=True)]
-    followed = _followed(sum(map(len, chosen)), progress)
-    data = page_data(shown)
+    data, done, total = page_data(shown), 0, sum(map(len, chosen))
     for name, hits, drawn in zip(datasets, chosen, data["results"], strict=True):
-        drawn["trajectories"] = {  # the page does not show what is left of the plate
-            hit: trajectory_data(replay(datasets[name], hit, folder=folders[name], snapshots=0))
-            for hit in followed(hits)
-        }
+        drawn["trajectories"] = {}
+        for hit in hits:  # the page does not show what is left of the plate
+            history = replay(datasets[name], hit, folder=folders[name], snapshots=0)
+            drawn["trajectories"][hit] = trajectory_data(history)
+            done += 1
+            if progress:
+                progress(done, total)
         drawn["first"] = telling(datasets[name], hits)
     comparison = compared(datasets) if len(datasets) > 1 else None
     return _page(
@@ -94,21 +96,6 @@ def report_page(
         comparison=comparison,
         conclusion=conclusion(results, comparison),
     )
-
-
-def _followed(total: int, progress: Progress | None) -> Callable[[Sequence[int]], Iterator[int]]:
-    """A function that iterates over hits and reports to `progress` how many of all are done."""
-    done = 0
-
-    def follow(hits: Sequence[int]) -> Iterator[int]:
-        nonlocal done
-        for hit in hits:
-            yield hit
-            done += 1
-            if progress:
-                progress(done, total)
-
-    return follow
 
 
 def telling(dataset: xarray.Dataset, hits: Sequence[int]) -> int | None:
