@@ -101,7 +101,6 @@ def response_of(
     take.
 
     Args:
-        output: the file of the test.
         count: number of hits of the campaign, instead of that in the file.
 
     Returns:

@@ -38,8 +38,7 @@ def simulate_test(
     """Fire a test many times at a target whose response is known.
 
     Args:
-        response: response of the target; None where the test asks for directions alone.
-        sector: protection by direction.
+        response: None where the test asks for directions alone.
         attributes: further global attributes, such as the cost of the search of limits.
 
     Raises:

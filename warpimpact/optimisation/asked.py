@@ -97,12 +97,10 @@ class Bound(_Asked):
 
 
 def check_needs(asked: Mapping[str, Objective | Bound], output: Mapping[str, Any], *, layered: bool) -> None:
-    """Refuse a measure if the campaign lacks what it needs.
+    """Refuse a measure if the campaign, with layers behind the plate or not, lacks what it needs.
 
     Args:
         asked: objectives and bounds by their places in the file.
-        output: table [output] of the campaign.
-        layered: whether the campaign has layers behind the plate.
 
     Raises:
         ValueError: the message names the measure, and what it needs.

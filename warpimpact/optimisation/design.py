@@ -261,13 +261,8 @@ def design_from(text: str, name: str, folder: Path) -> Design:
         folder=folder,
         base=data,
         space=space,
-        objectives=asking.objectives,
-        bounds=asking.bounds,
-        threats=threats,
-        references=asking.references,
-        constraints=asking.constraints,
-        search=asking.search,
         keys=tuple(keys),
+        **dict(asking) | {"threats": threats},
     )
     over = any(goal.assumptions != "given" and goal.asked.kind != "target" for goal in design.asked)
     return replace(design, assumed=_assumptions(design)) if over else design

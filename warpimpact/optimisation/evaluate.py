@@ -92,10 +92,8 @@ class Said:
 
 
 def campaign_of(design: Design, tables: Mapping[str, Any], threat: FacedThreat, seed: int | None = None) -> Campaign:
-    """The campaign whose hits a search computes: hits in the irreducible part of the cell, where it has one.
-
-    Args:
-        seed: seed of the hits; None for that of the search.
+    """The campaign whose hits a search computes: hits in the irreducible part of the cell, where it has one; by default
+    with the seed of the search.
 
     Raises:
         CampaignError: the campaign is not valid.

@@ -32,7 +32,6 @@ def optimise(design: Design | str | Path, *, device: str = "auto", progress: Fol
     Args:
         design: the design, or its file.
         device: "auto" (CUDA if there is one, else the CPU), "cpu" or "cuda:0".
-        progress: called with the progress of the search.
 
     Returns:
         The Dataset of results/front.py: every computed design, and the front by fresh hits.

@@ -139,12 +139,7 @@ def _campaign(design: Design, record: DesignRecord) -> str:
 
 
 def campaign_tables(design: Design, tables: Mapping[str, Any], values: Array, threat: FacedThreat) -> dict[str, Any]:
-    """The tables of the campaign of a target and a threat, for `warpimpact run`.
-
-    Args:
-        tables: tables of the target.
-        values: values of the variables; empty for a reference.
-    """
+    """The tables of the campaign of a target and a threat, for `warpimpact run`. A reference has no values."""
     made = json.loads(json.dumps(tables, default=str))
     named = f", {threat.name}" if len(design.threats) > 1 else ""
     told = design.space.text(values) if len(values) else ""
@@ -182,7 +177,6 @@ def write_campaigns(
     """Write a campaign file per design of the front, and per threat if there are several.
 
     Args:
-        dataset: Dataset of the search (results/front.py).
         overwrite: replace campaigns of an earlier search, and remove those of designs that are no longer on the front;
             otherwise a changed file is kept.
         tell: called with a sentence for each file that is kept.

@@ -119,12 +119,7 @@ class Space:
             )
 
     def tables(self, base: Mapping[str, Any], values: Array, name: str) -> dict[str, Any]:
-        """The tables of the campaign of a point.
-
-        Args:
-            base: tables of the design file.
-            name: name of the file in errors.
-        """
+        """The tables of the campaign of a point, from those of the design file, whose name is for errors."""
         data = json.loads(json.dumps(base, default=str))
         for variable, value in zip(self.variables, values, strict=True):
             if not math.isnan(value):
@@ -145,10 +140,7 @@ class Space:
 
 
 def read_space(given: Any, name: str) -> Space:
-    """The table `[variables]` of a design file.
-
-    Args:
-        name: name of the file in errors.
+    """The table `[variables]` of a design file, whose name is for errors.
 
     Raises:
         CampaignError: a variable is neither a range nor a list, or has no value.

@@ -27,12 +27,7 @@ thickness = { low = "3 mm", high = "5 mm", step = "0.5 mm" }
 def test_what_stands_below_an_alternative_counts_with_it_alone() -> None:
     one = design(ALTERNATIVES, WEIGHT_AND_ENERGY)
     names = [variable.name for variable in one.space.variables]
-    assert names == [
-        "thickness",
-        "plate.pattern",
-        "plate.pattern[round].diameter",
-        "plate.pattern[slots].spacing.0",
-    ]
+    assert names == ["thickness", "plate.pattern", "plate.pattern[round].diameter", "plate.pattern[slots].spacing.0"]
     assert math.isinf(one.space.size)
     slots = one.space.at([2, 1, 0.5, 0.5])
     assert slots.tolist()[:2] == [4.0, 1.0]
@@ -55,10 +50,7 @@ def test_points_of_a_finite_space_each_once() -> None:
         (('[variables]\nthickness = "4 mm"', WEIGHT_AND_ENERGY), 'thickness: got "4 mm", but it must be a range'),
         (('[variables]\nthickness = { low = "5 mm", high = "4 mm" }', WEIGHT_AND_ENERGY), "low must not be greater"),
         (('[variables]\nthickness = { low = "5 mm", high = "1 cm" }', WEIGHT_AND_ENERGY), "they must be one"),
-        (
-            ("[variables]\nthickness = { low = 1, high = 2, step = 0 }", WEIGHT_AND_ENERGY),
-            "thickness.step",
-        ),
+        (("[variables]\nthickness = { low = 1, high = 2, step = 0 }", WEIGHT_AND_ENERGY), "thickness.step"),
         (('[variables]\nthickness = { low = "1 mm", most = 2 }', WEIGHT_AND_ENERGY), 'unknown key "most"'),
         (('[variables]\nthickness = ["3 mm", "3 mm"]', WEIGHT_AND_ENERGY), "got a value twice"),
         (('[variables]\nthicknes = ["3 mm"]', WEIGHT_AND_ENERGY), 'unknown input "thicknes"'),

@@ -206,10 +206,7 @@ def test_bad_input_gets_a_sentence_and_writes_nothing(
 @pytest.mark.parametrize(
     ("value", "sentence"),
     [
-        (
-            'materials = ["ARMOX"]',
-            'continuum.materials: got "ARMOX", which is not in the catalogue; did you mean',
-        ),
+        ('materials = ["ARMOX"]', 'continuum.materials: got "ARMOX", which is not in the catalogue; did you mean'),
         ('materials = ["mine.toml"]', 'continuum.materials: got "mine.toml", but there is no file'),
         ("friction = 2", "continuum.friction: got 2, but it must be less than or equal to 1"),
         ('fidelity = "fine"', "continuum.fidelity: got"),

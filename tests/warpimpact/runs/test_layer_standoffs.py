@@ -65,11 +65,7 @@ def test_a_file_keeps_them(result: xarray.Dataset, tmp_path: Path) -> None:
     assert tilt.dims == ("hit", "layer", "layer_standoff")
     np.testing.assert_array_equal(tilt, result["layer_standoff_tilt"])
     known = np.isfinite(tilt.values).all(axis=0)  # 50 mm and 18 mm of core are more than a gap of 60 mm
-    assert known.tolist() == [
-        [True, True, False],
-        [True, True, True],
-        [True, True, True],
-    ]
+    assert known.tolist() == [[True, True, False], [True, True, True], [True, True, True]]
 
 
 def test_images_of_a_hit_have_mirrored_angles(result: xarray.Dataset) -> None:

@@ -185,12 +185,7 @@ def test_resumed_equals_undisturbed(
 
 
 def test_processes_give_the_bits_of_threads(
-    name: str,
-    straight: Path,
-    asked: Answered,
-    two_processes: Executor,
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
+    name: str, straight: Path, asked: Answered, two_processes: Executor, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     processes = Lent(two_processes)
     monkeypatch.setattr(choice, "Processes", lambda *_: processes)

@@ -38,11 +38,7 @@ PATIENCE = 600.0
 """Until what must come is missing, however busy the machine [s]."""
 HERE = Path(__file__).parents[1]
 pytestmark = pytest.mark.usefixtures("small_shards")
-WARPIMPACT = (
-    sys.executable,
-    "-c",
-    "import small_shards; from warpimpact.cli import main; raise SystemExit(main())",
-)
+WARPIMPACT = (sys.executable, "-c", "import small_shards; from warpimpact.cli import main; raise SystemExit(main())")
 
 
 @pytest.fixture(scope="module")
@@ -84,11 +80,7 @@ def wait_for_a_shard(process: subprocess.Popen, output: Path) -> None:
 
 
 def test_runs_killed_at_any_moment_end_with_the_same_bits(
-    campaign_file: Path,
-    undisturbed: Path,
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
-    assert_same_bits: SameBits,
+    campaign_file: Path, undisturbed: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, assert_same_bits: SameBits
 ) -> None:
     # A server that has imported everything forks real processes; each saves the second of the imports.
     def command(path: Path) -> list[str]:
@@ -423,11 +415,7 @@ def test_ctrl_c_stops_cleanly_and_says_how_to_resume(by: signal.Signals, where: 
     listen = _after("signal.signal(signal.SIGINT, signal.SIG_DFL)")
     command = [*listen, *WARPIMPACT, "run", str(path), "-o", str(output), "--device", "cpu", *where]
     with subprocess.Popen(
-        command,
-        env=os.environ | {"PYTHONPATH": str(HERE)},
-        stderr=subprocess.PIPE,
-        text=True,
-        start_new_session=True,
+        command, env=os.environ | {"PYTHONPATH": str(HERE)}, stderr=subprocess.PIPE, text=True, start_new_session=True
     ) as process:
         wait_for_a_shard(process, output)
         if by == signal.SIGINT:
