@@ -32,20 +32,19 @@ def box(counts: tuple[int, int, int], spacing: float = 1.0e-3) -> SheetMesh:
     return SheetMesh(rows, columns, np.ones((counts[1], counts[2]), dtype=bool), x, spacing)
 
 
+def start_at(
+    position: tuple[float, float, float], speed: float, momentum: Any = (0.0, 0.0, 0.0), **own: float
+) -> Start:
+    """A core along x at a speed along x [m/s], with an angular momentum [N m s]."""
+    body = {"mass": 4e-3, "inertia_axial": 1.5e-8, "inertia_transverse": 1.65e-7, "friction": 0.0} | own
+    upright, velocity = np.array([0.0, 0.0, 0.0, 1.0]), np.array([speed, 0.0, 0.0])
+    return Start(np.array(position), upright, velocity, np.array(momentum), **body)
+
+
 def alone(sheet: SheetMesh, flow: Flow, *, free: bool, edge: bool = False) -> OneHit:
     """A mesh that a core passes aside, in double precision; its nodes have masses, or move as they are told; nothing is
     beyond its edge, or more of the same."""
-    start = Start(
-        np.array([0.0, -1.0, 0.0]),
-        np.array([0.0, 0.0, 0.0, 1.0]),
-        np.array([1.0, 0.0, 0.0]),
-        np.zeros(3),
-        1.0,
-        1.0,
-        1.0,
-        0.0,
-    )
-    hit = OneHit(CORE, start, [sheet], [flow], double=True)
+    hit = OneHit(CORE, start_at((0.0, -1.0, 0.0), 1.0), [sheet], [flow], double=True)
     hit.inverse_mass = np.where(free, hit.inverse_mass, 0.0)
     hit.mesh.inverse_mass.assign(hit.inverse_mass)
     if not edge:
@@ -67,6 +66,13 @@ def masses_of(hit: OneHit) -> Array:
 
 def step_of(hit: OneHit) -> float:
     return float(hit.flight["step"])
+
+
+def stretch(hit: OneHit, gradient: Array) -> None:
+    """A step with a gradient of the velocity [1/s] about its middle."""
+    about = np.eye(3) - 0.5 * step_of(hit) * gradient
+    nodal(hit, "velocity")[:] = gradient @ np.linalg.solve(about, nodal(hit, "position"))
+    hit.advance(1)
 
 
 def test_a_rigid_rotation_strains_nothing() -> None:
@@ -109,11 +115,9 @@ def test_a_patch_of_distorted_elements_strains_evenly() -> None:
     columns += 2.0e-4 * rng.uniform(-1.0, 1.0, (2, 1, 2, 2))
     gradient = rng.normal(size=(3, 3)) * 10.0 + np.diag([20.0, 20.0, 20.0])
     for _ in range(2):
-        middle = np.linalg.solve(np.eye(3) - 0.5 * step_of(hit) * gradient, position)
-        nodal(hit, "velocity")[:] = gradient @ middle
         strain = 0.5 * step_of(hit) * (gradient + gradient.T)
         before = nodal(hit, "stress").copy()
-        hit.advance(1)
+        stretch(hit, gradient)
     stress = nodal(hit, "stress")[:, sheet.alive] - before[:, sheet.alive]
     lame = ELASTIC.bulk_modulus - 2.0 / 3.0 * ELASTIC.shear_modulus
     expected = 2.0 * ELASTIC.shear_modulus * strain + lame * np.trace(strain) * np.eye(3)
@@ -166,10 +170,7 @@ def test_an_element_takes_the_work_of_its_flow() -> None:
     gradient, time = np.diag([rate, -rate, 0.0]), 0.0
     while time < 2.0e-5:
         time += step_of(hit)
-        nodal(hit, "velocity")[:] = np.linalg.solve(
-            np.eye(3) - 0.5 * step_of(hit) * gradient, gradient @ nodal(hit, "position")
-        )
-        hit.advance(1)
+        stretch(hit, gradient)
     strain = 2.0 / math.sqrt(3.0) * rate * time
     three = 3.0 * flow.shear_modulus
     plastic = float(nodal(hit, "strain")[0, 0])
@@ -203,10 +204,7 @@ def test_the_flow_stress_is_that_of_its_law(constants: dict[str, Any], stress: C
     hit, rate = alone(box((1, 1, 1)), Flow(**COLD | constants), free=False), 1.0e4
     gradient = np.diag([rate, -rate, 0.0])
     while nodal(hit, "strain")[0, 0] < 0.3:
-        nodal(hit, "velocity")[:] = np.linalg.solve(
-            np.eye(3) - 0.5 * step_of(hit) * gradient, gradient @ nodal(hit, "position")
-        )
-        hit.advance(1)
+        stretch(hit, gradient)
     flowing, of_rate = nodal(hit, "stress")[:, 0], 2.0 / math.sqrt(3.0) * rate
     equivalent = math.sqrt(1.5 * float((flowing[:3] ** 2).sum()) - 0.5 * float(flowing[:3].sum()) ** 2)
     assert equivalent == pytest.approx(stress(float(nodal(hit, "strain")[0, 0]), of_rate), rel=3e-3)
@@ -218,10 +216,7 @@ def test_fracture_takes_the_work_of_the_largest_principal_stress() -> None:
     hit, rate = alone(box((1, 1, 1)), flow, free=False), 1.0e4
     gradient = np.diag([rate, -rate, 0.0])
     while nodal(hit, "alive")[0, 0] > 0.0:
-        nodal(hit, "velocity")[:] = np.linalg.solve(
-            np.eye(3) - 0.5 * step_of(hit) * gradient, gradient @ nodal(hit, "position")
-        )
-        hit.advance(1)
+        stretch(hit, gradient)
     largest_step = 2.0 / math.sqrt(3.0) * rate * float(hit.flight["step"])
     assert float(nodal(hit, "strain")[0, 0]) == pytest.approx(math.sqrt(3.0) * 2.0e7 / 4.0e8, abs=largest_step)
 
@@ -310,16 +305,7 @@ def test_an_element_fails_where_it_is_too_thin_or_too_wide(rate: float, share: f
 def test_a_free_core_precesses_about_its_angular_momentum() -> None:
     """By the angle |L| t / I across the axis: Euler's equations of a symmetric top."""
     momentum, transverse = np.array([2.0e-4, 0.0, 3.0e-4]), 1.65e-7
-    start = Start(
-        np.array([-1.0, 0.0, 0.0]),
-        np.array([0.0, 0.0, 0.0, 1.0]),
-        np.array([1.0, 0.0, 0.0]),
-        momentum,
-        4e-3,
-        1.5e-8,
-        transverse,
-        0.0,
-    )
+    start = start_at((-1.0, 0.0, 0.0), 1.0, momentum, inertia_transverse=transverse)
     hit = OneHit(CORE, start, [box((1, 1, 1))], [ELASTIC], double=True)
     hit.advance(4000)
     turned = Rotation.from_quat(np.array(hit.flight["state"]["attitude"])).apply([1.0, 0.0, 0.0])
@@ -332,16 +318,7 @@ def test_momentum_of_a_free_plate_is_that_which_the_core_lost() -> None:
     """Nothing is held: the sum of m Δv of all nodes is that of the core, with its sign changed."""
     sheet = box((2, 12, 12))
     centred_sheet = SheetMesh(sheet.y - 6e-3, sheet.z - 6e-3, sheet.solid, sheet.x, sheet.spacing)
-    start = Start(
-        np.array([-18.1e-3, 1e-3, 0.0]),
-        np.array([0.0, 0.0, 0.0, 1.0]),
-        np.array([300.0, 0.0, 0.0]),
-        np.zeros(3),
-        4e-3,
-        1.5e-8,
-        1.65e-7,
-        0.1,
-    )
+    start = start_at((-18.1e-3, 1e-3, 0.0), 300.0, friction=0.1)
     hit = OneHit(CORE, start, [centred_sheet], [STEEL], double=True)
     hit.mesh.impedance.zero_()
     hit.advance(400)
@@ -366,16 +343,7 @@ def pressed(friction: float, *, eroded: bool = False, approach: float | None = N
     core = OgiveCore(diameter=6e-3, length=20e-3, crh=3.0, mass=4e-3)
     sheet = box((1, 1, 1), 1.0e-4)
     beside = SheetMesh(sheet.y + 2.99e-3, sheet.z - 5.0e-5, sheet.solid, sheet.x - 5.0e-3, sheet.spacing)
-    start = Start(
-        np.zeros(3),
-        np.array([0.0, 0.0, 0.0, 1.0]),
-        np.array([100.0, 0.0, 0.0]),
-        np.zeros(3),
-        4e-3,
-        1.5e-8,
-        1.65e-7,
-        friction,
-    )
+    start = start_at((0.0, 0.0, 0.0), 100.0, friction=friction)
     hit = OneHit(core, start, [beside], [ELASTIC], double=True)
     hit.mesh.impedance.zero_()
     if approach is None:
