@@ -9,7 +9,7 @@ import warp as wp
 
 from warpimpact.kernels import exposure, sliding, structs
 from warpimpact.kernels.variant import Variant
-from warpimpact.scene import Hits, Impact, Layer, Numerics, Plate, Scene, Target, make_shots
+from warpimpact.scene import Hits, Impact, Numerics, Plate, Scene, Target, make_shots
 from warpimpact.solver import windows
 from warpimpact.solver.device import find_device
 from warpimpact.solver.marching import Marching
@@ -18,19 +18,15 @@ from warpimpact.solver.prepare import prepare
 from warpimpact.solver.replay import traced
 from warpimpact.solver.windows import Cells
 
-from ..verification.scenes import PAPER_CORE, paper_plate
+from ..verification.scenes import PAPER_CORE, layer, paper_plate
 
 HITS = 16
 PLATE = paper_plate(degradation_interval=None, degradation_distance=0.8e-3)
 SOFT = Plate(thickness=25e-3, resistance=0.4e9, degradation=0.9, degradation_distance=0.8e-3, degradation_depth=4e-3)
 
 
-def behind(plate: Plate, gap: float) -> Layer:
-    return Layer(gap=gap, **{name: getattr(plate, name) for name in plate.model_fields_set})
-
-
 PART = SOFT.model_copy(update={"thickness": 8e-3})
-LAMINATE = behind(PART, 0.08), behind(PART, 0.0), behind(PART, 0.0), behind(PART, 0.0)
+LAMINATE = layer(PART, gap=0.08), layer(PART, gap=0.0), layer(PART, gap=0.0), layer(PART, gap=0.0)
 
 
 class Marched(NamedTuple):
@@ -52,8 +48,8 @@ def marched(target: tuple[Plate, ...], impact: dict[str, float], device: str, *,
 @pytest.mark.parametrize(
     ("target", "impact"),
     [
-        ((PLATE, behind(SOFT, 0.05)), {"obliquity": 45.0, "azimuth": 250.0}),  # cores turn in the layer behind
-        ((PLATE, behind(SOFT, 0.02)), {"obliquity": 60.0, "azimuth": 250.0}),  # and go far aside
+        ((PLATE, layer(SOFT, gap=0.05)), {"obliquity": 45.0, "azimuth": 250.0}),  # cores turn in the layer behind
+        ((PLATE, layer(SOFT, gap=0.02)), {"obliquity": 60.0, "azimuth": 250.0}),  # and go far aside
         ((PLATE, *LAMINATE), {"obliquity": 10.0}),
     ],
 )
@@ -72,7 +68,7 @@ def test_a_window_that_follows_the_core_has_the_bits_of_a_wide_one(
 def test_a_replay_keeps_all_that_the_core_has_passed(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(windows, "SLACK", 0.2)
     monkeypatch.setattr(windows, "WIDER_BEHIND", 0.1)
-    target, impact = (PLATE, behind(SOFT, 0.05)), {"obliquity": 45.0, "azimuth": 250.0}
+    target, impact = (PLATE, layer(SOFT, gap=0.05)), {"obliquity": 45.0, "azimuth": 250.0}
     wide = marched(target, impact, "cpu", slide=False)
     scene = Scene(core=PAPER_CORE, target=Target(layers=target))
     shots = make_shots(Impact(velocity=825.0, **impact), Hits(count=HITS, seed=2), PLATE)

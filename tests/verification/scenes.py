@@ -10,6 +10,7 @@ from scipy.spatial.transform import Rotation
 from warpimpact.scene import (
     Core,
     Interaction,
+    Layer,
     NoPattern,
     Numerics,
     Plate,
@@ -51,6 +52,14 @@ def paper_plate(**changes: Any) -> Plate:
 def solid_plate(**changes: Any) -> Plate:
     """The paper's plate without holes."""
     return paper_plate(pattern=NoPattern(), **changes)
+
+
+def layer(plate: Plate, **changes: Any) -> Layer:
+    """A plate as a layer behind another one."""
+    return Layer(**{name: getattr(plate, name) for name in plate.model_fields_set} | changes)
+
+
+BASE = layer(paper_plate(thickness=3e-3, resistance=1.5e9), gap=20e-3)
 
 
 def shots_at(

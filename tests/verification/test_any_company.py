@@ -12,10 +12,9 @@ from warpimpact.solver import marching, windows
 from warpimpact.solver.simulate import simulate
 
 from .extremes import drawn
-from .scenes import PAPER_CORE, STANDOFFS, paper_plate, scattered_hits, shots_at
+from .scenes import BASE, PAPER_CORE, STANDOFFS, paper_plate, scattered_hits, shots_at
 
 SAMPLES, AT_A_PLATE = 24, 3
-BASE = Layer(**paper_plate(thickness=3e-3, resistance=1.5e9).model_dump(), gap=20e-3)
 
 
 class Case(NamedTuple):

@@ -7,12 +7,12 @@ import numpy as np
 import pytest
 
 from warpimpact.records.outcomes import Outcomes
-from warpimpact.scene import CirclePattern, Core, Layer, Numerics, Plate, Record, Scene, Shots, Target
+from warpimpact.scene import CirclePattern, Core, Numerics, Plate, Record, Scene, Shots, Target
 from warpimpact.solver import prepare
 from warpimpact.solver import simulate as simulation
 from warpimpact.solver.rings import Rings, Sections, sections_of
 
-from .scenes import PAPER_CORE, REFERENCE, paper_plate, scattered_hits, shots_at, solid_plate
+from .scenes import PAPER_CORE, REFERENCE, layer, paper_plate, scattered_hits, shots_at, solid_plate
 
 COUNT = 32
 
@@ -94,7 +94,7 @@ def test_parts_without_a_gap_bend_a_core_as_the_whole_does(shares: tuple[float, 
     # The moment at a section comes from the loads of all layers together.
     whole = solid_plate(thickness=6e-3, degradation=1.0)
     parts = [whole.model_copy(update={"thickness": share * whole.thickness}) for share in shares]
-    layers = tuple(Layer(**{name: getattr(part, name) for name in part.model_fields_set}) for part in parts[1:])
+    layers = tuple(layer(part) for part in parts[1:])
     shots = slanted_shots()
     expected = bent(whole, shots, device, time_step=1e-6)
     got = bent(Target(layers=(parts[0], *layers)), shots, device, time_step=1e-6)

@@ -18,10 +18,9 @@ from warpimpact.solver.memory import Memory
 from warpimpact.solver.prepare import prepare
 
 from . import references
-from .scenes import PAPER_CORE, STANDOFFS, paper_plate, scattered_hits, shots_at, solid_plate
+from .scenes import BASE, PAPER_CORE, STANDOFFS, paper_plate, scattered_hits, shots_at, solid_plate
 
 SAMPLES, COUNT = 12, 4
-BASE = Layer(**paper_plate(thickness=3e-3, resistance=1.5e9).model_dump(), gap=20e-3)
 TARGETS = pytest.mark.parametrize("behind", [(), (BASE,)], ids=["plate", "two layers"])
 
 

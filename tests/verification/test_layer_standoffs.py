@@ -8,8 +8,8 @@ import pytest
 from warpimpact.scene import Numerics, Record, Scene, Shots, Target
 from warpimpact.solver import simulate as simulation
 
-from .scenes import PAPER_CORE, paper_plate, scattered_hits, shots_at, simulate, solid_plate
-from .test_layers import TURNED, layer
+from .scenes import PAPER_CORE, layer, paper_plate, scattered_hits, shots_at, simulate, solid_plate
+from .test_layers import TURNED
 
 NEAR, FAR = 0.04, 0.07  # [m]
 GAP = 0.1  # [m]

@@ -14,7 +14,7 @@ from warpimpact.scene import CirclePattern, Layer, NoPattern, Plate, Target
 from warpimpact.solver import resolution
 
 from . import references
-from .scenes import PAPER_CORE, SLOTS, histories, paper_plate, scattered_hits, shots_at, simulate, solid_plate
+from .scenes import PAPER_CORE, SLOTS, histories, layer, paper_plate, scattered_hits, shots_at, simulate, solid_plate
 
 CORE = PAPER_CORE.mass_properties
 RADIUS = references.PAPER_LARGEST_RADIUS
@@ -24,11 +24,6 @@ SMOOTH = 1e-9
 """No friction to speak of, in the build of the kernels that has it."""
 MISSES = {"pattern": NoPattern(), "size": (1e-3, 1e-3), "offset": (0.5, 0.0)}
 """A layer that no core of these tests comes near."""
-
-
-def layer(plate: Plate, **changes: Any) -> Layer:
-    """A plate as a layer behind another one."""
-    return Layer(**{name: getattr(plate, name) for name in plate.model_fields_set} | changes)
 
 
 def layered(plate: Plate, *layers: Layer, **shots: Any) -> Outcomes:
