@@ -1,5 +1,4 @@
-"""A target of one plate: its footprint in a step, and its load. It has the functions of a target of several layers
-(layers.py)."""
+"""A target of one plate: its footprint in a step, and its load (kernels/contracts.py, TargetKind)."""
 
 from functools import cache
 from types import SimpleNamespace
