@@ -4,12 +4,13 @@
 
 Every shot is a row, appended when it has ended, so that a search may be ended at any time and continued. All shots hit
 at normal incidence without yaw. The first one has the published velocity; while every shot has passed, the next one has
-99 % of the velocity that the energy of the slowest one asks for; then it is halfway to the next lower one.
+99 % of the velocity that the energy of the slowest one asks for. Where a shot failed, the next one is faster.
 """
 
 from __future__ import annotations
 
 import argparse
+import math
 import time
 from pathlib import Path
 from typing import NamedTuple
@@ -21,7 +22,7 @@ from warpimpact import Continuum, Impact, Shots, simulate
 from warpimpact.catalogue.flow_entries import flow_entry
 from warpimpact.kernels.status import Status
 
-WIDTH, SHOTS, STEP = 0.025, 6, 1.04
+WIDTH, SHOTS, STEP = 0.025, 8, 1.04
 """A search ends at a bracket of this share of the velocity, or after so many shots; and the step from one that is held
 or has failed to the next, while none has passed."""
 
@@ -47,9 +48,11 @@ def next_velocity(shots: list[Shot], published: float) -> float | None:
     slowest = min(passed)
     if slowest.velocity - held <= WIDTH * slowest.velocity:
         return None
-    below = max((shot.velocity for shot in shots if shot.velocity < slowest.velocity), default=0.0)
     by_energy = 0.99 * float(np.sqrt(slowest.velocity**2 - slowest.residual**2))
-    return 0.5 * (below + slowest.velocity) if below else by_energy
+    velocity = 0.5 * (held + slowest.velocity) if held else by_energy
+    while any(math.isclose(shot.velocity, velocity, rel_tol=1e-3) for shot in shots):
+        velocity = 0.5 * (velocity + slowest.velocity)
+    return velocity
 
 
 def shot_at(plate: str, friction: float, spacing: float | None, velocity: float) -> Shot:
