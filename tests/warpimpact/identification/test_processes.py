@@ -73,6 +73,8 @@ def begun(text: str, small: tuple[str, str], folder: Path) -> tuple[subprocess.P
     """A fit in a process of its own, and the processes that it has begun."""
     (folder / "fit.toml").write_text(text.replace(small[0], "[sampling]\nsets = 1048576\neffective = 65536\nhits = 32"))
     code = (
+        "import signal\n"
+        "signal.signal(signal.SIGINT, signal.default_int_handler)\n"  # the tests may run in the background of a shell
         "from warpimpact.cli import main\n"
         "raise SystemExit(main(['identify', 'fit.toml', '--device', 'cpu', '--workers', '2']))\n"
     )
