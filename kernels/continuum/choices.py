@@ -27,7 +27,7 @@ FIRM = Constant(
     "m/s",
     "Speed at which a material yields, its yield stress over density and speed of sound. That of armour steel is as "
     "high; in a softer material the resistance is less by the root of the share: more takes too much of the energy, "
-    "and with less the hourglasses grow and do.",
+    "and less lets hourglasses grow until they take it.",
     test="verification/test_continuum.py::test_an_hourglass_is_braked_at_the_rate_of_its_resistance",
 )
 THINNEST = Constant(

@@ -130,8 +130,8 @@ def build(variant: Variant) -> SimpleNamespace:
 
     @wp.struct
     class Limits:
-        """When a hit ends: rear face of the target [m], the impact energy [J], and the longest time [s]; and front face
-        of the next layer, which has no mesh yet [m], beyond the target if all have one."""
+        """When a hit ends: rear face of the target [m], the impact energy [J], and the longest time [s]. `unmeshed` is
+        the front face of the next layer that has no mesh yet [m]; infinite if all have one."""
 
         rear: wp.float64
         unmeshed: wp.float64

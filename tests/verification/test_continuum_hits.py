@@ -164,7 +164,7 @@ def test_a_layer_has_its_mesh_where_the_core_crosses_it(coarse: float) -> None:
     march = meeting.march_of(scene, shots, 0, Continuum(flows=(STEEL,), spacing=coarse), conditions)
     list(march.hit.steps())
     assert march.hit.waits
-    state, first = march.hit.flight["state"], march.hit.mesh.position.numpy().reshape(3, -1)
+    state, before = march.hit.flight["state"], march.hit.mesh
     position, velocity = np.array(state["position"]), np.array(state["velocity"])
     crossing = position[1] + velocity[1] / velocity[0] * (104e-3 - position[0])
     assert abs(crossing) > CORE.max_radius
@@ -172,7 +172,11 @@ def test_a_layer_has_its_mesh_where_the_core_crosses_it(coarse: float) -> None:
     along = hit.sheets[1].edges[0]
     fine = np.diff(along) < 1.01 * coarse
     assert 0.5 * (along[:-1][fine].min() + along[1:][fine].max()) == pytest.approx(crossing, abs=0.5 * coarse)
-    assert np.array_equal(hit.mesh.position.numpy().reshape(3, -1)[:, : first.shape[1]], first)
+    for name in ("position", "velocity", "stress", "alive", "work"):
+        kept, first = (getattr(mesh, name).numpy().reshape(-1, mesh.size) for mesh in (hit.mesh, before))
+        assert np.array_equal(kept[:, : before.size], first), name
+    assert hit.mesh.touched.numpy().tolist() == [before.touched.numpy()[0], -1.0]
+    assert before.touched.numpy()[0] > 0.0
     struck = march.ended()
     assert struck.status == Status.PERFORATED
     assert struck.touched.tolist() == [True, True]

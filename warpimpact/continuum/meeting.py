@@ -20,8 +20,8 @@ from warpimpact.solver.worker import NEVER, Cancel
 Array = NDArray[np.float64]
 
 FINE, PATCH, SWEPT = 2.5, 5.0, 1.0
-"""Half of the fine part of a mesh and half of it all, in radii of the core; and as much of both as the ends of a turned
-core may sweep before the mesh grows."""
+"""Half of the fine part of a mesh, half of it all, and how far the ends of a turned core may sweep before both grow; in
+radii of the core."""
 WIDER = 1.0, 1.6, 2.5
 """By how much its meshes are wider, each time that a hit is computed again because its core came near their edge."""
 SLOWEST = 0.1

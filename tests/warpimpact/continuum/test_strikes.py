@@ -11,6 +11,7 @@ import pytest
 from warpimpact import CirclePattern, Continuum, Layer, Plate, PolynomialCore, Record, Scene, Shots, simulate
 from warpimpact.catalogue.flow_entries import flow_entry, flow_names
 from warpimpact.continuum import many_hits, meeting, strikes
+from warpimpact.continuum.meshing import nodes_of
 from warpimpact.continuum.one_hit import Energies
 from warpimpact.kernels.status import Status
 from warpimpact.scene.flow import FINENESS
@@ -151,6 +152,19 @@ def test_a_core_that_reaches_the_edge_of_the_mesh_has_left_it(monkeypatch: pytes
     conditions = strikes.memory_of(scene, SHOT, Worker("cpu", 1)).prepared.conditions
     ((number, together),) = strikes.together([meeting.march_of(scene, SHOT, 0, narrow, conditions, device)])
     assert (number, together.status) == (0, Status.LEFT_WINDOW)
+
+
+def test_a_mesh_covers_what_a_turned_core_sweeps_and_its_way_through_the_layer() -> None:
+    """A core that flies along (1, 0.5, 0) and lies across, with an arm of a, sweeps a − r beyond a radius along z; the
+    layer is h thick, so it goes on by 0.5 h along y. Memory is set aside for as many nodes as the mesh has."""
+    layer = meeting.Meeting(CORE, PLATE, (0.0, 0.0), 0.1, 1e-3, 1.6)
+    state = np.array([0.02, 0.01, 0.0]), np.array([600.0, 300.0, 0.0]), np.array([0.0, 0.0, 1.0])
+    along_y, along_z = layer.extents(*state)
+    nose, radius, way = CORE.mass_properties.centre_of_mass, CORE.max_radius, 0.25 * PLATE.thickness
+    swept = max(nose, CORE.length - nose) - radius
+    assert along_y == pytest.approx((0.05 + way, 1.6 * (2.5 * radius + way), 1.6 * (5.0 * radius + way)))
+    assert along_z == pytest.approx((0.0, 1.6 * (2.5 * radius + swept), 1.6 * (5.0 * radius + swept)))
+    assert nodes_of(PLATE.thickness, 1e-3, (along_y, along_z)) == layer.mesh(*state).nodes
 
 
 def test_elements_follow_core_thickness_and_ligament() -> None:
