@@ -9,6 +9,7 @@ from ..results import kinds
 from ..results.files import kind_of
 from ..results.kind import Kind
 from ..scene import toml_text
+from .removed_keys import check_removed
 
 
 class CampaignError(ValueError):
@@ -31,6 +32,7 @@ def parsed(text: str, name: str, kind: Kind | None = None) -> dict[str, Any]:
     """
     with _as_campaign():
         tables = toml_text.parsed(text, name)
+        check_removed(tables, name)
     other = kinds.kind_of_tables(tables)
     if kind is not None and other not in (None, kind) and not {*kind.marks} & {*tables}:
         raise CampaignError(other.told(name, kind.name))

@@ -1,0 +1,31 @@
+"""Keys that files of earlier versions have, and what to use instead."""
+
+from collections.abc import Iterator
+from typing import Any
+
+REMOVED_KEYS: dict[str, str] = {}
+"""The sentence for each key, by its dotted path without numbers of list items; or for a value, as "key = value"."""
+
+
+def check_removed(tables: dict[str, Any], name: str) -> None:
+    """Refuse tables with a key that was removed.
+
+    Raises:
+        ValueError: names the file, the key and what to use instead.
+    """
+    for path, value in _entries(tables, ""):
+        for key in (path, f"{path} = {value}"):
+            if key in REMOVED_KEYS:
+                raise ValueError(f"{name}: {key} was removed: {REMOVED_KEYS[key]}")
+
+
+def _entries(value: Any, path: str) -> Iterator[tuple[str, Any]]:
+    """Dotted paths and values of all keys; items of a list have the path of the list."""
+    if isinstance(value, dict):
+        for key, inner in value.items():
+            place = f"{path}.{key}" if path else str(key)
+            yield place, inner
+            yield from _entries(inner, place)
+    elif isinstance(value, list):
+        for inner in value:
+            yield from _entries(inner, path)
