@@ -3,11 +3,9 @@
 import json
 import math
 import operator
-import re
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from difflib import get_close_matches
-from functools import cache
 from itertools import islice
 from numbers import Real
 from typing import TYPE_CHECKING, Annotated, Any, TypeAlias, get_args, get_origin
@@ -17,18 +15,16 @@ from pydantic.fields import FieldInfo
 from pydantic_core import PydanticCustomError
 
 from .display import UNITS, Unit
+from .unit_text import UnitError, factor, number_and_unit
 
 MOST_QUOTED = 80
 """Largest number of characters of input in a message, and of a number with its unit."""
 LARGEST = 1e30
 """Largest quantity in SI; results such as a volume then stay finite."""
 RIGHT_ANGLE = math.pi / 2
-_TOWER = re.compile(r"(?:\*\*|\^)\s*(?:[-+]?\d{3}|\(|[-+]?\d+\s*(?:\*\*|\^))|[)⁰¹²³⁴-⁹]\s*(?:\*\*|\^)|[⁰¹²³⁴-⁹]{3}")
-"""Powers of powers, and exponents of three digits: no unit has them, and they can take for ever."""
-_STRING = r"^\s*[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?\s*$"
-_STRING_WITH_UNIT = r"^\s*[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?\s*\S.*$"
+_STRING = r"^\s*[-+−]?[\d.,]+([eE][-+]?\d+)?\s*%?\s*$"
+_STRING_WITH_UNIT = r"^\s*[-+−]?[\d.,]+([eE/][-+]?\d+)?\s*\S.*$"
 """Strings that editors accept, in the dialect of JSON schemas; only the reader knows the units."""
-_NUMBER_AND_UNIT = re.compile(r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*(\S.*)?", re.DOTALL)
 
 
 if TYPE_CHECKING:
@@ -121,20 +117,13 @@ class _Quantity:
     def _from_text(self, text: str) -> float:
         if len(text) > MOST_QUOTED:
             raise self._error(text, f"which has more than {MOST_QUOTED} characters")
-        match = _NUMBER_AND_UNIT.fullmatch(text)
-        if match is None:
-            raise self._error(text, f"which is not {self.name}")
-        number, unit = float(match[1]), (match[2] or "").strip()
-        if not unit and self.unit:
-            raise self._error(text, "which has no unit")
-        if not unit:
-            return number
         try:
-            return number * (COMMON.get((unit, self.unit)) or _by_pint(unit, self.unit))
-        except LookupError:
-            raise self._error(text, f'whose unit "{brief(unit)}" is unknown') from None
-        except ValueError:
-            raise self._error(text, f"which is not {self.name}") from None
+            number, unit = number_and_unit(text)
+            if self.unit and not unit:
+                raise UnitError("which has no unit")
+            return number * factor(unit, self.unit)
+        except UnitError as error:
+            raise self._error(text, str(error) or f"which is not {self.name}") from None
 
     def _error(self, value: object, complaint: str) -> ValueError:
         unit = "deg" if self.unit == "rad" else self.unit
@@ -150,60 +139,6 @@ def float_of(value: Real | float | str) -> float:
         return float(value)
     except OverflowError:  # of an integer with more than 308 digits
         return math.inf
-
-
-@cache
-def _registry() -> Any:
-    import pint  # a third of a second
-
-    return pint.UnitRegistry()
-
-
-COMMON = {
-    ("m", "m"): 1.0,
-    ("mm", "m"): 1e-3,
-    ("cm", "m"): 1e-2,
-    ("um", "m"): 1e-6,
-    ("kg", "kg"): 1.0,
-    ("g", "kg"): 1e-3,
-    ("s", "s"): 1.0,
-    ("us", "s"): 1e-6,
-    ("Pa", "Pa"): 1.0,
-    ("MPa", "Pa"): 1e6,
-    ("GPa", "Pa"): 1e9,
-    ("kg/m^3", "kg/m^3"): 1.0,
-    ("kg/m^2", "kg/m^2"): 1.0,
-    ("m/s", "m/s"): 1.0,
-    ("rad", "rad"): 1.0,
-    ("deg", "rad"): math.pi / 180.0,
-    ("rad/s", "rad/s"): 1.0,
-}
-"""Factors of the common units, so that most campaigns do not import pint, which takes as long as a thousand hits. A
-test compares each factor with pint."""
-
-
-@cache
-def _by_pint(unit: str, si_unit: str) -> float:
-    """Factor from `unit` to `si_unit`.
-
-    Raises:
-        LookupError: the unit is unknown.
-        ValueError: it is the unit of another quantity.
-    """
-    import pint
-
-    if _TOWER.search(unit):
-        raise LookupError(unit)
-    try:
-        parsed = _registry().parse_units(unit)
-    except Exception as error:  # pint's parser lets tokenizer, syntax, type and value errors through
-        raise LookupError(unit) from error
-    try:
-        factor = float(_registry().Quantity(1.0, parsed).to(si_unit).magnitude)
-    except pint.DimensionalityError:
-        raise ValueError(unit) from None
-    turns = si_unit == "rad/s" and "radian" not in _registry().get_root_units(parsed)[1]._units
-    return 2.0 * math.pi * factor if turns else factor  # a frequency counts turns
 
 
 def meant(name: str, allowed: Iterable[str]) -> str:

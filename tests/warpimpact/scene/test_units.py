@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 from pydantic import TypeAdapter, ValidationError
 
-from warpimpact.scene import units
+from warpimpact.scene import display, units
+from warpimpact.scene.unit_text import factor
 
 
 @pytest.mark.parametrize(
@@ -27,11 +28,30 @@ from warpimpact.scene import units
         (units.Angle, 180, math.pi),
         (units.Angle, "0.1 rad", 0.1),
         (units.AngularVelocity, "60 rpm", 2 * math.pi),
-        (units.AngularVelocity, "2.7 kHz", 5400 * math.pi),  # a frequency counts turns
+        (units.AngularVelocity, "2.7e3 turn/s", 5400 * math.pi),
         (units.AngularVelocity, "1 deg/s", math.pi / 180),
         (units.Inertia, "1.5 g cm^2", 1.5e-7),
         (units.Number, "5 %", 0.05),
         (units.Number, "0.05", 0.05),
+        (units.Length, "4,0 mm", 4e-3),
+        (units.Length, "0,125 in", 3.175e-3),
+        (units.Length, "3/16 in", 4.7625e-3),
+        (units.Length, "−5 mm", -5e-3),
+        (units.Angle, "20 º", math.pi / 9),
+        (units.Angle, "20°", math.pi / 9),
+        (units.Angle, "20 gon", math.pi / 10),
+        (units.Angle, "20 mrad", 0.02),
+        (units.Angle, "20 nato_mil", math.pi / 160),
+        (units.Mass, "81 grain", 5.24871171e-3),
+        (units.Stress, "2600 N/mm2", 2.6e9),
+        (units.Stress, "1 ksi", 6894757.293168361),
+        (units.Density, "7850 kg/m3", 7850.0),
+        (units.Density, "7850 kg·m⁻³", 7850.0),
+        (units.Density, "7.85 g/(cm * cm ^ 2)", 7850.0),
+        (units.Density, "7.85 t/m**3", 7850.0),
+        (units.Speed, "0.825 mm/μs", 825.0),
+        (units.Speed, "2700 ft/s", 822.96),
+        (units.Moment, "50 N·m", 50.0),
     ],
 )
 def test_a_quantity_becomes_si(kind: object, given: object, si: float) -> None:
@@ -43,10 +63,12 @@ def test_a_quantity_becomes_si(kind: object, given: object, si: float) -> None:
     [
         ("4 kg", 'got "4 kg", which is not a length'),
         ("4", 'got "4", which has no unit'),
-        ("mm", 'got "mm", which is not a length'),
-        ("4 mm 5", 'got "4 mm 5", whose unit "mm 5" is unknown'),
+        ("mm", 'got "mm", which does not begin with a number'),
+        ("4 mm 5", 'got "4 mm 5", whose unit "mm 5" is not one of names, powers, * and /'),
         ("4 foos", 'got "4 foos", whose unit "foos" is unknown'),
-        ("nan mm", 'got "nan mm", which is not a length'),
+        ("4 MM", 'got "4 MM", whose unit "MM" is unknown; did you mean "mm"?'),
+        ("4 mm2", 'got "4 mm2", which is not a length'),
+        ("nan mm", 'got "nan mm", which does not begin with a number'),
         ("1e999 mm", 'got "1e999 mm", which is not finite'),
         (math.nan, "got NaN, which is not finite"),
         (math.inf, "got Infinity, which is not finite"),
@@ -97,6 +119,105 @@ def test_an_angle_that_was_read_stays_an_angle_in_arithmetic(changed: Callable[[
     assert isinstance(units.Radians(2.0) * np.ones(2), np.ndarray)
 
 
-@pytest.mark.parametrize(("unit", "si_unit"), units.COMMON)
-def test_common_units_are_those_of_pint(unit: str, si_unit: str) -> None:
-    assert units.COMMON[unit, si_unit] == units._by_pint(unit, si_unit)
+@pytest.mark.parametrize("unit", display.UNITS.items(), ids=lambda unit: unit[0])
+def test_units_of_a_result_can_be_typed(unit: tuple[str, display.Unit]) -> None:
+    si_unit, stored = unit[0], unit[1].stored if unit[0] else ""
+    assert factor(stored, si_unit) == (math.pi / 180 if si_unit == "rad" else 1.0)
+
+
+MORE_THAN_A_NUMBER_AND_A_UNIT = [
+    *("20 deg, 1 deg", "2600 MPa (1 %)", "4+1 mm", "4 mm # 3 mm", "0.05, 1", "4 mm?", "4 mm 3", "4 mm*2", "4 mm/2"),
+    *(
+        "1 000 mm",
+        "1_000 mm",
+        "1'000 mm",
+        "4 mm - 3 mm",
+        "4-5 mm",
+        "~4 mm",
+        "< 4 mm",
+        "4 mm x 3 mm",
+        "4 mm × 3",
+        "4x3 mm",
+    ),
+    *(
+        "(4 mm)",
+        "4 mm)",
+        "4 (mm",
+        "4 ()mm",
+        "4 mm;",
+        "4 mm; 5",
+        "1 3/16 in",
+        "1/2/3 in",
+        "5/0 in",
+        "0x10 mm",
+        "1e5e3 m",
+    ),
+    *(
+        "5 mm^",
+        "5 mm^22",
+        "5 mm**2**2",
+        "5 mm^1.5",
+        "4 mm /",
+        "4 / mm",
+        "4 mm·3",
+        "４ mm",
+        "4 mm\n3 mm",
+        "4 mm 1/1",
+        '5"',
+    ),
+]
+
+
+@pytest.mark.parametrize("text", MORE_THAN_A_NUMBER_AND_A_UNIT)
+@pytest.mark.parametrize("kind", [units.Length, units.Angle, units.Stress, units.Number, units.AngularVelocity])
+def test_a_text_is_one_number_and_one_unit(kind: object, text: str) -> None:
+    with pytest.raises(ValidationError):
+        TypeAdapter(kind).validate_python(text)
+
+
+@pytest.mark.parametrize(
+    "text", ["20 deg ± 1 deg", "20±1 deg", "2600 MPa ± 1 %", "20 +/- 1 deg", "20 +- 1 deg", "4..5 mm"]
+)
+def test_a_text_that_scatters_names_distributions(text: str) -> None:
+    with pytest.raises(ValidationError, match="write a distribution"):
+        TypeAdapter(units.Angle).validate_python(text)
+
+
+@pytest.mark.parametrize(
+    ("kind", "text"),
+    [
+        (units.Angle, "20 deg^2"),
+        (units.Angle, "5 %"),
+        (units.Angle, "1 sr"),
+        (units.Angle, "1 count"),
+        (units.Angle, "20 min"),
+        (units.Number, "3 dB"),
+        (units.Number, "3 deg"),
+        (units.Stress, "2600 mPa"),
+        (units.AngularVelocity, "15000"),
+    ],
+)
+def test_the_dimension_is_exact(kind: object, text: str) -> None:
+    with pytest.raises(ValidationError):
+        TypeAdapter(kind).validate_python(text)
+
+
+@pytest.mark.parametrize(
+    ("kind", "text", "spellings"),
+    [
+        (units.Angle, "20 mil", ["nato_mil", "mrad", "thou"]),
+        (units.Length, "20 mil", ["nato_mil", "mrad", "thou"]),
+        (units.Angle, "20 grad", ["gon", "deg"]),
+        (units.Angle, "30 Grad", ["gon", "deg"]),
+        (units.Mass, "5.3 gr", ["grain", "g"]),
+        (units.Density, "1 ton/m^3", ["t", "kg"]),
+        (units.AngularVelocity, "15000 1/s", ["turn/s", "rad/s"]),
+        (units.AngularVelocity, "15 kHz", ["turn/s", "rad/s"]),
+        (units.Length, "1,250 mm", ["thousands"]),
+    ],
+)
+def test_what_means_two_things_is_refused_with_both_spellings(kind: object, text: str, spellings: list[str]) -> None:
+    with pytest.raises(ValidationError) as caught:
+        TypeAdapter(kind).validate_python(text)
+    message = str(caught.value.errors()[0]["ctx"]["error"])
+    assert all(spelling in message for spelling in spellings)
