@@ -81,7 +81,7 @@ COMMANDS: dict[str, Sequence[Sequence[str]]] = {
     "limits": (*_MAP[:4], (*_TEST, "limits.toml")),
     "history": (("export", "altered.nc", "-o", "vtk"), ("inspect", "altered.nc")),
     "sweep": ((*_TEST, "sweep.toml"), ("inspect", "altered.nc")),
-    "posterior": (_REPORT, ("run", "drawn.toml", "--posterior", "altered.nc", "-o", "d.nc", "--overwrite")),
+    "posterior": (_REPORT,),
     "front": (_REPORT, ("design", "altered.nc", "--no-browser", "--port", "70000")),
     "firing": (("inspect", "altered.nc"), ("report", "altered.nc", "-o", "a.html", "--overwrite")),
 }
@@ -114,7 +114,6 @@ def write_files(folder: Path) -> None:
     design = design_from(FIXED + HEAD + ASKED + PLATE + FREE, "design", Path())
     files.write(optimise(design), folder / "front.nc")
     files.write(simulate_test(firing_test(FIRING, "test", Path()), None, {}, None), folder / "firing.nc")
-    (folder / "drawn.toml").write_text(FIXED + TARGET)
     for name in ("limits", "sweep"):
         (folder / f"{name}.toml").write_text('title = "a"\ntests = 20\n' + OF_A_FILE.format(name))
 

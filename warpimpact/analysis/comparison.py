@@ -29,11 +29,10 @@ from warpimpact.analysis.comparable import check_same_question, other_shots
 from warpimpact.analysis.comparison_short import short_view
 from warpimpact.analysis.comparison_text import ComparedPlates, comparison_view
 from warpimpact.analysis.contestants import Contestant, Difference, Pair, Verdict
-from warpimpact.analysis.effectiveness import Score, Scored, depth_note, measures_of, ratio_of_draws, scores
+from warpimpact.analysis.effectiveness import Score, Scored, depth_note, measures_of, scores
 from warpimpact.analysis.numbers import of_each
 from warpimpact.analysis.plate_text import common_name, plate_text, reference_name, solid_note, solid_plate, weights_of
 from warpimpact.analysis.summary import breaks_promise, hits_at_two_levels, sampling_note
-from warpimpact.analysis.survival import draws_note, survival_of
 from warpimpact.results import attributes as attr
 from warpimpact.results.measures import Measure
 from warpimpact.results.per_hit import base_thickness, has_base
@@ -113,12 +112,8 @@ def compare(
         for (i, j), pair in zip(pairs, used, strict=True):
             both, sides, is_ratio = (datasets[i], datasets[j]), (scored[i], scored[j]), measure.text in by_ratio
             paired = not pair.independent and measure.kind != "quantile"
-            drawn, interval = _apart(sides, both, of_each_pair, by_ratio=is_ratio, paired=paired)
-            why = pair.independent
-            if not why and is_ratio and len(drawn[0]) != len(drawn[1]):
-                why = "a ratio to the solid plate needs as many hits of both plates"
-            survival = survival_of(both, drawn, interval, reason=why, confidence=(confidence, of_each_pair))
-            differences.append(Difference(measure.text, names[i], names[j], *interval, survival))
+            interval = _apart(sides, both, of_each_pair, by_ratio=is_ratio, paired=paired)
+            differences.append(Difference(measure.text, names[i], names[j], *interval))
             verdicts += _verdicts(sides, both, (names[i], names[j]), of_each_pair, paired=paired)
     plates = tuple(
         Contestant(
@@ -156,7 +151,7 @@ def _verdicts(
     measure, moves = scored[0].score.measure, [side.of.moves for side in scored]
     if measure.higher_is_better is None or not all(moves):
         return
-    _, (value, low, high) = _apart(scored, datasets, confidence, by_ratio=False, paired=paired)
+    value, low, high = _apart(scored, datasets, confidence, by_ratio=False, paired=paired)
     if math.isnan(low + high):
         return
     half, sign = max(high - value, value - low), 1 if measure.higher_is_better else -1
@@ -176,16 +171,16 @@ def _apart(
     *,
     by_ratio: bool,
     paired: bool,
-) -> tuple[tuple[Array, Array], tuple[float, float, float]]:
-    """The numbers of two plates whose means over the shots of a draw are compared, and their difference with its
-    interval, widened by the shift of both plates by the numerics. Rounding counts as 0."""
+) -> tuple[float, float, float]:
+    """Difference of two plates with its interval, widened by the shift of both by the numerics. Rounding counts as
+    0."""
     dealt = [Estimating(**dealing(dataset), confidence=confidence) for dataset in datasets]
     side, other = (_side(*given, by_ratio=by_ratio) for given in zip(scored, datasets, dealt, strict=True))
     value, low, high = _difference(side, other, dealt[0], paired=paired)
     shift = (side.estimate.numerics or 0.0) + (other.estimate.numerics or 0.0)
     rounded = ROUNDED * max(abs(side.estimate.value), abs(other.estimate.value))
     value, low, high = (0.0 if abs(end) <= rounded else end for end in (value, low - shift, high + shift))
-    return (side.drawn, other.drawn), (value, low, high)
+    return value, low, high
 
 
 def _differ_in_weight(datasets: Sequence[xarray.Dataset]) -> bool:
@@ -228,13 +223,11 @@ def _used(result: xarray.Dataset, name: str, other: xarray.Dataset, other_name: 
 
 class _Side(NamedTuple):
     """What is compared of a plate: whether it is a share or follows from one; whether it is a ratio to the solid plate;
-    numbers whose mean it is; numbers whose mean over the shots of a draw is its value for the draw; and its estimate,
-    with the shift by the numerics."""
+    numbers whose mean it is; and its estimate, with the shift by the numerics."""
 
     is_share: bool
     by_ratio: bool
     numbers: Array
-    drawn: Array
     estimate: Estimate
 
 
@@ -256,14 +249,12 @@ def _side(scored: Scored, dataset: xarray.Dataset, dealt: Estimating, *, by_rati
     estimate = replace(estimate_from(measure, evidence.values, **dealt), numerics=shift)
     numbers = evidence.values if evidence.numbers is None else evidence.numbers
     if not by_ratio:
-        return _Side(measure.is_binary, False, numbers, evidence.drawn, estimate)
+        return _Side(measure.is_binary, False, numbers, estimate)
     assert scored.solid is not None
-    assert scored.solid_drawn is not None
     ratio = Ratio.of(estimate, numbers, scored.solid, dealt)
     numbers = ratio_numbers(numbers, scored.solid, ratio.value)
-    drawn = ratio_of_draws(evidence.drawn, scored.solid_drawn)
     estimate = replace(estimate, value=ratio.value, low=ratio.low, high=ratio.high, numerics=shift / ratio.reference)
-    return _Side(measure.is_binary, True, numbers, drawn, estimate)
+    return _Side(measure.is_binary, True, numbers, estimate)
 
 
 def _difference(side: _Side, other: _Side, dealt: Estimating, *, paired: bool) -> tuple[float, float, float]:
@@ -318,7 +309,7 @@ def _notes(datasets: Sequence[xarray.Dataset], names: Sequence[str]) -> Iterator
     solid = {name: solid_note(dataset) for name, dataset in zip(names, datasets, strict=True)}
     alike = len(set(solid.values())) == 1
     yield from dict.fromkeys(note if alike else f"{name}: {note}" for name, note in solid.items() if note)
-    yield from dict.fromkeys(note for d in datasets for note in (sampling_note(d), draws_note(d)) if note)
+    yield from dict.fromkeys(filter(None, map(sampling_note, datasets)))
 
 
 def _materials(datasets: Sequence[xarray.Dataset], names: Sequence[str]) -> Iterator[str]:

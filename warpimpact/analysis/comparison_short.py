@@ -5,7 +5,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
-from dataclasses import replace
 
 from warpimpact.analysis.comparison_text import (
     ComparedPlates,
@@ -52,9 +51,8 @@ def from_best(comparison: ComparedPlates, measure: str) -> list[Difference]:
 
 def _reversed(pair: Difference) -> Difference:
     """The difference with both plates exchanged."""
-    survival = pair.survival and replace(pair.survival, interval=negative(pair.survival.interval))
     low, high = negative((pair.low, pair.high))
-    return Difference(pair.measure, pair.other, pair.one, 0.0 - pair.value, low, high, survival)
+    return Difference(pair.measure, pair.other, pair.one, 0.0 - pair.value, low, high)
 
 
 def short_view(comparison: ComparedPlates, evidence: Sequence[str] = ()) -> Section:
@@ -99,7 +97,7 @@ def _ranks(comparison: ComparedPlates, score: Score) -> Table:
         value = (shown.value, intervals_text(Ends(shown.low, shown.high)))
         ratio = (shown.ratio,) if by_ratio else ()
         pair = differences.get(plate.name)
-        apart = (None, "") if pair is None else (pair.value, intervals_text(Ends(pair.low, pair.high, pair.parameters)))
+        apart = (None, "") if pair is None else (pair.value, intervals_text(Ends(pair.low, pair.high)))
         add_on = (plate.weights["add-on"],) if parted else ()
         rows.append((rank, plate.name, *add_on, plate.areal_density, *value, *ratio, *apart))
     best = comparison.ordered(score.name)[0]

@@ -12,7 +12,6 @@ from warpimpact.analysis.contestants import Contestant, Difference, Pair, Verdic
 from warpimpact.analysis.effectiveness import Score
 from warpimpact.analysis.numbers import Ends, intervals_text, number_text, of_each
 from warpimpact.analysis.plate_text import common_name
-from warpimpact.analysis.survival import survival_text
 from warpimpact.view.view import Column, Section, Table, number, text_of
 
 
@@ -92,18 +91,7 @@ def conditions(comparison: ComparedPlates) -> list[str]:
     """What was compared and how, a sentence each."""
     together = f"Differences of a measure hold together at {comparison.confidence:.0%} (Bonferroni over the pairs)."
     chance = "The intervals describe the hits that were drawn, not what the model leaves out."
-    return [*hits_used(comparison), together, chance, *_drawn(comparison), *comparison.notes]
-
-
-def _drawn(comparison: ComparedPlates) -> list[str]:
-    """How verdicts consider the uncertainty of the parameters, where it is known."""
-    if all(pair.survival is None for pair in comparison.differences):
-        return []
-    return [
-        "The parameters are drawn from a posterior. P is the share of its draws for which a verdict holds; the verdict "
-        f"survives the uncertainty of the parameters if P is at least {comparison.confidence:.0%} even at the lower "
-        "end of its interval, and does not if P itself is less."
-    ]
+    return [*hits_used(comparison), together, chance, *comparison.notes]
 
 
 def hits_used(comparison: ComparedPlates) -> list[str]:
@@ -141,8 +129,8 @@ def best_rows(comparison: ComparedPlates) -> list[tuple[str, str]]:
         first = [name for name, rank in comparison.ranks(measure.name).items() if rank == 1]
         told_apart = len(first) < len(comparison.plates)
         neither = "cannot be told apart" if is_ranked(comparison, measure.name) else "not ranked"
-        doubts = _doubt(comparison, measure.name) + _turned(comparison, measure.name, first)
-        sentence = listed(first) + _as_good(comparison, measure.name, first) + doubts
+        doubts = _as_good(comparison, measure.name, first) + _turned(comparison, measure.name, first)
+        sentence = listed(first) + doubts
         rows.append((measure.measure.label, sentence if told_apart else neither))
     return rows
 
@@ -153,13 +141,6 @@ def _as_good(comparison: ComparedPlates, measure: str, first: Sequence[str]) -> 
     others = [plate.name for plate in comparison.plates if plate.name not in first]
     open_ = [name for name in others if not all({name, leader} in apart for leader in first)]
     return f" (not told apart for certain from {listed(open_)})" if open_ else ""
-
-
-def _doubt(comparison: ComparedPlates, measure: str) -> str:
-    """Words about a verdict on the measure that does not survive the uncertainty of the parameters; mostly empty."""
-    survivals = [pair.survival for pair in comparison.differences if pair.measure == measure and pair.told_apart]
-    failing = any(survival is not None and not survival.survives for survival in survivals)
-    return " (not certain under the uncertainty of the parameters)" if failing else ""
 
 
 def _turned(comparison: ComparedPlates, measure: str, first: Sequence[str]) -> str:
@@ -225,18 +206,15 @@ def _in_words(pair: Difference, measure: Score, what: str) -> str:
         text = f"difference{what} {number_text(pair.value)}"
         return f"{pair.one} and {pair.other}: {text}, of which these hits give no interval"
     if not pair.told_apart:
-        interval = intervals_text(Ends(pair.low, pair.high, pair.parameters))
+        interval = intervals_text(Ends(pair.low, pair.high))
         difference = f"difference{what} {number_text(pair.value)} ({interval})"
         return f"{pair.one} and {pair.other} cannot be told apart: {difference}"
     better = measure.measure.higher_is_better
     names = [pair.one, pair.other] if (pair.value > 0.0) == (better is not False) else [pair.other, pair.one]
-    by_hits, by_parameters = (pair.low, pair.high), pair.parameters
-    if pair.value < 0.0:
-        by_hits, by_parameters = negative(by_hits), by_parameters and negative(by_parameters)
-    interval = intervals_text(Ends(*by_hits, by_parameters))
+    by_hits = (pair.low, pair.high)
+    interval = intervals_text(Ends(*(negative(by_hits) if pair.value < 0.0 else by_hits)))
     than = f"{'higher' if better is None else 'better'} than"
-    verdict = f"{names[0]} {than} {names[1]} by {number_text(abs(pair.value))}{what} ({interval})"
-    return verdict + survival_text(pair.survival)
+    return f"{names[0]} {than} {names[1]} by {number_text(abs(pair.value))}{what} ({interval})"
 
 
 def negative(interval: tuple[float, float]) -> tuple[float, float]:

@@ -6,7 +6,6 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 from warpimpact.analysis.effectiveness import Score
-from warpimpact.analysis.survival import Survival
 
 
 @dataclass(frozen=True)
@@ -30,10 +29,7 @@ class Contestant:
 
 @dataclass(frozen=True)
 class Difference:
-    """Difference of a measure between one plate and another, with its interval; NaN where there is none.
-
-    `survival` says whether its sign also holds for the true parameters; None without a posterior.
-    """
+    """Difference of a measure between one plate and another, with its interval; NaN where there is none."""
 
     measure: str
     one: str
@@ -41,12 +37,6 @@ class Difference:
     value: float
     low: float
     high: float
-    survival: Survival | None = None
-
-    @property
-    def parameters(self) -> tuple[float, float] | None:
-        """The interval by the parameters, as in `Estimate`."""
-        return None if self.survival is None else self.survival.interval
 
     @property
     def told_apart(self) -> bool:

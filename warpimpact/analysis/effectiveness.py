@@ -17,16 +17,14 @@ import xarray
 from warpimpact.analysis.estimates import Evidence, asked_measures, by_hit_of, evidence
 from warpimpact.analysis.numbers import Ends, ends_of, intervals_text
 from warpimpact.analysis.plate_text import plate_text, reference_name, solid_note
-from warpimpact.analysis.survival import by_draws, over_draws
 from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
 from warpimpact.results.measures import Measure
 from warpimpact.results.per_hit import Array
 from warpimpact.results.solid_reference import base_alone, base_alone_limits, solid_limits, solid_reference
 from warpimpact.results.tallies import dealing, estimate_from
-from warpimpact.statistics.comparisons import Ratio, ratio_numbers
+from warpimpact.statistics.comparisons import Ratio
 from warpimpact.statistics.intervals import Estimate
-from warpimpact.statistics.tails import worst_tenth_weights
 from warpimpact.view.view import Column, Section, Table, number, text_of
 
 
@@ -59,8 +57,6 @@ class Score:
         solid: value of the solid reference: a plate of equal areal density, or an add-on before the same base.
         ratio, ratio_low, ratio_high: ratio of the value to `solid`, with its interval.
         hit: number of the hit that is the worst point; None for other measures.
-        parameters: interval by the parameters, as in `Estimate`.
-        ratio_parameters: interval of the ratio by the parameters.
         numerics: largest shift of the value by the numerics; None or NaN where unknown.
         alone: value of the base alone.
         assumptions: value under each assumption, as in `Estimate`.
@@ -75,8 +71,6 @@ class Score:
     ratio_low: float
     ratio_high: float
     hit: int | None = None
-    parameters: tuple[float, float] | None = None
-    ratio_parameters: tuple[float, float] | None = None
     numerics: float | None = None
     alone: float = math.nan
     assumptions: Mapping[str, float] = field(default_factory=dict)
@@ -89,16 +83,16 @@ class Score:
     @property
     def ends(self) -> Ends:
         """Its intervals."""
-        beside = self.parameters, self.numerics, self.assumptions
+        beside = self.numerics, self.assumptions
         return ends_of(Estimate(self.value, self.low, self.high, 0, math.nan, *beside))
 
     @property
     def ratio_text(self) -> str:
-        """The interval of the ratio, or both intervals; empty where there is none."""
-        if math.isnan(self.ratio) or (self.ratio_parameters is None and math.isnan(self.ratio_low)):
+        """The interval of the ratio; empty where there is none."""
+        if math.isnan(self.ratio) or math.isnan(self.ratio_low):
             return ""
         numerics = None if self.numerics is None else self.numerics / self.solid
-        return intervals_text(Ends(self.ratio_low, self.ratio_high, self.ratio_parameters, numerics))
+        return intervals_text(Ends(self.ratio_low, self.ratio_high, numerics))
 
 
 @dataclass(frozen=True)
@@ -107,13 +101,11 @@ class Scored:
 
     Attributes:
         solid: numbers of the first shots at the solid plate whose mean is its measure; None where there are none.
-        solid_drawn: `Evidence.drawn` of the solid plate.
     """
 
     score: Score
     of: Evidence
     solid: Array | None = None
-    solid_drawn: Array | None = None
 
 
 def measures_of(dataset: xarray.Dataset, texts: Sequence[str] = ()) -> list[Measure]:
@@ -171,12 +163,10 @@ def _is_comparable(measure: Measure, dataset: xarray.Dataset, reference: xarray.
 
 def _scored(given: Evidence, dataset: xarray.Dataset, reference: xarray.Dataset | None) -> Scored:
     measure, estimate = given.measure, given.estimate
-    solid = solid_drawn = None
+    solid = None
     if reference is not None:
         of_solid = measure.display.factor * measure.counted(by_hit_of(reference, measure))
-        solid = solid_drawn = _averaged_of_solid(measure, of_solid)
-        if measure.kind == "worst_tenth" and len(of_solid) > 1:
-            solid_drawn = measure.worse * by_draws(dataset, measure.worse * of_solid, worst_tenth_weights)
+        solid = _averaged_of_solid(measure, of_solid)
     numbers = given.values if given.numbers is None else given.numbers
     against = Ratio.of(estimate, numbers, solid, {**dealing(dataset), "confidence": 0.95})
     score = Score(
@@ -189,17 +179,10 @@ def _scored(given: Evidence, dataset: xarray.Dataset, reference: xarray.Dataset 
         ratio_low=against.low,
         ratio_high=against.high,
         hit=None if given.worst_shot is None else int(dataset[v.HIT][given.worst_shot]),
-        parameters=estimate.parameters,
         numerics=estimate.numerics,
         assumptions=estimate.assumptions,
     )
-    if given.numbers is not None and score.parameters and solid_drawn is not None:
-        by_parameters = Estimate(against.value, math.nan, math.nan, 1, math.nan)
-        if np.isfinite(solid_drawn).any() and np.nanmean(solid_drawn) > 0.0:
-            ends = replace(by_parameters, low=against.low, high=against.high)
-            by_parameters = over_draws(dataset, ends, ratio_of_draws(given.drawn, solid_drawn)).within(0.0)
-        score = replace(score, ratio_parameters=by_parameters.parameters or (math.nan, math.nan))
-    return Scored(score, given, solid, solid_drawn)
+    return Scored(score, given, solid)
 
 
 def _averaged_of_solid(measure: Measure, values: Array) -> Array:
@@ -208,11 +191,6 @@ def _averaged_of_solid(measure: Measure, values: Array) -> Array:
     if measure.kind in ("quantile", "worst_point"):
         return np.array([estimate_from(measure, values).value])
     return measure.averaged(values)
-
-
-def ratio_of_draws(drawn: Array, solid: Array) -> Array:
-    """Numbers whose means over the shots of a draw are the ratios of two means, to first order."""
-    return ratio_numbers(drawn, solid, float(np.nanmean(drawn) / np.nanmean(solid)))
 
 
 def effectiveness_text(dataset: xarray.Dataset, texts: Sequence[str] = ()) -> str:

@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from warpimpact.analysis.assumptions import Assumed, Moves
-from warpimpact.analysis.survival import by_draws, over_draws
 from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
 from warpimpact.results.dataset import SLICE, finer_pair
@@ -19,7 +18,6 @@ from warpimpact.results.measures import STATUSES, Measure
 from warpimpact.results.per_hit import Array
 from warpimpact.results.tallies import dealing, estimate_from, shift_of
 from warpimpact.statistics.intervals import Estimate
-from warpimpact.statistics.tails import quantile_weights, worst_tenth_weights
 
 if TYPE_CHECKING:
     from warpimpact.results.table import Result
@@ -33,14 +31,12 @@ class Evidence:
 
     Attributes:
         values: values of the shots for the measure, NaN where a shot does not count, shape [hits].
-        drawn: numbers whose mean over the shots of a draw of a posterior is the measure for this draw, shape [hits].
         moves: changes by assumptions; None where unknown.
     """
 
     measure: Measure
     estimate: Estimate
     values: Array
-    drawn: Array
     moves: Moves | None = None
 
     @property
@@ -61,7 +57,7 @@ class Evidence:
         """The evidence in the display unit of the measure."""
         factor = self.measure.display.factor
         estimate, moves = self.estimate.times(factor), self.moves and self.moves.times(factor)
-        return Evidence(self.measure, estimate, factor * self.values, factor * self.drawn, moves)
+        return Evidence(self.measure, estimate, factor * self.values, moves)
 
 
 def evidence(dataset: Result, measures: Sequence[Measure]) -> Iterator[Evidence]:
@@ -76,15 +72,13 @@ def evidence(dataset: Result, measures: Sequence[Measure]) -> Iterator[Evidence]
         values = measure.counted(by_hit)
         estimate = estimate_from(measure, values, **dealt)
         estimate = replace(estimate, numerics=shift_of(measure, pair))
-        drawn, moves = _drawn(dataset, measure, values), assumed.moves(measure)
+        moves = assumed.moves(measure)
         if measure.has_interval:
-            units = "" if measure.name.startswith("limit_") else measure.units
             under = {} if moves is None else {name: estimate.value + by for name, by in moves.by.items()}
-            estimate = replace(over_draws(dataset, estimate, drawn, units=units), assumptions=under)
-            estimate = estimate.within(measure.least, measure.most)
+            estimate = replace(estimate, assumptions=under).within(measure.least, measure.most)
         if measure.kind == "quantile" and measure.name in _LIMITS:
             estimate = _beyond(estimate, dataset.attrs.get(attr.LIMIT_HIGHEST, math.inf))
-        yield Evidence(measure, estimate, values, drawn, moves)
+        yield Evidence(measure, estimate, values, moves)
 
 
 def _beyond(estimate: Estimate, highest: float) -> Estimate:
@@ -97,15 +91,6 @@ def by_hit_of(dataset: Result, measure: Measure) -> Array:
     """The quantity of every hit, shape [hits]. Of an open file, one slice at a time is in memory."""
     names: list[str] = [name for name in (v.STATUS, *measure.quantity.of) if name in dataset]
     return np.concatenate([measure.by_hit(part) for part in slices(dataset[names])])
-
-
-def _drawn(dataset: Result, measure: Measure, values: Array) -> Array:
-    """Numbers whose mean over the shots of a draw is the measure for this draw."""
-    if measure.kind == "quantile":
-        return by_draws(dataset, values, quantile_weights(measure.share))
-    if measure.kind == "worst_tenth":
-        return measure.worse * by_draws(dataset, measure.worse * values, worst_tenth_weights)
-    return values
 
 
 def asked_measures(dataset: Result, texts: Sequence[str], shown: Sequence[str]) -> list[Measure]:

@@ -22,7 +22,6 @@ from warpimpact.analysis.summary import (
     stop_lines,
     symmetry_text,
 )
-from warpimpact.analysis.survival import draws_note
 from warpimpact.kernels.status import Status
 from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
@@ -112,7 +111,6 @@ def _numbers(dataset: xarray.Dataset) -> Section:
         sampling_note(dataset),
         numerics_note(dataset),
         levels_note(dataset),
-        draws_note(dataset),
     )
     return Section([*table, *filter(None, notes), *stop_lines(dataset)], title)
 

@@ -32,19 +32,18 @@ def interval_text(low: float, high: float, text: Callable[[float], str] = number
 
 
 class Ends(NamedTuple):
-    """Intervals of a number: by the hits; by the parameters where shots draw these from a posterior; the largest shift
-    by the numerics, None or NaN where unknown; and the range under assumptions."""
+    """Intervals of a number: by the hits; the largest shift by the numerics, None or NaN where unknown; and the range
+    under assumptions."""
 
     low: float
     high: float
-    parameters: tuple[float, float] | None = None
     numerics: float | None = None
     assumed: tuple[float, float] | None = None
 
 
 def ends_of(estimate: Estimate) -> Ends:
     """The intervals of an estimate."""
-    return Ends(estimate.low, estimate.high, estimate.parameters, estimate.numerics, estimate.assumed)
+    return Ends(estimate.low, estimate.high, estimate.numerics, estimate.assumed)
 
 
 def intervals_text(
@@ -55,11 +54,6 @@ def intervals_text(
     shift = shift or text or "{:.2g}".format
     text = text or number_text
     text_of_ends = interval_text(ends.low, ends.high, text)
-    if ends.parameters is not None:
-        unknown = math.isnan(ends.parameters[0])
-        text_of_ends = (
-            f"by hits {text_of_ends}, by parameters {'not known' if unknown else interval_text(*ends.parameters, text)}"
-        )
     if text_of_ends == "-":
         return text_of_ends
     if ends.numerics is not None and not math.isnan(ends.numerics):

@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING, Any
 from warpimpact.analysis.assumptions_view import assumptions_lines
 from warpimpact.analysis.estimates import estimated, means_of, slices
 from warpimpact.analysis.numbers import ends_of, interval_text, intervals_text
-from warpimpact.analysis.survival import draws_note
 from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
 from warpimpact.results.dataset import finer_pair, is_choice, status_codes
@@ -115,7 +114,7 @@ def summary_text(dataset: Result) -> str:
             shown, unit = estimate.times(measure.display.factor), measure.display.shown
             interval = intervals_text(ends_of(shown), "{:.2f}".format)
             rows.append((measure.column.label, shown.value, unit, interval, shown.spread, _counted(shown.count, hits)))
-    notes = (numerics_note(dataset), levels_note(dataset), draws_note(dataset))
+    notes = (numerics_note(dataset), levels_note(dataset))
     moved = assumptions_lines(dataset)
     return text_of([Section([shares, Table(columns, rows), *moved, *stop_lines(dataset), *filter(None, notes)])])
 

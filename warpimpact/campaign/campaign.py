@@ -3,7 +3,6 @@
 Long because everything that two tables of a file must agree on is checked here.
 """
 
-import json
 import math
 from pathlib import Path
 from typing import Annotated, Any, Self
@@ -11,7 +10,6 @@ from typing import Annotated, Any, Self
 import numpy as np
 from pydantic import Field, PrivateAttr, ValidationError, model_validator
 
-from ..results.files import ResultError
 from ..results.kinds import CAMPAIGN
 from ..results.measures import Measure
 from ..scene import (
@@ -38,7 +36,6 @@ from ..scene.exclusions import check_together
 from ..scene.input_files import InputFile
 from ..scene.model import Model
 from ..scene.problems import sentence
-from ..scene.quantities import SCATTERED
 from ..scene.scatter import check_range
 from ..scene.shots import FARTHEST_HIT
 from ..scene.symmetry import unsymmetric
@@ -47,7 +44,6 @@ from ..scene.units import Number, PositiveLength, Title
 from .assumptions import Assumptions
 from .catalogued import catalogue_of, with_materials, with_threat
 from .continuum_settings import FiniteElements
-from .drawn import DrawnSampler, Posterior, read_posterior
 from .needs import lacking
 from .plausible import check_plausible, warn_of
 from .published import Published
@@ -92,7 +88,6 @@ class Campaign(Model):
         output: what is reported.
         burst: several shots at one plate, one after another; hits are then their aims.
         scatter: distributions of values that scatter. A file has them in the places of the values.
-        posterior: file of `warpimpact identify`; every shot draws the parameters of the material from it, jointly.
         catalogue: TOML file with threats and materials of your own, tables `[[threat]]` and `[[material]]`.
         assumptions: what nobody measured, and what it may be instead.
         stop: when the run ends, instead of a count. Unless told otherwise, its hits are then those of the irreducible
@@ -113,7 +108,6 @@ class Campaign(Model):
     numerics: Numerics = Numerics()
     output: Output = Output()
     scatter: Scatter = Scatter()
-    posterior: InputFile | None = None
     catalogue: InputFile | None = None
     assumptions: Assumptions = Assumptions()
     stop: Stop | None = None
@@ -129,23 +123,19 @@ class Campaign(Model):
         return self._source or self.model_dump_json()
 
     @classmethod
-    def from_toml(
-        cls, path: str | Path, *, count: int | None = None, posterior: Path | None = None, needs_velocity: bool = True
-    ) -> Self:
+    def from_toml(cls, path: str | Path, *, count: int | None = None, needs_velocity: bool = True) -> Self:
         """Read a campaign file; file names in it count from its folder.
 
         Args:
             path: the TOML file.
             count: number of hits, instead of the file's.
-            posterior: file of `warpimpact identify`, in addition to the file; the campaign's text then names it.
             needs_velocity: whether the shots need a velocity. Where it is searched, a threat without one will do.
 
         Raises:
             CampaignError: the file is missing, is not TOML, or has a value that is not allowed.
         """
         path = Path(path)
-        named = "" if posterior is None else f"posterior = {json.dumps(str(posterior.absolute()))}\n"
-        text = named + read_text(path)
+        text = read_text(path)
         return cls.from_text(text, name=str(path), folder=path.parent, count=count, needs_velocity=needs_velocity)
 
     @classmethod
@@ -215,8 +205,6 @@ class Campaign(Model):
     def sampler(self) -> Sampler:
         """The sampler of its shots."""
         sampled = (self.impact, self.hits, self.plate, self.scatter, self.replicates)
-        if self.drawn is not None:
-            return DrawnSampler(self.drawn, self.plate, self.hits.seed, len(self.symmetries), *sampled)
         if self.burst is not None:
             given: dict[str, Any] = {"scatter": self.scatter, "replicates": self.replicates}
             return BurstSampler(self.impact, self.hits, self.plate, self.burst, **given)
@@ -243,11 +231,6 @@ class Campaign(Model):
         """Number of consecutive hits that count as one: the shots at one plate, with their images."""
         return len(self.symmetries) * self.at_a_plate
 
-    @property
-    def drawn(self) -> Posterior | None:
-        """The draws of its posterior, if it has one."""
-        return None if self.posterior is None else read_posterior(self.posterior)
-
     @model_validator(mode="after")
     def _is_plausible(self) -> Self:  # first, as a slip of units breaks other rules, too
         if not self.allow_implausible:
@@ -255,21 +238,6 @@ class Campaign(Model):
                 check_plausible(self.core, self.target, self.output, self.impact, self.hits)
             except ValueError as error:
                 raise ValueError(f"{error}; allow_implausible = true has it computed as it is") from None
-        return self
-
-    @model_validator(mode="after")
-    def _posterior_fits(self) -> Self:
-        if self.posterior is None:
-            return self
-        try:
-            drawn = read_posterior(self.posterior)
-        except ResultError as error:
-            raise ValueError(f"posterior: {error}") from None
-        drawn.check(self.plate, self.interaction)
-        scattered = [name for name, layer in self.scatter.given if not layer]
-        given = [name for name in scattered if ("plate", name) in drawn.values or name == "degradation"]
-        scattered_name = bool(given) and f"a distribution of plate.{given[0]}"
-        check_together({exclusions.POSTERIOR: True, exclusions.SCATTER_OF_MATERIAL: scattered_name})
         return self
 
     @model_validator(mode="before")
@@ -285,7 +253,7 @@ class Campaign(Model):
         """Sample the irreducible part of the cell by default, where an answer costs least
         (tests/benchmarks/NOTES.md)."""
         hits = self.hits
-        chosen = "irreducible" in hits.model_fields_set or hits.area != "cell"
+        chosen = "irreducible" in hits.model_fields_set or hits.area != "cell" or hits.file is not None
         if self.stop is None or self.burst is not None or chosen or any(unsymmetric(self.scatter, self.layer).values()):
             return self  # without symmetry every hit is computed
         part = hits.model_copy(update={"irreducible": hits.sampling in ("sobol", "random")})
@@ -305,7 +273,6 @@ class Campaign(Model):
                 exclusions.IMAGES: hits.irreducible,
                 exclusions.LISTED_STRENGTH: "strength" in (hits.listed or {}),
                 exclusions.BURST: self.burst is not None,
-                exclusions.POSTERIOR: self.posterior is not None,
                 exclusions.LAYERS: bool(self.layer),
                 exclusions.LAYER_STANDOFFS: bool(self.output.layer_standoffs),
                 exclusions.BENDING: self.output.bending,
@@ -337,7 +304,7 @@ class Campaign(Model):
     @model_validator(mode="after")
     def _hits_cover_something(self) -> Self:
         covered, listed = self.hits.covered(self.plate), self.hits.listed
-        if listed is None:
+        if listed is None or "hit_y" not in listed:
             farthest = 0.5 * max(covered)
         else:
             farthest = max(float(np.abs(listed[name]).max()) for name in ("hit_y", "hit_z"))
@@ -359,23 +326,23 @@ class Campaign(Model):
             low, high = distribution.quantile(np.array([EDGE, 1.0 - EDGE]))
             ranges[name] = (float(low), float(high))
         for name, column in (self.hits.listed or {}).items():
-            if name in SCATTERED:
-                ranges[name] = (float(column.min()), float(column.max()))
-                try:
-                    check_range(name, *ranges[name])
-                except ValueError as error:
-                    raise ValueError(f"got hits.file with a column {name} that {error}") from None
+            ranges[name] = (float(column.min()), float(column.max()))
+            try:
+                check_range(name, *ranges[name])
+            except ValueError as error:
+                raise ValueError(f"got hits.file with a column {name} that {error}") from None
         if ranges != {name: (value, value) for name, value in self.impact}:
             _check_nose_first({name: max(map(abs, ends)) for name, ends in ranges.items()})
         return self
 
     @model_validator(mode="after")
     def _weakens_about_the_core(self) -> Self:
-        radius = self.core.max_radius
+        radius, listed = self.core.max_radius, (self.hits.listed or {}).get("degradation_length", [math.inf])
         for name, plate in self.target.named:
-            if radius > _MOST_LENGTHS * plate.degradation_length:
+            shortest = min(plate.degradation_length, *listed) if name == "plate" else plate.degradation_length
+            if radius > _MOST_LENGTHS * shortest:
                 raise ValueError(
-                    f"got {name}.degradation_length = {plate.degradation_length:g} m, but a core of radius {radius:g} "
+                    f"got {name}.degradation_length = {shortest:g} m, but a core of radius {radius:g} "
                     f"m needs at least 1/{_MOST_LENGTHS} of its radius, {radius / _MOST_LENGTHS:.4g} m"
                 )
             if plate.thickness > _MOST_DEPTHS * plate.degradation_depth and plate.degradation < 1.0:

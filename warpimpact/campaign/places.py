@@ -21,7 +21,7 @@ _WHOLE = ("core", "plate", "plate.pattern", "interaction")
 _WHOLE_OF_A_LAYER = re.compile(r"layer \d+(\.pattern)?")
 """Tables that may be given as a whole."""
 _LAYER = re.compile(r"layer (\d{1,3})")
-_NAMES_A_FILE = ("file", "posterior", "catalogue")
+_NAMES_A_FILE = ("file", "catalogue")
 
 
 def is_table(place: str) -> bool:

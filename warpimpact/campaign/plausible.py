@@ -10,7 +10,7 @@ import numpy as np
 
 from ..scene import Core, Hits, Impact, Plate, Record, Scene, Target
 from ..scene.bounds import USUAL, Implausible, hit_bounds, implausible, impossible
-from ..scene.quantities import SCATTERED
+from ..scene.quantities import QUANTITIES
 from ..scene.target import layer_name
 
 _OF_A_PLATE = [name for name in Plate.model_fields if f"plate.{name}" in USUAL and name != "size"]
@@ -83,7 +83,8 @@ def _values(
         for standoff in getattr(record, name):
             yield f"output.{name}", "output.standoffs", standoff
     for name, column in ((hits and hits.listed) or {}).items():
-        kind = f"{SCATTERED[name].table}.{name}" if name in SCATTERED else "hits"
+        table = QUANTITIES[name].table
+        kind = table if table == "hits" else f"{table}.{name}"
         ends = [float(column[np.abs(column).argmax()])]
         if kind != "hits":  # hits may be as near to the origin as they like
             ends.append(float(column[np.abs(column).argmin()]))

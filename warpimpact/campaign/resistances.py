@@ -57,8 +57,7 @@ def resistance_by_thickness(campaign: Campaign, layer: int, thickest: float, uni
 
 
 def is_drawn(campaign: Campaign, quantity: str, layers: Collection[int] = (0,)) -> bool:
-    """Whether a quantity differs from shot to shot, by a distribution, a list of hits or a posterior."""
+    """Whether a quantity differs from shot to shot, by a distribution or a file of hits."""
     scattered = any(name == quantity and k in layers for name, k in campaign.scatter.given)
     listed = campaign.hits.listed is not None and quantity in campaign.hits.listed
-    drawn = campaign.drawn is not None and any(str(path[1]).startswith(quantity) for path in campaign.drawn.values)
-    return scattered or listed or drawn
+    return scattered or listed

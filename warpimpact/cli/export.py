@@ -15,24 +15,22 @@ def add_export(commands: Commands) -> None:
         commands,
         "export",
         _export,
-        summary="write a result as CSV, a hit for ParaView, a posterior as a material, or a plate as a drawing",
+        summary="write a result as CSV, a hit for ParaView, or a plate as a drawing",
         description="Write a result as CSV, one row per hit. Or write the history of a hit as a folder of VTK files; "
         "open its core.pvd and plate.pvd in ParaView. VTK needs: pip install 'warpimpact[vtk]'. Or write the holes of "
-        "a campaign's plate as an SVG or DXF drawing in mm. DXF needs: pip install 'warpimpact[cad]'. Or write what a "
-        "posterior tells of a material as a catalogue file, with its plate and what it misses",
+        "a campaign's plate as an SVG or DXF drawing in mm. DXF needs: pip install 'warpimpact[cad]'.",
         example="export slotted.nc -o slotted.csv",
     )
     parser.add_argument(
         "file",
         type=Path,
-        metavar="RESULT.nc|HIT.nc|POSTERIOR.nc|CAMPAIGN.toml",
-        help="written by warpimpact run, replay or identify, or a campaign file",
+        metavar="RESULT.nc|HIT.nc|CAMPAIGN.toml",
+        help="written by warpimpact run or replay, or a campaign file",
     )
     add_output(
         parser,
-        "RESULT.csv|FOLDER|MATERIAL.toml|PLATE.svg|PLATE.dxf",
-        "CSV file, new folder for VTK, catalogue file, or drawing (default: the file's name with .csv, _vtk, "
-        "_material.toml or .svg, in its folder)",
+        "RESULT.csv|FOLDER|PLATE.svg|PLATE.dxf",
+        "CSV file, new folder for VTK, or drawing (default: the file's name with .csv, _vtk or .svg, in its folder)",
     )
     add_overwrite(parser, "an existing file")
 
@@ -42,15 +40,11 @@ def _export(arguments: argparse.Namespace) -> None:
     from warpimpact.export.spreadsheet import write_csv
     from warpimpact.results import files
     from warpimpact.results.checks import RESULT
-    from warpimpact.results.posterior_file import POSTERIOR
     from warpimpact.results.replayed_hit import HISTORY
 
     path, output = arguments.file, arguments.output
     if path.suffix == ".toml":
         _export_drawing(path, output or path.with_suffix(".svg"), overwrite=arguments.overwrite)
-        return
-    if (kind := files.kind_of(path)) is not None and kind.name == POSTERIOR.name:
-        _export_material(path, output or path.with_name(f"{path.stem}_material.toml"), overwrite=arguments.overwrite)
         return
     with files.opened(path, RESULT, HISTORY) as dataset:
         if files.is_history(dataset):
@@ -80,18 +74,6 @@ def _export_drawing(path: Path, output: Path, *, overwrite: bool) -> None:
     check_suffix(output, "a drawing", *SUFFIXES)
     check_output(output, overwrite=overwrite)
     write_drawing(Campaign.from_toml(path).plate, output)
-    print(output)
-
-
-def _export_material(path: Path, output: Path, *, overwrite: bool) -> None:
-    from warpimpact.identification.material_entry import material_entry
-    from warpimpact.results.files import aside
-
-    check_suffix(output, "a catalogue", ".toml")
-    check_output(output, overwrite=overwrite)
-    text = material_entry(path)
-    with aside(output) as file:
-        file.write_text(text, encoding="utf-8")
     print(output)
 
 

@@ -9,7 +9,7 @@ from warpimpact.results.interrupts import terminated_as_interrupted
 
 from .mistakes import memory_told
 from .options import Commands, add_command, add_computing, add_earlier, add_output
-from .paths import check_picture, check_result, replaces
+from .paths import check_output, check_picture, check_result, replaces
 from .plain import say
 from .progress import Step, show_progress, warn
 
@@ -30,8 +30,8 @@ def add_identify(commands: Commands) -> None:
         summary="find parameters with their uncertainty from measured shots",
         description="Find the parameters of plate, interaction and core that agree with measured shots, each with its "
         "uncertainty. Unknown hit points are integrated out. Write the posterior as a netCDF file, which ArviZ reads, "
-        "and figures into the same folder. Print which parameters the shots determine, and whether the computation has "
-        "converged.",
+        "the draws of the material as a CSV file that hits.file takes, and figures into the same folder. Print which "
+        "parameters the shots determine, and whether the computation has converged.",
         example="identify campaigns/fits/paper_fit.toml -o paper_fit.nc",
     )
     parser.add_argument(
@@ -50,6 +50,7 @@ def _identify(arguments: argparse.Namespace) -> int:
     from warpimpact.identification.computed_shots import fit_of_result
     from warpimpact.identification.fit_file import read_fit
     from warpimpact.identification.identify import extent_of, identify_to_file
+    from warpimpact.identification.posterior import material_draws
     from warpimpact.identification.posterior_view import posterior_view
     from warpimpact.plotting.posterior import FIGURES
     from warpimpact.results import files, posterior_file
@@ -62,6 +63,8 @@ def _identify(arguments: argparse.Namespace) -> int:
     output = arguments.output or Path(f"{arguments.fit.stem}_fit.nc" if by_elements else f"{arguments.fit.stem}.nc")
     check_result(output, "a posterior")
     pictures = {output.with_name(f"{output.stem}_{name}.png"): draw for name, draw in FIGURES.items()}
+    table = output.with_suffix(".csv")
+    check_output(table, overwrite=replaces(arguments, output))
     for picture in pictures:
         check_picture(picture, overwrite=replaces(arguments, output))
     for sentence in fit.warnings:
@@ -90,6 +93,9 @@ def _identify(arguments: argparse.Namespace) -> int:
     tree = files.read_tree(output, posterior_file.POSTERIOR)
     print(text_of(posterior_view(tree)))
     print(f"written to {output}")
+    if len(draws := material_draws(fit, tree)):
+        draws.to_csv(table, index=False)
+        print(f"draws of the material for hits.file in {table}")
     for picture, draw in pictures.items():
         draw(tree).savefig(picture, dpi=150)
         print(picture)

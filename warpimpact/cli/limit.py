@@ -56,9 +56,7 @@ def _limit(arguments: argparse.Namespace) -> int:
     from warpimpact.view.view import text_of
 
     is_sought = arguments.quantity == "velocity"
-    campaign = Campaign.from_toml(
-        arguments.campaign, count=arguments.count, posterior=arguments.posterior, needs_velocity=not is_sought
-    )
+    campaign = Campaign.from_toml(arguments.campaign, count=arguments.count, needs_velocity=not is_sought)
     output = arguments.output or Path(arguments.campaign.stem + "_limit.nc")
     picture = output.with_suffix(".png")
     check_place(output)

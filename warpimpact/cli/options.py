@@ -94,16 +94,6 @@ def add_device(parser: argparse.ArgumentParser) -> None:
     )
 
 
-def add_posterior(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument(
-        "--posterior",
-        type=Path,
-        metavar="POSTERIOR.nc",
-        help="file of warpimpact identify; every shot draws the parameters of the material from this posterior, all of "
-        "them together",
-    )
-
-
 def add_computing(parser: argparse.ArgumentParser) -> None:
     """Add the options on where to compute: a device, processes, or a cluster; `executor_of` reads them."""
     add_device(parser)

@@ -15,7 +15,6 @@ from .options import (
     add_count,
     add_earlier,
     add_output,
-    add_posterior,
     executor_of,
 )
 from .paths import check_result
@@ -50,7 +49,7 @@ def _run(arguments: argparse.Namespace) -> int:
     from warpimpact.results.netcdf import open_table
     from warpimpact.view.view import text_of
 
-    campaign = Campaign.from_toml(arguments.campaign, count=arguments.count, posterior=arguments.posterior)
+    campaign = Campaign.from_toml(arguments.campaign, count=arguments.count)
     output = arguments.output or Path(arguments.campaign.stem + ".nc")
     check_result(output, "a result")
     run_shown(campaign, output, arguments)
@@ -70,11 +69,10 @@ def _run(arguments: argparse.Namespace) -> int:
 
 
 def add_run_options(parser: argparse.ArgumentParser, what: str) -> None:
-    """Options of a command that computes every hit: device, number of hits, posterior, and what happens to an earlier
-    computation, which `what` names."""
+    """Options of a command that computes every hit: device, number of hits, and what happens to an earlier computation,
+    which `what` names."""
     add_computing(parser)
     add_count(parser)
-    add_posterior(parser)
     add_earlier(parser, what, f"an existing result or an interrupted {what}")
 
 

@@ -37,11 +37,6 @@ def add_inspect(commands: Commands) -> None:
     add_result(parser)
     add_measures(parser)
     parser.add_argument("--campaign", action="store_true", help="print only the campaign that the result contains")
-    parser.add_argument(
-        "--discrepancy",
-        action="store_true",
-        help="add the discrepancy of the fit to the intervals by parameters; for a result that draws from a posterior",
-    )
 
 
 def _inspect(arguments: argparse.Namespace) -> None:
@@ -52,15 +47,14 @@ def _inspect(arguments: argparse.Namespace) -> None:
     from warpimpact.view.view import text_of
 
     kind = files.kind_of(arguments.result)
-    if kind is not None and is_shown(kind) and not (arguments.campaign or arguments.discrepancy):
+    if kind is not None and is_shown(kind) and not arguments.campaign:
         print(text_of(view_of(arguments.result, kind, arguments.measure)))
         return
     with files.opened(arguments.result) as dataset:
-        asked = dataset.assign_attrs({attr.DISCREPANCY_COUNTS: 1}) if arguments.discrepancy else dataset
         if arguments.campaign:
             print(dataset.attrs[attr.CAMPAIGN])
         else:
-            print(effectiveness_text(asked, arguments.measure) if arguments.measure else inspect_text(asked))
+            print(effectiveness_text(dataset, arguments.measure) if arguments.measure else inspect_text(dataset))
 
 
 def add_plot(commands: Commands) -> None:

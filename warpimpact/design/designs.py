@@ -27,7 +27,7 @@ from warpimpact.solver.resolution import LADDER, TooManySteps, at_level, coarses
 
 Tables = dict[str, Any]
 
-FILE_KEYS = ("file", "posterior", "catalogue")
+FILE_KEYS = ("file", "catalogue")
 """Keys of a campaign that name files."""
 FEW, SOME, _IMAGES = 256, 1024, 4
 """Most hits of the first map after a change, and of the draft; and fewest images of each other with which a first map

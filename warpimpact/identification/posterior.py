@@ -3,16 +3,15 @@
 from __future__ import annotations
 
 import json
-import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+import pandas as pd
 import xarray
 from numpy.typing import NDArray
 
-from warpimpact.campaign.drawn import OF_THE_MATERIAL
 from warpimpact.identification.fit import Fit
 from warpimpact.identification.likelihood import KEPT_HITS, ShotScore
 from warpimpact.identification.scoring import data_of, discrepancies
@@ -21,6 +20,8 @@ from warpimpact.results import posterior_file
 from warpimpact.results.variables import HIT_Y, HIT_Z
 from warpimpact.scene.display import UNITS
 from warpimpact.scene.model import Array
+from warpimpact.scene.quantities import QUANTITIES
+from warpimpact.solver.columns import columns_of
 from warpimpact.statistics.importance import LARGEST_K, Weights, resampled
 
 LARGEST_NOISE = 0.5
@@ -31,7 +32,6 @@ WIDE = 0.6
 """Share of the prior within the posterior's 90 % interval (0.9 if nothing was learnt) above which little was learnt."""
 STRONG = 0.7
 """Correlation above which two parameters are reported as a combination."""
-_OF_PLATE = {path[1] for path in OF_THE_MATERIAL if path[0] == "plate"}
 _DENSITY_DRAWS = 400
 """Number of predicted rows whose probability is compared with that of the measured row."""
 
@@ -193,7 +193,6 @@ def _attributes(fit: Fit, sampled: Sampled, made: Mapping[str, str], noise: Arra
         attr.TITLE: fit.title,
         attr.HISTORY: attr.history_line("identify"),
         posterior_file.FIT_TEXT: fit.text,
-        posterior_file.MATERIAL: _material(fit, sampled),
         **made,
         attr.SEED: fit.sampling.seed,
         posterior_file.EFFECTIVE: sampled.effective,
@@ -209,20 +208,14 @@ def _attributes(fit: Fit, sampled: Sampled, made: Mapping[str, str], noise: Arra
     }
 
 
-def _material(fit: Fit, sampled: Sampled) -> str:
-    scales = discrepancies(fit, sampled.points)
-    sizes = {"m s-1": scales.get("velocity"), "degree": scales.get("angle")}
-    missed = {unit: _median(size, sampled) for unit, size in sizes.items() if size is not None}
-    missed |= {"degree": math.degrees(missed["degree"])} if "degree" in missed else {}
-    scene = fit.scene_of(fit.shots[0])
-    plate = scene.target.layers[0].model_dump(include={str(name) for name in _OF_PLATE})
-    return json.dumps({"plate": plate, "interaction": scene.interaction.model_dump(), "discrepancy": missed})
-
-
-def _median(values: Array, sampled: Sampled) -> float:
-    """Median of the posterior."""
-    order = np.argsort(values)
-    return float(values[order][np.searchsorted(np.cumsum(sampled.weights.values[order]), 0.5)])
+def material_draws(fit: Fit, tree: xarray.DataTree) -> pd.DataFrame:
+    """Draws of the material, a column for each quantity that `hits.file` takes."""
+    draws = tree["posterior"].to_dataset()
+    values = {parameter.path: draws[parameter.name].values.ravel() for parameter in fit.scene_parameters}
+    columns = columns_of(values, fit.scene_of(fit.shots[0]).target.layers[0])
+    return pd.DataFrame(
+        {name: column for name, column in columns.items() if name != "thickness" and QUANTITIES[name].table != "core"}
+    )
 
 
 def is_converged(fit: Fit, sampled: Sampled, noise: float) -> bool:

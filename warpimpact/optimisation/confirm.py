@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from itertools import pairwise
 from typing import Any, TypeVar
 
 import numpy as np
@@ -18,7 +17,6 @@ from warpimpact.optimisation.judged import (
     excesses,
     interval,
     means,
-    numbers_of,
     objectives,
     values,
     weights_of,
@@ -28,7 +26,6 @@ from warpimpact.optimisation.searcher import front_of
 from warpimpact.runs.questions import Question
 from warpimpact.scene.model import Array
 from warpimpact.statistics.comparisons import ROUNDED
-from warpimpact.statistics.random_effects import positive_share
 
 Part = TypeVar("Part")
 
@@ -55,9 +52,6 @@ class Confirmed:
         assumptions: names of the assumptions.
         under: objectives and bounds of the front, then of the references, under every assumption, shape [front +
             references, assumptions, asked].
-        survival: for each design and each objective and bound, the share of a posterior's draws in which the difference
-            to the next design of another group has the same sign as over all hits, and the lower end of the interval of
-            this share, shape [front, asked, 2]; NaN where unknown.
     """
 
     numbers: NDArray[np.int64]
@@ -67,7 +61,6 @@ class Confirmed:
     kept: NDArray[np.bool_]
     groups: NDArray[np.int64]
     references: tuple[DesignRecord, ...]
-    survival: Array
     assumptions: tuple[str, ...]
     under: Array
 
@@ -81,20 +74,18 @@ def confirm(design: Design, searched: Searched, follow: Follow) -> Question[Conf
     numbers = spread(searched.front, design.search.confirmed)
     chosen = [searched.records[int(number)] for number in numbers]
     others = [_reference(design, place) for place in range(len(design.references))]
-    records, places, draws = yield from _fresh(design, [*chosen, *others], follow)
+    records, places = yield from _fresh(design, [*chosen, *others], follow)
     front = records[: len(chosen)]
     solids = yield from _solids(design, front, follow)
     names, under = yield from _under_assumptions(design, records, follow)
-    kept, leaders = _kept(design, front), groups(design, front)
     return Confirmed(
         numbers=numbers,
         records=tuple(front),
         places=places[: len(chosen)],
         solids=tuple(solids),
-        kept=kept,
-        groups=leaders,
+        kept=_kept(design, front),
+        groups=groups(design, front),
         references=tuple(records[len(chosen) :]),
-        survival=survival(design, front, draws, kept & (leaders == np.arange(len(front)))),
         assumptions=names,
         under=under,
     )
@@ -148,8 +139,8 @@ def _batched(parts: Sequence[Part], count: int) -> list[tuple[Part, ...]]:
 
 def _fresh(
     design: Design, targets: Sequence[DesignRecord], follow: Follow
-) -> Question[tuple[list[DesignRecord], Array, list[Array]]]:
-    """Targets with fresh hits, the places of the hits, and their draws of a posterior."""
+) -> Question[tuple[list[DesignRecord], Array]]:
+    """Targets with fresh hits, and the places of the hits."""
     seed, count = fresh_seed(design), design.search.confirm_hits if design.keys else 1
     threats, situations = range(len(design.threats)), design.situations
     asked = [
@@ -158,7 +149,7 @@ def _fresh(
     if not design.keys:
         empty = np.zeros((len(situations), 0, count))
         without_hits = [replace(target, levels=("",) * len(threats), said=empty) for target in targets]
-        return without_hits, np.zeros((len(targets), 2, 0)), [np.zeros(0)] * len(targets)
+        return without_hits, np.zeros((len(targets), 2, 0))
     whose = "the front and references" if design.references else "the front"
     piloting = _telling(follow, len(targets), len(asked), f"pilots for fresh hits of {whose}")
     levels = yield from levels_asked(design, asked, piloting)
@@ -174,7 +165,7 @@ def _fresh(
         for target, levels_of_target, parts in zip(targets, of_targets, _batched(said, len(situations)), strict=True)
     ]
     of_first = said[:: len(situations)]
-    return records, np.array([first.places for first in of_first]), [first.draws for first in of_first]
+    return records, np.array([first.places for first in of_first])
 
 
 def _under_assumptions(
@@ -251,19 +242,3 @@ def is_better(design: Design, record: DesignRecord, other: DesignRecord) -> bool
     low = interval(signs * (theirs - means(design, record, record.hits)[:count]))[0]
     same = [SAME_WEIGHT if asked.asked.kind == "target" else ROUNDED for asked in design.objectives]
     return bool((low > np.array(same) * np.nan_to_num(np.abs(theirs)).max(axis=1)).any())
-
-
-def survival(design: Design, front: Sequence[DesignRecord], draws: Sequence[Array], leads: NDArray[np.bool_]) -> Array:
-    """Whether the order of neighbours on the front survives the uncertainty of the parameters (`Confirmed.survival`).
-    Hit k of every design takes the same draw."""
-    shares = np.full((len(front), len(design.asked), 2), np.nan)
-    for number, following in pairwise(int(lead) for lead in np.flatnonzero(leads)):
-        leader, follower = front[number], front[following]
-        if not len(draws[number]) or not np.array_equal(draws[number], draws[following]):
-            continue
-        for row, asked in enumerate(design.asked):
-            apart = numbers_of(design, leader, asked, leader.hits) - numbers_of(design, follower, asked, follower.hits)
-            if asked.asked.kind != "target" and np.isfinite(apart).any():
-                share = positive_share(np.sign(np.nanmean(apart)) * apart, draws[number])
-                shares[number, row] = (np.nan, np.nan) if share is None else (share.share, share.at_least)
-    return shares

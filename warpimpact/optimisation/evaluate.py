@@ -81,13 +81,11 @@ class Said:
         values: value of every measure that the design file asks for, shape [measures, hits]; NaN where a hit does not
             count.
         places: y and z of the hits [m], shape [2, hits].
-        draws: draw of the posterior that each hit took, shape [hits]; empty without one.
         seconds: processor time of preparing and marching; a share of that of the jobs side by side [s].
     """
 
     values: Array
     places: Array
-    draws: Array
     seconds: float
 
 
@@ -145,9 +143,8 @@ def _hits_computed(
     needed = {v.STATUS, v.STOPPED_IN, *(name for measure in design.keys for name in measure.quantity.of)}
     for outcome, (_, scene, shots) in zip(outcomes, scenes, strict=True):
         table = narrow_table(scene, shots, outcome, needed)
-        draws = np.zeros(0) if shots.posterior_draw is None else shots.posterior_draw
         places = np.array([shots.hit_y, shots.hit_z])
-        said.append(Said(said_of(design, table), places, draws, seconds / len(jobs)))
+        said.append(Said(said_of(design, table), places, seconds / len(jobs)))
     ended = count(1)
 
     def limit(which: int, share: Worker, _: Any) -> Array:

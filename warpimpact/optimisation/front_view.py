@@ -21,8 +21,6 @@ _ROUNDED = 1e-6
 """Largest relative difference of objectives that count as equal."""
 _NAMED = 3
 """Most assumptions that are named as reversing a comparison."""
-SURVIVING_SHARE = 0.95
-"""Share of a posterior's draws in which a difference must have the same sign to survive."""
 
 
 def front_view(dataset: xarray.Dataset) -> list[Section]:
@@ -37,7 +35,7 @@ def front_view(dataset: xarray.Dataset) -> list[Section]:
     on_front, confirmed = int(dataset[f.ON_FRONT].sum()), dataset.sizes["front"]
     again = f"front: {on_front} designs, of which {confirmed} were computed again with fresh hits"
     references = [line for place in range(dataset.sizes["reference"]) for line in _against(dataset, place)]
-    notes = [*_shrinkage(dataset), *_survival(dataset)]
+    notes = [*_shrinkage(dataset)]
     return [
         Section([computed, again]),
         Section([_front_table(dataset)]),
@@ -163,18 +161,6 @@ def _variables_table(dataset: xarray.Dataset) -> Table:
         values = [value for _, value, _ in _values(dataset, int(design))]
         rows.append((file, *(values[place] for place in used)))
     return Table([Column("design"), *columns], rows)
-
-
-def _survival(dataset: xarray.Dataset) -> Iterator[str]:
-    """Which part of the order of the front survives the uncertainty of the parameters."""
-    for place, label in enumerate(dataset[f.LABEL].values):
-        least = dataset[f.SURVIVAL_AT_LEAST].values[:, place]
-        if (known := np.isfinite(least)).any():
-            name, survive = label_and_unit(label)[0], int((least[known] >= SURVIVING_SHARE).sum())
-            yield (
-                f"{name}: {survive} of {int(known.sum())} differences between neighbours on the front survive the "
-                f"uncertainty of the parameters (in at least {SURVIVING_SHARE:.0%} of the draws)"
-            )
 
 
 def _against(dataset: xarray.Dataset, reference: int) -> Iterator[str]:

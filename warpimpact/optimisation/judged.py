@@ -24,7 +24,7 @@ from warpimpact.scene.model import Array
 from warpimpact.statistics.comparisons import ROUNDED
 from warpimpact.statistics.intervals import Estimate, estimate_of
 from warpimpact.statistics.student import student_quantile
-from warpimpact.statistics.tails import pseudo_values, quantile_weights
+from warpimpact.statistics.tails import pseudo_values
 
 DIFFERENCE_CONFIDENCE = 0.95
 
@@ -115,7 +115,7 @@ def _averaged(measure: Measure, numbers: Array) -> Array:
     """Numbers of hits whose mean is a measure, shape [hits]. A quantile is the one of Harrell and Davis, a smooth
     function of the hits, so that a small change of a design changes it little (statistics/tails.py)."""
     if measure.kind == "quantile":
-        return pseudo_values(numbers, np.zeros(len(numbers)), quantile_weights(measure.share))
+        return pseudo_values(numbers, measure.share)
     return measure.averaged(measure.counted(numbers))
 
 

@@ -64,8 +64,6 @@ def to_dataset(design: Design, searched: Searched, confirmed: Confirmed, made_by
         f.NUMBER: confirmed.numbers,
         f.KEPT: confirmed.kept.astype(np.int8),
         f.GROUP: confirmed.groups,
-        f.SURVIVAL: confirmed.survival[..., 0],
-        f.SURVIVAL_AT_LEAST: confirmed.survival[..., 1],
         f.CAMPAIGN: _texts(_campaign(design, record) for record in confirmed.records),
         f.FILE: _texts(f"design_{number:0{width}d}.toml" for number in range(len(confirmed.records))),
         f.FRESH_LEVELS: _texts(_levels(record) for record in confirmed.records),

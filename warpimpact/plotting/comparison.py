@@ -70,10 +70,8 @@ def comparison_figure(comparison: Comparison, *, every: bool = False) -> Figure:
         _furnish(left, labels)
         _draw_differences(right, comparison, measures, shown)
     legend_below(figure, 4)
-    drawn = any(pair.parameters for pair in comparison.differences)
-    both = " by hits (thin lines) and by parameters (broad ones)" if drawn else ""
     title = "Plates compared" if decides is None or every else f"Plates by {decides.measure.label}"
-    add_heading(figure, title, f"95 % intervals{both}; hollow marker: cannot be told apart", *hits_used(comparison))
+    add_heading(figure, title, "95 % intervals; hollow marker: cannot be told apart", *hits_used(comparison))
     return figure
 
 
@@ -142,10 +140,8 @@ def _draw_interval(
     label: str | None = None,
     hollow: bool = False,
 ) -> None:
-    """Draw a number with its interval by the hits and, if it has one, its interval by the parameters."""
+    """Draw a number with its interval."""
     value, (marker, colour) = number.value, style
-    if number.parameters is not None and not math.isnan(sum(number.parameters)):
-        axes.plot(number.parameters, [line, line], color=colour, linewidth=7.0, alpha=0.3, solid_capstyle="butt")
     axes.errorbar(
         value,
         line,

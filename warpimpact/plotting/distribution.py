@@ -13,7 +13,6 @@ from matplotlib.ticker import MaxNLocator
 from warpimpact.analysis.hit_map import hit_points
 from warpimpact.analysis.local import NEIGHBOURS, plane_fit, share_of
 from warpimpact.plotting.cell import (
-    Shown,
     draw_holes,
     draw_values,
     limits,
@@ -144,32 +143,6 @@ def uncertainty(dataset: xarray.Dataset, variable: str, standoff: float | None =
     labels = f"local mean of {column.label}", f"half width of its 95 % interval {unit}"
     method = "plane through the {} nearest hits, Student's interval; bends of the map widen it"
     return _local_maps(dataset, images, labels, column.title, method)
-
-
-def mean_and_spread(dataset: xarray.Dataset, variable: str, standoff: float | None = None) -> Figure:
-    """A map of the mean over the draws of a posterior, and of their standard deviation about it, from nearby hits."""
-    column = shown(dataset, variable, standoff)
-    images = _local(dataset, column.values, _covered(dataset), lambda near: plane_fit(*near)[::2])
-    labels = f"mean of {column.label}", f"spread over draws and conditions [{column.label.partition('[')[2]}"
-    method = "plane through the {} nearest hits, each with a draw of the posterior, and their spread about it"
-    return _local_maps(dataset, images, labels, column.title, method)
-
-
-def is_drawn(dataset: xarray.Dataset) -> bool:
-    """Whether neighbouring hits have different parameters, so that a map shows their mean and their spread."""
-    return v.POSTERIOR_DRAW in dataset and nearest_hits(dataset) is not None
-
-
-def averaged(dataset: xarray.Dataset, column: Shown) -> Shown:
-    """A variable averaged over neighbouring hits, for a result whose hits draw their parameters."""
-    exists = np.isfinite(column.values)
-    if not is_drawn(dataset) or exists.sum() < NEIGHBOURS:
-        return column
-    period = np.asarray(dataset.attrs[attr.PLATE_PERIOD])
-    near = _neighbours(dataset, column.values, (hit_points(dataset)[exists] + period / 2) % period)
-    values = np.full(len(exists), np.nan)
-    values[exists] = plane_fit(*near).value
-    return column._replace(values=values, label=f"mean of {column.label}", title=f"{column.title}\nmean of hits nearby")
 
 
 def is_uncertain(dataset: xarray.Dataset) -> bool:

@@ -14,12 +14,9 @@ from warpimpact.analysis.hit_map import is_folded
 from warpimpact.plotting.bursts import bursts_figure
 from warpimpact.plotting.cell import Shown, draw_status, draw_values, limits, scale_of, shots_text, shown, words
 from warpimpact.plotting.distribution import (
-    averaged,
     dispersion,
-    is_drawn,
     is_uncertain,
     marginals,
-    mean_and_spread,
     probability_map,
     uncertainty,
 )
@@ -48,13 +45,8 @@ _MOST_COLUMNS = 3
 
 
 def variable_map(dataset: xarray.Dataset, variable: str, standoff: float | None = None) -> Figure:
-    """Map of one variable of the Dataset over the hit points; hits without a value are grey.
-
-    Where hits draw their parameters from a posterior, it shows the mean and the spread at every place. Args and errors
-    are those of `cell.shown`.
-    """
-    if is_drawn(dataset):
-        return mean_and_spread(dataset, variable, standoff)
+    """Map of one variable of the Dataset over the hit points; hits without a value are grey. Args and errors are those
+    of `cell.shown`."""
     figure, (axes,) = _sheet_of_one(dataset, maps=1, columns=1)
     _draw(axes, dataset, shown(dataset, variable, standoff))
     return figure
@@ -75,14 +67,14 @@ def measure_map(dataset: xarray.Dataset, text: str) -> Figure:
     finite = np.where(np.isfinite(values), values, np.nan)
     column = Shown(finite, measure.axis, measure.column.label, signed=measure.least < 0.0)
     figure, (axes,) = _sheet_of_one(dataset, maps=1, columns=1)
-    _draw(axes, dataset, averaged(dataset, column))
+    _draw(axes, dataset, column)
     return figure
 
 
 def variable_maps(datasets: Mapping[str, xarray.Dataset], variable: str, standoff: float | None = None) -> Figure:
     """A map of one variable for several results, by the names of their maps, side by side, in the same colours and to
     the same scale."""
-    columns = [averaged(dataset, shown(dataset, variable, standoff)) for dataset in datasets.values()]
+    columns = [shown(dataset, variable, standoff) for dataset in datasets.values()]
     scale = scale_of([column.values for column in columns], signed=columns[0].signed)
     title, *_ = columns[0].title.splitlines()
     notes = ("seen from behind the plates; colours and lengths to the same scale",)
@@ -116,7 +108,7 @@ def overview(dataset: xarray.Dataset) -> Figure:
     alike = f"; all {names[int(statuses[0])]}" if len(statuses) == 1 and columns else ""
     figure, panels = _sheet_of_one(dataset, maps=len(columns) + (not alike), columns=2, note=alike)
     for axes, column in zip(panels, columns, strict=False):
-        _draw(axes, dataset, averaged(dataset, column))
+        _draw(axes, dataset, column)
     if not alike:
         draw_status(panels[-1], dataset)
     _share_legend(figure, panels)

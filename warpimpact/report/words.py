@@ -21,7 +21,6 @@ from warpimpact.analysis.inspection import verdict
 from warpimpact.analysis.numbers import ends_of, intervals_text
 from warpimpact.analysis.plate_text import reference_name, solid_note, weights_of, weights_text
 from warpimpact.analysis.summary import numerics_note, numerics_sentence, promise_text, sampling_note
-from warpimpact.analysis.survival import draws_note
 from warpimpact.campaign.text import parsed
 from warpimpact.plotting.cell import range_text, words
 from warpimpact.plotting.comparison import comparison_figure
@@ -128,7 +127,7 @@ def _caveats(dataset: xarray.Dataset) -> list[str]:
     numerics = numerics_sentence(dataset)
     chance = "Intervals describe the hits that were drawn."
     model = "The core stays one rigid body, which overstates what comes through where cores break or erode."
-    notes = (numerics, chance, sampling_note(dataset), numerics_note(dataset), draws_note(dataset), model)
+    notes = (numerics, chance, sampling_note(dataset), numerics_note(dataset), model)
     return [sentence for sentence in notes if sentence]
 
 

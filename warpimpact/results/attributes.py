@@ -118,10 +118,6 @@ RESTS_ON, NOT_TESTED = "evidence: ", "not tested: "
 """Beginnings of the first line of the evidence, and of the lines about what was not measured."""
 EFFECTIVE = "effective_sample_size"
 """Effective number of draws of a posterior, which has no map of hits."""
-DISCREPANCY = _declared("discrepancy", "table")
-"""JSON of the standard deviation of the error of a posterior's model, by units of the Dataset."""
-DISCREPANCY_COUNTS = _declared("discrepancy_counts", "number")
-"""1 where a reader asks to count the discrepancy; in no file."""
 LAYERS = _declared("layers", "table")
 """JSON of the layers behind the plate, by number; absent if there are none."""
 STANDOFF_POINT = _declared("standoff_point")

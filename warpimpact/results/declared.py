@@ -87,7 +87,6 @@ _SHAPES: Mapping[str, Any] = {
     attr.ACCURACY: Json[_Accuracy],
     attr.MATERIAL: Json[_DeclaredMaterial],
     attr.NUMERICS_GIVEN: Json[_Fidelity],
-    attr.DISCREPANCY: Json[dict[str, Finite]],
     attr.LAYERS: Json[dict[str, _Layer]],
     attr.LEVEL_SHIFTS: Json[dict[Annotated[str, Field(pattern=r"^\d{1,3}$")], _Shifts]],
     attr.SWEEP: Json[dict[str, Annotated[list[Text], Field(min_length=1)]]],

@@ -57,10 +57,6 @@ FRESH, FRESH_LOW, FRESH_HIGH = with_interval(
 )
 KEPT = Variable("front_kept", ("front",), "1", "1 where fresh hits leave it on the front and within the bounds, else 0")
 GROUP = Variable("front_group", ("front",), "1", "first design than which it is not certainly better at 95 %")
-SURVIVAL = Variable(
-    "front_survival", _BY_FRONT, "1", "share of the draws of a posterior in which it differs so from the next design"
-)
-SURVIVAL_AT_LEAST = Variable("front_survival_at_least", _BY_FRONT, "1", "lower end of the interval of that share")
 CAMPAIGN = Variable("front_campaign", ("front",), "1", "campaign of the first threat, as TOML")
 FILE = Variable("front_file", ("front",), "1", "name of its campaign file")
 SOLID = Variable("front_solid", _BY_FRONT, "1", "the same of the solid plate of equal areal density")

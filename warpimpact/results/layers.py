@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from warpimpact.results import variables as v
-from warpimpact.scene.quantities import BY_LAYER, OF_A_DRAW
+from warpimpact.scene.quantities import BY_LAYER
 
 if TYPE_CHECKING:
     import xarray
@@ -20,8 +20,7 @@ if TYPE_CHECKING:
 def own_columns(target: Target, shots: Shots) -> dict[str, NDArray[Any]]:
     """Quantities that differ from shot to shot, under the names of a result. A quantity that every layer has is named
     as `thickness` for the plate, and as `layer_thickness` for all layers if a layer behind the plate differs."""
-    elsewhere = (*BY_LAYER, *OF_A_DRAW)  # the latter in the posterior, at `posterior_draw`
-    columns: dict[str, NDArray[Any]] = {name: values for name, values in shots.columns.items() if name not in elsewhere}
+    columns: dict[str, NDArray[Any]] = {name: values for name, values in shots.columns.items() if name not in BY_LAYER}
     for name in BY_LAYER:
         values = [shots.own_of(target, name, k) for k in range(len(target.layers))]
         if shots.differs(name, 0):

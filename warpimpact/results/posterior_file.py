@@ -12,11 +12,10 @@ best                      the set of smallest misfit
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from pydantic import BaseModel, Json
+from pydantic import Json
 
 from warpimpact.results import attributes as attr
 from warpimpact.results.declared import Declaration, Finite, Number, Size, Text, finite, not_negative, numbers, texts
@@ -45,8 +44,6 @@ PATH = "path"
 """Attribute of a parameter: its key in the scene, as JSON."""
 
 FIT_TEXT = "fit"
-MATERIAL = "material"
-"""The material in the fit, with the parameters at their medians: JSON of the tables plate and interaction."""
 EFFECTIVE = attr.EFFECTIVE
 PARETO_K = "pareto_k"
 CONVERGED = "converged"
@@ -68,18 +65,10 @@ _OF_A_POSTERIOR: Mapping[str, Mapping[str, tuple[str, ...]]] = {
 _MAY_LACK = {"best": ("misfit",), "posterior_predictive": (MEASURED, FITTED)}
 """Numbers that are NaN where a core does not come through, by group."""
 _OF_A_PARAMETER = {"prior": _DRAWS, "posterior": _DRAWS, "sets": ("set",), "best": ()}
-_GROUPS_OF_DRAWS = ("posterior",)
 
 
-class _Material(BaseModel):
-    plate: dict[str, Any]
-    interaction: dict[str, Any]
-    discrepancy: dict[str, Finite] = {}
-
-
-_OF_THE_DRAWS: Mapping[str, Any] = {attr.WARPIMPACT_VERSION: Text, FIT_TEXT: Text, MATERIAL: Json[_Material]}
-_OF_A_REPORT: Mapping[str, Any] = {
-    **dict.fromkeys((attr.TITLE, attr.HISTORY, attr.DEVICE), Text),
+_ATTRIBUTES: Mapping[str, Any] = {
+    **dict.fromkeys((attr.TITLE, attr.HISTORY, attr.DEVICE, attr.WARPIMPACT_VERSION, FIT_TEXT), Text),
     **dict.fromkeys((EFFECTIVE, WANTED), Finite),
     **dict.fromkeys((PARETO_K, HIT_NOISE), Number),
     **dict.fromkeys((CONVERGED, SETS), Size),
@@ -87,16 +76,14 @@ _OF_A_REPORT: Mapping[str, Any] = {
 }
 
 
-def _fault(tree: xarray.DataTree, groups: Sequence[str]) -> str | None:
-    """What keeps these groups of a tree from being a posterior, as a phrase; None if nothing does."""
-    if missing := [name for name in groups if name not in tree.children]:
+def _fault(tree: xarray.DataTree) -> str | None:
+    """What keeps a tree from being a posterior, as a phrase; None if nothing does."""
+    if missing := [name for name in GROUPS if name not in tree.children]:
         return f'it has no group "{missing[0]}"'
-    alone = groups == _GROUPS_OF_DRAWS
-    root = Declaration({}, attributes=_OF_THE_DRAWS if alone else {**_OF_THE_DRAWS, **_OF_A_REPORT})
-    if fault := root.fault(tree.to_dataset()):
+    if fault := Declaration({}, attributes=_ATTRIBUTES).fault(tree.to_dataset()):
         return fault
-    datasets = {name: tree[name].to_dataset() for name in groups}
-    parameters = [name for name in datasets["posterior" if alone else "prior"].data_vars if name not in HITS]
+    datasets = {name: tree[name].to_dataset() for name in GROUPS}
+    parameters = list(datasets["prior"].data_vars)
     for name, dataset in datasets.items():
         if fault := _declared(name, parameters, datasets).fault(dataset):
             return f'in its group "{name}" {fault}'
@@ -106,10 +93,9 @@ def _fault(tree: xarray.DataTree, groups: Sequence[str]) -> str | None:
 def _declared(group: str, parameters: Sequence[Any], datasets: Mapping[str, xarray.Dataset]) -> Declaration:
     """The declaration of a group: the parameters with their dimensions in it, and the numbers beside them."""
     variables = dict.fromkeys(map(str, parameters), _OF_A_PARAMETER[group]) if group in _OF_A_PARAMETER else {}
-    if len(datasets) > 1:
-        variables |= _OF_A_POSTERIOR.get(group, {})
-        if not datasets["observed_data"].data_vars:  # only limits, or statuses, were measured
-            variables = {name: dims for name, dims in variables.items() if _OBSERVED[0] not in dims}
+    variables |= _OF_A_POSTERIOR.get(group, {})
+    if not datasets["observed_data"].data_vars:  # only limits, or statuses, were measured
+        variables = {name: dims for name, dims in variables.items() if _OBSERVED[0] not in dims}
     along = {dim: (dim,) for dims in variables.values() for dim in dims if dim in (*_SHOTS, *_OBSERVED)}
     rules = {name: numbers if name in _MAY_LACK.get(group, ()) else _some for name in variables}
     rules |= {STD: not_negative} if group == "observed_data" else {}
@@ -128,11 +114,9 @@ def _path_fault(parameter: xarray.DataArray) -> str | None:
 
 POSTERIOR = Kind(
     "a posterior",
-    "warpimpact report takes it, and warpimpact run with --posterior",
+    "warpimpact report takes it",
     ("posterior", EFFECTIVE),
     maker="warpimpact identify",
-    fault=lambda tree: _fault(tree, GROUPS),
+    fault=_fault,
     is_tree=True,
 )
-DRAWS = replace(POSTERIOR, fault=lambda tree: _fault(tree, _GROUPS_OF_DRAWS))
-"""A posterior of which only the draws are needed."""

@@ -43,7 +43,7 @@ COORDINATES = (HIT, HIT_Y, HIT_Z, STANDOFF, AXIS)
 SHOT_VARIABLES = tuple(_condition(name) for name, quantity in QUANTITIES.items() if quantity.table == "impact")
 IMPACT_VELOCITY, OBLIQUITY, AZIMUTH, IMPACT_PITCH, IMPACT_YAW, SPIN = SHOT_VARIABLES
 _OF_THE_SCENE = tuple(_condition(name, " of the plate" if name in BY_LAYER else "") for name in OF_THE_SCENE)
-RESISTANCE, SHEAR_COEFFICIENT, DEGRADATION, THICKNESS, MASS, STRENGTH = _OF_THE_SCENE
+RESISTANCE, SHEAR_COEFFICIENT, DEGRADATION, THICKNESS, MASS, STRENGTH, *_ = _OF_THE_SCENE
 LAYER_SCATTER = tuple(_by_layer(name) for name in BY_LAYER)
 LAYER_THICKNESS = LAYER_SCATTER[BY_LAYER.index("thickness")]
 SCATTER_VARIABLES = (*_OF_THE_SCENE, *LAYER_SCATTER)
@@ -52,10 +52,6 @@ SCATTER_VARIABLES = (*_OF_THE_SCENE, *LAYER_SCATTER)
 EDGE_DISTANCE = Variable("edge_distance", HITS, "m", "from the nearest edge of hole or plate; negative in a hole")
 OF_THE_HIT_POINT = (EDGE_DISTANCE,)
 
-POSTERIOR_DRAW = Variable("posterior_draw", HITS, "1", "place of the shot's parameters in the posterior")
-POSTERIOR_VARIABLES = (POSTERIOR_DRAW,)
-"""Present only in a campaign with a posterior."""
-
 # --- Bursts ---
 SAMPLE = Variable("sample", HITS, "1", "number of the plate that the shot hits")
 BURST_ORDER = Variable("burst_order", HITS, "1", "number of hits on that plate before")
@@ -63,7 +59,7 @@ NEAREST_EARLIER_HIT = Variable("nearest_earlier_hit", HITS, "m", "distance from 
 
 BURST_VARIABLES = (SAMPLE, BURST_ORDER, NEAREST_EARLIER_HIT)
 """Present only in a campaign of bursts."""
-OPTIONAL_SHOT_VARIABLES = (*SCATTER_VARIABLES, *BURST_VARIABLES, *POSTERIOR_VARIABLES)
+OPTIONAL_SHOT_VARIABLES = (*SCATTER_VARIABLES, *BURST_VARIABLES)
 
 
 def _beside(variable: Variable, kind: str, along: str, what: str) -> Variable:

@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from typing import NamedTuple
 
-BURST, LAYERS, POSTERIOR, STOP = "[burst]", "[[layer]]", "posterior", "[stop]"
+BURST, LAYERS, STOP = "[burst]", "[[layer]]", "[stop]"
 IMAGES = "hits.irreducible = true"
 NODAL = 'numerics.scheme = "nodal"'
 BLOCK = 'numerics.layout = "block"'
@@ -15,7 +15,6 @@ BY_PATH = "plate.degradation_distance"
 MASS_PROPERTIES = "core.centre_of_mass, core.inertia_axial or core.inertia_transverse"
 TURNED = "a distribution of impact.obliquity, azimuth, pitch, yaw or spin"
 HOLED_LAYERS = "a [[layer]] with a pattern or a rim"
-SCATTER_OF_MATERIAL = "a distribution of what the posterior gives"
 UNEVEN = 'hits.sampling = "grid" or "list"'
 ONE_SCRAMBLING = "hits.replicates = 1"
 LISTED_STRENGTH = "a column strength in hits.file"
@@ -41,7 +40,6 @@ _BY_BLOCK = "a block computes the consistent scheme in single precision, without
 EXCLUDED = (
     Rule(BURST, IMAGES, "the hits of a burst have no images"),
     Rule(BURST, NODAL, "the nodal scheme does not know earlier hits"),
-    Rule(BURST, POSTERIOR, "the shots of a burst share one plate, not their draws"),
     Rule(SPACING, OFFSETS, "each says how the hits of a burst lie"),
     Rule(SPACING, HIT_SCATTER, "each says how the hits of a burst lie"),
     Rule(LIMIT_COMMAND, STOP, "limits are searched for every hit; leave out the table [stop]"),
@@ -60,7 +58,6 @@ EXCLUDED = (
     *(Rule(BLOCK, other, _BY_BLOCK) for other in (NODAL, DOUBLE, BENDING)),
     Rule(IMAGES, TURNED, "a symmetry must hold for every shot; of the impact quantities only velocity may scatter"),
     Rule(IMAGES, HOLED_LAYERS, "only layers that are solid and unbounded leave the symmetry of the plate"),
-    Rule(POSTERIOR, SCATTER_OF_MATERIAL, "the posterior gives it"),
     Rule(STOP, UNEVEN, 'an interval needs "sobol" or "random"'),
     Rule(STOP, ONE_SCRAMBLING, 'an interval of "sobol" needs several scramblings'),
 )

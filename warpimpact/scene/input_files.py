@@ -108,9 +108,10 @@ def read_columns(
             wanted, present = list(range(len(header))), names
             is_known = tuple(names[: len(required)]) == required and set(names[len(required) :]) <= set(optional)
         if not is_known or len(set(present)) < len(present):
+            first = f"{','.join(required)} and then " if required else ""
             raise ValueError(
-                f"{path.name}, line 1: {_got(header, (*required, *optional))}the header must be {','.join(required)} "
-                f"and then any of {', '.join(optional)}"
+                f"{path.name}, line 1: {_got(header, (*required, *optional))}the header must be {first}any of "
+                f"{', '.join(optional)}"
             )
         rows = _rows(path, header, reader, wanted).T
         return {name: CsvColumn(row, units[place]) for name, row, place in zip(present, rows, wanted, strict=True)}

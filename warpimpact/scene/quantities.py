@@ -37,8 +37,7 @@ class Quantity(NamedTuple):
         meaning: long name of its column in a result.
         by_layer: whether each layer has a value.
         scatters: whether it may have a distribution.
-        listed: whether it may be a column in a list of hits.
-        drawn: whether it may be drawn from a posterior.
+        listed: whether it may be a column in a file of hits.
         column: name of its column in a result; None if it is the name of the quantity.
     """
 
@@ -48,13 +47,7 @@ class Quantity(NamedTuple):
     by_layer: bool = False
     scatters: bool = True
     listed: bool = True
-    drawn: bool = False
     column: str | None = None
-
-
-def _of_material(table: str, kind: Any) -> Quantity:
-    """A quantity of the material that only a posterior varies."""
-    return Quantity(table, kind, scatters=False, listed=False, drawn=True)
 
 
 QUANTITIES: Mapping[str, Quantity] = {
@@ -68,14 +61,13 @@ QUANTITIES: Mapping[str, Quantity] = {
     ),
     "yaw": Quantity("impact", Tilt, "yaw of the core on impact, relative to the line of fire", column="impact_yaw"),
     "spin": Quantity("impact", AngularVelocity, "spin of the core about its axis on impact"),
-    "resistance": Quantity("plate", NonNegativeStress, "resistance", by_layer=True, drawn=True),
-    "shear_coefficient": Quantity("plate", NonNegativeNumber, "friction per normal stress", by_layer=True, drawn=True),
+    "resistance": Quantity("plate", NonNegativeStress, "resistance", by_layer=True),
+    "shear_coefficient": Quantity("plate", NonNegativeNumber, "friction per normal stress", by_layer=True),
     "degradation": Quantity(
         "plate",
         Annotated[Number, Field(ge=0, le=1)],
         "share that an interval of contact leaves of the resistance",
         by_layer=True,
-        drawn=True,
     ),
     "thickness": Quantity("plate", PositiveLength, "thickness", by_layer=True),
     "mass": Quantity("core", PositiveMass, "mass of the core"),
@@ -86,24 +78,22 @@ QUANTITIES: Mapping[str, Quantity] = {
     "offset_z": Quantity(
         "layer", Length, "place of its origin in the plane of the plate, z", by_layer=True, listed=False
     ),
-    "degradation_interval": _of_material("plate", PositiveTime),
-    "degradation_distance": _of_material("plate", PositiveLength),
-    "degradation_length": _of_material("plate", PositiveLength),
-    "degradation_depth": _of_material("plate", PositiveLength),
+    "degradation_interval": Quantity("plate", PositiveTime, scatters=False, listed=False),
+    "degradation_distance": Quantity("plate", PositiveLength, scatters=False, listed=False),
+    "degradation_length": Quantity("plate", PositiveLength, "length within which it weakens", scatters=False),
+    "degradation_depth": Quantity("plate", PositiveLength, "depth within which it weakens", scatters=False),
     "density": Quantity("plate", PositiveDensity, scatters=False, listed=False),
-    "static": _of_material("interaction", NonNegativeNumber),
-    "linear": _of_material("interaction", NonNegativeNumber),
-    "quadratic": _of_material("interaction", NonNegativeNumber),
-    "onset": _of_material("interaction", NonNegativeNumber),
+    "static": Quantity("interaction", NonNegativeNumber, "normal stress at rest per resistance", scatters=False),
+    "linear": Quantity("interaction", NonNegativeNumber, "linear coefficient of the normal stress", scatters=False),
+    "quadratic": Quantity("interaction", NonNegativeNumber, "quadratic coefficient of it", scatters=False),
+    "onset": Quantity("interaction", NonNegativeNumber, "closing speed of full contact per speed", scatters=False),
 }
 """All quantities by name."""
 SCATTERED = {name: quantity for name, quantity in QUANTITIES.items() if quantity.scatters}
 LISTED = tuple(name for name, quantity in QUANTITIES.items() if quantity.listed)
 BY_LAYER = tuple(name for name, quantity in QUANTITIES.items() if quantity.by_layer)
-OF_THE_SCENE = tuple(name for name, quantity in SCATTERED.items() if quantity.table in ("plate", "core"))
-"""Quantities of plate and core that may differ from shot to shot."""
-OF_A_DRAW = ("degradation_length", "degradation_depth", "static", "linear", "quadratic", "onset")
-"""Quantities of plate and interaction that only a posterior gives by shot. A unit of exposure becomes a degradation."""
+OF_THE_SCENE = tuple(name for name in LISTED if QUANTITIES[name].table in ("plate", "core", "interaction"))
+"""Quantities of plate, core and interaction that may differ from shot to shot."""
 
 _OF_THE_PLATE = [name for name, quantity in SCATTERED.items() if quantity.table != "layer"]
 _OF_LAYERS_BEHIND = ("thickness", "resistance", "shear_coefficient", "degradation", "offset_y", "offset_z")

@@ -18,8 +18,9 @@ from .shots import Hits, Impact, Shots
 from .sobol import Sobol
 from .symmetry import irreducible_part, symmetries_used, unsymmetric
 
-_HIT_COLUMNS = 2
-"""Columns of uniform numbers for y and z of the hit; those of the quantities follow."""
+_HIT_COLUMNS, _ROWS = 2, 2**20
+"""Columns of uniform numbers for y and z of the hit, before those of the quantities; column that chooses the rows of
+`Hits.file`."""
 
 
 class Sampler:
@@ -81,7 +82,9 @@ class Sampler:
         for ((name, layer), distribution), share in zip(self._scatter.items(), uniform, strict=True):
             shots = shots.with_own({name: distribution.quantile(np.clip(share, EDGE, 1.0 - EDGE))}, layer)
         if self._hits.listed is not None:
-            rows = np.arange(first, first + count) % len(self._hits.listed["hit_y"])
+            listed, length = self._hits.sampling == "list", len(next(iter(self._hits.listed.values())))
+            uniform_rows = stream(self._hits.seed, (_ROWS,), first, count) * length
+            rows = np.arange(first, first + count) % length if listed else uniform_rows.astype(np.int64)
             shots = shots.with_own({name: column[rows] for name, column in self._hits.listed.items()})
         return shots
 

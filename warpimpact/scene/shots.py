@@ -23,8 +23,8 @@ FARTHEST_HIT = 100.0
 _REPLICATES = 16
 """Default number of scramblings. It does not depend on the count, so a larger count keeps the earlier shots. Student's
 interval over 16 means is 9 % wider than over infinitely many."""
-OF_A_SHOT = ("sample", "burst_order", "nearest_earlier_hit", "posterior_draw")
-"""Columns of shots that share their plates or draw their parameters; no campaign gives their values."""
+OF_A_SHOT = ("sample", "burst_order", "nearest_earlier_hit")
+"""Columns of shots that share their plates; no campaign gives their values."""
 EXPORTED = {quantity.column: name for name, quantity in QUANTITIES.items() if quantity.column is not None}
 """Name of a column in an exported result → its name in a list of hits."""
 
@@ -86,7 +86,8 @@ class Hits(Model):
         seed: of all random numbers.
         file: CSV file of a list, with the header hit_y,hit_z in metres; more columns, named as in `Shots`, override
             those quantities: angles in degrees, all else in SI, or in the unit behind the name, as in "hit_y [mm]".
-            A result that `warpimpact export` wrote is such a list, too.
+            A result that `warpimpact export` wrote is such a list, too. With another sampling, a file without hit
+            points: each shot takes a random row, as of the draws that `warpimpact identify` writes.
         repeats: number of shots at every hit of a grid or a list, each with other draws of the quantities that scatter.
         replicates: number of independent scramblings of a sobol sampling, 16 by default; shots are dealt to them in
             turn. Their spread gives the error of a mean.
@@ -106,7 +107,7 @@ class Hits(Model):
 
     @model_validator(mode="after")
     def _is_complete(self) -> Self:
-        needed, foreign = ("file", {"count", "area", "irreducible"}) if self.sampling == "list" else ("count", {"file"})
+        needed, foreign = ("file", {"count", "area", "irreducible"}) if self.sampling == "list" else ("count", set())
         if getattr(self, needed) is None:
             raise ValueError(f'sampling = "{self.sampling}" needs {needed}')
         if self.sampling in ("sobol", "random"):
@@ -116,6 +117,8 @@ class Hits(Model):
         for name in sorted(foreign):
             if getattr(self, name) != type(self).model_fields[name].default:
                 raise ValueError(f'{name} and sampling = "{self.sampling}" cannot be combined; leave out {name}')
+        if self.file is not None and self.irreducible:
+            raise ValueError("file and irreducible = true cannot be combined; leave out irreducible")
         _ = self.listed
         return self
 
@@ -124,9 +127,11 @@ class Hits(Model):
         """Columns of the file by name, in SI and radians, shape [hits] each; None without a file."""
         if self.file is None:
             return None
-        required = ("hit_y", "hit_z")
+        required = ("hit_y", "hit_z") if self.sampling == "list" else ()
         optional = tuple(name for name in LISTED if name not in required)
         columns = read_columns(self.file, required, optional, EXPORTED)
+        if self.sampling != "list" and {"hit_y", "hit_z"} & columns.keys():
+            raise ValueError(f'{self.file.name} has hit points. Give sampling = "list", which takes them.')
         return {name: _in_si(name, column, self.file.name) for name, column in columns.items()}
 
     @property
@@ -148,7 +153,7 @@ class Hits(Model):
 
     def total(self, period: tuple[float, float]) -> int:
         """Number of shots over a unit cell of this extent along y and z [m]."""
-        if self.listed is not None:
+        if self.sampling == "list" and self.listed is not None:
             return len(self.listed["hit_y"]) * self.repeats
         assert self.count is not None  # validated
         return math.prod(self.grid(period)) * self.repeats if self.sampling == "grid" else self.count
@@ -171,8 +176,8 @@ class Shots:
         pitch, yaw: of the axis, beyond those of the line of flight [rad].
         spin: about the axis [rad/s].
         mass [kg], strength [Pa]: of the core; None if all shots have the value of the scene.
-        degradation_length, degradation_depth [m]: of the plate, drawn from a posterior; None as for `mass`.
-        static, linear, quadratic, onset: of the interaction, drawn from a posterior; None as for `mass`.
+        degradation_length, degradation_depth [m]: of the plate; None as for `mass`.
+        static, linear, quadratic, onset: of the interaction; None as for `mass`.
         resistance [Pa], shear_coefficient, degradation, thickness [m], offset_y, offset_z [m]: of the layers, shape
             [shots, layers]; NaN where a layer has the value of the scene, None if all layers have. Layers beyond the
             columns have the value of the scene. An array of shape [shots] is that of the plate.
@@ -180,7 +185,6 @@ class Shots:
             plate.
         burst_order: number of earlier shots at that plate.
         nearest_earlier_hit: distance from the nearest earlier hit on that plate [m]; NaN for the first one.
-        posterior_draw: index of its parameters in a posterior; None if they are not drawn.
     """
 
     hit_y: Array
@@ -208,7 +212,6 @@ class Shots:
     sample: NDArray[np.int64] | None = None
     burst_order: NDArray[np.int64] | None = None
     nearest_earlier_hit: Array | None = None
-    posterior_draw: Array | None = None
 
     def __post_init__(self) -> None:
         """Make arrays of the plate alone columns of layer 0."""

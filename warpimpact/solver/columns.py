@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from warpimpact.scene.quantities import OF_A_DRAW, OF_THE_SCENE, QUANTITIES
+from warpimpact.scene.quantities import OF_THE_SCENE, QUANTITIES
 from warpimpact.solver.materials import decay_rate
 
 if TYPE_CHECKING:
@@ -18,7 +18,7 @@ Array = NDArray[np.float64]
 Path = tuple[str | int, ...]
 """Place of a key in the tables of a scene, such as ("plate", "pattern", "spacing", 0)."""
 
-COLUMN_OF: dict[Path, str] = {(QUANTITIES[name].table, name): name for name in (*OF_THE_SCENE, *OF_A_DRAW)}
+COLUMN_OF: dict[Path, str] = {(QUANTITIES[name].table, name): name for name in OF_THE_SCENE}
 """Name of the column, by the path."""
 UNITS_OF_EXPOSURE: tuple[Path, ...] = (("plate", "degradation_interval"), ("plate", "degradation_distance"))
 """β per Δt_β is the same law as β^(Δt₀/Δt_β) per Δt₀, so these become a degradation of the shot."""

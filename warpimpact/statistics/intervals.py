@@ -29,8 +29,6 @@ class Estimate:
     Attributes:
         count: number of shots that count.
         spread: standard deviation over these shots.
-        parameters: interval of the number over the draws of a posterior; None if shots draw no parameters, NaN if the
-            hits are too few. `low` and `high` are the interval by the sample of hits alone.
         numerics: largest shift of the number by the numerics, to either side; None or NaN if it is not known.
         assumptions: the number under each assumption about what nobody measured, by the name of the assumption; empty
             if none was computed.
@@ -41,7 +39,6 @@ class Estimate:
     high: float
     count: int
     spread: float
-    parameters: tuple[float, float] | None = None
     numerics: float | None = None
     assumptions: Mapping[str, float] = field(default_factory=dict)
 
@@ -53,19 +50,16 @@ class Estimate:
     def times(self, factor: float) -> Self:
         """The estimate in another unit."""
         value, low, high, spread = (factor * number for number in (self.value, self.low, self.high, self.spread))
-        parameters = self.parameters and (factor * self.parameters[0], factor * self.parameters[1])
         numerics = None if self.numerics is None else factor * self.numerics
         assumptions = {name: factor * number for name, number in self.assumptions.items()}
-        scaled = replace(self, parameters=parameters, numerics=numerics, assumptions=assumptions)
+        scaled = replace(self, numerics=numerics, assumptions=assumptions)
         return replace(scaled, value=value, low=low, high=high, spread=spread)
 
     def within(self, least: float, most: float = math.inf) -> Self:
         """The estimate with the ends of its intervals limited to a range."""
-        ends = (self.low, self.high, *(self.parameters or ()))
-        low, high, *more = (end if math.isnan(end) else min(max(end, least), most) for end in ends)
+        low, high = (end if math.isnan(end) else min(max(end, least), most) for end in (self.low, self.high))
         assumptions = {name: min(max(number, least), most) for name, number in self.assumptions.items()}
-        parameters = (more[0], more[1]) if more else None
-        return replace(self, low=low, high=high, parameters=parameters, assumptions=assumptions)
+        return replace(self, low=low, high=high, assumptions=assumptions)
 
     @property
     def assumed(self) -> tuple[float, float] | None:

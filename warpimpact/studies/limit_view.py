@@ -15,7 +15,6 @@ from warpimpact.analysis.numbers import ends_of, interval_text, intervals_text, 
 from warpimpact.analysis.plate_text import reference_name
 from warpimpact.analysis.proxy import proxy
 from warpimpact.analysis.summary import numerics_note
-from warpimpact.analysis.survival import draws_note
 from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
 from warpimpact.results.dataset import hit_numbers
@@ -156,7 +155,7 @@ def _costs(dataset: xarray.Dataset) -> Iterator[str]:
     runs = dataset[v.LIMITS[dataset.attrs[attr.LIMIT]].runs].values
     yield f"{runs.mean():.2g} runs of a hit on average, {runs.max()} at most"
     yield promise_line(dataset)
-    yield from filter(None, [numerics_note(dataset), draws_note(dataset)])
+    yield from filter(None, [numerics_note(dataset)])
 
 
 def _references(dataset: xarray.Dataset) -> Iterator[str]:

@@ -57,7 +57,6 @@ def test_what_may_have_no_end_is_not_opened(
     ("before", "after", "key"),
     [
         ("title =", 'catalogue = "{}"\ntitle =', "catalogue"),
-        ("title =", 'posterior = "{}"\ntitle =', "posterior"),
         ('sampling = "sobol"', 'sampling = "list"\nfile = "{}"', "hits.file"),
     ],
 )
@@ -153,12 +152,6 @@ def test_a_run_takes_the_name_of_a_campaign(in_tmp_path: Path) -> None:
     assert np.array_equal(run("a.toml", device="cpu")["tilt"], expected["tilt"], equal_nan=True)
     run_to_file("a.toml", "a.nc", device="cpu")
     assert np.array_equal(files.read(Path("a.nc"))["tilt"], expected["tilt"], equal_nan=True)
-
-
-def test_a_posterior_that_links_to_itself_is_told(in_tmp_path: Path, refusal: Refusal) -> None:
-    Path("loop.nc").symlink_to("loop.nc")
-    Path("a.toml").write_text(SLOTTED, encoding="utf-8")
-    assert "but there is no file" in refusal(["run", "a.toml", "--posterior", "loop.nc", "-o", "a.nc"])
 
 
 def test_a_target_without_limits_is_told(make_result: ResultMaker) -> None:

@@ -189,7 +189,7 @@ def test_every_key_that_names_a_file_is_known() -> None:
         for name, field in model.model_fields.items()
         if any(getattr(mark, "func", None) is input_file for mark in field.metadata) or "Path" in str(field.annotation)
     }
-    assert {"posterior", "catalogue"} <= named <= set(FILE_KEYS)
+    assert {"file", "catalogue"} <= named <= set(FILE_KEYS)
 
 
 def test_a_page_reads_the_files_of_its_campaigns(small: Path, tmp_path: Path) -> None:

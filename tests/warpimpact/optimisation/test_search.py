@@ -1,6 +1,5 @@
 """The whole search against fronts that are known, and against itself: killed, resumed, with other seeds."""
 
-import json
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -35,7 +34,6 @@ from warpimpact.solver.resolution import at_level
 from warpimpact.solver.worker import Worker
 from warpimpact.view.view import text_of
 
-from ..campaign.test_posterior import posterior
 from .conftest import CORE, HOLES, SEARCH, WEIGHT_AND_ENERGY, design
 
 RANGE = '{ low = "4 mm", high = "4 mm" }'
@@ -341,19 +339,6 @@ def test_a_limit_of_what_weakens_by_time_is_refused() -> None:
     asked = '[[objectives]]\nmeasure = "mean(limit_velocity)"\n'
     with pytest.raises(CampaignError, match="weakens by time"):
         optimise(design("degradation = 0.8", HOLES, asked, SEARCH))
-
-
-def test_the_front_says_what_survives_the_uncertainty_of_the_parameters(tmp_path: Path) -> None:
-    drawn = posterior(tmp_path)
-    parts = ("degradation = 0.8", '[variables]\nthickness = ["2 mm", "4 mm"]', WEIGHT_AND_ENERGY)
-    plan = SEARCH.replace("confirm_hits = 64", "confirm_hits = 512")
-    text = "\n".join([f"posterior = {json.dumps(drawn.name)}", CORE, *parts, plan])
-    found = optimise(design_from(text, "d.toml", tmp_path))
-    assert (found.sizes["front"], found[f.KEPT].values.tolist()) == (2, [1, 1])
-    # Twice the plate takes more in every draw; the last design of a front has no next one.
-    assert found[f.SURVIVAL].values[0, 1] > 0.99
-    assert np.isnan(found[f.SURVIVAL].values[[0, 1], [0, 1]]).all()
-    assert "1 of 1 differences" in text_of(front_view(found))
 
 
 def test_a_search_says_which_library_it_needs(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -14,7 +14,6 @@ from warpimpact.results.dataset import status_codes
 from warpimpact.results.outlines import outlines
 from warpimpact.results.variables import EXIT_VARIABLES, OPTIONAL_SHOT_VARIABLES, OUTCOME_VARIABLES, SHOT_VARIABLES
 from warpimpact.scene import NoPattern, Shots, SquarePattern
-from warpimpact.scene.quantities import OF_A_DRAW
 
 MM = 1e-3
 TWO_HOLES = SquarePattern(side=2 * MM, spacing=(16 * MM, 8 * MM), holes=[(2 * MM, 0.0), (-2 * MM, 0.0)])
@@ -172,8 +171,7 @@ def test_failing_rename_keeps_the_existing_file(make_result, tmp_path):
 def test_every_field_of_shots_has_a_variable():
     shot_names = {variable.field for variable in SHOT_VARIABLES} | {"hit_y", "hit_z"}
     of_layers = {name.removeprefix("layer_") for name in OPTIONAL_SHOT_VARIABLES}
-    # `posterior_draw` says what shots of a posterior have of those.
-    assert {field.name for field in dataclasses.fields(Shots)} == shot_names | of_layers | {*OF_A_DRAW}
+    assert {field.name for field in dataclasses.fields(Shots)} == shot_names | of_layers
 
 
 def test_a_result_is_opened_by_its_name(make_result, tmp_path):

@@ -73,7 +73,7 @@ def test_a_bad_row_is_named(tmp_path: Path, row: str, complaint: str) -> None:
         ({"sampling": "list", "file": __file__, "count": 3}, "count and sampling"),
         ({"sampling": "grid", "count": 3, "replicates": 8}, "replicates and sampling"),
         ({"sampling": "random", "count": 3, "repeats": 2}, "repeats and sampling"),
-        ({"count": 3, "file": __file__}, "file and sampling"),
+        ({"count": 3, "file": __file__}, "the header must be any of hit_y, hit_z, velocity"),
         ({"count": 0}, "greater than or equal to 1"),
         ({"count": 1.5}, "valid integer"),
         ({"count": True}, "valid integer"),
