@@ -102,18 +102,19 @@ class Core(Model, ABC):
     def mass_properties(self) -> MassProperties:
         """Integrals over the solid of revolution, unless they are overridden.
 
-        The transverse moment is about the centroid, even if `centre_of_mass` is overridden.
+        The transverse moment is about `centre_of_mass`, also where that is overridden (parallel-axis theorem).
         """
         s, weight = self._quadrature()
         area = np.pi * self.radius(s) ** 2 * weight
         volume = area.sum()
         centroid = (area * s).sum() / volume
         axial = (area * self.radius(s) ** 2).sum() / 2
-        transverse = axial / 2 + (area * (s - centroid) ** 2).sum()
+        centre = self.centre_of_mass or centroid  # none of the overrides is 0
+        transverse = axial / 2 + (area * (s - centre) ** 2).sum()
         density = self.density if self.mass is None else self.mass / volume
         return MassProperties(
             mass=float(density * volume),
-            centre_of_mass=float(self.centre_of_mass or centroid),  # none of the overrides is 0
+            centre_of_mass=float(centre),
             inertia_axial=float(self.inertia_axial or density * axial),
             inertia_transverse=float(self.inertia_transverse or density * transverse),
         )

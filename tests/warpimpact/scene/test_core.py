@@ -73,7 +73,9 @@ def test_a_profile_from_a_file_is_that_of_its_numbers(tmp_path: Path) -> None:
 def test_overrides_replace_what_the_shape_gives() -> None:
     plain = PolynomialCore(**PAPER, mass="4 g").mass_properties
     own = PolynomialCore(**PAPER, mass="4 g", centre_of_mass="17 mm", inertia_axial=1e-8).mass_properties
-    assert own == plain._replace(centre_of_mass=17e-3, inertia_axial=1e-8)
+    moved = plain.inertia_transverse + plain.mass * (plain.centre_of_mass - 17e-3) ** 2  # parallel-axis theorem
+    assert own.inertia_transverse == pytest.approx(moved, rel=1e-12)
+    assert own == plain._replace(centre_of_mass=17e-3, inertia_axial=1e-8, inertia_transverse=own.inertia_transverse)
 
 
 @pytest.mark.parametrize(
