@@ -24,11 +24,10 @@ from typing import NamedTuple
 import numpy as np
 import xarray
 
-from warpimpact.analysis.assumptions import AS_GIVEN, moved_apart
 from warpimpact.analysis.comparable import check_same_question, other_shots
 from warpimpact.analysis.comparison_short import short_view
 from warpimpact.analysis.comparison_text import ComparedPlates, comparison_view
-from warpimpact.analysis.contestants import Contestant, Difference, Pair, Verdict
+from warpimpact.analysis.contestants import Contestant, Difference, Pair
 from warpimpact.analysis.effectiveness import Score, Scored, depth_note, measures_of, scores
 from warpimpact.analysis.numbers import of_each
 from warpimpact.analysis.plate_text import common_name, plate_text, reference_name, solid_note, solid_plate, weights_of
@@ -93,7 +92,7 @@ def compare(
     differ_in_weight, by_ratio = _differ_in_weight(datasets), set()
     of_each_pair = confidence_of_each(confidence, len(pairs))
     of_plates: list[list[Score]] = [[] for _ in datasets]
-    differences, verdicts = list[Difference](), list[Verdict]()
+    differences = list[Difference]()
     for scored in zip(
         *(
             scores(dataset, [measure for measure in measures if measure.quantity.name in common])
@@ -114,7 +113,6 @@ def compare(
             paired = not pair.independent and measure.kind != "quantile"
             interval = _apart(sides, both, of_each_pair, by_ratio=is_ratio, paired=paired)
             differences.append(Difference(measure.text, names[i], names[j], *interval))
-            verdicts += _verdicts(sides, both, (names[i], names[j]), of_each_pair, paired=paired)
     plates = tuple(
         Contestant(
             name,
@@ -134,34 +132,7 @@ def compare(
         *(*_weights(datasets, names), *cautions.values()),
         *(*_notes(datasets, names), *_notes_of_bases(datasets, plates)),
     )
-    told = tuple(differences), tuple(used), at_equal_weight, confidence, notes, tuple(verdicts)
-    return Comparison(plates, *told, tuple(cautions))
-
-
-def _verdicts(
-    scored: tuple[Scored, Scored],
-    datasets: tuple[xarray.Dataset, xarray.Dataset],
-    names: tuple[str, str],
-    confidence: float,
-    *,
-    paired: bool,
-) -> Iterator[Verdict]:
-    """Which of two plates has the better value as given, and under every assumption of either; empty where a plate has
-    no hits under assumptions, or where hits give no interval."""
-    measure, moves = scored[0].score.measure, [side.of.moves for side in scored]
-    if measure.higher_is_better is None or not all(moves):
-        return
-    value, low, high = _apart(scored, datasets, confidence, by_ratio=False, paired=paired)
-    if math.isnan(low + high):
-        return
-    half, sign = max(high - value, value - low), 1 if measure.higher_is_better else -1
-    moved = moved_apart(moves[0], moves[1], confidence)
-    under = {AS_GIVEN: (0.0, 0.0)} | moved
-    by = {
-        name: sign * int(np.sign(value + move)) if abs(value + move) > math.hypot(half, open_by) else 0
-        for name, (move, open_by) in under.items()
-    }
-    yield Verdict(measure.text, *names, by.pop(AS_GIVEN), by)
+    return Comparison(plates, tuple(differences), tuple(used), at_equal_weight, confidence, notes, tuple(cautions))
 
 
 def _apart(

@@ -3,8 +3,7 @@ one, and open points. `comparison_text` has every measure."""
 
 from __future__ import annotations
 
-import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 
 from warpimpact.analysis.comparison_text import (
     ComparedPlates,
@@ -56,12 +55,11 @@ def _reversed(pair: Difference) -> Difference:
 
 
 def short_view(comparison: ComparedPlates, evidence: Sequence[str] = ()) -> Section:
-    """The deciding measure with its ranks and differences, what is not told apart, what the answer rests on, and last
-    the lines of evidence."""
+    """The deciding measure with its ranks and differences, what is not told apart, and last the lines of evidence."""
     score = deciding(comparison)
     if score is None:
         return Section([*hits_used(comparison), "no measure ranks these plates", *evidence])
-    notes = (_open(comparison, score), _used(comparison), _assumptions(comparison, score), *evidence)
+    notes = (_open(comparison, score), _used(comparison), *evidence)
     return Section([_ranks(comparison, score), *filter(None, notes)], _title(comparison, score))
 
 
@@ -140,27 +138,3 @@ def _used(comparison: ComparedPlates) -> str:
     same = "" if any(pair.independent for pair in comparison.pairs) else ", the same shots"
     left_open = f"; not allowed for: {', '.join(comparison.cautions)}" if comparison.cautions else ""
     return f"{count} hits of each plate{same}{left_open}"
-
-
-def _assumptions(comparison: ComparedPlates, score: Score) -> str:
-    """Whether the best plate stays the best under other assumptions about what nobody measured."""
-    best = comparison.ordered(score.name)[0]
-    about = [each for each in comparison.verdicts if each.measure == score.name and best in (each.one, each.other)]
-    told = [verdict for verdict in about if verdict.given and (verdict.given > 0) == (verdict.one == best)]
-    if not about:
-        return "" if math.isnan(score.value) else "assumptions: how far they move this is not known"
-    by_value = ", by value alone" if score.name in (comparison.at_equal_weight or ()) else ""
-    if not told:
-        return f"assumptions{by_value}: {best} is not told to be best as given"
-    every = list(dict.fromkeys(name for verdict in told for name in verdict.under))
-    turned = list(dict.fromkeys(name for verdict in told for name in verdict.turned))
-    open_ = [name for name in every if name not in turned and any(not verdict.under.get(name) for verdict in told)]
-    kept = len(every) - len(turned) - len(open_)
-    return f"assumptions{by_value}: {best} stays ahead in {kept} of {len(every)}" + "".join(_named(turned, open_))
-
-
-def _named(turned: Sequence[str], open_: Sequence[str]) -> Iterator[str]:
-    if turned:
-        yield f"; turned over by {', '.join(turned)}"
-    if open_:
-        yield f"; open in {len(open_)}"

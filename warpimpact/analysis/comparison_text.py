@@ -7,8 +7,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from warpimpact.analysis.assumptions import AS_GIVEN
-from warpimpact.analysis.contestants import Contestant, Difference, Pair, Verdict
+from warpimpact.analysis.contestants import Contestant, Difference, Pair
 from warpimpact.analysis.effectiveness import Score
 from warpimpact.analysis.numbers import Ends, intervals_text, number_text, of_each
 from warpimpact.analysis.plate_text import common_name
@@ -27,7 +26,6 @@ class ComparedPlates:
             solid plate; None if the weights are the same.
         confidence: confidence at which the intervals of a measure's differences hold together.
         notes: further notes, a sentence each.
-        verdicts: verdicts on every pair in every measure that assumptions change.
         cautions: differences or unknowns of the plates that the ranks do not consider, in a few words.
     """
 
@@ -37,7 +35,6 @@ class ComparedPlates:
     at_equal_weight: frozenset[str] | None
     confidence: float
     notes: tuple[str, ...]
-    verdicts: tuple[Verdict, ...] = ()
     cautions: tuple[str, ...] = ()
 
     @property
@@ -129,8 +126,7 @@ def best_rows(comparison: ComparedPlates) -> list[tuple[str, str]]:
         first = [name for name, rank in comparison.ranks(measure.name).items() if rank == 1]
         told_apart = len(first) < len(comparison.plates)
         neither = "cannot be told apart" if is_ranked(comparison, measure.name) else "not ranked"
-        doubts = _as_good(comparison, measure.name, first) + _turned(comparison, measure.name, first)
-        sentence = listed(first) + doubts
+        sentence = listed(first) + _as_good(comparison, measure.name, first)
         rows.append((measure.measure.label, sentence if told_apart else neither))
     return rows
 
@@ -141,21 +137,6 @@ def _as_good(comparison: ComparedPlates, measure: str, first: Sequence[str]) -> 
     others = [plate.name for plate in comparison.plates if plate.name not in first]
     open_ = [name for name in others if not all({name, leader} in apart for leader in first)]
     return f" (not told apart for certain from {listed(open_)})" if open_ else ""
-
-
-def _turned(comparison: ComparedPlates, measure: str, first: Sequence[str]) -> str:
-    """Words about assumptions that reverse the verdict on the best plates; mostly empty."""
-    if measure in (comparison.at_equal_weight or ()):
-        return ""  # verdicts compare values, not ratios
-    about = [verdict for verdict in comparison.verdicts if verdict.measure == measure]
-    turned = dict.fromkeys(
-        name
-        for verdict in about
-        if verdict.given and {verdict.one, verdict.other} & {*first}
-        for name in verdict.turned
-    )
-    every = {name for verdict in about for name in verdict.under}
-    return f" (turned over by {len(turned)} of {len(every)} assumptions)" if turned else ""
 
 
 def is_ranked(comparison: ComparedPlates, measure: str) -> bool:
@@ -185,10 +166,8 @@ def _ranking(comparison: ComparedPlates, measure: Score) -> Section:
     columns += [number("add-on kg/m²", digits=".2f"), number("base alone")] if parted else []
     what = f" in the ratio to the {reference}" if measure.name in (comparison.at_equal_weight or ()) else ""
     differences = [_in_words(pair, measure, what) for pair in comparison.differences if pair.measure == measure.name]
-    by_value = "by value alone, " if what else ""
-    verdicts = [by_value + verdict.text for verdict in comparison.verdicts if verdict.measure == measure.name]
     title = f"{measure.measure.title}; {measure.measure.better}{weighed(comparison, measure.name)}"
-    return Section([Table(columns, rows), *differences, *verdicts], title)
+    return Section([Table(columns, rows), *differences], title)
 
 
 def weighed(comparison: ComparedPlates, measure: str) -> str:
@@ -220,19 +199,3 @@ def _in_words(pair: Difference, measure: Score, what: str) -> str:
 def negative(interval: tuple[float, float]) -> tuple[float, float]:
     """The interval of the negated number."""
     return -interval[1], -interval[0]
-
-
-def assumptions_view(comparison: ComparedPlates) -> list[Section]:
-    """Every measure of all plates under every assumption."""
-    sections = []
-    for score in compared_scores(comparison):
-        of_plates = [plate.score(score.name) for plate in comparison.plates]
-        names = dict.fromkeys(name for of_plate in of_plates for name in of_plate.assumptions)
-        if names:
-            given = (AS_GIVEN, *(of_plate.value for of_plate in of_plates))
-            under = [(name, *(plate.assumptions.get(name, plate.value) for plate in of_plates)) for name in names]
-            columns = (Column("assumption"), *(number(plate.name) for plate in comparison.plates))
-            sections.append(
-                Section([Table(columns, [given, *under])], f"{score.measure.title}; {score.measure.better}")
-            )
-    return sections

@@ -8,14 +8,14 @@ those of statistics/comparisons.py.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 import xarray
 
 from warpimpact.analysis.estimates import Evidence, asked_measures, by_hit_of, evidence
-from warpimpact.analysis.numbers import Ends, ends_of, intervals_text
+from warpimpact.analysis.numbers import Ends, intervals_text
 from warpimpact.analysis.plate_text import plate_text, reference_name, solid_note
 from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
@@ -24,7 +24,6 @@ from warpimpact.results.per_hit import Array
 from warpimpact.results.solid_reference import base_alone, base_alone_limits, solid_limits, solid_reference
 from warpimpact.results.tallies import dealing, estimate_from
 from warpimpact.statistics.comparisons import Ratio
-from warpimpact.statistics.intervals import Estimate
 from warpimpact.view.view import Column, Section, Table, number, text_of
 
 
@@ -59,7 +58,6 @@ class Score:
         hit: number of the hit that is the worst point; None for other measures.
         numerics: largest shift of the value by the numerics; None or NaN where unknown.
         alone: value of the base alone.
-        assumptions: value under each assumption, as in `Estimate`.
     """
 
     measure: Measure
@@ -73,7 +71,6 @@ class Score:
     hit: int | None = None
     numerics: float | None = None
     alone: float = math.nan
-    assumptions: Mapping[str, float] = field(default_factory=dict)
 
     @property
     def name(self) -> str:
@@ -83,8 +80,7 @@ class Score:
     @property
     def ends(self) -> Ends:
         """Its intervals."""
-        beside = self.numerics, self.assumptions
-        return ends_of(Estimate(self.value, self.low, self.high, 0, math.nan, *beside))
+        return Ends(self.low, self.high, self.numerics)
 
     @property
     def ratio_text(self) -> str:
@@ -180,7 +176,6 @@ def _scored(given: Evidence, dataset: xarray.Dataset, reference: xarray.Dataset 
         ratio_high=against.high,
         hit=None if given.worst_shot is None else int(dataset[v.HIT][given.worst_shot]),
         numerics=estimate.numerics,
-        assumptions=estimate.assumptions,
     )
     return Scored(score, given, solid)
 

@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from warpimpact.analysis.assumptions import Assumed, Moves
 from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
 from warpimpact.results.dataset import SLICE, finer_pair
@@ -31,13 +30,11 @@ class Evidence:
 
     Attributes:
         values: values of the shots for the measure, NaN where a shot does not count, shape [hits].
-        moves: changes by assumptions; None where unknown.
     """
 
     measure: Measure
     estimate: Estimate
     values: Array
-    moves: Moves | None = None
 
     @property
     def numbers(self) -> Array | None:
@@ -56,15 +53,14 @@ class Evidence:
     def shown(self) -> Evidence:
         """The evidence in the display unit of the measure."""
         factor = self.measure.display.factor
-        estimate, moves = self.estimate.times(factor), self.moves and self.moves.times(factor)
-        return Evidence(self.measure, estimate, factor * self.values, moves)
+        return Evidence(self.measure, self.estimate.times(factor), factor * self.values)
 
 
 def evidence(dataset: Result, measures: Sequence[Measure]) -> Iterator[Evidence]:
     """Measures one after the other. Of an open file, one slice at a time and one number per hit are in memory."""
     needed = (v.STATUS, *v.GROUPS["finer"], *(name for measure in measures for name in measure.quantity.of))
     pair = finer_pair(dataset[[name for name in dict.fromkeys(needed) if name in dataset]])
-    dealt, assumed = dealing(dataset), Assumed(dataset, measures)
+    dealt = dealing(dataset)
     key, by_hit = None, np.empty(0)
     for measure in measures:
         if key != (key := (measure.quantity, measure.standoff)):
@@ -72,13 +68,11 @@ def evidence(dataset: Result, measures: Sequence[Measure]) -> Iterator[Evidence]
         values = measure.counted(by_hit)
         estimate = estimate_from(measure, values, **dealt)
         estimate = replace(estimate, numerics=shift_of(measure, pair))
-        moves = assumed.moves(measure)
         if measure.has_interval:
-            under = {} if moves is None else {name: estimate.value + by for name, by in moves.by.items()}
-            estimate = replace(estimate, assumptions=under).within(measure.least, measure.most)
+            estimate = estimate.within(measure.least, measure.most)
         if measure.kind == "quantile" and measure.name in _LIMITS:
             estimate = _beyond(estimate, dataset.attrs.get(attr.LIMIT_HIGHEST, math.inf))
-        yield Evidence(measure, estimate, values, moves)
+        yield Evidence(measure, estimate, values)
 
 
 def _beyond(estimate: Estimate, highest: float) -> Estimate:

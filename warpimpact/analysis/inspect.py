@@ -8,7 +8,6 @@ from typing import Any
 import numpy as np
 import xarray
 
-from warpimpact.analysis.assumptions_view import assumptions_view
 from warpimpact.analysis.bursts import bursts, bursts_view
 from warpimpact.analysis.effectiveness import effectiveness_view
 from warpimpact.analysis.estimates import estimated, means_of, slices, status_shares
@@ -40,15 +39,14 @@ def inspect_text(dataset: xarray.Dataset) -> str:
 
 
 def inspect_view(dataset: xarray.Dataset) -> list[Section]:
-    """The view of a hit map: its origin, how shots ended, its numbers, its measures of protection, what
-    nobody measured, and what failed."""
+    """The view of a hit map: its origin, how shots ended, its numbers, its measures of protection, and
+    what failed."""
     return [
         _origin(dataset),
         _statuses(dataset),
         _numbers(dataset),
         *(bursts_view(bursts(dataset)) if v.BURST_ORDER in dataset else []),
         effectiveness_view(dataset),
-        assumptions_view(dataset),
         failures(dataset),
     ]
 

@@ -17,11 +17,6 @@ def number_text(number: float) -> str:
     return "-" if math.isnan(number) else f"{0.0 if abs(number) < ROUNDING else number:#.4g}"
 
 
-def rough_text(number: float) -> str:
-    """A number with three digits, for what is not known better."""
-    return f"{float(f'{number:.3g}'):.10g}"
-
-
 def interval_text(low: float, high: float, text: Callable[[float], str] = number_text) -> str:
     """A confidence interval as text: a dash if there is none, one end if the shots give only one."""
     if math.isnan(low) and math.isnan(high):
@@ -32,18 +27,16 @@ def interval_text(low: float, high: float, text: Callable[[float], str] = number
 
 
 class Ends(NamedTuple):
-    """Intervals of a number: by the hits; the largest shift by the numerics, None or NaN where unknown; and the range
-    under assumptions."""
+    """Intervals of a number: by the hits, and the largest shift by the numerics, None or NaN where unknown."""
 
     low: float
     high: float
     numerics: float | None = None
-    assumed: tuple[float, float] | None = None
 
 
 def ends_of(estimate: Estimate) -> Ends:
     """The intervals of an estimate."""
-    return Ends(estimate.low, estimate.high, estimate.numerics, estimate.assumed)
+    return Ends(estimate.low, estimate.high, estimate.numerics)
 
 
 def intervals_text(
@@ -58,9 +51,6 @@ def intervals_text(
         return text_of_ends
     if ends.numerics is not None and not math.isnan(ends.numerics):
         text_of_ends += f", numerics ± {shift(ends.numerics)}"
-    if ends.assumed is not None:
-        low, high = map(rough_text, ends.assumed)
-        text_of_ends += f", assumptions {low} to {high}" * (low != high)
     return text_of_ends
 
 

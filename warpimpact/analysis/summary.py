@@ -7,7 +7,6 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
-from warpimpact.analysis.assumptions_view import assumptions_lines
 from warpimpact.analysis.estimates import estimated, means_of, slices
 from warpimpact.analysis.numbers import ends_of, interval_text, intervals_text
 from warpimpact.results import attributes as attr
@@ -115,8 +114,7 @@ def summary_text(dataset: Result) -> str:
             interval = intervals_text(ends_of(shown), "{:.2f}".format)
             rows.append((measure.column.label, shown.value, unit, interval, shown.spread, _counted(shown.count, hits)))
     notes = (numerics_note(dataset), levels_note(dataset))
-    moved = assumptions_lines(dataset)
-    return text_of([Section([shares, Table(columns, rows), *moved, *stop_lines(dataset), *filter(None, notes)])])
+    return text_of([Section([shares, Table(columns, rows), *stop_lines(dataset), *filter(None, notes)])])
 
 
 def _counts(dataset: Result) -> dict[str, int]:

@@ -23,7 +23,7 @@ from warpimpact.view.view import Column, Section, Table, number
 SHOWN_OF_SWEEPS = (f"mean({v.RESIDUAL_VELOCITY})", f"mean({v.DEFLECTION})", f"mean({v.TILT})", "P(perforated)")
 """Default measures of a sweep, as far as it has them."""
 
-_MORE = "means are over the cores that passed; --measure TEXT tells how far numerics and assumptions may shift it"
+_MORE = "means are over the cores that passed; --measure TEXT tells how far the numerics may shift it"
 
 
 class Point(NamedTuple):
@@ -68,7 +68,7 @@ def points(sweep: xarray.Dataset, measures: Sequence[Measure]) -> Iterator[Point
 
 def sweep_view(sweep: xarray.Dataset, texts: Sequence[str] = ()) -> list[Section]:
     """The view of a sweep: one table with a row for every combination and its measures. If measures are asked for, each
-    has a table, with its shifts by the numerics and by assumptions, and the hits that count."""
+    has a table, with its shifts by the numerics, and the hits that count."""
     measures = measures_of(sweep, texts)
     every = list(points(sweep, measures))
     title = str(sweep.attrs.get(attr.TITLE, "untitled"))

@@ -41,7 +41,6 @@ from ..scene.shots import FARTHEST_HIT
 from ..scene.symmetry import unsymmetric
 from ..scene.target import MOST_LAYERS
 from ..scene.units import Number, PositiveLength, Title
-from .assumptions import Assumptions
 from .catalogued import catalogue_of, with_materials, with_threat
 from .continuum_settings import FiniteElements
 from .needs import lacking
@@ -89,7 +88,6 @@ class Campaign(Model):
         burst: several shots at one plate, one after another; hits are then their aims.
         scatter: distributions of values that scatter. A file has them in the places of the values.
         catalogue: TOML file with threats and materials of your own, tables `[[threat]]` and `[[material]]`.
-        assumptions: what nobody measured, and what it may be instead.
         stop: when the run ends, instead of a count. Unless told otherwise, its hits are then those of the irreducible
             part of the cell, with their images.
         allow_implausible: compute also with values that no core or target has, such as a plate of 4 m: they are else
@@ -109,7 +107,6 @@ class Campaign(Model):
     output: Output = Output()
     scatter: Scatter = Scatter()
     catalogue: InputFile | None = None
-    assumptions: Assumptions = Assumptions()
     stop: Stop | None = None
     burst: Burst | None = None
     allow_implausible: Annotated[bool, Field(strict=True)] = False

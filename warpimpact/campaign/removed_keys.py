@@ -4,6 +4,7 @@ from collections.abc import Iterator
 from typing import Any
 
 REMOVED_KEYS: dict[str, str] = {
+    "assumptions": "run warpimpact sensitivity CAMPAIGN.toml",
     "posterior": "use hits.file with the CSV file that `warpimpact identify` writes",
 }
 """The sentence for each key, by its dotted path without numbers of list items; or for a value, as "key = value"."""

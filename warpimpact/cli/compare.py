@@ -25,8 +25,6 @@ from .run import failure_code
 if TYPE_CHECKING:
     from xarray import Dataset
 
-    from warpimpact.analysis.comparison import Comparison
-
 
 def add_compare(commands: Commands) -> None:
     parser = add_command(
@@ -59,12 +57,6 @@ def add_compare(commands: Commands) -> None:
         action="store_true",
         dest="every",
         help="print and draw every measure, every pair of plates, and what was compared how",
-    )
-    parser.add_argument(
-        "--assumptions",
-        action="store_true",
-        help="also print every number under every assumption about what nobody measured: resistance, weakening, "
-        "friction, onset, obliquity, yaw, stand-off",
     )
     add_computing(parser)
     add_count(parser)
@@ -108,8 +100,6 @@ def _compare(arguments: argparse.Namespace) -> int:
         print(text_of([*comparison_view(comparison), Section(evidence)]))
     else:
         print(text_of([short_view(comparison, evidence)]))
-    if arguments.assumptions:
-        print(_under_assumptions(comparison))
     comparison_figure(comparison, every=arguments.every).savefig(figure, dpi=150)
     print(f"{figure}{replaced}" + ("" if arguments.every else "; every measure with --all"))
     if (against_weight := weight_figure(comparison)) is not None:
@@ -129,10 +119,10 @@ def _print_models(
     from warpimpact.results import variables as v
     from warpimpact.view.view import text_of
 
-    if arguments.measure or arguments.assumptions:
+    if arguments.measure:
         raise files.ResultError(
-            f"{arguments.files[0]}: --measure and --assumptions are for plates, but these are the same shots at one "
-            "plate by two models, which are compared hit by hit"
+            f"{arguments.files[0]}: --measure is for plates, but these are the same shots at one plate by two models, "
+            "which are compared hit by hit"
         )
     print(text_of([shot_by_shot(shared)]))
     for line in evidence:
@@ -140,20 +130,6 @@ def _print_models(
     for path, variable in zip(figures, (v.RESIDUAL_VELOCITY, v.TILT), strict=True):
         variable_maps(shared, variable).savefig(path, dpi=150)
         print(path)
-
-
-def _under_assumptions(comparison: "Comparison") -> str:
-    """Every number under every assumption, as text."""
-    from warpimpact.analysis.comparison_text import assumptions_view
-    from warpimpact.results.files import ResultError
-    from warpimpact.view.view import text_of
-
-    if not (sections := assumptions_view(comparison)):
-        raise ResultError(
-            "--assumptions: these results have no hits under assumptions; [assumptions] compute = true in a campaign "
-            "has them computed"
-        )
-    return text_of(sections)
 
 
 def _plates_run(arguments: argparse.Namespace, folder: Path) -> dict[str, Path]:

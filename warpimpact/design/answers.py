@@ -26,9 +26,8 @@ from warpimpact.report.report import report_page
 from warpimpact.report.words import compared, result_content, templates
 from warpimpact.results import attributes as attr
 from warpimpact.results.replayed_hit import hit_view
-from warpimpact.runs.assumed import has_assumptions
 from warpimpact.runs.replay import replay
-from warpimpact.runs.run import run, with_assumptions
+from warpimpact.runs.run import run
 from warpimpact.solver.worker import Cancel
 from warpimpact.view.view import text_of
 
@@ -79,32 +78,18 @@ class Answers:
         }
 
     def result(self, design: ValidDesign, cancel: Cancel) -> xarray.Dataset:
-        """The hit map of a design. `assume` adds its hits under assumptions.
+        """The hit map of a design.
 
         Raises:
             Cancelled: by `cancel`.
         """
         text, campaign = design.text, design.campaign
         if text not in self._results:
-            none = campaign.assumptions.model_copy(update={"compute": False})
-            alone = campaign.model_copy(update={"assumptions": none})
-            self._results[text] = run(alone, device=self._device, progress=lambda _: None, cancel=cancel)
+            self._results[text] = run(campaign, device=self._device, progress=lambda _: None, cancel=cancel)
             while len(self._results) > 1 and sum(result.nbytes for result in self._results.values()) > _MOST_KEPT:
                 self._results.popitem(last=False)
         self._results.move_to_end(text)
         return self._results[text]
-
-    def assume(self, designs: Mapping[str, ValidDesign], cancel: Cancel) -> None:
-        """Compute the missing hits of designs under assumptions, if these are asked for.
-
-        Raises:
-            Cancelled: by `cancel`.
-        """
-        for design in designs.values():
-            dataset = self.result(design, cancel)
-            if has_assumptions(design.campaign) and attr.ASSUMED_TIME not in dataset.attrs:
-                told = with_assumptions(dataset, design.campaign, device=self._device, cancel=cancel)
-                self._results[design.text] = told
 
     def maps(
         self, name: str, designs: Mapping[str, ValidDesign], full: Mapping[str, ValidDesign], level: int, cancel: Cancel
@@ -146,12 +131,8 @@ class Answers:
             ),
         }
 
-    def numbers(self, designs: Mapping[str, ValidDesign], assumed: bool, cancel: Cancel) -> dict[str, Any]:
-        """The tables of the designs as HTML.
-
-        Args:
-            assumed: whether all hits under assumptions that they can have are computed.
-        """
+    def numbers(self, designs: Mapping[str, ValidDesign], cancel: Cancel) -> dict[str, Any]:
+        """The tables of the designs as HTML."""
         datasets = {label: self.result(design, cancel) for label, design in designs.items()}
         results = []
         for label, dataset in datasets.items():
@@ -159,9 +140,7 @@ class Answers:
             results.append(result_content(label, dataset))
         cancel.check()
         comparison = compared(datasets, picture=False) if len(datasets) > 1 else None
-        html = self._environment.get_template("answer.html").render(
-            results=results, comparison=comparison, assumed=assumed
-        )
+        html = self._environment.get_template("answer.html").render(results=results, comparison=comparison)
         return {"kind": "numbers", "html": html}
 
     def trajectory(self, design: ValidDesign, level: int, stage: str, hit: int, cancel: Cancel) -> dict[str, Any]:
@@ -205,7 +184,6 @@ class Answers:
         Raises:
             Cancelled: by `cancel`.
         """
-        self.assume(designs, cancel)
         datasets = {name: self.result(design, cancel) for name, design in designs.items()}
         return report_page(datasets, folders=dict.fromkeys(datasets, ROOT), progress=lambda done, total: cancel.check())
 

@@ -264,10 +264,9 @@ def _valid(shelf: Shelf, tables: Tables) -> ValidDesign | None:
 
 
 def _of_few_hits(design: ValidDesign, most: int, *, irreducible: bool = False) -> Tables:
-    """Tables of a design with at most this number of hits, without a stop rule and assumptions. A list keeps the hits
+    """Tables of a design with at most this number of hits, without a stop rule. A list keeps the hits
     of its file."""
-    tables = {key: value for key, value in design.tables.items() if key not in ("stop", "assumptions")}
-    tables["assumptions"] = {"compute": False}
+    tables = {key: value for key, value in design.tables.items() if key != "stop"}
     count, together = design.campaign.hits.count, design.campaign.at_a_plate
     if count is None:
         return tables

@@ -30,7 +30,6 @@ from warpimpact.design.edits import changed
 from warpimpact.design.guard import Guard
 from warpimpact.design.hasty import Hasty
 from warpimpact.results.files import ResultError
-from warpimpact.runs.assumed import has_assumptions
 from warpimpact.scene.bounds import Implausible
 from warpimpact.scene.units import quoted
 from warpimpact.solver.device import DeviceError
@@ -46,11 +45,11 @@ _FILES = {
 """Files of the page, by the rooms that have them."""
 _MISTAKES = (CampaignError, ResultError, DeviceError, TooManySteps, MemoryError)
 """Errors that the page shows as a sentence."""
-_FIRST, _ASKED, _REFINE, _LAST = 0, 1, 2, 3
-"""Urgencies: the first map after a change, a click of the user, the later stages, and hits under assumptions."""
+_FIRST, _ASKED, _REFINE = 0, 1, 2
+"""Urgencies: the first map after a change, a click of the user, and the later stages."""
 _LINES = "application/x-ndjson"
 _PLOTLY = cache(get_plotlyjs)
-_STAGES = {"first": _FIRST, "draft": _REFINE, "full": _LAST}
+_STAGES = {"first": _FIRST, "draft": _REFINE, "full": _REFINE}
 
 
 def _nothing() -> None:
@@ -114,7 +113,7 @@ class _Pages:
     async def _lines(
         self, design: ValidDesign, others: list[tuple[str, ValidDesign]], level: int
     ) -> AsyncGenerator[Any]:
-        """The plate, and maps and numbers of each stage; then the numbers under assumptions. The first map is computed
+        """The plate, and maps and numbers of each stage. The first map is computed
         while the plate is drawn."""
         full = named(design, others)
         every = [dict(stages(self._shelf, other, level)) for _, other in others]
@@ -137,13 +136,7 @@ class _Pages:
                 yield told
             finally:
                 maps.cancel()
-            asks = name == "full" and any(has_assumptions(by_stage.campaign) for by_stage in designs.values())
-            yield await self._desk.do(
-                _STAGES[name], partial(self._answers.numbers, designs, name == "full" and not asks)
-            )
-        if asks:
-            await self._desk.do(_LAST, partial(self._answers.assume, full))
-            yield await self._desk.do(_LAST, partial(self._answers.numbers, full, True))
+            yield await self._desk.do(_STAGES[name], partial(self._answers.numbers, designs))
 
     async def change(self, asked: Tables) -> Any:
         design, _ = self._designs(asked)

@@ -16,13 +16,11 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field, model_validator
 
-from warpimpact.campaign.alternatives import alternatives
 from warpimpact.campaign.campaign import Campaign
 from warpimpact.campaign.evidence import evidence_of
 from warpimpact.campaign.text import CampaignError
 from warpimpact.kernels.status import Status
 from warpimpact.records.group import failures
-from warpimpact.runs.assumed import has_assumptions
 from warpimpact.runs.executor import Job
 from warpimpact.runs.questions import Arrays, Question, Round, RoundProgress
 from warpimpact.scene import Numerics, Scene, Shots
@@ -37,8 +35,6 @@ from warpimpact.statistics.student import student_quantile
 Angles = Annotated[tuple[Angle, ...], Field(min_length=1, max_length=64)]
 
 _LARGEST_OBLIQUITY = math.radians(89.0)
-ASSUMED_HITS = 64
-"""Hits under each assumption, over all directions, unless the campaign gives their number."""
 
 
 class Directions(Model):
@@ -120,8 +116,7 @@ class Sector:
         share, low, high: P(perforation) and its 95 % interval.
         hits: number of computed hits.
         failed: number of hits that failed.
-        mean: the weighted mean of P(perforation) with its 95 % interval, and under assumptions.
-        assumed_hits: number of hits under each assumption.
+        mean: the weighted mean of P(perforation) with its 95 % interval.
         evidence: as in `Response`.
     """
 
@@ -131,7 +126,6 @@ class Sector:
     hits: NDArray[np.int64]
     failed: NDArray[np.int64]
     mean: Estimate
-    assumed_hits: int
     evidence: str
 
 
@@ -189,47 +183,7 @@ def protect(
             passed[cell] = np.concatenate([passed[cell], answers["passed"]])
         open_ = [cell for cell in open_ if _wanted(campaign, passed[cell], directions)]
         count = min(2 * count, directions.max_count)
-    sector = _sector(campaign, directions, passed)
-    return (yield from _under_assumptions(campaign, directions, sector, first, numerics, passed))
-
-
-def _under_assumptions(
-    campaign: Campaign,
-    directions: Directions,
-    sector: Sector,
-    first: Shots,
-    numerics: str,
-    passed: dict[tuple[float, float], Array],
-) -> Question[Sector]:
-    """The mean over directions under each assumption, from some of the hits. The number of hits in a direction is
-    proportional to its weight, so their plain mean is the weighted one.
-
-    Args:
-        first: hits that every direction has.
-        passed: answers in every direction.
-    """
-    if not has_assumptions(campaign):
-        return sector
-    count = campaign.assumptions.hits or ASSUMED_HITS
-    edges = np.cumsum(directions.weights().ravel())
-    which = np.minimum(np.searchsorted(edges, (np.arange(count) + 0.5) / count), len(edges) - 1)
-    numbers, cells = np.arange(count) % len(first), list(passed)
-    shots = Shots.joined([toward(first[numbers[which == place]], *cells[place]) for place in np.unique(which)])
-    given = np.concatenate([passed[cells[place]][numbers[which == place]] for place in np.unique(which)])
-    possible = [
-        candidate for candidate in alternatives(campaign) if candidate.moves_limits and candidate.is_possible(shots)
-    ]
-    results = yield Round(
-        [Job(_answers, (alternative.scene, alternative.shots(shots), numerics)) for alternative in possible],
-        [f"assumption {alternative.name}" for alternative in possible],
-    )
-    moves = {
-        alternative.name: float(np.nanmean(answers["passed"] - given))
-        for alternative, answers in zip(possible, results, strict=True)
-        if not np.isnan(answers["passed"] - given).all()
-    }
-    under = {name: sector.mean.value + move for name, move in moves.items()}
-    return replace(sector, mean=replace(sector.mean, assumptions=under).within(0.0, 1.0), assumed_hits=count)
+    return _sector(campaign, directions, passed)
 
 
 def _piloted(campaign: Campaign, shots: Shots, *, worker: Worker, report: Callable[[float], object]) -> Arrays:
@@ -277,7 +231,7 @@ def _sector(campaign: Campaign, directions: Directions, passed: dict[tuple[float
     hits = np.array([len(answers) for answers in passed.values()]).reshape(shape)
     failed = np.array([int(np.isnan(answers).sum()) for answers in passed.values()]).reshape(shape)
     mean = weighted_mean(list(passed.values()), directions.weights().ravel(), campaign.replicates)
-    return Sector(share, low, high, hits, failed, mean, 0, "\n".join(evidence_of(campaign)))
+    return Sector(share, low, high, hits, failed, mean, "\n".join(evidence_of(campaign)))
 
 
 def weighted_mean(passed: list[Array], weights: Array, replicates: int) -> Estimate:

@@ -8,25 +8,13 @@ from typing import Any
 
 import numpy as np
 import xarray
-from numpy.typing import NDArray
 
-from warpimpact.analysis.assumptions_view import assumptions_table
 from warpimpact.analysis.evidence_lines import evidence_lines
 from warpimpact.results import attributes as attr
 from warpimpact.results import firing as f
 from warpimpact.statistics.acceptance import acceptance, shown_stop_probability
 from warpimpact.statistics.intervals import Estimate, estimate_of
 from warpimpact.view.view import Column, Section, Table, number
-
-_ANSWERS = {
-    f.ASSUMED_V50: "V50 of the target, m/s",
-    f.ASSUMED_REPORTED: "reported V50, mean, m/s",
-    f.ASSUMED_REQUIRED: "tests that report the required V50",
-    f.ASSUMED_STOP: "P(stop) of a shot of the proof",
-    f.ASSUMED_PASS: "tests that pass the proof",
-    f.ASSUMED_MEAN: "P(perforation), mean over directions",
-}
-"""Words for the answers that assumptions change."""
 
 
 @dataclass(frozen=True)
@@ -90,23 +78,8 @@ def firing_view(dataset: xarray.Dataset) -> list[Section]:
         *([Section([_size(dataset, test["precision"])])] if f.SIZE in dataset else []),
         *([_proof(dataset, test["proof"])] if f.PASS in dataset else []),
         *([_directions(dataset)] if f.DIRECTION_SHARE in dataset else []),
-        *([_assumptions(dataset)] if f.ASSUMPTIONS_NOTE in attributes else []),
         Section(evidence_lines(dataset)),
     ]
-
-
-def _assumptions(dataset: xarray.Dataset) -> Section:
-    """Ranges of the answers of the test under assumptions."""
-    answers = {answer: dataset[answer].values for answer in f.ASSUMED_ANSWERS if answer in dataset}
-    names = [str(name) for name in dataset[f.ASSUMPTION].values] if answers else []
-    table = assumptions_table({_ANSWERS[answer]: assumed_estimate(names, values) for answer, values in answers.items()})
-    return Section([*([table] if answers else []), dataset.attrs[f.ASSUMPTIONS_NOTE]], "what nobody measured")
-
-
-def assumed_estimate(names: list[str], values: NDArray[np.float64]) -> Estimate:
-    """An answer as given (the first value), with the known ones under assumptions."""
-    under = {name: float(value) for name, value in zip(names[1:], values[1:], strict=True) if np.isfinite(value)}
-    return Estimate(float(values[0]), np.nan, np.nan, 0, np.nan, assumptions=under)
 
 
 def _directions(dataset: xarray.Dataset) -> Section:

@@ -7,7 +7,6 @@ from typing import Any
 import numpy as np
 import xarray
 
-from warpimpact.firing.assumed_answers import assumed
 from warpimpact.firing.directions import Sector
 from warpimpact.firing.estimators import Reports, reported
 from warpimpact.firing.fire import Firings
@@ -55,7 +54,7 @@ def simulate_test(
     }
     if evidence := next((known.evidence for known in (response, sector) if known is not None and known.evidence), ""):
         told[attr.EVIDENCE] = evidence
-    for more_columns, more in (_fired(test, response), _directions(test, sector), assumed(test, response, sector)):
+    for more_columns, more in (_fired(test, response), _directions(test, sector)):
         columns, told = columns | more_columns, told | more
     return dataset_of(columns, f.FIXED | told | (attributes or {}))
 

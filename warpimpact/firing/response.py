@@ -9,8 +9,8 @@ find several changes.
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -18,15 +18,12 @@ import xarray
 from numpy.typing import NDArray
 from scipy import special
 
-from warpimpact.analysis.assumptions import Assumed
-from warpimpact.analysis.assumptions_view import notes_of
 from warpimpact.analysis.proxy import inclination
 from warpimpact.kernels.status import Status
 from warpimpact.records.group import failures
 from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
-from warpimpact.results.dataset import failed, hit_numbers
-from warpimpact.results.measures import Measure
+from warpimpact.results.dataset import failed
 from warpimpact.results.outlines import outlines
 from warpimpact.results.tallies import dealing
 from warpimpact.scene.model import Array
@@ -50,8 +47,6 @@ class Response:
         cell: extent along y and z of the unit cell that the hits cover [m]; None for a response without places.
         dealt: how places are dealt to the replicates of the sampling (`results.measures.dealing`).
         outline: outlines of the holes in the cell, y and z [m], separated by NaN.
-        under: `changes` under each assumption, by name.
-        under_note: how these were computed, or why they are unknown.
         evidence: what the limits rest on, one line each, the summary first; empty if the target itself is known.
     """
 
@@ -62,8 +57,6 @@ class Response:
     cell: tuple[float, float] | None
     dealt: Dealing
     outline: tuple[Array, Array] = (np.empty(0), np.empty(0))
-    under: Mapping[str, Array] = field(default_factory=dict)
-    under_note: str = ""
     evidence: str = ""
 
     def __len__(self) -> int:
@@ -143,12 +136,7 @@ class Response:
             hit_z=self.hit_z[which],
             yaw=self.yaw[which],
             dealt={"replicates": 1, "images": 1},
-            under={name: changes[which] for name, changes in self.under.items()},
         )
-
-    def assumed(self) -> dict[str, Response]:
-        """The response under each assumption."""
-        return {name: replace(self, changes=changes, under={}) for name, changes in self.under.items()}
 
 
 def known_response(velocities: Sequence[float], shares: Sequence[float]) -> Response:
@@ -179,29 +167,8 @@ def response_of_limits(dataset: xarray.Dataset) -> Response:
     if not sound.any():
         raise ValueError("has no limit velocity: all searches have failed")
     limits = dataset[v.LIMITS["velocity"].value].values.astype(float)[:, None]
-    under = limits_under_assumptions(dataset, limits)
-    response = replace(_with_places(dataset, limits, np.ones_like(sound)), under=under)
-    response = replace(response, under_note=" ".join(notes_of(dataset, known=bool(under))))
+    response = _with_places(dataset, limits, np.ones_like(sound))
     return response if sound.all() else response.only(sound)
-
-
-def limits_under_assumptions(dataset: xarray.Dataset, limits: Array) -> dict[str, Array]:
-    """Limits of all places under each assumption. The limit of a place moves as the quantile at its limit does among
-    the hits that were searched under the assumption. A place without material stays."""
-    measure = Measure.parse(f"mean({v.LIMITS['velocity'].value})")
-    moves = Assumed(dataset, [measure]).moves(measure)
-    if moves is None:
-        return {}
-    numbers = hit_numbers(dataset)
-    order = np.argsort(numbers, kind="stable")
-    given = measure.by_hit(dataset)[order[np.searchsorted(numbers, moves.hits, sorter=order)]]
-    under = {}
-    for name, by in moves.of_hits.items():
-        known = ~np.isnan(by)
-        before, after = np.sort(given[known]), np.sort((given + by)[known])
-        moved = np.maximum(limits + np.interp(limits, before, after - before), 0.0)
-        under[name] = np.where(limits > 0.0, moved, limits)
-    return under
 
 
 def response_of_sweep(sweep: xarray.Dataset, layer: int | None = None) -> Response:
@@ -248,7 +215,6 @@ def _with_places(dataset: xarray.Dataset, changes: Array, sound: Flags) -> Respo
         cell=(float(cell[0]), float(cell[1])),
         dealt=dealing(dataset),
         outline=(holes["y"], holes["z"]),
-        under_note="How far assumptions move these numbers is not known of a sweep; target.limits tells it.",
         evidence=dataset.attrs.get(attr.EVIDENCE, ""),
     )
     return response if sound.all() else response.only(sound)

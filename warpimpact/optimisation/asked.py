@@ -23,13 +23,10 @@ class _Asked(Model):
             `P(inclination@130mm > 30 deg)`, `V50`, `mean(limit_thickness@layer 1)` or `areal_density`; the default
             stand-off is the largest one.
         threats: over several threats the "worst" one counts, or their weighted "mean".
-        assumptions: of what nobody measured, what the campaign says counts ("given"), or over all assumptions the
-            "worst" or the "mean".
     """
 
     measure: str
     threats: Literal["worst", "mean"] = "worst"
-    assumptions: Literal["given", "worst", "mean"] = "given"
 
     @field_validator("measure")
     @classmethod

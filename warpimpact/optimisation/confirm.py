@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpimpact.campaign.text import CampaignError
-from warpimpact.optimisation.design import Design, alternatives_of
+from warpimpact.optimisation.design import Design
 from warpimpact.optimisation.evaluate import HitJob, Told, campaign_of, hits_asked, levels_asked
 from warpimpact.optimisation.judged import (
     DesignRecord,
@@ -18,7 +18,6 @@ from warpimpact.optimisation.judged import (
     interval,
     means,
     objectives,
-    values,
     weights_of,
 )
 from warpimpact.optimisation.search import Searched
@@ -49,9 +48,6 @@ class Confirmed:
         kept: whether each design is still on the front and within the bounds by fresh hits.
         groups: for each design, the number of the first design than which it is not certainly better.
         references: targets to compare with.
-        assumptions: names of the assumptions.
-        under: objectives and bounds of the front, then of the references, under every assumption, shape [front +
-            references, assumptions, asked].
     """
 
     numbers: NDArray[np.int64]
@@ -61,8 +57,6 @@ class Confirmed:
     kept: NDArray[np.bool_]
     groups: NDArray[np.int64]
     references: tuple[DesignRecord, ...]
-    assumptions: tuple[str, ...]
-    under: Array
 
 
 Follow = Callable[[int, int, str], object]
@@ -77,7 +71,6 @@ def confirm(design: Design, searched: Searched, follow: Follow) -> Question[Conf
     records, places = yield from _fresh(design, [*chosen, *others], follow)
     front = records[: len(chosen)]
     solids = yield from _solids(design, front, follow)
-    names, under = yield from _under_assumptions(design, records, follow)
     return Confirmed(
         numbers=numbers,
         records=tuple(front),
@@ -86,8 +79,6 @@ def confirm(design: Design, searched: Searched, follow: Follow) -> Question[Conf
         kept=_kept(design, front),
         groups=groups(design, front),
         references=tuple(records[len(chosen) :]),
-        assumptions=names,
-        under=under,
     )
 
 
@@ -142,12 +133,12 @@ def _fresh(
 ) -> Question[tuple[list[DesignRecord], Array]]:
     """Targets with fresh hits, and the places of the hits."""
     seed, count = fresh_seed(design), design.search.confirm_hits if design.keys else 1
-    threats, situations = range(len(design.threats)), design.situations
+    threats = range(len(design.threats))
     asked = [
         HitJob(target.tables, threat, 0, count, CONFIRM_FIDELITY, seed) for target in targets for threat in threats
     ]
     if not design.keys:
-        empty = np.zeros((len(situations), 0, count))
+        empty = np.zeros((len(threats), 0, count))
         without_hits = [replace(target, levels=("",) * len(threats), said=empty) for target in targets]
         return without_hits, np.zeros((len(targets), 2, 0))
     whose = "the front and references" if design.references else "the front"
@@ -155,46 +146,17 @@ def _fresh(
     levels = yield from levels_asked(design, asked, piloting)
     of_targets = _batched(levels, len(threats))
     jobs = [
-        HitJob(target.tables, threat, 0, count, of_target[threat], seed, assumption=name)
+        HitJob(target.tables, threat, 0, count, of_target[threat], seed)
         for target, of_target in zip(targets, of_targets, strict=True)
-        for threat, name in situations
+        for threat in threats
     ]
     said = yield from hits_asked(design, jobs, _telling(follow, len(targets), len(jobs), f"fresh hits of {whose}"))
     records = [
         replace(target, levels=levels_of_target, said=np.array([part.values for part in parts]))
-        for target, levels_of_target, parts in zip(targets, of_targets, _batched(said, len(situations)), strict=True)
+        for target, levels_of_target, parts in zip(targets, of_targets, _batched(said, len(threats)), strict=True)
     ]
-    of_first = said[:: len(situations)]
+    of_first = said[:: len(threats)]
     return records, np.array([first.places for first in of_first])
-
-
-def _under_assumptions(
-    design: Design, targets: Sequence[DesignRecord], follow: Follow
-) -> Question[tuple[tuple[str, ...], Array]]:
-    """Names of the possible assumptions, and objectives and bounds of all targets under them: the values as given plus
-    the change between the first hits."""
-    count = min(design.search.assumed_hits, design.search.confirm_hits)
-    if not count or not design.keys:
-        return (), np.zeros((len(targets), 0, len(design.asked)))
-    of_targets = [alternatives_of(campaign_of(design, target.tables, design.threats[0])) for target in targets]
-    names = tuple(dict.fromkeys(name for of_target in of_targets for name in of_target))
-    jobs = [
-        HitJob(target.tables, threat, 0, count, level, fresh_seed(design), assumption=name)
-        for target, of_target in zip(targets, of_targets, strict=True)
-        for name in of_target
-        for threat, level in enumerate(target.levels)
-    ]
-    what = "assumptions of the front and references" if design.references else "assumptions of the front"
-    said = iter((yield from hits_asked(design, jobs, _telling(follow, len(targets), len(jobs), what))))
-    threats, under = len(design.threats), np.zeros((len(targets), len(names), len(design.asked)))
-    for number, (target, of_target) in enumerate(zip(targets, of_targets, strict=True)):
-        alone = replace(target, said=target.said[:threats])
-        given = replace(alone, said=alone.said[:, :, :count])
-        under[number] = values(design, alone)
-        for name in of_target:
-            moved = replace(given, said=np.array([next(said).values for _ in range(threats)]))
-            under[number, names.index(name)] += values(design, moved) - values(design, given)
-    return names, under
 
 
 def _solids(design: Design, front: Sequence[DesignRecord], follow: Follow) -> Question[list[DesignRecord]]:

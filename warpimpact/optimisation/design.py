@@ -4,15 +4,13 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping
-from contextlib import suppress
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import lru_cache
 from pathlib import Path
 from typing import Annotated, Any
 
 from pydantic import Field, ValidationError, model_validator
 
-from warpimpact.campaign.alternatives import Alternative, alternatives
 from warpimpact.campaign.campaign import Campaign
 from warpimpact.campaign.schema import campaign_schema, completed_schema
 from warpimpact.campaign.text import CampaignError, parsed, read_text
@@ -26,8 +24,6 @@ from warpimpact.scene.units import Number, PositiveArealDensity, PositiveLength,
 
 SCRAMBLINGS = 16
 """Number of scramblings of the hits of a search: hit k belongs to scrambling k modulo this number."""
-_TRIED = 64
-"""Points of a space at which the possible assumptions are looked up."""
 _Table = dict[str, Any]
 _Name = Annotated[Title, Field(min_length=1, max_length=80)]
 
@@ -103,7 +99,6 @@ class Search(Model):
         confirm_hits: hits of each of these.
         allow_untested: whether a design may have holes, thicknesses or resistances that no published test had
             (campaign/tested.py).
-        assumed_hits: hits of each of these, and of the references, under every assumption; 0 for none.
     """
 
     designs: Annotated[int, Field(strict=True, ge=1, le=1_000_000)] = 1000
@@ -114,7 +109,6 @@ class Search(Model):
     confirmed: Annotated[int, Field(strict=True, ge=1, le=200)] = 20
     confirm_hits: Annotated[int, Field(strict=True, ge=64, le=2**22)] = 1024
     allow_untested: Annotated[bool, Field(strict=True)] = False
-    assumed_hits: Annotated[int, Field(strict=True, ge=0, le=2**16)] = 256
 
     @model_validator(mode="after")
     def _grows(self) -> Search:
@@ -125,11 +119,9 @@ class Search(Model):
     @property
     def extent(self) -> str:
         """Words for the most that is computed."""
-        assumed = f" and {self.assumed_hits} under every assumption" if self.assumed_hits else ""
-        fresh = f"{self.confirm_hits} fresh hits{assumed}"
         return (
             f"searches at most {self.designs} designs with {self.hits} to {self.most_hits} hits each, then up to "
-            f"{self.confirmed} of the front with {fresh}; how long that takes is told as it runs"
+            f"{self.confirmed} of the front with {self.confirm_hits} fresh hits; how long that takes is told as it runs"
         )
 
     @property
@@ -165,8 +157,6 @@ class Design:
         objectives, bounds, threats, references, constraints, search: as in the file. Without threats there is the
             threat of the campaign, without a name.
         keys: columns that are computed of every hit, for the measures that are asked for.
-        assumed: assumptions under which a search computes every hit, too; empty unless an objective or a bound is over
-            assumptions.
     """
 
     title: str
@@ -182,18 +172,11 @@ class Design:
     constraints: Constraints
     search: Search
     keys: tuple[Measure, ...] = field(default=())
-    assumed: tuple[str, ...] = field(default=())
 
     @property
     def asked(self) -> tuple[Objective | Bound, ...]:
         """Objectives and bounds."""
         return (*self.objectives, *self.bounds)
-
-    @property
-    def situations(self) -> list[tuple[int, str]]:
-        """The situations in which every hit is computed: each threat as given, then each threat under every
-        assumption."""
-        return [(threat, name) for name in ("", *self.assumed) for threat in range(len(self.threats))]
 
     def tables(self, values: Array) -> dict[str, Any]:
         """The tables of the campaign of a point of the space."""
@@ -254,7 +237,7 @@ def design_from(text: str, name: str, folder: Path) -> Design:
         raise CampaignError(f"{name}: {error}") from None
     asked = (goal.asked for goal in (*asking.objectives, *asking.bounds))
     keys = dict.fromkeys(measure.column for measure in asked if measure.kind != "target")
-    design = Design(
+    return Design(
         title=str(data.get("title", "")),
         text=text,
         name=name,
@@ -264,23 +247,6 @@ def design_from(text: str, name: str, folder: Path) -> Design:
         keys=tuple(keys),
         **dict(asking) | {"threats": threats},
     )
-    over = any(goal.assumptions != "given" and goal.asked.kind != "target" for goal in design.asked)
-    return replace(design, assumed=_assumptions(design)) if over else design
-
-
-def _assumptions(design: Design) -> tuple[str, ...]:
-    """Names of the assumptions that are possible at some of a few points of the space."""
-    names: dict[str, None] = {}
-    for values in design.space.some(_TRIED, design.search.seed):
-        with suppress(CampaignError):
-            tables = design.tables(values) | {"hits": {"count": 1}}
-            names |= dict.fromkeys(alternatives_of(design.campaign(tables, design.threats[0])))
-    return tuple(names)
-
-
-def alternatives_of(campaign: Campaign) -> dict[str, Alternative]:
-    """The alternatives of a campaign that change its hits, by name."""
-    return {alternative.name: alternative for alternative in alternatives(campaign) if not alternative.breaks}
 
 
 def asking_schema() -> dict[str, Any]:

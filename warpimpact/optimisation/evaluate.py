@@ -15,7 +15,7 @@ import numpy as np
 from warpimpact.campaign.campaign import Campaign
 from warpimpact.campaign.references import at_solid
 from warpimpact.campaign.resistances import resistance_by_thickness
-from warpimpact.optimisation.design import SCRAMBLINGS, Design, FacedThreat, alternatives_of
+from warpimpact.optimisation.design import Design, FacedThreat
 from warpimpact.records.group import failures
 from warpimpact.records.outcomes import Outcomes
 from warpimpact.results import variables as v
@@ -59,8 +59,6 @@ class HitJob:
         level: numerics as JSON.
         seed: seed of the hits.
         solid: whether the solid plate of equal areal density takes the place of the target.
-        assumption: name of the assumption; empty for the target as given. A target without such an alternative is
-            computed as given.
     """
 
     tables: Mapping[str, Any]
@@ -70,7 +68,6 @@ class HitJob:
     level: str
     seed: int
     solid: bool = False
-    assumption: str = ""
 
 
 @dataclass(frozen=True)
@@ -109,17 +106,10 @@ def is_even(tables: Mapping[str, Any]) -> bool:
     return not holed and not any(isinstance(impact.get(name), dict) for name in _TURNING)
 
 
-def hits_of(campaign: Campaign, first: int, count: int, *, turned: bool = False) -> Shots:
-    """Hits of a campaign that are computed, none an image of another.
-
-    Args:
-        turned: whether the shots will be turned, so that images differ. The hits then take the different images in turn
-            within every scrambling.
-    """
+def hits_of(campaign: Campaign, first: int, count: int) -> Shots:
+    """Hits of a campaign that are computed, none an image of another."""
     sampler = campaign.sampler()
-    shots, hits = sampler.shots(first * sampler.images, count * sampler.images), np.arange(count)
-    image = (first + hits) // SCRAMBLINGS % sampler.images if turned else 0
-    return shots[hits * sampler.images + image]
+    return sampler.shots(first * sampler.images, count * sampler.images)[:: sampler.images]
 
 
 Told = Callable[[float, bool], object]
@@ -161,17 +151,10 @@ def _hits_computed(
 
 def _scene_of(design: Design, job: HitJob) -> tuple[Campaign, Scene, Shots]:
     campaign = campaign_of(design, job.tables, design.threats[job.threat], job.seed)
-    other = alternatives_of(campaign).get(job.assumption) if job.assumption else None
-    shots = hits_of(campaign, job.first, job.count, turned=other is not None and bool(other.turned))
+    shots = hits_of(campaign, job.first, job.count)
     if job.solid:
         return (campaign, *at_solid(campaign, shots))
-    if other is None:
-        return campaign, campaign.scene, shots
-    target = other.scene.target
-    if any(key.is_limit for key in design.keys):
-        target = target.by_path(campaign.impact.velocity)
-    scene = other.scene.model_copy(update={"target": target})
-    return campaign, scene, other.shots(shots)
+    return campaign, campaign.scene, shots
 
 
 def _marched(

@@ -19,8 +19,6 @@ if TYPE_CHECKING:
 
 _ROUNDED = 1e-6
 """Largest relative difference of objectives that count as equal."""
-_NAMED = 3
-"""Most assumptions that are named as reversing a comparison."""
 
 
 def front_view(dataset: xarray.Dataset) -> list[Section]:
@@ -41,77 +39,8 @@ def front_view(dataset: xarray.Dataset) -> list[Section]:
         Section([_front_table(dataset)]),
         Section([_variables_table(dataset)] if confirmed else []),
         *([Section([*references, *notes])] if references or notes else []),
-        *_assumptions(dataset),
         Section(evidence_lines(dataset)),
     ]
-
-
-def _assumptions(dataset: xarray.Dataset) -> Iterator[Section]:
-    """In how many assumptions a design stays on the front and is better than each reference, and the largest change."""
-    if f.ASSUMPTION not in dataset:
-        return
-    stays, names = stays_on_front(dataset), [str(name) for name in dataset[f.ASSUMPTION].values]
-    asked = dataset[f.ASKED].values  # no assumption changes the weight
-    goals = [place for place in _goals(dataset) if not str(asked[place]).startswith(tuple(WEIGHTS))]
-    columns = [Column("design"), Column("on the front")]
-    columns += [Column(f"better than {name}") for name in dataset[f.REFERENCE].values]
-    columns += [Column(f"{label_and_unit(dataset[f.LABEL].values[place])[0]}, moved most by") for place in goals]
-    rows = []
-    for place, file in enumerate(dataset[f.FILE].values):
-        over = [_better_text(dataset, place, reference) for reference in range(dataset.sizes["reference"])]
-        moved = [_moved_text(dataset, place, goal, names) for goal in goals]
-        rows.append((file, f"{int(stays[place].sum())} of {len(names)}", *over, *moved))
-    note = (
-        "Each assumption alone, at all targets. A design is on the front if it keeps the bounds and none of these "
-        "beats it; it is better than a reference if it is no worse in all objectives and better in one."
-    )
-    yield Section([Table(columns, rows), note], "what nobody measured: the front under other assumptions")
-
-
-def stays_on_front(dataset: xarray.Dataset) -> np.ndarray[Any, np.dtype[np.bool_]]:
-    """Whether each design keeps the bounds and is beaten by no other design of the front under each assumption, shape
-    [front, assumptions]."""
-    signs, limits = dataset[f.SIGN].values, dataset[f.ASKED_LIMIT].values
-    goals, bounds = _goals(dataset), np.flatnonzero(~np.isnan(limits))
-    signed = signs * dataset[f.UNDER].values
-    kept = (signed[:, :, bounds] <= signs[bounds] * limits[bounds] + _ROUNDED * np.abs(limits[bounds])).all(axis=-1)
-    beaten = np.zeros(kept.shape, dtype=bool)
-    for rival, within in zip(signed[:, :, goals], kept, strict=True):
-        beaten |= within & _beats(rival, signed[:, :, goals])
-    return np.asarray(kept & ~beaten)
-
-
-def _beats(one: Any, others: Any) -> Any:
-    """Whether objectives to minimise are no worse than others in all and better in at least one."""
-    close = _ROUNDED * np.abs(others)
-    return (one <= others + close).all(axis=-1) & (one < others - close).any(axis=-1)
-
-
-def _better_text(dataset: xarray.Dataset, place: int, reference: int) -> str:
-    """Text such as "4 of 14". Where the design is better as given, the assumptions that reverse the comparison are
-    named."""
-    goals = _goals(dataset)
-    signs = dataset[f.SIGN].values[goals]
-    places = (place, f.UNDER, f.FRESH), (reference, f.REFERENCE_UNDER, f.REFERENCE_FOUND)
-    under = [signs * dataset[name].values[number][:, goals] for number, name, _ in places]
-    given = [signs * dataset[name].values[number][goals] for number, _, name in places]
-    better = _beats(*under)
-    if not bool(_beats(*given)):
-        return f"not as given; in {int(better.sum())} of {len(better)}"
-    lost = [str(name) for name in dataset[f.ASSUMPTION].values[~better]]
-    return (
-        f"{int(better.sum())} of {len(better)}"
-        + f"; not with {', '.join(lost[:_NAMED])}" * bool(lost)
-        + (f" and {len(lost) - _NAMED} more" * (len(lost) > _NAMED))
-    )
-
-
-def _moved_text(dataset: xarray.Dataset, place: int, goal: int, names: list[str]) -> str:
-    """The value as given, and under the assumption that moves it most."""
-    given, under = float(dataset[f.FRESH].values[place, goal]), dataset[f.UNDER].values[place, :, goal]
-    moves = np.abs(np.nan_to_num(under - given))
-    most = int(np.argmax(moves))
-    return f"{given:.3g}; {names[most]}: {under[most]:.3g}" if moves[most] > 0.0 else f"{given:.3g}"
 
 
 def _goals(dataset: xarray.Dataset) -> list[int]:

@@ -38,7 +38,7 @@ class DesignRecord:
         tables: tables of its campaign.
         weights: masses per area [kg/m²], by the names of the measures (results/measures.py).
         levels: numerics for every threat, as JSON.
-        said: columns of `Design.keys` in each of `Design.situations`, shape [situations, columns, hits].
+        said: columns of `Design.keys` by each threat, shape [threats, columns, hits].
         seconds: processor time of its hits [s].
         means, known: cached results of `means` and `values`, by number of hits; empty in every copy.
     """
@@ -86,8 +86,8 @@ def values(design: Design, record: DesignRecord) -> Array:
 
 
 def numbers_of(design: Design, record: DesignRecord, goal: Objective | Bound, hits: int) -> Array:
-    """Numbers of the first hits whose mean is an objective or a bound, shape [hits]: those of the worst threat and
-    assumption, or averages over them, as the goal asks."""
+    """Numbers of the first hits whose mean is an objective or a bound, shape [hits]: those of the worst threat,
+    or averages over threats, as the goal asks."""
     measure = goal.asked
     if measure.kind == "target":
         return np.full(hits, record.weights[measure.name])
@@ -95,14 +95,7 @@ def numbers_of(design: Design, record: DesignRecord, goal: Objective | Bound, hi
     if not measure.is_binary:
         numbers = np.array([_averaged(measure, of_hits) for of_hits in numbers])
     weights = np.array([threat.weight for threat in design.threats])
-    under = numbers.reshape(-1, len(weights), hits)
-    if goal.assumptions == "given":
-        under = under[:1]
-    of_each = [
-        weights @ by_threat / weights.sum() if goal.threats == "mean" else _worst(goal, by_threat)
-        for by_threat in under
-    ]
-    return np.asarray(np.mean(of_each, axis=0) if goal.assumptions == "mean" else _worst(goal, np.array(of_each)))
+    return np.asarray(weights @ numbers / weights.sum()) if goal.threats == "mean" else _worst(goal, numbers)
 
 
 def _worst(goal: Objective | Bound, numbers: Array) -> Array:
@@ -125,7 +118,7 @@ def estimate(design: Design, record: DesignRecord, goal: Objective | Bound) -> E
         weight = record.weights[goal.asked.name]
         return Estimate(weight, weight, weight, record.hits, 0.0)
     numbers = numbers_of(design, record, goal, record.hits)
-    averaged = goal.assumptions == "mean" or (goal.threats == "mean" and len(design.threats) > 1)
+    averaged = goal.threats == "mean" and len(design.threats) > 1
     is_share = goal.asked.is_binary and not averaged
     return estimate_of("share" if is_share else "mean", numbers, replicates=SCRAMBLINGS)
 

@@ -73,10 +73,6 @@ def to_dataset(design: Design, searched: Searched, confirmed: Confirmed, made_by
         f.VOLUME: searched.history[:, 1],
         f.UNTESTED: _texts(_untested(design, record) for record in confirmed.records),
     }
-    if confirmed.assumptions:
-        columns[f.ASSUMPTION] = _texts(confirmed.assumptions)
-        of_front, of_references = np.split(confirmed.under, [len(confirmed.records)])
-        columns |= {f.UNDER: of_front, f.REFERENCE_UNDER: of_references}
     for records, names in (
         (searched.records, (f.FOUND, f.FOUND_LOW, f.FOUND_HIGH)),
         (confirmed.records, (f.FRESH, f.FRESH_LOW, f.FRESH_HIGH)),

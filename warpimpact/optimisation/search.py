@@ -173,7 +173,7 @@ class _State:
         if checked_design.violations or checked_design.campaign is None:
             self.refused[key] = checked_design
             return
-        nothing = np.zeros((len(self.design.situations), len(self.design.keys), 0))
+        nothing = np.zeros((len(self.design.threats), len(self.design.keys), 0))
         self.drafts[key] = DesignRecord(values, tables, weights_of(checked_design.campaign.target), (), nothing)
 
     def _compute(self, new: dict[bytes, DesignRecord]) -> Question[None]:
@@ -198,15 +198,13 @@ class _State:
         """The designs with the hits from `first` up to `stop` added."""
         design = self.design
         if not design.keys:
-            return [record.more(np.zeros((len(design.situations), 0, stop)), 0.0) for record in records]
+            return [record.more(np.zeros((len(design.threats), 0, stop)), 0.0) for record in records]
         jobs = [
-            HitJob(
-                record.tables, threat, first, stop - first, record.levels[threat], design.search.seed, assumption=name
-            )
+            HitJob(record.tables, threat, first, stop - first, record.levels[threat], design.search.seed)
             for record in records
-            for threat, name in design.situations
+            for threat in range(len(design.threats))
         ]
-        what, each = f"{len(records)} designs at {stop} hits", len(design.situations)
+        what, each = f"{len(records)} designs at {stop} hits", len(design.threats)
 
         def tell(done: float, is_resumed: bool) -> None:
             if done >= len(jobs):

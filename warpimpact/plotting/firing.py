@@ -63,11 +63,6 @@ def _draw_response(axes: Axes, dataset: xarray.Dataset, settings: _Settings) -> 
     if np.isfinite(low).any():
         axes.fill_between(velocity, low, high, color=BLUE, alpha=0.2, linewidth=0, label="95 % interval")
     axes.plot(velocity, dataset[f.SHARE].values, color=BLUE, linewidth=1.5)
-    if f.ASSUMED_V50 in dataset:
-        under = dataset[f.ASSUMED_V50].values
-        reach = [float(np.nanmin(under)), float(np.nanmax(under))]
-        label = "V50 under other assumptions"
-        axes.plot(reach, [0.5, 0.5], color="0.7", linewidth=6, solid_capstyle="butt", zorder=1, label=label)
     for row, share in enumerate(dataset[f.QUANTILE].values):
         value = float(dataset[f.QUANTILE_VELOCITY][row])
         if np.isfinite(value):

@@ -128,7 +128,6 @@ def _draw_front(axes: Axes, dataset: xarray.Dataset, names: dict[int, str]) -> N
     better = [
         "less is better" if dataset[f.SIGN].values[objective] > 0 else "more is better" for objective in (across, up)
     ]
-    _draw_assumptions(axes, dataset, across, up)
     axes.set(xlabel=f"{labels[across]}, {better[0]}", ylabel=fill(f"{labels[up]}, {better[1]}", _LONGEST_LABEL))
     axes.grid(color="0.92")
     hide_sides(axes, "top", "right")
@@ -149,20 +148,6 @@ def _draw_fresh(axes: Axes, dataset: xarray.Dataset, shown: tuple[int, int], thi
     if third is not None:
         drawn = axes.scatter(fresh[:, across], fresh[:, up], c=fresh[:, third], s=36, zorder=5, cmap="viridis")
         axes.figure.colorbar(drawn, ax=axes, label=str(dataset[f.LABEL].values[third]))
-
-
-def _draw_assumptions(axes: Axes, dataset: xarray.Dataset, across: int, up: int) -> None:
-    """Draw the ranges of an objective under all assumptions, for the front and the references."""
-    if f.ASSUMPTION not in dataset or across == up:
-        return
-    groups = ((f.FRESH, f.UNDER, BLUE), (f.REFERENCE_FOUND, f.REFERENCE_UNDER, VERMILION))
-    for given, under, colour in groups:
-        at, values = dataset[given].values, dataset[under].values[:, :, up]
-        if len(at):
-            every = np.concatenate([at[:, up : up + 1], values], axis=1)
-            ends = np.nanmin(every, axis=1), np.nanmax(every, axis=1)
-            label = "under other assumptions" if colour == BLUE else ""
-            axes.vlines(at[:, across], *ends, color=colour, alpha=0.25, linewidth=4.0, zorder=2, label=label)
 
 
 def _draw_variables(figure: SubFigure, dataset: xarray.Dataset, leaders: Any) -> None:

@@ -10,7 +10,6 @@ import xarray
 from jinja2 import ChoiceLoader, Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup
 
-from warpimpact.analysis.assumptions_view import assumptions_view
 from warpimpact.analysis.comparison import compare
 from warpimpact.analysis.comparison_short import short_view, verdict_of
 from warpimpact.analysis.comparison_text import comparison_view
@@ -81,7 +80,6 @@ def result_content(name: str, dataset: xarray.Dataset) -> dict[str, Any]:
         "measures": measures,
         "through": Markup(html_of(limit_view(dataset)) if is_limit else table_html(_through(dataset), means_over)),
         "protects": Markup(table_html(measures_table(measures, reference_name(dataset)), against_solid)),
-        "assumed": Markup(html_of([assumptions_view(dataset)])),
         "provenance": {words(key): str(attributes[key]) for key in _PROVENANCE if key in attributes},
         "speed": float(f"{attributes.get(attr.HITS_PER_SECOND, 0.0):.2g}"),
     }

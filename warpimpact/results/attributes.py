@@ -109,11 +109,6 @@ MATERIAL = _declared("material", "table", _SI)
 EVIDENCE = _declared("evidence")
 """What a result rests on, one line each: names of threat and materials with the state of their evidence, and what was
 not measured."""
-ASSUMPTIONS = _declared("assumptions", "table")
-"""JSON of the numbers of the assumptions under which some hits were computed, too, by their names."""
-ASSUMED_TIME = _declared("assumed_time", "number", "s")
-WOULD_BREAK = _declared("would_break", "table")
-"""JSON of the share of cores that would break, by the strength that they might have."""
 RESTS_ON, NOT_TESTED = "evidence: ", "not tested: "
 """Beginnings of the first line of the evidence, and of the lines about what was not measured."""
 EFFECTIVE = "effective_sample_size"

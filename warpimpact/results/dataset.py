@@ -79,7 +79,7 @@ def to_table(
         coordinates[v.LAYER_STANDOFF] = np.array(scene.record.layer_standoffs)
     coordinates |= beside or {}
     coordinates |= outlines_in(scene.target.layers[0], *((-0.5 * side, 0.5 * side) for side in period))
-    beside_the_hits = (name for group in ("solid", "finer", "assumed") for name in v.GROUPS[group])
+    beside_the_hits = (name for group in ("solid", "finer") for name in v.GROUPS[group])
     coordinates |= labels(scene.target)
     of_layers = (*v.LAYER_LABELS, *v.LAYER_COORDINATES)
     along = (*v.COORDINATES, *v.OUTLINE_VARIABLES, *of_layers, *beside_the_hits)
@@ -125,46 +125,21 @@ def columns_beside(outcomes: Outcomes, variables: Mapping[v.Variable, v.Variable
     return {name: getattr(outcomes, of_hits) for name, of_hits in variables.items() if of_hits in outcomes}
 
 
-def assumed_table(columns: Mapping[str, Any], attributes: Mapping[str, Any], *, double: bool) -> HitTable:
-    """A table of hits under assumptions as `to_table` stores them, to be joined to the table of the hits."""
-    stored = (name for name in v.GROUPS["assumed"] if name in columns)
-    return HitTable.of({}, stored_columns(stored, columns, () if double else _computed()), attr.with_units(attributes))
-
-
 def _computed() -> set[v.Variable]:
     """Variables, also of other shots, that are stored in single precision unless computed in double precision."""
     computed = {*v.computed_variables(), *v.SOLID_VARIABLES, *v.SOLID_DEPTHS, *v.BASE_ALONE_VARIABLES}
-    of_hits = v.FINER_VARIABLES | v.ASSUMED_VARIABLES
-    return computed | {name for name, variable in of_hits.items() if variable in computed}
+    return computed | {name for name, variable in v.FINER_VARIABLES.items() if variable in computed}
 
 
 def finer_pair(dataset: Result) -> tuple[Any, Any] | None:
     """The hits of a result that were computed at a finer level, too, in memory: with their values in the result, and
     with those at the finer level. None if there are none."""
-    pair = _pair(dataset, v.FINER_HIT, v.FINER_VARIABLES)
-    return None if pair is None else pair[:2]
-
-
-def assumed_pair(dataset: Result) -> tuple[Any, Any, NDArray[np.int64]] | None:
-    """The hits of a result under assumptions, one assumption after another, in memory: with their values in the result,
-    with those under the assumption, and the number of the assumption, shape [hits]. None if there are none."""
-    if v.ASSUMPTION not in dataset:
+    if v.FINER_HIT not in dataset or v.HIT not in dataset.sizes:
         return None
-    pair = _pair(dataset, v.ASSUMED_HIT, v.ASSUMED_VARIABLES)
-    return None if pair is None else (*pair[:2], np.asarray(dataset[v.ASSUMPTION].values)[pair[2]])
-
-
-def _pair(
-    dataset: Result, of_number: v.Variable, variables: Mapping[v.Variable, v.Variable]
-) -> tuple[Any, Any, NDArray[np.int64]] | None:
-    """Hits of a result that were also computed otherwise: with their values in the result, with the other values, and
-    their places among the other values."""
-    if of_number not in dataset or v.HIT not in dataset.sizes:
-        return None
-    stored = {name: of_hits for name, of_hits in variables.items() if name in dataset and of_hits in dataset}
-    if any(dataset[name].dims != name.dims for name in (of_number, *stored)) or v.STATUS not in stored.values():
+    stored = {name: of_hits for name, of_hits in v.FINER_VARIABLES.items() if name in dataset and of_hits in dataset}
+    if any(dataset[name].dims != name.dims for name in (v.FINER_HIT, *stored)) or v.STATUS not in stored.values():
         return None  # joined results have several hits of a number, and altered ones lack some
-    numbers, hits = dataset[of_number].values, hit_numbers(dataset)
+    numbers, hits = dataset[v.FINER_HIT].values, hit_numbers(dataset)
     order = np.argsort(hits, kind="stable")
     places = order[np.minimum(np.searchsorted(hits, numbers, sorter=order), len(order) - 1)]
     there = np.flatnonzero(hits[places] == numbers)
@@ -176,7 +151,7 @@ def _pair(
         of_hits: (of_hits.dims, dataset[name].values[there], dict(dataset[of_hits].attrs))
         for name, of_hits in stored.items()
     }
-    return given, given.assign(changed), there
+    return given, given.assign(changed)
 
 
 def numbered(dataset: AResult, first: int = 0) -> AResult:

@@ -3,7 +3,6 @@
 response        probability of perforation against velocity, and the places that it comes from
 test            what every simulated test reports
 size            how exact tests of other sizes are
-assumption      what a test tells if something that nobody measured is otherwise
 azimuth, elevation   probability of perforation by direction of fire
 proof           probability that n shots with at most k perforations pass, against velocity
 """
@@ -16,7 +15,7 @@ from pydantic import Json
 
 from warpimpact.records.variable import Variable
 from warpimpact.results import attributes as attr
-from warpimpact.results.declared import Declaration, Text, among, finite, texts, with_interval
+from warpimpact.results.declared import Declaration, Text, among, finite, with_interval
 from warpimpact.results.kind import Kind
 
 _TESTS, _SHOTS, _SIZES, _ENDS = ("test",), ("test", "shot"), ("size",), ("bound",)
@@ -78,18 +77,6 @@ DIRECTION_WEIGHT = Variable("direction_weight", _DIRECTIONS, "1", "weight of the
 DIRECTION_HITS = Variable("direction_hits", _DIRECTIONS, "1", "hits computed in the direction")
 DIRECTION_FAILED = Variable("direction_failed", _DIRECTIONS, "1", "hits whose computation failed")
 
-_ASSUMPTION = ("assumption",)
-ASSUMPTION = Variable("assumption_name", _ASSUMPTION, "1", "what nobody measured, chosen otherwise; the first is not")
-ASSUMED_V50 = Variable("assumed_v50", _ASSUMPTION, "m s-1", "V50 of the target under the assumption")
-ASSUMED_REPORTED = Variable("assumed_reported_v50", _ASSUMPTION, "m s-1", "mean of the V50 that tests report of it")
-ASSUMED_REQUIRED = Variable("assumed_required_share", _ASSUMPTION, "1", "share of the tests with the required V50")
-ASSUMED_STOP = Variable("assumed_stop_probability", _ASSUMPTION, "1", "probability that it stops a shot of the proof")
-ASSUMED_PASS = Variable("assumed_pass_probability", _ASSUMPTION, "1", "probability that it passes the proof")
-ASSUMED_MEAN = Variable(
-    "assumed_mean_perforation_probability", _ASSUMPTION, "1", "weighted mean over directions under the assumption"
-)
-ASSUMED_ANSWERS = (ASSUMED_V50, ASSUMED_REPORTED, ASSUMED_REQUIRED, ASSUMED_STOP, ASSUMED_PASS, ASSUMED_MEAN)
-
 VARIABLES = tuple(one for one in [*globals().values()] if isinstance(one, Variable))
 """All of the above."""
 TEST = attr.FIRING_TEST
@@ -112,9 +99,6 @@ MEAN, MEAN_INTERVAL = "mean_perforation_probability", "mean_perforation_probabil
 """Weighted mean over all directions, and its interval."""
 SEARCH = "limit_runs_per_hit"
 """Runs per hit of the search of limits."""
-ASSUMPTIONS_NOTE = "assumptions_note"
-"""How the answers under assumptions were computed, or why they are unknown; absent if the target itself is known."""
-
 
 _RESPONSE = (SHARE, SHARE_LOW, SHARE_HIGH, VELOCITY, QUANTILE, QUANTILE_VELOCITY, QUANTILE_LOW, QUANTILE_HIGH)
 _PLACES = (CHANGES, HIT_Y, HIT_Z, YAW, OUTLINE_Y, OUTLINE_Z)
@@ -131,7 +115,6 @@ _DECLARED = Declaration(
     whole=(_RESPONSE, _PLACES, _REPORTED, _OF_SIZES, _PROOF, _OF_DIRECTIONS),
     rules={
         SHOT_PERFORATED: among(0, 1, -1),
-        ASSUMPTION: texts,
         **dict.fromkeys((VELOCITY, AZIMUTH, ELEVATION, SIZE), finite),
     },
     attributes={**dict.fromkeys((attr.TITLE, TEST, DISCLAIMER, REQUIREMENT), Text), SETTINGS: Json[dict[str, Any]]},

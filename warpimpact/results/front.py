@@ -71,12 +71,6 @@ REFERENCE_FOUND, REFERENCE_LOW, REFERENCE_HIGH = with_interval(
 )
 REFERENCE_CAMPAIGN = Variable("reference_campaign", ("reference",), "1", "campaign of the first threat, as TOML")
 
-ASSUMPTION = Variable("assumption_name", ("assumption",), "1", "what nobody measured, chosen otherwise")
-UNDER = Variable("front_under", ("front", "assumption", "asked"), "1", "objective or bound under the assumption")
-REFERENCE_UNDER = Variable(
-    "reference_under", ("reference", "assumption", "asked"), "1", "objective or bound under the assumption"
-)
-
 UNTESTED = Variable("front_untested", ("front",), "1", "what of its plates lies beyond every published test")
 
 COMPUTED = Variable("computed", ("generation",), "1", "designs that were computed so far")
@@ -118,16 +112,14 @@ def _more(dataset: xarray.Dataset) -> str | None:
     return None
 
 
-_OF_ASSUMPTIONS = (ASSUMPTION, UNDER, REFERENCE_UNDER)
-"""Present only where something was computed under assumptions."""
 _TEXTS = (
-    *(UNTESTED, ASSUMPTION, NAME, UNIT, ASKED, LABEL, LEVELS, CAMPAIGN, FILE, FRESH_LEVELS),
+    *(UNTESTED, NAME, UNIT, ASKED, LABEL, LEVELS, CAMPAIGN, FILE, FRESH_LEVELS),
     *(REFERENCE, REFERENCE_CAMPAIGN),
 )
 _DECLARED = Declaration(
     {variable: variable.dims for variable in VARIABLES},
-    optional=(HIT_Y, HIT_Z, HIT_VALUE, *_OF_ASSUMPTIONS),
-    whole=((HIT_Y, HIT_Z, HIT_VALUE), _OF_ASSUMPTIONS),
+    optional=(HIT_Y, HIT_Z, HIT_VALUE),
+    whole=((HIT_Y, HIT_Z, HIT_VALUE),),
     rules={
         **dict.fromkeys(_TEXTS, texts),
         **dict.fromkeys((HIT_Y, HIT_Z), finite),

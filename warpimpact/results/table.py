@@ -137,11 +137,6 @@ class HitTable:
         """The table with these global attributes, which replace its own of the same name."""
         return replace(self, attrs=self.attrs | dict(attrs))
 
-    def beside(self, other: HitTable) -> HitTable:
-        """The table with the variables and attributes of another one, which has other dimensions."""
-        variables, coords = {**self.variables, **other.variables}, self.coords | other.coords
-        return replace(self, variables=variables, coords=coords, attrs=self.attrs | other.attrs)
-
     def drop_vars(self, names: Collection[str]) -> HitTable:
         """The table without these variables. Names that it lacks are ignored."""
         kept = {name: column for name, column in self.variables.items() if name not in names}

@@ -109,15 +109,6 @@ FINER_VARIABLES = {
 """Outcomes of some hits at a finer level of resolution, each with the corresponding variable of the hits. Present where
 a pilot found the resolution."""
 
-ASSUMED_HIT = Variable("assumed_hit", ("assumed",), "1", "number of a hit that was computed under an assumption, too")
-ASSUMPTION = Variable("assumption", ("assumed",), "1", "number of the assumption, from 0, in the attribute assumptions")
-ASSUMED_COORDINATES = (ASSUMED_HIT, ASSUMPTION)
-ASSUMED_VARIABLES = {
-    _beside(variable, "assumed", "assumed", "under an assumption"): variable for variable in FINER_VARIABLES.values()
-}
-"""Outcomes of some hits under other assumptions about what nobody measured (campaign/alternatives.py), each with the
-corresponding variable of the hits."""
-
 OUTLINE_Y = Variable("outline_y", ("vertex",), "m", "hole outlines in the unit cell, y, separated by NaN")
 OUTLINE_Z = Variable("outline_z", ("vertex",), "m", "hole outlines in the unit cell, z, separated by NaN")
 
@@ -133,7 +124,6 @@ GROUPS = {
         *BASE_ALONE_LIMITS.values(),
     ),
     "finer": (*FINER_COORDINATES, *FINER_VARIABLES),
-    "assumed": (*ASSUMED_COORDINATES, *ASSUMED_VARIABLES),
 }
 """Groups of the file for variables that are not along "hit". In memory those of other shots are coordinates, so that no
 choice of hits repeats them per hit. For the outlines see outlines.py."""

@@ -16,7 +16,6 @@ from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
 from warpimpact.results.dataset import columns_beside
 from warpimpact.results.table import HitTable
-from warpimpact.runs.assumed import assumed
 from warpimpact.runs.describe import described
 from warpimpact.runs.levels import aim_of, level_for, shifts_of
 from warpimpact.runs.pilot_hits import pilot_most, pilot_shots
@@ -24,7 +23,6 @@ from warpimpact.runs.task import Report, Task
 from warpimpact.scene import Numerics, Scene, Shots
 from warpimpact.solver.device import find_device
 from warpimpact.solver.findings import Found, HitErrors
-from warpimpact.solver.many import simulate_many
 from warpimpact.solver.marching import Progress
 from warpimpact.solver.memory import Memory
 from warpimpact.solver.prepare import prepare
@@ -47,13 +45,6 @@ class HitMap:
     def compute(self, campaign: Campaign, task: Task, worker: Worker, report: Report = lambda done: None) -> HitTable:
         """See `compute`."""
         return compute(campaign, task, worker, report)
-
-    def assumed(
-        self, campaign: Campaign, findings: Found | None, worker: Worker, report: Report = lambda done: None
-    ) -> HitTable:
-        """See `Computation.assumed`."""
-        numerics = numerics_of(campaign, findings)
-        return assumed(campaign, numerics, lambda scenes: simulate_many(scenes, numerics, worker))
 
     def pilot(self, campaign: Campaign, worker: Worker, report: Report = lambda level: None) -> HitErrors | None:
         """See `Computation.pilot`."""

@@ -1,4 +1,4 @@
-"""The hits that stand for all hits of a campaign, in a pilot and under assumptions."""
+"""The hits that stand for all hits of a campaign in a pilot."""
 
 from __future__ import annotations
 

@@ -14,7 +14,6 @@ from warpimpact.results import attributes as attr
 from warpimpact.results.dataset import images
 from warpimpact.results.outlines import in_memory
 from warpimpact.results.table import HitTable, joined
-from warpimpact.runs.assumed import has_assumptions
 from warpimpact.runs.choice import executor_for, opened
 from warpimpact.runs.compute import HIT_MAP, numerics_of
 from warpimpact.runs.executor import Executor, Job, completed, result_of
@@ -62,17 +61,6 @@ def run(
         end = _fill(campaign, HIT_MAP, shards, executor, follow)
     table = joined(shards.shard(index) for index in range(end.shards))
     return in_memory(table.assign_attrs(_attributes(table, end)).to_xarray())
-
-
-def with_assumptions(
-    dataset: xarray.Dataset, campaign: Campaign, *, device: str = "auto", cancel: Cancel | None = None
-) -> xarray.Dataset:
-    """Add the hits under assumptions to a result whose campaign left them out, as `run` would compute them."""
-    findings = HIT_MAP.found_in(dataset)
-    with executor_for(device, cancel=cancel) as executor:
-        table = result_of(executor, HIT_MAP.assumed, campaign, None if findings is None else findings.told)
-    assumed = in_memory(table.to_xarray())
-    return dataset.assign(assumed.variables).assign_attrs(assumed.attrs)
 
 
 def run_to_file(
@@ -139,39 +127,23 @@ def _fill(campaign: Campaign, computation: Computation, shards: Shards, executor
         watch.found = result_of(executor, computation.pilot, campaign, tick=piloting)
     warn(numerics_of(campaign, watch.found))
 
-    asks = is_new and has_assumptions(campaign)
-    found_alone = None if watch.found is None else watch.found.told
+    later = None if watch.found is None else watch.found.told
 
-    def jobs() -> Iterator[tuple[range | None, Job]]:
-        if asks:
-            yield None, Job(computation.assumed, (campaign, found_alone))
+    def jobs() -> Iterator[tuple[range, Job]]:
         most = lambda: task_size(executor, 0.0 if campaign.stop else watch.rate)  # noqa: E731
         for task in ranges(shards, most):
             shots = sampler.shots(task.start * shards.extent, len(task) * shards.extent)
             first = shots[: shards.extent] if task.start == 0 else None
             solid = None if first is None else solid_shots(campaign, first, computation.most_solid)
-            findings = watch.found if task.start == 0 else found_alone
+            findings = watch.found if task.start == 0 else later
             yield task, Job(computation.compute, (campaign, Task(shots, solid, findings)))
 
-    def take(index: int, shard: HitTable) -> None:
-        shards.save(index, shard)
-        watch.add(index, shard)
-
     with closing(completed(executor, jobs(), lambda: follow(watch.progress(sum(executor.reports()))))) as tables:
-        first = assumed = None  # the first shard takes up the assumed hits, and is kept until they are there
         while watch.end is None:
             task, table = next(tables)
-            if task is None:
-                assumed = table
-            else:
-                for index, shard in split(table, task, shards.extent):
-                    if index == 0 and asks:
-                        first = shard
-                    else:
-                        take(index, shard)
-            if first is not None and assumed is not None:
-                take(0, first.beside(assumed))
-                first = None
+            for index, shard in split(table, task, shards.extent):
+                shards.save(index, shard)
+                watch.add(index, shard)
     follow(watch.progress(0))
     return watch.end
 

@@ -61,9 +61,6 @@ class Computation(Protocol):
         """Compute a task: the columns of results/dataset.py, one entry per shot. They are a complete result. Reports
         how many shots are done."""
 
-    def assumed(self, campaign: Campaign, findings: Found | None, worker: Worker, report: Report = ...) -> HitTable:
-        """Some hits of the campaign under assumptions, by `runs.assumed.assumed`; reports nothing."""
-
     def pilot(self, campaign: Campaign, worker: Worker, report: Report = ...) -> Found | None:
         """The findings of a pilot with hits of the campaign; None if the campaign fixes the resolution. Reports every
         level that it computes."""

@@ -64,18 +64,6 @@ class Target(Model):
         """Air in front of each layer [m]."""
         return tuple(layer.gap if isinstance(layer, Layer) else 0.0 for layer in self.layers)
 
-    def by_path(self, velocity: float) -> Self:
-        """The target with every law by time replaced by the law by path that weakens alike at this velocity [m/s],
-        because a plate that weakens by time has no limit velocity."""
-
-        def changed(layer: Plate) -> Plate:
-            if layer.degradation == 1.0 or layer.degradation_interval is None:
-                return layer
-            by_path = {"degradation_interval": None, "degradation_distance": velocity * layer.degradation_interval}
-            return layer.model_copy(update=by_path)
-
-        return self.model_copy(update={"layers": tuple(map(changed, self.layers))})
-
     def value(self, name: str, layer: int) -> float:
         """A quantity of a layer by its name in `Scatter`."""
         plate = self.layers[layer]

@@ -9,8 +9,8 @@ the results of the replicates is used (A. B. Owen, Monte Carlo theory, methods a
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
 from statistics import NormalDist
 from typing import Self, TypedDict, Unpack
 
@@ -30,8 +30,6 @@ class Estimate:
         count: number of shots that count.
         spread: standard deviation over these shots.
         numerics: largest shift of the number by the numerics, to either side; None or NaN if it is not known.
-        assumptions: the number under each assumption about what nobody measured, by the name of the assumption; empty
-            if none was computed.
     """
 
     value: float
@@ -40,7 +38,6 @@ class Estimate:
     count: int
     spread: float
     numerics: float | None = None
-    assumptions: Mapping[str, float] = field(default_factory=dict)
 
     @property
     def half_width(self) -> float:
@@ -51,21 +48,13 @@ class Estimate:
         """The estimate in another unit."""
         value, low, high, spread = (factor * number for number in (self.value, self.low, self.high, self.spread))
         numerics = None if self.numerics is None else factor * self.numerics
-        assumptions = {name: factor * number for name, number in self.assumptions.items()}
-        scaled = replace(self, numerics=numerics, assumptions=assumptions)
+        scaled = replace(self, numerics=numerics)
         return replace(scaled, value=value, low=low, high=high, spread=spread)
 
     def within(self, least: float, most: float = math.inf) -> Self:
         """The estimate with the ends of its intervals limited to a range."""
         low, high = (end if math.isnan(end) else min(max(end, least), most) for end in (self.low, self.high))
-        assumptions = {name: min(max(number, least), most) for name, number in self.assumptions.items()}
-        return replace(self, low=low, high=high, assumptions=assumptions)
-
-    @property
-    def assumed(self) -> tuple[float, float] | None:
-        """The smallest and the largest of the number as given and under each assumption; None if none was computed."""
-        numbers = [self.value, *self.assumptions.values()]
-        return (min(numbers), max(numbers)) if self.assumptions else None
+        return replace(self, low=low, high=high)
 
 
 class Dealing(TypedDict, total=False):

@@ -14,21 +14,19 @@ from warpimpact.campaign.evidence import limit_velocity_factors
 from warpimpact.campaign.references import at_base_alone, at_solid
 from warpimpact.campaign.resistances import resistance_by_thickness
 from warpimpact.campaign.text import CampaignError
-from warpimpact.records.outcomes import Outcomes
 from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
 from warpimpact.results.measures import Measure
 from warpimpact.results.table import HitTable
 from warpimpact.results.vocabulary import LIMIT_VELOCITY
-from warpimpact.runs.assumed import assumed
 from warpimpact.runs.compute import found_in, numerics_of, of_images
 from warpimpact.runs.describe import described
 from warpimpact.runs.pilot_hits import pilot_shots
 from warpimpact.runs.shards import extent
 from warpimpact.runs.task import Report, Task
-from warpimpact.scene import Numerics, Scene, Shots, Target, exclusions
+from warpimpact.scene import Numerics, Shots, Target, exclusions
 from warpimpact.scene.model import Array
-from warpimpact.solver.findings import Found, LimitErrors
+from warpimpact.solver.findings import LimitErrors
 from warpimpact.solver.limit import (
     HIGHEST_VELOCITY,
     PASSAGES,
@@ -41,8 +39,6 @@ from warpimpact.solver.limit import (
     short_steps,
     thickest,
 )
-from warpimpact.solver.many import side_by_side
-from warpimpact.solver.marching import Helpers
 from warpimpact.solver.pilot import limits_pilot_size
 from warpimpact.solver.worker import Worker
 
@@ -173,22 +169,6 @@ class LimitMap:
             return {}
         searched = limits(*at_base_alone(campaign, shots), replace(sought, layer=0), numerics, worker)
         return {v.BASE_ALONE_LIMITS[sought.quantity]: searched.value}
-
-    def assumed(
-        self, campaign: Campaign, findings: Found | None, worker: Worker, report: Report = lambda done: None
-    ) -> HitTable:
-        """See `Computation.assumed`."""
-        sought, numerics = self.sought, numerics_of(campaign, findings)
-
-        def searched(scenes: list[tuple[Scene, Shots]]) -> list[Outcomes]:
-            def of_scene(number: int, share: Worker, _: Helpers | None) -> Outcomes:
-                scene, shots = scenes[number]
-                by_path = scene.model_copy(update={"target": scene.target.by_path(campaign.impact.velocity)})
-                return limits(by_path, shots, sought, numerics, share).recorded(sought.quantity)
-
-            return side_by_side(of_scene, len(scenes), worker)
-
-        return assumed(campaign, numerics, searched, limits=True)
 
     def pilot(self, campaign: Campaign, worker: Worker, report: Report = lambda level: None) -> LimitErrors | None:
         """See `Computation.pilot`."""

@@ -8,16 +8,13 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 import xarray
 
-from warpimpact.analysis.assumptions import Assumed
-from warpimpact.analysis.assumptions_view import assumptions_lines
 from warpimpact.analysis.estimates import estimated
-from warpimpact.analysis.numbers import ends_of, interval_text, intervals_text, rough_text
+from warpimpact.analysis.numbers import ends_of, interval_text, intervals_text
 from warpimpact.analysis.plate_text import reference_name
 from warpimpact.analysis.proxy import proxy
 from warpimpact.analysis.summary import numerics_note
 from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
-from warpimpact.results.dataset import hit_numbers
 from warpimpact.results.files import ResultError
 from warpimpact.results.measures import NAMES, Measure
 from warpimpact.results.per_hit import needed_density
@@ -63,7 +60,7 @@ def limit_view(dataset: xarray.Dataset, texts: Sequence[str] = ()) -> list[Secti
         *([Section([_hits(dataset)]), *_proxies(dataset)] if short else []),
         *([] if short and not texts else [Section([_estimates(dataset, texts)])]),
         *published_view(dataset),
-        Section([*_left_out(dataset), *assumptions_lines(dataset), *_expected(dataset), *_references(dataset)]),
+        Section([*_left_out(dataset), *_expected(dataset), *_references(dataset)]),
         Section(list(_costs(dataset))),
     ]
 
@@ -92,23 +89,9 @@ def _hits(dataset: xarray.Dataset) -> Table:
     columns = (
         *(number("hit", digits="d"), number("obliquity", "°", ".4g")),
         *(number(header, unit, ".5g") for header in (f"limit {quantity}", "lower end", "upper end")),
-        Column("assumptions"),
     )
-    ends = _assumed(dataset)
-    under = [f"{rough_text(factor * low)} to {rough_text(factor * high)}" for low, high in ends]
     obliquity = dataset[v.OBLIQUITY].values
-    rows = zip(range(len(value)), obliquity, value, lower, upper, under or [""] * len(value), strict=True)
-    return Table(columns if ends else columns[:-1], [row if ends else row[:-1] for row in rows])
-
-
-def _assumed(dataset: xarray.Dataset) -> list[tuple[float, float]]:
-    """The smallest and the largest limit of every hit under any assumption; empty unless known for all hits."""
-    measure = Measure.parse(f"mean({v.LIMITS[dataset.attrs[attr.LIMIT]].value})")
-    moves, value = Assumed(dataset, [measure]).moves(measure), measure.by_hit(dataset)
-    if moves is None or not np.array_equal(moves.hits, hit_numbers(dataset)):
-        return []
-    moved = np.array([np.zeros(len(value)), *moves.of_hits.values()])
-    return list(zip(value + np.nanmin(moved, axis=0), value + np.nanmax(moved, axis=0), strict=True))
+    return Table(columns, list(zip(range(len(value)), obliquity, value, lower, upper, strict=True)))
 
 
 def _estimates(dataset: xarray.Dataset, texts: Sequence[str]) -> Table:

@@ -6,7 +6,6 @@ import json
 import math
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -17,7 +16,7 @@ from warpimpact import Campaign
 from warpimpact.analysis.comparison import Comparison, compare
 from warpimpact.analysis.comparison_short import short_view
 from warpimpact.analysis.comparison_text import best_rows, comparison_text
-from warpimpact.analysis.contestants import Difference, Verdict
+from warpimpact.analysis.contestants import Difference
 from warpimpact.analysis.effectiveness import effectiveness
 from warpimpact.campaign.campaign import CampaignError
 from warpimpact.campaign.plates import read_plates
@@ -90,15 +89,6 @@ def test_any_measure_may_be_compared(make_plate_result) -> None:
     assert [label for label, _ in best_rows(comparison)] == ["residual velocity, 50 % quantile", "areal density"]
     with pytest.raises(ResultError, match="which needs layers behind the plate"):
         compare([slow, fast], ["slow", "fast"], ["P(base_pierced)"])
-
-
-def test_the_short_answer_counts_the_assumptions_under_which_the_best_plate_stays_ahead(make_plate_result) -> None:
-    velocity, measure = NUMBERS.uniform(600.0, 700.0, 500), "mean(residual_velocity)"
-    slow, fast = make_plate_result(velocity, 5.0), make_plate_result(velocity + 50.0, 5.0)
-    comparison = compare([slow, fast], ["slow", "fast"], [measure])
-    verdict = Verdict(measure, "fast", "slow", -1, {"yaw": -1, "stand-off": 0, "no weakening": 1, "thin": -1})
-    text = text_of([short_view(replace(comparison, verdicts=[verdict]))])
-    assert "assumptions: slow stays ahead in 2 of 4; turned over by no weakening; open in 1" in text
 
 
 @pytest.mark.parametrize(("apart", "told"), [(1e-8, False), (1e-4, True)])

@@ -1,7 +1,6 @@
 """P(perforation) over directions: geometry, weights, interval, and more hits where they are needed."""
 
 import math
-import re
 from pathlib import Path
 
 import numpy as np
@@ -71,10 +70,7 @@ def test_the_interval_of_the_mean_holds_as_often_as_it_says() -> None:
 
 
 def test_more_hits_are_computed_where_the_share_is_between_0_and_1() -> None:
-    """Through a plate without strength all cores pass, so that the mean under this assumption is near 1."""
-    alone = "".join(f"{name} = [], " for name in ("degradation", "shear_coefficient", "onset", "obliquity", "yaw"))
-    assumptions = f"assumptions = {{ {alone}edges = false, compute = true, hits = 32, resistance = [1e-3] }}\n"
-    campaign = Campaign.from_text(TEXT + assumptions, name="a", folder=Path())
+    campaign = Campaign.from_text(TEXT, name="a", folder=Path())
     directions = Directions(azimuth=[0, "60 deg"], elevation=[0], first_count=32, max_count=128, half_width=0.01)
     with executor_for("cpu") as executor:
         sector = answered(protect(campaign, directions), executor)
@@ -82,8 +78,6 @@ def test_more_hits_are_computed_where_the_share_is_between_0_and_1() -> None:
     assert 0.0 < sector.share[0, 0] < 1.0
     assert sector.hits.ravel().tolist() == [128, 32]
     assert sector.mean.value == pytest.approx(float((directions.weights() * sector.share).sum()))
-    assert {**sector.mean.assumptions} == {"Y × 0.001": pytest.approx(1.0, abs=0.15)}
-    assert sector.mean.value < 0.7
     test = firing_test('title = "a"\n[target]\nmean = 1\ndeviation = 1\n', "a", Path()).model_copy(
         update={"directions": directions, "target": {"campaign": __file__}}
     )
@@ -91,7 +85,6 @@ def test_more_hits_are_computed_where_the_share_is_between_0_and_1() -> None:
     text = text_of(firing_view(dataset))
     assert "\nmean, weighted by area: " in text
     assert "\nevidence: two shots at one slotted plate" in text
-    assert re.search(r"P\(perforation\), mean over directions +0\.\d+ .*Y × 0\.001: ", text)
     assert "mean by area" in directions_figure(dataset).get_supxlabel()
 
 

@@ -36,7 +36,6 @@ population = 6
 hits = 16
 most_hits = 64
 confirm_hits = 64
-assumed_hits = 0
 """
 
 

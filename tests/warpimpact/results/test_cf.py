@@ -51,7 +51,6 @@ def test_a_firing_test_with_directions_complies(tmp_path: Path) -> None:
         cells.astype(int),
         cells.astype(int),
         Estimate(0.5, 0.4, 0.6, 64, 0.5),
-        64,
         "evidence: none",
     )
     test = firing_test(KNOWN_TARGET.replace("tests = 1000", "tests = 20"), "a", tmp_path)

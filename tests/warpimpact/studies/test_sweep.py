@@ -21,7 +21,7 @@ from warpimpact.studies.sweep import folder_of, joined, read_sweep, run_sweep
 
 CAMPAIGNS = Path(__file__).parents[3] / "campaigns"
 TEXT = (CAMPAIGNS / "slotted_plate.toml").read_text(encoding="utf-8").replace('"standard"', '"draft"')
-TEXT = TEXT.replace("4096", "24") + "\n[assumptions]\ncompute = false\n"
+TEXT = TEXT.replace("4096", "24")
 TWO = '[sweep]\nobliquity = ["0 deg", "30 deg"]\n"plate.pattern.width" = ["3 mm", "4 mm", "5 mm"]\n'
 
 
@@ -69,9 +69,8 @@ def test_a_layer_is_swept_by_its_number(tmp_path: Path) -> None:
     assert resolved("layer 0.thickness", "a.toml") == "plate.thickness"
 
 
-def test_a_point_keeps_its_hits_at_two_levels_and_under_assumptions(tmp_path: Path) -> None:
-    text = TEXT.replace("compute = false", "compute = true") + '[sweep]\nvelocity = ["700 m/s", "800 m/s"]\n'
-    (tmp_path / "a.toml").write_text(text, encoding="utf-8")
+def test_a_point_keeps_its_hits_at_two_levels(tmp_path: Path) -> None:
+    (tmp_path / "a.toml").write_text(TEXT + '[sweep]\nvelocity = ["700 m/s", "800 m/s"]\n', encoding="utf-8")
     sweep, measure = read_sweep(tmp_path / "a.toml"), Measure.parse("mean(tilt@130mm)")
     points = [run(one, device="cpu") for one in sweep.campaigns.values()]
     files.write(joined(sweep, points), tmp_path / "a.nc")
@@ -80,7 +79,6 @@ def test_a_point_keeps_its_hits_at_two_levels_and_under_assumptions(tmp_path: Pa
         estimate = estimated(point, [measure])[measure]
         assert estimated(found.isel(impact_velocity=number), [measure])[measure] == estimate
         assert estimate.numerics is not None
-        assert estimate.assumptions
 
 
 @pytest.mark.parametrize("standoffs", [[["50 mm"], ["50 mm", "130 mm"]], [["50 mm"], ["60 mm"]], [[], ["50 mm"]]])
