@@ -15,22 +15,17 @@ if TYPE_CHECKING:
     from warpimpact.results.table import Result
 
 
-def plate_numbers(
-    open_area: float, ligament: float, weights: Mapping[str, float], resolution: float = 0.0
-) -> dict[str, str]:
+def plate_numbers(open_area: float, ligament: float, weights: Mapping[str, float]) -> dict[str, str]:
     """Numbers of a plate as text with units, by name.
 
     Args:
         open_area: share of holes.
         ligament: the smallest one [m]; inf if there is none, and then it is left out.
         weights: as `Target.weights`.
-        resolution: resolution of the ligament [m]; 0 if it is exact.
     """
     numbers = {"open area": f"{open_area:.1%}"}
     if math.isfinite(ligament):
         numbers["smallest ligament"] = f"{1e3 * ligament:.2f} mm"
-        if resolution:
-            numbers["smallest ligament"] += f" (resolved to {1e3 * resolution:g} mm)"
     return numbers | {name: f"{weight:.1f} kg/m²" for name, weight in weights.items()}
 
 

@@ -6,6 +6,9 @@ from typing import Any
 REMOVED_KEYS: dict[str, str] = {
     "assumptions": "run warpimpact sensitivity CAMPAIGN.toml",
     "posterior": "use hits.file with the CSV file that `warpimpact identify` writes",
+    "plate.pattern.shape = supershape": 'use shape = "slot", which protects no worse, or shape = "polygons"',
+    "plate.pattern.shape = level_set": 'use shape = "slot", which protects no worse, or shape = "polygons"',
+    "plate.pattern.smallest_feature": "leave it out, and round the corners of the polygons",
 }
 """The sentence for each key, by its dotted path without numbers of list items; or for a value, as "key = value"."""
 

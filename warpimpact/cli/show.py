@@ -153,7 +153,7 @@ def _plate(arguments: argparse.Namespace) -> None:
     plate = campaign.plate
     plate_figure(campaign.target, campaign.core, campaign.title, campaign.impact).savefig(output, dpi=150)
     rows = [("thickness", f"{1e3 * plate.thickness:g} mm")]
-    rows += plate_numbers(plate.open_area, plate.ligament, campaign.target.weights, plate.pattern.resolution).items()
+    rows += plate_numbers(plate.open_area, plate.ligament, campaign.target.weights).items()
     for place, layer in enumerate(campaign.layer, start=1):
         behind = f"{1e3 * layer.gap:g} mm behind the one before"
         rows.append((f"layer {place}", f"{1e3 * layer.thickness:g} mm, {behind}, {layer.open_area:.1%} open"))

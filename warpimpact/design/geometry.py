@@ -48,7 +48,7 @@ def drawn(campaign: Campaign) -> dict[str, Any]:
         "fire": fire_of(campaign.impact.obliquity, campaign.impact.azimuth)._asdict(),
         "handles": list(_handles(campaign)),
         "section": _section(target, half[1]),
-        "numbers": plate_numbers(plate.open_area, plate.ligament, target.weights, plate.pattern.resolution),
+        "numbers": plate_numbers(plate.open_area, plate.ligament, target.weights),
         "thickness": f"{plate.thickness * MM:.4g} mm",
     }
 

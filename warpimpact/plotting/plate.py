@@ -61,7 +61,7 @@ def plate_figure(
     if impact is not None:
         draw_fire(axes, fire_of(impact.obliquity, impact.azimuth))
     steel = Patch(facecolor=_STEEL, edgecolor="black", label=f"plate, {plate.thickness * MM:g} mm thick")
-    numbers = plate_numbers(plate.open_area, plate.ligament, target.weights, plate.pattern.resolution)
+    numbers = plate_numbers(plate.open_area, plate.ligament, target.weights)
     parts = (f"{name} {number}".replace(" ", "\u00a0") for name, number in numbers.items())  # no break within a part
     axes.set_title(fill(", ".join(parts), 70), fontsize="medium")
     inch = 1.0 / figure.get_figheight()

@@ -25,7 +25,7 @@ from warpimpact.results.dataset import columns_beside, stored_columns
 from warpimpact.results.outlines import in_memory
 from warpimpact.runs.describe import computed_by, described_as
 from warpimpact.runs.executor import Executor, Job
-from warpimpact.runs.jobs import solid_shots, with_ligament
+from warpimpact.runs.jobs import solid_shots
 from warpimpact.runs.questions import Arrays, Question, Round, RoundProgress, answered
 from warpimpact.runs.shards import manifest
 from warpimpact.runs.store import stored
@@ -118,7 +118,7 @@ def _computed(
         ),
     }
     table = described_as(
-        with_ligament(campaign, worker=Worker("cpu"), report=lambda now: None),
+        campaign,
         shots,
         Outcomes.joined(outcomes).unfolded(unique.symmetries),
         told,

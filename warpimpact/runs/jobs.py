@@ -15,20 +15,12 @@ from warpimpact.results.table import HitTable
 from warpimpact.runs.executor import Executor
 from warpimpact.runs.shards import Shards
 from warpimpact.scene import Shots
-from warpimpact.solver.worker import Worker
 
 CUDA_SHOTS = 2**17
 """Shots per task on a GPU. Fewer shots would not fill it."""
 CPU_SHOTS, CPU_SECONDS = 2**14, 0.5
 """Most shots of a task on the CPU of this machine, and the time that it shall take, beside which its set-up on one core
 is short. A task is at least one shard; another process computes one shard per task."""
-
-
-def with_ligament(campaign: Campaign, *, worker: Worker, report: Callable[[int], object]) -> Campaign:
-    """The campaign with the ligament of its plate computed. The ligament of a free form takes seconds, and every shard
-    states it."""
-    _ = campaign.plate.ligament
-    return campaign
 
 
 def task_size(executor: Executor, rate: float) -> int:

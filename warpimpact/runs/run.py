@@ -18,7 +18,7 @@ from warpimpact.runs.choice import executor_for, opened
 from warpimpact.runs.compute import HIT_MAP, numerics_of
 from warpimpact.runs.executor import Executor, Job, completed, result_of
 from warpimpact.runs.foreseen import cost_warning
-from warpimpact.runs.jobs import computed_hits, ranges, solid_shots, split, task_size, with_ligament
+from warpimpact.runs.jobs import computed_hits, ranges, solid_shots, split, task_size
 from warpimpact.runs.parts import claimed, telling
 from warpimpact.runs.progress import Follow, followed
 from warpimpact.runs.shards import Shards, ShardsOnDisk, extent, manifest
@@ -112,8 +112,6 @@ def _fill(campaign: Campaign, computation: Computation, shards: Shards, executor
     sampler = campaign.sampler()
     watch = Watch(campaign, shards, computation.measures)
     is_new, warn = 0 not in shards.there(), cost_warning(campaign, executor.made_by[attr.DEVICE], computation.passages)
-    if watch.end is None:
-        campaign = result_of(executor, with_ligament, campaign)
     if not is_new:  # shard 0 holds the pilot's findings, and its hits at a finer level
         watch.found = computation.found_in(shards.shard(0))
     else:

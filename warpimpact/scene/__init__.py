@@ -14,16 +14,12 @@ from .patterns import (
     EllipsePattern,
     HexagonPattern,
     LatticePattern,
-    LevelSetPattern,
     NoPattern,
     Pattern,
     PolygonsPattern,
     SlotPattern,
     SquarePattern,
-    Supershape,
-    SupershapePattern,
     TrianglePattern,
-    Wave,
 )
 from .plate import Plate
 from .sampling import Sampler, make_shots

@@ -21,7 +21,7 @@ LISTED_STRENGTH = "a column strength in hits.file"
 LAYER_STANDOFFS = "output.layer_standoffs"
 WHOLE_PLATE, SIZE, MARGIN = 'hits.area = "plate"', "size of the plate", "margin"
 BY_TIME, STAGGERED, HOLES = "plate.degradation_interval", "staggered", "holes"
-CELLS = 'shape = "supershape", "level_set" or "polygons"'
+POLYGONS = 'shape = "polygons"'
 THICKNESS, AREAL_DENSITY = "thickness", "areal_density"
 SPACING, OFFSETS, HIT_SCATTER = "burst.spacing", "burst.offsets", "burst.scatter"
 FREE_SURFACE = "interaction.free_surface"
@@ -47,7 +47,7 @@ EXCLUDED = (
     Rule(BY_TIME, BY_PATH, "exposure counts either time or path"),
     Rule(THICKNESS, AREAL_DENSITY, "with the holes each gives the other"),
     Rule(STAGGERED, HOLES, "it stands for two holes; list all holes of the cell"),
-    Rule(MARGIN, CELLS, "it has no single holes to leave out; give polygons in a cell as large as the plate"),
+    Rule(MARGIN, POLYGONS, "it has no single holes to leave out; give polygons in a cell as large as the plate"),
     Rule(LAYERS, NODAL, "the nodal scheme knows one plate and no layers behind it"),
     Rule(BY_PATH, NODAL, "the nodal scheme weakens the plate once per time step"),
     Rule(BENDING, NODAL, "the nodal scheme has no bending moment"),

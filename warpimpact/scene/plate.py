@@ -1,6 +1,7 @@
 """Plate: a thickness of resisting material with holes (docs/model.md §3, §4)."""
 
 from collections.abc import Callable
+from functools import cached_property
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Self
 
 import numpy as np
@@ -8,7 +9,8 @@ from pydantic import BaseModel, Field, ModelWrapValidatorHandler, ValidationInfo
 
 from .exclusions import AREAL_DENSITY, BY_PATH, BY_TIME, MARGIN, SIZE, THICKNESS, check_together
 from .model import Array, Model
-from .patterns import AnyPattern, BoolArray, NoPattern, Pattern
+from .patterns import AnyPattern, NoPattern, Pattern
+from .patterns.geometry import BoolArray
 from .units import (
     NonNegativeNumber,
     NonNegativeStress,
@@ -134,7 +136,7 @@ class Plate(Model):
         """Share of holes in a unit cell; with a margin, in the whole plate."""
         return self.pattern.open_area
 
-    @property
+    @cached_property
     def ligament(self) -> float:
         """Smallest distance between two holes, or between a whole hole and the rim [m]; inf without holes."""
         return self.pattern.ligament(self.size)
@@ -153,14 +155,6 @@ class Plate(Model):
         beyond_y, beyond_z = np.abs(y) - 0.5 * self.size[0], np.abs(z) - 0.5 * self.size[1]
         off = np.hypot(np.maximum(beyond_y, 0.0), np.maximum(beyond_z, 0.0))
         return np.where(off > 0.0, -off, np.minimum(of_holes, -np.maximum(beyond_y, beyond_z)))
-
-    def has_edge(self, y: Array, z: Array, reach: float) -> BoolArray:
-        """`Pattern.has_edge`, including the rim of the plate."""
-        near_y, near_z = (
-            np.abs(np.abs(along) - 0.5 * side) <= reach
-            for along, side in zip((y, z), self.size or (np.inf, np.inf), strict=True)
-        )
-        return self.pattern.has_edge(y, z, reach) | near_y | near_z
 
     @property
     def sampled_cell(self) -> tuple[float, float]:

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpimpact.scene.patterns import NoPattern
-from warpimpact.scene.patterns.pattern import Check
+from warpimpact.scene.patterns.geometry import Check
 from warpimpact.solver.keys import Key
 from warpimpact.solver.tile import Floats, Real, Tile, kept
 

@@ -299,7 +299,7 @@ def material_about(plate: Plate, y: Array, z: Array, spacing: float) -> Array:
     """Share of material about every node, shape [nodes_y, nodes_z]; points are taken where an edge may be."""
     share, rows = np.empty((len(y), len(z))), max(1, NODES_AT_A_TIME // len(z))
     parts = {first: y[first : first + rows, None] for first in range(0, len(y), rows)}
-    edges = {first: plate.has_edge(along_y, z, spacing) for first, along_y in parts.items()}
+    edges = {first: np.abs(plate.edge_distance(along_y, z)) <= spacing for first, along_y in parts.items()}
     nodes = max(1, sum(int(edge.sum()) for edge in edges.values()))
     samples = min(SAMPLES, max(2, math.isqrt(MOST_POINTS // nodes)))
     fine = ((np.arange(samples) + 0.5) / samples - 0.5) * spacing

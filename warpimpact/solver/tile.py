@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpimpact.scene.patterns import WHOLE_CELL
-from warpimpact.scene.patterns.pattern import Check, no_end
+from warpimpact.scene.patterns.geometry import Check, no_end
 from warpimpact.solver.device import SMALL_MEMORY, free_memory
 from warpimpact.solver.keys import Key
 

@@ -33,7 +33,7 @@ MISTAKES = {
         'shape = "slot"',
         'shape = "slit"',
         "plate.pattern.shape: got \"slit\", but it must be one of 'slot', 'circle', 'triangle', "
-        "'square', 'hexagon', 'ellipse', 'none', 'supershape', 'level_set', 'polygons'",
+        "'square', 'hexagon', 'ellipse', 'none', 'polygons'",
     ),
     "unknown choice": (
         '"standard"',

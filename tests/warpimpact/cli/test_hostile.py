@@ -72,7 +72,7 @@ CAMPAIGNS = {
     "many polygons": (with_polygons([[[0, 0], [1e-3, 0], [0, 1e-3]]] * 401), "at most 400 items"),
     "many corners": (with_polygons([ZIGZAG * 2]), "at most 400 items"),
     "corners far away": (with_polygons([[[0, 0], [1e30, 0], [0, 1e30]]]), "at most one spacing away"),
-    "an image": (with_polygons([]).replace('"polygons"', '"mask"'), "'level_set', 'polygons'"),
+    "an image": (with_polygons([]).replace('"polygons"', '"mask"'), "'none', 'polygons'"),
     "a tiny depth": (
         re.sub("(degradation_length *= .*)", '\\1\ndegradation_depth = "1 nm"', BASE),
         "must be at least 1/100 of the thickness",

@@ -117,13 +117,12 @@ def test_dimensions_are_those_of_the_plate() -> None:
     assert sorted(filter(None, shown)) == ["12", "16", "16", "4", "4"]
 
 
-def test_the_resolution_of_a_free_form_is_told() -> None:
+def test_polygons_have_the_ligament_of_their_corners() -> None:
     hole = 1e-3 * np.array([(-5, -5), (5, -5), (5, 5), (-5, 5)])
     pattern = PolygonsPattern(polygons=[hole.tolist()], spacing=("16 mm", "16 mm"), cell_size="1 mm")
     figure = plate_figure(plate(pattern=pattern))
     np.testing.assert_allclose(colours(figure, (-4, 1), (-6, 1)), [HOLE, STEEL], atol=0.01)
-    title = " ".join(figure.axes[0].get_title().split())
-    assert "smallest ligament 6.00 mm (resolved to 1 mm)" in title
+    assert "smallest ligament 6.00 mm" in " ".join(figure.axes[0].get_title().split())
 
 
 def test_a_solid_plate_is_steel_as_far_as_the_core_needs() -> None:

@@ -3,7 +3,6 @@
 import io
 import logging
 import os
-import pickle
 import signal
 from collections.abc import Callable, Iterator
 from concurrent.futures import CancelledError
@@ -16,11 +15,9 @@ from warpimpact.cli import main
 from warpimpact.runs.choice import executor_for
 from warpimpact.runs.cluster import _made_by, _on_worker
 from warpimpact.runs.executor import ClusterError, Job
-from warpimpact.runs.jobs import with_ligament
 from warpimpact.runs.progress import RunProgress
 from warpimpact.runs.run import run_to_file
 from warpimpact.solver.device import DeviceError
-from warpimpact.solver.worker import Worker
 
 distributed = pytest.importorskip("distributed")
 
@@ -147,22 +144,6 @@ def test_workers_that_would_compute_other_bits_are_refused() -> None:
     kind = {"warpimpact_version": "0.0.0", "warp_version": "1", "device": "cpu"}
     with pytest.raises(DeviceError, match=r'the workers differ: warpimpact_version is "0.0.0" on one and'):
         _on_worker(Job(_made_by, ()), "cpu", kind)
-
-
-def test_the_ligament_of_a_free_form_is_found_once_for_all_workers(
-    campaign: Campaign, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    pattern = {"shape": "supershape", "spacing": ["8 mm", "8 mm"], "forms": [{"radius": "2 mm"}]}
-    free_form = campaign.model_copy(update={"plate": campaign.plate.model_copy(update={"pattern": pattern})})
-    found = with_ligament(free_form, worker=Worker("cpu"), report=list)
-
-    def again(_: object) -> float:
-        raise AssertionError("was computed again")
-
-    monkeypatch.setattr("warpimpact.scene.patterns.cells.smallest_gap", again)
-    with pytest.raises(AssertionError):
-        _ = free_form.model_copy().plate.pattern.model_copy().ligament()
-    assert pickle.loads(pickle.dumps(found)).plate.ligament == found.plate.ligament > 0.0
 
 
 @pytest.mark.parametrize("lost", ["closed", "cancelled"])

@@ -16,16 +16,14 @@ from warpimpact.scene import (
     EllipsePattern,
     HexagonPattern,
     LatticePattern,
-    LevelSetPattern,
     NoPattern,
+    PolygonsPattern,
     SlotPattern,
     SquarePattern,
     TrianglePattern,
-    Wave,
 )
 from warpimpact.scene.patterns import WHOLE_CELL
-from warpimpact.scene.patterns.lines import LINES
-from warpimpact.scene.patterns.pattern import rounded
+from warpimpact.scene.patterns.geometry import LINES, rounded
 
 MM = 1e-3
 SLOT = SlotPattern(length="12 mm", width="4 mm", spacing=["8 mm", "16 mm"], staggered=True)
@@ -286,10 +284,10 @@ def test_a_turned_hole_is_the_hole_turned(shape: LatticePattern, turn: float) ->
     turned = type(shape).model_validate(shape.model_dump() | {"rotation": math.degrees(turn)})
     y, z = np.random.default_rng(4).uniform(-3 * MM, 3 * MM, (2, 2000))
     cosine, sine = math.cos(turn), math.sin(turn)
-    clear = ~shape.has_edge(y, z, 1e-9)  # elsewhere rounding decides
+    clear = abs(shape.edge_distance(y, z)) > 0.01 * MM  # elsewhere rounding decides
     there = turned.is_hole(cosine * y - sine * z, sine * y + cosine * z)
     assert np.array_equal(there[clear], shape.is_hole(y, z)[clear])
-    assert clear.mean() > 0.99
+    assert clear.mean() > 0.97
 
 
 @pytest.mark.parametrize(
@@ -297,14 +295,12 @@ def test_a_turned_hole_is_the_hole_turned(shape: LatticePattern, turn: float) ->
     [
         *(SLOT, CIRCLE, TRIANGLE, UP_AND_DOWN, SQUARE, HEXAGON, ELLIPSE, DIAGONAL, NoPattern()),
         CIRCLE.bounded((30 * MM, 41 * MM), 2 * MM),
-        LevelSetPattern(
-            spacing=(8 * MM, 6 * MM), waves=(Wave(along_y=1, along_z=2), Wave(along_y=2, along_z=0)), share=0.3
-        ),
+        PolygonsPattern(spacing=(8 * MM, 6 * MM), polygons=[[(-2 * MM, 0), (2.5 * MM, -MM), (0, 2 * MM)]]),
     ],
     ids=lambda pattern: getattr(pattern, "shape", pattern),
 )
 def test_shares_of_cells_in_holes_are_those_of_many_points(pattern: Any, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("warpimpact.scene.patterns.lines._LINES_PER_LOT", 100)  # several lots
+    monkeypatch.setattr("warpimpact.scene.patterns.geometry._LINES_PER_LOT", 100)  # several lots
     counts, points = (57, 46), 24
     sides = pattern.period[0] / counts[0], pattern.period[1] / counts[1]
     y, z = ((np.arange(points * n) + 0.5) * side / points for n, side in zip(counts, sides, strict=True))
@@ -350,18 +346,6 @@ def test_mirrored_holes_have_mirrored_shares_to_the_bit(shape: dict[str, Any], c
     points = pattern.is_hole(y[:, None], y)
     assert np.array_equal(points, points[::-1])
     assert np.array_equal(points, points[:, ::-1])
-
-
-@settings(deadline=None, max_examples=25)
-@given(pattern=lattices(), reach=st.floats(0.01 * MM, 0.3 * MM), direction=TURNS)
-def test_away_from_edges_all_points_within_reach_are_alike(
-    pattern: LatticePattern, reach: float, direction: float
-) -> None:
-    y, z = np.random.default_rng(5).uniform(-20 * MM, 20 * MM, (2, 5000))
-    clear = ~pattern.has_edge(y, z, reach)
-    near = pattern.is_hole(y + reach * math.cos(direction), z + reach * math.sin(direction))
-    assert np.array_equal(near[clear], pattern.is_hole(y, z)[clear])
-    assert clear.mean() > 0.2 or reach > 0.1 * 2 * MM  # a tenth of the narrowest hole is as far as it looks
 
 
 def two_slots(*turns: float, **changes: Any) -> SlotPattern:

@@ -100,7 +100,7 @@ def of_cells(material: np.ndarray) -> Plate:
 
 
 @pytest.mark.parametrize("sides", [(12, 16), (13, 16), (13, 17)])
-def test_of_a_free_form_are_those_of_its_cells(sides: tuple[int, int]) -> None:
+def test_of_polygons_are_those_of_their_cells(sides: tuple[int, int]) -> None:
     blank = np.ones(sides)
     blank[3:-3, 5:-5] = 0
     assert found(of_cells(blank)) == {*ALL}
@@ -116,7 +116,7 @@ def test_of_a_free_form_are_those_of_its_cells(sides: tuple[int, int]) -> None:
         assert found(of_cells(notched)) == expected
 
 
-def test_a_free_form_may_be_centred_or_glide() -> None:
+def test_polygons_may_be_centred_or_glide() -> None:
     material = np.ones((12, 16))
     material[1:3, 6:10] = 0
     material[7:9, [14, 15, 0, 1]] = 0  # the hole again, half a cell on along both sides

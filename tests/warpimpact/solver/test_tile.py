@@ -12,14 +12,13 @@ from warpimpact import Campaign
 from warpimpact.runs.foreseen import cost_of
 from warpimpact.scene import (
     CirclePattern,
-    LevelSetPattern,
     Numerics,
     Plate,
+    PolygonsPattern,
     SlotPattern,
     Target,
     TrianglePattern,
 )
-from warpimpact.scene.patterns.free_form import Wave
 from warpimpact.solver import replay
 from warpimpact.solver.grid import FINER, tent_taps
 from warpimpact.solver.prepare import prepare
@@ -133,16 +132,14 @@ def test_a_window_full_of_edges_takes_a_bounded_number_of_points(
         points.append(np.broadcast(y, z).size)
         return np.broadcast_to(y - np.floor(y) < 0.5, np.broadcast(y, z).shape)
 
-    plate = SimpleNamespace(is_solid=is_solid, has_edge=lambda y, z, _: np.ones((len(y), len(z)), bool))
+    plate = SimpleNamespace(is_solid=is_solid, edge_distance=lambda y, z: np.zeros((len(y), len(z))))
     share = replay.material_about(cast(Any, plate), np.arange(nodes) + 0.5, np.arange(nodes) + 0.5, 1.0)
     np.testing.assert_array_equal(share, 0.5)
     assert sum(points) == nodes**2 * (1 + samples**2)
 
 
 SLOTTED_PLATE = Path(__file__).parents[3] / "campaigns" / "slotted_plate.toml"
-FREE_FORM = LevelSetPattern(
-    spacing=(8e-3, 9e-3), waves=(Wave(along_y=1, along_z=0), Wave(along_y=0, along_z=1)), share=0.3
-)
+POLYGONS = PolygonsPattern(spacing=(8e-3, 9e-3), polygons=[[(-2e-3, 0.0), (2.5e-3, -1e-3), (0.0, 2e-3)]])
 WIDE = PLATE.model_copy(update={"pattern": SlotPattern(length=12e-3, width=4e-3, spacing=(1.0, 1.0))})
 
 
@@ -165,7 +162,7 @@ def test_the_holes_of_a_plate_are_not_built_before_somebody_computes_and_not_at_
     assert tile.built
 
 
-@pytest.mark.parametrize("pattern", [*PATTERNS, FREE_FORM], ids=lambda pattern: pattern.shape)
+@pytest.mark.parametrize("pattern", [*PATTERNS, POLYGONS], ids=lambda pattern: pattern.shape)
 @pytest.mark.parametrize("sharp", [False, True])
 def test_a_tile_is_built_in_small_parts_that_may_end_it(
     pattern: Any, sharp: bool, monkeypatch: pytest.MonkeyPatch
@@ -174,7 +171,7 @@ def test_a_tile_is_built_in_small_parts_that_may_end_it(
     whole = tile_of(plate, 0.1e-3, sharp=sharp).material
     forget_tiles()
     monkeypatch.setattr("warpimpact.solver.tile.AT_ONCE", 500)
-    monkeypatch.setattr("warpimpact.scene.patterns.cells._CELLS_PER_CHECK", 700)
+    monkeypatch.setattr("warpimpact.scene.patterns.polygons._CELLS_PER_CHECK", 700)
     part, looks = tile_of(plate, 0.1e-3, sharp=sharp), 0
 
     def look() -> None:
@@ -187,7 +184,7 @@ def test_a_tile_is_built_in_small_parts_that_may_end_it(
         part.build(look)
     assert not part.built
     part.build(look)
-    assert looks > (24 if pattern is FREE_FORM else 11 + part.shape[0] if sharp else 12 + sum(part.shape))
+    assert looks > (24 if pattern is POLYGONS else 11 + part.shape[0] if sharp else 12 + sum(part.shape))
     np.testing.assert_array_equal(part.material, whole)
 
 

@@ -1,13 +1,13 @@
-"""Hole patterns: one hole shape on a lattice, or free forms in a cell, repeated periodically (docs/model.md §3)."""
+"""Hole patterns: one hole shape on a lattice, or polygons, repeated periodically (docs/model.md §3)."""
 
 from typing import Annotated
 
 from pydantic import Field
 
-from .free_form import LevelSetPattern, PolygonsPattern, Supershape, SupershapePattern, Wave
+from .geometry import WHOLE_CELL as WHOLE_CELL
 from .lattice import HolePlace, LatticePattern
-from .pattern import WHOLE_CELL as WHOLE_CELL
-from .pattern import BoolArray, NoPattern, Pattern
+from .pattern import NoPattern, Pattern
+from .polygons import PolygonsPattern
 from .shapes import CirclePattern, EllipsePattern, HexagonPattern, SlotPattern, SquarePattern, TrianglePattern
 
 AnyPattern = Annotated[
@@ -18,8 +18,6 @@ AnyPattern = Annotated[
     | HexagonPattern
     | EllipsePattern
     | NoPattern
-    | SupershapePattern
-    | LevelSetPattern
     | PolygonsPattern,
     Field(discriminator="shape"),
 ]

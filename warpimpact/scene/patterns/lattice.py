@@ -13,9 +13,24 @@ from pydantic import Field, PrivateAttr, ValidationInfo, field_validator, model_
 from ..exclusions import HOLES, STAGGERED, check_together
 from ..model import Array
 from ..units import Angle, Length, PositiveLength, quantity
-from .lines import Chords, Numbers, half_shares
-from .pattern import BoolArray, Check, Counts, Pattern, Range, half_sides, no_end
-from .roundings import area, chords, distance, geometries, neighbours, outline, placed
+from .geometry import (
+    BoolArray,
+    Check,
+    Chords,
+    Counts,
+    Numbers,
+    Range,
+    area,
+    chords,
+    distance,
+    geometries,
+    half_shares,
+    neighbours,
+    no_end,
+    placed,
+    shifts_into,
+)
+from .pattern import Pattern
 
 _MOST_HOLES = 20_000
 _ROWS_PER_CHECK = 64
@@ -72,11 +87,6 @@ class LatticePattern(Pattern):
         [corners, 2] [m]."""
 
     @property
-    def rounding(self) -> float:
-        """How far the hole reaches beyond its spine [m]."""
-        return 0.0
-
-    @property
     def hole_area(self) -> float:
         """Area of one hole [m²]."""
         return area(self.spine, self.rounding)
@@ -110,7 +120,7 @@ class LatticePattern(Pattern):
         if self.open_area >= 1:
             raise ValueError(f"got spacing = {_millimetres(self.spacing)}, but the cell must be larger than its holes")
         gap, first, second = self._nearest
-        if gap <= _EQUAL_LENGTHS * max(self.spacing):
+        if gap <= self._edge:
             raise ValueError(
                 f"got spacing = {_millimetres(self.spacing)}, which lets the holes at {_millimetres(first)} and "
                 f"{_millimetres(second)} overlap or touch, but a ligament must be left between them"
@@ -154,14 +164,16 @@ class LatticePattern(Pattern):
         return pattern
 
     def is_hole(self, y: Array, z: Array) -> BoolArray:
-        inside: BoolArray = self._deepest(y, z) >= -_EQUAL_LENGTHS * max(
-            self.spacing
-        )  # an edge lies in its hole on any side
-        return inside
-
-    def has_edge(self, y: Array, z: Array, reach: float) -> BoolArray:
-        deepest = self._deepest(y, z)
-        return np.asarray(~(np.abs(deepest) > reach) if reach <= self._sight else np.ones(deepest.shape, dtype=bool))
+        (period_y, period_z), (count_y, count_z) = self.period, self._bins[0]
+        y, z = y - period_y * np.round(y / period_y), z - period_z * np.round(z / period_z)
+        cell = _bin(y, period_y, count_y) * count_z + _bin(z, period_z, count_z)
+        deepest = np.full(cell.shape, -np.inf)
+        for hole_y, hole_z, cosine, sine in self._bins[1]:
+            from_y, from_z = y - hole_y[cell], z - hole_z[cell]
+            along_y = cosine[cell] * from_y + sine[cell] * from_z
+            along_z = cosine[cell] * from_z - sine[cell] * from_y
+            deepest = np.fmax(deepest, self._depth(along_y, along_z))  # a bin with fewer holes has NaN
+        return np.asarray(deepest >= -self._edge)  # an edge lies in its hole on any side
 
     def shares_in_holes(self, counts: tuple[int, int], sides: tuple[float, float], check: Check = no_end) -> Counts:
         ranges = [(-side, side * (count + 1)) for side, count in zip(sides, counts, strict=True)]
@@ -179,32 +191,12 @@ class LatticePattern(Pattern):
         spines = placed(self.spine, places)
         return partial(chords, spines[:, ::-1, ::-1] if exchanged else spines, self.rounding)
 
-    def _deepest(self, y: Array, z: Array) -> Array:
-        """Depth of points inside a hole [m]; negative outside, −inf if no hole is in sight."""
-        (period_y, period_z), (count_y, count_z) = self.period, self._bins[0]
-        y, z = y - period_y * np.round(y / period_y), z - period_z * np.round(z / period_z)
-        cell = _bin(y, period_y, count_y) * count_z + _bin(z, period_z, count_z)
-        deepest = np.full(cell.shape, -np.inf)
-        for hole_y, hole_z, cosine, sine in self._bins[1]:
-            from_y, from_z = y - hole_y[cell], z - hole_z[cell]
-            along_y = cosine[cell] * from_y + sine[cell] * from_z
-            along_z = cosine[cell] * from_z - sine[cell] * from_y
-            deepest = np.fmax(deepest, self._depth(along_y, along_z))  # a bin with fewer holes has NaN
-        return deepest
+    def spines(self, y_range: Range, z_range: Range) -> Any:
+        return geometries(placed(self.spine, self._reaching(y_range, z_range)))
 
-    def outlines(self, y_range: Range, z_range: Range) -> list[Array]:
-        return [outline(spine, self.rounding) for spine in placed(self.spine, self._reaching(y_range, z_range))]
-
-    def ligament(self, size: tuple[float, float] | None = None) -> float:
-        """Smallest distance between two holes, or between a whole hole and the rim of a plate of this `size` [m];
-        exact, except for ellipses, which are polygons here."""
-        if size is None:
-            return self._nearest[0]
-        half = half_sides(size, self.period, np.ptp(self._boxes(self._places), axis=1).max(axis=0))
-        places = self._reaching((-half[0], half[0]), (-half[1], half[1]))
-        to_rim = (half - np.abs(self._boxes(places))).min(axis=(1, 2))
-        between = neighbours(geometries(placed(self.spine, places)), len(places))[0] - 2 * self.rounding
-        return float(min(between, to_rim[to_rim >= 0].min(initial=np.inf)))
+    @property
+    def _gap(self) -> float:
+        return self._nearest[0]
 
     def is_symmetric(self, along_y: int, along_z: int, *, centred: bool) -> bool:
         period, mirror = np.array(self.period), np.array([along_y, along_z])
@@ -260,15 +252,10 @@ class LatticePattern(Pattern):
 
     def _repeated(self, places: Array, period: tuple[float, float], y_range: Range, z_range: Range) -> Array:
         """Places repeated by whole periods whose holes reach into a rectangle, shape [holes, 3]."""
-        repeated = []
-        for place, (low, high) in zip(places, self._boxes(places), strict=True):
-            along_y, along_z = (
-                np.arange(math.ceil((ends[0] - high[axis]) / step), math.floor((ends[1] - low[axis]) / step) + 1) * step
-                for axis, (ends, step) in enumerate(zip((y_range, z_range), period, strict=True))
-            )
-            shifts = np.stack(np.meshgrid(along_y, along_z, 0.0, indexing="ij"), axis=-1)
-            repeated.append(place + shifts.reshape(-1, 3))
-        return np.concatenate(repeated)
+        shifts = [shifts_into(low, high, period, y_range, z_range) for low, high in self._boxes(places)]
+        return np.concatenate(
+            [place + np.pad(of_it, ((0, 0), (0, 1))) for place, of_it in zip(places, shifts, strict=True)]
+        )
 
     def _boxes(self, places: Array) -> Array:
         """Lower and upper corners (y, z) of the holes at these places, shape [holes, 2, 2] [m]."""
@@ -289,13 +276,13 @@ class LatticePattern(Pattern):
         return gap - 2 * self.rounding, places[first, :2], places[second, :2]
 
     @property
-    def _sight(self) -> float:
-        """Distance from its edge within which a hole is in sight [m]."""
-        return 0.1 * float(np.ptp(self.spine, axis=0).min() + 2 * self.rounding)
+    def _edge(self) -> float:
+        """Distance from its hole within which a point lies on the edge [m]."""
+        return _EQUAL_LENGTHS * max(self.spacing)
 
     @cached_property
     def _bins(self) -> tuple[tuple[int, int], list[tuple[Array, ...]]]:
-        """Numbers of bins of a period along y and z, and the holes in sight of each bin.
+        """Numbers of bins of a period along y and z, and the holes that reach into each bin.
 
         Entry k has the origin (y, z), the cosine and the sine of the rotation of the k-th hole of every bin, shape
         [bins] each; NaN in a bin with fewer holes.
@@ -303,9 +290,9 @@ class LatticePattern(Pattern):
         period, boxes = np.array(self.period), self._boxes(self._places)
         finest = math.ceil(8 * math.sqrt(len(boxes)))
         counts = np.minimum(np.ceil(2 * period / np.ptp(boxes, axis=1).max(axis=0)), finest).astype(int)
-        half = period / 2 + self._sight
+        half = period / 2 + self._edge
         places = self._repeated(self._places, self.period, (-half[0], half[0]), (-half[1], half[1]))
-        reaches = _bin(self._boxes(places) + np.array([[-self._sight], [self._sight]]), period, counts)
+        reaches = _bin(self._boxes(places) + np.array([[-self._edge], [self._edge]]), period, counts)
         inside: list[list[int]] = [[] for _ in range(math.prod(counts))]
         for hole, ((low_y, low_z), (high_y, high_z)) in enumerate(reaches):
             for row in range(low_y, high_y + 1):

@@ -2,49 +2,21 @@
 
 import math
 from abc import ABC, abstractmethod
-from collections.abc import Callable
 from functools import cached_property
 from typing import Any, Literal, Self
 
 import numpy as np
-from numpy.typing import NDArray
+import shapely
 
 from ..model import Array, Model
-from .roundings import distance_to, pieces
+from .geometry import BoolArray, Check, Counts, Range, distance_to, neighbours, no_end, pieces
 
-BoolArray = NDArray[np.bool_]
-Counts = NDArray[np.int16]
-Range = tuple[float, float]
-Check = Callable[[], object]
-
-
-WHOLE_CELL = 24576
-"""Parts of a cell that count its share in holes as an integer; a cell inside a hole has exactly all."""
-
-
-def no_end() -> None:
-    """A `check` that never ends the work."""
-
-
-def rounded(share: Array, whole: Any) -> Counts:
-    """Shares of `whole` as integers. A half is rounded up, even after a rounding error, so that mirrored holes have
-    mirrored shares."""
-    return np.asarray(np.floor(share * whole + (0.5 + 1e-6)), dtype=np.int16)
-
-
-def half_sides(size: tuple[float, float], cell: tuple[float, float], reach: Array) -> Array:
-    """Half the sides of a small plate with the same ligaments as a plate of this `size` [m].
-
-    A plate that is smaller by whole cells on every side cuts the same holes. It is at least two cells larger than the
-    `reach` of a hole.
-    """
-    half, sides = np.array(size) / 2, np.array(cell)
-    spare: Array = np.maximum(0.0, np.floor((half - reach) / sides) - 2)
-    return np.asarray(half - spare * sides)
+_QUARTER = 16
+"""Chords per quarter of a turn in an outline; a circle loses 1.6e-3 of its area."""
 
 
 class Pattern(Model, ABC):
-    """Where a plate has holes."""
+    """Where a plate has holes. A hole has all points within the distance `rounding` of its spine."""
 
     @property
     @abstractmethod
@@ -66,15 +38,26 @@ class Pattern(Model, ABC):
     def is_hole(self, y: Array, z: Array) -> BoolArray:
         """Whether points y, z [m] lie in a hole; bool, of their broadcast shape."""
 
-    def has_edge(self, y: Array, z: Array, reach: float) -> BoolArray:
-        """Whether the edge of a hole may lie within `reach` of points y, z [m]; bool, of their broadcast shape. False
-        is certain."""
-        return np.ones(np.broadcast_shapes(np.shape(y), np.shape(z)), dtype=bool)
-
     @abstractmethod
     def shares_in_holes(self, counts: tuple[int, int], sides: tuple[float, float], check: Check = no_end) -> Counts:
         """Share of every cell that lies in holes, in parts of WHOLE_CELL, shape `counts`: cells of a period along y and
         z with these sides [m], from the origin on. `check` is called often, and raises to end the work."""
+
+    @abstractmethod
+    def spines(self, y_range: Range, z_range: Range) -> Any:
+        """Spines of the holes that reach into a rectangle, as an array of shapely geometries."""
+
+    @property
+    def rounding(self) -> float:
+        """How far a hole reaches beyond its spine [m]."""
+        return 0.0
+
+    def outlines(self, y_range: Range, z_range: Range) -> list[Array]:
+        """Closed outlines, each of shape [points, 2] [m], of the holes that reach into a rectangle."""
+        holes = self.spines(y_range, z_range)
+        if self.rounding:
+            holes = shapely.buffer(holes, self.rounding, quad_segs=_QUARTER)
+        return [np.array(shapely.get_coordinates(hole)) for hole in holes]
 
     def edge_distance(self, y: Array, z: Array) -> Array:
         """Distance of points y, z [m] from the nearest outline of a hole, of their broadcast shape: negative in a hole,
@@ -90,19 +73,31 @@ class Pattern(Model, ABC):
         sides = np.array(self.period)
         return pieces(self.outlines(*((-reach, reach) for reach in 0.5 * (sides + np.hypot(*sides)))))
 
-    @abstractmethod
-    def outlines(self, y_range: Range, z_range: Range) -> list[Array]:
-        """Closed outlines, each of shape [points, 2] [m], of the holes that reach into a rectangle."""
-
-    @abstractmethod
     def ligament(self, size: tuple[float, float] | None = None) -> float:
         """Smallest distance between two holes, or between a whole hole and the rim of a plate of this `size` [m]; inf
-        where there is none. A hole that the rim cuts has no distance to it."""
+        where there is none. A hole that the rim cuts has no distance to it. An ellipse is a polygon here."""
+        if size is None:
+            return self._gap
+        sides, half = np.array(self.period), 0.5 * np.array(size)
+        low, high = self._corners(self.spines(*((-side, side) for side in 0.5 * sides)))
+        reach = (high - low).max(axis=0, initial=0.0)
+        # A plate that is smaller by whole cells on every side cuts the same holes.
+        half = half - np.maximum(0.0, np.floor((half - reach) / sides) - 2) * sides
+        holes = self.spines(*((-side, side) for side in half))
+        to_rim = (half - np.abs(self._corners(holes))).min(axis=(0, 2))
+        is_wide = bool((half >= reach + 2 * sides).all())
+        between = self._gap if is_wide else neighbours(holes, len(holes))[0] - 2.0 * self.rounding
+        return float(min(between, to_rim[to_rim >= 0].min(initial=np.inf)))
+
+    def _corners(self, spines: Any) -> Array:
+        """Lower and upper corners (y, z) of the boxes around holes, shape [2, holes, 2] [m]."""
+        bounds = shapely.bounds(spines)
+        return np.stack([bounds[:, :2] - self.rounding, bounds[:, 2:] + self.rounding])
 
     @property
-    def resolution(self) -> float:
-        """Largest error of the ligament [m]; 0 for shapes with exact formulas."""
-        return 0.0
+    @abstractmethod
+    def _gap(self) -> float:
+        """Smallest distance between two holes of the unbounded pattern [m]."""
 
     @abstractmethod
     def is_symmetric(self, along_y: int, along_z: int, *, centred: bool) -> bool:
@@ -148,10 +143,11 @@ class NoPattern(Pattern):
     def shares_in_holes(self, counts: tuple[int, int], sides: tuple[float, float], check: Check = no_end) -> Counts:
         return np.zeros(counts, dtype=np.int16)
 
-    def outlines(self, y_range: Range, z_range: Range) -> list[Array]:
-        return []
+    def spines(self, y_range: Range, z_range: Range) -> Any:
+        return np.empty(0, dtype=object)
 
-    def ligament(self, size: tuple[float, float] | None = None) -> float:
+    @property
+    def _gap(self) -> float:
         return math.inf
 
     def is_symmetric(self, along_y: int, along_z: int, *, centred: bool) -> bool:

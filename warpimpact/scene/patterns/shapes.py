@@ -7,8 +7,8 @@ import numpy as np
 
 from ..model import Array
 from ..units import NonNegativeLength, PositiveLength
+from .geometry import Chords, Numbers
 from .lattice import LatticePattern
-from .lines import Chords, Numbers
 
 _ELLIPSE_CHORDS = 720
 

@@ -1,25 +1,44 @@
-"""Geometry of rounded convex shapes. A shape has all points within the distance `rounding` of a spine, which is a
-convex polygon, a line or a point. Areas, distances and extents are exact. Spines are arrays of shape [corners, 2] [m].
+"""Geometry of rounded convex shapes, and shares of cells that lie in them.
+
+A shape has all points within the distance `rounding` of a spine, which is a convex polygon, a line or a point. Areas,
+distances and extents are exact. Spines are arrays of shape [corners, 2] [m].
 """
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
+import shapely
+from numpy.typing import NDArray
 
 from ..model import Array
 
+BoolArray = NDArray[np.bool_]
+Counts = NDArray[np.int16]
+Numbers = NDArray[np.int64]
+Range = tuple[float, float]
+Check = Callable[[], object]
+Chords = Callable[[Numbers, Array, float], tuple[Array, Array]]
+"""(number of the hole, z [m], slack [m]) of lines along y → their two ends in the hole [m], NaN if a line misses it.
+The ends have the shape of z; its last axis is along the holes."""
+
+WHOLE_CELL = 24576
+"""Parts of a cell that count its share in holes as an integer; a cell inside a hole has exactly all."""
+LINES = 3
+"""Evenly spaced lines in each direction through the part of a hole in a cell. The share along a line is exact."""
+_PER_LINE = WHOLE_CELL // (2 * LINES)
+_EDGE = 1e-6
+"""Distance from a hole, in sides of a cell, within which a line touches it."""
+_LINES_PER_LOT = 2**16
+"""Approximate number of lines that are computed together."""
 _PIECE = 16
 """Chords per piece of an outline."""
-_QUARTER = 16
-"""Chords per quarter of a turn in an outline; a circle loses 1.6e-3 of its area."""
 
 
 def area(spine: Array, rounding: float) -> float:
     """Area of the shape [m²] (Steiner's formula)."""
-    import shapely
-
     shape = geometries(spine[None])[0]
     perimeter = shape.length * (2.0 if len(spine) == 2 else 1.0)  # a line counts on both sides
     return float(shapely.area(shape) + rounding * perimeter + np.pi * rounding**2)
@@ -84,18 +103,17 @@ def placed(spine: Array, places: Array) -> Array:
     return np.stack([cosine * y - sine * z + places[:, :1], sine * y + cosine * z + places[:, 1:2]], axis=-1)
 
 
-def outline(spine: Array, rounding: float) -> Array:
-    """Closed outline of the shape, shape [points, 2] [m]; chords between points on the exact outline."""
-    import shapely
-
-    shape = geometries(spine[None])[0]
-    return np.array(shapely.get_coordinates(shapely.buffer(shape, rounding, quad_segs=_QUARTER) if rounding else shape))
+def shifts_into(low: Array, high: Array, period: Range, y_range: Range, z_range: Range) -> Array:
+    """Whole periods by which a box from `low` to `high` reaches into a rectangle, shape [shifts, 2] [m]."""
+    along_y, along_z = (
+        np.arange(math.ceil((ends[0] - high[axis]) / step), math.floor((ends[1] - low[axis]) / step) + 1) * step
+        for axis, (ends, step) in enumerate(zip((y_range, z_range), period, strict=True))
+    )
+    return np.stack(np.meshgrid(along_y, along_z, indexing="ij"), axis=-1).reshape(-1, 2)
 
 
 def distance_to(geometries: Any, y: Array, z: Array) -> Array:
     """Distance of points y, z from the nearest geometry [m], in their broadcast shape; inf if there is none."""
-    import shapely
-
     points: Any = shapely.points(*np.broadcast_arrays(y, z))
     if not len(geometries):
         return np.full(points.shape, np.inf)
@@ -109,8 +127,6 @@ def neighbours(geometries: Any, first: int) -> tuple[float, int, int]:
 
     The distance is 0 if they overlap, and inf if there are fewer than two geometries.
     """
-    import shapely
-
     if len(geometries) < 2:
         return np.inf, 0, 0
     tree = shapely.STRtree(geometries)
@@ -122,32 +138,8 @@ def neighbours(geometries: Any, first: int) -> tuple[float, int, int]:
     return float(gaps[least]), int(pairs[0, least]), int(pairs[1, least])
 
 
-def smallest_gap(shapes: Sequence[Sequence[Array]]) -> float:
-    """Smallest distance [m] between two shapes that do not overlap; inf if there are fewer than two. A shape is its
-    closed outlines, each of shape [points, 2] [m].
-
-    A tree finds the nearest of short pieces of the outlines. The numbers of two shapes differ in a binary digit; so for
-    every digit, the pieces of the shapes with 1 are compared with the pieces of the shapes with 0.
-    """
-    import shapely
-
-    lines = pieces([ring for rings in shapes for ring in rings])
-    counts = [sum(math.ceil((len(ring) - 1) / _PIECE) for ring in rings) for rings in shapes]
-    owner, least = np.repeat(np.arange(len(shapes)), counts), np.inf
-    for digit in range((len(shapes) - 1).bit_length() if shapes else 0):
-        is_one = (owner >> digit & 1).astype(bool)
-        limit = least if np.isfinite(least) and least > 0.0 else None
-        gaps = shapely.STRtree(lines[~is_one]).query_nearest(
-            lines[is_one], max_distance=limit, return_distance=True, all_matches=False
-        )[1]
-        least = min(least, float(gaps.min(initial=np.inf)))
-    return least
-
-
 def pieces(rings: Sequence[Array]) -> Any:
     """Short pieces of closed outlines, each of shape [points, 2] [m], as an array of shapely geometries."""
-    import shapely
-
     parts = [ring[at : at + _PIECE + 1] for ring in rings for at in range(0, len(ring) - 1, _PIECE)]
     numbers = np.repeat(np.arange(len(parts)), list(map(len, parts)))
     return shapely.linestrings(np.concatenate([*parts, np.empty((0, 2))]), indices=numbers)
@@ -155,8 +147,69 @@ def pieces(rings: Sequence[Array]) -> Any:
 
 def geometries(spines: Array) -> Any:
     """Spines of shape [spines, corners, 2] [m] as an array of shapely geometries, shape [spines]."""
-    import shapely
-
     corners = spines.shape[1]
     make = shapely.points if corners == 1 else shapely.linestrings if corners == 2 else shapely.polygons
     return make(spines[:, 0] if corners == 1 else spines)
+
+
+def no_end() -> None:
+    """A `check` that never ends the work."""
+
+
+def rounded(share: Array, whole: Any) -> Counts:
+    """Shares of `whole` as integers. A half is rounded up, even after a rounding error, so that mirrored holes have
+    mirrored shares."""
+    return np.asarray(np.floor(share * whole + (0.5 + 1e-6)), dtype=np.int16)
+
+
+def half_shares(
+    chords: Chords, extents: Array, counts: tuple[int, int], sides: tuple[float, float], check: Check
+) -> Counts:
+    """Half the shares of cells in holes, from lines along y, in parts of WHOLE_CELL, shape `counts`.
+
+    The other half comes from lines along z, so that a plate turned by a right angle has the same shares. Straight sides
+    of a hole are exact anywhere in a cell: sides along z end lines, and sides along y end the strip of the lines.
+
+    Args:
+        extents: lowest and highest z of every hole, shape [holes, 2] [m].
+        counts, sides, check: as in `Pattern.shares_in_holes`.
+    """
+    inside = np.zeros((counts[0] + 2, counts[1]), dtype=np.int16)
+    ends = extents / sides[1]
+    columns = np.clip(np.stack([np.floor(ends[:, 0]), np.ceil(ends[:, 1])], axis=1), 0, counts[1]).astype(np.int64)
+    for holes in _lots(LINES * (columns[:, 1] - columns[:, 0])):
+        check()
+        met_columns = columns[holes, 1] - columns[holes, 0]
+        hole = np.repeat(holes, met_columns)
+        column = np.arange(met_columns.sum()) + np.repeat(columns[holes, 1] - np.cumsum(met_columns), met_columns)
+        from_z = np.maximum(column, ends[hole, 0])
+        strip = np.minimum(column + 1, ends[hole, 1]) - from_z
+        z = from_z + (np.arange(LINES)[:, None] + 0.5) / LINES * strip
+        low, high = chords(hole, z * sides[1], _EDGE * min(sides))
+        met = low < high
+        column, weight = (np.broadcast_to(values, met.shape)[met] for values in (column, rounded(strip, _PER_LINE)))
+        for end, sign in ((low, 1), (high, -1)):
+            _add(inside, np.clip(end[met] / sides[0], 0, counts[0]), column, weight, sign)
+    for before, row in pairwise(inside):  # half the time of numpy.cumsum along the first axis
+        check()
+        row += before
+    return inside[: counts[0]]
+
+
+def _lots(lines: Numbers) -> list[Numbers]:
+    """Numbers of the holes in lots of about _LINES_PER_LOT lines; `lines` is the number of lines of each hole."""
+    lot = np.cumsum(lines) // _LINES_PER_LOT
+    return np.split(np.arange(len(lines)), np.flatnonzero(np.diff(lot)) + 1)
+
+
+def _add(inside: Counts, at: Array, column: Numbers, weight: Counts, sign: int) -> None:
+    """Add signed lines, from their ends `at` on [cells], to the differences between cells along y.
+
+    At both ends the part of the cell that lies in the hole is rounded, so mirrored holes have mirrored shares.
+    """
+    cell = np.floor(at)
+    part = at - cell if sign < 0 else 1.0 - (at - cell)
+    inside_cell = rounded(part, weight)
+    first = inside_cell if sign > 0 else weight - inside_cell
+    for row, share in ((cell, first), (cell + 1, weight - first)):
+        np.add.at(inside.reshape(-1), row.astype(np.int64) * inside.shape[1] + column, sign * share)

@@ -1,0 +1,114 @@
+"""Polygons: areas, ligaments, what is refused, and drawings."""
+
+import math
+from pathlib import Path
+from typing import Any
+from xml.etree import ElementTree
+
+import numpy as np
+import pytest
+import shapely
+from pydantic import TypeAdapter, ValidationError
+
+from warpimpact import Campaign, PolygonsPattern
+from warpimpact.cli import main
+from warpimpact.scene import AnyPattern, CirclePattern, Pattern
+
+SLOTTED_PLATE = Path(__file__).parents[3] / "campaigns" / "slotted_plate.toml"
+CELL = {"spacing": (8e-3, 10e-3), "cell_size": 2.5e-5}
+
+
+ENDS = ((3e-3, 5e-3), (-4e-3, -2.5e-3))  # along y; the second one a cell further overlaps the first
+WIDE = [(-5e-3, -1e-3), (5e-3, -1e-3), (5e-3, 2e-3), (-5e-3, 2e-3)]
+SQUARE = [(-2e-3, -1e-3), (1e-3, -1e-3), (1e-3, 2e-3), (-2e-3, 2e-3)]
+
+
+def rounds(diameter: float, *places: tuple[float, float], **more: Any) -> PolygonsPattern:
+    """Polygons of 200 corners about these places [m]."""
+    turn = np.linspace(0.0, 2.0 * np.pi, 200, endpoint=False)
+    circle = 0.5 * diameter * np.column_stack([np.cos(turn), np.sin(turn)])
+    return PolygonsPattern(polygons=[(circle + place).tolist() for place in places], **(CELL | more))
+
+
+def test_polygons_are_the_holes() -> None:
+    cell = PolygonsPattern(polygons=[SQUARE], **CELL)
+    assert cell.open_area == pytest.approx(9.0 / 80.0, rel=1e-12)
+    y, z = 1e-3 * np.array([0.9, 1.1, -1.9, 8.9]), 1e-3 * np.array([1.9, 1.9, -0.9, -8.1])
+    assert cell.is_hole(y, z).tolist() == [True, False, True, True]
+    (outline,) = cell.outlines((-4e-3, 4e-3), (-5e-3, 5e-3))
+    bounds = shapely.Polygon(outline).bounds
+    assert bounds == pytest.approx((-2e-3, -1e-3, 1e-3, 2e-3), abs=1e-15)
+    across = rounds(3e-3, (3.9e-3, -4.8e-3), staggered=True)
+    assert across.open_area == pytest.approx(np.pi * 2.25e-6 / 8e-5, rel=0.01)
+
+
+@pytest.mark.parametrize("cell_size", [2.5e-4, 5e-5])
+def test_the_ligament_is_that_of_the_corners(cell_size: float) -> None:
+    lattice = CirclePattern(diameter=5e-3, spacing=(5e-3, 10e-3), staggered=True)
+    spacing = (10e-3, 10e-3)
+    cells: Pattern = rounds(5e-3, (0.0, 0.0), (5e-3, 5e-3), spacing=spacing, cell_size=cell_size)
+    between, near = (math.hypot(5.0, 5.0) - 5.0) * 1e-3, 1e-6  # of chords
+    assert lattice.ligament() == pytest.approx(between)
+    assert cells.ligament() == pytest.approx(between, abs=near)
+    # On a plate of 9.5 mm the corner holes are cut; the middle one is 2.07 mm from these, 2.25 mm from the rim.
+    assert cells.ligament((9.5e-3, 9.5e-3)) == pytest.approx(between, abs=near)
+    assert cells.ligament((6e-3, 6e-3)) == pytest.approx(0.5e-3, abs=near)
+    at = (np.arange(200) - 99.5) * 5e-5
+    distances = (abs(pattern.edge_distance(at[:, None], at)) for pattern in (cells, lattice))
+    np.testing.assert_allclose(*distances, rtol=0, atol=4e-6)
+    with pytest.raises(ValueError, match=r"margin cannot be combined with shape = .*: it has no single holes"):
+        cells.bounded((6e-3, 8e-3), 1e-3)
+
+
+def test_polygons_that_overlap_those_of_the_next_cell_unite() -> None:
+    high, low = ([(y, z) for y, z in ((a, -1e-3), (b, -1e-3), (b, 1e-3), (a, 1e-3))] for a, b in ENDS)
+    both = PolygonsPattern(polygons=[high, low], **CELL)
+    assert both.open_area == pytest.approx(2.5 * 2.0 / 80.0, rel=1e-12)
+    assert both.ligament() == pytest.approx(5.5e-3, rel=1e-12)
+    (outline,) = both.outlines((2.9e-3, 5.6e-3), (-1e-3, 1e-3))
+    assert shapely.Polygon(outline).bounds == pytest.approx((3e-3, -1e-3, 5.5e-3, 1e-3), abs=1e-15)
+
+
+@pytest.mark.parametrize(
+    ("given", "sentence"),
+    [
+        ({"shape": "polygons", "polygons": [WIDE]}, "cut the plate apart"),
+        ({"shape": "polygons", "polygons": [SQUARE], "cell_size": "1 um"}, "larger cell_size"),
+        ({"shape": "polygons", "polygons": []}, "at least 1"),
+        ({"shape": "polygons", "polygons": [[(0, 0), (1e-3, 1e-3), (1e-3, 0), (0, 1e-3)]]}, "cross themselves"),
+        ({"shape": "polygons", "polygons": [SQUARE, SQUARE]}, "cross themselves or overlap"),
+        ({"shape": "polygons", "polygons": [SQUARE[:2]]}, "at least 3"),
+        ({"shape": "polygons", "polygons": [[(0, 0), (9e-3, 0), (0, 1e-3)]]}, r"as far as \(9, 1\) mm from the middle"),
+    ],
+)
+def test_a_form_that_is_no_plate_is_refused(given: dict[str, Any], sentence: str) -> None:
+    with pytest.raises(ValidationError, match=sentence):
+        TypeAdapter[Any](AnyPattern).validate_python({"spacing": ["8 mm", "8 mm"], **given})
+
+
+@pytest.mark.parametrize("suffix", [".svg", ".dxf"])
+def test_a_drawing_has_the_holes(suffix: str, tmp_path: Path) -> None:
+    text = SLOTTED_PLATE.read_text(encoding="utf-8")
+    head, _, tail = text.partition("[plate.pattern]")
+    _, _, rest = tail.partition("\n[")
+    pattern = (
+        '[plate.pattern]\nshape = "polygons"\nspacing = ["9 mm", "9 mm"]\n'
+        'polygons = [[["-2 mm", 0], ["3 mm", 0], [0, "4 mm"]]]\n'
+    )
+    (tmp_path / "own.toml").write_text(f"{head}{pattern}\n[{rest}", encoding="utf-8")
+    output = tmp_path / f"own{suffix}"
+    assert main(["export", str(tmp_path / "own.toml"), "-o", str(output)]) == 0
+    drawn = Campaign.from_toml(tmp_path / "own.toml").plate.pattern
+    if suffix == ".svg":
+        (path,) = ElementTree.parse(output).getroot()
+        rings = path.attrib["d"].removeprefix("M").removesuffix("Z").split("ZM")
+        outlines = [np.array([point.split(",") for point in ring.split("L")], dtype=float) for ring in rings]
+    else:
+        import ezdxf
+
+        shapes = ezdxf.readfile(output).modelspace().query('*[layer=="HOLES"]')
+        outlines = [np.array(shape.get_points("xy")) for shape in shapes]
+    area = sum(0.5 * abs(np.linalg.det(np.stack([one, np.roll(one, -1, axis=0)], axis=1)).sum()) for one in outlines)
+    assert area / 81.0 == pytest.approx(drawn.open_area, abs=0.01)
+    assert main(["export", str(tmp_path / "own.toml"), "-o", str(output)]) == 2  # it exists
+    assert main(["export", str(tmp_path / "own.toml"), "-o", str(tmp_path / "a.pdf")]) == 2
