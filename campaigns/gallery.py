@@ -18,7 +18,7 @@ from warpimpact import Campaign, replay, run
 from warpimpact.plotting import bursts_figure, dispersion, marginals, overview, trajectory, uncertainty, variable_maps
 from warpimpact.plotting.posterior import hits_figure, pairs_figure
 from warpimpact.plotting.pressure import pressure
-from warpimpact.results import files, posterior_file
+from warpimpact.results import files
 
 HERE = Path(__file__).parent
 HIT = 5.8e-3, -5.0e-3  # [m], at the edge of a slot: the core tumbles
@@ -47,7 +47,7 @@ def pictures() -> Iterator[tuple[str, Figure, int]]:
 
 def pictures_of_fit(posterior: Path) -> Iterator[tuple[str, Figure, int]]:
     """The same of the posterior of fits/paper_fit.toml."""
-    tree = files.read_tree(posterior, posterior_file.POSTERIOR)
+    tree = files.read_tree(posterior)
     yield "fits/paper_fit_hits.png", hits_figure(tree), 920
     yield "fits/paper_fit_pairs.png", pairs_figure(tree), 1064
 

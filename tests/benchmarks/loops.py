@@ -119,7 +119,7 @@ def identified(folder: Path) -> dict[str, Any]:
     for process in multiprocessing.active_children():
         process.join()  # what it took counts then
     seconds = sum(os.times()[:4]) - sum(begin[:4])
-    told = read_tree(output, posterior_file.POSTERIOR).attrs
+    told = read_tree(output).attrs
     effective, sets = float(told[posterior_file.EFFECTIVE]), int(told[posterior_file.SETS])
     return {"seconds": seconds, "wall": wall, "effective": effective, "sets": sets}
 

@@ -56,7 +56,7 @@ def refined(fit: Fit, points: np.ndarray, misfit: np.ndarray, seed: int = 0) -> 
 
 
 def main() -> None:
-    tree = read_tree(Path(sys.argv[1]), posterior_file.POSTERIOR)
+    tree = read_tree(Path(sys.argv[1]))
     fit = fit_from(str(tree.attrs[posterior_file.FIT_TEXT]), sys.argv[1], Path("campaigns"))
     sets = tree["sets"].to_dataset()
     shares, grid = [], np.linspace(EDGE, 1.0 - EDGE, 10_001)

@@ -14,6 +14,7 @@ from warpimpact import ConeCore, Plate, Record, Scene, SquarePattern
 from warpimpact.kernels.status import Status
 from warpimpact.records.outcomes import Outcomes
 from warpimpact.results.dataset import to_dataset
+from warpimpact.results.kinds import HIT_MAP
 from warpimpact.results.variables import SHOT_VARIABLES
 from warpimpact.runs import shards
 from warpimpact.scene import AnyPattern, Shots
@@ -114,6 +115,7 @@ def plate_result(
         {name: ("hit", values) for name, values in columns.items()} | {"tilt": (("hit", "standoff"), tilts)},
         {"standoff": STANDOFFS, "hit_y": ("hit", places * PERIOD[0]), "hit_z": ("hit", places * PERIOD[1])},
         {
+            "warpimpact_kind": HIT_MAP.mark,
             "core": CYLINDER.model_dump_json(),
             "impact": '{"velocity": 1000.0}',
             "standoff_point": "nose",

@@ -20,7 +20,7 @@ def check_removed(tables: dict[str, Any], name: str) -> None:
         ValueError: names the file, the key and what to use instead.
     """
     for path, value in _entries(tables, ""):
-        for key in (path, f"{path} = {value}"):
+        for key in (path, f"{path} = {value}") if isinstance(value, str) else (path,):
             if key in REMOVED_KEYS:
                 raise ValueError(f"{name}: {key} was removed: {REMOVED_KEYS[key]}")
 

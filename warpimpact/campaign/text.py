@@ -5,9 +5,8 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-from ..results import kinds
-from ..results.files import kind_of
-from ..results.kind import Kind
+from ..results.files import is_netcdf, kind_of
+from ..results.kinds import text_kind
 from ..scene import toml_text
 from .removed_keys import check_removed
 
@@ -24,18 +23,18 @@ def _as_campaign() -> Iterator[None]:
         raise CampaignError(str(error)) from None
 
 
-def parsed(text: str, name: str, kind: Kind | None = None) -> dict[str, Any]:
+def parsed(text: str, name: str, kind: str = "") -> dict[str, Any]:
     """The tables of a campaign, TOML or JSON, not yet validated.
 
     Raises:
-        CampaignError: the text is neither, or is not of this kind of file; `name` is its name in the message.
+        CampaignError: the text is neither, or is another kind of file; `name` is its name in the message.
     """
     with _as_campaign():
         tables = toml_text.parsed(text, name)
         check_removed(tables, name)
-    other = kinds.kind_of_tables(tables)
-    if kind is not None and other not in (None, kind) and not {*kind.marks} & {*tables}:
-        raise CampaignError(other.told(name, kind.name))
+    other, use = text_kind(tables, kind)
+    if kind and other not in ("", kind):
+        raise CampaignError(f"{name}: is {other}, not {kind}; {use}")
     return tables
 
 
@@ -48,6 +47,8 @@ def read_text(path: Path) -> str:
     with _as_campaign():
         try:
             return toml_text.read_text(path)
-        except toml_text.NoTextError as error:
+        except toml_text.NoTextError:
+            if not is_netcdf(path):
+                raise
             kind = kind_of(path)
-            raise CampaignError(str(error) if kind is None else kind.told(path, "a TOML file")) from None
+            raise CampaignError(f"{path}: is {kind.name}, not a TOML file; {kind.use}") from None

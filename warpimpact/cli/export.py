@@ -39,14 +39,13 @@ def _export(arguments: argparse.Namespace) -> None:
     from warpimpact.export.paraview import write_vtk
     from warpimpact.export.spreadsheet import write_csv
     from warpimpact.results import files
-    from warpimpact.results.checks import RESULT
-    from warpimpact.results.replayed_hit import HISTORY
+    from warpimpact.results.kinds import HISTORY, HIT_MAP
 
     path, output = arguments.file, arguments.output
     if path.suffix == ".toml":
         _export_drawing(path, output or path.with_suffix(".svg"), overwrite=arguments.overwrite)
         return
-    with files.opened(path, RESULT, HISTORY) as dataset:
+    with files.opened(path, HIT_MAP, HISTORY) as dataset:
         if files.is_history(dataset):
             output = output or path.with_name(f"{path.stem}_vtk")
             check_folder(output.parent)
@@ -104,19 +103,20 @@ def add_report(commands: Commands) -> None:
 
 def _report(arguments: argparse.Namespace) -> None:
     from warpimpact.report.front_page import write_front_report
-    from warpimpact.report.one_file import is_shown, write_file_report
+    from warpimpact.report.one_file import write_file_report
     from warpimpact.report.report import write_report
-    from warpimpact.results import files, front
+    from warpimpact.results import files
+    from warpimpact.results.kinds import FRONT, HIT_MAP
 
     paths = arguments.results
     output = arguments.output or paths[0].with_suffix(".html")
     check_suffix(output, "a report", ".html")
     check_output(output, overwrite=arguments.overwrite)
     for path, kind in zip(paths, map(files.kind_of, paths), strict=True):
-        if kind is not None and is_shown(kind):
+        if kind is not HIT_MAP:
             if len(paths) > 1:
                 raise files.ResultError(f"got {len(paths)} files, one of which is {kind.name}, which is reported alone")
-            if kind.name == front.FRONT.name:
+            if kind is FRONT:
                 write_front_report(files.read(path, kind), output, arguments.campaign_folder or path.parent)
             else:
                 write_file_report(path, kind, output)

@@ -53,7 +53,7 @@ def _identify(arguments: argparse.Namespace) -> int:
     from warpimpact.identification.posterior import material_draws
     from warpimpact.identification.posterior_view import posterior_view
     from warpimpact.plotting.posterior import FIGURES
-    from warpimpact.results import files, posterior_file
+    from warpimpact.results import files
     from warpimpact.runs.choice import executor_for
     from warpimpact.solver.device import cores, find_device
     from warpimpact.view.view import text_of
@@ -90,7 +90,7 @@ def _identify(arguments: argparse.Namespace) -> int:
             progress=lambda now: show(Step(now.done, now.total, now.resumed, _running(now))),
             tell=warn,
         )
-    tree = files.read_tree(output, posterior_file.POSTERIOR)
+    tree = files.read_tree(output)
     print(text_of(posterior_view(tree)))
     print(f"written to {output}")
     if len(draws := material_draws(fit, tree)):

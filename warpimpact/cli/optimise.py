@@ -44,6 +44,7 @@ def _optimise(arguments: argparse.Namespace) -> int:
     from warpimpact.optimisation.optimise import folder_of, optimise_to_file
     from warpimpact.plotting.front import front_figure
     from warpimpact.results import files, front
+    from warpimpact.results.kinds import FRONT
     from warpimpact.view.view import text_of
 
     design = read_design(arguments.design)
@@ -69,7 +70,7 @@ def _optimise(arguments: argparse.Namespace) -> int:
             ),
             tell=warn,
         )
-    dataset = files.read(output, front.FRONT)
+    dataset = files.read(output, FRONT)
     print(text_of(front_view(dataset)))
     front_figure(dataset, design.folder).savefig(picture, dpi=150)
     beside = f", campaigns in {folder_of(output)}" if campaigns else ""

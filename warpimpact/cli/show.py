@@ -42,12 +42,13 @@ def add_inspect(commands: Commands) -> None:
 def _inspect(arguments: argparse.Namespace) -> None:
     from warpimpact.analysis.effectiveness import effectiveness_text
     from warpimpact.analysis.inspect import inspect_text
-    from warpimpact.report.one_file import is_shown, view_of
+    from warpimpact.report.one_file import view_of
     from warpimpact.results import files
+    from warpimpact.results.kinds import HIT_MAP
     from warpimpact.view.view import text_of
 
     kind = files.kind_of(arguments.result)
-    if kind is not None and is_shown(kind) and not arguments.campaign:
+    if kind is not HIT_MAP and not arguments.campaign:
         print(text_of(view_of(arguments.result, kind, arguments.measure)))
         return
     with files.opened(arguments.result) as dataset:

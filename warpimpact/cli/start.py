@@ -74,8 +74,8 @@ def _new(arguments: argparse.Namespace) -> None:
         check_output(file, overwrite=arguments.overwrite)
     for original, copy in copies.items():
         shutil.copyfile(original, copy)
-    told_apart = ((kinds.FIT, "fit"), (kinds.TEST, "test"), (kinds.DESIGN, "design"))
-    kind = next((name for known, name in told_apart if kinds.kind_of_tables(tables) is known), "campaign")
+    names = {kinds.FIT: "fit", kinds.TEST: "test", kinds.DESIGN: "design"}
+    kind = names.get(kinds.text_kind(tables)[0], "campaign")
     schema = output.parent / (_SCHEMA if kind == "campaign" else f"warpimpact.{kind}.schema.json")
     output.write_text(f"#:schema {schema.name}\n{text}", encoding="utf-8")
     schema.write_text(_schema_text(kind), encoding="utf-8")

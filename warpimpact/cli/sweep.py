@@ -45,7 +45,7 @@ def _sweep(arguments: argparse.Namespace) -> None:
     from warpimpact.analysis.swept import sweep_view
     from warpimpact.plotting.sweep import sweep_figure
     from warpimpact.results import files
-    from warpimpact.results.checks import SWEEP
+    from warpimpact.results.kinds import SWEEP
     from warpimpact.studies.sweep import folder_of, read_sweep, run_sweep
     from warpimpact.view.view import text_of
 

@@ -18,6 +18,7 @@ from warpimpact.campaign.toml import toml_text
 from warpimpact.results import attributes as attr
 from warpimpact.results import files, front
 from warpimpact.results.files import kind_of, opened
+from warpimpact.results.kinds import FRONT
 from warpimpact.runs.levels import MEASURES, level_for
 from warpimpact.scene import Numerics
 from warpimpact.scene.units import quoted
@@ -128,11 +129,11 @@ def _texts(path: Path) -> Iterator[tuple[str, str]]:
 
 def _texts_of_results(path: Path) -> Iterator[tuple[str, str]]:
     """Name and text of every design in a file of results: the campaigns of a front, or that of a hit map."""
-    if kind_of(path) is not front.FRONT:
+    if kind_of(path) is not FRONT:
         with opened(path) as dataset:
             yield path.stem, str(dataset.attrs.get(attr.CAMPAIGN, ""))
         return
-    front_file = files.read(path, front.FRONT)
+    front_file = files.read(path, FRONT)
     for name, text in zip(front_file[front.FILE].values, front_file[front.CAMPAIGN].values, strict=True):
         yield Path(str(name)).stem, str(text)
 

@@ -23,7 +23,7 @@ from warpimpact.firing.response import (
 from warpimpact.results import files
 from warpimpact.results import firing as f
 from warpimpact.results import variables as v
-from warpimpact.results.checks import SWEEP
+from warpimpact.results.kinds import SWEEP
 from warpimpact.runs.executor import Executor
 from warpimpact.runs.progress import Follow
 from warpimpact.runs.questions import answered

@@ -20,6 +20,7 @@ from warpimpact.records.variable import Variable
 from warpimpact.results import attributes as attr
 from warpimpact.results import firing as f
 from warpimpact.results.dataset import dataset_of
+from warpimpact.results.kinds import FIRING
 from warpimpact.scene.model import Array
 from warpimpact.statistics.acceptance import acceptance
 
@@ -45,6 +46,7 @@ def simulate_test(
     """
     columns: dict[Variable, Any] = {}
     told: dict[str, Any] = {
+        attr.KIND: FIRING.mark,
         attr.TITLE: test.title,
         attr.HISTORY: attr.history_line("test"),
         f.TEST: test.text,

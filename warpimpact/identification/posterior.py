@@ -17,6 +17,7 @@ from warpimpact.identification.likelihood import KEPT_HITS, ShotScore
 from warpimpact.identification.scoring import data_of, discrepancies
 from warpimpact.results import attributes as attr
 from warpimpact.results import posterior_file
+from warpimpact.results.kinds import POSTERIOR
 from warpimpact.results.variables import HIT_Y, HIT_Z
 from warpimpact.scene.display import UNITS
 from warpimpact.scene.model import Array
@@ -190,6 +191,7 @@ def _attributes(fit: Fit, sampled: Sampled, made: Mapping[str, str], noise: Arra
         if fit.shots[place].observations
     }
     return {
+        attr.KIND: POSTERIOR.mark,
         attr.TITLE: fit.title,
         attr.HISTORY: attr.history_line("identify"),
         posterior_file.FIT_TEXT: fit.text,

@@ -15,7 +15,7 @@ from warpimpact.optimisation.search import Follow, Searched, SearchProgress, sea
 from warpimpact.optimisation.searcher import check_installed
 from warpimpact.results import attributes as attr
 from warpimpact.results import files
-from warpimpact.results import front as f
+from warpimpact.results.kinds import FRONT
 from warpimpact.runs.choice import executor_for, opened
 from warpimpact.runs.executor import Executor
 from warpimpact.runs.parts import is_begun
@@ -80,7 +80,7 @@ def optimise_to_file(
             if store is not None:
                 dataset = _answered(design, computing, progress, store)
                 files.write(dataset.assign_attrs({attr.FINGERPRINT: store.parts.fingerprint}), output)
-    return write_campaigns(design, files.read(output, f.FRONT), folder, overwrite=overwrite, tell=tell)
+    return write_campaigns(design, files.read(output, FRONT), folder, overwrite=overwrite, tell=tell)
 
 
 def folder_of(output: Path) -> Path:

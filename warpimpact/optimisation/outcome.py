@@ -24,6 +24,7 @@ from warpimpact.results import attributes as attr
 from warpimpact.results import front as f
 from warpimpact.results.dataset import dataset_of
 from warpimpact.results.files import OutputError, aside
+from warpimpact.results.kinds import FRONT
 from warpimpact.runs.parts import remove
 from warpimpact.scene.model import Array
 
@@ -116,6 +117,7 @@ def _estimates(design: Design, records: Sequence[DesignRecord]) -> Array:
 def _attributes(design: Design, searched: Searched, made_by: Mapping[str, str]) -> dict[str, Any]:
     return {
         **made_by,
+        attr.KIND: FRONT.mark,
         attr.TITLE: design.title,
         attr.HISTORY: attr.history_line("optimise"),
         attr.SEED: design.search.seed,

@@ -59,7 +59,6 @@ class VariableGroup(Collection[Variable]):
         recorded: whether a computation of these shots at this scene records them; never if something else fills them.
         filled: columns by variable, SI and radians.
         beside: variables of the Dataset without an axis along the shots that go with the group.
-        whole: whether a result has all variables of the group, and those beside it, or none.
         measured: whether measures, as in mean(tilt@130mm), and maps of the variables are allowed.
         exact: whether columns stay in double precision when shots are computed in single precision.
     """
@@ -69,7 +68,6 @@ class VariableGroup(Collection[Variable]):
     recorded: Callable[[Scene, Shots], bool] = lambda scene, shots: False
     filled: Callable[[Returned], Columns] = lambda returned: {}
     beside: tuple[Variable, ...] = ()
-    whole: bool = False
     measured: bool = True
     exact: bool = False
 

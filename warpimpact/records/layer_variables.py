@@ -93,7 +93,6 @@ LAYER_VARIABLES: VariableGroup = VariableGroup(
     _layered,
     lambda returned: _columns(returned, LAYER_VARIABLES),
     beside=LAYER_FACES,
-    whole=True,
 )
 LAYER_STANDOFF_VARIABLES: VariableGroup = VariableGroup(
     "With `output.layer_standoffs`",
@@ -101,7 +100,6 @@ LAYER_STANDOFF_VARIABLES: VariableGroup = VariableGroup(
     lambda scene, shots: _layered(scene, shots) and bool(scene.record.layer_standoffs),
     _behind,
     beside=LAYER_COORDINATES,
-    whole=True,
 )
 LAYER_NUMBERS = (LAYER_RESIDUAL_VELOCITY, LAYER_TILT, LAYER_TIME, *LAYER_STANDOFF_VARIABLES)
 """Variables with one number per hit and layer, or per hit, layer and stand-off behind the layer."""

@@ -72,3 +72,10 @@ class Variable(str):
     def is_number_of_hit(self) -> bool:
         """Whether it has one number with a unit per hit, or per hit and stand-off, as maps and measures need."""
         return self.flags is None and self.units != "1" and self.dims in {HITS, AT_STANDOFF}
+
+
+def with_interval(name: str, dims: tuple[str, ...], units: str, meaning: str) -> tuple[Variable, ...]:
+    """A variable, and the lower and the upper end of its interval."""
+    ends = (("low", "lower"), ("high", "upper"))
+    bounds = (Variable(f"{name}_{end}", dims, units, f"{what} end of its 95 % interval") for end, what in ends)
+    return (Variable(name, dims, units, meaning), *bounds)

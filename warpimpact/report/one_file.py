@@ -1,7 +1,4 @@
-"""Files of all kinds but hit maps: what `inspect` prints of one, and its report, one HTML file that works offline.
-
-A kind with a view of its own (`results.kind.Kind`) is shown without a line here; `_SHOWN` has what rooms above know.
-"""
+"""Files of all kinds but hit maps: what `inspect` prints of one, and its report, one HTML file that works offline."""
 
 from __future__ import annotations
 
@@ -22,8 +19,9 @@ from warpimpact.plotting.style import data_url
 from warpimpact.plotting.sweep import sweep_figure
 from warpimpact.plotting.trajectory import FIGURES
 from warpimpact.results import attributes as attr
-from warpimpact.results import checks, files, firing, front, posterior_file, replayed_hit
-from warpimpact.results.kind import Kind
+from warpimpact.results import files, firing, front, posterior_file
+from warpimpact.results.kinds import FIRING, FRONT, HISTORY, POSTERIOR, SWEEP, Kind
+from warpimpact.results.replayed_hit import hit_view
 from warpimpact.view.view import Section, html_of
 
 if TYPE_CHECKING:
@@ -37,23 +35,23 @@ _STYLE = (
 
 
 class _Shown(NamedTuple):
-    """The report of a kind beside its own view.
+    """What is shown of a kind.
 
     Attributes:
-        view: its view, if results has none; for a kind with measures it takes their texts, too.
+        view: its view; for a kind with measures it takes their texts, too.
         measured: whether it takes measures.
         figures: figures by their headings, each with the variable that it needs, empty if none.
         asked: attribute with the text of the file behind the result.
     """
 
-    view: Callable[..., list[Section]] | None = None
+    view: Callable[..., list[Section]]
     measured: bool = False
     figures: Mapping[str, tuple[str, Callable[[Any], Figure]]] = MappingProxyType({})
     asked: str = ""
 
 
 _SHOWN = {
-    posterior_file.POSTERIOR.name: _Shown(
+    POSTERIOR: _Shown(
         posterior_view,
         figures={
             "Parameters, in pairs": ("", pairs_figure),
@@ -62,9 +60,9 @@ _SHOWN = {
         },
         asked=posterior_file.FIT_TEXT,
     ),
-    front.FRONT.name: _Shown(front_view, asked=front.DESIGN),
-    checks.SWEEP.name: _Shown(sweep_view, measured=True, figures={"By input": ("", sweep_figure)}, asked=attr.CAMPAIGN),
-    firing.FIRING.name: _Shown(
+    FRONT: _Shown(front_view, asked=front.DESIGN),
+    SWEEP: _Shown(sweep_view, measured=True, figures={"By input": ("", sweep_figure)}, asked=attr.CAMPAIGN),
+    FIRING: _Shown(
         firing_view,
         figures={
             "What the tests report": (firing.SHARE, firing_figure),
@@ -72,19 +70,12 @@ _SHOWN = {
         },
         asked=firing.TEST,
     ),
-    replayed_hit.HISTORY.name: _Shown(
-        figures={draw.__name__.replace("_", " ").capitalize(): ("", draw) for draw in FIGURES}
-    ),
+    HISTORY: _Shown(hit_view, figures={draw.__name__.replace("_", " ").capitalize(): ("", draw) for draw in FIGURES}),
 }
 
 
-def is_shown(kind: Kind) -> bool:
-    """Whether a kind has a view."""
-    return kind.view is not None or kind.name in _SHOWN
-
-
 def view_of(path: Path, kind: Kind, measures: Sequence[str] = ()) -> list[Section]:
-    """The view of a file of a kind that is shown.
+    """The view of a file of any kind but a map of hits.
 
     Args:
         measures: texts of measures; by default those of the kind.
@@ -96,17 +87,15 @@ def view_of(path: Path, kind: Kind, measures: Sequence[str] = ()) -> list[Sectio
 
 
 def _view(kind: Kind, dataset: Any, measures: Sequence[str] = ()) -> list[Section]:
-    shown = _SHOWN.get(kind.name, _Shown())
+    shown = _SHOWN[kind]
     if measures and not shown.measured:
         raise files.ResultError(f"--measure: got {kind.name}, but measures are those of a map of hits or a sweep")
     asked = (measures,) if shown.measured else ()
-    view: Callable[..., list[Section]] | None = kind.view or shown.view
-    assert view is not None  # `is_shown`
-    return view(dataset, *asked)
+    return shown.view(dataset, *asked)
 
 
 def _loaded(path: Path, kind: Kind) -> Any:
-    return files.read_tree(path, kind) if kind.is_tree else files.read(path, kind)
+    return files.read_tree(path) if kind is POSTERIOR else files.read(path, kind)
 
 
 def write_file_report(path: Path, kind: Kind, output: Path) -> None:
@@ -116,7 +105,7 @@ def write_file_report(path: Path, kind: Kind, output: Path) -> None:
         OutputError: the report cannot be written.
         ResultError: the file cannot be read.
     """
-    dataset, shown = _loaded(path, kind), _SHOWN.get(kind.name, _Shown())
+    dataset, shown = _loaded(path, kind), _SHOWN[kind]
     attributes = dataset.attrs
     title, (first, *others) = str(attributes.get(attr.TITLE, path.stem)), _view(kind, dataset)
     sections = [replace(first, title="") if first.title == title else first, *others]

@@ -39,6 +39,9 @@ TITLE = _declared("title")
 HISTORY = _declared("history")
 REFERENCES = _declared("references")
 
+KIND = _declared("warpimpact_kind")
+"""Name and version of the kind of file, as in results/kinds.py."""
+
 # The campaign, and how it was computed
 CAMPAIGN = _declared("campaign")
 WARPIMPACT_VERSION = _declared("warpimpact_version")
@@ -111,8 +114,6 @@ EVIDENCE = _declared("evidence")
 not measured."""
 RESTS_ON, NOT_TESTED = "evidence: ", "not tested: "
 """Beginnings of the first line of the evidence, and of the lines about what was not measured."""
-EFFECTIVE = "effective_sample_size"
-"""Effective number of draws of a posterior, which has no map of hits."""
 LAYERS = _declared("layers", "table")
 """JSON of the layers behind the plate, by number; absent if there are none."""
 STANDOFF_POINT = _declared("standoff_point")

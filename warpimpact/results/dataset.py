@@ -15,6 +15,7 @@ from warpimpact.kernels.status import Status
 from warpimpact.records.group import failures
 from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
+from warpimpact.results.kinds import HISTORY, HIT_MAP
 from warpimpact.results.layers import faces, fields, labels, own_columns, sections
 from warpimpact.results.outlines import in_memory, outlines_in
 from warpimpact.results.table import HitTable
@@ -30,6 +31,7 @@ if TYPE_CHECKING:
 
 
 _ATTRIBUTES = {
+    attr.KIND: HIT_MAP.mark,
     "Conventions": "CF-1.11",
     "source": "warpimpact: trajectories of a rigid core through a perforated plate that resists and weakens",
     attr.REFERENCES: "Numerical and experimental investigation of asymmetrical contact between a steel plate "
@@ -220,7 +222,7 @@ def history_dataset(
     layered = (*v.LAYER_FACES, *v.LAYER_SECTIONS) if len(scene.target.layers) > 1 else ()
     layered = (*layered, *(name for name in v.LAYER_FIELDS if name in behind))
     return dataset.assign(stored_columns((*v.HISTORY_VARIABLES, *v.OUTLINE_VARIABLES, *layered), values)).assign_attrs(
-        attr.with_units(dict(attributes) | {attr.PLATE_THICKNESS: thickness})
+        attr.with_units(dict(attributes) | {attr.KIND: HISTORY.mark, attr.PLATE_THICKNESS: thickness})
     )
 
 

@@ -4,22 +4,22 @@ from __future__ import annotations
 
 import os
 import shutil
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Collection, Hashable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import netCDF4
 
-from warpimpact.results import kinds
+from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
-from warpimpact.results.checks import RESULT, SWEEP, packing_fault
 from warpimpact.results.interrupts import uninterrupted
-from warpimpact.results.kind import Kind
+from warpimpact.results.kinds import HIT_MAP, KINDS, POSTERIOR, SWEEP, Kind, text_kind
 from warpimpact.results.netcdf import write_table
 from warpimpact.results.outlines import in_a_file, in_memory
 from warpimpact.results.table import HitTable
 from warpimpact.scene.input_files import check_file
+from warpimpact.scene.toml_text import parsed, read_text
 
 if TYPE_CHECKING:
     import xarray
@@ -103,28 +103,27 @@ def write_tree(tree: xarray.DataTree, path: Path) -> None:
         tree.to_netcdf(file, engine="netcdf4", format="NETCDF4")
 
 
-def read(path: Path, kind: Kind = RESULT) -> xarray.Dataset:
+def read(path: Path, kind: Kind = HIT_MAP) -> xarray.Dataset:
     """Read a file of a kind into memory.
 
     Raises:
         ResultError: The file is missing, is not netCDF, or is not of this kind.
     """
-    with uninterrupted(), opened(path, kind) as dataset:
+    with uninterrupted(), opened(path, kind) as dataset, readable(path):
         loaded = dataset.load()
-    return loaded.set_xindex(v.HIT) if kind in (RESULT, SWEEP) else loaded
+    return loaded.set_xindex(v.HIT) if kind in (HIT_MAP, SWEEP) else loaded
 
 
-def read_tree(path: Path, kind: Kind) -> xarray.DataTree:
-    """Read a file of groups into memory.
+def read_tree(path: Path) -> xarray.DataTree:
+    """Read a posterior, a file of groups, into memory.
 
     Raises:
-        ResultError: The file is missing, is not netCDF, or is not of this kind.
+        ResultError: The file is missing, is not netCDF, or is no posterior.
     """
-    check_kind(path, kind)
+    check_kind(path, POSTERIOR)
     with uninterrupted(), readable(path):
         tree = _loaded(path)
-    if (mistake := kind.mistake(tree)) is not None:
-        raise ResultError(f"{path}: {mistake}")
+    _check_needed(path, tree.children, POSTERIOR)
     return tree
 
 
@@ -140,16 +139,14 @@ def open_result(path: str | Path) -> xarray.Dataset:
     Raises:
         ResultError: the file is missing, is not netCDF, or is not a warpimpact result.
     """
-    with opened(Path(path)):
-        pass  # the file is checked here; the one that is returned stays open
-    dataset = _joined(Path(path))
+    dataset = _open(Path(path), HIT_MAP)
     result = dataset.set_xindex(v.HIT)
     result.set_close(dataset.close)
     return result
 
 
 @contextmanager
-def opened(path: Path, *kinds_allowed: Kind) -> Iterator[xarray.Dataset]:
+def opened(path: Path, *kinds: Kind) -> Iterator[xarray.Dataset]:
     """Open a file of one of these kinds (by default a map of hits). Values are read when they are used.
 
     Damage that the library finds, now or when values are read, is raised as a sentence.
@@ -157,18 +154,8 @@ def opened(path: Path, *kinds_allowed: Kind) -> Iterator[xarray.Dataset]:
     Raises:
         ResultError: The file is missing, is not netCDF, or is of no such kind.
     """
-    kind = check_kind(path, *(kinds_allowed or (RESULT,)))
     try:
-        with readable(path):
-            dataset = _joined(path)
-        with dataset:
-            needed, size = dataset.nbytes, path.stat().st_size
-            if needed > 2**20 + _MOST_PACKED * size:
-                raise ResultError(f"{path}: damaged: it has {size} bytes, but declares {needed} of data")
-            if fault := packing_fault(dataset):
-                raise ResultError(f"{path}: damaged: {fault}")
-            if (mistake := kind.mistake(dataset)) is not None:
-                raise ResultError(f"{path}: {mistake}")
+        with _open(path, *(kinds or (HIT_MAP,))) as dataset:
             yield dataset
     except RuntimeError as error:
         if not str(error).startswith("NetCDF"):
@@ -176,47 +163,97 @@ def opened(path: Path, *kinds_allowed: Kind) -> Iterator[xarray.Dataset]:
         raise ResultError(f"{path}: damaged, it cannot be read ({error})") from error
 
 
+def _open(path: Path, *kinds: Kind) -> xarray.Dataset:
+    kind = check_kind(path, *kinds)
+    with readable(path):
+        dataset = _joined(path)
+    try:
+        _check_needed(path, {*dataset.variables, *dataset.attrs}, kind)
+        if kind is HIT_MAP:
+            _check_hits(path, dataset)
+    except ResultError:
+        dataset.close()
+        raise
+    return dataset
+
+
+def _check_needed(path: Path, there: Collection[Hashable], kind: Kind) -> None:
+    if missing := [name for name in kind.needed if name not in there]:
+        raise ResultError(f'{path}: is no whole file of {kind.name}, it has no "{missing[0]}"')
+
+
+def _check_hits(path: Path, dataset: xarray.Dataset) -> None:
+    """Refuse hits that were chosen from a result in a way that no command can use."""
+    for dim, what, example in ((v.HIT, "hit", "isel(hit=[5])"), (v.STANDOFF, "stand-off", "isel(standoff=[0])")):
+        if dim not in dataset.sizes:
+            raise ResultError(
+                f"{path}: holds one {what} without its dimension; choose {what}s as a list, as in {example}"
+            )
+    status = dataset[v.STATUS]
+    if status.dtype.kind == "f" and bool(status.isnull().any()):
+        raise ResultError(
+            f"{path}: has hits without a status, as where(...) leaves them; choose hits with where(..., drop=True)"
+        )
+    if not dataset.sizes[v.HIT]:
+        raise ResultError(f"{path}: has no hits, so there is nothing to show")
+
+
 def is_history(dataset: xarray.Dataset) -> bool:
     """Whether a Dataset is the history of one hit, not a map of hits."""
     return v.TIME in dataset.variables
 
 
-_MOST_PACKED = 2000
-"""Largest ratio of the contents of a file to its size: zlib packs a thousand bytes into one at best."""
+def is_netcdf(path: Path) -> bool:
+    """Whether a regular file begins as netCDF files do."""
+    with path.open("rb") as file:
+        return file.read(4).startswith((b"\x89HDF", b"CDF"))
 
 
-def kind_of(path: Path) -> Kind | None:
-    """The kind of a file, by its contents; None if it is no known kind.
+def kind_of(path: Path) -> Kind:
+    """The kind of a netCDF file.
 
     Raises:
-        ResultError: the file is missing, is no regular file, or is damaged.
+        ResultError: the file is missing, is no regular file, is damaged, or is no netCDF file of this version of
+            warpimpact; a TOML file is named as what it is.
     """
     try:
         check_file(path)
     except ValueError as error:
         raise ResultError(str(error)) from None
-    with readable(path):
-        return kinds.kind_of(path)
+    if not is_netcdf(path):
+        try:
+            name, use = text_kind(parsed(read_text(path), path.name))
+        except ValueError:
+            name = use = ""
+        raise ResultError(
+            f"{path}: " + (f"is {name}, not a result; {use}" if name else "cannot be read as a netCDF file")
+        )
+    with readable(path), netCDF4.Dataset(path) as file:
+        mark = str(file.getncattr(attr.KIND)) if attr.KIND in file.ncattrs() else ""
+        is_point = v.STATUS in file.variables and file.variables[v.STATUS].dimensions == (v.HIT,)
+    if not mark:
+        raise ResultError(
+            f'{path}: is no file of this version of warpimpact, it has no attribute "{attr.KIND}"; if it was chosen '
+            "from a result, keep the attributes"
+        )
+    kind = next((kind for kind in KINDS if kind.mark == mark), None)
+    if kind is None:
+        raise ResultError(
+            f'{path}: is "{mark}", but this version of warpimpact reads {", ".join(kind.mark for kind in KINDS)}'
+        )
+    return HIT_MAP if kind is SWEEP and is_point else kind
 
 
 def check_kind(path: Path, *wanted: Kind) -> Kind:
-    """The kind of a file, if it is one of the wanted ones. A file without a recognised kind counts as a map of hits,
-    whose reader says what it lacks.
+    """The kind of a file, if it is one of the wanted ones.
 
     Raises:
         ResultError: the file is missing, is damaged, or is of another kind.
     """
     kind = kind_of(path)
-    for allowed in wanted:
-        if kind is not None and kind.name == allowed.name:
-            return allowed
-    if kind is not None:
-        raise ResultError(kind.told(path, wanted[0].name))
-    if not kinds.is_netcdf(path):
-        raise ResultError(f"{path}: cannot be read as a netCDF file")
-    if RESULT in wanted:
-        return RESULT
-    raise ResultError(f"{path}: not {wanted[0].name} of warpimpact")
+    if kind not in wanted:
+        raise ResultError(f"{path}: is {kind.name}, as {kind.maker} writes, not {wanted[0].name}; {kind.use}")
+    return kind
 
 
 @contextmanager

@@ -1,4 +1,4 @@
-"""The file of a simulated firing test: its variables and attributes, and what is checked of it.
+"""The file of a simulated firing test: its variables and attributes.
 
 response        probability of perforation against velocity, and the places that it comes from
 test            what every simulated test reports
@@ -9,14 +9,8 @@ proof           probability that n shots with at most k perforations pass, again
 
 from __future__ import annotations
 
-from typing import Any
-
-from pydantic import Json
-
-from warpimpact.records.variable import Variable
+from warpimpact.records.variable import Variable, with_interval
 from warpimpact.results import attributes as attr
-from warpimpact.results.declared import Declaration, Text, among, finite, with_interval
-from warpimpact.results.kind import Kind
 
 _TESTS, _SHOTS, _SIZES, _ENDS = ("test",), ("test", "shot"), ("size",), ("bound",)
 
@@ -99,31 +93,3 @@ MEAN, MEAN_INTERVAL = "mean_perforation_probability", "mean_perforation_probabil
 """Weighted mean over all directions, and its interval."""
 SEARCH = "limit_runs_per_hit"
 """Runs per hit of the search of limits."""
-
-_RESPONSE = (SHARE, SHARE_LOW, SHARE_HIGH, VELOCITY, QUANTILE, QUANTILE_VELOCITY, QUANTILE_LOW, QUANTILE_HIGH)
-_PLACES = (CHANGES, HIT_Y, HIT_Z, YAW, OUTLINE_Y, OUTLINE_Z)
-_REPORTED = (SHOT_VELOCITY, SHOT_PERFORATED, SHOT_PLACE, V50, SPREAD, V50_LOW, V50_HIGH, SHOTS)
-_OF_SIZES = (SIZE, SIZE_SHOTS, SIZE_WITHIN, SIZE_BIAS, SIZE_DEVIATION)
-_PROOF = (PROOF_PERFORATION, PASS, PASS_SAME_PLACE)
-_OF_DIRECTIONS = (
-    *(AZIMUTH, ELEVATION, DIRECTION_SHARE, DIRECTION_LOW, DIRECTION_HIGH, DIRECTION_OBLIQUITY),
-    *(DIRECTION_WEIGHT, DIRECTION_HITS, DIRECTION_FAILED),
-)
-_DECLARED = Declaration(
-    {variable: variable.dims for variable in VARIABLES},
-    optional=VARIABLES,
-    whole=(_RESPONSE, _PLACES, _REPORTED, _OF_SIZES, _PROOF, _OF_DIRECTIONS),
-    rules={
-        SHOT_PERFORATED: among(0, 1, -1),
-        **dict.fromkeys((VELOCITY, AZIMUTH, ELEVATION, SIZE), finite),
-    },
-    attributes={**dict.fromkeys((attr.TITLE, TEST, DISCLAIMER, REQUIREMENT), Text), SETTINGS: Json[dict[str, Any]]},
-    more=lambda dataset: None if {SHARE, DIRECTION_SHARE} & {*dataset.variables} else "it has neither part of a test",
-)
-FIRING = Kind(
-    "a firing test",
-    "its text and figure stand beside it; xarray.open_dataset reads it",
-    (TEST,),
-    maker="warpimpact test",
-    fault=_DECLARED.fault,
-)

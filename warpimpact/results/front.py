@@ -1,4 +1,4 @@
-"""The file of a search for designs: its variables and attributes, and what is checked of it.
+"""The file of a search for designs: its variables and attributes.
 
 design      every design that was computed
 variable    the free variables
@@ -10,29 +10,8 @@ generation  of the search
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any
-
-import numpy as np
-
-from warpimpact.records.variable import Variable
+from warpimpact.records.variable import Variable, with_interval
 from warpimpact.results import attributes as attr
-from warpimpact.results.declared import (
-    Declaration,
-    Size,
-    Text,
-    among,
-    finite,
-    not_negative,
-    place_in,
-    texts,
-    with_interval,
-)
-from warpimpact.results.kind import Kind
-from warpimpact.scene.toml_text import parsed_json
-
-if TYPE_CHECKING:
-    import xarray
 
 _BY_DESIGN, _BY_FRONT, _BY_REFERENCE = ("design", "asked"), ("front", "asked"), ("reference", "asked")
 
@@ -93,53 +72,5 @@ REFUSED, PILOTS = "refused_designs", "pilots"
 REFERENCES = "docs/howto/optimise.md of warpimpact"
 
 
-def _labels(values: np.ndarray[Any, Any], sizes: Mapping[str, int]) -> bool:
-    """Whether the values are JSON lists of the options of each variable; empty for a range."""
-    choices = [parsed_json(text) for text in values.flat if text] if texts(values, sizes) else [None]
-    return all(isinstance(choice, list) and all(isinstance(label, str) for label in choice) for choice in choices)
-
-
-def _more(dataset: xarray.Dataset) -> str | None:
-    if not np.isnan(dataset[ASKED_LIMIT].values).any():
-        return "it has no objective"
-    if not dataset.sizes["design"]:
-        return "it has no design"
-    for place, labels in enumerate(dataset[LABELS].values):
-        values = dataset[VALUE].values[:, place]
-        known = values[~np.isnan(values)]
-        if labels and not np.isin(known, np.arange(len(parsed_json(labels)))).all():
-            return f'its variable "{VALUE}" has numbers that choose nothing'
-    return None
-
-
-_TEXTS = (
-    *(UNTESTED, NAME, UNIT, ASKED, LABEL, LEVELS, CAMPAIGN, FILE, FRESH_LEVELS),
-    *(REFERENCE, REFERENCE_CAMPAIGN),
-)
-_DECLARED = Declaration(
-    {variable: variable.dims for variable in VARIABLES},
-    optional=(HIT_Y, HIT_Z, HIT_VALUE),
-    whole=((HIT_Y, HIT_Z, HIT_VALUE),),
-    rules={
-        **dict.fromkeys(_TEXTS, texts),
-        **dict.fromkeys((HIT_Y, HIT_Z), finite),
-        **dict.fromkeys((HITS, COST, COMPUTED), not_negative),
-        **dict.fromkeys((ON_FRONT, KEPT), among(0, 1)),
-        LABELS: _labels,
-        SIGN: among(1, -1),
-        NUMBER: place_in("design"),
-        GROUP: place_in("front"),
-    },
-    attributes={
-        **dict.fromkeys((attr.TITLE, attr.HISTORY, attr.WARPIMPACT_VERSION, DESIGN, OUTCOME), Text),
-        **dict.fromkeys((REFUSED, PILOTS), Size),
-    },
-    more=_more,
-)
-FRONT = Kind(
-    "a search for designs",
-    "warpimpact report and design take it",
-    (DESIGN,),
-    maker="warpimpact optimise",
-    fault=_DECLARED.fault,
-)
+NEEDED = tuple(name for name in VARIABLES if name not in (HIT_Y, HIT_Z, HIT_VALUE))
+"""Variables of every search; the others are there if its plates have such hits."""

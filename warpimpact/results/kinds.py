@@ -1,63 +1,91 @@
-"""All kinds of files, and how a file's kind is recognised."""
+"""Kinds of files, how they are recognised, and the commands that take them."""
 
 from __future__ import annotations
 
-from collections.abc import Collection
-from pathlib import Path
-
-import netCDF4
+from collections.abc import Collection, Sequence
+from typing import NamedTuple
 
 from warpimpact.results import attributes as attr
-from warpimpact.results import checks, firing, front, posterior_file, replayed_hit
+from warpimpact.results import front, posterior_file
 from warpimpact.results import variables as v
-from warpimpact.results.kind import Kind
-from warpimpact.scene.toml_text import parsed, read_text
-
-_BEGIN_NETCDF = b"\x89HDF", b"CDF"
 
 
-NETCDF = (posterior_file.POSTERIOR, front.FRONT, firing.FIRING, replayed_hit.HISTORY)
-"""Kinds that are recognised by their marks. A map of hits and a sweep are recognised by the variable of statuses."""
+class Kind(NamedTuple):
+    """A kind of netCDF file.
 
-DESIGN = Kind("a design file", "warpimpact optimise takes it", ("variables", "objectives"))
-FIT = Kind("a fit", "warpimpact identify takes it", ("shot", "prior"))
-TEST = Kind("a test file", "warpimpact test takes it", ("target", "procedure"))
-ENTRIES = Kind("a catalogue", "warpimpact catalogue --file takes it", ("threat", "material"))
-CAMPAIGN = Kind("a campaign", "warpimpact run takes it", ("hits", "sweep"))
-_TEXT_KINDS = (DESIGN, FIT, TEST, ENTRIES, CAMPAIGN)
-
-
-def is_netcdf(path: Path) -> bool:
-    """Whether a path is a regular file that begins as netCDF files do."""
-    with path.open("rb") as file:
-        return file.read(4).startswith(_BEGIN_NETCDF)
-
-
-def kind_of(path: Path) -> Kind | None:
-    """The kind of a regular file, by its contents; None if it is no known kind.
-
-    Raises:
-        Exception: of any class, for a damaged netCDF file.
+    Attributes:
+        name: name with its article.
+        mark: name and version, the value of the global attribute `attr.KIND`.
+        maker: the command that writes it.
+        use: the commands that take it.
+        needed: variables and groups of each such file, and global attributes.
     """
-    if not is_netcdf(path):
-        try:
-            return kind_of_tables(parsed(read_text(path), path.name))
-        except ValueError:
-            return None
-    with netCDF4.Dataset(path) as file:
-        names = {*file.variables, *file.groups, *file.ncattrs()}
-        if (kind := _marked(names, NETCDF)) is not None:
-            return kind
-        if v.STATUS not in file.variables:
-            return None
-        is_sweep = attr.SWEEP in names and file.variables[v.STATUS].dimensions != (v.HIT,)
-        return checks.SWEEP if is_sweep else checks.RESULT
+
+    name: str
+    mark: str
+    maker: str
+    use: str
+    needed: Sequence[str]
 
 
-def kind_of_tables(tables: Collection[str]) -> Kind | None:
-    """The kind of a TOML file with these tables."""
-    return _marked(tables, _TEXT_KINDS)
+_OF_HITS = (*v.COORDINATES, *v.VARIABLES, attr.PLATE_PERIOD)
+HIT_MAP = Kind(
+    "a map of hits",
+    "hit map 1",
+    "warpimpact run or limit",
+    "warpimpact inspect, plot, report, export, compare and replay take it",
+    _OF_HITS,
+)
+SWEEP = Kind(
+    "a sweep",
+    "sweep 1",
+    "warpimpact sweep",
+    "warpimpact inspect and report take it; its points, in the folder beside it, are results, as is what isel(INPUT=0) "
+    "chooses of it",
+    (*_OF_HITS, attr.SWEEP),
+)
+HISTORY = Kind(
+    "the history of a hit",
+    "history 1",
+    "warpimpact replay",
+    "warpimpact inspect, report and export take it",
+    (*v.HISTORY_COORDINATES, *v.HISTORY_VARIABLES),
+)
+POSTERIOR = Kind(
+    "a posterior",
+    "posterior 1",
+    "warpimpact identify",
+    "warpimpact report takes it",
+    posterior_file.GROUPS,
+)
+FRONT = Kind(
+    "a search for designs",
+    "design search 1",
+    "warpimpact optimise",
+    "warpimpact report and design take it",
+    front.NEEDED,
+)
+FIRING = Kind(
+    "a firing test",
+    "firing test 1",
+    "warpimpact test",
+    "its text and figure stand beside it; xarray.open_dataset reads it",
+    (attr.FIRING_TEST,),
+)
+KINDS = (HIT_MAP, SWEEP, HISTORY, POSTERIOR, FRONT, FIRING)
+
+DESIGN, FIT, TEST, CAMPAIGN = "a design file", "a fit", "a test file", "a campaign"
+_TABLES = {
+    ("variables", "objectives"): (DESIGN, "warpimpact optimise takes it"),
+    ("shot", "prior"): (FIT, "warpimpact identify takes it"),
+    ("target", "procedure"): (TEST, "warpimpact test takes it"),
+    ("threat", "material"): ("a catalogue", "warpimpact catalogue --file takes it"),
+    ("hits", "sweep"): (CAMPAIGN, "warpimpact run takes it"),
+}
+"""Tables of a TOML file, one of which only files of one kind have: the kind, and the command that takes it."""
 
 
-def _marked(names: Collection[str], kinds: Collection[Kind]) -> Kind | None:
-    return next((kind for kind in kinds if {*kind.marks} & {*names}), None)
+def text_kind(tables: Collection[str], wanted: str = "") -> tuple[str, str]:
+    """The kind of a TOML file with these tables, the wanted one if it may be that, and its use; empty if unknown."""
+    found = [kind for names, kind in _TABLES.items() if {*names} & {*tables}]
+    return next((kind for kind in found if kind[0] == wanted), found[0] if found else ("", ""))

@@ -238,9 +238,3 @@ def hit_variables() -> tuple[Variable, ...]:
     always, *others = registry.RECORDS
     optional = (variable for group in others for variable in (*group, *group.beside))
     return tuple(dict.fromkeys((*SHOT_VARIABLES, EDGE_DISTANCE, *always, *OPTIONAL_SHOT_VARIABLES, *optional)))
-
-
-def whole_groups() -> list[tuple[Variable, ...]]:
-    """Groups of variables; a result has all variables of a group or none."""
-    of_records = [(*group, *group.beside) for group in registry.RECORDS if group.whole]
-    return [*of_records, OUTLINE_VARIABLES, *map(tuple, (SOLID_VARIABLES, SOLID_DEPTHS, BASE_ALONE_VARIABLES))]

@@ -1,11 +1,9 @@
 """The parts of an unfinished computation on the disk: a folder beside the result file.
 
 Beside RESULT.nc the folder RESULT.nc.parts holds the parts and a manifest, which says what is being computed. A file is
-written under another name, flushed and renamed, so a file with its final name is whole. A part carries a seal of its
-bytes, its place and the manifest's content. A part that was damaged, moved or taken from another computation lacks the
-right seal, and is computed again. For the same reason, parts without a manifest, or with a damaged one, are kept. A
-lock
-in the folder keeps a second process away. The system releases it when the process ends, however it ends.
+written under another name, flushed and renamed, so a file with its final name is whole. The name of a part has a
+checksum. A part whose bytes have another one is computed again. A lock in the folder keeps a second process away. The
+system releases it when the process ends, however it ends.
 """
 
 from __future__ import annotations
@@ -97,7 +95,7 @@ def telling(kept: Callable[[], str]) -> Iterator[None]:
 
 
 class Form(NamedTuple):
-    """Names of parts: what they hold, the number of its first item, and a seal.
+    """Names of parts: what they hold, the number of its first item, and a checksum.
 
     Attributes:
         holds: the items of a part, such as "hits".
@@ -115,7 +113,7 @@ class Form(NamedTuple):
         return f"{self.holds}_*{self.suffix}"
 
     def stem(self, number: int) -> str:
-        """Name of a part before its seal."""
+        """Name of a part before its checksum."""
         return f"{self.holds}_{number * self.extent:010d}"
 
     def number_in(self, name: str) -> int:
@@ -195,31 +193,25 @@ class Parts:
 
     def _begun(self) -> dict[str, Any] | None:
         """The manifest in the folder; None without one; empty if it cannot be read."""
-        if self._manifest.is_fifo():  # reading would wait for a writer
-            return {}
         try:
-            begun = json.loads(self._manifest.read_bytes())
-            replaces, known = begun.pop("replaces"), begun.pop("fingerprint")
-            damaged = not isinstance(replaces, bool) or known != fingerprint(begun)
+            return dict(json.loads(self._manifest.read_bytes()))
         except FileNotFoundError:
             return {} if self.paths() else None
-        except (OSError, ValueError, RecursionError, AttributeError, KeyError, TypeError):
+        except (OSError, TypeError, ValueError):
             return {}
-        return {} if damaged else {"content": begun, "replaces": replaces}
 
     def _take_up(self, begun: dict[str, Any], *, overwrite: bool) -> None:
-        if begun and (changed := difference(begun["content"], self._content)):
+        if not begun:
+            raise OutputError(f"{self._manifest}: is missing or damaged; begin anew with --overwrite")
+        replaces = begun.pop("replaces", False) or overwrite
+        if changed := difference(begun, self._content):
             raise OutputError(
                 f"{self.folder}: cannot be resumed: {changed}; put it back, or begin anew with --overwrite"
             )
-        replaces = overwrite or begun.get("replaces", False)
         if self.output.exists() and not (replaces or self.is_complete()):
             raise OutputError(f"{self.output}: exists already; name another file or give --overwrite")
         for leftover in self.folder.glob(".*.part"):
             remove(leftover)
-        if not begun:
-            self._tell(f"{self._manifest}: is missing or damaged; it is written again")
-            self._write_manifest(replaces=replaces)
         damaged = []
         for path in self.paths():
             number = self._form.number_in(path.name)
@@ -230,16 +222,11 @@ class Parts:
                 self.saved[number] = path
         if damaged:
             more = f" and {len(damaged) - 1} more" if len(damaged) > 1 else ""
-            self._tell(
-                f"{self.folder}: {damaged[0].name}{more}: damaged, or not of this place or {self._kind}; computed again"
-            )
+            self._tell(f"{self.folder}: {damaged[0].name}{more}: damaged; computed again")
 
     def _write_manifest(self, *, replaces: bool) -> None:
-        if self._manifest.is_dir():
-            remove(self._manifest)
         with files.aside(self._manifest) as file:
-            content = {**self._content, "replaces": replaces, "fingerprint": self.fingerprint}
-            file.write_text(json.dumps(content, indent=1), encoding="utf-8")
+            file.write_text(json.dumps({**self._content, "replaces": replaces}, indent=1), encoding="utf-8")
 
     def _is_whole(self, number: int, path: Path) -> bool:
         try:
@@ -250,9 +237,8 @@ class Parts:
     def _named(self, number: int, written: Path) -> Path:
         """Path of the part with this number and these bytes."""
         with written.open("rb") as file:
-            bits = hashlib.file_digest(file, "sha256").hexdigest()
-        seal = hashlib.sha256(f"{self.fingerprint} {number} {bits}".encode()).hexdigest()[:16]
-        return self.folder / f"{self._form.stem(number)}_{seal}{self._form.suffix}"
+            checksum = hashlib.file_digest(file, "sha256").hexdigest()[:16]
+        return self.folder / f"{self._form.stem(number)}_{checksum}{self._form.suffix}"
 
     def path(self, number: int) -> Path:
         """Path of a saved part.
@@ -284,7 +270,7 @@ class Parts:
 
     def paths(self) -> list[Path]:
         """Paths of the saved parts."""
-        return sorted(path for path in self.folder.glob(self._form.pattern) if not path.is_fifo())
+        return sorted(self.folder.glob(self._form.pattern))
 
     @property
     def counted(self) -> str:

@@ -54,14 +54,6 @@ def parsed(text: str, name: str) -> dict[str, Any]:
     return data
 
 
-def parsed_json(text: Any) -> Any:
-    """The value of a JSON text, str or bytes, that a program wrote; None if it is not JSON."""
-    try:
-        return json.loads(text)
-    except (TypeError, ValueError, RecursionError):
-        return None
-
-
 def _has_long_key(text: str) -> bool:
     """Whether a key or a table has more than _MOST_DOTS dots. The parser's time grows with the square of the dots."""
     _, *parts = _BESIDE_A_KEY.split(f"\n{text}\n")

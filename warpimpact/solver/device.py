@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-import json
 import logging
 import os
 import shutil
 import tempfile
 import threading
 import time
-import zlib
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, nullcontext, suppress
 from functools import cache
@@ -20,12 +18,9 @@ import psutil
 import warp as wp
 
 from warpimpact.kernels import lanes
-from warpimpact.scene.toml_text import parsed_json
 
 _logger = logging.getLogger(__name__)
 Scratch = TypeVar("Scratch")
-_SUMS = "checksums.json"
-"""File in the folder of a compiled module with the checksum of every other file there."""
 
 
 class DeviceError(RuntimeError):
@@ -118,14 +113,11 @@ _LOADING = threading.RLock()
 
 
 def load(kernel: Any, device: Any) -> None:
-    """Load a kernel on a device for launches with Warp's own block size. Compile it if the cache has no whole copy.
-    Several threads may load the same kernel.
+    """Load a kernel on a device for launches with Warp's own block size. Compile it if the cache has no copy that can
+    be loaded. Several threads may load the same kernel.
 
     A module is compiled for one block size. By default Warp loads with the block size of CUDA on a CPU, too, and
-    compiles again at the launch. Warp trusts the files of its cache, and one wrong bit in them can end the process.
-
-    Raises:
-        DeviceError: the cached files are damaged and cannot be removed.
+    compiles again at the launch.
     """
     with _LOADING:
         _load(kernel, device)
@@ -138,16 +130,12 @@ def _load(kernel: Any, device: Any) -> None:
     if loaded is not None and loaded.module_hash == module.get_module_hash(block):
         return
     folder = Path(wp.config.kernel_cache_dir, module.get_module_identifier(block))
-    with nullcontext() if _is_whole(folder) else _alone(folder):
-        if not _is_whole(folder):
-            _remove(folder)
+    with nullcontext() if folder.exists() else _alone(folder):
         try:
             module.load(device, block)
-        except Exception:  # another process has removed it meanwhile; a kernel that cannot be compiled fails again
-            _remove(folder)
+        except Exception:  # a file of the cache is damaged; a kernel that cannot be compiled fails again
+            shutil.rmtree(folder, ignore_errors=True)
             module.load(device, block)
-        if not _is_whole(folder):
-            _seal(folder)
     _logger.debug("%s on %s: loaded in %.2f s", kernel.key, device, time.perf_counter() - begin)
 
 
@@ -164,42 +152,6 @@ def _alone(folder: Path) -> Iterator[None]:
         yield
     finally:
         lock.release()
-
-
-def _sums(folder: Path) -> dict[str, int]:
-    files = (path for path in folder.iterdir() if path.is_file() and path.suffix != Path(_SUMS).suffix)
-    return {path.name: zlib.crc32(path.read_bytes()) for path in files}
-
-
-def _is_whole(folder: Path) -> bool:
-    """Whether the files of a compiled module have the checksums with which they were sealed."""
-    sums = folder / _SUMS
-    try:
-        return sums.is_file() and parsed_json(sums.read_bytes()) == _sums(folder)
-    except OSError:
-        return False
-
-
-def _seal(folder: Path) -> None:
-    """Write the checksums of a compiled module. If that fails, the module is compiled again next time."""
-    part = folder / f"{os.getpid()}.json"
-    with suppress(OSError):
-        part.write_text(json.dumps(_sums(folder)), encoding="utf-8")
-        part.replace(folder / _SUMS)
-
-
-def _remove(folder: Path) -> None:
-    try:
-        if folder.is_dir() and not folder.is_symlink():
-            shutil.rmtree(folder)
-        else:
-            folder.unlink(missing_ok=True)
-    except FileNotFoundError:  # another process removes it, too
-        pass
-    except OSError as error:
-        raise DeviceError(
-            f"device: the compiled kernel in {folder} is damaged and cannot be removed ({error.strerror}); delete it"
-        ) from None
 
 
 def halving(slots: int, allocate: Callable[[int], Scratch]) -> tuple[int, Scratch]:

@@ -22,7 +22,7 @@ from warpimpact.campaign.text import CampaignError, parsed, read_text
 from warpimpact.results import attributes as attr
 from warpimpact.results import files
 from warpimpact.results import variables as v
-from warpimpact.results.kinds import CAMPAIGN
+from warpimpact.results.kinds import CAMPAIGN, SWEEP
 from warpimpact.results.measures import Measure
 from warpimpact.runs.choice import opened
 from warpimpact.runs.executor import Executor
@@ -257,6 +257,7 @@ def _attributes(sweep: Sweep, points: Sequence[xarray.Dataset]) -> dict[str, Any
         and all(name in other and np.array_equal(other[name], value) for other in others)
     }
     return shared | {
+        attr.KIND: SWEEP.mark,
         attr.TITLE: sweep.title,
         attr.HISTORY: attr.history_line("sweep"),
         attr.CAMPAIGN: sweep.text,

@@ -18,7 +18,7 @@ from warpimpact.firing.response import Response, response_of_limits
 from warpimpact.identification.fit_file import read_fit
 from warpimpact.optimisation.design import read_design
 from warpimpact.results import files
-from warpimpact.results.checks import RESULT
+from warpimpact.results.kinds import HIT_MAP
 from warpimpact.scene.toml_text import parsed
 from warpimpact.solver import device as devices
 
@@ -89,12 +89,6 @@ def test_dots_in_a_value_are_not_those_of_a_key() -> None:
     assert parsed(f'file = "{path}"\nx = [1, {{ y = "{path}" }}]', "a") == {"file": path, "x": [1, {"y": path}]}
 
 
-@pytest.mark.parametrize("content", ["[" * 200_000, '{"a":' * 200_000])
-def test_checksums_nested_without_end_are_none(content: str, tmp_path: Path) -> None:
-    (tmp_path / "checksums.json").write_text(content)
-    assert not devices._is_whole(tmp_path)
-
-
 def test_a_cache_that_cannot_be_written_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
     def refuse() -> None:
         raise PermissionError(13, "Permission denied", "/cache")
@@ -109,7 +103,7 @@ def test_a_text_is_named_as_what_it_is(kind: str, in_tmp_path: Path, refusal: Re
     text, use = TEXTS[kind]
     Path("a.toml").write_text(text, encoding="utf-8")
     for arguments in (["inspect", "a.toml"], ["report", "a.toml", "-o", "a.html"]):
-        assert refusal(arguments) == f"a.toml: is {kind}, not a map of hits; {use}"
+        assert refusal(arguments) == f"a.toml: is {kind}, not a result; {use}"
     commands = {"run": "a campaign", "optimise": "a design file", "identify": "a fit", "test": "a test file"}
     for command, wanted in commands.items():
         if wanted != kind:
@@ -119,12 +113,12 @@ def test_a_text_is_named_as_what_it_is(kind: str, in_tmp_path: Path, refusal: Re
 def test_a_result_is_named_where_a_text_is_taken(make_result: ResultMaker, in_tmp_path: Path, refusal: Refusal) -> None:
     files.write(make_result(20), Path("a.nc"))
     files.write(make_result(20), Path("b.toml"))
-    told = RESULT.told("", "a TOML file").removeprefix(": ")
+    told = f"is a map of hits, not a TOML file; {HIT_MAP.use}"
     for command in ("run", "plate", "sweep", "optimise", "test", "limit"):
         assert refusal([command, "a.nc"]) == f"a.nc: {told}"
     assert refusal(["export", "b.toml"]) == f"b.toml: {told}"
     for read in (run, read_design, read_fit):
-        with pytest.raises(CampaignError, match="a map of hits, as warpimpact run or limit writes, not a TOML file"):
+        with pytest.raises(CampaignError, match="a map of hits, not a TOML file"):
             read("a.nc")
 
 
@@ -132,6 +126,41 @@ def test_a_picture_is_neither(in_tmp_path: Path, refusal: Refusal) -> None:
     Image.new("1", (2, 2)).save("a.png")
     assert refusal(["inspect", "a.png"]) == "a.png: cannot be read as a netCDF file"
     assert "a.png: is not valid TOML" in refusal(["run", "a.png"])
+
+
+@pytest.mark.parametrize(
+    ("mark", "said"),
+    [
+        ("hit map 2", 'is "hit map 2", but this version of warpimpact reads hit map 1, sweep 1,'),
+        ("posterior 1", "is a posterior, as warpimpact identify writes, not a map of hits"),
+        ("", 'is no file of this version of warpimpact, it has no attribute "warpimpact_kind"'),
+    ],
+)
+def test_another_version_or_kind_is_named(
+    mark: str, said: str, make_result: ResultMaker, in_tmp_path: Path, refusal: Refusal
+) -> None:
+    files.write(make_result(20).assign_attrs(warpimpact_kind=mark), Path("a.nc"))
+    for arguments in (["plot", "a.nc"], ["replay", "a.nc", "--hit", "0"]):
+        assert said in refusal(arguments)
+
+
+@pytest.mark.parametrize("share", [0.0, 0.01, 0.3, 0.9])
+def test_a_truncated_result_is_told(
+    share: float, make_result: ResultMaker, in_tmp_path: Path, refusal: Refusal
+) -> None:
+    files.write(make_result(2000), Path("a.nc"))
+    data = Path("a.nc").read_bytes()
+    Path("a.nc").write_bytes(data[: int(share * len(data))])
+    assert "a.nc: cannot be read as a netCDF file" in refusal(["inspect", "a.nc"])
+
+
+def test_damaged_values_are_told(make_result: ResultMaker, in_tmp_path: Path, refusal: Refusal) -> None:
+    files.write(make_result(20000), Path("a.nc"))
+    data = bytearray(Path("a.nc").read_bytes())
+    data[len(data) // 3 : len(data) // 2] = bytes(len(data) // 2 - len(data) // 3)
+    Path("a.nc").write_bytes(data)
+    for command in (["inspect", "a.nc"], ["plot", "a.nc"], ["export", "a.nc"]):
+        assert "a.nc: " in refusal(command)
 
 
 def test_a_flipped_bit_of_the_header_is_told(

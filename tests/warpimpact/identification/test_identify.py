@@ -44,7 +44,7 @@ def test_arviz_reads_it(posterior: Path) -> None:
 
 def test_draws_hold_together(posterior: Path) -> None:
     """A draw has the numbers of the set that it is."""
-    tree = read_tree(posterior, posterior_file.POSTERIOR)
+    tree = read_tree(posterior)
     which = tree["sample_stats"]["set"].values[0]
     for name in parameters_of(tree):
         assert tree["posterior"][name].values[0] == pytest.approx(tree["sets"][name].values[which])
@@ -56,7 +56,7 @@ def test_draws_hold_together(posterior: Path) -> None:
 
 
 def test_the_resistance_is_learnt_and_told(posterior: Path) -> None:
-    tree = read_tree(posterior, posterior_file.POSTERIOR)
+    tree = read_tree(posterior)
     resistance = learnt(tree)["resistance"]
     assert resistance.quantiles[2] - resistance.quantiles[0] < 0.8 * (resistance.prior[2] - resistance.prior[0])
     text = text_of(posterior_view(tree))
@@ -66,7 +66,7 @@ def test_the_resistance_is_learnt_and_told(posterior: Path) -> None:
 
 
 def test_figures_are_drawn(posterior: Path) -> None:
-    tree = read_tree(posterior, posterior_file.POSTERIOR)
+    tree = read_tree(posterior)
     assert len(pairs_figure(tree).axes) == 10
     assert len(measured_figure(tree).axes) == 2
     assert len(hits_figure(tree).axes) == 2

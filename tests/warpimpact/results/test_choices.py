@@ -10,7 +10,7 @@ import xarray
 from warpimpact import Campaign, open_result
 from warpimpact.analysis.effectiveness import effectiveness
 from warpimpact.cli import main
-from warpimpact.results import files, posterior_file
+from warpimpact.results import files
 from warpimpact.results import variables as v
 from warpimpact.results.dataset import is_choice
 from warpimpact.results.outlines import outlines
@@ -87,8 +87,8 @@ def test_holes_follow_from_the_plate_where_the_outlines_were_left_behind(
         (lambda d: d.isel(hit=3), "holds one hit without its dimension; choose hits as a list"),
         (lambda d: d.isel(standoff=0), "holds one stand-off without its dimension; choose stand-offs as a list"),
         (lambda d: d.where(d["tilt"].isel(standoff=0, drop=True) > 20.0), "choose hits with where(..., drop=True)"),
-        (lambda d: d[["tilt"]], 'not a warpimpact result, it has no variable "angular_velocity"'),
-        (lambda d: d.drop_attrs(deep=False), 'no attribute "plate_period"; where it was chosen from one, keep its'),
+        (lambda d: d[["tilt"]], 'is no whole file of a map of hits, it has no "axis"'),
+        (lambda d: d.drop_attrs(deep=False), 'no attribute "warpimpact_kind"; if it was chosen from a result, keep'),
     ],
 )
 def test_what_a_choice_lacks_is_told_in_a_sentence(
@@ -128,12 +128,6 @@ def test_shots_at_the_solid_plate_stay_with_their_hits() -> None:
     chosen = solid.isel(hit=slice(10, 50, 2))
     for name in ("residual_velocity", "tilt", "impact_velocity"):
         np.testing.assert_array_equal(later[name], chosen[name])
-
-
-def test_a_posterior_is_named_as_what_it_is(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    xarray.Dataset(attrs={posterior_file.EFFECTIVE: 1000.0}).to_netcdf(tmp_path / "fit.nc")
-    assert main(["plot", str(tmp_path / "fit.nc")]) == 2
-    assert "is a posterior, as warpimpact identify writes, not a map of hits" in capsys.readouterr().err
 
 
 def test_results_of_different_plates_are_joined(result: xarray.Dataset, tmp_path: Path) -> None:

@@ -189,17 +189,8 @@ def test_what_is_no_result_is_told(make_result, tmp_path):
     for name, told in (
         ("absent", r"cannot be read \(it is not there\)"),
         ("notes", "cannot be read as a netCDF file"),
-        ("other", 'not a warpimpact result, it has no variable "tilt"'),
+        ("other", 'is no whole file of a map of hits, it has no "tilt"'),
     ):
         for read in (files.read, open_result):
             with pytest.raises(files.ResultError, match=rf"{name}\.nc: {told}"):
                 read(tmp_path / f"{name}.nc")
-
-
-@pytest.mark.parametrize("standoff", [np.nan, 130e-3])
-def test_stand_offs_that_name_no_place_of_their_own_are_refused(make_result, tmp_path, standoff):
-    result = make_result(5)
-    places = result["standoff"].copy(data=[standoff, 130e-3])
-    files.write(result.assign_coords(standoff=places), tmp_path / "a.nc")
-    with pytest.raises(files.ResultError, match='"standoff" has values that are no lengths, or one of them twice'):
-        files.read(tmp_path / "a.nc")

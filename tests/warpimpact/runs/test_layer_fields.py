@@ -11,8 +11,7 @@ from warpimpact.analysis.slabs import LayerField, fields_behind
 from warpimpact.export.paraview import write_vtk
 from warpimpact.plotting.layers import layers
 from warpimpact.results import files
-from warpimpact.results.checks import RESULT
-from warpimpact.results.replayed_hit import HISTORY
+from warpimpact.results.kinds import HISTORY, HIT_MAP
 from warpimpact.runs.replay import replay
 
 CAMPAIGN = """
@@ -105,7 +104,7 @@ def test_an_image_of_a_hit_is_mirrored() -> None:
 
 def test_a_file_a_figure_and_paraview_keep_it(hit: xarray.Dataset, tmp_path: Path) -> None:
     files.write(hit, tmp_path / "hit.nc")
-    with files.opened(tmp_path / "hit.nc", RESULT, HISTORY) as again:
+    with files.opened(tmp_path / "hit.nc", HIT_MAP, HISTORY) as again:
         np.testing.assert_array_equal(fields_behind(again)[0].share, fields_behind(hit)[0].share)
     panels = [axes for axes in layers(hit).axes if axes.images]
     assert len(panels) == hit.sizes["snapshot"]

@@ -13,7 +13,7 @@ from warpimpact.campaign.places import resolved
 from warpimpact.cli import main
 from warpimpact.plotting.sweep import sweep_figure
 from warpimpact.results import files
-from warpimpact.results.checks import SWEEP
+from warpimpact.results.kinds import SWEEP
 from warpimpact.results.measures import Measure
 from warpimpact.runs.run import run
 from warpimpact.studies import sweep as module
