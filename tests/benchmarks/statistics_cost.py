@@ -63,8 +63,7 @@ class Hitting:
             irreducible=irreducible,
             replicates=REPLICATES if sampling == "sobol" else None,
         )
-        self.images = len(symmetries_used(campaign.impact, hits, campaign.plate))
-        shots = make_shots(campaign.impact, hits, campaign.plate)[:: self.images]
+        shots = make_shots(campaign.impact, hits, campaign.plate)
         self.count = len(shots)
         self.standard, self.cost_standard = self._answers(campaign, shots, 2)
         self.draft, self.cost_draft = self._answers(campaign, shots, 0)
@@ -136,7 +135,7 @@ def measured(campaign: Campaign) -> dict[str, dict[str, float]]:
     group = symmetries_used(campaign.impact, Hits(count=8, irreducible=True), campaign.plate)
     if len(group) > 1:
         ways[f"irreducible (1 of {len(group)})"] = [
-            Hitting(campaign, HITS * len(group), seed, sampling="sobol", irreducible=True) for seed in range(SEEDS)
+            Hitting(campaign, HITS, seed, sampling="sobol", irreducible=True) for seed in range(SEEDS)
         ]
     table: dict[str, dict[str, float]] = {}
     for name, (question, target, relative) in QUESTIONS.items():

@@ -18,6 +18,7 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 from scipy.stats import chisquare
 
+from warpimpact.identification.between import with_images
 from warpimpact.identification.fit import Fit
 from warpimpact.identification.fit_file import fit_from
 from warpimpact.identification.likelihood import Compared, Data
@@ -87,7 +88,7 @@ def calibrate(fit: Fit, *, data_sets: int, library: int, device: str = "auto") -
     scales = discrepancies(fit, points)
     for bench in benches(fit):
         for run, outcomes in computed(fit, bench, points, Worker(device)):
-            (which,), unfolded = run.which.T, outcomes.unfolded(run.aim.group)
+            (which,), unfolded = run.which.T, with_images(outcomes, run.aim.group)
             some = {kind: scale[which] for kind, scale in scales.items()}
             for place in bench.which:
                 shot = fit.shots[place]

@@ -45,7 +45,7 @@ CAMPAIGNS: dict[str, dict[str, Any]] = {
     "slots, double": {"numerics": {"level": 0, "precision": "double"}},
     "slots, nodal": {"numerics": {"scheme": "nodal", "grid_spacing": 5e-5}, "hits": ONE_NET | {"count": 6}},
     "slots, with bending and the nose": {"output": {"bending": True, "standoff_point": "nose"}},
-    "slots, irreducible": {"hits": ONE_NET | {"count": 32, "irreducible": True}},
+    "slots, irreducible": {"hits": ONE_NET | {"count": 4, "irreducible": True}},
     "shank through round holes, oblique and yawed": {
         "core": SHANKED,
         "plate": PLATE | {"pattern": CIRCLES, "thickness": 6e-3, "degradation_depth": 6e-3},

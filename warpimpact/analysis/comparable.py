@@ -58,7 +58,7 @@ def _in_degrees(impact: dict[str, Any]) -> dict[str, Any]:
 def other_shots(result: xarray.Dataset, other: xarray.Dataset) -> str:
     """Why the shots of two results differ; empty where they are the same."""
     if dealing(result) != dealing(other):
-        return "their shots have other replicates or symmetries"
+        return "their shots have other replicates"
     for axis, coordinate in enumerate((v.HIT_Y, v.HIT_Z)):
         here, there = (
             dataset[coordinate].values / dataset.attrs[attr.PLATE_PERIOD][axis] for dataset in (result, other)

@@ -14,6 +14,7 @@ from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
 from warpimpact.results.dataset import passed
 from warpimpact.results.per_hit import place_of_standoff
+from warpimpact.scene.symmetry import IDENTITY, SYMMETRIES, Symmetry
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -65,6 +66,7 @@ def hit_map(
         raise ValueError(f'method: got "{method}", but it must be "nearest" or "linear"')
     if pixels is not None and pixels < 1:
         raise ValueError(f"pixels: got {pixels}, but it must be at least 1")
+    result = mirrored(result)
     array = chosen(result, variable, standoff, layer)
     if variable == v.STATUS and method == "linear":
         raise ValueError('got "status" with method = "linear", but codes cannot be interpolated; use "nearest"')
@@ -123,6 +125,30 @@ def chosen(
 def mappable(dataset: xarray.Dataset) -> list[str]:
     """Names of the variables with one number per hit, per stand-off and per layer."""
     return [str(name) for name, array in dataset.data_vars.items() if array.dims in _DIMENSIONS]
+
+
+def symmetries_of(dataset: xarray.Dataset) -> list[Symmetry]:
+    """Symmetries that give the rest of the cell from the hits; the identity alone where the hits cover it."""
+    names = str(dataset.attrs.get(attr.SYMMETRIES, IDENTITY)).split("; ")
+    return [symmetry for symmetry in SYMMETRIES if str(symmetry) in names]
+
+
+def mirrored(dataset: xarray.Dataset) -> xarray.Dataset:
+    """The hits with their mirror images, to be drawn, where they cover the irreducible part of the cell only.
+
+    The coordinate "image" is 0 for the hits themselves. Variables with vectors are left out.
+    """
+    group, hits = symmetries_of(dataset), dataset.sizes["hit"]
+    if len(group) == 1 or "image" in dataset.coords:
+        return dataset
+    points, cell = (dataset[v.HIT_Y].values, dataset[v.HIT_Z].values), dataset.attrs[attr.PLATE_PERIOD]
+    images = np.concatenate([symmetry.image(*points, cell) for symmetry in group], axis=1)
+    whole = dataset.drop_dims("axis", errors="ignore").isel(hit=np.tile(np.arange(hits), len(group)))
+    changed = {name: whole[name].copy(data=places) for name, places in zip((v.HIT_Y, v.HIT_Z), images, strict=True)}
+    for name in (name for name in v.hit_variables() if name.mirror is not None and name in whole):
+        signs = np.repeat([getattr(symmetry, str(name.mirror)) for symmetry in group], hits)
+        whole = whole.assign({name: whole[name].copy(data=(whole[name].values.T * signs).T)})
+    return whole.assign_coords({**changed, "image": ("hit", np.repeat(np.arange(len(group)), hits))})
 
 
 def hit_points(dataset: xarray.Dataset) -> Array:

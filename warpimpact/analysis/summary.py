@@ -208,8 +208,8 @@ def stop_lines(dataset: Result) -> list[str]:
 
 
 def symmetry_text(dataset: Result) -> str:
-    """How many hits of a map with `hits.irreducible` were computed, and where the others come from."""
-    computed, hits = dataset.attrs[attr.COMPUTED_HITS], dataset.sizes["hit"]
-    if computed == hits:
-        return f"all {hits} hits computed: plate and shot have no symmetry in common"
-    return f"{computed} of {hits} hits computed, the others are their images by {dataset.attrs[attr.SYMMETRIES]}"
+    """What part of the cell the hits of a result with `hits.irreducible` stand for."""
+    parts = str(dataset.attrs[attr.SYMMETRIES]).count(";") + 1
+    if parts == 1:
+        return "hits of the whole cell: plate and shot have no symmetry in common"
+    return f"hits of 1/{parts} of the cell, which {dataset.attrs[attr.SYMMETRIES]} repeat"

@@ -88,8 +88,8 @@ class Campaign(Model):
         burst: several shots at one plate, one after another; hits are then their aims.
         scatter: distributions of values that scatter. A file has them in the places of the values.
         catalogue: TOML file with threats and materials of your own, tables `[[threat]]` and `[[material]]`.
-        stop: when the run ends, instead of a count. Unless told otherwise, its hits are then those of the irreducible
-            part of the cell, with their images.
+        stop: when the run ends, instead of a count. By default, its hits are then those of the irreducible part of the
+            cell.
         allow_implausible: compute also with values that no core or target has, such as a plate of 4 m: they are else
             refused, as a slip of units.
         continuum: how `warpimpact continuum` computes its hits.
@@ -196,7 +196,7 @@ class Campaign(Model):
 
     @property
     def symmetries(self) -> tuple[Symmetry, ...]:
-        """Symmetries by which the hits are images of each other; the identity alone if none is asked for or exists."""
+        """Symmetries that give the rest of the cell from its hits; the identity alone without `hits.irreducible`."""
         return symmetries_used(self.impact, self.hits, self.plate)
 
     def sampler(self) -> Sampler:
@@ -223,11 +223,6 @@ class Campaign(Model):
         """Number of shots at one plate."""
         return 1 if self.burst is None else self.burst.count
 
-    @property
-    def group(self) -> int:
-        """Number of consecutive hits that count as one: the shots at one plate, with their images."""
-        return len(self.symmetries) * self.at_a_plate
-
     @model_validator(mode="after")
     def _is_plausible(self) -> Self:  # first, as a slip of units breaks other rules, too
         if not self.allow_implausible:
@@ -246,7 +241,7 @@ class Campaign(Model):
         return values
 
     @model_validator(mode="after")
-    def _stop_computes_no_image(self) -> Self:
+    def _stop_samples_irreducible_part(self) -> Self:
         """Sample the irreducible part of the cell by default, where an answer costs least
         (tests/benchmarks/NOTES.md)."""
         hits = self.hits
@@ -267,7 +262,7 @@ class Campaign(Model):
                 exclusions.STOP: stop is not None,
                 exclusions.UNEVEN: hits.sampling in ("grid", "list") and f'hits.sampling = "{hits.sampling}"',
                 exclusions.ONE_SCRAMBLING: hits.sampling == "sobol" and self.replicates == 1,
-                exclusions.IMAGES: hits.irreducible,
+                exclusions.IRREDUCIBLE: hits.irreducible,
                 exclusions.LISTED_STRENGTH: "strength" in (hits.listed or {}),
                 exclusions.BURST: self.burst is not None,
                 exclusions.LAYERS: bool(self.layer),

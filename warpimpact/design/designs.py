@@ -30,9 +30,8 @@ Tables = dict[str, Any]
 
 FILE_KEYS = ("file", "catalogue")
 """Keys of a campaign that name files."""
-FEW, SOME, _IMAGES = 256, 1024, 4
-"""Most hits of the first map after a change, and of the draft; and fewest images of each other with which a first map
-has as many hits as the draft."""
+FEW, SOME = 256, 1024
+"""Most hits of the first map after a change, and of the draft."""
 FIRST_WORK, FEWEST = 0.08, 64
 """Approximate seconds of a core for the hits of a first map, so that it appears in 0.3 s on two cores; and its fewest
 hits. A lower level comes before fewer hits."""
@@ -166,8 +165,7 @@ def stages(shelf: Shelf, design: ValidDesign, level: int) -> Iterator[tuple[str,
     So is the draft of several layers if it has as many hits as the campaign, because measures need a lower level there
     than single hits at draft.
 
-    The hits of the first stage are those of the irreducible part of the cell with their images, if there is one: as
-    many hits for a part of the time.
+    The hits of the first stage are those of the irreducible part of the cell, if there is one.
 
     Args:
         level: finest level of the first stage, as the last draft has found it.
@@ -207,14 +205,12 @@ def _first(shelf: Shelf, design: ValidDesign, level: int) -> ValidDesign | None:
 
 
 def _of_first_hits(shelf: Shelf, design: ValidDesign, level: int, few: int) -> ValidDesign | None:
-    """A design with few hits at a level, or with four times as many where at least four are images of each other."""
+    """A design with few hits at a level, in the irreducible part of the cell where the scene allows it."""
     numerics = design.tables.get("numerics", {})
     if design.campaign.numerics.explicit is None:
         numerics = _kept(design) | {"level": level}
-    part = _valid(shelf, _of_few_hits(design, _IMAGES * few, irreducible=True) | {"numerics": numerics})
-    if part is not None and len(part.campaign.symmetries) >= _IMAGES:
-        return part
-    return _valid(shelf, _of_few_hits(design, few) | {"numerics": numerics})
+    few_hits = (_of_few_hits(design, few, irreducible=part) | {"numerics": numerics} for part in (True, False))
+    return next(filter(None, (_valid(shelf, tables) for tables in few_hits)), None)
 
 
 def _kept(design: ValidDesign) -> Tables:
@@ -230,10 +226,10 @@ def work(campaign: Campaign, numerics: Numerics | None = None) -> float:
     Args:
         numerics: numerics that fix a resolution; by default those of the campaign.
     """
-    sampler, images = campaign.sampler(), len(campaign.symmetries)
+    sampler = campaign.sampler()
     try:
         first = prepare(campaign.scene, sampler.shots(0, campaign.at_a_plate), numerics or campaign.numerics)
-        return first.seconds * len(sampler) / images
+        return first.seconds * len(sampler)
     except (ValueError, TooManySteps, MemoryError):
         return math.inf
 
@@ -249,10 +245,10 @@ def work_ahead(campaign: Campaign, level: int) -> float:
         return work(campaign)
     first = 0 if level_for(campaign) else coarsest_level(campaign.numerics.asked.strictness)
     last = max(first, level)
-    hits = len(campaign.sampler()) / len(campaign.symmetries)
+    hits = len(campaign.sampler())
     of_levels = [work(campaign, at_level(at, campaign.numerics)) for at in range(first, last + 3) if at < len(LADDER)]
     compared = COMPARED * of_levels[last - first] if level_for(campaign) == MEASURES else 0.0
-    pilot = pilot_size(campaign.numerics.asked, int(hits)) / hits * sum(of_levels)
+    pilot = pilot_size(campaign.numerics.asked, hits) / hits * sum(of_levels)
     return of_levels[last - first] + pilot + compared
 
 

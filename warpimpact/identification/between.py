@@ -8,6 +8,7 @@ import numpy as np
 
 from warpimpact.identification.aim import HitPoints
 from warpimpact.identification.measured import MEASURABLE, Observation
+from warpimpact.records.outcomes import Outcomes
 from warpimpact.scene import Symmetry
 from warpimpact.scene.model import Array
 
@@ -20,6 +21,15 @@ def signs(observations: Sequence[Observation], group: Sequence[Symmetry]) -> Arr
     mirrors = [MEASURABLE[observation.name].mirror for observation in observations]
     factors = [[1.0 if mirror is None else getattr(symmetry, mirror) for mirror in mirrors] for symmetry in group]
     return np.array(factors, dtype=np.float64).reshape(len(group), len(mirrors))
+
+
+def with_images(outcomes: Outcomes, group: Sequence[Symmetry]) -> Outcomes:
+    """Outcomes of all images of the shots under a group of symmetries; the images of a shot follow each other."""
+    columns = {name: np.repeat(values, len(group), axis=0) for name, values in vars(outcomes).items()}
+    for name in columns.keys() & {str(variable) for variable in MEASURABLE.values() if variable.mirror}:
+        signs = np.tile([getattr(symmetry, str(MEASURABLE[name].mirror)) for symmetry in group], len(outcomes))
+        columns[name] = columns[name] * signs[:, None]
+    return Outcomes(**columns)
 
 
 def changes(observations: Sequence[Observation], aim: HitPoints, computed: Array) -> Array:

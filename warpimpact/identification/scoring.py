@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpimpact.identification.aim import HitPoints, aim
+from warpimpact.identification.between import with_images
 from warpimpact.identification.fit import Fit, MeasuredShot
 from warpimpact.identification.hit_places import HitPlace
 from warpimpact.identification.likelihood import Compared, Data, ShotScore
@@ -185,7 +186,7 @@ def evaluate(fit: Fit, points: Array, worker: Worker, *, seed: int) -> list[Shot
     rng = np.random.default_rng(np.random.SeedSequence(fit.sampling.seed, spawn_key=(1, seed)))
     for bench in benches(fit):
         for run, outcomes in computed(fit, bench, points, worker, seed=seed):
-            unfolded, changes = outcomes.unfolded(run.aim.group), dict[tuple[Any, ...], Array]()
+            unfolded, changes = with_images(outcomes, run.aim.group), dict[tuple[Any, ...], Array]()
             for place in bench.which:
                 shot = fit.shots[place]
                 targets = run.aim.of(shot.hit, run.scene.target.layers[0], run.scene.core)

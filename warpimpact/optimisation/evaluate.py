@@ -42,7 +42,7 @@ from warpimpact.solver.simulate import pilot_of
 from warpimpact.solver.worker import Worker
 
 SAMPLER_HITS = 2**20
-"""Number of hits, images counted, of the sampler of a search. Far fewer are computed."""
+"""Number of hits of the sampler of a search. Far fewer are computed."""
 JOBS_TOGETHER = 16
 """Number of jobs that a worker computes side by side and saves together."""
 _TURNING = ("obliquity", "azimuth", "pitch", "yaw", "spin")
@@ -106,12 +106,6 @@ def is_even(tables: Mapping[str, Any]) -> bool:
     return not holed and not any(isinstance(impact.get(name), dict) for name in _TURNING)
 
 
-def hits_of(campaign: Campaign, first: int, count: int) -> Shots:
-    """Hits of a campaign that are computed, none an image of another."""
-    sampler = campaign.sampler()
-    return sampler.shots(first * sampler.images, count * sampler.images)[:: sampler.images]
-
-
 Told = Callable[[float, bool], object]
 """Called with the number of jobs done, fractions included, and with whether all of them come from the disk."""
 
@@ -151,7 +145,7 @@ def _hits_computed(
 
 def _scene_of(design: Design, job: HitJob) -> tuple[Campaign, Scene, Shots]:
     campaign = campaign_of(design, job.tables, design.threats[job.threat], job.seed)
-    shots = hits_of(campaign, job.first, job.count)
+    shots = campaign.sampler().shots(job.first, job.count)
     if job.solid:
         return (campaign, *at_solid(campaign, shots))
     return campaign, campaign.scene, shots
@@ -203,7 +197,7 @@ def level_of(design: Design, job: HitJob, worker: Worker) -> str:
     if campaign.numerics.explicit is not None:
         return campaign.numerics.model_dump_json()
     asked = campaign.numerics.model_copy(update={"fidelity": job.level, "accuracy": None})
-    shots = hits_of(campaign, 0, pilot_size(asked.asked))
+    shots = campaign.sampler().shots(0, pilot_size(asked.asked))
     found_levels = [limits_level(campaign, shots, key, asked, worker) for key in design.keys if key.is_limit]
     if len(found_levels) < len(design.keys):
         found_levels.append(pilot_of(campaign.scene, shots, asked, worker, aim=aim_of(campaign, job.count)).numerics)

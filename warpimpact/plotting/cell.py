@@ -126,7 +126,8 @@ def shots_text(dataset: xarray.Dataset) -> str:
     share = float(passed(dataset).mean())
     share_text = "" if share == 1.0 else f" ({share:.1%} passed the {struck(dataset)})"
     broken = "; numerics less exact than promised" if breaks_promise(dataset) else ""
-    return f"{dataset.sizes['hit']} hits{share_text}, {velocity}, obliquity {obliquity}{broken}"
+    hits = int((dataset["image"] == 0).sum()) if "image" in dataset.coords else dataset.sizes["hit"]
+    return f"{hits} hits{share_text}, {velocity}, obliquity {obliquity}{broken}"
 
 
 def range_text(array: xarray.DataArray) -> str:

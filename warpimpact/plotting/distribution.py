@@ -10,7 +10,7 @@ import xarray
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
-from warpimpact.analysis.hit_map import hit_points
+from warpimpact.analysis.hit_map import hit_points, mirrored
 from warpimpact.analysis.local import NEIGHBOURS, plane_fit, share_of
 from warpimpact.plotting.cell import (
     draw_holes,
@@ -53,6 +53,7 @@ def marginals(dataset: xarray.Dataset, variable: str, standoff: float | None = N
     Strips of the cell with equal numbers of hits give the median and the middle 50 % and 90 %. Arguments and errors are
     those of `cell.shown`.
     """
+    dataset = mirrored(dataset)
     column = shown(dataset, variable, standoff)
     size = _map_size(dataset)
     notes = column.title, f"{shots_text(dataset)}; seen from behind the plate"
@@ -133,6 +134,7 @@ def uncertainty(dataset: xarray.Dataset, variable: str, standoff: float | None =
     Raises:
         ValueError: nothing is uncertain, the hits do not cover the cell, or the variable cannot be mapped.
     """
+    dataset = mirrored(dataset)
     column = shown(dataset, variable, standoff)
     unit = f"[{column.label.partition('[')[2]}"
     if not shots_scatter(dataset):
@@ -166,6 +168,7 @@ def probability_map(dataset: xarray.Dataset, quantity: str) -> Figure:
     Raises:
         ValueError: the quantity is no probability, the result does not have it, or the hits do not cover the cell.
     """
+    dataset = mirrored(dataset)
     values, nearest = _of_every_hit(dataset, quantity), _covered(dataset)
     if not shots_scatter(dataset):
         note = "each hit has one outcome, 1 or 0; nearest hit"

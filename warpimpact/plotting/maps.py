@@ -10,7 +10,7 @@ import numpy as np
 import xarray
 from matplotlib.figure import Figure
 
-from warpimpact.analysis.hit_map import is_folded
+from warpimpact.analysis.hit_map import is_folded, mirrored
 from warpimpact.plotting.bursts import bursts_figure
 from warpimpact.plotting.cell import Shown, draw_status, draw_values, limits, scale_of, shots_text, shown, words
 from warpimpact.plotting.distribution import (
@@ -47,6 +47,7 @@ _MOST_COLUMNS = 3
 def variable_map(dataset: xarray.Dataset, variable: str, standoff: float | None = None) -> Figure:
     """Map of one variable of the Dataset over the hit points; hits without a value are grey. Args and errors are those
     of `cell.shown`."""
+    dataset = mirrored(dataset)
     figure, (axes,) = _sheet_of_one(dataset, maps=1, columns=1)
     _draw(axes, dataset, shown(dataset, variable, standoff))
     return figure
@@ -58,6 +59,7 @@ def measure_map(dataset: xarray.Dataset, text: str) -> Figure:
     Raises:
         ValueError: the text is no measure of hits, or the result does not have it.
     """
+    dataset = mirrored(dataset)
     measure = Measure.parse(text).of(dataset)
     if measure.is_binary:
         return probability_map(dataset, text)
@@ -74,6 +76,7 @@ def measure_map(dataset: xarray.Dataset, text: str) -> Figure:
 def variable_maps(datasets: Mapping[str, xarray.Dataset], variable: str, standoff: float | None = None) -> Figure:
     """A map of one variable for several results, by the names of their maps, side by side, in the same colours and to
     the same scale."""
+    datasets = {name: mirrored(dataset) for name, dataset in datasets.items()}
     columns = [shown(dataset, variable, standoff) for dataset in datasets.values()]
     scale = scale_of([column.values for column in columns], signed=columns[0].signed)
     title, *_ = columns[0].title.splitlines()
@@ -88,6 +91,7 @@ def variable_maps(datasets: Mapping[str, xarray.Dataset], variable: str, standof
 
 def status_map(dataset: xarray.Dataset) -> Figure:
     """Map of how the shots ended, with the share of each status."""
+    dataset = mirrored(dataset)
     figure, (axes,) = _sheet_of_one(dataset, maps=1, columns=1)
     draw_status(axes, dataset)
     return figure
@@ -99,6 +103,7 @@ def overview(dataset: xarray.Dataset) -> Figure:
     If all shots ended alike, the tilt at the smallest stand-off stands in place of the status, and the note says how
     they ended.
     """
+    dataset = mirrored(dataset)
     statuses, standoffs = np.unique(dataset[v.STATUS].values), dataset[v.STANDOFF].values
     columns = [shown(dataset, variable) for variable in _MAIN if variable != v.TILT or len(standoffs)]
     if len(statuses) == 1 and len(standoffs) > 1:
@@ -118,6 +123,7 @@ def overview(dataset: xarray.Dataset) -> Figure:
 def layers_figure(dataset: xarray.Dataset) -> Figure:
     """A row of maps for each layer: how the cores ended in it, their velocity behind it, and their tilt at the farthest
     stand-off that they reach in free flight, or on leaving the layer. A layer that no core left shows their depth."""
+    dataset = mirrored(dataset)
     layers = dataset.sizes["layer"]
     figure, panels = _sheet_of_one(dataset, maps=3 * layers, columns=3, note="; layer 0 is the plate")
     for layer, (status, *others) in enumerate(zip(*[iter(panels)] * 3, strict=True)):
@@ -155,6 +161,7 @@ def save_maps(dataset: xarray.Dataset, folder: Path, stem: str, *, overwrite: bo
     Raises:
         OutputError: one of them exists, and must not be replaced.
     """
+    dataset = mirrored(dataset)
     figures: dict[str, Figure] = {
         "overview": overview(dataset),
         "status": status_map(dataset),

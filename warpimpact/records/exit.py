@@ -11,9 +11,7 @@ from warpimpact.records.variable import AT_STANDOFF, HITS, MAIN, VECTORS, Variab
 STATUS = Variable("status", HITS, "1", "how the shot ended", flags=OF_SHOTS)
 RESIDUAL_VELOCITY = Variable("residual_velocity", HITS, "m s-1", "residual velocity", shown_by=MAIN)
 DEFLECTION = Variable("deflection", HITS, "degree", "angle between residual velocity and line of fire", shown_by=MAIN)
-ANGULAR_VELOCITY = Variable(
-    "angular_velocity", VECTORS, "rad s-1", "angular velocity at the end of contact", mirror="axial"
-)
+ANGULAR_VELOCITY = Variable("angular_velocity", VECTORS, "rad s-1", "angular velocity at the end of contact")
 ENERGY_LOSS = Variable("energy_loss", HITS, "J", "kinetic energy lost in the target")
 CONTACT_DURATION = Variable("contact_duration", HITS, "s", "duration of contact")
 TILT = Variable("tilt", AT_STANDOFF, "degree", "angle between core axis and line of fire", shown_by=MAIN)
@@ -21,13 +19,9 @@ PITCH = Variable("pitch", AT_STANDOFF, "degree", "pitch of the core, projected i
 YAW = Variable("yaw", AT_STANDOFF, "degree", "yaw of the core, projected into the x-y plane", mirror="along_y")
 TOTAL_YAW = Variable("total_yaw", AT_STANDOFF, "degree", "angle between core axis and residual velocity")
 
-EXIT_VELOCITY = Variable("exit_velocity", VECTORS, "m s-1", "velocity at the end of contact", mirror="polar")
-EXIT_AXIS = Variable(
-    "exit_axis", VECTORS, "1", "unit vector along the core towards its nose at the end of contact", mirror="polar"
-)
-EXIT_POSITION = Variable(
-    "exit_position", VECTORS, "m", "centre of mass at the end of contact, in the plate frame", mirror="polar"
-)
+EXIT_VELOCITY = Variable("exit_velocity", VECTORS, "m s-1", "velocity at the end of contact")
+EXIT_AXIS = Variable("exit_axis", VECTORS, "1", "unit vector along the core towards its nose at the end of contact")
+EXIT_POSITION = Variable("exit_position", VECTORS, "m", "centre of mass at the end of contact, in the plate frame")
 """In outcomes it counts from the hit point."""
 
 _OF_FLIGHT = (

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
@@ -12,7 +12,7 @@ from warpimpact.records import registry
 
 if TYPE_CHECKING:
     from warpimpact.records.group import Returned
-    from warpimpact.scene import Scene, Shots, Symmetry
+    from warpimpact.scene import Scene, Shots
 
 Which = slice | NDArray[np.int64] | NDArray[np.bool_]
 
@@ -74,16 +74,3 @@ class Outcomes:
         for name, values in columns.items():
             values[which] = getattr(other, name)
         return type(self)(**columns)
-
-    def unfolded(self, group: Sequence[Symmetry]) -> Self:
-        """Outcomes of all images of the shots under a group of symmetries; the images of a shot follow each other."""
-        return type(self)(**{name: _images(name, values, group) for name, values in vars(self).items()})
-
-
-def _images(name: str, values: NDArray[Any], group: Sequence[Symmetry]) -> NDArray[Any]:
-    mirror = registry.variable(name).mirror
-    if mirror is None:
-        return np.repeat(values, len(group), axis=0)
-    factors = np.array([getattr(symmetry, mirror) for symmetry in group])  # a number or a vector for each
-    factors = factors.reshape(len(group), *(1,) * (values.ndim - factors.ndim), *factors.shape[1:])
-    return np.asarray((values[:, None] * factors).reshape(len(group) * len(values), *values.shape[1:]))

@@ -8,7 +8,7 @@ from typing import Any, Literal, TypeAlias
 
 import numpy as np
 
-Mirror: TypeAlias = Literal["polar", "axial", "along_y", "along_z"]
+Mirror: TypeAlias = Literal["along_y", "along_z"]
 
 HITS, AT_STANDOFF, VECTORS = ("hit",), ("hit", "standoff"), ("hit", "axis")
 IN_LAYER, BEHIND_LAYER = ("hit", "layer"), ("hit", "layer", "layer_standoff")
@@ -27,7 +27,7 @@ class Variable(str):
         flags: codes that it may hold (CF: flag_values, flag_meanings); None for numbers.
         field: name of its source: a field of shots or history, or a member of the kernels' struct.
         shown_by: commands that show it by default; other commands show it on request, or show all variables.
-        mirror: factors of `Symmetry` that a mirror image applies to it; None if it does not change.
+        mirror: factor of `Symmetry` that a mirror image applies to it; None for a vector, or if it does not change.
     """
 
     dims: tuple[str, ...]

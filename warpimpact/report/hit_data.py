@@ -11,7 +11,7 @@ import xarray
 from matplotlib import colormaps
 from matplotlib.colors import to_hex
 
-from warpimpact.analysis.hit_map import hit_points
+from warpimpact.analysis.hit_map import hit_points, mirrored, symmetries_of
 from warpimpact.analysis.slabs import runs_of, slabs
 from warpimpact.kernels.status import Status
 from warpimpact.plotting.cell import STATUS_COLOURS, Shown, limits, nearest_hits, shown, words
@@ -40,18 +40,18 @@ _TURN = 1.5  # turn of an outline from point to point [degree]; its error is 0.0
 
 
 def thinned(dataset: xarray.Dataset, most: int, *, keep: Sequence[int] = ()) -> xarray.Dataset:
-    """The hits of a page, loaded.
+    """The hits of a page, loaded, with their mirror images.
 
     If there are more than `most`, the hits in `keep` stay and others are chosen at random. Hits at a constant step in a
     grid or a Sobol sampling would leave out parts of the cell.
     """
-    places = np.arange(dataset.sizes["hit"])
+    places, most = np.arange(dataset.sizes["hit"]), most // len(symmetries_of(dataset))
     if len(places) > most:
         kept = np.flatnonzero(np.isin(hit_numbers(dataset), keep))
         others = np.setdiff1d(places, kept)
         chosen = np.random.default_rng(0).choice(others, most - len(kept), replace=False)
         places = np.union1d(chosen, kept)
-    return dataset.assign_coords(hit=hit_numbers(dataset)).isel(hit=places).load()
+    return mirrored(dataset.assign_coords(hit=hit_numbers(dataset)).isel(hit=places).load())
 
 
 def worst_and_spread(dataset: xarray.Dataset, count: int, *, first: Sequence[int] = ()) -> list[int]:

@@ -46,7 +46,6 @@ _PROVENANCE = (
     attr.SEED,
     attr.REPLICATES,
     attr.SYMMETRIES,
-    attr.COMPUTED_HITS,
     attr.FINGERPRINT,
     attr.REFERENCES,
 )

@@ -96,10 +96,7 @@ SEED = _declared("seed", "number")
 COUNT = _declared("count", "count")
 REPLICATES = _declared("replicates", "count")
 SYMMETRIES = _declared("symmetries")
-IMAGES = _declared("images", "count")
-"""Number of consecutive hits that are images of each other. SYMMETRIES, IMAGES and COMPUTED_HITS need
-`hits.irreducible`."""
-COMPUTED_HITS = _declared("computed_hits", "count")
+"""Symmetries that give the rest of the cell from its hits, separated by "; "; only with `hits.irreducible`."""
 BURST = _declared("burst", "table")
 """JSON of the burst. This and the next attributes are present only for a campaign of bursts."""
 SHOTS_AT_A_PLATE = _declared("shots_at_a_plate", "count")

@@ -276,8 +276,3 @@ def failed(dataset: Result) -> NDArray[np.bool_]:
 def shots_at_a_plate(dataset: Result) -> int:
     """Number of consecutive hits on one plate; 1 without bursts."""
     return int(dataset.attrs.get(attr.SHOTS_AT_A_PLATE, 1))
-
-
-def images(dataset: Result) -> int:
-    """Number of consecutive hits that are images of each other; 1 without `hits.irreducible`."""
-    return int(dataset.attrs.get(attr.IMAGES, 1))

@@ -51,7 +51,7 @@ class HitMap:
         if campaign.numerics.explicit is not None:
             return None
         pilot, numbers = pilot_shots(campaign, pilot_most(campaign))
-        hits = len(campaign.sampler()) // len(campaign.symmetries)
+        hits = len(campaign.sampler())
         errors = pilot_of(campaign.scene, pilot, campaign.numerics, worker, report, aim_of(campaign, hits), hits)
         return replace(errors, shifts=shifts_of(campaign, pilot, errors), tried=(), numbers=numbers)
 
@@ -74,8 +74,7 @@ HIT_MAP = HitMap()
 
 
 def compute(campaign: Campaign, task: Task, worker: Worker, report: Report = lambda done: None) -> HitTable:
-    """Compute some shots of a campaign. If the campaign uses symmetry, only the first shot of each group of images is
-    computed.
+    """Compute some shots of a campaign.
 
     Returns:
         The columns of results/dataset.py, one entry per shot. They are a complete result.
@@ -83,8 +82,9 @@ def compute(campaign: Campaign, task: Task, worker: Worker, report: Report = lam
     Raises:
         DeviceError: the device is absent.
     """
-    images, numerics = len(campaign.symmetries), numerics_of(campaign, task.findings)
-    outcomes, elapsed = _outcomes(campaign.scene, task.shots[::images], numerics, worker, of_images(report, images))
+    numerics = numerics_of(campaign, task.findings)
+    progress = lambda done, total: report(done)  # noqa: E731
+    outcomes, elapsed = _outcomes(campaign.scene, task.shots, numerics, worker, progress)
     references, beside = list[tuple[Scene, Shots, Mapping[v.Variable, v.Variable]]](), dict[str, Any]()
     if task.solid is not None:
         references.append((*at_solid(campaign, task.solid), v.SOLID_VARIABLES | v.SOLID_DEPTHS))
@@ -99,11 +99,6 @@ def compute(campaign: Campaign, task: Task, worker: Worker, report: Report = lam
 def numerics_of(campaign: Campaign, findings: Found | None) -> Numerics:
     """The numerics of the campaign, or what its pilot found."""
     return campaign.numerics if findings is None else findings.numerics
-
-
-def of_images(report: Report, images: int) -> Progress:
-    """Reports hits where each group of `images` hits is computed as one."""
-    return lambda done, total: report(done * images)
 
 
 def found_in(result: Result) -> tuple[Numerics, bool, float]:

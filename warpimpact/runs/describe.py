@@ -36,7 +36,6 @@ def described(
     """The columns of a task.
 
     Args:
-        outcomes: outcomes of the first shot of every group of images.
         computed: the device, and the time [s].
         attributes: attributes of this kind of computation.
         beside: columns of other shots than those of the pilot.
@@ -46,17 +45,16 @@ def described(
     told |= {attr.EVIDENCE: "\n".join(lines)} if (lines := evidence_of(campaign)) else {}
     told |= computed_by(campaign, computed[0], len(outcomes), computed[1])
     told |= _found(campaign.numerics.asked, task.findings)
-    unfolded, beside = outcomes.unfolded(campaign.symmetries), {**_finer_hits(campaign, task.findings), **beside}
-    return described_as(campaign, task.shots, unfolded, {**told, **attributes}, beside, double=is_double(campaign))
+    beside = {**_finer_hits(task.findings), **beside}
+    return described_as(campaign, task.shots, outcomes, {**told, **attributes}, beside, double=is_double(campaign))
 
 
-def _finer_hits(campaign: Campaign, findings: Found | None) -> dict[str, Any]:
+def _finer_hits(findings: Found | None) -> dict[str, Any]:
     """Columns of the hits that a pilot computed at a finer level."""
     if findings is None or findings.finer is None or findings.numbers is None:
         return {}
-    finer = findings.finer.unfolded(campaign.symmetries)
-    numbers = findings.numbers[: len(finer)].astype("int32")
-    return {v.FINER_HIT: numbers} | columns_beside(finer, v.FINER_VARIABLES)
+    numbers = findings.numbers[: len(findings.finer)].astype("int32")
+    return {v.FINER_HIT: numbers} | columns_beside(findings.finer, v.FINER_VARIABLES)
 
 
 def described_as(
@@ -88,8 +86,8 @@ def is_double(campaign: Campaign) -> bool:
 
 
 def computed_by(campaign: Campaign, device: str, computed: int, elapsed: float) -> dict[str, Any]:
-    """Attributes on versions, device, number of computed shots, and time [s]."""
-    chosen, group = find_device(device), campaign.symmetries
+    """Attributes on versions, device, symmetries, and time [s] of this number of shots."""
+    chosen = find_device(device)
     attributes = {
         **attr.versions(),
         **attr.machine(),
@@ -98,11 +96,7 @@ def computed_by(campaign: Campaign, device: str, computed: int, elapsed: float) 
         attr.HITS_PER_SECOND: computed / elapsed,
     }
     if campaign.hits.irreducible:
-        attributes |= {
-            attr.SYMMETRIES: ", ".join(map(str, group)),
-            attr.IMAGES: len(group),
-            attr.COMPUTED_HITS: computed,
-        }
+        attributes[attr.SYMMETRIES] = "; ".join(map(str, campaign.symmetries))
     return attributes
 
 

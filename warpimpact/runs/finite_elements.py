@@ -56,7 +56,7 @@ def continuum_to_file(
     the disk when it has ended.
 
     Args:
-        hits: by their numbers in the campaign; None is all of them, of which images are not computed.
+        hits: by their numbers in the campaign; None is all of them.
         progress: called with the hits that are done, how many of them an earlier call had computed, and all hits.
 
     Raises:
@@ -80,23 +80,19 @@ def continuum_to_file(
 def _computed(
     campaign: Campaign, hits: tuple[int, ...] | None, device: str, progress: Callable[[int, int, int], object]
 ) -> Question[xarray.Dataset]:
-    """The result of the hits of some numbers; where they are all, the first one of each group of images is computed."""
+    """The result of the hits of some numbers; None is all of them."""
     sampler, elements = campaign.sampler(), campaign.continuum
     continuum, numbers = elements.solver, range(len(sampler)) if hits is None else hits
-    unique = campaign  # of hits that are given by their numbers, none is an image of another
-    if hits is not None:
-        unique = campaign.model_copy(update={"hits": campaign.hits.model_copy(update={"irreducible": False})})
-    group, together = len(unique.symmetries), 1 if device == "cpu" else MOST
+    together = 1 if device == "cpu" else MOST
     shots = Shots.joined([sampler.shots(int(number), 1) for number in numbers])
-    computed = shots[::group]
-    asked = [(campaign.scene, computed[k : k + together], continuum) for k in range(0, len(computed), together)]
+    asked = [(campaign.scene, shots[k : k + together], continuum) for k in range(0, len(shots), together)]
     solid = solid_shots(campaign, shots[:1], 1)
     if solid is not None:
         scene, alone = at_solid(campaign, solid)
         asked.append((scene, alone, continuum))
 
     def tell(now: RoundProgress) -> None:
-        done, resumed = (min(int(jobs * together * group), len(shots)) for jobs in (now.done, now.resumed))
+        done, resumed = (min(int(jobs * together), len(shots)) for jobs in (now.done, now.resumed))
         progress(done, resumed, len(shots))
 
     results = yield Round(
@@ -105,7 +101,7 @@ def _computed(
     outcomes = [Outcomes(**{name: values for name, values in row.items() if name != SECONDS}) for row in results]
     beside = {} if solid is None else columns_beside(outcomes.pop(), v.SOLID_VARIABLES | v.SOLID_DEPTHS)
     elapsed = float(sum(float(row[SECONDS][0]) for row in results))
-    told = computed_by(unique, "cpu", len(computed), elapsed)
+    told = computed_by(campaign, "cpu", len(shots), elapsed)
     told |= {} if device == "cpu" else {attr.DEVICE: device}
     told |= {
         attr.CONTINUUM: json.dumps(
@@ -120,7 +116,7 @@ def _computed(
     table = described_as(
         campaign,
         shots,
-        Outcomes.joined(outcomes).unfolded(unique.symmetries),
+        Outcomes.joined(outcomes),
         told,
         beside,
         double=True,

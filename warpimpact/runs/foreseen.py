@@ -36,10 +36,9 @@ def cost_warning(campaign: Campaign, device: str, passages: int = 1) -> Callable
 def cost_of(campaign: Campaign, numerics: Numerics, passages: int = 1) -> str | None:
     """A sentence about the cost of hits on a CPU, with numerics that fix the resolution; None where it is low. An
     unhindered first hit of the campaign stands for all."""
-    sampler, images = campaign.sampler(), len(campaign.symmetries)
-    shots = sampler.shots(0, images * campaign.at_a_plate)[::images]
-    prepared = prepare(campaign.scene, shots, numerics)
-    seconds, hits = passages * prepared.seconds, len(sampler) // images
+    sampler = campaign.sampler()
+    prepared = prepare(campaign.scene, sampler.shots(0, campaign.at_a_plate), numerics)
+    seconds, hits = passages * prepared.seconds, len(sampler)
     level = "" if numerics.level is None else f"at level {numerics.level} "
     if seconds * campaign.at_a_plate < SLOW and prepared.window_bytes < LARGE:
         before, size = (sum(getattr(tile, name) for tile in prepared.tiles) for name in ("seconds", "bytes"))

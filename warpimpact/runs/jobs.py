@@ -10,7 +10,7 @@ from warpimpact.campaign.campaign import Campaign
 from warpimpact.campaign.references import has_solid
 from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
-from warpimpact.results.dataset import images, numbered
+from warpimpact.results.dataset import numbered
 from warpimpact.results.table import HitTable
 from warpimpact.runs.executor import Executor
 from warpimpact.runs.shards import Shards
@@ -57,17 +57,12 @@ def ranges(shards: Shards, shots: Callable[[], int]) -> Iterator[range]:
 
 
 def split(table: HitTable, task: range, size: int) -> Iterator[tuple[int, HitTable]]:
-    """The shards of a task, each with its share of the time and of the computed hits. Only the first shard of a
-    campaign keeps the variables of the whole campaign."""
+    """The shards of a task, each with its share of the time. Only the first shard of a campaign keeps the variables of
+    the whole campaign."""
     hits, of_the_campaign = table.sizes["hit"], [name for names in v.GROUPS.values() for name in names]
     for place, index in enumerate(task):
         shard = numbered(table.isel(hit=slice(place * size, (place + 1) * size)), first=index * size)
         if index:
             shard = shard.drop_vars(of_the_campaign)
         time = table.attrs[attr.COMPUTE_TIME] * shard.sizes["hit"] / hits
-        yield index, shard.assign_attrs({attr.COMPUTE_TIME: time} | computed_hits(table, shard.sizes["hit"]))
-
-
-def computed_hits(table: HitTable, hits: int) -> dict[str, int]:
-    """The attribute with the number of computed ones among `hits` hits; none where a HitTable has no such attribute."""
-    return {attr.COMPUTED_HITS: hits // images(table)} if attr.COMPUTED_HITS in table.attrs else {}
+        yield index, shard.assign_attrs({attr.COMPUTE_TIME: time})

@@ -43,7 +43,7 @@ def aim_of(campaign: Campaign, hits: int) -> Aim | None:
     several layers a level that keeps the accuracy will do, too.
 
     Args:
-        hits: computed hits of the campaign, images not counted.
+        hits: number of hits of the campaign.
     """
     if not level_for(campaign):
         return None

@@ -18,41 +18,39 @@ _MOST_OF_LAYERS = 1024
 
 
 def pilot_shots(campaign: Campaign, most: int) -> tuple[Shots, NDArray[np.int64]]:
-    """Some hits of a campaign, none an image of another (of bursts, whole ones); and the numbers of these hits with
-    their images."""
+    """Some hits of a campaign (of bursts, whole ones), and their numbers."""
     at_a_plate = campaign.at_a_plate
     places = places_of(campaign, most if at_a_plate == 1 else max(-(-most // at_a_plate), _FEWEST_BURSTS))
-    return shots_at(campaign, places)[:: len(campaign.symmetries)], hits_at(campaign, places)
+    return shots_at(campaign, places), hits_at(campaign, places)
 
 
 def pilot_most(campaign: Campaign) -> int:
     """Most shots of a campaign's pilot. At several layers, where the level is chosen for measures, it may be all shots
     of a short run, because a few shots say little of the share that ends otherwise."""
-    hits, usual = len(campaign.sampler()) // len(campaign.symmetries), campaign.numerics.asked
+    hits, usual = len(campaign.sampler()), campaign.numerics.asked
     fewest = pilot_size(usual, hits)
     return max(fewest, min(hits, _MOST_OF_LAYERS)) if level_for(campaign) == MEASURES else fewest
 
 
 def places_of(campaign: Campaign, most: int) -> NDArray[np.int64]:
-    """Numbers of at most so many groups of images, or bursts with their images, that stand for all of them.
+    """Numbers of at most so many hits, or bursts, that stand for all of them.
 
     They depend on the campaign alone: the first ones of a Sobol or random sampling, or ones at even distances of a grid
     or list.
     """
-    groups = len(campaign.sampler()) // campaign.group
-    count = min(most, groups)
-    return np.arange(count) if campaign.hits.sampling in ("sobol", "random") else spread_places(groups, count)
+    targets = len(campaign.sampler()) // campaign.at_a_plate
+    count = min(most, targets)
+    return np.arange(count) if campaign.hits.sampling in ("sobol", "random") else spread_places(targets, count)
 
 
 def hits_at(campaign: Campaign, places: NDArray[np.int64]) -> NDArray[np.int64]:
-    """Numbers of the hits of groups, with their images."""
-    return (places[:, None] * campaign.group + np.arange(campaign.group)).reshape(-1)
+    """Numbers of the hits at places."""
+    return (places[:, None] * campaign.at_a_plate + np.arange(campaign.at_a_plate)).reshape(-1)
 
 
 def shots_at(campaign: Campaign, places: NDArray[np.int64]) -> Shots:
-    """The shots of groups, with their images. Bursts are whole, because a later hit meets what the earlier ones
-    left."""
-    sampler, group = campaign.sampler(), campaign.group
+    """The shots at places. Bursts are whole, because a later hit meets what the earlier ones left."""
+    sampler, group = campaign.sampler(), campaign.at_a_plate
     if campaign.hits.sampling in ("sobol", "random"):
         return sampler.shots(0, len(places) * group)
     return Shots.joined([sampler.shots(int(place) * group, group) for place in places])

@@ -22,13 +22,12 @@ from warpimpact.scene import Numerics, Scene, Shots
 from warpimpact.scene.flow import Continuum
 from warpimpact.solver import replay as solver
 from warpimpact.solver.limit import short_steps
-from warpimpact.solver.unfold import image_of
 
 DEVICE_ROUNDING = {v.RESIDUAL_VELOCITY: 0.1, v.DEFLECTION: 0.5, v.TILT: 0.5}
 """Largest change of an outcome by the rounding of another device [m/s, degree]. Between single and double precision,
 6144 hits on the slotted plate (825, 300 and 200 m/s) differ by at most 0.012 m/s and 0.04 degrees."""
 _OF_A_MAP = (
-    *(attr.COUNT, attr.COMPUTE_TIME, attr.CONTINUUM, attr.HITS_PER_SECOND, attr.COMPUTED_HITS, attr.IMAGES),
+    *(attr.COUNT, attr.COMPUTE_TIME, attr.CONTINUUM, attr.HITS_PER_SECOND),
     attr.SHOTS_AT_A_PLATE,
     attr.BURST,
     *v.OUTLINE_VARIABLES,
@@ -37,8 +36,6 @@ _OF_A_MAP = (
 
 def replay(result: xarray.Dataset, hit: int, *, folder: str | Path = ".", snapshots: int = 6) -> xarray.Dataset:
     """Compute one hit of a result again, on the CPU, from the campaign that the result contains.
-
-    If symmetry unfolded the hit, the computed hit of its group is computed again and its history is unfolded.
 
     Args:
         result: the Dataset of `run`.
@@ -64,24 +61,17 @@ def replay(result: xarray.Dataset, hit: int, *, folder: str | Path = ".", snapsh
     sampler = campaign.sampler()
     if hit >= len(sampler):
         raise ResultError(f"hit: got {hit}, but the campaign and the files it names give only {len(sampler)} hits")
-    scene, group = campaign.scene, campaign.symmetries
-    image = hit % len(group)
-    # Every image of the hit, or every earlier hit of its burst and itself.
-    before = hit % campaign.at_a_plate
-    drawn = sampler.shots(hit - image - before, len(group) + before)
-    images = _at_their_limit(scene, drawn, result, place)
-    computed, shot = images[: 1 + before], images[image + before :][:1]
+    scene, before = campaign.scene, hit % campaign.at_a_plate  # every earlier hit of its burst, too
+    computed = _at_their_limit(scene, sampler.shots(hit - before, 1 + before), result, place)
     if attr.CONTINUUM in result.attrs:
         settings = json.loads(result.attrs[attr.CONTINUUM])
         continuum = Continuum.model_validate({name: value for name, value in settings.items() if name != "materials"})
         again = replay_continuum(scene, computed, continuum, snapshots)
     else:
         again = solver.replay(scene, computed, numerics=_numerics(campaign, result), snapshots=snapshots)
-    home, away = ((float(at.hit_y[-1]), float(at.hit_z[-1])) for at in (computed, shot))
-    again = image_of(again, group[image], home=home, image=away)
     period = campaign.hits.covered(campaign.plate)
     double = is_double(campaign) or attr.CONTINUUM in result.attrs
-    ended = to_dataset(scene, shot, again.outcomes, period=period, attributes={}, double=double)
+    ended = to_dataset(scene, computed[-1:], again.outcomes, period=period, attributes={}, double=double)
     end = numbered(ended, hit).isel(hit=0)
     stored = result.isel(hit=place)
     if not _same(end, stored, (v.HIT_Y, v.HIT_Z, *v.shot_variables(end))):
@@ -112,7 +102,7 @@ def _with_mesh(history: xarray.Dataset, deformed: solver.Deformed) -> xarray.Dat
 
 
 def _at_their_limit(scene: Scene, shots: Shots, result: xarray.Dataset, place: int) -> Shots:
-    """The images of a hit at their limit, for a result of limits; else the shots as given."""
+    """Shots at their limit, for a result of limits; else as given."""
     if attr.LIMIT not in result.attrs:
         return shots
     layer = int(result.attrs[attr.LIMIT_LAYER])

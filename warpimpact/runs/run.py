@@ -11,14 +11,13 @@ from typing import TYPE_CHECKING, Any
 
 from warpimpact.campaign.campaign import Campaign
 from warpimpact.results import attributes as attr
-from warpimpact.results.dataset import images
 from warpimpact.results.outlines import in_memory
 from warpimpact.results.table import HitTable, joined
 from warpimpact.runs.choice import executor_for, opened
 from warpimpact.runs.compute import HIT_MAP, numerics_of
 from warpimpact.runs.executor import Executor, Job, completed, result_of
 from warpimpact.runs.foreseen import cost_warning
-from warpimpact.runs.jobs import computed_hits, ranges, solid_shots, split, task_size
+from warpimpact.runs.jobs import ranges, solid_shots, split, task_size
 from warpimpact.runs.parts import claimed, telling
 from warpimpact.runs.progress import Follow, followed
 from warpimpact.runs.shards import Shards, ShardsOnDisk, extent, manifest
@@ -151,7 +150,6 @@ def _attributes(table: HitTable, end: End) -> dict[str, Any]:
     return {
         attr.HISTORY: attr.history_line(table.attrs[attr.HISTORY].partition(" warpimpact ")[2]),
         attr.COMPUTE_TIME: end.compute_time,
-        attr.HITS_PER_SECOND: end.hits / images(table) / end.compute_time,
-        **computed_hits(table, end.hits),
+        attr.HITS_PER_SECOND: end.hits / end.compute_time,
         **end.stop,
     }

@@ -25,7 +25,7 @@ class Task:
     """Some shots of a campaign that are computed together.
 
     Attributes:
-        shots: whole groups of images, as the campaign's sampler gives them.
+        shots: as the campaign's sampler gives them.
         solid: the shots among them that are also fired at the solid plate of equal areal density; None for none.
         findings: findings of the pilot; None if the campaign fixes the resolution.
     """

@@ -9,7 +9,7 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from .distributions import EDGE, AnyDistribution, Distribution, normal_quantile
-from .exclusions import BURST, HIT_SCATTER, IMAGES, OFFSETS, SPACING, check_together
+from .exclusions import BURST, HIT_SCATTER, IRREDUCIBLE, OFFSETS, SPACING, check_together
 from .model import Array
 from .plate import Plate
 from .quantities import DRAWN, QUANTITIES, Quantity, drawn_column
@@ -110,7 +110,7 @@ class BurstSampler(Sampler):
     campaign without bursts.
 
     Raises:
-        ValueError: images of shots (`hits.irreducible`), and as a `Sampler`.
+        ValueError: `hits.irreducible`, and as a `Sampler`.
     """
 
     def __init__(
@@ -123,7 +123,7 @@ class BurstSampler(Sampler):
         scatter: Scatter | None = None,
         replicates: int = 1,
     ) -> None:
-        check_together({BURST: True, IMAGES: hits.irreducible})
+        check_together({BURST: True, IRREDUCIBLE: hits.irreducible})
         super().__init__(impact, hits, plate, scatter, replicates)
         self._burst = burst
 

@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from typing import NamedTuple
 
 BURST, LAYERS, STOP = "[burst]", "[[layer]]", "[stop]"
-IMAGES = "hits.irreducible = true"
+IRREDUCIBLE = "hits.irreducible = true"
 NODAL = 'numerics.scheme = "nodal"'
 BLOCK = 'numerics.layout = "block"'
 DOUBLE = 'numerics.precision = "double"'
@@ -38,7 +38,7 @@ class Rule(NamedTuple):
 
 _BY_BLOCK = "a block computes the consistent scheme in single precision, without the bending moment"
 EXCLUDED = (
-    Rule(BURST, IMAGES, "the hits of a burst have no images"),
+    Rule(BURST, IRREDUCIBLE, "the hits of a burst have no mirror images"),
     Rule(BURST, NODAL, "the nodal scheme does not know earlier hits"),
     Rule(SPACING, OFFSETS, "each says how the hits of a burst lie"),
     Rule(SPACING, HIT_SCATTER, "each says how the hits of a burst lie"),
@@ -56,8 +56,8 @@ EXCLUDED = (
     Rule(FREE_SURFACE, BURST, "it does not know the channels of earlier hits"),
     Rule(BENDING, MASS_PROPERTIES, "it needs the mass of every slice, which follows from the shape alone"),
     *(Rule(BLOCK, other, _BY_BLOCK) for other in (NODAL, DOUBLE, BENDING)),
-    Rule(IMAGES, TURNED, "a symmetry must hold for every shot; of the impact quantities only velocity may scatter"),
-    Rule(IMAGES, HOLED_LAYERS, "only layers that are solid and unbounded leave the symmetry of the plate"),
+    Rule(IRREDUCIBLE, TURNED, "a symmetry holds for every shot; of the impact, only velocity may scatter"),
+    Rule(IRREDUCIBLE, HOLED_LAYERS, "only layers that are solid and unbounded leave the symmetry of the plate"),
     Rule(STOP, UNEVEN, 'an interval needs "sobol" or "random"'),
     Rule(STOP, ONE_SCRAMBLING, 'an interval of "sobol" needs several scramblings'),
 )

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
 
 from .distributions import EDGE
-from .exclusions import IMAGES, check_together
+from .exclusions import IRREDUCIBLE, check_together
 from .model import Array
 from .plate import Plate
 from .quantities import drawn_column, drawn_columns
@@ -26,9 +25,8 @@ _HIT_COLUMNS, _ROWS = 2, 2**20
 class Sampler:
     """The shots of a campaign; any part of them can be drawn at any time.
 
-    With hits.irreducible, the images of a shot under `symmetries_used` are consecutive, the shot itself first. They
-    differ in their hit points only. Hits cover one unit cell of the plate, or the whole plate (`Hits.area`). The impact
-    has velocity and attitude unless hits or scatter give them.
+    Hits cover one unit cell of the plate, or the whole plate (`Hits.area`); with hits.irreducible, the part of it from
+    which `symmetries_used` give the rest. The impact has velocity and attitude unless hits or scatter give them.
 
     Raises:
         ValueError: scatter that removes the symmetry of hits.irreducible; hits on the whole of an unbounded plate.
@@ -37,41 +35,22 @@ class Sampler:
     def __init__(
         self, impact: Impact, hits: Hits, plate: Plate, scatter: Scatter | None = None, replicates: int = 1
     ) -> None:
-        check_together({IMAGES: hits.irreducible} | unsymmetric(scatter or Scatter()))
-        self._impact, self._cell, self._group = impact, hits.covered(plate), symmetries_used(impact, hits, plate)
-        (low_y, high_y), (low_z, high_z) = irreducible_part(self._group)
-        self._extent = self._cell[0] * (high_y - low_y), self._cell[1] * (high_z - low_z)
-        self._middle = 0.5 * self._cell[0] * (high_y + low_y), 0.5 * self._cell[1] * (high_z + low_z)
-        computed = None if hits.count is None else max(1, hits.count // len(self._group))
-        self._hits = hits.model_copy(update={"count": computed})
+        check_together({IRREDUCIBLE: hits.irreducible} | unsymmetric(scatter or Scatter()))
+        self._impact, self._hits, cell = impact, hits, hits.covered(plate)
+        (low_y, high_y), (low_z, high_z) = irreducible_part(symmetries_used(impact, hits, plate))
+        self._extent = cell[0] * (high_y - low_y), cell[1] * (high_z - low_z)
+        self._middle = 0.5 * cell[0] * (high_y + low_y), 0.5 * cell[1] * (high_z + low_z)
         scatter = scatter or Scatter()
         self._scatter = scatter.given
         dimensions = _HIT_COLUMNS + (drawn_columns(scatter.layers) if self._scatter else 0)
         self._sobol = [_sequence(dimensions, hits.seed, replicate) for replicate in range(replicates)]
 
     def __len__(self) -> int:
-        return self._hits.total(self._extent) * len(self._group)
-
-    @property
-    def images(self) -> int:
-        """Number of consecutive shots that are images of the first of them, including it."""
-        return len(self._group)
+        return self._hits.total(self._extent)
 
     def shots(self, first: int, count: int) -> Shots:
         """`count` shots from number `first` on, fewer at the end of the campaign."""
         count = min(count, len(self) - first)
-        original, skipped = divmod(first, len(self._group))
-        originals = self._originals(original, -(-(skipped + count) // len(self._group)))
-        return self._with_images(originals)[skipped : skipped + count]
-
-    def _with_images(self, shots: Shots) -> Shots:
-        """Every shot followed by its images."""
-        images = np.array([symmetry.image(shots.hit_y, shots.hit_z, self._cell) for symmetry in self._group])
-        hit_y, hit_z = images.transpose(1, 2, 0).reshape(2, -1)
-        return replace(shots[np.repeat(np.arange(len(shots)), len(self._group))], hit_y=hit_y, hit_z=hit_z)
-
-    def _originals(self, first: int, count: int) -> Shots:
-        """`count` shots that are no images, from number `first` of such shots on."""
         columns = [_HIT_COLUMNS + drawn_column(name, layer) for name, layer in self._scatter]
         hit_y, hit_z, *uniform = self._uniform([0, 1, *columns], first, count)
         shots = Shots(
@@ -116,7 +95,7 @@ class Sampler:
 def make_shots(impact: Impact, hits: Hits, plate: Plate, scatter: Scatter | None = None) -> Shots:
     """All shots at once. Hit points cover one unit cell of the plate, or the whole plate (`Hits.area`).
 
-    With hits.irreducible, the images of a shot follow it. A `Sampler` gives the shots of a large campaign in parts.
+    A `Sampler` gives the shots of a large campaign in parts.
     """
     sampler = Sampler(impact, hits, plate, scatter, hits.scramblings)
     return sampler.shots(0, len(sampler))

@@ -92,8 +92,8 @@ class Hits(Model):
         replicates: number of independent scramblings of a sobol sampling, 16 by default; shots are dealt to them in
             turn. Their spread gives the error of a mean.
         area: what the sampling covers: one unit cell (or a smaller plate), or all of a finite "plate".
-        irreducible: sample only the irreducible part of the unit cell under the symmetries of plate and shot, and
-            include the images of each hit: at most `count` in all, but at least those of one hit.
+        irreducible: sample only the irreducible part of the unit cell under the symmetries of plate and shot. Maps
+            show its mirror images, too.
     """
 
     sampling: Literal["sobol", "grid", "random", "list"] = "sobol"

@@ -36,16 +36,6 @@ class Symmetry:
         signs = {1: "", -1: "-"}
         return f"({signs[self.along_y]}y, {signs[self.along_z]}z)" + (" + centring" if self.centred else "")
 
-    @property
-    def polar(self) -> Array:
-        """Factors of the components of a polar vector (position, velocity, force), shape [3]."""
-        return np.array([1.0, self.along_y, self.along_z])
-
-    @property
-    def axial(self) -> Array:
-        """Factors of the components of an axial vector (angular velocity, moment), shape [3]."""
-        return self.along_y * self.along_z * self.polar
-
     def image(self, y: Array, z: Array, cell: tuple[float, float]) -> tuple[Array, Array]:
         """Images of points y, z [m] of a unit cell of this extent [m], centred on the origin, in the same cell."""
         y, z = self.along_y * y, self.along_z * z
@@ -58,7 +48,7 @@ IDENTITY = SYMMETRIES[0]
 
 
 def symmetries_used(impact: Impact, hits: Hits, plate: Plate) -> tuple[Symmetry, ...]:
-    """Symmetries whose images are included in the hits; the identity alone without `hits.irreducible`."""
+    """Symmetries that give the rest of the cell; the identity alone without `hits.irreducible`."""
     return symmetries(plate, impact) if hits.irreducible else (IDENTITY,)
 
 

@@ -28,7 +28,7 @@ class Found:
         kept: whether the errors are within the promise.
         share: share of the shots that are within the errors.
         finer: outcomes of the pilot's first shots at the finer level of the comparison; None without a comparison.
-        numbers: numbers of all the pilot's hits in their campaign, images included; None without a campaign.
+        numbers: numbers of all the pilot's hits in their campaign; None without a campaign.
     """
 
     numerics: Numerics

@@ -7,8 +7,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, ClassVar
 
-import numpy as np
-
 from warpimpact.campaign.campaign import Campaign
 from warpimpact.campaign.evidence import limit_velocity_factors
 from warpimpact.campaign.references import at_base_alone, at_solid
@@ -19,7 +17,7 @@ from warpimpact.results import variables as v
 from warpimpact.results.measures import Measure
 from warpimpact.results.table import HitTable
 from warpimpact.results.vocabulary import LIMIT_VELOCITY
-from warpimpact.runs.compute import found_in, numerics_of, of_images
+from warpimpact.runs.compute import found_in, numerics_of
 from warpimpact.runs.describe import described
 from warpimpact.runs.pilot_hits import pilot_shots
 from warpimpact.runs.shards import extent
@@ -113,11 +111,11 @@ class LimitMap:
 
     def compute(self, campaign: Campaign, task: Task, worker: Worker, report: Report = lambda done: None) -> HitTable:
         """Search the limits of some shots. The table has the shots as they just perforate, with their limits."""
-        sought, images, findings = self.sought, len(campaign.symmetries), task.findings
-        numerics, together = numerics_of(campaign, findings), extent(len(campaign.sampler())) // images
-        shots, progress = task.shots[::images], of_images(report, images)
+        sought, findings = self.sought, task.findings
+        numerics, together = numerics_of(campaign, findings), extent(len(campaign.sampler()))
+        progress = lambda done, total: report(done)  # noqa: E731
         begin = time.perf_counter()
-        searched = limits(campaign.scene, shots, sought, numerics, worker, progress, together)
+        searched = limits(campaign.scene, task.shots, sought, numerics, worker, progress, together)
         elapsed = time.perf_counter() - begin
         attributes = {
             **({attr.LIMIT_ERROR: findings.error} if isinstance(findings, LimitErrors) else {}),
@@ -138,7 +136,7 @@ class LimitMap:
         tried = searched.shots.velocity
         if sought.quantity == "thickness":
             tried = searched.shots.own_of(campaign.target, "thickness", sought.layer)
-        put = replace(task, shots=sought.put(campaign.target, task.shots, np.repeat(tried, images)))
+        put = replace(task, shots=sought.put(campaign.target, task.shots, tried))
         outcomes, by = searched.recorded(sought.quantity), (worker.device, elapsed)
         return described(campaign, put, outcomes, short_steps(numerics), by, attributes, beside)
 

@@ -115,11 +115,8 @@ def test_scatter_in_plate_and_core_from_file_to_result(
 def test_scatter_in_plate_and_core_beside_symmetry(own: Campaign) -> None:
     hits = own.hits.model_copy(update={"irreducible": True})
     dataset = run(own.model_copy(update={"hits": hits}), device="cpu")
-    assert dataset.attrs["computed_hits"] == 8
     for name in (*OWN, "residual_velocity", "energy_loss", "tilt"):
-        values = dataset[name].values.reshape(8, 8, -1)
-        assert (values == values[:, :1]).all(), name  # a hit and its images
-        assert len(np.unique(values[:, 0, 0])) == 8
+        assert len(np.unique(dataset[name].values.reshape(64, -1)[:, 0])) == 64, name
 
 
 def test_a_list_may_bring_its_own_plates(tmp_path: Path) -> None:

@@ -322,14 +322,14 @@ def test_a_limit_is_that_of_the_command(measure: str, tmp_path: Path) -> None:
     one = design(HOLES, asked, SEARCH.replace("most_hits = 64", "most_hits = 16"), folder=tmp_path)
     (path,) = optimise_to_file(one, tmp_path / "front.nc")
     found = files.read(tmp_path / "front.nc", f.FRONT)
-    hits = f'[hits]\nsampling = "sobol"\ncount = 256\nirreducible = true\nseed = {fresh_seed(one)}'
+    hits = f'[hits]\nsampling = "sobol"\ncount = 64\nirreducible = true\nseed = {fresh_seed(one)}'
     path.write_text(path.read_text().partition("[hits]")[0] + hits)
     quantity = "velocity" if measure in ("mean(limit_velocity)", "V50") else "thickness"
     assert main(["limit", str(path), "--quantity", quantity, "-o", str(tmp_path / "limit.nc"), "-q"]) == 0
     (score,) = effectiveness(read(tmp_path / "limit.nc"), [measure])
     fresh = float(found[f.FRESH][0, 0])
     if measure == "V50":  # a smooth quantile beside an order statistic
-        values = read(tmp_path / "limit.nc")["limit_velocity"].values[::4]
+        values = read(tmp_path / "limit.nc")["limit_velocity"].values
         assert abs(fresh - float(hdquantiles(values, [0.5])[0])) < 0.1 * (score.high - score.low)
     else:
         assert fresh == pytest.approx(score.value, rel=1e-6)

@@ -28,7 +28,6 @@ velocity = "825 m/s"
 [hits]
 count = 8
 seed = 2
-irreducible = {irreducible}
 [numerics]
 time_step = "1 us"
 [output]
@@ -46,7 +45,7 @@ SLOTS = '{ shape = "slot", length = "12 mm", width = "4 mm", spacing = ["8 mm", 
 
 
 def history(hit: int, snapshots: int = 6, **given: object) -> xarray.Dataset:
-    text = CAMPAIGN.format(**{"front": 2600, "degradation": 0.8, "layer": BEHIND, "irreducible": "false"} | given)
+    text = CAMPAIGN.format(**{"front": 2600, "degradation": 0.8, "layer": BEHIND} | given)
     campaign = Campaign.from_text(text, name="test", folder=Path())
     found = replay(run(campaign, device="cpu"), hit, snapshots=snapshots)
     assert found.attrs["agreement"] == "bit-identical"
@@ -90,16 +89,6 @@ def test_behind_a_plate_of_no_resistance_it_is_the_plate_alone() -> None:
     expected = (share[0] - share[-1]).sum()
     assert expected > 100.0
     assert taken(layer).sum() == pytest.approx(expected, rel=0.03)
-
-
-def test_an_image_of_a_hit_is_mirrored() -> None:
-    first, second = (history(number, irreducible="true") for number in (0, 1))
-    home, image = (fields_behind(found)[0] for found in (first, second))
-    assert taken(home).sum() == pytest.approx(taken(image).sum(), rel=1e-12)
-    assert (np.diff(image.cell_y) > 0.0).all()
-    for field, found in ((home, first), (image, second)):
-        path = found["plate_position"].values
-        np.testing.assert_allclose(centre(field), path[np.argmax(path[:, 0] > 0.0655), 1:], atol=2e-3)
 
 
 def test_a_file_a_figure_and_paraview_keep_it(hit: xarray.Dataset, tmp_path: Path) -> None:

@@ -198,7 +198,7 @@ def test_a_rule_that_is_never_met_ends_at_its_largest_count(tmp_path: Path) -> N
         (('sampling = "sobol"', 'sampling = "random"'), True),
     ],
 )
-def test_a_rule_computes_no_image_unless_told_otherwise(
+def test_a_rule_samples_the_irreducible_part_by_default(
     change: tuple[str, str], expected: bool, tmp_path: Path
 ) -> None:
     text = DRAFT.replace("[output]", STOP.format("mean(residual_velocity)", "1 m/s", 4096))

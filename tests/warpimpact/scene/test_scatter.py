@@ -71,10 +71,10 @@ SAMPLERS: dict[str, Callable[..., Sampler]] = {
     "sobol": lambda count, **hits: sampler("sobol", count, **hits),
     "replicates": lambda count, **hits: sampler("sobol", count, replicates=8, **hits),
     "random": lambda count, **hits: sampler("random", count, **hits),
-    "images": lambda count, **hits: Sampler(
+    "irreducible": lambda count, **hits: Sampler(
         IMPACT, Hits(count=count, irreducible=True, **hits), SLOTTED, Scatter(velocity=SCATTER.velocity), 8
     ),
-    "images of random hits": lambda count, **hits: Sampler(
+    "irreducible, random": lambda count, **hits: Sampler(
         IMPACT, Hits(sampling="random", count=count, irreducible=True, **hits), SLOTTED
     ),
     "bursts": lambda count, **hits: BurstSampler(

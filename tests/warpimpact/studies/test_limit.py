@@ -141,14 +141,6 @@ def test_another_quantity_is_not_resumed(tmp_path: Path, monkeypatch: pytest.Mon
         search(campaign(text), tmp_path / "broken.nc", resume=True, quantity="thickness")
 
 
-def test_images_share_the_limit_of_their_hit(tmp_path: Path) -> None:
-    folded = campaign(TEXT.replace("count = 64", "count = 64\nirreducible = true").replace(PROMISED, GIVEN))
-    found = search(folded, tmp_path / "folded.nc")
-    groups = found["limit_velocity"].values.reshape(-1, len(folded.symmetries))
-    assert groups.shape[1] > 1
-    assert (groups == groups[:, :1]).all()
-
-
 def test_a_hit_can_be_replayed(result: xarray.Dataset) -> None:
     assert replay(result, 5, folder=Path()).attrs["agreement"] == "bit-identical"
 
