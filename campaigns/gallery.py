@@ -15,7 +15,7 @@ from matplotlib.figure import Figure
 from PIL import Image
 
 from warpimpact import Campaign, replay, run
-from warpimpact.plotting import bursts_figure, dispersion, marginals, overview, trajectory, uncertainty, variable_maps
+from warpimpact.plotting import dispersion, marginals, overview, trajectory, uncertainty, variable_maps
 from warpimpact.plotting.posterior import hits_figure, pairs_figure
 from warpimpact.plotting.pressure import pressure
 from warpimpact.results import files
@@ -38,7 +38,6 @@ def pictures() -> Iterator[tuple[str, Figure, int]]:
     yaw = {"distribution": "normal", "mean": "-2 deg", "std": "1 deg"}
     scattered = run(oblique.model_copy(update={"scatter": {"yaw": yaw}}))
     yield "gallery/uncertainty.png", uncertainty(scattered, "tilt"), 1100
-    yield "gallery/bursts.png", bursts_figure(run(Campaign.from_toml(HERE / "burst_of_five.toml"))), 900
     edge = np.hypot(slotted.hit_y - HIT[0], slotted.hit_z - HIT[1])
     hit = replay(slotted, int(edge.argmin("hit")), folder=HERE)
     for draw in (trajectory.passage, trajectory.flight, trajectory.plate, pressure):

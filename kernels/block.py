@@ -21,24 +21,18 @@ The barriers, and the error that each of them prevents (E is the exposure, G the
 6. After `settle`: the next step adds to nodes of G that other lanes clear.
 7. After the window is cleared (`open_window`), as after 6.
 
-All lanes write the slot's state of the layers (`Stack`, `Passage`) and of earlier hits (`Earlier`, `Channels`), and all
-write the same values. A lane therefore reads its own writes, and barriers stand only before a write, for lanes that
-still read the old value:
+All lanes write the slot's state of the layers (`Stack`, `Passage`), and all write the same values. A lane therefore
+reads its own writes, and barriers stand only before a write, for lanes that still read the old value:
 
 8. Before a window opens (kernels/layers.py): other lanes check whether it is open.
 9. Before a layer's footprint is kept, there: other lanes read the last one, and whether the core was near the layer.
 10. Before a core leaves a layer (kernels/passage.py): other lanes read whether it has left, and whether it has touched.
-11. Before the box of a channel widens (kernels/channel.py): other lanes read it, and the last section drawn on the
-    plane must be complete, because other lanes may have drawn it.
-12. Before a section is kept, there: other lanes compare it with the next one.
-13. After each step of `recall` (kernels/earlier.py): the next step, or the march, reads what other lanes have written.
 
-Butterflies stand between the passes and 5, between the steps, and between the places that 9, 11 and 12 separate. They
-make lanes wait, but order no memory: hence these barriers. The shots of a burst are launches of their own. Touches need
-no barrier: a patch belongs to the same lane in every loop. `settle` needs none before it for G: it goes over the same
-nodes, in the same lanes, as the second direction of the filter. All conditions around barriers hold for all lanes
-alike,
-because they follow from sums over the lanes, from the state, or from values that all lanes write alike.
+Butterflies stand between the passes and 5, between the steps, and between the places that 9 separates. They make lanes
+wait, but order no memory: hence these barriers. Touches need no barrier: a patch belongs to the same lane in every
+loop. `settle` needs none before it for G: it goes over the same nodes, in the same lanes, as the second direction of
+the filter. All conditions around barriers hold for all lanes alike, because they follow from sums over the lanes, from
+the state, or from values that all lanes write alike.
 """
 
 from functools import cache
@@ -46,7 +40,7 @@ from types import SimpleNamespace
 
 import warp as wp
 
-from . import channel, contact, core_surface, exposure, fixed_point, lanes, memory, structs
+from . import contact, core_surface, exposure, fixed_point, lanes, memory, structs
 from .variant import Variant
 
 
@@ -55,7 +49,7 @@ def build(variant: Variant) -> SimpleNamespace:
     """Device functions of a step's load in the block layout for one variant, in float32."""
     struct, real = structs.build(variant), variant.real
     zero = real(0.0)
-    use = variant.use(channel, contact, core_surface, exposure, fixed_point, lanes)
+    use = variant.use(contact, core_surface, exposure, fixed_point, lanes)
     read, part_of, read_index = memory.build(real).read, memory.build(real).part_of, memory.build(wp.int32).read
 
     @wp.func
@@ -78,8 +72,6 @@ def build(variant: Variant) -> SimpleNamespace:
                 part.exposure = use.lanes.shared_exposure(fields.exposure, slot * fields.nodes)
                 part.gain = use.lanes.shared_gain(fields.gain, slot * fields.nodes)
                 part.filtered = part_of(fields.filtered, slot * fields.nodes, fields.nodes)
-            if wp.static(variant.burst):
-                part.channel = part_of(fields.channel, slot * fields.channel_nodes, fields.channel_nodes)
         return part
 
     @wp.func
@@ -151,9 +143,6 @@ def build(variant: Variant) -> SimpleNamespace:
         begin, end = first * surface.around, (last + 1) * surface.around
         base = use.core_surface.patches_before(surface, context.slot) - begin
         use.contact.find_touches(context, slab, base, begin, end)
-        if wp.static(variant.burst):
-            if window.pierced:
-                use.channel.spare(fields, window, touches, base + begin, end - begin)
         if use.lanes.any_of(use.contact.meet(plate, touches, base + begin, end - begin) > zero):
             weakened = bool(False)
             if wp.static(variant.degrades):

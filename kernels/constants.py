@@ -134,35 +134,6 @@ FAINT = Constant(
     "kernels/test_rigid_body.py::test_a_core_swings_when_a_step_turns_back_the_last_one",
 )
 
-# Channels of earlier hits (kernels/channel.py)
-NO_CHANNEL = Constant(
-    -1.0,
-    "m",
-    "Depth in a channel where none is near: outside by more than any core is wide.",
-    "8",
-)
-WALL = Constant(
-    20.0,
-    "1/cell",
-    "The share of material goes from 0 to 1 over a twentieth of a cell outside the wall of a channel.",
-    "8",
-    "kernels/test_channel.py::test_the_wall_of_a_channel_is_a_twentieth_of_a_cell_wide",
-)
-STEEPEST = Constant(
-    0.5,
-    "cosine of the core's angle with the normal",
-    "A core that lies flatter is drawn node by node: its sections are too long to be compared.",
-    "8",
-    "kernels/test_channel.py::test_a_core_at_more_than_60_degrees_is_drawn_node_by_node",
-)
-SPARED = Constant(
-    0.1,
-    "cells",
-    "What a section adds to the last one by no more is not drawn. So few sections are drawn.",
-    "8",
-    "verification/test_bursts.py::test_a_core_leaves_its_cross_section_open",
-)
-
 # The computation
 VECTOR = Constant(
     16,

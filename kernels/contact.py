@@ -14,7 +14,6 @@ from typing import Any
 import warp as wp
 
 from . import (
-    channel,
     constants,
     core_surface,
     damping,
@@ -36,7 +35,7 @@ def build(variant: Variant) -> SimpleNamespace:
     struct = structs.build(variant)
     real, reals, vec2, vec3 = variant.real, variant.reals, variant.vec2, variant.vec3
     zero, half, one = real(0.0), real(0.5), real(1.0)
-    use = variant.use(channel, core_surface, damping, exposure, free_edges, grip, interaction, lanes, plate_grid)
+    use = variant.use(core_surface, damping, exposure, free_edges, grip, interaction, lanes, plate_grid)
     far = constants.FAR_NODES.value
     ring_of, patch_at = use.core_surface.ring_of, use.core_surface.patch_at
     read, write = memory.build(real).read, memory.build(real).write
@@ -79,10 +78,6 @@ def build(variant: Variant) -> SimpleNamespace:
             write_index(touches.cell, base + j, index)
             write(touches.y, base + j, cell.y)
             write(touches.z, base + j, cell.z)
-            if wp.static(variant.burst):
-                place, ahead = use.channel.node_at(window, patch.x, wp.clamp(cell.index, window.first, last_cell))
-                write_index(touches.place, base + j, place)
-                write(touches.ahead, base + j, ahead)
             j += use.lanes.count()
         if wp.static(variant.free_surface):
             use.free_edges.restrict(context, slab, base, begin, end)
@@ -330,9 +325,6 @@ def build(variant: Variant) -> SimpleNamespace:
         )  # the touches of a step then stay in the fastest cache
         rings = use.core_surface.rings_before(surface, context.slot)
         find_touches(context, slab, base, begin, end)
-        if wp.static(variant.burst):
-            if window.pierced:
-                use.channel.spare(fields, window, touches, base + begin, end - begin)
         first, last = int(surface.rings), int(-1)  # of the rings that touch
         for index in range(footprint.first_ring, footprint.last_ring + 1):
             area = zero
@@ -371,6 +363,5 @@ def build(variant: Variant) -> SimpleNamespace:
                     use.exposure.settle(plate, fields, window, box)
         return load
 
-    fields_of_slot, fields_of_window = use.exposure.fields_of_slot, use.exposure.fields_of_window
-    open_window = use.exposure.open_window
+    fields_of_slot, open_window = use.exposure.fields_of_slot, use.exposure.open_window
     return SimpleNamespace(**locals())

@@ -23,15 +23,12 @@ class Scheme:
 
     Attributes:
         fields_of_slot: Fields of all slots → Fields of one slot, from its first node on.
-        fields_of_window: Fields of a slot → Fields of the window that begins at its node `first`. They differ where the
-            window lies in shared memory.
         open_window: plate, its thickness [m], the fields of a slot, the number of the layer, y and z of the hit in the
             layer's frame [m] → Window about the hit on an untouched plate.
         load_on: → Load of one layer in a step. It also adds the exposure of the step to the fields of the context.
     """
 
     fields_of_slot: Annotated[wp.Function, "fields: Fields, slot: int32"]
-    fields_of_window: Annotated[wp.Function, "fields: Fields, first: int32"]
     open_window: Annotated[wp.Function, "plate: Plate, thickness: real, fields: Fields, layer: int32, hit: vec2d"]
     load_on: Annotated[wp.Function, "context: Context, slab: Slab"]
 
@@ -48,12 +45,10 @@ class TargetKind:
             [s]. `last` is the change of the velocities in the step before.
         law_at: law of the plate → the law with the onset of contact of all that the step can touch.
         load_on: → Load of all that the step touches.
-        follow: keeps the place of the core for later shots at this target.
         free_time: state of a core that touches nothing → time [s] for which it flies on after this step without a
             contact, and whether it is lost between layers.
         next_step: `free` time [s] after this step → length of the next step [s].
-        given_up: → status of a core that has not ended after the last step.
-        conclude: keeps what the results and later shots need of a shot that ended.
+        conclude: status, RUNNING after the last step → final status. Records how the core ended in each layer.
     """
 
     first_step: Annotated[wp.Function, "context: Context, shortest: real"]
@@ -63,13 +58,11 @@ class TargetKind:
     ]
     law_at: Annotated[wp.Function, "context: Context, law: Law, reach: Reach"]
     load_on: Annotated[wp.Function, "context: Context, law: Law, reach: Reach, pose: Pose, dt: real"]
-    follow: Annotated[wp.Function, "context: Context, reach: Reach, pose: Pose"]
     free_time: Annotated[wp.Function, "context: Context, reach: Reach, state: State, pose: Pose, dt: real"]
     next_step: Annotated[
         wp.Function, "context: Context, reach: Reach, pose: Pose, last: Change, clock: Clock, free: real"
     ]
-    given_up: Annotated[wp.Function, "context: Context, reach: Reach, state: State, touched: bool"]
-    conclude: Annotated[wp.Function, "context: Context, reach: Reach, status: int32"]
+    conclude: Annotated[wp.Function, "context: Context, reach: Reach, state: State, status: int32, touched: bool"]
 
 
 def checked(contract: type[Contract], variant: Variant, build: Any) -> Contract:

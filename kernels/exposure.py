@@ -157,14 +157,7 @@ def build(variant: Variant) -> SimpleNamespace:
             part.exposure = part_of(fields.exposure, slot * fields.nodes, fields.nodes)
             part.gain = part_of(fields.gain, slot * fields.nodes, fields.nodes)
             part.filtered = part_of(fields.filtered, slot * fields.nodes, fields.nodes)
-        if wp.static(variant.burst):
-            part.channel = part_of(fields.channel, slot * fields.channel_nodes, fields.channel_nodes)
         return part
-
-    @wp.func
-    def fields_of_window(fields: struct.Fields, first: wp.int32):
-        """The fields of a window: those of its slot."""
-        return fields
 
     @wp.func
     def open_window(plate: struct.Plate, thickness: real, fields: struct.Fields, layer: wp.int32, hit: wp.vec2d):

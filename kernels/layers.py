@@ -38,7 +38,7 @@ def build(variant: Variant) -> SimpleNamespace:
     far = constants.FAR_AWAY.value
     use = variant.use(contact, core_surface, exposure, footprint, lanes, passage, scheme, shots, sliding, target)
     faces_of, layer_value, plate_of = use.target.faces_of, use.target.layer_value, use.target.plate_of
-    slides = variant.degrades and not variant.burst and variant.window == 0
+    slides = variant.degrades and variant.window == 0
 
     @wp.func
     def first_step(context: struct.Context, shortest: real):
@@ -76,7 +76,6 @@ def build(variant: Variant) -> SimpleNamespace:
     def begin(context: struct.Context, state: struct.State):
         """The Reach before the first step: no layer is reached."""
         target, stack, shot = context.target, context.stack, context.shot
-        use.target.begin(context)
         for k in range(target.count):
             stack.open[context.slot * target.count + k] = False
             stack.near[context.slot * target.count + k] = False
@@ -227,7 +226,7 @@ def build(variant: Variant) -> SimpleNamespace:
                     reach.first = wp.min(reach.first, k)
                     reach.last = k
                     footprint.last_ring = surface.rings - 1
-                    held = touch.inside or not (target.weakens[k] or wp.static(variant.burst))
+                    held = touch.inside or not target.weakens[k]
                     footprint.inside = footprint.inside and held
                 use.lanes.barrier()
                 stack.footprint[here] = touch
@@ -285,14 +284,6 @@ def build(variant: Variant) -> SimpleNamespace:
         return load
 
     @wp.func
-    def follow(context: struct.Context, reach: struct.Reach, pose: struct.Pose):
-        """Keep the place of the core in the layers that a step can touch."""
-        stack, base = context.stack, context.slot * context.target.count
-        for k in range(reach.first, reach.last + 1):
-            if stack.footprint[base + k].last_ring >= 0:
-                use.target.follow(context, stack.window[base + k], k, in_layer(context, k, pose))
-
-    @wp.func
     def free_time(context: struct.Context, reach: struct.Reach, state: struct.State, pose: struct.Pose, dt: real):
         """Time [s] that a core between layers can go on after a step before it may touch one, and whether it is lost
         between them. No part of the core moves along x faster than its centre of mass and its turn together. The core
@@ -318,30 +309,23 @@ def build(variant: Variant) -> SimpleNamespace:
         return wp.max(zero, time - half * dt), lost
 
     @wp.func
-    def given_up(context: struct.Context, reach: struct.Reach, state: struct.State, touched: wp.bool):
-        """The status of a core that has not ended. It rests if it has touched, all of it is in the target, and its
-        centre of mass is in no layer."""
-        target, x, between = context.target, state.position[0], touched and reach.rearmost > zero
-        for k in range(target.count):
-            front, rear = faces_of(target, k, context.shot)
-            between = between and (x < front or x > rear)
-            if k == target.count - 1:
-                between = between and reach.foremost < rear
-        return wp.where(between, Status.ARRESTED, Status.UNFINISHED)
+    def conclude(context: struct.Context, reach: struct.Reach, state: struct.State, status: wp.int32, touched: wp.bool):
+        """The final status. Records how the core ended in the layers that it did not leave through their rear faces.
 
-    @wp.func
-    def conclude(context: struct.Context, reach: struct.Reach, status: wp.int32):
-        """Record how the core ended in the layers that it did not leave through their rear faces. Keep for later shots
-        at this target what they need of the layers that it reached, each in its last window there."""
-        target, stack, shot = context.target, context.stack, context.shot
+        A core that has not ended rests if it has touched, all of it is in the target, and its centre of mass is in no
+        layer.
+        """
+        target, shot, x, final = context.target, context.shot, state.position[0], status
+        between = touched and reach.rearmost > zero
         for k in range(target.count):
-            here = context.slot * target.count + k
+            front, rear = faces_of(target, k, shot)
+            between = between and (x < front or x > rear) and (k < target.count - 1 or reach.foremost < rear)
+        if status == RUNNING:
+            final = wp.where(between, Status.ARRESTED, Status.UNFINISHED)
+        for k in range(target.count):
             front, rear = faces_of(target, k, shot)
             inside = reach.foremost > front and reach.rearmost < rear
-            use.passage.conclude(context.passage, shot, k, status, inside, reach.deepest - front)
-            if stack.open[here] and target.laminate[k] == k:
-                use.target.keep(context, stack.window[here])
-            if stack.open[here] and use.passage.has_left(context.passage, shot, k):
-                use.target.leave_channel(context, stack.window[here], k)
+            use.passage.conclude(context.passage, shot, k, final, inside, reach.deepest - front)
+        return final
 
     return SimpleNamespace(**locals())

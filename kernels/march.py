@@ -105,7 +105,6 @@ def build(variant: Variant) -> SimpleNamespace:
         context.fields = use.scheme.fields_of_slot(scratch.fields, slot)
         context.touches = scratch.touches
         context.stack = scratch.stack
-        context.earlier = scratch.earlier
         context.passage = passage
         return context
 
@@ -118,7 +117,7 @@ def build(variant: Variant) -> SimpleNamespace:
         results: struct.Results,
     ):
         """March one shot per thread, or per block of threads: number k computes shot order[first + k] in slot k mod
-        slots. Shots at one plate have consecutive numbers, and are computed one after another in one slot.
+        slots.
 
         A step finds what the core can touch at mid-step, loads the core, kicks it there, and drifts it to the middle of
         the next step (kernels/clock.py). Velocities therefore change at mid-steps only, where positions are known: the
@@ -168,7 +167,6 @@ def build(variant: Variant) -> SimpleNamespace:
                 free = real(0.0)
                 if reach.footprint.last_ring >= 0:
                     load = kind.load_on(context, law, reach, pose, dt)
-                    kind.follow(context, reach, pose)
                 else:
                     free, lost = kind.free_time(context, reach, state, pose, dt)
                 if load.touching:
@@ -194,9 +192,7 @@ def build(variant: Variant) -> SimpleNamespace:
         if inputs.rows > 0:
             row = shot * inputs.rows + clock.steps
             use.trace.record(results.trace, row, use.clock.now(clock), clock.step, state, vec3(), vec3())
-        if status == RUNNING:
-            status = kind.given_up(context, reach, state, touched)
-        kind.conclude(context, reach, status)
+        status = kind.conclude(context, reach, state, status, touched)
         axis = use.rigid_body.axis_of(state.attitude)
         if use.lanes.lane() > 0:  # all lanes of a block know the outcome
             return

@@ -112,5 +112,5 @@ def build(variant: Variant) -> SimpleNamespace:
             degrade(context, slab)
         return load
 
-    fields_of_slot, fields_of_window = use.exposure.fields_of_slot, use.exposure.fields_of_window
+    fields_of_slot = use.exposure.fields_of_slot
     return SimpleNamespace(**locals())

@@ -50,7 +50,6 @@ def build(variant: Variant) -> SimpleNamespace:
     @wp.func
     def begin(context: struct.Context, state: struct.State):
         """Open the window of the plate; a core that flies clear through a hole ends at once."""
-        use.target.begin(context)
         reach = struct.Reach()
         reach.window = use.target.open_window(context, 0, vec3())
         plate = use.target.plate_of(context.target, 0)
@@ -94,25 +93,13 @@ def build(variant: Variant) -> SimpleNamespace:
         return use.scheme.load_on(context, slab)
 
     @wp.func
-    def follow(context: struct.Context, reach: struct.Reach, pose: struct.Pose):
-        """Keep the place of the core in the plate."""
-        use.target.follow(context, reach.window, 0, pose)
-
-    @wp.func
     def free_time(context: struct.Context, reach: struct.Reach, state: struct.State, pose: struct.Pose, dt: real):
         """No free time: a core beside the plate goes on step by step, and is never lost."""
         return zero, False
 
     @wp.func
-    def given_up(context: struct.Context, reach: struct.Reach, state: struct.State, touched: wp.bool):
-        """The status of a core that has not ended: its computation is not complete."""
-        return Status.UNFINISHED
-
-    @wp.func
-    def conclude(context: struct.Context, reach: struct.Reach, status: wp.int32):
-        """Keep what later shots at this plate need."""
-        use.target.keep(context, reach.window)
-        if status == Status.PERFORATED:
-            use.target.leave_channel(context, reach.window, 0)
+    def conclude(context: struct.Context, reach: struct.Reach, state: struct.State, status: wp.int32, touched: wp.bool):
+        """The final status: the computation of a core that has not ended is not complete."""
+        return wp.where(status == RUNNING, Status.UNFINISHED, status)
 
     return SimpleNamespace(**locals())

@@ -206,8 +206,6 @@ def _build(double: bool, many_plates: bool) -> SimpleNamespace:
         `thickness` is the thickness of the plate. Its front face is `behind` [m] the first of `planes` planes of
         `nodes` nodes each; `low_y`, `high_y`, `low_z` and `high_z` are its rims relative to the hit [m]. (y0, z0) is
         the place of the node `home` in the literal scheme [m]. `weakens` says whether the fields hold this window.
-        `channel` is the first node of its `channel_planes` planes with the channels of earlier hits
-        (kernels/channel.py), `pierced` says whether there are any.
         """
 
         first: wp.int32
@@ -235,10 +233,6 @@ def _build(double: bool, many_plates: bool) -> SimpleNamespace:
         y0: real
         z0: real
         weakens: wp.bool
-        channel: wp.int32
-        channel_planes: wp.int32
-        per_channel_plane: real
-        pierced: wp.bool
 
     @wp.struct
     class Cell:
@@ -530,19 +524,16 @@ def _build(double: bool, many_plates: bool) -> SimpleNamespace:
         cells_y × cells_z of them, from number `first` on; shape [layers].
 
         The consistent law keeps the exposure [s] (or [m] where it counts a path), the exposure gained in the step, and
-        room for the filter. `channel` has other planes of the same windows, `channel_nodes` in a slot: the depth of
-        each node inside the channels of earlier hits [m], negative outside. The literal scheme keeps each node's share
-        of the resistance Y, 0 in holes, and 1 where the step `touched` the node.
+        room for the filter. The literal scheme keeps each node's share of the resistance Y, 0 in holes, and 1 where the
+        step `touched` the node.
         """
 
         exposure: wp.array(dtype=real)
         gain: wp.array(dtype=real)
         filtered: wp.array(dtype=real)
-        channel: wp.array(dtype=real)
         share: wp.array(dtype=real)
         touched: wp.array(dtype=real)
         nodes: wp.int32
-        channel_nodes: wp.int32
         first: wp.array(dtype=wp.int32)
         cells_y: wp.array(dtype=wp.int32)
         cells_z: wp.array(dtype=wp.int32)
@@ -557,10 +548,9 @@ def _build(double: bool, many_plates: bool) -> SimpleNamespace:
         of the tile and of the grid; `x`, `y` and `z` are its place in the grid's cell, `x` only where a window has
         planes. There `row`, `column` and `plane` are those of the cell, too. `ring_area` is the area of all patches of
         a ring. If the bending moment is recorded, `sums` holds the sums of the second pass over a ring, and
-        `total_area` the area of a ring in all layers of the target. `place` and `ahead` are the patch's place in the
-        channels of earlier hits (kernels/channel.py). `cover` is the index of the node and direction before the patch
-        in the table of the cover, `cover_y`, `cover_z` and `cover_turn` are the fractions of the way to the next ones,
-        and `cover_decay` is the negative exponent per cover [1/m].
+        `total_area` the area of a ring in all layers of the target. `cover` is the index of the node and direction
+        before the patch in the table of the cover, `cover_y`, `cover_z` and `cover_turn` are the fractions of the way
+        to the next ones, and `cover_decay` is the negative exponent per cover [1/m].
         """
 
         area: wp.array(dtype=real)
@@ -578,8 +568,6 @@ def _build(double: bool, many_plates: bool) -> SimpleNamespace:
         row: wp.array(dtype=wp.int32)
         column: wp.array(dtype=wp.int32)
         plane: wp.array(dtype=wp.int32)
-        place: wp.array(dtype=wp.int32)
-        ahead: wp.array(dtype=real)
         cover: wp.array(dtype=wp.int32)
         cover_y: wp.array(dtype=real)
         cover_z: wp.array(dtype=real)
@@ -606,69 +594,12 @@ def _build(double: bool, many_plates: bool) -> SimpleNamespace:
         first_cells: wp.array2d(dtype=wp.int32)
 
     @wp.struct
-    class Section:
-        """A core at a plane: its axis, and the place where the axis crosses the plane, with the radius there [m], 0 if
-        it does not cross."""
-
-        axis: vec3
-        y: real
-        z: real
-        radius: real
-
-    @wp.struct
-    class Earlier:
-        """What the `count` shots at a slot's plate leave to each other, in all slots.
-
-        Of the windows: `exposure` has the `nodes` of all layers of every shot, shape [slots × count × nodes]: while a
-        shot is under way the exposure before it, afterwards the exposure that it added [s]. `hit` is the centre of the
-        window in the frame of its layer [m], `open` says whether a shot has opened its window; shape [slots × count ×
-        layers].
-
-        Of the channels (kernels/channel.py): `inside` has the `channel_nodes` of all layers of every shot, the depth of
-        each inside its channel [m], negative outside; shape [slots × count × channel_nodes]. `box` has all nodes that a
-        channel may hold, and `through` says whether the shot has left the layer through its rear face; shape [slots ×
-        count × layers]. `sections` are those of the shot under way that are not drawn yet, shape [slots × planes].
-        `first` and `first_plane` are the first node and plane of every layer, and `apart` is the largest distance of
-        its planes [m]; shape [layers].
-        """
-
-        count: wp.int32
-        nodes: wp.int32
-        layers: wp.int32
-        channel_nodes: wp.int32
-        planes: wp.int32
-        exposure: wp.array(dtype=real)
-        hit: wp.array(dtype=wp.vec2d)
-        open: wp.array(dtype=wp.bool)
-        inside: wp.array(dtype=real)
-        box: wp.array(dtype=Box)
-        through: wp.array(dtype=wp.bool)
-        sections: wp.array(dtype=Section)
-        first: wp.array(dtype=wp.int32)
-        first_plane: wp.array(dtype=wp.int32)
-        apart: wp.array(dtype=wp.float64)
-
-    @wp.struct
-    class Place:
-        """Where Earlier keeps what a shot leaves of a layer: the shot's `order` at its target, and whether it is the
-        `last` there. `index` counts shots and layers of all slots; `window` is the node before the windows of the shot,
-        `channel` the first node of its channel, and `section` its first section."""
-
-        order: wp.int32
-        last: wp.bool
-        index: wp.int32
-        window: wp.int32
-        channel: wp.int32
-        section: wp.int32
-
-    @wp.struct
     class Scratch:
         """What the shots of a launch write while they run."""
 
         fields: Fields
         touches: Touches
         stack: Stack
-        earlier: Earlier
 
     # --- Results ---
 
@@ -773,7 +704,6 @@ def _build(double: bool, many_plates: bool) -> SimpleNamespace:
         fields: Fields
         touches: Touches
         stack: Stack
-        earlier: Earlier
         passage: Passage
 
     return SimpleNamespace(**locals())

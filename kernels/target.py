@@ -6,7 +6,7 @@ from typing import Any
 
 import warp as wp
 
-from . import channel, earlier, scheme, shots, structs
+from . import scheme, shots, structs
 from .variant import Variant
 
 
@@ -15,7 +15,7 @@ def build(variant: Variant) -> SimpleNamespace:
     """Device functions of the target for one variant."""
     struct, real, vec3 = structs.build(variant), variant.real, variant.vec3
     zero, one = wp.float64(0.0), real(1.0)
-    use = variant.use(channel, earlier, scheme, shots)
+    use = variant.use(scheme, shots)
 
     @wp.func
     def layer_value(values: wp.array2d(dtype=Any), layer: wp.int32, shot: wp.int32):
@@ -62,7 +62,7 @@ def build(variant: Variant) -> SimpleNamespace:
 
     @wp.func
     def open_window(context: struct.Context, layer: wp.int32, home: vec3):
-        """Open a layer's window about a place relative to the hit [m], with what earlier shots have left there."""
+        """Open a layer's window about a place relative to the hit [m], on an untouched layer."""
         target, shots, shot = context.target, context.shots, context.shot
         y = use.shots.shot_value(shots.hit_y, shot) + wp.float64(home[1]) - layer_value(target.offset_y, layer, shot)
         z = use.shots.shot_value(shots.hit_z, shot) + wp.float64(home[2]) - layer_value(target.offset_z, layer, shot)
@@ -78,41 +78,6 @@ def build(variant: Variant) -> SimpleNamespace:
             else:  # it weakens as a whole, and only the first plane has a memory
                 window.planes = 1
                 window.per_plane = real(0.0)
-        if wp.static(variant.burst):
-            fields = use.scheme.fields_of_window(context.fields, window.first)
-            window = use.channel.open_window(context.earlier, window, thickness, layer)
-            window.pierced = use.earlier.recall(context.earlier, fields, plate, window, context.slot, shot, layer, hit)
         return window
-
-    # These functions keep what a shot leaves to later shots at the same target, and do nothing if it has no later
-    # shots.
-
-    @wp.func
-    def begin(context: struct.Context):
-        """Record that this shot has opened no window yet."""
-        if wp.static(variant.burst):
-            use.earlier.begin(context.earlier, context.slot, context.shot)
-
-    @wp.func
-    def keep(context: struct.Context, window: struct.Window):
-        """Keep what this shot has added to a layer in its window there."""
-        if wp.static(variant.burst):
-            if window.weakens:
-                fields = use.scheme.fields_of_window(context.fields, window.first)
-                use.earlier.keep(context.earlier, fields, window, context.slot, context.shot)
-
-    @wp.func
-    def follow(context: struct.Context, window: struct.Window, layer: wp.int32, pose: struct.Pose):
-        """Keep the place of the core in a layer."""
-        if wp.static(variant.burst):
-            place = use.earlier.place_of(context.earlier, context.slot, context.shot, layer)
-            use.channel.follow(context.earlier, context.surface, window, place, pose)
-
-    @wp.func
-    def leave_channel(context: struct.Context, window: struct.Window, layer: wp.int32):
-        """Keep that this shot went through a layer, with its channel."""
-        if wp.static(variant.burst):
-            place = use.earlier.place_of(context.earlier, context.slot, context.shot, layer)
-            use.channel.conclude(context.earlier, context.surface, window, place)
 
     return SimpleNamespace(**locals())

@@ -76,7 +76,7 @@ SLOTS, OBLIQUE, LAYERS, DEEP = (
     "slotted plate at 30° with a base",
     "round holes at 30°",
 )
-BURST, WEAK = ROADS["slotted plate, bursts of three"], base("3 mm", "1500 MPa") + "degradation = 0.8\n"
+WEAK = base("3 mm", "1500 MPa") + "degradation = 0.8\n"
 SCENES = {
     SLOTS: ROADS[SLOTS],
     OBLIQUE: ROADS[SLOTS].replace(NORMAL, OBLIQUE_IMPACT),
@@ -89,13 +89,11 @@ SCENES = {
     "a rim": ROADS[SLOTS].replace("[plate]", '[plate]\nsize = ["20 mm", "30 mm"]'),
     "lengths of their own": ROADS[SLOTS],
     "a base that weakens": ROADS[SLOTS] + WEAK,
-    "bursts": BURST,
-    "bursts at a base that weakens": BURST + WEAK,
     DEEP: ROADS["the same at 30 degrees"],
     "strength of the core": ROADS["slotted plate, strength of the core"],
     "double precision": ROADS[SLOTS],
     "the literal scheme": ROADS[SLOTS],
-    "all at once": BURST.replace('mass = "4 g"', 'mass = "4 g"\nstrength = "3 GPa"')
+    "all at once": ROADS[SLOTS].replace('mass = "4 g"', 'mass = "4 g"\nstrength = "3 GPa"')
     + WEAK.replace("3 mm", "9 mm")
     + "[interaction]\nquadratic = 0.5\n",
 }
@@ -194,9 +192,8 @@ def _parser() -> argparse.ArgumentParser:
 
 
 def scene_of(name: str, count: int) -> tuple[Scene, Shots]:
-    """A scene of SCENES and `count` hits of it; of a burst, `count` // 3 bursts."""
+    """A scene of SCENES and `count` hits of it."""
     scene, shots = scene_and_shots(SCENES[name], count)
-    shots = shots[: max(1, count // shots.at_a_plate) * shots.at_a_plate]
     if name == "lengths of their own":
         shots = replace(shots, degradation_length=np.linspace(0.45e-3, 0.6e-3, 8)[np.arange(len(shots)) % 8])
     return scene, shots

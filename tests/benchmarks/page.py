@@ -147,7 +147,7 @@ def _roads(values: Mapping[str, Any]) -> Iterator[Row]:
 
 
 def _drawn(values: Mapping[str, Any]) -> Iterator[Row]:
-    kinds = {"plate": "single plates", "layers": "targets of layers, and bursts"}
+    kinds = {"plate": "single plates", "layers": "targets of layers"}
     for kind, scene in kinds.items():
         some = [one for name, one in values["roads"].items() if name.startswith(kind)]
         costs, shares = (sorted(one[name] for one in some) for name in ("ratio", "pilot_share"))

@@ -1,10 +1,9 @@
-"""Layered targets and bursts drawn from a seed: is the error that a pilot tells at least the one that other hits show?
+"""Layered targets drawn from a seed: is the error that a pilot tells at least the one that other hits show?
 
 A target is a plate of random_scenes.py with one to three layers behind it: laminated, close or far, thin or thick,
 patterned or solid, weakening or not. Together they take up to all of the core's energy, so that some stop a part or all
-of the hits. Every third scene is a burst of three shots at such a target or at one plate. The answer comes from a level
-of LADDER that no promise takes; the change from the level before is its uncertainty. Rows are kept in a folder, so that
-a run goes on where it ended. Run it as a script:
+of the hits. The answer comes from a level of LADDER that no promise takes; the change from the level before is its
+uncertainty. Rows are kept in a folder, so that a run goes on where it ended. Run it as a script:
 python tests/benchmarks/random_layers.py --seed 1 --scenes 24 --cache FOLDER
 """
 
@@ -14,7 +13,6 @@ import argparse
 import json
 import math
 import time
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -26,9 +24,6 @@ from warpimpact.records.layer_variables import LAYER_RESIDUAL_VELOCITY
 from warpimpact.records.outcomes import Outcomes
 from warpimpact.scene import (
     PRESETS,
-    Burst,
-    BurstSampler,
-    Hits,
     Interaction,
     Layer,
     NoPattern,
@@ -38,7 +33,6 @@ from warpimpact.scene import (
     Scene,
     Shots,
     Target,
-    make_shots,
 )
 from warpimpact.solver.changes import changes, ended_otherwise
 from warpimpact.solver.pilot import pilot_size
@@ -49,47 +43,27 @@ Array = NDArray[np.float64]
 
 ANSWER = 8
 """Level of LADDER behind the answer."""
-BURST = 3
-"""Shots of a burst."""
 RUN = 16384
 """Hits of the run for which a pilot is made."""
 NAMES = ("draft", "standard")
 QUANTITIES = ("velocity", "tilt", "depth", "status")
 
 
-@dataclass(frozen=True)
-class Layered(Case):
-    """A case with layers, or one plate, and how the hits of a burst lie."""
-
-    burst: Burst | None = None
-
-    def shots(self, count: int, seed: int = 0) -> Shots:
-        """Some `count` hits; whole bursts."""
-        plate = self.scene.target.layers[0]
-        if self.burst is None:
-            return make_shots(self.impact, Hits(count=count, seed=seed), plate)
-        hits = Hits(count=count // BURST, seed=seed)
-        return BurstSampler(self.impact, hits, plate, self.burst).shots(0, BURST * (count // BURST))
-
-
-def drawn(seed: int, index: int) -> Layered:
+def drawn(seed: int, index: int) -> Case:
     """The case of an index, a function of (seed, index) alone."""
     front, rng = draw(seed, index), np.random.default_rng([seed, index, 1])
     core, plate = front.scene.core, front.scene.target.layers[0]
-    calibre, several = 2.0 * core.max_radius, index % 3 == 2
-    count = int(rng.integers(0 if several else 1, 4))
+    calibre, count = 2.0 * core.max_radius, int(rng.integers(1, 4))
     # A solid plate without friction takes Y h π R² of the core's energy.
     energy = 0.5 * core.mass_properties.mass * front.impact.velocity**2 * rng.uniform(0.2, 1.2)
-    shares = rng.dirichlet(np.ones(count)) if count else np.empty(0)
+    shares = rng.dirichlet(np.ones(count))
     layers = tuple(_layer(rng, calibre, share * energy / (math.pi * core.max_radius**2)) for share in shares)
     path = {"degradation_interval": None, "degradation_distance": rng.uniform(0.5e-3, 1e-3)}
     by_path: dict[str, Any] = path if rng.random() < 0.5 else {}
     target = Target(layers=(plate.model_copy(update=by_path), *layers))
-    spacing = float(rng.uniform(0.5, 3.0)) * calibre
     scene = Scene(core=core, target=target, interaction=Interaction(), record=Record(standoffs=(0.13,)))
     kinds = " + ".join("solid" if isinstance(one.pattern, NoPattern) else "holes" for one in layers)
-    name = f"{front.name}{' | ' if kinds else ''}{kinds}{' burst' if several else ''}"
-    return Layered(name, scene, front.impact, Burst(count=BURST, spacing=spacing) if several else None)
+    return Case(f"{front.name} | {kinds}", scene, front.impact)
 
 
 def _layer(rng: np.random.Generator, calibre: float, work: float) -> Layer:
@@ -111,7 +85,7 @@ def _layer(rng: np.random.Generator, calibre: float, work: float) -> Layer:
     )
 
 
-def computed(case: Layered, shots: Shots, numerics: Numerics) -> Outcomes:
+def computed(case: Case, shots: Shots, numerics: Numerics) -> Outcomes:
     return simulate(case.scene, shots, numerics=numerics, device="cpu", threads=1)
 
 
@@ -134,7 +108,7 @@ def counted(name: str, found: Outcomes, truth: Outcomes, free: tuple[bool, ...])
     return errors(found, truth, free, shares if layered else (0.0, 0.0))
 
 
-def measured(case: Layered, hits: int) -> dict[str, Any]:
+def measured(case: Case, hits: int) -> dict[str, Any]:
     """What the promises come to on a scene."""
     shots = case.shots(hits)
     truth, before = (computed(case, shots, Numerics(level=level)) for level in (ANSWER, ANSWER - 1))

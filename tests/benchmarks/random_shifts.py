@@ -7,7 +7,7 @@ few, so what they show has an interval of its own. A shift is more than was prom
 the promise.
 
     python tests/benchmarks/random_shifts.py --seed 1 --scenes 16            # single plates
-    python tests/benchmarks/random_shifts.py --seed 1 --scenes 8 --layers    # several layers, bursts
+    python tests/benchmarks/random_shifts.py --seed 1 --scenes 8 --layers    # several layers
 """
 
 from __future__ import annotations
@@ -82,7 +82,7 @@ def measured(case: Case, hits: int) -> tuple[int, bool, list[Shift]]:
     found = pilot_of(case.scene, pilot, Numerics(), Worker("cpu", 1))
     level = found.numerics.level
     pair = next(of[1:] for of in found.tried if of[0].numerics == found.numerics)
-    return level or 0, found.kept, shifts(pair, (at(level, others), at(ANSWER, others)), pilot.at_a_plate)
+    return level or 0, found.kept, shifts(pair, (at(level, others), at(ANSWER, others)))
 
 
 def main() -> None:
@@ -91,7 +91,7 @@ def main() -> None:
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--scenes", type=int, default=16)
     parser.add_argument("--hits", type=int, default=256, help="that show the shift (default: 256)")
-    parser.add_argument("--layers", action="store_true", help="targets of several layers, and bursts")
+    parser.add_argument("--layers", action="store_true", help="targets of several layers")
     given = parser.parse_args()
     found: list[Shift] = []
     for index in range(given.scenes):

@@ -36,7 +36,7 @@ from warpimpact.solver.worker import NEVER, Worker
 RUN, SMALL = 16384, 1024
 """Hits of the run that a pilot is made for; likewise of scenes that are drawn, whose pilots may take long."""
 FLOOR_HITS = 8
-"""Hits, or bursts, over which the operations of the floor are counted."""
+"""Hits over which the operations of the floor are counted."""
 ROUNDS, TIMED = 3, 0.4
 """Runs of each road, in turn with the slotted plate, and processor time of one of them [s]."""
 
@@ -89,7 +89,6 @@ ROADS = {
     "the same at 30 degrees": OGIVE + ROUND + OBLIQUE,
     "the same with a base that it pierces": OGIVE + ROUND + OBLIQUE + base("6 mm", "800 MPa"),
     "the same with a base that stops half": OGIVE + ROUND + OBLIQUE + base("10 mm", "3000 MPa"),
-    "slotted plate, bursts of three": P80 + SLOTTED + NORMAL + '[burst]\ncount = 3\nscatter = "5 mm"\n',
     "slotted plate, strength of the core": P80 + 'strength = "3 GPa"\n' + SLOTTED + NORMAL,
     "slotted plate, weakening by distance": P80
     + SLOTTED.replace("[plate]\n", '[plate]\ndegradation_distance = "0.8 mm"\n')
@@ -122,14 +121,13 @@ class Road:
 
     def floor(self) -> float:
         """Time of the counted operations of a hit at the measured peak of a core [s] (floor.py)."""
-        some = self.shots[: FLOOR_HITS * self.shots.at_a_plate]
-        return work_of(self.scene, some, self.numerics).operations / measured_peak()
+        return work_of(self.scene, self.shots[:FLOOR_HITS], self.numerics).operations / measured_peak()
 
 
 def road(scene: Scene, shots: Shots, pilot: Shots, asked: Numerics, run: int) -> Road:
     """A scene and its shots with what their pilot finds for a run of so many hits."""
     worker = Worker("cpu", 1)
-    pilot_of(scene, pilot[: pilot.at_a_plate], asked, worker)  # builds the kernels
+    pilot_of(scene, pilot[:1], asked, worker)  # builds the kernels
     begin = time.process_time()
     found = pilot_of(scene, pilot, asked, worker, hits=run)
     return Road(scene, shots, found.numerics, found.kept, time.process_time() - begin)
@@ -150,20 +148,19 @@ def scenes_of(texts: Sequence[str], hits: int) -> Scenes:
 def scene_and_shots(text: str, hits: int) -> tuple[Scene, Shots]:
     """The scene of a text of ROADS, and its first shots."""
     campaign = campaign_of(text)
-    return campaign.scene, campaign.sampler().shots(0, hits * campaign.at_a_plate)
+    return campaign.scene, campaign.sampler().shots(0, hits)
 
 
 def named(text: str, hits: int, run: int = RUN) -> Road:
     """A road of ROADS, for a run of so many hits."""
     campaign = campaign_of(text)
-    each = campaign.at_a_plate
-    shots = campaign.sampler().shots(0, max(hits, pilot_size(PRESETS["standard"], run)) * each)
-    pilot = shots[: pilot_size(PRESETS["standard"], run) * each]
-    return road(campaign.scene, shots[: hits * each], pilot, campaign.numerics, run)
+    shots = campaign.sampler().shots(0, max(hits, pilot_size(PRESETS["standard"], run)))
+    pilot = shots[: pilot_size(PRESETS["standard"], run)]
+    return road(campaign.scene, shots[:hits], pilot, campaign.numerics, run)
 
 
 def drawn_roads(seed: int, scenes: int, hits: int) -> dict[str, Road]:
-    """Roads that nobody chose: so many single plates, then so many targets of layers or bursts."""
+    """Roads that nobody chose: so many single plates, then so many targets of layers."""
     found = {}
     for kind, draws in (("plate", draw), ("layers", drawn)):
         for index in range(scenes):

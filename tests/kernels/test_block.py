@@ -46,14 +46,13 @@ NORMAL, OBLIQUE = {}, {"obliquity": 0.35, "azimuth": 0.7, "yaw": 0.1, "pitch": 0
 
 
 class Case(NamedTuple):
-    """A core, the plate and the layers behind it, the impact, the interaction, and how many shots hit one plate."""
+    """A core, the plate and the layers behind it, the impact, and the interaction."""
 
     core: Core = PAPER
     plate: Plate = SLOTTED
     impact: dict[str, float] = NORMAL
     interaction: dict[str, Any] = NORMAL
     behind: tuple[Layer, ...] = ()
-    at_a_plate: int = 1
 
 
 SOUND = SLOTTED.model_copy(update={"degradation": 1.0})
@@ -76,12 +75,10 @@ SCENES = {
         behind=(WEAK.model_copy(update={"thickness": 8e-3}), LAMINATE.model_copy(update={"gap": 5e-3})),
     ),
     "near a free surface": Case(plate=SOUND, impact=OBLIQUE, interaction={"free_surface": FreeSurface()}),
-    "a burst": Case(plate=SOUND, at_a_plate=3),
-    "a burst at layers": Case(impact={"obliquity": 0.2}, behind=(WEAK,), at_a_plate=3),
 }
-ON_CUDA = ("no degradation", "a burst")
+ON_CUDA = ("no degradation",)
 """Scenes that differ from others in what is left out of a build, which takes 10 s of a core to compile on a CPU."""
-CHECKED = ("slots", "thick layers", "near a free surface", "a burst at layers")
+CHECKED = ("slots", "thick layers", "near a free surface")
 """Those that together read and write all arrays, whose bounds the debug mode checks."""
 IN_RELEASE = pytest.mark.skipif("config.getoption('warp_mode') == 'debug'", reason="others read and write these arrays")
 ROUNDING = {"residual_velocity": 0.1, "tilt": np.radians(0.5)}
@@ -106,16 +103,11 @@ def in_blocks(monkeypatch: pytest.MonkeyPatch) -> pytest.MonkeyPatch:
     return monkeypatch
 
 
-def shots_of(count: int, at_a_plate: int = 1, **columns: float) -> Shots:
-    """Hits all over a unit cell, at 825 m/s except for the given columns; those at one plate are some 2 mm apart."""
+def shots_of(count: int, **columns: float) -> Shots:
+    """Hits all over a unit cell, at 825 m/s except for the given columns."""
     rng = np.random.default_rng(3)
     values = dict.fromkeys(Impact.model_fields, 0.0) | {"velocity": 825.0} | columns
     hits = {name: rng.uniform(-most, most, count) for name, most in (("hit_y", 4e-3), ("hit_z", 8e-3))}
-    if at_a_plate > 1:
-        hits = {
-            name: np.repeat(at[::at_a_plate], at_a_plate) + rng.normal(0.0, 2e-3, count) for name, at in hits.items()
-        }
-        hits |= {"sample": np.arange(count) // at_a_plate, "burst_order": np.arange(count) % at_a_plate}
     return Shots(**hits, **{name: np.full(count, value) for name, value in values.items()})
 
 
@@ -123,7 +115,7 @@ def scene_of(name: str, count: int) -> tuple[Scene, Shots]:
     case = SCENES[name]
     target, record = Target(layers=(case.plate, *case.behind)), Record(standoffs=(0.13,))
     scene = Scene(core=case.core, target=target, interaction=Interaction(**case.interaction), record=record)
-    return scene, shots_of(count, case.at_a_plate, **case.impact)
+    return scene, shots_of(count, **case.impact)
 
 
 def by_one_thread(scene: Scene, shots: Shots) -> Any:

@@ -16,7 +16,7 @@ BUILDS = [
     (Scheme, block, Variant(window=2048)),
     (Scheme, nodal, Variant(nodal=True)),
     (TargetKind, one_plate, Variant()),
-    (TargetKind, layers, Variant(layered=True, burst=True)),
+    (TargetKind, layers, Variant(layered=True)),
 ]
 
 

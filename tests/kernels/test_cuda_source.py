@@ -18,12 +18,12 @@ pytestmark = pytest.mark.skipif(
 )
 
 
-# The simple layout; the block layout is compiled below, with layers and with a burst.
+# The simple layout; the block layout is compiled below, with layers.
 @pytest.mark.parametrize(
     ("stage", "variant"),
     [
         (march, Variant(double=True, nodal=True)),
-        (march, Variant(bends=True, burst=True, tabled=True)),
+        (march, Variant(bends=True, tabled=True)),
         (free_flight, Variant(double=True)),
     ],
 )
@@ -53,7 +53,7 @@ def test_the_march_of_many_hits_keeps_no_struct_in_local_memory(double: bool, tm
     ("variant", "barriers"),
     [
         (Variant(window=512, degrades=False, rimmed=True), 0),
-        (Variant(window=2048, burst=True), 16),
+        (Variant(window=2048), 8),
         (Variant(window=2048, layered=True), 18),
         (Variant(window=2048, deep=True), 9),
     ],

@@ -14,17 +14,16 @@ from warpimpact.solver.simulate import simulate
 from .extremes import drawn
 from .scenes import BASE, PAPER_CORE, STANDOFFS, paper_plate, scattered_hits, shots_at
 
-SAMPLES, AT_A_PLATE = 24, 3
+SHOTS = 24
 
 
 class Case(NamedTuple):
-    """A build of the kernels: what is shot at, how it is computed, and how many shots hit one plate."""
+    """A build of the kernels: what is shot at, and how it is computed."""
 
     plate: Plate = paper_plate()
     behind: tuple[Layer, ...] = ()
     numerics: dict[str, Any] = {}  # noqa: RUF012
     interaction: Interaction = Interaction()
-    at_a_plate: int = 1
     bending: bool = False
     varies: tuple[str, ...] = ()
 
@@ -39,8 +38,6 @@ CASES = {
     ),
     "bending": Case(bending=True),
     "layers": Case(behind=(BASE,)),
-    "burst": Case(at_a_plate=AT_A_PLATE),
-    "burst at layers": Case(behind=(BASE,), at_a_plate=AT_A_PLATE),
     "plates of their own": Case(varies=("resistance", "thickness", "degradation", "mass")),
     "turned back at two layers": Case(),
 }
@@ -57,14 +54,11 @@ def scene_of(name: str) -> tuple[Scene, Shots, Numerics]:
     if name == "turned back at two layers":
         scene, shots, precision = drawn(np.random.default_rng([1, 221]).random, hits=3)
         return scene, shots, Numerics(level=0, precision=precision)
-    count = SAMPLES * case.at_a_plate
     arrivals = {"velocity": (300.0, 900.0), "obliquity": (0.0, 60.0), "azimuth": (0.0, 360.0), "spin": (0.0, 2e4)}
     arrivals |= dict.fromkeys(("pitch", "yaw"), (-10.0, 10.0))
-    hits = np.repeat(scattered_hits(SAMPLES), case.at_a_plate, axis=1) + rng.normal(0.0, 2e-3, (2, count))
-    shots = shots_at(*hits, **{column: rng.uniform(*ends, count) for column, ends in arrivals.items()})
-    own = {column: rng.uniform(*RANGES[column], count) for column in case.varies}
-    if case.at_a_plate > 1:
-        own |= {"sample": np.arange(count) // case.at_a_plate, "burst_order": np.arange(count) % case.at_a_plate}
+    hits = scattered_hits(SHOTS) + rng.normal(0.0, 2e-3, (2, SHOTS))
+    shots = shots_at(*hits, **{column: rng.uniform(*ends, SHOTS) for column, ends in arrivals.items()})
+    own = {column: rng.uniform(*RANGES[column], SHOTS) for column in case.varies}
     record = Record(standoffs=STANDOFFS, bending=case.bending)
     target = Target(layers=(case.plate, *case.behind))
     scene = Scene(core=PAPER_CORE, target=target, interaction=case.interaction, record=record)
@@ -87,14 +81,14 @@ def assert_expected(got: dict[str, np.ndarray], name: str, device: str) -> None:
         np.testing.assert_array_equal(got[column], values, err_msg=column)
 
 
-def in_parts(name: str, device: str, bursts: int) -> dict[str, np.ndarray]:
-    size, count = bursts * CASES[name].at_a_plate, len(scene_of(name)[1])
+def in_parts(name: str, device: str, size: int) -> dict[str, np.ndarray]:
+    count = len(scene_of(name)[1])
     parts = [computed(name, slice(first, first + size), device) for first in range(0, count, size)]
     return {column: np.concatenate([part[column] for part in parts]) for column in parts[0]}
 
 
 def backwards(name: str, device: str) -> dict[str, np.ndarray]:
-    order = np.arange(len(scene_of(name)[1])).reshape(-1, CASES[name].at_a_plate)[::-1].ravel()
+    order = np.arange(len(scene_of(name)[1]))[::-1]
     return {column: values[np.argsort(order)] for column, values in computed(name, order, device).items()}
 
 
@@ -143,7 +137,6 @@ def test_shots_that_leave_narrow_windows_have_the_bits_of_wide_ones(
         monkeypatch.setattr(windows, width, 0.3 * getattr(windows, width))
     assert_expected(computed(name), name, "cpu")
     assert len(marched) > 1 or CASES[name].behind  # windows of several layers slide with the core
-    assert not any(count % CASES[name].at_a_plate for count in marched)  # whole bursts are repeated
 
 
 def test_first_window_is_wide_enough(marched: list[int]) -> None:

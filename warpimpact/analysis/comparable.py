@@ -38,9 +38,8 @@ def _question(dataset: xarray.Dataset, name: str) -> dict[str, Any]:
     if not {attr.CORE, attr.IMPACT} <= attributes.keys():
         raise ResultError(f"{name}: has no description of its core and impact, which a comparison needs; run it again")
     output = {"standoffs": dataset[v.STANDOFF].values.tolist(), "standoff_point": attributes[attr.STANDOFF_POINT]}
-    told_of = {"burst": json.loads(attributes[attr.BURST])} if attr.BURST in attributes else {}
-    told_of |= {"limit": attributes[attr.LIMIT]} if attr.LIMIT in attributes else {}
-    return told_of | {
+    limit = {"limit": attributes[attr.LIMIT]} if attr.LIMIT in attributes else {}
+    return limit | {
         "core": json.loads(attributes[attr.CORE]),
         "impact": _in_degrees(json.loads(attributes[attr.IMPACT])),
         "output": output,

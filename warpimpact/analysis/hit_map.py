@@ -152,18 +152,8 @@ def mirrored(dataset: xarray.Dataset) -> xarray.Dataset:
 
 
 def hit_points(dataset: xarray.Dataset) -> Array:
-    """Hit points [m], shape [hits, 2]; those of bursts folded into the cell (`is_folded`)."""
-    points = np.stack([dataset[v.HIT_Y].values, dataset[v.HIT_Z].values], axis=-1)
-    if not is_folded(dataset):
-        return points
-    period = np.asarray(dataset.attrs[attr.PLATE_PERIOD])
-    return np.asarray((points + 0.5 * period) % period - 0.5 * period)
-
-
-def is_folded(dataset: xarray.Dataset) -> bool:
-    """Whether a map shows hits at their places in the cell instead of the plate, because the hits of a burst lie in
-    several cells of the pattern. A plate with a rim does not repeat."""
-    return v.BURST_ORDER in dataset and _is_periodic(dataset)
+    """Hit points [m], shape [hits, 2]."""
+    return np.stack([dataset[v.HIT_Y].values, dataset[v.HIT_Z].values], axis=-1)
 
 
 def axes_of(period: Array, count: int) -> tuple[Array, Array]:

@@ -8,7 +8,6 @@ from typing import Any
 import numpy as np
 import xarray
 
-from warpimpact.analysis.bursts import bursts, bursts_view
 from warpimpact.analysis.effectiveness import effectiveness_view
 from warpimpact.analysis.estimates import estimated, means_of, slices, status_shares
 from warpimpact.analysis.numbers import ends_of, intervals_text
@@ -45,7 +44,6 @@ def inspect_view(dataset: xarray.Dataset) -> list[Section]:
         _origin(dataset),
         _statuses(dataset),
         _numbers(dataset),
-        *(bursts_view(bursts(dataset)) if v.BURST_ORDER in dataset else []),
         effectiveness_view(dataset),
         failures(dataset),
     ]

@@ -76,8 +76,7 @@ def _drawing(dataset: xarray.Dataset) -> str:
     """The hits, orange where a core passed, blue where it stopped and black where the computation failed."""
     if attr.PLATE_PERIOD not in dataset.attrs:
         return ""
-    needed = [name for name in (v.STATUS, v.BURST_ORDER) if name in dataset]
-    first_hits = dataset[needed].isel(hit=slice(_MOST_HITS)).load()
+    first_hits = dataset[[v.STATUS]].isel(hit=slice(_MOST_HITS)).load()
     hits, status, came = hit_points(first_hits), first_hits[v.STATUS].values, passed(first_hits)
     half = np.maximum(0.5 * np.asarray(dataset.attrs[attr.PLATE_PERIOD]), np.abs(hits).max(axis=0))
     holes = outlines(dataset)

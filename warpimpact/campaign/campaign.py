@@ -14,8 +14,6 @@ from ..results.kinds import CAMPAIGN
 from ..results.measures import Measure
 from ..scene import (
     AnyCore,
-    Burst,
-    BurstSampler,
     Hits,
     Impact,
     Interaction,
@@ -85,7 +83,6 @@ class Campaign(Model):
         interaction: stress on the surface of the core.
         numerics: how finely the shots are computed.
         output: what is reported.
-        burst: several shots at one plate, one after another; hits are then their aims.
         scatter: distributions of values that scatter. A file has them in the places of the values.
         catalogue: TOML file with threats and materials of your own, tables `[[threat]]` and `[[material]]`.
         stop: when the run ends, instead of a count. By default, its hits are then those of the irreducible part of the
@@ -108,7 +105,6 @@ class Campaign(Model):
     scatter: Scatter = Scatter()
     catalogue: InputFile | None = None
     stop: Stop | None = None
-    burst: Burst | None = None
     allow_implausible: Annotated[bool, Field(strict=True)] = False
     continuum: FiniteElements = FiniteElements()
     published: Annotated[tuple[Published, ...], Field(fail_fast=True, max_length=1000)] = ()
@@ -202,9 +198,6 @@ class Campaign(Model):
     def sampler(self) -> Sampler:
         """The sampler of its shots."""
         sampled = (self.impact, self.hits, self.plate, self.scatter, self.replicates)
-        if self.burst is not None:
-            given: dict[str, Any] = {"scatter": self.scatter, "replicates": self.replicates}
-            return BurstSampler(self.impact, self.hits, self.plate, self.burst, **given)
         return Sampler(*sampled)
 
     def lacking(self, measure: Measure) -> str:
@@ -217,11 +210,6 @@ class Campaign(Model):
             bending=self.output.bending,
             breakable=breakable,
         )
-
-    @property
-    def at_a_plate(self) -> int:
-        """Number of shots at one plate."""
-        return 1 if self.burst is None else self.burst.count
 
     @model_validator(mode="after")
     def _is_plausible(self) -> Self:  # first, as a slip of units breaks other rules, too
@@ -246,7 +234,7 @@ class Campaign(Model):
         (tests/benchmarks/NOTES.md)."""
         hits = self.hits
         chosen = "irreducible" in hits.model_fields_set or hits.area != "cell" or hits.file is not None
-        if self.stop is None or self.burst is not None or chosen or any(unsymmetric(self.scatter, self.layer).values()):
+        if self.stop is None or chosen or any(unsymmetric(self.scatter, self.layer).values()):
             return self  # without symmetry every hit is computed
         part = hits.model_copy(update={"irreducible": hits.sampling in ("sobol", "random")})
         object.__setattr__(self, "hits", part)
@@ -264,7 +252,6 @@ class Campaign(Model):
                 exclusions.ONE_SCRAMBLING: hits.sampling == "sobol" and self.replicates == 1,
                 exclusions.IRREDUCIBLE: hits.irreducible,
                 exclusions.LISTED_STRENGTH: "strength" in (hits.listed or {}),
-                exclusions.BURST: self.burst is not None,
                 exclusions.LAYERS: bool(self.layer),
                 exclusions.LAYER_STANDOFFS: bool(self.output.layer_standoffs),
                 exclusions.BENDING: self.output.bending,
@@ -300,7 +287,6 @@ class Campaign(Model):
             farthest = 0.5 * max(covered)
         else:
             farthest = max(float(np.abs(listed[name]).max()) for name in ("hit_y", "hit_z"))
-        farthest += 0.0 if self.burst is None else self.burst.reach
         # Cells of the plate have 32-bit numbers, counted from the origin.
         cell = min(self.plate.degradation_length / 25.0, (self.numerics.grid_spacing or math.inf) / 5.0)
         allowed = min(FARTHEST_HIT, 2**30 * cell)

@@ -5,6 +5,7 @@ from typing import Any
 
 REMOVED_KEYS: dict[str, str] = {
     "assumptions": "run warpimpact sensitivity CAMPAIGN.toml",
+    "burst": "cracks and bulges decide several hits on one plate, and the model lacks them; compute single hits",
     "posterior": "use hits.file with the CSV file that `warpimpact identify` writes",
     "plate.pattern.shape = supershape": 'use shape = "slot", which protects no worse, or shape = "polygons"',
     "plate.pattern.shape = level_set": 'use shape = "slot", which protects no worse, or shape = "polygons"',

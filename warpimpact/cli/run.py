@@ -42,12 +42,10 @@ def add_run(commands: Commands) -> None:
 
 
 def _run(arguments: argparse.Namespace) -> int:
-    from warpimpact.analysis.bursts import bursts, orders_view
     from warpimpact.analysis.evidence_lines import evidence_lines
     from warpimpact.analysis.summary import promise_text, summary_text, symmetry_text
     from warpimpact.campaign.campaign import Campaign
     from warpimpact.results.netcdf import open_table
-    from warpimpact.view.view import text_of
 
     campaign = Campaign.from_toml(arguments.campaign, count=arguments.count)
     output = arguments.output or Path(arguments.campaign.stem + ".nc")
@@ -55,8 +53,6 @@ def _run(arguments: argparse.Namespace) -> int:
     run_shown(campaign, output, arguments)
     with open_table(output) as dataset:
         print(summary_text(dataset))
-        if attr.BURST in dataset.attrs:
-            print(text_of([orders_view(bursts(dataset))]))
         if attr.SYMMETRIES in dataset.attrs:
             print(symmetry_text(dataset))
         if (promise := promise_text(dataset)) is not None:

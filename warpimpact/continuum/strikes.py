@@ -74,8 +74,6 @@ def check_continuum(scene: Scene, shots: Shots, continuum: Continuum) -> None:
     """
     if scene.record.bending:
         raise ValueError("the continuum has no bending moment of its rigid core; leave out output.bending")
-    if shots.at_a_plate > 1:
-        raise ValueError("the continuum computes every shot at a target of its own; leave out [burst]")
     if len(continuum.flows) > len(scene.target.layers):
         raise ValueError(f"got {len(continuum.flows)} materials, but the target has {len(scene.target.layers)} layers")
 

@@ -228,7 +228,7 @@ def work(campaign: Campaign, numerics: Numerics | None = None) -> float:
     """
     sampler = campaign.sampler()
     try:
-        first = prepare(campaign.scene, sampler.shots(0, campaign.at_a_plate), numerics or campaign.numerics)
+        first = prepare(campaign.scene, sampler.shots(0, 1), numerics or campaign.numerics)
         return first.seconds * len(sampler)
     except (ValueError, TooManySteps, MemoryError):
         return math.inf
@@ -264,12 +264,11 @@ def _of_few_hits(design: ValidDesign, most: int, *, irreducible: bool = False) -
     """Tables of a design with at most this number of hits, without a stop rule. A list keeps the hits
     of its file."""
     tables = {key: value for key, value in design.tables.items() if key != "stop"}
-    count, together = design.campaign.hits.count, design.campaign.at_a_plate
+    count = design.campaign.hits.count
     if count is None:
         return tables
-    few = max(together, min(most, count) // together * together)
     part = {"irreducible": True} if irreducible else {}
-    return tables | {"hits": dict(design.tables.get("hits", {})) | {"count": few} | part}
+    return tables | {"hits": dict(design.tables.get("hits", {})) | {"count": min(most, count)} | part}
 
 
 def stage_of(shelf: Shelf, design: ValidDesign, level: int, name: str) -> ValidDesign:

@@ -135,8 +135,8 @@ def check_directions(campaign: Campaign) -> None:
     Raises:
         CampaignError: the message gives the reason.
     """
-    if campaign.burst is not None or campaign.stop is not None:
-        raise CampaignError("directions cannot be combined with burst or stop")
+    if campaign.stop is not None:
+        raise CampaignError("directions cannot be combined with stop")
     if campaign.hits.sampling not in ("sobol", "random") or campaign.hits.irreducible:
         raise CampaignError('directions need hits.sampling = "sobol" or "random", without irreducible')
     if campaign.impact.obliquity > 0.0 or {("obliquity", 0), ("azimuth", 0)} & {*campaign.scatter.given}:

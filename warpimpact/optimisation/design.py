@@ -215,9 +215,8 @@ def design_from(text: str, name: str, folder: Path) -> Design:
     """Read a design from its text; `name` is the name of the file in errors."""
     data = parsed(text, name, DESIGN)
     asking_tables = {key: data.pop(key) for key in OWN_TABLES if key in data}
-    for table in ("stop", "burst"):
-        if table in data:
-            raise CampaignError(f"{name}: {table}: a design file takes no [{table}]; [search] sets the hits")
+    if "stop" in data:
+        raise CampaignError(f"{name}: stop: a design file takes no [stop]; [search] sets the hits")
     space = read_space(asking_tables.pop("variables", {}), name)
     try:
         asking = Asking.model_validate(asking_tables)
@@ -264,7 +263,7 @@ def asking_schema() -> dict[str, Any]:
 def design_schema() -> dict[str, Any]:
     """The JSON schema (2020-12) of a design file, with the meaning, the default and the bounds of every key."""
     campaign, asking = campaign_schema(), asking_schema()
-    left_out = ("stop", "burst", "sweep", "published")
+    left_out = ("stop", "sweep", "published")
     return campaign | {
         "title": "warpimpact design",
         "description": "A search for designs: a campaign, what is free in it, and what is sought.",

@@ -6,7 +6,6 @@ analysis and the rooms below it, but neither export nor report. Text in figures 
 
 import matplotlib as mpl
 
-from warpimpact.plotting.bursts import bursts_figure
 from warpimpact.plotting.comparison import comparison_figure
 from warpimpact.plotting.distribution import dispersion, marginals, probability_map, uncertainty
 from warpimpact.plotting.limit import limit_figure
@@ -28,7 +27,6 @@ mpl.rcParams["text.usetex"] = False  # a matplotlibrc may ask for it, and titles
 mpl.rcParams["text.parse_math"] = False  # a title is text: "$" is a character of it, and broken mathtext an error
 
 __all__ = [
-    "bursts_figure",
     "comparison_figure",
     "course",
     "dispersion",

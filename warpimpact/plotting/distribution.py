@@ -153,8 +153,8 @@ def is_uncertain(dataset: xarray.Dataset) -> bool:
 
 
 def shots_scatter(dataset: xarray.Dataset) -> bool:
-    """Whether shots differ in more than their hit point: in their conditions, or in earlier hits."""
-    return v.BURST_ORDER in dataset or any(np.ptp(dataset[name].values) > 0.0 for name in v.shot_variables(dataset))
+    """Whether shots differ in more than their hit point."""
+    return any(np.ptp(dataset[name].values) > 0.0 for name in v.shot_variables(dataset))
 
 
 def probability_map(dataset: xarray.Dataset, quantity: str) -> Figure:

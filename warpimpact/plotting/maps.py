@@ -10,8 +10,7 @@ import numpy as np
 import xarray
 from matplotlib.figure import Figure
 
-from warpimpact.analysis.hit_map import is_folded, mirrored
-from warpimpact.plotting.bursts import bursts_figure
+from warpimpact.analysis.hit_map import mirrored
 from warpimpact.plotting.cell import Shown, draw_status, draw_values, limits, scale_of, shots_text, shown, words
 from warpimpact.plotting.distribution import (
     dispersion,
@@ -181,8 +180,6 @@ def save_maps(dataset: xarray.Dataset, folder: Path, stem: str, *, overwrite: bo
         figures["uncertainty"] = uncertainty(dataset, v.RESIDUAL_VELOCITY)
     if v.LAYER_STATUS in dataset:
         figures["layers"] = layers_figure(dataset)
-    if v.BURST_ORDER in dataset:
-        figures["bursts"] = bursts_figure(dataset)
     return _saved(figures, folder, stem, overwrite=overwrite)
 
 
@@ -213,8 +210,7 @@ def _saved(figures: Mapping[str, Figure], folder: Path, stem: str, *, overwrite:
 
 def _sheet_of_one(dataset: xarray.Dataset, *, maps: int, columns: int, note: str = "") -> tuple[Figure, list[Axes]]:
     """A sheet for several maps of one result, with title and note."""
-    folded = "; all hits of the bursts, folded into the cell" if is_folded(dataset) else ""
-    notes = f"{shots_text(dataset)}; seen from behind the plate{note}{folded}", *names(dataset)
+    notes = f"{shots_text(dataset)}; seen from behind the plate{note}", *names(dataset)
     return _sheet([dataset] * maps, columns, str(dataset.attrs.get(attr.TITLE, "")), notes)
 
 

@@ -97,9 +97,6 @@ COUNT = _declared("count", "count")
 REPLICATES = _declared("replicates", "count")
 SYMMETRIES = _declared("symmetries")
 """Symmetries that give the rest of the cell from its hits, separated by "; "; only with `hits.irreducible`."""
-BURST = _declared("burst", "table")
-"""JSON of the burst. This and the next attributes are present only for a campaign of bursts."""
-SHOTS_AT_A_PLATE = _declared("shots_at_a_plate", "count")
 
 # Core, plate and output
 CORE = _declared("core", "table", _SI)

@@ -112,7 +112,7 @@ def _values(scene: Scene, shots: Shots, outcomes: Outcomes) -> dict[str, Any]:
     """Conditions, outcomes and faces of the layers by their names in a result, SI and radians."""
     conditions: dict[str, Any] = {variable: getattr(shots, variable.field) for variable in v.SHOT_VARIABLES}
     columns = own_columns(scene.target, shots)
-    conditions |= {name: columns[name] for name in v.OPTIONAL_SHOT_VARIABLES if name in columns}
+    conditions |= {name: columns[name] for name in v.SCATTER_VARIABLES if name in columns}
     return conditions | vars(outcomes) | faces(scene.target)
 
 
@@ -271,8 +271,3 @@ def passed(dataset: Result) -> NDArray[np.bool_]:
 def failed(dataset: Result) -> NDArray[np.bool_]:
     """Whether the computation of each shot failed, shape (hit,)."""
     return failures(dataset[v.STATUS].values)
-
-
-def shots_at_a_plate(dataset: Result) -> int:
-    """Number of consecutive hits on one plate; 1 without bursts."""
-    return int(dataset.attrs.get(attr.SHOTS_AT_A_PLATE, 1))

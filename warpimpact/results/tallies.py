@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Unpack
 import numpy as np
 
 from warpimpact.results import attributes as attr
-from warpimpact.results.dataset import is_choice, shots_at_a_plate
+from warpimpact.results.dataset import is_choice
 from warpimpact.results.measures import Measure
 from warpimpact.results.per_hit import Array
 from warpimpact.statistics.intervals import Dealing, Dealt, Estimate, Estimating, estimate_of
@@ -83,8 +83,5 @@ def shift_of(measure: Measure, levels: tuple[Result, Result] | None, confidence:
 
 
 def dealing(dataset: Result) -> Dealing:
-    """Arguments of `Dealt` for the sampling of a result. The shots at one plate count as one. Chosen hits are no longer
-    in the order of the replicates."""
-    if is_choice(dataset):
-        return {"replicates": 1, "images": 1}
-    return {"replicates": int(dataset.attrs.get(attr.REPLICATES, 1)), "images": shots_at_a_plate(dataset)}
+    """Arguments of `Dealt` for the sampling of a result. Chosen hits are no longer in the order of the replicates."""
+    return {"replicates": 1 if is_choice(dataset) else int(dataset.attrs.get(attr.REPLICATES, 1)), "images": 1}

@@ -52,15 +52,6 @@ SCATTER_VARIABLES = (*_OF_THE_SCENE, *LAYER_SCATTER)
 EDGE_DISTANCE = Variable("edge_distance", HITS, "m", "from the nearest edge of hole or plate; negative in a hole")
 OF_THE_HIT_POINT = (EDGE_DISTANCE,)
 
-# --- Bursts ---
-SAMPLE = Variable("sample", HITS, "1", "number of the plate that the shot hits")
-BURST_ORDER = Variable("burst_order", HITS, "1", "number of hits on that plate before")
-NEAREST_EARLIER_HIT = Variable("nearest_earlier_hit", HITS, "m", "distance from the nearest earlier hit on that plate")
-
-BURST_VARIABLES = (SAMPLE, BURST_ORDER, NEAREST_EARLIER_HIT)
-"""Present only in a campaign of bursts."""
-OPTIONAL_SHOT_VARIABLES = (*SCATTER_VARIABLES, *BURST_VARIABLES)
-
 
 def _beside(variable: Variable, kind: str, along: str, what: str) -> Variable:
     """A variable of shots other than the hits, along a dimension of their own."""
@@ -219,8 +210,8 @@ def shown_by(command: str) -> tuple[Variable, ...]:
 
 
 def shot_variables(dataset: xarray.Dataset) -> list[Variable]:
-    """Names of the variables of the impact, of plate and core where they differ, and of bursts; no hit points."""
-    return [*SHOT_VARIABLES, *(name for name in (*SCATTER_VARIABLES, *BURST_VARIABLES) if name in dataset)]
+    """Names of the variables of the impact, of plate and core where they differ; no hit points."""
+    return [*SHOT_VARIABLES, *(name for name in SCATTER_VARIABLES if name in dataset)]
 
 
 def outcome_variables(dataset: xarray.Dataset) -> list[Variable]:
@@ -237,4 +228,4 @@ def hit_variables() -> tuple[Variable, ...]:
     """All variables that a map of hits may have beside its coordinates, in the order of a file."""
     always, *others = registry.RECORDS
     optional = (variable for group in others for variable in (*group, *group.beside))
-    return tuple(dict.fromkeys((*SHOT_VARIABLES, EDGE_DISTANCE, *always, *OPTIONAL_SHOT_VARIABLES, *optional)))
+    return tuple(dict.fromkeys((*SHOT_VARIABLES, EDGE_DISTANCE, *always, *SCATTER_VARIABLES, *optional)))

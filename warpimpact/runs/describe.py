@@ -148,9 +148,6 @@ def _campaign(campaign: Campaign) -> dict[str, Any]:
         solid = solid_target(campaign).add_on
         attributes[attr.SOLID_ADD_ON] = json.dumps([plate.model_dump(mode="json") for plate in solid])
     attributes |= {attr.LIGAMENT: ligament} if math.isfinite(ligament) else {}
-    if campaign.burst is not None:
-        attributes[attr.BURST] = campaign.burst.model_dump_json(exclude_none=True)
-        attributes[attr.SHOTS_AT_A_PLATE] = campaign.burst.count
     return attributes
 
 

@@ -67,7 +67,7 @@ def continuum_to_file(
         "continuum": json.loads(solver.model_dump_json()),
         "numbers": hits and list(hits),
     }
-    check_continuum(campaign.scene, campaign.sampler().shots(0, campaign.at_a_plate), solver)
+    check_continuum(campaign.scene, campaign.sampler().shots(0, 1), solver)
     with stored(output, content, "continuum", resume=resume, overwrite=overwrite, tell=tell) as store:
         if store is None:
             return

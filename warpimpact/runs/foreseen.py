@@ -11,8 +11,7 @@ from warpimpact.scene import Numerics
 from warpimpact.solver.prepare import prepare
 
 SLOW, SLOW_BEFORE = 1.0, 5.0
-"""Seconds of a core above which the cost is announced: of a hit or a whole burst, and of what comes before the first
-hit."""
+"""Seconds of a core above which the cost is announced: of a hit, and of what comes before the first hit."""
 LARGE = 2**30
 """Bytes of the windows of a hit above which they are announced. Each thread has its own."""
 
@@ -22,8 +21,8 @@ class Costly(UserWarning):
 
 
 def cost_warning(campaign: Campaign, device: str, passages: int = 1) -> Callable[[Numerics], None]:
-    """Return a function that warns (`Costly`), once for each numerics, of hits or bursts that are slow on a CPU. It
-    raises what `prepare` does: TooManySteps, MemoryError."""
+    """Return a function that warns (`Costly`), once for each numerics, of hits that are slow on a CPU. It raises what
+    `prepare` does: TooManySteps, MemoryError."""
 
     @cache
     def warn(numerics: Numerics) -> None:
@@ -37,10 +36,10 @@ def cost_of(campaign: Campaign, numerics: Numerics, passages: int = 1) -> str | 
     """A sentence about the cost of hits on a CPU, with numerics that fix the resolution; None where it is low. An
     unhindered first hit of the campaign stands for all."""
     sampler = campaign.sampler()
-    prepared = prepare(campaign.scene, sampler.shots(0, campaign.at_a_plate), numerics)
+    prepared = prepare(campaign.scene, sampler.shots(0, 1), numerics)
     seconds, hits = passages * prepared.seconds, len(sampler)
     level = "" if numerics.level is None else f"at level {numerics.level} "
-    if seconds * campaign.at_a_plate < SLOW and prepared.window_bytes < LARGE:
+    if seconds < SLOW and prepared.window_bytes < LARGE:
         before, size = (sum(getattr(tile, name) for tile in prepared.tiles) for name in ("seconds", "bytes"))
         return (
             f"{level}the holes of the plates take about {before:.2g} s of a core and {size / 2**30:.2g} GiB before the "

@@ -39,9 +39,7 @@ def solid_shots(campaign: Campaign, shots: Shots, most: int) -> Shots | None:
     conditions = [values for name, values in shots.columns.items() if name not in elsewhere]
     unbounded = all(layer == layer.solid and layer.size is None for layer in campaign.target.solid.layers)
     alike = unbounded and not any(np.nan_to_num(np.ptp(values, axis=0)).any() for values in conditions)
-    if alike and campaign.burst is None:
-        return shots[:1]
-    return shots[: max(1, most // campaign.at_a_plate) * campaign.at_a_plate]
+    return shots[: 1 if alike else max(1, most)]
 
 
 def ranges(shards: Shards, shots: Callable[[], int]) -> Iterator[range]:

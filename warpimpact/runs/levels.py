@@ -9,7 +9,6 @@ import numpy as np
 from warpimpact.campaign.campaign import Campaign
 from warpimpact.campaign.stop import Stop
 from warpimpact.records.outcomes import Outcomes
-from warpimpact.results import attributes as attr
 from warpimpact.results.dataset import to_table
 from warpimpact.results.measures import Measure
 from warpimpact.results.table import HitTable
@@ -106,6 +105,5 @@ def _last_tilts(campaign: Campaign) -> list[str]:
 
 def _table(campaign: Campaign, shots: Shots, outcomes: Outcomes) -> HitTable:
     """A result of a pilot's shots and their outcomes."""
-    together = {attr.SHOTS_AT_A_PLATE: campaign.at_a_plate} if campaign.at_a_plate > 1 else {}
     period = campaign.hits.covered(campaign.plate)
-    return to_table(campaign.scene, shots, outcomes, period=period, attributes=together)
+    return to_table(campaign.scene, shots, outcomes, period=period, attributes={})

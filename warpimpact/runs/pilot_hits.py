@@ -11,17 +11,14 @@ from warpimpact.scene import Shots
 from warpimpact.solver.pilot import pilot_size
 from warpimpact.solver.simulate import spread_places
 
-_FEWEST_BURSTS = 8
-"""Fewest bursts of a pilot, however many shots they have."""
 _MOST_OF_LAYERS = 1024
 """Most shots of a pilot at several layers."""
 
 
 def pilot_shots(campaign: Campaign, most: int) -> tuple[Shots, NDArray[np.int64]]:
-    """Some hits of a campaign (of bursts, whole ones), and their numbers."""
-    at_a_plate = campaign.at_a_plate
-    places = places_of(campaign, most if at_a_plate == 1 else max(-(-most // at_a_plate), _FEWEST_BURSTS))
-    return shots_at(campaign, places), hits_at(campaign, places)
+    """Some hits of a campaign, and their numbers."""
+    places = places_of(campaign, most)
+    return shots_at(campaign, places), places
 
 
 def pilot_most(campaign: Campaign) -> int:
@@ -33,24 +30,19 @@ def pilot_most(campaign: Campaign) -> int:
 
 
 def places_of(campaign: Campaign, most: int) -> NDArray[np.int64]:
-    """Numbers of at most so many hits, or bursts, that stand for all of them.
+    """Numbers of at most so many hits that stand for all of them.
 
     They depend on the campaign alone: the first ones of a Sobol or random sampling, or ones at even distances of a grid
     or list.
     """
-    targets = len(campaign.sampler()) // campaign.at_a_plate
-    count = min(most, targets)
-    return np.arange(count) if campaign.hits.sampling in ("sobol", "random") else spread_places(targets, count)
-
-
-def hits_at(campaign: Campaign, places: NDArray[np.int64]) -> NDArray[np.int64]:
-    """Numbers of the hits at places."""
-    return (places[:, None] * campaign.at_a_plate + np.arange(campaign.at_a_plate)).reshape(-1)
+    hits = len(campaign.sampler())
+    count = min(most, hits)
+    return np.arange(count) if campaign.hits.sampling in ("sobol", "random") else spread_places(hits, count)
 
 
 def shots_at(campaign: Campaign, places: NDArray[np.int64]) -> Shots:
-    """The shots at places. Bursts are whole, because a later hit meets what the earlier ones left."""
-    sampler, group = campaign.sampler(), campaign.at_a_plate
+    """The shots of these numbers."""
+    sampler = campaign.sampler()
     if campaign.hits.sampling in ("sobol", "random"):
-        return sampler.shots(0, len(places) * group)
-    return Shots.joined([sampler.shots(int(place) * group, group) for place in places])
+        return sampler.shots(0, len(places))
+    return Shots.joined([sampler.shots(int(place), 1) for place in places])

@@ -28,8 +28,6 @@ DEVICE_ROUNDING = {v.RESIDUAL_VELOCITY: 0.1, v.DEFLECTION: 0.5, v.TILT: 0.5}
 6144 hits on the slotted plate (825, 300 and 200 m/s) differ by at most 0.012 m/s and 0.04 degrees."""
 _OF_A_MAP = (
     *(attr.COUNT, attr.COMPUTE_TIME, attr.CONTINUUM, attr.HITS_PER_SECOND),
-    attr.SHOTS_AT_A_PLATE,
-    attr.BURST,
     *v.OUTLINE_VARIABLES,
 )
 
@@ -61,8 +59,8 @@ def replay(result: xarray.Dataset, hit: int, *, folder: str | Path = ".", snapsh
     sampler = campaign.sampler()
     if hit >= len(sampler):
         raise ResultError(f"hit: got {hit}, but the campaign and the files it names give only {len(sampler)} hits")
-    scene, before = campaign.scene, hit % campaign.at_a_plate  # every earlier hit of its burst, too
-    computed = _at_their_limit(scene, sampler.shots(hit - before, 1 + before), result, place)
+    scene = campaign.scene
+    computed = _at_their_limit(scene, sampler.shots(hit, 1), result, place)
     if attr.CONTINUUM in result.attrs:
         settings = json.loads(result.attrs[attr.CONTINUUM])
         continuum = Continuum.model_validate({name: value for name, value in settings.items() if name != "materials"})

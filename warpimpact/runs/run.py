@@ -56,7 +56,7 @@ def run(
     campaign = _read(campaign)
     total = len(campaign.sampler())
     with executor_for(device, cancel=cancel) as executor, followed(progress) as follow:
-        shards = Shards(total, extent(total, campaign.at_a_plate))
+        shards = Shards(total, extent(total))
         end = _fill(campaign, HIT_MAP, shards, executor, follow)
     table = joined(shards.shard(index) for index in range(end.shards))
     return in_memory(table.assign_attrs(_attributes(table, end)).to_xarray())

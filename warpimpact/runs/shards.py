@@ -35,18 +35,16 @@ HELD = 1.0
 """Seconds for which a few shards may be held in memory before they are written. A run shorter than this writes none."""
 
 
-def extent(count: int, at_a_plate: int = 1) -> int:
-    """Shots per shard of a campaign of `count` shots, `at_a_plate` of which hit each plate: a power of two plates. It
-    depends on the campaign alone."""
-    shots = min(MOST, max(FEWEST, 1 << (count // SHARDS).bit_length()))
-    return at_a_plate << max(0, (shots // at_a_plate).bit_length() - 1)
+def extent(count: int) -> int:
+    """Shots per shard of a campaign of `count` shots: a power of two. It depends on the campaign alone."""
+    return min(MOST, max(FEWEST, 1 << (count // SHARDS).bit_length()))
 
 
 def manifest(campaign: Campaign, made_by: Mapping[str, str]) -> dict[str, Any]:
     """What determines every bit of a result: the campaign with the contents of its files, versions and kind of
     device."""
     contents = json.loads(json.dumps(campaign.model_dump(), default=digest))
-    dealt = {"replicates": campaign.replicates, "extent": extent(len(campaign.sampler()), campaign.at_a_plate)}
+    dealt = {"replicates": campaign.replicates, "extent": extent(len(campaign.sampler()))}
     return {"campaign": contents, **dealt, **made_by}
 
 

@@ -4,7 +4,6 @@ Change cores, plates, patterns, shots and their scatter here; a message says wha
 imports view for drawings, and no other room: neither a kernel nor a Dataset.
 """
 
-from .burst import Burst, BurstSampler
 from .core import AnyCore, ConeCore, Core, MassProperties, OgiveCore, PolynomialCore, ProfileCore
 from .interaction import FreeSurface, Interaction
 from .numerics import PRESETS, Accuracy, Coarser, Numerics

@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from typing import NamedTuple
 
-BURST, LAYERS, STOP = "[burst]", "[[layer]]", "[stop]"
+LAYERS, STOP = "[[layer]]", "[stop]"
 IRREDUCIBLE = "hits.irreducible = true"
 NODAL = 'numerics.scheme = "nodal"'
 BLOCK = 'numerics.layout = "block"'
@@ -23,7 +23,6 @@ WHOLE_PLATE, SIZE, MARGIN = 'hits.area = "plate"', "size of the plate", "margin"
 BY_TIME, STAGGERED, HOLES = "plate.degradation_interval", "staggered", "holes"
 POLYGONS = 'shape = "polygons"'
 THICKNESS, AREAL_DENSITY = "thickness", "areal_density"
-SPACING, OFFSETS, HIT_SCATTER = "burst.spacing", "burst.offsets", "burst.scatter"
 FREE_SURFACE = "interaction.free_surface"
 LIMIT_COMMAND = "warpimpact limit"
 
@@ -38,12 +37,7 @@ class Rule(NamedTuple):
 
 _BY_BLOCK = "a block computes the consistent scheme in single precision, without the bending moment"
 EXCLUDED = (
-    Rule(BURST, IRREDUCIBLE, "the hits of a burst have no mirror images"),
-    Rule(BURST, NODAL, "the nodal scheme does not know earlier hits"),
-    Rule(SPACING, OFFSETS, "each says how the hits of a burst lie"),
-    Rule(SPACING, HIT_SCATTER, "each says how the hits of a burst lie"),
     Rule(LIMIT_COMMAND, STOP, "limits are searched for every hit; leave out the table [stop]"),
-    Rule(LIMIT_COMMAND, BURST, "limits are searched for every hit alone; leave out the table [burst]"),
     Rule(BY_TIME, BY_PATH, "exposure counts either time or path"),
     Rule(THICKNESS, AREAL_DENSITY, "with the holes each gives the other"),
     Rule(STAGGERED, HOLES, "it stands for two holes; list all holes of the cell"),
@@ -53,7 +47,6 @@ EXCLUDED = (
     Rule(BENDING, NODAL, "the nodal scheme has no bending moment"),
     Rule(DEEP, NODAL, "the nodal scheme weakens the whole thickness at once, so the depth must be no less"),
     Rule(FREE_SURFACE, NODAL, "the nodal scheme has the same stress everywhere"),
-    Rule(FREE_SURFACE, BURST, "it does not know the channels of earlier hits"),
     Rule(BENDING, MASS_PROPERTIES, "it needs the mass of every slice, which follows from the shape alone"),
     *(Rule(BLOCK, other, _BY_BLOCK) for other in (NODAL, DOUBLE, BENDING)),
     Rule(IRREDUCIBLE, TURNED, "a symmetry holds for every shot; of the impact, only velocity may scatter"),

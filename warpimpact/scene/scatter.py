@@ -20,7 +20,7 @@ from pydantic import (
 from .distributions import EDGE, PURE_NUMBERS, AnyDistribution, Distribution
 from .model import Model
 from .quantities import LISTED, QUANTITIES, SCATTERED, Quantity
-from .shots import OF_A_SHOT, Shots
+from .shots import Shots
 from .units import Radians, in_radians, quantity
 
 
@@ -155,4 +155,4 @@ def _read(read: Any, name: str, value: Any) -> Any:
 
 
 assert set(SCATTERED) == set(Scatter.model_fields)
-assert {*LISTED, *SCATTERED, *OF_A_SHOT} == set(Shots.__dataclass_fields__)
+assert {*LISTED, *SCATTERED} == set(Shots.__dataclass_fields__)

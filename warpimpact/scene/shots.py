@@ -23,8 +23,6 @@ FARTHEST_HIT = 100.0
 _REPLICATES = 16
 """Default number of scramblings. It does not depend on the count, so a larger count keeps the earlier shots. Student's
 interval over 16 means is 9 % wider than over infinitely many."""
-OF_A_SHOT = ("sample", "burst_order", "nearest_earlier_hit")
-"""Columns of shots that share their plates; no campaign gives their values."""
 EXPORTED = {quantity.column: name for name, quantity in QUANTITIES.items() if quantity.column is not None}
 """Name of a column in an exported result → its name in a list of hits."""
 
@@ -181,10 +179,6 @@ class Shots:
         resistance [Pa], shear_coefficient, degradation, thickness [m], offset_y, offset_z [m]: of the layers, shape
             [shots, layers]; NaN where a layer has the value of the scene, None if all layers have. Layers beyond the
             columns have the value of the scene. An array of shape [shots] is that of the plate.
-        sample: number of the plate that a shot hits; shots at one plate are consecutive. None if every shot hits a new
-            plate.
-        burst_order: number of earlier shots at that plate.
-        nearest_earlier_hit: distance from the nearest earlier hit on that plate [m]; NaN for the first one.
     """
 
     hit_y: Array
@@ -209,9 +203,6 @@ class Shots:
     linear: Array | None = None
     quadratic: Array | None = None
     onset: Array | None = None
-    sample: NDArray[np.int64] | None = None
-    burst_order: NDArray[np.int64] | None = None
-    nearest_earlier_hit: Array | None = None
 
     def __post_init__(self) -> None:
         """Make arrays of the plate alone columns of layer 0."""
@@ -231,21 +222,6 @@ class Shots:
     def columns(self) -> dict[str, NDArray[Any]]:
         """The arrays by name. Arrays that are None are left out."""
         return {f.name: values for f in fields(self) if (values := getattr(self, f.name)) is not None}
-
-    @property
-    def at_a_plate(self) -> int:
-        """Number of consecutive shots at one plate.
-
-        Raises:
-            ValueError: the shots at a plate are incomplete or not in order.
-        """
-        if self.sample is None or self.burst_order is None or not len(self):
-            return 1
-        count = int(self.burst_order.max()) + 1
-        plates, rest = divmod(len(self), count)
-        if rest or not np.array_equal(self.burst_order, np.tile(np.arange(count), plates)):
-            raise ValueError(f"got {len(self)} shots of bursts of {count}, but they must be whole bursts in order")
-        return count
 
     def own(self, name: str, otherwise: float) -> Array:
         """A quantity of every shot, shape [shots], or the value of the scene, shape [1]."""

@@ -69,7 +69,7 @@ def compared(
     relative = _relative(accuracy) if layered else (0.0, 0.0)
 
     def upper(**how: Any) -> Array:
-        usual: dict[str, Any] = {"at_a_plate": shots.at_a_plate, "share": accuracy.share, "free": free}
+        usual: dict[str, Any] = {"share": accuracy.share, "free": free}
         change = upper_errors(coarse, fine, **usual | how)
         of_fine = change if coarse is between else upper_errors(between, fine, **usual | how)
         return change + (margin - 1.0) * of_fine
@@ -106,7 +106,6 @@ def _excess(accuracy: Accuracy, errors: Array, layered: bool) -> float:
 def upper_errors(
     coarse: Outcomes,
     fine: Outcomes,
-    at_a_plate: int,
     share: float,
     impact: Array | None = None,
     relative: tuple[float, float] = (0.0, 0.0),
@@ -115,45 +114,13 @@ def upper_errors(
 ) -> Array:
     """Upper bounds, at this risk, of the changes of residual velocity [m/s], last tilt [rad] and depth [m] of a share
     of the shots; NaN where no shot has the quantity. The other arguments are those of `changes`."""
-    plates = np.arange(len(fine)) // at_a_plate
     known = [(errors, ~np.isnan(errors)) for errors in changes(coarse, fine, impact, relative, free)]
-    return np.array([upper_error(x[has], share, plates[has], risk) if has.any() else math.nan for x, has in known])
+    return np.array([upper_error(x[has], share, risk) if has.any() else math.nan for x, has in known])
 
 
-def upper_error(errors: Array, share: float, plates: NDArray[np.intp] | None = None, risk: float = RISK) -> float:
-    """Upper bound, at this risk, of the errors of a share of the shots.
-
-    Args:
-        errors: shape [shots].
-        plates: number of the plate that each shot hits, shape [shots]; None if each has its own. Shots at one plate
-            count as one as far as their errors agree.
-    """
-    ordered, count = np.sort(errors), float(len(errors))
-    if plates is not None:
-        beyond = errors > ordered[math.ceil(share * len(errors)) - 1]
-        count /= design_effect(beyond.astype(np.float64), plates)
-    counted = max(1, math.floor(count + 1e-9))
-    return float(ordered[math.ceil(len(errors) * upper_place(counted, share, risk) / counted) - 1])
-
-
-def design_effect(values: Array, groups: NDArray[np.intp]) -> float:
-    """Number of grouped values that determine the mean as well as one independent value (design effect; Kish, Survey
-    Sampling, 1965): the variance of the mean from the sums of groups over that from single values, plus one standard
-    error, because there may be few groups; clipped to 1 … mean size of a group.
-
-    Args:
-        values, groups: values and the number of the group of each, shape [values].
-    """
-    sums = np.bincount(groups, values - values.mean())
-    sizes = np.bincount(groups)
-    sums, sizes = sums[sizes > 0], sizes[sizes > 0]
-    size, number = float(sizes.mean()), len(sizes)
-    if size == 1.0 or number == 1:
-        return size
-    squares = float(np.square(values - values.mean()).sum())
-    effect = float(np.square(sums).sum()) / squares * number / (number - 1) if squares > 0.0 else 1.0
-    doubt = math.sqrt(2.0 * (size - 1.0) / (size * (number - 1)))
-    return min(max(1.0, effect + doubt), size)
+def upper_error(errors: Array, share: float, risk: float = RISK) -> float:
+    """Upper bound, at this risk, of the errors of a share of the shots, shape [shots]."""
+    return float(np.sort(errors)[upper_place(len(errors), share, risk) - 1])
 
 
 def upper_place(count: int, share: float, risk: float = RISK) -> int:

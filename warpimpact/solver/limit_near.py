@@ -6,7 +6,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpimpact.scene import IDENTITY, Scene, Shots, Symmetry
-from warpimpact.scene.shots import OF_A_SHOT
 from warpimpact.scene.symmetry import SYMMETRIES, of_plate
 from warpimpact.solver.limit_search import LimitSearch
 
@@ -81,7 +80,7 @@ def _coordinates(shots: Shots, sought: tuple[str, int]) -> tuple[Array, Array, A
     [shots, 5]; and the other conditions."""
     across = np.sin(shots.obliquity)
     signed = (across * np.cos(shots.azimuth), across * np.sin(shots.azimuth), shots.yaw, shots.pitch, shots.spin)
-    used = (*OF_A_SHOT, "hit_y", "hit_z", "obliquity", "azimuth", "yaw", "pitch", "spin")
+    used = ("hit_y", "hit_z", "obliquity", "azimuth", "yaw", "pitch", "spin")
     others = []
     for name, values in shots.columns.items():
         if name in used:

@@ -1,11 +1,11 @@
-"""The march of a scene's shots on a device: growing windows, threads, and the order of the shots at one plate."""
+"""The march of a scene's shots on a device: growing windows and threads."""
 
 from __future__ import annotations
 
 import math
 import threading
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from concurrent.futures import Executor, ThreadPoolExecutor
 from contextlib import suppress
 from dataclasses import replace
@@ -18,7 +18,6 @@ import warp as wp
 from numpy.typing import NDArray
 
 from warpimpact.kernels.status import Status
-from warpimpact.records.group import failures
 from warpimpact.solver.device import halving, launching, load
 from warpimpact.solver.memory import Memory
 from warpimpact.solver.prepare import Prepared
@@ -65,7 +64,7 @@ class Marching:
     """
 
     def __init__(self, memory: Memory, threads: int | None = None, helpers: Helpers | None = None) -> None:
-        self.memory, self.at_a_plate = memory, memory.at_a_plate
+        self.memory = memory
         self.threads, self.helpers, self.sizes = launching(threads), helpers, MAX_DOUBLINGS
         self.cells = self._window_cells()
 
@@ -82,13 +81,11 @@ class Marching:
         pending = np.arange(count)
         for size in range(1, self.sizes + 1):
             self._march_some(pending, outcomes, _after(count - len(pending), reached))
-            left = (outcomes.status.numpy() == Status.LEFT_WINDOW).reshape(-1, self.at_a_plate).any(axis=1)
-            pending = np.flatnonzero(np.repeat(left, self.at_a_plate))  # all shots at a plate are marched again
+            pending = np.flatnonzero(outcomes.status.numpy() == Status.LEFT_WINDOW)
             wider = 2 * self.cells[0], 2 * self.cells[1]
             if not len(pending) or size == self.sizes or not self._fits(wider):
                 break
             self.widen(wider)
-        outcomes.status.assign(spoilt(outcomes.status.numpy(), self.at_a_plate))
         reached(count)
         return outcomes
 
@@ -130,9 +127,9 @@ class Marching:
             self._on_threads(launch, apiece, len(which), progress)
             return
         slots, scratch = halving(slots, lambda slots: memory.scratch(slots, cells))
-        order = memory.put(in_turns(which, self.at_a_plate, slots), wp.int32)
-        for first, count in turns(len(which), self.at_a_plate, slots):
-            memory.launch(order, outcomes, scratch, slots, first, count)
+        order = memory.put(which, wp.int32)
+        for first in range(0, len(which), slots):
+            count = memory.launch(order, outcomes, scratch, slots, first, min(slots, len(which) - first))
             wp.synchronize_device(memory.device)
             progress(first + count)
 
@@ -142,7 +139,7 @@ class Marching:
         if len(apiece) == 1 and threading.current_thread() is not threading.main_thread():
             self._here(launch, apiece[0], total, progress)
             return
-        chunks, ended = Chunks(total, self.at_a_plate, SHARES * len(apiece), LARGEST_CHUNK), SimpleQueue[int]()
+        chunks, ended = Chunks(total, SHARES * len(apiece), LARGEST_CHUNK), SimpleQueue[int]()
         # Signals reach the main thread, so it computes nothing: an interrupt need not wait for a long shot.
         pool = ThreadPoolExecutor(len(apiece))
         try:
@@ -163,7 +160,7 @@ class Marching:
         """Compute chunks of shots on this thread, and on helper threads that have nothing else to do."""
         memory, cells, helpers = self.memory, self.cells, self.helpers
         # Without helpers few chunks: between two of them, this thread may wait for one that prepares another scene.
-        chunks = Chunks(total, self.at_a_plate, SHARES * (1 + helpers.threads) if helpers else 1, total)
+        chunks = Chunks(total, SHARES * (1 + helpers.threads) if helpers else 1, total)
 
         def others_work() -> None:
             with suppress(MemoryError):
@@ -190,16 +187,15 @@ class Chunks:
         total, done: numbers of all shots and of computed ones.
     """
 
-    def __init__(self, total: int, together: int, shares: int, most: int) -> None:
+    def __init__(self, total: int, shares: int, most: int) -> None:
         """Chunks of shots none of which is computed.
 
         Args:
-            together: number of consecutive shots that one thread must compute.
             shares: fewest chunks into which the remaining shots would be divided, unless these take no time.
             most: most shots of a chunk.
         """
         self.total, self.done = total, 0
-        self._together, self._shares, self._most = together, shares, most
+        self._shares, self._most = shares, most
         self._begun, self._pace, self._lock = 0, math.inf, threading.Lock()
 
     def take(self) -> tuple[int, int]:
@@ -207,7 +203,7 @@ class Chunks:
         with self._lock:
             left, fewest, most = self.total - self._begun, SHORTEST / self._pace, LONGEST / self._pace
             count = min(max(left // self._shares, int(fewest)), int(most), self._most)
-            first, count = self._begun, min(max(1, count // self._together) * self._together, left)
+            first, count = self._begun, min(max(1, count), left)
             self._begun += count
             return first, count
 
@@ -253,27 +249,3 @@ def one_beside_another(prepared: Prepared, which: Numbers) -> Numbers:
     y, z = (np.mod(hits[which], extent) for hits, extent in zip((shots.hit_y, shots.hit_z), period, strict=True))
     strip = (y / STRIP).astype(int)
     return which[np.lexsort((np.where(strip % 2, -z, z), strip))]
-
-
-def in_turns(which: Numbers, count: int, slots: int) -> Numbers:
-    """Order in which a device with `slots` plates at a time takes the shots: for each lot of plates first all first
-    shots, then all second ones. Shots at one plate then use the same slot, one after another."""
-    lots = (which[first : first + slots * count] for first in range(0, len(which), slots * count))
-    return np.concatenate([lot.reshape(-1, count).T.reshape(-1) for lot in lots])
-
-
-def turns(total: int, count: int, slots: int) -> Iterator[tuple[int, int]]:
-    """(first, number) of the launches that compute `total` shots in the order of `in_turns`."""
-    for first in range(0, total, slots * count):
-        plates = min(slots, (total - first) // count)
-        yield from ((first + turn * plates, plates) for turn in range(count))
-
-
-def spoilt(status: NDArray[np.int32], count: int) -> NDArray[np.int32]:
-    """Statuses of all shots, where a shot also fails if an earlier one at its plate failed: what that shot left of the
-    plate is unknown."""
-    rows = status.reshape(-1, count).copy()
-    for order in range(1, count):
-        before = rows[:, order - 1]
-        rows[:, order] = np.where(failures(before), before, rows[:, order])
-    return rows.reshape(-1)

@@ -15,7 +15,6 @@ from numpy.typing import NDArray
 from warpimpact.kernels import free_flight, lanes, march
 from warpimpact.kernels.trace import WIDTH
 from warpimpact.records.group import Returned
-from warpimpact.solver import earlier as earlier_hits
 from warpimpact.solver.device import SMALL_MEMORY, free_memory, load
 from warpimpact.solver.prepare import Prepared
 from warpimpact.solver.structs import Put, empty, filled, inputs_of
@@ -40,8 +39,6 @@ class Memory:
         device: the device.
         stage, flight: builds of the march and of the free flight that the scene needs.
         put: puts values on the device.
-        at_a_plate: consecutive shots that share a slot of scratch, because the earlier ones change the plate for the
-            later ones.
         inputs: what a launch of the march reads.
         rings, patches: numbers of the largest surface.
         bending, passage, history: what the march fills beside the outcomes.
@@ -55,7 +52,6 @@ class Memory:
         self.prepared, self.device, self.variant = prepared, device, variant
         self.stage, self.flight = built(variant)
         self.put = Put(device.alias, variant.real)
-        self.at_a_plate = prepared.shots.at_a_plate if variant.burst else 1
         self.inputs, self._kept = inputs_of(self.stage, prepared, self.put)
         self.rings = max(len(surface.rings.station) for surface in prepared.surfaces)
         self.patches = max(len(surface.rings.station) * surface.around for surface in prepared.surfaces)
@@ -108,11 +104,11 @@ class Memory:
     def slots(self, cells: Cells, threads: int) -> int:
         """Slots of scratch that the free memory of the device and 32-bit indices allow; on a CPU at most one per
         thread."""
-        count, nodes = self.at_a_plate, max(sum(self.prepared.nodes(cells)), self._pierced(cells))
-        wanted = threads if self.device.is_cpu else min(CUDA_CHUNK, len(self.prepared.shots) // count)
+        nodes = sum(self.prepared.nodes(cells))
+        wanted = threads if self.device.is_cpu else min(CUDA_CHUNK, len(self.prepared.shots))
         bytes_of_one = self.slot_bytes(cells)
         fitting = wanted if wanted * bytes_of_one <= SMALL_MEMORY else int(MEMORY_SHARE * self._free / bytes_of_one)
-        return min(wanted, fitting, (2**31 - 1) // (count * max(nodes, 1)))
+        return min(wanted, fitting, (2**31 - 1) // max(nodes, 1))
 
     def too_large(self, cells: Cells) -> str:
         """A message that says why there is no slot for a plate's window of these cells."""
@@ -134,22 +130,13 @@ class Memory:
         """Free memory of the device [bytes]."""
         return free_memory() if self.device.is_cpu else int(self.device.free_memory)
 
-    def _pierced(self, cells: Cells) -> int:
-        """Nodes per slot in the channels of earlier hits."""
-        return sum(earlier_hits.channel_nodes(self.prepared, self.prepared.windows(cells)))
-
     def slot_bytes(self, cells: Cells) -> int:
         """Memory of a slot of scratch [bytes]."""
-        count, nodes, layers = self.at_a_plate, sum(self.prepared.nodes(cells)), len(self.prepared.grids)
+        nodes = sum(self.prepared.nodes(cells))
         size = 8 if self.variant.double else 4
         per_ring: int = size + (wp.types.type_size_in_bytes(self.stage.Sums) if self.variant.bends else 0)
-        earlier = 0
-        if self.variant.burst:
-            boxes = count * layers * wp.types.type_size_in_bytes(self.stage.Box) + count * layers * 18
-            sections = sum(earlier_hits.planes(self.prepared)) * wp.types.type_size_in_bytes(self.stage.Section)
-            earlier = (count * nodes + (1 + count) * self._pierced(cells)) * size + boxes + sections
         patches = self._patches * (8 * size + 3 * 4)
-        return int(len(self.fields) * nodes * size + earlier + patches + self.rings * per_ring)
+        return int(len(self.fields) * nodes * size + patches + self.rings * per_ring)
 
     def scratch(self, slots: int, cells: Cells) -> Any:
         """The Scratch of some slots."""
@@ -161,26 +148,22 @@ class Memory:
         for name in self.fields:
             setattr(fields, name, room(slots * fields.nodes))
         patches, rings = slots * self._patches, slots * self.rings
-        members = ["area", "slope", "shift", "gain", "y", "z", "x" * self.variant.deep, "ahead" * self.variant.burst]
+        members = ["area", "slope", "shift", "gain", "y", "z", "x" * self.variant.deep]
         free = self.variant.free_surface
         members += [f"cover_{name}" * free for name in ("y", "z", "turn", "decay")]
         for name in filter(None, members):
             setattr(touches, name, room(patches))
         places = ["row", "column", "plane"] if self.variant.deep else []
-        for name in filter(None, ["tile", "cell", "place" * self.variant.burst, "cover" * free, *places]):
+        for name in filter(None, ["tile", "cell", "cover" * free, *places]):
             setattr(touches, name, wp.empty(patches, dtype=wp.int32, device=self.device))
         touches.ring_area = room(rings)
         if self.variant.bends:
             touches.sums = wp.empty(rings, dtype=stage.Sums, device=self.device)
             touches.total_area = room(rings)
-        earlier = stage.Earlier()
-        if self.variant.burst:
-            windows = self.prepared.windows(cells)
-            earlier = earlier_hits.scratch(self.prepared, stage, put, fields, slots, fields.nodes, windows)
         stack = empty(stage.Stack, self.device, (slots * len(nodes) if self.variant.layered else 0,), (0, 0))
         if self.variant.layered:
             stack.first_cells = put(self.prepared.windows_behind(self.prepared.first_cells), wp.int32)
-        return filled(stage.Scratch, fields=fields, touches=touches, stack=stack, earlier=earlier)
+        return filled(stage.Scratch, fields=fields, touches=touches, stack=stack)
 
     def launch(self, order: Any, outcomes: Any, scratch: Any, slots: int, first: int, count: int) -> int:
         """March `count` shots from order[first] on; returns their number."""

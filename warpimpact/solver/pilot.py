@@ -210,10 +210,9 @@ class _Pilot:
 
     @property
     def counts(self) -> list[int]:
-        """Numbers of shots that may judge a level: each twice the one before, of whole plates."""
-        at_a_plate = self.shots.at_a_plate
-        most = min(-(-MOST // at_a_plate) * at_a_plate, len(self.shots))
-        counts = [min(most, -(-_first_shots(self.numerics.asked) // at_a_plate) * at_a_plate)]
+        """Numbers of shots that may judge a level: each twice the one before."""
+        most = min(MOST, len(self.shots))
+        counts = [min(most, _first_shots(self.numerics.asked))]
         while counts[-1] < most:
             counts.append(min(most, 2 * counts[-1]))
         return counts
@@ -299,8 +298,7 @@ class _Pilot:
         kept, finer = self.tried[level].errors.kept, min(level + 2, len(LADDER) - 1)
         known = min(len(self.known[level]), len(self.known[finer]))
         room = COMPARED * hits * self.price(level) / (self.price(level) + self.price(finer))
-        plates = min(len(self.shots), known + int(room)) // self.shots.at_a_plate
-        if (count := plates * self.shots.at_a_plate) > len(self.tried[level].coarse):
+        if (count := min(len(self.shots), known + int(room))) > len(self.tried[level].coarse):
             self.judged(level, finer, count)
             tried = self.tried[level]
             self.tried[level] = tried._replace(errors=replace(tried.errors, kept=kept))

@@ -29,8 +29,6 @@ Array = NDArray[np.float64]
 PER_BYTE, PER_PATCH, PER_NODE = 1.7e-10, 2.8e-9, 1.5e-9
 """Seconds that a core takes: to open a window, per byte; for a step, per patch and per node under the core
 (tests/benchmarks/NOTES.md)."""
-AFTER_OTHERS = 3.0
-"""Factor on the time of a shot where earlier hits have left their marks in the plate."""
 
 
 class Surface(NamedTuple):
@@ -108,10 +106,8 @@ class Prepared:
 
     def windows_behind(self, plate: NDArray[np.int64]) -> NDArray[np.int64]:
         """`windows.windows_behind` for this scene."""
-        core, burst = self.scene.core, self.variant.burst
-        return windows_behind(
-            core, self.shots, self.materials, self.plates, self.conditions["plates"], plate, burst=burst
-        )
+        which = self.conditions["plates"]
+        return windows_behind(self.scene.core, self.shots, self.materials, self.plates, which, plate)
 
     def nodes(self, cells: Cells) -> list[int]:
         """Nodes of a shot in the windows of all layers, for a plate's window of these cells. The nodes of a laminate
@@ -141,8 +137,7 @@ class Prepared:
             below = grid.planes.number * (2.0 * core.max_radius / grid.spacing) ** 2 if material.weakens else 0.0
             passage = float(np.mean((material.thickness + core.length) / way))
             steps += passage * (PER_PATCH * patches + PER_NODE * below)
-        alone = PER_BYTE * self.window_bytes + steps
-        return AFTER_OTHERS * alone if self.variant.burst else alone
+        return PER_BYTE * self.window_bytes + steps
 
 
 def prepare(scene: Scene, shots: Shots, numerics: Numerics) -> Prepared:
@@ -153,7 +148,7 @@ def prepare(scene: Scene, shots: Shots, numerics: Numerics) -> Prepared:
 
     Raises:
         ValueError: the numerics fix no resolution; they cannot compute the bending moment that the scene records,
-            several shots at one plate or layers; or the block layout does not compute the scene.
+            or layers; or the block layout does not compute the scene.
         TooManySteps: a shot would take months.
         MemoryError: the tiles of the plates take more memory or time than they may.
     """
@@ -171,7 +166,7 @@ def prepare(scene: Scene, shots: Shots, numerics: Numerics) -> Prepared:
     conditions: dict[str, NDArray[Any]] = conditions_of(scene, shots, materials, time_steps)
     steps = int(steps_of(shots, conditions).max())
     deep = any(material.deep.any() for material in materials)
-    plates, burst = list(enumerate(target.layers)), shots.burst_order is not None
+    plates = list(enumerate(target.layers))
     exclusions.check_together(
         {
             exclusions.NODAL: resolution.nodal,
@@ -180,7 +175,6 @@ def prepare(scene: Scene, shots: Shots, numerics: Numerics) -> Prepared:
             exclusions.BENDING: record.bending,
             exclusions.LAYERS: len(plates) > 1,
             exclusions.BY_PATH: any(material.by_path for material in materials),
-            exclusions.BURST: burst,
             exclusions.DEEP: deep,
             exclusions.FREE_SURFACE: interaction.free_surface is not None,
         }
@@ -211,7 +205,6 @@ def prepare(scene: Scene, shots: Shots, numerics: Numerics) -> Prepared:
         layered=len(plates) > 1,
         deep=deep,
         tabled=tabled,
-        burst=burst,  # even for one shot, as a replay of the first of several is
         window=block_window(int(first_cells.max())) if resolution.block else 0,
     )
     rings = [

@@ -12,12 +12,10 @@ import numpy as np
 import warp as wp
 from numpy.typing import NDArray
 
-from warpimpact.kernels import constants
 from warpimpact.kernels.trace import WIDTH
 from warpimpact.records.outcomes import Outcomes
 from warpimpact.scene import MassProperties, Numerics, Scene, Shots
 from warpimpact.solver.device import find_device, free_memory
-from warpimpact.solver.earlier import channel_nodes, planes_of
 from warpimpact.solver.grid import WHOLE
 from warpimpact.solver.history import History
 from warpimpact.solver.marching import Marching, apart
@@ -109,7 +107,7 @@ def replay(scene: Scene, shots: Shots, *, numerics: Numerics, snapshots: int = 6
     for bit.
 
     Args:
-        shots: the shot, preceded by the earlier shots at the same plate.
+        shots: the shot alone.
         numerics: the resolution with which `simulate` computed it.
         snapshots: number of instants at which the plate is shown, evenly from the first touch to the end. For each of
             them the shot is computed again up to there; 0 computes no field of any layer.
@@ -182,7 +180,7 @@ def traced(scene: Scene, shots: Shots, numerics: Numerics, snapshots: int = 0) -
         "a history of %d steps and %d snapshots of %d cells, %.3g GiB", steps, snapshots, cells, needed / 2**30
     )
     march = Marching(Memory(replace(prepared, rows=steps + 1), device))
-    if len(shots) == march.at_a_plate:  # shots at several plates would all get the widest window
+    if len(shots) == 1:  # several shots would all get the widest window
         march.widen(first.cells)
         march.sizes = 1  # a shot that left this window would take more steps in a wider one
     return march, march.march()
@@ -210,33 +208,25 @@ def _body(prepared: Prepared) -> MassProperties:
 def _left_after(
     memory: Memory, cells: Cells, scratch: Any, steps: int, time_step: float, plate: Weakened
 ) -> dict[int, Weakened]:
-    """What is left of the layers, by number, after some steps of the last shot on the CPU. All shots hit one plate.
+    """What is left of the layers, by number, after some steps of the shot on the CPU.
 
     Args:
         cells: of the plate's window.
         scratch: of one slot.
         plate: the plate in this window, intact.
     """
-    prepared, variant = memory.prepared, memory.variant
-    before, outcomes = len(prepared.shots) - 1, memory.outcomes()
-    order = memory.put(np.arange(before + 1), wp.int32)
-    if variant.layered and before:
-        steps = max(1, steps)  # the window of a layer opens with the first step
+    prepared, variant, outcomes = memory.prepared, memory.variant, memory.outcomes()
     memory.give_up_after((steps - 0.5) * time_step * prepared.shots.velocity[-1])
-    if before:
-        apart(memory.launch, order, outcomes, scratch, 1, 0, before)
-    if variant.burst:  # a shot that meets no channel leaves the channels found by the shot before it
-        scratch.fields.channel.fill_(constants.NO_CHANNEL.value)
-    apart(memory.launch, order, outcomes, scratch, 1, before, 1)
+    apart(memory.launch, memory.put(np.arange(1), wp.int32), outcomes, scratch, 1, 0, 1)
     if variant.nodal:
         return {0: plate._replace(share=np.array(scratch.fields.share.numpy().reshape(cells), dtype=np.float64))}
-    behind = _behind(memory, scratch, cells) if variant.layered and (variant.degrades or variant.burst) else {}
+    behind = _behind(memory, scratch, cells) if variant.layered and variant.degrades else {}
     return {0: plate._replace(share=plate.material * _share_left(memory, 0, scratch.fields, cells))} | behind
 
 
 def _behind(memory: Memory, scratch: Any, plate: Cells) -> dict[int, Weakened]:
-    """The layers behind the plate that the last shot reached and that weaken or are pierced by earlier hits, after a
-    march of one slot with its scratch, in which the plate's window has these cells."""
+    """The layers behind the plate that the last shot reached and that weaken, after a march of one slot with its
+    scratch, in which the plate's window has these cells."""
     prepared, hit = memory.prepared, _hit(memory.prepared)
     is_open, homes = scratch.stack.open.numpy(), scratch.stack.home.numpy()
     layers = {}
@@ -261,17 +251,10 @@ def _share_left(memory: Memory, layer: int, fields: Any, plate: Cells) -> Array:
         depth = material.front[-1] - memory.prepared.materials[material.laminate].front[-1]
         depth = depth + material.thickness[-1] * through
         weakened = depth / planes.spacing + (planes.number > 1)  # one spare plane lies before the first face
-    if memory.variant.burst:
-        firsts = np.cumsum([0, *channel_nodes(memory.prepared, memory.prepared.windows(plate))])
-        number = planes_of(memory.prepared, layer, float(material.thickness[-1]))
-        channel, pierced = _planes_of(fields.channel, firsts[layer], number, cells), through * (number - 1)
     for k in range(THROUGH):  # all depths of a wide window at once would take tens of gigabytes
         share = np.ones(cells)
         if material.weakens:
             share *= np.exp(material.decay_rate[-1] * np.maximum(_between(field, weakened[k]), 0.0))
-        if memory.variant.burst:
-            inside = _between(channel, pierced[k])
-            share *= np.clip(0.5 - inside / memory.prepared.grids[layer].spacing, 0.0, 1.0)
         total += share
     return total / THROUGH
 

@@ -35,8 +35,7 @@ def simulate(
     progress: Progress | None = None,
     cancel: Cancel = NEVER,
 ) -> Outcomes:
-    """Compute every shot on its own copy of the target (docs/model.md §§1–5). The shots of a sample hit one copy, one
-    after another (`Shots.sample`, docs/model.md §8).
+    """Compute every shot on its own copy of the target (docs/model.md §§1–5).
 
     Args:
         numerics: as in a campaign. None is the standard fidelity: a pilot on some of the shots finds the resolution. A
@@ -109,7 +108,7 @@ def pilot_of(
 
     @cache
     def price(level: int) -> float:
-        return prepared_of(pilot[: pilot.at_a_plate], at_level(level, numerics)).seconds
+        return prepared_of(pilot[:1], at_level(level, numerics)).seconds
 
     errors = pilot_hits(outcomes_at, pilot, numerics, price, scene.free_behind, aim, hits)
     if not errors.tried:
@@ -121,11 +120,8 @@ def pilot_of(
 
 
 def spread(shots: Shots, most: int) -> Shots:
-    """At least `most` shots at even distances, in the order of `spread_places`. Shots at one plate stay together."""
-    together = shots.at_a_plate
-    plates = len(shots) // together
-    places = spread_places(plates, min(plates, -(-most // together)))
-    return shots[(places[:, None] * together + np.arange(together)).reshape(-1)]
+    """At least `most` shots at even distances, in the order of `spread_places`."""
+    return shots[spread_places(len(shots), min(len(shots), most))]
 
 
 def spread_places(places: int, count: int) -> NDArray[np.int64]:

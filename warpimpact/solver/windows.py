@@ -58,11 +58,8 @@ def windows_behind(
     plates: Sequence[Sequence[Grid]],
     which: Counts,
     plate: Counts,
-    *,
-    burst: bool,
 ) -> Counts:
-    """Nodes of the windows of all layers, in each direction, shape [layers, shots]; 0 where a layer keeps no field. A
-    layer that earlier hits pierce keeps their channels.
+    """Nodes of the windows of all layers, in each direction, shape [layers, shots]; 0 where a layer keeps no field.
 
     Args:
         plate: nodes of the plate's windows in each direction, shape [1] or [shots].
@@ -75,7 +72,7 @@ def windows_behind(
         thicker = np.maximum(0.0, material.together - materials[0].together)
         half = 0.5 * counts[0] * wide + WIDER_BEHIND * core.bounding_radius + thicker * steep
         count = 2 * (np.ceil(half / spacing).astype(np.int64) + 2 * taps + 3)
-        counts.append(count if material.weakens or burst else np.zeros_like(counts[0]))
+        counts.append(count if material.weakens else np.zeros_like(counts[0]))
     return np.stack([counts[material.laminate] for material in materials])
 
 

@@ -65,8 +65,8 @@ class LimitMap:
             CampaignError: the campaign has no limits, or this search cannot find them.
         """
         try:
-            given = {exclusions.STOP: campaign.stop is not None, exclusions.BURST: campaign.burst is not None}
-            exclusions.check_together({exclusions.LIMIT_COMMAND: True} | given)
+            stop = {exclusions.STOP: campaign.stop is not None}
+            exclusions.check_together({exclusions.LIMIT_COMMAND: True} | stop)
             check_arrests(campaign.scene, campaign.sampler().shots(0, 1))
         except ValueError as error:
             raise CampaignError(str(error)) from None

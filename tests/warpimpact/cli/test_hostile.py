@@ -242,7 +242,6 @@ def test_any_quantity_is_read_or_refused(text: str) -> None:
         ("coefficients = [3.0e-4, 0.24, -5.29]", "coefficients = [{}]"),
         ('standoffs = ["50 mm", "130 mm"]', "standoffs = [{}]"),
         ("staggered = true", "holes = [{}]"),
-        ("[impact]", "[burst]\ncount = 2\noffsets = [{}]\n\n[impact]"),
     ],
 )
 def test_a_list_is_read_up_to_its_first_mistake(before: str, after: str, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -35,12 +35,6 @@ COARSE = Continuum(flows=(STEEL,), spacing=2e-3)
             Continuum(flows=(STEEL, STEEL)),
             "got 2 materials, but the target has 1",
         ),
-        (
-            Scene(core=CORE, target=PLATE),
-            replace(Shots.joined([SHOT, SHOT]), sample=np.zeros(2, dtype=int), burst_order=np.arange(2)),
-            COARSE,
-            r"leave out \[burst\]",
-        ),
     ],
 )
 def test_what_is_not_computed_is_refused(scene: Scene, shots: Shots, continuum: Continuum, sentence: str) -> None:

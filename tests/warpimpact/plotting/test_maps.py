@@ -212,19 +212,6 @@ def test_status_map_has_a_colour_and_a_share_for_each_status_that_occurs(covered
     assert np.mean(matches) >= 0.9
 
 
-def test_hits_of_bursts_are_folded_into_the_cell(make_result):
-    period = np.array([16e-3, 8e-3])
-    inside = np.random.default_rng(3).random((200, 2)) * period - period / 2
-    cells = np.random.default_rng(4).integers(-3, 4, (200, 2))
-    plain = make_result(200, inside)
-    burst = make_result(200, inside + cells * period).assign(burst_order=("hit", np.zeros(200, dtype=int)))
-    np.testing.assert_allclose(cell.hit_points(burst), inside, atol=1e-12)
-    np.testing.assert_array_equal(cell.nearest_hits(burst), cell.nearest_hits(plain))
-    assert overview(burst).get_supxlabel().endswith("all hits of the bursts, folded into the cell")
-    rimmed = burst.assign_attrs(plate='{"size": [0.1, 0.1]}')  # such a plate does not repeat
-    np.testing.assert_allclose(cell.hit_points(rimmed), inside + cells * period)
-
-
 def test_every_status_has_its_own_colour():
     assert len({to_rgb(colour) for colour in cell.STATUS_COLOURS}) == len(Status)
 

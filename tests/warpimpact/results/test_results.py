@@ -12,7 +12,7 @@ from warpimpact.kernels.status import OF_SHOTS, Status
 from warpimpact.results import files
 from warpimpact.results.dataset import status_codes
 from warpimpact.results.outlines import outlines
-from warpimpact.results.variables import EXIT_VARIABLES, OPTIONAL_SHOT_VARIABLES, OUTCOME_VARIABLES, SHOT_VARIABLES
+from warpimpact.results.variables import EXIT_VARIABLES, OUTCOME_VARIABLES, SCATTER_VARIABLES, SHOT_VARIABLES
 from warpimpact.scene import NoPattern, Shots, SquarePattern
 
 MM = 1e-3
@@ -170,7 +170,7 @@ def test_failing_rename_keeps_the_existing_file(make_result, tmp_path):
 
 def test_every_field_of_shots_has_a_variable():
     shot_names = {variable.field for variable in SHOT_VARIABLES} | {"hit_y", "hit_z"}
-    of_layers = {name.removeprefix("layer_") for name in OPTIONAL_SHOT_VARIABLES}
+    of_layers = {name.removeprefix("layer_") for name in SCATTER_VARIABLES}
     assert {field.name for field in dataclasses.fields(Shots)} == shot_names | of_layers
 
 

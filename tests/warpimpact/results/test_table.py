@@ -25,7 +25,7 @@ from warpimpact.solver.worker import Worker
 CAMPAIGNS = Path(__file__).parents[3] / "campaigns"
 
 
-@pytest.fixture(scope="module", params=["slotted_plate", "layered_target", "burst_of_five"])
+@pytest.fixture(scope="module", params=["slotted_plate", "layered_target"])
 def table(request: pytest.FixtureRequest) -> HitTable:
     """Some hits of a campaign, with the solid reference, which has a group of its own in the file."""
     campaign = Campaign.from_toml(CAMPAIGNS / f"{request.param}.toml")

@@ -8,7 +8,6 @@ import pytest
 
 from warpimpact import Campaign, Numerics, SlotPattern
 from warpimpact.runs.foreseen import SLOW, Costly, cost_of, cost_warning
-from warpimpact.scene import Burst
 from warpimpact.solver.prepare import prepare
 from warpimpact.solver.resolution import MOST_STEPS, TooManySteps
 
@@ -32,16 +31,6 @@ def test_hits_that_take_long_are_told_once_at_each_level() -> None:
         warnings.simplefilter("error")
         warn(LEVEL)
     assert cost_of(Campaign.from_toml(SLOTTED_PLATE), LEVEL) is None
-
-
-def test_bursts_that_take_long_are_told() -> None:
-    hit = slow().model_copy(update={"numerics": Numerics(level=0)})
-    plate = hit.plate.model_copy(update={"thickness": 6e-3})
-    few, many = (
-        hit.model_copy(update={"plate": plate, "burst": Burst(count=count, spacing="20 mm")}) for count in (2, 50)
-    )
-    assert cost_of(few, Numerics(level=0)) is None
-    assert str(cost_of(many, Numerics(level=0))).startswith("at level 0 a hit takes about 0.")
 
 
 def test_limits_and_large_windows_are_told(monkeypatch: pytest.MonkeyPatch) -> None:

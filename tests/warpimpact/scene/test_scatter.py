@@ -8,7 +8,7 @@ import pytest
 from scipy import stats
 
 from warpimpact import Impact, Plate
-from warpimpact.scene import Burst, BurstSampler, Hits, NoPattern, Sampler, Scatter, Shots, SlotPattern
+from warpimpact.scene import Hits, NoPattern, Sampler, Scatter, Shots, SlotPattern
 from warpimpact.scene.quantities import QUANTITIES, SCATTERED
 
 PLATE = Plate(thickness="4 mm", resistance="2 GPa", pattern=NoPattern())
@@ -18,7 +18,6 @@ SLOTTED = Plate(
     pattern=SlotPattern(length="12 mm", width="4 mm", spacing=["8 mm", "16 mm"], staggered=True),
 )
 IMPACT = Impact(velocity=820.0)
-BURST = Burst(count=4, spacing={"distribution": "uniform", "low": "1 mm", "high": "5 mm"})
 SCATTER = Scatter(
     velocity={"distribution": "normal", "mean": "820 m/s", "std": "10 m/s"},
     obliquity={"distribution": "uniform", "low": "0 deg", "high": "10 deg"},
@@ -76,12 +75,6 @@ SAMPLERS: dict[str, Callable[..., Sampler]] = {
     ),
     "irreducible, random": lambda count, **hits: Sampler(
         IMPACT, Hits(sampling="random", count=count, irreducible=True, **hits), SLOTTED
-    ),
-    "bursts": lambda count, **hits: BurstSampler(
-        IMPACT, Hits(count=count // 4, **hits), PLATE, BURST, scatter=SCATTER, replicates=16
-    ),
-    "bursts of random hits": lambda count, **hits: BurstSampler(
-        IMPACT, Hits(sampling="random", count=count // 4, **hits), PLATE, BURST, scatter=SCATTER
     ),
 }
 

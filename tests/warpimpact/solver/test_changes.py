@@ -15,7 +15,6 @@ from warpimpact.solver.changes import (
     _excess,
     changes,
     compared,
-    design_effect,
     upper_error,
     upper_place,
 )
@@ -89,41 +88,10 @@ def test_fast_cores_count_as_they_are(fine: Outcomes) -> None:
     np.testing.assert_array_equal(tilt, plain[1])
 
 
-def test_shots_at_one_plate_count_as_one_where_they_err_alike() -> None:
+def test_an_upper_bound_is_an_order_statistic() -> None:
     errors = np.arange(60.0)
-    assert upper_error(errors, 0.9) == upper_error(errors, 0.9, np.arange(60)) == upper_place(60, 0.9) - 1 < 58
+    assert upper_error(errors, 0.9) == upper_place(60, 0.9) - 1 < 58
     assert upper_error(errors, 0.9, risk=0.5) == 54  # of as many as lie beyond 90 %
-    assert upper_error(errors, 0.9, np.arange(60) // 3) == 59  # of 20 plates the last one
-    assert upper_error(errors, 0.9, np.zeros(60, dtype=int)) == 59  # one plate tells of no other
-    assert upper_error(errors, 0.9, np.arange(60) % 20) < 59  # the largest errors are those of other plates
-
-
-@pytest.mark.parametrize("alike", [0.0, 0.3, 0.7, 1.0])
-@pytest.mark.parametrize(("plates", "at_a_plate"), [(22, 3), (85, 3), (32, 2), (16, 8)])
-def test_an_estimate_is_rarely_below_the_percentile_however_alike_shots_at_a_plate_err(
-    plates: int, at_a_plate: int, alike: float
-) -> None:
-    rng, numbers = np.random.default_rng(8), np.repeat(np.arange(plates), at_a_plate)
-    below = 0
-    for _ in range(1000):
-        own, shared = rng.normal(size=plates * at_a_plate), rng.normal(size=plates)[numbers]
-        below += upper_error(math.sqrt(alike) * shared + math.sqrt(1.0 - alike) * own, 0.9, numbers) < 1.2816
-    enough = 0.9**plates < RISK  # for the largest of errors that are wholly alike
-    assert below < 1000 * (RISK + 0.04 if enough or alike < 1.0 else 0.9**plates + 0.04)
-
-
-def test_design_effect_of_groups_of_several_sizes() -> None:
-    # An analysis of variance, of groups of one size: between them over within, F, gives (m - 1) correlation + 1.
-    rng = np.random.default_rng(2)
-    values = rng.normal(size=(400, 5)) + rng.normal(size=(400, 1))
-    within = values.var(axis=1, ddof=1).mean()
-    between = 5.0 * values.mean(axis=1).var(ddof=1)
-    correlation = (between - within) / (between + 4.0 * within)
-    groups = np.repeat(np.arange(400), 5)
-    doubt = math.sqrt(2.0 * 4.0 / (5.0 * 399.0))
-    assert design_effect(values.ravel(), groups) == pytest.approx(1.0 + 4.0 * correlation + doubt, rel=3e-3)
-    some = rng.random(2000) < 0.7  # as where some shots have no depth
-    assert design_effect(values.ravel()[some], groups[some]) == pytest.approx(1.0 + 2.5 * correlation, rel=0.15)
 
 
 def test_a_failed_computation_has_no_bound(fine: Outcomes) -> None:

@@ -589,12 +589,3 @@ def test_errors_above_a_bound_never_read_as_if_they_kept_it(bound: float) -> Non
         assert error <= float(upper_digits(error)) <= bound
     assert errors_text(1.04, 0.3, 1.23e-4) == "1.1 m/s, 0.3 deg and 0.13 mm of depth"
     assert errors_text(math.inf, 123.0) == "inf m/s and 130 deg"
-
-
-def test_more_shots_of_a_pilot_are_whole_bursts() -> None:
-    text = (Path(__file__).parents[3] / "campaigns" / "burst_of_five.toml").read_text(encoding="utf-8")
-    campaign = Campaign.from_text(text, name="burst", folder=Path())
-    shots = campaign.sampler().shots(0, 5 * 60)
-    found = pilot._Pilot(lambda numerics, some: None, shots, Numerics(), lambda level: 0.0, (True,), None)
-    assert len(found.counts) > 2
-    assert all(count % 5 == 0 for count in found.counts)

@@ -1,13 +1,10 @@
 """What a shot takes, before it is computed (`Prepared.seconds`)."""
 
-from dataclasses import replace
 from typing import Any
 
 import pytest
 
 from warpimpact.scene import (
-    Burst,
-    BurstSampler,
     Hits,
     Impact,
     Layer,
@@ -56,14 +53,3 @@ def test_twice_as_many_steps_take_twice_as_long() -> None:
     coarse, fine = (prepared(travel=travel, grid_spacing=0.3e-3) for travel in (0.1, 0.05))
     planes = coarse.grid.planes.number / fine.grid.planes.number  # planes follow the step
     assert 2.0 < of_steps(fine) / of_steps(coarse) <= 2.0 / planes
-
-
-def test_a_shot_after_others_takes_longer() -> None:
-    scene = Scene(core=CORE, target=Target(layers=(PLATE,)))
-    sampler = BurstSampler(IMPACT, Hits(count=2), PLATE, Burst(count=3, spacing=0.02))
-    shots = sampler.shots(0, 3)
-    found = prepare(scene, shots, LEVEL)
-    alone = replace(found, variant=replace(found.variant, burst=False))
-    assert found.variant.burst
-    assert found.seconds == pytest.approx(preparing.AFTER_OTHERS * alone.seconds)
-    assert preparing.AFTER_OTHERS > 1.0

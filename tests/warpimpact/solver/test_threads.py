@@ -15,7 +15,7 @@ CAMPAIGN = Path(__file__).parents[3] / "campaigns" / "slotted_plate.toml"
 
 @pytest.mark.parametrize(("pace", "most", "fewest"), [(1.0, 1, 1), (0.1, 2, 1), (1e-4, 60, 20), (1e-9, 60, 60)])
 def test_chunks_begin_with_a_shot_and_take_neither_too_long_nor_too_little(pace: float, most: int, fewest: int) -> None:
-    chunks, counts, together = Chunks(700, 1, 6, 60), list[int](), 0
+    chunks, counts, together = Chunks(700, 6, 60), list[int](), 0
     while (chunk := chunks.take())[1]:
         assert chunk[0] == together
         counts, together = [*counts, chunk[1]], together + chunk[1]
