@@ -53,7 +53,7 @@ def test_the_march_of_many_hits_keeps_no_struct_in_local_memory(double: bool, tm
     ("variant", "barriers"),
     [
         (Variant(window=512, degrades=False, rimmed=True), 0),
-        (Variant(window=2048), 8),
+        (Variant(window=2048), 7),
         (Variant(window=2048, layered=True), 18),
         (Variant(window=2048, deep=True), 9),
     ],
