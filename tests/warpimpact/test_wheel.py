@@ -28,7 +28,7 @@ def test_a_wheel_computes_from_another_folder(tmp_path: Path) -> None:
         "import warpimpact, warpimpact.kernels.march as march\n"
         "from warpimpact.cli import main\n"
         f"assert all(m.__file__.startswith({str(site)!r}) for m in (warpimpact, march))\n"
-        "raise SystemExit(main(['examples']) or main(['validate', '--device', 'cpu']))\n"
+        "raise SystemExit(main(['new', '--list']) or main(['validate', '--device', 'cpu']))\n"
     )
     result = subprocess.run(
         [sys.executable, "-c", script],

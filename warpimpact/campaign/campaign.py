@@ -43,7 +43,6 @@ from .catalogued import catalogue_of, with_materials, with_threat
 from .continuum_settings import FiniteElements
 from .needs import lacking
 from .plausible import check_plausible, warn_of
-from .published import Published
 from .scatter_tables import with_scatter_apart
 from .stop import Stop
 from .text import CampaignError, parsed, read_text
@@ -90,7 +89,6 @@ class Campaign(Model):
         allow_implausible: compute also with values that no core or target has, such as a plate of 4 m: they are else
             refused, as a slip of units.
         continuum: how `warpimpact continuum` computes its hits.
-        published: published limits, which `warpimpact limit` puts beside its own: a table `[[published]]` each.
     """
 
     title: Title
@@ -107,7 +105,6 @@ class Campaign(Model):
     stop: Stop | None = None
     allow_implausible: Annotated[bool, Field(strict=True)] = False
     continuum: FiniteElements = FiniteElements()
-    published: Annotated[tuple[Published, ...], Field(fail_fast=True, max_length=1000)] = ()
     _source: str = PrivateAttr("")
 
     @property

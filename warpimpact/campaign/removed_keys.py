@@ -10,6 +10,7 @@ REMOVED_KEYS: dict[str, str] = {
     "plate.pattern.shape = supershape": 'use shape = "slot", which protects no worse, or shape = "polygons"',
     "plate.pattern.shape = level_set": 'use shape = "slot", which protects no worse, or shape = "polygons"',
     "plate.pattern.smallest_feature": "leave it out, and round the corners of the polygons",
+    "published": "put published limits into a comment; warpimpact catalogue shows those of its materials",
 }
 """The sentence for each key, by its dotted path without numbers of list items; or for a value, as "key = value"."""
 

@@ -6,13 +6,13 @@ arguments, messages and progress here; a number is computed in another room. It 
 
 import argparse
 import os
+import signal
 import sys
 from collections.abc import Sequence
 from contextlib import redirect_stderr, redirect_stdout, suppress
 from typing import NoReturn
 
 from warpimpact import __version__
-from warpimpact.results.interrupts import terminated_as_interrupted
 
 from .catalogue import add_catalogue
 from .compare import add_compare
@@ -29,7 +29,7 @@ from .progress import verbosity
 from .replay import add_replay
 from .run import add_run
 from .show import add_inspect, add_plate, add_plot
-from .start import add_examples, add_new, add_schema
+from .start import add_new, add_schema
 from .sweep import add_sweep
 from .validate import add_validate
 
@@ -38,7 +38,7 @@ _DAILY = (
     *(add_compare, add_limit, add_optimise, add_report),
 )
 _EXPERT = (
-    *(add_examples, add_plate, add_inspect, add_plot, add_sweep, add_test),
+    *(add_plate, add_inspect, add_plot, add_sweep, add_test),
     *(add_replay, add_export, add_continuum, add_identify, add_validate, add_schema),
 )
 """Commands in the order of the help: those of a task from names to a report, and those for experts."""
@@ -54,6 +54,9 @@ def command() -> NoReturn:
     Nothing is left to do when the command has ended, so the process ends at once: to free all that it has loaded would
     take as long as a small run computes. A thread that is still computing, after Ctrl-C, has nothing to save.
     """
+    for number in (signal.SIGINT, signal.SIGTERM):  # a batch system sends SIGTERM when the time is used up
+        if signal.getsignal(number) is not signal.SIG_IGN:  # a background job of a shell ignores SIGINT
+            signal.signal(number, signal.default_int_handler)
     for name in ("stdout", "stderr"):
         if getattr(sys, name) is None:  # a closed stream: the next file that is opened would get its number
             setattr(sys, name, open(os.devnull, "w", encoding="utf-8"))  # noqa: SIM115, it stays open
@@ -76,7 +79,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         arguments = parser().parse_args(argv)
     try:
         loud = verbosity(verbose=arguments.verbose, quiet=arguments.quiet)
-        with terminated_as_interrupted(), redirect_stdout(Plain(sys.stdout)), implausible_told(), loud:
+        with redirect_stdout(Plain(sys.stdout)), implausible_told(), loud:
             code: int | None = arguments.command(arguments)
             sys.stdout.flush()
     except KeyboardInterrupt as interrupt:

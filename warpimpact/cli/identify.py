@@ -5,8 +5,6 @@ import math
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from warpimpact.results.interrupts import terminated_as_interrupted
-
 from .mistakes import memory_told
 from .options import Commands, add_command, add_computing, add_earlier, add_output
 from .paths import check_output, check_picture, check_result, replaces
@@ -77,7 +75,6 @@ def _identify(arguments: argparse.Namespace) -> int:
     say(extent_of(fit, min(workers or 1, cores()) if on_cpu else None))
     with (
         memory_told(arguments.fit),
-        terminated_as_interrupted(),
         show_progress("set") as show,
         executor_for(device, workers=workers, scheduler=scheduler, apart=True, after=after) as executor,
     ):

@@ -5,8 +5,6 @@ import math
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from warpimpact.results.interrupts import terminated_as_interrupted
-
 from .mistakes import memory_told
 from .options import Commands, add_command, add_computing, add_earlier, add_output, executor_of
 from .paths import check_picture, check_result, replaces
@@ -55,7 +53,6 @@ def _optimise(arguments: argparse.Namespace) -> int:
     say(design.search.extent)
     with (
         memory_told(arguments.design),
-        terminated_as_interrupted(),
         show_progress("design") as show,
         executor_of(arguments) as executor,
     ):

@@ -1,4 +1,4 @@
-"""The commands examples, new and schema, which help to write a campaign."""
+"""The commands new and schema, which help to write a campaign."""
 
 import argparse
 import re
@@ -15,27 +15,6 @@ _FOLDERS = (".", "fits", "firing", "designs")
 """Folders of the examples: campaigns, and what identify, test and optimise take."""
 
 
-def add_examples(commands: Commands) -> None:
-    add_command(
-        commands,
-        "examples",
-        _examples,
-        summary="list the campaigns, fits, tests and designs that come with warpimpact",
-        description="List the campaigns, fits, tests and designs that come with warpimpact, each with the question "
-        "that it answers. warpimpact new NAME copies an example.",
-        example="examples",
-    )
-
-
-def _examples(arguments: argparse.Namespace) -> None:
-    from warpimpact.view.view import Section, labelled, text_of
-
-    questions = [
-        (name, path.read_text(encoding="utf-8").splitlines()[0].removeprefix("# ")) for name, path in _paths().items()
-    ]
-    print(text_of([Section([labelled(questions)])]))
-
-
 def add_new(commands: Commands) -> None:
     parser = add_command(
         commands,
@@ -46,7 +25,8 @@ def add_new(commands: Commands) -> None:
         f"names. Write its schema, such as {_SCHEMA}, so that an editor can complete and check the keys.",
         example="new slotted_plate -o my.toml",
     )
-    parser.add_argument("name", metavar="NAME", help="name of an example; warpimpact examples lists them")
+    parser.add_argument("name", metavar="NAME", nargs="?", default="", help="name of an example")
+    parser.add_argument("--list", action="store_true", help="list the examples, each with the question that it answers")
     add_output(parser, "CAMPAIGN.toml", "campaign file (default: NAME.toml in this folder)")
     add_overwrite(parser, "existing files")
 
@@ -57,10 +37,17 @@ def _new(arguments: argparse.Namespace) -> None:
     from warpimpact.campaign.text import CampaignError
     from warpimpact.results import kinds
     from warpimpact.scene.units import meant
+    from warpimpact.view.view import Section, labelled, text_of
 
     paths, name = _paths(), arguments.name.removesuffix(".toml")
+    if arguments.list:
+        questions = [
+            (name, path.read_text(encoding="utf-8").splitlines()[0].removeprefix("# ")) for name, path in paths.items()
+        ]
+        print(text_of([Section([labelled(questions)])]))
+        return
     if name not in paths:
-        raise CampaignError(f'got the unknown example "{name}"; {meant(name, paths)}')
+        raise CampaignError(f'got the unknown example "{name}"; {meant(name, paths)}; warpimpact new --list lists all')
     source, output = paths[name], arguments.output or Path(f"{name}.toml")
     # Commands in the comments name the file by its place in the checkout.
     text = re.sub(

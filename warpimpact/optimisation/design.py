@@ -263,7 +263,7 @@ def asking_schema() -> dict[str, Any]:
 def design_schema() -> dict[str, Any]:
     """The JSON schema (2020-12) of a design file, with the meaning, the default and the bounds of every key."""
     campaign, asking = campaign_schema(), asking_schema()
-    left_out = ("stop", "sweep", "published")
+    left_out = ("stop", "sweep")
     return campaign | {
         "title": "warpimpact design",
         "description": "A search for designs: a campaign, what is free in it, and what is sought.",

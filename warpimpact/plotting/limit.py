@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from itertools import cycle
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -21,12 +20,10 @@ from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
 from warpimpact.results.solid_reference import base_alone_limits, solid_limits
 from warpimpact.studies.limit_view import measures_of, promise_line, shown_unit
-from warpimpact.studies.published_limits import published_beside
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-_OTHERS = ("#E69F00", "#009E73", "#CC79A7", "#56B4E9", "#000000")
 _CURVE = {
     "velocity": ("impact velocity", "share of the hits that perforate"),
     "thickness": ("thickness of {}", "share of the hits whose limit is thinner"),
@@ -50,14 +47,8 @@ def limit_figure(dataset: xarray.Dataset) -> Figure:
     artist = draw_values(at, dataset, values, scale_of([values], signed=False))
     figure.colorbar(artist, ax=at, label=column.label)
     _draw_curve(curve, dataset, quantity)
-    _inscribe(figure, dataset)
+    inscribe(figure, dataset, f"{dataset.sizes['hit']} hits, {promise_line(dataset)}")
     return figure
-
-
-def _inscribe(figure: Figure, dataset: xarray.Dataset) -> None:
-    sources = "; ".join(dict.fromkeys(row.published.source for row in published_beside(dataset)))
-    published = [f"published: {sources}"] if sources else []
-    inscribe(figure, dataset, f"{dataset.sizes['hit']} hits, {promise_line(dataset)}", *published)
 
 
 def _over_obliquity(dataset: xarray.Dataset, quantity: str) -> Figure:
@@ -77,8 +68,6 @@ def _over_obliquity(dataset: xarray.Dataset, quantity: str) -> Figure:
         law = growth if quantity == "velocity" else 1.0 / growth
         label = "as 1/cos(obliquity)" if quantity == "velocity" else "as cos(obliquity)"
         axes.plot(angles, factor * value[first] * law, color="0.5", linewidth=1.0, label=label)
-    if not yawed:
-        _draw_published(axes, dataset)
     across = "between axis and line of fire on impact" if yawed else "obliquity"
     reference = solid_limits(dataset)
     if reference is not None:
@@ -88,29 +77,8 @@ def _over_obliquity(dataset: xarray.Dataset, quantity: str) -> Figure:
     axes.grid(color="0.9")
     axes.set_axisbelow(True)
     axes.legend(frameon=False)
-    _inscribe(figure, dataset)
+    inscribe(figure, dataset, f"{dataset.sizes['hit']} hits, {promise_line(dataset)}")
     return figure
-
-
-def _draw_published(axes: Axes, dataset: xarray.Dataset) -> None:
-    """Draw published limits against the obliquity; rows with the same label share a marker."""
-    rows = published_beside(dataset)
-    for (label, marker), colour in zip(
-        zip(dict.fromkeys(row.label for row in rows), "s^vP*", strict=False), _OTHERS, strict=False
-    ):
-        limits_of_label = [row.published for row in rows if row.label == label]
-        axes.errorbar(
-            [math.degrees(limit.obliquity) for limit in limits_of_label],
-            [limit.velocity for limit in limits_of_label],
-            yerr=[limit.standard_deviation or math.nan for limit in limits_of_label]
-            if any(limit.standard_deviation for limit in limits_of_label)
-            else None,
-            fmt=marker,
-            color=colour,
-            fillstyle="none",
-            capsize=3.0,
-            label=label,
-        )
 
 
 def _solid_label(dataset: xarray.Dataset, quantity: str) -> str:
@@ -119,17 +87,6 @@ def _solid_label(dataset: xarray.Dataset, quantity: str) -> str:
     if quantity == "velocity":
         return f"{reference_name(dataset)} of equal areal density{several}"
     return "with the solid add-on" if attr.ADD_ON_DENSITY in dataset.attrs else "solid plate"
-
-
-def _mark_published(axes: Axes, dataset: xarray.Dataset) -> None:
-    """Draw published limits at the obliquity of the hits as vertical lines."""
-    for row, colour in zip(
-        (beside for beside in published_beside(dataset) if not math.isnan(beside.computed)), cycle(_OTHERS)
-    ):
-        velocity, error = row.published.velocity, row.published.standard_deviation
-        _draw_upright(axes, velocity, color=colour, linestyle=":", label=row.label)
-        if error:
-            axes.axvspan(velocity - error, velocity + error, color=colour, alpha=0.12)
 
 
 def _draw_upright(axes: Axes, at: float, **style: Any) -> None:
@@ -178,7 +135,6 @@ def _draw_curve(axes: Axes, dataset: xarray.Dataset, quantity: str) -> None:
         mean = math.nan if reference is None else factor * float(np.nanmean(reference[v.LIMITS[quantity].value].values))
         if np.isfinite(mean):
             _draw_upright(axes, mean, color=GREY, linestyle=style, label=label)
-    _mark_published(axes, dataset)
     _mark_measures(axes, dataset, factor, unit)
     if axes.get_legend_handles_labels()[0]:
         axes.legend(loc="upper left", fontsize="small", framealpha=1.0, edgecolor="none")

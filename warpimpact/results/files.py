@@ -13,7 +13,6 @@ import netCDF4
 
 from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
-from warpimpact.results.interrupts import uninterrupted
 from warpimpact.results.kinds import HIT_MAP, KINDS, POSTERIOR, SWEEP, Kind, text_kind
 from warpimpact.results.netcdf import write_table
 from warpimpact.results.outlines import in_a_file, in_memory
@@ -39,7 +38,7 @@ def write(dataset: xarray.Dataset, path: Path) -> None:
     Raises:
         OutputError: The file cannot be written; what was there before is untouched.
     """
-    with uninterrupted(), aside(path) as file:
+    with aside(path) as file:
         write_table(in_a_file(HitTable.from_xarray(dataset)), file)
 
 
@@ -99,7 +98,7 @@ def write_tree(tree: xarray.DataTree, path: Path) -> None:
     Raises:
         OutputError: The file cannot be written; what was there before is untouched.
     """
-    with uninterrupted(), aside(path) as file:
+    with aside(path) as file:
         tree.to_netcdf(file, engine="netcdf4", format="NETCDF4")
 
 
@@ -109,7 +108,7 @@ def read(path: Path, kind: Kind = HIT_MAP) -> xarray.Dataset:
     Raises:
         ResultError: The file is missing, is not netCDF, or is not of this kind.
     """
-    with uninterrupted(), opened(path, kind) as dataset, readable(path):
+    with opened(path, kind) as dataset, readable(path):
         loaded = dataset.load()
     return loaded.set_xindex(v.HIT) if kind in (HIT_MAP, SWEEP) else loaded
 
@@ -121,7 +120,7 @@ def read_tree(path: Path) -> xarray.DataTree:
         ResultError: The file is missing, is not netCDF, or is no posterior.
     """
     check_kind(path, POSTERIOR)
-    with uninterrupted(), readable(path):
+    with readable(path):
         tree = _loaded(path)
     _check_needed(path, tree.children, POSTERIOR)
     return tree

@@ -8,7 +8,6 @@ from pathlib import Path
 from typing import Any
 
 from warpimpact.results.files import FILE_CHUNK, aside, told_as
-from warpimpact.results.interrupts import uninterrupted
 from warpimpact.results.netcdf import append, open_to_append, write_table
 from warpimpact.results.table import HitTable, joined
 
@@ -57,10 +56,9 @@ class IncrementalFile:
         if not self._waiting:
             return
         table, self._waiting = joined(self._waiting), []
-        with uninterrupted():
-            if self._at == 0:
-                write_table(table, self._written, chunk=self._chunk)
-                self._file = open_to_append(self._written)
-            else:
-                append(table, self._file, self._at)
-            self._at += table.sizes["hit"]
+        if self._at == 0:
+            write_table(table, self._written, chunk=self._chunk)
+            self._file = open_to_append(self._written)
+        else:
+            append(table, self._file, self._at)
+        self._at += table.sizes["hit"]

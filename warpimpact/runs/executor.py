@@ -21,7 +21,6 @@ from queue import SimpleQueue
 from typing import Any, NamedTuple, Protocol, TypeVar
 
 from warpimpact.results import attributes as attr
-from warpimpact.results.interrupts import stop_if_asked
 from warpimpact.runs.describe import made_by
 from warpimpact.solver.device import DeviceError, cores, find_device
 from warpimpact.solver.worker import Cancel, Worker
@@ -93,7 +92,6 @@ def completed(
             if not waiting:
                 return
             finished, _ = wait(waiting, timeout=LOOK_EVERY, return_when=FIRST_COMPLETED)
-            stop_if_asked()
             for future in finished:
                 yield waiting.pop(future), future.result()
             tick()

@@ -23,7 +23,6 @@ from filelock import FileLock, Timeout
 from warpimpact.results import attributes as attr
 from warpimpact.results import files
 from warpimpact.results.files import OutputError
-from warpimpact.results.interrupts import uninterrupted
 from warpimpact.results.netcdf import attribute
 from warpimpact.runs.manifests import difference, fingerprint
 
@@ -263,7 +262,7 @@ class Parts:
             self.saved[number] = self._named(number, written)
             return self.saved[number]
 
-        with uninterrupted(), files.aside(self.folder / f"{self._form.stem(number)}", named=named) as file:
+        with files.aside(self.folder / f"{self._form.stem(number)}", named=named) as file:
             write(file)
         if before not in (None, self.saved[number]):
             remove(before)

@@ -23,7 +23,6 @@ from warpimpact.scene.quantities import QUANTITIES
 from warpimpact.scene.units import quantity as reader_of
 from warpimpact.solver.findings import hits_text, limit_error_text
 from warpimpact.solver.limit_search import MOST_RUNS
-from warpimpact.studies.published_limits import published_view
 from warpimpact.view.view import Column, Section, Table, number
 
 _MOST_LISTED = 12
@@ -59,7 +58,6 @@ def limit_view(dataset: xarray.Dataset, texts: Sequence[str] = ()) -> list[Secti
     return [
         *([Section([_hits(dataset)]), *_proxies(dataset)] if short else []),
         *([] if short and not texts else [Section([_estimates(dataset, texts)])]),
-        *published_view(dataset),
         Section([*_left_out(dataset), *_expected(dataset), *_references(dataset)]),
         Section(list(_costs(dataset))),
     ]

@@ -283,7 +283,7 @@ def test_a_closed_stream_a_backend_and_a_name_end_in_no_bug(tmp_path: Path) -> N
             capture_output=True, text=True, check=False, cwd=tmp_path, env=os.environ | environment,
         )  # fmt: skip
 
-    arguments = ["examples"]
+    arguments = ["new", "--list"]
     assert ended(">&-").returncode == 0
     arguments = ["plate", str(SHIPPED / "slotted_plate.toml")]
     (tmp_path / "matplotlibrc").write_text("text.usetex: True")

@@ -188,7 +188,7 @@ def test_runs_one_after_another_begin_anew(capsys: pytest.CaptureFixture[str], c
 
 
 def test_quiet_lasts_for_its_command(capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["examples", "-q"]) == 0
+    assert main(["new", "--list", "-q"]) == 0
     with show_progress("shot") as show:
         show(Step(1, 2, 0, ""))
     assert "1 of 2" in capsys.readouterr().err

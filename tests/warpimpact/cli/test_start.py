@@ -1,4 +1,4 @@
-"""The commands that help to start: examples, new and schema; and what -v and -q tell."""
+"""The commands that help to start: new and schema; and what -v and -q tell."""
 
 import json
 import subprocess
@@ -24,7 +24,7 @@ pytestmark = pytest.mark.usefixtures("in_tmp_path")
 
 
 def test_examples_are_listed_with_their_questions(capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["examples"]) == 0
+    assert main(["new", "--list"]) == 0
     lines = capsys.readouterr().out.splitlines()
     paths = [path for kind in (".", "fits", "firing", "designs") for path in CAMPAIGNS.glob(f"{kind}/*.toml")]
     assert [line.split()[0] for line in lines] == sorted(path.stem for path in paths)
@@ -89,7 +89,7 @@ def test_a_new_file_names_itself_in_its_commands(capsys: pytest.CaptureFixture[s
         text = Path("my.toml").read_text(encoding="utf-8")
         assert " my.toml" in text
         assert "campaigns/" not in text
-    assert main(["examples"]) == 0
+    assert main(["new", "--list"]) == 0
     assert "campaigns/" not in capsys.readouterr().out
 
 
@@ -134,7 +134,7 @@ class Raising:
             signal.raise_signal({0})
 sys.meta_path.insert(0, Raising())
 from warpimpact.__main__ import command
-sys.argv = ["warpimpact", "examples"]
+sys.argv = ["warpimpact", "new", "--list"]
 command()
 """
 

@@ -261,35 +261,6 @@ def test_what_a_search_cannot_tell_is_refused(
     assert sentence in capsys.readouterr().err
 
 
-PUBLISHED = """[[published]]
-velocity = "{} m/s"
-standard_deviation = "9 m/s"
-obliquity = "{} deg"
-label = "shots"
-source = "somebody 2020"
-"""
-
-
-def test_published_limits_stand_beside_the_computed_ones(result: xarray.Dataset) -> None:
-    told = result.assign_attrs(campaign=TEXT + PUBLISHED.format(300, 0) + PUBLISHED.format(700, 45))
-    median = estimated(result, [V50])[V50].value
-    lines = text_of(limit_view(told)).splitlines()
-    at = next(place for place, line in enumerate(lines) if line.split()[:1] == ["published"])
-    assert lines[at + 1].split() == ["300", "0", f"{median:.4g}", f"{100 * (median / 300 - 1):+.1f}", *OF]
-    assert lines[at + 2].split() == ["700", "45", "-", "-", *OF]
-    assert lines[at + 3] == "[1] somebody 2020"
-    assert "published" not in text_of(limit_view(result))
-    labels = limit_figure(told).axes[1].get_legend_handles_labels()[1]
-    assert "published: shots" in labels
-    places = result.assign(hit_y=0 * result["hit_y"], hit_z=0 * result["hit_z"], obliquity=0 * result["obliquity"])
-    places["obliquity"][-1] = 30.0
-    oblique = limit_figure(places.assign_attrs(told.attrs)).axes[0]
-    assert "published: shots" in oblique.get_legend_handles_labels()[1]
-    with pytest.raises(CampaignError, match=r"published\[0\].source: is missing"):
-        campaign(TEXT + '[[published]]\nvelocity = "300 m/s"\n')
-    assert campaign(TEXT + PUBLISHED.format(300, 20)).published[0].obliquity == pytest.approx(np.radians(20))
-
-
 OF = ["shots", "[1]"]
 
 
