@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from .catalogue.by_name import Layer, Plate, material, threat
     from .continuum.strikes import simulate
     from .export.spreadsheet import to_dataframe
+    from .firing.v50 import v50
     from .optimisation.optimise import optimise, optimise_to_file
     from .records.outcomes import Outcomes
     from .results.files import OutputError, ResultError, open_result
@@ -121,6 +122,7 @@ __all__ = [
     "simulate",
     "threat",
     "to_dataframe",
+    "v50",
 ]
 
 _HOMES = {
@@ -156,6 +158,7 @@ _HOMES = {
     "simulate": ".continuum.strikes",
     "threat": ".catalogue.by_name",
     "to_dataframe": ".export.spreadsheet",
+    "v50": ".firing.v50",
 }
 """Modules of the names that are not in `warpimpact.scene`."""
 

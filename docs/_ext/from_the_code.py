@@ -226,7 +226,7 @@ class FiringReference(CampaignReference):
     """Every key of a test file, table by table, from its JSON schema."""
 
     def lines(self) -> Iterator[str]:
-        from warpimpact.firing.plan_file import firing_schema
+        from warpimpact.firing.plan import firing_schema
 
         self.schema = firing_schema()
         yield from ["## Tables of the file", ""]

@@ -11,6 +11,10 @@ REMOVED_KEYS: dict[str, str] = {
     "plate.pattern.shape = level_set": 'use shape = "slot", which protects no worse, or shape = "polygons"',
     "plate.pattern.smallest_feature": "leave it out, and round the corners of the polygons",
     "published": "put published limits into a comment; warpimpact catalogue shows those of its materials",
+    "procedure.name = 3pod": "use langlie",
+    "procedure.name = neyer": "use langlie",
+    "directions": "sweep impact.obliquity and impact.azimuth",
+    "requirement": "give proof.velocity and the core of the campaign",
 }
 """The sentence for each key, by its dotted path without numbers of list items; or for a value, as "key = value"."""
 

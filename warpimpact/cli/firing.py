@@ -1,4 +1,4 @@
-"""The command test: what a firing test would report of a target, and the error of that report."""
+"""The command test: V50 of fired shots, or what a simulated firing test would report of a target."""
 
 import argparse
 from pathlib import Path
@@ -6,7 +6,7 @@ from pathlib import Path
 from .mistakes import memory_told
 from .options import Commands, add_command, add_computing, add_count, add_earlier, add_output, executor_of
 from .paths import check_output, check_picture, check_suffix
-from .progress import Step, show_progress, show_run, warn
+from .progress import show_run, warn
 
 
 def add_test(commands: Commands) -> None:
@@ -14,15 +14,16 @@ def add_test(commands: Commands) -> None:
         commands,
         "test",
         _test,
-        summary="simulate firing tests: V50, its interval, proof at a confidence",
-        description="Fire a test procedure many times at a target whose limit velocities are known or are searched "
-        "first. Print and draw what the tests report beside the truth: V50, spread, how often the interval holds, how "
-        "many shots a precision takes, and the operating characteristic of n shots with at most k perforations. The "
-        "limits of a campaign go to TEST_limits.nc, which a later call takes with --resume.",
-        example="test campaigns/firing/v50_test.toml -o v50_test.nc",
+        summary="V50 of fired shots; simulate firing tests and plans of proof",
+        description="SHOTS.csv has a column of velocities and one that says whether each shot perforated: print and "
+        "draw V50 by maximum likelihood and by MIL-STD-662F, spread, and interval. TEST.toml simulates a test: fire a "
+        "procedure many times at a target whose limit velocities are known or are searched first. Print and draw what "
+        "the tests report beside the truth, and the operating characteristic of n shots with at most k perforations. "
+        "The limits of a campaign go to TEST_limits.nc, which a later call takes with --resume.",
+        example="test shots.csv",
     )
-    parser.add_argument("test", type=Path, metavar="TEST.toml", help="test file: target, procedure, gun, questions")
-    add_output(parser, "TEST.nc", "result file (default: the test's name, in this folder); the figure is TEST.png")
+    parser.add_argument("test", type=Path, metavar="SHOTS.csv|TEST.toml", help="fired shots, or a test to simulate")
+    add_output(parser, "FILE", "figure SHOTS.png of shots, or result TEST.nc, with its figure beside it")
     add_computing(parser)
     add_count(parser)
     resume = "keep the limits that are computed, and continue what was interrupted"
@@ -30,58 +31,44 @@ def add_test(commands: Commands) -> None:
 
 
 def _test(arguments: argparse.Namespace) -> None:
-    from warpimpact.campaign.text import CampaignError
-    from warpimpact.firing.firing_view import firing_view
-    from warpimpact.firing.known_target import directions_of, response_of
-    from warpimpact.firing.plan_file import read_test
-    from warpimpact.firing.repeated import simulate_test
-    from warpimpact.plotting.firing import directions_figure, firing_figure
+    if arguments.test.suffix.lower() == ".csv":
+        _evaluate(arguments)
+    else:
+        _simulate(arguments)
+
+
+def _evaluate(arguments: argparse.Namespace) -> None:
+    from warpimpact.firing.v50 import read_shots, v50
+    from warpimpact.plotting.firing import shots_figure
+
+    picture = arguments.output or Path(arguments.test.stem + ".png")
+    check_picture(picture, overwrite=arguments.overwrite)
+    shots = read_shots(arguments.test)
+    found = v50(*shots)
+    print(found)
+    shots_figure(shots, found, arguments.test.stem).savefig(picture, dpi=150)
+    print(f"figure in {picture}")
+
+
+def _simulate(arguments: argparse.Namespace) -> None:
+    from warpimpact.firing.plan import read_test
+    from warpimpact.firing.simulate import response_of, simulate_test
+    from warpimpact.firing.view import firing_view
+    from warpimpact.plotting.firing import firing_figure
     from warpimpact.results import files
     from warpimpact.view.view import text_of
 
     test = read_test(arguments.test)
     output = arguments.output or Path(arguments.test.stem + ".nc")
-    picture = output.with_suffix(".png")
-    replace = arguments.overwrite or arguments.resume
+    picture, resume, overwrite = output.with_suffix(".png"), arguments.resume, arguments.overwrite
     check_suffix(output, "a test", ".nc")
-    check_output(output, overwrite=replace)
-    polar = picture.with_name(f"{picture.stem}_directions.png")
-    for path in (picture, polar):
-        check_picture(path, overwrite=replace)
-    resume, overwrite = arguments.resume, arguments.overwrite
-    with memory_told(arguments.test), executor_of(arguments) as executor:
-        with show_run() as progress:
-            response, attributes = response_of(
-                test,
-                output,
-                executor=executor,
-                count=arguments.count,
-                resume=resume,
-                overwrite=overwrite,
-                progress=progress,
-                tell=warn,
-            )
-        with (
-            show_progress("direction") as show,
-            directions_of(
-                test,
-                output,
-                executor=executor,
-                resume=resume,
-                overwrite=overwrite,
-                progress=lambda done, total: show(Step(done, total)),
-                tell=warn,
-            ) as sector,
-        ):
-            try:
-                dataset = simulate_test(test, response, attributes, sector)
-            except ValueError as error:
-                raise CampaignError(f"{arguments.test}: {error}") from None
-            files.write(dataset, output)
+    for path in (output, picture):
+        check_output(path, overwrite=overwrite or resume)
+    with memory_told(arguments.test), executor_of(arguments) as executor, show_run() as progress:
+        options = {"resume": resume, "overwrite": overwrite, "progress": progress, "tell": warn}
+        response = response_of(test, output, executor=executor, count=arguments.count, **options)
+    dataset = simulate_test(test, response)
+    files.write(dataset, output)
     print(text_of(firing_view(dataset)))
-    figures = {picture: firing_figure} if test.needs_limits else {}
-    if test.directions is not None:
-        figures[polar] = directions_figure
-    for path, draw in figures.items():
-        draw(dataset).savefig(path, dpi=150)
-    print(f"written to {output}, figure in {' and '.join(map(str, figures))}")
+    firing_figure(dataset).savefig(picture, dpi=150)
+    print(f"written to {output}, figure in {picture}")

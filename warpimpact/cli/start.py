@@ -124,7 +124,7 @@ def _schema_text(kind: str) -> str:
     room, name = {
         "campaign": ("campaign.schema", "campaign_schema"),
         "fit": ("identification.fit_schema", "fit_schema"),
-        "test": ("firing.plan_file", "firing_schema"),
+        "test": ("firing.plan", "firing_schema"),
         "design": ("optimisation.design", "design_schema"),
     }[kind]  # the schemas of the other kinds would take seconds to import
     made = getattr(import_module(f"warpimpact.{room}"), name)

@@ -1,108 +1,173 @@
-"""A firing test: the models of its file."""
+"""A simulated firing test: the models of its file, its procedures, and how the file is read."""
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Annotated, Any, Literal, NamedTuple
 
-from pydantic import Field, PrivateAttr, model_validator
+import numpy as np
+from pydantic import Field, PrivateAttr, ValidationError, model_validator
+from scipy import special
 
-from warpimpact.firing.directions import Directions
-from warpimpact.firing.estimators import Estimator
-from warpimpact.firing.procedures import AnyProcedure
-from warpimpact.firing.rules import FairHit, Gun
+from warpimpact.campaign.schema import completed_schema
+from warpimpact.campaign.text import CampaignError, parsed, read_text
+from warpimpact.firing.v50 import within_span
+from warpimpact.results.kinds import TEST
 from warpimpact.scene.input_files import InputFile
-from warpimpact.scene.model import Model
-from warpimpact.scene.units import NonNegativeNumber, Number, PositiveSpeed, Title
+from warpimpact.scene.model import Array, Model
+from warpimpact.scene.problems import sentence
+from warpimpact.scene.units import Number, PositiveSpeed, Speed, Title
+from warpimpact.statistics.acceptance import fewest_shots
 
-Size = Annotated[int, Field(strict=True, ge=4, le=200)]
 Share = Annotated[Number, Field(gt=0, lt=1)]
+Count = Annotated[int, Field(strict=True, ge=2, le=1000)]
 
 
 class FiringTarget(Model):
-    """The target is exactly one of campaign, limits, sweep, mean and velocities.
+    """The target is a campaign or its limits.
 
     Attributes:
         campaign: campaign file, whose limit velocities are searched.
         limits: result of `warpimpact limit`.
-        sweep: result of `warpimpact sweep` over impact.velocity, for targets whose limits are not unique.
-        layer: layer that must hold, 0 is the plate; of a campaign the layers behind it are left out. Not given, it is
-            the last one.
         count: limits that are searched of a campaign.
-        tolerance: how far the two ends of a searched limit may lie apart [m/s]; the limit itself is nearer.
-        mean, deviation: limit velocities with a normal distribution [m/s].
-        velocities: known limit velocities [m/s].
-        shares: of the hits that have each of them.
     """
 
     campaign: InputFile | None = None
     limits: InputFile | None = None
-    sweep: InputFile | None = None
-    layer: Annotated[int, Field(strict=True, ge=0)] | None = None
     count: Annotated[int, Field(strict=True, ge=1, le=2**20)] = 256
-    tolerance: PositiveSpeed = 4.0
-    mean: PositiveSpeed | None = None
-    deviation: PositiveSpeed | None = None
-    velocities: Annotated[tuple[PositiveSpeed, ...], Field(min_length=1, max_length=1000)] | None = None
-    shares: tuple[NonNegativeNumber, ...] | None = None
 
     @model_validator(mode="after")
     def _is_one(self) -> FiringTarget:
-        kinds = ("campaign", "limits", "sweep", "mean", "velocities")
-        given = [name for name in kinds if getattr(self, name) is not None]
-        if len(given) != 1:
-            raise ValueError(f"got {' and '.join(given) or 'nothing'}, but it must be one of {', '.join(kinds)}")
-        for name, needs in {"deviation": "mean", "shares": "velocities"}.items():
-            if (getattr(self, name) is None) == (needs in given):
-                raise ValueError(f"{needs} and {name} must be given together")
-        velocities, shares = self.velocities or (), self.shares or ()
-        if len(velocities) != len(shares) or (shares and not sum(shares) > 0.0):
-            raise ValueError(
-                f"got {len(velocities)} velocities and {len(shares)} shares, but there must be a share for each "
-                "velocity, and their sum must be greater than 0"
-            )
-        if self.layer is not None and not ({"campaign", "sweep"} & {*given}):
-            raise ValueError("layer needs campaign or sweep")
+        if (self.campaign is None) == (self.limits is None):
+            raise ValueError("got both or neither of campaign and limits, but it must be one of them")
         return self
 
 
-class Precision(Model):
-    """Asks how many shots a precision needs.
+class Gun(Model):
+    """How well a velocity is met. It is measured exactly.
 
     Attributes:
-        within: largest difference of the reported V50 from the true one [m/s].
-        share: of the tests that must be within that difference.
-        sizes: numbers of shots that are tried.
+        deviation: standard deviation from the velocity that was aimed at [m/s].
+        window: largest difference of a fair hit from the velocity aimed at [m/s]; other shots are fired again.
     """
 
-    within: PositiveSpeed
-    share: Share = 0.9
-    sizes: Annotated[tuple[Size, ...], Field(min_length=1, max_length=20)] = (6, 8, 10, 12, 16, 20, 30, 40, 60)
+    deviation: Annotated[Speed, Field(ge=0)] = 0.0
+    window: PositiveSpeed | None = None
+
+    def errors(self, drawn: Array) -> Array:
+        """Differences from the velocity aimed at [m/s] for uniform numbers in [0, 1), cut at the window."""
+        if self.deviation == 0.0:
+            return np.zeros_like(drawn)
+        outside = 0.0 if self.window is None else 2.0 * float(special.ndtr(-self.window / self.deviation))
+        share = np.clip(outside / 2.0 + (1.0 - outside) * drawn, 1e-15, 1.0 - 1e-15)
+        return np.asarray(self.deviation * special.ndtri(share))
 
 
-class Required(Model):
-    """A required V50.
+class Shot(NamedTuple):
+    """A fired shot: its velocity [m/s], and whether it perforated."""
+
+    velocity: float
+    perforated: bool
+
+
+class MilStd662F(Model):
+    """Up and down until equal numbers of the slowest perforations and the fastest stops lie within a span.
+
+    V50 is their mean. The first change of velocity is larger, until there are a stop and a perforation. The standard's
+    text was not at hand: spans, changes and counts are as publications quote them.
 
     Attributes:
-        v50: least V50 that a test must report [m/s].
-        by: what must reach it: the reported "v50", or the lower end of its interval ("lower_end").
+        start: velocity of the first shot [m/s].
+        first_change: of velocity until there are a stop and a perforation [m/s].
+        change: of velocity from then on [m/s].
+        pairs: stops, and as many perforations, that V50 is the mean of.
+        span: largest difference between their velocities [m/s].
+        most_shots: after which a test ends without a V50.
     """
 
-    v50: PositiveSpeed
-    by: Literal["v50", "lower_end"] = "v50"
+    name: Literal["mil_std_662f"] = "mil_std_662f"
+    start: PositiveSpeed
+    first_change: PositiveSpeed = 30.0
+    change: PositiveSpeed = 15.0
+    pairs: Annotated[int, Field(strict=True, ge=1, le=50)] = 3
+    span: PositiveSpeed = 27.0
+    most_shots: Count = 30
+
+    def chosen(self, shots: Sequence[Shot]) -> list[float] | None:
+        """Velocities that V50 is the mean of; None until they lie within the span."""
+        stops, perforations = ([shot.velocity for shot in shots if shot.perforated is way] for way in (False, True))
+        return within_span(stops, perforations, self.pairs, self.span)
+
+    def aim(self, shots: Sequence[Shot]) -> float | None:
+        """Velocity of the next shot [m/s]; None at the end of the test."""
+        if not shots:
+            return self.start
+        if len(shots) == self.most_shots or self.chosen(shots) is not None:
+            return None
+        change = self.first_change if len({shot.perforated for shot in shots}) == 1 else self.change
+        return shots[-1].velocity + (-change if shots[-1].perforated else change)
+
+
+class Langlie(Model):
+    """One-shot test of H. J. Langlie (A reliability test method for "one-shot" items, Aeronutronic U-1792, 1962).
+
+    The next velocity is the middle between the last one and that of the nearest earlier shot from which on stops and
+    perforations are equal in number; without such a shot, between the last one and an end of the range.
+
+    Attributes:
+        lowest, highest: ends of the range, in which V50 must lie [m/s].
+        most_shots: shots of a test.
+    """
+
+    name: Literal["langlie"] = "langlie"
+    lowest: PositiveSpeed
+    highest: PositiveSpeed
+    shots: Count = 12
+
+    @model_validator(mode="after")
+    def _rises(self) -> Langlie:
+        if self.lowest >= self.highest:
+            raise ValueError(
+                f"got lowest = {self.lowest:g} m/s and highest = {self.highest:g} m/s, but lowest must be less"
+            )
+        return self
+
+    @property
+    def most_shots(self) -> int:
+        """Shots of a test."""
+        return self.shots
+
+    def aim(self, shots: Sequence[Shot]) -> float | None:
+        """Velocity of the next shot [m/s]; None at the end of the test."""
+        if len(shots) == self.shots:
+            return None
+        if not shots:
+            return 0.5 * (self.lowest + self.highest)
+        other, balance = self.lowest if shots[-1].perforated else self.highest, 0
+        for shot in reversed(shots):
+            balance += 1 if shot.perforated else -1
+            if balance == 0:
+                other = shot.velocity
+                break
+        return 0.5 * (shots[-1].velocity + other)
+
+
+Procedure = MilStd662F | Langlie
 
 
 class Proof(Model):
     """Shots at one velocity, of which at most some may perforate.
 
     Attributes:
-        velocity: velocity aimed at [m/s]; by default that of the named requirement.
+        velocity: velocity aimed at [m/s].
         shots: shots of a test; by default the fewest that show `stop_probability` at `confidence`.
         allowed: perforations with which a target still passes.
         stop_probability: probability of a stop that a pass shall show.
         confidence: confidence at which it shows this.
     """
 
-    velocity: PositiveSpeed | None = None
+    velocity: PositiveSpeed
     shots: Annotated[int, Field(strict=True, ge=1, le=100_000)] | None = None
     allowed: Annotated[int, Field(strict=True, ge=0, le=1000)] = 0
     stop_probability: Share = 0.9
@@ -114,9 +179,14 @@ class Proof(Model):
             raise ValueError(f"got allowed = {self.allowed}, but it must be less than shots = {self.shots}")
         return self
 
+    @property
+    def shot_count(self) -> int:
+        """Shots of a test: the given number, or the fewest that show what a pass shall show."""
+        return self.shots or fewest_shots(self.allowed, self.stop_probability, self.confidence)
+
 
 class FiringTest(Model):
-    """A firing test: target, procedure, and questions.
+    """A simulated firing test: target, procedure, gun and proof.
 
     Attributes:
         title: one line, which the figure shows.
@@ -125,31 +195,16 @@ class FiringTest(Model):
         target: what is fired at.
         procedure: how V50 is sought.
         gun: how well a velocity is met.
-        fair_hit: which hits count.
-        estimator: what is reported.
-        precision: asks how many shots a precision takes.
-        required: asks how often a required V50 is reported.
-        requirement: a named requirement, such as "STANAG 4569 L3", which gives core, velocity, proof and directions,
-            unless the file does.
-        threat: of a requirement that has several.
         proof: asks how often n shots with at most k perforations pass.
-        directions: asks for P(perforation) over directions of fire; the target is then a campaign.
     """
 
     title: Title
     tests: Annotated[int, Field(strict=True, ge=1, le=100_000)] = 1000
     seed: Annotated[int, Field(strict=True, ge=0, lt=2**63)] = 0
     target: FiringTarget
-    procedure: AnyProcedure | None = None
+    procedure: Annotated[Procedure, Field(discriminator="name")] | None = None
     gun: Gun = Gun()
-    fair_hit: FairHit = FairHit()
-    estimator: Estimator = Estimator()
-    precision: Precision | None = None
-    required: Required | None = None
-    requirement: Title | None = None
-    threat: Title | None = None
     proof: Proof | None = None
-    directions: Directions | None = None
     _source: str = PrivateAttr("")
 
     @property
@@ -157,27 +212,31 @@ class FiringTest(Model):
         """The TOML file as it was read; of a test made in Python, its values as JSON."""
         return self._source or self.model_dump_json()
 
-    @property
-    def needs_limits(self) -> bool:
-        """Whether the test needs the response of its target."""
-        return self.procedure is not None or self.proof is not None or self.directions is None
 
-    @model_validator(mode="after")
-    def _goes_together(self) -> FiringTest:
-        for name in ("precision", "required"):
-            if getattr(self, name) is not None and self.procedure is None:
-                raise ValueError(f"{name} needs procedure")
-        if self.estimator.name == "dixon_mood" and getattr(self.procedure, "name", None) != "up_and_down":
-            raise ValueError('estimator.name = "dixon_mood" needs procedure.name = "up_and_down"')
-        by_mean = self.estimator.name in ("mean", "dixon_mood") or (
-            self.estimator.name is None and getattr(self.procedure, "name", None) == "mil_std_662f"
-        )
-        if self.required is not None and self.required.by == "lower_end" and by_mean:
-            raise ValueError('required.by = "lower_end" needs an estimator with an interval: "probit" or "logit"')
-        if self.directions is not None and self.target.campaign is None:
-            raise ValueError("directions needs target.campaign")
-        if self.threat is not None and self.requirement is None:
-            raise ValueError("threat needs requirement")
-        if self.proof is not None and self.proof.velocity is None and self.requirement is None:
-            raise ValueError("proof.velocity: is missing, but must be given")
-        return self
+def read_test(path: str | Path) -> FiringTest:
+    """Read a test file; file names in it count from its folder.
+
+    Raises:
+        CampaignError: the file is missing, is not TOML, or has a value that is not allowed.
+    """
+    path = Path(path)
+    return firing_test(read_text(path), str(path), path.parent)
+
+
+def firing_test(text: str, name: str, folder: Path) -> FiringTest:
+    """Read a test from its text; `name` is the name of the file in errors."""
+    data: dict[str, Any] = parsed(text, name, TEST)
+    try:
+        test = FiringTest.model_validate(data, context={"folder": folder})
+    except ValidationError as error:
+        raise CampaignError(f"{name}: {sentence(error, data)}") from None
+    test._source = text
+    return test
+
+
+def firing_schema() -> dict[str, Any]:
+    """The JSON schema (2020-12) of a test file, with the meaning, the default and the bounds of every key."""
+    return completed_schema(FiringTest) | {
+        "title": "warpimpact firing test",
+        "description": "A firing test of warpimpact: what is fired at, how, and what is asked of it.",
+    }

@@ -10,10 +10,10 @@ from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from warpimpact.analysis.swept import sweep_view
-from warpimpact.firing.firing_view import firing_view
+from warpimpact.firing.view import firing_view
 from warpimpact.identification.posterior_view import posterior_view
 from warpimpact.optimisation.front_view import front_view
-from warpimpact.plotting.firing import directions_figure, firing_figure
+from warpimpact.plotting.firing import firing_figure
 from warpimpact.plotting.posterior import hits_figure, measured_figure, pairs_figure
 from warpimpact.plotting.style import data_url
 from warpimpact.plotting.sweep import sweep_figure
@@ -40,13 +40,13 @@ class _Shown(NamedTuple):
     Attributes:
         view: its view; for a kind with measures it takes their texts, too.
         measured: whether it takes measures.
-        figures: figures by their headings, each with the variable that it needs, empty if none.
+        figures: figures by their headings.
         asked: attribute with the text of the file behind the result.
     """
 
     view: Callable[..., list[Section]]
     measured: bool = False
-    figures: Mapping[str, tuple[str, Callable[[Any], Figure]]] = MappingProxyType({})
+    figures: Mapping[str, Callable[[Any], Figure]] = MappingProxyType({})
     asked: str = ""
 
 
@@ -54,23 +54,16 @@ _SHOWN = {
     POSTERIOR: _Shown(
         posterior_view,
         figures={
-            "Parameters, in pairs": ("", pairs_figure),
-            "Measured and computed": ("", measured_figure),
-            "Where the shots hit": ("", hits_figure),
+            "Parameters, in pairs": pairs_figure,
+            "Measured and computed": measured_figure,
+            "Where the shots hit": hits_figure,
         },
         asked=posterior_file.FIT_TEXT,
     ),
     FRONT: _Shown(front_view, asked=front.DESIGN),
-    SWEEP: _Shown(sweep_view, measured=True, figures={"By input": ("", sweep_figure)}, asked=attr.CAMPAIGN),
-    FIRING: _Shown(
-        firing_view,
-        figures={
-            "What the tests report": (firing.SHARE, firing_figure),
-            "By direction": (firing.DIRECTION_SHARE, directions_figure),
-        },
-        asked=firing.TEST,
-    ),
-    HISTORY: _Shown(hit_view, figures={draw.__name__.replace("_", " ").capitalize(): ("", draw) for draw in FIGURES}),
+    SWEEP: _Shown(sweep_view, measured=True, figures={"By input": sweep_figure}, asked=attr.CAMPAIGN),
+    FIRING: _Shown(firing_view, figures={"What the tests report": firing_figure}, asked=firing.TEST),
+    HISTORY: _Shown(hit_view, figures={draw.__name__.replace("_", " ").capitalize(): draw for draw in FIGURES}),
 }
 
 
@@ -110,9 +103,7 @@ def write_file_report(path: Path, kind: Kind, output: Path) -> None:
     title, (first, *others) = str(attributes.get(attr.TITLE, path.stem)), _view(kind, dataset)
     sections = [replace(first, title="") if first.title == title else first, *others]
     figures = "".join(
-        f"<h2>{name}</h2><img alt='{name}' src='{data_url(draw(dataset))}'>"
-        for name, (needed, draw) in shown.figures.items()
-        if not needed or needed in dataset
+        f"<h2>{name}</h2><img alt='{name}' src='{data_url(draw(dataset))}'>" for name, draw in shown.figures.items()
     )
     asked = (
         f"<h2>What was asked</h2><pre>{escape(str(attributes[shown.asked]))}</pre>" if shown.asked in attributes else ""

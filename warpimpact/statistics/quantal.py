@@ -1,9 +1,9 @@
-"""Median and scale of a threshold from yes-or-no answers at known levels: probit and logit of many tests at once.
+"""Median and spread of a threshold from yes-or-no answers at known levels: probit of many tests at once.
 
-A test has levels x and answers y. P(y = 1 | x) = F((x − location) / scale), where F is the normal distribution (probit)
-or the logistic one (logit). The log likelihood is concave in location/scale and 1/scale. It has a maximum at a finite
-slope if the answers overlap: one 0 at a higher level than one 1 (M. J. Silvapulle, Journal of the Royal Statistical
-Society B 43 (1981) 310). Newton's method finds it. Tests are rows of all arrays; `used` marks the levels that count.
+A test has levels x and answers y. P(y = 1 | x) = Φ((x − location) / scale). The log likelihood is concave in
+location/scale and 1/scale. It has a maximum at a finite slope if the answers overlap: one 0 at a higher level than one
+1 (M. J. Silvapulle, Journal of the Royal Statistical Society B 43 (1981) 310). Newton's method finds it. Tests are rows
+of all arrays; `used` marks the levels that count.
 """
 
 from __future__ import annotations
@@ -13,15 +13,13 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import special
+from scipy import optimize, special
 
 from warpimpact.statistics.intervals import Array
 
 Flags = NDArray[np.bool_]
 
 _LN_2_PI = math.log(2.0 * math.pi)
-_NO_INFORMATION = 35.0
-"""Distance from the location, in scales, beyond which the information of an answer is below double precision."""
 
 
 @dataclass(frozen=True)
@@ -31,7 +29,7 @@ class QuantalFit:
     Attributes:
         location: level of equal odds; without overlap the middle of the gap; NaN if all answers are the same or the
             odds fall with the level.
-        scale: standard deviation of the normal distribution, or scale of the logistic one; 0 without overlap.
+        scale: standard deviation; NaN without overlap, which does not determine it.
         log_likelihood: maximum.
         overlap: whether the maximum is at a finite slope.
     """
@@ -42,16 +40,16 @@ class QuantalFit:
     overlap: Flags
 
 
-def fit_quantal(levels: Array, answers: Flags, used: Flags, link: str = "probit") -> QuantalFit:
+def fit_quantal(levels: Array, answers: Flags, used: Flags) -> QuantalFit:
     """Fit of maximum likelihood of every test, from arrays of shape [tests, shots]."""
     below, above = _ends(levels, answers, used)
     overlap = below > above
     apart = np.isfinite(below) & np.isfinite(above) & ~overlap
     location, scale = np.full((2, len(levels)), np.nan)
-    location[apart], scale[apart] = 0.5 * (below + above)[apart], 0.0
-    likelihood = np.where(apart, -math.log(2.0) * _at_tie(levels, used, below, above), np.nan)
+    location[apart] = 0.5 * (below + above)[apart]
+    likelihood = np.where(apart, _of_a_step(levels, answers, used, below == above), np.nan)
     if overlap.any():
-        maximum = _newton(levels[overlap], answers[overlap], used[overlap], link)
+        maximum = _newton(levels[overlap], answers[overlap], used[overlap])
         location[overlap], scale[overlap], likelihood[overlap] = maximum
     return QuantalFit(location, scale, likelihood, overlap & np.isfinite(location))
 
@@ -63,12 +61,16 @@ def _ends(levels: Array, answers: Flags, used: Flags) -> tuple[Array, Array]:
     return below, above
 
 
-def _at_tie(levels: Array, used: Flags, below: Array, above: Array) -> NDArray[np.int64]:
-    """Number of shots at the level where 0 and 1 meet, which even a step does not explain; shape [tests]."""
-    return np.asarray((used & (levels == below[:, None]) & (below == above)[:, None]).sum(axis=1))
+def _of_a_step(levels: Array, answers: Flags, used: Flags, meet: Flags) -> Array:
+    """Log likelihood of answers that a step explains, but at a level where 0 and 1 `meet`; shape [tests]."""
+    below, _ = _ends(levels, answers, used)
+    there = used & (levels == below[:, None]) & meet[:, None]
+    count, ones = there.sum(axis=1), (there & answers).sum(axis=1)
+    share = ones / np.maximum(count, 1)
+    return np.asarray(special.xlogy(ones, share) + special.xlogy(count - ones, 1.0 - share))
 
 
-def _newton(levels: Array, answers: Flags, used: Flags, link: str) -> tuple[Array, Array, Array]:
+def _newton(levels: Array, answers: Flags, used: Flags) -> tuple[Array, Array, Array]:
     """Location, scale and log likelihood of tests whose answers overlap, shape [tests] each."""
     count = used.sum(axis=1)
     centre = np.where(used, levels, 0.0).sum(axis=1) / count
@@ -76,7 +78,7 @@ def _newton(levels: Array, answers: Flags, used: Flags, link: str) -> tuple[Arra
     width = np.sqrt((from_centre**2).sum(axis=1) / count)
     u, sign = from_centre / width[:, None], np.where(answers, 1.0, -1.0)
     at, slope = np.zeros(len(u)), np.ones(len(u))
-    value, rate, curve = _terms(sign * (at[:, None] + slope[:, None] * u), used, link)
+    value, rate, curve = _terms(sign * (at[:, None] + slope[:, None] * u), used)
     best = value.sum(axis=1)
     for _ in range(60):
         toward = sign * rate
@@ -87,7 +89,7 @@ def _newton(levels: Array, answers: Flags, used: Flags, link: str) -> tuple[Arra
         share = np.ones(len(u))
         for _ in range(40):  # halve steps that lose likelihood
             new0, new1 = at + share * step0, slope + share * step1
-            value, rate, curve = _terms(sign * (new0[:, None] + new1[:, None] * u), used, link)
+            value, rate, curve = _terms(sign * (new0[:, None] + new1[:, None] * u), used)
             total = value.sum(axis=1)
             worse = ~(total >= best - 1e-12 * np.abs(best))
             if not worse.any():
@@ -104,21 +106,17 @@ def _newton(levels: Array, answers: Flags, used: Flags, link: str) -> tuple[Arra
     return location, scale, best
 
 
-def _terms(t: Array, used: Flags, link: str) -> tuple[Array, Array, Array]:
+def _terms(t: Array, used: Flags) -> tuple[Array, Array, Array]:
     """ln F(t), its derivative and minus its second derivative; 0 where `used` is false."""
     t = np.clip(np.where(used, t, 0.0), -1e7, 1e7)
-    if link == "probit":
-        value = special.log_ndtr(t)
-        rate = np.exp(-0.5 * (t * t + _LN_2_PI) - value)
-        curve = rate * (rate + t)
-    else:
-        value, rate = special.log_expit(t), special.expit(-t)
-        curve = rate * (1.0 - rate)
+    value = special.log_ndtr(t)
+    rate = np.exp(-0.5 * (t * t + _LN_2_PI) - value)
+    curve = rate * (rate + t)
     return np.where(used, value, 0.0), np.where(used, rate, 0.0), np.where(used, np.maximum(curve, 0.0), 0.0)
 
 
 def likelihood_interval(
-    levels: Array, answers: Flags, used: Flags, fit: QuantalFit, *, confidence: float = 0.95, link: str = "probit"
+    levels: Array, answers: Flags, used: Flags, fit: QuantalFit, *, confidence: float = 0.95
 ) -> tuple[Array, Array]:
     """Interval of the location by the likelihood ratio (B. T. Neyer, Analysis of sensitivity tests, MLM-3736, 1992).
 
@@ -133,14 +131,12 @@ def likelihood_interval(
         tests = levels[known], answers[known], used[known]
         floor = fit.log_likelihood[known] - drop
         start, scale = fit.location[known], fit.scale[known]
-        low[known] = _profile_end(tests, floor, start, scale, -1.0, link)
-        high[known] = _profile_end(tests, floor, start, scale, 1.0, link)
+        low[known] = _profile_end(tests, floor, start, scale, -1.0)
+        high[known] = _profile_end(tests, floor, start, scale, 1.0)
     return low, high
 
 
-def _profile_end(
-    tests: tuple[Array, Flags, Flags], floor: Array, start: Array, scale: Array, side: float, link: str
-) -> Array:
+def _profile_end(tests: tuple[Array, Flags, Flags], floor: Array, start: Array, scale: Array, side: float) -> Array:
     """Location on one side of `start` at which the profile likelihood falls to `floor`, by bisection; shape [tests]."""
     levels, _, used = tests
     reach = np.ptp(np.where(used, levels, start[:, None]), axis=1)
@@ -149,7 +145,7 @@ def _profile_end(
     steep = np.where(scale > 0.0, 1.0 / np.maximum(scale, 1e-12), 1.0 / reach)
     trial = 0.25 * reach
     for _ in range(44):
-        likelihood, steep = _profile(tests, start + side * trial, steep, link)
+        likelihood, steep = _profile(tests, start + side * trial, steep)
         beyond = likelihood < floor
         outside, inside = np.where(beyond, trial, outside), np.where(beyond, inside, trial)
         trial = np.where(np.isinf(outside), 2.0 * inside, 0.5 * (inside + np.where(np.isinf(outside), 0.0, outside)))
@@ -158,7 +154,7 @@ def _profile_end(
     return np.where(np.isinf(outside) | (outside > 1e3 * reach), side * np.inf, start + side * 0.5 * (inside + outside))
 
 
-def _profile(tests: tuple[Array, Flags, Flags], location: Array, steep: Array, link: str) -> tuple[Array, Array]:
+def _profile(tests: tuple[Array, Flags, Flags], location: Array, steep: Array) -> tuple[Array, Array]:
     """Maximum of the log likelihood over all slopes ≥ 0 at a location, and the slope from which the next search starts;
     shape [tests] each."""
     levels, answers, used = tests
@@ -167,7 +163,7 @@ def _profile(tests: tuple[Array, Flags, Flags], location: Array, steep: Array, l
     flat = ~step_fits & (z.sum(axis=1) <= 0.0)  # an infinite scale: the likelihood is concave in the slope
     slope = steep.copy()
     for _ in range(30):
-        _, rate, curve = _terms(slope[:, None] * z, used, link)
+        _, rate, curve = _terms(slope[:, None] * z, used)
         gain, bend = (rate * z).sum(axis=1), (curve * z * z).sum(axis=1)
         step = gain / np.maximum(bend, 1e-30 * np.abs(gain) + 1e-300)
         new = np.clip(slope + np.clip(step, -slope, 4.0 * slope), 0.2 * slope, None)
@@ -175,60 +171,32 @@ def _profile(tests: tuple[Array, Flags, Flags], location: Array, steep: Array, l
         slope = new
         if (close | step_fits | flat).all():
             break
-    value = _terms(slope[:, None] * z, used, link)[0].sum(axis=1)
+    value = _terms(slope[:, None] * z, used)[0].sum(axis=1)
     none = -math.log(2.0) * used.sum(axis=1)
     value = np.where(step_fits, -math.log(2.0) * (used & (z == 0.0)).sum(axis=1), np.where(flat, none, value))
     return value, np.where(step_fits | flat, steep, slope)
 
 
-def wald_interval(
-    levels: Array, used: Flags, fit: QuantalFit, *, confidence: float = 0.95, link: str = "probit"
-) -> tuple[Array, Array]:
-    """Interval of the location by Fisher's information at the fit, as most laboratory programs report it; NaN without
-    overlap."""
-    s0, s1, s2 = information(levels, used, fit.location, fit.scale, link)
-    quantile = float(special.ndtri(0.5 * (1.0 + confidence)))
-    with np.errstate(divide="ignore", invalid="ignore"):
-        error = fit.scale * np.sqrt(s2 / (s0 * s2 - s1 * s1))
-    half = np.where(fit.overlap, quantile * error, np.nan)
-    return fit.location - half, fit.location + half
+def scale_interval(levels: Array, answers: Flags, fit: QuantalFit, *, confidence: float = 0.95) -> tuple[float, float]:
+    """Interval of the scale of one test by the likelihood ratio, from arrays of shape [shots].
 
-
-def information(
-    levels: Array, used: Flags, location: Array, scale: Array, link: str = "probit"
-) -> tuple[Array, Array, Array]:
-    """Sums of w, w z and w z² over the levels, z = (level − location) / scale: scale² times Fisher's information of
-    location and scale. Shape [tests] each; NaN where the scale is not positive."""
-    safe = np.where(scale > 0.0, scale, np.nan)[:, None]
-    z = np.where(used, np.clip((levels - location[:, None]) / safe, -_NO_INFORMATION, _NO_INFORMATION), 0.0)
-    w = np.where(used, weight(z, link), 0.0)
-    return w.sum(axis=1), (w * z).sum(axis=1), (w * z * z).sum(axis=1)
-
-
-def weight(z: Array, link: str = "probit") -> Array:
-    """Information of one answer: F'² / (F (1 − F))."""
-    if link == "probit":
-        return np.asarray(np.exp(-z * z - _LN_2_PI - special.log_ndtr(z) - special.log_ndtr(-z)))
-    return np.asarray(special.expit(z) * special.expit(-z))
-
-
-_CANDIDATES = np.linspace(-4.0, 4.0, 401)
-
-
-def d_optimal(levels: Array, used: Flags, location: Array, scale: Array) -> Array:
-    """Next level with the largest determinant of Fisher's information of all levels, for a probit with this location
-    and scale (B. T. Neyer, Technometrics 36 (1994) 61); shape [tests].
-
-    An answer with weight w at z adds w (S₀ z² − 2 S₁ z + S₂) to the determinant.
+    Without overlap it begins at 0. It is infinite above if no scale is excluded, and NaN if `fit.location` is.
     """
-    s0, s1, s2 = (total[:, None] for total in information(levels, used, location, scale))
-    gain = weight(_CANDIDATES) * (s0 * _CANDIDATES**2 - 2.0 * s1 * _CANDIDATES + s2)
-    best = np.clip(gain.argmax(axis=1), 1, len(_CANDIDATES) - 2)
-    rows = np.arange(len(levels))
-    left, middle, right = (gain[rows, best + k] for k in (-1, 0, 1))
-    bend = left - 2.0 * middle + right
-    with np.errstate(divide="ignore", invalid="ignore"):
-        shift = np.where(bend < 0.0, 0.5 * (left - right) / bend, 0.0)
-    return np.asarray(
-        location + scale * (_CANDIDATES[best] + np.clip(shift, -1.0, 1.0) * (_CANDIDATES[1] - _CANDIDATES[0]))
-    )
+    if not np.isfinite(fit.location[0]):
+        return math.nan, math.nan
+    floor = float(fit.log_likelihood[0]) - 0.5 * float(special.chdtri(1, 1.0 - confidence))
+    sign, reach = np.where(answers, 1.0, -1.0), float(np.ptp(levels))
+
+    def above_floor(log_scale: float) -> float:
+        scale = math.exp(log_scale) * reach
+        ends = (float(levels.min()) - 6.0 * scale, float(levels.max()) + 6.0 * scale)
+        lost = optimize.minimize_scalar(
+            lambda at: -float(special.log_ndtr(sign * (levels - at) / scale).sum()), bounds=ends, method="bounded"
+        )
+        return -float(lost.fun) - floor
+
+    narrow, wide = math.log(1e-4), math.log(1e4)
+    middle = math.log(float(fit.scale[0]) / reach) if fit.overlap[0] else narrow
+    low = reach * math.exp(optimize.brentq(above_floor, narrow, middle)) if fit.overlap[0] else 0.0
+    high = math.inf if above_floor(wide) > 0.0 else reach * math.exp(optimize.brentq(above_floor, middle, wide))
+    return low, high

@@ -9,7 +9,7 @@ from jsonschema import Draft202012Validator
 from jsonschema.exceptions import best_match
 
 from warpimpact.campaign.schema import campaign_schema
-from warpimpact.firing.plan_file import firing_schema
+from warpimpact.firing.plan import firing_schema
 from warpimpact.identification.fit_schema import fit_schema
 
 CAMPAIGNS = sorted((Path(__file__).parents[3] / "campaigns").glob("*.toml"))

@@ -14,7 +14,7 @@ from warpimpact import Campaign, CampaignError, run, run_to_file
 from warpimpact.catalogue.catalogue import Catalogue
 from warpimpact.cli import main
 from warpimpact.export.spreadsheet import write_csv
-from warpimpact.firing.response import Response, response_of_limits
+from warpimpact.firing.simulate import Response, response_of_limits
 from warpimpact.identification.fit_file import read_fit
 from warpimpact.optimisation.design import read_design
 from warpimpact.results import files

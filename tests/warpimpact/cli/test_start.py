@@ -12,7 +12,7 @@ from jsonschema import Draft202012Validator
 
 from warpimpact import Campaign
 from warpimpact.cli import main
-from warpimpact.firing.plan_file import read_test
+from warpimpact.firing.plan import read_test
 from warpimpact.identification.fit_file import read_fit
 from warpimpact.identification.fit_schema import fit_schema
 from warpimpact.optimisation.design import read_design

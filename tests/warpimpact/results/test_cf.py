@@ -9,17 +9,13 @@ import pytest
 import xarray
 
 from warpimpact import Campaign
-from warpimpact.firing.directions import Directions, Sector
-from warpimpact.firing.plan_file import firing_test
-from warpimpact.firing.repeated import simulate_test
-from warpimpact.firing.response import normal_response
+from warpimpact.firing.plan import firing_test
+from warpimpact.firing.simulate import Response, simulate_test
 from warpimpact.results import files
 from warpimpact.runs.run import run
-from warpimpact.statistics.intervals import Estimate
 
 pytest.importorskip("compliance_checker")
 CAMPAIGNS = Path(__file__).parents[3] / "campaigns"
-KNOWN_TARGET = (CAMPAIGNS / "firing" / "known_target.toml").read_text(encoding="utf-8")
 SLOTTED_PLATE = (CAMPAIGNS / "slotted_plate.toml").read_text(encoding="utf-8")
 
 
@@ -41,22 +37,11 @@ def test_a_hit_map_complies(result: xarray.Dataset, tmp_path: Path) -> None:
     assert "All tests passed!" in told, told
 
 
-def test_a_firing_test_with_directions_complies(tmp_path: Path) -> None:
-    directions = Directions(azimuth=(0.0, 0.5), elevation=(0.0,))
-    cells = np.full((2, 1), 0.5)
-    sector = Sector(
-        cells,
-        cells,
-        cells,
-        cells.astype(int),
-        cells.astype(int),
-        Estimate(0.5, 0.4, 0.6, 64, 0.5),
-        "evidence: none",
-    )
-    test = firing_test(KNOWN_TARGET.replace("tests = 1000", "tests = 20"), "a", tmp_path)
-    target = {"campaign": Path(__file__)}
-    asked = test.model_copy(update={"directions": directions, "target": target})
-    files.write(simulate_test(asked, normal_response(800.0, 25.0), None, sector), tmp_path / "a.nc")
+def test_a_firing_test_complies(tmp_path: Path) -> None:
+    (tmp_path / "limits.nc").touch()
+    text = (CAMPAIGNS / "firing" / "v50_test.toml").read_text(encoding="utf-8").replace("tests = 1000", "tests = 20")
+    test = firing_test(text.replace('campaign = "plate_and_base.toml"', 'limits = "limits.nc"'), "a", tmp_path)
+    files.write(simulate_test(test, Response(np.linspace(800.0, 1100.0, 20))), tmp_path / "a.nc")
     told = report(tmp_path / "a.nc")
     assert "All tests passed!" in told, told
 

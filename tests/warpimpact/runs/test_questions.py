@@ -40,11 +40,6 @@ QUESTIONS: dict[str, tuple[str, ...]] = {
     "run": ("run", CAMPAIGN),
     "limit": ("limit", TARGET + PLATE + HOLED + HITS.format(160), "--tolerance", "60 m/s"),
     "sweep": ("sweep", CAMPAIGN.replace("160", "96") + '[sweep]\nvelocity = ["700 m/s", "800 m/s"]\n'),
-    "directions": (
-        "test",
-        'title = "directions"\n[target]\ncampaign = "target.toml"\n[directions]\nvelocity = "825 m/s"\n'
-        'azimuth = ["0 deg", "30 deg"]\nelevation = ["0 deg"]\nfirst_count = 32\nmax_count = 64\nhalf_width = 0.01\n',
-    ),
     "identify": (
         "identify",
         TARGET.replace('[impact]\nvelocity = "825 m/s"\n', "").replace("[output]", "[record]")
