@@ -78,31 +78,38 @@ class CampaignReference(FromTheCode):
     """Every key of a campaign file, table by table, from its JSON schema."""
 
     def lines(self) -> Iterator[str]:
-        from warpimpact.campaign.schema import campaign_schema
+        from warpimpact.campaign.campaign import Campaign
+        from warpimpact.campaign.schema import campaign_schema, file_schema
+        from warpimpact.scene.distributions import Distribution
 
-        self.schema = campaign_schema()
+        self.schema = file_schema(Campaign, "") | {"properties": campaign_schema()["properties"]}
+        yield from self.file()
+        yield from ["## Distributions", "", "A distribution in the place of a value: each shot draws its own.", ""]
+        names = [one.__name__ for one in subclasses(Distribution)]
+        for name in names:
+            if name in self.schema["$defs"]:
+                yield from self.variant(self.schema["$defs"][name], "distribution")
+
+    def file(self) -> Iterator[str]:
         yield from ["## Tables of the file", ""]
         yield from self.keys(self.schema)
         for name, part in self.schema["properties"].items():
             yield from self.of_table(name, part)
-        yield from ["## Distributions", "", self.definition("Distribution")["description"], ""]
-        for one in self.chosen(self.definition("Distribution")):
-            yield from self.variant(one, "distribution")
 
-    def definition(self, reference: str) -> dict[str, Any]:
-        found: dict[str, Any] = self.schema["$defs"][reference.rpartition("/")[2]]
+    def definition(self, part: dict[str, Any]) -> dict[str, Any]:
+        found: dict[str, Any] = self.schema["$defs"].get(part.get("$ref", "").rpartition("/")[2], {})
         return found
 
-    def chosen(self, part: dict[str, Any]) -> list[dict[str, Any]]:
-        """The models that a part of the schema may be."""
-        options = [part, *([part["then"]] if "type" in part and "then" in part else [])]
-        options += [one["then"] for one in part.get("allOf", []) if "then" in one]
-        options += [option["items"] for option in options if "items" in option]
-        return [self.definition(option["$ref"]) for option in options if "$ref" in option]
+    def tables(self, part: dict[str, Any]) -> list[dict[str, Any]]:
+        """The tables that a part of the schema may be, or a list of which."""
+        if "anyOf" in part or "items" in part:
+            inner = [*part.get("anyOf", []), *([part["items"]] if "items" in part else [])]
+            return [table for one in inner for table in self.tables(one)]
+        return [found] if "properties" in (found := self.definition(part)) else []
 
     def of_table(self, name: str, part: dict[str, Any], depth: str = "##") -> Iterator[str]:
         """A table of the file, and those within it."""
-        models = [one for one in self.chosen(part) if "properties" in one]
+        models = self.tables(part)
         if not models or name == "layer.pattern":  # which is that of the plate
             return
         yield from [f"{depth} `[{name}]`", "", part.get("description", "").capitalize(), ""]
@@ -111,24 +118,14 @@ class CampaignReference(FromTheCode):
             shared = self.shared(models)
             yield from self.keys(shared)
             for model in models:
-                model["properties"] = {k: v for k, v in model["properties"].items() if k not in shared["properties"]}
-                yield from self.variant(model, decided[0], depth + "#")
+                own = {key: one for key, one in model["properties"].items() if key not in shared["properties"]}
+                yield from self.variant(model | {"properties": own}, decided[0], depth + "#")
             return
         for model in models:
-            if model is not models[0]:
-                new = {key for key in model["properties"] if key not in models[0]["properties"]}
-                yield f"With several, each has besides these: {', '.join(map(code, sorted(new)))}."
-                yield ""
-                continue
             yield from [model.get("description", ""), ""]
             yield from self.keys(model)
             for key, inner in model["properties"].items():
-                if not any(
-                    "distribution" in one.get("properties", {})
-                    or "enum" in one.get("properties", {}).get("distribution", {})
-                    for one in self.chosen(inner)
-                ):
-                    yield from self.of_table(f"{name}.{key}", inner, depth)
+                yield from self.of_table(f"{name}.{key}", inner, depth)
 
     def shared(self, models: list[dict[str, Any]]) -> dict[str, Any]:
         """The keys that all of some models have alike."""
@@ -145,11 +142,6 @@ class CampaignReference(FromTheCode):
         name = model["properties"][key]["const"]
         yield from [f'{depth} `{key} = "{name}"`', "", model.get("description", ""), ""]
         yield from self.keys(model, without=key)
-        for name, part in model["properties"].items():
-            for one in self.chosen({"items": part["items"]} if "items" in part else {}):
-                if "properties" in one:
-                    yield from [f"Each of {code(name)} has:", ""]
-                    yield from self.keys(one)
 
     def keys(self, model: dict[str, Any], without: str = "") -> Iterator[str]:
         required = model.get("required", [])
@@ -159,7 +151,7 @@ class CampaignReference(FromTheCode):
                 self.kind(part),
                 "**required**" if key in required else self.default(part),
                 self.bounds(part),
-                self.meaning(part),
+                self.meaning(key, part),
             )
             for key, part in model["properties"].items()
             if key != without
@@ -167,25 +159,22 @@ class CampaignReference(FromTheCode):
         if rows:
             yield from table(("key", "unit or type", "default", "allowed", "meaning"), rows)
 
-    def scatters(self, part: dict[str, Any]) -> bool:
-        """Whether a distribution may take the place of the value."""
-        return str(part.get("then", {}).get("$ref", "")).endswith("/Distribution")
-
     def kind(self, part: dict[str, Any]) -> str:
-        tables = "items" not in part or "object" in part["type"]
-        if tables and not self.scatters(part) and any("properties" in one for one in self.chosen(part)):
-            return "table"
+        if "anyOf" in part:
+            return " or ".join(dict.fromkeys(map(self.kind, part["anyOf"])))
         if "unit" in part:
-            return f"{part['unit']}, or a list of them" if "prefixItems" in part else str(part["unit"])
+            return str(part["unit"])
         if "enum" in part or "const" in part:
             return "word" if isinstance(part.get("const", part.get("enum", [""])[0]), str) else "integer"
         if part.get("type") == "array":
             inner = part.get("items") or part["prefixItems"][0]
             return f"list of {self.kind(inner)}"
-        if "$ref" in part and "properties" not in self.definition(part["$ref"]):
-            return self.kind(self.definition(part["$ref"]))
+        if "$ref" in part:
+            found = self.definition(part)
+            return "table" if "properties" in found else self.kind(found)
         kinds = part.get("type", "string")
-        return "number" if isinstance(kinds, list) else {"string": "text", "boolean": "true or false"}.get(kinds, kinds)
+        names = {"string": "text", "boolean": "true or false", "object": "table"}
+        return "number" if isinstance(kinds, list) else names.get(kinds, kinds)
 
     def default(self, part: dict[str, Any]) -> str:
         default = part.get("default")
@@ -212,9 +201,18 @@ class CampaignReference(FromTheCode):
             told.append(f"at most {part['maxItems']} items")
         return ", ".join(told)
 
-    def meaning(self, part: dict[str, Any]) -> str:
+    def meaning(self, key: str, part: dict[str, Any]) -> str:
+        from warpimpact.scene.quantities import SCATTERED
+
         told = str(part.get("description", ""))
-        return f"{told} May [scatter](#distributions)." if self.scatters(part) else told
+        return f"{told} May [scatter](#distributions)." if key in SCATTERED else told
+
+
+def subclasses(model: type) -> Iterator[type]:
+    """All classes below a class."""
+    for one in model.__subclasses__():
+        yield one
+        yield from subclasses(one)
 
 
 def short(number: float) -> str:
@@ -226,27 +224,24 @@ class FiringReference(CampaignReference):
     """Every key of a test file, table by table, from its JSON schema."""
 
     def lines(self) -> Iterator[str]:
-        from warpimpact.firing.plan import firing_schema
+        from warpimpact.campaign.schema import file_schema
+        from warpimpact.firing.plan import FiringTest
 
-        self.schema = firing_schema()
-        yield from ["## Tables of the file", ""]
-        yield from self.keys(self.schema)
-        for name, part in self.schema["properties"].items():
-            yield from self.of_table(name, part)
+        self.schema = file_schema(FiringTest, "")
+        yield from self.file()
 
 
 class DesignReference(CampaignReference):
     """Every key of a design file beside those of a campaign, table by table, from its JSON schema."""
 
     def lines(self) -> Iterator[str]:
-        from warpimpact.optimisation.design import asking_schema
+        from warpimpact.campaign.campaign import Campaign
+        from warpimpact.optimisation.design import design_schema
 
-        self.schema = asking_schema()
-        yield from ["## Tables of the file", ""]
-        yield from self.keys(self.schema)
-        for name, part in self.schema["properties"].items():
-            if name != "variables":
-                yield from self.of_table(name, part)
+        self.schema = design_schema()
+        own = {key: part for key, part in self.schema["properties"].items() if key not in Campaign.model_fields}
+        self.schema["properties"] = own
+        yield from self.file()
 
 
 # --- Commands ---

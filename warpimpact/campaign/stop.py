@@ -21,7 +21,7 @@ class Stop(Model):
     """
 
     quantity: str
-    half_width: float
+    half_width: Annotated[float, Field(json_schema_extra={"type": ["number", "string"]})]
     confidence: Annotated[Number, Field(gt=0, lt=1)] = 0.95
     max_count: Annotated[int, Field(strict=True, ge=1, le=2**30)]
 

@@ -119,13 +119,21 @@ def _schema(arguments: argparse.Namespace) -> None:
 
 def _schema_text(kind: str) -> str:
     import json
-    from importlib import import_module
 
-    room, name = {
-        "campaign": ("campaign.schema", "campaign_schema"),
-        "fit": ("identification.fit_schema", "fit_schema"),
-        "test": ("firing.plan", "firing_schema"),
-        "design": ("optimisation.design", "design_schema"),
-    }[kind]  # the schemas of the other kinds would take seconds to import
-    made = getattr(import_module(f"warpimpact.{room}"), name)
-    return json.dumps(made(), indent=1, ensure_ascii=False) + "\n"
+    from warpimpact.campaign.schema import campaign_schema, file_schema
+
+    if kind == "fit":  # each kind takes seconds to import
+        from warpimpact.identification.fit_file import FitFile
+
+        schema = file_schema(FitFile, "warpimpact fit")
+    elif kind == "test":
+        from warpimpact.firing.plan import FiringTest
+
+        schema = file_schema(FiringTest, "warpimpact firing test")
+    elif kind == "design":
+        from warpimpact.optimisation.design import design_schema
+
+        schema = design_schema()
+    else:
+        schema = campaign_schema()
+    return json.dumps(schema, indent=1, ensure_ascii=False) + "\n"

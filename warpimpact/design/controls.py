@@ -6,13 +6,11 @@ import math
 from collections.abc import Iterator, Mapping
 from typing import Any
 
-from pydantic import BaseModel
-
 from warpimpact.campaign.campaign import Campaign
-from warpimpact.campaign.schema import read_docstring
 from warpimpact.design.designs import Tables, ValidDesign
 from warpimpact.plotting.cell import words
 from warpimpact.scene import NoPattern, Plate
+from warpimpact.scene.model import Model
 from warpimpact.scene.units import reader_in, typed
 
 Place = list[str | int]
@@ -91,7 +89,7 @@ def _of_plate(campaign: Campaign, tables: Tables, table: Place, plate: Plate) ->
             pitch = pattern.spacing[1] * _UNITS["m"][1]
             yield _slider(campaign, tables, [*place, "spacing"], "pattern", "spacing", pitch) | {"label": "pitch"}
     if hasattr(pattern, "staggered"):
-        meaning = read_docstring(type(pattern))[1].get("staggered", "")
+        meaning = pattern.meanings().get("staggered", "")
         path = [*place, "staggered"]
         yield {"kind": "switch", "path": path, "label": "staggered", "value": pattern.staggered, "meaning": meaning}
 
@@ -111,7 +109,7 @@ def _slider(
         value: value in the unit of the slider, if the campaign does not have it at this place.
     """
     name = key or str(path[-1])
-    owner: BaseModel = _value(campaign, path[:-1] if key is None else path[: path.index(key)])
+    owner: Model = _value(campaign, path[:-1] if key is None else path[: path.index(key)])
     field = type(owner).model_fields.get(name)
     reader = None if field is None else reader_in(typed(field))
     si = "m" if name == "spacing" else "kg/m^2" if name == "areal_density" else reader.unit if reader else ""
@@ -130,7 +128,7 @@ def _slider(
         "high": max(high, value),
         "step": step,
         "scatters": isinstance(_value(tables, path), dict),
-        "meaning": read_docstring(type(owner))[1].get(name, ""),
+        "meaning": owner.meanings().get(name, ""),
     }
 
 

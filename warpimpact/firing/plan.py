@@ -10,7 +10,6 @@ import numpy as np
 from pydantic import Field, PrivateAttr, ValidationError, model_validator
 from scipy import special
 
-from warpimpact.campaign.schema import completed_schema
 from warpimpact.campaign.text import CampaignError, parsed, read_text
 from warpimpact.firing.v50 import within_span
 from warpimpact.results.kinds import TEST
@@ -232,11 +231,3 @@ def firing_test(text: str, name: str, folder: Path) -> FiringTest:
         raise CampaignError(f"{name}: {sentence(error, data)}") from None
     test._source = text
     return test
-
-
-def firing_schema() -> dict[str, Any]:
-    """The JSON schema (2020-12) of a test file, with the meaning, the default and the bounds of every key."""
-    return completed_schema(FiringTest) | {
-        "title": "warpimpact firing test",
-        "description": "A firing test of warpimpact: what is fired at, how, and what is asked of it.",
-    }

@@ -102,7 +102,7 @@ class _DiscrepancyTable(Model):
     angle: Any = None
 
 
-class _FitFile(_WithScene):
+class FitFile(_WithScene):
     """A fit file."""
 
     title: Title = ""
@@ -120,7 +120,7 @@ def fit_from(text: str, name: str, folder: FilePath) -> Fit:
     """Read a fit from its text; `name` is the name of the file in errors."""
     data = parsed(text, name, FIT)
     catalogue = catalogue_of(data, name, folder)
-    given: _FitFile = _model(_FitFile, with_cores(data, catalogue, name), name)
+    given: FitFile = _model(FitFile, with_cores(data, catalogue, name), name)
     parameters, record = read_priors(given.prior, given.tables, name), given.record
     tables = with_medians(given.tables, given.prior, parameters)
     shots = tuple(

@@ -12,7 +12,7 @@ from typing import Annotated, Any
 from pydantic import Field, ValidationError, model_validator
 
 from warpimpact.campaign.campaign import Campaign
-from warpimpact.campaign.schema import campaign_schema, completed_schema
+from warpimpact.campaign.schema import campaign_schema, file_schema
 from warpimpact.campaign.text import CampaignError, parsed, read_text
 from warpimpact.optimisation.asked import Bound, Objective, check_needs
 from warpimpact.optimisation.space import Space, read_space
@@ -248,27 +248,18 @@ def design_from(text: str, name: str, folder: Path) -> Design:
     )
 
 
-def asking_schema() -> dict[str, Any]:
-    """The JSON schema of the tables of a design file beside those of a campaign."""
-    schema = completed_schema(Asking)
-    schema["properties"]["variables"] = {
+def design_schema() -> dict[str, Any]:
+    """The JSON schema of a design file: of a campaign, what is free in it, and what is sought."""
+    campaign, asking = campaign_schema(), file_schema(Asking, "warpimpact design")
+    variables = {
         "description": 'Free variables by their places, such as "plate.pattern.width": a range with low, high and, '
         "where it has one, a step; or a list of values, or of tables with names.",
         "type": "object",
         "additionalProperties": {"type": ["object", "array"]},
     }
-    return schema
-
-
-def design_schema() -> dict[str, Any]:
-    """The JSON schema (2020-12) of a design file, with the meaning, the default and the bounds of every key."""
-    campaign, asking = campaign_schema(), asking_schema()
-    left_out = ("stop", "sweep")
-    return campaign | {
-        "title": "warpimpact design",
-        "description": "A search for designs: a campaign, what is free in it, and what is sought.",
-        "properties": {key: key_schema for key, key_schema in campaign["properties"].items() if key not in left_out}
-        | asking["properties"],
-        "$defs": campaign["$defs"] | asking["$defs"],
-        "required": [*(key for key in campaign.get("required", ()) if key != "hits"), "objectives"],
+    keys = {key: schema for key, schema in campaign["properties"].items() if key not in ("stop", "sweep")}
+    return asking | {
+        "properties": keys | asking["properties"] | {"variables": variables},
+        "$defs": asking["$defs"] | campaign["$defs"],
+        "required": ["objectives"],
     }

@@ -1,18 +1,23 @@
 """The base class of the models of a scene."""
 
 import inspect
+import re
 from collections.abc import Mapping
 from copy import deepcopy
 from typing import Any, ClassVar, Self
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import BaseModel, ConfigDict, model_validator
+from pydantic import BaseModel, ConfigDict, GetJsonSchemaHandler, model_validator
+from pydantic.json_schema import JsonSchemaValue
+from pydantic_core import CoreSchema
 
 from .notebook import html_of
 from .units import meant, quoted
 
 Array = NDArray[np.float64]
+_ENTRY = re.compile(r"^    (?P<names>\w+(?:, \w+)*): ?(?P<text>.*)$")
+"""An entry under Attributes in a docstring."""
 
 
 class Model(BaseModel):
@@ -29,6 +34,32 @@ class Model(BaseModel):
         fields = inspect.signature(cls).parameters.values()
         short = [inspect.Parameter(field.name, field.kind, default=field.default) for field in fields]
         cls.__signature__ = inspect.Signature(short)
+
+    @classmethod
+    def __get_pydantic_json_schema__(cls, core_schema: CoreSchema, handler: GetJsonSchemaHandler) -> JsonSchemaValue:
+        """The schema of a table, with the meanings of its keys and with keys that are read into others."""
+        schema = handler(core_schema)
+        table = handler.resolve_ref_schema(schema)
+        table["description"] = " ".join(inspect.cleandoc(cls.__doc__ or "").partition("Attributes:\n")[0].split())
+        for name, text in cls.meanings().items():
+            if name in cls._keys():
+                table["properties"].setdefault(name, {})["description"] = text
+        return schema
+
+    @classmethod
+    def meanings(cls) -> dict[str, str]:
+        """Meanings of the keys, by the docstrings."""
+        entries: dict[str, str] = {}
+        for kind in reversed(cls.__mro__):
+            names: list[str] = []
+            section = inspect.cleandoc(kind.__doc__ or "").partition("Attributes:\n")[2].partition("\n\n")[0]
+            for line in section.splitlines():
+                if match := _ENTRY.match(line):
+                    names = match["names"].split(", ")
+                    entries |= dict.fromkeys(names, match["text"])
+                else:
+                    entries |= {name: f"{entries[name]} {line.strip()}" for name in names}
+        return entries
 
     @model_validator(mode="before")
     @classmethod

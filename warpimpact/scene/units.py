@@ -175,7 +175,11 @@ def _part(value: object, depth: int = 3) -> object:
 
 def _quantity(name: str, unit: str, example: str) -> BeforeValidator:
     """The reader of a quantity, with its JSON schema."""
-    schema = {"type": ["number", "string"], "pattern": _STRING_WITH_UNIT if unit else _STRING, "examples": [example]}
+    schema = {
+        "type": ["number", "string", "object"],
+        "pattern": _STRING_WITH_UNIT if unit else _STRING,
+        "examples": [example],
+    }
     if unit:
         schema["unit"] = "deg" if unit == "rad" else unit
     return BeforeValidator(

@@ -8,13 +8,11 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
-from jsonschema import Draft202012Validator
 
 from warpimpact import Campaign
 from warpimpact.cli import main
 from warpimpact.firing.plan import read_test
 from warpimpact.identification.fit_file import read_fit
-from warpimpact.identification.fit_schema import fit_schema
 from warpimpact.optimisation.design import read_design
 
 CAMPAIGNS = Path(__file__).parents[3] / "campaigns"
@@ -91,16 +89,6 @@ def test_a_new_file_names_itself_in_its_commands(capsys: pytest.CaptureFixture[s
         assert "campaigns/" not in text
     assert main(["new", "--list"]) == 0
     assert "campaigns/" not in capsys.readouterr().out
-
-
-def test_the_schema_of_fits_takes_the_fits_and_finds_slips() -> None:
-    validator = Draft202012Validator(fit_schema())
-    for path in (CAMPAIGNS / "fits").glob("*.toml"):
-        fit = tomllib.loads(path.read_text(encoding="utf-8"))
-        assert list(validator.iter_errors(fit)) == []
-        for table, slip in (("plate", {"thicknes": 1}), ("sampling", {"set": 1}), ("discrepancy", {"speed": 1})):
-            (error,) = validator.iter_errors(fit | {table: fit.get(table, {}) | slip})
-            assert error.json_path == f"$.{table}"
 
 
 @pytest.mark.parametrize(
