@@ -14,10 +14,11 @@ import numpy as np
 from matplotlib.figure import Figure
 from PIL import Image
 
-from warpimpact import Campaign, replay, run
+from warpimpact import Campaign, replay, run, sensitivity
 from warpimpact.plotting import dispersion, marginals, overview, trajectory, uncertainty, variable_maps
 from warpimpact.plotting.posterior import hits_figure, pairs_figure
 from warpimpact.plotting.pressure import pressure
+from warpimpact.plotting.sensitivity import sensitivity_figure
 from warpimpact.results import files
 
 HERE = Path(__file__).parent
@@ -38,6 +39,8 @@ def pictures() -> Iterator[tuple[str, Figure, int]]:
     yaw = {"distribution": "normal", "mean": "-2 deg", "std": "1 deg"}
     scattered = run(oblique.model_copy(update={"scatter": {"yaw": yaw}}))
     yield "gallery/uncertainty.png", uncertainty(scattered, "tilt"), 1100
+    plate = Campaign.from_toml(HERE / "slotted_plate.toml")
+    yield "gallery/sensitivity.png", sensitivity_figure(sensitivity(plate, hits=256), plate.title, 256), 1100
     edge = np.hypot(slotted.hit_y - HIT[0], slotted.hit_z - HIT[1])
     hit = replay(slotted, int(edge.argmin("hit")), folder=HERE)
     for draw in (trajectory.passage, trajectory.flight, trajectory.plate, pressure):

@@ -58,6 +58,7 @@ if TYPE_CHECKING:
     from .scene.flow import Continuum, Flow
     from .solver.device import DeviceError
     from .solver.limit import limit_thickness, limit_velocity
+    from .studies.sensitivity import sensitivity
 
     __version__: str
 
@@ -119,6 +120,7 @@ __all__ = [
     "replay",
     "run",
     "run_to_file",
+    "sensitivity",
     "simulate",
     "threat",
     "to_dataframe",
@@ -155,6 +157,7 @@ _HOMES = {
     "inspect": ".analysis.inspection",
     "run": ".runs.run",
     "run_to_file": ".runs.run",
+    "sensitivity": ".studies.sensitivity",
     "simulate": ".continuum.strikes",
     "threat": ".catalogue.by_name",
     "to_dataframe": ".export.spreadsheet",

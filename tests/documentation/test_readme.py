@@ -35,6 +35,7 @@ FEWER = {
     "compare": ["--count", "128"],
     "continuum": ["--hits", "1"],
     "report": ["--trajectories", "1"],
+    "sensitivity": ["--hits", "32"],
     "test": ["--count", "16"],
 }
 

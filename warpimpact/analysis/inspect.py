@@ -28,6 +28,7 @@ from warpimpact.results.measures import Measure
 from warpimpact.statistics.intervals import Estimate
 from warpimpact.view.view import Column, Section, Table, labelled, number, text_of
 
+NO_SENSITIVITY = "No sensitivity computed. Run: warpimpact sensitivity CAMPAIGN.toml"
 _QUANTILES = (0.05, 0.5, 0.95)
 _ARRESTED = "Other cores count in none of these numbers; in the file an arrested core has a residual velocity of 0."
 
@@ -45,6 +46,7 @@ def inspect_view(dataset: xarray.Dataset) -> list[Section]:
         _statuses(dataset),
         _numbers(dataset),
         effectiveness_view(dataset),
+        Section([NO_SENSITIVITY]),
         failures(dataset),
     ]
 

@@ -28,6 +28,7 @@ from .plain import Plain, say
 from .progress import verbosity
 from .replay import add_replay
 from .run import add_run
+from .sensitivity import add_sensitivity
 from .show import add_inspect, add_plate, add_plot
 from .start import add_new, add_schema
 from .sweep import add_sweep
@@ -38,7 +39,7 @@ _DAILY = (
     *(add_compare, add_limit, add_optimise, add_report),
 )
 _EXPERT = (
-    *(add_plate, add_inspect, add_plot, add_sweep, add_test),
+    *(add_plate, add_inspect, add_plot, add_sensitivity, add_sweep, add_test),
     *(add_replay, add_export, add_continuum, add_identify, add_validate, add_schema),
 )
 """Commands in the order of the help: those of a task from names to a report, and those for experts."""

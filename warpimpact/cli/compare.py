@@ -21,9 +21,12 @@ from .options import (
 from .paths import check_picture, named
 from .progress import show_run, warn
 from .run import failure_code
+from .sensitivity import show_rows
 
 if TYPE_CHECKING:
     from xarray import Dataset
+
+    from warpimpact.analysis.comparison import Comparison
 
 
 def add_compare(commands: Commands) -> None:
@@ -58,6 +61,11 @@ def add_compare(commands: Commands) -> None:
         dest="every",
         help="print and draw every measure, every pair of plates, and what was compared how",
     )
+    parser.add_argument(
+        "--sensitivity",
+        action="store_true",
+        help="rank the plates of a campaign by the deciding measure with each change of what nobody measured, too",
+    )
     add_computing(parser)
     add_count(parser)
     replaced = "an existing figure; of a campaign, compute all plates again"
@@ -82,6 +90,10 @@ def _compare(arguments: argparse.Namespace) -> int:
     tilts = figure.with_stem(f"{figure.stem}_tilt")
     for picture in (figure, beside, tilts):
         check_picture(picture, overwrite=arguments.overwrite or (is_campaign and arguments.output is None))
+    if arguments.sensitivity and not is_campaign:
+        raise files.ResultError(
+            f"{arguments.files[0]}: --sensitivity computes the plates again. Give the campaign with their [[plate]]."
+        )
     replaced = " (replaced)" if figure.exists() else ""
     paths = _plates_run(arguments, figure.parent) if is_campaign else named(arguments.files)
     if len(paths) < 2:
@@ -100,12 +112,37 @@ def _compare(arguments: argparse.Namespace) -> int:
         print(text_of([*comparison_view(comparison), Section(evidence)]))
     else:
         print(text_of([short_view(comparison, evidence)]))
+    if arguments.sensitivity:
+        print(_sensitivity(arguments, comparison))
     comparison_figure(comparison, every=arguments.every).savefig(figure, dpi=150)
     print(f"{figure}{replaced}" + ("" if arguments.every else "; every measure with --all"))
     if (against_weight := weight_figure(comparison)) is not None:
         against_weight.savefig(beside, dpi=150)
         print(beside)
     return code
+
+
+def _sensitivity(arguments: argparse.Namespace, comparison: "Comparison") -> str:
+    """The deciding measure of the plates with each change, and which changes turn their order over."""
+    from warpimpact.analysis.comparison_short import deciding
+    from warpimpact.campaign.plates import read_plates
+    from warpimpact.results.files import ResultError
+    from warpimpact.studies.sensitivity import plate_sensitivity, reversals
+
+    score = deciding(comparison)
+    if score is None:
+        raise ResultError(f"{arguments.files[0]}: no measure ranks these plates, so no change can turn them over")
+    with memory_told(arguments.files[0]), show_rows() as progress:
+        table = plate_sensitivity(
+            read_plates(arguments.files[0], count=arguments.count),
+            score.name,
+            shifts={plate.name: plate.score(score.name).numerics or 0.0 for plate in comparison.plates},
+            device=arguments.device,
+            progress=progress,
+        )
+    by_value = ", by value alone" if score.name in (comparison.at_equal_weight or ()) else ""
+    text = table.to_string(float_format="{:.4g}".format, na_rep="-")
+    return f"\n{score.measure.title}{by_value}:\n{text}\n{reversals(table)}\n"
 
 
 def _print_models(

@@ -1,0 +1,146 @@
+"""A study of sensitivity: each row is what a campaign with this change gives, at the same hits."""
+
+from pathlib import Path
+
+import pandas as pd
+import pytest
+
+from warpimpact import Campaign, run, sensitivity
+from warpimpact.campaign.text import CampaignError
+from warpimpact.cli import main
+from warpimpact.plotting.sensitivity import sensitivity_figure
+from warpimpact.studies.sensitivity import changes, largest_move, plate_sensitivity, reversals
+
+TEXT = """title = "slots"
+core = { shape = "ogive", diameter = "6 mm", crh = 3.0, length = "27 mm", mass = "4 g" }
+numerics = { level = 1 }
+[plate]
+thickness = "4 mm"
+resistance = "2.6 GPa"
+shear_coefficient = 0.05
+degradation = 0.8
+pattern = { shape = "circle", diameter = "5 mm", spacing = ["8 mm", "8 mm"] }
+[impact]
+velocity = "825 m/s"
+[hits]
+count = 64
+[output]
+standoffs = ["130 mm"]
+"""
+OF_CATALOGUE = """title = "catalogue"
+core = { threat = ".30 AP M2" }
+plate = { material = "HHA Class 1", thickness = "6 mm" }
+hits = { count = 4 }
+"""
+MEAN = "residual velocity, mean [m/s]"
+
+
+def read(text: str = TEXT) -> Campaign:
+    return Campaign.from_text(text, name="a", folder=Path())
+
+
+def test_every_change_has_a_row() -> None:
+    of_weak = ["Y at its low end", "Y at its high end", "no weakening (β = 1)", "weakens half as fast"]
+    of_weak += ["weakens twice as fast", "weakening reaches half as far", "weakening reaches twice as far"]
+    of_law = ["friction η = 0", "friction η = 0.1", "onset κ = 0", "onset κ = 0.02", "less resistance near edges"]
+    of_shot = ["5° more oblique", "2° of yaw", "half the stand-off"]
+    assert list(changes(read())) == [*of_weak, *of_law, *of_shot]
+    assert "weakening (β = 0.8 in 1 µs)" in changes(read(TEXT.replace("degradation = 0.8\n", "")))
+    solid = read(TEXT.replace("degradation = 0.8\n", "").replace("pattern =", "#"))
+    assert list(changes(solid)) == [*of_weak[:2], *of_law[:-1], *of_shot]
+    assert "less resistance near edges" not in changes(
+        read(f'{TEXT}[numerics]\nscheme = "nodal"\n'.replace("numerics = { level = 1 }\n", ""))
+    )
+
+
+def test_what_scatters_does_not_change() -> None:
+    scattered = read(TEXT + '[impact.yaw]\ndistribution = "normal"\nmean = 0\nstd = "1 deg"\n')
+    assert {*changes(read())} - {*changes(scattered)} == {"2° of yaw"}
+
+
+def test_only_a_core_with_a_strength_gets_another_one() -> None:
+    strong = TEXT.replace('mass = "4 g"', 'mass = "4 g", strength = "5 GPa"') + "bending = true\n"
+    strengths = [changed.core.strength for name, changed in changes(read(strong)).items() if name.startswith("a core")]
+    assert strengths == pytest.approx([3.5e9, 6.5e9])
+
+
+def test_resistance_of_the_catalogue_has_its_interval_and_follows_the_friction() -> None:
+    given, changed = read(OF_CATALOGUE), changes(read(OF_CATALOGUE))
+    low, high = (changed[f"Y at its {end} end"].plate.resistance for end in ("low", "high"))
+    assert 0.6 < low / given.plate.resistance < 1.0 < high / given.plate.resistance < 1.6
+    named = OF_CATALOGUE.replace("thickness", "shear_coefficient = 0.1, thickness")
+    of_more = changed["friction η = 0.1"].plate.resistance
+    assert of_more == pytest.approx(read(named).plate.resistance, rel=1e-3)
+    assert of_more < 0.99 * given.plate.resistance
+
+
+def test_a_row_is_a_run_of_the_changed_campaign() -> None:
+    table = sensitivity(read(), hits=64, device="cpu")
+    assert table.index[0] == "as given"
+    assert list(table.columns) == [MEAN, "deflection, mean [°]", "tilt at 130 mm, mean [°]"]
+    texts = {
+        "as given": TEXT,
+        "no weakening (β = 1)": TEXT.replace("degradation = 0.8", "degradation = 1.0"),
+        "Y at its high end": TEXT.replace('"2.6 GPa"', '"3.38 GPa"'),
+        "friction η = 0": TEXT.replace("shear_coefficient = 0.05", "shear_coefficient = 0"),
+        "2° of yaw": TEXT.replace("[impact]", '[impact]\nyaw = "2 deg"'),
+    }
+    for name, text in texts.items():
+        alone = float(run(read(text), device="cpu").residual_velocity.mean())
+        assert table.loc[name, MEAN] == pytest.approx(alone, rel=1e-6), name
+    nearer = float(run(read(TEXT.replace('"130 mm"', '"65 mm"')), device="cpu").tilt.mean())
+    assert table.loc["half the stand-off", "tilt at 130 mm, mean [°]"] == pytest.approx(nearer, rel=1e-6)
+    assert table.loc["half the stand-off", MEAN] == table.loc["as given", MEAN]
+
+
+def test_the_sentence_names_what_moves_the_first_number_that_moves() -> None:
+    table = pd.DataFrame({"P(base perforated)": [0.0] * 4, "v": [700.0, 690.0, 720.0, 700.0]}, ["as given", *"abc"])
+    assert largest_move(table) == "v is 700 as given. It moves most with: b (720), a (690)."
+    assert largest_move(table[["P(base perforated)"]]) == "No change moves these numbers."
+
+
+def test_the_order_of_plates_turns_over_where_only_one_of_them_changes() -> None:
+    """The stronger plate is the best, except where nothing separates them."""
+    strong = read(TEXT.replace('"2.6 GPa"', '"2.7 GPa"').replace("degradation = 0.8\n", ""))
+    table = plate_sensitivity({"weak": read(), "strong": strong}, "mean(residual_velocity)", hits=64, device="cpu")
+    assert list(table.columns) == ["weak", "strong", "best"]
+    assert table.loc["as given", "best"] == "strong"
+    assert table.loc["weakens half as fast", "strong"] == table.loc["as given", "strong"]  # it does not weaken
+    assert table.loc["weakening (β = 0.8 in 1 µs)", "weak"] == table.loc["as given", "weak"]
+    unsure = {"weak": 1000.0}
+    doubted = plate_sensitivity(
+        {"weak": read(), "strong": strong}, "mean(residual_velocity)", shifts=unsure, hits=64, device="cpu"
+    )
+    assert not any(doubted["best"])
+    best = pd.DataFrame({"best": ["a", "a", "b", ""]}, ["as given", "one", "two", "three"])
+    sentence = "a stays the best with 1 of 3 changes; another plate is the best with: two; 1 do not decide."
+    assert reversals(best) == sentence
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("mean(colour)", "measure: got"),
+        ("V50", "must be a mean, a quantile or a probability"),
+        ("P(base_pierced)", r"P\(base_pierced\) needs a table \[\[layer\]\]"),
+    ],
+)
+def test_a_measure_that_the_campaign_lacks_is_named(text: str, message: str) -> None:
+    with pytest.raises(CampaignError, match=message):
+        sensitivity(read(), measures=[text])
+
+
+def test_the_command_writes_table_and_figure(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    campaign, output = tmp_path / "a.toml", tmp_path / "a.csv"
+    campaign.write_text(TEXT, encoding="utf-8")
+    arguments = ["sensitivity", str(campaign), "-o", str(output), "--hits", "16", "--device", "cpu", "-q"]
+    assert main([*arguments, "--measure", "mean(tilt)"]) == 0
+    shown = capsys.readouterr().out
+    table = pd.read_csv(output, index_col="change")
+    assert list(table.columns) == ["tilt at 130 mm, mean [°]"]
+    assert f"tilt at 130 mm, mean [°] is {table.iloc[0, 0]:.4g} as given. It moves most with: " in shown
+    assert output.with_suffix(".png").is_file()
+    assert main(arguments) == 2
+    (panel,) = sensitivity_figure(table).axes
+    assert len(panel.patches) == len(table) - 1
+    assert {bar.get_x() for bar in panel.patches} == {table.iloc[0, 0]}
