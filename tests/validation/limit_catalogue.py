@@ -8,7 +8,7 @@ import json
 import numpy as np
 import pandas as pd
 
-from warpimpact.campaign.tested import nose_length
+from warpimpact.campaign.tested_range import nose_length
 from warpimpact.catalogue.catalogue import FOLDERS, HERE, file_name
 from warpimpact.catalogue.entries import Material
 from warpimpact.catalogue.strength import FIT_FILE, NINETY, Plates, limit_fit
@@ -83,7 +83,7 @@ def _entry(rows: Rows, found: Fit, name: str, predicted: pd.DataFrame) -> str:
 
 
 def figures(rows: Rows, predicted: pd.DataFrame) -> dict[str, dict[str, float]]:
-    """Errors of what the model fails at, for the sentences of a campaign (warpimpact/campaign/tested.py)."""
+    """Errors of what the model fails at, for the sentences of a campaign (warpimpact/campaign/tested_range.py)."""
     error = predicted["predicted"] / predicted["published"] - 1.0
     of, steel = predicted["split"], rows.steel[predicted["row"]]
     in_steel, in_aluminium = (error[(of == CARBIDE) & which] for which in (steel, ~steel))

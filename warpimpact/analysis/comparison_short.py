@@ -54,13 +54,13 @@ def _reversed(pair: Difference) -> Difference:
     return Difference(pair.measure, pair.other, pair.one, 0.0 - pair.value, low, high)
 
 
-def short_view(comparison: ComparedPlates, evidence: Sequence[str] = ()) -> Section:
-    """The deciding measure with its ranks and differences, what is not told apart, and last the lines of evidence."""
+def short_view(comparison: ComparedPlates, notes: Sequence[str] = ()) -> Section:
+    """The deciding measure with its ranks and differences, what is not told apart, and last more notes."""
     score = deciding(comparison)
     if score is None:
-        return Section([*hits_used(comparison), "no measure ranks these plates", *evidence])
-    notes = (_open(comparison, score), _used(comparison), *evidence)
-    return Section([_ranks(comparison, score), *filter(None, notes)], _title(comparison, score))
+        return Section([*hits_used(comparison), "no measure ranks these plates", *notes])
+    every = (_open(comparison, score), _used(comparison), *notes)
+    return Section([_ranks(comparison, score), *filter(None, every)], _title(comparison, score))
 
 
 def verdict_of(comparison: ComparedPlates) -> list[str]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import math
 from typing import Any
 
@@ -16,6 +17,7 @@ from warpimpact.analysis.summary import (
     levels_note,
     numerics_note,
     promise_text,
+    range_note,
     sampling_note,
     stop_lines,
     symmetry_text,
@@ -74,8 +76,11 @@ def _origin(dataset: xarray.Dataset) -> Section:
     if attr.COMPUTE_TIME in attributes:
         rate = f"{attributes[attr.HITS_PER_SECOND]:.4g} hits per second"
         rows.append(("took", f"{attributes[attr.COMPUTE_TIME]:.4g} s of computing, {rate}"))
-    evidence = attributes.get(attr.EVIDENCE, "").splitlines()
-    return Section([labelled(rows), *evidence], attributes.get(attr.TITLE, "untitled"))
+    names = attributes.get(attr.CATALOGUE_NAMES, "").splitlines()
+    outside = json.loads(attributes.get(attr.OUTSIDE_TESTED_RANGE, "[]"))
+    return Section(
+        [labelled(rows), *names, *range_note({"": dataset}), *outside], attributes.get(attr.TITLE, "untitled")
+    )
 
 
 def _statuses(dataset: xarray.Dataset) -> Section:

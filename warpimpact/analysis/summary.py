@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from warpimpact.analysis.estimates import estimated, means_of, slices
 from warpimpact.analysis.numbers import ends_of, interval_text, intervals_text
+from warpimpact.campaign.tested_range import range_line
 from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
 from warpimpact.results.dataset import finer_pair, is_choice, status_codes
@@ -213,3 +214,20 @@ def symmetry_text(dataset: Result) -> str:
     if parts == 1:
         return "hits of the whole cell: plate and shot have no symmetry in common"
     return f"hits of 1/{parts} of the cell, which {dataset.attrs[attr.SYMMETRIES]} repeat"
+
+
+def range_note(datasets: Mapping[str, Result], file: str = "") -> list[str]:
+    """A line on whether results, by name, lie in the tested range; empty where that is unknown.
+
+    Args:
+        file: the file of a single result, which `inspect` shows with the details.
+    """
+    lines: dict[str, list[str]] = {}
+    for name, dataset in datasets.items():
+        if attr.OUTSIDE_TESTED_RANGE in dataset.attrs:
+            line = range_line(json.loads(dataset.attrs[attr.OUTSIDE_TESTED_RANGE]))
+            lines.setdefault(line, []).append(name)
+    if len(lines) == 1:
+        (line,) = lines
+        return [line + f" Details: warpimpact inspect {file}" * bool(file and line.startswith("Outside"))]
+    return [" ".join(f"{', '.join(names)}: {line}" for line, names in lines.items())] if lines else []

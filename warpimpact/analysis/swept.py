@@ -11,7 +11,6 @@ import numpy as np
 import xarray
 
 from warpimpact.analysis.estimates import asked_measures, estimated
-from warpimpact.analysis.evidence_lines import evidence_lines
 from warpimpact.analysis.numbers import ends_of, interval_text, intervals_text, number_text
 from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
@@ -75,10 +74,9 @@ def sweep_view(sweep: xarray.Dataset, texts: Sequence[str] = ()) -> list[Section
     inputs = ", ".join(inputs_of(sweep)).replace("_", " ")
     sentence = f"{len(every)} combinations of {inputs}, with at most {sweep.sizes[v.HIT]} hits each"
     if not texts:
-        short = Section([f"{sentence}; 95 % intervals", _short(every, measures), _MORE], title)
-        return [short, Section(evidence_lines(sweep))]
+        return [Section([f"{sentence}; 95 % intervals", _short(every, measures), _MORE], title)]
     tables = [Section([_table(every, measure)], measure.title) for measure in measures]
-    return [Section([sentence], title), *tables, Section(evidence_lines(sweep))]
+    return [Section([sentence], title), *tables]
 
 
 def _inputs(point: Point) -> list[Column]:

@@ -4,6 +4,7 @@ from collections.abc import Iterator
 from typing import Any
 
 REMOVED_KEYS: dict[str, str] = {
+    "search.allow_untested": "leave it out; the front names designs outside the tested range",
     "assumptions": "run warpimpact sensitivity CAMPAIGN.toml",
     "burst": "cracks and bulges decide several hits on one plate, and the model lacks them; compute single hits",
     "posterior": "use hits.file with the CSV file that `warpimpact identify` writes",

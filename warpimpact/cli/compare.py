@@ -2,7 +2,6 @@
 
 import argparse
 import sys
-from collections.abc import Sequence
 from contextlib import ExitStack
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -76,8 +75,8 @@ def _compare(arguments: argparse.Namespace) -> int:
     from warpimpact.analysis.comparison import compare
     from warpimpact.analysis.comparison_short import short_view
     from warpimpact.analysis.comparison_text import comparison_view
-    from warpimpact.analysis.evidence_lines import evidence_of_all
     from warpimpact.analysis.shot_by_shot import shared_hits
+    from warpimpact.analysis.summary import range_note
     from warpimpact.plotting import comparison_figure, weight_figure
     from warpimpact.results import files
     from warpimpact.view.view import Section, text_of
@@ -103,15 +102,15 @@ def _compare(arguments: argparse.Namespace) -> int:
     with ExitStack() as stack:
         datasets = [stack.enter_context(files.opened(path)) for path in paths.values()]
         code = max(failure_code(dataset, path) for dataset, path in zip(datasets, paths.values(), strict=True))
-        evidence = evidence_of_all(dict(zip(paths, datasets, strict=True)))
+        outside = range_note(dict(zip(paths, datasets, strict=True)))
         if shared := shared_hits(dict(zip(paths, datasets, strict=True))):
-            _print_models(arguments, shared, evidence, (figure, tilts))
+            _print_models(arguments, shared, (figure, tilts))
             return code
         comparison = compare(datasets, list(paths), arguments.measure)
     if arguments.every:
-        print(text_of([*comparison_view(comparison), Section(evidence)]))
+        print(text_of([*comparison_view(comparison), Section(outside)]))
     else:
-        print(text_of([short_view(comparison, evidence)]))
+        print(text_of([short_view(comparison, outside)]))
     if arguments.sensitivity:
         print(_sensitivity(arguments, comparison))
     comparison_figure(comparison, every=arguments.every).savefig(figure, dpi=150)
@@ -145,9 +144,7 @@ def _sensitivity(arguments: argparse.Namespace, comparison: "Comparison") -> str
     return f"\n{score.measure.title}{by_value}:\n{text}\n{reversals(table)}\n"
 
 
-def _print_models(
-    arguments: argparse.Namespace, shared: "dict[str, Dataset]", evidence: Sequence[str], figures: tuple[Path, Path]
-) -> None:
+def _print_models(arguments: argparse.Namespace, shared: "dict[str, Dataset]", figures: tuple[Path, Path]) -> None:
     """Print how a map and a result by finite elements differ at the same shots; draw their maps of velocity and tilt
     side by side."""
     from warpimpact.analysis.shot_by_shot import shot_by_shot
@@ -162,8 +159,6 @@ def _print_models(
             "which are compared hit by hit"
         )
     print(text_of([shot_by_shot(shared)]))
-    for line in evidence:
-        print(line)
     for path, variable in zip(figures, (v.RESIDUAL_VELOCITY, v.TILT), strict=True):
         variable_maps(shared, variable).savefig(path, dpi=150)
         print(path)

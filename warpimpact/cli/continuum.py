@@ -75,7 +75,6 @@ def add_continuum(commands: Commands) -> None:
 
 
 def _continuum(arguments: argparse.Namespace) -> int:
-    from warpimpact.analysis.evidence_lines import evidence_lines
     from warpimpact.analysis.summary import summary_text
     from warpimpact.campaign.text import CampaignError
     from warpimpact.results import attributes as attr
@@ -104,8 +103,7 @@ def _continuum(arguments: argparse.Namespace) -> int:
             raise CampaignError(f"{arguments.file}: {error}") from None
     with open_table(output) as dataset:
         print(summary_text(dataset))
-        for line in evidence_lines(dataset, file=str(output)):
-            print(line)
+        print(dataset.attrs[attr.CATALOGUE_NAMES])
         computer = "core" if dataset.attrs[attr.DEVICE].startswith("cpu") else "GPU"
         print(f"{dataset.attrs[attr.COMPUTE_TIME]:.4g} s of a {computer}")
         print(f"written to {output}")

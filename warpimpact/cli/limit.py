@@ -47,7 +47,7 @@ def add_limit(commands: Commands) -> None:
 
 
 def _limit(arguments: argparse.Namespace) -> int:
-    from warpimpact.analysis.evidence_lines import evidence_lines
+    from warpimpact.analysis.summary import range_note
     from warpimpact.campaign.campaign import Campaign
     from warpimpact.plotting.limit import limit_figure
     from warpimpact.results import files
@@ -68,7 +68,7 @@ def _limit(arguments: argparse.Namespace) -> int:
     run_shown(campaign, output, arguments, computation)
     dataset = files.read(output)
     print(text_of(limit_view(dataset, arguments.measure)))
-    for line in evidence_lines(dataset, file=str(output)):
+    for line in range_note({"": dataset}, str(output)):
         print(line)
     limit_figure(dataset).savefig(picture, dpi=150)
     print(f"written to {output}, figure in {picture}")

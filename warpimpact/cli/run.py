@@ -42,8 +42,7 @@ def add_run(commands: Commands) -> None:
 
 
 def _run(arguments: argparse.Namespace) -> int:
-    from warpimpact.analysis.evidence_lines import evidence_lines
-    from warpimpact.analysis.summary import promise_text, summary_text, symmetry_text
+    from warpimpact.analysis.summary import promise_text, range_note, summary_text, symmetry_text
     from warpimpact.campaign.campaign import Campaign
     from warpimpact.results.netcdf import open_table
 
@@ -57,7 +56,7 @@ def _run(arguments: argparse.Namespace) -> int:
             print(symmetry_text(dataset))
         if (promise := promise_text(dataset)) is not None:
             print(promise)
-        for line in evidence_lines(dataset, file=str(output)):
+        for line in range_note({"": dataset}, str(output)):
             print(line)
         print(f"{dataset.attrs[attr.HITS_PER_SECOND]:.4g} hits per second on {dataset.attrs[attr.DEVICE]}")
         print(f"written to {output}")

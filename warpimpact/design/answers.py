@@ -12,8 +12,9 @@ from typing import Any
 import xarray
 
 from warpimpact.analysis.summary import breaks_promise, numerics_sentence
-from warpimpact.campaign.evidence import evidence_of
 from warpimpact.campaign.plausible import doubted, doubted_holes
+from warpimpact.campaign.resistances import catalogue_names
+from warpimpact.campaign.tested_range import outside_tested_range, range_line
 from warpimpact.campaign.text import CampaignError
 from warpimpact.design.controls import groups
 from warpimpact.design.designs import ROOT, Shelf, ValidDesign, stage_of, work_ahead
@@ -66,6 +67,7 @@ class Answers:
     def plate(self, design: ValidDesign) -> dict[str, Any]:
         """The plate, the controls and the campaign file of a design; no shot is computed."""
         campaign = design.campaign
+        outside = outside_tested_range(campaign)
         return {
             "kind": "plate",
             "plate": drawn(campaign),
@@ -74,7 +76,7 @@ class Answers:
             "toml": design.text,
             "title": campaign.title,
             "notes": [*doubted(campaign.scene, campaign.impact, campaign.hits), *doubted_holes(campaign.target)],
-            "evidence": evidence_of(campaign),
+            "tested": [range_line(outside), *catalogue_names(campaign), *outside],
         }
 
     def result(self, design: ValidDesign, cancel: Cancel) -> xarray.Dataset:

@@ -203,7 +203,7 @@
   const viewOf = plateView(at("plate"), at("section"), (path, value) => set(path, `${value} mm`));
   const controls = controlsOf(at("controls"), { set, change });
 
-  function showPlate({ plate, groups, choices, toml: file, title, notes, evidence }) {
+  function showPlate({ plate, groups, choices, toml: file, title, notes, tested }) {
     toml = file;
     at("save").disabled = false;
     if (document.activeElement !== at("title")) at("title").value = title;
@@ -221,9 +221,9 @@
       element.className = kind;
       return element;
     }));
-    const [summary, ...details] = evidence;
-    at("evidence").firstElementChild.textContent = summary;
-    at("evidence").lastElementChild.replaceChildren(...details.map((words) => {
+    const [summary, ...details] = tested;
+    at("tested").firstElementChild.textContent = summary;
+    at("tested").lastElementChild.replaceChildren(...details.map((words) => {
       const element = document.createElement("li");
       element.textContent = words;
       return element;

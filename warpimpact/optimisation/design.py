@@ -97,8 +97,6 @@ class Search(Model):
         most_hits: most hits of a design while the paired difference to the front does not decide.
         confirmed: most designs of the front that are computed again with fresh hits.
         confirm_hits: hits of each of these.
-        allow_untested: whether a design may have holes, thicknesses or resistances that no published test had
-            (campaign/tested.py).
     """
 
     designs: Annotated[int, Field(strict=True, ge=1, le=1_000_000)] = 1000
@@ -108,7 +106,6 @@ class Search(Model):
     most_hits: Annotated[int, Field(strict=True, ge=16, le=2**20)] = 1024
     confirmed: Annotated[int, Field(strict=True, ge=1, le=200)] = 20
     confirm_hits: Annotated[int, Field(strict=True, ge=64, le=2**22)] = 1024
-    allow_untested: Annotated[bool, Field(strict=True)] = False
 
     @model_validator(mode="after")
     def _grows(self) -> Search:

@@ -10,7 +10,6 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from warpimpact.campaign.campaign import Campaign
-from warpimpact.campaign.tested import Standing, standings_of
 from warpimpact.campaign.text import CampaignError
 from warpimpact.optimisation.design import Constraints, Design
 from warpimpact.optimisation.evaluate import campaign_of
@@ -21,11 +20,6 @@ from warpimpact.scene.patterns.lattice import LatticePattern
 from warpimpact.solver.limit import check_arrests
 
 INVALID = "a campaign that is valid"
-NOT_TESTED = "within what was tested, as search.allow_untested is not true"
-
-
-_OF_PLATES = ("holes", "thickness", "resistance", "the kind of material")
-"""Subjects of published tests that a design decides."""
 
 
 class Violation(NamedTuple):
@@ -79,19 +73,11 @@ def _violations(design: Design, campaign: Campaign) -> Iterator[Violation]:
     for measure, density in weights_of(target).items():
         for key in (f"smallest_{measure}", f"largest_{measure}"):
             yield from _broken(design.constraints, key, partial(float, density), WEIGHTS[measure].label, "kg/m²")
-    if not design.search.allow_untested:
-        yield from (Violation(NOT_TESTED, 1.0, standing.sentence) for standing in untested(campaign))
     for name, plate in target.named:
         if plate.open_area > 0.0:
             for key, value, what, unit in _of_holes(plate):
                 for of_hole in _broken(design.constraints, key, value, what, unit):
                     yield of_hole._replace(text=f"{name}: {of_hole.text}")
-
-
-def untested(campaign: Campaign) -> list[Standing]:
-    """The properties of a campaign's plates that lie beyond every published test."""
-    standings = standings_of(campaign)
-    return [standing for standing in standings if standing.subject in _OF_PLATES]
 
 
 def _of_holes(plate: Plate) -> tuple[tuple[str, Callable[[], float], str, str], ...]:

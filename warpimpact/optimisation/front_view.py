@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from warpimpact.analysis.evidence_lines import evidence_lines
 from warpimpact.analysis.numbers import interval_text, number_text
 from warpimpact.results import front as f
 from warpimpact.results.vocabulary import WEIGHTS
@@ -39,7 +38,6 @@ def front_view(dataset: xarray.Dataset) -> list[Section]:
         Section([_front_table(dataset)]),
         Section([_variables_table(dataset)] if confirmed else []),
         *([Section([*references, *notes])] if references or notes else []),
-        Section(evidence_lines(dataset)),
     ]
 
 
@@ -62,7 +60,7 @@ def _front_table(dataset: xarray.Dataset) -> Table:
         if not int(dataset[f.KEPT][place]):
             notes.append("not on the front by fresh hits")
         if beyond := str(dataset[f.UNTESTED].values[place]):
-            notes.append(f"untested: {beyond}")
+            notes.append(f"outside the tested range: {beyond}")
         rows.append((file, *_cells(dataset, OF_FRONT, place), "; ".join(notes)))
     for place, name in enumerate(dataset[f.REFERENCE].values):
         rows.append((name, *_cells(dataset, OF_REFERENCE, place), ""))

@@ -11,13 +11,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from warpimpact.campaign.places import relocated
-from warpimpact.campaign.tested import summary_of_all
+from warpimpact.campaign.tested_range import outside_tested_range
 from warpimpact.campaign.toml import toml_text
 from warpimpact.optimisation.asked import Bound
 from warpimpact.optimisation.confirm import Confirmed
 from warpimpact.optimisation.design import Design, FacedThreat
 from warpimpact.optimisation.evaluate import campaign_of
-from warpimpact.optimisation.feasible import untested
 from warpimpact.optimisation.judged import DesignRecord, estimate
 from warpimpact.optimisation.search import Searched
 from warpimpact.results import attributes as attr
@@ -85,18 +84,14 @@ def to_dataset(design: Design, searched: Searched, confirmed: Confirmed, made_by
         columns |= {f.HIT_Y: confirmed.places[:, 0], f.HIT_Z: confirmed.places[:, 1]}
         columns[f.HIT_VALUE] = np.array([record.said[0] for record in confirmed.records])
     dataset = dataset_of(columns, {attr.REFERENCES: f.REFERENCES, **_attributes(design, searched, made_by)})
-    if confirmed.records:
-        targets = [
-            campaign_of(design, fresh.tables, threat) for fresh in confirmed.records for threat in design.threats
-        ]
-        dataset = dataset.assign_attrs({attr.EVIDENCE: summary_of_all(targets, "designs")})
     return dataset.set_coords([f.UNIT, f.LABEL])  # a selected value keeps its unit and its label
 
 
 def _untested(design: Design, record: DesignRecord) -> str:
-    """Subjects in which the plates of a design lie beyond every published test."""
-    standings = untested(campaign_of(design, record.tables, design.threats[0]))
-    return ", ".join(dict.fromkeys(standing.subject for standing in standings))
+    """In what the plates of a design lie outside the tested range: the words before the plate's name."""
+    sentences = outside_tested_range(campaign_of(design, record.tables, design.threats[0]))
+    heads = (sentence.partition(": ")[0] for sentence in sentences)
+    return ", ".join(dict.fromkeys(head.partition(" (")[0] for head in heads if " (" in head))
 
 
 def _texts(texts: Any) -> Any:

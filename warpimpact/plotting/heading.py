@@ -75,9 +75,8 @@ def note_lines(width: float, title: str, notes: Sequence[str]) -> list[str]:
 
 
 def names(dataset: xarray.Dataset) -> list[str]:
-    """A sentence for every name of the catalogue that a result has, with the state of its evidence."""
-    lines = dataset.attrs.get(attr.EVIDENCE, "").splitlines()
-    return [line for line in lines if not line.startswith((attr.RESTS_ON, attr.NOT_TESTED))]
+    """A line for each name of the catalogue that a result has, with how well it is known."""
+    return list(dataset.attrs.get(attr.CATALOGUE_NAMES, "").splitlines())
 
 
 def _in_one_line(title: str, width: float) -> tuple[str, float]:

@@ -15,11 +15,10 @@ from warpimpact.analysis.comparison_short import short_view, verdict_of
 from warpimpact.analysis.comparison_text import comparison_view
 from warpimpact.analysis.effectiveness import depth_note, effectiveness, measures_table
 from warpimpact.analysis.estimates import estimated, means_of, slices, status_shares
-from warpimpact.analysis.evidence_lines import evidence_of_all
 from warpimpact.analysis.inspection import verdict
 from warpimpact.analysis.numbers import ends_of, intervals_text
 from warpimpact.analysis.plate_text import reference_name, solid_note, weights_of, weights_text
-from warpimpact.analysis.summary import numerics_note, numerics_sentence, promise_text, sampling_note
+from warpimpact.analysis.summary import numerics_note, numerics_sentence, promise_text, range_note, sampling_note
 from warpimpact.campaign.text import parsed
 from warpimpact.plotting.cell import range_text, words
 from warpimpact.plotting.comparison import comparison_figure
@@ -71,7 +70,8 @@ def result_content(name: str, dataset: xarray.Dataset) -> dict[str, Any]:
         "verdict": f"{in_short(dataset)}." if is_limit else verdict(dataset, measures[0]),
         "is_limit": is_limit,
         "asked": _asked(dataset),
-        "evidence": attributes.get(attr.EVIDENCE, "").splitlines(),
+        "names": attributes.get(attr.CATALOGUE_NAMES, "").splitlines(),
+        "tested": range_note({name: dataset}),
         "campaign": attributes.get(attr.CAMPAIGN, ""),
         "promise": promise_text(dataset),
         "caveats": [*_caveats(dataset), *filter(None, [depth_note(measures), solid_note(dataset)])],
@@ -92,7 +92,7 @@ def compared(datasets: Mapping[str, xarray.Dataset], *, picture: bool = True) ->
     except ResultError as error:
         return {"view": Markup(html_of([Section([str(error)])])), "every": "", "verdict": [], "picture": ""}
     return {
-        "view": Markup(html_of([short_view(comparison, evidence_of_all(datasets))])),
+        "view": Markup(html_of([short_view(comparison, range_note(datasets))])),
         "every": Markup(html_of(comparison_view(comparison))),
         "verdict": verdict_of(comparison),
         "picture": data_url(comparison_figure(comparison), 100) if picture else "",

@@ -103,11 +103,10 @@ CORE = _declared("core", "table", _SI)
 PLATE = _declared("plate", "table", _SI)
 IMPACT = _declared("impact", "table", _SI)
 MATERIAL = _declared("material", "table", _SI)
-EVIDENCE = _declared("evidence")
-"""What a result rests on, one line each: names of threat and materials with the state of their evidence, and what was
-not measured."""
-RESTS_ON, NOT_TESTED = "evidence: ", "not tested: "
-"""Beginnings of the first line of the evidence, and of the lines about what was not measured."""
+CATALOGUE_NAMES = _declared("catalogue_names")
+"""A line for each name of the catalogue, with how well it is known; absent without names."""
+OUTSIDE_TESTED_RANGE = _declared("outside_tested_range")
+"""JSON list of the sentences of campaign/tested_range.py; absent where nobody looked."""
 LAYERS = _declared("layers", "table")
 """JSON of the layers behind the plate, by number; absent if there are none."""
 STANDOFF_POINT = _declared("standoff_point")

@@ -50,7 +50,7 @@ REFERENCE_FOUND, REFERENCE_LOW, REFERENCE_HIGH = with_interval(
 )
 REFERENCE_CAMPAIGN = Variable("reference_campaign", ("reference",), "1", "campaign of the first threat, as TOML")
 
-UNTESTED = Variable("front_untested", ("front",), "1", "what of its plates lies beyond every published test")
+UNTESTED = Variable("front_untested", ("front",), "1", "in what its plates lie outside the tested range")
 
 COMPUTED = Variable("computed", ("generation",), "1", "designs that were computed so far")
 VOLUME = Variable(

@@ -8,8 +8,9 @@ from collections.abc import Mapping
 from typing import Any
 
 from warpimpact.campaign.campaign import Campaign
-from warpimpact.campaign.evidence import evidence_of
 from warpimpact.campaign.references import has_solid, solid_target
+from warpimpact.campaign.resistances import catalogue_names
+from warpimpact.campaign.tested_range import outside_tested_range
 from warpimpact.records.outcomes import Outcomes
 from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
@@ -42,7 +43,8 @@ def described(
     """
     resolution = resolve(campaign.scene, numerics, weakens(campaign.target, task.shots))
     told = _numerics(campaign.numerics, campaign.impact, campaign.target, resolution)
-    told |= {attr.EVIDENCE: "\n".join(lines)} if (lines := evidence_of(campaign)) else {}
+    told |= {attr.CATALOGUE_NAMES: "\n".join(names)} if (names := catalogue_names(campaign)) else {}
+    told |= {attr.OUTSIDE_TESTED_RANGE: json.dumps(outside_tested_range(campaign), ensure_ascii=False)}
     told |= computed_by(campaign, computed[0], len(outcomes), computed[1])
     told |= _found(campaign.numerics.asked, task.findings)
     beside = {**_finer_hits(task.findings), **beside}

@@ -109,9 +109,7 @@ def _computed(
         ),
         attr.NUMERICS: elements.words,
         attr.PRECISION: "single",
-        attr.EVIDENCE: "\n".join(
-            [f"{attr.RESTS_ON}{elements.words}", *(f"{entry.name}: {entry.evidence}" for entry in elements.entries)]
-        ),
+        attr.CATALOGUE_NAMES: "\n".join(f"{entry.name}: {entry.evidence}" for entry in elements.entries),
     }
     table = described_as(
         campaign,

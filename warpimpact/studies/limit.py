@@ -8,9 +8,8 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, ClassVar
 
 from warpimpact.campaign.campaign import Campaign
-from warpimpact.campaign.evidence import limit_velocity_factors
 from warpimpact.campaign.references import at_base_alone, at_solid
-from warpimpact.campaign.resistances import resistance_by_thickness
+from warpimpact.campaign.resistances import limit_velocity_factors, resistance_by_thickness
 from warpimpact.campaign.text import CampaignError
 from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v

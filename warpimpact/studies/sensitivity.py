@@ -41,11 +41,6 @@ SHOWN = ("P(base_perforated)", "P(base_pierced)", "mean(residual_velocity)", "me
 HITS = 1024
 UNKNOWN_SHARE = 0.3
 """How far a resistance or a strength that a user gives may be off: two steels of one hardness differ by more."""
-PAPER_WEAKENING = {"degradation": 0.8, "degradation_interval": 1e-6, "degradation_distance": None}
-"""Weakening of a plate with holes that is given without it."""
-
-STEEPEST = math.radians(75.0)
-"""Largest obliquity at which the shots are still turned further [rad]."""
 
 Values = dict[str, dict[Measure, Array]]
 """Values of the hits by change and measure, in the units of the Dataset; NaN where a hit does not count."""
@@ -74,7 +69,7 @@ def sensitivity(
     Raises:
         CampaignError: a text is no measure, or the campaign lacks what it needs.
     """
-    computed = _computed({"": campaign}, hits, measures, device, progress)[""]
+    computed = _computed({"": campaign}, measures, hits, device, progress)[""]
     rows = {
         name: {
             measure.title: measure.display.factor * estimate_from(measure, values).value
@@ -98,13 +93,7 @@ def largest_move(table: pd.DataFrame) -> str:
 
 
 def plate_sensitivity(
-    campaigns: Mapping[str, Campaign],
-    text: str,
-    *,
-    shifts: Mapping[str, float] | None = None,
-    hits: int = HITS,
-    device: str = "auto",
-    progress: Progress | None = None,
+    campaigns: Mapping[str, Campaign], text: str, *, shifts: Mapping[str, float] | None = None, **options: Any
 ) -> pd.DataFrame:
     """A measure of several plates with each change, and the plate that is best.
 
@@ -115,9 +104,9 @@ def plate_sensitivity(
         campaigns: campaigns of the plates, by name.
         text: text of the measure, a mean or a probability.
         shifts: largest shift of each plate's value by the numerics, in the display unit.
-        hits, device, progress: as in `sensitivity`.
+        options: hits, device and progress of `sensitivity`.
     """
-    computed = _computed(campaigns, hits, (text,), device, progress)
+    computed = _computed(campaigns, (text,), **options)
     rows, replicates = {}, next(iter(campaigns.values())).replicates
     for name in dict.fromkeys(name for numbers in computed.values() for name in numbers):
         of_plates = {plate: numbers.get(name, numbers[AS_GIVEN]) for plate, numbers in computed.items()}
@@ -159,7 +148,11 @@ def _best(measure: Measure, values: Mapping[str, Array], shifts: Mapping[str, fl
 
 
 def _computed(
-    campaigns: Mapping[str, Campaign], hits: int, texts: Sequence[str], device: str, progress: Progress | None
+    campaigns: Mapping[str, Campaign],
+    texts: Sequence[str],
+    hits: int = HITS,
+    device: str = "auto",
+    progress: Progress | None = None,
 ) -> dict[str, Values]:
     """Values of the hits of campaigns with each of their changes, all at the finest level that their pilots find."""
     measures = _parsed(campaigns, texts)
@@ -297,9 +290,18 @@ def _edges(campaign: Campaign) -> Campaign:
 
 def _turned(campaign: Campaign, name: str, degrees: float) -> Campaign:
     """The campaign with an angle of the shots larger by so much, unless they are steep already."""
-    steep = campaign.impact.obliquity > STEEPEST
     angle = Radians(getattr(campaign.impact, name) + math.radians(degrees))
-    return campaign if steep else _with(campaign, "impact", **{name: angle})
+    return _with(campaign, "impact", **{name: angle}) if campaign.impact.obliquity < math.radians(75.0) else campaign
+
+
+def _nearer(campaign: Campaign) -> Campaign:
+    return _with(campaign, "output", standoffs=tuple(0.5 * at for at in campaign.output.standoffs))
+
+
+def _weakening(_: Campaign, plate: Plate) -> dict[str, Any]:
+    """The paper's weakening of a plate with holes that is given without it."""
+    paper = {"degradation": 0.8, "degradation_interval": 1e-6, "degradation_distance": None}
+    return paper if plate.open_area and plate.degradation == 1.0 else {}
 
 
 def _strength(campaign: Campaign, factor: float) -> Campaign:
@@ -322,11 +324,7 @@ CHANGES: tuple[tuple[str, tuple[str, ...], Change], ...] = (
     ("Y at its low end", ("resistance",), _resistance(0)),
     ("Y at its high end", ("resistance",), _resistance(1)),
     ("no weakening (β = 1)", ("degradation",), _plates(lambda _, one: {"degradation": 1.0})),
-    (
-        "weakening (β = 0.8 in 1 µs)",
-        ("degradation",),
-        _plates(lambda _, one: PAPER_WEAKENING if one.open_area and one.degradation == 1.0 else {}),
-    ),
+    ("weakening (β = 0.8 in 1 µs)", ("degradation",), _plates(_weakening)),
     ("weakens half as fast", ("degradation",), _plates(lambda _, one: {"degradation": one.degradation**0.5})),
     ("weakens twice as fast", ("degradation",), _plates(lambda _, one: {"degradation": one.degradation**2})),
     ("weakening reaches half as far", ("degradation_length",), _reach(0.5)),
@@ -338,11 +336,7 @@ CHANGES: tuple[tuple[str, tuple[str, ...], Change], ...] = (
     ("less resistance near edges", _FIT, _edges),
     ("5° more oblique", ("obliquity",), lambda campaign: _turned(campaign, "obliquity", 5.0)),
     ("2° of yaw", ("yaw",), lambda campaign: _turned(campaign, "yaw", 2.0)),
-    (
-        "half the stand-off",
-        (),
-        lambda campaign: _with(campaign, "output", standoffs=tuple(0.5 * at for at in campaign.output.standoffs)),
-    ),
+    ("half the stand-off", (), _nearer),
     ("a core 30 % weaker", ("strength",), lambda campaign: _strength(campaign, 1.0 - UNKNOWN_SHARE)),
     ("a core 30 % stronger", ("strength",), lambda campaign: _strength(campaign, 1.0 + UNKNOWN_SHARE)),
 )

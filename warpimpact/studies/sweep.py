@@ -17,7 +17,6 @@ import xarray
 
 from warpimpact.campaign.campaign import Campaign
 from warpimpact.campaign.places import is_table, labels_of, put, resolved, type_at, value_at
-from warpimpact.campaign.tested import summary_of_all
 from warpimpact.campaign.text import CampaignError, parsed, read_text
 from warpimpact.results import attributes as attr
 from warpimpact.results import files
@@ -261,6 +260,5 @@ def _attributes(sweep: Sweep, points: Sequence[xarray.Dataset]) -> dict[str, Any
         attr.TITLE: sweep.title,
         attr.HISTORY: attr.history_line("sweep"),
         attr.CAMPAIGN: sweep.text,
-        attr.EVIDENCE: summary_of_all(sweep.campaigns.values(), "points"),
         attr.SWEEP: json.dumps({swept.name: list(swept.labels) for swept in sweep.inputs}),
     }

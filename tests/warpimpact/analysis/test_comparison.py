@@ -375,7 +375,7 @@ def test_a_campaign_with_plates_is_run_compared_and_not_run_again(
     )
     assert "\n   1   round holes   " in shown
     assert "\n256 hits of each plate, the same shots\n" in shown
-    assert "evidence: " in shown
+    assert "Outside the tested range: " in shown
     assert sorted(path.name for path in in_tmp_path.iterdir()) == ["round holes.nc", "slots.nc", "two.png", "two.toml"]
     before = Path("slots.nc").stat()
     assert main([*command, "-o", "two.svg", "--measure", "P(inclination@50mm > 45 deg)"]) == 0

@@ -9,11 +9,10 @@ import pytest
 
 from warpimpact import Campaign
 from warpimpact.campaign.catalogued import SEARCHED_FROM
-from warpimpact.campaign.evidence import evidence_of, limit_velocity_factors
-from warpimpact.campaign.resistances import catalogue_resistance
+from warpimpact.campaign.resistances import catalogue_names, catalogue_resistance, limit_velocity_factors
 from warpimpact.campaign.schema import campaign_schema
 from warpimpact.campaign.straight_passage import StraightPassage
-from warpimpact.campaign.tested import summary_of_all
+from warpimpact.campaign.tested_range import outside_tested_range, range_line
 from warpimpact.campaign.text import CampaignError
 from warpimpact.identification.fit_file import fit_from
 
@@ -151,27 +150,28 @@ def test_a_threat_needs_no_velocity_where_it_is_searched(folder: Path) -> None:
     assert Campaign.from_text(text, name="named.toml", folder=folder, needs_velocity=False) == read(folder)
 
 
-def test_evidence_is_told_with_what_leaves_it(folder: Path) -> None:
-    rests_on, core, plate = evidence_of(read(folder))
-    assert rests_on == "evidence: inside what was measured (limit velocities)"
+def test_names_come_with_how_well_they_are_known_and_what_is_outside(folder: Path) -> None:
+    core, plate = catalogue_names(read(folder))
+    assert outside_tested_range(read(folder)) == []
+    assert range_line([]) == "Inside the tested range."
     assert core.startswith("core: .30 AP M2 (assumed: nose, length")
     assert plate.startswith("plate: plate A, Y 2 GPa (12 limit velocities")
-    beyond = evidence_of(
-        read(
-            folder,
-            core={"threat": "7.62x51 P80 AP", "mass": "5 g"},
-            plate=TABLES["plate"] | {"thickness": "13 mm", "resistance": "1 GPa"},
-            impact={"obliquity": "45 deg"},
-        )
+    beyond = read(
+        folder,
+        core={"threat": "7.62x51 P80 AP", "mass": "5 g"},
+        plate=TABLES["plate"] | {"thickness": "13 mm", "resistance": "1 GPa"},
+        impact={"obliquity": "45 deg"},
     )
-    assert beyond[0] == "evidence: limit velocities; beyond them: thickness, obliquity, the threat"
-    assert beyond[1].startswith("core: 7.62x51 P80 AP with another mass (")
-    assert beyond[2].startswith("plate: plate A with another resistance, Y 1 GPa (")
-    assert beyond[3:] == [
-        "not tested: thickness (plate): 13 mm, but limit velocities of plate A are of 3 to 12 mm",
-        "not tested: thickness (plate): 2.15 calibres, but limit velocities of plate A are of 0.5 to 2 calibres",
-        "not tested: obliquity (plate): 45°, but limit velocities of plate A are of 0 to 30°",
-        "not tested: the threat (plate): no limit velocity of plate A is of the 7.62x51 P80 AP, but of .30 AP M2",
+    core, plate = catalogue_names(beyond)
+    assert core.startswith("core: 7.62x51 P80 AP with another mass (")
+    assert plate.startswith("plate: plate A with another resistance, Y 1 GPa (")
+    sentences = outside_tested_range(beyond)
+    assert range_line(sentences) == "Outside the tested range: thickness, obliquity, the threat."
+    assert sentences == [
+        "thickness (plate): 13 mm, but limit velocities of plate A are of 3 to 12 mm",
+        "thickness (plate): 2.15 calibres, but limit velocities of plate A are of 0.5 to 2 calibres",
+        "obliquity (plate): 45°, but limit velocities of plate A are of 0 to 30°",
+        "the threat (plate): no limit velocity of plate A is of the 7.62x51 P80 AP, but of .30 AP M2",
     ]
 
 
@@ -233,33 +233,19 @@ BEHIND = [{"thickness": "7 mm", "resistance": "4 GPa"}]
         ),
     ],
 )
-def test_what_nobody_measured_is_said(folder: Path, changes: dict[str, Any], other: dict[str, Any], said: str) -> None:
+def test_each_property_outside_the_tested_range_has_a_sentence(
+    folder: Path, changes: dict[str, Any], other: dict[str, Any], said: str
+) -> None:
     usual = {"plate": STEEL, "impact": {"velocity": 800.0}}
-    assert any(said in line for line in evidence_of(read(folder, **usual | changes)))
-    assert not any(said in line for line in evidence_of(read(folder, **usual | other)))
+    assert any(said in line for line in outside_tested_range(read(folder, **usual | changes)))
+    assert not any(said in line for line in outside_tested_range(read(folder, **usual | other)))
 
 
 def test_layers_that_say_the_same_are_told_once(folder: Path) -> None:
     thin = {"thickness": "1 mm", "resistance": "4 GPa"}
-    lines = evidence_of(read(folder, plate=thin, layer=[thin] * 9))
+    lines = outside_tested_range(read(folder, plate=thin, layer=[thin] * 9))
     assert sum("0.16 calibres" in line for line in lines) == 2  # its thickness, and that Y is of such a thickness
-    assert any(line.startswith("not tested: thickness (plate and 9 more): 0.16 calibres") for line in lines)
-
-
-def test_of_several_campaigns_it_is_said_how_many_leave_what_was_measured(folder: Path) -> None:
-    usual = {"impact": {"velocity": 800.0}}
-    thin = [read(folder, **usual, plate=STEEL | {"thickness": f"{h} mm"}) for h in (1, 7, 8)]
-    told = summary_of_all(thin, "designs")
-    assert "thickness (1 of 3 designs)" in told
-    assert "obliquity" not in told
-    assert summary_of_all(thin[1:], "designs") == "evidence: inside what was measured (limit velocities)"
-    fast = read(folder, plate=STEEL, impact={"velocity": 2000.0})
-    assert summary_of_all([fast], "targets") == "evidence: limit velocities; beyond them: the impact velocity"
-
-
-def test_two_shots_are_named_where_there_are_holes(folder: Path) -> None:
-    assert "two shots at one slotted plate" in evidence_of(read(folder, plate=HOLED))[0]
-    assert "two shots" not in evidence_of(read(folder, plate=STEEL))[0]
+    assert any(line.startswith("thickness (plate and 9 more): 0.16 calibres") for line in lines)
 
 
 def test_the_schema_knows_the_names(folder: Path) -> None:

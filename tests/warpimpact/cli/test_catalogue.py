@@ -1,5 +1,6 @@
 """Names of the catalogue, from the command to what a run prints, stores and draws."""
 
+import json
 from pathlib import Path
 
 import pytest
@@ -28,10 +29,10 @@ rows = { "7.62x51 P80 AP" = 3 }
 thickness_high = "10 mm"
 """
 LINES = (
-    "evidence: limit velocities; beyond them: thickness",
+    "Outside the tested range: thickness.",
     "core: 7.62x51 P80 AP (quoted at second hand: bullet mass, velocity)",
     "plate: own steel, Y 1 GPa (3 limit velocities; nothing assumed)",
-    "not tested: thickness (plate): 20 mm, but limit velocities of own steel are of 0 to 10 mm",
+    "thickness (plate): 20 mm, but limit velocities of own steel are of 0 to 10 mm",
 )
 
 
@@ -43,8 +44,8 @@ def test_names_are_carried_along(
     Path("named.toml").write_text(CAMPAIGN, encoding="utf-8")
     assert main(["run", "named.toml", "--device", "cpu"]) == 0
     told = capsys.readouterr().out.splitlines()
-    assert f"{LINES[0]} (warpimpact inspect named.nc says by how much)" in told
-    assert LINES[1] in told
+    assert f"{LINES[0]} Details: warpimpact inspect named.nc" in told
+    assert LINES[1] not in told
     assert LINES[3] not in told
     assert main(["inspect", "named.nc"]) == 0
     told = capsys.readouterr().out.splitlines()
@@ -54,14 +55,15 @@ def test_names_are_carried_along(
     assert main(["compare", "named.nc", "other.nc"]) == 0
     assert capsys.readouterr().out.splitlines().count(LINES[0]) == 1
     dataset = files.read(Path("named.nc"))
-    assert dataset.attrs[attr.EVIDENCE].splitlines() == list(LINES)
+    assert dataset.attrs[attr.CATALOGUE_NAMES].splitlines() == list(LINES[1:3])
+    assert json.loads(dataset.attrs[attr.OUTSIDE_TESTED_RANGE]) == [LINES[3]]
     figure = variable_map(dataset, "residual_velocity")
     assert figure.get_suptitle() == "named"
     below = " ".join(figure.get_supxlabel().split())
     assert all(line in below for line in names(dataset))
     assert main(["report", "named.nc", "-o", "named.html"]) == 0
     page = Path("named.html").read_text(encoding="utf-8")
-    assert all(line in page for line in LINES)
+    assert all(line in page for line in LINES[:3])
 
 
 def test_the_command_lists_shows_and_draws(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -30,7 +30,6 @@ measure = "areal_density"
 measure = "mean(residual_energy_fraction)"
 """
 SEARCH = """[search]
-allow_untested = true
 designs = 12
 population = 6
 hits = 16

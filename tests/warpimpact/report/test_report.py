@@ -18,8 +18,8 @@ from warpimpact.analysis.comparison import compare
 from warpimpact.analysis.comparison_short import short_view, verdict_of
 from warpimpact.analysis.comparison_text import comparison_view
 from warpimpact.analysis.effectiveness import effectiveness
-from warpimpact.analysis.evidence_lines import evidence_of_all
 from warpimpact.analysis.numbers import number_text
+from warpimpact.analysis.summary import range_note
 from warpimpact.campaign.campaign import CampaignError
 from warpimpact.cli import main
 from warpimpact.kernels.status import Status
@@ -119,7 +119,7 @@ def test_page_compares_the_plates(folder: Path, make_result: ResultMaker, tmp_pa
     assert "narrow: 400 of 400 cores pass. residual energy fraction, mean " in short
     for sentence in verdict_of(comparison):
         assert f"<li>{sentence}</li>" in short
-    assert html.unescape(html_of([short_view(comparison, evidence_of_all(stored))])) in text
+    assert html.unescape(html_of([short_view(comparison, range_note(stored))])) in text
     assert html.unescape(html_of(comparison_view(comparison))) in text
     assert text.count('<img src="data:image/png;base64,') == 1
     files.write(make_result(100), tmp_path / "other.nc")

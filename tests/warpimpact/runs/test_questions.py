@@ -55,7 +55,7 @@ QUESTIONS: dict[str, tuple[str, ...]] = {
         + PLATE
         + '[variables]\nthickness = { low = "2 mm", high = "7 mm", step = "1 mm" }\n'
         + '[[objectives]]\nmeasure = "areal_density"\n[[objectives]]\nmeasure = "mean(residual_energy_fraction)"\n'
-        + "[search]\nallow_untested = true\n"
+        + "[search]\n"
         + "designs = 6\npopulation = 6\nhits = 16\nmost_hits = 64\nconfirm_hits = 64\n",
     ),
 }

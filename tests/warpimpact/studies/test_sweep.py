@@ -188,7 +188,6 @@ def test_a_sweep_is_asked_in_the_language_of_measures(
     assert main(["inspect", sweep, "--measure", "quantile(residual_velocity, 0.05)"]) == 0
     shown = capsys.readouterr().out.splitlines()
     assert shown[3] == "residual velocity, 5 % quantile [m/s]"
-    assert shown[-1].startswith("evidence: two shots at one slotted plate")
     point = sorted(folder_of(folder / "a.nc").glob("*.nc"))[4]  # 30°, 4 mm
     assert main(["inspect", str(point), "--measure", "quantile(residual_velocity, 0.05)"]) == 0
     alone = next(line for line in capsys.readouterr().out.splitlines() if "5 % quantile" in line)

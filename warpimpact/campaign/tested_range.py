@@ -1,0 +1,192 @@
+"""Where a campaign leaves what was measured: published limit velocities of solid plates, and two shots at one slotted
+plate (docs/validation.md)."""
+
+from __future__ import annotations
+
+import json
+import math
+import re
+from collections.abc import Iterable, Iterator, Mapping
+from functools import cache
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ..catalogue.catalogue import HERE, Catalogue
+from ..catalogue.entries import Material
+from ..scene import Core, Plate
+from .catalogued import calibres_of
+
+if TYPE_CHECKING:
+    from .campaign import Campaign
+
+Figures = Mapping[str, Mapping[str, float]]
+Sentences = Iterator[tuple[str, str]]
+"""What leaves the range, in a word or two, and the value found beside what was measured."""
+
+_SLACK = 0.05
+"""Relative distance beyond the end of a range that still counts as inside."""
+_HEAVY, _CARBIDE = 5000.0, 11_000.0
+"""Density above which a plate is steel, and above which a core is a carbide or a heavy metal [kg/m³]."""
+_STRONG = 2.0e9
+"""Resistance from which a steel may be hard [Pa]; below a calibre its resistance falls."""
+_NOSE, _SHORT = 0.95, 0.75
+"""Share of the largest radius at which a nose ends; length in diameters below which it is blunt."""
+_STRAIGHT = math.radians(2.0)
+"""Obliquity or yaw that a straight shot may have [rad]."""
+_HOLED_CALIBRES, _HOLED_LIGAMENT, _SIMILAR_RATIO = 0.66, 1.0, 1.5
+"""The plate of the two shots: its thickness in calibres, and its approximate ligament over its thickness, because the
+spacing of the slots is not published (the paper's §2); and the chosen ratio up to which another plate is similar."""
+
+
+def outside_tested_range(campaign: Campaign) -> list[str]:
+    """A sentence for each property of a campaign that leaves what was measured; layers that do so alike share one."""
+    figures, materials = _figures(), Catalogue.of(campaign.catalogue).all(Material)
+    places: dict[tuple[str, str], list[str]] = {sentence: [] for sentence in _of_shot(campaign, figures)}
+    for place, plate in campaign.target.named:
+        for sentence in _of_plate(campaign, plate, materials.get(str(plate.material)), figures):
+            where = places.setdefault(sentence, [])
+            where += [place] * (place not in where)
+    return [
+        f"{subject}{f' ({where[0]}{more})' if where else ''}: {text}"
+        for (subject, text), where in places.items()
+        for more in [f" and {len(where) - 1} more" if len(where) > 1 else ""]
+    ]
+
+
+def range_line(sentences: Iterable[str]) -> str:
+    """One line on whether a campaign lies in the tested range, from its sentences."""
+    subjects = dict.fromkeys(re.split(r" \(|: ", sentence, maxsplit=1)[0] for sentence in sentences)
+    return f"Outside the tested range: {', '.join(subjects)}." if subjects else "Inside the tested range."
+
+
+def nose_length(core: Core) -> float:
+    """Distance behind the tip at which a core is nearly at its widest, in its largest diameters."""
+    s = np.linspace(0.0, core.length, 1001)
+    first = int(np.argmax(core.radius(s) >= _NOSE * core.max_radius))
+    return float(s[first] / (2.0 * core.max_radius))
+
+
+@cache
+def _figures() -> Figures:
+    """Ranges of what was measured, and errors of what the model fails at (tests/validation/limit_catalogue.py)."""
+    figures: Figures = json.loads((HERE / "figures.json").read_text(encoding="utf-8"))
+    return figures
+
+
+def _of_shot(campaign: Campaign, figures: Figures) -> Sentences:
+    core, impact, layers = campaign.core, campaign.impact, campaign.target.layers
+    nose, rows, oblique = nose_length(core), figures["core"], campaign.impact.obliquity > _STRAIGHT
+    if nose < _SHORT:
+        yield (
+            "the blunt nose",
+            f"it is {nose:.2g} diameters long, but the cores with a limit velocity had a nose of {rows['nose']:.2g}; "
+            "a blunt nose shears out a plug, which the model lacks",
+        )
+    diameter = 2e3 * core.max_radius
+    yield from _outside("the diameter of the core", diameter, rows["diameter_low"], rows["diameter_high"], "mm")
+    yield from _outside("the impact velocity", impact.velocity, rows["velocity_low"], rows["velocity_high"], "m/s")
+    if max(abs(impact.pitch), abs(impact.yaw)) > _STRAIGHT:
+        yield "yaw on impact", "no shot whose numbers we could read had any"
+    if len(layers) > 1:
+        yield "several layers", "no shot whose numbers we could read was at more than one"
+    if any(layer.degradation < 1.0 for layer in layers):
+        yield "weakening", "β is below 1, which rests on the two shots alone; solid plates were fitted without it"
+        if oblique:
+            yield (
+                "weakening at an angle",
+                "with β below 1 an oblique plate is weaker than a straight one: with the paper's core the limit "
+                "velocity at 30° is 0.90 to 0.92 of that at 0°, where published ones of aluminium are 1.16 of it",
+            )
+    if any(layer.open_area for layer in layers):
+        if oblique:
+            yield "holes hit at an angle", "the two shots whose numbers we could read were along the normal"
+        if core.strength is None:
+            yield (
+                "whether the core breaks",
+                "[core] gives no strength, so it cannot; the paper's plate is meant to break cores",
+            )
+
+
+def _of_plate(campaign: Campaign, plate: Plate, material: Material | None, figures: Figures) -> Sentences:
+    """Properties in which a plate leaves what was measured. Rows of its material replace those of all materials."""
+    core, calibres = campaign.core, calibres_of(campaign.core, plate)
+    kind = "steel" if plate.density > _HEAVY else "aluminium"
+    rows, thin, carbide = figures[kind], figures["thin hard steel"], figures["carbide"]
+    if not _within(plate.density, rows["density_low"], rows["density_high"], 0.03):
+        yield "the kind of material", f"{plate.density:.4g} kg/m³ is neither steel nor aluminium"
+        return
+    share = plate.ligament / plate.thickness
+    if plate.open_area and not (_similar(calibres, _HOLED_CALIBRES) and _similar(share, _HOLED_LIGAMENT)):
+        yield (
+            "holes",
+            f"{calibres:.2g} calibres thick, ligaments of {1e3 * plate.ligament:.3g} mm ({share:.2g} of the thickness)"
+            f"; the two shots were at one plate of {_HOLED_CALIBRES:.2g} calibres, ligaments about as wide as thick",
+        )
+    if material is not None and material.rows:
+        yield from _of_rows(campaign, plate, material)
+    else:
+        yield from _outside("thickness", calibres, rows["calibres_low"], rows["calibres_high"], "calibres", kind)
+        yield from _oblique(campaign, 0.0, math.radians(rows["obliquity_high"]), kind)
+        y = plate.resistance / 1e9
+        yield from _outside("resistance", y, rows["resistance_low"], rows["resistance_high"], "GPa", kind)
+    if material is None and kind == "steel" and calibres < 1.0 and plate.resistance >= _STRONG:
+        yield (
+            "thin hard steel",
+            f"steel that may be hard, {calibres:.2g} calibres thick: hard steel has {thin['share']:.0%} of its Y at "
+            f"one calibre where it is {thin['calibres']:.2g} calibres thick (median of {thin['materials']:.0f} steels)"
+            "; check that your Y is of such a thickness",
+        )
+    if (material is None or core.threat not in material.rows) and _density(core) >= _CARBIDE:
+        bias = carbide[kind]
+        yield (
+            "the dense core",
+            "the core is as dense as a carbide: from rows of steel cores the model predicts limit velocities of the "
+            f"BS41 carbide core in {kind} {abs(bias):.0%} too {'high' if bias > 0 else 'low'} "
+            f"(median of {carbide[f'{kind} rows']:.0f})",
+        )
+
+
+def _of_rows(campaign: Campaign, plate: Plate, material: Material) -> Sentences:
+    """Properties in which a plate leaves the rows of its material."""
+    core, name = campaign.core, material.name
+    high, thickest = material.calibres_high or math.inf, material.thickness_high or math.inf
+    yield from _outside("thickness", 1e3 * plate.thickness, 1e3 * material.thickness_low, 1e3 * thickest, "mm", name)
+    yield from _outside("thickness", calibres_of(core, plate), material.calibres_low, high, "calibres", name)
+    farthest = math.inf if material.obliquity_high is None else material.obliquity_high  # 0 where no row is oblique
+    yield from _oblique(campaign, material.obliquity_low, farthest, name)
+    if core.threat not in material.rows:
+        threat = "this core" if core.threat is None else f"the {core.threat}"
+        yield "the threat", f"no limit velocity of {name} is of {threat}, but of {', '.join(material.rows)}"
+
+
+def _oblique(campaign: Campaign, low: float, high: float, whose: str) -> Sentences:
+    """An obliquity beyond the measured range [rad], with a tolerance for the shots of a test."""
+    obliquity = campaign.impact.obliquity
+    if not low - _STRAIGHT <= obliquity <= high + _STRAIGHT:
+        yield from _outside("obliquity", math.degrees(obliquity), math.degrees(low), math.degrees(high), "°", whose)
+
+
+def _similar(value: float, other: float) -> bool:
+    return other / _SIMILAR_RATIO <= value <= other * _SIMILAR_RATIO
+
+
+def _density(core: Core) -> float:
+    """Mass over volume [kg/m³]."""
+    if core.density is not None:
+        return core.density
+    s = np.linspace(0.0, core.length, 2001)
+    return core.mass_properties.mass / float(np.trapezoid(np.pi * core.radius(s) ** 2, s))
+
+
+def _outside(subject: str, value: float, low: float, high: float, unit: str, whose: str = "") -> Sentences:
+    """A number that lies beyond a measured range."""
+    if not _within(value, low, high):
+        of = f" of {whose}" if whose else ""
+        measured = f"{low:.3g} to {high:.3g}" if math.isfinite(high) else f"from {low:.3g} on"
+        measured = f"{low:.3g}" if low == high else measured
+        yield subject, f"{value:.3g} {unit}, but limit velocities{of} are of {measured} {unit}".replace(" °", "°")
+
+
+def _within(value: float, low: float, high: float, close: float = _SLACK) -> bool:
+    return low * (1.0 - close) - 1e-12 <= value <= high * (1.0 + close) + 1e-12
