@@ -4,18 +4,16 @@ Lane k takes every 32nd patch, from the k-th on, of one list: the patches of all
 
 The passes, the law and the filter are those of the simple layout (kernels/contact.py, kernels/exposure.py). Two things
 differ: where a window lies, and that exposure is added to it as whole numbers, because their sum does not depend on the
-order of the lanes. So an outcome has the same bits in every run. The front window (of the plate, or of the laminate
-that begins with it) is in the block's shared memory. The windows of layers behind it are in global memory: a core
-arrives turned, so they are some 130 nodes wide, and shared memory would not hold them. It would not hold several
-planes, either: if any layer is deep, all windows are in global memory.
+order of the lanes. So an outcome has the same bits in every run. The front window, of the plate, is
+in the block's shared memory. The windows of layers behind it are in global memory: a core arrives turned, so they are
+some 130 nodes wide, and shared memory would not hold them.
 
 The barriers, and the error that each of them prevents (E is the exposure, G the exposure gained):
 
 1. After the deposits: a lane converts nodes of G that all lanes add to.
 2. After the conversion: the filter reads nodes of G that other lanes have converted.
 3. Between the filter's directions, in `exposure.spread`: the second direction reads what other lanes have filtered, and
-   overwrites G, which they read in the first one. The same barrier stands before spreading over planes overwrites what
-   was filtered.
+   overwrites G, which they read in the first one.
 4. Before the second pass: a patch reads nodes of E that other lanes have raised to mid-step.
 5. After the second pass: `settle` raises nodes of E that other lanes read as they are at mid-step.
 6. After `settle`: the next step adds to nodes of G that other lanes clear.
@@ -65,7 +63,7 @@ def build(variant: Variant) -> SimpleNamespace:
     def fields_of_slot(fields: struct.Fields, slot: wp.int32):
         """The fields of one block: those of its slot, and of a single plate in shared memory."""
         part = fields
-        if wp.static(variant.layered or variant.deep):
+        if wp.static(variant.layered):
             part = use.exposure.fields_of_slot(fields, slot)
         else:
             if wp.static(variant.degrades):
@@ -78,7 +76,7 @@ def build(variant: Variant) -> SimpleNamespace:
     def fields_of_window(fields: struct.Fields, first: wp.int32):
         """The fields of a window that begins at node `first` of its slot; the front window is the first."""
         part = fields
-        if wp.static(variant.layered and not variant.deep):
+        if wp.static(variant.layered):
             if first == 0:
                 part = in_front(fields)
         return part
@@ -109,12 +107,6 @@ def build(variant: Variant) -> SimpleNamespace:
             if gain > zero:
                 cell = read_index(touches.cell, base + j)
                 y, z = read(touches.y, base + j), read(touches.z, base + j)
-                if wp.static(variant.deep):
-                    ahead = read(touches.x, base + j) * gain
-                    if ahead > zero:
-                        next = cell + window.nodes
-                        use.fixed_point.scatter(fields.gain, window.cells_z, next, y, z, ahead * units)
-                    gain -= ahead
                 use.fixed_point.scatter(fields.gain, window.cells_z, cell, y, z, gain * units)
             j += use.lanes.count()
 
@@ -138,41 +130,36 @@ def build(variant: Variant) -> SimpleNamespace:
         surface, touches = context.surface, context.touches
         plate, law, window, footprint = slab.plate, slab.law, slab.window, slab.footprint
         load = struct.Load()
-        box = footprint.box
         first, last = footprint.first_closing, footprint.last_closing
         begin, end = first * surface.around, (last + 1) * surface.around
         base = use.core_surface.patches_before(surface, context.slot) - begin
         use.contact.find_touches(context, slab, base, begin, end)
         if use.lanes.any_of(use.contact.meet(plate, touches, base + begin, end - begin) > zero):
-            weakened = bool(False)
             if wp.static(variant.degrades):
                 if use.contact.weakens(window):
                     coarsest = zero
                     for index in range(first, last + 1):
                         coarsest = wp.max(coarsest, use.core_surface.ring_at(surface, slab.pose, index).area)
                     units = use.fixed_point.units(law, window, coarsest, wp.length(slab.pose.velocity), slab.dt)
-                    box = use.contact.gained_box(touches, footprint.box, base + begin, end - begin)
-                    weakened = box.y_high > box.y_low
-                    if weakened:
-                        expose(touches, fields, window, base, begin, end, units)
-                        use.lanes.barrier()
-                        use.fixed_point.measure(fields.gain, window, box, units)
-                        use.lanes.barrier()
-                        use.exposure.spread(plate, fields, window, box)
-                        use.lanes.barrier()
+                    expose(touches, fields, window, base, begin, end, units)
+                    use.lanes.barrier()
+                    use.fixed_point.measure(fields.gain, window, footprint.box, units)
+                    use.lanes.barrier()
+                    use.exposure.spread(plate, fields, window, footprint.box)
+                    use.lanes.barrier()
             sums = use.contact.summed(context, slab, fields, base, first, last)
             load = use.contact.load_of(total_of(sums))
             if wp.static(variant.degrades):
-                if weakened:
+                if use.contact.weakens(window):
                     use.lanes.barrier()
-                    use.exposure.settle(plate, fields, window, box)
+                    use.exposure.settle(plate, fields, window, footprint.box)
                     use.lanes.barrier()
         return load
 
     @wp.func
     def load_on(context: struct.Context, slab: struct.Slab):
         """The load of one step by all lanes of a block."""
-        if wp.static(variant.layered and not variant.deep):  # two calls, so that none goes through generic addresses
+        if wp.static(variant.layered):  # two calls, so that none goes through generic addresses
             if slab.window.first == 0:
                 return load_in(context, slab, in_front(context.fields))
         return load_in(context, slab, context.fields)

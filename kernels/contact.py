@@ -67,15 +67,7 @@ def build(variant: Variant) -> SimpleNamespace:
             write(touches.gain, base + j, per_node * area * wp.abs(use.grip.normal_along_x(pose, patch, face)))
             write_index(touches.tile, base + j, use.plate_grid.tile_at(plate, window, patch.y, patch.z))
             cell = use.plate_grid.cell_at(window, patch.y, patch.z)
-            index = wp.clamp(cell.index, window.first, last_cell)
-            if wp.static(variant.deep):
-                plane = use.plate_grid.planes_at(window, patch.x)
-                write(touches.x, base + j, plane - wp.floor(plane))
-                index += wp.int32(wp.floor(plane)) * window.nodes
-                write_index(touches.row, base + j, cell.row)
-                write_index(touches.column, base + j, cell.column)
-                write_index(touches.plane, base + j, wp.int32(wp.floor(plane)))
-            write_index(touches.cell, base + j, index)
+            write_index(touches.cell, base + j, wp.clamp(cell.index, window.first, last_cell))
             write(touches.y, base + j, cell.y)
             write(touches.z, base + j, cell.z)
             j += use.lanes.count()
@@ -105,62 +97,8 @@ def build(variant: Variant) -> SimpleNamespace:
                 i = j + k * quarter
                 cell, y, z = read_index(touches.cell, i), read(touches.y, i), read(touches.z, i)
                 gain = read(touches.gain, i)
-                if wp.static(variant.deep):
-                    ahead = read(touches.x, i) * gain
-                    use.exposure.scatter(fields.gain, window.cells_z, cell + window.nodes, y, z, ahead)
-                    gain -= ahead
                 use.exposure.scatter(fields.gain, window.cells_z, cell, y, z, gain)
             j += 1
-
-    # Native, because a compiler vectorises the loop only in this form.
-    @wp.func_native(
-        lanes.share(variant)
-        + """
-    assert(start >= 0 && start + count <= gain.shape[0] && start + count <= place.shape[0]);
-    const auto* __restrict__ given = gain.data + start;
-    const int* __restrict__ at = place.data + start;
-    int largest = least;
-    for (int j = lane; j < count; j += lanes) {
-        const int here = given[j] > 0 ? sign * at[j] : least;
-        largest = here > largest ? here : largest;
-    }
-    return largest;
-    """
-    )
-    def largest_of(
-        sign: wp.int32,
-        least: wp.int32,
-        gain: reals,
-        place: wp.array(dtype=wp.int32),
-        start: wp.int32,
-        count: wp.int32,
-    ) -> wp.int32:
-        """The largest sign × place among the patches that give exposure to their nodes; `least` if it is larger."""
-        ...
-
-    @wp.func
-    def ends_of(touches: struct.Touches, place: wp.array(dtype=wp.int32), start: wp.int32, count: wp.int32):
-        """The first and the last place among the patches, on all lanes, that give exposure to their nodes."""
-        low = -largest_of(-1, -far, touches.gain, place, start, count)
-        high = largest_of(1, -far, touches.gain, place, start, count)
-        return use.lanes.least(low), use.lanes.most(high + 1)
-
-    @wp.func
-    def gained_box(touches: struct.Touches, whole: struct.Box, start: wp.int32, count: wp.int32):
-        """The nodes that gain exposure, among the nodes that a step can touch. To spread over more planes than needed
-        costs more than this look at the patches."""
-        box = whole
-        if wp.static(variant.deep):
-            y_low, y_high = ends_of(touches, touches.row, start, count)
-            z_low, z_high = ends_of(touches, touches.column, start, count)
-            plane_low, plane_high = ends_of(touches, touches.plane, start, count)
-            box.y_low = y_low
-            box.y_high = y_high
-            box.z_low = z_low
-            box.z_high = z_high
-            box.plane_low = plane_low
-            box.plane_high = plane_high
-        return box
 
     def summing(weakened: bool) -> Any:
         """The second pass, without a branch, for a layer that weakens or for one that does not."""
@@ -195,9 +133,6 @@ def build(variant: Variant) -> SimpleNamespace:
                     cell = read_index(touches.cell, base + j)
                     y, z = read(touches.y, base + j), read(touches.z, base + j)
                     exposed = use.exposure.gather(fields.exposure, window.cells_z, cell, y, z)
-                    if wp.static(variant.deep):
-                        ahead = use.exposure.gather(fields.exposure, window.cells_z, cell + window.nodes, y, z)
-                        exposed = wp.max(zero, exposed + read(touches.x, base + j) * (ahead - exposed))
                     left = use.interaction.remaining(law, exposed)
                 area = left * read(touches.area, base + j)
                 stress = use.interaction.normal_stress(law, face.closing, ring.radius)
@@ -318,7 +253,6 @@ def build(variant: Variant) -> SimpleNamespace:
         surface, fields, touches = context.surface, context.fields, context.touches
         plate, window, footprint = slab.plate, slab.window, slab.footprint
         load = struct.Load()
-        box = footprint.box
         begin, end = footprint.first_closing * surface.around, (footprint.last_closing + 1) * surface.around
         base = (
             use.core_surface.patches_before(surface, context.slot) - begin
@@ -334,7 +268,6 @@ def build(variant: Variant) -> SimpleNamespace:
             if area > zero:
                 first, last = wp.min(first, index), index
         if last >= 0:
-            weakened = bool(False)
             if wp.static(variant.degrades):
                 if weakens(window):
                     # After all rings are found: a CPU has to wait before it reads single values that it has just stored
@@ -342,12 +275,7 @@ def build(variant: Variant) -> SimpleNamespace:
                     for index in range(first, last + 1):
                         if touches.ring_area[rings + index] > zero:
                             expose(context, window, base + index * surface.around)
-                    box = gained_box(
-                        touches, footprint.box, base + first * surface.around, (last + 1 - first) * surface.around
-                    )
-                    weakened = box.y_high > box.y_low
-                    if weakened:
-                        use.exposure.spread(plate, fields, window, box)
+                    use.exposure.spread(plate, fields, window, footprint.box)
             sums = struct.Sums()
             if wp.static(variant.bends):
                 for index in range(first, last + 1):
@@ -359,8 +287,8 @@ def build(variant: Variant) -> SimpleNamespace:
                 sums = summed(context, slab, fields, base, first, last)
             load = load_of(sums)
             if wp.static(variant.degrades):
-                if weakened:
-                    use.exposure.settle(plate, fields, window, box)
+                if weakens(window):
+                    use.exposure.settle(plate, fields, window, footprint.box)
         return load
 
     fields_of_slot, open_window = use.exposure.fields_of_slot, use.exposure.open_window

@@ -1,11 +1,5 @@
 """The exposure T [s] that each node of a window remembers, and how a contact spreads it (docs/model.md §4): over the
-degradation length in the plane of the plate, by the tent filter, and over the degradation depth through its thickness.
-
-A window has one plane of nodes for the whole thickness, or several where a plate is thicker than the depth. Where the
-thickness differs from shot to shot, a window of several planes serves both: a shot at a plate that is no thicker than
-the depth uses the first plane.
-
-Long because all spreading goes over the same strips of a window.
+degradation length in the plane of the plate, by the tent filter, and through the whole thickness.
 """
 
 from functools import cache
@@ -136,16 +130,6 @@ def build(variant: Variant) -> SimpleNamespace:
         """target[j] += factor × source[j], and then source[j] = 0, in a strip."""
         ...
 
-    @wp.func_native(
-        by_rows("""
-    auto* __restrict__ into = target.data + start;
-    for (int j = lane; j < count; j += lanes) into[j] = 0;
-    """)
-    )
-    def clear_strip(target: reals, strip: struct.Strip):
-        """target[j] = 0 in a strip."""
-        ...
-
     @wp.func
     def fields_of_slot(fields: struct.Fields, slot: wp.int32):
         """The fields of one slot."""
@@ -165,36 +149,27 @@ def build(variant: Variant) -> SimpleNamespace:
         cells_y, cells_z = fields.cells_y[layer], fields.cells_z[layer]
         window = use.plate_grid.window_at(plate, thickness, fields.first[layer], cells_y, cells_z, hit)
         if wp.static(variant.degrades):
-            fill(fields.exposure, window.first, window.planes * window.nodes, zero)
-            fill(fields.gain, window.first, window.planes * window.nodes, zero)
+            fill(fields.exposure, window.first, window.nodes, zero)
+            fill(fields.gain, window.first, window.nodes, zero)
         return window
 
     # Native, because a CPU copies whole rows.
     @wp.func_native("""
-    assert(start >= 0 && start + planes * cells_y * cells_z <= field.shape[0]);
-    for (int plane = 0; plane < planes; ++plane) {
-        auto* const first = field.data + start + plane * cells_y * cells_z;
-        for (int n = 0; n < cells_y; ++n) {
-            const int row = rows >= 0 ? n : cells_y - 1 - n;  // in an order that overwrites nothing that is still read
-            auto* const into = first + row * cells_z;
-            const auto* const from = into + rows * cells_z + columns;
-            const bool known = row + rows >= 0 && row + rows < cells_y;
-            for (int m = 0; m < cells_z; ++m) {
-                const int column = columns >= 0 ? m : cells_z - 1 - m;
-                const bool kept = known && column + columns >= 0 && column + columns < cells_z;
-                into[column] = kept ? from[column] : 0;
-            }
+    assert(start >= 0 && start + cells_y * cells_z <= field.shape[0]);
+    for (int n = 0; n < cells_y; ++n) {
+        const int row = rows >= 0 ? n : cells_y - 1 - n;  // in an order that overwrites nothing that is still read
+        auto* const into = field.data + start + row * cells_z;
+        const auto* const from = into + rows * cells_z + columns;
+        const bool known = row + rows >= 0 && row + rows < cells_y;
+        for (int m = 0; m < cells_z; ++m) {
+            const int column = columns >= 0 ? m : cells_z - 1 - m;
+            const bool kept = known && column + columns >= 0 && column + columns < cells_z;
+            into[column] = kept ? from[column] : 0;
         }
     }
     """)
     def slide_nodes(
-        field: reals,
-        start: wp.int32,
-        planes: wp.int32,
-        cells_y: wp.int32,
-        cells_z: wp.int32,
-        rows: wp.int32,
-        columns: wp.int32,
+        field: reals, start: wp.int32, cells_y: wp.int32, cells_z: wp.int32, rows: wp.int32, columns: wp.int32
     ):
         """Move the nodes of a window that has slid over its plate by some rows and columns. New nodes are 0."""
         ...
@@ -217,13 +192,6 @@ def build(variant: Variant) -> SimpleNamespace:
         return strip
 
     @wp.func
-    def nodes_later(strip: struct.Strip, nodes: wp.int32):
-        """The strip that begins this number of nodes later, such as that of another plane."""
-        later = strip
-        later.start += nodes
-        return later
-
-    @wp.func
     def filter_(target: reals, source: reals, plate: struct.Plate, strip: struct.Strip, step: wp.int32):
         """Apply the tent's taps along one direction, `step` apart, to `source` in a strip, and put the result in
         `target`."""
@@ -232,134 +200,25 @@ def build(variant: Variant) -> SimpleNamespace:
             filter_far(target, source, strip, k * step, plate.taps[k])
 
     @wp.func
-    def filter_plane(plate: struct.Plate, fields: struct.Fields, strip: struct.Strip):
-        """Filter the gained exposure in a strip of a plane, one direction after the other."""
-        wider = nodes_later(strip, -plate.reach * strip.stride)
-        wider.rows += 2 * plate.reach
-        filter_(fields.filtered, fields.gain, plate, wider, 1)
-        use.lanes.barrier()  # the other direction reads what other lanes filter, and overwrites what they read
-        filter_(fields.gain, fields.filtered, plate, strip, strip.stride)
-
-    if variant.window:
-        columns = "for (int j = lane; j < count; j += lanes) sum((Real)0, gained + j, into + j, kept + j);"
-    else:
-        columns = f"""
-        int j = 0;
-    #if !defined(__CUDA_ARCH__)
-        typedef Real Vector __attribute__((vector_size({vector} * sizeof(Real))));
-        typedef Real Pair __attribute__((vector_size(2 * {vector} * sizeof(Real))));  // one waits while the other adds
-        for (; j + 2 * {vector} <= count; j += 2 * {vector}) sum(Pair{{}}, gained + j, into + j, kept + j);
-        for (; j + {vector} <= count; j += {vector}) sum(Vector{{}}, gained + j, into + j, kept + j);
-    #endif
-        for (; j < count; ++j) sum((Real)0, gained + j, into + j, kept + j);
-    """
-
-    # Σ over |i − plane| < reach, and half of the planes at ± reach: the trapezoidal rule over twice the depth. From one
-    # plane to the next two planes come in by halves, and two go. The sums are those of a kernel whose ends are blurred
-    # by
-    # three linear interpolations (scattering, the trapezoidal rule, gathering), each with the variance 1/6 of a spacing
-    # squared. Subtracting a quarter of the second difference makes up for that: the error is of fourth order. All
-    # planes
-    # of a few nodes at a time stay in registers.
-    @wp.func_native(
-        share
-        + """
-    const int first = low - reach - 2 > 0 ? low - reach - 2 : 0;
-    const int last = high + reach + 2 < planes ? high + reach + 2 : planes - 1;
-    int start = strip.start, rows = strip.rows, count = strip.count;
-    assert(start + first * nodes >= 0 && start + (rows - 1) * strip.stride + last * nodes + count <= exposure.shape[0]);
-    if (count == strip.stride) { count *= rows; rows = 1; }
-    using Real = decltype(0 * gain.data[0]);
-    const auto sum = [=](auto none, const Real* gained, Real* into, Real* kept) {
-        using Some = decltype(none);
-        const auto load = [](const Real* from) { Some x; memcpy(&x, from, sizeof(x)); return x; };
-        const auto add = [=](Some& total, int from, Real share) {
-            if (from >= low && from <= high) total += share * load(gained + from * nodes);
-        };
-        Some before = none, here = none;
-        for (int plane = first; plane <= last; ++plane) {
-            Some next = here;
-            if (plane == first)
-                for (int from = low; from < first + reach && from <= high; ++from) add(next, from, 1);
-            add(next, plane + reach, 0.5f);
-            if (plane > first) {
-                add(next, plane + reach - 1, 0.5f);
-                add(next, plane - reach, -0.5f);
-                add(next, plane - reach - 1, -0.5f);
-            }
-            if (plane > first + 1) {
-                const int at = (plane - 1) * nodes;
-                const Some part = (Real)0.75f * here - (Real)0.125f * (before + next);
-                const Some whole = load(into + at) + part;
-                memcpy(kept + at, &part, sizeof(part));
-                memcpy(into + at, &whole, sizeof(whole));
-            }
-            before = here;
-            here = next;
-        }
-    };
-    for (int row = 0; row < rows; ++row, start += strip.stride) {
-        const auto* gained = gain.data + start;
-        auto *into = exposure.data + start, *kept = later.data + start;
-    """
-        + columns
-        + "}"
-    )
-    def add_half_of_planes(
-        exposure: reals,
-        later: reals,
-        gain: reals,
-        strip: struct.Strip,
-        nodes: wp.int32,
-        planes: wp.int32,
-        low: wp.int32,
-        high: wp.int32,
-        reach: wp.int32,
-    ):
-        """Add half of what a gain spreads over the planes up to `reach` away, of `nodes` each, in a strip of each, and
-        keep this half in `later`. Only the planes from `low` to `high` have a gain."""
-        ...
-
-    @wp.func
     def spread(plate: struct.Plate, fields: struct.Fields, window: struct.Window, box: struct.Box):
-        """Spread the gained exposure by the tent K of the law and over the degradation depth, and add half of it to the
+        """Spread the gained exposure by the tent K of the law, one direction after the other, and add half of it to the
         exposure. The sum is the exposure at mid-step.
 
         Values that wrap from one row to the next are zero, because the box keeps the filter's reach away from the
         window's edge.
         """
-        strip, through = strip_of(plate, window, box), wp.static(variant.deep) and window.planes > 1
-        if through:
-            for plane in range(box.plane_low, box.plane_high + 1):
-                filter_plane(plate, fields, nodes_later(strip, plane * window.nodes))
-            use.lanes.barrier()  # the next loop overwrites filtered values that other lanes read
-            add_half_of_planes(
-                fields.exposure,
-                fields.filtered,
-                fields.gain,
-                strip,
-                window.nodes,
-                window.planes,
-                box.plane_low,
-                box.plane_high,
-                plate.plane_reach,
-            )
-        else:
-            filter_plane(plate, fields, strip)
-            add_scaled(fields.exposure, fields.gain, strip, half)
+        strip = strip_of(plate, window, box)
+        wider = strip
+        wider.start -= plate.reach * strip.stride
+        wider.rows += 2 * plate.reach
+        filter_(fields.filtered, fields.gain, plate, wider, 1)
+        use.lanes.barrier()  # the other direction reads what other lanes filter, and overwrites what they read
+        filter_(fields.gain, fields.filtered, plate, strip, strip.stride)
+        add_scaled(fields.exposure, fields.gain, strip, half)
 
     @wp.func
     def settle(plate: struct.Plate, fields: struct.Fields, window: struct.Window, box: struct.Box):
         """Add the other half of the gained exposure and clear it for the next step."""
-        strip, through = strip_of(plate, window, box), wp.static(variant.deep) and window.planes > 1
-        if through:
-            first = wp.max(box.plane_low - plate.plane_reach - 1, 1)
-            last = wp.min(box.plane_high + plate.plane_reach + 1, window.planes - 2)
-            for plane in range(first, last + 1):
-                add_scaled(fields.exposure, fields.filtered, nodes_later(strip, plane * window.nodes), one)
-            for plane in range(box.plane_low, box.plane_high + 1):
-                clear_strip(fields.gain, nodes_later(strip, plane * window.nodes))
-        else:
-            take_scaled(fields.exposure, fields.gain, strip, half)
+        take_scaled(fields.exposure, fields.gain, strip_of(plate, window, box), half)
 
     return SimpleNamespace(**locals())

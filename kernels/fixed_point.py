@@ -78,10 +78,6 @@ def build(variant: Variant) -> SimpleNamespace:
     def measure(field: wp.array(dtype=wp.float32), window: struct.Window, box: struct.Box, units: real):
         """Convert the whole numbers in the rows of a box to exposure [s]."""
         start, count = window.first + box.y_low * window.cells_z, (box.y_high - box.y_low + 1) * window.cells_z
-        if wp.static(variant.deep):
-            for plane in range(box.plane_low, wp.min(box.plane_high, window.planes - 1) + 1):
-                convert(field, start + plane * window.nodes, count, one / units)
-        else:
-            convert(field, start, count, one / units)
+        convert(field, start, count, one / units)
 
     return SimpleNamespace(**locals())

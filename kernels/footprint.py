@@ -48,7 +48,6 @@ def build(variant: Variant) -> SimpleNamespace:
         first_ring, last_ring, not_through, not_back = int(surface.rings), int(-1), int(0), int(0)
         first_closing, last_closing = int(surface.rings), int(-1)
         y_low, y_high, z_low, z_high = int(far), int(-far), int(far), int(-far)
-        plane_low, plane_high = int(far), int(-far)
         index = use.lanes.lane()
         while index < surface.rings:
             ring = ring_at(surface, pose, index)
@@ -67,10 +66,6 @@ def build(variant: Variant) -> SimpleNamespace:
             z_low = wp.min(z_low, wp.where(within, node_below(window, ring.centre[2] - wide_z), far))
             y_high = wp.max(y_high, wp.where(within, node_below(window, ring.centre[1] + wide_y), -far))
             z_high = wp.max(z_high, wp.where(within, node_below(window, ring.centre[2] + wide_z), -far))
-            if wp.static(variant.deep):
-                behind, ahead = use.plate_grid.planes_at(window, rearmost), use.plate_grid.planes_at(window, foremost)
-                plane_low = wp.min(plane_low, wp.where(within, wp.int32(behind), far))
-                plane_high = wp.max(plane_high, wp.where(within, wp.int32(ahead) + 1, -far))
             index += use.lanes.count()
         footprint = struct.Footprint()
         footprint.first_ring = use.lanes.least(first_ring)
@@ -82,16 +77,12 @@ def build(variant: Variant) -> SimpleNamespace:
         footprint.inside = True
         y_low, y_high = use.lanes.least(y_low), use.lanes.most(y_high)
         z_low, z_high = use.lanes.least(z_low), use.lanes.most(z_high)
-        if wp.static(variant.deep):
-            plane_low, plane_high = use.lanes.least(plane_low), use.lanes.most(plane_high)
         if footprint.last_ring >= 0:
             # One node of slack, because rounding may move a patch at the ring's outermost point.
             footprint.box.y_low = window.home_y + y_low - 1
             footprint.box.y_high = window.home_y + y_high + 2
             footprint.box.z_low = window.home_z + z_low - 1
             footprint.box.z_high = window.home_z + z_high + 2
-            footprint.box.plane_low = plane_low
-            footprint.box.plane_high = plane_high
             footprint.inside = holds(plate, window, footprint.box)
         return footprint
 

@@ -101,54 +101,38 @@ def build(variant: Variant) -> SimpleNamespace:
 
     @wp.func
     def slide(context: struct.Context, layer: wp.int32, touch: struct.Footprint):
-        """Have the window of a layer and its laminate follow a core that leaves the window; returns whether it could.
+        """Have the window of a layer follow a core that leaves it; returns whether it could.
 
-        Nodes that leave the window lose their memory. Therefore the window must not take in nodes that it has held
-        before, and no other layer of the laminate may have been looked up in the window in this step.
+        Nodes that leave the window lose their memory. Therefore it must not take in nodes that it has held before.
         """
-        target, stack, fields = context.target, context.stack, context.fields
-        base, first = context.slot * target.count, target.laminate[layer]
-        old, known, box = stack.window[base + layer], stack.known[base + layer], touch.box
+        stack, fields = context.stack, context.fields
+        here, box = context.slot * context.target.count + layer, touch.box
+        old, known = stack.window[here], stack.known[here]
         rows = (box.y_low + box.y_high) // 2 - old.cells_y // 2
         columns = (box.z_low + box.z_high) // 2 - old.cells_z // 2
         new = use.sliding.slid(old, rows, columns)
         before, after = use.sliding.extent_of(old), use.sliding.extent_of(new)
+        plate = plate_of(context.target, layer)
         possible = use.sliding.is_ahead(before, after, known)
-        possible = possible and use.footprint.holds(plate_of(target, layer), new, use.sliding.moved(box, rows, columns))
-        for k in range(first, layer):
-            possible = possible and not (stack.near[base + k] and stack.footprint[base + k].last_ring >= 0)
+        possible = possible and use.footprint.holds(plate, new, use.sliding.moved(box, rows, columns))
         if possible:
-            use.exposure.slide_nodes(fields.exposure, old.first, old.planes, old.cells_y, old.cells_z, rows, columns)
-            for k in range(first, target.count):
-                if target.laminate[k] == first:
-                    stack.window[base + k] = use.sliding.slid(stack.window[base + k], rows, columns)
-                    stack.known[base + k] = use.sliding.around(known, after)
+            use.exposure.slide_nodes(fields.exposure, old.first, old.cells_y, old.cells_z, rows, columns)
+            stack.window[here] = new
+            stack.known[here] = use.sliding.around(known, after)
         return possible
 
     @wp.func
     def open_layer(context: struct.Context, layer: wp.int32, pose: struct.Pose, ahead: vec3):
-        """Open the windows of a layer and its laminate where the core will reach the layer; at first that of the plate
-        about the hit."""
-        target, stack, base = context.target, context.stack, context.slot * context.target.count
+        """Open the window of a layer where the core will reach the layer; at first that of the plate about the hit."""
+        stack, here = context.stack, context.slot * context.target.count + layer
         home = vec3()
-        if layer > 0 or stack.open[base + layer]:
+        if layer > 0 or stack.open[here]:
             home = vec3(zero, pose.position[1] + ahead[1], pose.position[2] + ahead[2])
         use.lanes.barrier()
-        for k in range(target.laminate[layer], target.count):
-            if target.laminate[k] == target.laminate[layer]:
-                stack.window[base + k] = use.target.open_window(context, k, home)
-                stack.home[base + k] = home
-                stack.open[base + k] = True
-                stack.known[base + k] = use.sliding.extent_of(stack.window[base + k])
-
-    @wp.func
-    def was_near(context: struct.Context, layer: wp.int32):
-        """Whether the core was near a layer, or near another layer of its laminate, in the last step."""
-        target, near = context.target, bool(False)
-        for k in range(target.laminate[layer], target.count):
-            same = target.laminate[k] == target.laminate[layer]
-            near = near or (same and context.stack.near[context.slot * target.count + k])
-        return near
+        stack.window[here] = use.target.open_window(context, layer, home)
+        stack.home[here] = home
+        stack.open[here] = True
+        stack.known[here] = use.sliding.extent_of(stack.window[here])
 
     @wp.func
     def touch_of(context: struct.Context, layer: wp.int32, state: struct.State, pose: struct.Pose, dt: real):
@@ -166,7 +150,7 @@ def build(variant: Variant) -> SimpleNamespace:
         touch = use.footprint.footprint_of(surface, plate, stack.window[here], seen, dt)
         if (
             touch.last_ring >= 0
-            and not was_near(context, layer)
+            and not stack.near[here]
             and use.footprint.is_beside(stack.window[here], touch, layer_value(stack.first_cells, layer, context.shot))
         ):
             open_layer(context, layer, pose, vec3())

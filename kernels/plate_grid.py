@@ -34,7 +34,6 @@ def build(variant: Variant) -> SimpleNamespace:
         window = struct.Window()
         window.first = first
         window.nodes = cells_y * cells_z
-        window.planes = plate.planes
         window.home_y = cells_y // 2
         window.home_z = cells_z // 2
         window.home = window.first + window.home_y * cells_z + window.home_z
@@ -42,7 +41,6 @@ def build(variant: Variant) -> SimpleNamespace:
         window.cells_z = cells_z
         window.thickness = thickness
         window.per_cell = one / plate.spacing
-        window.per_plane = plate.per_plane
         # Whole cells of the tile are kept apart from the rest, so two hits that differ by a lattice vector of whole
         # cells compute the same bits.
         across = hit[0] * wp.float64(plate.tile_y) / plate.period_y
@@ -125,10 +123,5 @@ def build(variant: Variant) -> SimpleNamespace:
         cell.y = across - row
         cell.z = along - column
         return cell
-
-    @wp.func
-    def planes_at(window: struct.Window, x: real):
-        """Place of a depth behind the front face among the planes, in planes. A point outside counts at the face."""
-        return (wp.clamp(x, zero, window.thickness) + window.behind) * window.per_plane
 
     return SimpleNamespace(**locals())

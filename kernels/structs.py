@@ -162,8 +162,7 @@ def _build(double: bool, many_plates: bool) -> SimpleNamespace:
         is a lower bound of each cell's distance from material [m]. `period_y` and `period_z` are the extents of the
         period [m]. `half_y` and `half_z` are half the sides of a finite plate [m], infinite without a rim. `spacing` is
         the spacing of the exposure's grid [m]. `taps` is half of the tent filter on this grid, and `reach` is its reach
-        in nodes, at least 1. A window has `planes` of the grid through the thickness, `per_plane` of them per metre. A
-        contact weakens those up to `plane_reach` planes away. One plane stands for the whole thickness.
+        in nodes, at least 1.
 
         `cover` has the material along a normal [m] (kernels/free_edges.py), shape [radii × (directions + 1) × (cover_y
         + 1) × (cover_z + 1)]: classes of the core's radius; directions, where the last repeats the first; the nodes of
@@ -182,9 +181,6 @@ def _build(double: bool, many_plates: bool) -> SimpleNamespace:
         spacing: real
         taps: wp.array(dtype=real)
         reach: wp.int32
-        planes: wp.int32
-        per_plane: real
-        plane_reach: wp.int32
         cover: wp.array(dtype=real)
         cover_y: wp.int32
         cover_z: wp.int32
@@ -203,9 +199,9 @@ def _build(double: bool, many_plates: bool) -> SimpleNamespace:
         `home_z`, which may lie outside the window: so a shot computes the same bits in a window of any size and place.
         `per_cell` is nodes per metre. `row` and `column` are the cell of the tile that holds the hit, `tile_y` and
         `tile_z` are the hit's place in this cell, `per_row` and `per_column` are cells of the tile per metre.
-        `thickness` is the thickness of the plate. Its front face is `behind` [m] the first of `planes` planes of
-        `nodes` nodes each; `low_y`, `high_y`, `low_z` and `high_z` are its rims relative to the hit [m]. (y0, z0) is
-        the place of the node `home` in the literal scheme [m]. `weakens` says whether the fields hold this window.
+        `thickness` is the thickness of the plate; `low_y`, `high_y`, `low_z` and `high_z` are its rims relative to the
+        hit [m]. (y0, z0) is the place of the node `home` in the literal scheme [m]. `weakens` says whether the fields
+        hold this window.
         """
 
         first: wp.int32
@@ -215,10 +211,7 @@ def _build(double: bool, many_plates: bool) -> SimpleNamespace:
         cells_y: wp.int32
         cells_z: wp.int32
         nodes: wp.int32
-        planes: wp.int32
         per_cell: real
-        per_plane: real
-        behind: real
         row: wp.int32
         column: wp.int32
         tile_y: real
@@ -247,18 +240,16 @@ def _build(double: bool, many_plates: bool) -> SimpleNamespace:
 
     @wp.struct
     class Box:
-        """Rows, columns and planes of nodes of a window, ends included."""
+        """Rows and columns of nodes of a window, ends included."""
 
         y_low: wp.int32
         y_high: wp.int32
         z_low: wp.int32
         z_high: wp.int32
-        plane_low: wp.int32
-        plane_high: wp.int32
 
     @wp.struct
     class Strip:
-        """Nodes of one plane of a window: `rows` rows of `count` nodes, `stride` apart, from node `start` on."""
+        """Nodes of a window: `rows` rows of `count` nodes, `stride` apart, from node `start` on."""
 
         start: wp.int32
         rows: wp.int32
@@ -310,9 +301,6 @@ def _build(double: bool, many_plates: bool) -> SimpleNamespace:
         origin in the plane of the plate [m]. These, `thickness` [m] and the members of Law have one value for all shots
         or one per shot: shape [layers, 1] or [layers, shots]. The layers that a step can touch add their `onset_jump`,
         up to `most_jump`, as if they were one plate. `weakens` says whether the layer keeps a field.
-        Layers that touch each other and have the same memory form a laminate: a contact in one weakens the others, and
-        they share a field. `laminate` is the number of its first layer. `deep` is 1 where the laminate is thicker than
-        the depth over which it weakens together, else 0.
         `stretch` is the ratio of the longest allowed step to the shortest one while a core touches nothing but the
         layer, and `slowing` is the share of its speed that a longer step may take. Where there are several layers,
         windows that `slide` follow a core that leaves them.
@@ -324,7 +312,6 @@ def _build(double: bool, many_plates: bool) -> SimpleNamespace:
         plates: Plates
         first: wp.int32
         weakens: wp.array(dtype=wp.bool)
-        laminate: wp.array(dtype=wp.int32)
         by_path: wp.array(dtype=wp.bool)
         standoffs: wp.array(dtype=real)
         ahead: real
@@ -332,7 +319,6 @@ def _build(double: bool, many_plates: bool) -> SimpleNamespace:
         slide: wp.bool
         front: wp.array2d(dtype=wp.float64)
         thickness: wp.array2d(dtype=wp.float64)
-        deep: wp.array2d(dtype=wp.float64)
         offset_y: wp.array2d(dtype=wp.float64)
         offset_z: wp.array2d(dtype=wp.float64)
         a0: wp.array2d(dtype=real)
@@ -520,7 +506,7 @@ def _build(double: bool, many_plates: bool) -> SimpleNamespace:
 
     @wp.struct
     class Fields:
-        """The nodes of all slots, or of one. A slot has `nodes` of each array. The window of a layer has planes of
+        """The nodes of all slots, or of one. A slot has `nodes` of each array. The window of a layer has
         cells_y × cells_z of them, from number `first` on; shape [layers].
 
         The consistent law keeps the exposure [s] (or [m] where it counts a path), the exposure gained in the step, and
@@ -545,9 +531,8 @@ def _build(double: bool, many_plates: bool) -> SimpleNamespace:
 
         `area` is the area that presses on material [m²], `slope` its derivative by the closing speed [m s], and `shift`
         that of Contact. `gain` is the exposure that the patch gives to its nodes [s]. `tile` and `cell` are its cells
-        of the tile and of the grid; `x`, `y` and `z` are its place in the grid's cell, `x` only where a window has
-        planes. There `row`, `column` and `plane` are those of the cell, too. `ring_area` is the area of all patches of
-        a ring. If the bending moment is recorded, `sums` holds the sums of the second pass over a ring, and
+        of the tile and of the grid; `y` and `z` are its place in the grid's cell. `ring_area` is the area of all
+        patches of a ring. If the bending moment is recorded, `sums` holds the sums of the second pass over a ring, and
         `total_area` the area of a ring in all layers of the target. `cover` is the index of the node and direction
         before the patch in the table of the cover, `cover_y`, `cover_z` and `cover_turn` are the fractions of the way
         to the next ones, and `cover_decay` is the negative exponent per cover [1/m].
@@ -559,15 +544,11 @@ def _build(double: bool, many_plates: bool) -> SimpleNamespace:
         gain: wp.array(dtype=real)
         tile: wp.array(dtype=wp.int32)
         cell: wp.array(dtype=wp.int32)
-        x: wp.array(dtype=real)
         y: wp.array(dtype=real)
         z: wp.array(dtype=real)
         ring_area: wp.array(dtype=real)
         sums: wp.array(dtype=Sums)
         total_area: wp.array(dtype=real)
-        row: wp.array(dtype=wp.int32)
-        column: wp.array(dtype=wp.int32)
-        plane: wp.array(dtype=wp.int32)
         cover: wp.array(dtype=wp.int32)
         cover_y: wp.array(dtype=real)
         cover_z: wp.array(dtype=real)

@@ -69,15 +69,6 @@ def build(variant: Variant) -> SimpleNamespace:
         hit, plate, thickness = wp.vec2d(y, z), plate_of(target, layer), layer_value(target.thickness, layer, shot)
         window = use.scheme.open_window(plate, real(thickness), context.fields, layer, hit)
         window.weakens = target.weakens[layer]
-        if wp.static(variant.deep):
-            if layer_value(target.deep, layer, shot) > zero:
-                within = layer_value(target.front, layer, shot) - layer_value(
-                    target.front, target.laminate[layer], shot
-                )
-                window.behind = real(within) + one / plate.per_plane  # one spare plane
-            else:  # it weakens as a whole, and only the first plane has a memory
-                window.planes = 1
-                window.per_plane = real(0.0)
         return window
 
     return SimpleNamespace(**locals())

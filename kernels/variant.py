@@ -31,7 +31,6 @@ class Variant:
         rimmed: the plate is finite.
         bends: the core's largest bending moment is recorded.
         layered: the target has several layers.
-        deep: a plate is thicker than the depth over which its material weakens together.
         tabled: plates and surfaces differ from shot to shot, and come from tables.
         window: largest number of nodes of a shot's window in shared memory, in the block layout: one block of CUDA
             threads per shot (kernels/block.py). 0 is the simple layout: one thread per shot, windows in global memory.
@@ -46,7 +45,6 @@ class Variant:
     rimmed: bool = False
     bends: bool = False
     layered: bool = False
-    deep: bool = False
     tabled: bool = False
     window: int = 0
 

@@ -70,7 +70,7 @@ ENDING_OTHERWISE = 0.01
 FLOAT_LANES = 128
 """float32 lanes per multiprocessor, as on compute capability 8.6, 8.9, 9.0, 10 and 12; 64 on 7.x and 8.0."""
 
-SLOTS, OBLIQUE, LAYERS, DEEP = (
+SLOTS, OBLIQUE, LAYERS, ROUND = (
     "slotted plate",
     "slotted plate at 30°",
     "slotted plate at 30° with a base",
@@ -89,7 +89,7 @@ SCENES = {
     "a rim": ROADS[SLOTS].replace("[plate]", '[plate]\nsize = ["20 mm", "30 mm"]'),
     "lengths of their own": ROADS[SLOTS],
     "a base that weakens": ROADS[SLOTS] + WEAK,
-    DEEP: ROADS["the same at 30 degrees"],
+    ROUND: ROADS["the same at 30 degrees"],
     "strength of the core": ROADS["slotted plate, strength of the core"],
     "double precision": ROADS[SLOTS],
     "the literal scheme": ROADS[SLOTS],
@@ -128,7 +128,7 @@ class Way:
 SIMPLE, BLOCK = Way(), Way("block")
 OTHERS = [replace(way, grid_stride=False) for way in (SIMPLE, BLOCK)]
 OTHERS += [replace(SIMPLE, threads=count) for count in (64, 128)] + [replace(BLOCK, blocks=count) for count in (8, 16)]
-RATES = [(name, way) for name in (SLOTS, OBLIQUE, LAYERS, DEEP) for way in (SIMPLE, BLOCK)]
+RATES = [(name, way) for name in (SLOTS, OBLIQUE, LAYERS, ROUND) for way in (SIMPLE, BLOCK)]
 RATES += [*((SLOTS, way) for way in OTHERS), (LAYERS, replace(BLOCK, blocks=8))]
 """Scenes and ways whose rates are measured, the most telling ones first."""
 

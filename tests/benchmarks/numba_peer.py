@@ -61,7 +61,6 @@ class Peer:
 
     def __init__(self, core: Core, plate: Plate, interaction: Interaction, setting: Setting) -> None:
         assert setting.around <= LANES
-        assert plate.degradation_depth >= plate.thickness, "the peer weakens a plate through its thickness"
         self.core, self.plate, self.setting = core, plate, setting
         self.rings = rings_of(core, setting.axial, setting.around).astype(f4)
         azimuth = (np.arange(setting.around) + 0.5) * (2.0 * np.pi / setting.around)

@@ -106,7 +106,7 @@ def main() -> int:
     """Measure, print, store; returns 1 if something disagrees."""
     peak = measured_peak()
     bouts = [fight(name, file, peak) for name, file in SCENES.items()]
-    apart = literal_difference(_campaign(SCENES["slotted plate"]))
+    apart = literal_difference(campaign_of(SCENES["slotted plate"]))
     print(f"literal scheme, warpimpact against NumPy: {apart[0]:.2g} m/s and {apart[1]:.2g}° apart (90 %)")
     values = {
         "machine": machine() | {"numba": numba.__version__, "numpy": np.__version__},
@@ -129,7 +129,7 @@ def main() -> int:
 
 def fight(name: str, file: str, peak: float) -> Bout:
     """All contenders on one scene: errors, costs, and warpimpact's distance from the floor."""
-    campaign = _campaign(file)
+    campaign = campaign_of(file)
     shots = shots_of(campaign, HITS)
     coarse, truth = (_converged(campaign, shots, level) for level in FINE)
     contenders = [*_warpimpact(campaign), *_numba(campaign)]
@@ -145,14 +145,6 @@ def fight(name: str, file: str, peak: float) -> Bout:
     work = work_of(campaign.scene, shots[:FLOOR_HITS], Numerics(level=STANDARD))
     above = bout.ours(STANDARD).cost * peak / work.operations
     return bout._replace(floor=asdict(work) | {"above_floor": above})
-
-
-def _campaign(file: str) -> Campaign:
-    """A campaign whose plate weakens through its thickness, as the peers have no depth of weakening."""
-    campaign = campaign_of(file)
-    plate = campaign.plate
-    through = max(plate.degradation_depth, plate.thickness)
-    return campaign.model_copy(update={"plate": plate.model_copy(update={"degradation_depth": through})})
 
 
 def _march(campaign: Campaign, numerics: Numerics) -> Callable[[Shots], Answer]:

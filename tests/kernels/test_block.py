@@ -58,7 +58,7 @@ class Case(NamedTuple):
 SOUND = SLOTTED.model_copy(update={"degradation": 1.0})
 BASE = Layer(thickness=6e-3, resistance=1.5e9, shear_coefficient=0.05, gap=20e-3)
 WEAK = Layer(**SLOTTED.model_copy(update={"thickness": 2e-3}).model_dump(), gap=10e-3)
-LAMINATE = Layer(**ROUND.model_copy(update={"thickness": 1.5e-3}).model_dump())
+TOUCHING = Layer(**ROUND.model_copy(update={"thickness": 1.5e-3}).model_dump())
 SCENES = {
     "slots": Case(),
     "oblique and yawed": Case(impact=OBLIQUE),
@@ -68,11 +68,11 @@ SCENES = {
     "stress that depends on the rate, beside the rim": Case(
         plate=SLOTTED.model_copy(update={"size": (9e-3, 30e-3)}), interaction={"linear": 0.1, "quadratic": 0.5}
     ),
-    "layers": Case(impact=OBLIQUE, behind=(BASE, WEAK, LAMINATE)),
+    "layers": Case(impact=OBLIQUE, behind=(BASE, WEAK, TOUCHING)),
     "layers without degradation": Case(plate=SOUND, behind=(BASE, BASE.model_copy(update={"resistance": 8e9}))),
     "thick layers": Case(
         plate=SLOTTED.model_copy(update={"thickness": 6e-3}),
-        behind=(WEAK.model_copy(update={"thickness": 8e-3}), LAMINATE.model_copy(update={"gap": 5e-3})),
+        behind=(WEAK.model_copy(update={"thickness": 8e-3}), TOUCHING.model_copy(update={"gap": 5e-3})),
     ),
     "near a free surface": Case(plate=SOUND, impact=OBLIQUE, interaction={"free_surface": FreeSurface()}),
 }

@@ -12,7 +12,7 @@ from warpimpact.kernels.variant import Variant
 
 BUILDS = [
     (Scheme, contact, Variant()),
-    (Scheme, contact, Variant(double=True, deep=True)),
+    (Scheme, contact, Variant(double=True)),
     (Scheme, block, Variant(window=2048)),
     (Scheme, nodal, Variant(nodal=True)),
     (TargetKind, one_plate, Variant()),

@@ -55,7 +55,6 @@ def test_the_march_of_many_hits_keeps_no_struct_in_local_memory(double: bool, tm
         (Variant(window=512, degrades=False, rimmed=True), 0),
         (Variant(window=2048), 7),
         (Variant(window=2048, layered=True), 18),
-        (Variant(window=2048, deep=True), 9),
     ],
 )
 def test_block_keeps_its_front_window_in_shared_memory(variant: Variant, barriers: int, tmp_path: Path) -> None:
@@ -63,8 +62,7 @@ def test_block_keeps_its_front_window_in_shared_memory(variant: Variant, barrier
     wp.compile_aot_module(kernel.module, arch=90, use_ptx=True, module_dir=tmp_path)
     ptx = next(tmp_path.glob("*.ptx")).read_text()
     shared = re.findall(r"\.shared \.align 4 \.b8 \S*?(exposure|gain)\[(\d+)\]", ptx)
-    within = variant.degrades and not variant.deep
-    assert shared == ([("exposure", "8192"), ("gain", "8192")] if within else [])
+    assert shared == ([("exposure", "8192"), ("gain", "8192")] if variant.degrades else [])
     assert f".maxntid {LANES}, 1, 1" in ptx
     used = Counter(re.findall(r"^\s+(?:@!?%p\d+ )?((?:ld|st|atom|red|shfl|bar|barrier)\.[\w.:]+)", ptx, re.MULTILINE))
     spaces = {name.split(".")[1] for name in used if name.startswith(("ld.", "st.", "atom.", "red."))}
@@ -73,6 +71,6 @@ def test_block_keeps_its_front_window_in_shared_memory(variant: Variant, barrier
     assert used["shfl.sync.bfly.b32"] >= 5 * 20
     assert not [name for name in used if name.startswith("bar.sync")]  # a warp waits for itself alone
     assert used["bar.warp.sync"] == barriers  # kernels/block.py says what for
-    if within:
+    if variant.degrades:
         assert used["ld.shared.f32"] >= 4 + 4
         assert sum(count for name, count in used.items() if name.startswith(("atom.shared.add", "red.shared.add"))) >= 4

@@ -10,7 +10,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property, partial
 from itertools import pairwise
-from math import atan, ceil, exp, log, log1p, pi, sqrt
+from math import atan, ceil, log1p, pi, sqrt
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -147,75 +147,6 @@ def nonlocal_degradation_residual(
         # T is only as smooth as the tent, so a step of high order has no advantage.
         state, _ = _march(panel, (start, stop), state, method="RK45", rtol=1e-6)
     return float(state[0])
-
-
-def depth_of_degradation_residual(
-    *,
-    velocity: float,
-    thickness: float,
-    resistance: float,
-    shear_coefficient: float,
-    degradation: float,
-    degradation_distance: float,
-    degradation_length: float,
-    degradation_depth: float,
-    resolution: int = 8,
-) -> float:
-    """Residual velocity [m/s] with degradation by path at a finite ℓ and a depth d (§4.8), of a plate of any thickness.
-
-    The core goes straight, so the exposure S needs no velocity. When the tip is at X', station u at depth X' − u
-    touches. At (p, x) count those within d of x: the annulus between the stations X' − x − d and X' − x + d, in the
-    plate. With D_u(p) the tent K around p integrated over the disc r < r(u), 0 for u < 0 and D_{s_R} for u > s_R,
-    and A_u = ∫_{−∞}^u D du', the surface at station s meets at depth x
-
-        S = A_{x + s − max(x − d, 0)} − A_{x + s − min(x + d, h)},   work = Y ∫₀^h dx ∫ 2πr (dr/ds + η) β^(S/Δs) ds,
-
-    the nose disc a station s = 0 of its own. T and the mean over a circle as in `nonlocal_degradation_residual`.
-
-    Raises ValueError where the core is arrested.
-    """
-    radii = paper_radius(np.linspace(0.0, PAPER_SHOULDER, ceil(resolution * PAPER_SHOULDER / degradation_length) + 1))
-    nodes = np.concatenate([np.linspace(0.0, radii[0], 4)[:-1], radii])
-    angles, angle_weights = _gauss(0, pi / 4, 6)
-    y, z = nodes[:, None] * np.cos(angles), nodes[:, None] * np.sin(angles)
-    stations = np.linspace(0.0, PAPER_SHOULDER, len(radii))
-    discs = np.array([tent_over_disc(y, z, float(radius), degradation_length) for radius in radii])
-    summed = CubicSpline(stations, discs).antiderivative()
-    at = np.concatenate([np.zeros(3), stations])  # of the surface over the nodes: the nose disc is at station 0
-
-    def swept(u: Array) -> Array:
-        """A_u(p) of every node at its own u, shape of y."""
-        inside = np.clip(u, 0.0, PAPER_SHOULDER)
-        piece = np.clip(np.searchsorted(summed.x, inside, side="right") - 1, 0, len(summed.x) - 2)
-        powers = (inside - summed.x[piece])[:, None] ** np.arange(len(summed.c))[::-1]
-        known = np.einsum("kp,pka->ka", powers, summed.c[:, piece, np.arange(len(u))])
-        return known + np.maximum(u - PAPER_SHOULDER, 0.0)[:, None] * discs[-1]
-
-    def force(x: float) -> float:
-        """Axial force per Y of all that passes depth x, one station after the other."""
-        near, far = max(x - degradation_depth, 0.0), min(x + degradation_depth, thickness)
-        exposure = swept(x + at - near) - swept(x + at - far)
-        left = degradation ** (exposure / degradation_distance) @ angle_weights / (pi / 4)
-        disc = CubicSpline(nodes[:4], 2 * pi * nodes[:4] * left[:4]).integrate(0.0, radii[0])
-        ring = CubicSpline(stations, _paper_force_per_station(stations, shear_coefficient) * left[3:])
-        return float(disc + ring.integrate(0.0, PAPER_SHOULDER))
-
-    kinks = sorted(
-        {0.0, thickness, *(x for x in (degradation_depth, thickness - degradation_depth) if 0 < x < thickness)}
-    )
-    panels = [_gauss(low, high, 8) for low, high in pairwise(kinks)]
-    work = resistance * sum(weight * force(x) for xs, weights in panels for x, weight in zip(xs, weights, strict=True))
-    square = velocity**2 - 2 * work / PAPER_MASS
-    if square < 0:
-        raise ValueError("the core is arrested")
-    return sqrt(square)
-
-
-def work_of_depth(thickness: float, degradation: float, degradation_distance: float, degradation_depth: float) -> float:
-    """Thickness [m] without degradation of the same work, ℓ → 0 (§4.8): ∫₀^h β^(min(x, d)/Δs) dx."""
-    decay = -log(degradation) / degradation_distance
-    near = min(thickness, degradation_depth)
-    return (1 - exp(-decay * near)) / decay + (thickness - near) * exp(-decay * near)
 
 
 def tent_over_disc(y: Array, z: Array, radius: float, length: float) -> Array:

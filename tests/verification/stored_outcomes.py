@@ -48,12 +48,7 @@ CAMPAIGNS: dict[str, dict[str, Any]] = {
     "slots, irreducible": {"hits": ONE_NET | {"count": 4, "irreducible": True}},
     "shank through round holes, oblique and yawed": {
         "core": SHANKED,
-        "plate": PLATE | {"pattern": CIRCLES, "thickness": 6e-3, "degradation_depth": 6e-3},
-        "impact": OBLIQUE,
-    },
-    "the same, thicker than its depth": {
-        "core": SHANKED,
-        "plate": PLATE | {"pattern": CIRCLES, "thickness": 6e-3, "degradation_depth": 4e-3},
+        "plate": PLATE | {"pattern": CIRCLES, "thickness": 6e-3},
         "impact": OBLIQUE,
     },
     "arrest in a hard plate that does not weaken": {

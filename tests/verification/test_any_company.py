@@ -32,7 +32,7 @@ CASES = {
     "single": Case(),
     "double": Case(numerics={"precision": "double"}),
     "fixed step": Case(numerics={"time_step": 0.7e-6}),
-    "nodal": Case(paper_plate(degradation_depth=10e-3), numerics={"scheme": "nodal", "grid_spacing": 1e-4}),
+    "nodal": Case(numerics={"scheme": "nodal", "grid_spacing": 1e-4}),
     "rate and rim": Case(
         paper_plate(size=(24e-3, 30e-3)), interaction=Interaction(static=0.9, linear=0.3, quadratic=0.2)
     ),

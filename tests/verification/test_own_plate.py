@@ -58,11 +58,6 @@ def scene_of(shot: int) -> tuple[Core, Plate]:
     return core_with(mass=own.pop("mass")), paper_plate(**own)
 
 
-def whole(plate: Plate) -> Plate:
-    """The plate as it weakens through its whole thickness at once, which the nodal scheme needs."""
-    return plate.model_copy(update={"degradation_depth": 10e-3})
-
-
 def simulated(core: Core, plate: Plate, shots: Shots, device: str = "cpu", **numerics: Any) -> Outcomes:
     record = Record(standoffs=STANDOFFS, standoff_point="nose")
     law = Interaction(static=0.9) if numerics.get("scheme") == "nodal" else INTERACTION
@@ -78,12 +73,10 @@ def without(shots: Shots) -> Shots:
 @pytest.mark.parametrize(("scheme", "every"), [("consistent", 3), ("nodal", 11)])
 def test_a_shot_depends_on_its_own_numbers_alone(scheme: str, every: int, device: str) -> None:
     numerics = {"scheme": scheme} | ({"level": 0} if scheme == "consistent" else {"grid_spacing": 5e-5})
-    far = paper_plate(**FAR)
-    together = simulated(PAPER_CORE, whole(far) if scheme == "nodal" else far, SHOTS, device, **numerics)
+    together = simulated(PAPER_CORE, paper_plate(**FAR), SHOTS, device, **numerics)
     assert np.ptp(together.residual_velocity) > 100.0
     for shot in range(0, COUNT, every):
         core, plate = scene_of(shot)
-        plate = whole(plate) if scheme == "nodal" else plate
         alone = simulated(core, plate, SHOTS[shot : shot + 1], device, **numerics)
         plain = simulated(core, plate, without(SHOTS)[shot : shot + 1], device, **numerics)
         for name, values in vars(together).items():

@@ -87,8 +87,7 @@ def _weakens(material: Mapping[str, Any]) -> str:
         if by_path
         else f"{1e6 * material['degradation_interval']:.3g} µs of contact"
     )
-    at_once = "" if material.get("degradation_depth") is not None else ", through its whole thickness at once,"
-    return f"which weakens{at_once} to {share:.3g} in {unit}"
+    return f"which weakens, through its whole thickness at once, to {share:.3g} in {unit}"
 
 
 def solid_note(dataset: Result) -> str:
@@ -104,7 +103,7 @@ def solid_note(dataset: Result) -> str:
     material = json.loads(dataset.attrs[attr.MATERIAL])
     if attr.CONTINUUM in dataset.attrs:
         return note
-    if not material.get("degradation", 1.0) < 1.0 or material.get("degradation_depth") is not None:
+    if not material.get("degradation", 1.0) < 1.0:
         return note
     note += " A thick plate that weakens as a whole holds less than a real one, so a ratio to it flatters the target."
     if material.get("degradation_distance") is not None:

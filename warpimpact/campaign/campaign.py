@@ -49,8 +49,6 @@ from .text import CampaignError, parsed, read_text
 
 _MOST_LENGTHS = 1000
 """Most degradation lengths in the radius of a core, whose surface has patches of about this length."""
-_MOST_DEPTHS = 100
-"""Most degradation depths in a thickness. Each needs planes of every window in memory."""
 
 
 class Output(Record):
@@ -319,11 +317,6 @@ class Campaign(Model):
                 raise ValueError(
                     f"got {name}.degradation_length = {shortest:g} m, but a core of radius {radius:g} "
                     f"m needs at least 1/{_MOST_LENGTHS} of its radius, {radius / _MOST_LENGTHS:.4g} m"
-                )
-            if plate.thickness > _MOST_DEPTHS * plate.degradation_depth and plate.degradation < 1.0:
-                raise ValueError(
-                    f"got {name}.degradation_depth = {plate.degradation_depth:g} m, but it must be at least "
-                    f"1/{_MOST_DEPTHS} of the thickness, {plate.thickness / _MOST_DEPTHS:.4g} m"
                 )
         return self
 

@@ -18,6 +18,8 @@ _MOST_OPEN = 0.6
 """Open area of a plate above which a warning says that hits meet little."""
 _THIN = 0.25
 """Ligament over thickness below which a web is called thin: a beam four times as deep as wide."""
+LEAST_EFFECTIVE_SHARE = 0.5
+"""Effective thickness over thickness below which a plate that weakens is doubted. The paper's plate has 0.61."""
 
 
 def warn_of(scene: Scene, impact: Impact, hits: Hits) -> None:
@@ -37,6 +39,26 @@ def doubted(scene: Scene, impact: Impact, hits: Hits) -> Iterator[str]:
     plate = scene.target.layers[0]
     usual = USUAL | {"hits": hit_bounds(plate.sampled_cell, plate.size)}
     yield from implausible(_values(scene.core, scene.target, scene.record, impact, hits), usual)
+    for place, plate in scene.target.named:
+        share = effective_thickness(plate, impact.velocity) / plate.thickness
+        if share < LEAST_EFFECTIVE_SHARE:
+            yield (
+                f"{place}: only {share:.0%} of its {1e3 * plate.thickness:.3g} mm resist a core, because it weakens. "
+                "Weakening was only fitted to 4 mm, and such a plate takes hardly more than a thinner one; give thick "
+                "plates degradation = 1"
+            )
+
+
+def effective_thickness(plate: Plate, velocity: float) -> float:
+    """Thickness [m] without weakening that takes as much from a core at this velocity [m/s].
+
+    It holds for a solid plate that is hit normally, if the speed hardly changes (docs/model.md §4.8).
+    """
+    if plate.degradation in (0.0, 1.0):
+        return plate.degradation * plate.thickness
+    way = plate.degradation_unit * (velocity if plate.degradation_distance is None else 1.0)
+    decay = -math.log(plate.degradation) / way
+    return (1.0 - math.exp(-decay * plate.thickness)) / decay
 
 
 def doubted_holes(target: Target) -> Iterator[str]:

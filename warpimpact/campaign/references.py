@@ -50,5 +50,5 @@ def at_base_alone(campaign: Campaign, shots: Shots) -> tuple[Scene, Shots]:
     columns: dict[str, Any] = {
         name: shots.columns[name][:, last] if shots.differs(name, last) else None for name in BY_LAYER
     }
-    columns |= dict.fromkeys(("offset_y", "offset_z", "degradation_length", "degradation_depth"))
+    columns |= dict.fromkeys(("offset_y", "offset_z", "degradation_length"))
     return campaign.scene.model_copy(update={"target": campaign.target.base_alone}), replace(shots, **columns)

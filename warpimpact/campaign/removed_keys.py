@@ -7,6 +7,8 @@ REMOVED_KEYS: dict[str, str] = {
     "search.allow_untested": "leave it out; the front names designs outside the tested range",
     "assumptions": "run warpimpact sensitivity CAMPAIGN.toml",
     "burst": "cracks and bulges decide several hits on one plate, and the model lacks them; compute single hits",
+    "layer.degradation_depth": "leave it out: a layer weakens as a whole; give thick layers degradation = 1",
+    "plate.degradation_depth": "leave it out: a plate weakens as a whole; give thick plates degradation = 1",
     "posterior": "use hits.file with the CSV file that `warpimpact identify` writes",
     "plate.pattern.shape = supershape": 'use shape = "slot", which protects no worse, or shape = "polygons"',
     "plate.pattern.shape = level_set": 'use shape = "slot", which protects no worse, or shape = "polygons"',

@@ -128,7 +128,6 @@ class Weakening(Model):
     degradation_interval: PositiveTime | None = None
     degradation_distance: PositiveLength | None = None
     degradation_length: PositiveLength | None = None
-    degradation_depth: PositiveLength | None = None
 
 
 class Material(Model):

@@ -52,6 +52,5 @@ def cost_of(campaign: Campaign, numerics: Numerics, passages: int = 1) -> str | 
     return (
         f"{level}a hit takes about {seconds:.2g} s of a core, and {hits} hits {time}: at "
         f"least {prepared.steps} steps, and windows of {prepared.window_nodes:.2g} nodes, "
-        f"{prepared.window_bytes / 2**30:.2g} GiB; a lower level, and a longer degradation_length or "
-        "degradation_depth, take less"
+        f"{prepared.window_bytes / 2**30:.2g} GiB; a lower level, and a longer degradation_length, take less"
     )

@@ -88,7 +88,6 @@ USUAL = {
         1e-9, 1e-3, "s", (("us", 1e-6), ("ns", 1e-9)), most=0.1, why="any passage is over by then"
     ),
     "plate.degradation_length": _length(0.01, 20.0, 100.0, "a core weakens a plate about itself"),
-    "plate.degradation_depth": _length(0.1, 200.0, 1_000.0, "no plate is thicker"),
     "plate.density": Bounds(500.0, 25_000.0, "kg/m^3", _DENSITIES, 10.0, 25_000.0, _OF_MATTER),
     "plate.pattern.cell": _length(0.5, 500.0, 2_000.0, "a plate with its holes as far apart is a solid one to a core"),
     "layer.gap": _length(0.05, 3_000.0),

@@ -8,7 +8,6 @@ IRREDUCIBLE = "hits.irreducible = true"
 NODAL = 'numerics.scheme = "nodal"'
 BLOCK = 'numerics.layout = "block"'
 DOUBLE = 'numerics.precision = "double"'
-DEEP = "a plate or laminate that weakens and is thicker than its degradation_depth"
 BENDING = "output.bending = true"
 STRENGTH = "core.strength"
 BY_PATH = "plate.degradation_distance"
@@ -45,7 +44,6 @@ EXCLUDED = (
     Rule(LAYERS, NODAL, "the nodal scheme knows one plate and no layers behind it"),
     Rule(BY_PATH, NODAL, "the nodal scheme weakens the plate once per time step"),
     Rule(BENDING, NODAL, "the nodal scheme has no bending moment"),
-    Rule(DEEP, NODAL, "the nodal scheme weakens the whole thickness at once, so the depth must be no less"),
     Rule(FREE_SURFACE, NODAL, "the nodal scheme has the same stress everywhere"),
     Rule(BENDING, MASS_PROPERTIES, "it needs the mass of every slice, which follows from the shape alone"),
     *(Rule(BLOCK, other, _BY_BLOCK) for other in (NODAL, DOUBLE, BENDING)),

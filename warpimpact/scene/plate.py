@@ -39,13 +39,11 @@ class Plate(Model):
         resistance: Y, the stress of the material against the core [Pa].
         shear_coefficient: η, friction per normal stress.
         degradation: β, share of Y that remains after contact for `degradation_interval` or over
-            `degradation_distance`; with 1 the material does not weaken.
+            `degradation_distance`, through the whole thickness; with 1 the material does not weaken.
         degradation_interval: Δt_β [s], by default 1 us; None if exposure counts the path.
         degradation_distance: Δs_β, a path of the centre of mass [m]; None if exposure counts the time. By path, the law
             has no rate: outcomes depend on Y/v² alone.
         degradation_length: ℓ, distance from a contact in the plane of the plate within which the material weakens [m].
-        degradation_depth: d, distance from a contact along the thickness within which the material weakens [m]. A plate
-            that is not thicker weakens as a whole, as in the paper. All depths of a thicker plate lose the same share.
         density: of the material [kg/m³].
         material: name in the catalogue. In a file it gives resistance, shear_coefficient and density, and the law of
             [interaction]; a key beside it overrides its value. In Python it gives them for a `threat` (a name, or a
@@ -68,7 +66,6 @@ class Plate(Model):
     degradation_interval: PositiveTime | None = None
     degradation_distance: PositiveLength | None = None
     degradation_length: PositiveLength = 0.5e-3
-    degradation_depth: PositiveLength = 4.0e-3
     density: PositiveDensity = 7850.0
     material: Title | None = None
     size: tuple[PositiveLength, PositiveLength] | None = None

@@ -81,7 +81,6 @@ QUANTITIES: Mapping[str, Quantity] = {
     "degradation_interval": Quantity("plate", PositiveTime, scatters=False, listed=False),
     "degradation_distance": Quantity("plate", PositiveLength, scatters=False, listed=False),
     "degradation_length": Quantity("plate", PositiveLength, "length within which it weakens", scatters=False),
-    "degradation_depth": Quantity("plate", PositiveLength, "depth within which it weakens", scatters=False),
     "density": Quantity("plate", PositiveDensity, scatters=False, listed=False),
     "static": Quantity("interaction", NonNegativeNumber, "normal stress at rest per resistance", scatters=False),
     "linear": Quantity("interaction", NonNegativeNumber, "linear coefficient of the normal stress", scatters=False),

@@ -174,7 +174,7 @@ class Shots:
         pitch, yaw: of the axis, beyond those of the line of flight [rad].
         spin: about the axis [rad/s].
         mass [kg], strength [Pa]: of the core; None if all shots have the value of the scene.
-        degradation_length, degradation_depth [m]: of the plate; None as for `mass`.
+        degradation_length [m]: of the plate; None as for `mass`.
         static, linear, quadratic, onset: of the interaction; None as for `mass`.
         resistance [Pa], shear_coefficient, degradation, thickness [m], offset_y, offset_z [m]: of the layers, shape
             [shots, layers]; NaN where a layer has the value of the scene, None if all layers have. Layers beyond the
@@ -198,7 +198,6 @@ class Shots:
     offset_y: Array | None = None
     offset_z: Array | None = None
     degradation_length: Array | None = None
-    degradation_depth: Array | None = None
     static: Array | None = None
     linear: Array | None = None
     quadratic: Array | None = None

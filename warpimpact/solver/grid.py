@@ -5,18 +5,16 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from warpimpact.solver.cover import Cover, Pushed, cover_of
-from warpimpact.solver.materials import THICKNESS_ROUNDING
 from warpimpact.solver.tile import Tile, tile_of
 
 if TYPE_CHECKING:
     from warpimpact.scene import Plate
-    from warpimpact.solver.materials import Materials
     from warpimpact.solver.resolution import Resolution
 
 Array = NDArray[np.float64]
@@ -29,32 +27,6 @@ FINEST = 15.0
 SHARED = 4
 """Sizes of a shared tile's cells per factor of two."""
 
-FEWEST_PLANES, PLANES = 3, 1.6
-"""Planes per degradation depth: the fewest, and the factor of the square root of the steps in that depth, because the
-error of planes is of the fourth order in their distance and that of steps of the second. Twice as many planes change no
-answer by a tenth of its error (oblique, slots)."""
-SPARE = 4
-"""Planes beyond those within a laminate: one on each side, one behind the last whole spacing, and its neighbour."""
-
-
-class Lengths(NamedTuple):
-    """Lengths over which a layer weakens together: `length` in its plane, `depth` through its thickness [m]."""
-
-    length: float
-    depth: float
-
-
-class Planes(NamedTuple):
-    """Planes of a window through the thickness: their number, their `spacing` [m], and the number within a degradation
-    depth (`reach`). A single plane stands for the whole thickness."""
-
-    number: int = 1
-    spacing: float = math.inf
-    reach: int = 0
-
-
-WHOLE = Planes()
-
 
 @dataclass(frozen=True)
 class Grid:
@@ -65,7 +37,6 @@ class Grid:
         period, half_size: extents (y, z) of the period, and half extents of the plate [m]; infinite without a rim.
         spacing: spacing of the window's grid [m].
         taps: weights of the tent filter from its middle on, and one 0.
-        planes: planes of the window's grid through the thickness.
         cover: material along a normal, where a free surface counts.
     """
 
@@ -74,7 +45,6 @@ class Grid:
     half_size: tuple[float, float]
     spacing: float
     taps: Array
-    planes: Planes = WHOLE
     cover: Cover | None = None
 
     @property
@@ -90,29 +60,26 @@ class Grid:
 
 def grids_of(
     layers: Sequence[Plate],
-    materials: Sequence[Materials],
     resolution: Resolution,
-    lengths: Sequence[Lengths],
+    lengths: Sequence[float],
     *,
-    deep: bool,
     shared: bool,
     cover: Pushed | None,
 ) -> list[Grid]:
     """The grids of some layers. The width of their cells is proportional to their degradation lengths.
 
     Args:
-        lengths: degradation lengths and depths that replace those of the layers.
-        deep: whether windows have planes through the thickness.
+        lengths: degradation lengths [m] that replace those of the layers.
         shared: whether plates with similar degradation lengths share a tile, whose cells are then finer than needed.
         cover: what the covers depend on; None without a free surface.
     """
     grids, nodal = [], resolution.nodal
-    for plate, reach, material in zip(layers, lengths, materials, strict=True):
-        spacing = reach.length / lengths[0].length * resolution.grid_spacing
-        cells = spacing if nodal else min(spacing / FINER, reach.length / FINEST)
+    for plate, length in zip(layers, lengths, strict=True):
+        spacing = length / lengths[0] * resolution.grid_spacing
+        cells = spacing if nodal else min(spacing / FINER, length / FINEST)
         if shared:
             cells = 2.0 ** (math.floor(SHARED * math.log2(cells)) / SHARED)
-        taps = half_taps(0.0 if nodal else reach.length, spacing)
+        taps = half_taps(0.0 if nodal else length, spacing)
         tile = tile_of(plate, cells, sharp=nodal, double=resolution.double)
         if nodal:  # its nodes are the tile's cells, which fit the period
             spacing = min(tile.dy, tile.dz)
@@ -124,7 +91,6 @@ def grids_of(
                 half_size=(0.5 * size_y, 0.5 * size_z),
                 spacing=spacing,
                 taps=taps,
-                planes=_planes(reach.depth, material, resolution) if deep else WHOLE,
                 cover=None if cover is None else cover_of(plate, cells, cover, double=resolution.double),
             )
         )
@@ -135,15 +101,6 @@ def half_taps(length: float, spacing: float) -> Array:
     """The tent filter of a degradation length [m] on a grid as the kernels read it: from its middle on, and one 0."""
     taps = tent_taps(length, spacing)
     return np.append(taps[len(taps) // 2 :], 0.0)
-
-
-def _planes(depth: float, material: Materials, resolution: Resolution) -> Planes:
-    """Planes of a layer with a degradation depth [m]. They are finer where the steps in a plate of this thickness
-    are."""
-    way = resolution.travel * float(resolution.passage(depth, depth, weakens=True))
-    reach = max(FEWEST_PLANES, math.ceil(PLANES * math.sqrt(depth / way)))
-    most = float(material.together.max()) / depth if material.weakens else 0.0
-    return Planes(math.floor(most * reach + THICKNESS_ROUNDING) + SPARE, depth / reach, reach)
 
 
 def tent_taps(length: float, cell: float) -> Array:

@@ -1,10 +1,8 @@
-"""The material of each layer in every shot, and which layers weaken together (docs/model.md §4.8)."""
+"""The material of each layer in every shot."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
-from itertools import pairwise
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -13,7 +11,7 @@ from numpy.typing import NDArray
 from warpimpact.scene.interaction import coefficients
 
 if TYPE_CHECKING:
-    from warpimpact.scene import Core, Plate, Scene, Shots, Target
+    from warpimpact.scene import Core, Scene, Shots, Target
 
 Array = NDArray[np.float64]
 
@@ -22,10 +20,6 @@ ONSET = 0.02
 FASTEST_DECAY = 1.0e30
 """Largest rate of decay of the resistance [1/s]. β = 0 takes all resistance at the first touch; its rate is beyond any
 exposure, yet finite, because 0 × ∞ is no number."""
-OWN_LENGTHS = ("degradation_length", "degradation_depth")
-"""Lengths of the plate that may differ from shot to shot."""
-THICKNESS_ROUNDING = 1e-9
-"""Rounding error of a thickness in degradation depths, which may be a sum."""
 
 
 @dataclass(frozen=True)
@@ -35,9 +29,6 @@ class Materials:
     Attributes:
         front: distance of its front face behind that of the target.
         thickness: thickness of the layer.
-        together: thickness of its laminate.
-        depth: degradation depth of its material.
-        deep: 1 where the laminate is thicker than the degradation depth, so that it remembers contact by depth; else 0.
         offset_y, offset_z: place of its origin in the plane of the plate.
         a0, a1, a2, friction, degradation, decay_rate: coefficients of the law (kernels/interaction.py).
         onset_jump: onset speed per time step if the core touches this layer alone. Layers in contact add theirs.
@@ -45,15 +36,11 @@ class Materials:
             together can add.
         per_reach: 1 / λH of a free surface [1/m]; 0 without one.
         by_path: whether exposure counts the path of the core instead of the time.
-        laminate: number of the first layer of its laminate, with which it shares the memory of contact.
         weakens: whether it remembers contact.
     """
 
     front: Array
     thickness: Array
-    together: Array
-    depth: Array
-    deep: Array
     offset_y: Array
     offset_z: Array
     a0: Array
@@ -66,7 +53,6 @@ class Materials:
     most_jump: Array
     per_reach: Array
     by_path: bool
-    laminate: int
     weakens: bool
 
 
@@ -75,31 +61,23 @@ def materials_of(scene: Scene, shots: Shots) -> list[Materials]:
     target = scene.target
     weakening = weakens(target, shots)
     thickness = [shots.own_of(target, "thickness", k) for k in range(len(target.layers))]
-    fronts, laminates = target.fronts(thickness), _laminates(target, weakening, shots)
-    rears = {k: front + h for k, front, h in zip(laminates, fronts, thickness, strict=True)}  # last layers
+    fronts = target.fronts(thickness)
     core, interaction, free = scene.core, scene.interaction, scene.interaction.free_surface
     mass = shots.own("mass", core.mass_properties.mass)
     static, linear, quadratic = (
         shots.own(name, getattr(interaction, name)) for name in ("static", "linear", "quadratic")
     )
     materials = []
-    for k, (plate, first) in enumerate(zip(target.layers, laminates, strict=True)):
+    for k, plate in enumerate(target.layers):
         resistance, friction, degradation, offset_y, offset_z = (
             shots.own_of(target, name, k)
             for name in ("resistance", "shear_coefficient", "degradation", "offset_y", "offset_z")
         )
         a0, a1, a2 = coefficients(static, linear, quadratic, resistance, plate.density)
-        depth, together = np.array([plate.degradation_depth]), rears[first] - fronts[first]
-        if k == 0:
-            depth = shots.own("degradation_depth", plate.degradation_depth)
-        deep = weakening[k] & (together > (1.0 + THICKNESS_ROUNDING) * depth)
         materials.append(
             Materials(
                 front=fronts[k],
                 thickness=thickness[k],
-                together=together,
-                depth=depth,
-                deep=np.asarray(deep, dtype=np.float64),
                 offset_y=offset_y,
                 offset_z=offset_z,
                 a0=a0,
@@ -112,7 +90,6 @@ def materials_of(scene: Scene, shots: Shots) -> list[Materials]:
                 most_jump=onset_jump(core, np.array([core.length]), mass, a0),
                 per_reach=np.zeros(1) if free is None else 1.0 / (free.reach * thickness[k]),
                 by_path=plate.degradation_distance is not None,
-                laminate=first,
                 weakens=weakening[k],
             )
         )
@@ -125,22 +102,6 @@ def weakens(target: Target, shots: Shots | None = None) -> list[bool]:
         layer.degradation < 1.0 or (shots is not None and shots.differs("degradation", k))
         for k, layer in enumerate(target.layers)
     ]
-
-
-def _laminates(target: Target, weakening: Sequence[bool], shots: Shots) -> list[int]:
-    """For every layer, the number of the first layer of its laminate. Layers form a laminate if they weaken, touch each
-    other and have the same memory. A laminate of one material acts as one plate of its thickness. A plate whose memory
-    differs from shot to shot is in no laminate."""
-    differs = any(name in shots.columns for name in OWN_LENGTHS)
-    first = [0]
-    for k, (before, layer) in enumerate(pairwise(target.layers), start=1):
-        both = weakening[k - 1] and weakening[k] and target.gaps[k] == 0.0 and not (differs and k == 1)
-        first.append(first[-1] if both and _memory(before) == _memory(layer) else k)
-    return first
-
-
-def _memory(plate: Plate) -> tuple[float, float, bool]:
-    return plate.degradation_length, plate.degradation_depth, plate.degradation_distance is None
 
 
 def onset_jump(core: Core, thickness: Array, mass: Array, static_stress: Array) -> Array:

@@ -83,16 +83,14 @@ class Memory:
 
     def firsts(self, cells: Cells) -> NDArray[np.int64]:
         """Index of the first node of every layer's field in a slot."""
-        before = np.cumsum([0, *self.prepared.nodes(cells)[:-1]])
-        return np.asarray(before[[material.laminate for material in self.prepared.materials]])
+        return np.cumsum([0, *self.prepared.nodes(cells)[:-1]])
 
     @property
     def fields(self) -> list[str]:
         """Names of the fields that a slot needs."""
         if not (self.variant.nodal or self.variant.degrades):
             return []
-        everywhere = self.variant.layered or self.variant.deep
-        if self.variant.window and self.device.is_cuda and not everywhere:  # the others are in shared memory
+        if self.variant.window and self.device.is_cuda and not self.variant.layered:  # the others are in shared memory
             return ["filtered"]
         return ["share", "touched"] if self.variant.nodal else ["exposure", "gain", "filtered"]
 
@@ -114,15 +112,13 @@ class Memory:
         """A message that says why there is no slot for a plate's window of these cells."""
         prepared = self.prepared
         windows = [
-            f"{place}: {y} × {z} nodes" + (f" in {grid.planes.number} planes" if grid.planes.number > 1 else "")
-            for (place, _), grid, (y, z) in zip(
-                prepared.scene.target.named, prepared.grids, prepared.windows(cells), strict=True
-            )
+            f"{place}: {y} × {z} nodes"
+            for (place, _), (y, z) in zip(prepared.scene.target.named, prepared.windows(cells), strict=True)
         ]
         return (
             f"a shot needs {self.slot_bytes(cells) / 2**30:.3g} GiB in {sum(prepared.nodes(cells)):.3g} nodes about "
             f"its way through the target ({', '.join(windows)}), but {MEMORY_SHARE * self._free / 2**30:.3g} GiB and "
-            "2.15e+09 nodes are allowed; give a lower level or a longer degradation_length or degradation_depth"
+            "2.15e+09 nodes are allowed; give a lower level or a longer degradation_length"
         )
 
     @property
@@ -148,13 +144,12 @@ class Memory:
         for name in self.fields:
             setattr(fields, name, room(slots * fields.nodes))
         patches, rings = slots * self._patches, slots * self.rings
-        members = ["area", "slope", "shift", "gain", "y", "z", "x" * self.variant.deep]
+        members = ["area", "slope", "shift", "gain", "y", "z"]
         free = self.variant.free_surface
         members += [f"cover_{name}" * free for name in ("y", "z", "turn", "decay")]
         for name in filter(None, members):
             setattr(touches, name, room(patches))
-        places = ["row", "column", "plane"] if self.variant.deep else []
-        for name in filter(None, ["tile", "cell", "cover" * free, *places]):
+        for name in filter(None, ["tile", "cell", "cover" * free]):
             setattr(touches, name, wp.empty(patches, dtype=wp.int32, device=self.device))
         touches.ring_area = room(rings)
         if self.variant.bends:

@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 from warpimpact.kernels.variant import Variant
 from warpimpact.scene import exclusions
 from warpimpact.solver.cover import Pushed
-from warpimpact.solver.grid import Grid, Lengths, grids_of
-from warpimpact.solver.materials import OWN_LENGTHS, Materials, materials_of
+from warpimpact.solver.grid import Grid, grids_of
+from warpimpact.solver.materials import Materials, materials_of
 from warpimpact.solver.resolution import Resolution, conditions_of, layer_steps, resolve, steps_of
 from warpimpact.solver.rings import Rings, Sections, azimuths_of, rings_of, sections_of
 from warpimpact.solver.tile import check_tiles
@@ -110,12 +110,8 @@ class Prepared:
         return windows_behind(self.scene.core, self.shots, self.materials, self.plates, which, plate)
 
     def nodes(self, cells: Cells) -> list[int]:
-        """Nodes of a shot in the windows of all layers, for a plate's window of these cells. The nodes of a laminate
-        count in its first layer."""
-        return [
-            max(grids[k].planes.number for grids in self.plates) * math.prod(window) if material.laminate == k else 0
-            for k, (material, window) in enumerate(zip(self.materials, self.windows(cells), strict=True))
-        ]
+        """Nodes of a shot in the windows of all layers, for a plate's window of these cells."""
+        return [math.prod(window) for window in self.windows(cells)]
 
     @property
     def window_nodes(self) -> int:
@@ -134,7 +130,7 @@ class Prepared:
         patches, steps = len(self.surfaces[0].rings.station) * self.resolution.patches_around, 0.0
         for material, grid, stretch in zip(self.materials, self.grids, self.stretch, strict=True):
             way = stretch * self.conditions["time_step"] * shots.velocity * np.cos(shots.obliquity)
-            below = grid.planes.number * (2.0 * core.max_radius / grid.spacing) ** 2 if material.weakens else 0.0
+            below = (2.0 * core.max_radius / grid.spacing) ** 2 if material.weakens else 0.0
             passage = float(np.mean((material.thickness + core.length) / way))
             steps += passage * (PER_PATCH * patches + PER_NODE * below)
         return PER_BYTE * self.window_bytes + steps
@@ -158,14 +154,12 @@ def prepare(scene: Scene, shots: Shots, numerics: Numerics) -> Prepared:
     materials = materials_of(scene, shots)
     weakening = [material.weakens for material in materials]
     lengths, which = _lengths(target.layers, shots)
-    resolutions = [resolve(scene, numerics, weakening, [layer.length for layer in layers]) for layers in lengths]
-    shared = "degradation_length" in shots.columns
-    resolution, tabled = resolutions[0], any(name in shots.columns for name in OWN_LENGTHS)
-    own_lengths = [np.array([layer.length for layer in layers])[which] for layers in zip(*lengths, strict=True)]
+    resolutions = [resolve(scene, numerics, weakening, layers) for layers in lengths]
+    resolution, tabled = resolutions[0], "degradation_length" in shots.columns
+    own_lengths = [np.array(layers)[which] for layers in zip(*lengths, strict=True)]
     time_steps = layer_steps(scene, shots, materials, resolution, own_lengths)
     conditions: dict[str, NDArray[Any]] = conditions_of(scene, shots, materials, time_steps)
     steps = int(steps_of(shots, conditions).max())
-    deep = any(material.deep.any() for material in materials)
     plates = list(enumerate(target.layers))
     exclusions.check_together(
         {
@@ -175,16 +169,13 @@ def prepare(scene: Scene, shots: Shots, numerics: Numerics) -> Prepared:
             exclusions.BENDING: record.bending,
             exclusions.LAYERS: len(plates) > 1,
             exclusions.BY_PATH: any(material.by_path for material in materials),
-            exclusions.DEEP: deep,
             exclusions.FREE_SURFACE: interaction.free_surface is not None,
         }
     )
     # The build depends on which quantities may differ, not on their values, so a shot has the same bits in any company.
-    deep |= not resolution.nodal and any(weakening[k] and shots.differs("thickness", k) for k, _ in plates)
-    deep |= not resolution.nodal and weakening[0] and "degradation_depth" in shots.columns
     cover = None if interaction.free_surface is None else Pushed.of(interaction.free_surface, core)
     grids = [
-        grids_of(target.layers, materials, resolution, length, deep=deep, shared=shared, cover=cover)
+        grids_of(target.layers, resolution, length, shared=tabled, cover=cover)
         for length, resolution in zip(lengths, resolutions, strict=True)
     ]
     check_tiles(
@@ -203,7 +194,6 @@ def prepare(scene: Scene, shots: Shots, numerics: Numerics) -> Prepared:
         rimmed=any(plate.size is not None for _, plate in plates),
         bends=record.bending,
         layered=len(plates) > 1,
-        deep=deep,
         tabled=tabled,
         window=block_window(int(first_cells.max())) if resolution.block else 0,
     )
@@ -240,12 +230,9 @@ def prepare(scene: Scene, shots: Shots, numerics: Numerics) -> Prepared:
     )
 
 
-def _lengths(layers: Sequence[Plate], shots: Shots) -> tuple[list[list[Lengths]], NDArray[np.int64]]:
+def _lengths(layers: Sequence[Plate], shots: Shots) -> tuple[list[list[float]], NDArray[np.int64]]:
     """All different degradation lengths of the layers among the shots; and which of them each shot has, shape [1] where
     all have the same."""
-    front, *behind = [Lengths(layer.degradation_length, layer.degradation_depth) for layer in layers]
-    if not any(name in shots.columns for name in OWN_LENGTHS):
-        return [[front, *behind]], np.zeros(1, dtype=np.int64)
-    columns = [np.broadcast_to(shots.own(name, at), len(shots)) for name, at in zip(OWN_LENGTHS, front, strict=True)]
-    different, which = np.unique(np.stack(columns, axis=1), axis=0, return_inverse=True)
-    return [[Lengths(*row), *behind] for row in different.tolist()], np.asarray(which.reshape(-1), dtype=np.int64)
+    front, *behind = [layer.degradation_length for layer in layers]
+    different, which = np.unique(shots.own("degradation_length", front), return_inverse=True)
+    return [[length, *behind] for length in different.tolist()], np.asarray(which.reshape(-1), dtype=np.int64)

@@ -16,7 +16,6 @@ from warpimpact.kernels.trace import WIDTH
 from warpimpact.records.outcomes import Outcomes
 from warpimpact.scene import MassProperties, Numerics, Scene, Shots
 from warpimpact.solver.device import find_device, free_memory
-from warpimpact.solver.grid import WHOLE
 from warpimpact.solver.history import History
 from warpimpact.solver.marching import Marching, apart
 from warpimpact.solver.memory import Memory
@@ -34,8 +33,6 @@ HISTORY_BYTES = 1000
 """Memory per step of a history until it is written [bytes]: its trace, and twice the columns of its Dataset."""
 SNAPSHOT_COPIES, OTHER_COPIES = 3, 8
 """Numbers per cell until the file is written: those of each snapshot, and those of the computation."""
-THROUGH = 16
-"""Depths over which the mean through a layer is taken."""
 NODES_AT_A_TIME = 2**13
 """Nodes of a window that are computed together."""
 SAMPLES, MOST_POINTS = 16, 2**24
@@ -241,35 +238,14 @@ def _behind(memory: Memory, scratch: Any, plate: Cells) -> dict[int, Weakened]:
 
 
 def _share_left(memory: Memory, layer: int, fields: Any, plate: Cells) -> Array:
-    """Share of a layer's resistance that the last shot leaves in its window, mean through the thickness, by the fields
-    of one slot and the cells of the plate's window."""
+    """Share of a layer's resistance that the last shot leaves in its window, by the fields of one slot and the cells of
+    the plate's window."""
     material, cells = memory.prepared.materials[layer], memory.prepared.windows(plate)[layer]
-    through, total = (np.arange(THROUGH) + 0.5) / THROUGH, np.zeros(cells)
-    if material.weakens:
-        planes = memory.prepared.grids[layer].planes if material.deep[-1] else WHOLE
-        field = _planes_of(fields.exposure, memory.firsts(plate)[layer], planes.number, cells)
-        depth = material.front[-1] - memory.prepared.materials[material.laminate].front[-1]
-        depth = depth + material.thickness[-1] * through
-        weakened = depth / planes.spacing + (planes.number > 1)  # one spare plane lies before the first face
-    for k in range(THROUGH):  # all depths of a wide window at once would take tens of gigabytes
-        share = np.ones(cells)
-        if material.weakens:
-            share *= np.exp(material.decay_rate[-1] * np.maximum(_between(field, weakened[k]), 0.0))
-        total += share
-    return total / THROUGH
-
-
-def _planes_of(field: Any, first: int, number: int, cells: Cells) -> NDArray[Any]:
-    """Planes of a window from its first node on, shape [number, cells_y, cells_z]; a view of memory on the CPU."""
-    values = field.numpy()[first : first + number * cells[0] * cells[1]]
-    return np.asarray(values.reshape(number, *cells))
-
-
-def _between(planes: NDArray[Any], place: float) -> Array:
-    """Linear interpolation between planes at a place in units of planes."""
-    low = math.floor(place)
-    at, high = place - low, min(low + 1, len(planes) - 1)
-    return np.asarray((1.0 - at) * planes[low].astype(np.float64) + at * planes[high].astype(np.float64))
+    if not material.weakens:
+        return np.ones(cells)
+    first = memory.firsts(plate)[layer]
+    exposure = fields.exposure.numpy()[first : first + math.prod(cells)].reshape(cells).astype(np.float64)
+    return np.asarray(np.exp(material.decay_rate[-1] * exposure))
 
 
 def nodes_about(home: tuple[float, float], cells: Sequence[int], spacing: float) -> tuple[Array, Array]:

@@ -44,8 +44,6 @@ class Level:
 
 
 SLENDER = 1.0 / 7.0
-ACTING_DEPTHS = 2.0
-"""Thickness, in degradation depths, up to which a step of the passage stays within the depth."""
 ALONG = 1.6
 """Largest way of a step in the plane of a plate, in degradation lengths and per unit of `travel`. Contact that sweeps
 farther sideways leaves gaps in the exposure, and jumps over edges of holes."""
@@ -149,10 +147,9 @@ class Resolution:
         """Largest share of the speed that contact may take in a step."""
         return 0.5 * SLOWING * self.travel
 
-    def passage(self, thickness: ArrayLike, depth: ArrayLike, *, weakens: bool) -> Array:
-        """Way on which a plate acts on a core [m], for thicknesses and degradation depths [m] of the same shape."""
-        acting = np.minimum(thickness, ACTING_DEPTHS * np.asarray(depth)) if weakens else thickness
-        return np.minimum(acting, self.slender)
+    def passage(self, thickness: ArrayLike) -> Array:
+        """Way on which a plate acts on a core [m], for thicknesses [m]."""
+        return np.minimum(thickness, self.slender)
 
     def way_along(self, plate: Plate, length: ArrayLike, *, weakens: bool, behind: bool) -> Array:
         """Largest part of a step's way in the plane of a plate [m], for degradation lengths [m], of their shape;
@@ -196,8 +193,8 @@ class Resolution:
         decay = decay_rate(np.array(plate.degradation), plate.degradation_unit)
         longest_time = self.longest_time(decay, plate, impact.velocity, self.mass, stress)
         weakens = plate.degradation < 1.0
-        passage = self.passage(plate.thickness, plate.degradation_depth, weakens=weakens)
         way_along = self.way_along(plate, plate.degradation_length, weakens=weakens, behind=behind)
+        passage = self.passage(plate.thickness)
         return float(self.step_at(impact.velocity, impact.obliquity, passage, longest_time, way_along))
 
     def step_in(self, impact: Impact, target: Target) -> float:
@@ -252,7 +249,7 @@ def layer_steps(
         resolution.step_at(
             shots.velocity,
             shots.obliquity,
-            resolution.passage(material.thickness, material.depth, weakens=material.weakens),
+            resolution.passage(material.thickness),
             resolution.longest_time(material.decay_rate, layer, shots.velocity, mass, material.a0),
             resolution.way_along(layer, length, weakens=material.weakens, behind=k > 0),
         )
@@ -291,7 +288,6 @@ def steps_of(shots: Shots, conditions: dict[str, Array]) -> Array:
     if (most := float(steps.max())) > MOST_STEPS:
         raise TooManySteps(
             f"a passage through the target takes {most:.3g} steps of {1e9 * float(step.min()):.3g} ns, but at most "
-            f"{MOST_STEPS:.0e} are computed; the thinnest layer, the shortest degradation_depth and numerics.time_step "
-            "set the step"
+            f"{MOST_STEPS:.0e} are computed; the thinnest layer and numerics.time_step set the step"
         )
     return np.asarray(steps)

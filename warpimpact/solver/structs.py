@@ -102,7 +102,7 @@ def _target_of(stage: Any, prepared: Prepared, put: Put) -> tuple[Any, Any]:
         target.plates, kept = plates_of(stage.Plate, [grid for plates in prepared.plates for grid in plates], put)
     else:
         target.plates = plate_of(stage.Plate, prepared.grid, put)
-    for name, dtype in {"weakens": wp.bool, "laminate": wp.int32, "by_path": wp.bool}.items():
+    for name, dtype in {"weakens": wp.bool, "by_path": wp.bool}.items():
         setattr(target, name, put(np.array([getattr(material, name) for material in materials]), dtype))
     target.slowing, target.slide = prepared.resolution.slowing, prepared.slide
     target.standoffs, target.ahead = put(np.array(record.layer_standoffs)), record.ahead(prepared.scene.core)
@@ -173,9 +173,6 @@ def plates_of(struct: Any, grids: Sequence[Grid], put: Put) -> tuple[Any, Any]:
     members = {
         "spacing": [grid.spacing for grid in grids],
         "reach": [grid.reach for grid in grids],
-        "planes": [grid.planes.number for grid in grids],
-        "per_plane": [1.0 / grid.planes.spacing for grid in grids],
-        "plane_reach": [grid.planes.reach for grid in grids],
     }
     for name, values_of in members.items():
         table[name] = values_of
@@ -191,7 +188,6 @@ def plate_of(struct: Any, grid: Grid, put: Put) -> Any:
     plate.half_y, plate.half_z = grid.half_size
     plate.spacing = grid.spacing
     plate.taps, plate.reach = put(grid.taps, aligned=True), grid.reach
-    plate.planes, plate.per_plane, plate.plane_reach = grid.planes.number, 1.0 / grid.planes.spacing, grid.planes.reach
     if grid.cover is not None:
         (plate.cover,) = _on_device(grid.cover, put, "material")
         plate.cover_y, plate.cover_z = grid.cover.shape

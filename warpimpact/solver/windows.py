@@ -32,8 +32,7 @@ def first_windows(
     core: Core, shots: Shots, material: Materials, plates: Sequence[Sequence[Grid]], which: Counts, *, nodal: bool
 ) -> Counts:
     """Nodes, in each direction, of a window that holds the footprint of a core that keeps its attitude through the
-    plate, or through the laminate that begins with the plate; shape [shots]. Layers farther behind have windows of
-    their own.
+    plate; shape [shots]. Layers behind it have windows of their own.
 
     Args:
         material: material of the plate.
@@ -44,7 +43,7 @@ def first_windows(
     turned = np.minimum(1.0, np.sin(np.hypot(shots.pitch, shots.yaw)))
     half = (
         slack * core.max_radius / np.cos(shots.obliquity)
-        + material.together * np.tan(shots.obliquity)
+        + material.thickness * np.tan(shots.obliquity)
         + core.bounding_radius * turned
     )
     spacing, reach = (np.array([getattr(grids[0], name) for grids in plates])[which] for name in ("spacing", "reach"))
@@ -69,11 +68,11 @@ def windows_behind(
     for k, material in enumerate(materials[1:], start=1):
         spacing = np.array([grids[k].spacing for grids in plates])[which]
         taps = np.array([len(grids[k].taps) for grids in plates])[which]
-        thicker = np.maximum(0.0, material.together - materials[0].together)
+        thicker = np.maximum(0.0, material.thickness - materials[0].thickness)
         half = 0.5 * counts[0] * wide + WIDER_BEHIND * core.bounding_radius + thicker * steep
         count = 2 * (np.ceil(half / spacing).astype(np.int64) + 2 * taps + 3)
         counts.append(count if material.weakens else np.zeros_like(counts[0]))
-    return np.stack([counts[material.laminate] for material in materials])
+    return np.stack(counts)
 
 
 def block_window(cells: int) -> int:

@@ -5,10 +5,12 @@ import warnings
 from pathlib import Path
 
 import pytest
+from scipy.integrate import quad
+from scipy.optimize import brentq
 
 from warpimpact import Campaign
 from warpimpact.campaign.plates import read_plates
-from warpimpact.campaign.plausible import doubted_holes
+from warpimpact.campaign.plausible import doubted_holes, effective_thickness
 from warpimpact.campaign.text import CampaignError
 from warpimpact.cli import main
 from warpimpact.scene.bounds import USUAL, Implausible
@@ -53,6 +55,30 @@ def test_the_campaigns_are_plausible(path: Path) -> None:
         text = path.read_text(encoding="utf-8")
         read = read_plates if "[[plate]]" in text else read_sweep if "[sweep]" in text else Campaign.from_toml
         read(path)
+
+
+@pytest.mark.parametrize("unit", ['degradation_interval = "1 us"', 'degradation_distance = "0.825 mm"'])
+def test_a_plate_of_which_less_than_half_resists_is_doubted(unit: str, folder: Path) -> None:
+    # h_eff = ∫₀^h β^(x/Δs) dx with Δs = v Δt = 0.825 mm is h/2 at 5.9 mm (docs/model.md §4.8).
+    weakened = f"degradation = 0.8\n{unit}\n"
+
+    def plate(thickness: float, weakens: str = weakened) -> str:
+        return TEXT.replace('thickness = "4 mm"\n', f"thickness = {thickness!r}\n{weakens}")
+
+    def effective(thickness: float) -> float:
+        return float(quad(lambda x: 0.8 ** (x / 0.825e-3), 0.0, thickness)[0])
+
+    most = brentq(lambda thickness: effective(thickness) - 0.5 * thickness, 4e-3, 8e-3)
+    assert most == pytest.approx(5.9e-3, abs=0.05e-3)
+    (paper,) = Campaign.from_text(plate(4e-3), name="text", folder=folder).target.layers
+    assert effective_thickness(paper, 825.0) == pytest.approx(effective(4e-3))
+    assert warned(plate(0.999 * most), folder) == []
+    (sentence,) = warned(plate(1.001 * most), folder)
+    assert sentence.startswith("plate: only 50% of its 5.9")
+    assert sentence.endswith("give thick plates degradation = 1")
+    assert warned(plate(12e-3, ""), folder) == []
+    behind = TEXT.replace("[impact]", f'[[layer]]\nthickness = "8 mm"\nresistance = "2 GPa"\n{weakened}[impact]')
+    assert warned(behind, folder)[0].startswith("layer 1: only 41% of its 8 mm")
 
 
 @pytest.mark.parametrize(

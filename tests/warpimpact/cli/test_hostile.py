@@ -68,10 +68,6 @@ CAMPAIGNS = {
     "many corners": (with_polygons([ZIGZAG * 2]), "at most 400 items"),
     "corners far away": (with_polygons([[[0, 0], [1e30, 0], [0, 1e30]]]), "at most one spacing away"),
     "an image": (with_polygons([]).replace('"polygons"', '"mask"'), "'none', 'polygons'"),
-    "a tiny depth": (
-        re.sub("(degradation_length *= .*)", '\\1\ndegradation_depth = "1 nm"', BASE),
-        "must be at least 1/100 of the thickness",
-    ),
 }
 FILES: dict[str, tuple[str, str | bytes, str]] = {
     "a long field": ("a.csv", "hit_y,hit_z\n" + "1" * 200_000 + ",1\n", "field larger than field limit"),

@@ -113,9 +113,9 @@ def test_a_failing_allocation_changes_no_bit(campaign: Campaign, monkeypatch: py
 def test_windows_that_do_not_fit_are_refused(campaign: Campaign, monkeypatch: pytest.MonkeyPatch) -> None:
     base = Layer(**campaign.plate.model_dump() | {"thickness": 0.2}, gap=0.0)  # wide, however narrow the plate's is
     scene = campaign.scene.model_copy(update={"target": Target(layers=(campaign.plate, base))})
-    monkeypatch.setattr("warpimpact.solver.memory.free_memory", lambda: 2**20)
+    monkeypatch.setattr("warpimpact.solver.memory.free_memory", lambda: 2**16)
     monkeypatch.setattr("warpimpact.solver.memory.SMALL_MEMORY", 0)
-    with pytest.raises(MemoryError, match=r"needs .* GiB in .* nodes .*layer 1: \d+ × \d+ nodes in \d+ planes"):
+    with pytest.raises(MemoryError, match=r"needs .* GiB in .* nodes .*layer 1: \d+ × \d+ nodes\b"):
         simulate.simulate(scene, campaign.sampler().shots(0, 1), numerics=Numerics(level=0), device="cpu")
 
 
