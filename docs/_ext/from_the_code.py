@@ -296,7 +296,6 @@ class VariableReference(FromTheCode):
             "Hit point": variables.OF_THE_HIT_POINT,
             "Plate and core, where they scatter": variables.SCATTER_VARIABLES,
             **{group.title: (*group, *group.beside) for group in RECORDS},
-            "At the solid plate (group `solid`)": (*variables.SOLID_VARIABLES, *variables.SOLID_LIMIT_VARIABLES),
             "At a finer level (group `finer`)": (*variables.FINER_COORDINATES, *variables.FINER_VARIABLES),
         }
         for title, group in groups.items():

@@ -21,7 +21,7 @@ from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
 from warpimpact.results.measures import Measure
 from warpimpact.results.per_hit import Array
-from warpimpact.results.solid_reference import base_alone, base_alone_limits, solid_limits, solid_reference
+from warpimpact.results.references import reference as reference_of
 from warpimpact.results.tallies import dealing, estimate_from
 from warpimpact.statistics.comparisons import Ratio
 from warpimpact.view.view import Column, Section, Table, number, text_of
@@ -128,9 +128,7 @@ def effectiveness(dataset: xarray.Dataset, texts: Sequence[str] = ()) -> list[Sc
 
 def scores(dataset: xarray.Dataset, measures: Sequence[Measure]) -> Iterator[Scored]:
     """Measures one after the other, beside those of the solid plate, with the numbers behind them."""
-    of_limits = attr.LIMIT in dataset.attrs
-    reference = solid_limits(dataset) if of_limits else solid_reference(dataset)
-    alone = base_alone_limits(dataset) if of_limits else base_alone(dataset)
+    reference, alone = (reference_of(dataset, name) for name in ("solid", "base_alone"))
     for scored_evidence in evidence(dataset, measures):
         comparable = reference is not None and _is_comparable(scored_evidence.measure, dataset, reference)
         scored = _scored(scored_evidence.shown(), dataset, reference if comparable else None)
@@ -200,8 +198,8 @@ def effectiveness_view(dataset: xarray.Dataset, texts: Sequence[str] = ()) -> Se
     notes = [depth_note(measures), solid_note(dataset)]
     if not with_solid and attr.OPEN_AREA in dataset.attrs and attr.LIMIT not in dataset.attrs:
         notes.append(
-            "There is no solid plate or add-on to compare with: the result has no shots at one. They are computed "
-            'unless output.solid_reference is false, and stand in the group "solid" of the file.'
+            "There is no solid plate or add-on to compare with. warpimpact run computes it into the file, unless "
+            "output.solid_reference is false."
         )
     table = measures_table(measures, reference_name(dataset) if with_solid else None)
     return Section([table, *filter(None, notes)], f"effectiveness{plate_text(dataset)}")

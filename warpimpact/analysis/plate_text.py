@@ -8,9 +8,12 @@ from typing import TYPE_CHECKING, Any
 
 from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
+from warpimpact.results.references import references_of
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping
+
+    import xarray
 
     from warpimpact.results.table import Result
 
@@ -63,10 +66,14 @@ def common_name(references: Iterable[str]) -> str:
     return names.pop() if len(names) == 1 else "solid reference"
 
 
-def solid_plate(dataset: Result) -> str:
+def solid_plate(dataset: xarray.Dataset) -> str:
     """Thickness and material of the solid reference as a phrase; empty where unknown."""
-    attributes = dataset.attrs
-    plates = json.loads(attributes.get(attr.SOLID_ADD_ON, "[]"))
+    attributes, solid = dataset.attrs, references_of(dataset).get("solid")
+    if solid is None or attr.CAMPAIGN not in solid.attrs:
+        return ""
+    campaign = json.loads(solid.attrs[attr.CAMPAIGN])
+    plates = [campaign["plate"], *campaign["layer"]]
+    plates = plates[:-1] or plates  # the last of several layers is the base
     if attr.CONTINUUM in attributes:
         materials = json.loads(attributes[attr.CONTINUUM])["materials"]
         pairs = zip(plates, materials, strict=False)
@@ -90,11 +97,11 @@ def _weakens(material: Mapping[str, Any]) -> str:
     return f"which weakens, through its whole thickness at once, to {share:.3g} in {unit}"
 
 
-def solid_note(dataset: Result) -> str:
+def solid_note(dataset: xarray.Dataset) -> str:
     """A sentence about the solid plate beside a result, and why it may not be the best plate of its weight; empty where
     the result has none."""
     plate = solid_plate(dataset)
-    if not plate or not {*v.SOLID_VARIABLES, *v.SOLID_LIMIT_VARIABLES} & dataset.variables.keys():
+    if not plate:
         return ""
     what = "the material of the plate in front"
     if attr.ADD_ON_DENSITY in dataset.attrs:

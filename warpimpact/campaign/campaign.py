@@ -4,11 +4,12 @@ Long because everything that two tables of a file must agree on is checked here.
 """
 
 import math
+from functools import partial
 from pathlib import Path
 from typing import Annotated, Any, Self
 
 import numpy as np
-from pydantic import Field, PrivateAttr, ValidationError, model_validator
+from pydantic import BaseModel, Field, PrivateAttr, ValidationError, model_validator
 
 from ..results.kinds import CAMPAIGN
 from ..results.measures import Measure
@@ -34,15 +35,17 @@ from ..scene.exclusions import check_together
 from ..scene.input_files import InputFile
 from ..scene.model import Model
 from ..scene.problems import sentence
+from ..scene.quantities import BY_LAYER
 from ..scene.scatter import check_range
 from ..scene.shots import FARTHEST_HIT
 from ..scene.symmetry import unsymmetric
 from ..scene.target import MOST_LAYERS
 from ..scene.units import Number, PositiveLength, Title
-from .catalogued import catalogue_of, with_materials, with_threat
+from .catalogued import catalogue_of, known_resistance, with_materials, with_threat
 from .continuum_settings import FiniteElements
 from .needs import lacking
 from .plausible import check_plausible, warn_of
+from .references import ReferenceSampler, at_base_alone, at_solid
 from .scatter_tables import with_scatter_apart
 from .stop import Stop
 from .text import CampaignError, parsed, read_text
@@ -56,8 +59,7 @@ class Output(Record):
 
     Attributes:
         failed_share: share of shots whose computation may fail; a run with more ends with exit code 3.
-        solid_reference: compute the solid plate of the same weight, too; of layers the solid add-on of the same weight
-            before the same base, and the base alone. Of limits, its limit.
+        solid_reference: compute some hits of its references, too (`Campaign.references`), into groups of the file.
         exit_state: store velocity, axis and position of every core at the end of contact.
     """
 
@@ -104,6 +106,7 @@ class Campaign(Model):
     allow_implausible: Annotated[bool, Field(strict=True)] = False
     continuum: FiniteElements = FiniteElements()
     _source: str = PrivateAttr("")
+    _sampler: Sampler | None = PrivateAttr(None)
 
     @property
     def text(self) -> str:
@@ -192,8 +195,47 @@ class Campaign(Model):
 
     def sampler(self) -> Sampler:
         """The sampler of its shots."""
-        sampled = (self.impact, self.hits, self.plate, self.scatter, self.replicates)
-        return Sampler(*sampled)
+        if self._sampler is not None:
+            return self._sampler
+        return Sampler(self.impact, self.hits, self.plate, self.scatter, self.replicates)
+
+    @property
+    def references(self) -> dict[str, Self]:
+        """Its references: "solid" if it is not solid itself, and "base_alone" if it has layers."""
+        is_solid = not self.layer and self.target.solid == self.target
+        return ({} if is_solid else {"solid": self.solid()}) | ({"base_alone": self.base_alone()} if self.layer else {})
+
+    def solid(self) -> Self:
+        """The campaign with a solid plate as heavy as its own; of layers, a solid add-on before the same base.
+
+        A Y of the catalogue becomes that of the new thickness. The shots have the places and conditions of this
+        campaign; where thicknesses scatter, each solid plate is as heavy as that of its shot.
+        """
+        pairs = zip(self.target.layers, self.target.solid.layers, strict=True)
+        solid = Target(layers=tuple(self._of_its_thickness(*pair) for pair in pairs))
+        return self._reference(solid, ReferenceSampler(self.sampler(), partial(at_solid, self.target, solid)))
+
+    def base_alone(self) -> Self:
+        """The campaign with its last layer alone; the shots have the places and conditions of this campaign."""
+        last = len(self.layer)
+        own = {name: getattr(self.scatter, name)[last:] for name in BY_LAYER if not name.startswith("offset")}
+        scatter = BaseModel.model_copy(self.scatter, update={"offset_y": (), "offset_z": ()} | own)
+        sampler = ReferenceSampler(self.sampler(), partial(at_base_alone, self.target))
+        return self._reference(self.target.base_alone, sampler, scatter=scatter)
+
+    def _reference(self, target: Target, sampler: Sampler, **changed: Any) -> Self:
+        changed |= {"plate": target.layers[0], "layer": target.layers[1:]}
+        changed["hits"] = BaseModel.model_copy(self.hits, update={"irreducible": False})  # not that of its own plate
+        reference = BaseModel.model_copy(self, update=changed)
+        reference._source, reference._sampler = "", sampler
+        return reference
+
+    def _of_its_thickness(self, given: Plate, solid: Plate) -> Plate:
+        known = None
+        if solid != given:
+            of = self.interaction, self.core, given, self.impact.obliquity, self.catalogue
+            known = known_resistance(*of, solid.thickness)
+        return solid if known is None else solid.model_copy(update={"resistance": known.median})
 
     def lacking(self, measure: Measure) -> str:
         """Keys that the campaign needs for a measure of its hits and does not have; empty if it lacks none."""

@@ -22,6 +22,8 @@ _Table = dict[str, Any]
 _OF_ANY_CORE = set(Core.model_fields)
 SEARCHED_FROM = 800.0
 """Impact velocity at which a search of limit velocities begins if the threat has none [m/s]."""
+SAME = 1e-6
+"""Largest relative difference of a resistance from that of the catalogue at which it counts as the catalogue's."""
 _LAW = ("linear", "quadratic", "onset")
 """Keys of [interaction] that belong to a material."""
 
@@ -203,6 +205,23 @@ def resistance_under(
     )
     ratio = math.log(high / low) / (2.0 * NINETY * known.deviation) if known.deviation else 1.0
     return Resistance(median, ratio * known.deviation, ratio * known.test)
+
+
+def known_resistance(
+    law: Interaction, core: Core, plate: Plate, obliquity: float, file: Path | None, thickness: float | None = None
+) -> Resistance | None:
+    """The resistance of a plate, or of one of another thickness [m], by the catalogue; None where Y is the user's."""
+    catalogue = Catalogue.of(file)
+    material = catalogue.all(Material).get(str(plate.material))
+    if material is None:
+        return None
+    known = resistance_under(law, material, core, plate, obliquity, catalogue)
+    if not math.isclose(known.median, plate.resistance, rel_tol=SAME):
+        return None
+    if thickness is None:
+        return known
+    other = plate.model_copy(update={"thickness": thickness})
+    return resistance_under(law, material, core, other, obliquity, catalogue)
 
 
 def calibres_of(core: Core, plate: Plate) -> float:

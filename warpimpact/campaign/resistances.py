@@ -12,7 +12,7 @@ from ..catalogue.catalogue import Catalogue
 from ..catalogue.entries import Material, Threat
 from ..catalogue.strength import NINETY
 from ..scene import Core, Plate
-from .catalogued import resistance_under
+from .catalogued import SAME, known_resistance, resistance_under
 
 if TYPE_CHECKING:
     from ..catalogue.strength import Resistance
@@ -20,8 +20,6 @@ if TYPE_CHECKING:
 
 Curve = tuple[tuple[float, ...], tuple[float, ...]]
 
-_SAME = 1e-6
-"""Largest relative difference from a value of the catalogue at which a value counts as the catalogue's."""
 _THINNEST, _POINTS = 1e-3, 128
 """Least thickness of a curve as a share of the largest, and number of its points. The points are closer than a tenth of
 the width within which the fit takes thicknesses as nearly equal (`catalogue.strength.SAME_THICKNESS`, as logarithms).
@@ -30,26 +28,15 @@ Linear interpolation is wrong by at most 0.1 %."""
 
 def catalogue_resistance(campaign: Campaign, plate: Plate, thickness: float | None = None) -> Resistance | None:
     """The resistance of a plate, or of one of another thickness [m], by the catalogue; None where Y is the user's."""
-    catalogue = Catalogue.of(campaign.catalogue)
-    material = catalogue.all(Material).get(str(plate.material))
-    if material is None:
-        return None
-
-    def known_of(plate: Plate) -> Resistance:
-        given = campaign.interaction, material, campaign.core, plate, campaign.impact.obliquity, catalogue
-        return resistance_under(*given)
-
-    known = known_of(plate)
-    if not math.isclose(known.median, plate.resistance, rel_tol=_SAME):
-        return None
-    return known if thickness is None else known_of(plate.model_copy(update={"thickness": thickness}))
+    given = campaign.interaction, campaign.core, plate, campaign.impact.obliquity, campaign.catalogue
+    return known_resistance(*given, thickness)
 
 
-def resistance_by_thickness(campaign: Campaign, layer: int, thickest: float, unit: float | None = None) -> Curve | None:
+def resistance_by_thickness(campaign: Campaign, layer: int, thickest: float) -> Curve | None:
     """Thicknesses of a layer, ascending to the thickest [m], and its resistance there, where the catalogue gives it;
-    None elsewhere. The resistance of the thickness `unit` [m], by default that of the layer, is 1."""
+    None elsewhere. The resistance of the layer is 1."""
     plate = campaign.target.layers[layer]
-    known = None if is_drawn(campaign, "resistance", [layer]) else catalogue_resistance(campaign, plate, unit)
+    known = None if is_drawn(campaign, "resistance", [layer]) else catalogue_resistance(campaign, plate)
     if known is None:
         return None
     thicknesses = np.geomspace(_THINNEST * thickest, thickest, _POINTS).tolist()
@@ -138,5 +125,5 @@ def _own(names: list[str]) -> str:
 
 def _same(first: object, other: object) -> bool:
     if isinstance(first, float) and isinstance(other, float):
-        return math.isclose(first, other, rel_tol=_SAME)
+        return math.isclose(first, other, rel_tol=SAME)
     return first == other

@@ -13,7 +13,6 @@ from typing import Any
 import numpy as np
 
 from warpimpact.campaign.campaign import Campaign
-from warpimpact.campaign.references import at_solid
 from warpimpact.campaign.resistances import resistance_by_thickness
 from warpimpact.optimisation.design import Design, FacedThreat
 from warpimpact.records.group import failures
@@ -145,10 +144,8 @@ def _hits_computed(
 
 def _scene_of(design: Design, job: HitJob) -> tuple[Campaign, Scene, Shots]:
     campaign = campaign_of(design, job.tables, design.threats[job.threat], job.seed)
-    shots = campaign.sampler().shots(job.first, job.count)
-    if job.solid:
-        return (campaign, *at_solid(campaign, shots))
-    return campaign, campaign.scene, shots
+    faced = campaign.solid() if job.solid else campaign
+    return campaign, faced.scene, faced.sampler().shots(job.first, job.count)
 
 
 def _marched(

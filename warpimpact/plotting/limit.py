@@ -18,7 +18,7 @@ from warpimpact.plotting.heading import inscribe
 from warpimpact.plotting.style import BLUE, GREY, MAP_SIDE, VERMILION
 from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
-from warpimpact.results.solid_reference import base_alone_limits, solid_limits
+from warpimpact.results.references import reference
 from warpimpact.studies.limit_view import measures_of, promise_line, shown_unit
 
 if TYPE_CHECKING:
@@ -69,9 +69,8 @@ def _over_obliquity(dataset: xarray.Dataset, quantity: str) -> Figure:
         label = "as 1/cos(obliquity)" if quantity == "velocity" else "as cos(obliquity)"
         axes.plot(angles, factor * value[first] * law, color="0.5", linewidth=1.0, label=label)
     across = "between axis and line of fire on impact" if yawed else "obliquity"
-    reference = solid_limits(dataset)
-    if reference is not None:
-        solid = np.broadcast_to(reference[v.LIMITS[quantity].value].values, value.shape)
+    if (of_solid := reference(dataset, "solid")) is not None:
+        solid = np.broadcast_to(of_solid[v.LIMITS[quantity].value].values, value.shape)
         axes.plot(along, factor * solid, "D", color=GREY, fillstyle="none", label=_solid_label(dataset, quantity))
     axes.set(xlabel=f"{across} [°]", ylabel=f"limit {quantity} [{unit}]")
     axes.grid(color="0.9")
@@ -83,7 +82,8 @@ def _over_obliquity(dataset: xarray.Dataset, quantity: str) -> Figure:
 
 def _solid_label(dataset: xarray.Dataset, quantity: str) -> str:
     """Label of the solid reference."""
-    several = ", mean" if dataset.sizes.get("solid_hit", 1) > 1 and quantity == "velocity" else ""
+    solid = reference(dataset, "solid")
+    several = ", mean" if solid is not None and solid.sizes["hit"] > 1 and quantity == "velocity" else ""
     if quantity == "velocity":
         return f"{reference_name(dataset)} of equal areal density{several}"
     return "with the solid add-on" if attr.ADD_ON_DENSITY in dataset.attrs else "solid plate"
@@ -127,12 +127,12 @@ def _draw_curve(axes: Axes, dataset: xarray.Dataset, quantity: str) -> None:
         steps = [ends[0], *limits_found[finite], ends[1]], [0.0, *share[finite], share[finite][-1]]
         axes.step(factor * np.array(steps[0]), steps[1], where="post", color=BLUE, linewidth=1.5)
         axes.set_xlim(*(factor * np.array(ends)))
-    references = (
-        (solid_limits(dataset), _solid_label(dataset, quantity), "--"),
-        (base_alone_limits(dataset), "base alone", "-."),
-    )
-    for reference, label, style in references:
-        mean = math.nan if reference is None else factor * float(np.nanmean(reference[v.LIMITS[quantity].value].values))
+    for name, label, style in (
+        ("solid", _solid_label(dataset, quantity), "--"),
+        ("base_alone", "base alone", "-."),
+    ):
+        known = reference(dataset, name)
+        mean = math.nan if known is None else factor * float(np.nanmean(known[v.LIMITS[quantity].value].values))
         if np.isfinite(mean):
             _draw_upright(axes, mean, color=GREY, linestyle=style, label=label)
     _mark_measures(axes, dataset, factor, unit)

@@ -115,8 +115,6 @@ AREAL_DENSITY = _declared("areal_density", "number", "kg m-2")
 """Areal density of the whole target."""
 ADD_ON_DENSITY = _declared("add_on_areal_density", "number", "kg m-2")
 """Areal density of the layers in front of the base; only with a base."""
-SOLID_ADD_ON = _declared("solid_add_on")
-"""JSON of the plates of the solid reference: the plate's, or that of the layers in front of the base."""
 LIGAMENT = _declared("ligament", "number", "m")
 PLATE_PERIOD = _declared("plate_period", "pair", "m")
 PLATE_THICKNESS = _declared("plate_thickness", "number", "m")
@@ -145,11 +143,6 @@ LIMIT_DENSITY = _declared("limit_density", "number", "kg m-3")
 """Mass per area and thickness of this layer, including its holes."""
 LIMIT_ELSEWHERE = _declared("limit_elsewhere", "number", "kg m-2")
 """Areal density of all other layers."""
-SOLID_LIMIT_TIME = _declared("solid_limit_time", "number", "s")
-SOLID_LIMIT_DENSITY = _declared("solid_limit_density", "number", "kg m-3")
-SOLID_LIMIT_ELSEWHERE = _declared("solid_limit_elsewhere", "number", "kg m-2")
-SOLID_LIMIT_HIGHEST = _declared("solid_limit_highest", "number")
-"""`LIMIT_DENSITY`, `LIMIT_ELSEWHERE` and `LIMIT_HIGHEST` of the solid reference."""
 LIMIT_TOLERANCE = _declared("limit_tolerance", "number")
 LIMIT_HIGHEST = _declared("limit_highest", "number")
 LIMIT_ERROR = _declared("limit_error", "number")

@@ -54,7 +54,7 @@ def to_table(
     period: tuple[float, float],
     attributes: Mapping[str, Any],
     double: bool = False,
-    beside: Mapping[str, Any] | None = None,
+    finer: Mapping[str, Any] | None = None,
     left_out: Collection[str] = (),
 ) -> HitTable:
     """Gather shots and outcomes into the columns of the hit map.
@@ -67,7 +67,7 @@ def to_table(
         attributes: global attributes of the run.
         double: whether the outcomes were computed in double precision. If not, they are stored in single precision;
             shots are always double.
-        beside: columns of other shots, such as v.SOLID_VARIABLES, SI and radians.
+        finer: columns of hits at a finer level, v.FINER_VARIABLES, SI and radians.
         left_out: variables that are not stored.
     """
     coordinates: dict[str, Any] = {
@@ -79,12 +79,11 @@ def to_table(
     }
     if v.LAYER_STANDOFF_TILT in outcomes:
         coordinates[v.LAYER_STANDOFF] = np.array(scene.record.layer_standoffs)
-    coordinates |= beside or {}
+    coordinates |= finer or {}
     coordinates |= outlines_in(scene.target.layers[0], *((-0.5 * side, 0.5 * side) for side in period))
-    beside_the_hits = (name for group in ("solid", "finer") for name in v.GROUPS[group])
     coordinates |= labels(scene.target)
     of_layers = (*v.LAYER_LABELS, *v.LAYER_COORDINATES)
-    along = (*v.COORDINATES, *v.OUTLINE_VARIABLES, *of_layers, *beside_the_hits)
+    along = (*v.COORDINATES, *v.OUTLINE_VARIABLES, *of_layers, *v.GROUPS["finer"])
     values = _values(scene, shots, outcomes)
     values[v.EDGE_DISTANCE] = scene.target.layers[0].edge_distance(shots.hit_y, shots.hit_z)
     zero = np.zeros(len(shots))
@@ -121,15 +120,9 @@ def to_dataset(scene: Scene, shots: Shots, outcomes: Outcomes, **arguments: Any)
     return in_memory(to_table(scene, shots, outcomes, **arguments).to_xarray())
 
 
-def columns_beside(outcomes: Outcomes, variables: Mapping[v.Variable, v.Variable]) -> dict[str, Any]:
-    """Stored columns of other shots than the hits, SI and radians: `variables` with those of the hits, as in
-    v.SOLID_VARIABLES, of which the outcomes have values."""
-    return {name: getattr(outcomes, of_hits) for name, of_hits in variables.items() if of_hits in outcomes}
-
-
 def _computed() -> set[v.Variable]:
-    """Variables, also of other shots, that are stored in single precision unless computed in double precision."""
-    computed = {*v.computed_variables(), *v.SOLID_VARIABLES, *v.SOLID_DEPTHS, *v.BASE_ALONE_VARIABLES}
+    """Variables that are stored in single precision unless computed in double precision."""
+    computed = v.computed_variables()
     return computed | {name for name, variable in v.FINER_VARIABLES.items() if variable in computed}
 
 

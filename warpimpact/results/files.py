@@ -16,6 +16,7 @@ from warpimpact.results import variables as v
 from warpimpact.results.kinds import HIT_MAP, KINDS, POSTERIOR, SWEEP, Kind, text_kind
 from warpimpact.results.netcdf import write_table
 from warpimpact.results.outlines import in_a_file, in_memory
+from warpimpact.results.references import NAMES, references_of, with_references
 from warpimpact.results.table import HitTable
 from warpimpact.scene.input_files import check_file
 from warpimpact.scene.toml_text import parsed, read_text
@@ -33,13 +34,14 @@ class ResultError(ValueError):
 
 
 def write(dataset: xarray.Dataset, path: Path) -> None:
-    """Write the Dataset to a netCDF file, whole or not at all; an existing file is replaced.
+    """Write the Dataset, with its references, to a netCDF file, whole or not at all; an existing file is replaced.
 
     Raises:
         OutputError: The file cannot be written; what was there before is untouched.
     """
     with aside(path) as file:
-        write_table(in_a_file(HitTable.from_xarray(dataset)), file)
+        references = {name: HitTable.from_xarray(of_reference) for name, of_reference in references_of(dataset).items()}
+        write_table(in_a_file(HitTable.from_xarray(dataset)), file, references=references)
 
 
 FILE_CHUNK = 2**15
@@ -126,11 +128,12 @@ def read_tree(path: Path) -> xarray.DataTree:
     return tree
 
 
-def open_result(path: str | Path) -> xarray.Dataset:
+def open_result(path: str | Path, group: str | None = None) -> xarray.Dataset:
     """Open a result file. Values are read when they are used. ``with open_result(path) as result:`` closes the file.
 
     Args:
         path: a file of ``warpimpact run``, of `run_to_file`, or of ``to_netcdf`` of a result.
+        group: "solid" or "base_alone", for the result of that reference.
 
     Returns:
         The Dataset of `run`, one entry per hit.
@@ -138,7 +141,7 @@ def open_result(path: str | Path) -> xarray.Dataset:
     Raises:
         ResultError: the file is missing, is not netCDF, or is not a warpimpact result.
     """
-    dataset = _open(Path(path), HIT_MAP)
+    dataset = _open(Path(path), HIT_MAP, group=group)
     result = dataset.set_xindex(v.HIT)
     result.set_close(dataset.close)
     return result
@@ -162,10 +165,10 @@ def opened(path: Path, *kinds: Kind) -> Iterator[xarray.Dataset]:
         raise ResultError(f"{path}: damaged, it cannot be read ({error})") from error
 
 
-def _open(path: Path, *kinds: Kind) -> xarray.Dataset:
+def _open(path: Path, *kinds: Kind, group: str | None = None) -> xarray.Dataset:
     kind = check_kind(path, *kinds)
     with readable(path):
-        dataset = _joined(path)
+        dataset = _joined(path) if group is None else _part(path, group)
     try:
         _check_needed(path, {*dataset.variables, *dataset.attrs}, kind)
         if kind is HIT_MAP:
@@ -265,8 +268,27 @@ def readable(path: Path) -> Iterator[None]:
 
 
 def _joined(path: Path) -> xarray.Dataset:
-    """The root of a file with the contents of its groups as coordinates. The cache has room for some chunks per
-    variable instead of tens of megabytes.
+    """The root of a file with its references, and with the contents of its other groups as coordinates."""
+    import xarray
+
+    root = _part(path)
+    dataset = root.copy()
+    with netCDF4.Dataset(path) as file:
+        groups = list(file.groups)
+    for group in v.GROUPS.keys() & {*groups}:
+        with xarray.open_dataset(path, engine="netcdf4", group=group) as inner:
+            dataset = dataset.assign_coords({name: array.variable for name, array in inner.load().data_vars.items()})
+    references = dict[str, xarray.Dataset]()
+    for name in {*NAMES} & {*groups}:
+        with _part(path, name) as inner:  # a file that stays open until Python collects it crashes netCDF
+            references[name] = inner.load()
+    dataset = with_references(in_memory(dataset), references)
+    dataset.set_close(root.close)
+    return dataset
+
+
+def _part(path: Path, group: str | None = None) -> xarray.Dataset:
+    """The root or a group of a file. The cache has room for some chunks per variable instead of tens of megabytes.
 
     Numbers of hits have no index, because the whole index would be in memory.
     """
@@ -275,19 +297,13 @@ def _joined(path: Path) -> xarray.Dataset:
     _, slots, preemption = kept = netCDF4.get_chunk_cache()
     netCDF4.set_chunk_cache(4 * 8 * FILE_CHUNK, slots, preemption)
     try:
-        root = xarray.open_dataset(path, engine="netcdf4", create_default_indexes=False)
+        root = xarray.open_dataset(path, engine="netcdf4", group=group, create_default_indexes=False)
     finally:
         netCDF4.set_chunk_cache(*kept)
-    dataset = root.copy()
-    with netCDF4.Dataset(path) as file:
-        groups = [group for group in v.GROUPS if group in file.groups]
-    for group in groups:
-        with xarray.open_dataset(path, engine="netcdf4", group=group) as inner:
-            dataset = dataset.assign_coords({name: array.variable for name, array in inner.load().data_vars.items()})
-    for name in dataset.dims:
-        if name != v.HIT and name in dataset.coords:
+    dataset = root
+    for name in root.dims:
+        if name != v.HIT and name in root.coords:
             dataset = dataset.set_xindex(str(name))
-    dataset = in_memory(dataset)
     dataset.set_close(root.close)
     return dataset
 

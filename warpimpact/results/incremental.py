@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from warpimpact.results.files import FILE_CHUNK, aside, told_as
-from warpimpact.results.netcdf import append, open_to_append, write_table
+from warpimpact.results.netcdf import append, open_to_append, write_groups, write_table
 from warpimpact.results.table import HitTable, joined
 
 
@@ -33,9 +33,9 @@ class IncrementalFile:
             with told_as(self._path):
                 self._write()
 
-    def complete(self, attributes: Mapping[str, Any]) -> None:
-        """Rename the file to its final name, which replaces an existing file. The attributes replace global attributes
-        of the first part.
+    def complete(self, attributes: Mapping[str, Any], groups: Mapping[str, HitTable]) -> None:
+        """Rename the file, with tables as its groups, to its final name, which replaces an existing file. The
+        attributes replace global attributes of the first part.
 
         Raises:
             OutputError: The file cannot be written; what was there before is untouched.
@@ -43,6 +43,7 @@ class IncrementalFile:
         with aside(self._path, self._written.parent) as file:
             self._write()
             self._file.setncatts(dict(attributes))
+            write_groups(groups, self._file)
             self.close()
             os.replace(self._written, file)
 

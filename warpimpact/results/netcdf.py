@@ -17,10 +17,18 @@ from warpimpact.results.table import HitTable, StoredColumn
 _PACKED = {"zlib": True, "complevel": 1}
 
 
-def write_table(table: HitTable, file: Path, *, chunk: int | None = None, compressed: bool = True) -> None:
+def write_table(
+    table: HitTable,
+    file: Path,
+    *,
+    chunk: int | None = None,
+    compressed: bool = True,
+    references: Mapping[str, HitTable] | None = None,
+) -> None:
     """Write a HitTable. Coordinates that belong to a group are written into it.
 
     Args:
+        references: tables of references, by the names of their groups.
         chunk: hits per chunk; "hit" is then unlimited.
         compressed: whether numbers of the root are compressed. Those of the groups always are.
     """
@@ -36,6 +44,16 @@ def write_table(table: HitTable, file: Path, *, chunk: int | None = None, compre
                 inner = {name: table[name] for name in names}
                 beside = {dim: table[dim] for column in inner.values() for dim in column.dims if dim in table.coords}
                 _write(inner | beside, frozenset(beside), target.createGroup(group))
+        write_groups(references or {}, target)
+
+
+def write_groups(groups: Mapping[str, HitTable], target: Any) -> None:
+    """Write tables of references into an open file, each into a group of its name, without outlines."""
+    for name, table in groups.items():
+        table = table.drop_vars([inner for names in v.GROUPS.values() for inner in names])
+        group = target.createGroup(name)
+        group.setncatts(table.attrs)
+        _write(table.variables, table.coords, group)
 
 
 def _write(
@@ -49,7 +67,7 @@ def _write(
     """Write variables into a file or one of its groups."""
     for column in variables.values():
         for dim, size in zip(column.dims, column.shape, strict=True):
-            if dim not in target.dimensions and (target.parent is None or dim not in target.parent.dimensions):
+            if dim not in target.dimensions:
                 target.createDimension(dim, size)
     beside = sorted(name for name in coords if variables[name].dims != (name,))
     for name, column in variables.items():

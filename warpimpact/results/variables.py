@@ -59,34 +59,6 @@ def _beside(variable: Variable, kind: str, along: str, what: str) -> Variable:
     return Variable(f"{kind}_{variable}", dims, variable.units, f"{variable.long_name}, {what}")
 
 
-def _solid(variable: Variable) -> Variable:
-    """A variable at the solid plate of equal areal density, or at the solid add-on before the same base."""
-    return _beside(variable, "solid", "solid_hit", "solid plate of equal areal density")
-
-
-SOLID_VARIABLES = {_solid(variable): variable for variable in (STATUS, RESIDUAL_VELOCITY, TILT)}
-"""Outcomes of the first shots at the solid plate of equal areal density, each with the corresponding variable of the
-hits; with layers, at the solid add-on of equal areal density before the same base. There is one shot if the shots
-differ only in their hit points. Present only for a perforated plate or layers, and with `output.solid_reference`."""
-SOLID_DEPTHS = {_solid(variable): variable for variable in (STOPPED_IN, DEPTH)}
-"""Further outcomes with layers: how deep the cores go into the base."""
-BASE_ALONE_VARIABLES = {
-    _beside(variable, "base_alone", "solid_hit", "base without the layers in front"): variable
-    for variable in SOLID_VARIABLES.values()
-}
-"""Outcomes of the same shots at the base alone. Present with layers and `output.solid_reference`."""
-
-SOLID_LIMITS = {quantity: _solid(limit.value) for quantity, limit in LIMITS.items()}
-"""Limits of the first shots at the solid plate of equal areal density, by the quantity of the search; one if all shots
-are alike. Present only in a result of `warpimpact limit` with `output.solid_reference`."""
-SOLID_LIMIT_VARIABLES = tuple(SOLID_LIMITS.values())
-BASE_ALONE_LIMITS = {
-    quantity: _beside(limit.value, "base_alone", "solid_hit", "base without the layers in front")
-    for quantity, limit in LIMITS.items()
-}
-"""Limits of the same shots at the base alone. Present with layers and `output.solid_reference`, unless the thickness of
-another layer was searched."""
-
 _RECORDED = dict.fromkeys(
     variable for group in registry.RECORDS if group.measured and not group.exact for variable in group
 )
@@ -107,13 +79,6 @@ OUTLINE_VARIABLES = (OUTLINE_Y, OUTLINE_Z)
 
 GROUPS = {
     "plate": OUTLINE_VARIABLES,
-    "solid": (
-        *SOLID_VARIABLES,
-        *SOLID_DEPTHS,
-        *BASE_ALONE_VARIABLES,
-        *SOLID_LIMIT_VARIABLES,
-        *BASE_ALONE_LIMITS.values(),
-    ),
     "finer": (*FINER_COORDINATES, *FINER_VARIABLES),
 }
 """Groups of the file for variables that are not along "hit". In memory those of other shots are coordinates, so that no

@@ -10,11 +10,8 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, ClassVar
 
 from warpimpact.campaign.campaign import Campaign
-from warpimpact.campaign.references import at_base_alone, at_solid
 from warpimpact.records.outcomes import Outcomes
 from warpimpact.results import attributes as attr
-from warpimpact.results import variables as v
-from warpimpact.results.dataset import columns_beside
 from warpimpact.results.table import HitTable
 from warpimpact.runs.describe import described
 from warpimpact.runs.levels import aim_of, level_for, shifts_of
@@ -37,10 +34,14 @@ if TYPE_CHECKING:
 class HitMap:
     """The `Computation` of how every hit of a campaign ends."""
 
-    most_solid: ClassVar[int] = 2**12
+    reference_hits: ClassVar[int] = 2**12
     passages: ClassVar[int] = 1
     content: ClassVar[Mapping[str, str]] = {}
     measures: ClassVar[Sequence[str]] = ()
+
+    def of_reference(self, campaign: Campaign, name: str) -> HitMap:
+        """See `Computation.of_reference`."""
+        return self
 
     def compute(self, campaign: Campaign, task: Task, worker: Worker, report: Report = lambda done: None) -> HitTable:
         """See `compute`."""
@@ -85,15 +86,8 @@ def compute(campaign: Campaign, task: Task, worker: Worker, report: Report = lam
     numerics = numerics_of(campaign, task.findings)
     progress = lambda done, total: report(done)  # noqa: E731
     outcomes, elapsed = _outcomes(campaign.scene, task.shots, numerics, worker, progress)
-    references, beside = list[tuple[Scene, Shots, Mapping[v.Variable, v.Variable]]](), dict[str, Any]()
-    if task.solid is not None:
-        references.append((*at_solid(campaign, task.solid), v.SOLID_VARIABLES | v.SOLID_DEPTHS))
-        if campaign.layer:
-            references.append((*at_base_alone(campaign, task.solid), v.BASE_ALONE_VARIABLES))
-    for scene, shots, variables in references:
-        beside |= columns_beside(_outcomes(scene, shots, numerics, worker)[0], variables)
     attributes = _errors(task.findings) | ({attr.LEVEL_FOR: what} if (what := level_for(campaign)) else {})
-    return described(campaign, task, outcomes, numerics, (worker.device, elapsed), attributes, beside)
+    return described(campaign, task, outcomes, numerics, (worker.device, elapsed), attributes)
 
 
 def numerics_of(campaign: Campaign, findings: Found | None) -> Numerics:

@@ -8,13 +8,12 @@ from collections.abc import Mapping
 from typing import Any
 
 from warpimpact.campaign.campaign import Campaign
-from warpimpact.campaign.references import has_solid, solid_target
 from warpimpact.campaign.resistances import catalogue_names
 from warpimpact.campaign.tested_range import outside_tested_range
 from warpimpact.records.outcomes import Outcomes
 from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
-from warpimpact.results.dataset import columns_beside, to_table
+from warpimpact.results.dataset import to_table
 from warpimpact.results.table import HitTable
 from warpimpact.runs.task import Task
 from warpimpact.scene import Accuracy, Impact, Numerics, Shots, Target
@@ -32,14 +31,12 @@ def described(
     numerics: Numerics,
     computed: tuple[str, float],
     attributes: Mapping[str, Any],
-    beside: Mapping[str, Any],
 ) -> HitTable:
     """The columns of a task.
 
     Args:
         computed: the device, and the time [s].
         attributes: attributes of this kind of computation.
-        beside: columns of other shots than those of the pilot.
     """
     resolution = resolve(campaign.scene, numerics, weakens(campaign.target, task.shots))
     told = _numerics(campaign.numerics, campaign.impact, campaign.target, resolution)
@@ -47,8 +44,8 @@ def described(
     told |= {attr.OUTSIDE_TESTED_RANGE: json.dumps(outside_tested_range(campaign), ensure_ascii=False)}
     told |= computed_by(campaign, computed[0], len(outcomes), computed[1])
     told |= _found(campaign.numerics.asked, task.findings)
-    beside = {**_finer_hits(task.findings), **beside}
-    return described_as(campaign, task.shots, outcomes, {**told, **attributes}, beside, double=is_double(campaign))
+    finer, double = _finer_hits(task.findings), is_double(campaign)
+    return described_as(campaign, task.shots, outcomes, {**told, **attributes}, double=double, finer=finer)
 
 
 def _finer_hits(findings: Found | None) -> dict[str, Any]:
@@ -56,7 +53,11 @@ def _finer_hits(findings: Found | None) -> dict[str, Any]:
     if findings is None or findings.finer is None or findings.numbers is None:
         return {}
     numbers = findings.numbers[: len(findings.finer)].astype("int32")
-    return {v.FINER_HIT: numbers} | columns_beside(findings.finer, v.FINER_VARIABLES)
+    return {v.FINER_HIT: numbers} | {
+        name: getattr(findings.finer, of_hits)
+        for name, of_hits in v.FINER_VARIABLES.items()
+        if of_hits in findings.finer
+    }
 
 
 def described_as(
@@ -64,9 +65,9 @@ def described_as(
     shots: Shots,
     outcomes: Outcomes,
     attributes: Mapping[str, Any],
-    beside: Mapping[str, Any],
     *,
     double: bool,
+    finer: Mapping[str, Any] | None = None,
 ) -> HitTable:
     """The columns of shots of a campaign with the outcomes of all of them, and attributes that do not follow from the
     campaign alone."""
@@ -77,7 +78,7 @@ def described_as(
         period=campaign.hits.covered(campaign.plate),
         attributes={**_campaign(campaign), **attributes},
         double=double,
-        beside=beside,
+        finer=finer,
         left_out=() if campaign.output.exit_state else v.EXIT_VARIABLES,
     )
 
@@ -146,9 +147,6 @@ def _campaign(campaign: Campaign) -> dict[str, Any]:
     if campaign.layer:
         attributes[attr.LAYERS] = _layers(campaign)
         attributes[attr.ADD_ON_DENSITY] = campaign.target.weights["add-on"]
-    if campaign.output.solid_reference and has_solid(campaign):
-        solid = solid_target(campaign).add_on
-        attributes[attr.SOLID_ADD_ON] = json.dumps([plate.model_dump(mode="json") for plate in solid])
     attributes |= {attr.LIGAMENT: ligament} if math.isfinite(ligament) else {}
     return attributes
 

@@ -14,18 +14,17 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from warpimpact.campaign.campaign import Campaign
-from warpimpact.campaign.references import at_solid
 from warpimpact.continuum.many_hits import MOST
 from warpimpact.continuum.strikes import check_continuum, struck
 from warpimpact.records.outcomes import Outcomes
 from warpimpact.results import attributes as attr
 from warpimpact.results import files
 from warpimpact.results import variables as v
-from warpimpact.results.dataset import columns_beside, stored_columns
+from warpimpact.results.dataset import stored_columns
 from warpimpact.results.outlines import in_memory
+from warpimpact.results.references import with_references
 from warpimpact.runs.describe import computed_by, described_as
 from warpimpact.runs.executor import Executor, Job
-from warpimpact.runs.jobs import solid_shots
 from warpimpact.runs.questions import Arrays, Question, Round, RoundProgress, answered
 from warpimpact.runs.shards import manifest
 from warpimpact.runs.store import stored
@@ -86,10 +85,9 @@ def _computed(
     together = 1 if device == "cpu" else MOST
     shots = Shots.joined([sampler.shots(int(number), 1) for number in numbers])
     asked = [(campaign.scene, shots[k : k + together], continuum) for k in range(0, len(shots), together)]
-    solid = solid_shots(campaign, shots[:1], 1)
+    solid = campaign.references.get("solid") if campaign.output.solid_reference else None
     if solid is not None:
-        scene, alone = at_solid(campaign, solid)
-        asked.append((scene, alone, continuum))
+        asked.append((solid.scene, solid.sampler().shots(int(numbers[0]), 1), continuum))
 
     def tell(now: RoundProgress) -> None:
         done, resumed = (min(int(jobs * together), len(shots)) for jobs in (now.done, now.resumed))
@@ -99,7 +97,6 @@ def _computed(
         [Job(_hits, arguments) for arguments in asked], [_key(*arguments) for arguments in asked], tell
     )
     outcomes = [Outcomes(**{name: values for name, values in row.items() if name != SECONDS}) for row in results]
-    beside = {} if solid is None else columns_beside(outcomes.pop(), v.SOLID_VARIABLES | v.SOLID_DEPTHS)
     elapsed = float(sum(float(row[SECONDS][0]) for row in results))
     told = computed_by(campaign, "cpu", len(shots), elapsed)
     told |= {} if device == "cpu" else {attr.DEVICE: device}
@@ -111,17 +108,14 @@ def _computed(
         attr.PRECISION: "single",
         attr.CATALOGUE_NAMES: "\n".join(f"{entry.name}: {entry.evidence}" for entry in elements.entries),
     }
-    table = described_as(
-        campaign,
-        shots,
-        Outcomes.joined(outcomes),
-        told,
-        beside,
-        double=True,
-    )
+    references = {}
+    if solid is not None:
+        table = described_as(solid, asked[-1][1], outcomes.pop(), told, double=True)
+        references["solid"] = in_memory(table.to_xarray())
+    table = described_as(campaign, shots, Outcomes.joined(outcomes), told, double=True)
     if hits is not None:
         table = table.assign_coords(stored_columns((v.HIT,), {v.HIT: np.array(numbers, dtype=np.int32)}))
-    return in_memory(table.to_xarray())
+    return with_references(in_memory(table.to_xarray()), references)
 
 
 def _key(scene: Scene, shots: Shots, continuum: Continuum) -> str:

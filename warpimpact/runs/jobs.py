@@ -7,7 +7,6 @@ from collections.abc import Callable, Iterator
 import numpy as np
 
 from warpimpact.campaign.campaign import Campaign
-from warpimpact.campaign.references import has_solid
 from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
 from warpimpact.results.dataset import numbered
@@ -30,14 +29,13 @@ def task_size(executor: Executor, rate: float) -> int:
     return 0 if executor.is_remote else min(CPU_SHOTS, int(CPU_SECONDS * rate))
 
 
-def solid_shots(campaign: Campaign, shots: Shots, most: int) -> Shots | None:
-    """The shots of the first shard that are also fired at the solid reference plates. One stands for all if the shots
-    differ only in their places and the base has no holes."""
-    if not campaign.output.solid_reference or not has_solid(campaign):
-        return None
+def reference_shots(campaign: Campaign, among: int, most: int) -> Shots:
+    """The first shots of a reference. One stands for all where the first ones differ only in their places, and all
+    layers are solid and unbounded."""
+    shots = campaign.sampler().shots(0, among)
     elsewhere = (v.HIT_Y, v.HIT_Z, "offset_y", "offset_z")
     conditions = [values for name, values in shots.columns.items() if name not in elsewhere]
-    unbounded = all(layer == layer.solid and layer.size is None for layer in campaign.target.solid.layers)
+    unbounded = all(layer == layer.solid and layer.size is None for layer in campaign.target.layers)
     alike = unbounded and not any(np.nan_to_num(np.ptp(values, axis=0)).any() for values in conditions)
     return shots[: 1 if alike else max(1, most)]
 

@@ -17,7 +17,7 @@ from warpimpact.runs.choice import executor_for, opened
 from warpimpact.runs.compute import HIT_MAP, numerics_of
 from warpimpact.runs.executor import Executor, Job, completed, result_of
 from warpimpact.runs.foreseen import cost_warning
-from warpimpact.runs.jobs import ranges, solid_shots, split, task_size
+from warpimpact.runs.jobs import ranges, reference_shots, split, task_size
 from warpimpact.runs.parts import claimed, telling
 from warpimpact.runs.progress import Follow, followed
 from warpimpact.runs.shards import Shards, ShardsOnDisk, extent, manifest
@@ -37,7 +37,7 @@ def run(
     progress: Follow | None = None,
     cancel: Cancel | None = None,
 ) -> xarray.Dataset:
-    """Compute every hit of a campaign, in memory.
+    """Compute every hit of a campaign, in memory. `run(campaign.solid())` computes its solid reference.
 
     Args:
         campaign: the campaign, or its file.
@@ -99,7 +99,8 @@ def run_to_file(
         with telling(shards.kept):
             with followed(progress) as follow:
                 end = _fill(campaign, computation, shards, computing, follow)
-            shards.finish(end.shards, lambda first: _attributes(first, end))
+                references = _references(campaign, computation, shards, computing)
+            shards.finish(end.shards, lambda first: _attributes(first, end), references)
 
 
 def _read(campaign: Campaign | str | Path) -> Campaign:
@@ -130,10 +131,8 @@ def _fill(campaign: Campaign, computation: Computation, shards: Shards, executor
         most = lambda: task_size(executor, 0.0 if campaign.stop else watch.rate)  # noqa: E731
         for task in ranges(shards, most):
             shots = sampler.shots(task.start * shards.extent, len(task) * shards.extent)
-            first = shots[: shards.extent] if task.start == 0 else None
-            solid = None if first is None else solid_shots(campaign, first, computation.most_solid)
             findings = watch.found if task.start == 0 else later
-            yield task, Job(computation.compute, (campaign, Task(shots, solid, findings)))
+            yield task, Job(computation.compute, (campaign, Task(shots, findings)))
 
     with closing(completed(executor, jobs(), lambda: follow(watch.progress(sum(executor.reports()))))) as tables:
         while watch.end is None:
@@ -143,6 +142,18 @@ def _fill(campaign: Campaign, computation: Computation, shards: Shards, executor
                 watch.add(index, shard)
     follow(watch.progress(0))
     return watch.end
+
+
+def _references(
+    campaign: Campaign, computation: Computation, shards: Shards, executor: Executor
+) -> dict[str, HitTable]:
+    """Some hits of the references of a campaign, by their names, at the resolution that its pilot found."""
+    found, tables = computation.found_in(shards.shard(0)), dict[str, HitTable]()
+    for name, reference in campaign.references.items() if campaign.output.solid_reference else ():
+        if (of_reference := computation.of_reference(campaign, name)) is not None:
+            shots = reference_shots(reference, shards.extent, computation.reference_hits)
+            tables[name] = result_of(executor, of_reference.compute, reference, Task(shots, found))
+    return tables
 
 
 def _attributes(table: HitTable, end: End) -> dict[str, Any]:

@@ -159,11 +159,14 @@ class ShardsOnDisk(Shards):
         self._growing, self._grown = None, 0
         (self.parts.folder / _GROWING).unlink(missing_ok=True)
 
-    def finish(self, count: int, attributes: Callable[[HitTable], Mapping[str, Any]]) -> None:
+    def finish(
+        self, count: int, attributes: Callable[[HitTable], Mapping[str, Any]], groups: Mapping[str, HitTable]
+    ) -> None:
         """Join the first `count` shards into the result file, and remove them.
 
         Args:
             attributes: computes global attributes from the first shard.
+            groups: hits of the references, by their names.
 
         Raises:
             OutputError: the file cannot be written, or a shard was damaged; the other shards are kept.
@@ -171,7 +174,7 @@ class ShardsOnDisk(Shards):
         complete = {**attributes(self.shard(0)), attr.FINGERPRINT: self.parts.fingerprint}
         self._grow(count)
         assert self._growing is not None  # a campaign has hits
-        self._growing.complete(complete)
+        self._growing.complete(complete, groups)
         self._held.clear()
         _logger.info("%d shards joined into %s", count, self.parts.output)
         self.parts.discard()

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Protocol
+from typing import TYPE_CHECKING, Protocol, Self
 
 from warpimpact.campaign.campaign import Campaign
 from warpimpact.results.table import HitTable
@@ -26,12 +26,10 @@ class Task:
 
     Attributes:
         shots: as the campaign's sampler gives them.
-        solid: the shots among them that are also fired at the solid plate of equal areal density; None for none.
         findings: findings of the pilot; None if the campaign fixes the resolution.
     """
 
     shots: Shots
-    solid: Shots | None = None
     findings: Found | None = None
 
 
@@ -42,8 +40,8 @@ class Computation(Protocol):
     """
 
     @property
-    def most_solid(self) -> int:
-        """Most shots at the solid plate of equal areal density."""
+    def reference_hits(self) -> int:
+        """Most hits of a reference of the campaign."""
 
     @property
     def passages(self) -> int:
@@ -56,6 +54,9 @@ class Computation(Protocol):
     @property
     def measures(self) -> Sequence[str]:
         """Measures whose running estimates are shown; empty for those of a hit map."""
+
+    def of_reference(self, campaign: Campaign, name: str) -> Self | None:
+        """The computation for the hits of a reference of the campaign; None if it has none for this one."""
 
     def compute(self, campaign: Campaign, task: Task, worker: Worker, report: Report = ...) -> HitTable:
         """Compute a task: the columns of results/dataset.py, one entry per shot. They are a complete result. Reports

@@ -8,7 +8,6 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, ClassVar
 
 from warpimpact.campaign.campaign import Campaign
-from warpimpact.campaign.references import at_base_alone, at_solid
 from warpimpact.campaign.resistances import limit_velocity_factors, resistance_by_thickness
 from warpimpact.campaign.text import CampaignError
 from warpimpact.results import attributes as attr
@@ -21,8 +20,7 @@ from warpimpact.runs.describe import described
 from warpimpact.runs.pilot_hits import pilot_shots
 from warpimpact.runs.shards import extent
 from warpimpact.runs.task import Report, Task
-from warpimpact.scene import Numerics, Shots, Target, exclusions
-from warpimpact.scene.model import Array
+from warpimpact.scene import Target, exclusions
 from warpimpact.solver.findings import LimitErrors
 from warpimpact.solver.limit import (
     HIGHEST_VELOCITY,
@@ -51,7 +49,7 @@ class LimitMap:
     """
 
     sought: Sought
-    most_solid: ClassVar[int] = 256
+    reference_hits: ClassVar[int] = 256
     passages: ClassVar[int] = PASSAGES
 
     @classmethod
@@ -108,6 +106,19 @@ class LimitMap:
         """The running estimates: the mean limit."""
         return (f"mean({v.LIMITS[self.sought.quantity].value})",)
 
+    def of_reference(self, campaign: Campaign, name: str) -> LimitMap | None:
+        """See `Computation.of_reference`. The thickness of a layer in front of the base is none of the base alone."""
+        sought, base = self.sought, len(campaign.layer)
+        if name == "base_alone":
+            searched = sought.quantity == "velocity" or sought.layer == base
+            return replace(self, sought=replace(sought, layer=0)) if searched else None
+        if sought.quantity == "velocity":
+            return self
+        solid = campaign.references[name]
+        highest = thickest(solid.scene, sought.layer)
+        curve = resistance_by_thickness(solid, sought.layer, highest)
+        return replace(self, sought=replace(sought, highest=highest, by_thickness=curve))
+
     def compute(self, campaign: Campaign, task: Task, worker: Worker, report: Report = lambda done: None) -> HitTable:
         """Search the limits of some shots. The table has the shots as they just perforate, with their limits."""
         sought, findings = self.sought, task.findings
@@ -127,45 +138,12 @@ class LimitMap:
         }
         if sought.quantity == "velocity" and (factors := limit_velocity_factors(campaign)) is not None:
             attributes[attr.LIMIT_FACTORS] = list(factors)
-        beside = dict[str, Array]()
-        if task.solid is not None:
-            solid, of_solid = self._at_solid(campaign, task.solid, numerics, worker)
-            attributes |= of_solid
-            beside = solid | self._at_base_alone(campaign, task.solid, numerics, worker)
         tried = searched.shots.velocity
         if sought.quantity == "thickness":
             tried = searched.shots.own_of(campaign.target, "thickness", sought.layer)
         put = replace(task, shots=sought.put(campaign.target, task.shots, tried))
         outcomes, by = searched.recorded(sought.quantity), (worker.device, elapsed)
-        return described(campaign, put, outcomes, short_steps(numerics), by, attributes, beside)
-
-    def _at_solid(
-        self, campaign: Campaign, shots: Shots, numerics: Numerics, worker: Worker
-    ) -> tuple[dict[str, Array], dict[str, float]]:
-        """Column and attributes of the limits of some shots at the solid reference of the target."""
-        (scene, shots), sought = at_solid(campaign, shots), self.sought
-        layer = scene.target.layers[sought.layer]
-        if sought.quantity == "thickness":
-            highest = thickest(scene, sought.layer)
-            curve = resistance_by_thickness(campaign, sought.layer, highest, layer.thickness)
-            sought = replace(sought, highest=highest, by_thickness=curve)
-        begin = time.perf_counter()
-        searched = limits(scene, shots, sought, numerics, worker)
-        return {v.SOLID_LIMITS[sought.quantity]: searched.value}, {
-            attr.SOLID_LIMIT_TIME: time.perf_counter() - begin,
-            attr.SOLID_LIMIT_DENSITY: layer.areal_density / layer.thickness,
-            attr.SOLID_LIMIT_ELSEWHERE: scene.target.areal_density - layer.areal_density,
-            attr.SOLID_LIMIT_HIGHEST: sought.highest,
-        }
-
-    def _at_base_alone(self, campaign: Campaign, shots: Shots, numerics: Numerics, worker: Worker) -> dict[str, Array]:
-        """Column of the limits of some shots at the base alone; empty without a base, or if the thickness of a layer in
-        front of it is searched."""
-        sought, base = self.sought, len(campaign.target.layers) - 1
-        if not base or (sought.quantity == "thickness" and sought.layer != base):
-            return {}
-        searched = limits(*at_base_alone(campaign, shots), replace(sought, layer=0), numerics, worker)
-        return {v.BASE_ALONE_LIMITS[sought.quantity]: searched.value}
+        return described(campaign, put, outcomes, short_steps(numerics), by, attributes)
 
     def pilot(self, campaign: Campaign, worker: Worker, report: Report = lambda level: None) -> LimitErrors | None:
         """See `Computation.pilot`."""

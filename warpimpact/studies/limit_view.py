@@ -18,7 +18,7 @@ from warpimpact.results import variables as v
 from warpimpact.results.files import ResultError
 from warpimpact.results.measures import NAMES, Measure
 from warpimpact.results.per_hit import needed_density
-from warpimpact.results.solid_reference import base_alone_limits, solid_limits
+from warpimpact.results.references import reference
 from warpimpact.scene.quantities import QUANTITIES
 from warpimpact.scene.units import quantity as reader_of
 from warpimpact.solver.findings import hits_text, limit_error_text
@@ -141,33 +141,33 @@ def _costs(dataset: xarray.Dataset) -> Iterator[str]:
 
 def _references(dataset: xarray.Dataset) -> Iterator[str]:
     """The limits of the solid reference and of the base alone; empty without them."""
-    if (solid := solid_limits(dataset)) is not None:
+    if (solid := reference(dataset, "solid")) is not None:
         yield _of_solid(dataset, solid)
-    if (alone := base_alone_limits(dataset)) is not None:
+    if (alone := reference(dataset, "base_alone")) is not None:
         quantity = dataset.attrs[attr.LIMIT]
         yield f"base alone: limit {quantity} {_mean_text(alone, quantity)}"
 
 
-def _mean_text(reference: xarray.Dataset, quantity: str) -> str:
+def _mean_text(of_reference: xarray.Dataset, quantity: str) -> str:
     """The mean limit of a reference."""
     unit, factor = shown_unit(quantity)
-    value = reference[v.LIMITS[quantity].value].values
+    value = of_reference[v.LIMITS[quantity].value].values
     return f"{factor * float(np.nanmean(value)):.5g} {unit}" + (", mean" if len(value) > 1 else "")
 
 
-def _of_solid(dataset: xarray.Dataset, reference: xarray.Dataset) -> str:
+def _of_solid(dataset: xarray.Dataset, solid: xarray.Dataset) -> str:
     """The limit of the solid reference, and the cost of its search."""
-    quantity, hit_count = dataset.attrs[attr.LIMIT], reference.sizes["hit"]
-    limit = _mean_text(reference, quantity)
+    quantity, hit_count = dataset.attrs[attr.LIMIT], solid.sizes["hit"]
+    limit = _mean_text(solid, quantity)
     density = float(dataset.attrs[attr.AREAL_DENSITY])
     if quantity == "thickness":
-        needed = needed_density(reference, 0.0)
+        needed = needed_density(solid, 0.0)
         limit += f", {float(np.nanmean(needed)):.4g} kg/m²"
         limit += f" (the target as given has {density:.4g} kg/m²)"
     else:
         limit += f", of {density:.4g} kg/m² as the target"
     hits = f"{hit_count} hit{'s' if hit_count > 1 else ''}"
-    seconds = float(dataset.attrs[attr.SOLID_LIMIT_TIME])
+    seconds = float(solid.attrs[attr.COMPUTE_TIME])
     return f"{reference_name(dataset)}: limit {quantity} {limit}; {hits} searched in {seconds:.2g} s"
 
 

@@ -28,8 +28,8 @@ from warpimpact.runs.executor import Executor
 from warpimpact.runs.run import run_to_file
 from warpimpact.scene.units import quoted, reader_in
 
-_OF_POINTS = {str(name) for group in ("plate", "solid") for name in v.GROUPS[group]}
-"""Holes and shots at the solid plate, which only the results of the points have."""
+_OF_POINTS = {str(name) for name in v.GROUPS["plate"]}
+"""Holes, which only the results of the points have."""
 _MOST = 10_000
 """Most points of a sweep."""
 _OF_A_POINT = (

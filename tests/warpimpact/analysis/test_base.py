@@ -23,6 +23,7 @@ from warpimpact.results.dataset import stored_columns
 from warpimpact.results.files import ResultError
 from warpimpact.results.measures import Measure
 from warpimpact.results.per_hit import is_pierced, piercing_margin
+from warpimpact.results.references import references_of, with_references
 from warpimpact.results.tallies import shift_of
 from warpimpact.results.variables import LIMITS, STATUS
 from warpimpact.runs.task import Task
@@ -228,8 +229,9 @@ def test_what_the_solid_plate_is_stands_beside_the_ratios(quarter) -> None:
 
     def of(**material: float) -> xarray.Dataset:
         steel = {"resistance": 2.6e9, "density": 7850.0} | material
-        reference = json.dumps([steel | {"thickness": 3e-3}])
-        return quarter.assign_attrs({attr.MATERIAL: json.dumps(steel), attr.SOLID_ADD_ON: reference})
+        campaign = json.dumps({"plate": steel | {"thickness": 3e-3}, "layer": []})
+        solid = references_of(quarter)["solid"].assign_attrs({attr.CAMPAIGN: campaign})
+        return with_references(quarter.assign_attrs({attr.MATERIAL: json.dumps(steel)}), {"solid": solid})
 
     plate, by_time = "The solid plate is 3 mm of 2.6 GPa, which ", of(degradation=0.8, degradation_interval=1e-6)
     whole, never = "weakens, through its whole thickness at once, to 0.8 in 1", "it stops no core, however slow"
@@ -247,13 +249,8 @@ def test_what_the_solid_plate_is_stands_beside_the_ratios(quarter) -> None:
 
 def test_the_figure_of_limits_stands_over_the_weight_that_the_target_needs(make_plate_result) -> None:
     result, thickness = make_plate_result(np.zeros(400)), np.random.default_rng(2).uniform(4e-3, 6e-3, 400)
-    told = {"solid_limit_density": 7850.0, "solid_limit_elsewhere": 0.0, "solid_limit_highest": 0.1}
-    one, other = (
-        limits(result, thickness, elsewhere)
-        .assign_coords(solid_limit_thickness=("solid_hit", [9e-3]))
-        .assign_attrs(told)
-        for elsewhere in (20.0, 0.0)
-    )
+    solid = limits(result, np.full(400, 9e-3), 0.0).isel(hit=[0]).assign_attrs(limit_density=7850.0)
+    one, other = (with_references(limits(result, thickness, elsewhere), {"solid": solid}) for elsewhere in (20.0, 0.0))
     measures = named(one)
     assert measures["mean(limit_areal_density)"].solid == pytest.approx(7850.0 * 9e-3)
     (axes,) = weight_figure(compare([one, other], ["one", "other"])).axes

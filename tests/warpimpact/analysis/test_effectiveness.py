@@ -76,8 +76,6 @@ def test_numbers_without_a_valid_interval_have_none(make_plate_result) -> None:
     assert math.isnan(few[name].low)
     assert many[name].low < many[name].value < many[name].high
     assert math.isnan(many["worst_point(residual_energy_fraction)"].low)
-    images = make_plate_result(np.linspace(500.0, 900.0, 400), images=2)
-    assert math.isnan(named(images)[name].low)
 
 
 def test_failed_computations_alone_tell_nothing(make_plate_result) -> None:

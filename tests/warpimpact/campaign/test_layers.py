@@ -7,15 +7,17 @@ import numpy as np
 import pytest
 import xarray
 
-from warpimpact import Campaign, run, to_dataframe
+from warpimpact import Campaign, to_dataframe
 from warpimpact import Plate as NamedPlate
 from warpimpact.analysis.effectiveness import effectiveness
 from warpimpact.analysis.inspect import inspect_text
 from warpimpact.campaign.plates import read_plates
-from warpimpact.campaign.references import at_base_alone, at_solid, solid_target
 from warpimpact.campaign.text import CampaignError
 from warpimpact.kernels.status import Status
+from warpimpact.results import files
+from warpimpact.results.references import reference
 from warpimpact.runs.replay import replay
+from warpimpact.runs.run import run_to_file
 
 CAMPAIGN = """
 title = "two layers"
@@ -68,8 +70,10 @@ def campaign(**changes: str) -> Campaign:
 
 
 @pytest.fixture(scope="module")
-def result() -> xarray.Dataset:
-    return run(campaign(offset=UNKNOWN, thickness=ABOUT), device="cpu")
+def result(tmp_path_factory: pytest.TempPathFactory) -> xarray.Dataset:
+    path = tmp_path_factory.mktemp("layers") / "a.nc"
+    run_to_file(campaign(offset=UNKNOWN, thickness=ABOUT), path, device="cpu")
+    return files.read(path)
 
 
 def test_layers_stand_behind_the_plate_in_order() -> None:
@@ -149,9 +153,8 @@ def test_layers_scatter_and_say_so(result: xarray.Dataset) -> None:
 
 def test_the_references_are_a_solid_add_on_before_the_same_base_and_the_base_alone() -> None:
     made = campaign(thickness=ABOUT)
-    shots = made.sampler().shots(0, 4)
-    (solid, of_solid), (alone, of_base) = at_solid(made, shots), at_base_alone(made, shots)
-    given = made.target
+    solid, alone, given = made.solid(), made.base_alone(), made.target
+    shots, of_solid, of_base = (one.sampler().shots(0, 4) for one in (made, solid, alone))
     assert all(layer.open_area == 0.0 for layer in solid.target.layers)
     assert solid.target.weights == pytest.approx(given.weights, rel=1e-12)
     assert solid.target.gaps == given.gaps
@@ -164,13 +167,13 @@ def test_the_references_are_a_solid_add_on_before_the_same_base_and_the_base_alo
 def test_a_solid_add_on_of_the_catalogue_has_the_resistance_of_its_thickness() -> None:
     named = {"plate": PLATE.replace('resistance = "2600 MPa"', 'material = "HHA Class 1"')}
     made = campaign(**named)
-    plate, solid = made.plate, solid_target(made).layers[0]
+    plate, solid = made.plate, made.solid().plate
     thin = made.plate.model_dump(include={"material"}) | {"thickness": solid.thickness, "obliquity": 0.0}
     assert solid.resistance == pytest.approx(NamedPlate(**thin, threat=made.core).resistance)
     assert solid.resistance < 0.97 * plate.resistance
     scattered = campaign(plate=PLATE.replace('"2600 MPa"', '{ distribution = "uniform", low = 2e9, high = 3e9 }'))
     shots = scattered.sampler().shots(0, 4)
-    np.testing.assert_array_equal(at_solid(scattered, shots)[1].resistance, shots.resistance)
+    np.testing.assert_array_equal(scattered.solid().sampler().shots(0, 4).resistance, shots.resistance)
 
 
 def test_layers_of_a_result_have_names_and_their_status_is_a_word(result: xarray.Dataset) -> None:
@@ -183,8 +186,9 @@ def test_layers_of_a_result_have_names_and_their_status_is_a_word(result: xarray
 
 
 def test_a_result_holds_its_references_and_tells_the_weights_apart(result: xarray.Dataset) -> None:
-    assert result.sizes["solid_hit"] == result.sizes["hit"]  # the base scatters
-    assert (result["base_alone_status"] == Status.ARRESTED).all()
+    solid, alone = (reference(result, name) for name in ("solid", "base_alone"))
+    assert solid.sizes["hit"] == alone.sizes["hit"] == result.sizes["hit"]  # the base scatters
+    assert (alone["status"] == Status.ARRESTED).all()
     scores = {score.name: score for score in effectiveness(result)}
     assert scores["P(base_perforated)"].alone == 0.0
     assert np.isfinite(scores["mean(base_depth)"].solid)

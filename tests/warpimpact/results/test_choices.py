@@ -14,7 +14,7 @@ from warpimpact.results import files
 from warpimpact.results import variables as v
 from warpimpact.results.dataset import is_choice
 from warpimpact.results.outlines import outlines
-from warpimpact.results.solid_reference import solid_reference
+from warpimpact.results.references import reference, with_references
 from warpimpact.results.tallies import dealing
 from warpimpact.runs.run import run
 
@@ -121,8 +121,9 @@ def test_a_number_names_the_same_hit_in_a_choice(result: xarray.Dataset) -> None
 
 def test_shots_at_the_solid_plate_stay_with_their_hits() -> None:
     text = TEXT.replace('"825 m/s" ', '{ distribution = "uniform", low = 700, high = 850 } ')
-    result = run(Campaign.from_text(text, name="a", folder=Path(), count=64), device="cpu")
-    solid, later = solid_reference(result), solid_reference(result.isel(hit=slice(10, 50, 2)))
+    campaign = Campaign.from_text(text, name="a", folder=Path(), count=64)
+    result = with_references(run(campaign, device="cpu"), {"solid": run(campaign.solid(), device="cpu")})
+    solid, later = (reference(one, "solid") for one in (result, result.isel(hit=slice(10, 50, 2))))
     assert solid is not None
     assert later is not None
     chosen = solid.isel(hit=slice(10, 50, 2))
@@ -141,7 +142,7 @@ def test_results_of_different_plates_are_joined(result: xarray.Dataset, tmp_path
         by_plate = xarray.concat([a, b], "plate")
     assert lengths[0] != lengths[1]
     assert along_hits["tilt"].shape == (256, 2)
-    assert solid_reference(along_hits) is None  # each plate has its own
+    assert reference(along_hits, "solid") is None  # each plate has its own
     assert len(effectiveness(along_hits)) == len(effectiveness(result))
     assert by_plate["residual_velocity"].shape == (2, 128)
     np.testing.assert_array_equal(by_plate["residual_velocity"][1], other["residual_velocity"])

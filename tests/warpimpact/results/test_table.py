@@ -27,11 +27,11 @@ CAMPAIGNS = Path(__file__).parents[3] / "campaigns"
 
 @pytest.fixture(scope="module", params=["slotted_plate", "layered_target"])
 def table(request: pytest.FixtureRequest) -> HitTable:
-    """Some hits of a campaign, with the solid reference, which has a group of its own in the file."""
+    """Some hits of a campaign."""
     campaign = Campaign.from_toml(CAMPAIGNS / f"{request.param}.toml")
     campaign = campaign.model_copy(update={"numerics": Numerics(level=0)})
     shots = campaign.sampler().shots(0, 40)
-    return compute(campaign, Task(shots, shots[:1]), Worker("cpu"))
+    return compute(campaign, Task(shots), Worker("cpu"))
 
 
 def content(group: Any, name: str = "") -> Iterator[tuple[Any, ...]]:

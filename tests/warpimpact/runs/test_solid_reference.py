@@ -1,4 +1,4 @@
-"""The solid plate of equal areal density, computed in the same run."""
+"""The solid plate of equal areal density, computed into the same file."""
 
 import math
 from pathlib import Path
@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 import xarray
 
-from warpimpact import Campaign
+from warpimpact import Campaign, Numerics, open_result
 from warpimpact.kernels.status import Status
 from warpimpact.results import files
-from warpimpact.results.solid_reference import solid_reference
+from warpimpact.results.references import reference, references_of
 from warpimpact.runs.compute import HitMap
 from warpimpact.runs.run import run, run_to_file
 
@@ -26,11 +26,8 @@ def computed(tmp_path: Path, *changes: tuple[str, str]) -> xarray.Dataset:
         assert change[0] in text
         text = text.replace(*change)
     (tmp_path / "a.toml").write_text(text, encoding="utf-8")
-    return run(Campaign.from_toml(tmp_path / "a.toml"), device="cpu")
-
-
-def solids(dataset: xarray.Dataset) -> set[str]:
-    return {str(name) for name in dataset.variables if str(name).startswith("solid_")}
+    run_to_file(Campaign.from_toml(tmp_path / "a.toml"), tmp_path / "a.nc", device="cpu")
+    return files.read(tmp_path / "a.nc")
 
 
 def test_it_has_the_areal_density_of_the_perforated_one(tmp_path: Path) -> None:
@@ -44,14 +41,15 @@ def test_a_shot_that_does_not_scatter_is_fired_once_and_meets_the_closed_form(tm
     """Without friction and degradation the work is Y·h·π R²."""
     no_loss = [("shear_coefficient = 0.05", "shear_coefficient = 0.0"), ("degradation = 0.8 ", "degradation = 1.0 ")]
     dataset = computed(tmp_path, *no_loss, ('fidelity = "draft"', 'fidelity = "reference"'), ("= 600", "= 4"))
-    assert dataset.sizes["solid_hit"] == 1
+    solid = references_of(dataset)["solid"]
+    assert solid.sizes["hit"] == 1
     campaign = Campaign.from_toml(tmp_path / "a.toml")
     thickness = 4e-3 * (1.0 - dataset.attrs["open_area"])
     work = 2.6e9 * thickness * math.pi * campaign.core.max_radius**2
     exact = math.sqrt(825.0**2 - 2.0 * work / 4e-3)
-    assert float(dataset["solid_residual_velocity"][0]) == pytest.approx(exact, abs=0.5)
-    assert float(dataset["solid_tilt"][0, 1]) == pytest.approx(0.0, abs=0.01)
-    assert int(dataset["solid_status"][0]) == Status.PERFORATED
+    assert float(solid["residual_velocity"][0]) == pytest.approx(exact, abs=0.5)
+    assert float(solid["tilt"][0, 1]) == pytest.approx(0.0, abs=0.01)
+    assert int(solid["status"][0]) == Status.PERFORATED
 
 
 @pytest.mark.parametrize(
@@ -67,15 +65,14 @@ def test_a_shot_that_does_not_scatter_is_fired_once_and_meets_the_closed_form(tm
 def test_it_takes_the_shots_of_the_first_shard_if_they_differ_and_none_if_not_asked(
     tmp_path: Path, change: tuple[str, str], shots: int
 ) -> None:
-    dataset = computed(tmp_path, change)
-    assert dataset.sizes.get("solid_hit", 0) == shots
-    assert bool(solids(dataset)) == (shots > 0)
+    references = references_of(computed(tmp_path, change))
+    assert {name: one.sizes["hit"] for name, one in references.items()} == ({"solid": shots} if shots else {})
 
 
 def test_shot_k_is_that_of_hit_k(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(HitMap, "most_solid", 100)
+    monkeypatch.setattr(HitMap, "reference_hits", 100)
     dataset = computed(tmp_path, ('"825 m/s" ', '{ distribution = "uniform", low = 700, high = 850 } '))
-    solid = solid_reference(dataset)
+    solid = reference(dataset, "solid")
     assert solid is not None
     assert solid.sizes["hit"] == 100
     np.testing.assert_array_equal(solid["impact_velocity"], dataset["impact_velocity"][:100])
@@ -90,4 +87,17 @@ def test_tasks_of_many_shards_give_the_same_file(tmp_path: Path, monkeypatch: py
     monkeypatch.setattr("warpimpact.runs.run.task_size", lambda executor, rate: 2**17)
     run_to_file(campaign, tmp_path / "many.nc", device="cpu")
     assert_same_bits(tmp_path / "one.nc", tmp_path / "many.nc")
-    assert solids(files.read(tmp_path / "many.nc"))
+    with open_result(tmp_path / "many.nc", group="solid") as solid:
+        assert solid["status"].dims == ("hit",)
+
+
+def test_it_is_a_campaign_of_its_own(tmp_path: Path) -> None:
+    dataset = computed(
+        tmp_path, ('"825 m/s" ', '{ distribution = "uniform", low = 700, high = 850 } '), ("= 600", "= 32")
+    )
+    campaign = Campaign.from_toml(tmp_path / "a.toml")
+    level = Numerics.model_validate_json(dataset.attrs["resolution"])
+    alone = run(campaign.model_copy(update={"numerics": level}).solid(), device="cpu")
+    np.testing.assert_array_equal(references_of(dataset)["solid"]["residual_velocity"], alone["residual_velocity"])
+    with pytest.raises(files.ResultError, match="no group"):
+        open_result(tmp_path / "a.nc", group="base_alone")

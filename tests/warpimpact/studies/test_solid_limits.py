@@ -13,6 +13,7 @@ from warpimpact.analysis.inspect import inspect_text
 from warpimpact.kernels.status import Status
 from warpimpact.plotting.limit import limit_figure
 from warpimpact.results import files
+from warpimpact.results.references import references_of, with_references
 from warpimpact.runs.run import run_to_file
 from warpimpact.studies.limit import LimitMap
 from warpimpact.studies.limit_view import limit_view
@@ -61,6 +62,10 @@ def thickness(tmp_path_factory: pytest.TempPathFactory) -> xarray.Dataset:
     return search(tmp_path_factory.mktemp("limit") / "thickness.nc", "thickness", 1, layer=LAYER)
 
 
+def limit_of(dataset: xarray.Dataset, reference: str = "solid") -> float:
+    return float(references_of(dataset)[reference][f"limit_{dataset.attrs['limit']}"][0])
+
+
 def test_it_is_the_search_of_a_solid_plate_that_is_as_heavy(velocity: xarray.Dataset, tmp_path: Path) -> None:
     density = 7850.0 * 4e-3 * (1.0 - np.pi * 2.5**2 / 64.0)
     assert velocity.attrs["areal_density"] == pytest.approx(density, rel=1e-6)
@@ -68,15 +73,14 @@ def test_it_is_the_search_of_a_solid_plate_that_is_as_heavy(velocity: xarray.Dat
     thin = TEXT.format(pattern=NONE, layer="", solid="true").replace('"4 mm"', f"{density / 7850.0}")
     of = Campaign.from_text(thin, name="text", folder=Path(), count=1)
     run_to_file(of, tmp_path / "b.nc", device="cpu", computation=LimitMap.of(of))
-    assert "solid_limit_velocity" not in alone.variables  # it is its own
+    assert not references_of(alone)  # it is its own
     expected = files.read(tmp_path / "b.nc")["limit_velocity"].values
-    assert velocity["solid_limit_velocity"].values == pytest.approx(expected, abs=1.0)
-    assert velocity.sizes["solid_hit"] == 1  # the hits differ in their places alone
+    assert limit_of(velocity) == pytest.approx(expected.item(), abs=1.0)
+    assert references_of(velocity)["solid"].sizes["hit"] == 1  # the hits differ in their places alone
 
 
 @pytest.mark.parametrize("quantity", ["velocity", "thickness"])
 def test_the_base_alone_is_a_plate_of_its_own(quantity: str, tmp_path: Path, request: pytest.FixtureRequest) -> None:
-    name = f"base_alone_limit_{quantity}"
     if quantity == "thickness":
         with_base = request.getfixturevalue("thickness")
     else:
@@ -85,7 +89,9 @@ def test_the_base_alone_is_a_plate_of_its_own(quantity: str, tmp_path: Path, req
     base = Campaign.from_text(text.replace("shear_coefficient = 0.05", ""), name="text", folder=Path(), count=1)
     run_to_file(base, tmp_path / "b.nc", device="cpu", computation=LimitMap.of(base, quantity))
     expected = files.read(tmp_path / "b.nc")[f"limit_{quantity}"].values
-    assert with_base[name].values == pytest.approx(expected, abs=1.0 if quantity == "velocity" else 1e-5)
+    assert limit_of(with_base, "base_alone") == pytest.approx(
+        expected.item(), abs=1.0 if quantity == "velocity" else 1e-5
+    )
     (measure,) = [one for one in effectiveness(with_base) if one.name == f"mean(limit_{quantity})"]
     assert measure.alone == pytest.approx(expected.item() * measure.measure.display.factor, rel=2e-3)
     assert "base alone: limit" in text_of(limit_view(with_base))
@@ -93,14 +99,14 @@ def test_the_base_alone_is_a_plate_of_its_own(quantity: str, tmp_path: Path, req
 
 def test_it_changes_no_bit_of_the_hits(velocity: xarray.Dataset, tmp_path: Path) -> None:
     without = search(tmp_path / "without.nc", solid="false")
-    assert "solid_limit_velocity" not in without.variables
+    assert not references_of(without)
     for name in without.variables:
         np.testing.assert_array_equal(without[name], velocity[name], err_msg=str(name))
 
 
 def test_a_limit_velocity_has_measures_and_a_ratio(velocity: xarray.Dataset) -> None:
     mean, worst_tenth, worst = effectiveness(velocity)
-    values, solid = velocity["limit_velocity"].values, float(velocity["solid_limit_velocity"][0])
+    values, solid = velocity["limit_velocity"].values, limit_of(velocity)
     assert [one.measure.label for one in (mean, worst)] == ["limit velocity, mean", "limit velocity, worst point"]
     assert mean.value == pytest.approx(values.mean())
     assert mean.measure.higher_is_better
@@ -114,7 +120,8 @@ def test_plates_of_other_weight_are_ranked_by_the_ratio(velocity: xarray.Dataset
     heavy = velocity.copy(deep=True)
     heavy.attrs["areal_density"] *= 2.0
     heavy["limit_velocity"] = velocity["limit_velocity"] * 1.1
-    heavy = heavy.assign_coords(solid_limit_velocity=velocity["solid_limit_velocity"] * 1.5)
+    solid = references_of(velocity)["solid"]
+    heavy = with_references(heavy, {"solid": solid.assign(limit_velocity=solid["limit_velocity"] * 1.5)})
     found = compare([velocity, heavy], ["light", "heavy"])
     assert found.at_equal_weight == {"mean(limit_velocity)", "worst_tenth(limit_velocity)"}
     assert found.ranks("mean(limit_velocity)") == {"light": 1, "heavy": 2}
@@ -133,16 +140,16 @@ def test_limits_within_their_tolerance_are_not_told_apart(
 def test_of_a_thickness_it_tells_the_areal_density_that_a_solid_plate_needs(thickness: xarray.Dataset) -> None:
     measures = {one.name: one for one in effectiveness(thickness)}
     plate = 7850.0 * 4e-3 * (1.0 - np.pi * 2.5**2 / 64.0)
-    solid = plate + 7850.0 * float(thickness["solid_limit_thickness"][0])
+    solid = plate + 7850.0 * limit_of(thickness)
     density = measures["mean(limit_areal_density)"]
     assert (density.solid, density.ratio) == (pytest.approx(solid), pytest.approx(density.value / solid))
     of_base = measures["mean(limit_thickness)"]
-    assert of_base.solid == pytest.approx(1e3 * float(thickness["solid_limit_thickness"][0]))
+    assert of_base.solid == pytest.approx(1e3 * limit_of(thickness))
     assert f"{solid:.4g} kg/m² (the target as given has" in text_of(limit_view(thickness))
 
 
 def test_text_and_figure_tell_of_it(velocity: xarray.Dataset) -> None:
-    solid = float(velocity["solid_limit_velocity"][0])
+    solid = limit_of(velocity)
     assert f"limit velocity {solid:.5g} m/s" in text_of(limit_view(velocity))
     assert "; 1 hit searched in " in text_of(limit_view(velocity))
     *_, curve = limit_figure(velocity).axes[:2]

@@ -1,0 +1,50 @@
+"""References of a result: results of the solid plate or add-on that is as heavy, and of the base alone."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from warpimpact.results import attributes as attr
+from warpimpact.results import variables as v
+from warpimpact.results.dataset import hit_numbers
+
+if TYPE_CHECKING:
+    import xarray
+
+NAMES = ("solid", "base_alone")
+"""Names of the references, and of their groups in a file."""
+
+
+def with_references(dataset: xarray.Dataset, references: Mapping[str, xarray.Dataset]) -> xarray.Dataset:
+    """A result with its references by their names, such as {"solid": run(campaign.solid())}."""
+    result = dataset.copy()
+    result.encoding = dataset.encoding | {"references": dict(references)}
+    return result
+
+
+def references_of(dataset: xarray.Dataset) -> dict[str, xarray.Dataset]:
+    """The references of a result by their names."""
+    return dict(dataset.encoding.get("references", {}))
+
+
+def reference(dataset: xarray.Dataset, name: str) -> xarray.Dataset | None:
+    """A reference of a result, along "hit": its first hits, or a single one that stands for all; None if there is none.
+
+    A solid plate that stands alone is its own reference, except that of its limits.
+    """
+    is_alone = attr.LIMIT not in dataset.attrs and v.LAYER_STATUS not in dataset.variables
+    if name == "solid" and is_alone and dataset.attrs.get(attr.OPEN_AREA) == 0.0:
+        return dataset
+    found = references_of(dataset).get(name)
+    if found is None or dataset[v.STATUS].dims != (v.HIT,):
+        return None
+    numbers, hits = hit_numbers(dataset), found.sizes["hit"]
+    if len(np.unique(numbers)) < len(numbers):
+        return None  # joined results have several references
+    if hits == 1:
+        return found
+    numbers = numbers[: np.argmax(np.append(numbers, hits) >= hits)]  # the first hits that have a reference
+    return found.isel(hit=numbers) if len(numbers) else None
