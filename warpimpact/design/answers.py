@@ -87,7 +87,9 @@ class Answers:
         """
         text, campaign = design.text, design.campaign
         if text not in self._results:
-            self._results[text] = run(campaign, device=self._device, progress=lambda _: None, cancel=cancel)
+            self._results[text] = run(
+                campaign, references=True, device=self._device, progress=lambda _: None, cancel=cancel
+            )
             while len(self._results) > 1 and sum(result.nbytes for result in self._results.values()) > _MOST_KEPT:
                 self._results.popitem(last=False)
         self._results.move_to_end(text)

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 from warpimpact.campaign.campaign import Campaign
 from warpimpact.results import attributes as attr
 from warpimpact.results.outlines import in_memory
+from warpimpact.results.references import with_references
 from warpimpact.results.table import HitTable, joined
 from warpimpact.runs.choice import executor_for, opened
 from warpimpact.runs.compute import HIT_MAP, numerics_of
@@ -33,6 +34,7 @@ if TYPE_CHECKING:
 def run(
     campaign: Campaign | str | Path,
     *,
+    references: bool = False,
     device: str = "auto",
     progress: Follow | None = None,
     cancel: Cancel | None = None,
@@ -41,6 +43,7 @@ def run(
 
     Args:
         campaign: the campaign, or its file.
+        references: compute some hits of its references, too, with which `inspect` and `compare` then compare it.
         device: "auto" (every CUDA device if there is one, else the CPU), "cpu", "cuda:0", "cuda:0,cuda:1", …
         progress: called several times a second; without it a notebook shows a bar.
         cancel: ends the run from another thread.
@@ -58,8 +61,10 @@ def run(
     with executor_for(device, cancel=cancel) as executor, followed(progress) as follow:
         shards = Shards(total, extent(total))
         end = _fill(campaign, HIT_MAP, shards, executor, follow)
+        tables = _references(campaign, HIT_MAP, shards, executor) if references else {}
     table = joined(shards.shard(index) for index in range(end.shards))
-    return in_memory(table.assign_attrs(_attributes(table, end)).to_xarray())
+    result = in_memory(table.assign_attrs(_attributes(table, end)).to_xarray())
+    return with_references(result, {name: in_memory(one.to_xarray()) for name, one in tables.items()})
 
 
 def run_to_file(
