@@ -17,8 +17,8 @@ from PIL import Image
 from warpimpact import Campaign, replay, run, sensitivity
 from warpimpact.plotting import dispersion, marginals, overview, trajectory, uncertainty, variable_maps
 from warpimpact.plotting.posterior import hits_figure, pairs_figure
-from warpimpact.plotting.pressure import pressure
 from warpimpact.plotting.sensitivity import sensitivity_figure
+from warpimpact.plotting.trajectory import pressure
 from warpimpact.results import files
 
 HERE = Path(__file__).parent

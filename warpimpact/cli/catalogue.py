@@ -45,7 +45,7 @@ def _catalogue(arguments: argparse.Namespace) -> None:
         view = threat_view(entry) if isinstance(entry, Threat) else material_view(entry, is_own=is_own)
         print(text_of(view))
     if arguments.output and core is not None and entry is not None:
-        from warpimpact.plotting.core import core_figure
+        from warpimpact.plotting.plate import core_figure
 
         check_picture(arguments.output, overwrite=arguments.overwrite)
         core_figure(core, entry.name, entry.evidence).savefig(arguments.output, dpi=150)

@@ -10,9 +10,8 @@ import numpy as np
 
 from warpimpact.analysis.plate_text import plate_numbers
 from warpimpact.analysis.slabs import runs_of
-from warpimpact.plotting.dimensions import Dimension, hole_dimensions, smallest_ligament
-from warpimpact.plotting.fire import fire_of
-from warpimpact.plotting.plate import drawn_extent
+from warpimpact.plotting.plate import Dimension, drawn_extent, hole_dimensions, smallest_ligament
+from warpimpact.plotting.style import fire_of
 from warpimpact.scene import NoPattern
 from warpimpact.scene.display import MM
 from warpimpact.scene.patterns.lattice import LatticePattern

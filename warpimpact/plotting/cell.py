@@ -9,36 +9,33 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from textwrap import fill
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 import xarray
 from matplotlib import colormaps
-from matplotlib.colors import ListedColormap, Normalize
+from matplotlib.artist import Artist
+from matplotlib.axes import Axes
+from matplotlib.cm import ScalarMappable
+from matplotlib.colors import Colormap, ListedColormap, Normalize
 from matplotlib.patches import Patch
 from matplotlib.patheffects import Normal, Stroke
 from matplotlib.transforms import ScaledTranslation
+from numpy.typing import NDArray
 from scipy.spatial import KDTree
 
 from warpimpact.analysis.hit_map import OF_PASSED, chosen, hit_points
 from warpimpact.analysis.summary import breaks_promise
 from warpimpact.kernels.status import Status
-from warpimpact.plotting.fire import common_fire, draw_fire
+from warpimpact.plotting.style import common_fire, draw_fire
 from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
 from warpimpact.results.dataset import passed
 from warpimpact.results.outlines import outlines
 from warpimpact.scene.display import MM, STORED
+from warpimpact.scene.model import Array
 
-if TYPE_CHECKING:
-    from matplotlib.artist import Artist
-    from matplotlib.axes import Axes
-    from matplotlib.cm import ScalarMappable
-    from matplotlib.colors import Colormap
-    from numpy.typing import NDArray
-
-    Array = NDArray[np.float64]
-    Scale = tuple[Colormap, Normalize]
+Scale = tuple[Colormap, Normalize]
 
 CELL_PIXELS = 400  # along the longer side of the cell
 FEWEST_HITS = 64  # fewer are drawn as points: an image would suggest detail that they do not have

@@ -3,27 +3,21 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from itertools import groupby
 from textwrap import fill
-from typing import TYPE_CHECKING
 
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.layout_engine import ConstrainedLayoutEngine
 
+from warpimpact.analysis.comparison import Comparison
 from warpimpact.analysis.comparison_short import deciding, from_best
 from warpimpact.analysis.comparison_text import hits_used, is_ranked
-from warpimpact.analysis.plate_text import weights_text
-from warpimpact.plotting.heading import add_heading, legend_below
-from warpimpact.plotting.style import BLUE, GREY, VERMILION, bars, hide_sides
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from matplotlib.axes import Axes
-
-    from warpimpact.analysis.comparison import Comparison
-    from warpimpact.analysis.contestants import Difference
+from warpimpact.analysis.contestants import Difference
 from warpimpact.analysis.effectiveness import Score
+from warpimpact.analysis.plate_text import weights_text
+from warpimpact.plotting.style import BLUE, GREY, VERMILION, add_heading, bars, hide_sides, legend_below
 
 # Markers differ for a print in grey.
 _AVERAGE = ("mean, or share", "o", BLUE, -0.12)

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from textwrap import fill
-from typing import TYPE_CHECKING
 
 import numpy as np
 import xarray
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
+from numpy.typing import NDArray
 
 from warpimpact.analysis.hit_map import hit_points, mirrored
 from warpimpact.analysis.local import NEIGHBOURS, plane_fit, share_of
@@ -25,20 +27,12 @@ from warpimpact.plotting.cell import (
     struck,
     tree_of,
 )
-from warpimpact.plotting.heading import LINE, inscribe, names, note_lines
-from warpimpact.plotting.style import BLUE, MAP_SIDE, VERMILION
+from warpimpact.plotting.style import BLUE, LINE, MAP_SIDE, VERMILION, inscribe, names, note_lines
 from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
 from warpimpact.results.measures import Measure
 from warpimpact.scene.display import MM
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
-
-    from matplotlib.axes import Axes
-    from numpy.typing import NDArray
-
-    Array = NDArray[np.float64]
+from warpimpact.scene.model import Array
 
 _BANDS = {"5 to 95 %": (0.05, 0.95, 0.2), "25 to 75 %": (0.25, 0.75, 0.4)}  # two quantiles and the opacity
 _PER_STRIP, _MOST_STRIPS = 50, 48  # fewest hits of a strip; most strips along an axis

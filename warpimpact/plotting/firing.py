@@ -3,22 +3,19 @@
 from __future__ import annotations
 
 import json
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import xarray
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from scipy import special
 
 from warpimpact.firing.v50 import V50, Shots
 from warpimpact.firing.view import reported_lines, tests_title
-from warpimpact.plotting.heading import add_heading
-from warpimpact.plotting.style import BLUE, GREEN, GREY, VERMILION, bars
+from warpimpact.plotting.style import BLUE, GREEN, GREY, VERMILION, add_heading, bars
 from warpimpact.results import attributes as attr
 from warpimpact.results import firing as f
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
 
 _ABOVE = (-11, 4, -7)
 """Distances of the names of V50, V05 and V01 above their points [pt]."""

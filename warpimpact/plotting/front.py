@@ -5,23 +5,18 @@ from __future__ import annotations
 import json
 from pathlib import Path
 from textwrap import fill
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
-from matplotlib.figure import Figure
+import xarray
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure, SubFigure
 
 from warpimpact.campaign.campaign import Campaign
 from warpimpact.campaign.text import CampaignError
-from warpimpact.plotting.heading import inscribe
 from warpimpact.plotting.plate import hole_patches
-from warpimpact.plotting.style import BLUE, GREEN, GREY, VERMILION, all_bars, hide_sides
+from warpimpact.plotting.style import BLUE, GREEN, GREY, VERMILION, all_bars, hide_sides, inscribe
 from warpimpact.results import front as f
-
-if TYPE_CHECKING:
-    import xarray
-    from matplotlib.axes import Axes
-    from matplotlib.figure import SubFigure
-
 
 MOST_DRAWN = 6
 """Most plates that are drawn."""

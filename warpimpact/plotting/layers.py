@@ -2,20 +2,18 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import xarray
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.image import AxesImage
+from numpy.typing import NDArray
 
 from warpimpact.analysis.slabs import LayerField, fields_behind
-from warpimpact.plotting.heading import inscribe_hit
+from warpimpact.plotting.style import inscribe_hit
 from warpimpact.results import variables as v
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.image import AxesImage
-    from numpy.typing import NDArray
 
 _MM, _US = 1e3, 1e6
 _ROOM_ABOUT = 2.0

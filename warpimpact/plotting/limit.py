@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import xarray
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from warpimpact.analysis.estimates import estimated
@@ -14,15 +15,11 @@ from warpimpact.analysis.hit_map import hit_points
 from warpimpact.analysis.plate_text import reference_name
 from warpimpact.analysis.proxy import inclination
 from warpimpact.plotting.cell import draw_values, limits, scale_of, shown
-from warpimpact.plotting.heading import inscribe
-from warpimpact.plotting.style import BLUE, GREY, MAP_SIDE, VERMILION
+from warpimpact.plotting.style import BLUE, GREY, MAP_SIDE, VERMILION, inscribe
 from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
 from warpimpact.results.references import reference
 from warpimpact.studies.limit_view import measures_of, promise_line, shown_unit
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
 
 _CURVE = {
     "velocity": ("impact velocity", "share of the hits that perforate"),

@@ -4,14 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 import xarray
+from matplotlib.artist import Artist
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from warpimpact.analysis.hit_map import mirrored
-from warpimpact.plotting.cell import Shown, draw_status, draw_values, limits, scale_of, shots_text, shown, words
+from warpimpact.plotting.cell import Scale, Shown, draw_status, draw_values, limits, scale_of, shots_text, shown, words
 from warpimpact.plotting.distribution import (
     dispersion,
     is_uncertain,
@@ -19,20 +20,13 @@ from warpimpact.plotting.distribution import (
     probability_map,
     uncertainty,
 )
-from warpimpact.plotting.heading import LINE, add_heading, names, note_lines
-from warpimpact.plotting.style import MAP_SIDE
+from warpimpact.plotting.style import LINE, MAP_SIDE, add_heading, names, note_lines
 from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
 from warpimpact.results.dataset import passed, status_codes
 from warpimpact.results.files import OutputError
 from warpimpact.results.measures import Measure
 from warpimpact.scene.display import MM
-
-if TYPE_CHECKING:
-    from matplotlib.artist import Artist
-    from matplotlib.axes import Axes
-
-    from warpimpact.plotting.cell import Scale
 
 _MAIN = (v.RESIDUAL_VELOCITY, v.DEFLECTION, v.TILT)
 # Sizes on paper [inch]: the longer side of the largest map, the room round it, the title and the note of a sheet.

@@ -1,4 +1,4 @@
-"""Figure of a plate to scale: its holes, its unit cell, and the largest section of the core.
+"""Figures to scale of a plate, with its holes, unit cell, dimensions and the core's section, and of a core.
 
 The view is that of the maps: against the line of fire, y to the right, z up.
 """
@@ -6,35 +6,42 @@ The view is that of the maps: against the line of fire, y to the right, z up.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import combinations
 from textwrap import fill
-from typing import TYPE_CHECKING, Any
+from typing import Any, NamedTuple
 
 import numpy as np
+import shapely
+from matplotlib.axes import Axes
 from matplotlib.colors import to_rgba
 from matplotlib.figure import Figure
 from matplotlib.patches import Circle, Patch, PathPatch, Rectangle
 from matplotlib.path import Path
 
 from warpimpact.analysis.plate_text import plate_numbers
-from warpimpact.plotting.dimensions import draw_dimensions
-from warpimpact.plotting.fire import draw_fire, fire_of
-from warpimpact.plotting.heading import add_heading
-from warpimpact.scene import NoPattern, Target
+from warpimpact.plotting.style import VERMILION, add_heading, draw_fire, fire_of, note_lines
+from warpimpact.scene import Core, Impact, NoPattern, Plate, Target
 from warpimpact.scene.display import MM
+from warpimpact.scene.model import Array
 from warpimpact.scene.notebook import UNIT_CELLS
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from numpy.typing import NDArray
-
-    from warpimpact.scene import Core, Impact, Plate
 
 _PLATE_SIDE = 5.0  # of the plate on paper [inch], without axes, title and legend
 _ROOM_ACROSS, _BELOW, _ABOVE = 1.5, 1.7, 0.85
 _NARROWEST = 6.0
 _SECTION = 4.2  # of a target on paper [inch]
 _FIGURE_SECTION = 2001
-_STEEL, _CORE_COLOUR = "0.72", "#D55E00"
+_STEEL = "0.72"
+_NEAREST_HOLES = 40
+"""Number of holes about the middle among which the smallest ligament is searched."""
+_EQUALLY_SMALL = 1.01
+"""Largest ratio of a ligament to the smallest one at which both count as equally small, because outlines are polygons.
+The written length is the exact one of the plate."""
+_BESIDE_HOLE, _BELOW_HOLE = 0.1, 0.05
+"""Distance of the dimensions of a hole from it, in periods."""
+_DIMENSION_COLOUR = "#0072B2"
+_LIGAMENT_COLOUR = "#CC79A7"
+_PROFILE_STATIONS, _CORE_WIDTH = 801, 7.5
+"""Stations of the drawn profile of a core, and width of its figure [inch]."""
 
 
 def plate_figure(
@@ -78,7 +85,7 @@ def plate_figure(
     return figure
 
 
-def drawn_extent(plate: Plate, core: Core | None) -> NDArray[np.float64]:
+def drawn_extent(plate: Plate, core: Core | None) -> Array:
     """Drawn extent along y and z [m]; that of an unbounded plate is at least twice the core's diameter."""
     if plate.size is not None:
         return np.array(plate.size)
@@ -105,7 +112,7 @@ def _draw_section(figure: Figure, plane: Axes, target: Target) -> None:
     axes.tick_params(labelleft=False)
 
 
-def _sheet(extent: NDArray[np.float64], beside: float) -> tuple[Figure, Axes]:
+def _sheet(extent: Array, beside: float) -> tuple[Figure, Axes]:
     """Figure with axes to scale, centred on the origin; extent in mm, and room beside it [inch]."""
     across, up = _PLATE_SIDE * extent / extent.max()
     width, height = max(across + _ROOM_ACROSS, _NARROWEST) + beside, up + _BELOW + _ABOVE
@@ -154,5 +161,117 @@ def _section(core: Core) -> Patch:
     radius = core.max_radius * MM
     label = f"largest section of the core, \u2300 {2 * radius:.2f} mm"
     return Circle(
-        (0.0, 0.0), radius, facecolor=to_rgba(_CORE_COLOUR, 0.45), edgecolor=_CORE_COLOUR, linewidth=1.5, label=label
+        (0.0, 0.0), radius, facecolor=to_rgba(VERMILION, 0.45), edgecolor=VERMILION, linewidth=1.5, label=label
     )
+
+
+class Dimension(NamedTuple):
+    """A length between two points (y, z) [m]. The text of an upright one stands on its right, or on its left."""
+
+    start: Array
+    end: Array
+    text: str
+    on_left: bool = False
+
+
+def hole_dimensions(plate: Plate, ligament: Dimension | None) -> list[Dimension]:
+    """Width and height of the hole that is nearest to the middle, away from the smallest ligament, and the periods of
+    the pattern."""
+    if isinstance(plate.pattern, NoPattern) or not (holes := _holes(plate)):
+        return []
+    low_y, low_z, high_y, high_z = holes[0].bounds
+    period_y, period_z = plate.pattern.unit_cell
+    on_the_right = ligament is not None and ligament.start[0] + ligament.end[0] < 0.0  # where the ligament is not
+    beside = high_y + _BESIDE_HOLE * period_y if on_the_right else low_y - _BESIDE_HOLE * period_y
+    below = low_z - _BELOW_HOLE * period_z
+    return [
+        _dimension((low_y, below), (high_y, below)),
+        _dimension((beside, low_z), (beside, high_z)),
+        _dimension((-period_y / 2, period_z / 2), (period_y / 2, period_z / 2)),
+        _dimension((-period_y / 2, -period_z / 2), (-period_y / 2, period_z / 2))._replace(on_left=True),
+    ]
+
+
+def smallest_ligament(plate: Plate) -> Dimension | None:
+    """The smallest ligament between two holes that lies nearest to the middle; None if there is none."""
+    pairs = list(combinations(_holes(plate), 2))
+    if not pairs:
+        return None
+    lengths = np.array([first.distance(other) for first, other in pairs])
+    if not lengths.min() > 0.0:
+        return None
+    lines = [
+        shapely.shortest_line(*pairs[place]) for place in np.flatnonzero(lengths <= _EQUALLY_SMALL * lengths.min())
+    ]
+    line = min(lines, key=lambda line: line.distance(shapely.Point(0.0, 0.0)))
+    start, end = np.asarray(line.coords)
+    smallest = plate.ligament
+    return _dimension(start, end, smallest if lengths.min() <= _EQUALLY_SMALL * smallest else None)
+
+
+def draw_dimensions(axes: Axes, plate: Plate) -> None:
+    """Draw the dimensions on axes in mm."""
+    ligament = smallest_ligament(plate)
+    for dimension in hole_dimensions(plate, ligament):
+        _draw_dimension(axes, dimension, _DIMENSION_COLOUR)
+    if ligament is not None:
+        _draw_dimension(axes, ligament, _LIGAMENT_COLOUR)
+
+
+def _dimension(
+    start: tuple[float, float] | Array, end: tuple[float, float] | Array, length: float | None = None
+) -> Dimension:
+    """A dimension; `length` [m] replaces the distance of its ends if it is known better."""
+    start, end = np.asarray(start), np.asarray(end)
+    return Dimension(start, end, f"{(float(np.linalg.norm(end - start)) if length is None else length) * MM:.3g}")
+
+
+def _holes(plate: Plate) -> list[shapely.Polygon]:
+    """Holes within the rim, the nearest to the middle first."""
+    cell = np.array(plate.pattern.unit_cell)
+    reach = 1.5 * cell if plate.size is None else np.minimum(1.5 * cell, 0.5 * np.array(plate.size))
+    outlines = plate.pattern.outlines((-reach[0], reach[0]), (-reach[1], reach[1]))
+    holes = [shapely.Polygon(outline) for outline in outlines if len(outline) > 3]
+    return sorted(holes, key=lambda hole: hole.centroid.distance(shapely.Point(0.0, 0.0)))[:_NEAREST_HOLES]
+
+
+def _draw_dimension(axes: Axes, dimension: Dimension, colour: str) -> None:
+    """Draw a line with an arrow at each end, and its length [mm] beside the middle."""
+    start, end = dimension.start * MM, dimension.end * MM
+    style = {"arrowstyle": "<->", "color": colour, "linewidth": 1.2, "shrinkA": 0.0, "shrinkB": 0.0}
+    axes.annotate("", tuple(end), tuple(start), arrowprops=style, zorder=5)
+    along_z = abs(end[1] - start[1]) > abs(end[0] - start[0])
+    middle = 0.5 * (start + end)
+    axes.annotate(
+        dimension.text,
+        tuple(middle),
+        ((-4.0, 0.0) if dimension.on_left else (4.0, 0.0)) if along_z else (0.0, 3.0),
+        textcoords="offset points",
+        ha=("right" if dimension.on_left else "left") if along_z else "center",
+        va="center" if along_z else "bottom",
+        color=colour,
+        fontsize="small",
+        zorder=6,
+        bbox={"boxstyle": "round,pad=0.1", "facecolor": "white", "edgecolor": "none", "alpha": 0.75},
+    )
+
+
+def core_figure(core: Core, title: str, evidence: str) -> Figure:
+    """Draw a core in its section, nose to the left, with its evidence below."""
+    lines = note_lines(_CORE_WIDTH, "", [evidence])
+    s = np.linspace(0.0, core.length, _PROFILE_STATIONS)
+    r = core.radius(s)
+    height = 0.95 * _CORE_WIDTH * 2.0 * core.max_radius / core.length + 1.1 + 0.2 * len(lines)
+    figure = Figure(figsize=(_CORE_WIDTH, height), layout="constrained")
+    axes = figure.subplots()
+    outline_s, outline_r = np.concatenate([s, s[::-1]]), np.concatenate([r, -r[::-1]])
+    axes.fill(outline_s * MM, outline_r * MM, facecolor="0.8", edgecolor="black", linewidth=1.0)
+    properties = core.mass_properties
+    axes.plot(properties.centre_of_mass * MM, 0.0, "+", color=VERMILION, ms=12, mew=2)
+    axes.annotate(
+        "centre of mass", (properties.centre_of_mass * MM, 0.0), (10.0, 0.0), textcoords="offset points", va="center"
+    )
+    axes.set(aspect="equal", xlabel="behind the nose [mm]", ylabel="radius [mm]")
+    numbers = f"{core.length * MM:.4g} mm, \u2300 {2 * core.max_radius * MM:.4g} mm, {properties.mass * 1e3:.4g} g"
+    add_heading(figure, f"{title}: {numbers}", evidence)
+    return figure

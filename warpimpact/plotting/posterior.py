@@ -4,26 +4,20 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 import xarray
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from warpimpact.identification.fit_file import fit_from
 from warpimpact.identification.posterior import learnt, parameters_of
 from warpimpact.identification.posterior_view import unit_of
-from warpimpact.plotting.heading import add_heading, legend_below
-from warpimpact.plotting.style import BLUE, VERMILION
+from warpimpact.plotting.style import BLUE, VERMILION, add_heading, legend_below
 from warpimpact.results import attributes as attr
 from warpimpact.results import posterior_file
 from warpimpact.scene.display import MM
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from numpy.typing import NDArray
-
-    Array = NDArray[np.float64]
+from warpimpact.scene.model import Array
 
 _GREY = "0.6"
 _POINTS = 600

@@ -3,16 +3,12 @@
 from __future__ import annotations
 
 from textwrap import fill
-from typing import TYPE_CHECKING
 
 import numpy as np
+import pandas as pd
 from matplotlib.figure import Figure
 
-from warpimpact.plotting.heading import add_heading
-from warpimpact.plotting.style import BLUE, VERMILION, hide_sides
-
-if TYPE_CHECKING:
-    import pandas as pd
+from warpimpact.plotting.style import BLUE, VERMILION, add_heading, hide_sides
 
 _ROW, _PANEL, _LABELS = 0.24, 2.6, 2.4
 """Height of a row, and widths of a panel and of the names of the changes [inch]."""

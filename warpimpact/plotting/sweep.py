@@ -4,21 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from textwrap import fill
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import xarray
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from warpimpact.analysis.swept import Point, inputs_of, measures_of, points
 from warpimpact.plotting.cell import words
-from warpimpact.plotting.heading import inscribe, legend_below
-from warpimpact.plotting.style import all_bars
+from warpimpact.plotting.style import all_bars, inscribe, legend_below
 from warpimpact.results.measures import Measure
 from warpimpact.scene.display import STORED
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
 
 _COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")  # of Okabe and Ito
 _MOST_LINES = 12

@@ -1,4 +1,4 @@
-"""Figures of one hit's history: the core in the plate and behind it, its loads, and the plate.
+"""Figures and film of one hit's history: the core in the plate and behind it, its loads, and the plate.
 
 The core is drawn to scale in two views: x-y shows the yaw, x-z the pitch. It comes from the left. The plate is cut
 through the hit point.
@@ -8,30 +8,32 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import xarray
 from matplotlib import colormaps
+from matplotlib.animation import AbstractMovieWriter, FFMpegWriter, FuncAnimation, PillowWriter
+from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.cm import ScalarMappable
+from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
 from matplotlib.patches import Polygon
 from matplotlib.patheffects import Normal, Stroke
+from matplotlib.ticker import MaxNLocator
+from scipy.spatial import ConvexHull
 
 from warpimpact.analysis.slabs import depth_of, plate_field, slabs
-from warpimpact.analysis.surface import pressed
+from warpimpact.analysis.surface import POINTS_AROUND, largest_in_plate, pressed
 from warpimpact.plotting.cell import struck, words
-from warpimpact.plotting.heading import inscribe_hit, legend_below
 from warpimpact.plotting.layers import draw_left, layers, weakened_ranges
-from warpimpact.plotting.poses import Pose, pose_at_step, poses_behind, poses_in_plate, silhouette
-from warpimpact.plotting.pressure import pressure
-from warpimpact.plotting.style import BLUE, GREY, VERMILION
+from warpimpact.plotting.style import BLUE, GREY, VERMILION, inscribe_hit, legend_below
+from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from numpy.typing import NDArray
-
-    Array = NDArray[np.float64]
+from warpimpact.results.dataset import passed
+from warpimpact.results.files import OutputError
+from warpimpact.scene.model import Array
 
 _MM, _US = 1e3, 1e6
 _ANGLE_SHOWN = {"y": v.YAW, "z": v.PITCH}  # view → projected angle of the axis that it shows
@@ -42,6 +44,90 @@ _STEEL = "0.8"
 _NEAR_FRAME = 0.2  # share of the width in which a text would cross the frame
 _ARROW = 12.0  # length of the arrow of a force that lies in the view [mm]
 _ARC, _ARC_RADIUS = 300.0, 4.5  # angle [degree] and radius [mm] of the arc of a moment across the view
+INSTANTS = 5
+"""Number of drawn poses of the core within the plate."""
+_FULL_TURN = np.linspace(0.0, 2.0 * np.pi, 73)
+_LONGEST_STRESS = 5.0  # length of the largest stress [mm]
+_SECTIONS, _SPOKES = 3, 3  # every third section and azimuth gets an arrow
+FRAMES = 50
+_PER_SECOND = 20
+
+
+class Pose(NamedTuple):
+    """Position of the centre of mass in the plate's frame [m], and unit vector towards the nose, both of shape [3]."""
+
+    position: Array
+    axis: Array
+
+
+def poses_in_plate(dataset: xarray.Dataset) -> dict[str, Pose]:
+    """Poses of the core at equal intervals of its passage through the plate, by time."""
+    steps = np.linspace(0, dataset.sizes["time"] - 1, INSTANTS).round().astype(int)
+    return {f"{float(dataset[v.TIME][step]) * _US:.0f} µs": pose_at_step(dataset, step) for step in steps}
+
+
+def poses_behind(dataset: xarray.Dataset) -> dict[str, Pose]:
+    """Poses of the core at the stand-offs, by distance: those behind layers that it reaches, and those behind the
+    target, if it passes that."""
+    standoffs = dataset[v.STANDOFF].values.tolist() if passed(dataset) else []
+    return _poses_behind_layers(dataset) | {
+        f"{standoff * _MM:g} mm": _pose_at(dataset, standoff) for standoff in standoffs
+    }
+
+
+def _poses_behind_layers(dataset: xarray.Dataset) -> dict[str, Pose]:
+    """Poses at the stand-offs behind all layers but the last one. Free flight leads from step to step there."""
+    if v.LAYER_STANDOFF not in dataset:
+        return {}
+    path, poses = dataset[v.PLATE_POSITION].values, {}
+    for layer, rear in enumerate(dataset[v.LAYER_REAR].values[:-1]):
+        for place, standoff in enumerate(dataset[v.LAYER_STANDOFF].values):
+            angles = [float(dataset[name][layer, place]) for name in (v.LAYER_STANDOFF_YAW, v.LAYER_STANDOFF_PITCH)]
+            if np.isfinite(angles).all():
+                axis = _axis_of(*np.radians(angles))
+                x = rear + standoff - _ahead(dataset) * axis[0]
+                before = int(np.argmax(path[:, 0] > x)) - 1
+                share = (x - path[before, 0]) / (path[before + 1, 0] - path[before, 0])
+                position = path[before] + share * (path[before + 1] - path[before])
+                poses[f"{standoff * _MM:g} mm behind\nlayer {layer}"] = Pose(position, axis)
+    return poses
+
+
+def silhouette(dataset: xarray.Dataset, pose: Pose, view: str) -> Array:
+    """Outline of the core [m], shape [points, 2]: x, and y or z as `view` says.
+
+    It is the convex hull of the rings; it does not show a groove.
+    """
+    _, _, (_, right, up) = np.linalg.svd(pose.axis[None, :])  # two directions at right angles to the axis
+    station, radius = (dataset[name].values[:, None, None] for name in (v.STATION, v.CORE_RADIUS))
+    ring = np.cos(_FULL_TURN)[:, None] * right + np.sin(_FULL_TURN)[:, None] * up
+    points = (pose.position + station * pose.axis + radius * ring)[..., [0, "xyz".index(view)]].reshape(-1, 2)
+    outline: Array = points[ConvexHull(points).vertices]
+    return outline
+
+
+def pose_at_step(dataset: xarray.Dataset, step: int) -> Pose:
+    return Pose(dataset[v.PLATE_POSITION].values[step], dataset[v.CORE_AXIS].values[step])
+
+
+def _pose_at(dataset: xarray.Dataset, standoff: float) -> Pose:
+    """The core when it passes a stand-off [m]: the axis from the projected angles, the position from free flight."""
+    there, end = dataset.sel(standoff=standoff), dataset.isel(time=-1)
+    axis = _axis_of(*(np.radians(float(there[name])) for name in (v.YAW, v.PITCH)))
+    position, velocity = end[v.PLATE_POSITION].values, end[v.VELOCITY].values
+    x = depth_of(dataset) + standoff - _ahead(dataset) * axis[0]
+    return Pose(position + velocity * ((x - position[0]) / velocity[0]), axis)
+
+
+def _axis_of(yaw: float, pitch: float) -> Array:
+    """The unit vector with these projected angles [rad]."""
+    axis = np.sign(np.cos(yaw)) * np.array([1.0, np.tan(yaw), np.tan(pitch)])
+    return np.asarray(axis / np.linalg.norm(axis))
+
+
+def _ahead(dataset: xarray.Dataset) -> float:
+    """Distance of the stand-off point ahead of the centre of mass [m]."""
+    return float(dataset[v.STATION].max()) if dataset.attrs[attr.STANDOFF_POINT] == "nose" else 0.0
 
 
 def passage(dataset: xarray.Dataset) -> Figure:
@@ -196,6 +282,37 @@ def plate(dataset: xarray.Dataset) -> Figure:
     return figure
 
 
+def pressure(dataset: xarray.Dataset) -> Figure:
+    """The core at its largest force; arrows into its surface show the normal stress.
+
+    Colour and length show the stress as a share of that of the untouched plate at rest (`analysis.surface.pressed`).
+    """
+    step = largest_in_plate(dataset)
+    surface = pressed(dataset, step)
+    figure = Figure(figsize=(9.0, 6.0), layout="constrained")
+    when = f"at {float(dataset[v.TIME][step]) * _US:.1f} µs"
+    inscribe_hit(figure, dataset, f"normal stress under the largest force, {when}")
+    axes = figure.add_subplot(projection="3d")
+    x, y, z = np.moveaxis(np.concatenate([surface.point, surface.point[:, :1]], axis=1) * _MM, -1, 0)
+    axes.plot_wireframe(x, y, z, rcount=24, ccount=POINTS_AROUND // _SPOKES, color="0.75", linewidth=0.5)
+    some = np.zeros(surface.stress.shape, dtype=bool)
+    some[::_SECTIONS, ::_SPOKES] = True
+    some &= surface.stress > 0.0
+    scale, colours = Normalize(0.0, 1.0), colormaps["viridis"]
+    arrows = -surface.normal[some] * surface.stress[some][:, None] * _LONGEST_STRESS
+    tails = surface.point[some] * _MM - arrows
+    axes.quiver(
+        *tails.T, *arrows.T, colors=colours(scale(surface.stress[some])), linewidths=1.2, arrow_length_ratio=0.3
+    )
+    axes.set(xlabel="x [mm]", ylabel="y [mm]", zlabel="z [mm]", aspect="equal")
+    axes.set_box_aspect([np.ptp(axes.get_xlim()), np.ptp(axes.get_ylim()), np.ptp(axes.get_zlim())], zoom=1.3)
+    for side in (axes.yaxis, axes.zaxis):
+        side.set_major_locator(MaxNLocator(4))
+    label = "normal stress, share of the untouched plate's"
+    figure.colorbar(ScalarMappable(scale, colours), ax=axes, shrink=0.6, pad=0.1, label=label)
+    return figure
+
+
 FIGURES = (passage, flight, largest_load, pressure, course, plate)
 
 
@@ -251,3 +368,60 @@ def _draw_energy(axes: Axes, time: xarray.DataArray, dataset: xarray.Dataset) ->
         side.plot(time, dataset[energy], color=colour)
         side.set_ylabel(f"{words(energy)} [J]", color=colour)
         side.tick_params(axis="y", colors=colour)
+
+
+def animation(dataset: xarray.Dataset) -> FuncAnimation:
+    """Film of a history from the first contact to the end of contact, at constant time intervals.
+
+    Between two steps position and axis are interpolated linearly.
+    """
+    times = np.linspace(float(dataset[v.TIME][0]), float(dataset[v.TIME][-1]), FRAMES)
+    between = dataset[[v.PLATE_POSITION, v.CORE_AXIS, v.VELOCITY]].interp(time=times)
+    every = (pose_at_step(between, frame) for frame in range(FRAMES))
+    poses = [Pose(pose.position, pose.axis / np.linalg.norm(pose.axis)) for pose in every]
+    speeds = np.linalg.norm(between[v.VELOCITY], axis=1)
+    figure, panels = two_views(dataset, poses, "", room=4.0)
+    FigureCanvasAgg(figure)
+    cores = {view: Polygon(np.zeros((1, 2)), facecolor="0.55", edgecolor="black") for view in panels}
+    for view, axes in panels.items():
+        axes.add_patch(cores[view])
+        axes.plot(*np.array([pose.position[[0, "xyz".index(view)]] for pose in poses]).T * _MM, "k--", lw=0.8)
+    title = f"hit {dataset.attrs[attr.HIT]}"
+
+    def show(frame: int) -> list[Polygon]:
+        for view, core in cores.items():
+            core.set_xy(silhouette(dataset, poses[frame], view) * _MM)
+        tilt = np.degrees(np.arccos(np.clip(poses[frame].axis @ _line_of_fire(dataset), -1.0, 1.0)))
+        figure.suptitle(f"{title}: {times[frame] * _US:5.1f} µs, {speeds[frame]:.0f} m/s, tilt {tilt:.1f}°")
+        return list(cores.values())
+
+    show(0)
+    figure.draw_without_rendering()
+    figure.set_layout_engine("none")  # the layout is the same in all frames, and solving it takes most of the time
+    return FuncAnimation(figure, show, frames=FRAMES, interval=1e3 / _PER_SECOND)
+
+
+def save_animation(dataset: xarray.Dataset, path: Path) -> None:
+    """Write the film of a history in the format that its name asks for (`writer_for`)."""
+    animation(dataset).save(path, writer=writer_for(path), dpi=80)
+
+
+def writer_for(path: Path) -> AbstractMovieWriter:
+    """The writer for the format that the name of a film asks for.
+
+    Raises:
+        OutputError: the name ends neither in .gif nor in .mp4, or FFmpeg is missing for an MP4.
+    """
+    match path.suffix.lower():
+        case ".gif":
+            return PillowWriter(fps=_PER_SECOND)
+        case ".mp4" if FFMpegWriter.isAvailable():
+            return FFMpegWriter(fps=_PER_SECOND)
+        case ".mp4":
+            raise OutputError(f"{path}: an MP4 needs the program ffmpeg, which was not found; a GIF does not need it")
+    raise OutputError(f"{path}: the name of a film must end in .gif or .mp4")
+
+
+def _line_of_fire(dataset: xarray.Dataset) -> np.ndarray:
+    obliquity, azimuth = (np.radians(float(dataset[name])) for name in (v.OBLIQUITY, v.AZIMUTH))
+    return np.array([np.cos(obliquity), np.sin(obliquity) * np.cos(azimuth), np.sin(obliquity) * np.sin(azimuth)])

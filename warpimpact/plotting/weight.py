@@ -4,22 +4,16 @@ weight."""
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Any
+from collections.abc import Sequence
+from typing import Any
 
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from warpimpact.analysis.effectiveness import depth_note
-from warpimpact.plotting.heading import add_heading, legend_below
-from warpimpact.plotting.style import BLUE, GREY, VERMILION, bars, hide_sides
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from matplotlib.axes import Axes
-
-    from warpimpact.analysis.comparison import Comparison
-    from warpimpact.analysis.contestants import Contestant
-from warpimpact.analysis.effectiveness import Score
+from warpimpact.analysis.comparison import Comparison
+from warpimpact.analysis.contestants import Contestant
+from warpimpact.analysis.effectiveness import Score, depth_note
+from warpimpact.plotting.style import BLUE, GREY, VERMILION, add_heading, bars, hide_sides, legend_below
 
 _MARKERS = {
     "mean": ("mean, or share", "o", BLUE),

@@ -15,8 +15,8 @@ from warpimpact.analysis.hit_map import hit_points, mirrored, symmetries_of
 from warpimpact.analysis.slabs import runs_of, slabs
 from warpimpact.kernels.status import Status
 from warpimpact.plotting.cell import STATUS_COLOURS, Shown, limits, nearest_hits, shown, words
-from warpimpact.plotting.fire import common_fire
-from warpimpact.plotting.poses import Pose, poses_behind, poses_in_plate, silhouette
+from warpimpact.plotting.style import common_fire
+from warpimpact.plotting.trajectory import Pose, poses_behind, poses_in_plate, silhouette
 from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
 from warpimpact.results.dataset import hit_numbers

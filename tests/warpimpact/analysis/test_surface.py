@@ -9,7 +9,7 @@ from mpl_toolkits.mplot3d.art3d import Line3DCollection
 
 from warpimpact import Campaign
 from warpimpact.analysis.surface import pressed
-from warpimpact.plotting.pressure import pressure
+from warpimpact.plotting.trajectory import pressure
 from warpimpact.runs.replay import replay
 from warpimpact.runs.run import run
 

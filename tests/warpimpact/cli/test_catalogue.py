@@ -7,7 +7,7 @@ import pytest
 
 from warpimpact.cli import main
 from warpimpact.plotting import variable_map
-from warpimpact.plotting.heading import names
+from warpimpact.plotting.style import names
 from warpimpact.results import attributes as attr
 from warpimpact.results import files
 

@@ -12,7 +12,6 @@ from PIL import Image
 
 from warpimpact import Campaign
 from warpimpact.cli import main
-from warpimpact.plotting import animation as film
 from warpimpact.plotting import trajectory
 from warpimpact.results import files
 from warpimpact.runs.run import run
@@ -23,7 +22,7 @@ SLOTTED_PLATE = Path(__file__).parents[3] / "campaigns" / "slotted_plate.toml"
 @pytest.fixture(scope="module", autouse=True)
 def few_frames() -> Iterator[None]:
     with pytest.MonkeyPatch.context() as patched:
-        patched.setattr(film, "FRAMES", 12)
+        patched.setattr(trajectory, "FRAMES", 12)
         yield
 
 
@@ -43,9 +42,9 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def test_film_moves_the_core(folder: Path) -> None:
     with Image.open(folder / "a.gif") as image:
-        assert image.n_frames == film.FRAMES
+        assert image.n_frames == trajectory.FRAMES
         frames = []
-        for number in (0, film.FRAMES // 2, film.FRAMES - 1):
+        for number in (0, trajectory.FRAMES // 2, trajectory.FRAMES - 1):
             image.seek(number)
             frames.append(np.asarray(image.convert("L"), dtype=float))
     dark = [np.mean(np.nonzero((frame > 120) & (frame < 160))[1]) for frame in frames]  # columns of the grey core
@@ -54,8 +53,8 @@ def test_film_moves_the_core(folder: Path) -> None:
 
 def test_frames_show_the_history(folder: Path) -> None:
     history = xarray.load_dataset(folder / "a_hit1.nc")
-    made = film.animation(history)
-    made._func(film.FRAMES - 1)
+    made = trajectory.animation(history)
+    made._func(trajectory.FRAMES - 1)
     made._draw_was_started = True  # matplotlib warns of a film that is never shown
     (core,) = (patch for patch in made._fig.axes[0].patches if isinstance(patch, Polygon))
     outline = np.asarray(core.get_xy()) * 1e-3
@@ -78,4 +77,4 @@ def test_other_names_are_refused_before_computing(folder: Path, capsys: pytest.C
 def test_mp4_needs_ffmpeg(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(FFMpegWriter, "isAvailable", lambda: False)
     with pytest.raises(files.OutputError, match=r"a\.mp4: an MP4 needs the program ffmpeg"):
-        film.writer_for(Path("a.mp4"))
+        trajectory.writer_for(Path("a.mp4"))

@@ -12,7 +12,7 @@ from warpimpact import Campaign
 from warpimpact.campaign.plates import read_plates
 from warpimpact.cli import main
 from warpimpact.plotting import plate_figure
-from warpimpact.plotting.dimensions import hole_dimensions, smallest_ligament
+from warpimpact.plotting.plate import hole_dimensions, smallest_ligament
 from warpimpact.scene import ConeCore, Impact, Layer, NoPattern, Plate, PolygonsPattern, SlotPattern, Target
 from warpimpact.studies.sweep import read_sweep
 

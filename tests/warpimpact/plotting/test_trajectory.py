@@ -10,7 +10,7 @@ from matplotlib.patches import Polygon
 
 from warpimpact import Campaign, CirclePattern, Hits, Impact, Numerics, Plate, PolynomialCore
 from warpimpact.plotting import trajectory
-from warpimpact.plotting.poses import INSTANTS, Pose, silhouette
+from warpimpact.plotting.trajectory import INSTANTS, Pose, silhouette
 from warpimpact.runs.replay import replay
 from warpimpact.runs.run import run
 

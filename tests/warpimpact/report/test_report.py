@@ -23,7 +23,7 @@ from warpimpact.analysis.summary import range_note
 from warpimpact.campaign.campaign import CampaignError
 from warpimpact.cli import main
 from warpimpact.kernels.status import Status
-from warpimpact.plotting.poses import poses_behind, poses_in_plate, silhouette
+from warpimpact.plotting.trajectory import poses_behind, poses_in_plate, silhouette
 from warpimpact.report import hit_data, report
 from warpimpact.results import files
 from warpimpact.runs.replay import replay

@@ -12,7 +12,7 @@ from warpimpact.analysis.hit_map import mirrored
 from warpimpact.analysis.inspect import inspect_text
 from warpimpact.campaign.text import CampaignError
 from warpimpact.kernels.status import Status
-from warpimpact.plotting import poses, trajectory
+from warpimpact.plotting import trajectory
 from warpimpact.plotting.cell import NO_VALUE, STATUS_COLOURS, shown
 from warpimpact.plotting.maps import layers_figure
 from warpimpact.report.words import result_content
@@ -134,7 +134,7 @@ def test_figures_say_what_lies_behind(result: xarray.Dataset) -> None:
 def test_a_replay_shows_the_core_between_the_layers(result: xarray.Dataset) -> None:
     history = replay(result, 3)
     assert history.attrs["agreement"] == "bit-identical"
-    found = poses.poses_behind(history)
+    found = trajectory.poses_behind(history)
     assert list(found) == [
         *(f"{at} mm behind\nlayer 0" for at in (20, 40)),
         *(f"{at} mm behind\nlayer 1" for at in (20, 40, 50)),
