@@ -256,7 +256,7 @@ impact = { velocity = "825 m/s" }
 numerics = { level = 0 }
 plate = { thickness = "4 mm", resistance = "2600 MPa" }
 objectives = [{ measure = "areal_density" }, { measure = "mean(residual_energy_fraction)" }]
-search = { designs = 6, hits = 16, most_hits = 16, confirm_hits = 64 }
+search = { designs = 6, hits = 16, confirm_hits = 64 }
 [[references]]
 name = "published"
 [references.plate]

@@ -18,6 +18,7 @@ REMOVED_KEYS: dict[str, str] = {
     "procedure.name = neyer": "use langlie",
     "directions": "sweep impact.obliquity and impact.azimuth",
     "requirement": "give proof.velocity and the core of the campaign",
+    "search.most_hits": "use search.hits, which every design gets",
 }
 """The sentence for each key, by its dotted path without numbers of list items; or for a value, as "key = value"."""
 

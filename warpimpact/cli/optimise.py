@@ -1,18 +1,12 @@
 """The command optimise: the best designs of a target."""
 
 import argparse
-import math
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from .mistakes import memory_told
 from .options import Commands, add_command, add_computing, add_earlier, add_output, executor_of
 from .paths import check_picture, check_result, replaces
-from .plain import say
 from .progress import Step, show_progress, warn
-
-if TYPE_CHECKING:
-    from warpimpact.optimisation.search import SearchProgress
 
 NONE_WITHIN_BOUNDS = 4
 """Exit code where no computed design keeps the bounds."""
@@ -25,9 +19,9 @@ def add_optimise(commands: Commands) -> None:
         _optimise,
         summary="search the best designs: lightest, safest, and what lies between",
         description="Search the free variables of a target for the designs that no other one beats in every objective. "
-        "Cheap hits come first, more where they decide; the front is computed again with fresh hits. Write every "
-        "design as netCDF, a campaign file for each design of the front, and a figure. Exit code 4: no design keeps "
-        "the bounds. Needs pip install 'warpimpact[optimise]'.",
+        "Every design gets the same hits; the front is computed again with fresh hits. Write every design as netCDF, "
+        "a campaign file for each design of the front, and a figure. Exit code 4: no design keeps the bounds. Needs "
+        "pip install 'warpimpact[optimise]'.",
         example="optimise campaigns/designs/lightest_plate.toml -o front.nc",
     )
     parser.add_argument("design", type=Path, metavar="DESIGN.toml", help="design file: a campaign, and what is free")
@@ -50,7 +44,6 @@ def _optimise(arguments: argparse.Namespace) -> int:
     check_result(output, "a search")
     picture = output.with_suffix(".png")
     check_picture(picture, overwrite=replaces(arguments, output))
-    say(design.search.extent)
     with (
         memory_told(arguments.design),
         show_progress("design") as show,
@@ -63,7 +56,7 @@ def _optimise(arguments: argparse.Namespace) -> int:
             resume=arguments.resume,
             overwrite=arguments.overwrite,
             progress=lambda now: show(
-                Step(now.done, now.total, now.resumed, _running(now), certain=now.certain, now=now.what)
+                Step(now.done, now.total, text=f"{now.front} on the front", certain=now.certain, now=now.what)
             ),
             tell=warn,
         )
@@ -73,10 +66,3 @@ def _optimise(arguments: argparse.Namespace) -> int:
     beside = f", campaigns in {folder_of(output)}" if campaigns else ""
     print(f"written to {output}, figure in {picture}{beside}")
     return 0 if dataset.attrs[front.OUTCOME] == front.FEASIBLE else NONE_WITHIN_BOUNDS
-
-
-def _running(now: "SearchProgress") -> str:
-    parts = [f"{now.front} on the front"]
-    if math.isfinite(now.hypervolume):
-        parts.append(f"hypervolume {now.hypervolume:.4f}")
-    return ", ".join(parts)

@@ -2,38 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import Any, TypeVar
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from warpimpact.campaign.text import CampaignError
 from warpimpact.optimisation.design import Design
-from warpimpact.optimisation.evaluate import HitJob, Told, campaign_of, hits_asked, levels_asked
-from warpimpact.optimisation.judged import (
-    DesignRecord,
-    excesses,
-    interval,
-    means,
-    objectives,
-    weights_of,
-)
-from warpimpact.optimisation.search import Searched
-from warpimpact.optimisation.searcher import front_of
+from warpimpact.optimisation.evaluate import HitJob, Report, columns_of, levels_of
+from warpimpact.optimisation.objectives import Candidate, results_of, weights_of
+from warpimpact.optimisation.search import Searched, front_of
 from warpimpact.runs.questions import Question
 from warpimpact.scene.model import Array
-from warpimpact.statistics.comparisons import ROUNDED
-
-Part = TypeVar("Part")
 
 CONFIRM_FIDELITY = "standard"
 """Fidelity of the pilots of the designs of the front, unless the campaign fixes a resolution."""
-SOLID_HITS = 64
-"""Number of hits of a solid plate, which differ in scattered quantities only."""
-SAME_WEIGHT = 0.01
-"""Relative difference below which two areal densities are the same weight."""
 
 
 @dataclass(frozen=True)
@@ -42,21 +27,15 @@ class Confirmed:
 
     Attributes:
         numbers: numbers of its designs in the search.
-        records: its designs with fresh hits.
-        places: y and z of the hits of each design [m], shape [front, 2, hits].
-        solids: solid plates of equal areal density.
-        kept: whether each design is still on the front and within the bounds by fresh hits.
-        groups: for each design, the number of the first design than which it is not certainly better.
-        references: targets to compare with.
+        candidates: its designs, then the references, with fresh hits.
+        columns: numbers of their hits, shape [candidates, threats, columns, hits].
+        on_front: whether each design is still on the front and within the bounds by fresh hits.
     """
 
     numbers: NDArray[np.int64]
-    records: tuple[DesignRecord, ...]
-    places: Array
-    solids: tuple[DesignRecord, ...]
-    kept: NDArray[np.bool_]
-    groups: NDArray[np.int64]
-    references: tuple[DesignRecord, ...]
+    candidates: tuple[Candidate, ...]
+    columns: Array
+    on_front: NDArray[np.bool_]
 
 
 Follow = Callable[[int, int, str], object]
@@ -64,30 +43,40 @@ Follow = Callable[[int, int, str], object]
 
 
 def confirm(design: Design, searched: Searched, follow: Follow) -> Question[Confirmed]:
-    """Compute the front, its solid plates and the references with fresh hits at the standard fidelity."""
+    """Compute the front and the references with fresh hits at the standard fidelity."""
     numbers = spread(searched.front, design.search.confirmed)
-    chosen = [searched.records[int(number)] for number in numbers]
-    others = [_reference(design, place) for place in range(len(design.references))]
-    records, places = yield from _fresh(design, [*chosen, *others], follow)
-    front = records[: len(chosen)]
-    solids = yield from _solids(design, front, follow)
-    return Confirmed(
-        numbers=numbers,
-        records=tuple(front),
-        places=places[: len(chosen)],
-        solids=tuple(solids),
-        kept=_kept(design, front),
-        groups=groups(design, front),
-        references=tuple(records[len(chosen) :]),
-    )
+    targets = [searched.candidates[number] for number in numbers] + references(design)
+    seed, count = fresh_seed(design), design.search.confirm_hits if design.columns else 1
+    threats = len(design.threats)
+
+    def report(what: str) -> Report:
+        return lambda done: follow(int(done / threats), len(targets), what)
+
+    jobs = [
+        HitJob(target.tables, threat, count, CONFIRM_FIDELITY, seed)
+        for target in (targets if design.columns else ())
+        for threat in range(threats)
+    ]
+    levels = yield from levels_of(design, jobs, report("pilots for fresh hits"))
+    jobs = [replace(job, level=level) for job, level in zip(jobs, levels, strict=True)]
+    found = yield from columns_of(design, jobs, report("fresh hits"))
+    columns = np.array(found).reshape(len(targets), threats, len(design.columns), count)
+    candidates = [
+        replace(
+            target,
+            levels=tuple(levels[number * threats : (number + 1) * threats]),
+            results=results_of(design, target.weights, of_target),
+        )
+        for number, (target, of_target) in enumerate(zip(targets, columns, strict=True))
+    ]
+    on_front = np.isin(np.arange(len(numbers)), front_of(design, candidates[: len(numbers)]))
+    return Confirmed(numbers, tuple(candidates), columns, on_front)
 
 
 def spread(front: NDArray[np.int64], most: int) -> NDArray[np.int64]:
     """At most `most` designs at even distances along a front, including both ends."""
-    if len(front) <= most:
-        return front
-    places = np.unique(np.round(np.linspace(0, len(front) - 1, most)).astype(np.int64))
-    return np.asarray(front[places])
+    places = np.linspace(0, len(front) - 1, min(most, len(front)))
+    return np.asarray(front[np.round(places).astype(np.int64)])
 
 
 def fresh_seed(design: Design) -> int:
@@ -95,112 +84,21 @@ def fresh_seed(design: Design) -> int:
     return int(np.random.SeedSequence(design.search.seed, spawn_key=(24,)).generate_state(1)[0] >> 1)
 
 
-def _reference(design: Design, place: int) -> DesignRecord:
-    """The record of a reference target, without hits."""
-    given = design.references[place]
-    tables: dict[str, Any] = dict(design.base) | {"plate": dict(given.plate)}
-    if given.layer is not None:
-        tables["layer"] = [dict(layer) for layer in given.layer]
-    try:
-        campaign = campaign_of(design, tables, design.threats[0])
-    except CampaignError as error:
-        text = str(error).removeprefix(f"{design.name}: ")
-        raise CampaignError(f'{design.name}: references[{place}] "{given.name}": {text}') from None
-    return DesignRecord(np.zeros(0), tables, weights_of(campaign.target), (), np.zeros((0, 0, 0)))
-
-
-def check_references(design: Design) -> None:
-    """Refuse a reference that is no campaign before anything is computed.
+def references(design: Design) -> list[Candidate]:
+    """The reference targets, before their hits are computed.
 
     Raises:
-        CampaignError: the message names the reference.
+        CampaignError: a reference is no campaign; the message names it.
     """
-    for place in range(len(design.references)):
-        _reference(design, place)
-
-
-def _telling(follow: Follow, targets: int, jobs: int, what: str) -> Told:
-    """Return a function that converts finished jobs to finished targets for `follow`. All targets have as many jobs."""
-    return lambda done, _: follow(int(targets * done / jobs), targets, what)
-
-
-def _batched(parts: Sequence[Part], count: int) -> list[tuple[Part, ...]]:
-    return [tuple(parts[first : first + count]) for first in range(0, len(parts), count)]
-
-
-def _fresh(
-    design: Design, targets: Sequence[DesignRecord], follow: Follow
-) -> Question[tuple[list[DesignRecord], Array]]:
-    """Targets with fresh hits, and the places of the hits."""
-    seed, count = fresh_seed(design), design.search.confirm_hits if design.keys else 1
-    threats = range(len(design.threats))
-    asked = [
-        HitJob(target.tables, threat, 0, count, CONFIRM_FIDELITY, seed) for target in targets for threat in threats
-    ]
-    if not design.keys:
-        empty = np.zeros((len(threats), 0, count))
-        without_hits = [replace(target, levels=("",) * len(threats), said=empty) for target in targets]
-        return without_hits, np.zeros((len(targets), 2, 0))
-    whose = "the front and references" if design.references else "the front"
-    piloting = _telling(follow, len(targets), len(asked), f"pilots for fresh hits of {whose}")
-    levels = yield from levels_asked(design, asked, piloting)
-    of_targets = _batched(levels, len(threats))
-    jobs = [
-        HitJob(target.tables, threat, 0, count, of_target[threat], seed)
-        for target, of_target in zip(targets, of_targets, strict=True)
-        for threat in threats
-    ]
-    said = yield from hits_asked(design, jobs, _telling(follow, len(targets), len(jobs), f"fresh hits of {whose}"))
-    records = [
-        replace(target, levels=levels_of_target, said=np.array([part.values for part in parts]))
-        for target, levels_of_target, parts in zip(targets, of_targets, _batched(said, len(threats)), strict=True)
-    ]
-    of_first = said[:: len(threats)]
-    return records, np.array([first.places for first in of_first])
-
-
-def _solids(design: Design, front: Sequence[DesignRecord], follow: Follow) -> Question[list[DesignRecord]]:
-    """The solid plate with the areal density of each design of the front."""
-    if not design.keys or not front:
-        return list(front)
-    jobs = [
-        HitJob(record.tables, threat, 0, SOLID_HITS, level, fresh_seed(design), solid=True)
-        for record in front
-        for threat, level in enumerate(record.levels)
-    ]
-    telling = _telling(follow, len(front), len(jobs), "solid plates of the same weight")
-    said = yield from hits_asked(design, jobs, telling)
-    parts = _batched(said, len(design.threats))
-    return [
-        replace(record, said=np.array([part.values for part in of_record]))
-        for record, of_record in zip(front, parts, strict=True)
-    ]
-
-
-def _kept(design: Design, front: Sequence[DesignRecord]) -> NDArray[np.bool_]:
-    """Whether each design is within the bounds, and not dominated by another design within the bounds."""
-    kept = np.array([not excesses(design, record).any() for record in front], dtype=bool)
-    within = np.flatnonzero(kept)
-    points = np.array([objectives(design, front[int(number)]) for number in within])
-    kept[:] = False
-    kept[within[front_of(points)]] = True
-    return kept
-
-
-def groups(design: Design, front: Sequence[DesignRecord]) -> NDArray[np.int64]:
-    """For each design, the number of the first design of the front than which it is not certainly better."""
-    leaders_of = np.arange(len(front))
-    for number, record in enumerate(front):
-        leaders = [lead for lead in range(number) if leaders_of[lead] == lead]
-        leaders_of[number] = next((lead for lead in leaders if not is_better(design, record, front[lead])), number)
-    return leaders_of
-
-
-def is_better(design: Design, record: DesignRecord, other: DesignRecord) -> bool:
-    """Whether one design is better than another in some objective at 95 %, by the same hits of both."""
-    count = len(design.objectives)
-    signs = np.array([asked.sign for asked in design.objectives])[:, None]
-    theirs = means(design, other, other.hits)[:count]
-    low = interval(signs * (theirs - means(design, record, record.hits)[:count]))[0]
-    same = [SAME_WEIGHT if asked.asked.kind == "target" else ROUNDED for asked in design.objectives]
-    return bool((low > np.array(same) * np.nan_to_num(np.abs(theirs)).max(axis=1)).any())
+    targets = []
+    for place, reference in enumerate(design.references):
+        tables: dict[str, Any] = dict(design.base) | {"plate": dict(reference.plate)}
+        if reference.layer is not None:
+            tables["layer"] = [dict(layer) for layer in reference.layer]
+        try:
+            campaign = design.campaign(tables)
+        except CampaignError as error:
+            text = str(error).removeprefix(f"{design.name}: ")
+            raise CampaignError(f'{design.name}: references[{place}] "{reference.name}": {text}') from None
+        targets.append(Candidate(np.zeros(0), tables, weights_of(campaign.target)))
+    return targets

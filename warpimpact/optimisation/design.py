@@ -4,31 +4,111 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping
-from dataclasses import dataclass, field
-from functools import lru_cache
+from dataclasses import dataclass
+from functools import cached_property, lru_cache
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, Literal
 
-from pydantic import Field, ValidationError, model_validator
+from pydantic import Field, ValidationError, field_validator, model_validator
 
 from warpimpact.campaign.campaign import Campaign
+from warpimpact.campaign.needs import lacking
 from warpimpact.campaign.schema import campaign_schema, file_schema
 from warpimpact.campaign.text import CampaignError, parsed, read_text
-from warpimpact.optimisation.asked import Bound, Objective, check_needs
 from warpimpact.optimisation.space import Space, read_space
 from warpimpact.results.kinds import DESIGN
 from warpimpact.results.measures import Measure
+from warpimpact.results.vocabulary import WEIGHTS
 from warpimpact.scene.model import Array, Model
 from warpimpact.scene.problems import sentence
-from warpimpact.scene.units import Number, PositiveArealDensity, PositiveLength, Title
+from warpimpact.scene.units import Number, PositiveArealDensity, PositiveLength, Title, quoted
 
-SCRAMBLINGS = 16
-"""Number of scramblings of the hits of a search: hit k belongs to scrambling k modulo this number."""
+_SAMPLER_HITS = 2**20
+"""Number of hits of the sampler of a search. Far fewer are computed."""
+_TURNING = ("obliquity", "azimuth", "pitch", "yaw", "spin")
 _Table = dict[str, Any]
 _Name = Annotated[Title, Field(min_length=1, max_length=80)]
 
-OWN_TABLES = ("variables", "objectives", "bounds", "threats", "constraints", "search", "references")
+SEARCH_TABLES = ("variables", "objectives", "bounds", "threats", "constraints", "search", "references")
 """Tables of a design file beside those of a campaign."""
+
+
+class _Goal(Model):
+    """A measure of a target.
+
+    Attributes:
+        measure: such as `mean(residual_energy_density@130mm)`, `worst_tenth(base_depth)`, `P(base_perforated)`,
+            `P(inclination@130mm > 30 deg)`, `V50`, `mean(limit_thickness@layer 1)` or `areal_density`; the default
+            stand-off is the largest one.
+        threats: over several threats the "worst" one counts, or their weighted "mean".
+    """
+
+    measure: str
+    threats: Literal["worst", "mean"] = "worst"
+
+    @field_validator("measure")
+    @classmethod
+    def _is_no_single_hit(cls, text: str) -> str:
+        if Measure.parse(text).kind == "worst_point":
+            raise ValueError(
+                f"got {quoted(text)}, but a search takes a mean, a worst tenth, a quantile, a probability or "
+                f"{' or '.join(WEIGHTS)}"
+            )
+        return text
+
+    @cached_property
+    def spec(self) -> Measure:
+        """The measure."""
+        return Measure.parse(self.measure)
+
+
+class Objective(_Goal):
+    """What is minimised or maximised.
+
+    Attributes:
+        goal: "minimise" or "maximise"; by default, what is better for whoever is behind the plate.
+    """
+
+    goal: Literal["minimise", "maximise"] | None = None
+
+    @property
+    def sign(self) -> float:
+        """Factor that turns the measure into a quantity to minimise."""
+        if self.goal is not None:
+            return 1.0 if self.goal == "minimise" else -1.0
+        return -1.0 if self.spec.higher_is_better else 1.0
+
+    @model_validator(mode="after")
+    def _has_a_goal(self) -> Objective:
+        if self.goal is None and self.spec.higher_is_better is None:
+            raise ValueError(f'needs goal = "minimise" or "maximise": neither is better of {quoted(self.measure)}')
+        return self
+
+
+class Bound(_Goal):
+    """A measure with an upper or a lower limit.
+
+    Attributes:
+        at_most, at_least: limits, in the units in which inspect shows the measure.
+    """
+
+    at_most: Number | None = None
+    at_least: Number | None = None
+
+    @model_validator(mode="after")
+    def _has_a_limit(self) -> Bound:
+        if (self.at_most is None) == (self.at_least is None):
+            raise ValueError("needs at_most or at_least, one of both")
+        return self
+
+    @property
+    def limit(self) -> float:
+        return float(next(limit for limit in (self.at_most, self.at_least) if limit is not None))
+
+    @property
+    def sign(self) -> float:
+        """Factor that turns a lower limit into an upper one."""
+        return 1.0 if self.at_most is not None else -1.0
 
 
 class FacedThreat(Model):
@@ -93,8 +173,7 @@ class Search(Model):
         designs: most designs that are computed.
         population: designs that are computed together, and from which the next ones follow.
         seed: seed of the optimiser and of the hits.
-        hits: first number of hits of every design.
-        most_hits: most hits of a design while the paired difference to the front does not decide.
+        hits: hits of every design, at the same places of all.
         confirmed: most designs of the front that are computed again with fresh hits.
         confirm_hits: hits of each of these.
     """
@@ -102,35 +181,12 @@ class Search(Model):
     designs: Annotated[int, Field(strict=True, ge=1, le=1_000_000)] = 1000
     population: Annotated[int, Field(strict=True, ge=4, le=1024)] = 40
     seed: Annotated[int, Field(strict=True, ge=0, lt=2**31)] = 0
-    hits: Annotated[int, Field(strict=True, ge=16, le=2**16)] = 64
-    most_hits: Annotated[int, Field(strict=True, ge=16, le=2**20)] = 1024
+    hits: Annotated[int, Field(strict=True, ge=16, le=2**20)] = 256
     confirmed: Annotated[int, Field(strict=True, ge=1, le=200)] = 20
     confirm_hits: Annotated[int, Field(strict=True, ge=64, le=2**22)] = 1024
 
-    @model_validator(mode="after")
-    def _grows(self) -> Search:
-        if self.most_hits < self.hits:
-            raise ValueError(f"got most_hits = {self.most_hits}, but it must be at least hits = {self.hits}")
-        return self
 
-    @property
-    def extent(self) -> str:
-        """Words for the most that is computed."""
-        return (
-            f"searches at most {self.designs} designs with {self.hits} to {self.most_hits} hits each, then up to "
-            f"{self.confirmed} of the front with {self.confirm_hits} fresh hits; how long that takes is told as it runs"
-        )
-
-    @property
-    def rungs(self) -> list[int]:
-        """Numbers of hits of a design, from the first to the largest, each four times the one before."""
-        rungs = [self.hits]
-        while rungs[-1] < self.most_hits:
-            rungs.append(min(4 * rungs[-1], self.most_hits))
-        return rungs
-
-
-class Asking(Model):
+class SearchTables(Model):
     """The tables of a design file beside those of a campaign and its variables."""
 
     objectives: Annotated[tuple[Objective, ...], Field(min_length=1, max_length=3)]
@@ -153,7 +209,7 @@ class Design:
         space: free variables.
         objectives, bounds, threats, references, constraints, search: as in the file. Without threats there is the
             threat of the campaign, without a name.
-        keys: columns that are computed of every hit, for the measures that are asked for.
+        columns: numbers of every hit, of which the measures are made.
     """
 
     title: str
@@ -168,10 +224,10 @@ class Design:
     references: tuple[Reference, ...]
     constraints: Constraints
     search: Search
-    keys: tuple[Measure, ...] = field(default=())
+    columns: tuple[Measure, ...]
 
     @property
-    def asked(self) -> tuple[Objective | Bound, ...]:
+    def goals(self) -> tuple[Objective | Bound, ...]:
         """Objectives and bounds."""
         return (*self.objectives, *self.bounds)
 
@@ -179,22 +235,39 @@ class Design:
         """The tables of the campaign of a point of the space."""
         return self.space.tables(self.base, values, self.name)
 
-    def campaign(self, tables: Mapping[str, Any], threat: FacedThreat) -> Campaign:
-        """The campaign of a target with these tables and a threat.
+    def campaign(self, tables: Mapping[str, Any], threat: int = 0, seed: int | None = None) -> Campaign:
+        """The campaign of a target and a threat: hits in the irreducible part of the cell, where it has one.
+
+        Args:
+            tables: tables of the target.
+            threat: number of the threat.
+            seed: of the hits; by default that of the search.
 
         Raises:
             CampaignError: the campaign is not valid.
         """
-        data = dict(tables)
-        for table in ("core", "impact"):
-            overrides = getattr(threat, table)
-            data[table] = dict(overrides) if table == "core" and overrides else data.get(table, {}) | overrides
-        return _campaign(json.dumps(data, ensure_ascii=False), self.name, self.folder)
+        data = self.against(tables, self.threats[threat])
+        seed = self.search.seed if seed is None else seed
+        sampling = {"sampling": "sobol", "count": _SAMPLER_HITS, "seed": seed, "irreducible": is_even(tables)}
+        data["hits"] = {key: value for key, value in data.get("hits", {}).items() if key == "area"} | sampling
+        return _campaign(json.dumps(data, default=str, ensure_ascii=False), self.name, self.folder)
+
+    def against(self, tables: Mapping[str, Any], threat: FacedThreat) -> dict[str, Any]:
+        """The tables of a target with the keys of a threat."""
+        core = dict(threat.core) or tables.get("core", {})
+        return dict(tables) | {"core": core, "impact": tables.get("impact", {}) | threat.impact}
+
+
+def is_even(tables: Mapping[str, Any]) -> bool:
+    """Whether the symmetries of a target depend only on plate and shot."""
+    layers, impact = tables.get("layer", ()), tables.get("impact", {})
+    holed = any({"pattern", "size"} & {*layer} for layer in layers)
+    return not holed and not any(isinstance(impact.get(name), dict) for name in _TURNING)
 
 
 @lru_cache(maxsize=256)
 def _campaign(text: str, name: str, folder: Path) -> Campaign:
-    """A campaign of a search, cached for further hits, so that its plate also keeps its tile."""
+    """A campaign of a search, cached so that its plate keeps its tile."""
     return Campaign.from_text(text, name=name, folder=folder)
 
 
@@ -211,28 +284,24 @@ def read_design(path: str | Path) -> Design:
 def design_from(text: str, name: str, folder: Path) -> Design:
     """Read a design from its text; `name` is the name of the file in errors."""
     data = parsed(text, name, DESIGN)
-    asking_tables = {key: data.pop(key) for key in OWN_TABLES if key in data}
+    own_tables = {key: data.pop(key) for key in SEARCH_TABLES if key in data}
     if "stop" in data:
         raise CampaignError(f"{name}: stop: a design file takes no [stop]; [search] sets the hits")
-    space = read_space(asking_tables.pop("variables", {}), name)
+    space = read_space(own_tables.pop("variables", {}), name)
     try:
-        asking = Asking.model_validate(asking_tables)
+        own = SearchTables.model_validate(own_tables)
     except ValidationError as error:
-        raise CampaignError(f"{name}: {sentence(error, asking_tables)}") from None
-    threats = asking.threats or (FacedThreat(name="threat"),)
-    names = [threat.name for threat in threats] + [reference.name for reference in asking.references]
+        raise CampaignError(f"{name}: {sentence(error, own_tables)}") from None
+    threats = own.threats or (FacedThreat(name="threat"),)
+    names = [threat.name for threat in threats] + [reference.name for reference in own.references]
     if twice := next((name for name in names if names.count(name) > 1), None):
         raise CampaignError(f'{name}: got the name "{twice}" twice, but each threat and reference needs its own')
     layered = "layer" in data or any(variable.place == "layer" for variable in space.variables)
-    places = {
-        f"{table}[{k}]": goal for table in ("objectives", "bounds") for k, goal in enumerate(getattr(asking, table))
-    }
-    try:
-        check_needs(places, data.get("output", {}), layered=layered)
-    except ValueError as error:
-        raise CampaignError(f"{name}: {error}") from None
-    asked = (goal.asked for goal in (*asking.objectives, *asking.bounds))
-    keys = dict.fromkeys(measure.column for measure in asked if measure.kind != "target")
+    for table in ("objectives", "bounds"):
+        for k, goal in enumerate(getattr(own, table)):
+            _check_needs(f"{name}: {table}[{k}]", goal, data.get("output", {}), layered=layered)
+    measures = (goal.spec for goal in (*own.objectives, *own.bounds))
+    columns = dict.fromkeys(measure.column for measure in measures if measure.kind != "target")
     return Design(
         title=str(data.get("title", "")),
         text=text,
@@ -240,14 +309,22 @@ def design_from(text: str, name: str, folder: Path) -> Design:
         folder=folder,
         base=data,
         space=space,
-        keys=tuple(keys),
-        **dict(asking) | {"threats": threats},
+        columns=tuple(columns),
+        **dict(own) | {"threats": threats},
     )
+
+
+def _check_needs(place: str, goal: Objective | Bound, output: Mapping[str, Any], *, layered: bool) -> None:
+    """Refuse a measure if the campaign, with layers behind the plate or not, lacks what it needs."""
+    standoffs: list[float] | None = [] if output.get("standoffs") == [] else None
+    bends = output.get("bending") is True
+    if keys := lacking(goal.spec, standoffs=standoffs, layered=layered, bending=bends, breakable=True):
+        raise CampaignError(f'{place}.measure = "{goal.measure}" needs {keys}')
 
 
 def design_schema() -> dict[str, Any]:
     """The JSON schema of a design file: of a campaign, what is free in it, and what is sought."""
-    campaign, asking = campaign_schema(), file_schema(Asking, "warpimpact design")
+    campaign, own = campaign_schema(), file_schema(SearchTables, "warpimpact design")
     variables = {
         "description": 'Free variables by their places, such as "plate.pattern.width": a range with low, high and, '
         "where it has one, a step; or a list of values, or of tables with names.",
@@ -255,8 +332,8 @@ def design_schema() -> dict[str, Any]:
         "additionalProperties": {"type": ["object", "array"]},
     }
     keys = {key: schema for key, schema in campaign["properties"].items() if key not in ("stop", "sweep")}
-    return asking | {
-        "properties": keys | asking["properties"] | {"variables": variables},
-        "$defs": asking["$defs"] | campaign["$defs"],
+    return own | {
+        "properties": keys | own["properties"] | {"variables": variables},
+        "$defs": own["$defs"] | campaign["$defs"],
         "required": ["objectives"],
     }

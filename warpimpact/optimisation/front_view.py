@@ -16,51 +16,40 @@ from warpimpact.view.view import Column, Section, Table, number
 if TYPE_CHECKING:
     import xarray
 
-_ROUNDED = 1e-6
-"""Largest relative difference of objectives that count as equal."""
-
 
 def front_view(dataset: xarray.Dataset) -> list[Section]:
     """The view of a search: its front with intervals, the values of its variables, and how fresh hits changed it."""
-    designs, told = dataset.sizes["design"], dataset.attrs
+    attributes = dataset.attrs
     computed = (
-        f"{designs} designs computed, {int(dataset[f.HITS].sum())} hits, {told[f.PILOTS]} pilots; "
-        f"{told[f.REFUSED]} more broke a constraint and were not computed"
+        f"{dataset.sizes['design']} designs computed with {attributes[f.HITS]} hits each, {attributes[f.PILOTS]} "
+        f"pilots; {attributes[f.REFUSED]} more broke a constraint and were not computed"
     )
-    if told[f.OUTCOME] == f.NONE_FEASIBLE:
+    if attributes[f.OUTCOME] == f.NONE_FEASIBLE:
         return [Section([computed, *_nearest(dataset)])]
     on_front, confirmed = int(dataset[f.ON_FRONT].sum()), dataset.sizes["front"]
     again = f"front: {on_front} designs, of which {confirmed} were computed again with fresh hits"
-    references = [line for place in range(dataset.sizes["reference"]) for line in _against(dataset, place)]
-    notes = [*_shrinkage(dataset)]
+    shrinkage = [*_shrinkage(dataset)]
     return [
         Section([computed, again]),
         Section([_front_table(dataset)]),
         Section([_variables_table(dataset)] if confirmed else []),
-        *([Section([*references, *notes])] if references or notes else []),
+        Section(shrinkage),
     ]
-
-
-def _goals(dataset: xarray.Dataset) -> list[int]:
-    """Indices of the objectives among objectives and bounds."""
-    return np.flatnonzero(np.isnan(dataset[f.ASKED_LIMIT].values)).tolist()
 
 
 def _front_table(dataset: xarray.Dataset) -> Table:
     """Objectives and bounds of the front and of the targets to compare with, by fresh hits."""
     columns = [Column("design")]
-    for label in dataset[f.LABEL].values:
+    for label in dataset[f.GOAL_LABEL].values:
         name, unit = label_and_unit(label)
         columns += [number(name, unit), Column("95 % interval")]
     rows: list[tuple[Any, ...]] = []
     for place, file in enumerate(dataset[f.FILE].values):
         notes = []
-        if (group := int(dataset[f.GROUP][place])) != place:
-            notes.append(f"cannot be told from {dataset[f.FILE].values[group]}")
-        if not int(dataset[f.KEPT][place]):
+        if not int(dataset[f.CONFIRMED][place]):
             notes.append("not on the front by fresh hits")
-        if beyond := str(dataset[f.UNTESTED].values[place]):
-            notes.append(f"outside the tested range: {beyond}")
+        if outside := str(dataset[f.OUTSIDE].values[place]):
+            notes.append(f"outside the tested range: {outside}")
         rows.append((file, *_cells(dataset, OF_FRONT, place), "; ".join(notes)))
     for place, name in enumerate(dataset[f.REFERENCE].values):
         rows.append((name, *_cells(dataset, OF_REFERENCE, place), ""))
@@ -68,7 +57,7 @@ def _front_table(dataset: xarray.Dataset) -> Table:
 
 
 OF_FRONT = (f.FRESH, f.FRESH_LOW, f.FRESH_HIGH)
-OF_REFERENCE = (f.REFERENCE_FOUND, f.REFERENCE_LOW, f.REFERENCE_HIGH)
+OF_REFERENCE = (f.REFERENCE_RESULT, f.REFERENCE_LOW, f.REFERENCE_HIGH)
 
 
 def _cells(dataset: xarray.Dataset, names: tuple[str, str, str], place: int) -> Iterator[Any]:
@@ -90,32 +79,11 @@ def _variables_table(dataset: xarray.Dataset) -> Table:
     return Table([Column("design"), *columns], rows)
 
 
-def _against(dataset: xarray.Dataset, reference: int) -> Iterator[str]:
-    """How much better than a reference a design is in one of two objectives while no worse in the other."""
-    goals = np.flatnonzero(np.isnan(dataset[f.ASKED_LIMIT].values))
-    if len(goals) != 2:
-        return
-    signs, names = dataset[f.SIGN].values[goals], [label_and_unit(label)[0] for label in dataset[f.LABEL].values]
-    kept = dataset[f.KEPT].values == 1
-    fresh, files = (signs * dataset[f.FRESH].values[:, goals])[kept], dataset[f.FILE].values[kept]
-    rival = signs * dataset[f.REFERENCE_FOUND].values[reference, goals]
-    for better, other in ((0, 1), (1, 0)):
-        no_worse = np.flatnonzero(fresh[:, other] <= rival[other])
-        if len(no_worse) and rival[better]:
-            best = no_worse[np.argmin(fresh[no_worse, better])]
-            gain = (rival[better] - fresh[best, better]) / abs(rival[better])
-            more = "less" if gain * signs[better] > 0 else "more"
-            yield (
-                f"{files[best]} has {abs(gain):.1%} {more} {names[goals[better]]} than "
-                f"{dataset[f.REFERENCE].values[reference]}, and is no worse in {names[goals[other]]}"
-            )
-
-
 def numbers_of(dataset: xarray.Dataset, names: tuple[str, str, str], place: int) -> list[str]:
     """Objectives and bounds of a target with their intervals, by the `names` of their variables."""
     cells = list(_cells(dataset, names, place))
     numbers = []
-    for label, value, interval in zip(dataset[f.LABEL].values, cells[::2], cells[1::2], strict=True):
+    for label, value, interval in zip(dataset[f.GOAL_LABEL].values, cells[::2], cells[1::2], strict=True):
         name, unit = label_and_unit(label)
         numbers.append(f"{name} {number_text(value)}{f' ({interval})' if interval else ''} {unit}".rstrip())
     return numbers
@@ -148,11 +116,11 @@ def _values(dataset: xarray.Dataset, design: int) -> Iterator[tuple[str, str, st
 
 def _shrinkage(dataset: xarray.Dataset) -> Iterator[str]:
     """How much worse the fresh hits are than the hits of the search."""
-    searched, fresh = dataset[f.FOUND].values[dataset[f.NUMBER].values], dataset[f.FRESH].values
+    searched, fresh = dataset[f.RESULT].values[dataset[f.NUMBER].values], dataset[f.FRESH].values
     for place, (label, sign, limit) in enumerate(
-        zip(dataset[f.LABEL].values, dataset[f.SIGN].values, dataset[f.ASKED_LIMIT].values, strict=True)
+        zip(dataset[f.GOAL_LABEL].values, dataset[f.GOAL_SIGN].values, dataset[f.GOAL_LIMIT].values, strict=True)
     ):
-        if not np.isnan(limit) or not len(fresh) or str(dataset[f.ASKED].values[place]).startswith(tuple(WEIGHTS)):
+        if not np.isnan(limit) or not len(fresh) or str(dataset[f.GOAL].values[place]).startswith(tuple(WEIGHTS)):
             continue
         worse = float(np.mean(sign * (fresh[:, place] - searched[:, place])))
         before = float(np.mean(searched[:, place]))
@@ -166,16 +134,14 @@ def _shrinkage(dataset: xarray.Dataset) -> Iterator[str]:
 
 def _nearest(dataset: xarray.Dataset) -> Iterator[str]:
     """The design that comes nearest to the bounds, if none keeps them."""
-    limits, signs, values = dataset[f.ASKED_LIMIT].values, dataset[f.SIGN].values, dataset[f.FOUND].values
+    limits, signs, values = dataset[f.GOAL_LIMIT].values, dataset[f.GOAL_SIGN].values, dataset[f.RESULT].values
     bounds = np.flatnonzero(~np.isnan(limits))
-    over = np.maximum(
-        signs[bounds] * (values[:, bounds] - limits[bounds]) / np.maximum(np.abs(limits[bounds]), 1e-30), 0.0
-    )
-    nearest = int(np.nanargmin(over.sum(axis=1))) if len(bounds) and np.isfinite(over).any() else 0
-    asked = [
-        f"{dataset[f.LABEL].values[bound]!s} {'<' if signs[bound] > 0 else '>'}= {limits[bound]:.4g}"
+    over = np.maximum(signs * (values - limits) / np.maximum(np.abs(limits), 1e-30), 0.0)[:, bounds].sum(axis=1)
+    nearest = int(np.nanargmin(over)) if np.isfinite(over).any() else 0
+    texts = [
+        f"{dataset[f.GOAL_LABEL].values[bound]!s} {'<' if signs[bound] > 0 else '>'}= {limits[bound]:.4g}"
         f" (nearest: {number_text(float(values[nearest, bound]))})"
         for bound in bounds
     ]
-    yield f"no design keeps the bounds: {'; '.join(asked) or 'no hit of any design could be computed'}"
+    yield f"no design keeps the bounds: {'; '.join(texts) or 'no hit of any design could be computed'}"
     yield f"the nearest: {design_text(dataset, nearest)}"

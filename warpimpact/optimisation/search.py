@@ -1,21 +1,31 @@
-"""The search: few hits of each point that the optimiser asks for, and more where the paired difference does not
-decide."""
+"""The search: NSGA-II of pymoo asks for points, and every feasible one gets the same hits.
+
+Other optimisers: tests/benchmarks/NOTES.md.
+"""
 
 from __future__ import annotations
 
-import math
+from collections import Counter
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field, replace
+from importlib.util import find_spec
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from warpimpact.campaign.text import CampaignError
 from warpimpact.optimisation.design import Design
-from warpimpact.optimisation.evaluate import HitJob, hits_asked, levels_asked
-from warpimpact.optimisation.feasible import Checked, checked
-from warpimpact.optimisation.judged import DesignRecord, excesses, objectives, undecided, weights_of
-from warpimpact.optimisation.searcher import Searcher, front_of, hypervolume
+from warpimpact.optimisation.evaluate import HitJob, columns_of, levels_of
+from warpimpact.optimisation.objectives import (
+    Candidate,
+    Violation,
+    excesses,
+    results_of,
+    to_minimise,
+    violations,
+    weights_of,
+)
 from warpimpact.runs.questions import Question
 from warpimpact.scene.model import Array
 
@@ -23,86 +33,65 @@ IDLE = 25
 """Generations without a new feasible design after which a search ends."""
 SEARCH_FIDELITY = "draft"
 """Fidelity of the pilots of a search, unless the campaign fixes a resolution."""
-MARGIN = 0.1
-"""Distance of the hypervolume's reference beyond the box of the first generation, as a share of the box."""
-NEIGHBOURHOOD = 0.5
-"""Distance, as a share of every range, within which designs of the same alternatives share a pilot."""
 
 
-@dataclass(frozen=True)
-class SearchProgress:
+class SearchProgress(NamedTuple):
     """The progress of a search.
 
     Attributes:
         done, total: numbers of designs, first of the search, then of those with fresh hits.
         certain: whether `total` will be reached; else it is an upper bound.
-        resumed: designs among `done` that an earlier call had computed.
         front: designs on the front.
-        hypervolume: volume of the front up to the reference (`MARGIN`), in boxes of the first generation; or NaN.
         what: words for what is being computed.
     """
 
     done: int
     total: int
     certain: bool
-    resumed: int
     front: int
-    hypervolume: float
     what: str
 
 
-Follow = Callable[[SearchProgress], None]
+Follow = Callable[[SearchProgress], object]
 
 
-@dataclass(frozen=True)
-class Searched:
+class Searched(NamedTuple):
     """A search that has ended.
 
     Attributes:
-        records: all computed designs, in the order of computing.
+        candidates: all computed designs, in the order of computing.
         front: numbers of the designs on the front, sorted by the first objective.
         refused: number of designs that broke a constraint and were not computed.
-        history: computed designs and hypervolume after every generation, shape [generations, 2].
-        reference, scale: worst values of the objectives to minimise in the first generation, and their distance from
-            the best, shape [objectives]; empty where no design keeps the bounds.
         pilots: number of pilots.
     """
 
-    records: tuple[DesignRecord, ...]
+    candidates: tuple[Candidate, ...]
     front: NDArray[np.int64]
     refused: int
-    history: Array
-    reference: Array
-    scale: Array
     pilots: int
 
 
-def search(design: Design, follow: Follow = lambda now: None) -> Question[Searched]:
+def search(design: Design, follow: Follow) -> Question[Searched]:
     """Search until the budget of designs is computed, or there are no others.
 
     Raises:
         CampaignError: no design keeps the constraints; the message names the constraint that rules them out.
     """
-    state = _State(design, follow)
-    if design.space.size <= design.search.designs:
-        every = state.feasible(design.space.points())
-        state.total, state.certain = len(every), True
-        for first in range(0, len(every), design.search.population):
-            yield from state.generation(every[first : first + design.search.population])
+    state, plan = _State(design, follow), design.search
+    if design.space.size <= plan.designs:
+        points = list(design.space.points())
+        for first in range(0, len(points), plan.population):
+            yield from state.compute(points[first : first + plan.population])
     else:
-        plan = design.search
-        searcher = Searcher(design.space, len(design.objectives), 1 + len(design.bounds), plan.population, plan.seed)
-        while asked := searcher.ask():
-            points = [design.space.at(coordinates) for coordinates in asked]
-            yield from state.generation(points)
-            if state.done >= plan.designs or state.idle >= IDLE:
-                break
-            searcher.tell(*state.told(points))
-    if not state.records:
-        raise CampaignError(f"{design.name}: {state.why_none()}")
-    state.total, state.certain = state.done, True
-    state.tell("")
-    return state.searched()
+        optimiser = Optimiser(design)
+        while len(state.candidates) < plan.designs and state.idle < IDLE and (points := optimiser.ask()):
+            yield from state.compute(points)
+            optimiser.tell(*state.scores(points))
+    if not state.candidates:
+        raise CampaignError(f"{design.name}: {_why_none(list(state.refused.values()))}")
+    state.tell("", certain=True)
+    candidates = tuple(state.candidates.values())
+    return Searched(candidates, front_of(design, candidates), len(state.refused), len(state.pilots))
 
 
 @dataclass
@@ -110,225 +99,187 @@ class _State:
     """The state of a search.
 
     Attributes:
-        records: computed designs; front: numbers of those on the front.
-        drafts: feasible designs that are not computed yet.
-        refused: designs that break a constraint.
-        total, certain, resumed: as in `SearchProgress`.
-        is_resumed: whether all rounds of this generation so far come from the disk.
+        candidates: computed designs, by their points.
+        refused: violations of the designs that break a constraint.
+        pilots: levels, by alternatives and number of the threat.
+        idle: generations since the last new design.
+        front: as in `SearchProgress`.
     """
 
     design: Design
     follow: Follow
-    records: dict[bytes, DesignRecord] = field(default_factory=dict)
-    front: list[DesignRecord] = field(default_factory=list)
-    drafts: dict[bytes, DesignRecord] = field(default_factory=dict)
-    refused: dict[bytes, Checked] = field(default_factory=dict)
-    pilots: list[tuple[Array, int, str]] = field(default_factory=list)
-    history: list[tuple[int, float]] = field(default_factory=list)
-    box: tuple[Array, Array] | None = None
+    candidates: dict[bytes, Candidate] = field(default_factory=dict)
+    refused: dict[bytes, tuple[Violation, ...]] = field(default_factory=dict)
+    pilots: dict[tuple[bytes, int], str] = field(default_factory=dict)
     idle: int = 0
-    certain: bool = False
-    resumed: int = 0
-    is_resumed: bool = False
+    front: int = 0
 
-    def __post_init__(self) -> None:
-        self.total = int(min(self.design.search.designs, self.design.space.size))
-
-    @property
-    def done(self) -> int:
-        return len(self.records)
-
-    def generation(self, points: Sequence[Array]) -> Question[None]:
-        """Compute the new feasible points among these."""
-        new: dict[bytes, DesignRecord] = {}
-        for values in points:
-            key = values.tobytes()
-            if key in self.records or key in new:
+    def compute(self, points: Iterable[Array]) -> Question[None]:
+        """Compute the new feasible points among these, as far as the budget goes."""
+        new: dict[bytes, Candidate] = {}
+        for point in points:
+            key = point.tobytes()
+            if key in self.candidates or key in self.refused:
                 continue
-            if self.done + len(new) == self.design.search.designs:
+            if len(self.candidates) + len(new) == self.design.search.designs:
                 break
-            if self.feasible([values]):
-                new[key] = self.drafts.pop(key)
+            tables = self.design.tables(point)
+            campaign, broken = violations(self.design, tables)
+            if campaign is None or broken:
+                self.refused[key] = broken
+            else:
+                new[key] = Candidate(point, tables, weights_of(campaign.target))
         self.idle = 0 if new else self.idle + 1
-        if new:
-            self.is_resumed = bool(self.design.keys)
-            yield from self._compute(new)
-            self.resumed += len(new) if self.is_resumed else 0
-            self._measure()
-
-    def feasible(self, points: Iterable[Array]) -> list[Array]:
-        """The points that keep the constraints."""
-        keeping = []
-        for values in points:
-            key = values.tobytes()
-            if key not in self.drafts and key not in self.refused:
-                self._check(key, values)
-            if key in self.drafts:
-                keeping.append(values)
-        return keeping
-
-    def _check(self, key: bytes, values: Array) -> None:
-        tables = self.design.tables(values)
-        checked_design = checked(self.design, tables)
-        if checked_design.violations or checked_design.campaign is None:
-            self.refused[key] = checked_design
-            return
-        nothing = np.zeros((len(self.design.threats), len(self.design.keys), 0))
-        self.drafts[key] = DesignRecord(values, tables, weights_of(checked_design.campaign.target), (), nothing)
-
-    def _compute(self, new: dict[bytes, DesignRecord]) -> Question[None]:
-        """Compute hits of designs. Designs that may be on the front get the hits of the next rung."""
         levels = yield from self._levels(list(new.values()))
         for key, of_threats in zip(list(new), levels, strict=True):
             new[key] = replace(new[key], levels=of_threats)
-        going, before = list(new), 0
-        for hits in self.design.search.rungs if self.design.keys else [self.design.search.hits]:
-            with_more = yield from self._more([new[key] for key in going], before, hits)
-            new |= zip(going, with_more, strict=True)
-            best = [record for record in self.front if record.hits >= hits]
-            candidates = [new[key] for key in going]
-            keep = undecided(self.design, candidates, [*best, *candidates], hits)
-            going, before = [key for key, kept in zip(going, keep, strict=True) if kept], hits
-            if not going:
-                break
-        self._admit(list(new.values()))
-        self.records |= new
+        yield from self._hits(new)
 
-    def _more(self, records: Sequence[DesignRecord], first: int, stop: int) -> Question[list[DesignRecord]]:
-        """The designs with the hits from `first` up to `stop` added."""
-        design = self.design
-        if not design.keys:
-            return [record.more(np.zeros((len(design.threats), 0, stop)), 0.0) for record in records]
+    def _hits(self, new: dict[bytes, Candidate]) -> Question[None]:
+        design, threats = self.design, range(len(self.design.threats))
+        plan = design.search
         jobs = [
-            HitJob(record.tables, threat, first, stop - first, record.levels[threat], design.search.seed)
-            for record in records
-            for threat in range(len(design.threats))
+            HitJob(candidate.tables, threat, plan.hits, candidate.levels[threat], plan.seed)
+            for candidate in (new.values() if design.columns else ())
+            for threat in threats
         ]
-        what, each = f"{len(records)} designs at {stop} hits", len(design.threats)
 
-        def tell(done: float, is_resumed: bool) -> None:
-            if done >= len(jobs):
-                self.is_resumed = self.is_resumed and is_resumed
-            self.tell(f"{what}, {done / len(jobs):.0%}")
+        def report(done: float) -> None:
+            self.tell(f"{len(new)} designs at {plan.hits} hits, {done / len(jobs):.0%}")
 
-        said = yield from hits_asked(design, jobs, tell)
-        extended = []
-        for number, record in enumerate(records):
-            hits = said[number * each : (number + 1) * each]
-            extended.append(record.more(np.array([part.values for part in hits]), sum(part.seconds for part in hits)))
-        return extended
-
-    def _levels(self, records: Sequence[DesignRecord]) -> Question[list[tuple[str, ...]]]:
-        """Numerics of designs for every threat, from the pilot of a neighbour or one of their own."""
-        places = [self._place(record.values) for record in records]
-        if not self.design.keys:
-            return [("",) * len(self.design.threats) for _ in records]
-        centres: list[tuple[Array, int]] = [(place, threat) for place, threat, _ in self.pilots]
-        jobs, count = [], self.design.search.most_hits
-        for record, place in zip(records, places, strict=True):
-            for threat in range(len(self.design.threats)):
-                if not any(of == threat and _apart(place, centre) <= NEIGHBOURHOOD for centre, of in centres):
-                    centres.append((place, threat))
-                    jobs.append(HitJob(record.tables, threat, 0, count, SEARCH_FIDELITY, self.design.search.seed))
-        tell = lambda done, _: self.tell(f"{done:.0f} of {len(jobs)} pilots")  # noqa: E731
-        levels = yield from levels_asked(self.design, jobs, tell)
-        self.pilots += [(*centre, level) for centre, level in zip(centres[len(self.pilots) :], levels, strict=True)]
-        return [tuple(self._nearest(place, threat) for threat in range(len(self.design.threats))) for place in places]
-
-    def _nearest(self, place: Array, threat: int) -> str:
-        near = [(_apart(place, centre), level) for centre, of, level in self.pilots if of == threat]
-        return min(near, key=lambda pair: pair[0])[1]
-
-    def _place(self, values: Array) -> Array:
-        """Coordinates as shares of the ranges. Different choices lie far apart, as do points only one of which uses a
-        variable."""
-        shares = [
-            1e6 * value if variable.labels else (value - variable.low) / ((variable.high - variable.low) or 1.0)
-            for variable, value in zip(self.design.space.variables, values, strict=True)
-        ]
-        return np.asarray(np.nan_to_num(np.array(shares), nan=-1e6))
-
-    def _admit(self, new: Sequence[DesignRecord]) -> None:
-        """Add to the front the designs that keep the bounds, have all their hits, and are not dominated."""
-        most = self.design.search.most_hits if self.design.keys else self.design.search.hits
-        full = [record for record in new if record.hits >= most and not excesses(self.design, record).any()]
-        may = [*self.front, *(record for record in full if np.isfinite(objectives(self.design, record)).all())]
-        shape = len(may), len(self.design.objectives)
-        points = np.array([objectives(self.design, record) for record in may]).reshape(shape)
-        self.front = [may[number] for number in front_of(points)]
-
-    def _measure(self) -> None:
-        """Record the hypervolume, in the box of the first generation in which some design keeps the bounds."""
-        if self.box is None:
-            kept = [record for record in self.records.values() if not excesses(self.design, record).any()]
-            every = [objectives(self.design, record) for record in kept]
-            if finite := [signed for signed in every if np.isfinite(signed).all()]:
-                low, high = np.min(finite, axis=0), np.max(finite, axis=0)
-                self.box = high, np.where(high > low, high - low, np.maximum(np.abs(high), 1.0))
-        self.history.append((self.done, self._volume()))
+        columns = yield from columns_of(design, jobs, report)
+        for number, (key, candidate) in enumerate(new.items()):
+            of_threats = np.array(columns[number * len(threats) : (number + 1) * len(threats)])
+            self.candidates[key] = replace(candidate, results=results_of(design, candidate.weights, of_threats))
+        self.front = len(front_of(design, tuple(self.candidates.values())))
         self.tell("")
 
-    def _volume(self) -> float:
-        if self.box is None or not self.front:
-            return 0.0
-        reference, scale = self.box
-        points = np.array([objectives(self.design, record) for record in self.front])
-        return hypervolume((points - reference) / scale, np.full(len(scale), MARGIN))
+    def _levels(self, new: Sequence[Candidate]) -> Question[list[tuple[str, ...]]]:
+        """Numerics of designs for every threat, from the pilot of the first design of the same alternatives."""
+        if not self.design.columns:
+            return [() for _ in new]
+        is_choice, plan = [bool(variable.labels) for variable in self.design.space.variables], self.design.search
+        threats = range(len(self.design.threats))
+        keys = [[(one.point[is_choice].tobytes(), threat) for threat in threats] for one in new]
+        jobs = {
+            key: HitJob(one.tables, key[1], plan.hits, SEARCH_FIDELITY, plan.seed)
+            for one, of_threats in reversed(list(zip(new, keys, strict=True)))
+            for key in of_threats
+            if key not in self.pilots
+        }
+        report = lambda done: self.tell(f"{done:.0f} of {len(jobs)} pilots")  # noqa: E731
+        levels = yield from levels_of(self.design, list(jobs.values()), report)
+        self.pilots |= zip(jobs, levels, strict=True)
+        return [tuple(self.pilots[key] for key in of_threats) for of_threats in keys]
 
-    def told(self, points: Sequence[Array]) -> tuple[Array, Array]:
-        """Objectives and violations of the points of a generation."""
-        count, rows = len(self.design.objectives), []
-        for values in points:
-            key = values.tobytes()
-            if (record := self.records.get(key)) is not None:
-                rows.append(
-                    [*np.nan_to_num(objectives(self.design, record), posinf=1e30), 0.0, *excesses(self.design, record)]
-                )
+    def scores(self, points: Sequence[Array]) -> tuple[Array, Array]:
+        """Objectives to minimise and violations of the points of a generation."""
+        objectives, broken = [], []
+        for point in points:
+            candidate = self.candidates.get(point.tobytes())
+            if candidate is None:
+                shares = [violation.share for violation in self.refused.get(point.tobytes(), ())]
+                objectives.append(np.zeros(len(self.design.objectives)))
+                broken.append([sum(shares), *np.zeros(len(self.design.bounds))])
             else:
-                broken = self.refused[key].excess
-                rows.append([*([0.0] * count), broken, *([0.0] * len(self.design.bounds))])
-        told = np.array(rows)
-        return told[:, :count], told[:, count:]
+                objectives.append(np.nan_to_num(to_minimise(self.design, candidate.results), posinf=1e30))
+                broken.append([0.0, *excesses(self.design, candidate.results)])
+        return np.array(objectives), np.array(broken)
 
-    def tell(self, what: str) -> None:
+    def tell(self, what: str, *, certain: bool = False) -> None:
         """Report the progress of the search, and what is being computed."""
-        volume = self.history[-1][1] if self.history else math.nan
-        told = (self.done, self.total, self.certain, self.resumed, len(self.front), volume)
-        self.follow(SearchProgress(*told, what))
+        done = len(self.candidates)
+        total = done if certain else int(min(self.design.search.designs, self.design.space.size))
+        self.follow(SearchProgress(done, total, certain, self.front, what))
 
-    def why_none(self) -> str:
-        """A sentence about the constraint that rules out all designs tried."""
-        tried = list(self.refused.values())
-        broken: dict[str, list[float]] = {}
-        for attempt in tried:
-            for violation in attempt.violations:
-                broken.setdefault(violation.constraint, []).append(violation.share)
-        by_all = [name for name, shares in broken.items() if len(shares) == len(tried)]
-        name = by_all[0] if by_all else max(broken, key=lambda key: len(broken[key]))
-        nearest = min(
-            (violation for attempt in tried for violation in attempt.violations if violation.constraint == name),
-            key=lambda violation: violation.share,
+
+def _why_none(refused: Sequence[Sequence[Violation]]) -> str:
+    """A sentence about the constraint that rules out most of the designs."""
+    counts = Counter(violation.constraint for broken in refused for violation in broken)
+    name, count = counts.most_common(1)[0]
+    of_it = (violation for broken in refused for violation in broken if violation.constraint == name)
+    nearest = min(of_it, key=lambda violation: violation.share)
+    others = ", ".join(sorted({*counts} - {name}))
+    alone = "" if count == len(refused) else f", which {count} of them break, beside {others}"
+    return f"constraints: none of {len(refused)} designs keeps {name}{alone}; the nearest has {nearest.text}"
+
+
+def front_of(design: Design, candidates: Sequence[Candidate]) -> NDArray[np.int64]:
+    """Numbers of the designs within the bounds that no other one dominates, sorted by the first objective; the first of
+    designs that agree in seven digits."""
+    import moocore
+
+    points = [to_minimise(design, candidate.results) for candidate in candidates]
+    within = [
+        number
+        for number, (point, candidate) in enumerate(zip(points, candidates, strict=True))
+        if np.isfinite(point).all() and not excesses(design, candidate.results).any()
+    ]
+    if not within:
+        return np.zeros(0, dtype=np.int64)
+    rounded = np.array([[float(f"{number:.7g}") for number in points[place]] for place in within])
+    front = np.array(within)[moocore.is_nondominated(rounded)]
+    return np.array(sorted(front, key=lambda number: tuple(points[number])), dtype=np.int64)
+
+
+def check_installed() -> None:
+    """Refuse a search if a library that it needs is missing.
+
+    Raises:
+        CampaignError: the message names the library.
+    """
+    for library in ("pymoo", "moocore"):
+        if find_spec(library) is None:
+            raise CampaignError(f"a search needs {library}: pip install 'warpimpact[optimise]'")
+
+
+class Optimiser:
+    """Points of a space, a generation at a time. They depend on the seed and on the results of earlier points."""
+
+    def __init__(self, design: Design) -> None:
+        from pymoo.algorithms.moo.nsga2 import NSGA2
+        from pymoo.core.mixed import MixedVariableDuplicateElimination, MixedVariableMating, MixedVariableSampling
+        from pymoo.core.problem import Problem
+        from pymoo.core.termination import NoTermination
+
+        self._space = design.space
+        self._names = [f"{number:03d}" for number in range(len(design.space.variables))]
+        kinds = {name: _kind(variable) for name, variable in zip(self._names, design.space.variables, strict=True)}
+        self._problem = Problem(vars=kinds, n_obj=len(design.objectives), n_ieq_constr=1 + len(design.bounds))
+        duplicates = MixedVariableDuplicateElimination()
+        self._algorithm = NSGA2(
+            pop_size=design.search.population,
+            sampling=MixedVariableSampling(),
+            mating=MixedVariableMating(eliminate_duplicates=duplicates),
+            eliminate_duplicates=duplicates,
         )
-        others = ", ".join(sorted({*broken} - {name}))
-        alone = "" if by_all or not others else f", which {len(broken[name])} of them break, beside {others}"
-        return f"constraints: none of {len(tried)} designs keeps {name}{alone}; the nearest has {nearest.text}"
+        self._algorithm.setup(self._problem, termination=NoTermination(), seed=design.search.seed, verbose=False)
+        self._population: Any = None
 
-    def searched(self) -> Searched:
-        records = list(self.records.values())
-        on_front = {id(record) for record in self.front}
-        front = [number for number, record in enumerate(records) if id(record) in on_front]
-        front.sort(key=lambda number: tuple(objectives(self.design, records[number])))
-        reference, scale = self.box or (np.zeros(0), np.zeros(0))
-        return Searched(
-            records=tuple(records),
-            front=np.array(front, dtype=np.int64),
-            refused=len(self.refused),
-            history=np.array(self.history, dtype=float).reshape(-1, 2),
-            reference=reference,
-            scale=scale,
-            pilots=len(self.pilots),
-        )
+    def ask(self) -> list[Array]:
+        """The next points; empty if there are no others."""
+        self._population = self._algorithm.ask()
+        if self._population is None or not len(self._population):
+            return []
+        return [self._space.at([float(one[name]) for name in self._names]) for one in self._population.get("X")]
+
+    def tell(self, objectives: Array, broken: Array) -> None:
+        """Tell the results of these points.
+
+        Args:
+            objectives: to minimise, shape [points, objectives].
+            broken: positive where a constraint is violated, shape [points, constraints].
+        """
+        from pymoo.core.evaluator import Evaluator
+        from pymoo.problems.static import StaticProblem
+
+        Evaluator().eval(StaticProblem(self._problem, F=objectives, G=broken), self._population)
+        self._algorithm.tell(infills=self._population)
 
 
-def _apart(place: Array, other: Array) -> float:
-    return float(np.abs(place - other).max(initial=0.0))
+def _kind(variable: Any) -> Any:
+    from pymoo.core.variable import Choice, Integer, Real
+
+    if variable.labels:
+        return Choice(options=list(range(len(variable.labels))))
+    return Real(bounds=(0.0, 1.0)) if variable.count is None else Integer(bounds=(0, variable.count - 1))

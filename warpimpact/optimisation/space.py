@@ -110,14 +110,6 @@ class Space:
                 seen.add(values.tobytes())
                 yield values
 
-    def some(self, count: int, seed: int) -> Iterator[Array]:
-        """The given number of random points."""
-        random = np.random.default_rng(seed)
-        for _ in range(count):
-            yield self.at(
-                [random.random() * (1.0 if variable.count is None else variable.count) for variable in self.variables]
-            )
-
     def tables(self, base: Mapping[str, Any], values: Array, name: str) -> dict[str, Any]:
         """The tables of the campaign of a point, from those of the design file, whose name is for errors."""
         data = json.loads(json.dumps(base, default=str))

@@ -1,4 +1,4 @@
-"""Figure of a search for designs: the front with its plates, references and solid plates, and variables along it."""
+"""Figure of a search for designs: the front with its plates, references, and variables along it."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from matplotlib.figure import Figure, SubFigure
 from warpimpact.campaign.campaign import Campaign
 from warpimpact.campaign.text import CampaignError
 from warpimpact.plotting.plate import hole_patches
-from warpimpact.plotting.style import BLUE, GREEN, GREY, VERMILION, all_bars, hide_sides, inscribe
+from warpimpact.plotting.style import BLUE, GREEN, VERMILION, all_bars, hide_sides, inscribe
 from warpimpact.results import front as f
 
 MOST_DRAWN = 6
@@ -31,8 +31,9 @@ _MARKS: tuple[Any, ...] = ("*", "P", "X", "^", "v")
 def front_figure(dataset: xarray.Dataset, folder: Path = Path()) -> Figure:
     """The front of a search by fresh hits with 95 % intervals, beside all computed designs; plates along it; and their
     variables. `folder` has the files that the design file names."""
-    leaders = front_leaders(dataset)
-    drawn = leaders[np.unique(np.round(np.linspace(0, len(leaders) - 1, min(MOST_DRAWN, len(leaders)))).astype(int))]
+    confirmed = np.flatnonzero(dataset[f.CONFIRMED].values)
+    places = np.linspace(0, len(confirmed) - 1, min(MOST_DRAWN, len(confirmed)))
+    drawn = confirmed[np.round(places).astype(int)]
     names = {int(place): _LETTERS[number] for number, place in enumerate(drawn)}
     figure = Figure(figsize=(12.0, 8.0 if names else 5.6), layout="constrained")
     rows = figure.subfigures(2 if names else 1, 1, height_ratios=(1.0, 2.4) if names else None, squeeze=False)[:, 0]
@@ -40,37 +41,9 @@ def front_figure(dataset: xarray.Dataset, folder: Path = Path()) -> Figure:
         _draw_plates(rows[0], dataset, names, folder)
     left, right = rows[-1].subfigures(1, 2, width_ratios=(1.7, 1.0))
     _draw_front(left.subplots(), dataset, names)
-    _draw_variables(right, dataset, leaders)
-    notes = [f"of each plate {_THUMBNAIL:g} mm × {_THUMBNAIL:g} mm"] if names else []
-    searched = np.isfinite(dataset[f.FOUND].values).all(axis=1)
-    searched[dataset[f.NUMBER].values] = False
-    if hidden := int((searched & ~holding(dataset)).sum()):
-        notes.append(
-            f"left out: {hidden} of {dataset.sizes['design']} designs, beyond the front by the few hits of the search "
-            "alone"
-        )
-    inscribe(figure, dataset, "; ".join(notes))
+    _draw_variables(right, dataset, confirmed)
+    inscribe(figure, dataset, f"of each plate {_THUMBNAIL:g} mm × {_THUMBNAIL:g} mm" if names else "")
     return figure
-
-
-def front_leaders(dataset: xarray.Dataset) -> np.ndarray[Any, np.dtype[np.int64]]:
-    """Places on the front of the designs that fresh hits tell apart."""
-    group, kept = dataset[f.GROUP].values, dataset[f.KEPT].values
-    leads = (group == np.arange(len(group))) & (kept == 1)
-    return np.flatnonzero(leads)
-
-
-def holding(dataset: xarray.Dataset) -> np.ndarray[Any, np.dtype[np.bool_]]:
-    """Designs that a leader of the front equals or beats in every objective, or that break a bound, shape [designs].
-
-    The others lie beyond the front by the few hits of the search only: among many designs the luckiest are the best.
-    """
-    goals, sign = np.isnan(dataset[f.ASKED_LIMIT].values), dataset[f.SIGN].values
-    limits, searched = sign * dataset[f.ASKED_LIMIT].values, sign * dataset[f.FOUND].values
-    front = (sign * dataset[f.FRESH].values)[front_leaders(dataset)][:, goals]
-    breaks = (searched[:, ~goals] > limits[~goals]).any(axis=1)
-    beaten = (front[None] <= searched[:, None, goals]).all(axis=-1).any(axis=1)
-    return np.asarray(breaks | beaten | (len(front) == 0))
 
 
 def _draw_plates(figure: SubFigure, dataset: xarray.Dataset, names: dict[int, str], folder: Path) -> None:
@@ -98,30 +71,25 @@ def campaign_at(dataset: xarray.Dataset, place: int, folder: Path) -> Campaign |
 
 
 def _draw_front(axes: Axes, dataset: xarray.Dataset, names: dict[int, str]) -> None:
-    labels, limits = dataset[f.LABEL].values, dataset[f.ASKED_LIMIT].values
+    labels, limits = dataset[f.GOAL_LABEL].values, dataset[f.GOAL_LIMIT].values
     goals = [place for place in range(len(labels)) if np.isnan(limits[place])]
     across, up = goals[0], goals[min(1, len(goals) - 1)]
-    every, fresh = dataset[f.FOUND].values, dataset[f.FRESH].values
-    shown = holding(dataset)
-    axes.plot(every[shown, across], every[shown, up], ".", color="0.82", markersize=3, zorder=1, label="other designs")
+    every, fresh = dataset[f.RESULT].values, dataset[f.FRESH].values
+    axes.plot(every[:, across], every[:, up], ".", color="0.82", markersize=3, zorder=1, label="other designs")
     if len(fresh):
         _draw_fresh(axes, dataset, (across, up), goals[2] if len(goals) == 3 else None)
-        solid = dataset[f.SOLID].values
-        if across != up and np.isfinite(solid[:, up]).any():
-            order = np.argsort(solid[:, across])
-            style: dict[str, Any] = {"color": GREY, "linestyle": "--", "marker": "D", "fillstyle": "none"}
-            axes.plot(solid[order, across], solid[order, up], **style, label="solid, of the same weight", zorder=2)
-    reference = (f.REFERENCE_FOUND, f.REFERENCE_LOW, f.REFERENCE_HIGH)
+    reference = (f.REFERENCE_RESULT, f.REFERENCE_LOW, f.REFERENCE_HIGH)
     ends = all_bars(*(dataset[column].values[:, up] for column in reference))
     for place, (name, mark) in enumerate(zip(dataset[f.REFERENCE].values, 4 * _MARKS, strict=False)):
-        at = dataset[f.REFERENCE_FOUND].values[place]
+        at = dataset[f.REFERENCE_RESULT].values[place]
         point: dict[str, Any] = {"color": VERMILION, "markersize": 11, "zorder": 5}
         axes.errorbar(at[across], at[up], yerr=ends[:, place, None], fmt=mark, label=str(name), **point)
     for number, (place, letter) in enumerate(names.items()):
         at, above = (fresh[place, across], fresh[place, up]), number % 2 == 0  # neighbours may lie close together
         axes.annotate(letter, at, xytext=(6, 6 if above else -15), textcoords="offset points", weight="bold", zorder=6)
     better = [
-        "less is better" if dataset[f.SIGN].values[objective] > 0 else "more is better" for objective in (across, up)
+        "less is better" if dataset[f.GOAL_SIGN].values[objective] > 0 else "more is better"
+        for objective in (across, up)
     ]
     axes.set(xlabel=f"{labels[across]}, {better[0]}", ylabel=fill(f"{labels[up]}, {better[1]}", _LONGEST_LABEL))
     axes.grid(color="0.92")
@@ -130,29 +98,28 @@ def _draw_front(axes: Axes, dataset: xarray.Dataset, names: dict[int, str]) -> N
 
 
 def _draw_fresh(axes: Axes, dataset: xarray.Dataset, shown: tuple[int, int], third: int | None) -> None:
-    """The front by fresh hits; designs that are no better than another one are hollow."""
+    """The front by fresh hits; designs that these take from the front are hollow."""
     across, up = shown
-    fresh, leaders = dataset[f.FRESH].values, front_leaders(dataset)
-    others = np.setdiff1d(np.arange(len(fresh)), leaders)
+    fresh, confirmed = dataset[f.FRESH].values, dataset[f.CONFIRMED].values == 1
     ends = all_bars(*(dataset[name].values[:, up] for name in (f.FRESH, f.FRESH_LOW, f.FRESH_HIGH)))
-    groups = ((leaders, "o", "front, fresh hits, 95 %", BLUE), (others, "o", "not told from another design", "white"))
-    for which, mark, label, face in groups:
-        if len(which):
+    groups = ((confirmed, "front, fresh hits, 95 %", BLUE), (~confirmed, "not on the front by fresh hits", "white"))
+    for which, label, face in groups:
+        if which.any():
             style: dict[str, Any] = {"color": BLUE, "markerfacecolor": face, "markersize": 6, "capsize": 2, "zorder": 4}
-            axes.errorbar(fresh[which, across], fresh[which, up], yerr=ends[:, which], fmt=mark, label=label, **style)
+            axes.errorbar(fresh[which, across], fresh[which, up], yerr=ends[:, which], fmt="o", label=label, **style)
     if third is not None:
         drawn = axes.scatter(fresh[:, across], fresh[:, up], c=fresh[:, third], s=36, zorder=5, cmap="viridis")
-        axes.figure.colorbar(drawn, ax=axes, label=str(dataset[f.LABEL].values[third]))
+        axes.figure.colorbar(drawn, ax=axes, label=str(dataset[f.GOAL_LABEL].values[third]))
 
 
-def _draw_variables(figure: SubFigure, dataset: xarray.Dataset, leaders: Any) -> None:
+def _draw_variables(figure: SubFigure, dataset: xarray.Dataset, places: Any) -> None:
     """Values over the first objective of the variables that count somewhere on the front."""
-    names, values = dataset[f.NAME].values, dataset[f.VALUE].values[dataset[f.NUMBER].values[leaders]]
+    names, values = dataset[f.NAME].values, dataset[f.VALUE].values[dataset[f.NUMBER].values[places]]
     shown = np.flatnonzero(np.isfinite(values).any(axis=0))
     if not len(shown):
         return
     panels = figure.subplots(len(shown), 1, sharex=True, squeeze=False)[:, 0]
-    over = dataset[f.FRESH].values[leaders, 0]
+    over = dataset[f.FRESH].values[places, 0]
     for place, axes in zip(shown, panels, strict=True):
         axes.plot(over, values[:, place], "o-", color=GREEN, markersize=4, linewidth=0.8)
         every = dataset[f.VALUE].values[:, place]
@@ -166,4 +133,4 @@ def _draw_variables(figure: SubFigure, dataset: xarray.Dataset, leaders: Any) ->
         axes.set_title(f"{name} [{unit}]" if unit else name, fontsize="small", loc="left", pad=2)
         axes.tick_params(labelsize="small")
         hide_sides(axes, "top", "right")
-    panels[-1].set_xlabel(str(dataset[f.LABEL].values[0]))
+    panels[-1].set_xlabel(str(dataset[f.GOAL_LABEL].values[0]))

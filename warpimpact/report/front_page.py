@@ -14,9 +14,9 @@ from numpy.typing import NDArray
 
 from warpimpact.campaign.campaign import Campaign
 from warpimpact.campaign.text import parsed
-from warpimpact.optimisation.evaluate import is_even
+from warpimpact.optimisation.design import is_even
 from warpimpact.optimisation.front_view import OF_FRONT, OF_REFERENCE, design_text, front_view, numbers_of
-from warpimpact.plotting.front import campaign_at, front_figure, front_leaders, holding
+from warpimpact.plotting.front import campaign_at, front_figure
 from warpimpact.plotting.style import data_url, png_url
 from warpimpact.report.words import templates
 from warpimpact.results import attributes as attr
@@ -46,16 +46,13 @@ def write_front_report(dataset: xarray.Dataset, path: Path, folder: Path) -> Non
     Raises:
         OutputError: the file cannot be written.
     """
-    goals = np.flatnonzero(np.isnan(dataset[f.ASKED_LIMIT].values))
+    goals = np.flatnonzero(np.isnan(dataset[f.GOAL_LIMIT].values))
     across, up = int(goals[0]), int(goals[min(1, len(goals) - 1)])
     chart = _Chart(dataset, across, up)
-    leaders = {*front_leaders(dataset).tolist()}
-    designs = [
-        _design(dataset, place, chart, folder) | {"leads": place in leaders} for place in range(dataset.sizes["front"])
-    ]
+    designs = [_design(dataset, place, chart, folder) for place in range(dataset.sizes["front"])]
     references = [
         {"name": str(name), "numbers": numbers_of(dataset, OF_REFERENCE, place)}
-        | chart.at(dataset[f.REFERENCE_FOUND].values[place])
+        | chart.at(dataset[f.REFERENCE_RESULT].values[place])
         for place, name in enumerate(dataset[f.REFERENCE].values)
     ]
     page = (
@@ -85,7 +82,7 @@ class _Chart:
         from matplotlib.ticker import MaxNLocator
 
         self._dataset, self._shown = dataset, [across, up]
-        names = (f.FOUND, f.FRESH, f.FRESH_LOW, f.FRESH_HIGH, f.SOLID, f.REFERENCE_FOUND)
+        names = (f.RESULT, f.FRESH, f.FRESH_LOW, f.FRESH_HIGH, f.REFERENCE_RESULT)
         every = np.concatenate([dataset[name].values[:, self._shown] for name in names])
         every = every[np.isfinite(every).all(axis=1)]
         low, high = every.min(axis=0), every.max(axis=0)
@@ -105,11 +102,9 @@ class _Chart:
 
     def drawn(self) -> dict[str, Any]:
         """What the page draws beside the front."""
-        dataset, labels = self._dataset, self._dataset[f.LABEL].values
-        searched, solid = dataset[f.FOUND].values[:, self._shown], dataset[f.SOLID].values[:, self._shown]
-        shown = searched[holding(dataset)]
+        dataset, labels = self._dataset, self._dataset[f.GOAL_LABEL].values
+        shown = dataset[f.RESULT].values[:, self._shown]
         every = (self._place(design) for design in shown if np.isfinite(design).all())
-        line = [self._place(plate) for plate in solid[np.argsort(solid[:, 0])] if np.isfinite(plate).all()]
         ticks = [
             [tick for tick in at if low <= tick <= high]
             for at, low, high in zip(self._ticks, self._low, self._high, strict=True)
@@ -127,9 +122,6 @@ class _Chart:
             "label_across": str(labels[self._shown[0]]),
             "label_up": str(labels[self._shown[1]]),
             "every": "".join(f"M{x},{y}h0" for x, y in every),
-            "solid": "M" + "L".join(f"{x},{y}" for x, y in line)
-            if len(line) > 1 and self._shown[0] != self._shown[1]
-            else "",
         }
 
     def bar(self, place: int) -> str:
@@ -149,6 +141,7 @@ def _design(dataset: xarray.Dataset, place: int, chart: _Chart, folder: Path) ->
         "numbers": numbers_of(dataset, OF_FRONT, place),
         "variables": design_text(dataset, int(dataset[f.NUMBER][place])),
         "campaign": text,
+        "confirmed": bool(dataset[f.CONFIRMED][place]),
         "bar": chart.bar(place),
         "plate": None if campaign is None else _plate(campaign, str(dataset[f.FILE].values[place])),
         "map": None if campaign is None or f.HIT_VALUE not in dataset else _map(dataset, place, campaign, text),
@@ -181,7 +174,7 @@ def _map(dataset: xarray.Dataset, place: int, campaign: Campaign, text: str) -> 
     label = f"map of {dataset[f.FILE].values[place]}"
     effects = [
         str(label)
-        for label, name in zip(dataset[f.LABEL].values, dataset[f.ASKED].values, strict=True)
+        for label, name in zip(dataset[f.GOAL_LABEL].values, dataset[f.GOAL].values, strict=True)
         if not str(name).startswith(tuple(WEIGHTS))
     ]
     return {

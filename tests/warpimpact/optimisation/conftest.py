@@ -32,8 +32,7 @@ measure = "mean(residual_energy_fraction)"
 SEARCH = """[search]
 designs = 12
 population = 6
-hits = 16
-most_hits = 64
+hits = 64
 confirm_hits = 64
 """
 

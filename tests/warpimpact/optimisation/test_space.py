@@ -8,8 +8,7 @@ import pytest
 
 from warpimpact.campaign.text import CampaignError
 from warpimpact.campaign.toml import toml_text
-from warpimpact.optimisation.feasible import checked, corner_radius, hole_sizes
-from warpimpact.optimisation.judged import weights_of
+from warpimpact.optimisation.objectives import corner_radius, hole_sizes, violations, weights_of
 from warpimpact.scene import CirclePattern, EllipsePattern, Plate, SlotPattern, SquarePattern
 
 from .conftest import HOLES, WEIGHT_AND_ENERGY, design
@@ -32,7 +31,9 @@ def test_what_stands_below_an_alternative_counts_with_it_alone() -> None:
     slots = one.space.at([2, 1, 0.5, 0.5])
     assert slots.tolist()[:2] == [4.0, 1.0]
     assert np.isnan(slots[2])
-    plate = checked(one, one.tables(slots)).campaign.plate
+    campaign, _ = violations(one, one.tables(slots))
+    assert campaign is not None
+    plate = campaign.plate
     assert (plate.thickness, plate.pattern.shape, plate.pattern.spacing[0]) == (0.004, "slot", 8.5e-3)
     assert one.space.text(slots) == "thickness = 4 mm, plate.pattern = slots, plate.pattern[slots].spacing.0 = 0.0085"
 
@@ -61,7 +62,6 @@ def test_points_of_a_finite_space_each_once() -> None:
         ((WEIGHT_AND_ENERGY, '[[bounds]]\nmeasure = "P(stopped)"\nat_most = "much"'), "bounds[0].at_most"),
         (('[[objectives]]\nmeasure = "mean(base_depth)"',), "needs a table [[layer]]"),
         (('[[objectives]]\nmeasure = "P(broken)"',), "needs output.bending = true"),
-        ((WEIGHT_AND_ENERGY, "[search]\nhits = 64\nmost_hits = 32"), "most_hits = 32"),
         ((WEIGHT_AND_ENERGY, "[stop]\nhalf_width = 1"), "a design file takes no [stop]"),
         ((WEIGHT_AND_ENERGY, '[[threats]]\nname = "a"\n[[threats]]\nname = "a"'), 'the name "a" twice'),
         ((WEIGHT_AND_ENERGY, '[constraints]\nsmallest_hole = "-1 mm"'), "constraints.smallest_hole"),
@@ -105,8 +105,8 @@ def test_sizes_of_holes(pattern: CirclePattern, narrow: float, wide: float, corn
 )
 def test_constraints_are_checked_before_anything_is_computed(constraint: str, broken: str) -> None:
     one = design(HOLES, WEIGHT_AND_ENERGY, "[constraints]", constraint)
-    found = checked(one, one.tables(one.space.at([])))
-    assert [broken in violation.text for violation in found.violations] == ([True] if broken else [])
+    _, found = violations(one, one.tables(one.space.at([])))
+    assert [broken in violation.text for violation in found] == ([True] if broken else [])
 
 
 @pytest.mark.parametrize(
@@ -122,18 +122,18 @@ def test_the_weight_of_the_add_on_alone_is_bounded_and_sought(constraint: str, b
     sought = WEIGHT_AND_ENERGY.replace('"areal_density"', '"add_on_areal_density"')
     assert sought != WEIGHT_AND_ENERGY
     one = design(HOLES, sought, base, "[constraints]", constraint)
-    found = checked(one, one.tables(one.space.at([])))
-    texts = [violation.text for violation in found.violations if violation.text.startswith("areal density")]
+    campaign, found = violations(one, one.tables(one.space.at([])))
+    texts = [violation.text for violation in found if violation.text.startswith("areal density")]
     assert [text.startswith(broken) for text in texts] == ([True] if broken else [])
-    assert found.campaign is not None
-    weights = weights_of(found.campaign.target)
+    assert campaign is not None
+    weights = weights_of(campaign.target)
     assert weights["add_on_areal_density"] == pytest.approx(weights["areal_density"] - 78.5)
-    assert one.objectives[0].asked.quantity.label == "areal density of the add-on"
+    assert one.objectives[0].spec.quantity.label == "areal density of the add-on"
 
 
 def test_holes_that_overlap_are_no_campaign() -> None:
     one = design(HOLES.replace("5 mm", "8.5 mm"), WEIGHT_AND_ENERGY)
-    assert "overlap or touch" in checked(one, one.tables(one.space.at([]))).violations[0].text
+    assert "overlap or touch" in violations(one, one.tables(one.space.at([])))[1][0].text
 
 
 @pytest.mark.parametrize(

@@ -56,7 +56,7 @@ QUESTIONS: dict[str, tuple[str, ...]] = {
         + '[variables]\nthickness = { low = "2 mm", high = "7 mm", step = "1 mm" }\n'
         + '[[objectives]]\nmeasure = "areal_density"\n[[objectives]]\nmeasure = "mean(residual_energy_fraction)"\n'
         + "[search]\n"
-        + "designs = 6\npopulation = 6\nhits = 16\nmost_hits = 64\nconfirm_hits = 64\n",
+        + "designs = 6\npopulation = 6\nhits = 64\nconfirm_hits = 64\n",
     ),
 }
 """By name: the command, its file, and options."""
