@@ -19,12 +19,11 @@ import math
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from itertools import combinations, pairwise
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import xarray
 
-from warpimpact.analysis.comparable import check_same_question, other_shots
 from warpimpact.analysis.comparison_short import short_view
 from warpimpact.analysis.comparison_text import ComparedPlates, comparison_view
 from warpimpact.analysis.contestants import Contestant, Difference, Pair
@@ -33,6 +32,8 @@ from warpimpact.analysis.numbers import of_each
 from warpimpact.analysis.plate_text import common_name, plate_text, reference_name, solid_note, solid_plate, weights_of
 from warpimpact.analysis.summary import breaks_promise, hits_at_two_levels, sampling_note
 from warpimpact.results import attributes as attr
+from warpimpact.results import variables as v
+from warpimpact.results.files import ResultError
 from warpimpact.results.measures import Measure
 from warpimpact.results.per_hit import base_thickness, has_base
 from warpimpact.results.tallies import dealing, estimate_from
@@ -50,6 +51,9 @@ from warpimpact.statistics.comparisons import (
 from warpimpact.statistics.intervals import Array, Estimate, Estimating, estimate_of
 from warpimpact.view.view import html_of
 
+_SAME_PLACE = 1e-9
+"""Rounding of a place in units of the cell."""
+_ANGLES = ("obliquity", "azimuth", "pitch", "yaw")
 _SAME_WEIGHT = 1.01
 """Largest ratio of the areal densities of plates that count as equally heavy."""
 
@@ -84,7 +88,7 @@ def compare(
             measure needs.
     """
     for dataset, name in zip(datasets[1:], names[1:], strict=True):
-        check_same_question(datasets[0], names[0], dataset, name)
+        _check_same_question(datasets[0], names[0], dataset, name)
     pairs = list(combinations(range(len(datasets)), 2))
     used = [_used(datasets[i], names[i], datasets[j], names[j]) for i, j in pairs]
     asked = [measures_of(dataset, texts) for dataset in datasets]
@@ -188,7 +192,7 @@ def _notes_of_bases(datasets: Sequence[xarray.Dataset], plates: Sequence[Contest
 def _used(result: xarray.Dataset, name: str, other: xarray.Dataset, other_name: str) -> Pair:
     """How the hits of two results are used."""
     common = min(result.sizes["hit"], other.sizes["hit"])
-    why = other_shots(result.isel(hit=slice(common)), other.isel(hit=slice(common)))
+    why = _other_shots(result.isel(hit=slice(common)), other.isel(hit=slice(common)))
     return Pair(name, other_name, 0 if why else common, why)
 
 
@@ -296,3 +300,53 @@ def _materials(datasets: Sequence[xarray.Dataset], names: Sequence[str]) -> Iter
             read = reader_of(QUANTITIES[quantity].type).text if quantity in QUANTITIES else "{:g}".format
             shown = ["not given" if value is None else read(value) for value in values.values()]
             yield f"{quantity} ({of_each(list(values), shown)})"
+
+
+def _check_same_question(result: xarray.Dataset, name: str, other: xarray.Dataset, other_name: str) -> None:
+    """Refuse results with another core, impact or stand-offs.
+
+    Raises:
+        ResultError: the message names the first difference.
+    """
+    asked, asked_other = _question(result, name), _question(other, other_name)
+    if (mismatch := first_difference(asked, asked_other)) is not None:
+        place, was, now = mismatch
+        raise ResultError(f"{other_name}: cannot be compared with {name}: {place} is {now} here and {was} there")
+
+
+def _question(dataset: xarray.Dataset, name: str) -> dict[str, Any]:
+    """What must be the same for plates to be compared."""
+    attributes = dataset.attrs
+    if not {attr.CORE, attr.IMPACT} <= attributes.keys():
+        raise ResultError(f"{name}: has no description of its core and impact, which a comparison needs; run it again")
+    output = {"standoffs": dataset[v.STANDOFF].values.tolist(), "standoff_point": attributes[attr.STANDOFF_POINT]}
+    limit = {"limit": attributes[attr.LIMIT]} if attr.LIMIT in attributes else {}
+    return limit | {
+        "core": json.loads(attributes[attr.CORE]),
+        "impact": _in_degrees(json.loads(attributes[attr.IMPACT])),
+        "output": output,
+    }
+
+
+def _in_degrees(impact: dict[str, Any]) -> dict[str, Any]:
+    """An impact whose angles in numbers are in degrees."""
+    return {
+        name: f"{math.degrees(value)!r} deg" if name in _ANGLES and isinstance(value, float) else value
+        for name, value in impact.items()
+    }
+
+
+def _other_shots(result: xarray.Dataset, other: xarray.Dataset) -> str:
+    """Why the shots of two results differ; empty where they are the same."""
+    if dealing(result) != dealing(other):
+        return "their shots have other replicates"
+    for axis, coordinate in enumerate((v.HIT_Y, v.HIT_Z)):
+        here, there = (
+            dataset[coordinate].values / dataset.attrs[attr.PLATE_PERIOD][axis] for dataset in (result, other)
+        )
+        if not np.allclose(here, there, rtol=0.0, atol=_SAME_PLACE):
+            return "their shots hit other places of the cell"
+    for name in (*v.SHOT_VARIABLES, v.MASS):
+        if name in result and not (name in other and np.array_equal(result[name], other[name])):
+            return f"their shots differ in {name}"
+    return ""

@@ -16,7 +16,7 @@ from warpimpact.analysis.comparison_text import (
 )
 from warpimpact.analysis.contestants import Difference
 from warpimpact.analysis.effectiveness import Score
-from warpimpact.analysis.numbers import Ends, intervals_text
+from warpimpact.analysis.numbers import interval_text
 from warpimpact.view.view import Column, Section, Table, number
 
 
@@ -92,10 +92,10 @@ def _ranks(comparison: ComparedPlates, score: Score) -> Table:
     parted = all("add-on" in plate.weights for plate in comparison.plates)
     rows = []
     for rank, plate, shown in comparison.ranked(score.name):
-        value = (shown.value, intervals_text(Ends(shown.low, shown.high)))
+        value = (shown.value, interval_text(shown.low, shown.high))
         ratio = (shown.ratio,) if by_ratio else ()
         pair = differences.get(plate.name)
-        apart = (None, "") if pair is None else (pair.value, intervals_text(Ends(pair.low, pair.high)))
+        apart = (None, "") if pair is None else (pair.value, interval_text(pair.low, pair.high))
         add_on = (plate.weights["add-on"],) if parted else ()
         rows.append((rank, plate.name, *add_on, plate.areal_density, *value, *ratio, *apart))
     best = comparison.ordered(score.name)[0]

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 from warpimpact.analysis.contestants import Contestant, Difference, Pair
 from warpimpact.analysis.effectiveness import Score
-from warpimpact.analysis.numbers import Ends, intervals_text, number_text, of_each
+from warpimpact.analysis.numbers import interval_text, number_text, of_each
 from warpimpact.analysis.plate_text import common_name
 from warpimpact.view.view import Column, Section, Table, number, text_of
 
@@ -155,7 +155,7 @@ def _ranking(comparison: ComparedPlates, measure: Score) -> Section:
     reference, parted = comparison.reference, all("add-on" in plate.weights for plate in comparison.plates)
     rows = []
     for rank, plate, shown in comparison.ranked(measure.name):
-        value = (plate.areal_density, shown.value, intervals_text(shown.ends), shown.ratio, shown.ratio_text)
+        value = (plate.areal_density, shown.value, shown.interval, shown.ratio, shown.ratio_text)
         rows.append(
             (rank if ranked else "-", plate.name, *value, plate.weights.get("add-on"), shown.alone)[: 7 + 2 * parted]
         )
@@ -185,13 +185,13 @@ def _in_words(pair: Difference, measure: Score, what: str) -> str:
         text = f"difference{what} {number_text(pair.value)}"
         return f"{pair.one} and {pair.other}: {text}, of which these hits give no interval"
     if not pair.told_apart:
-        interval = intervals_text(Ends(pair.low, pair.high))
+        interval = interval_text(pair.low, pair.high)
         difference = f"difference{what} {number_text(pair.value)} ({interval})"
         return f"{pair.one} and {pair.other} cannot be told apart: {difference}"
     better = measure.measure.higher_is_better
     names = [pair.one, pair.other] if (pair.value > 0.0) == (better is not False) else [pair.other, pair.one]
     by_hits = (pair.low, pair.high)
-    interval = intervals_text(Ends(*(negative(by_hits) if pair.value < 0.0 else by_hits)))
+    interval = interval_text(*(negative(by_hits) if pair.value < 0.0 else by_hits))
     than = f"{'higher' if better is None else 'better'} than"
     return f"{names[0]} {than} {names[1]} by {number_text(abs(pair.value))}{what} ({interval})"
 

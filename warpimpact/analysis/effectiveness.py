@@ -15,7 +15,7 @@ import numpy as np
 import xarray
 
 from warpimpact.analysis.estimates import Evidence, asked_measures, by_hit_of, evidence
-from warpimpact.analysis.numbers import Ends, intervals_text
+from warpimpact.analysis.numbers import intervals_text
 from warpimpact.analysis.plate_text import plate_text, reference_name, solid_note
 from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
@@ -78,9 +78,9 @@ class Score:
         return self.measure.text
 
     @property
-    def ends(self) -> Ends:
-        """Its intervals."""
-        return Ends(self.low, self.high, self.numerics)
+    def interval(self) -> str:
+        """Its interval, with the shift by the numerics, as text."""
+        return intervals_text(self.low, self.high, self.numerics)
 
     @property
     def ratio_text(self) -> str:
@@ -88,7 +88,7 @@ class Score:
         if math.isnan(self.ratio) or math.isnan(self.ratio_low):
             return ""
         numerics = None if self.numerics is None else self.numerics / self.solid
-        return intervals_text(Ends(self.ratio_low, self.ratio_high, numerics))
+        return intervals_text(self.ratio_low, self.ratio_high, numerics)
 
 
 @dataclass(frozen=True)
@@ -215,7 +215,7 @@ def measures_table(measures: Sequence[Score], reference: str | None = "solid pla
         (
             measure.measure.title,
             measure.value,
-            intervals_text(measure.ends) if measure.hit is None else f"at hit {measure.hit}",
+            measure.interval if measure.hit is None else f"at hit {measure.hit}",
             measure.solid,
             measure.ratio,
             measure.ratio_text,

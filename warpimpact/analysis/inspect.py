@@ -11,7 +11,7 @@ import xarray
 
 from warpimpact.analysis.effectiveness import effectiveness_view
 from warpimpact.analysis.estimates import estimated, means_of, slices, status_shares
-from warpimpact.analysis.numbers import ends_of, intervals_text
+from warpimpact.analysis.numbers import intervals_text
 from warpimpact.analysis.plate_text import plate_numbers, weights_of
 from warpimpact.analysis.summary import (
     levels_note,
@@ -88,7 +88,7 @@ def _statuses(dataset: xarray.Dataset) -> Section:
     percent = "{:.2%}".format
     columns = Column("status"), Column("share", write=percent, right=True), Column("95 % interval")
     rows = [
-        (status, share.value, intervals_text(ends_of(share), percent))
+        (status, share.value, intervals_text(share.low, share.high, share.numerics, percent, percent))
         for status, share in status_shares(dataset).items()
     ]
     return Section([Table(columns, rows)])
@@ -120,7 +120,7 @@ def _numbers(dataset: xarray.Dataset) -> Section:
 
 def _row(measure: Measure, estimate: Estimate) -> tuple[Any, ...]:
     shown = estimate.times(measure.display.factor)
-    interval = intervals_text(ends_of(shown), "{:.2f}".format)
+    interval = intervals_text(shown.low, shown.high, shown.numerics, "{:.2f}".format, "{:.2f}".format)
     if measure.kind != "mean":
         return ("", f"{measure.share * 100.0:g} % quantile", shown.value, interval, None)
     name = f"{measure.column.label}, {measure.display.shown}"

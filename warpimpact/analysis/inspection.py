@@ -13,7 +13,7 @@ from warpimpact.analysis.effectiveness import Score, effectiveness
 from warpimpact.analysis.estimates import slices
 from warpimpact.analysis.hit_map import hit_points
 from warpimpact.analysis.inspect import inspect_text
-from warpimpact.analysis.numbers import intervals_text, number_text
+from warpimpact.analysis.numbers import number_text
 from warpimpact.analysis.plate_text import reference_name
 from warpimpact.analysis.summary import numerics_sentence
 from warpimpact.records.group import failures
@@ -65,7 +65,7 @@ def inspect(dataset: xarray.Dataset | str | Path) -> Inspection:
 
 def verdict(dataset: xarray.Dataset, first: Score) -> str:
     """How many cores pass, one measure of protection, and the accuracy of the numerics."""
-    count, interval = sum(int(passed(part).sum()) for part in slices(dataset[[v.STATUS]])), intervals_text(first.ends)
+    count, interval = sum(int(passed(part).sum()) for part in slices(dataset[[v.STATUS]])), first.interval
     protection = f"{first.measure.title} {number_text(first.value)}"
     protection += "" if interval == "-" else f" ({interval})"
     protection += "" if np.isnan(first.ratio) else f", {number_text(first.ratio)} of the {reference_name(dataset)}'s"

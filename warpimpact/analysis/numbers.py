@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from typing import NamedTuple
 
 from warpimpact.statistics.intervals import Estimate
 
@@ -26,32 +25,18 @@ def interval_text(low: float, high: float, text: Callable[[float], str] = number
     return f"at least {text(low)}" if math.isnan(high) else f"{text(low)} to {text(high)}"
 
 
-class Ends(NamedTuple):
-    """Intervals of a number: by the hits, and the largest shift by the numerics, None or NaN where unknown."""
-
-    low: float
-    high: float
-    numerics: float | None = None
-
-
-def ends_of(estimate: Estimate) -> Ends:
-    """The intervals of an estimate."""
-    return Ends(estimate.low, estimate.high, estimate.numerics)
-
-
 def intervals_text(
-    ends: Ends, text: Callable[[float], str] | None = None, shift: Callable[[float], str] | None = None
+    low: float,
+    high: float,
+    numerics: float | None = None,
+    text: Callable[[float], str] = number_text,
+    shift: Callable[[float], str] = "{:.2g}".format,
 ) -> str:
-    """The intervals of a number as text. Ends have four digits by default. The shift by the numerics has two, or the
-    format of the ends if only that is given."""
-    shift = shift or text or "{:.2g}".format
-    text = text or number_text
-    text_of_ends = interval_text(ends.low, ends.high, text)
-    if text_of_ends == "-":
-        return text_of_ends
-    if ends.numerics is not None and not math.isnan(ends.numerics):
-        text_of_ends += f", numerics ± {shift(ends.numerics)}"
-    return text_of_ends
+    """An interval by the hits and the largest shift by the numerics, which is None or NaN where unknown, as text."""
+    interval = interval_text(low, high, text)
+    if interval == "-" or numerics is None or math.isnan(numerics):
+        return interval
+    return f"{interval}, numerics ± {shift(numerics)}"
 
 
 def plus_minus(estimate: Estimate, number: str, half_width: str) -> str:

@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 from warpimpact.analysis.estimates import estimated, means_of, slices
-from warpimpact.analysis.numbers import ends_of, interval_text, intervals_text
+from warpimpact.analysis.numbers import interval_text, intervals_text
 from warpimpact.campaign.tested_range import range_line
 from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
@@ -112,7 +112,7 @@ def summary_text(dataset: Result) -> str:
     for measure, estimate in estimated(dataset, means).items():
         if estimate.count or measure != _DEPTH:
             shown, unit = estimate.times(measure.display.factor), measure.display.shown
-            interval = intervals_text(ends_of(shown), "{:.2f}".format)
+            interval = intervals_text(shown.low, shown.high, shown.numerics, "{:.2f}".format, "{:.2f}".format)
             rows.append((measure.column.label, shown.value, unit, interval, shown.spread, _counted(shown.count, hits)))
     notes = (numerics_note(dataset), levels_note(dataset))
     return text_of([Section([shares, Table(columns, rows), *stop_lines(dataset), *filter(None, notes)])])

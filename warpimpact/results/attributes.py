@@ -148,7 +148,7 @@ LIMIT_HIGHEST = _declared("limit_highest", "number")
 LIMIT_ERROR = _declared("limit_error", "number")
 """Of a limit velocity [m/s] or of a limit thickness [m]."""
 LIMIT_FACTORS = _declared("limit_material_factors", "pair", "1")
-"""Ends of the 90 % interval of a limit velocity over the velocity, from the evidence on the material."""
+"""Ends of the 90 % interval of a limit velocity over the velocity, from what is known of the material."""
 
 # A replayed hit
 HIT = _declared("hit", "number")

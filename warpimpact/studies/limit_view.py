@@ -9,7 +9,7 @@ import numpy as np
 import xarray
 
 from warpimpact.analysis.estimates import estimated
-from warpimpact.analysis.numbers import ends_of, interval_text, intervals_text
+from warpimpact.analysis.numbers import interval_text, intervals_text
 from warpimpact.analysis.plate_text import reference_name
 from warpimpact.analysis.proxy import proxy
 from warpimpact.analysis.summary import numerics_note
@@ -97,7 +97,7 @@ def _estimates(dataset: xarray.Dataset, texts: Sequence[str]) -> Table:
     rows = []
     for measure, estimate in estimated(dataset, measures_of(dataset, texts)).items():
         shown = estimate.times(measure.display.factor)
-        interval = intervals_text(ends_of(shown), "{:.5g}".format, "{:.2g}".format)
+        interval = intervals_text(shown.low, shown.high, shown.numerics, "{:.5g}".format)
         rows.append((measure.text, shown.value, interval, measure.title))
     columns = Column("measure"), number("value", digits=".5g"), Column("95 % interval"), Column("meaning")
     return Table(columns, rows)
@@ -119,7 +119,7 @@ def _left_out(dataset: xarray.Dataset) -> Iterator[str]:
 
 
 def _expected(dataset: xarray.Dataset) -> Iterator[str]:
-    """Where a test would find the limit velocity, from the evidence on the material; empty without evidence."""
+    """Where a test would find the limit velocity, from what is known of the material; empty where that is unknown."""
     value = dataset[v.LIMITS[dataset.attrs[attr.LIMIT]].value].values
     if attr.LIMIT_FACTORS not in dataset.attrs or not np.isfinite(value).any():
         return
