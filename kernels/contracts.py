@@ -41,7 +41,7 @@ class TargetKind:
     Attributes:
         first_step: length of the `shortest` step [s] → length of the first step [s].
         begin: state at the first mid-step → Reach before the first step, and status of the shot, which may have ended.
-        find_reach: Reach of the step before → Reach of this step, which is at the pose, at the time `now` and `dt` long
+        find_reach: Reach of the step before → Reach of this step, which is at the pose and `dt` long
             [s]. `last` is the change of the velocities in the step before.
         law_at: law of the plate → the law with the onset of contact of all that the step can touch.
         load_on: → Load of all that the step touches.
@@ -54,7 +54,7 @@ class TargetKind:
     first_step: Annotated[wp.Function, "context: Context, shortest: real"]
     begin: Annotated[wp.Function, "context: Context, state: State"]
     find_reach: Annotated[
-        wp.Function, "context: Context, before: Reach, state: State, pose: Pose, last: Change, now: real, dt: real"
+        wp.Function, "context: Context, before: Reach, state: State, pose: Pose, last: Change, dt: real"
     ]
     law_at: Annotated[wp.Function, "context: Context, law: Law, reach: Reach"]
     load_on: Annotated[wp.Function, "context: Context, law: Law, reach: Reach, pose: Pose, dt: real"]

@@ -174,7 +174,6 @@ def build(variant: Variant) -> SimpleNamespace:
         state: struct.State,
         pose: struct.Pose,
         last: struct.Change,
-        now: real,
         dt: real,
     ):
         """The Reach of a step in every layer. Layers that the core has left are recorded; `last` is the change of its
@@ -219,8 +218,7 @@ def build(variant: Variant) -> SimpleNamespace:
                 speed = wp.length(state.velocity)
                 if before.first != k or before.last != k:  # other layers slow the core down while it leaves this one
                     speed = wp.length(pose.velocity - (since / dt) * last.velocity)
-                use.passage.leave(context, k, state, speed, since, now, reach.flight)
-                use.passage.fly_on(context, k, state, rear, reach.flight)
+                use.passage.leave(context, k, state, speed, since, reach.flight)
             stack.near[here] = near
         reach.footprint = footprint
         reach.behind = use.passage.has_left(context.passage, shot, 0)

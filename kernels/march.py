@@ -153,7 +153,7 @@ def build(variant: Variant) -> SimpleNamespace:
             # These are the closing speeds at mid-step if this step changes the velocities as the last one did.
             pose.velocity += half * last.velocity
             pose.omega += half * last.omega
-            reach = kind.find_reach(context, reach, state, pose, last, now, dt)
+            reach = kind.find_reach(context, reach, state, pose, last, dt)
             status = status_of(context, reach, state, pose, touched)
             if status == RUNNING:
                 law = kind.law_at(context, context.law, reach)

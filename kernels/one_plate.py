@@ -64,7 +64,6 @@ def build(variant: Variant) -> SimpleNamespace:
         state: struct.State,
         pose: struct.Pose,
         last: struct.Change,
-        now: real,
         dt: real,
     ):
         """The footprint of the step on the plate."""

@@ -5,7 +5,7 @@ from types import SimpleNamespace
 
 import warp as wp
 
-from . import constants, lanes, rigid_body, structs
+from . import lanes, rigid_body, structs
 from .status import Status
 from .variant import Variant
 
@@ -15,7 +15,6 @@ def build(variant: Variant) -> SimpleNamespace:
     """Device functions of the passage through the layers for one variant."""
     struct = structs.build(variant)
     real, vec3 = variant.real, variant.vec3
-    slowest = real(constants.SLOWEST.value)
     use = variant.use(lanes, rigid_body)
     ENTERED = wp.constant(int(Status.ARRESTED))  # the status of a core in a layer until it leaves the layer
 
@@ -26,12 +25,6 @@ def build(variant: Variant) -> SimpleNamespace:
             passage.status[shot, k] = Status.NOT_REACHED
             passage.velocity[shot, k] = real(wp.nan)
             passage.tilt[shot, k] = real(wp.nan)
-            passage.time[shot, k] = real(wp.nan)
-            passage.deflection[shot, k] = real(wp.nan)
-            for m in range(passage.standoff_tilt.shape[2]):
-                passage.standoff_tilt[shot, k, m] = real(wp.nan)
-                passage.standoff_pitch[shot, k, m] = real(wp.nan)
-                passage.standoff_yaw[shot, k, m] = real(wp.nan)
         passage.stopped_in[shot] = -1
         passage.depth[shot] = real(wp.nan)
 
@@ -47,22 +40,8 @@ def build(variant: Variant) -> SimpleNamespace:
         return passage.status[shot, layer] == Status.PERFORATED or passage.status[shot, layer] == Status.MISSED
 
     @wp.func
-    def fly_on(context: struct.Context, layer: wp.int32, state: struct.State, rear: real, flight: vec3):
-        """Record the attitude of a core in free flight at distances behind a layer's rear face [m]."""
-        passage, target, shot = context.passage, context.target, context.shot
-        axis, forwards = use.rigid_body.axis_of(state.attitude), wp.max(state.velocity[0], slowest)
-        for m in range(target.standoffs.shape[0]):
-            distance = target.standoffs[m] + (rear - state.position[0])
-            then = use.rigid_body.axis_at(context.body, axis, state.angular_momentum, target.ahead, forwards, distance)
-            passage.standoff_tilt[shot, layer, m] = use.rigid_body.angle_between(then, flight)
-            passage.standoff_pitch[shot, layer, m] = wp.atan2(then[2], then[0])
-            passage.standoff_yaw[shot, layer, m] = wp.atan2(then[1], then[0])
-
-    @wp.func
-    def leave(
-        context: struct.Context, layer: wp.int32, state: struct.State, speed: real, since: real, now: real, flight: vec3
-    ):
-        """Record how a core left a layer at a speed [m/s], `since` [s] before the time `now`."""
+    def leave(context: struct.Context, layer: wp.int32, state: struct.State, speed: real, since: real, flight: vec3):
+        """Record how a core left a layer at a speed [m/s], `since` [s] ago."""
         passage, shot = context.passage, context.shot
         axis = use.rigid_body.axis_of(state.attitude)
         axis = use.rigid_body.turned(context.body, axis, state.angular_momentum, -since)
@@ -71,8 +50,6 @@ def build(variant: Variant) -> SimpleNamespace:
         passage.status[shot, layer] = wp.where(entered, Status.PERFORATED, Status.MISSED)
         passage.velocity[shot, layer] = speed
         passage.tilt[shot, layer] = use.rigid_body.angle_between(axis, flight)
-        passage.time[shot, layer] = now - since
-        passage.deflection[shot, layer] = use.rigid_body.angle_between(state.velocity, flight)
 
     @wp.func
     def conclude(

@@ -304,8 +304,6 @@ def _build(double: bool, many_plates: bool) -> SimpleNamespace:
         `stretch` is the ratio of the longest allowed step to the shortest one while a core touches nothing but the
         layer, and `slowing` is the share of its speed that a longer step may take. Where there are several layers,
         windows that `slide` follow a core that leaves them.
-        `standoffs` are distances behind the rear face of every layer [m], which count for the point `ahead` of the
-        centre of mass [m].
         """
 
         count: wp.int32
@@ -313,8 +311,6 @@ def _build(double: bool, many_plates: bool) -> SimpleNamespace:
         first: wp.int32
         weakens: wp.array(dtype=wp.bool)
         by_path: wp.array(dtype=wp.bool)
-        standoffs: wp.array(dtype=real)
-        ahead: real
         slowing: real
         slide: wp.bool
         front: wp.array2d(dtype=wp.float64)
@@ -601,22 +597,14 @@ def _build(double: bool, many_plates: bool) -> SimpleNamespace:
     class Passage:
         """How each core left each layer: arrays of shape [shots, layers], empty for one plate.
 
-        Velocity, tilt and time are taken at the instant when the last point of the core leaves the layer through its
+        Velocity and tilt are taken at the instant when the last point of the core leaves the layer through its
         rear face; NaN where it does not leave. Per shot: the layer in which the core came to rest, or −1, and the
         largest distance of its points behind this layer's front face [m].
-
-        `deflection` is that of the velocity at this instant; `standoff_tilt`, `standoff_pitch` and `standoff_yaw`, of
-        shape [shots, layers, stand-offs], are those of a core that flies freely from there on.
         """
 
         status: wp.array2d(dtype=wp.int32)
         velocity: wp.array2d(dtype=real)
         tilt: wp.array2d(dtype=real)
-        time: wp.array2d(dtype=real)
-        deflection: wp.array2d(dtype=real)
-        standoff_tilt: wp.array3d(dtype=real)
-        standoff_pitch: wp.array3d(dtype=real)
-        standoff_yaw: wp.array3d(dtype=real)
         stopped_in: wp.array(dtype=wp.int32)
         depth: wp.array(dtype=real)
 

@@ -72,7 +72,6 @@ def test_work_of_a_normal_hit_is_that_of_all_layers(gap: float, device: str) -> 
     assert (outcomes.layer_status == Status.PERFORATED).all()
     assert outcomes.residual_velocity == pytest.approx(expected, abs=0.4)  # κ takes some; measured: 0.1
     assert outcomes.layer_residual_velocity[:, -1] == pytest.approx(outcomes.residual_velocity, abs=1e-3)
-    assert (np.diff(outcomes.layer_time, axis=1) > 0.0).all()
 
 
 def test_depth_in_a_base_is_that_of_the_energy_left(device: str) -> None:
@@ -93,7 +92,6 @@ def test_depth_in_a_base_is_that_of_the_energy_left(device: str) -> None:
     assert (outcomes.stopped_in == 1).all()
     assert (outcomes.layer_status == [Status.PERFORATED, Status.ARRESTED]).all()
     assert outcomes.depth == pytest.approx(expected, abs=0.1e-3)
-    assert np.isnan(outcomes.layer_time[:, 1]).all()
 
 
 def test_far_layers_are_a_chain_of_single_plates(device: str) -> None:
@@ -134,7 +132,6 @@ def test_flight_between_layers_is_exact_for_a_core_that_turns(device: str) -> No
     assert np.degrees(jumps.tilt).max() > 25.0
     assert_alike(jumps, steps, velocity=0.2, angle=0.2)
     assert jumps.layer_residual_velocity[:, 0] == pytest.approx(steps.layer_residual_velocity[:, 0], abs=2e-3)
-    assert jumps.layer_time[:, 1] == pytest.approx(steps.layer_time[:, 2], abs=1e-7)
 
 
 def test_a_layer_that_is_missed_changes_nothing(device: str) -> None:

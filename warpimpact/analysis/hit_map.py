@@ -94,7 +94,7 @@ def hit_map(
     return xarray.DataArray(image, coordinates | known, (v.HIT_Z, v.HIT_Y), str(variable), array.attrs)
 
 
-_DIMENSIONS = {("hit",), ("hit", "standoff"), ("hit", "layer"), v.LAYER_STANDOFF_TILT.dims}
+_DIMENSIONS = {("hit",), ("hit", "standoff"), ("hit", "layer")}
 """Dimensions of variables with one number per hit, once a stand-off and a layer are chosen."""
 
 
@@ -115,10 +115,8 @@ def chosen(
         if layer is not None and not 0 <= layer < layers:
             raise ValueError(f"the result has no layer {layer}; it has layers 0 (the plate) to {layers - 1}")
         array = array.isel(layer=-1 if layer is None else layer)
-    for name in (v.STANDOFF, v.LAYER_STANDOFF):
-        if name in array.dims:
-            place = -1 if standoff is None else place_of_standoff(dataset[name].values, standoff)
-            array = array.isel({name: place})
+    if v.STANDOFF in array.dims:
+        array = array.isel(standoff=-1 if standoff is None else place_of_standoff(dataset[v.STANDOFF].values, standoff))
     return array
 
 

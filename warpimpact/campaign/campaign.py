@@ -290,7 +290,6 @@ class Campaign(Model):
                 exclusions.IRREDUCIBLE: hits.irreducible,
                 exclusions.LISTED_STRENGTH: "strength" in (hits.listed or {}),
                 exclusions.LAYERS: bool(self.layer),
-                exclusions.LAYER_STANDOFFS: bool(self.output.layer_standoffs),
                 exclusions.BENDING: self.output.bending,
                 exclusions.STRENGTH: self.core.strength is not None or "strength" in (hits.listed or {}),
                 exclusions.NODAL: numerics.scheme == "nodal",
@@ -365,7 +364,7 @@ class Campaign(Model):
     @model_validator(mode="after")
     def _output_is_possible(self) -> Self:
         self.output.check_bending(self.core)
-        self.output.check_standoffs(self.core, self.target)
+        self.output.check_standoffs(self.core)
         return self
 
     @model_validator(mode="after")

@@ -101,9 +101,8 @@ def _values(
         yield f"{layer_name(k)}.gap", "layer.gap", gap
     for name, value in impact:
         yield f"impact.{name}", f"impact.{name}", value
-    for name in ("standoffs", "layer_standoffs"):
-        for standoff in getattr(record, name):
-            yield f"output.{name}", "output.standoffs", standoff
+    for standoff in record.standoffs:
+        yield "output.standoffs", "output.standoffs", standoff
     for name, column in ((hits and hits.listed) or {}).items():
         table = QUANTITIES[name].table
         kind = table if table == "hits" else f"{table}.{name}"

@@ -5,6 +5,7 @@ from typing import Any
 
 REMOVED_KEYS: dict[str, str] = {
     "search.allow_untested": "leave it out; the front names designs outside the tested range",
+    "output.layer_standoffs": "layer_tilt and layer_residual_velocity say how a core leaves each layer",
     "assumptions": "run warpimpact sensitivity CAMPAIGN.toml",
     "burst": "cracks and bulges decide several hits on one plate, and the model lacks them; compute single hits",
     "layer.degradation_depth": "leave it out: a layer weakens as a whole; give thick layers degradation = 1",

@@ -169,13 +169,12 @@ def _fill_passage(memory: Memory, hits: list[Struck]) -> None:
     for k, hit in enumerate(hits):
         flight = line_of_flight(float(shots.obliquity[k]), float(shots.azimuth[k]))
         for layer in range(layers):
-            velocity, axis, time = hit.left[layer, :3], hit.left[layer, 3:6], hit.left[layer, 6]
-            has_left = not math.isnan(time)
+            velocity, axis = hit.left[layer, :3], hit.left[layer, 3:6]
+            has_left = not math.isnan(hit.left[layer, 6])
             columns["status"][k, layer] = _layer_status(hit.status, has_left, bool(hit.touched[layer]))
             if has_left:
-                columns["velocity"][k, layer], columns["time"][k, layer] = np.linalg.norm(velocity), time
+                columns["velocity"][k, layer] = np.linalg.norm(velocity)
                 columns["tilt"][k, layer] = _angle(axis, flight)
-                columns["deflection"][k, layer] = _angle(velocity, flight)
         resting = [layer for layer in range(layers) if columns["status"][k, layer] == Status.ARRESTED]
         if hit.status is Status.ARRESTED and resting:
             columns["stopped_in"][k] = resting[-1]

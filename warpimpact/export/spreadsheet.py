@@ -23,8 +23,7 @@ def to_dataframe(dataset: xarray.Dataset) -> pd.DataFrame:
     """One row per hit, in the units of the Dataset.
 
     A variable with stand-offs, axes or layers gets one column for each: ``tilt_130mm``, ``angular_velocity_x``,
-    ``layer_tilt_0``, ``layer_standoff_tilt_0_50mm``. ``status`` and
-    ``layer_status_0`` are words. An angle that was given as 30° is 30.
+    ``layer_tilt_0``. ``status`` and ``layer_status_0`` are words. An angle that was given as 30° is 30.
     """
     columns: dict[str, Any] = {name: _as_given(array) for name, array in _columns(dataset)}
     for name, variable in _statuses(dataset).items():
@@ -64,10 +63,6 @@ def _columns(dataset: xarray.Dataset) -> Iterator[tuple[str, xarray.DataArray]]:
         elif array.dims == ("hit", "layer"):
             for layer in range(array.sizes["layer"]):
                 yield f"{name}_{layer}", array[:, layer]
-        elif array.dims == v.LAYER_STANDOFF_TILT.dims:
-            for layer in range(array.sizes["layer"]):
-                for index, standoff in enumerate(dataset[v.LAYER_STANDOFF].values):
-                    yield f"{name}_{layer}_{standoff * 1e3:g}mm", array[:, layer, index]
 
 
 def _units(dataset: xarray.Dataset) -> dict[str, str]:

@@ -51,7 +51,7 @@ where it did not reach the layer."""
 
 _SIGNED = {
     *(v.AZIMUTH, v.IMPACT_PITCH, v.IMPACT_YAW, v.EDGE_DISTANCE),
-    *(v.PITCH, v.YAW, v.LAYER_STANDOFF_PITCH, v.LAYER_STANDOFF_YAW),
+    *(v.PITCH, v.YAW),
 }
 
 
@@ -81,14 +81,10 @@ def shown(dataset: xarray.Dataset, variable: str, standoff: float | None = None,
     array = _selected(dataset, variable, standoff, layer)
     unit = STORED[array.attrs["units"]]
     exists = np.isfinite(array.values) & (passed(dataset) if variable in OF_PASSED else True)
-    title = name = words(
-        variable.removeprefix("layer_").removeprefix("standoff_") if variable in v.LAYER_NUMBERS else variable
-    )
+    title = name = words(variable.removeprefix("layer_"))
     if "standoff" in array.coords:
         title += f", {float(array[v.STANDOFF]) * MM:g} mm behind the {struck(dataset)}"
-    if v.LAYER_STANDOFF in array.coords:
-        title += f", {float(array[v.LAYER_STANDOFF]) * MM:g} mm behind layer {_number(dataset, layer)}"
-    elif variable in v.LAYER_NUMBERS:
+    if variable in v.LAYER_NUMBERS:
         title += f", layer {_number(dataset, layer)}"
     if array.attrs["long_name"] != title:
         title += f"\n{array.attrs['long_name']}"

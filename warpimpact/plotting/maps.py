@@ -114,14 +114,14 @@ def overview(dataset: xarray.Dataset) -> Figure:
 
 
 def layers_figure(dataset: xarray.Dataset) -> Figure:
-    """A row of maps for each layer: how the cores ended in it, their velocity behind it, and their tilt at the farthest
-    stand-off that they reach in free flight, or on leaving the layer. A layer that no core left shows their depth."""
+    """A row of maps for each layer: how the cores ended in it, and their velocity and tilt behind it. A layer that no
+    core left shows their depth."""
     dataset = mirrored(dataset)
     layers = dataset.sizes["layer"]
     figure, panels = _sheet_of_one(dataset, maps=3 * layers, columns=3, note="; layer 0 is the plate")
     for layer, (status, *others) in enumerate(zip(*[iter(panels)] * 3, strict=True)):
         draw_status(status, dataset, layer)
-        columns = [shown(dataset, v.LAYER_RESIDUAL_VELOCITY, layer=layer), _tilt_behind(dataset, layer)]
+        columns = [shown(dataset, variable, layer=layer) for variable in v.LAYER_NUMBERS]
         if not np.isfinite(columns[0].values).any():
             columns = [_depth_in(dataset, layer)]
         for axes, column in zip(others, columns, strict=False):
@@ -136,15 +136,6 @@ def _depth_in(dataset: xarray.Dataset, layer: int) -> Shown:
     column = shown(dataset, v.DEPTH)
     values = np.where(dataset[v.STOPPED_IN].values == layer, column.values, np.nan)
     return column._replace(values=values, title=f"depth in layer {layer}\nthat any point of the core reached")
-
-
-def _tilt_behind(dataset: xarray.Dataset, layer: int) -> Shown:
-    standoffs = dataset[v.LAYER_STANDOFF].values.tolist() if v.LAYER_STANDOFF in dataset else []
-    for standoff in reversed(standoffs):
-        column = shown(dataset, v.LAYER_STANDOFF_TILT, standoff, layer)
-        if np.isfinite(column.values).any():
-            return column
-    return shown(dataset, v.LAYER_TILT, layer=layer)
 
 
 def save_maps(dataset: xarray.Dataset, folder: Path, stem: str, *, overwrite: bool = False) -> list[Path]:

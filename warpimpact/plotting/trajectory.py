@@ -67,30 +67,9 @@ def poses_in_plate(dataset: xarray.Dataset) -> dict[str, Pose]:
 
 
 def poses_behind(dataset: xarray.Dataset) -> dict[str, Pose]:
-    """Poses of the core at the stand-offs, by distance: those behind layers that it reaches, and those behind the
-    target, if it passes that."""
+    """Poses of the core at the stand-offs behind the target, by distance; empty if it does not pass."""
     standoffs = dataset[v.STANDOFF].values.tolist() if passed(dataset) else []
-    return _poses_behind_layers(dataset) | {
-        f"{standoff * _MM:g} mm": _pose_at(dataset, standoff) for standoff in standoffs
-    }
-
-
-def _poses_behind_layers(dataset: xarray.Dataset) -> dict[str, Pose]:
-    """Poses at the stand-offs behind all layers but the last one. Free flight leads from step to step there."""
-    if v.LAYER_STANDOFF not in dataset:
-        return {}
-    path, poses = dataset[v.PLATE_POSITION].values, {}
-    for layer, rear in enumerate(dataset[v.LAYER_REAR].values[:-1]):
-        for place, standoff in enumerate(dataset[v.LAYER_STANDOFF].values):
-            angles = [float(dataset[name][layer, place]) for name in (v.LAYER_STANDOFF_YAW, v.LAYER_STANDOFF_PITCH)]
-            if np.isfinite(angles).all():
-                axis = _axis_of(*np.radians(angles))
-                x = rear + standoff - _ahead(dataset) * axis[0]
-                before = int(np.argmax(path[:, 0] > x)) - 1
-                share = (x - path[before, 0]) / (path[before + 1, 0] - path[before, 0])
-                position = path[before] + share * (path[before + 1] - path[before])
-                poses[f"{standoff * _MM:g} mm behind\nlayer {layer}"] = Pose(position, axis)
-    return poses
+    return {f"{standoff * _MM:g} mm": _pose_at(dataset, standoff) for standoff in standoffs}
 
 
 def silhouette(dataset: xarray.Dataset, pose: Pose, view: str) -> Array:

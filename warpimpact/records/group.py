@@ -28,7 +28,6 @@ class Returned(NamedTuple):
         flight: the flight behind the target, the struct `Report` of kernels/free_flight.py.
         bending: the struct `Bending` of kernels/bending.py, shape [shots] on the host; [0] if it is not recorded.
         passage: through the layers, the struct `Passage` of kernels/passage.py; empty if the plate stands alone.
-        free: whether a core flies free at each stand-off behind each layer, shape [layers, stand-offs].
     """
 
     status: NDArray[np.int8]
@@ -36,7 +35,6 @@ class Returned(NamedTuple):
     flight: Any
     bending: NDArray[Any]
     passage: Any
-    free: NDArray[np.bool_]
 
     @property
     def failed(self) -> NDArray[np.bool_]:

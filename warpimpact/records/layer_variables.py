@@ -11,7 +11,7 @@ import numpy as np
 
 from warpimpact.kernels.status import Status
 from warpimpact.records.group import Columns, Returned, VariableGroup
-from warpimpact.records.variable import BEHIND_LAYER, HITS, IN_LAYER, Variable
+from warpimpact.records.variable import HITS, IN_LAYER, Variable
 
 if TYPE_CHECKING:
     from warpimpact.scene import Scene, Shots
@@ -27,32 +27,8 @@ LAYER_RESIDUAL_VELOCITY = Variable(
 LAYER_TILT = Variable(
     "layer_tilt", IN_LAYER, "degree", "angle between core axis and line of fire when its last point leaves the layer"
 )
-LAYER_TIME = Variable(
-    "layer_time", IN_LAYER, "s", "time when the last point of the core leaves the layer, since the first touch"
-)
 STOPPED_IN = Variable("stopped_in", HITS, "1", "deepest layer that the core rests in; -1 where it does not rest in one")
 DEPTH = Variable("depth", HITS, "m", "how far behind the front face of that layer any point of the core came")
-
-LAYER_DEFLECTION = Variable(
-    "layer_deflection", IN_LAYER, "degree", "angle between velocity and line of fire behind the layer"
-)
-LAYER_STANDOFF_TILT = Variable(
-    "layer_standoff_tilt", BEHIND_LAYER, "degree", "angle between core axis and line of fire behind the layer"
-)
-LAYER_STANDOFF_PITCH = Variable(
-    "layer_standoff_pitch",
-    BEHIND_LAYER,
-    "degree",
-    "pitch of the core behind the layer, projected into the x-z plane",
-    mirror="along_z",
-)
-LAYER_STANDOFF_YAW = Variable(
-    "layer_standoff_yaw",
-    BEHIND_LAYER,
-    "degree",
-    "yaw of the core behind the layer, projected into the x-y plane",
-    mirror="along_y",
-)
 
 LAYER_FRONT = Variable("layer_front", ("layer",), "m", "front face of the layer, from that of the target")
 LAYER_REAR = Variable("layer_rear", ("layer",), "m", "rear face of the layer, from the front face of the target")
@@ -62,9 +38,6 @@ LAYER = Variable("layer", ("layer",), "1", "number of the layer; the plate is la
 LAYER_NAME = Variable("layer_name", ("layer",), "1", "name of the layer")
 LAYER_MATERIAL = Variable("layer_material", ("layer",), "1", "material of the layer in the catalogue, or empty")
 LAYER_LABELS = (LAYER, LAYER_NAME, LAYER_MATERIAL)
-LAYER_STANDOFF = Variable("layer_standoff", ("layer_standoff",), "m", "distance behind the rear face of a layer")
-LAYER_COORDINATES = (LAYER_STANDOFF,)
-
 _CODES = (LAYER_STATUS, STOPPED_IN)
 
 
@@ -78,28 +51,12 @@ def _columns(returned: Returned, group: VariableGroup) -> Columns:
     return {name: values.astype(np.int8 if name in _CODES else np.float64) for name, values in arrays.items()}
 
 
-def _behind(returned: Returned) -> Columns:
-    """Columns of the free flight behind each layer; NaN at stand-offs that the next layer is too near for."""
-    columns = _columns(returned, LAYER_STANDOFF_VARIABLES)
-    return {
-        name: values if name == LAYER_DEFLECTION else np.where(returned.free, values, np.nan)
-        for name, values in columns.items()
-    }
-
-
 LAYER_VARIABLES: VariableGroup = VariableGroup(
     "With layers behind the plate",
-    (LAYER_STATUS, LAYER_RESIDUAL_VELOCITY, LAYER_TILT, LAYER_TIME, STOPPED_IN, DEPTH),
+    (LAYER_STATUS, LAYER_RESIDUAL_VELOCITY, LAYER_TILT, STOPPED_IN, DEPTH),
     _layered,
     lambda returned: _columns(returned, LAYER_VARIABLES),
     beside=LAYER_FACES,
 )
-LAYER_STANDOFF_VARIABLES: VariableGroup = VariableGroup(
-    "With `output.layer_standoffs`",
-    (LAYER_DEFLECTION, LAYER_STANDOFF_TILT, LAYER_STANDOFF_PITCH, LAYER_STANDOFF_YAW),
-    lambda scene, shots: _layered(scene, shots) and bool(scene.record.layer_standoffs),
-    _behind,
-    beside=LAYER_COORDINATES,
-)
-LAYER_NUMBERS = (LAYER_RESIDUAL_VELOCITY, LAYER_TILT, LAYER_TIME, *LAYER_STANDOFF_VARIABLES)
-"""Variables with one number per hit and layer, or per hit, layer and stand-off behind the layer."""
+LAYER_NUMBERS = (LAYER_RESIDUAL_VELOCITY, LAYER_TILT)
+"""Variables with one number per hit and layer."""

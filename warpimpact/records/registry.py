@@ -6,7 +6,7 @@ from warpimpact.records.bending_variables import BENDING_VARIABLES, BROKEN_VARIA
 from warpimpact.records.continuum_variables import CONTINUUM_VARIABLES
 from warpimpact.records.exit import EXIT_VARIABLES, OUTCOME_VARIABLES
 from warpimpact.records.group import VariableGroup
-from warpimpact.records.layer_variables import LAYER_STANDOFF_VARIABLES, LAYER_VARIABLES
+from warpimpact.records.layer_variables import LAYER_VARIABLES
 from warpimpact.records.limit_variables import LIMIT_RECORDS
 from warpimpact.records.variable import Variable
 
@@ -16,7 +16,6 @@ RECORDS: tuple[VariableGroup, ...] = (
     BENDING_VARIABLES,
     BROKEN_VARIABLES,
     LAYER_VARIABLES,
-    LAYER_STANDOFF_VARIABLES,
     *LIMIT_RECORDS,
     CONTINUUM_VARIABLES,
 )

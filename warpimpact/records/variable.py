@@ -11,7 +11,7 @@ import numpy as np
 Mirror: TypeAlias = Literal["along_y", "along_z"]
 
 HITS, AT_STANDOFF, VECTORS = ("hit",), ("hit", "standoff"), ("hit", "axis")
-IN_LAYER, BEHIND_LAYER = ("hit", "layer"), ("hit", "layer", "layer_standoff")
+IN_LAYER = ("hit", "layer")
 """Dimensions of the variables of shots."""
 MAIN = ("run", "inspect", "plot", "report")
 """Commands that show the main variables by default."""

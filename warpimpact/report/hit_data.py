@@ -112,13 +112,11 @@ def _columns(dataset: xarray.Dataset) -> dict[str, Shown]:
                 name = words(variable) + ("" if standoff is None else f" at {standoff * MM:g} mm")
                 columns[name] = column._replace(label=f"{name} [{column.label.partition('[')[2]}")
     for variable in (name for name in v.LAYER_NUMBERS if name in dataset):
-        at_standoff = v.LAYER_STANDOFF in variable.dims
         for layer in range(dataset.sizes["layer"]):
-            for standoff in dataset[v.LAYER_STANDOFF].values.tolist() if at_standoff else [None]:
-                column = shown(dataset, variable, standoff, layer)
-                if np.isfinite(column.values).any():
-                    name, _, _ = column.title.partition("\n")
-                    columns[name] = column._replace(label=f"{name} [{column.label.partition('[')[2]}")
+            column = shown(dataset, variable, layer=layer)
+            if np.isfinite(column.values).any():
+                name, _, _ = column.title.partition("\n")
+                columns[name] = column._replace(label=f"{name} [{column.label.partition('[')[2]}")
     return columns
 
 

@@ -77,13 +77,10 @@ def to_table(
         v.STANDOFF: np.array(scene.record.standoffs),
         v.AXIS: ["x", "y", "z"],
     }
-    if v.LAYER_STANDOFF_TILT in outcomes:
-        coordinates[v.LAYER_STANDOFF] = np.array(scene.record.layer_standoffs)
     coordinates |= finer or {}
     coordinates |= outlines_in(scene.target.layers[0], *((-0.5 * side, 0.5 * side) for side in period))
     coordinates |= labels(scene.target)
-    of_layers = (*v.LAYER_LABELS, *v.LAYER_COORDINATES)
-    along = (*v.COORDINATES, *v.OUTLINE_VARIABLES, *of_layers, *v.GROUPS["finer"])
+    along = (*v.COORDINATES, *v.OUTLINE_VARIABLES, *v.LAYER_LABELS, *v.GROUPS["finer"])
     values = _values(scene, shots, outcomes)
     values[v.EDGE_DISTANCE] = scene.target.layers[0].edge_distance(shots.hit_y, shots.hit_z)
     zero = np.zeros(len(shots))

@@ -17,7 +17,6 @@ HOLED_LAYERS = "a [[layer]] with a pattern or a rim"
 UNEVEN = 'hits.sampling = "grid" or "list"'
 ONE_SCRAMBLING = "hits.replicates = 1"
 LISTED_STRENGTH = "a column strength in hits.file"
-LAYER_STANDOFFS = "output.layer_standoffs"
 WHOLE_PLATE, SIZE, MARGIN = 'hits.area = "plate"', "size of the plate", "margin"
 BY_TIME, STAGGERED, HOLES = "plate.degradation_interval", "staggered", "holes"
 POLYGONS = 'shape = "polygons"'
@@ -55,7 +54,6 @@ EXCLUDED = (
 NEEDS = (
     Rule(LISTED_STRENGTH, BENDING, "a core breaks by its bending stress"),
     Rule(STRENGTH, BENDING, "a core breaks by its bending stress"),
-    Rule(LAYER_STANDOFFS, LAYERS, "behind a plate alone output.standoffs count"),
     Rule(WHOLE_PLATE, SIZE, "only a finite plate can be covered"),
     Rule(MARGIN, SIZE, "only a finite plate has a rim"),
 )

@@ -3,8 +3,6 @@
 from itertools import pairwise
 from typing import TYPE_CHECKING, Annotated, Any, Literal, Self, TypeAlias
 
-import numpy as np
-from numpy.typing import NDArray
 from pydantic import Field, field_validator, model_validator
 
 from .core import AnyCore, Core
@@ -21,18 +19,15 @@ class Record(Model):
 
     Attributes:
         standoffs: distances behind the rear face of the target at which the attitude is reported [m], increasing.
-        layer_standoffs: distances behind the rear face of every layer at which the attitude is reported [m],
-            increasing; NaN if the next layer is too near for free flight.
         standoff_point: point of the core at which stand-offs are measured.
         bending: whether the largest bending moment and stress of each core are reported.
     """
 
     standoffs: Annotated[tuple[PositiveLength, ...], Field(fail_fast=True, max_length=64)] = ()
-    layer_standoffs: Annotated[tuple[PositiveLength, ...], Field(fail_fast=True, max_length=64)] = ()
     standoff_point: Literal["centre_of_mass", "nose"] = "centre_of_mass"
     bending: Annotated[bool, Field(strict=True)] = False
 
-    @field_validator("standoffs", "layer_standoffs")
+    @field_validator("standoffs")
     @classmethod
     def _increase(cls, standoffs: tuple[float, ...]) -> tuple[float, ...]:
         for before, after in pairwise(standoffs):
@@ -55,46 +50,19 @@ class Record(Model):
         """Distance of the stand-off point ahead of the centre of mass [m]."""
         return core.mass_properties.centre_of_mass if self.standoff_point == "nose" else 0.0
 
-    def _clearance(self, core: Core) -> float:
-        """Distance from a layer beyond which a core certainly does not touch it, in any attitude [m]."""
-        return core.bounding_radius + self.ahead(core)
-
-    def check_standoffs(self, core: Core, target: Target) -> None:
-        """Refuse stand-offs at which a core may still be in the target, and layer stand-offs that fit in no gap.
+    def check_standoffs(self, core: Core) -> None:
+        """Refuse stand-offs at which a core may still be in the target.
 
         Raises:
             ValueError: the message names the stand-off and what is allowed.
         """
-        needed = self._clearance(core)
-        for name in ("standoffs", "layer_standoffs"):
-            first = min(getattr(self, name), default=needed)
-            if first < needed:
-                raise ValueError(
-                    f"got {self._name}.{name} of {first:g} m, "
-                    f"but a core of this size is certain to be out of the target only from {needed:.4g} m"
-                )
-        free = self.flies_free(core, target)[:-1]
-        if len(target.layers) == 1 or free.any(axis=0).all():
-            return
-        widest = max(target.gaps)
-        if widest < 2.0 * needed:
+        needed = core.bounding_radius + self.ahead(core)
+        first = min(self.standoffs, default=needed)
+        if first < needed:
             raise ValueError(
-                f"got {self._name}.layer_standoffs and gaps of at most {widest:g} m, but a core of this size is "
-                f"certain to fly free only in gaps of at least {2.0 * needed:.4g} m; layer_tilt gives the tilt "
-                "as the core leaves each layer"
+                f"got {self._name}.standoffs of {first:g} m, "
+                f"but a core of this size is certain to be out of the target only from {needed:.4g} m"
             )
-        farthest = max(self.layer_standoffs)
-        raise ValueError(
-            f"got {self._name}.layer_standoffs of {farthest:g} m, but the widest gap is {widest:g} m, and free flight "
-            f"is certain to last only to {widest - needed:.4g} m behind the layer in front of it"
-        )
-
-    def flies_free(self, core: Core, target: Target) -> NDArray[np.bool_]:
-        """Whether a core certainly touches nothing, in any attitude, at each stand-off behind each layer, shape
-        [layers, stand-offs]; always true behind the last layer."""
-        gaps = np.array([*target.gaps[1:], np.inf])
-        reach = np.array(self.layer_standoffs) + self._clearance(core)
-        return np.asarray(reach <= gaps[:, None] * (1.0 + 1e-12))
 
     @property
     def _name(self) -> str:
@@ -133,7 +101,7 @@ class Scene(Model):
     @model_validator(mode="after")
     def _record_is_possible(self) -> Self:
         self.record.check_bending(self.core)
-        self.record.check_standoffs(self.core, self.target)
+        self.record.check_standoffs(self.core)
         return self
 
     @property

@@ -55,13 +55,10 @@ class Memory:
         self.inputs, self._kept = inputs_of(self.stage, prepared, self.put)
         self.rings = max(len(surface.rings.station) for surface in prepared.surfaces)
         self.patches = max(len(surface.rings.station) * surface.around for surface in prepared.surfaces)
-        self.free = scene.record.flies_free(scene.core, scene.target)
         self.bending = wp.empty(count if variant.bends else 0, dtype=self.stage.Bending, device=device)
         self.history = wp.empty((count * prepared.rows, WIDTH), dtype=variant.real, device=device)
-        layers, standoffs = self.free.shape
         recorded = count if variant.layered else 0
-        sizes = (recorded,), (recorded, layers), (recorded, layers, standoffs)
-        self.passage = empty(self.stage.Passage, device, *sizes)
+        self.passage = empty(self.stage.Passage, device, (recorded,), (recorded, len(scene.target.layers)))
 
     def build(self) -> float:
         """Compile the kernels, once per version and machine, and load them; returns the time [s]."""
@@ -182,7 +179,7 @@ class Memory:
         inputs = [self.inputs.shots, self.inputs.target, contact, self.put(standoffs, wp.float64), ahead]
         wp.launch(flight.kernel, count, inputs=inputs, outputs=[report], device=self.device)
         status = contact.status.numpy().astype(np.int8)
-        return Returned(status, contact, report, self.bending.numpy(), self.passage, self.free)
+        return Returned(status, contact, report, self.bending.numpy(), self.passage)
 
 
 _BUILDING = threading.Lock()

@@ -96,7 +96,7 @@ def _free_surface(prepared: Prepared) -> dict[str, float]:
 
 def _target_of(stage: Any, prepared: Prepared, put: Put) -> tuple[Any, Any]:
     """The Target, and the arrays of its plates that must be kept alive."""
-    target, kept, materials, record = stage.Target(), None, prepared.materials, prepared.scene.record
+    target, kept, materials = stage.Target(), None, prepared.materials
     target.count = len(materials)
     if prepared.variant.layered or prepared.variant.tabled:
         target.plates, kept = plates_of(stage.Plate, [grid for plates in prepared.plates for grid in plates], put)
@@ -105,7 +105,6 @@ def _target_of(stage: Any, prepared: Prepared, put: Put) -> tuple[Any, Any]:
     for name, dtype in {"weakens": wp.bool, "by_path": wp.bool}.items():
         setattr(target, name, put(np.array([getattr(material, name) for material in materials]), dtype))
     target.slowing, target.slide = prepared.resolution.slowing, prepared.slide
-    target.standoffs, target.ahead = put(np.array(record.layer_standoffs)), record.ahead(prepared.scene.core)
     for name, variable in stage.Target.vars.items():
         if getattr(variable.type, "ndim", 1) == 2:
             columns = prepared.stretch if name == "stretch" else [getattr(material, name) for material in materials]

@@ -203,9 +203,7 @@ def joined(sweep: Sweep, points: Sequence[xarray.Dataset]) -> xarray.Dataset:
     always have them. Hits that a point does not have are NaN. Points are in the order of `sweep.campaigns`.
     """
     every: dict[str, Any] = {v.HIT: np.arange(max(point.sizes["hit"] for point in points), dtype=np.int32)}
-    for along in (v.STANDOFF, v.LAYER_STANDOFF):
-        if all(along in point.coords for point in points):
-            every[along] = np.unique(np.concatenate([point[along].values for point in points]))
+    every[v.STANDOFF] = np.unique(np.concatenate([point[v.STANDOFF].values for point in points]))
     same = [_with(every, point) for point in points]
     names = tuple(swept.name for swept in sweep.inputs)
     first = same[0]

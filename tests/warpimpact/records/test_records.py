@@ -96,8 +96,7 @@ def some(count: int = 3) -> Outcomes:
     rng = np.random.default_rng(1)
     vectors = {name: rng.random((count, 3)) for name in ("exit_velocity", "angular_velocity")}
     angles = {name: rng.random((count, 2)) for name in ("tilt", "pitch", "yaw")}
-    behind = {name: rng.random((count, 2, 2)) for name in ("layer_standoff_pitch", "layer_standoff_yaw")}
-    return Outcomes(status=np.arange(count, dtype=np.int8), **vectors, **angles, **behind)
+    return Outcomes(status=np.arange(count, dtype=np.int8), **vectors, **angles)
 
 
 def test_rows_are_chosen_joined_and_put() -> None:
@@ -139,7 +138,6 @@ LAYERED = {"layer_status", "stopped_in", "layer_tilt"}
         (None, (), {"bending": True}, ALWAYS | BENT),
         (2e9, (), {"bending": True}, ALWAYS | BENT | {"broken"}),
         (None, (LAYER,), {}, ALWAYS | LAYERED),
-        (None, (LAYER,), {"layer_standoffs": ("0.03 m",)}, ALWAYS | LAYERED | {"layer_standoff_yaw"}),
         (2e9, (LAYER,), {"bending": True}, ALWAYS | LAYERED | BENT | {"broken"}),
     ],
 )
@@ -148,9 +146,7 @@ def test_a_scene_says_what_is_recorded(strength: Any, layers: Any, record: Any, 
     scene = Scene(core=core, target=Target(layers=(PLATE, *layers)), record=Record(**record))
     shots = make_shots(Impact(velocity=825.0), Hits(count=1), PLATE)
     groups = [group for group in registry.RECORDS if group.recorded(scene, shots)]
-    assert {str(one) for group in groups for one in group} & (
-        ALWAYS | LAYERED | BENT | {"broken", "layer_standoff_yaw"}
-    ) == expected
+    assert {str(one) for group in groups for one in group} & (ALWAYS | LAYERED | BENT | {"broken"}) == expected
 
 
 def test_each_name_has_one_variable() -> None:

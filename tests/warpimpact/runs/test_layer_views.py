@@ -1,4 +1,4 @@
-"""Stand-offs behind layers in a campaign: what a result, its table, its figures and a replay tell of them."""
+"""Layers behind a plate: what a result, its table and its figures say of each."""
 
 from pathlib import Path
 
@@ -8,15 +8,12 @@ import xarray
 from matplotlib.colors import to_hex
 
 from warpimpact import Campaign, hit_map, run, to_dataframe
-from warpimpact.analysis.hit_map import mirrored
 from warpimpact.analysis.inspect import inspect_text
-from warpimpact.campaign.text import CampaignError
 from warpimpact.kernels.status import Status
 from warpimpact.plotting import trajectory
 from warpimpact.plotting.cell import NO_VALUE, STATUS_COLOURS, shown
 from warpimpact.plotting.maps import layers_figure
 from warpimpact.report.words import result_content
-from warpimpact.results import files
 from warpimpact.runs.replay import replay
 
 CAMPAIGN = """
@@ -44,7 +41,6 @@ irreducible = true
 time_step = "2 us"
 [output]
 standoffs = ["50 mm"]
-layer_standoffs = ["20 mm", "40 mm", "50 mm"]
 solid_reference = false
 """
 
@@ -58,39 +54,15 @@ def result() -> xarray.Dataset:
     return run(campaign(), device="cpu")
 
 
-def test_a_file_keeps_them(result: xarray.Dataset, tmp_path: Path) -> None:
-    files.write(result, tmp_path / "layers.nc")
-    again = files.read(tmp_path / "layers.nc")
-    assert again["layer_standoff"].values.tolist() == [0.02, 0.04, 0.05]
-    tilt = again["layer_standoff_tilt"]
-    assert tilt.dims == ("hit", "layer", "layer_standoff")
-    np.testing.assert_array_equal(tilt, result["layer_standoff_tilt"])
-    known = np.isfinite(tilt.values).all(axis=0)  # 50 mm and 18 mm of core are more than a gap of 60 mm
-    assert known.tolist() == [[True, True, False], [True, True, True], [True, True, True]]
-
-
-def test_mirror_images_of_a_hit_have_mirrored_angles(result: xarray.Dataset) -> None:
-    images = mirrored(result).isel(hit=slice(None, None, 16))  # of hit 0
-    assert images.sizes["hit"] == 8
-    for name in ("layer_standoff_yaw", "layer_standoff_pitch"):
-        angle = images[name].values[:, 0, 0]
-        assert np.abs(angle).max() > 0.1
-        assert np.ptp(np.abs(angle)) == 0.0
-        assert len(set(np.sign(angle))) == 2, name
-    whole = np.sign(images["yaw"].values[:, 0])
-    assert abs((np.sign(images["layer_standoff_yaw"].values[:, 2, 2]) * whole).sum()) == 8
-
-
 def test_a_table_has_a_column_for_each(result: xarray.Dataset) -> None:
     table = to_dataframe(result)
-    np.testing.assert_array_equal(table["layer_standoff_tilt_0_40mm"], result["layer_standoff_tilt"][:, 0, 1])
-    np.testing.assert_array_equal(table["layer_deflection_1"], result["layer_deflection"][:, 1])
+    np.testing.assert_array_equal(table["layer_tilt_1"], result["layer_tilt"][:, 1])
 
 
 def test_maps_choose_the_layer(result: xarray.Dataset) -> None:
-    image = hit_map(result, "layer_standoff_tilt", standoff=0.04, layer=0, pixels=20)
-    assert set(np.unique(image)) <= set(result["layer_standoff_tilt"].values[:, 0, 1].astype(float))
-    assert shown(result, "layer_standoff_tilt", 0.02, 0).title.startswith("tilt, 20 mm behind layer 0")
+    image = hit_map(result, "layer_tilt", layer=0, pixels=20)
+    assert set(np.unique(image)) <= set(result["layer_tilt"].values[:, 0].astype(float))
+    assert shown(result, "layer_tilt", layer=0).title.startswith("tilt, layer 0")
     np.testing.assert_array_equal(shown(result, "layer_tilt").values, result["layer_tilt"].values[:, 2])
     with pytest.raises(ValueError, match=r"has no layer 3; it has layers 0 \(the plate\) to 2"):
         hit_map(result, "layer_tilt", layer=3)
@@ -100,14 +72,13 @@ def test_the_figure_of_layers_has_a_row_for_each(result: xarray.Dataset) -> None
     titles = [axes.get_title() for axes in layers_figure(result).axes if axes.get_title()]
     assert titles[0] == "layer 0\nperforated 100.0%"
     assert [title.splitlines()[0] for title in titles[1::3]] == [f"residual velocity, layer {k}" for k in range(3)]
-    behind = [f"tilt, {at} mm behind layer {k}" for k, at in enumerate((40, 50, 50))]
-    assert [title.splitlines()[0] for title in titles[2::3]] == behind
+    assert [title.splitlines()[0] for title in titles[2::3]] == [f"tilt, layer {k}" for k in range(3)]
 
 
 def test_the_legend_of_layers_names_each_colour_once(result: xarray.Dataset) -> None:
     stopped = result.copy(deep=True)
     stopped["layer_status"][:, 2] = Status.ARRESTED
-    stopped["layer_standoff_tilt"][:, 2] = stopped["layer_tilt"][:, 2] = np.nan
+    stopped["layer_tilt"][:, 2] = np.nan
     stopped["layer_residual_velocity"][:, 2] = np.nan
     (legend,) = layers_figure(stopped).legends
     texts = [text.get_text() for text in legend.get_texts()]
@@ -129,27 +100,3 @@ def test_figures_say_what_lies_behind(result: xarray.Dataset) -> None:
     assert f"whole target {weight:.1f} kg/m²" in result_content("a", result)["asked"]
     assert shown(result, "tilt").title.startswith("tilt, 50 mm behind the target")
     assert "on impact and behind the target" in trajectory.flight(replay(result, 3, snapshots=0)).get_suptitle()
-
-
-def test_a_replay_shows_the_core_between_the_layers(result: xarray.Dataset) -> None:
-    history = replay(result, 3)
-    assert history.attrs["agreement"] == "bit-identical"
-    found = trajectory.poses_behind(history)
-    assert list(found) == [
-        *(f"{at} mm behind\nlayer 0" for at in (20, 40)),
-        *(f"{at} mm behind\nlayer 1" for at in (20, 40, 50)),
-        "50 mm",
-    ]
-    pose = found["40 mm behind\nlayer 0"]
-    assert pose.position[0] == pytest.approx(0.044, abs=1e-9)
-    tilt = np.degrees(np.arccos(pose.axis[0]))
-    assert tilt == pytest.approx(float(result["layer_standoff_tilt"][3, 0, 1]), abs=1e-3)
-
-
-def test_a_plate_alone_and_distances_that_no_gap_holds_are_refused() -> None:
-    front, _, behind = CAMPAIGN.partition("[[layer]]")
-    alone = front + behind[behind.index("[impact]") :]
-    with pytest.raises(CampaignError, match=r"output.layer_standoffs needs \[\[layer\]\]"):
-        campaign(alone)
-    with pytest.raises(CampaignError, match=r"got output.layer_standoffs of 0.07 m, but the widest gap is 0.08 m"):
-        campaign(CAMPAIGN.replace('"40 mm", "50 mm"]', '"70 mm"]'))
