@@ -42,9 +42,9 @@ from warpimpact.identification.identify import identify_to_file
 from warpimpact.results import posterior_file
 from warpimpact.results.files import read_tree
 from warpimpact.runs.choice import executor_for
+from warpimpact.solver.accuracy import PILOT_LIMITS, pilot_size
 from warpimpact.solver.device import cores
 from warpimpact.solver.limit import limits, pilot_of_limits
-from warpimpact.solver.pilot import limits_pilot_size
 from warpimpact.solver.worker import Worker
 from warpimpact.studies.limit import LimitMap
 
@@ -62,7 +62,7 @@ def limit(text: str, slotted: float) -> dict[str, Any]:
     """A search of the limit velocities of some hits of a campaign, beside processor time per hit [s]."""
     campaign = campaign_of(text)
     sought, shots = LimitMap.of(campaign).sought, campaign.sampler().shots(0, HITS)
-    some = shots[: limits_pilot_size(campaign.numerics.asked)]
+    some = shots[: pilot_size(campaign.numerics.asked, PILOT_LIMITS)]
     pilot_of_limits(campaign.scene, some[:1], sought, campaign.numerics, ONE)  # builds the kernels
     found, pilot = spent(lambda: pilot_of_limits(campaign.scene, some, sought, campaign.numerics, ONE))
     searched, took = spent(lambda: limits(campaign.scene, shots, sought, found.numerics, ONE))

@@ -128,17 +128,12 @@ def _peers(values: Mapping[str, Any]) -> Iterator[Row]:
         )
 
 
-def _coarser(road: Mapping[str, Any]) -> str:
-    """Settings that have coarser levels."""
-    return f" ({road['coarser']})" if road["coarser"] else ""
-
-
 def _roads(values: Mapping[str, Any]) -> Iterator[Row]:
     for name, one in values["roads"].items():
         yield Row(
             "standard, times the cost of the slotted plate",
             name,
-            f"{one['ratio']:.1f}; level {one['level']}{_coarser(one)}, {one['microseconds_per_hit']:.3g} µs per hit, "
+            f"{one['ratio']:.1f}; level {one['level']}, {one['microseconds_per_hit']:.3g} µs per hit, "
             f"{one['above_floor']:.0f} times the floor, pilot {one['pilot_share']:.0%}"
             + ("" if one["kept"] else "; promise not kept"),
             f"processor time of a run of {values['run']} hits with its pilot",

@@ -30,7 +30,7 @@ from floor import measured_peak, work_of
 from random_scenes import FINE, Answer, extrapolated, off, p90, stepped
 
 from warpimpact import Campaign, Numerics, Shots
-from warpimpact.solver.pilot import pilot_size
+from warpimpact.solver.accuracy import pilot_size
 from warpimpact.solver.resolution import Level
 from warpimpact.solver.simulate import pilot_of, simulate
 from warpimpact.solver.worker import Worker

@@ -34,8 +34,7 @@ from warpimpact.scene import (
     Shots,
     Target,
 )
-from warpimpact.solver.changes import changes, ended_otherwise
-from warpimpact.solver.pilot import pilot_size
+from warpimpact.solver.accuracy import ended_otherwise, hit_changes, pilot_size
 from warpimpact.solver.simulate import pilot_of, simulate
 from warpimpact.solver.worker import Worker
 
@@ -90,22 +89,19 @@ def computed(case: Case, shots: Shots, numerics: Numerics) -> Outcomes:
 
 
 def errors(
-    found: Outcomes, truth: Outcomes, free: tuple[bool, ...], relative: tuple[float, float] = (0.0, 0.0)
-) -> list[float]:
+    found: Outcomes, truth: Outcomes, free: tuple[bool, ...], name: str = "draft"
+) -> tuple[list[float], list[float]]:
     """90th percentiles of the errors: of velocity [m/s], tilt [degree] and depth [mm], NaN of what no hit has; and the
-    share of the hits that end otherwise. A residual velocity counts behind those layers that the promise counts."""
-    each = zip(changes(found, truth, None, relative, free), (1.0, math.degrees(1.0), 1e3), strict=True)
-    known = [(factor, error[~np.isnan(error)]) for error, factor in each]
+    share of the hits that end otherwise. Then the same over what the name allows, for velocity, tilt and depth."""
+    changes = hit_changes(found, truth, PRESETS[name], free)
+    none = np.array([]), np.array([])
+    error, over = [], []
+    for column in ("residual_velocity_error", "tilt_error", "depth_error"):
+        for each, to in zip(changes.get(column, none), (error, over), strict=True):
+            known = each[~np.isnan(each)]
+            to.append(p90(known) if len(known) else math.nan)
     status = float(ended_otherwise(found, truth).mean()) if LAYER_RESIDUAL_VELOCITY in found else 0.0
-    return [*(factor * p90(error) if len(error) else math.nan for factor, error in known), status]
-
-
-def counted(name: str, found: Outcomes, truth: Outcomes, free: tuple[bool, ...]) -> list[float]:
-    """Errors of which those of velocity and tilt behind layers are less their relative part."""
-    asked = PRESETS[name]
-    layered = LAYER_RESIDUAL_VELOCITY in found
-    shares = asked.residual_velocity_share / asked.residual_velocity, asked.tilt_share / asked.tilt
-    return errors(found, truth, free, shares if layered else (0.0, 0.0))
+    return [*error[:2], 1e3 * error[2], status], over
 
 
 def measured(case: Case, hits: int) -> dict[str, Any]:
@@ -116,13 +112,16 @@ def measured(case: Case, hits: int) -> dict[str, Any]:
     row: dict[str, Any] = {
         "scene": case.name,
         "statuses": np.bincount(truth.status, minlength=4)[:4].tolist(),
-        "uncertain": errors(before, truth, free),
+        "uncertain": errors(before, truth, free)[0],
     }
     for name in NAMES:
         begin = time.process_time()
-        pilot = case.shots(pilot_size(PRESETS[name], RUN), seed=77)
-        promise = pilot_of(case.scene, pilot, Numerics(fidelity=name), Worker("cpu"), hits=RUN)
-        taken, velocity, tilt = time.process_time() - begin, promise.residual_velocity_error, promise.tilt_error
+        pilot = case.shots(pilot_size(PRESETS[name]), seed=77)
+        promise = pilot_of(case.scene, pilot, Numerics(fidelity=name), Worker("cpu"))
+        taken = time.process_time() - begin
+        told = [
+            promise.errors.get(f"{one}_error", math.nan) for one in ("residual_velocity", "tilt", "depth", "status")
+        ]
         begin = time.process_time()
         found = computed(case, shots, promise.numerics)
         row[name] = {
@@ -130,9 +129,9 @@ def measured(case: Case, hits: int) -> dict[str, Any]:
             "share": taken / (RUN / len(shots) * (time.process_time() - begin)),
             "level": promise.numerics.level,
             "kept": promise.kept,
-            "told": [velocity, math.degrees(tilt), 1e3 * promise.depth_error, promise.status_error],
-            "found": errors(found, truth, free),
-            "counted": counted(name, found, truth, free),
+            "told": [*told[:2], 1e3 * told[2], told[3]],
+            "found": errors(found, truth, free, name)[0],
+            "over": errors(found, truth, free, name)[1],
         }
     return row
 
@@ -149,12 +148,12 @@ def untrue(row: dict[str, Any], name: str) -> list[str]:
 
 
 def broken(row: dict[str, Any], name: str) -> bool:
-    """Whether a promise that is said to be kept is not."""
-    allowed = PRESETS[name]
-    limits = [allowed.residual_velocity, math.degrees(allowed.tilt), math.inf, math.inf]
-    if not math.isnan(row[name]["told"][3]):  # several layers
-        limits[2:] = [1e3 * allowed.depth, allowed.status_share]
-    return row[name]["kept"] and bool(beyond(row[name]["counted"], limits, row["uncertain"]))
+    """Whether a promise that is said to be kept is not, by more than the answer is uncertain by."""
+    allowed, unsure = PRESETS[name], row["uncertain"]
+    bounds = (allowed.residual_velocity, math.degrees(allowed.tilt), 1e3 * allowed.depth)
+    over = any(one > 1.0 + u / bound for one, u, bound in zip(row[name]["over"], unsure, bounds, strict=True))
+    layered = not math.isnan(row[name]["told"][3])
+    return row[name]["kept"] and (over or (layered and row[name]["found"][3] > allowed.status_share + unsure[3]))
 
 
 def summed_up(rows: list[dict[str, Any]]) -> str:

@@ -48,7 +48,7 @@ from warpimpact.scene import (
     make_shots,
 )
 from warpimpact.scene.interaction import NEAR_EDGES
-from warpimpact.solver.pilot import pilot_size
+from warpimpact.solver.accuracy import pilot_size
 from warpimpact.solver.resolution import Level
 from warpimpact.solver.simulate import pilot_of, simulate
 from warpimpact.solver.worker import Worker
@@ -60,8 +60,6 @@ STANDOFF = 0.13
 """Where tilt is compared [m]."""
 FINE = (Level(96, 96, 8.0, 0.05), Level(136, 136, 11.0, 0.035))
 """Levels behind the answer; each is extrapolated from its step and twice its step, of second order."""
-RUN = 4096
-"""Hits of the run for which a pilot is made."""
 LONG = 0.1
 """Processor time [s] from which on a run is timed as it is, once."""
 PAPER = {"coefficients": (3.0e-4, 0.24, -5.29), "length": 27.86e-3, "diameter": 6.044e-3}
@@ -286,11 +284,11 @@ class Row:
 
 def named(bench: Bench, case: Case, truth: Answer, name: str) -> Row:
     """The promise of a name, found by a pilot of other hits."""
-    pilot = case.shots(pilot_size(PRESETS[name], RUN), seed=77)
-    promise = pilot_of(case.scene, pilot, Numerics(fidelity=name), Worker("cpu"), hits=RUN)
+    pilot = case.shots(pilot_size(PRESETS[name]), seed=77)
+    promise = pilot_of(case.scene, pilot, Numerics(fidelity=name), Worker("cpu"))
     answer, cost = bench.run(case, promise.numerics)
     velocity, tilt = off(answer, truth)
-    told = (promise.residual_velocity_error, math.degrees(promise.tilt_error))
+    told = (promise.errors["residual_velocity_error"], promise.errors["tilt_error"])
     found = (p90(velocity), p90(tilt))
     assert promise.numerics.level is not None
     return Row(promise.numerics.level, promise.kept, told, found, *aggregates(answer, truth), cost)

@@ -1,6 +1,6 @@
 """Scenes drawn from a seed: do the numerics shift measures by more than a result says?
 
-A pilot for a run of 16,384 hits finds the level for standard. Its hits at that level and at the finer one say by how
+A pilot finds the level for standard. Its hits at that level and at the finer one say by how
 much the numerics may shift the mean residual velocity, the mean last tilt and the share of the cores whose last tilt is
 beyond 30°: this is "numerics ±". Other hits show the shift: they are computed at that level and at level 7. They are
 few, so what they show has an interval of its own. A shift is more than was promised where this interval begins beyond
@@ -19,13 +19,13 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from random_layers import RUN, drawn
+from random_layers import drawn
 from random_scenes import Case, draw
 
 from warpimpact.kernels.status import Status
 from warpimpact.records.outcomes import Outcomes
 from warpimpact.scene import PRESETS, Numerics, Shots
-from warpimpact.solver.pilot import pilot_size
+from warpimpact.solver.accuracy import pilot_size
 from warpimpact.solver.simulate import pilot_of, simulate
 from warpimpact.solver.worker import Worker
 from warpimpact.statistics.intervals import estimate_of
@@ -78,10 +78,11 @@ def measured(case: Case, hits: int) -> tuple[int, bool, list[Shift]]:
     def at(level: int | None, shots: Shots) -> Outcomes:
         return simulate(case.scene, shots, numerics=Numerics(level=level), device="cpu", threads=1)
 
-    pilot, others = case.shots(pilot_size(PRESETS["standard"], RUN), seed=77), case.shots(hits)
+    pilot, others = case.shots(pilot_size(PRESETS["standard"]), seed=77), case.shots(hits)
     found = pilot_of(case.scene, pilot, Numerics(), Worker("cpu", 1))
     level = found.numerics.level
-    pair = next(of[1:] for of in found.tried if of[0].numerics == found.numerics)
+    assert found.finer is not None
+    pair = (at(level, pilot), found.finer)
     return level or 0, found.kept, shifts(pair, (at(level, others), at(ANSWER, others)))
 
 

@@ -25,10 +25,10 @@ from random_scenes import draw
 
 from warpimpact import Campaign, Numerics, Scene, Shots
 from warpimpact.scene import PRESETS
+from warpimpact.solver.accuracy import pilot_size
 from warpimpact.solver.device import find_device
 from warpimpact.solver.marching import Marching
 from warpimpact.solver.memory import Memory
-from warpimpact.solver.pilot import pilot_size
 from warpimpact.solver.prepare import prepare
 from warpimpact.solver.simulate import outcomes_of, pilot_of
 from warpimpact.solver.worker import NEVER, Worker
@@ -124,12 +124,12 @@ class Road:
         return work_of(self.scene, self.shots[:FLOOR_HITS], self.numerics).operations / measured_peak()
 
 
-def road(scene: Scene, shots: Shots, pilot: Shots, asked: Numerics, run: int) -> Road:
-    """A scene and its shots with what their pilot finds for a run of so many hits."""
+def road(scene: Scene, shots: Shots, pilot: Shots, asked: Numerics) -> Road:
+    """A scene and its shots with what their pilot finds."""
     worker = Worker("cpu", 1)
     pilot_of(scene, pilot[:1], asked, worker)  # builds the kernels
     begin = time.process_time()
-    found = pilot_of(scene, pilot, asked, worker, hits=run)
+    found = pilot_of(scene, pilot, asked, worker)
     return Road(scene, shots, found.numerics, found.kept, time.process_time() - begin)
 
 
@@ -151,12 +151,12 @@ def scene_and_shots(text: str, hits: int) -> tuple[Scene, Shots]:
     return campaign.scene, campaign.sampler().shots(0, hits)
 
 
-def named(text: str, hits: int, run: int = RUN) -> Road:
-    """A road of ROADS, for a run of so many hits."""
+def named(text: str, hits: int) -> Road:
+    """A road of ROADS."""
     campaign = campaign_of(text)
-    shots = campaign.sampler().shots(0, max(hits, pilot_size(PRESETS["standard"], run)))
-    pilot = shots[: pilot_size(PRESETS["standard"], run)]
-    return road(campaign.scene, shots[:hits], pilot, campaign.numerics, run)
+    shots = campaign.sampler().shots(0, max(hits, pilot_size(PRESETS["standard"])))
+    pilot = shots[: pilot_size(PRESETS["standard"])]
+    return road(campaign.scene, shots[:hits], pilot, campaign.numerics)
 
 
 def drawn_roads(seed: int, scenes: int, hits: int) -> dict[str, Road]:
@@ -165,8 +165,8 @@ def drawn_roads(seed: int, scenes: int, hits: int) -> dict[str, Road]:
     for kind, draws in (("plate", draw), ("layers", drawn)):
         for index in range(scenes):
             case = draws(seed, index)
-            pilot = case.shots(pilot_size(PRESETS["standard"], SMALL), seed=77)
-            found[f"{kind} {index}: {case.name}"] = road(case.scene, case.shots(hits), pilot, Numerics(), SMALL)
+            pilot = case.shots(pilot_size(PRESETS["standard"]), seed=77)
+            found[f"{kind} {index}: {case.name}"] = road(case.scene, case.shots(hits), pilot, Numerics())
             print(f"{kind} {index}: {case.name}, pilot {found[f'{kind} {index}: {case.name}'].pilot:.1f} s", flush=True)
     return found
 
@@ -179,7 +179,7 @@ def main(argv: Sequence[str] | None = None) -> None:
     parser.add_argument("--scenes", type=int, default=6, help="of either kind that are drawn (default: 6)")
     given = parser.parse_args(argv)
     run = RUN if given.seed is None else SMALL
-    slotted = named(ROADS["slotted plate"], given.hits, run)
+    slotted = named(ROADS["slotted plate"], given.hits)
     values: dict[str, Any] = {"machine": machine(), "hits": given.hits, "run": run, "rounds": ROUNDS, "roads": {}}
     if given.seed is None:
         roads = {name: named(text, given.hits) for name, text in ROADS.items()}
@@ -195,7 +195,6 @@ def main(argv: Sequence[str] | None = None) -> None:
             "microseconds_per_hit": 1e6 * cost,
             "above_floor": cost / one.floor(),
             "level": one.numerics.level,
-            "coarser": str(one.numerics.coarser or ""),
             "kept": one.kept,
             "pilot_share": one.pilot / whole[0],
         }

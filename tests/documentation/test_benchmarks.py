@@ -45,8 +45,7 @@ def test_rows_follow_from_the_results(found: Results) -> None:
         ratios = re.findall(rf"times as fast as Numba \| {scene} \| ([\d.]+) \|", text)
         assert [float(one) for one in ratios] == [round(one["ratio"], 1) for one in bout["ratios"]]
     for name, one in found["roads"]["roads"].items():
-        coarser = f" ({one['coarser']})" if one["coarser"] else ""
-        assert f"| {name} | {one['ratio']:.1f}; level {one['level']}{coarser}," in text
+        assert f"| {name} | {one['ratio']:.1f}; level {one['level']}," in text
 
 
 def test_the_peer_solves_the_same_law(found: Results) -> None:

@@ -14,7 +14,6 @@ from warpimpact.analysis.estimates import estimated, means_of, slices, status_sh
 from warpimpact.analysis.numbers import intervals_text
 from warpimpact.analysis.plate_text import plate_numbers, weights_of
 from warpimpact.analysis.summary import (
-    levels_note,
     numerics_note,
     promise_text,
     range_note,
@@ -113,7 +112,6 @@ def _numbers(dataset: xarray.Dataset) -> Section:
         _ARRESTED if some_passed else None,
         sampling_note(dataset),
         numerics_note(dataset),
-        levels_note(dataset),
     )
     return Section([*table, *filter(None, notes), *stop_lines(dataset)], title)
 

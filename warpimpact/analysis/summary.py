@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 from warpimpact.analysis.estimates import estimated, means_of, slices
@@ -16,7 +16,7 @@ from warpimpact.results.dataset import finer_pair, is_choice, status_codes
 from warpimpact.results.measures import Measure
 from warpimpact.results.per_hit import has_base
 from warpimpact.scene.display import STORED
-from warpimpact.solver.findings import accuracy_text, errors_text
+from warpimpact.solver.accuracy import accuracy_text, errors_text
 from warpimpact.view.view import Column, Section, Table, number, text_of
 
 if TYPE_CHECKING:
@@ -29,15 +29,11 @@ def promise_text(dataset: Result) -> str | None:
     if attr.NUMERICS_GIVEN not in attributes or attr.LIMIT in attributes:
         return None
     given = json.loads(attributes[attr.NUMERICS_GIVEN])
-    if attr.RESIDUAL_VELOCITY_ERROR not in attributes:
+    if attr.RESOLUTION not in attributes:
         return f"promises nothing, as {_fixed_by(attributes)} is given"
-    if attr.LEVEL_FOR in attributes:
-        return _level_for(attributes)
     asked = json.loads(attributes[attr.ACCURACY])
     stated = accuracy_text(asked, layered=attr.STATUS_ERROR in attributes)
-    velocity, tilt = attributes[attr.RESIDUAL_VELOCITY_ERROR], attributes[attr.TILT_ERROR]
-    depth, status = (attributes.get(name, math.nan) for name in (attr.DEPTH_ERROR, attr.STATUS_ERROR))
-    errors = f"estimated errors: {errors_text(velocity, tilt, depth, status)}"
+    errors = f"estimated errors: {errors_text(attributes)}"
     name = "the campaign" if given.get("accuracy") else given["fidelity"]
     if attributes[attr.PROMISE_KEPT]:
         return f"{name} keeps its promise ({stated}); {errors}"
@@ -55,17 +51,6 @@ def _fixed_by(told: Mapping[str, Any]) -> str:
     given = json.loads(told[attr.NUMERICS_GIVEN])
     fixed = ("level", "time_step", "travel", "patches_axial", "patches_around", "grid_spacing")
     return f"numerics.{next((name for name in fixed if given.get(name) is not None), 'scheme')}"
-
-
-def _level_for(told: Mapping[str, Any]) -> str:
-    """What the level of a run with a stop rule was chosen for."""
-    velocity, tilt = told[attr.RESIDUAL_VELOCITY_ERROR], told[attr.TILT_ERROR]
-    depth, status = (told.get(name, math.nan) for name in (attr.DEPTH_ERROR, attr.STATUS_ERROR))
-    errors = f"single hits may err by {errors_text(velocity, tilt, depth, status)}"
-    exact = told[attr.PROMISE_KEPT] or told.get(attr.STOP_REASON) == "half_width"
-    which = "found" if exact else "not exact enough"
-    level = json.loads(told[attr.RESOLUTION])["level"]
-    return f"level {level} {which} for {told[attr.LEVEL_FOR]}; {errors}"
 
 
 def breaks_promise(dataset: Result) -> bool:
@@ -114,7 +99,7 @@ def summary_text(dataset: Result) -> str:
             shown, unit = estimate.times(measure.display.factor), measure.display.shown
             interval = intervals_text(shown.low, shown.high, shown.numerics, "{:.2f}".format, "{:.2f}".format)
             rows.append((measure.column.label, shown.value, unit, interval, shown.spread, _counted(shown.count, hits)))
-    notes = (numerics_note(dataset), levels_note(dataset))
+    notes = (numerics_note(dataset),)
     return text_of([Section([shares, Table(columns, rows), *stop_lines(dataset), *filter(None, notes)])])
 
 
@@ -157,32 +142,6 @@ def _why_not_known(dataset: Result) -> str:
         given = _fixed_by(dataset.attrs)
         return f"{given} is given, so no hits were computed at a finer level (numerics.fidelity in its place does that)"
     return "the result has no hits at a finer level"
-
-
-def levels_note(dataset: Result) -> str:
-    """A note where the means of a result need another level than its single hits; else empty."""
-    attributes = dataset.attrs
-    if attr.LEVEL_SHIFTS not in attributes or attr.RESOLUTION not in attributes or attr.LEVEL_FOR in attributes:
-        return ""
-    standoffs = dataset[v.STANDOFF].values.tolist()[-1:]
-    means = estimated(dataset, means_of((v.RESIDUAL_VELOCITY, v.TILT), standoffs)).values()
-    open_by = [estimate.half_width for estimate in means]
-    level, shifts = json.loads(attributes[attr.RESOLUTION])["level"], json.loads(attributes[attr.LEVEL_SHIFTS])
-    enough = [int(at) for at, by in shifts.items() if all(a <= 0.5 * b for a, b in zip(by, open_by, strict=False))]
-    if enough and min(enough) < level:
-        by = _shifts_text(shifts[str(min(enough))])
-        return f"For the means alone level {min(enough)} is enough (numerics.level): it shifts them by at most {by}."
-    if any(a > b for a, b in zip(shifts.get(str(level), ()), open_by, strict=False)):
-        by = _shifts_text(shifts[str(level)])
-        return (
-            f"The numerics may shift the means by more than the hits leave open, by {by}: a stricter numerics.accuracy "
-            "tells more of them than more hits."
-        )
-    return ""
-
-
-def _shifts_text(shifts: Sequence[float]) -> str:
-    return " and ".join(f"{shift:.2g}{unit}" for shift, unit in zip(shifts, (" m/s", "°"), strict=False))
 
 
 _STOPPED = {

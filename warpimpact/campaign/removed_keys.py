@@ -20,6 +20,7 @@ REMOVED_KEYS: dict[str, str] = {
     "directions": "sweep impact.obliquity and impact.azimuth",
     "requirement": "give proof.velocity and the core of the campaign",
     "search.most_hits": "use search.hits, which every design gets",
+    "numerics.coarser": "A level sets all settings. Use numerics.level, or patches_axial, grid_spacing and travel.",
 }
 """The sentence for each key, by its dotted path without numbers of list items; or for a value, as "key = value"."""
 

@@ -174,33 +174,14 @@ def show_run() -> "Iterator[Callable[[RunProgress], None]]":
     if _quiet:
         yield lambda run: None
         return
-    announced = False
     with show_progress() as show:
-
-        def follow(run: "RunProgress") -> None:
-            nonlocal announced
-            if not announced and not run.piloting:
-                announced = True
-                if sentence := _cost(run):
-                    warn(sentence)
-            show(Step(run.done, run.total, run.resumed, _running(run), _pilot(run)))
-
-        yield follow
+        yield lambda run: show(Step(run.done, run.total, run.resumed, _running(run), _pilot(run)))
 
 
 def _pilot(run: "RunProgress") -> str:
     if not run.piloting:
         return ""
     return "a pilot looks for the resolution" + ("" if run.trying is None else f", level {run.trying}")
-
-
-def _cost(run: "RunProgress") -> str:
-    """A sentence on the time of a level that costs much more than a coarser one; empty where it does not."""
-    from warpimpact.solver.findings import HitErrors
-
-    if not isinstance(run.found, HitErrors) or run.found.cost is None or run.found.numerics.level is None:
-        return ""
-    return run.found.cost.announced(run.found.numerics.level, run.total - run.resumed)
 
 
 def _running(run: "RunProgress") -> str:

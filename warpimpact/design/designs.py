@@ -19,10 +19,9 @@ from warpimpact.results import attributes as attr
 from warpimpact.results import files, front
 from warpimpact.results.files import kind_of, opened
 from warpimpact.results.kinds import FRONT
-from warpimpact.runs.levels import MEASURES, level_for
 from warpimpact.scene import Numerics
 from warpimpact.scene.units import quoted
-from warpimpact.solver.pilot import COMPARED, pilot_size
+from warpimpact.solver.accuracy import pilot_size
 from warpimpact.solver.prepare import prepare
 from warpimpact.solver.resolution import LADDER, TooManySteps, at_level, coarsest_level
 
@@ -162,8 +161,6 @@ def _absolute(part: Any, folder: Path, key: str = "") -> Any:
 def stages(shelf: Shelf, design: ValidDesign, level: int) -> Iterator[tuple[str, ValidDesign]]:
     """The stages in which a design is computed, by name: "first", few hits at one level of resolution, without a pilot;
     "draft", more hits at draft; and "full", the campaign as it is. A stage that the campaign cannot have is left out.
-    So is the draft of several layers if it has as many hits as the campaign, because measures need a lower level there
-    than single hits at draft.
 
     The hits of the first stage are those of the irreducible part of the cell, if there is one.
 
@@ -182,12 +179,7 @@ def _draft(shelf: Shelf, design: ValidDesign) -> ValidDesign | None:
     campaign = design.campaign
     if campaign.numerics.explicit is not None:
         return None
-    fidelity = {"fidelity": "draft"}
-    if level_for(campaign) == MEASURES:
-        if (campaign.hits.count or 0) <= SOME:
-            return None
-        fidelity = {}
-    return _valid(shelf, _of_few_hits(design, SOME) | {"numerics": _kept(design) | fidelity})
+    return _valid(shelf, _of_few_hits(design, SOME) | {"numerics": _kept(design) | {"fidelity": "draft"}})
 
 
 def _first(shelf: Shelf, design: ValidDesign, level: int) -> ValidDesign | None:
@@ -243,13 +235,11 @@ def work_ahead(campaign: Campaign, level: int) -> float:
     """
     if campaign.numerics.explicit is not None:
         return work(campaign)
-    first = 0 if level_for(campaign) else coarsest_level(campaign.numerics.asked.strictness)
+    first = coarsest_level(campaign.numerics.asked.strictness)
     last = max(first, level)
     hits = len(campaign.sampler())
     of_levels = [work(campaign, at_level(at, campaign.numerics)) for at in range(first, last + 3) if at < len(LADDER)]
-    compared = COMPARED * of_levels[last - first] if level_for(campaign) == MEASURES else 0.0
-    pilot = pilot_size(campaign.numerics.asked, hits) / hits * sum(of_levels)
-    return of_levels[last - first] + pilot + compared
+    return of_levels[last - first] + pilot_size(campaign.numerics.asked) / hits * sum(of_levels)
 
 
 def _valid(shelf: Shelf, tables: Tables) -> ValidDesign | None:

@@ -19,10 +19,10 @@ from warpimpact.results import variables as v
 from warpimpact.results.dataset import narrow_table
 from warpimpact.results.measures import Measure
 from warpimpact.runs.executor import Job
-from warpimpact.runs.levels import aim_of
 from warpimpact.runs.questions import Arrays, Question, Round
 from warpimpact.scene import Numerics, Shots
 from warpimpact.scene.model import Array
+from warpimpact.solver.accuracy import PILOT_LIMITS, pilot_size
 from warpimpact.solver.limit import (
     HIGHEST_VELOCITY,
     THICKNESS_TOLERANCE,
@@ -33,7 +33,6 @@ from warpimpact.solver.limit import (
     thickest,
 )
 from warpimpact.solver.many import side_by_side, simulate_many
-from warpimpact.solver.pilot import limits_pilot_size, pilot_size
 from warpimpact.solver.simulate import pilot_of
 from warpimpact.solver.worker import Worker
 
@@ -169,8 +168,6 @@ def _level_computed(
 def level_of(design: Design, job: HitJob, worker: Worker) -> str:
     """The numerics, as JSON, that a pilot finds for a job; those of the campaign where it fixes a resolution.
 
-    At several layers the level is chosen for the measures, as in a run (runs/levels.py).
-
     Args:
         job: `level` is the required fidelity unless the campaign fixes a resolution; `count` is the number of hits that
             will be computed.
@@ -180,9 +177,9 @@ def level_of(design: Design, job: HitJob, worker: Worker) -> str:
         return campaign.numerics.model_dump_json()
     numerics = campaign.numerics.model_copy(update={"fidelity": job.level, "accuracy": None})
     scene, shots = campaign.scene, campaign.sampler().shots(0, pilot_size(numerics.asked))
-    some = shots[: limits_pilot_size(numerics.asked)]
+    some = shots[: pilot_size(numerics.asked, PILOT_LIMITS)]
     of_limits = [measure for measure in design.columns if measure.is_limit]
     found = [pilot_of_limits(scene, some, _limit_of(campaign, one), numerics, worker).numerics for one in of_limits]
     if len(found) < len(design.columns):
-        found.append(pilot_of(scene, shots, numerics, worker, aim=aim_of(campaign, job.count)).numerics)
+        found.append(pilot_of(scene, shots, numerics, worker).numerics)
     return max(found, key=lambda numerics: numerics.level or 0).model_dump_json()

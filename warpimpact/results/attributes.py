@@ -63,7 +63,7 @@ TIME_STEP = _declared("time_step", "number", "s")
 PRECISION = _declared("precision")
 NUMERICS_GIVEN = _declared("numerics_given", "table", _SI)
 RESOLUTION = _declared("resolution", "table")
-"""JSON of the numerics that a pilot found. The next attributes, up to LEVEL_SHIFTS, are present only with a pilot."""
+"""JSON of the numerics that a pilot found. The next attributes, up to STATUS_ERROR, are present only with a pilot."""
 PROMISE_KEPT = _declared("promise_kept", "number")
 ACCURACY = _declared("accuracy", "table")
 """JSON of the accuracy that was asked for: errors in SI, and the share of the hits that shall stay within them."""
@@ -73,11 +73,6 @@ DEPTH_ERROR = _declared("depth_error", "number", "m")
 """Error of the depth; present only where some shots of the pilot stop in a layer."""
 STATUS_ERROR = _declared("status_error", "number")
 """Share of the hits that end otherwise at a finer level; only of targets with several layers."""
-LEVEL_FOR = _declared("level_for")
-"""The quantity of a stop rule, where the pilot chose the level for it instead of single hits."""
-LEVEL_SHIFTS = _declared("level_shifts", "table")
-"""JSON of the shift of the mean residual velocity [m s-1] and the mean last tilt [degree] by the numerics, at every
-level that the pilot tried."""
 CONTINUUM = _declared("continuum", "table", _SI)
 """JSON of the settings and the materials of a result by finite elements, which has no other numerics."""
 FINGERPRINT = _declared("fingerprint")
@@ -145,8 +140,8 @@ LIMIT_ELSEWHERE = _declared("limit_elsewhere", "number", "kg m-2")
 """Areal density of all other layers."""
 LIMIT_TOLERANCE = _declared("limit_tolerance", "number")
 LIMIT_HIGHEST = _declared("limit_highest", "number")
-LIMIT_ERROR = _declared("limit_error", "number")
-"""Of a limit velocity [m/s] or of a limit thickness [m]."""
+LIMIT_VELOCITY_ERROR = _declared("limit_velocity_error", "number", "m s-1")
+LIMIT_THICKNESS_ERROR = _declared("limit_thickness_error", "number", "m")
 LIMIT_FACTORS = _declared("limit_material_factors", "pair", "1")
 """Ends of the 90 % interval of a limit velocity over the velocity, from what is known of the material."""
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Mapping
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from warpimpact.campaign.campaign import Campaign
 from warpimpact.campaign.resistances import catalogue_names
@@ -18,10 +18,13 @@ from warpimpact.results.table import HitTable
 from warpimpact.runs.task import Task
 from warpimpact.scene import Accuracy, Impact, Numerics, Shots, Target
 from warpimpact.scene.quantities import QUANTITIES
+from warpimpact.solver.accuracy import UNITS, PilotResult
 from warpimpact.solver.device import find_device
-from warpimpact.solver.findings import Found
 from warpimpact.solver.materials import weakens
 from warpimpact.solver.resolution import Resolution, resolve
+
+if TYPE_CHECKING:
+    from warpimpact.results.table import Result
 
 
 def described(
@@ -43,12 +46,12 @@ def described(
     told |= {attr.CATALOGUE_NAMES: "\n".join(names)} if (names := catalogue_names(campaign)) else {}
     told |= {attr.OUTSIDE_TESTED_RANGE: json.dumps(outside_tested_range(campaign), ensure_ascii=False)}
     told |= computed_by(campaign, computed[0], len(outcomes), computed[1])
-    told |= _found(campaign.numerics.asked, task.findings)
+    told |= _pilot(campaign.numerics.asked, task.findings)
     finer, double = _finer_hits(task.findings), is_double(campaign)
     return described_as(campaign, task.shots, outcomes, {**told, **attributes}, double=double, finer=finer)
 
 
-def _finer_hits(findings: Found | None) -> dict[str, Any]:
+def _finer_hits(findings: PilotResult | None) -> dict[str, Any]:
     """Columns of the hits that a pilot computed at a finer level."""
     if findings is None or findings.finer is None or findings.numbers is None:
         return {}
@@ -103,9 +106,8 @@ def computed_by(campaign: Campaign, device: str, computed: int, elapsed: float) 
     return attributes
 
 
-def _found(asked: Accuracy, findings: Found | None) -> dict[str, Any]:
-    """Attributes on the accuracy that a pilot was asked for, and on its findings; none without a pilot. The kind of
-    computation adds the errors."""
+def _pilot(asked: Accuracy, findings: PilotResult | None) -> dict[str, Any]:
+    """Attributes on the accuracy that a pilot was asked for, and on its findings; none without a pilot."""
     if findings is None:
         return {}
     bounds = {name: getattr(asked, name) for name in Accuracy.model_fields}
@@ -114,7 +116,21 @@ def _found(asked: Accuracy, findings: Found | None) -> dict[str, Any]:
         attr.RESOLUTION: findings.numerics.model_dump_json(),
         attr.PROMISE_KEPT: int(findings.kept),
         attr.ACCURACY: json.dumps(given),
+        **findings.errors,
     }
+
+
+def pilot_in(result: Result) -> PilotResult | None:
+    """The findings of the pilot of a result; None if its campaign fixed the resolution."""
+    attributes = result.attrs
+    if attr.RESOLUTION not in attributes:
+        return None
+    return PilotResult(
+        Numerics.model_validate_json(attributes[attr.RESOLUTION]),
+        bool(attributes[attr.PROMISE_KEPT]),
+        float(json.loads(attributes[attr.ACCURACY])["share"]),
+        {name: float(attributes[name]) for name in UNITS if name in attributes},
+    )
 
 
 def made_by(device: str) -> dict[str, str]:
@@ -192,5 +208,4 @@ def _asked(numerics: Numerics) -> str:
         return "accuracy in numbers" if numerics.accuracy is not None else f"{numerics.fidelity} fidelity"
     if numerics.level is None:
         return "given resolution"
-    coarser = str(numerics.coarser or "")
-    return f"level {numerics.level}" + (f" ({coarser})" if coarser else "")
+    return f"level {numerics.level}"

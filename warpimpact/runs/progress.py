@@ -10,7 +10,7 @@ from importlib.util import find_spec
 from typing import Any
 
 from warpimpact.results.measures import Measure
-from warpimpact.solver.findings import Found
+from warpimpact.solver.accuracy import PilotResult
 from warpimpact.statistics.intervals import Estimate
 
 
@@ -37,7 +37,7 @@ class RunProgress:
     estimates: dict[Measure, Estimate]
     piloting: bool = False
     trying: int | None = None
-    found: Found | None = None
+    found: PilotResult | None = None
 
 
 Follow = Callable[[RunProgress], None]

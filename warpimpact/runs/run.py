@@ -16,6 +16,7 @@ from warpimpact.results.references import with_references
 from warpimpact.results.table import HitTable, joined
 from warpimpact.runs.choice import executor_for, opened
 from warpimpact.runs.compute import HIT_MAP, numerics_of
+from warpimpact.runs.describe import pilot_in
 from warpimpact.runs.executor import Executor, Job, completed, result_of
 from warpimpact.runs.foreseen import cost_warning
 from warpimpact.runs.jobs import ranges, reference_shots, split, task_size
@@ -118,7 +119,7 @@ def _fill(campaign: Campaign, computation: Computation, shards: Shards, executor
     watch = Watch(campaign, shards, computation.measures)
     is_new, warn = 0 not in shards.there(), cost_warning(campaign, executor.made_by[attr.DEVICE], computation.passages)
     if not is_new:  # shard 0 holds the pilot's findings, and its hits at a finer level
-        watch.found = computation.found_in(shards.shard(0))
+        watch.found = pilot_in(shards.shard(0))
     else:
 
         def piloting() -> None:
@@ -130,7 +131,7 @@ def _fill(campaign: Campaign, computation: Computation, shards: Shards, executor
         watch.found = result_of(executor, computation.pilot, campaign, tick=piloting)
     warn(numerics_of(campaign, watch.found))
 
-    later = None if watch.found is None else watch.found.told
+    later = None if watch.found is None else replace(watch.found, finer=None, numbers=None)
 
     def jobs() -> Iterator[tuple[range, Job]]:
         most = lambda: task_size(executor, 0.0 if campaign.stop else watch.rate)  # noqa: E731
@@ -153,7 +154,7 @@ def _references(
     campaign: Campaign, computation: Computation, shards: Shards, executor: Executor
 ) -> dict[str, HitTable]:
     """Some hits of the references of a campaign, by their names, at the resolution that its pilot found."""
-    found, tables = computation.found_in(shards.shard(0)), dict[str, HitTable]()
+    found, tables = pilot_in(shards.shard(0)), dict[str, HitTable]()
     for name, reference in campaign.references.items() if campaign.output.solid_reference else ():
         if (of_reference := computation.of_reference(campaign, name)) is not None:
             shots = reference_shots(reference, shards.extent, computation.reference_hits)

@@ -9,11 +9,11 @@ from typing import TYPE_CHECKING, Protocol, Self
 from warpimpact.campaign.campaign import Campaign
 from warpimpact.results.table import HitTable
 from warpimpact.scene import Shots
-from warpimpact.solver.findings import Found
+from warpimpact.solver.accuracy import PilotResult
 from warpimpact.solver.worker import Worker
 
 if TYPE_CHECKING:
-    from warpimpact.results.table import Result
+    pass
 
 
 Report = Callable[[int], None]
@@ -30,7 +30,7 @@ class Task:
     """
 
     shots: Shots
-    findings: Found | None = None
+    findings: PilotResult | None = None
 
 
 class Computation(Protocol):
@@ -62,9 +62,6 @@ class Computation(Protocol):
         """Compute a task: the columns of results/dataset.py, one entry per shot. They are a complete result. Reports
         how many shots are done."""
 
-    def pilot(self, campaign: Campaign, worker: Worker, report: Report = ...) -> Found | None:
+    def pilot(self, campaign: Campaign, worker: Worker, report: Report = ...) -> PilotResult | None:
         """The findings of a pilot with hits of the campaign; None if the campaign fixes the resolution. Reports every
         level that it computes."""
-
-    def found_in(self, result: Result) -> Found | None:
-        """The findings of the pilot of a result."""

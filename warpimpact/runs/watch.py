@@ -13,11 +13,13 @@ from warpimpact.results.dataset import failed, finer_pair
 from warpimpact.results.measures import Measure
 from warpimpact.results.table import HitTable
 from warpimpact.results.tallies import Tally, shift_of
-from warpimpact.runs.levels import OF_THE_NUMERICS
 from warpimpact.runs.progress import RunProgress
 from warpimpact.runs.shards import Shards
-from warpimpact.solver.findings import Found
+from warpimpact.solver.accuracy import PilotResult
 from warpimpact.statistics.intervals import looks
+
+NUMERICS_SHARE = 0.5
+"""Share of a half width that the numerics may take before more hits are of no use."""
 
 
 @dataclass(frozen=True)
@@ -53,7 +55,7 @@ class Watch:
         self._next, self._hits, self._time = 0, 0, 0.0
         self.done, self.resumed, self.failed = 0, 0, 0
         self.end: End | None = None
-        self.found: Found | None = None
+        self.found: PilotResult | None = None
         for index in sorted(shards.there()):
             self.add(index, shards.shard(index))
         self.resumed = self.done
@@ -92,7 +94,7 @@ class Watch:
         left = max(asked - shift, 0.0)
         # The half width is about proportional to 1/√hits.
         in_reach = self._hits * estimate.half_width**2 <= left**2 * self._shards.total
-        no_use = not met and not in_reach and estimate.half_width <= (1.0 - OF_THE_NUMERICS) * asked
+        no_use = not met and not in_reach and estimate.half_width <= (1.0 - NUMERICS_SHARE) * asked
         if not (met or no_use or is_last):
             return {}
         return {

@@ -6,7 +6,7 @@ imports view for drawings, and no other room: neither a kernel nor a Dataset.
 
 from .core import AnyCore, ConeCore, Core, MassProperties, OgiveCore, PolynomialCore, ProfileCore
 from .interaction import FreeSurface, Interaction
-from .numerics import PRESETS, Accuracy, Coarser, Numerics
+from .numerics import PRESETS, Accuracy, Numerics
 from .patterns import (
     AnyPattern,
     CirclePattern,

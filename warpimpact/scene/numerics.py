@@ -73,37 +73,16 @@ PRESETS = {"draft": _preset(0.2, 0.02), "standard": _preset(1.0, 0.006), "refere
 """Accuracy by fidelity."""
 
 
-class Coarser(_AsGiven):
-    """Levels of single settings that may be coarser than the common level.
-
-    Attributes:
-        along, around: of the patches along the core and around it.
-        grid: of the plate grid.
-        step: of the way per time step.
-    """
-
-    along: AtLevel | None = None
-    around: AtLevel | None = None
-    grid: AtLevel | None = None
-    step: AtLevel | None = None
-
-    def __str__(self) -> str:
-        return ", ".join(f"{name} {level}" for name, level in self if level is not None)
-
-
 class Numerics(_AsGiven):
     """Resolution of the computation: an accuracy, for which a pilot finds the level, or a level and single settings.
 
     Attributes:
         fidelity: the name of an accuracy: 90 % of the hits are within 5 m/s and 5° ("draft"), 1 m/s and 1°
-            ("standard"), or 0.2 m/s and 0.2° ("reference"). A campaign with several layers that gives neither this nor
-            an accuracy takes the level that its measures need.
+            ("standard"), or 0.2 m/s and 0.2° ("reference").
         accuracy: errors in numbers, in place of a fidelity.
         level: of the ladder of resolutions, 0 (coarse) to 9, in place of an accuracy: no pilot runs, and no accuracy is
             promised. A single setting below has the same effect; the other settings are then those of the level, or of
             the coarsest level that a pilot would try.
-        coarser: coarser levels of single settings beside `level`: `along` and `around` (patches), `grid` and `step`.
-            The pilot of a long run uses them if they keep the promised accuracy.
         scheme: "consistent", or "nodal" for the paper's literal scheme (docs/model.md §4).
         time_step: length of a step [s].
         travel: path per time step at impact velocity, as a share of the thickness of the plate, in place of time_step.
@@ -120,7 +99,6 @@ class Numerics(_AsGiven):
     fidelity: Literal["draft", "standard", "reference"] = "standard"
     accuracy: Accuracy | None = None
     level: AtLevel | None = None
-    coarser: Coarser | None = None
     scheme: Literal["consistent", "nodal"] = "consistent"
     time_step: PositiveTime | None = None
     travel: Annotated[float, Field(gt=0.0, le=2.0)] | None = None
@@ -148,11 +126,6 @@ class Numerics(_AsGiven):
         other = "level" if self.level is not None else "accuracy" if self.accuracy is not None else None
         if "fidelity" in self.model_fields_set and other is not None:
             raise ValueError(f"fidelity and {other} cannot be combined: each sets the resolution")
-        for name, level in self.coarser or ():
-            if level is not None and self.level is None:
-                raise ValueError(f"coarser.{name} needs level")
-            if level is not None and level > (self.level or 0):
-                raise ValueError(f"coarser.{name} must be at most level, {self.level}, but is {level}")
         if self.accuracy is not None and self.explicit is not None:
             raise ValueError(f"{self.explicit} and accuracy cannot be combined: each sets the resolution")
         if self.travel is not None and (self.time_step is not None or self.scheme == "nodal"):

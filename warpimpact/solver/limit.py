@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,14 +16,13 @@ from numpy.typing import NDArray
 from warpimpact.records.group import failures
 from warpimpact.records.limit_variables import LIMITS
 from warpimpact.records.outcomes import Outcomes
-from warpimpact.scene import Numerics, Plate, Scene, Shots, Target
-from warpimpact.solver.findings import LimitErrors
+from warpimpact.scene import PRESETS, Numerics, Plate, Scene, Shots, Target
+from warpimpact.solver.accuracy import PILOT_LIMITS, LevelErrors, PilotResult, choose_level, limit_errors, pilot_size
 from warpimpact.solver.limit_near import Neighbours
 from warpimpact.solver.limit_search import LimitSearch
 from warpimpact.solver.marching import Progress
-from warpimpact.solver.pilot import limits_pilot_size, pilot_limits
 from warpimpact.solver.prepare import prepare
-from warpimpact.solver.resolution import at_level, level_of
+from warpimpact.solver.resolution import at_level, coarsest_level, level_of
 from warpimpact.solver.simulate import computed, spread, spread_places
 from warpimpact.solver.worker import Worker
 
@@ -174,7 +174,7 @@ def _limits(
     scene: Scene, shots: Shots, sought: Sought, numerics: Numerics, worker: Worker, progress: Progress | None
 ) -> Limits:
     if numerics.explicit is None:
-        pilot = spread(shots, limits_pilot_size(numerics.asked))
+        pilot = spread(shots, pilot_size(numerics.asked, PILOT_LIMITS))
         numerics = pilot_of_limits(scene, pilot, sought, numerics, worker).numerics
     return limits(scene, shots, sought, numerics, worker, progress)
 
@@ -186,21 +186,30 @@ def pilot_of_limits(
     numerics: Numerics,
     worker: Worker,
     trying: Callable[[int], object] = lambda level: None,
-) -> LimitErrors:
-    """Find the level of resolution for an accuracy of limits (solver/pilot.py); the arguments are those of
-    `simulate.pilot_of`."""
+) -> PilotResult:
+    """Find the level of resolution for an accuracy of limits; arguments as in `simulate.pilot_of`.
 
-    known: dict[int, Limits] = {}
+    Raises:
+        ValueError: the accuracy has no bound on limits.
+    """
+    asked, draft = numerics.asked, PRESETS["draft"].limit
+    if asked.limit is None or draft is None:
+        raise ValueError("accuracy: needs limit, the error of a limit as a share of the median limit")
+    name = str(LIMITS[sought.quantity].value)
 
-    def limits_at(level: int) -> Array:
+    @cache
+    def outcomes(level: int) -> Outcomes:
         trying(level)
-        known[level] = limits(scene, pilot, sought, at_level(level, numerics), worker)
-        return known[level].value
+        return limits(scene, pilot, sought, at_level(level, numerics), worker).recorded(sought.quantity)
 
-    errors = pilot_limits(limits_at, numerics, sought.quantity)
-    if errors.finer_level is None:
-        return errors
-    return replace(errors, finer=known[errors.finer_level].recorded(sought.quantity))
+    @cache
+    def seconds(level: int) -> float:
+        return PASSAGES * len(pilot) * prepare(scene, pilot[:1], at_level(level, numerics)).seconds
+
+    def errors(coarse: Outcomes, fine: Outcomes) -> LevelErrors:
+        return limit_errors(getattr(coarse, name), getattr(fine, name), asked, sought.quantity)
+
+    return choose_level(numerics, coarsest_level(draft / asked.limit), outcomes, errors, seconds)
 
 
 def limits(

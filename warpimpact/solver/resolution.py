@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from warpimpact.scene import Coarser, Impact, Numerics, Plate, Scene, Shots, Target
+from warpimpact.scene import Impact, Numerics, Plate, Scene, Shots, Target
 from warpimpact.scene.patterns import NoPattern
 from warpimpact.scene.quantities import BY_LAYER
 from warpimpact.solver.materials import Materials, decay_rate
@@ -94,26 +94,20 @@ NODAL_SETTINGS: dict[str, Any] = {
 """The paper's own resolution. Its time step is the one that reproduces its rows (docs/model.md §4)."""
 
 
-def at_level(index: int, numerics: Numerics, **coarser: int) -> Numerics:
-    """Numerics of a level of the ladder, with the precision and layout given, and coarser levels of single settings."""
+def at_level(index: int, numerics: Numerics) -> Numerics:
+    """Numerics of a level of the ladder, with the precision and layout given."""
     kept = {name: getattr(numerics, name) for name in ("precision", "layout") if name in numerics.model_fields_set}
-    return Numerics(level=index, **kept, **({"coarser": Coarser(**coarser)} if coarser else {}))
+    return Numerics(level=index, **kept)
 
 
 def level_of(numerics: Numerics) -> Level:
     """The level that supplies the settings which the numerics do not give."""
-    index = coarsest_level(numerics.asked.strictness) if numerics.level is None else numerics.level
-    coarser = numerics.coarser or Coarser()
-    along, around, grid, step = (
-        LADDER[index if level is None else level]
-        for level in (coarser.along, coarser.around, coarser.grid, coarser.step)
-    )
-    return Level(along.patches_axial, around.patches_around, grid.cells_per_length, step.travel)
+    return LADDER[coarsest_level(numerics.asked.strictness) if numerics.level is None else numerics.level]
 
 
 def coarsest_level(strictness: float) -> int:
     """The first level that is tried for an accuracy, by how many times as strict as draft it is."""
-    return int(np.clip(math.floor(math.log2(max(strictness, 1.0)) + 1e-9), 0, len(LADDER) - 2))
+    return int(np.clip(math.floor(math.log2(max(strictness, 1.0)) + 1e-9), 0, len(LADDER) - 3))
 
 
 @dataclass(frozen=True)

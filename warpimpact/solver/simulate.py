@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-import time
+import math
 from collections.abc import Callable
-from dataclasses import replace
-from functools import cache, partial
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -13,13 +12,12 @@ from numpy.typing import NDArray
 
 from warpimpact.records.outcomes import Outcomes
 from warpimpact.scene import Numerics, Scene, Shots
+from warpimpact.solver.accuracy import LevelErrors, PilotResult, choose_level, hit_errors, pilot_size
 from warpimpact.solver.device import find_device
-from warpimpact.solver.findings import HitErrors, LevelCost
 from warpimpact.solver.marching import Helpers, Marching, Progress
 from warpimpact.solver.memory import Memory
-from warpimpact.solver.pilot import Aim, pilot_hits, pilot_size
 from warpimpact.solver.prepare import Prepared, prepare
-from warpimpact.solver.resolution import at_level
+from warpimpact.solver.resolution import at_level, coarsest_level
 from warpimpact.solver.worker import NEVER, Cancel, Worker
 
 Array = NDArray[np.float64]
@@ -51,7 +49,7 @@ def simulate(
         ValueError, MemoryError: as in `prepare`.
     """
     worker = Worker(device, threads, cancel)
-    fixed = numerics_for(scene, shots, numerics or Numerics(), worker, len(shots))
+    fixed = numerics_for(scene, shots, numerics or Numerics(), worker)
     prepared = prepare(scene, shots, fixed)
     return computed(prepared, worker, progress)
 
@@ -71,12 +69,11 @@ def marched(
     return outcomes_of(march.memory, contact)
 
 
-def numerics_for(scene: Scene, shots: Shots, numerics: Numerics, worker: Worker, hits: int = 0) -> Numerics:
-    """Numerics that fix the resolution: the given ones, or what a pilot of some of the shots finds for a run of this
-    number of hits."""
+def numerics_for(scene: Scene, shots: Shots, numerics: Numerics, worker: Worker) -> Numerics:
+    """Numerics that fix the resolution: the given ones, or what a pilot of some of the shots finds."""
     if numerics.explicit is not None:
         return numerics
-    return pilot_of(scene, spread(shots, pilot_size(numerics.asked, hits)), numerics, worker, hits=hits).numerics
+    return pilot_of(scene, spread(shots, pilot_size(numerics.asked)), numerics, worker).numerics
 
 
 def pilot_of(
@@ -85,38 +82,33 @@ def pilot_of(
     numerics: Numerics,
     worker: Worker,
     trying: Callable[[int], object] = lambda level: None,
-    aim: Aim | None = None,
-    hits: int = 0,
-) -> HitErrors:
-    """Find the resolution for an accuracy (solver/pilot.py).
+) -> PilotResult:
+    """Find the level of resolution for an accuracy (solver/accuracy.py).
 
     Args:
         pilot: some of the shots.
         trying: called with every level that is computed.
-    """
-    prepared_of, seconds = partial(prepare, scene), dict[Numerics, float]()
 
-    def outcomes_at(at: Numerics, some: Shots) -> Outcomes:
-        assert at.level is not None
-        trying(at.level)
-        memory = Memory(prepared_of(some, at), find_device(worker.device), worker.cancel)
-        memory.build()
-        begin = time.perf_counter()
-        outcomes = marched(memory, worker)
-        seconds[at] = (time.perf_counter() - begin) / len(some)
-        return outcomes
+    Raises:
+        ValueError: the accuracy has no bound on outcomes.
+    """
+    asked = numerics.asked
+    if math.isinf(asked.residual_velocity) and math.isinf(asked.tilt):
+        raise ValueError("accuracy: needs residual_velocity or tilt; a limit alone is for a search of limits")
 
     @cache
-    def price(level: int) -> float:
-        return prepared_of(pilot[:1], at_level(level, numerics)).seconds
+    def outcomes(level: int) -> Outcomes:
+        trying(level)
+        return computed(prepare(scene, pilot, at_level(level, numerics)), worker)
 
-    errors = pilot_hits(outcomes_at, pilot, numerics, price, scene.free_behind, aim, hits)
-    if not errors.tried:
-        return errors
-    first = errors.tried[0].errors
-    assert first.numerics.level is not None
-    cost = LevelCost(seconds[errors.numerics], seconds[first.numerics], first.numerics.level, first.errors)
-    return replace(errors, cost=cost)
+    @cache
+    def seconds(level: int) -> float:
+        return len(pilot) * prepare(scene, pilot[:1], at_level(level, numerics)).seconds
+
+    def errors(coarse: Outcomes, fine: Outcomes) -> LevelErrors:
+        return hit_errors(coarse, fine, asked, scene.free_behind)
+
+    return choose_level(numerics, coarsest_level(asked.strictness), outcomes, errors, seconds)
 
 
 def spread(shots: Shots, most: int) -> Shots:

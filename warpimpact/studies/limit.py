@@ -15,13 +15,13 @@ from warpimpact.results import variables as v
 from warpimpact.results.measures import Measure
 from warpimpact.results.table import HitTable
 from warpimpact.results.vocabulary import LIMIT_VELOCITY
-from warpimpact.runs.compute import found_in, numerics_of
+from warpimpact.runs.compute import numerics_of
 from warpimpact.runs.describe import described
 from warpimpact.runs.pilot_hits import pilot_shots
 from warpimpact.runs.shards import extent
 from warpimpact.runs.task import Report, Task
 from warpimpact.scene import Target, exclusions
-from warpimpact.solver.findings import LimitErrors
+from warpimpact.solver.accuracy import PILOT_LIMITS, PilotResult, pilot_size
 from warpimpact.solver.limit import (
     HIGHEST_VELOCITY,
     PASSAGES,
@@ -34,11 +34,10 @@ from warpimpact.solver.limit import (
     short_steps,
     thickest,
 )
-from warpimpact.solver.pilot import limits_pilot_size
 from warpimpact.solver.worker import Worker
 
 if TYPE_CHECKING:
-    from warpimpact.results.table import Result
+    pass
 
 
 @dataclass(frozen=True)
@@ -128,7 +127,6 @@ class LimitMap:
         searched = limits(campaign.scene, task.shots, sought, numerics, worker, progress, together)
         elapsed = time.perf_counter() - begin
         attributes = {
-            **({attr.LIMIT_ERROR: findings.error} if isinstance(findings, LimitErrors) else {}),
             attr.HISTORY: attr.history_line(f"limit --quantity {sought.quantity}"),
             attr.LIMIT: sought.quantity,
             attr.LIMIT_LAYER: sought.layer,
@@ -145,19 +143,13 @@ class LimitMap:
         outcomes, by = searched.recorded(sought.quantity), (worker.device, elapsed)
         return described(campaign, put, outcomes, short_steps(numerics), by, attributes)
 
-    def pilot(self, campaign: Campaign, worker: Worker, report: Report = lambda level: None) -> LimitErrors | None:
+    def pilot(self, campaign: Campaign, worker: Worker, report: Report = lambda level: None) -> PilotResult | None:
         """See `Computation.pilot`."""
         if campaign.numerics.explicit is not None:
             return None
-        pilot, numbers = pilot_shots(campaign, limits_pilot_size(campaign.numerics.asked))
+        pilot, numbers = pilot_shots(campaign, pilot_size(campaign.numerics.asked, PILOT_LIMITS))
         errors = pilot_of_limits(campaign.scene, pilot, self.sought, campaign.numerics, worker, report)
         return replace(errors, numbers=numbers)
-
-    def found_in(self, result: Result) -> LimitErrors | None:
-        """The findings of the pilot of a result."""
-        if attr.RESOLUTION not in result.attrs:
-            return None
-        return LimitErrors(*found_in(result), float(result.attrs[attr.LIMIT_ERROR]), result.attrs[attr.LIMIT])
 
     def weights(self, target: Target) -> dict[str, float]:
         """Attributes that convert the thickness of the layer to the areal density of the target; none for a

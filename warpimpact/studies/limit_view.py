@@ -21,7 +21,7 @@ from warpimpact.results.per_hit import needed_density
 from warpimpact.results.references import reference
 from warpimpact.scene.quantities import QUANTITIES
 from warpimpact.scene.units import quantity as reader_of
-from warpimpact.solver.findings import hits_text, limit_error_text
+from warpimpact.solver.accuracy import errors_text, share_text
 from warpimpact.solver.limit_search import MOST_RUNS
 from warpimpact.view.view import Column, Section, Table, number
 
@@ -194,9 +194,8 @@ def promise_line(dataset: xarray.Dataset) -> str:
     unit, factor = shown_unit(attributes[attr.LIMIT])
     of_layer = f"thickness of layer {attributes[attr.LIMIT_LAYER]}; " if attributes[attr.LIMIT_LAYER] else ""
     ends = f"{of_layer}ends of a limit at most {factor * attributes[attr.LIMIT_TOLERANCE]:g} {unit} apart"
-    if attr.LIMIT_ERROR not in attributes:
+    if attr.RESOLUTION not in attributes:
         return f"{ends}; the error of the numerics was not measured, as the campaign fixes the resolution"
     kept = "" if attributes[attr.PROMISE_KEPT] else ", more than was asked for"
-    error = limit_error_text(attributes[attr.LIMIT_ERROR], attributes[attr.LIMIT])
-    hits = hits_text(json.loads(attributes[attr.ACCURACY])["share"])
-    return f"{ends}; against a finer level {hits} are within {error}{kept}"
+    hits = share_text(json.loads(attributes[attr.ACCURACY])["share"])
+    return f"{ends}; against a finer level {hits} are within {errors_text(attributes)}{kept}"

@@ -164,7 +164,7 @@ def _computed(
     shots = {row: _shots(changed, hits) for row, changed in rows.items()}
     worker = Worker(device)
     found = [
-        numerics_for(campaign.scene, shots[plate, AS_GIVEN], campaign.numerics, worker, hits)
+        numerics_for(campaign.scene, shots[plate, AS_GIVEN], campaign.numerics, worker)
         for plate, campaign in campaigns.items()
     ]
     numerics = max(found, key=lambda each: each.level or 0)

@@ -36,8 +36,7 @@ _OF_A_POINT = (
     *(attr.CAMPAIGN, attr.HISTORY, attr.FINGERPRINT, attr.COMPUTE_TIME, attr.HITS_PER_SECOND, attr.TITLE),
     *(attr.RESOLUTION, attr.PROMISE_KEPT, attr.RESIDUAL_VELOCITY_ERROR, attr.TILT_ERROR, attr.NUMERICS_GIVEN),
     *(attr.STOP_QUANTITY, attr.STOP_REASON, attr.ESTIMATE, attr.ESTIMATE_INTERVAL, attr.ESTIMATE_UNITS),
-    *(attr.LEVEL_FOR, attr.LEVEL_SHIFTS, attr.ESTIMATE_NUMERICS),
-    *(attr.DEPTH_ERROR, attr.STATUS_ERROR, attr.CONFIDENCE, attr.SYMMETRIES),
+    *(attr.DEPTH_ERROR, attr.STATUS_ERROR, attr.CONFIDENCE, attr.SYMMETRIES, attr.ESTIMATE_NUMERICS),
 )
 """Attributes that only the result of a single point has."""
 

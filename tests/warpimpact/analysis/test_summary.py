@@ -4,12 +4,10 @@ import numpy as np
 import pytest
 
 from warpimpact.analysis.estimates import estimated
-from warpimpact.analysis.summary import promise_text, summary_text
+from warpimpact.analysis.summary import summary_text
 from warpimpact.kernels.status import Status
-from warpimpact.results import attributes as attr
 from warpimpact.results.dataset import passed
 from warpimpact.results.measures import Measure
-from warpimpact.scene import Numerics
 
 MIXED = [Status.PERFORATED, Status.ARRESTED, Status.RICOCHETED, Status.MISSED, Status.UNFINISHED]
 
@@ -61,21 +59,3 @@ def test_a_plate_that_stops_everything_has_no_residual_velocity(make_result):
     dataset = make_result([Status.ARRESTED] * 3)
     assert "no core behind the plate" in summary_text(dataset)
     assert "nan" not in summary_text(dataset)
-
-
-@pytest.mark.parametrize(
-    ("kept", "reason", "found"),
-    [(1, "max_count", "found"), (0, "half_width", "found"), (0, "numerics", "not exact enough")],
-)
-def test_the_level_of_a_stop_rule_is_told(make_result, kept, reason, found):
-    told = {
-        attr.STOP_REASON: reason,
-        attr.NUMERICS_GIVEN: "{}",
-        attr.RESOLUTION: Numerics(level=4).model_dump_json(),
-        attr.PROMISE_KEPT: kept,
-        attr.LEVEL_FOR: "mean(deflection)",
-        attr.RESIDUAL_VELOCITY_ERROR: 0.5,
-        attr.TILT_ERROR: 0.25,
-    }
-    text = promise_text(make_result(1).assign_attrs(told))
-    assert text.startswith(f"level 4 {found} for mean(deflection); single hits may err by ")

@@ -12,7 +12,8 @@ from warpimpact.campaign.campaign import CampaignError
 from warpimpact.cli import main
 from warpimpact.results import files
 from warpimpact.results.variables import OUTCOME_VARIABLES
-from warpimpact.runs.compute import HitMap, compute
+from warpimpact.runs.compute import compute
+from warpimpact.runs.describe import pilot_in
 from warpimpact.runs.replay import replay
 from warpimpact.runs.run import run, run_to_file
 from warpimpact.runs.task import Task
@@ -62,7 +63,7 @@ def test_a_hit_does_not_depend_on_its_company(tmp_path: Path) -> None:
     changes = 'obliquity = { distribution = "uniform", low = 0, high = "50 deg" }\nspin = 1e4'
     campaign = campaign_with(tmp_path, (VELOCITY, f"{NORMAL}\n{changes}"))
     whole = run(campaign, device="cpu")
-    found = HitMap().found_in(whole)
+    found = pilot_in(whole)
     for hit in range(0, 64, 9):
         alone = compute(campaign, Task(campaign.sampler().shots(hit, 1), findings=found), Worker("cpu"))
         for name in OUTCOME_VARIABLES:

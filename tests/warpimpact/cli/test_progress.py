@@ -1,7 +1,6 @@
 """Progress: plain lines in a log, a bar on a terminal, both with estimates and failed shots."""
 
 import io
-import math
 import re
 import sys
 import time
@@ -14,7 +13,7 @@ from warpimpact.cli.progress import Step, show_progress, show_run
 from warpimpact.results.measures import Measure
 from warpimpact.runs.progress import RunProgress
 from warpimpact.scene import Numerics
-from warpimpact.solver.findings import HitErrors
+from warpimpact.solver.accuracy import PilotResult
 from warpimpact.statistics.intervals import Estimate
 
 
@@ -96,7 +95,7 @@ def test_a_line_tells_the_accuracy_that_the_pilot_found(capsys: pytest.CaptureFi
         (True, "for 90 % of the hits, 0 failed"),
         (False, "for 90 % of the hits, not as promised, 0 failed"),
     ):
-        found = HitErrors(Numerics(level=2), kept, 0.9, 0.42, math.radians(0.7))
+        found = PilotResult(Numerics(level=2), kept, 0.9, {"residual_velocity_error": 0.42, "tilt_error": 0.7})
         with show_run() as show:
             clock[0] += 1.0
             show(replace(standing(400), found=found))

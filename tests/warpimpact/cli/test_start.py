@@ -96,7 +96,7 @@ def test_a_new_file_names_itself_in_its_commands(capsys: pytest.CaptureFixture[s
     [
         ([], "64 of 64 hits", "warpimpact.solver"),
         (["-q"], "", "of 64 hits"),
-        (["-v"], "warpimpact.solver.pilot: pilot: 64 shots at level", "warpimpact.solver.device"),
+        (["-v"], "warpimpact.solver.accuracy: pilot: level 2 errs by", "warpimpact.solver.device"),
     ],
 )
 def test_more_or_less_is_told(option: list[str], told: str, untold: str, capsys: pytest.CaptureFixture[str]) -> None:

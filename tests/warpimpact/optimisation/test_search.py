@@ -11,10 +11,9 @@ from warpimpact import Campaign
 from warpimpact.analysis.effectiveness import effectiveness
 from warpimpact.campaign.text import CampaignError
 from warpimpact.cli import main
-from warpimpact.optimisation import evaluate, search
+from warpimpact.optimisation import search
 from warpimpact.optimisation.confirm import fresh_seed, spread
 from warpimpact.optimisation.design import design_from, read_design
-from warpimpact.optimisation.evaluate import HitJob
 from warpimpact.optimisation.front_view import front_view
 from warpimpact.optimisation.objectives import Candidate, excesses
 from warpimpact.optimisation.optimise import folder_of, optimise, optimise_to_file
@@ -24,11 +23,6 @@ from warpimpact.results import front as f
 from warpimpact.results.files import OutputError, read
 from warpimpact.results.kinds import FRONT
 from warpimpact.runs.parts import Interrupted
-from warpimpact.scene import Numerics
-from warpimpact.solver.findings import HitErrors
-from warpimpact.solver.pilot import Aim
-from warpimpact.solver.resolution import at_level
-from warpimpact.solver.worker import Worker
 from warpimpact.view.view import text_of
 
 from .conftest import CORE, HOLES, SEARCH, WEIGHT_AND_ENERGY, design
@@ -223,23 +217,6 @@ def test_no_design_within_the_bounds_is_an_outcome() -> None:
     assert found.attrs[f.OUTCOME] == f.NONE_FEASIBLE
     assert (found.sizes["design"], found.sizes["front"]) == (12, 0)
     assert "no design keeps the bounds: P(stopped) >= 0.9" in text_of(front_view(found))
-
-
-def test_the_level_of_an_add_on_is_what_the_measures_need(monkeypatch: pytest.MonkeyPatch) -> None:
-    asked = []
-
-    def pilot(*_: object, aim: Aim | None) -> HitErrors:
-        asked.append(aim)
-        return HitErrors(at_level(3, Numerics()), True, 0.9, 1.0, 0.01)
-
-    monkeypatch.setattr(evaluate, "pilot_of", pilot)
-    for layers in ([], [{"gap": "50 mm", "thickness": "9 mm", "resistance": "500 MPa"}]):
-        searched = design(WEIGHT_AND_ENERGY, "[variables]\nthickness = { low = '2 mm', high = '4 mm' }")
-        tables = dict(searched.tables(np.array([3.0]))) | {"numerics": {}, "layer": layers}
-        level = evaluate.level_of(searched, HitJob(tables, 0, 64, "draft", 1), Worker("cpu"))
-        assert Numerics.model_validate_json(level).level == 3
-    assert asked[0] is None
-    assert not asked[1].alone
 
 
 @pytest.mark.parametrize(

@@ -16,8 +16,7 @@ from warpimpact.results.files import ResultError
 from warpimpact.results.variables import EXIT_VARIABLES, HISTORY_COORDINATES, HISTORY_VARIABLES, OUTCOME_VARIABLES
 from warpimpact.runs.replay import replay
 from warpimpact.runs.run import run
-from warpimpact.scene import Accuracy, Interaction
-from warpimpact.solver.pilot import PART, SHOTS
+from warpimpact.scene import Interaction
 
 SLOTTED_PLATE = Path(__file__).parents[3] / "campaigns" / "slotted_plate.toml"
 NOWHERE = Path("nowhere")
@@ -69,21 +68,6 @@ def test_replay_ends_with_the_bits_of_the_stored_outcome(
         for name in (*OUTCOME_VARIABLES, *EXIT_VARIABLES):
             end = "residual_angular_velocity" if name == "angular_velocity" else name
             np.testing.assert_array_equal(history[end], result[name][hit])
-
-
-def test_replay_of_a_long_run_has_the_coarser_settings_that_its_pilot_found(tmp_path: Path) -> None:
-    asked = Numerics(accuracy=Accuracy(residual_velocity=2.0, tilt=2.0))
-    oblique = Impact(velocity=825.0, obliquity=10, azimuth=20)
-    many = campaign(impact=oblique, numerics=asked, hits=Hits(count=PART * SHOTS))
-    long = run(many, device="cpu")
-    found = Numerics.model_validate_json(long.attrs["resolution"])
-    assert found.coarser is not None
-    # The level alone gives other bits.
-    plain = run(many.model_copy(update={"numerics": Numerics(level=found.level)}), device="cpu")
-    long = stored(long, tmp_path / "a.nc")
-    for hit in (0, PART * SHOTS - 1):
-        assert replay(long, hit, folder=NOWHERE).attrs["agreement"] == "bit-identical"
-        assert plain["residual_velocity"][hit] != long["residual_velocity"][hit]
 
 
 @pytest.fixture(scope="module")

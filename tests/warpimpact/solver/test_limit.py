@@ -33,11 +33,10 @@ def shots(count: int, velocity: float = 800.0, **own: object) -> Shots:
     return Shots(zero, zero, zero + velocity, zero, zero, zero, zero, zero, **own)
 
 
-@pytest.mark.parametrize(("coarser", "level"), [({}, 4), ({"grid": 1}, 4), ({"step": 2, "along": 3}, 2)])
-def test_short_steps_follow_from_the_level_of_the_step(coarser: dict[str, int], level: int) -> None:
-    numerics = Numerics(level=4, coarser=coarser)
+def test_short_steps_follow_from_the_level() -> None:
+    numerics = Numerics(level=4)
     short = short_steps(numerics)
-    assert short.travel == LADDER[level].travel / STEPS_OF_LIMITS
+    assert short.travel == LADDER[4].travel / STEPS_OF_LIMITS
     assert short == numerics.model_copy(update={"travel": short.travel})  # patches and grid stay
     given = numerics.model_copy(update={"travel": 0.3})
     assert short_steps(given) == given

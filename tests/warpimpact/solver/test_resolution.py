@@ -44,19 +44,6 @@ def test_a_level_fills_in_what_is_not_given(index: int) -> None:
     assert resolution.travel == level.travel
 
 
-def test_single_settings_have_coarser_levels() -> None:
-    along, around, grid, step = LADDER[3], LADDER[1], LADDER[0], LADDER[2]
-    expected = resolved(
-        level=1,  # which has the width of the patches around
-        patches_axial=along.patches_axial,
-        patches_around=around.patches_around,
-        grid_spacing=0.6e-3 / grid.cells_per_length,
-        travel=step.travel,
-    )
-    assert resolved(level=4, coarser={"along": 3, "around": 1, "grid": 0, "step": 2}) == expected
-    assert resolved(level=4, coarser={}) == resolved(level=4)
-
-
 @pytest.mark.parametrize(("fidelity", "index"), [("draft", 0), ("standard", 2), ("reference", 4)])
 def test_a_single_setting_goes_with_the_coarsest_level_of_a_fidelity(fidelity: str, index: int) -> None:
     assert resolved(fidelity=fidelity, patches_axial=20) == resolved(level=index, patches_axial=20)
@@ -70,8 +57,6 @@ def test_a_single_setting_goes_with_the_coarsest_level_of_a_fidelity(fidelity: s
         ({"accuracy": {"tilt": "1 deg"}, "patches_axial": 20}, "patches_axial and accuracy cannot be combined"),
         ({"travel": 0.1, "time_step": 1e-6}, "travel and time_step cannot be combined"),
         ({"travel": 0.1, "scheme": "nodal"}, "travel and scheme"),
-        ({"coarser": {"step": 1}}, "coarser.step needs level"),
-        ({"level": 2, "coarser": {"grid": 3}}, "coarser.grid must be at most level, 2, but is 3"),
         ({"accuracy": {}}, "needs at least one of residual_velocity"),
         ({"accuracy": {"tilt": "1 deg", "share": 0.995}}, "less than or equal to 0.99"),
     ],

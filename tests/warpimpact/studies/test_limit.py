@@ -24,9 +24,9 @@ from warpimpact.runs.replay import replay
 from warpimpact.runs.run import run_to_file
 from warpimpact.runs.task import Task
 from warpimpact.scene import Numerics, make_shots
+from warpimpact.solver.accuracy import PILOT_LIMITS
 from warpimpact.solver.limit import limit_velocity
 from warpimpact.solver.limit_search import MOST_RUNS
-from warpimpact.solver.pilot import LIMITS
 from warpimpact.solver.worker import Worker
 from warpimpact.studies.limit import LimitMap, warning_of
 from warpimpact.studies.limit_view import limit_view
@@ -83,15 +83,15 @@ def test_the_dataset_is_that_of_shots_that_just_perforate(result: xarray.Dataset
 def test_it_tells_its_error_against_a_finer_level(result: xarray.Dataset) -> None:
     told = result.attrs
     assert told["promise_kept"] == 1
-    assert 0.0 < told["limit_error"] < 0.02 * float(result["limit_velocity"].median())
+    assert 0.0 < told["limit_velocity_error"] < 0.02 * float(result["limit_velocity"].median())
     # The error holds: a finer level, whose own error is smaller, gives limits within it.
     scene, shots = campaign().scene, make_shots(campaign().impact, campaign().hits, campaign().plate)
     fine = limit_velocity(scene, shots, numerics=Numerics(level=4), device="cpu", tolerance=0.5)
     change = fine.value - result["limit_velocity"].values
-    assert np.quantile(np.abs(change), 0.9) <= told["limit_error"]
+    assert np.quantile(np.abs(change), 0.9) <= told["limit_velocity_error"]
     # So does what the numerics may shift a mean or V50 by: some of the hits have their limits at that level.
     at = result["finer_hit"].values
-    assert len(at) == LIMITS
+    assert len(at) == PILOT_LIMITS
     np.testing.assert_allclose(result["finer_limit_velocity"].values, fine.value[at], rtol=0, atol=1.5)
     mean, v50 = estimated(result, [MEAN])[MEAN], estimated(result, [V50])[V50]
     assert abs(change.mean()) <= mean.numerics < 2.0

@@ -1,0 +1,265 @@
+"""The level of resolution that keeps an accuracy: one rule for outcomes and limits.
+
+A pilot computes some hits of a run at a level of LADDER and at the level two finer. The error of the level is a
+percentile of the changes, times ERROR_PER_CHANGE. The level rises until its error is within the accuracy, up to the end
+of the ladder, of the memory or of PILOT_SECONDS. If no level is accurate enough, the promise is not kept, and the run
+takes the coarsest level whose error is about the smallest.
+"""
+
+from __future__ import annotations
+
+import logging
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from decimal import ROUND_CEILING, Context
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warpimpact.kernels.status import Status
+from warpimpact.records.group import failures
+from warpimpact.records.layer_variables import LAYER_RESIDUAL_VELOCITY
+from warpimpact.records.outcomes import Outcomes
+from warpimpact.scene import Accuracy, Numerics
+from warpimpact.solver.resolution import LADDER, TooManySteps, at_level
+
+Array = NDArray[np.float64]
+
+_logger = logging.getLogger(__name__)
+
+PILOT_HITS, PILOT_LIMITS = 128, 16
+"""Hits, and limits, of a pilot. A tenth of the hits may err otherwise than all others, and 64 hits can miss that tenth.
+A limit takes the time of some 35 hits."""
+PILOT_SECONDS = 10.0
+"""Seconds of a core that a pilot may take, as foreseen (`Prepared.seconds`), so that a level depends on no machine. It
+bounds a hit to some 10 ms; single plates get to the end of the ladder."""
+ERROR_PER_CHANGE = 1.5
+"""Error of a level over its change to the level two finer: 1.33 where errors halve from level to level, and a margin
+(tests/benchmarks/random_scenes.py). Errors that differ by less count as equal."""
+
+UNITS = {
+    "residual_velocity_error": ("m/s", 1.0),
+    "tilt_error": ("deg", 1.0),
+    "depth_error": ("mm of depth", 1e3),
+    "limit_velocity_error": ("m/s", 1.0),
+    "limit_thickness_error": ("mm", 1e3),
+    "status_error": ("% of the hits with another status", 100.0),
+}
+"""Unit in which each error is shown, with its factor. They are stored in m/s, degree, m, and as a share."""
+
+
+class LevelErrors(NamedTuple):
+    """Errors of a level, by the names of UNITS, and the largest of them over what is allowed."""
+
+    errors: Mapping[str, float]
+    excess: float
+
+
+@dataclass(frozen=True)
+class PilotResult:
+    """The level that a pilot chose, and its errors.
+
+    Attributes:
+        numerics: the level, with the precision and layout of the run.
+        kept: whether the errors are within the accuracy.
+        share: share of the hits that are within the errors.
+        errors: by the names of UNITS; infinite where no finer level could be computed.
+        finer: outcomes of the pilot's hits two levels finer; None without a comparison.
+        numbers: numbers of the pilot's hits in their campaign; None without a campaign.
+    """
+
+    numerics: Numerics
+    kept: bool
+    share: float
+    errors: Mapping[str, float] = field(default_factory=dict)
+    finer: Outcomes | None = field(default=None, compare=False, repr=False)
+    numbers: NDArray[np.int64] | None = field(default=None, compare=False, repr=False)
+
+    @property
+    def phrase(self) -> str:
+        """A phrase with the errors for a line of progress."""
+        kept = "" if self.kept else ", not as promised"
+        return f"accuracy {errors_text(self.errors)} for {share_text(self.share)}{kept}"
+
+
+def pilot_size(accuracy: Accuracy, least: int = PILOT_HITS) -> int:
+    """Hits of a pilot. Some 1.6 or more are expected beyond the promised share."""
+    return max(least, math.ceil(1.6 / (1.0 - accuracy.share) - 1e-9))
+
+
+def choose_level(
+    numerics: Numerics,
+    first: int,
+    outcomes: Callable[[int], Outcomes],
+    errors: Callable[[Outcomes, Outcomes], LevelErrors],
+    seconds: Callable[[int], float],
+) -> PilotResult:
+    """Choose the coarsest level that keeps the accuracy of the numerics.
+
+    Args:
+        first: coarsest level to try.
+        outcomes: computes the pilot's hits at a level, once.
+        errors: errors of a level, from its outcomes and those two levels finer.
+        seconds: foreseen time of the pilot's hits at a level.
+    """
+    tried: dict[int, LevelErrors] = {}
+
+    def result(level: int) -> PilotResult:
+        (found, excess), share = tried[level], numerics.asked.share
+        return PilotResult(at_level(level, numerics), excess <= 1.0, share, found, outcomes(level + 2))
+
+    for level in range(first, len(LADDER) - 2):
+        try:
+            if tried and sum(seconds(at) for at in range(first, level + 3)) > PILOT_SECONDS:
+                break
+            tried[level] = errors(outcomes(level), outcomes(level + 2))
+        except (MemoryError, TooManySteps):
+            break
+        _logger.info("pilot: level %d errs by %s", level, errors_text(tried[level].errors))
+        if tried[level].excess <= 1.0:
+            return result(level)
+    if not tried:
+        return PilotResult(at_level(first, numerics), False, numerics.asked.share)
+    alike = ERROR_PER_CHANGE * min(of_level.excess for of_level in tried.values())
+    return result(next(level for level, of_level in tried.items() if of_level.excess <= alike))
+
+
+def hit_errors(coarse: Outcomes, fine: Outcomes, accuracy: Accuracy, free: Sequence[bool]) -> LevelErrors:
+    """Errors of outcomes; arguments as in `hit_changes`."""
+    bounds = (accuracy.residual_velocity, accuracy.tilt, accuracy.depth)
+    errors, excess = dict[str, float](), 0.0
+    for bound, (name, (change, ratio)) in zip(bounds, hit_changes(coarse, fine, accuracy, free).items(), strict=False):
+        error = error_of_share(change, accuracy.share)
+        if not math.isnan(error):
+            errors[name] = error
+        if math.isfinite(bound) and not (name == "depth_error" and math.isnan(error)):
+            excess = max(excess, math.inf if math.isnan(error) else error_of_share(ratio, accuracy.share))
+    if LAYER_RESIDUAL_VELOCITY in fine:
+        errors["status_error"] = float(ended_otherwise(coarse, fine).mean())
+        excess = max(excess, errors["status_error"] / accuracy.status_share)
+    return LevelErrors(errors, excess)
+
+
+def hit_changes(
+    coarse: Outcomes, fine: Outcomes, accuracy: Accuracy, free: Sequence[bool]
+) -> dict[str, tuple[Array, Array]]:
+    """Changes of residual velocity [m/s] and last tilt [degree] of hits, and these over what is allowed.
+
+    The velocity is the one behind the target, or behind a layer if it changes more. A core that does not leave has the
+    speed 0; one that comes back a negative one. A tilt at one level alone counts as half a turn. A computation that
+    fails at one level alone has no bound. Several layers have the depth [m] of the cores that stop, too, and relative
+    bounds. Hits that end otherwise there are NaN: they count in the status alone.
+
+    Args:
+        coarse, fine: outcomes of the same hits at both levels.
+        free: for each layer, whether a core flies free behind it. Velocities behind other layers do not count.
+    """
+    layered = LAYER_RESIDUAL_VELOCITY in fine
+    relative = (accuracy.residual_velocity_share, accuracy.tilt_share) if layered else (0.0, 0.0)
+    before, after = _speeds(coarse, free), _speeds(fine, free)
+    speed, tilt, allowed = np.abs(after - before), np.zeros(len(after)), np.ones(len(after))
+    over = (speed / (accuracy.residual_velocity + relative[0] * np.abs(after))).max(axis=1)
+    if coarse.tilt.shape[1]:
+        last = coarse.tilt[:, -1], fine.tilt[:, -1]
+        neither = np.isnan(last[0]) & np.isnan(last[1])
+        tilt = np.where(neither, 0.0, np.nan_to_num(np.abs(last[1] - last[0]), nan=math.pi))
+        allowed = accuracy.tilt + relative[1] * np.nan_to_num(last[1])
+    changes = {
+        "residual_velocity_error": (speed.max(axis=1), over),
+        "tilt_error": (np.degrees(tilt), tilt / allowed),
+    }
+    failed = failures(coarse.status) != failures(fine.status)
+    if layered:
+        depth, other = np.abs(fine.depth - coarse.depth), ended_otherwise(coarse, fine)
+        changes["depth_error"] = (depth, depth / accuracy.depth)
+        changes = {name: _with(other, math.nan, both) for name, both in changes.items()}
+    for name in ("residual_velocity_error", "tilt_error"):
+        changes[name] = _with(failed, math.inf, changes[name])
+    return changes
+
+
+def _with(which: NDArray[np.bool_], value: float, both: tuple[Array, Array]) -> tuple[Array, Array]:
+    return np.where(which, value, both[0]), np.where(which, value, both[1])
+
+
+def limit_errors(coarse: Array, fine: Array, accuracy: Accuracy, quantity: str) -> LevelErrors:
+    """Error of limits. What is allowed is a share of the median limit.
+
+    Args:
+        coarse, fine: limits of the same hits at both levels [m/s] or [m].
+        quantity: "velocity" or "thickness". A thickness goes with the square of the velocity.
+    """
+    assert accuracy.limit is not None
+    same = (coarse == fine) | (np.isnan(coarse) & np.isnan(fine))
+    with np.errstate(invalid="ignore"):
+        change = np.nan_to_num(np.where(same, 0.0, np.abs(coarse - fine)), nan=math.inf, posinf=math.inf)
+    error, finite = error_of_share(change, accuracy.share), fine[np.isfinite(fine)]
+    allowed = (1.0 if quantity == "velocity" else 2.0) * accuracy.limit * (np.median(finite) if len(finite) else 0.0)
+    return LevelErrors({f"limit_{quantity}_error": error}, error / max(float(allowed), 1e-30))
+
+
+def error_of_share(changes: Array, share: float) -> float:
+    """Error of a share of the hits, from their changes to the level two finer; NaN counts as no hit.
+
+    Only half of the hits that the share leaves out may change more, because the pilot's hits are few: of 128 hits, the
+    122nd lies below the 90th percentile of all hits in 3 % of the pilots.
+    """
+    known = np.sort(changes[~np.isnan(changes)])
+    place = math.ceil(0.5 * (1.0 + share) * len(known) - 1e-9) - 1
+    return ERROR_PER_CHANGE * float(known[place]) if len(known) else math.nan
+
+
+def ended_otherwise(coarse: Outcomes, fine: Outcomes) -> NDArray[np.bool_]:
+    """Whether each hit at several layers ends in another status or in another layer."""
+    return np.asarray((coarse.status != fine.status) | (coarse.stopped_in != fine.stopped_in))
+
+
+def _speeds(outcomes: Outcomes, free: Sequence[bool]) -> Array:
+    """Residual velocities [m/s] behind the target and behind the layers that count, shape [hits, 1 or more]."""
+    back = outcomes.status == Status.RICOCHETED
+    speeds = np.where(back, -outcomes.residual_velocity, outcomes.residual_velocity)[:, None]
+    if LAYER_RESIDUAL_VELOCITY in outcomes:
+        speeds = np.concatenate([speeds, outcomes.layer_residual_velocity[:, np.array(free)]], axis=1)
+    return np.nan_to_num(speeds)
+
+
+def share_text(share: float) -> str:
+    """Words for a share of the hits."""
+    return f"{100.0 * share:.3g} % of the hits"
+
+
+def errors_text(errors: Mapping[str, float]) -> str:
+    """Words for the errors among some attributes, rounded up to two digits."""
+    known = {name: errors[name] for name in UNITS if name in errors and (name != "status_error" or errors[name])}
+    parts = [f"{upper_digits(UNITS[name][1] * error)} {UNITS[name][0]}" for name, error in known.items()]
+    return listed(parts) if parts else "unknown"
+
+
+def accuracy_text(asked: Mapping[str, float], *, layered: bool) -> str:
+    """Words for an accuracy, by the names and in the units of `Accuracy`. A bound that it lacks is not asked for."""
+
+    def bound(name: str, unit: str, factor: float = 1.0) -> str:
+        share = asked.get(f"{name}_share", 0.0) if layered else 0.0
+        return f"{factor * asked[name]:g} {unit}" + (f" + {100.0 * share:g} %" if share else "")
+
+    parts = [bound("residual_velocity", "m/s")] if "residual_velocity" in asked else []
+    parts += [bound("tilt", "deg", math.degrees(1.0))] if "tilt" in asked else []
+    if layered and "depth" in asked:
+        parts.append(f"{1e3 * asked['depth']:g} mm of depth")
+    stated = f"{listed(parts)} for {share_text(asked['share'])}"
+    if layered and asked.get("status_share", 1.0) < 1.0:
+        stated += f", another status for at most {100.0 * asked['status_share']:g} %"
+    return stated
+
+
+def upper_digits(error: float) -> str:
+    """An error rounded up to two digits, so that one above a bound never reads as if it were at the bound."""
+    up = Context(prec=2, rounding=ROUND_CEILING).create_decimal(f"{error:.9g}")  # nine digits: noise does not count
+    return f"{float(up):g}"
+
+
+def listed(parts: Sequence[str]) -> str:
+    """Parts of a sentence as a list."""
+    return " and ".join([", ".join(parts[:-1]), parts[-1]] if len(parts) > 1 else parts)
