@@ -22,9 +22,8 @@ from .export import add_export, add_report
 from .firing import add_test
 from .identify import add_identify
 from .limit import add_limit
-from .mistakes import bug_report, implausible_told, message_of
+from .mistakes import Plain, bug_report, implausible_told, message_of, say
 from .optimise import add_optimise
-from .plain import Plain, say
 from .progress import verbosity
 from .replay import add_replay
 from .run import add_run

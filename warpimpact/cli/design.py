@@ -6,8 +6,8 @@ import tempfile
 from contextlib import ExitStack
 from pathlib import Path
 
+from .mistakes import say
 from .options import Commands, add_command, add_device
-from .plain import say
 
 
 def add_design(commands: Commands) -> None:

@@ -5,10 +5,9 @@ import math
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from .mistakes import memory_told
+from .mistakes import memory_told, say
 from .options import Commands, add_command, add_computing, add_earlier, add_output
 from .paths import check_output, check_picture, check_result, replaces
-from .plain import say
 from .progress import Step, show_progress, warn
 
 if TYPE_CHECKING:

@@ -1,4 +1,7 @@
-"""Errors that the user can correct, and what their messages add."""
+"""Errors that the user can correct, what their messages add, and printed text without control characters.
+
+A title or a file may contain control characters, which a terminal would obey.
+"""
 
 import os
 import sys
@@ -8,9 +11,7 @@ import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
-
-from .plain import say
+from typing import IO, Any
 
 
 def message_of(error: Exception) -> str | None:
@@ -92,3 +93,42 @@ def folder_told(more: str = "") -> Iterator[None]:
         yield
     except CampaignError as error:
         raise CampaignError(f"{error}; give the folder of the campaign's files with --campaign-folder{more}") from None
+
+
+_MOST_SAID = 2000
+"""Most characters of a sentence on the error stream."""
+
+
+class Plain:
+    """A stream that spells out control characters, except ends of lines and tabulators.
+
+    Args:
+        stream: stream to which the text goes.
+    """
+
+    def __init__(self, stream: IO[str]) -> None:
+        self._stream = stream
+
+    def write(self, text: str) -> int:
+        """Write the text. Characters that the stream's encoding lacks are spelt out, too."""
+        encoding = getattr(self._stream, "encoding", None) or "utf-8"
+        self._stream.write(plain(text, "\n\t").encode(encoding, "backslashreplace").decode(encoding))
+        return len(text)
+
+    def __getattr__(self, name: str) -> Any:
+        """Take all other attributes from the stream."""
+        return getattr(self._stream, name)
+
+
+def plain(text: str, keep: str = "") -> str:
+    """The text with its control characters spelt out, except those in `keep`."""
+    return "".join(
+        character if character.isprintable() or character in keep else ascii(character)[1:-1] for character in text
+    )
+
+
+def say(sentence: str) -> None:
+    """Write one sentence for the user, on one line of the error stream."""
+    line = plain(sentence)
+    cut = line if len(line) <= _MOST_SAID else f"{line[: _MOST_SAID - 1]}…"
+    print(f"warpimpact: {cut}", file=Plain(sys.stderr), flush=True)

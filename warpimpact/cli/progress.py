@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, NamedTuple
 
-from .plain import Plain, say
+from .mistakes import Plain, say
 
 if TYPE_CHECKING:
     from warpimpact.results.measures import Measure

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 from warpimpact.results import attributes as attr
 
-from .mistakes import memory_told
+from .mistakes import memory_told, say
 from .options import (
     Commands,
     add_campaign,
@@ -18,7 +18,6 @@ from .options import (
     executor_of,
 )
 from .paths import check_result
-from .plain import say
 from .progress import show_run, warn
 
 if TYPE_CHECKING:

@@ -16,10 +16,9 @@ from warpimpact.campaign.plausible import doubted, doubted_holes
 from warpimpact.campaign.resistances import catalogue_names
 from warpimpact.campaign.tested_range import outside_tested_range, range_line
 from warpimpact.campaign.text import CampaignError
-from warpimpact.design.controls import groups
+from warpimpact.design.controls import drawn, groups
 from warpimpact.design.designs import ROOT, Shelf, ValidDesign, stage_of, work_ahead
 from warpimpact.design.edits import choices
-from warpimpact.design.geometry import drawn
 from warpimpact.plotting.style import data_url
 from warpimpact.plotting.trajectory import FIGURES
 from warpimpact.report.hit_data import MOST_HITS, PAGE_PIXELS, page_data, thinned, trajectory_data

@@ -1,12 +1,15 @@
-"""A guard for the server of the page: it answers this machine's own page, and nobody else."""
+"""Whom the server of the page answers: this machine's own page, and nobody else or for ever."""
 
 from __future__ import annotations
 
+import asyncio
 import hmac
 from collections.abc import Awaitable, Callable, Mapping, MutableMapping
-from typing import Any
+from typing import Any, cast
 
+import h11
 from starlette.responses import PlainTextResponse, Response
+from uvicorn.protocols.http.h11_impl import H11Protocol
 
 Scope = MutableMapping[str, Any]
 Receive = Callable[[], Awaitable[MutableMapping[str, Any]]]
@@ -21,6 +24,10 @@ _HEADERS = {
     "x-content-type-options": "nosniff",
     "cache-control": "no-store",
 }
+
+REQUEST_SECONDS = 10.0
+"""Seconds for a request to arrive, from the opening of its connection or from its first byte on. Between two requests
+uvicorn itself closes a connection (`timeout_keep_alive`)."""
 
 
 class Guard:
@@ -72,3 +79,36 @@ def _with_headers(send: Send) -> Send:
         await send(message)
 
     return sending
+
+
+class TimedProtocol(H11Protocol):
+    """A connection that is closed if no whole request comes in time.
+
+    uvicorn has a limit only between two requests; a silent connection would stay open for ever.
+    """
+
+    _closing: asyncio.TimerHandle | None = None
+
+    def connection_made(self, transport: asyncio.BaseTransport) -> None:
+        super().connection_made(cast("asyncio.Transport", transport))
+        self._watch()
+
+    def data_received(self, data: bytes) -> None:
+        super().data_received(data)
+        self._watch()
+
+    def connection_lost(self, exc: Exception | None) -> None:
+        self._forget()
+        super().connection_lost(exc)
+
+    def _watch(self) -> None:
+        """Start the clock for the rest of a request; further bytes do not restart it."""
+        if self.conn.their_state not in (h11.IDLE, h11.SEND_BODY):
+            self._forget()
+        elif self._closing is None:
+            self._closing = self.loop.call_later(REQUEST_SECONDS, self.transport.close)
+
+    def _forget(self) -> None:
+        if self._closing is not None:
+            self._closing.cancel()
+            self._closing = None

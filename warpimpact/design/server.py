@@ -27,8 +27,7 @@ from warpimpact.design.answers import Answers, named
 from warpimpact.design.designs import Shelf, Tables, ValidDesign, as_json, stages
 from warpimpact.design.desk import Desk
 from warpimpact.design.edits import changed
-from warpimpact.design.guard import Guard
-from warpimpact.design.hasty import Hasty
+from warpimpact.design.guard import Guard, TimedProtocol
 from warpimpact.results.files import ResultError
 from warpimpact.scene.bounds import Implausible
 from warpimpact.scene.units import quoted
@@ -273,7 +272,7 @@ def server_of(app: Guard) -> uvicorn.Server:
     return uvicorn.Server(
         uvicorn.Config(
             app,
-            http=Hasty,
+            http=TimedProtocol,
             ws="none",
             log_level="critical",
             access_log=False,

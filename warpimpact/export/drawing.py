@@ -3,17 +3,13 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 
 from warpimpact.results.files import OutputError, aside
+from warpimpact.scene import Plate
 from warpimpact.scene.display import MM
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    from warpimpact.scene import Plate
 
 SUFFIXES = (".svg", ".dxf")
 _CORNERS = 12

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import xarray
@@ -22,11 +22,7 @@ from warpimpact.results import variables as v
 from warpimpact.results.dataset import hit_numbers
 from warpimpact.results.outlines import outlines
 from warpimpact.scene.display import MM
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    Array = NDArray[np.float64]
+from warpimpact.scene.model import Array
 
 MOST_HITS = 12_000
 """Most hits on a page, for all results together: about 1 MB, compressed."""

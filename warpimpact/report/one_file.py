@@ -7,7 +7,9 @@ from dataclasses import replace
 from html import escape
 from pathlib import Path
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
+
+from matplotlib.figure import Figure
 
 from warpimpact.analysis.swept import sweep_view
 from warpimpact.firing.view import firing_view
@@ -23,9 +25,6 @@ from warpimpact.results import files, firing, front, posterior_file
 from warpimpact.results.kinds import FIRING, FRONT, HISTORY, POSTERIOR, SWEEP, Kind
 from warpimpact.results.replayed_hit import hit_view
 from warpimpact.view.view import Section, html_of
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 _STYLE = (
     "body{font:16px sans-serif;max-width:70rem;margin:2rem auto;padding:0 1rem}img{max-width:100%}pre{overflow:auto}"

@@ -18,7 +18,7 @@ from hypothesis import strategies as st
 from warpimpact.campaign.campaign import Campaign
 from warpimpact.campaign.text import CampaignError
 from warpimpact.cli import main
-from warpimpact.cli.plain import Plain, say
+from warpimpact.cli.mistakes import Plain, say
 from warpimpact.results import files
 from warpimpact.scene.unit_text import UnitError
 from warpimpact.scene.units import Length, quantity, quoted
@@ -49,8 +49,8 @@ CAMPAIGNS = {
     "a key of dots": (".".join("a" * 100_000) + " = 1\n" + BASE, "dots in a key"),
     "a table of dots": ("[" + ".".join("a" * 100_000) + "]\n" + BASE, "dots in a key"),
     "a long array": ("x = [" + "1," * 2_000_000 + "]\n" + BASE, "at most 1048576 characters"),
-    "a tower of powers": (BASE.replace('"4 mm"', '"4 m**9**9**9"', 1), 'whose unit "m**9**9**9" is unknown'),
-    "another tower": (BASE.replace('"4 mm"', '"4 m*(9**9)**9**9"', 1), "is unknown"),
+    "a tower of powers": (BASE.replace('"4 mm"', '"4 m**9**9**9"', 1), 'whose unit "m**9**9**9" is not one of names'),
+    "another tower": (BASE.replace('"4 mm"', '"4 m*(9**9)**9**9"', 1), "is not one of names"),
     "a long unit": (BASE.replace('"4 mm"', '"4 ' + "m" * 100_000 + '"', 1), "which has more than 80 characters"),
     "a long file name": (listed("z" * 300), "which is no file name"),
     "a long path": (listed("z" * 5000), "which is no file name"),

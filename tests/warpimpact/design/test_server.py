@@ -23,7 +23,7 @@ from warpimpact.campaign.text import CampaignError
 from warpimpact.catalogue.catalogue import Catalogue
 from warpimpact.catalogue.entries import Threat
 from warpimpact.cli import main
-from warpimpact.design import hasty
+from warpimpact.design import guard
 from warpimpact.design.answers import Answers
 from warpimpact.design.designs import FEWEST, FILE_KEYS, FIRST_WORK, shelf_of, stages, work
 from warpimpact.design.edits import SHAPES, changed
@@ -91,7 +91,7 @@ def test_it_asks_for_its_token(address: str, token: str) -> None:
 
 
 def test_a_socket_that_sends_no_whole_request_is_closed(address: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(hasty, "REQUEST_SECONDS", 0.5)
+    monkeypatch.setattr(guard, "REQUEST_SECONDS", 0.5)
     place = urlsplit(address)
     headers = f"Host: {place.netloc}\r\nOrigin: http://{place.netloc}\r\nContent-Length: 9\r\n"
     begun = ["", f"GET {place.path} HT", f"POST {place.path}compute HTTP/1.1\r\n{headers}\r\n{{"]
@@ -106,7 +106,7 @@ def test_a_socket_that_sends_no_whole_request_is_closed(address: str, monkeypatc
 
 
 def test_bytes_that_trickle_do_not_keep_a_socket(address: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(hasty, "REQUEST_SECONDS", 0.5)
+    monkeypatch.setattr(guard, "REQUEST_SECONDS", 0.5)
     place = urlsplit(address)
     with socket.create_connection((place.hostname, place.port)) as one, suppress(ConnectionError):
         one.settimeout(0.05)
@@ -217,7 +217,7 @@ def test_stages_go_from_few_hits_to_the_campaign(address: str, small: Path) -> N
     computed = lines[::2]
     assert [line["ahead"] > 0.0 for line in computed] == [True, True, False]
     assert plate["plate"]["numbers"]["open area"] == "34.8%"
-    assert [(line["stage"], line["hits"]) for line in computed] == [("first", 1024), ("draft", 1024), ("full", 1500)]
+    assert [(line["stage"], line["hits"]) for line in computed] == [("first", 256), ("draft", 1024), ("full", 1500)]
     assert [line["numerics"][:26] for line in computed[1:]] == [
         "Numerics: draft keeps its ",
         "Numerics: standard keeps i",
