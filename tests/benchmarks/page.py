@@ -25,22 +25,13 @@ RUNS: Mapping[str, Sequence[str]] = {
     "throughput": ("throughput.py",),
     "roads": ("roads.py",),
     "drawn": ("roads.py", "--seed", "1", "--scenes", "4", "--hits", "64"),
-    "loops": ("loops.py",),
-    "many": ("many.py",),
     "overheads": ("overheads.py",),
     "continuum_speed": ("continuum_speed.py",),
     "design_page": ("design_page.py",),
-    "statistics_cost": ("statistics_cost.py",),
 }
 """The benchmarks behind the page, by the name of their result."""
 KNOWN = {**RUNS, "gpu": ("gpu.py",)}
 """The same and those that a machine measures only where it can."""
-SHORT = {
-    "7.62 mm P80 core against a slotted plate": "slotted plate",
-    "7.62 mm P80 core against a plate with round holes (illustrative)": "round holes",
-    "7.62 mm P80 core against a slotted plate at 20° obliquity, yawed": "oblique shot",
-}
-"""Titles of campaigns as the table names them."""
 FIDELITIES = ("draft", "standard", "reference")
 COLOURS = {"warpimpact": "#0072B2", "Numba": "#D55E00"}
 
@@ -66,8 +57,8 @@ def results(folder: Path = RESULTS) -> dict[str, Any]:
 
 def rows(found: Mapping[str, Any]) -> Iterator[Row]:
     """Every row of the table."""
-    parts = (_throughput, _peers, _roads, _drawn, _loops, _many, _overheads, _continuum_speed, _design_page)
-    for part in (*parts, _statistics_cost, _gpu):
+    parts = (_throughput, _peers, _roads, _drawn, _overheads, _continuum_speed, _design_page)
+    for part in (*parts, _gpu):
         if (name := part.__name__.removeprefix("_")) in found:
             yield from part(found[name])
 
@@ -156,47 +147,6 @@ def _drawn(values: Mapping[str, Any]) -> Iterator[Row]:
         )
 
 
-def _loops(values: Mapping[str, Any]) -> Iterator[Row]:
-    for name, one in values["limits"].items():
-        yield Row(
-            "limit velocity, times the cost of the slotted plate at standard",
-            name,
-            f"{one['ratio']:.0f}, {one['runs']:.1f} runs of a hit; level {one['level']}, "
-            f"{one['microseconds_per_hit'] * 1e-3:.2g} ms per hit, pilot {one['pilot_share']:.0%}"
-            + ("" if one["kept"] else "; promise not kept"),
-            f"processor time of a run of {values['run']} hits with its pilot",
-            f"one run of {values['hits']} hits",
-        )
-    for name, one in values["drawn"].items():
-        yield Row(
-            f"hits of {values['draws']} draws, times the cost of one scene",
-            f"slotted plate, {name} of a posterior",
-            f"{one['ratio']:.2f}; {_rounded(one['hits_per_second'])} hits per second of one core",
-            f"one scene with as many hits, level {values['level']}",
-            f"least of {values['rounds']} rounds, {values['each']} hits of a draw",
-        )
-    fit = values["identify"]
-    yield Row(
-        "`warpimpact identify`, seconds and effective sample size",
-        "two shots of the paper (`paper_fit`)",
-        f"{fit['seconds']:.0f} s of a core, {fit['wall']:.0f} s wall time; {fit['effective']:.0f}",
-        f"{fit['sets']} sets of parameters",
-        "one fit",
-    )
-
-
-def _many(values: Mapping[str, Any]) -> Iterator[Row]:
-    for name, one in values["contenders"].items():
-        yield Row(
-            f"level {values['level']}, hits per second of many scenes in one call",
-            name,
-            f"{_rounded(one['one_core'])} on one core ({one['share']:.0%} of one scene), "
-            f"{_rounded(one['all_cores'])} on all",
-            "processor time of one core; wall time on all",
-            f"least of {values['rounds']} rounds",
-        )
-
-
 def _overheads(values: Mapping[str, Any]) -> Iterator[Row]:
     names = {
         "help_seconds": "`warpimpact --help`",
@@ -255,21 +205,6 @@ def _design_page(values: Mapping[str, Any]) -> Iterator[Row]:
         )
 
 
-def _statistics_cost(values: Mapping[str, Any]) -> Iterator[Row]:
-    sample = f"root mean square over {values['seeds']} seeds, up to {values['hits']} hits"
-    for title, questions in values["cost"].items():
-        for question, costs in questions.items():
-            ways = {way: cost for way, cost in costs.items() if " per " not in way}
-            way = min(ways, key=lambda one: ways[one])
-            yield Row(
-                f"cost of {question}",
-                SHORT.get(title, title),
-                f"{_milliseconds(ways[way])} ({way})",
-                f"random points: {_milliseconds(ways['random'])}; 95 % interval",
-                sample,
-            )
-
-
 def _gpu(values: Mapping[str, Any]) -> Iterator[Row]:
     device, level = values["device"], values["level"]
     for scene, ways in values["rates"].items():
@@ -310,17 +245,12 @@ def _gpu(values: Mapping[str, Any]) -> Iterator[Row]:
         )
 
 
-def _milliseconds(cost: float) -> str:
-    """A cost [s]; below some hits it is extrapolated and means nothing."""
-    return f"{1e3 * cost:.3g} ms" if cost >= 1e-3 else "below 1 ms"
-
-
 def _rounded(rate: float) -> str:
     return f"{float(f'{rate:.3g}'):,.0f}"
 
 
 def draw(found: Mapping[str, Any]) -> Any:
-    """Error against cost beside the peer, hits per second of the fidelities, and what an answer costs."""
+    """Error against cost beside the peer, and hits per second of the fidelities."""
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(12, 7.6), layout="constrained")
@@ -330,11 +260,8 @@ def draw(found: Mapping[str, Any]) -> Any:
         upper.subplots(1, max(1, len(bouts)), squeeze=False)[0], bouts.items(), strict=False
     ):
         _draw_peers(axes, scene, bout)
-    rates, costs = lower.subplots(1, 2, width_ratios=(1, 1.3))
     if "throughput" in found:
-        _draw_rates(rates, found["throughput"]["scenes"])
-    if "statistics_cost" in found:
-        _draw_costs(costs, found["statistics_cost"]["cost"])
+        _draw_rates(lower.subplots(), found["throughput"]["scenes"])
     told = found.get("throughput", found.get("peers", {})).get("machine", {})
     figure.suptitle(f"{told.get('processor')}, {told.get('cores')} cores, {told.get('date')}")
     return figure
@@ -374,33 +301,6 @@ def _draw_rates(axes: Any, scenes: Mapping[str, Any]) -> None:
     axes.grid(axis="y", which="major", color="0.9")
     axes.set_axisbelow(True)
     axes.legend(frameon=False, fontsize="small")
-
-
-def _draw_costs(axes: Any, tables: Mapping[str, Any]) -> None:
-    """Costs of the first question on every scene, by the way to draw the hits."""
-    kinds = ("random", "sobol", "sobol, two levels", "irreducible", "irreducible, two levels")
-    question = next(iter(next(iter(tables.values()))))
-    for place, (title, questions) in enumerate(tables.items()):
-        costs = {_kind(way): cost for way, cost in questions[question].items() if " per " not in way}
-        for index, kind in enumerate(kinds):
-            if kind in costs:
-                colour = ("#0072B2", "#56B4E9", "#CC79A7")[place % 3]
-                axes.barh(
-                    index + 0.27 * (place - 1), 1e3 * costs[kind], 0.25, color=colour, label=SHORT.get(title, title)
-                )
-    axes.set_yticks(range(len(kinds)), kinds)
-    axes.invert_yaxis()
-    axes.set(xscale="log", xlabel=f"ms of processor time for the {question}")
-    axes.grid(axis="x", which="major", color="0.9")
-    axes.set_axisbelow(True)
-    handles = dict(zip(*reversed(axes.get_legend_handles_labels()), strict=True))
-    axes.legend(handles.values(), handles.keys(), frameon=False, fontsize="small")
-
-
-def _kind(way: str) -> str:
-    """A way without the share of the cell that is computed."""
-    name, bracket, rest = way.partition(" (")
-    return name + rest.partition(")")[2] if bracket else way
 
 
 def main(argv: Sequence[str] | None = None) -> int:

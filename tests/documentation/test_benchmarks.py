@@ -76,5 +76,5 @@ def test_the_machine_and_the_date_are_told(found: Results) -> None:
 def test_the_figure_is_drawn(found: Results) -> None:
     figure = page.draw(found)
     panels = [axes for part in figure.subfigs for axes in part.axes]
-    assert len(panels) == len(found["peers"]["scenes"]) + 2
+    assert len(panels) == len(found["peers"]["scenes"]) + 1
     assert all(axes.lines or axes.patches for axes in panels)

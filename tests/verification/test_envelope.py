@@ -1,4 +1,4 @@
-"""Stability at extremes (tests/verification/extremes.py); tests/benchmarks/envelope.py looks at thousands of scenes."""
+"""Stability at extremes (tests/verification/extremes.py)."""
 
 import numpy as np
 import pytest
