@@ -3,8 +3,6 @@
 A step makes two passes over the patches in the slab. The first pass finds the patches that touch and adds their
 exposure to the plate. The second pass reads the weakened plate and sums the load. Each pass is one loop over the
 patches of all rings without a branch, so a CPU computes several patches at once.
-
-Long because the second pass reads what the first one finds.
 """
 
 from functools import cache

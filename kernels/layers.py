@@ -1,9 +1,8 @@
 """A target of several layers: the layers that a step can touch, their load, and how the core left each of them.
 
 A layer sees the core in a frame of its own: its front at x = 0, its window's home at y = z = 0. The load of one layer
-is therefore the load of one plate, and the loads of layers add (kernels/contracts.py, TargetKind).
-
-Long because all functions read the same layers of the same slot.
+is therefore the load of one plate, and the loads of layers add. one_plate.py
+has the same functions for one plate.
 """
 
 from functools import cache

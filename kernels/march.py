@@ -21,7 +21,6 @@ from . import (
     target,
     trace,
 )
-from .contracts import TargetKind, checked
 from .lanes import BLOCKS, LANES
 from .status import RUNNING, Status
 from .variant import Variant
@@ -36,7 +35,7 @@ def build(variant: Variant) -> SimpleNamespace:
     barrier_share, gained = real(constants.BARRIER_SHARE.value), real(constants.GAINED.value)
     steadied = real(constants.STEADIED.value)
     use = variant.use(bending, clock, core_surface, interaction, lanes, rigid_body, scheme, shots, target, trace)
-    kind = checked(TargetKind, variant, (layers if variant.layered else one_plate).build(variant))
+    kind = (layers if variant.layered else one_plate).build(variant)
     shot_value = use.shots.shot_value
 
     @wp.func

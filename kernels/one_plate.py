@@ -1,4 +1,4 @@
-"""A target of one plate: its footprint in a step, and its load (kernels/contracts.py, TargetKind)."""
+"""A target of one plate: its footprint in a step, and its load. layers.py has the same functions for several layers."""
 
 from functools import cache
 from types import SimpleNamespace

@@ -3,8 +3,6 @@
 A struct is what functions of several stages, or the host and a kernel, pass to each other. Its docstring gives the
 meaning, the unit and the shape of each member. Numbers are SI, angles in radians. Arrays lie in the memory of the
 device; the host fills those of the inputs (solver/structs.py, solver/memory.py).
-
-Long because all structs stand in one place.
 """
 
 from functools import cache
@@ -38,18 +36,13 @@ def _build(double: bool, many_plates: bool) -> SimpleNamespace:
         number for all patches of the ring, so that a CPU goes through the patches of all rings in one loop.
         `cosine` and `sine` belong to the azimuths of all patches, ring by ring. Odd rings are turned by half a patch,
         so that neighbouring rings do not all miss the same edge. The number of patches around a ring is a multiple of
-        4. `profile` has radii [m] at equidistant stations, `per_station` of them per metre, from the base's station
-        `base` [m] on. A slot has room for `most_rings` and `most_patches`, the numbers of the largest surface of a
-        launch.
+        4. A slot has room for `most_rings` and `most_patches`, the numbers of the largest surface of a launch.
         """
 
         of_rings: wp.array(dtype=real)
         of_patches: wp.array(dtype=real)
         cosine: wp.array(dtype=real)
         sine: wp.array(dtype=real)
-        profile: wp.array(dtype=real)
-        base: real
-        per_station: real
         rings: wp.int32
         around: wp.int32
         most_rings: wp.int32

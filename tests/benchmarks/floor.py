@@ -20,9 +20,8 @@ from scipy.spatial.transform import Rotation
 
 from warpimpact import Numerics, Scene, Shots
 from warpimpact.kernels.variant import Variant
-from warpimpact.solver.history import History
 from warpimpact.solver.prepare import prepare
-from warpimpact.solver.replay import trace
+from warpimpact.solver.replay import History, trace
 
 LOOK = 30
 # Closing speed from what its ring and its azimuth share, 5; depth, 2; extents along the meridian, around and by motion,

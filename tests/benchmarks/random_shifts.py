@@ -59,16 +59,16 @@ def columns(outcomes: Outcomes) -> tuple[Array, Array]:
     return np.where(passed, velocity, np.nan), np.where(passed, tilt, np.nan)
 
 
-def shifts(pilot: tuple[Outcomes, Outcomes], others: tuple[Outcomes, Outcomes], together: int) -> list[Shift]:
-    """Those of all measures, by a pilot and by other hits at two levels each, with so many shots at a plate."""
+def shifts(pilot: tuple[Outcomes, Outcomes], others: tuple[Outcomes, Outcomes]) -> list[Shift]:
+    """Those of all measures, by a pilot and by other hits at two levels each."""
     rows = []
     before, after = (list(zip(*map(columns, pair), strict=True)) for pair in (pilot, others))
     for name, by_pilot, by_others in zip(("velocity", "tilt"), before, after, strict=True):
-        change = change_of_mean(*by_others, images=together)
-        rows.append(Shift(name, shift_of_mean(*by_pilot, images=together), change.value, change.half_width))
+        change = change_of_mean(*by_others)
+        rows.append(Shift(name, shift_of_mean(*by_pilot), change.value, change.half_width))
     coarse, fine = (np.where(np.isnan(tilt), np.nan, tilt > TILTED) for tilt in after[1])
-    change = estimate_of("difference", fine - coarse, images=together)
-    promised = shift_of_share(*(tilt - TILTED for tilt in before[1]), images=together)
+    change = estimate_of("difference", fine - coarse)
+    promised = shift_of_share(*(tilt - TILTED for tilt in before[1]))
     return [*rows, Shift("P(tilted)", promised, change.value, change.half_width)]
 
 

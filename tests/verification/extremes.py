@@ -35,8 +35,7 @@ from warpimpact.scene import (
     Target,
 )
 from warpimpact.scene.core import MassProperties
-from warpimpact.solver.history import History
-from warpimpact.solver.replay import traced, traces_of
+from warpimpact.solver.replay import History, traced, traces_of
 
 from .scenes import shots_at
 

@@ -15,8 +15,7 @@ from warpimpact.kernels.status import Status
 from warpimpact.kernels.trace import WIDTH
 from warpimpact.scene import Scene, Shots
 from warpimpact.scene.flow import Continuum
-from warpimpact.solver.history import History
-from warpimpact.solver.replay import Deformed, Replay, Weakened
+from warpimpact.solver.replay import Deformed, History, Replay, Weakened
 from warpimpact.solver.worker import Worker
 
 Array = NDArray[np.float64]

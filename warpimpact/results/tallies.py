@@ -56,7 +56,7 @@ def estimate_from(measure: Measure, values: Array, **dealt: Unpack[Estimating]) 
         return Estimate(worst, math.nan, math.nan, len(known), math.nan)
     kind = "share" if measure.is_binary else "quantile" if measure.kind == "quantile" else "mean"
     estimate = estimate_of(kind, measure.averaged(values), share=measure.share, **dealt)
-    if measure.kind == "worst_tenth" and not has_interval(estimate.count, dealt.get("images", 1)):
+    if measure.kind == "worst_tenth" and not has_interval(estimate.count):
         estimate = replace(estimate, low=math.nan, high=math.nan)
     return estimate.within(measure.least, measure.most)
 
@@ -84,4 +84,4 @@ def shift_of(measure: Measure, levels: tuple[Result, Result] | None, confidence:
 
 def dealing(dataset: Result) -> Dealing:
     """Arguments of `Dealt` for the sampling of a result. Chosen hits are no longer in the order of the replicates."""
-    return {"replicates": 1 if is_choice(dataset) else int(dataset.attrs.get(attr.REPLICATES, 1)), "images": 1}
+    return {"replicates": 1 if is_choice(dataset) else int(dataset.attrs.get(attr.REPLICATES, 1))}

@@ -46,8 +46,7 @@ class Watch:
         if campaign.stop is not None:
             asked.append((campaign.stop.measure, campaign.stop.confidence))
         self._tallies = [
-            Tally(measure, replicates=campaign.replicates, images=1, confidence=confidence)
-            for measure, confidence in asked
+            Tally(measure, replicates=campaign.replicates, confidence=confidence) for measure, confidence in asked
         ]
         self._looks = {*looks(campaign.hits.sampling, shards.count)} if campaign.stop is not None else set[int]()
         self._shift: float | None = None

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
-from typing import Any, ClassVar
+from typing import Any
 
 import numpy as np
 from pydantic import (
@@ -24,16 +24,17 @@ from .shots import Shots
 from .units import Radians, in_radians, quantity
 
 
-def check_range(name: str, low: float, high: float, known: Mapping[str, Quantity] = QUANTITIES) -> None:
+def check_range(name: str, low: float, high: float) -> None:
     """Refuse a range of a quantity, `low` to `high`, with values that the quantity may not have.
 
     Raises:
         ValueError: the message has the value that is reached and what is allowed.
     """
-    read = quantity(known[name].type)
+    kind = QUANTITIES[name].type
+    read = quantity(kind)
     for value in (low, high):
         try:
-            TypeAdapter(known[name].type).validate_python(read.as_read(float(value)))
+            TypeAdapter(kind).validate_python(read.as_read(float(value)))
         except ValidationError as error:
             allowed = error.errors()[0]["msg"].replace("Input should", "it must")
             reached = f"{math.degrees(value):.6g} deg" if read.unit == "rad" else f"{value:.6g}"
@@ -49,56 +50,16 @@ def in_si(read: Any, given: Mapping[str, Any]) -> dict[str, Any]:
     return {name: part if name in PURE_NUMBERS else _read(read, name, part) for name, part in given.items()}
 
 
-class Scattering(Model):
-    """Distributions of quantities; None for a quantity that all shots share."""
-
-    _quantities: ClassVar[Mapping[str, Quantity]]
-
-    @field_validator("*", mode="before")
-    @classmethod
-    def _in_si(cls, value: Any, info: ValidationInfo) -> Any:
-        """Read parameters with the unit of their quantity."""
-        known = cls._quantities.get(str(info.field_name))
-        if known is not None and known.by_layer:
-            layers = (value,) if isinstance(value, dict | Distribution) else value
-            return [_in_si(known, layer) for layer in layers] if isinstance(layers, list | tuple) else layers
-        return value if known is None else _in_si(known, value)
-
-    @field_validator("*", mode="after")
-    @classmethod
-    def _is_possible(cls, value: Any, info: ValidationInfo) -> Any:
-        for distribution in value if isinstance(value, tuple) else (value,):
-            if isinstance(distribution, Distribution):
-                low, high = distribution.quantile(np.array([EDGE, 1.0 - EDGE]))
-                try:
-                    check_range(str(info.field_name), low, high, cls._quantities)
-                except ValueError as error:
-                    raise ValueError(f"got a {distribution.distribution} distribution that {error}") from None
-        return value
-
-    @field_serializer("*", mode="wrap")
-    def _as_read(self, value: Any, write: SerializerFunctionWrapHandler, info: FieldSerializationInfo) -> Any:
-        """Write angles in the form in which they are read."""
-        written = write(value)
-        known = self._quantities.get(info.field_name)
-        if not isinstance(written, dict) or known is None or quantity(known.type).unit != "rad":
-            return written
-        mark = in_radians if info.mode == "json" else Radians
-        return {name: part if name in PURE_NUMBERS else _marked(part, mark) for name, part in written.items()}
-
-
 _ByLayer = tuple[AnyDistribution | None, ...]
 
 
-class Scatter(Scattering):
+class Scatter(Model):
     """Distributions of the quantities that differ from shot to shot, beside the hit point; None for all others.
 
     In a campaign file a distribution takes the place of the value:
     ``velocity = { distribution = "normal", mean = "820 m/s", std = "10 m/s" }``.
     A quantity of layers has a distribution or None for each layer; a single distribution is that of the plate.
     """
-
-    _quantities = SCATTERED
 
     velocity: AnyDistribution | None = None
     obliquity: AnyDistribution | None = None
@@ -114,6 +75,37 @@ class Scatter(Scattering):
     strength: AnyDistribution | None = None
     offset_y: _ByLayer = ()
     offset_z: _ByLayer = ()
+
+    @field_validator("*", mode="before")
+    @classmethod
+    def _in_si(cls, value: Any, info: ValidationInfo) -> Any:
+        """Read parameters with the unit of their quantity."""
+        known = SCATTERED[str(info.field_name)]
+        if not known.by_layer:
+            return _in_si(known, value)
+        layers = (value,) if isinstance(value, dict | Distribution) else value
+        return [_in_si(known, layer) for layer in layers] if isinstance(layers, list | tuple) else layers
+
+    @field_validator("*", mode="after")
+    @classmethod
+    def _is_possible(cls, value: Any, info: ValidationInfo) -> Any:
+        for distribution in value if isinstance(value, tuple) else (value,):
+            if isinstance(distribution, Distribution):
+                low, high = distribution.quantile(np.array([EDGE, 1.0 - EDGE]))
+                try:
+                    check_range(str(info.field_name), low, high)
+                except ValueError as error:
+                    raise ValueError(f"got a {distribution.distribution} distribution that {error}") from None
+        return value
+
+    @field_serializer("*", mode="wrap")
+    def _as_read(self, value: Any, write: SerializerFunctionWrapHandler, info: FieldSerializationInfo) -> Any:
+        """Write angles in the form in which they are read."""
+        written = write(value)
+        if not isinstance(written, dict) or quantity(SCATTERED[info.field_name].type).unit != "rad":
+            return written
+        mark = in_radians if info.mode == "json" else Radians
+        return {name: part if name in PURE_NUMBERS else _marked(part, mark) for name, part in written.items()}
 
     @field_validator("offset_y", "offset_z")
     @classmethod

@@ -25,8 +25,6 @@ Array = NDArray[np.float64]
 
 LARGEST_ONSET = 0.02
 """Largest onset speed, as a share of the impact velocity."""
-PROFILE = 128
-"""Parts of a core's length in which the radius of its channel is linear."""
 
 
 @dataclass(frozen=True)
@@ -134,11 +132,9 @@ def _surface(struct: Any, key: Key[Core], rings: Rings, azimuth: bytes, put: Put
         "of_patches": np.repeat(of_rings, around),
         "cosine": np.cos(azimuth_of),
         "sine": np.sin(azimuth_of),
-        "profile": core.radius(core.length * np.linspace(1.0, 0.0, PROFILE + 1)),
     }
     for name, array in values.items():
         setattr(surface, name, put(array, aligned=True))
-    surface.base, surface.per_station = core.mass_properties.centre_of_mass - core.length, PROFILE / core.length
     surface.rings, surface.around = len(area), around
     surface.most_rings, surface.most_patches = len(area), len(area) * around
     surface.max_radius, surface.bounding_radius = core.max_radius, core.bounding_radius

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy import ndimage
 
 from warpimpact.scene.patterns import WHOLE_CELL
 from warpimpact.scene.patterns.geometry import Check, no_end
@@ -226,20 +227,7 @@ def _any_of(marked: NDArray[np.bool_], size: int) -> NDArray[np.bool_]:
 
 def nearest_wall(wall: NDArray[np.bool_], widths: tuple[float, float]) -> Array:
     """Distance [m] of every block of one period from the nearest wall of the lattice, centre to centre, for blocks of
-    these widths: first along z, then over all rows. At least one block must be a wall.
-
-    scipy.ndimage can compute this, but a run would wait a quarter of a second for its import.
-    """
+    these widths. At least one block must be a wall."""
     rows, columns = wall.shape
-    number, walls = np.arange(3 * columns), np.tile(wall, 3)
-    before = np.maximum.accumulate(np.where(walls, number, -math.inf), axis=1)
-    behind = np.minimum.accumulate(np.where(walls, number, math.inf)[:, ::-1], axis=1)[:, ::-1]
-    along = np.minimum(number - before, behind - number)[:, columns : 2 * columns] * widths[1]
-    nearest = np.full((rows, columns), math.inf)
-    square = np.tile(np.square(along), (3, 1))
-    for shift in range(rows // 2 + 1):
-        if (beyond := (shift * widths[0]) ** 2) >= nearest.max():
-            break
-        below, above = (square[rows + way : 2 * rows + way] for way in (-shift, shift))
-        nearest = np.minimum(nearest, beyond + np.minimum(below, above))
-    return np.asarray(np.sqrt(nearest))
+    distance = ndimage.distance_transform_edt(~np.tile(wall, (3, 3)), sampling=widths)
+    return np.asarray(distance[rows : 2 * rows, columns : 2 * columns])

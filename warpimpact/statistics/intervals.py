@@ -61,7 +61,6 @@ class Dealing(TypedDict, total=False):
     """Arguments of `Dealt` that say how shots are dealt."""
 
     replicates: int
-    images: int
 
 
 class Estimating(Dealing, total=False):
@@ -97,21 +96,18 @@ class Dealt:
         kind: "mean", "quantile", "share" (of numbers 0 or 1) or "difference" (of two shares, numbers −1, 0 or 1).
         share: of the numbers below a quantile.
         replicates: number of independent scramblings; 1 for independent shots.
-        images: number of consecutive shots that are images of each other; together they count as one shot.
         confidence: of the interval.
     """
 
-    def __init__(
-        self, kind: str, *, share: float = 0.5, replicates: int = 1, images: int = 1, confidence: float = 0.95
-    ) -> None:
-        self._kind, self._share, self._images, self._confidence = kind, share, images, confidence
+    def __init__(self, kind: str, *, share: float = 0.5, replicates: int = 1, confidence: float = 0.95) -> None:
+        self._kind, self._share, self._confidence = kind, share, confidence
         self._replicates = [_Sample(keeps=kind == "quantile") for _ in range(replicates)]
         self._shots = 0
 
     def add(self, values: Array) -> None:
         """Add the numbers of the next shots, shape [shots]; NaN marks a shot that does not count."""
         replicates = len(self._replicates)
-        dealt_to = (self._shots + np.arange(len(values))) // self._images % replicates
+        dealt_to = (self._shots + np.arange(len(values))) % replicates
         for replicate, sample in enumerate(self._replicates):
             sample.add(values[(dealt_to == replicate) & ~np.isnan(values)])
         self._shots += len(values)
@@ -132,7 +128,7 @@ class Dealt:
         Journal of the American Statistical Association 47 (1952) 635). Quantiles of single replicates would be biased.
         """
         replicates = [sample for sample in self._replicates if sample.count]
-        if len(replicates) < 2 or all(sample.count <= self._images for sample in replicates):  # independent shots
+        if len(replicates) < 2 or all(sample.count <= 1 for sample in replicates):  # independent shots
             return None
         quantile = self._kind == "quantile"
         results = [float((sample.values <= value).mean()) if quantile else sample.mean for sample in replicates]
@@ -149,14 +145,14 @@ class Dealt:
         return low, high
 
     def _independent(self, sample: _Sample) -> tuple[float, float]:
-        """Interval for independent shots; images of each other count as one."""
-        count = math.ceil(sample.count / self._images)
+        """Interval for independent shots."""
+        count = sample.count
         if self._kind == "quantile":
             from scipy import stats  # half a second to import
 
             tail = 0.5 * (1.0 - self._confidence)
             ends = stats.binom.ppf([tail, 1.0 - tail], count, self._share).astype(int)
-            ordered = np.sort(sample.values)[:: self._images]
+            ordered = np.sort(sample.values)
             low, high = ends[0] - 1, ends[1]
             return (float(ordered[low]) if low >= 0 else math.nan, float(ordered[high]) if high < count else math.nan)
         if self._kind == "share":

@@ -33,9 +33,9 @@ def worst_tenth(values: Array) -> Array:
     return start + np.maximum(values - start, 0.0) / WORST
 
 
-def has_interval(count: int, images: int) -> bool:
-    """Whether `count` shots suffice for an interval of the worst tenth; `images` in a row count as one shot."""
-    return count * WORST >= _FEWEST_WORST * images
+def has_interval(count: int) -> bool:
+    """Whether `count` shots suffice for an interval of the worst tenth."""
+    return count * WORST >= _FEWEST_WORST
 
 
 def pseudo_values(numbers: Array, share: float) -> Array:

@@ -14,7 +14,6 @@ HEAVY = {
     "jinja2",
     "matplotlib",
     "pandas",
-    "scipy",
     "statsmodels",
     "tqdm",
     "xarray",

@@ -52,8 +52,6 @@ def test_the_share_of_replicates_stays_between_0_and_1() -> None:
 def test_replicates_of_one_shot_each_are_independent_shots(kind: str) -> None:
     values = np.random.default_rng(1).integers(0, 2, 10).astype(float)
     assert estimate_of(kind, values, replicates=16) == estimate_of(kind, values)
-    images = np.repeat(values, 4)
-    assert estimate_of(kind, images, replicates=16, images=4) == estimate_of(kind, images, images=4)
 
 
 @pytest.mark.parametrize("freedom", [*range(1, 20), 50, 999, 1000, 1001, 10**6])

@@ -64,14 +64,6 @@ def test_shots_that_count_at_one_level_alone_shift_a_mean() -> None:
     assert np.isnan(shift_of_share(np.full(4, np.nan), fine[:4]))
 
 
-def test_images_count_as_one_shot() -> None:
-    rng = np.random.default_rng(2)
-    coarse = rng.random(32)
-    fine = coarse + rng.standard_normal(32)
-    twice = np.repeat(coarse, 2), np.repeat(fine, 2)
-    assert shift_of_mean(*twice, images=2) == pytest.approx(shift_of_mean(coarse, fine), rel=0.02)
-
-
 @pytest.mark.parametrize("say", [0.0, 1.0])
 def test_shots_that_say_the_same_shift_no_share(say: float) -> None:
     assert shift_of_yes(np.full(64, say), np.full(64, say)) == 0.0
