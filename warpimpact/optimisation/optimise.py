@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import warnings
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -14,10 +14,18 @@ import xarray
 from warpimpact.campaign.places import relocated
 from warpimpact.campaign.tested_range import outside_tested_range
 from warpimpact.campaign.toml import toml_text
-from warpimpact.optimisation.confirm import Confirmed, confirm, fresh_seed, references
 from warpimpact.optimisation.design import Bound, Design, FacedThreat, read_design
 from warpimpact.optimisation.objectives import Candidate, estimate
-from warpimpact.optimisation.search import Follow, Searched, SearchProgress, check_installed, search
+from warpimpact.optimisation.search import (
+    Confirmed,
+    Follow,
+    Searched,
+    check_installed,
+    confirm,
+    fresh_seed,
+    references,
+    search,
+)
 from warpimpact.results import attributes as attr
 from warpimpact.results import files
 from warpimpact.results import front as f
@@ -30,9 +38,6 @@ from warpimpact.runs.parts import is_begun, remove
 from warpimpact.runs.questions import Question, answered
 from warpimpact.runs.store import Store, content_of, stored
 from warpimpact.scene.model import Array
-
-_LONGEST_ENDING = 80
-"""Most bytes of a threat's name in a file name. File systems allow 255 in all."""
 
 
 def optimise(design: Design | str | Path, *, device: str = "auto", progress: Follow | None = None) -> xarray.Dataset:
@@ -109,11 +114,7 @@ def _answered(
 def _searched(design: Design, follow: Follow) -> Question[tuple[Searched, Confirmed]]:
     """The search and its front by fresh hits, as one question."""
     searched = yield from search(design, follow)
-
-    def confirming(done: int, total: int, what: str) -> None:
-        follow(SearchProgress(done, total, True, len(searched.front), what))
-
-    confirmed = yield from confirm(design, searched, confirming)
+    confirmed = yield from confirm(design, searched, follow)
     return searched, confirmed
 
 
@@ -250,8 +251,9 @@ def write_campaigns(
     for number, name in zip(numbers, names, strict=True):
         values = dataset[f.VALUE].values[int(number)]
         target = design.tables(values)
-        for threat, ending in zip(design.threats, endings(design.threats), strict=True):
+        for place, threat in enumerate(design.threats):
             tables = relocated(campaign_tables(design, target, values, threat), design.folder, folder)
+            ending = f"_{place}" if len(design.threats) > 1 else ""
             texts[folder / f"{Path(str(name)).stem}{ending}.toml"] = toml_text(tables)
     if overwrite:
         for stale in set(folder.glob("design_[0-9]*.toml")) - texts.keys():
@@ -265,11 +267,3 @@ def write_campaigns(
         elif not path.is_file() or path.read_bytes() != text.encode():
             tell(f"{path}: differs from the design of the front and is kept; --overwrite replaces it")
     return list(texts)
-
-
-def endings(threats: Sequence[FacedThreat]) -> list[str]:
-    """Unique endings of the names of campaign files, one per threat; empty for a single threat."""
-    if len(threats) == 1:
-        return [""]
-    words = ("".join(c if c.isalnum() else "_" for c in threat.name).encode() for threat in threats)
-    return [f"_{number}_{word[:_LONGEST_ENDING].decode(errors='ignore')}" for number, word in enumerate(words)]

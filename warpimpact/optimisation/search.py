@@ -1,6 +1,7 @@
 """The search: NSGA-II of pymoo asks for points, and every feasible one gets the same hits.
 
-Other optimisers: tests/benchmarks/NOTES.md.
+The front is confirmed with fresh hits: a search selects lucky hits, so its own numbers are biased. Other optimisers:
+tests/benchmarks/NOTES.md.
 """
 
 from __future__ import annotations
@@ -16,7 +17,7 @@ from numpy.typing import NDArray
 
 from warpimpact.campaign.text import CampaignError
 from warpimpact.optimisation.design import Design
-from warpimpact.optimisation.evaluate import HitJob, columns_of, levels_of
+from warpimpact.optimisation.evaluate import HitJob, Report, columns_of, levels_of
 from warpimpact.optimisation.objectives import (
     Candidate,
     Violation,
@@ -31,8 +32,8 @@ from warpimpact.scene.model import Array
 
 IDLE = 25
 """Generations without a new feasible design after which a search ends."""
-SEARCH_FIDELITY = "draft"
-"""Fidelity of the pilots of a search, unless the campaign fixes a resolution."""
+SEARCH_FIDELITY, CONFIRM_FIDELITY = "draft", "standard"
+"""Fidelity of the pilots of a search and of its front, unless the campaign fixes a resolution."""
 
 
 class SearchProgress(NamedTuple):
@@ -195,13 +196,10 @@ class _State:
 
 def _why_none(refused: Sequence[Sequence[Violation]]) -> str:
     """A sentence about the constraint that rules out most of the designs."""
-    counts = Counter(violation.constraint for broken in refused for violation in broken)
-    name, count = counts.most_common(1)[0]
+    name = Counter(violation.constraint for broken in refused for violation in broken).most_common(1)[0][0]
     of_it = (violation for broken in refused for violation in broken if violation.constraint == name)
     nearest = min(of_it, key=lambda violation: violation.share)
-    others = ", ".join(sorted({*counts} - {name}))
-    alone = "" if count == len(refused) else f", which {count} of them break, beside {others}"
-    return f"constraints: none of {len(refused)} designs keeps {name}{alone}; the nearest has {nearest.text}"
+    return f"constraints: none of {len(refused)} designs keeps {name}; the nearest has {nearest.text}"
 
 
 def front_of(design: Design, candidates: Sequence[Candidate]) -> NDArray[np.int64]:
@@ -220,6 +218,85 @@ def front_of(design: Design, candidates: Sequence[Candidate]) -> NDArray[np.int6
     rounded = np.array([[float(f"{number:.7g}") for number in points[place]] for place in within])
     front = np.array(within)[moocore.is_nondominated(rounded)]
     return np.array(sorted(front, key=lambda number: tuple(points[number])), dtype=np.int64)
+
+
+@dataclass(frozen=True)
+class Confirmed:
+    """The front by fresh hits.
+
+    Attributes:
+        numbers: numbers of its designs in the search.
+        candidates: its designs, then the references, with fresh hits.
+        columns: numbers of their hits, shape [candidates, threats, columns, hits].
+        on_front: whether each design is still on the front and within the bounds by fresh hits.
+    """
+
+    numbers: NDArray[np.int64]
+    candidates: tuple[Candidate, ...]
+    columns: Array
+    on_front: NDArray[np.bool_]
+
+
+def confirm(design: Design, searched: Searched, follow: Follow) -> Question[Confirmed]:
+    """Compute the front and the references with fresh hits at the standard fidelity."""
+    numbers = spread(searched.front, design.search.confirmed)
+    targets = [searched.candidates[number] for number in numbers] + references(design)
+    seed, count = fresh_seed(design), design.search.confirm_hits if design.columns else 1
+    threats = len(design.threats)
+
+    def report(what: str) -> Report:
+        return lambda done: follow(SearchProgress(int(done / threats), len(targets), True, len(searched.front), what))
+
+    jobs = [
+        HitJob(target.tables, threat, count, CONFIRM_FIDELITY, seed)
+        for target in (targets if design.columns else ())
+        for threat in range(threats)
+    ]
+    levels = yield from levels_of(design, jobs, report("pilots for fresh hits"))
+    jobs = [replace(job, level=level) for job, level in zip(jobs, levels, strict=True)]
+    found = yield from columns_of(design, jobs, report("fresh hits"))
+    columns = np.array(found).reshape(len(targets), threats, len(design.columns), count)
+    candidates = [
+        replace(
+            target,
+            levels=tuple(levels[number * threats : (number + 1) * threats]),
+            results=results_of(design, target.weights, of_target),
+        )
+        for number, (target, of_target) in enumerate(zip(targets, columns, strict=True))
+    ]
+    on_front = np.isin(np.arange(len(numbers)), front_of(design, candidates[: len(numbers)]))
+    return Confirmed(numbers, tuple(candidates), columns, on_front)
+
+
+def spread(front: NDArray[np.int64], most: int) -> NDArray[np.int64]:
+    """At most `most` designs at even distances along a front, including both ends."""
+    places = np.linspace(0, len(front) - 1, min(most, len(front)))
+    return np.asarray(front[np.round(places).astype(np.int64)])
+
+
+def fresh_seed(design: Design) -> int:
+    """Seed of hits that the search has not computed."""
+    return int(np.random.SeedSequence(design.search.seed, spawn_key=(24,)).generate_state(1)[0] >> 1)
+
+
+def references(design: Design) -> list[Candidate]:
+    """The reference targets, before their hits are computed.
+
+    Raises:
+        CampaignError: a reference is no campaign; the message names it.
+    """
+    targets = []
+    for place, reference in enumerate(design.references):
+        tables: dict[str, Any] = dict(design.base) | {"plate": dict(reference.plate)}
+        if reference.layer is not None:
+            tables["layer"] = [dict(layer) for layer in reference.layer]
+        try:
+            campaign = design.campaign(tables)
+        except CampaignError as error:
+            text = str(error).removeprefix(f"{design.name}: ")
+            raise CampaignError(f'{design.name}: references[{place}] "{reference.name}": {text}') from None
+        targets.append(Candidate(np.zeros(0), tables, weights_of(campaign.target)))
+    return targets
 
 
 def check_installed() -> None:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import math
-import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -14,12 +13,12 @@ import numpy as np
 from warpimpact.campaign.places import is_table, labels_of, put, resolved
 from warpimpact.campaign.text import CampaignError
 from warpimpact.scene.model import Array
+from warpimpact.scene.unit_text import number_and_unit
 from warpimpact.scene.units import LARGEST, float_of, quoted
 
 MOST_VARIABLES = 64
 MOST_VALUES = 100_000
 _RANGE = {"low", "high", "step"}
-_NUMBER = re.compile(r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*(\S.*)?")
 _RANGE_DIGITS = 6
 """Significant digits of a value of a range without a step."""
 
@@ -115,20 +114,14 @@ class Space:
         data = json.loads(json.dumps(base, default=str))
         for variable, value in zip(self.variables, values, strict=True):
             if not math.isnan(value):
-                put(
-                    data,
-                    variable.place,
-                    json.loads(json.dumps(variable.written(value), default=str)),
-                    f"{name}: variables",
-                )
+                written = json.loads(json.dumps(variable.written(value), default=str))
+                put(data, variable.place, written, f"{name}: variables")
         return dict(data)
 
     def text(self, values: Array) -> str:
         """A point as text."""
-        told = zip(self.variables, values, strict=True)
-        return ", ".join(
-            f"{variable.name} = {variable.text(value)}" for variable, value in told if not math.isnan(value)
-        )
+        used = ((free, value) for free, value in zip(self.variables, values, strict=True) if not math.isnan(value))
+        return ", ".join(f"{free.name} = {free.text(value)}" for free, value in used)
 
 
 def read_space(given: Any, name: str) -> Space:
@@ -170,11 +163,12 @@ def _range(name: str, place: str, given: dict[str, Any], where: str, under: Any)
         raise CampaignError(f"{where}.high: is missing, but must be given")
     numbers, units = {}, {}
     for key, value in given.items():
-        match = _NUMBER.fullmatch(value) if isinstance(value, str) else None
-        is_number = isinstance(value, int | float) and not isinstance(value, bool)
-        numbers[key] = float_of(value if is_number else match[1] if match else math.nan)
-        units[key] = (match[2] or "").strip() if match else ""
-        if not abs(numbers[key]) <= LARGEST:
+        try:
+            is_text = isinstance(value, str)
+            numbers[key], units[key] = number_and_unit(value) if is_text else (float_of(value), "")
+        except (TypeError, ValueError):
+            numbers[key] = math.nan
+        if isinstance(value, bool) or not abs(numbers[key]) <= LARGEST:
             raise CampaignError(
                 f"{where}.{key}: got {quoted(value)}, but it must be a number or a string with a unit, at most "
                 f"{LARGEST:g}"

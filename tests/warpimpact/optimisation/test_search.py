@@ -12,12 +12,11 @@ from warpimpact.analysis.effectiveness import effectiveness
 from warpimpact.campaign.text import CampaignError
 from warpimpact.cli import main
 from warpimpact.optimisation import search
-from warpimpact.optimisation.confirm import fresh_seed, spread
 from warpimpact.optimisation.design import design_from, read_design
 from warpimpact.optimisation.front_view import front_view
 from warpimpact.optimisation.objectives import Candidate, excesses
 from warpimpact.optimisation.optimise import folder_of, optimise, optimise_to_file
-from warpimpact.optimisation.search import SearchProgress, front_of
+from warpimpact.optimisation.search import SearchProgress, fresh_seed, front_of, spread
 from warpimpact.results import files
 from warpimpact.results import front as f
 from warpimpact.results.files import OutputError, read
