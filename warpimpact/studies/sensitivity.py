@@ -156,6 +156,7 @@ def _computed(
 ) -> dict[str, Values]:
     """Values of the hits of campaigns with each of their changes, all at the finest level that their pilots find."""
     measures = _parsed(campaigns, texts)
+    campaigns = {plate: _over_the_cell(campaign) for plate, campaign in campaigns.items()}
     rows = {
         (plate, name): changed
         for plate, campaign in campaigns.items()
@@ -193,10 +194,14 @@ def _parsed(campaigns: Mapping[str, Campaign], texts: Sequence[str]) -> list[Mea
     return [Measure.parse(text) for text in texts or SHOWN]
 
 
+def _over_the_cell(campaign: Campaign) -> Campaign:
+    """The campaign with hits over the whole cell, because a change may break a symmetry."""
+    return _with(campaign, "hits", irreducible=False) if campaign.hits.irreducible else campaign
+
+
 def _shots(campaign: Campaign, most: int) -> Shots:
-    """Shots over the whole cell, because a change may break a symmetry: the first ones, or ones at even distances."""
-    whole = campaign.model_copy(update={"hits": campaign.hits.model_copy(update={"irreducible": False})})
-    sampler = whole.sampler()
+    """The first shots of a campaign; of a grid or a list, shots at even distances."""
+    sampler = campaign.sampler()
     if campaign.hits.sampling in ("sobol", "random"):
         return sampler.shots(0, most)
     return spread(sampler.shots(0, len(sampler)), min(most, len(sampler)))

@@ -144,3 +144,20 @@ def test_the_command_writes_table_and_figure(tmp_path: Path, capsys: pytest.Capt
     (panel,) = sensitivity_figure(table).axes
     assert len(panel.patches) == len(table) - 1
     assert {bar.get_x() for bar in panel.patches} == {table.iloc[0, 0]}
+
+
+def test_plates_of_a_campaign_are_ranked_with_each_change(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    plate = TEXT[TEXT.index("[plate]") : TEXT.index("[impact]")].replace("[plate]", "[[plate]]")
+    weak, strong = (f'{plate}name = "{name}"\n'.replace("2.6", y) for name, y in (("weak", "2.2"), ("strong", "3.4")))
+    text = TEXT.replace(TEXT[TEXT.index("[plate]") : TEXT.index("[impact]")], weak + strong)
+    Path("two.toml").write_text(text, encoding="utf-8")
+    arguments = ["compare", "two.toml", "--device", "cpu", "-q", "--measure", "mean(residual_energy_fraction)"]
+    assert main([*arguments, "--sensitivity"]) == 0
+    shown = capsys.readouterr().out
+    assert "\nresidual energy fraction, mean:\n" in shown
+    assert "\nstrong stays the best with 15 of 15 changes.\n" in shown
+    assert main(["compare", "weak.nc", "strong.nc", "--sensitivity"]) == 2
+    assert "Give the campaign with their [[plate]]." in capsys.readouterr().err
