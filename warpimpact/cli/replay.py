@@ -39,8 +39,7 @@ def add_replay(commands: Commands) -> None:
 
 
 def _replay(arguments: argparse.Namespace) -> None:
-    from warpimpact.plotting.layers import layers
-    from warpimpact.plotting.trajectory import FIGURES, save_animation, save_figures, writer_for
+    from warpimpact.plotting.trajectory import FIGURES, layers, save_animation, save_figures, writer_for
     from warpimpact.results import files
     from warpimpact.results.replayed_hit import hit_view
     from warpimpact.runs.replay import replay

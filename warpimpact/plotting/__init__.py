@@ -6,7 +6,7 @@ analysis and the rooms below it, but neither export nor report. Text in figures 
 
 import matplotlib as mpl
 
-from warpimpact.plotting.comparison import comparison_figure
+from warpimpact.plotting.comparison import comparison_figure, weight_figure
 from warpimpact.plotting.distribution import dispersion, marginals, probability_map, uncertainty
 from warpimpact.plotting.limit import limit_figure
 from warpimpact.plotting.maps import (
@@ -21,7 +21,6 @@ from warpimpact.plotting.maps import (
 )
 from warpimpact.plotting.plate import plate_figure
 from warpimpact.plotting.trajectory import course, flight, largest_load, passage
-from warpimpact.plotting.weight import weight_figure
 
 mpl.rcParams["text.usetex"] = False  # a matplotlibrc may ask for it, and titles are no TeX
 mpl.rcParams["text.parse_math"] = False  # a title is text: "$" is a character of it, and broken mathtext an error

@@ -27,7 +27,7 @@ from scipy.spatial import KDTree
 from warpimpact.analysis.hit_map import OF_PASSED, chosen, hit_points
 from warpimpact.analysis.summary import breaks_promise
 from warpimpact.kernels.status import Status
-from warpimpact.plotting.style import common_fire, draw_fire
+from warpimpact.plotting.style import MAP_SIDE, common_fire, draw_fire
 from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
 from warpimpact.results.dataset import passed
@@ -135,6 +135,12 @@ def limits(dataset: xarray.Dataset) -> Array:
     half = np.asarray(dataset.attrs[attr.PLATE_PERIOD]) / 2
     hits = hit_points(dataset)
     return np.stack([np.minimum(-half, hits.min(axis=0)), np.maximum(half, hits.max(axis=0))], axis=1) * MM
+
+
+def map_size(dataset: xarray.Dataset) -> Array:
+    """Width and height of a map to scale [inch]."""
+    extent = np.ptp(limits(dataset), axis=1)
+    return np.asarray(MAP_SIDE * extent / extent.max())
 
 
 def scale_of(columns: Sequence[Array], *, signed: bool = False) -> Scale:

@@ -17,7 +17,7 @@ from warpimpact.analysis.local import NEIGHBOURS, plane_fit, share_of
 from warpimpact.plotting.cell import (
     draw_holes,
     draw_values,
-    limits,
+    map_size,
     nearest_hits,
     paint_pixels,
     pixels,
@@ -27,7 +27,7 @@ from warpimpact.plotting.cell import (
     struck,
     tree_of,
 )
-from warpimpact.plotting.style import BLUE, LINE, MAP_SIDE, VERMILION, inscribe, names, note_lines
+from warpimpact.plotting.style import BLUE, LINE, VERMILION, inscribe, names, note_lines
 from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
 from warpimpact.results.measures import Measure
@@ -49,7 +49,7 @@ def marginals(dataset: xarray.Dataset, variable: str, standoff: float | None = N
     """
     dataset = mirrored(dataset)
     column = shown(dataset, variable, standoff)
-    size = _map_size(dataset)
+    size = map_size(dataset)
     notes = column.title, f"{shots_text(dataset)}; seen from behind the plate"
     left, width = 0.95, size[0] + 4.8
     below = 1.25 + LINE * len(note_lines(width, "", [*notes, *names(dataset)]))
@@ -191,7 +191,7 @@ def _covered(dataset: xarray.Dataset) -> NDArray[np.intp]:
 def _local_maps(dataset: xarray.Dataset, images: Array, labels: Sequence[str], title: str, method: str) -> Figure:
     """A map of each image, shape [maps, pixels_z, pixels_y]: of a local value, and of how uncertain it is. The scale of
     a probability is that of all of them."""
-    width, height = _map_size(dataset)
+    width, height = map_size(dataset)
     figure = Figure(figsize=(len(images) * (width + 2.0) + (len(images) < 2), height + 1.9), layout="constrained")
     panels = figure.subplots(1, len(images), sharex=True, sharey=True, squeeze=False)[0]
     for axes, image, label in zip(panels, images, labels, strict=True):
@@ -234,13 +234,6 @@ def _neighbours(dataset: xarray.Dataset, values: Array, points: Array) -> tuple[
     _, near = tree_of(dataset, exists).query(points, k=NEIGHBOURS)
     offsets = (hit_points(dataset)[exists] + period / 2)[near] - points[:, None]
     return offsets - period * np.round(offsets / period), values[exists][near]
-
-
-def _map_size(dataset: xarray.Dataset) -> Array:
-    """Width and height of a map to scale [inch]."""
-    extent = np.ptp(limits(dataset), axis=1)
-    size: Array = MAP_SIDE * extent / extent.max()
-    return size
 
 
 def _draw_strips(axes: Axes, places: Array, values: Array, *, upright: bool) -> None:

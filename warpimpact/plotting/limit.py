@@ -14,8 +14,8 @@ from warpimpact.analysis.estimates import estimated
 from warpimpact.analysis.hit_map import hit_points
 from warpimpact.analysis.plate_text import reference_name
 from warpimpact.analysis.proxy import inclination
-from warpimpact.plotting.cell import draw_values, limits, scale_of, shown
-from warpimpact.plotting.style import BLUE, GREY, MAP_SIDE, VERMILION, inscribe
+from warpimpact.plotting.cell import draw_values, map_size, scale_of, shown
+from warpimpact.plotting.style import BLUE, GREY, VERMILION, inscribe
 from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
 from warpimpact.results.references import reference
@@ -37,8 +37,7 @@ def limit_figure(dataset: xarray.Dataset) -> Figure:
         return _over_obliquity(dataset, quantity)
     column = shown(dataset, v.LIMITS[quantity].value)
     values = np.where(np.isinf(column.values), np.nan, column.values)
-    extent = np.ptp(limits(dataset), axis=1)
-    width, height = MAP_SIDE * extent / extent.max()
+    width, height = map_size(dataset)
     figure = Figure(figsize=(width + 7.6, max(height + 2.2, 5.2)), layout="constrained")
     at, curve = figure.subplots(1, 2, width_ratios=[width + 1.4, 5.2])
     artist = draw_values(at, dataset, values, scale_of([values], signed=False))

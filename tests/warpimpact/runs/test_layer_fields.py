@@ -9,7 +9,7 @@ import xarray
 from warpimpact import Campaign, run
 from warpimpact.analysis.slabs import LayerField, fields_behind
 from warpimpact.export.paraview import write_vtk
-from warpimpact.plotting.layers import layers
+from warpimpact.plotting.trajectory import layers
 from warpimpact.results import files
 from warpimpact.results.kinds import HISTORY, HIT_MAP
 from warpimpact.runs.replay import replay
