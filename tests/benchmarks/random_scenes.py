@@ -3,7 +3,8 @@
 A scene is a hardened core of 5 to 11 mm with an ogive, a cone or the paper's nose, with or without a shank, shot at a
 perforated steel plate of 0.5 to 1.5 calibres, straight or obliquely, yawed or not. The answer that a setting is held
 against comes from two fine levels, each extrapolated in the time step; the change between them is its uncertainty.
-Answers and outcomes are kept in a cache, so that a run goes on where it ended. Run it as a script:
+The answer to a limit velocity is that of level LIMIT_ANSWER, of plates that weaken by path. Answers and outcomes are
+kept in a cache, so that a run goes on where it ended. Run it as a script:
 python tests/benchmarks/random_scenes.py --seed 1 --scenes 24 --cache FOLDER
 """
 
@@ -48,7 +49,8 @@ from warpimpact.scene import (
     make_shots,
 )
 from warpimpact.scene.interaction import NEAR_EDGES
-from warpimpact.solver.accuracy import pilot_size
+from warpimpact.solver.accuracy import PILOT_LIMITS, pilot_size
+from warpimpact.solver.limit import HIGHEST_VELOCITY, VELOCITY_TOLERANCE, Sought, limit_velocity, pilot_of_limits
 from warpimpact.solver.resolution import Level
 from warpimpact.solver.simulate import pilot_of, simulate
 from warpimpact.solver.worker import Worker
@@ -60,6 +62,8 @@ STANDOFF = 0.13
 """Where tilt is compared [m]."""
 FINE = (Level(96, 96, 8.0, 0.05), Level(136, 136, 11.0, 0.035))
 """Levels behind the answer; each is extrapolated from its step and twice its step, of second order."""
+LIMIT_ANSWER = 8
+"""Level behind the answer of a limit velocity; the change from the level before is its uncertainty."""
 LONG = 0.1
 """Processor time [s] from which on a run is timed as it is, once."""
 PAPER = {"coefficients": (3.0e-4, 0.24, -5.29), "length": 27.86e-3, "diameter": 6.044e-3}
@@ -307,7 +311,27 @@ def aggregates(answer: Answer, truth: Answer) -> tuple[float, float, float]:
     return float(mean), float(worst), float(tilted)
 
 
+def limits_of(case: Case, level: int, hits: int) -> Array:
+    """Limit velocities of the hits at a level [m/s]."""
+    return limit_velocity(case.scene, case.shots(hits), numerics=Numerics(level=level), device="cpu", threads=1).value
+
+
+def limit_claim(case: Case, name: str, answers: tuple[Array, Array]) -> dict[str, Any]:
+    """Whether the pilot of limits says that it keeps a name, and whether other limits keep it."""
+    asked, (before, truth) = PRESETS[name], answers
+    assert asked.limit is not None
+    pilot = case.shots(pilot_size(asked, PILOT_LIMITS), seed=77)
+    sought = Sought("velocity", VELOCITY_TOLERANCE, HIGHEST_VELOCITY)
+    promise = pilot_of_limits(case.scene, pilot, sought, Numerics(fidelity=name), Worker("cpu", 1))
+    assert promise.numerics.level is not None
+    found = limits_of(case, promise.numerics.level, len(truth))
+    error, uncertain = (p90(np.nan_to_num(np.abs(one - truth), nan=math.inf)) for one in (found, before))
+    true = error <= asked.limit * float(np.median(truth)) + uncertain
+    return {"level": promise.numerics.level, "kept": promise.kept, "true": bool(true), "error": error}
+
+
 NAMES = ("draft", "standard", "reference")
+LIMIT_NAMES = ("draft", "standard")
 
 
 def measured(bench: Bench, case: Case) -> dict[str, Any]:
@@ -320,7 +344,19 @@ def measured(bench: Bench, case: Case) -> dict[str, Any]:
         "perforated": float(np.mean(truth.status == Status.PERFORATED)),
         "plain_standard_cost": bench.run(case, Numerics(level=2))[1],
         **{name: asdict(row) for name, row in rows.items()},
+        "limits": limit_claims(case, bench.hits),
     }
+
+
+def limit_claims(case: Case, hits: int) -> dict[str, Any]:
+    """The claims of the pilots of limits, by name."""
+    (plate,) = case.scene.target.layers
+    distance = case.impact.velocity * plate.degradation_interval  # a plate that weakens by time stops no core
+    by_path = {"degradation_interval": None, "degradation_distance": distance}
+    target = Target(layers=(plate.model_copy(update=by_path),))
+    case = replace(case, scene=case.scene.model_copy(update={"target": target}))
+    answers = limits_of(case, LIMIT_ANSWER - 1, hits), limits_of(case, LIMIT_ANSWER, hits)
+    return {name: limit_claim(case, name, answers) for name in LIMIT_NAMES}
 
 
 def held(row: dict[str, Any], name: str, uncertain: Sequence[float]) -> bool:
@@ -348,6 +384,11 @@ def summed_up(scenes: Sequence[dict[str, Any]]) -> str:
         cells += ["{:.2g}; {:.2g}; {:.2g}".format(*numbers), f"{cost:.2f}"]
         lines.append(("{:20}" + "{:>18}" * 6).format(name, *cells))
     lines.append("errors in m/s; degree of tilt at 130 mm, 90 % of the hits; cost beside the plain standard, median")
+    hits = [held(scene[name], name, scene["uncertain"]) for scene in scenes for name in NAMES if scene[name]["kept"]]
+    limits = [one["true"] for scene in scenes for one in scene["limits"].values() if one["kept"]]
+    for what, claims, most in (("hits", hits, len(NAMES)), ("limits", limits, len(LIMIT_NAMES))):
+        true = f"{sum(claims)} of them true ({np.mean(claims):.1%})" if claims else "none"
+        lines.append(f"claims for {what}: {len(claims)} of {most * len(scenes)} promises, {true}")
     return "\n".join(lines)
 
 
@@ -386,7 +427,7 @@ def main() -> None:
         scenes.append(json.loads(path.read_text()))
         cells = "".join(
             f"{row['level']:4.1f}{'' if row['kept'] else '*':1}{row['error'][0]:7.2f}{row['error'][1]:6.2f}"
-            for row in (value for value in scenes[-1].values() if isinstance(value, dict))
+            for row in (scenes[-1][name] for name in NAMES)
         )
         print(f"{index:3} {scenes[-1]['scene']:38}{cells}", flush=True)
     print(summed_up(scenes))

@@ -16,7 +16,7 @@ from warpimpact.results.dataset import finer_pair, is_choice, status_codes
 from warpimpact.results.measures import Measure
 from warpimpact.results.per_hit import has_base
 from warpimpact.scene.display import STORED
-from warpimpact.solver.accuracy import accuracy_text, errors_text
+from warpimpact.solver.accuracy import errors_text, listed, share_text
 from warpimpact.view.view import Column, Section, Table, number, text_of
 
 if TYPE_CHECKING:
@@ -38,6 +38,23 @@ def promise_text(dataset: Result) -> str | None:
     if attributes[attr.PROMISE_KEPT]:
         return f"{name} keeps its promise ({stated}); {errors}"
     return f"{name} does not keep its promise ({stated}) at the level that it may use; {errors}"
+
+
+def accuracy_text(asked: Mapping[str, float], *, layered: bool) -> str:
+    """Words for an accuracy, by the names and in the units of `Accuracy`. A bound that it lacks is not asked for."""
+
+    def bound(name: str, unit: str, factor: float = 1.0) -> str:
+        share = asked.get(f"{name}_share", 0.0) if layered else 0.0
+        return f"{factor * asked[name]:g} {unit}" + (f" + {100.0 * share:g} %" if share else "")
+
+    parts = [bound("residual_velocity", "m/s")] if "residual_velocity" in asked else []
+    parts += [bound("tilt", "deg", math.degrees(1.0))] if "tilt" in asked else []
+    if layered and "depth" in asked:
+        parts.append(f"{1e3 * asked['depth']:g} mm of depth")
+    stated = f"{listed(parts)} for {share_text(asked['share'])}"
+    if layered and asked.get("status_share", 1.0) < 1.0:
+        stated += f", another status for at most {100.0 * asked['status_share']:g} %"
+    return stated
 
 
 def numerics_sentence(dataset: Result) -> str:

@@ -7,11 +7,13 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, ClassVar
 
+import numpy as np
+from numpy.typing import NDArray
+
 from warpimpact.campaign.campaign import Campaign
 from warpimpact.records.outcomes import Outcomes
 from warpimpact.results.table import HitTable
 from warpimpact.runs.describe import described
-from warpimpact.runs.pilot_hits import pilot_shots
 from warpimpact.runs.task import Report, Task
 from warpimpact.scene import Numerics, Scene, Shots
 from warpimpact.solver.accuracy import PilotResult, pilot_size
@@ -19,7 +21,7 @@ from warpimpact.solver.device import find_device
 from warpimpact.solver.marching import Progress
 from warpimpact.solver.memory import Memory
 from warpimpact.solver.prepare import prepare
-from warpimpact.solver.simulate import marched, pilot_of
+from warpimpact.solver.simulate import marched, pilot_of, spread_places
 from warpimpact.solver.worker import Worker
 
 if TYPE_CHECKING:
@@ -67,6 +69,20 @@ def compute(campaign: Campaign, task: Task, worker: Worker, report: Report = lam
     progress = lambda done, total: report(done)  # noqa: E731
     outcomes, elapsed = _outcomes(campaign.scene, task.shots, numerics, worker, progress)
     return described(campaign, task, outcomes, numerics, (worker.device, elapsed), {})
+
+
+def pilot_shots(campaign: Campaign, most: int) -> tuple[Shots, NDArray[np.int64]]:
+    """At most so many hits that stand for all hits of a campaign, and their numbers.
+
+    They depend on the campaign alone: the first ones of a Sobol or random sampling, or ones at even distances of a grid
+    or list.
+    """
+    sampler = campaign.sampler()
+    count = min(most, len(sampler))
+    if campaign.hits.sampling in ("sobol", "random"):
+        return sampler.shots(0, count), np.arange(count)
+    places = spread_places(len(sampler), count)
+    return Shots.joined([sampler.shots(int(place), 1) for place in places]), places
 
 
 def numerics_of(campaign: Campaign, findings: PilotResult | None) -> Numerics:

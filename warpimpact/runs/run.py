@@ -16,9 +16,9 @@ from warpimpact.results.references import with_references
 from warpimpact.results.table import HitTable, joined
 from warpimpact.runs.choice import executor_for, opened
 from warpimpact.runs.compute import HIT_MAP, numerics_of
+from warpimpact.runs.cost import cost_warning
 from warpimpact.runs.describe import pilot_in
 from warpimpact.runs.executor import Executor, Job, completed, result_of
-from warpimpact.runs.foreseen import cost_warning
 from warpimpact.runs.jobs import ranges, reference_shots, split, task_size
 from warpimpact.runs.parts import claimed, telling
 from warpimpact.runs.progress import Follow, followed

@@ -237,23 +237,6 @@ def errors_text(errors: Mapping[str, float]) -> str:
     return listed(parts) if parts else "unknown"
 
 
-def accuracy_text(asked: Mapping[str, float], *, layered: bool) -> str:
-    """Words for an accuracy, by the names and in the units of `Accuracy`. A bound that it lacks is not asked for."""
-
-    def bound(name: str, unit: str, factor: float = 1.0) -> str:
-        share = asked.get(f"{name}_share", 0.0) if layered else 0.0
-        return f"{factor * asked[name]:g} {unit}" + (f" + {100.0 * share:g} %" if share else "")
-
-    parts = [bound("residual_velocity", "m/s")] if "residual_velocity" in asked else []
-    parts += [bound("tilt", "deg", math.degrees(1.0))] if "tilt" in asked else []
-    if layered and "depth" in asked:
-        parts.append(f"{1e3 * asked['depth']:g} mm of depth")
-    stated = f"{listed(parts)} for {share_text(asked['share'])}"
-    if layered and asked.get("status_share", 1.0) < 1.0:
-        stated += f", another status for at most {100.0 * asked['status_share']:g} %"
-    return stated
-
-
 def upper_digits(error: float) -> str:
     """An error rounded up to two digits, so that one above a bound never reads as if it were at the bound."""
     up = Context(prec=2, rounding=ROUND_CEILING).create_decimal(f"{error:.9g}")  # nine digits: noise does not count

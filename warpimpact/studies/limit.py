@@ -15,9 +15,8 @@ from warpimpact.results import variables as v
 from warpimpact.results.measures import Measure
 from warpimpact.results.table import HitTable
 from warpimpact.results.vocabulary import LIMIT_VELOCITY
-from warpimpact.runs.compute import numerics_of
+from warpimpact.runs.compute import numerics_of, pilot_shots
 from warpimpact.runs.describe import described
-from warpimpact.runs.pilot_hits import pilot_shots
 from warpimpact.runs.shards import extent
 from warpimpact.runs.task import Report, Task
 from warpimpact.scene import Target, exclusions

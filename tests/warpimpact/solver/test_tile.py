@@ -9,7 +9,7 @@ import pytest
 from scipy import ndimage
 
 from warpimpact import Campaign
-from warpimpact.runs.foreseen import cost_of
+from warpimpact.runs.cost import estimate_cost
 from warpimpact.scene import (
     CirclePattern,
     Numerics,
@@ -147,7 +147,7 @@ def test_the_holes_of_a_plate_are_not_built_before_somebody_computes_and_not_at_
     forget_tiles()
     shots = campaign.sampler().shots(0, 2)
     prepared = prepare(campaign.scene, shots, Numerics(level=0))
-    assert cost_of(campaign, Numerics(level=0)) is None
+    assert estimate_cost(campaign, Numerics(level=0)) is None
     with pytest.raises(MemoryError, match=r"plate.pattern: got a period of 1 m x 1 m, .* 2 GiB"):
         prepare(scene, shots, Numerics(level=0))
     (tile,) = prepared.tiles

@@ -1,4 +1,4 @@
-"""The foreseen cost of a campaign's hits, announced before the run if it is far more than usual."""
+"""Cost of a campaign's hits, announced before the run if it is unusual."""
 
 from __future__ import annotations
 
@@ -26,13 +26,13 @@ def cost_warning(campaign: Campaign, device: str, passages: int = 1) -> Callable
 
     @cache
     def warn(numerics: Numerics) -> None:
-        if device == "cpu" and (sentence := cost_of(campaign, numerics, passages)) is not None:
+        if device == "cpu" and (sentence := estimate_cost(campaign, numerics, passages)) is not None:
             warnings.warn(sentence, Costly, stacklevel=2)
 
     return warn
 
 
-def cost_of(campaign: Campaign, numerics: Numerics, passages: int = 1) -> str | None:
+def estimate_cost(campaign: Campaign, numerics: Numerics, passages: int = 1) -> str | None:
     """A sentence about the cost of hits on a CPU, with numerics that fix the resolution; None where it is low. An
     unhindered first hit of the campaign stands for all."""
     sampler = campaign.sampler()

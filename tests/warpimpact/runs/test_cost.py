@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from warpimpact import Campaign, Numerics, SlotPattern
-from warpimpact.runs.foreseen import SLOW, Costly, cost_of, cost_warning
+from warpimpact.runs.cost import SLOW, Costly, cost_warning, estimate_cost
 from warpimpact.solver.prepare import prepare
 from warpimpact.solver.resolution import MOST_STEPS, TooManySteps
 
@@ -16,48 +16,48 @@ LEVEL = Numerics(level=2)
 
 
 def slow() -> Campaign:
-    """A thick plate that is hit aslant and weakens close to the core."""
+    """A plate that is hit aslant and weakens close to the core."""
     campaign = Campaign.from_toml(SLOTTED_PLATE)
-    plate = campaign.plate.model_copy(update={"thickness": 60e-3, "degradation_length": 0.1e-3})
+    plate = campaign.plate.model_copy(update={"degradation_length": 0.02e-3})
     impact = campaign.impact.model_copy(update={"obliquity": 65.0})
     return campaign.model_copy(update={"plate": plate, "impact": impact})
 
 
 def test_hits_that_take_long_are_told_once_at_each_level() -> None:
-    warn = cost_warning(slow(), "cpu")
+    warn = cost_warning(slow(), "cpu", passages=35)
     with pytest.warns(Costly, match=r"^at level 2 a hit takes about \d.* s of a core, and 4096 hits .* h: .* GiB"):
         warn(LEVEL)
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         warn(LEVEL)
-    assert cost_of(Campaign.from_toml(SLOTTED_PLATE), LEVEL) is None
+    assert estimate_cost(Campaign.from_toml(SLOTTED_PLATE), LEVEL) is None
 
 
 def test_limits_and_large_windows_are_told(monkeypatch: pytest.MonkeyPatch) -> None:
     campaign = Campaign.from_toml(SLOTTED_PLATE)
     prepared = prepare(campaign.scene, campaign.sampler().shots(0, 1), LEVEL)
-    assert cost_of(campaign, LEVEL) is None
-    assert str(cost_of(campaign, LEVEL, math.ceil(SLOW / prepared.seconds))).startswith(
+    assert estimate_cost(campaign, LEVEL) is None
+    assert str(estimate_cost(campaign, LEVEL, math.ceil(SLOW / prepared.seconds))).startswith(
         "at level 2 a hit takes about 1 s"
     )
     assert prepared.window_bytes > 0
-    monkeypatch.setattr("warpimpact.runs.foreseen.LARGE", prepared.window_bytes)
-    assert str(cost_of(campaign, LEVEL)).startswith("at level 2 a hit takes about ")
+    monkeypatch.setattr("warpimpact.runs.cost.LARGE", prepared.window_bytes)
+    assert str(estimate_cost(campaign, LEVEL)).startswith("at level 2 a hit takes about ")
 
 
 def test_holes_that_take_long_are_told_before_they_are_built() -> None:
     campaign = Campaign.from_toml(SLOTTED_PLATE)
     pattern = SlotPattern(length="12 mm", width="4 mm", spacing=("0.45 m", "0.45 m"))
     wide = campaign.model_copy(update={"plate": campaign.plate.model_copy(update={"pattern": pattern})})
-    assert cost_of(wide, LEVEL) == (
+    assert estimate_cost(wide, LEVEL) == (
         "at level 2 the holes of the plates take about 9.1 s of a core and 1.4 GiB before the first hit; a smaller "
         "period of the pattern, and a longer degradation_length, take less"
     )
 
 
 @pytest.mark.filterwarnings("error")
-def test_what_a_gpu_takes_is_not_foreseen() -> None:
-    cost_warning(slow(), "NVIDIA")(LEVEL)
+def test_what_a_gpu_takes_is_not_announced() -> None:
+    cost_warning(slow(), "NVIDIA", passages=35)(LEVEL)
 
 
 def test_a_shot_of_too_many_steps_is_refused() -> None:
