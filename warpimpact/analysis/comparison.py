@@ -298,7 +298,10 @@ def _materials(datasets: Sequence[xarray.Dataset], names: Sequence[str]) -> Iter
         values = {name: material.get(quantity) for name, material in materials.items()}
         if len(set(values.values())) > 1:
             read = reader_of(QUANTITIES[quantity].type).text if quantity in QUANTITIES else "{:g}".format
-            shown = ["not given" if value is None else read(value) for value in values.values()]
+            shown = [
+                "not given" if value is None else value if isinstance(value, str) else read(value)
+                for value in values.values()
+            ]
             yield f"{quantity} ({of_each(list(values), shown)})"
 
 

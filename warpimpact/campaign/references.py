@@ -14,7 +14,7 @@ class ReferenceSampler(Sampler):
     """The shots of another sampler, as they are at a reference."""
 
     def __init__(self, of: Sampler, changed: Callable[[Shots], Shots]) -> None:
-        self._of, self._changed = of, changed
+        self._of, self._changed, self.cell = of, changed, of.cell
 
     def __len__(self) -> int:
         return len(self._of)

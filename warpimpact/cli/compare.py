@@ -46,7 +46,8 @@ def add_compare(commands: Commands) -> None:
         type=Path,
         nargs="+",
         metavar="RESULT.nc",
-        help="two or more results of warpimpact run, or one campaign with several [[plate]] tables",
+        help="two or more results of warpimpact run; one, which is compared with its references; or one campaign with "
+        "several [[plate]] tables",
     )
     add_output(
         parser,
@@ -79,6 +80,7 @@ def _compare(arguments: argparse.Namespace) -> int:
     from warpimpact.analysis.summary import range_note
     from warpimpact.plotting import comparison_figure, weight_figure
     from warpimpact.results import files
+    from warpimpact.results.references import as_plates
     from warpimpact.view.view import Section, text_of
 
     is_campaign = arguments.files[0].suffix == ".toml"
@@ -95,18 +97,20 @@ def _compare(arguments: argparse.Namespace) -> int:
         )
     replaced = " (replaced)" if figure.exists() else ""
     paths = _plates_run(arguments, figure.parent) if is_campaign else named(arguments.files)
-    if len(paths) < 2:
-        raise files.ResultError(
-            f"{arguments.files[0]}: got one result, but compare needs at least two results, or one campaign"
-        )
     with ExitStack() as stack:
         datasets = [stack.enter_context(files.opened(path)) for path in paths.values()]
+        plates = dict(zip(paths, datasets, strict=True))
+        if len(plates) < 2 and not (references := as_plates(datasets[0])):
+            raise files.ResultError(
+                f"{arguments.files[0]}: got one result without references, but compare needs at least two plates"
+            )
+        plates |= references if len(plates) < 2 else {}
         code = max(failure_code(dataset, path) for dataset, path in zip(datasets, paths.values(), strict=True))
         outside = range_note(dict(zip(paths, datasets, strict=True)))
         if shared := shared_hits(dict(zip(paths, datasets, strict=True))):
             _print_models(arguments, shared, (figure, tilts))
             return code
-        comparison = compare(datasets, list(paths), arguments.measure)
+        comparison = compare(list(plates.values()), list(plates), arguments.measure)
     if arguments.every:
         print(text_of([*comparison_view(comparison), Section(outside)]))
     else:

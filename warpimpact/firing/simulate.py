@@ -30,7 +30,7 @@ from warpimpact.runs.run import run_to_file
 from warpimpact.scene.model import Array
 from warpimpact.scene.sampling import stream
 from warpimpact.statistics.acceptance import acceptance
-from warpimpact.statistics.intervals import Dealing, Estimate, estimate_of
+from warpimpact.statistics.intervals import Estimate, Estimating, estimate_of
 from warpimpact.statistics.quantal import fit_quantal, likelihood_interval
 from warpimpact.studies.limit import LimitMap
 
@@ -55,7 +55,7 @@ class Response:
     """
 
     limits: Array
-    dealt: Dealing = field(default_factory=Dealing)
+    dealt: Estimating = field(default_factory=Estimating)
 
     def estimate(self, velocity: float) -> Estimate:
         """The probability of perforation with its 95 % interval over the places."""
@@ -80,7 +80,7 @@ def response_of_limits(dataset: xarray.Dataset) -> Response:
     limits = dataset[v.LIMITS["velocity"].value].values.astype(float)[sound]
     if not np.isfinite(limits).any():
         raise ValueError("has no limit velocity: no hit perforates at any velocity that was tried, or all have failed")
-    dealt: Dealing = dealing(dataset) if sound.all() else {"replicates": 1}
+    dealt: Estimating = dealing(dataset) if sound.all() else {"replicates": 1}
     return Response(limits, dealt)
 
 

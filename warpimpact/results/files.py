@@ -169,6 +169,8 @@ def _open(path: Path, *kinds: Kind, group: str | None = None) -> xarray.Dataset:
     kind = check_kind(path, *kinds)
     with readable(path):
         dataset = _joined(path) if group is None else _part(path, group)
+    if group is not None:
+        return dataset
     try:
         _check_needed(path, {*dataset.variables, *dataset.attrs}, kind)
         if kind is HIT_MAP:

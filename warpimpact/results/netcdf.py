@@ -48,9 +48,11 @@ def write_table(
 
 
 def write_groups(groups: Mapping[str, HitTable], target: Any) -> None:
-    """Write tables of references into an open file, each into a group of its name, without outlines."""
+    """Write tables of references into an open file, each into a group of its name, without outlines and names of axes
+    and layers: xarray crashes when it reads and closes groups with strings again and again."""
     for name, table in groups.items():
-        table = table.drop_vars([inner for names in v.GROUPS.values() for inner in names])
+        strings = [label for label, column in table.variables.items() if column.values.dtype.kind in "UO"]
+        table = table.drop_vars([*strings, *(inner for names in v.GROUPS.values() for inner in names)])
         group = target.createGroup(name)
         group.setncatts(table.attrs)
         _write(table.variables, table.coords, group)

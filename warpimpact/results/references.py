@@ -14,8 +14,8 @@ from warpimpact.results.dataset import hit_numbers
 if TYPE_CHECKING:
     import xarray
 
-NAMES = ("solid", "base_alone")
-"""Names of the references, and of their groups in a file."""
+NAMES = {"solid": "solid, same weight", "base_alone": "base alone"}
+"""Names of the references, which are those of their groups in a file, and their names as plates."""
 
 
 def with_references(dataset: xarray.Dataset, references: Mapping[str, xarray.Dataset]) -> xarray.Dataset:
@@ -48,3 +48,14 @@ def reference(dataset: xarray.Dataset, name: str) -> xarray.Dataset | None:
         return found
     numbers = numbers[: np.argmax(np.append(numbers, hits) >= hits)]  # the first hits that have a reference
     return found.isel(hit=numbers) if len(numbers) else None
+
+
+def as_plates(dataset: xarray.Dataset) -> dict[str, xarray.Dataset]:
+    """The references of a result by their names as plates. One that stands for all has every hit of the result."""
+    plates = {label: reference(dataset, name) for name, label in NAMES.items() if name in references_of(dataset)}
+    every = dataset[[v.HIT_Y, v.HIT_Z]].coords
+    return {
+        label: plate if plate.sizes["hit"] > 1 else plate.isel(hit=[0] * dataset.sizes["hit"]).assign_coords(every)
+        for label, plate in plates.items()
+        if plate is not None
+    }

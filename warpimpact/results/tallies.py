@@ -12,7 +12,7 @@ from warpimpact.results import attributes as attr
 from warpimpact.results.dataset import is_choice
 from warpimpact.results.measures import Measure
 from warpimpact.results.per_hit import Array
-from warpimpact.statistics.intervals import Dealing, Dealt, Estimate, Estimating, estimate_of
+from warpimpact.statistics.intervals import Dealt, Estimate, Estimating, estimate_of
 from warpimpact.statistics.shifts import shift_of_mean, shift_of_quantile, shift_of_share, shift_of_yes
 from warpimpact.statistics.tails import has_interval
 
@@ -66,7 +66,7 @@ def shift_of(measure: Measure, levels: tuple[Result, Result] | None, confidence:
     them."""
     if levels is None or not measure.has_interval:
         return None
-    dealt: Estimating = {**dealing(levels[0]), "replicates": 1, "confidence": confidence}
+    dealt: Estimating = {"confidence": confidence}
     coarse, fine = (measure.by_hit(level) for level in levels)
     match measure.kind:
         case "quantile":
@@ -82,6 +82,6 @@ def shift_of(measure: Measure, levels: tuple[Result, Result] | None, confidence:
     return shift_of_mean(*averaged, **dealt)
 
 
-def dealing(dataset: Result) -> Dealing:
+def dealing(dataset: Result) -> Estimating:
     """Arguments of `Dealt` for the sampling of a result. Chosen hits are no longer in the order of the replicates."""
     return {"replicates": 1 if is_choice(dataset) else int(dataset.attrs.get(attr.REPLICATES, 1))}

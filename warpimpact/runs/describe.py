@@ -78,7 +78,7 @@ def described_as(
         campaign.scene,
         shots,
         outcomes,
-        period=campaign.hits.covered(campaign.plate),
+        period=campaign.sampler().cell,
         attributes={**_campaign(campaign), **attributes},
         double=double,
         finer=finer,

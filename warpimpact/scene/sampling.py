@@ -28,6 +28,9 @@ class Sampler:
     Hits cover one unit cell of the plate, or the whole plate (`Hits.area`); with hits.irreducible, the part of it from
     which `symmetries_used` give the rest. The impact has velocity and attitude unless hits or scatter give them.
 
+    Attributes:
+        cell: extent along y and z [m] of the whole cell or plate, centred on the origin.
+
     Raises:
         ValueError: scatter that removes the symmetry of hits.irreducible; hits on the whole of an unbounded plate.
     """
@@ -36,10 +39,10 @@ class Sampler:
         self, impact: Impact, hits: Hits, plate: Plate, scatter: Scatter | None = None, replicates: int = 1
     ) -> None:
         check_together({IRREDUCIBLE: hits.irreducible} | unsymmetric(scatter or Scatter()))
-        self._impact, self._hits, cell = impact, hits, hits.covered(plate)
+        self._impact, self._hits, self.cell = impact, hits, hits.covered(plate)
         (low_y, high_y), (low_z, high_z) = irreducible_part(symmetries_used(impact, hits, plate))
-        self._extent = cell[0] * (high_y - low_y), cell[1] * (high_z - low_z)
-        self._middle = 0.5 * cell[0] * (high_y + low_y), 0.5 * cell[1] * (high_z + low_z)
+        self._extent = self.cell[0] * (high_y - low_y), self.cell[1] * (high_z - low_z)
+        self._middle = 0.5 * self.cell[0] * (high_y + low_y), 0.5 * self.cell[1] * (high_z + low_z)
         scatter = scatter or Scatter()
         self._scatter = scatter.given
         dimensions = _HIT_COLUMNS + (drawn_columns(scatter.layers) if self._scatter else 0)

@@ -116,6 +116,5 @@ class Target(Model):
     @property
     def base_alone(self) -> Self:
         """The base at its place without the other layers."""
-        base = self.layers[-1]
-        front = base.model_copy(update={"gap": 0.0, "offset": (0.0, 0.0)}) if isinstance(base, Layer) else base
-        return self.model_copy(update={"layers": (front,)})
+        base = Plate(**{name: getattr(self.layers[-1], name) for name in Plate.model_fields})
+        return self.model_copy(update={"layers": (base,)})

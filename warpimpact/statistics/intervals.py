@@ -16,8 +16,7 @@ from typing import Self, TypedDict, Unpack
 
 import numpy as np
 from numpy.typing import NDArray
-
-from warpimpact.statistics.student import student_quantile
+from scipy import special, stats
 
 Array = NDArray[np.float64]
 
@@ -57,15 +56,10 @@ class Estimate:
         return replace(self, low=low, high=high)
 
 
-class Dealing(TypedDict, total=False):
-    """Arguments of `Dealt` that say how shots are dealt."""
-
-    replicates: int
-
-
-class Estimating(Dealing, total=False):
+class Estimating(TypedDict, total=False):
     """Arguments of `Dealt` after the kind."""
 
+    replicates: int
     confidence: float
 
 
@@ -128,7 +122,7 @@ class Dealt:
         Journal of the American Statistical Association 47 (1952) 635). Quantiles of single replicates would be biased.
         """
         replicates = [sample for sample in self._replicates if sample.count]
-        if len(replicates) < 2 or all(sample.count <= 1 for sample in replicates):  # independent shots
+        if len(replicates) < 2 or all(sample.count == 1 for sample in replicates):  # independent shots
             return None
         quantile = self._kind == "quantile"
         results = [float((sample.values <= value).mean()) if quantile else sample.mean for sample in replicates]
@@ -148,8 +142,6 @@ class Dealt:
         """Interval for independent shots."""
         count = sample.count
         if self._kind == "quantile":
-            from scipy import stats  # half a second to import
-
             tail = 0.5 * (1.0 - self._confidence)
             ends = stats.binom.ppf([tail, 1.0 - tail], count, self._share).astype(int)
             ordered = np.sort(sample.values)
@@ -168,7 +160,7 @@ class Dealt:
 
 def _student(confidence: float, count: int) -> float:
     """Half width of the interval of a mean of `count` numbers, in standard deviations."""
-    return student_quantile(0.5 * (1.0 + confidence), count - 1) / math.sqrt(count)
+    return float(special.stdtrit(count - 1, 0.5 * (1.0 + confidence))) / math.sqrt(count)
 
 
 def _wilson(successes: int, count: int, confidence: float) -> tuple[float, float]:

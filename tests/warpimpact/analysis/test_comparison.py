@@ -464,7 +464,6 @@ def test_one_plate_is_run_and_several_are_compared(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("arguments", "sentence"),
     [
-        (["a.nc"], "a.nc: got one result, but compare needs at least two results, or one campaign"),
         (["a.nc", "a.nc"], "a.nc: got this result 2 times, but each result counts once"),
         (["a.nc", "b.nc"], "a.nc: cannot be read (it is not there)"),
         (["a.nc", "b.nc", "-o", "a.gif"], "a.gif: the name of a picture must end in .png, .pdf or .svg"),

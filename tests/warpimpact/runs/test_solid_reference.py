@@ -8,6 +8,7 @@ import pytest
 import xarray
 
 from warpimpact import Campaign, Numerics, open_result
+from warpimpact.cli import main
 from warpimpact.kernels.status import Status
 from warpimpact.results import files
 from warpimpact.results.references import reference, references_of
@@ -89,6 +90,17 @@ def test_tasks_of_many_shards_give_the_same_file(tmp_path: Path, monkeypatch: py
     assert_same_bits(tmp_path / "one.nc", tmp_path / "many.nc")
     with open_result(tmp_path / "many.nc", group="solid") as solid:
         assert solid["status"].dims == ("hit",)
+
+
+def test_a_result_is_compared_with_its_solid_plate(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    computed(tmp_path, ("= 600", "= 64"))
+    monkeypatch.chdir(tmp_path)
+    assert main(["compare", "a.nc"]) == 0
+    told = capsys.readouterr().out
+    assert "64 hits of each plate, the same shots" in told
+    assert "solid, same weight" in told
 
 
 def test_it_is_a_campaign_of_its_own(tmp_path: Path) -> None:

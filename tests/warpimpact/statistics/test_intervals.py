@@ -5,7 +5,6 @@ import pytest
 from scipy import stats
 
 from warpimpact.statistics.intervals import Dealt, estimate_of, looks
-from warpimpact.statistics.student import student_quantile
 
 TRIALS = 500
 LEAST = 460  # 95 % of 500 trials: 475 ± 4.9, three standard deviations below
@@ -52,13 +51,6 @@ def test_the_share_of_replicates_stays_between_0_and_1() -> None:
 def test_replicates_of_one_shot_each_are_independent_shots(kind: str) -> None:
     values = np.random.default_rng(1).integers(0, 2, 10).astype(float)
     assert estimate_of(kind, values, replicates=16) == estimate_of(kind, values)
-
-
-@pytest.mark.parametrize("freedom", [*range(1, 20), 50, 999, 1000, 1001, 10**6])
-def test_quantiles_of_student_are_those_of_scipy(freedom: int) -> None:
-    shares = [0.5, 0.6, 0.9, 0.975, 0.995, 0.99999]
-    found = [student_quantile(share, freedom) for share in shares]
-    assert found == pytest.approx(stats.t.ppf(shares, freedom), rel=1e-11, abs=1e-14)
 
 
 @pytest.mark.parametrize(("successes", "count"), [(0, 1), (1, 1), (0, 40), (3, 40), (40, 40), (70_000, 100_000)])
