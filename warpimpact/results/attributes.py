@@ -7,77 +7,62 @@ from datetime import UTC, datetime
 from functools import cache
 from importlib.metadata import version
 from pathlib import Path
-from typing import Any, Literal, NamedTuple
+from typing import Any
 
-Kind = Literal["text", "table", "number", "count", "pair"]
-
-
-class Attribute(NamedTuple):
-    """The kind and the units of a global attribute.
-
-    Attributes:
-        kind: a "table" is a text with a JSON object, a "count" a whole number of at least 1, a "pair" two numbers.
-        units: CF units, which the attribute ``<name>_units`` of a result repeats; empty where there are none.
-    """
-
-    kind: Kind
-    units: str
-
-
-ATTRIBUTES: dict[str, Attribute] = {}
-"""All attributes by name."""
+UNITS: dict[str, str] = {}
+"""CF units of the attributes that have some, which the attribute ``<name>_units`` of a result repeats."""
 _SI = "SI; a text says its unit"
 
 
-def _declared(name: str, kind: Kind = "text", units: str = "") -> str:
-    ATTRIBUTES[name] = Attribute(kind, units)
+def _declared(name: str, units: str) -> str:
+    UNITS[name] = units
     return name
 
 
 # CF
-TITLE = _declared("title")
-HISTORY = _declared("history")
-REFERENCES = _declared("references")
+TITLE = "title"
+HISTORY = "history"
+REFERENCES = "references"
 
-KIND = _declared("warpimpact_kind")
+KIND = "warpimpact_kind"
 """Name and version of the kind of file, as in results/kinds.py."""
 
 # The campaign, and how it was computed
-CAMPAIGN = _declared("campaign")
-WARPIMPACT_VERSION = _declared("warpimpact_version")
-WARP_VERSION = _declared("warp_version")
-PYTHON_VERSION = _declared("python_version")
-NUMPY_VERSION = _declared("numpy_version")
-XARRAY_VERSION = _declared("xarray_version")
-COMMIT = _declared("commit")
+CAMPAIGN = "campaign"
+WARPIMPACT_VERSION = "warpimpact_version"
+WARP_VERSION = "warp_version"
+PYTHON_VERSION = "python_version"
+NUMPY_VERSION = "numpy_version"
+XARRAY_VERSION = "xarray_version"
+COMMIT = "commit"
 """Commit of the checkout that computed the result; absent where warpimpact was installed without one."""
-MACHINE = _declared("machine")
-PROCESSOR = _declared("processor")
-DEVICE = _declared("device")
-NUMERICS = _declared("numerics")
+MACHINE = "machine"
+PROCESSOR = "processor"
+DEVICE = "device"
+NUMERICS = "numerics"
 """The numerics as used, in words. The next attributes are their numbers."""
-PATCHES_AXIAL = _declared("patches_axial", "number")
-PATCHES_AROUND = _declared("patches_around", "number")
-GRID_SPACING = _declared("grid_spacing", "number", "m")
-TIME_STEP = _declared("time_step", "number", "s")
-PRECISION = _declared("precision")
-NUMERICS_GIVEN = _declared("numerics_given", "table", _SI)
-RESOLUTION = _declared("resolution", "table")
+PATCHES_AXIAL = "patches_axial"
+PATCHES_AROUND = "patches_around"
+GRID_SPACING = _declared("grid_spacing", "m")
+TIME_STEP = _declared("time_step", "s")
+PRECISION = "precision"
+NUMERICS_GIVEN = _declared("numerics_given", _SI)
+RESOLUTION = "resolution"
 """JSON of the numerics that a pilot found. The next attributes, up to STATUS_ERROR, are present only with a pilot."""
-PROMISE_KEPT = _declared("promise_kept", "number")
-ACCURACY = _declared("accuracy", "table")
+PROMISE_KEPT = "promise_kept"
+ACCURACY = "accuracy"
 """JSON of the accuracy that was asked for: errors in SI, and the share of the hits that shall stay within them."""
-RESIDUAL_VELOCITY_ERROR = _declared("residual_velocity_error", "number", "m s-1")
-TILT_ERROR = _declared("tilt_error", "number", "degree")
-DEPTH_ERROR = _declared("depth_error", "number", "m")
+RESIDUAL_VELOCITY_ERROR = _declared("residual_velocity_error", "m s-1")
+TILT_ERROR = _declared("tilt_error", "degree")
+DEPTH_ERROR = _declared("depth_error", "m")
 """Error of the depth; present only where some shots of the pilot stop in a layer."""
-STATUS_ERROR = _declared("status_error", "number")
+STATUS_ERROR = "status_error"
 """Share of the hits that end otherwise at a finer level; only of targets with several layers."""
-CONTINUUM = _declared("continuum", "table", _SI)
+CONTINUUM = _declared("continuum", _SI)
 """JSON of the settings and the materials of a result by finite elements, which has no other numerics."""
-FINGERPRINT = _declared("fingerprint")
-COMPUTE_TIME = _declared("compute_time", "number", "s")
-HITS_PER_SECOND = _declared("hits_per_second", "number", "s-1")
+FINGERPRINT = "fingerprint"
+COMPUTE_TIME = _declared("compute_time", "s")
+HITS_PER_SECOND = _declared("hits_per_second", "s-1")
 
 # These recognise files of other kinds, whose other attributes are in their own rooms
 DESIGN_FILE = "design_file"
@@ -86,68 +71,68 @@ FIRING_TEST = "firing_test"
 """The text of the test file."""
 
 # The shots
-SAMPLING = _declared("sampling")
-SEED = _declared("seed", "number")
-COUNT = _declared("count", "count")
-REPLICATES = _declared("replicates", "count")
-SYMMETRIES = _declared("symmetries")
+SAMPLING = "sampling"
+SEED = "seed"
+COUNT = "count"
+REPLICATES = "replicates"
+SYMMETRIES = "symmetries"
 """Symmetries that give the rest of the cell from its hits, separated by "; "; only with `hits.irreducible`."""
 
 # Core, plate and output
-CORE = _declared("core", "table", _SI)
-PLATE = _declared("plate", "table", _SI)
-IMPACT = _declared("impact", "table", _SI)
-MATERIAL = _declared("material", "table", _SI)
-CATALOGUE_NAMES = _declared("catalogue_names")
+CORE = _declared("core", _SI)
+PLATE = _declared("plate", _SI)
+IMPACT = _declared("impact", _SI)
+MATERIAL = _declared("material", _SI)
+CATALOGUE_NAMES = "catalogue_names"
 """A line for each name of the catalogue, with how well it is known; absent without names."""
-OUTSIDE_TESTED_RANGE = _declared("outside_tested_range")
+OUTSIDE_TESTED_RANGE = "outside_tested_range"
 """JSON list of the sentences of campaign/tested_range.py; absent where nobody looked."""
-LAYERS = _declared("layers", "table")
+LAYERS = "layers"
 """JSON of the layers behind the plate, by number; absent if there are none."""
-STANDOFF_POINT = _declared("standoff_point")
-OPEN_AREA = _declared("open_area", "number", "1")
-AREAL_DENSITY = _declared("areal_density", "number", "kg m-2")
+STANDOFF_POINT = "standoff_point"
+OPEN_AREA = _declared("open_area", "1")
+AREAL_DENSITY = _declared("areal_density", "kg m-2")
 """Areal density of the whole target."""
-ADD_ON_DENSITY = _declared("add_on_areal_density", "number", "kg m-2")
+ADD_ON_DENSITY = _declared("add_on_areal_density", "kg m-2")
 """Areal density of the layers in front of the base; only with a base."""
-LIGAMENT = _declared("ligament", "number", "m")
-PLATE_PERIOD = _declared("plate_period", "pair", "m")
-PLATE_THICKNESS = _declared("plate_thickness", "number", "m")
-FAILED_SHARE = _declared("failed_share", "number", "1")
+LIGAMENT = _declared("ligament", "m")
+PLATE_PERIOD = _declared("plate_period", "m")
+PLATE_THICKNESS = _declared("plate_thickness", "m")
+FAILED_SHARE = _declared("failed_share", "1")
 
 # A sweep
-SWEEP = _declared("sweep", "table")
+SWEEP = "sweep"
 """JSON of the swept inputs: name of the dimension → values as they were written."""
 
 # The stop rule
-STOP_QUANTITY = _declared("stop_quantity")
-STOP_REASON = _declared("stop_reason")
-ESTIMATE = _declared("estimate", "number")
-ESTIMATE_INTERVAL = _declared("estimate_interval", "pair")
-ESTIMATE_NUMERICS = _declared("estimate_numerics", "number")
+STOP_QUANTITY = "stop_quantity"
+STOP_REASON = "stop_reason"
+ESTIMATE = "estimate"
+ESTIMATE_INTERVAL = "estimate_interval"
+ESTIMATE_NUMERICS = "estimate_numerics"
 """Largest shift of the estimate by the numerics; only with a pilot."""
-ESTIMATE_UNITS = _declared("estimate_units")
-CONFIDENCE = _declared("confidence", "number")
+ESTIMATE_UNITS = "estimate_units"
+CONFIDENCE = "confidence"
 
 # A search of limits
-LIMIT = _declared("limit")
+LIMIT = "limit"
 """The quantity: "velocity" or "thickness"."""
-LIMIT_LAYER = _declared("limit_layer", "number")
+LIMIT_LAYER = "limit_layer"
 """Number of the layer whose thickness was searched; 0 is the plate."""
-LIMIT_DENSITY = _declared("limit_density", "number", "kg m-3")
+LIMIT_DENSITY = _declared("limit_density", "kg m-3")
 """Mass per area and thickness of this layer, including its holes."""
-LIMIT_ELSEWHERE = _declared("limit_elsewhere", "number", "kg m-2")
+LIMIT_ELSEWHERE = _declared("limit_elsewhere", "kg m-2")
 """Areal density of all other layers."""
-LIMIT_TOLERANCE = _declared("limit_tolerance", "number")
-LIMIT_HIGHEST = _declared("limit_highest", "number")
-LIMIT_VELOCITY_ERROR = _declared("limit_velocity_error", "number", "m s-1")
-LIMIT_THICKNESS_ERROR = _declared("limit_thickness_error", "number", "m")
-LIMIT_FACTORS = _declared("limit_material_factors", "pair", "1")
+LIMIT_TOLERANCE = "limit_tolerance"
+LIMIT_HIGHEST = "limit_highest"
+LIMIT_VELOCITY_ERROR = _declared("limit_velocity_error", "m s-1")
+LIMIT_THICKNESS_ERROR = _declared("limit_thickness_error", "m")
+LIMIT_FACTORS = _declared("limit_material_factors", "1")
 """Ends of the 90 % interval of a limit velocity over the velocity, from what is known of the material."""
 
 # A replayed hit
-HIT = _declared("hit", "number")
-AGREEMENT = _declared("agreement")
+HIT = "hit"
+AGREEMENT = "agreement"
 
 
 def with_units(attributes: Mapping[str, Any]) -> dict[str, Any]:
@@ -155,8 +140,8 @@ def with_units(attributes: Mapping[str, Any]) -> dict[str, Any]:
     described: dict[str, Any] = {}
     for name, value in attributes.items():
         described[name] = value
-        if name in ATTRIBUTES and (units := ATTRIBUTES[name].units):
-            described[f"{name}_units"] = units
+        if name in UNITS:
+            described[f"{name}_units"] = UNITS[name]
     return described
 
 

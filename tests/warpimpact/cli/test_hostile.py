@@ -43,11 +43,8 @@ def with_polygons(polygons: object) -> str:
 
 ZIGZAG = np.random.default_rng(1).uniform((-8e-3, -4e-3), (8e-3, 4e-3), (400, 2)).tolist()
 CAMPAIGNS = {
-    "nested arrays": ("a = " + "[" * 100_000 + "]" * 100_000, "nested more than 16 deep"),
-    "nested JSON": ('{"a":' + "[" * 100_000 + "]" * 100_000 + "}", "nested more than 16 deep"),
-    "nested 20 deep": (BASE + "\n[interaction]\na = " + "[" * 20 + "]" * 20, "nested more than 16 deep"),
-    "a key of dots": (".".join("a" * 100_000) + " = 1\n" + BASE, "dots in a key"),
-    "a table of dots": ("[" + ".".join("a" * 100_000) + "]\n" + BASE, "dots in a key"),
+    "nested arrays": ("a = " + "[" * 100_000 + "]" * 100_000, "nested too deep"),
+    "nested JSON": ('{"a":' + "[" * 100_000 + "]" * 100_000 + "}", "nested too deep"),
     "a long array": ("x = [" + "1," * 2_000_000 + "]\n" + BASE, "at most 1048576 characters"),
     "a tower of powers": (BASE.replace('"4 mm"', '"4 m**9**9**9"', 1), 'whose unit "m**9**9**9" is not one of names'),
     "another tower": (BASE.replace('"4 mm"', '"4 m*(9**9)**9**9"', 1), "is not one of names"),

@@ -152,7 +152,7 @@ def test_the_browser_is_opened_on_a_file_that_only_its_owner_reads(small: Path, 
     [
         ("nothing", "no JSON object"),
         ("[" * 100_000, "no JSON object"),
-        ('{"a":' * 5000, "nested more than 16 deep"),
+        ('{"a":' * 5000, "nested too deep"),
         ("{" + " " * 2**20 + "}", "more than 1048576 bytes"),
         ({"design": 3}, "it must be a table"),
         ({"design": {"title": None}}, "title: got null"),

@@ -64,8 +64,3 @@ def test_many_shots_are_checked_in_proportion(monkeypatch: pytest.MonkeyPatch) -
     assert len(fit.warnings) == 49 * len(data["shot"])  # one for each that repeats another
     with pytest.raises(FitError, match="at most 256"):
         fit_from(json.dumps(data | {"shot": data["shot"] * 200}), "fit.json", Path())
-
-
-def test_half_a_character_is_refused() -> None:
-    with pytest.raises(ValueError, match=r"is not valid TOML: .* can.t encode character"):
-        fit_from(json.dumps(tomllib.loads(TEXT) | {"title": "\ud800"}), "fit.json", Path())

@@ -221,8 +221,7 @@ def test_hits_without_values_or_cover_are_reported(make_result: ResultMaker, tmp
 @pytest.mark.parametrize(
     ("campaign", "sentence"),
     [
-        ("a." * 10**5 + "a=1", "16 dots in a key"),  # tomllib takes the square of their number
-        ("x=" + "[" * 10**4 + "]" * 10**4, "nested more than 16 deep"),
+        ("x=" + "[" * 10**4 + "]" * 10**4, "nested too deep"),
         ("null", "not valid TOML"),
         ("layer = 5", ""),
     ],
