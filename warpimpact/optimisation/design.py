@@ -29,9 +29,6 @@ _TURNING = ("obliquity", "azimuth", "pitch", "yaw", "spin")
 _Table = dict[str, Any]
 _Name = Annotated[Title, Field(min_length=1, max_length=80)]
 
-SEARCH_TABLES = ("variables", "objectives", "bounds", "threats", "constraints", "search", "references")
-"""Tables of a design file beside those of a campaign."""
-
 
 class _Goal(Model):
     """A measure of a target.
@@ -284,7 +281,7 @@ def read_design(path: str | Path) -> Design:
 def design_from(text: str, name: str, folder: Path) -> Design:
     """Read a design from its text; `name` is the name of the file in errors."""
     data = parsed(text, name, DESIGN)
-    own_tables = {key: data.pop(key) for key in SEARCH_TABLES if key in data}
+    own_tables = {key: data.pop(key) for key in ("variables", *SearchTables.model_fields) if key in data}
     if "stop" in data:
         raise CampaignError(f"{name}: stop: a design file takes no [stop]; [search] sets the hits")
     space = read_space(own_tables.pop("variables", {}), name)

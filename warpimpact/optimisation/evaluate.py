@@ -85,12 +85,8 @@ def _results(
     keys = [
         hashlib.sha256(json.dumps([asdict(job) for job in group], default=str).encode()).hexdigest() for group in groups
     ]
-    results = yield Round(
-        [Job(compute, (design, group)) for group in groups],
-        keys,
-        lambda now: report(min(now.done * together, len(jobs))),
-    )
-    return results
+    work = [Job(compute, (design, group)) for group in groups]
+    return (yield Round(work, keys, lambda now: report(min(now.done * together, len(jobs)))))
 
 
 def _columns_computed(
@@ -162,24 +158,17 @@ def _limits(campaign: Campaign, shots: Shots, measure: Measure, numerics: Numeri
 def _level_computed(
     design: Design, jobs: Sequence[HitJob], *, worker: Worker, report: Callable[[float], object]
 ) -> Arrays:
-    return {"level": np.array(level_of(design, jobs[0], worker))}
-
-
-def level_of(design: Design, job: HitJob, worker: Worker) -> str:
-    """The numerics, as JSON, that a pilot finds for a job; those of the campaign where it fixes a resolution.
-
-    Args:
-        job: `level` is the required fidelity unless the campaign fixes a resolution; `count` is the number of hits that
-            will be computed.
-    """
+    """The level that a pilot finds for one job, whose `level` is the fidelity, unless the campaign fixes the
+    resolution."""
+    (job,) = jobs
     campaign = design.campaign(job.tables, job.threat, job.seed)
-    if campaign.numerics.explicit is not None:
-        return campaign.numerics.model_dump_json()
-    numerics = campaign.numerics.model_copy(update={"fidelity": job.level, "accuracy": None})
-    scene, shots = campaign.scene, campaign.sampler().shots(0, pilot_size(numerics.asked))
-    some = shots[: pilot_size(numerics.asked, PILOT_LIMITS)]
-    of_limits = [measure for measure in design.columns if measure.is_limit]
-    found = [pilot_of_limits(scene, some, _limit_of(campaign, one), numerics, worker).numerics for one in of_limits]
-    if len(found) < len(design.columns):
-        found.append(pilot_of(scene, shots, numerics, worker).numerics)
-    return max(found, key=lambda numerics: numerics.level or 0).model_dump_json()
+    found = [campaign.numerics]
+    if campaign.numerics.explicit is None:
+        numerics = campaign.numerics.model_copy(update={"fidelity": job.level, "accuracy": None})
+        scene, shots = campaign.scene, campaign.sampler().shots(0, pilot_size(numerics.asked))
+        some = shots[: pilot_size(numerics.asked, PILOT_LIMITS)]
+        searched = [_limit_of(campaign, measure) for measure in design.columns if measure.is_limit]
+        found = [pilot_of_limits(scene, some, limit, numerics, worker).numerics for limit in searched]
+        if len(searched) < len(design.columns):
+            found.append(pilot_of(scene, shots, numerics, worker).numerics)
+    return {"level": np.array(max(found, key=lambda numerics: numerics.level or 0).model_dump_json())}

@@ -4,17 +4,15 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterator
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+import xarray
 
 from warpimpact.analysis.numbers import interval_text, number_text
 from warpimpact.results import front as f
 from warpimpact.results.vocabulary import WEIGHTS
 from warpimpact.view.view import Column, Section, Table, number
-
-if TYPE_CHECKING:
-    import xarray
 
 
 def front_view(dataset: xarray.Dataset) -> list[Section]:
@@ -28,13 +26,8 @@ def front_view(dataset: xarray.Dataset) -> list[Section]:
         return [Section([computed, *_nearest(dataset)])]
     on_front, confirmed = int(dataset[f.ON_FRONT].sum()), dataset.sizes["front"]
     again = f"front: {on_front} designs, of which {confirmed} were computed again with fresh hits"
-    shrinkage = [*_shrinkage(dataset)]
-    return [
-        Section([computed, again]),
-        Section([_front_table(dataset)]),
-        Section([_variables_table(dataset)] if confirmed else []),
-        Section(shrinkage),
-    ]
+    parts = ([computed, again], [_front_table(dataset)], [_variables_table(dataset)], [*_shrinkage(dataset)])
+    return [Section(part) for part in parts]
 
 
 def _front_table(dataset: xarray.Dataset) -> Table:
@@ -117,19 +110,16 @@ def _values(dataset: xarray.Dataset, design: int) -> Iterator[tuple[str, str, st
 def _shrinkage(dataset: xarray.Dataset) -> Iterator[str]:
     """How much worse the fresh hits are than the hits of the search."""
     searched, fresh = dataset[f.RESULT].values[dataset[f.NUMBER].values], dataset[f.FRESH].values
-    for place, (label, sign, limit) in enumerate(
-        zip(dataset[f.GOAL_LABEL].values, dataset[f.GOAL_SIGN].values, dataset[f.GOAL_LIMIT].values, strict=True)
-    ):
-        if not np.isnan(limit) or not len(fresh) or str(dataset[f.GOAL].values[place]).startswith(tuple(WEIGHTS)):
+    worse = (dataset[f.GOAL_SIGN].values * (fresh - searched)).mean(axis=0)
+    for goal in np.flatnonzero(np.isnan(dataset[f.GOAL_LIMIT].values)):
+        if str(dataset[f.GOAL].values[goal]).startswith(tuple(WEIGHTS)):
             continue
-        worse = float(np.mean(sign * (fresh[:, place] - searched[:, place])))
-        before = float(np.mean(searched[:, place]))
-        share = f", {abs(worse / before):.1%} of it" if before else ""
-        name, unit = label_and_unit(label)
-        yield (
-            f"shrinkage: by fresh hits {name} is {'worse' if worse > 0 else 'better'} by "
-            f"{number_text(abs(worse))}{' ' + unit if unit else ''}{share}, mean over the front"
-        )
+        name, unit = label_and_unit(dataset[f.GOAL_LABEL].values[goal])
+        by = f"{number_text(abs(float(worse[goal])))} {unit}".strip()
+        before = float(searched[:, goal].mean())
+        share = f", {abs(worse[goal] / before):.1%} of it" if before else ""
+        which = "worse" if worse[goal] > 0 else "better"
+        yield f"shrinkage: by fresh hits {name} is {which} by {by}{share}, mean over the front"
 
 
 def _nearest(dataset: xarray.Dataset) -> Iterator[str]:

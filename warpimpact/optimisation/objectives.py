@@ -183,7 +183,6 @@ def hole_sizes(plate: Plate) -> tuple[float, float]:
     thousandth of the extent where the pattern is no lattice."""
     if isinstance(plate.pattern, LatticePattern):
         return plate.pattern.hole_size
-
     narrow, wide = math.inf, 0.0
     for outline in plate.pattern.outlines(*((-0.5 * side, 0.5 * side) for side in plate.pattern.unit_cell)):
         hull = np.asarray(shapely.get_coordinates(shapely.convex_hull(shapely.multipoints(outline))))

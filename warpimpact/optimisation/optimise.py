@@ -107,15 +107,12 @@ def _answered(
 ) -> xarray.Dataset:
     check_installed()
     references(design)  # refused before anything is computed
-    searched, confirmed = answered(_searched(design, progress or (lambda now: None)), executor, store)
-    return to_dataset(design, searched, confirmed, executor.made_by)
 
+    def question() -> Question[tuple[Searched, Confirmed]]:
+        searched = yield from search(design, progress or (lambda now: None))
+        return searched, (yield from confirm(design, searched, progress or (lambda now: None)))
 
-def _searched(design: Design, follow: Follow) -> Question[tuple[Searched, Confirmed]]:
-    """The search and its front by fresh hits, as one question."""
-    searched = yield from search(design, follow)
-    confirmed = yield from confirm(design, searched, follow)
-    return searched, confirmed
+    return to_dataset(design, *answered(question(), executor, store), executor.made_by)
 
 
 def to_dataset(design: Design, searched: Searched, confirmed: Confirmed, made_by: Mapping[str, str]) -> xarray.Dataset:
@@ -123,7 +120,6 @@ def to_dataset(design: Design, searched: Searched, confirmed: Confirmed, made_by
     goals, variables, front = design.goals, design.space.variables, len(confirmed.numbers)
     names = [goal.measure for goal in goals]
     fresh, rivals = confirmed.candidates[:front], confirmed.candidates[front:]
-    width = max(2, len(str(max(front - 1, 0))))
     count = len(searched.candidates)
     columns: dict[Any, Any] = {
         f.NAME: _texts(variable.name for variable in variables),
@@ -140,7 +136,7 @@ def to_dataset(design: Design, searched: Searched, confirmed: Confirmed, made_by
         f.NUMBER: confirmed.numbers,
         f.CONFIRMED: confirmed.on_front.astype(np.int8),
         f.CAMPAIGN: _texts(_campaign(design, one) for one in fresh),
-        f.FILE: _texts(f"design_{number:0{width}d}.toml" for number in range(front)),
+        f.FILE: _texts(f"design_{number:02d}.toml" for number in range(front)),
         f.FRESH_LEVELS: _texts(_levels(one) for one in fresh),
         f.OUTSIDE: _texts(_outside(design, one) for one in fresh),
         f.REFERENCE: _texts(reference.name for reference in design.references),

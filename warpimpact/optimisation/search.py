@@ -80,7 +80,7 @@ def search(design: Design, follow: Follow) -> Question[Searched]:
     """
     state, plan = _State(design, follow), design.search
     if design.space.size <= plan.designs:
-        points = list(design.space.points())
+        points = design.space.points()
         for first in range(0, len(points), plan.population):
             yield from state.compute(points[first : first + plan.population])
     else:
@@ -137,17 +137,13 @@ class _State:
         yield from self._hits(new)
 
     def _hits(self, new: dict[bytes, Candidate]) -> Question[None]:
-        design, threats = self.design, range(len(self.design.threats))
-        plan = design.search
+        design, plan, threats = self.design, self.design.search, range(len(self.design.threats))
         jobs = [
             HitJob(candidate.tables, threat, plan.hits, candidate.levels[threat], plan.seed)
             for candidate in (new.values() if design.columns else ())
             for threat in threats
         ]
-
-        def report(done: float) -> None:
-            self.tell(f"{len(new)} designs at {plan.hits} hits, {done / len(jobs):.0%}")
-
+        report = lambda done: self.tell(f"{len(new)} designs, {done / len(jobs):.0%}")  # noqa: E731
         columns = yield from columns_of(design, jobs, report)
         for number, (key, candidate) in enumerate(new.items()):
             of_threats = np.array(columns[number * len(threats) : (number + 1) * len(threats)])

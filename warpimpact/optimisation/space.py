@@ -100,14 +100,11 @@ class Space:
                 values[number] = variable.at(coordinate)
         return values
 
-    def points(self) -> Iterator[Array]:
+    def points(self) -> list[Array]:
         """All points of a space that is not continuous, each once."""
-        seen = set()
-        for numbers in np.ndindex(*(variable.count or 0 for variable in self.variables)):
-            values = self.at([float(number) for number in numbers])
-            if values.tobytes() not in seen:
-                seen.add(values.tobytes())
-                yield values
+        counts = [variable.count or 0 for variable in self.variables]
+        every = (self.at([float(number) for number in numbers]) for numbers in np.ndindex(*counts))
+        return list({point.tobytes(): point for point in every}.values())
 
     def tables(self, base: Mapping[str, Any], values: Array, name: str) -> dict[str, Any]:
         """The tables of the campaign of a point, from those of the design file, whose name is for errors."""
