@@ -30,7 +30,7 @@ from warpimpact.scene import (
     Shots,
     Target,
 )
-from warpimpact.solver import simulate, structs, windows
+from warpimpact.solver import grid, simulate, structs
 from warpimpact.solver.rings import azimuths_of, rings_of
 
 from ..verification.scenes import paper_plate
@@ -142,7 +142,7 @@ def assert_same(outcomes: Any, expected: Any) -> None:
 def one_size(monkeypatch: pytest.MonkeyPatch, request: pytest.FixtureRequest) -> None:
     """On a CPU all windows have one size, so that scenes share builds."""
     if getattr(request.node, "callspec", None) is None or request.node.callspec.params.get("device", "cpu") == "cpu":
-        monkeypatch.setattr(windows, "SIZES", (4096,))
+        monkeypatch.setattr(grid, "SIZES", (4096,))
 
 
 # What 32 lanes compute in another test, one lane need not compute again.
@@ -172,7 +172,7 @@ def test_order_of_the_lanes_changes_no_outcome(in_blocks: pytest.MonkeyPatch) ->
     scene, shots = scene_of("slots", 12)
     first = simulate.simulate(scene, shots, numerics=BLOCK, device="cpu")
     in_blocks.setattr(lanes, "LANE", BACKWARDS)
-    in_blocks.setattr(windows, "SIZES", (2080,))  # so that kernels are built anew
+    in_blocks.setattr(grid, "SIZES", (2080,))  # so that kernels are built anew
     assert_same(simulate.simulate(scene, shots, numerics=BLOCK, device="cpu"), first)
 
 
@@ -181,7 +181,7 @@ def test_lanes_that_do_not_wait_are_found(in_blocks: pytest.MonkeyPatch) -> None
     scene, shots = scene_of("slots", 12)
     simple = by_one_thread(scene, shots)
     in_blocks.setattr(lanes, "WAIT", "")
-    in_blocks.setattr(windows, "SIZES", (2144,))
+    in_blocks.setattr(grid, "SIZES", (2144,))
     without = simulate.simulate(scene, shots, numerics=BLOCK, device="cpu")
     with pytest.raises(AssertionError):
         assert_same(without, simple)

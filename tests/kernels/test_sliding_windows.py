@@ -10,13 +10,13 @@ import warp as wp
 from warpimpact.kernels import exposure, sliding, structs
 from warpimpact.kernels.variant import Variant
 from warpimpact.scene import Hits, Impact, Numerics, Plate, Scene, Target, make_shots
-from warpimpact.solver import windows
+from warpimpact.solver import grid
 from warpimpact.solver.device import find_device
+from warpimpact.solver.grid import Cells
 from warpimpact.solver.marching import Marching
 from warpimpact.solver.memory import Memory
 from warpimpact.solver.prepare import prepare
 from warpimpact.solver.replay import traced
-from warpimpact.solver.windows import Cells
 
 from ..verification.scenes import PAPER_CORE, layer, paper_plate
 
@@ -51,8 +51,8 @@ def marched(target: tuple[Plate, ...], impact: dict[str, float], device: str, *,
 def test_a_window_that_follows_the_core_has_the_bits_of_a_wide_one(
     target: tuple[Plate, ...], impact: dict[str, float], device: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(windows, "SLACK", 0.2)  # narrow, so that they have to slide often
-    monkeypatch.setattr(windows, "WIDER_BEHIND", 0.1)
+    monkeypatch.setattr(grid, "SLACK", 0.2)  # narrow, so that they have to slide often
+    monkeypatch.setattr(grid, "WIDER_BEHIND", 0.1)
     wide, follows = (marched(target, impact, device, slide=slide) for slide in (False, True))
     for name, values in wide.outcomes.items():
         np.testing.assert_array_equal(follows.outcomes[name], values, err_msg=name)
@@ -61,8 +61,8 @@ def test_a_window_that_follows_the_core_has_the_bits_of_a_wide_one(
 
 
 def test_a_replay_keeps_all_that_the_core_has_passed(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(windows, "SLACK", 0.2)
-    monkeypatch.setattr(windows, "WIDER_BEHIND", 0.1)
+    monkeypatch.setattr(grid, "SLACK", 0.2)
+    monkeypatch.setattr(grid, "WIDER_BEHIND", 0.1)
     target, impact = (PLATE, layer(SOFT, gap=0.05)), {"obliquity": 45.0, "azimuth": 250.0}
     wide = marched(target, impact, "cpu", slide=False)
     scene = Scene(core=PAPER_CORE, target=Target(layers=target))

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from warpimpact.scene import Interaction, Layer, Numerics, Plate, Record, Scene, Shots, Target
-from warpimpact.solver import marching, windows
+from warpimpact.solver import grid, marching
 from warpimpact.solver.simulate import simulate
 
 from .extremes import drawn
@@ -134,7 +134,7 @@ def test_shots_that_leave_narrow_windows_have_the_bits_of_wide_ones(
     expected(name, "cpu")
     marched.clear()
     for width in ("SLACK", "NODAL_SLACK"):
-        monkeypatch.setattr(windows, width, 0.3 * getattr(windows, width))
+        monkeypatch.setattr(grid, width, 0.3 * getattr(grid, width))
     assert_expected(computed(name), name, "cpu")
     assert len(marched) > 1 or CASES[name].behind  # windows of several layers slide with the core
 

@@ -19,9 +19,9 @@ from numpy.typing import NDArray
 
 from warpimpact.kernels.status import Status
 from warpimpact.solver.device import halving, launching, load
+from warpimpact.solver.grid import Cells
 from warpimpact.solver.memory import Memory
 from warpimpact.solver.prepare import Prepared
-from warpimpact.solver.windows import Cells
 from warpimpact.solver.worker import NEVER, Cancel
 
 Array = NDArray[np.float64]
@@ -34,8 +34,6 @@ FEWEST_CELLS = 16
 """Fewest cells along a side of the plate's window. A smaller window would hold no core."""
 MAX_DOUBLINGS = 6
 """Most times that the windows are doubled for shots that leave theirs."""
-
-
 LARGEST_CHUNK = 64
 """Most shots of a chunk, where another thread reports the progress."""
 SHARES = 3
@@ -73,20 +71,20 @@ class Marching:
         outcomes = self.memory.outcomes()
         count = len(outcomes.status)
 
-        def reached(done: int) -> None:
+        def reached(finished: int, done: int) -> None:
             cancel.check()
             if progress is not None:
-                progress(done, count)
+                progress(finished + done, count)
 
         pending = np.arange(count)
         for size in range(1, self.sizes + 1):
-            self._march_some(pending, outcomes, _after(count - len(pending), reached))
+            self._march_some(pending, outcomes, partial(reached, count - len(pending)))
             pending = np.flatnonzero(outcomes.status.numpy() == Status.LEFT_WINDOW)
             wider = 2 * self.cells[0], 2 * self.cells[1]
             if not len(pending) or size == self.sizes or not self._fits(wider):
                 break
             self.widen(wider)
-        reached(count)
+        reached(count, 0)
         return outcomes
 
     def widen(self, cells: Cells) -> None:
@@ -235,11 +233,6 @@ def apart(function: Callable[..., int], *arguments: Any) -> int:
         return pool.submit(function, *arguments).result()
     finally:
         pool.shutdown(wait=False)
-
-
-def _after(finished: int, progress: Progress1) -> Progress1:
-    """Progress of further shots, after those already finished."""
-    return lambda done: progress(finished + done)
 
 
 def one_beside_another(prepared: Prepared, which: Numbers) -> Numbers:

@@ -16,9 +16,9 @@ from warpimpact.kernels import free_flight, lanes, march
 from warpimpact.kernels.trace import WIDTH
 from warpimpact.records.group import Returned
 from warpimpact.solver.device import SMALL_MEMORY, free_memory, load
+from warpimpact.solver.grid import Cells
 from warpimpact.solver.prepare import Prepared
 from warpimpact.solver.structs import Put, empty, filled, inputs_of
-from warpimpact.solver.windows import Cells
 from warpimpact.solver.worker import NEVER, Cancel
 
 if TYPE_CHECKING:

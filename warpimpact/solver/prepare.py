@@ -13,12 +13,11 @@ from numpy.typing import NDArray
 from warpimpact.kernels.variant import Variant
 from warpimpact.scene import exclusions
 from warpimpact.solver.cover import Pushed
-from warpimpact.solver.grid import Grid, grids_of
+from warpimpact.solver.grid import Cells, Grid, block_window, first_windows, grids_of, windows_behind
 from warpimpact.solver.materials import Materials, materials_of
 from warpimpact.solver.resolution import Resolution, conditions_of, layer_steps, resolve, steps_of
 from warpimpact.solver.rings import Rings, Sections, azimuths_of, rings_of, sections_of
 from warpimpact.solver.tile import check_tiles
-from warpimpact.solver.windows import Cells, block_window, first_windows, windows_behind
 
 if TYPE_CHECKING:
     from warpimpact.scene import Numerics, Plate, Scene, Shots
@@ -105,7 +104,7 @@ class Prepared:
         return [(int(count), int(count)) for count in counts]
 
     def windows_behind(self, plate: NDArray[np.int64]) -> NDArray[np.int64]:
-        """`windows.windows_behind` for this scene."""
+        """`grid.windows_behind` for this scene."""
         which = self.conditions["plates"]
         return windows_behind(self.scene.core, self.shots, self.materials, self.plates, which, plate)
 

@@ -17,11 +17,11 @@ from warpimpact.kernels.trace import COLUMNS, WIDTH
 from warpimpact.records.outcomes import Outcomes
 from warpimpact.scene import MassProperties, Numerics, Scene, Shots
 from warpimpact.solver.device import find_device, free_memory
+from warpimpact.solver.grid import Cells
 from warpimpact.solver.marching import Marching, apart
 from warpimpact.solver.memory import Memory
 from warpimpact.solver.prepare import Prepared, prepare
 from warpimpact.solver.simulate import outcomes_of
-from warpimpact.solver.windows import Cells
 
 if TYPE_CHECKING:
     from warpimpact.scene import Plate
@@ -175,7 +175,10 @@ def replay(scene: Scene, shots: Shots, *, numerics: Numerics, snapshots: int = 6
     home, spacing = _hit(memory.prepared), memory.prepared.grid.spacing
     cell_y, cell_z = nodes_about(home, march.cells, spacing)
     empty = Weakened(cell_y, cell_z, np.empty((0, 0)), np.empty((0, len(cell_y), len(cell_z))))
-    layers, history = {0: empty}, History.from_trace(trace, _body(memory.prepared))
+    own = {
+        name: float(memory.prepared.conditions[name][-1]) for name in ("mass", "inertia_axial", "inertia_transverse")
+    }
+    layers, history = {0: empty}, History.from_trace(trace, scene.core.mass_properties._replace(**own))
     if len(steps):
         material = material_about(scene.target.layers[0], cell_y, cell_z, spacing)
         scratch = memory.scratch(1, march.cells)
@@ -248,13 +251,6 @@ def traces_of(memory: Memory, contact: Any) -> list[Array]:
 def _hit(prepared: Prepared) -> tuple[float, float]:
     """Hit point of the last shot [m]."""
     return float(prepared.shots.hit_y[-1]), float(prepared.shots.hit_z[-1])
-
-
-def _body(prepared: Prepared) -> MassProperties:
-    """Mass properties of the last shot."""
-    names = ("mass", "inertia_axial", "inertia_transverse")
-    values = {name: float(prepared.conditions[name][-1]) for name in names}
-    return prepared.scene.core.mass_properties._replace(**values)
 
 
 def _left_after(

@@ -62,7 +62,7 @@ def empty(struct: Any, device: Any, *shapes: tuple[int, ...]) -> Any:
 def inputs_of(stage: Any, prepared: Prepared, put: Put) -> tuple[Any, list[Any]]:
     """The Inputs of a build of the march, and the arrays that must be kept alive with them: an array of structs does
     not keep the arrays that its members point to."""
-    core, variant = prepared.scene.core, prepared.variant
+    core, variant, free = prepared.scene.core, prepared.variant, prepared.scene.interaction.free_surface
     surfaces = [surface_of(stage.Surface, core, surface.rings, surface.azimuths, put) for surface in prepared.surfaces]
     sections = [
         filled(stage.Sections, **{name: put(values, aligned=True) for name, values in vars(surface.sections).items()})
@@ -73,6 +73,7 @@ def inputs_of(stage: Any, prepared: Prepared, put: Put) -> tuple[Any, list[Any]]
     most = {name: max(getattr(surface, name) for surface in surfaces) for name in ("most_rings", "most_patches")}
     shots = {name: put(prepared.conditions[name], variable.type.dtype) for name, variable in stage.Shots.vars.items()}
     target, plates = _target_of(stage, prepared, put)
+    of_edges = {} if free is None else {"cover": free.cover, "attack": free.attack}
     inputs = filled(
         stage.Inputs,
         surface=surfaces[0],
@@ -80,16 +81,11 @@ def inputs_of(stage: Any, prepared: Prepared, put: Put) -> tuple[Any, list[Any]]
         surfaces=table_of(stage.Surface, surfaces if variant.tabled else [], put, **most),
         all_sections=table_of(stage.Sections, sections if variant.tabled else [], put),
         target=target,
-        law=filled(stage.Law, onset_limit=LARGEST_ONSET, **_free_surface(prepared)),
+        law=filled(stage.Law, onset_limit=LARGEST_ONSET, **of_edges),
         shots=filled(stage.Shots, **shots),
         rows=prepared.rows,
     )
     return inputs, [surfaces, sections, plates]
-
-
-def _free_surface(prepared: Prepared) -> dict[str, float]:
-    free = prepared.scene.interaction.free_surface
-    return {} if free is None else {"cover": free.cover, "attack": free.attack}
 
 
 def _target_of(stage: Any, prepared: Prepared, put: Put) -> tuple[Any, Any]:

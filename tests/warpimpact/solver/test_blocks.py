@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from warpimpact.scene import Layer, Numerics, Plate, Record, Scene, Target
-from warpimpact.solver import replay, simulate, windows
+from warpimpact.solver import grid, replay, simulate
 from warpimpact.solver.prepare import prepare
 from warpimpact.solver.resolution import LADDER, at_level
 
@@ -24,8 +24,8 @@ THREE = np.zeros(3)
 @pytest.mark.parametrize("index", [0, 2, 4])
 def test_a_window_is_in_the_smallest_block_that_holds_it(index: int) -> None:
     prepared = prepare(SCENE, shots_at(THREE), at_level(index, BLOCK))
-    assert prepared.variant.window == min(size for size in windows.SIZES if size >= prepared.cells**2)
-    assert 2 * 4 * max(windows.SIZES) <= 48 * 1024
+    assert prepared.variant.window == min(size for size in grid.SIZES if size >= prepared.cells**2)
+    assert 2 * 4 * max(grid.SIZES) <= 48 * 1024
 
 
 def test_levels_of_a_pilot_keep_the_layout() -> None:
@@ -46,13 +46,13 @@ def test_only_the_front_window_has_to_fit_a_block() -> None:
     behind = Layer(**PLATE.model_dump(), gap=20e-3)
     prepared = prepare(Scene(core=PAPER_CORE, target=Target(layers=(PLATE, behind))), shots_at(THREE), BLOCK)
     front, base = prepared.nodes((prepared.cells,) * 2)
-    assert front <= prepared.variant.window <= max(windows.SIZES) < base
+    assert front <= prepared.variant.window <= max(grid.SIZES) < base
 
 
 def test_shots_that_leave_the_window_of_their_block_are_computed_in_the_simple_layout(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    monkeypatch.setattr(windows, "SLACK", 0.8)
+    monkeypatch.setattr(grid, "SLACK", 0.8)
     shots = shots_at(THREE, pitch=1.72)
     simple, block = (simulate.simulate(SCENE, shots, numerics=n) for n in (SIMPLE, BLOCK))
     np.testing.assert_array_equal(block.status, simple.status)
@@ -62,7 +62,7 @@ def test_shots_that_leave_the_window_of_their_block_are_computed_in_the_simple_l
 def test_shots_that_do_not_leave_theirs_keep_what_layers_and_histories_have_of_them(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    monkeypatch.setattr(windows, "WIDER_BEHIND", 0.2)  # so that a core leaves its window of the base if it is turned
+    monkeypatch.setattr(grid, "WIDER_BEHIND", 0.2)  # so that a core leaves its window of the base if it is turned
     base = Layer(**PLATE.model_dump(), gap=0.1)
     scene = Scene(core=PAPER_CORE, target=Target(layers=(PLATE.model_copy(update={"pattern": SLOTS}), base)))
     shots = shots_at([0.0, 2e-3, 0.0])

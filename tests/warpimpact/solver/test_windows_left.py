@@ -5,14 +5,14 @@ import pytest
 
 from warpimpact.kernels.status import Status
 from warpimpact.scene import Hits, Impact, Numerics, Scene, make_shots
-from warpimpact.solver import marching, replay, windows
+from warpimpact.solver import grid, marching, replay
 from warpimpact.solver.simulate import simulate
 
 from ...verification.scenes import PAPER_CORE, paper_plate
 
 
 def test_the_history_ends_where_the_march_in_the_largest_window_does(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(windows, "SLACK", 0.1)
+    monkeypatch.setattr(grid, "SLACK", 0.1)
     monkeypatch.setattr(marching, "MAX_DOUBLINGS", 2)
     plate = paper_plate()
     scene, shots = (
