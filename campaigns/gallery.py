@@ -20,6 +20,7 @@ from warpimpact.plotting.posterior import hits_figure, pairs_figure
 from warpimpact.plotting.sensitivity import sensitivity_figure
 from warpimpact.plotting.trajectory import pressure
 from warpimpact.results import files
+from warpimpact.results.kinds import POSTERIOR
 
 HERE = Path(__file__).parent
 HIT = 5.8e-3, -5.0e-3  # [m], at the edge of a slot: the core tumbles
@@ -49,9 +50,9 @@ def pictures() -> Iterator[tuple[str, Figure, int]]:
 
 def pictures_of_fit(posterior: Path) -> Iterator[tuple[str, Figure, int]]:
     """The same of the posterior of fits/paper_fit.toml."""
-    tree = files.read_tree(posterior)
-    yield "fits/paper_fit_hits.png", hits_figure(tree), 920
-    yield "fits/paper_fit_pairs.png", pairs_figure(tree), 1064
+    dataset = files.read(posterior, POSTERIOR)
+    yield "fits/paper_fit_hits.png", hits_figure(dataset), 920
+    yield "fits/paper_fit_pairs.png", pairs_figure(dataset), 1064
 
 
 def save(figure: Figure, path: Path, width: int, *, few_colours: bool = False) -> None:

@@ -25,7 +25,7 @@ def commands() -> list[list[str]]:
 
 
 SMALLER = {
-    "paper_fit.toml": ("sets = 6144\nhits = 320", "sets = 64\nhits = 64"),
+    "paper_fit.toml": ("hits = 160\neffective = 300", "sets = 256\nhits = 64"),
     "obliquity_sweep.toml": ("count = 1024", "count = 16"),
     "lightest_plate.toml": ("designs = 1500", "designs = 20"),
 }

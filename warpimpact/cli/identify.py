@@ -1,13 +1,12 @@
 """The command identify: parameters with their uncertainty from measured shots."""
 
 import argparse
-import math
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from .mistakes import memory_told, say
-from .options import Commands, add_command, add_computing, add_earlier, add_output
-from .paths import check_output, check_picture, check_result, replaces
+from .options import Commands, add_command, add_computing, add_output, add_overwrite
+from .paths import check_output, check_picture, check_result
 from .progress import Step, show_progress, warn
 
 if TYPE_CHECKING:
@@ -26,8 +25,8 @@ def add_identify(commands: Commands) -> None:
         _identify,
         summary="find parameters with their uncertainty from measured shots",
         description="Find the parameters of plate, interaction and core that agree with measured shots, each with its "
-        "uncertainty. Unknown hit points are integrated out. Write the posterior as a netCDF file, which ArviZ reads, "
-        "the draws of the material as a CSV file that hits.file takes, and figures into the same folder. Print which "
+        "uncertainty. Unknown hit points are integrated out. Write the posterior as a netCDF file, the draws "
+        " of the material as a CSV file that hits.file takes, and figures into the same folder. Print which "
         "parameters the shots determine, and whether the computation has converged.",
         example="identify campaigns/fits/paper_fit.toml -o paper_fit.nc",
     )
@@ -40,17 +39,17 @@ def add_identify(commands: Commands) -> None:
     )
     add_output(parser, "POSTERIOR.nc", "file of the posterior (default: the fit's name, in this folder)")
     add_computing(parser)
-    add_earlier(parser, "fit", "an existing posterior or an interrupted fit")
+    add_overwrite(parser, "an existing posterior")
 
 
 def _identify(arguments: argparse.Namespace) -> int:
     from warpimpact.identification.computed_shots import fit_of_result
     from warpimpact.identification.fit_file import read_fit
-    from warpimpact.identification.identify import extent_of, identify_to_file
-    from warpimpact.identification.posterior import material_draws
-    from warpimpact.identification.posterior_view import posterior_view
+    from warpimpact.identification.identify import extent_of, identify
+    from warpimpact.identification.posterior import material_draws, posterior_view
     from warpimpact.plotting.posterior import FIGURES
     from warpimpact.results import files
+    from warpimpact.results.posterior_file import INTERRUPTED
     from warpimpact.runs.choice import executor_for
     from warpimpact.solver.device import cores, find_device
     from warpimpact.view.view import text_of
@@ -59,11 +58,12 @@ def _identify(arguments: argparse.Namespace) -> int:
     fit = fit_of_result(arguments.fit) if by_elements else read_fit(arguments.fit)
     output = arguments.output or Path(f"{arguments.fit.stem}_fit.nc" if by_elements else f"{arguments.fit.stem}.nc")
     check_result(output, "a posterior")
+    check_output(output, overwrite=arguments.overwrite)
     pictures = {output.with_name(f"{output.stem}_{name}.png"): draw for name, draw in FIGURES.items()}
     table = output.with_suffix(".csv")
-    check_output(table, overwrite=replaces(arguments, output))
+    check_output(table, overwrite=arguments.overwrite)
     for picture in pictures:
-        check_picture(picture, overwrite=replaces(arguments, output))
+        check_picture(picture, overwrite=arguments.overwrite)
     for sentence in fit.warnings:
         warn(sentence)
     device, workers, scheduler = arguments.device, arguments.workers, arguments.scheduler
@@ -77,31 +77,23 @@ def _identify(arguments: argparse.Namespace) -> int:
         show_progress("set") as show,
         executor_for(device, workers=workers, scheduler=scheduler, apart=True, after=after) as executor,
     ):
-        identify_to_file(
+        posterior = identify(
             fit,
-            output,
             device=executor,
-            resume=arguments.resume,
-            overwrite=arguments.overwrite,
-            progress=lambda now: show(Step(now.done, now.total, now.resumed, _running(now))),
-            tell=warn,
+            progress=lambda now: show(Step(now.done, now.total, text=_running(now), certain=False)),
         )
-    tree = files.read_tree(output)
-    print(text_of(posterior_view(tree)))
+    files.write(posterior, output)
+    print(text_of(posterior_view(posterior)))
     print(f"written to {output}")
-    if len(draws := material_draws(fit, tree)):
+    if len(draws := material_draws(fit, posterior)):
         draws.to_csv(table, index=False)
         print(f"draws of the material for hits.file in {table}")
     for picture, draw in pictures.items():
-        draw(tree).savefig(picture, dpi=150)
+        draw(posterior).savefig(picture, dpi=150)
         print(picture)
-    return 0
+    return 130 if posterior.attrs[INTERRUPTED] else 0
 
 
 def _running(now: "FitProgress") -> str:
-    parts = [f"smallest misfit {now.misfit:.3g}"] if math.isfinite(now.misfit) else []
-    if math.isfinite(now.effective):
-        parts.append(f"effective sample size {now.effective:.0f}, Pareto k {now.pareto_k:.2f}")
-    if now.resumed:
-        parts.append(f"{now.resumed} from before")
-    return ", ".join(parts) or "drawn from the prior"
+    effective = "" if now.effective != now.effective else f", effective sample size {now.effective:.0f}"
+    return f"smallest misfit {now.misfit:.3g}{effective}"

@@ -4,16 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from functools import cached_property
 from pathlib import Path as FilePath
 from typing import Annotated, Any
 
+import numpy as np
 from pydantic import Field
 
-from warpimpact.identification.hit_places import HitPlace
-from warpimpact.identification.measured import Observation
+from warpimpact.identification.measured import HitPlace, Observation
 from warpimpact.identification.parameters import Parameter, as_read, put
-from warpimpact.results.measures import Measure
 from warpimpact.scene import Impact, Interaction, Numerics, Plate, Record, Scatter, Scene, Target
 from warpimpact.scene.model import Model
 from warpimpact.solver.columns import Path
@@ -25,17 +23,15 @@ class Sampling(Model):
     Attributes:
         sets: most sets of parameters.
         hits: hit points per set over the part of the cell that differs.
-        draws: draws of the posterior in the file, of equal weight.
-        effective: effective sample size at which the sampling ends.
-        shared: sets that share the numbers which need a scene of their own, such as a spacing of holes.
+        draws: draws of the posterior in the file.
+        effective: effective sample size of every parameter at which the sampling ends.
         seed: seed of all random numbers.
     """
 
-    sets: Annotated[int, Field(strict=True, ge=64, le=2**20)] = 4096
+    sets: Annotated[int, Field(strict=True, ge=64, le=2**24)] = 16384
     hits: Annotated[int, Field(strict=True, ge=32, le=2**16, multiple_of=8)] = 256
     draws: Annotated[int, Field(strict=True, ge=50, le=2**16)] = 1000
     effective: Annotated[int, Field(strict=True, ge=10, le=2**16)] = 400
-    shared: Annotated[int, Field(strict=True, ge=1, le=64)] = 1
     seed: Annotated[int, Field(strict=True, ge=0, lt=2**63)] = 0
 
 
@@ -44,7 +40,7 @@ class MeasuredShot:
     """A fired shot and its measurements.
 
     Attributes:
-        hit: class or place of its hit.
+        hit: place of its hit; None if unknown.
         impact, scatter: how the core arrived, and the uncertainty of that.
         tables: tables of its scene, with the medians of the priors.
         own: paths of the values that the shot itself gives, for which no prior counts.
@@ -53,7 +49,7 @@ class MeasuredShot:
     """
 
     name: str
-    hit: str | HitPlace
+    hit: HitPlace | None
     impact: Impact
     scatter: Scatter
     tables: Mapping[str, Any]
@@ -80,7 +76,6 @@ class Fit:
         parameters: unknown numbers of the scene, and the scales of discrepancy that the observations need. Those that
             need a scene of their own come first.
         discrepancy: fixed standard deviations of the model's error, by kind of observation.
-        selection: condition under which a shot was measured.
     """
 
     title: str
@@ -88,7 +83,6 @@ class Fit:
     folder: FilePath
     parameters: tuple[Parameter, ...]
     discrepancy: Mapping[str, float]
-    selection: tuple[Measure, ...]
     record: Record
     numerics: Numerics
     sampling: Sampling
@@ -99,10 +93,10 @@ class Fit:
     def scene_parameters(self) -> tuple[Parameter, ...]:
         return tuple(parameter for parameter in self.parameters if parameter.path[0] != "discrepancy")
 
-    @cached_property
-    def observed(self) -> int:
-        """Number of all measured values."""
-        return sum(shot.numbers for shot in self.shots)
+    def largest_discrepancy(self, kind: str) -> float:
+        """The discrepancy of a kind that its prior exceeds in 1 of 100 draws."""
+        priors = (parameter.prior for parameter in self.parameters if parameter.path == ("discrepancy", kind))
+        return max((float(prior.quantile(np.array(0.99))) for prior in priors), default=self.discrepancy.get(kind, 0.0))
 
     def scene_of(self, shot: MeasuredShot, values: Mapping[Path, float] | None = None) -> Scene:
         """The scene of a shot at these values of the parameters, at the medians of the others.

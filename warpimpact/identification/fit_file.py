@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Mapping
-from dataclasses import replace
 from pathlib import Path as FilePath
 from typing import Annotated, Any
 
@@ -16,8 +14,7 @@ from warpimpact.campaign.plausible import check_plausible
 from warpimpact.campaign.text import parsed, read_text
 from warpimpact.catalogue.catalogue import Catalogue
 from warpimpact.identification.fit import Fit, MeasuredShot, Sampling
-from warpimpact.identification.hit_places import CLASSES, read_hit
-from warpimpact.identification.measured import read_measured
+from warpimpact.identification.measured import read_hit, read_measured
 from warpimpact.identification.parameters import (
     FitError,
     Parameter,
@@ -27,11 +24,8 @@ from warpimpact.identification.parameters import (
     read_priors,
     with_medians,
 )
-from warpimpact.results import variables as v
 from warpimpact.results.kinds import FIT
-from warpimpact.results.measures import STATUSES, Measure
-from warpimpact.results.per_hit import place_of_standoff
-from warpimpact.scene import Core, Impact, Numerics, Plate, Record, Scatter, exclusions
+from warpimpact.scene import Impact, Numerics, Record, Scatter
 from warpimpact.scene.distributions import EDGE, Distribution
 from warpimpact.scene.model import Model
 from warpimpact.scene.problems import sentence
@@ -41,8 +35,6 @@ from warpimpact.solver.columns import Path
 from warpimpact.solver.limit import check_arrests
 
 _Table = dict[str, Any]
-_CONDITIONS = tuple(name for name in v.HIT_NUMBERS if name in (*v.OUTCOME_VARIABLES, *v.BENDING_VARIABLES))
-"""Recorded numbers of a hit that may be in a condition."""
 _MOST_MEASURED = 256
 DISCREPANCY = {
     "velocity": (Speed, {"distribution": "truncated_normal", "mean": 0, "std": 10, "low": 0, "high": 50}),
@@ -90,7 +82,7 @@ class _ShotTable(_WithScene):
     """A table [[shot]] of a fit file; `measured` is read with the stand-offs of the record."""
 
     name: Title = ""
-    hit: Annotated[Any, BeforeValidator(read_hit)] = "unknown"
+    hit: Annotated[Any, BeforeValidator(read_hit)] = None
     impact: _Table = Field(default_factory=dict)
     measured: Any = None
 
@@ -110,7 +102,6 @@ class FitFile(_WithScene):
     numerics: Annotated[Numerics, BeforeValidator(_at_a_level)] = Numerics(level=0)
     prior: Annotated[_Table, Field(min_length=1)]
     discrepancy: _DiscrepancyTable = _DiscrepancyTable()
-    selection: tuple[Any, ...] = ()
     sampling: Sampling = Sampling()
     shot: Annotated[tuple[_ShotTable, ...], Field(min_length=1, max_length=_MOST_MEASURED)]
     catalogue: Any = None
@@ -121,15 +112,12 @@ def fit_from(text: str, name: str, folder: FilePath) -> Fit:
     data = parsed(text, name, FIT)
     catalogue = catalogue_of(data, name, folder)
     given: FitFile = _model(FitFile, with_cores(data, catalogue, name), name)
-    parameters, record = read_priors(given.prior, given.tables, name), given.record
+    parameters = read_priors(given.prior, given.tables, name)
     tables = with_medians(given.tables, given.prior, parameters)
     shots = tuple(
-        _shot(table, tables, record, f"{name}: shot[{place}]", parameters, catalogue)
+        _shot(table, tables, given.record, f"{name}: shot[{place}]", parameters, catalogue)
         for place, table in enumerate(given.shot)
     )
-    selection = tuple(_condition(text, record, f"{name}: selection") for text in given.selection)
-    if any(condition.name == "bending_stress" for condition in selection):
-        record = record.model_copy(update={"bending": True})
     kinds = {observation.kind for shot in shots for observation in shot.observations}
     scales, fixed = _discrepancy(given.discrepancy, kinds, name)
     fit = Fit(
@@ -138,8 +126,7 @@ def fit_from(text: str, name: str, folder: FilePath) -> Fit:
         folder=folder,
         parameters=tuple(sorted((*parameters, *scales), key=lambda parameter: parameter.is_column)),
         discrepancy=fixed,
-        selection=selection,
-        record=record,
+        record=given.record,
         numerics=given.numerics,
         sampling=given.sampling,
         shots=shots,
@@ -210,22 +197,6 @@ def _gives(tables: Any, path: Path) -> bool:
     return True
 
 
-def _condition(text: Any, record: Record, place: str) -> Measure:
-    """A condition such as "perforated" or "bending_stress < 1.5 GPa"."""
-    name = re.split(r"[\s@<>]", str(text).strip(), maxsplit=1)[0]
-    if name not in (allowed := (*STATUSES, *_CONDITIONS)):
-        raise FitError(f"{place}: got {quoted(name)}, but it must be one of {', '.join(allowed)}")
-    try:
-        measure = Measure.parse(f"P({text})")
-        if measure.quantity.has_standoff:
-            last = (*record.standoffs[-1:], 0.0)[0]
-            measure = replace(measure, standoff=last if measure.standoff is None else measure.standoff)
-            place_of_standoff(record.standoffs, measure.standoff or 0.0)
-    except ValueError as error:
-        raise FitError(f'{place}: {error}; a condition is "perforated" or "bending_stress < 1.5 GPa"') from None
-    return measure
-
-
 def _discrepancy(given: _DiscrepancyTable, kinds: set[str], name: str) -> tuple[list[Parameter], dict[str, float]]:
     """Scales of discrepancy: the unknown ones as parameters, and the fixed ones by kind."""
     scales, fixed = list[Parameter](), dict[str, float]()
@@ -275,17 +246,10 @@ def _check_scenes(fit: Fit, name: str) -> None:
         where = f"{name}: shot[{place}]"
         try:
             scene = fit.scene_of(shot)
-            exclusions.check_together(
-                {exclusions.BENDING: fit.record.bending, exclusions.NODAL: fit.numerics.scheme == "nodal"}
-            )
             check_plausible(scene.core, scene.target, scene.record, shot.impact)
         except ValueError as error:
             raise FitError(f"{where}: {_reason(error, shot)}") from None
-        if isinstance(shot.hit, str) and not _some(shot.hit, scene.target.layers[0], scene.core):
-            raise FitError(f'{where}: hit: got "{shot.hit}", but no place of this plate is')
         has_limit = any(observation.is_limit for observation in shot.observations)
-        if has_limit and fit.record.bending:
-            raise FitError(f"{where}: limit_velocity and a selection by bending_stress cannot be combined")
         key = repr(shot.tables), shot.own, has_limit  # the scenes below depend on these alone
         if key in checked:
             continue
@@ -305,9 +269,3 @@ def _check_scenes(fit: Fit, name: str) -> None:
 
 def _reason(error: ValueError, shot: MeasuredShot) -> str:
     return sentence(error, dict(shot.tables)) if isinstance(error, ValidationError) else str(error)
-
-
-def _some(hit: str, plate: Plate, core: Core) -> bool:
-    """Whether a class of hits has any place in the cell."""
-    y, z = (np.linspace(-0.5, 0.5, 65)[1:] * side for side in plate.sampled_cell)
-    return bool(CLASSES[hit](plate, core, *np.meshgrid(y, z, indexing="ij")).any())

@@ -1,249 +1,248 @@
-"""How well computed shots explain a measured one: the likelihood with the hit point integrated out.
+"""The likelihood of measured shots, with the hit points integrated out (docs/identification.md).
 
-    L = Σ_h w_h S_h N(measured | computed_h, σ² + δ²) / Σ_h w_h S_h
+    L = mean over points h of N(measured | computed at h, σ² + δ²)
 
-over points h of the cell: w is 1 in the class of the hit, S is 1 where the shot would have been measured (selection), σ
-is the uncertainty of the measurement and δ the discrepancy of the model. Given the parameters, shots are independent,
-so
-their ln L add up. The discrepancies of different numbers are independent, too; the model has no bias that all shots
-share.
+The points cover the cell of the plate, or the measured place with its uncertainty. σ is the uncertainty of the
+measurement and δ the discrepancy of the model. A core that ends otherwise than the measured one counts as 0, and a
+computation that failed not at all. Given the parameters, shots are independent, as are the discrepancies of their
+numbers.
 
-A point stands for its share of the cell, over which numbers follow a plane (between.py). The covariance of N is
-therefore σ² + δ² along the diagonal, plus C Cᵀ, where C are the changes of the numbers over a standard deviation along
-y and z.
+Every set of parameters has points of its own, at random shifts. Their mean estimates the likelihood without bias, and
+Markov chains with such estimates have the exact posterior (C. Andrieu, G. O. Roberts, Annals of Statistics 37 (2009)
+697).
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, fields
-from typing import Self
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from warpimpact.identification.aim import HitPoints
-from warpimpact.identification.between import changes, signs
-from warpimpact.identification.measured import Observation
+from warpimpact.identification.fit import Fit, MeasuredShot
+from warpimpact.identification.measured import MEASURABLE, Observation
 from warpimpact.records.group import failures
 from warpimpact.records.outcomes import Outcomes
-from warpimpact.results import variables as v
-from warpimpact.results.measures import STATUSES, Measure
-from warpimpact.results.per_hit import place_of_standoff
+from warpimpact.results.measures import STATUSES
+from warpimpact.scene import IDENTITY, Hits, Plate, Sampler, Scene, Shots, Symmetry
 from warpimpact.scene.model import Array
+from warpimpact.scene.symmetry import irreducible_part, symmetries
+from warpimpact.solver.columns import COLUMN_OF, UNITS_OF_EXPOSURE, Path, columns_of
+from warpimpact.solver.limit import Limits, limit_velocity
+from warpimpact.solver.many import side_by_side, simulate_many
+from warpimpact.solver.worker import Worker
 
-KEPT_HITS = 4
-"""Number of hit points per set and shot that are kept for the posterior and for the prediction."""
-
-
-@dataclass(frozen=True)
-class Data:
-    """The measurements of a shot, and their condition.
-
-    Attributes:
-        selection: condition under which the shot was measured.
-        standoffs: stand-offs of the record [m].
-    """
-
-    observations: tuple[Observation, ...]
-    status: str | None
-    selection: tuple[Measure, ...] = ()
-    standoffs: tuple[float, ...] = ()
-
-    @property
-    def values(self) -> Array:
-        """The measured numbers, shape [observations]."""
-        return np.array([observation.value for observation in self.observations])
-
-    def miss(self, computed: Array) -> Array:
-        """Computed minus measured along the last axis, of the same shape."""
-        missed = np.empty_like(computed)
-        for place, observation in enumerate(self.observations):
-            missed[..., place] = observation.miss(computed[..., place])
-        return missed
-
-    def spread(self, discrepancy: Mapping[str, Array]) -> Array:
-        """√(σ² + δ²), shape [sets, observations]."""
-        if not self.observations:
-            return np.ones((1, 0))
-        return np.stack(
-            [np.hypot(observation.std, discrepancy[observation.kind]) for observation in self.observations], axis=-1
-        )
+HIT_REPLICATES = 8
+"""Parts of the hit points, every eighth point each. Their spread gives the standard error of ln L."""
+POINT_STEPS = 0.7548776662466927, 0.5698402909980532
+"""Steps from one point to the next along y and z, as shares of the part of the cell, modulo 1. They are the powers of
+the root of x³ = x + 1, whose points leave no wide gaps (M. Roberts, "The unreasonable effectiveness of quasirandom
+sequences", 2018)."""
 
 
-@dataclass(frozen=True)
-class ShotScore:
-    """How one shot fits some sets of parameters; SI and radians.
+class Scores(NamedTuple):
+    """How well sets of parameters explain the shots, each of shape [sets, shots].
 
     Attributes:
-        log_likelihood: shape [sets].
-        noise: standard error of it by the finite number of hit points, shape [sets].
-        misfit: smallest Σ (miss/σ)² over the hit points, shape [sets]; infinite where no shot has the numbers.
-        best: computed numbers at the hit of smallest misfit, shape [sets, observations]; best_hit: its place [m], shape
-            [sets, 2].
-        fitted, fitted_hit: computed numbers and hits drawn from their posterior, shapes [sets, kept, observations] and
-            [sets, kept, 2].
-        predicted: numbers that another shot like it would show, with uncertainty and discrepancy, NaN where it would
-            show none; shape [sets, kept, observations].
+        log_likelihood: ln L; −inf where no computed core ended as the measured one.
+        noise: standard error of ln L by the number of hit points.
+        misfit: smallest Σ (computed − measured)²/σ² over the points; infinite where ln L is −inf.
+        hit_y, hit_z: a hit point [m], drawn by its contribution to L.
     """
 
     log_likelihood: Array
     noise: Array
     misfit: Array
-    best: Array
-    best_hit: Array
-    fitted: Array
-    fitted_hit: Array
-    predicted: Array
+    hit_y: Array
+    hit_z: Array
 
-    @classmethod
-    def joined(cls, parts: Sequence[Self]) -> Self:
-        """Concatenate scores along the sets."""
-        return cls(**{f.name: np.concatenate([getattr(part, f.name) for part in parts]) for f in fields(cls)})
 
-    def __getitem__(self, which: slice | NDArray[np.int64]) -> Self:
-        return type(self)(**{f.name: getattr(self, f.name)[which] for f in fields(self)})
+class HitPoints(NamedTuple):
+    """The points over which a shot is integrated at sets of parameters that share a scene.
+
+    Attributes:
+        shots: the computed shots, set after set, shape [sets · points].
+        group: symmetries whose images of the points cover the whole cell.
+        cell: extent of the cell along y and z [m].
+    """
+
+    shots: Shots
+    group: tuple[Symmetry, ...]
+    cell: tuple[float, float]
 
 
 @dataclass(frozen=True)
-class Compared:
-    """Computed shots beside a measured one, before any scale of discrepancy; SI and radians.
+class Bench:
+    """Measured shots that share their runs, because they differ in their measurements alone.
 
     Attributes:
-        computed: numbers of all points, shape [sets, points, observations]; `missed` is computed minus measured.
-        changes: changes of the numbers about each computed point, shape [sets, computed points, 2, observations].
-        possible: whether the shot ended as the measured one did, with all its numbers, shape [sets, points].
-        counts: weight of each point, 0 where the shot would not have been measured, shape [sets, points].
+        shot: one of the shots.
+        which: their places in the fit.
     """
 
-    data: Data
-    aim: HitPoints
-    computed: Array
-    missed: Array
-    changes: Array
-    possible: NDArray[np.bool_]
-    counts: Array
+    shot: MeasuredShot
+    which: tuple[int, ...]
 
-    @classmethod
-    def of(cls, data: Data, aim: HitPoints, outcomes: Outcomes, known: Array | None = None) -> Self:
-        """Compare sets of parameters with one measured shot.
 
-        Args:
-            outcomes: outcomes of all points of the aim, set after set, images included, shape [sets · points].
-            known: `changes`, if another shot with the same numbers has them already.
-        """
-        sets, points = aim.weight.shape
-        computed = np.empty((sets, points, len(data.observations)))
-        for place, observation in enumerate(data.observations):
-            computed[:, :, place] = observation.of(outcomes).reshape(sets, points)
-            if observation.is_limit:
-                computed[:, :, place] = _median(computed[:, :, place], aim.weight)
-        counts = aim.weight * _counted(data, outcomes).reshape(sets, points)
-        missed = data.miss(computed)
-        possible = (counts > 0.0) & ~np.isnan(missed).any(axis=-1)
-        if data.status is not None:
-            possible &= outcomes.status.reshape(sets, points) == STATUSES[data.status]
-        about = changes(data.observations, aim, computed) if known is None else known
-        return cls(data, aim, computed, missed, about, possible, counts)
+class Run(NamedTuple):
+    """Shots of a bench at the sets of parameters with these numbers, which share a scene."""
 
-    def score(
-        self, discrepancy: Mapping[str, Array], rng: np.random.Generator, of: NDArray[np.int64] | None = None
-    ) -> ShotScore:
-        """Score the sets with scales of discrepancy.
+    which: NDArray[np.int64]
+    scene: Scene
+    points: HitPoints
 
-        Args:
-            discrepancy: standard deviations by kind, each of shape [sets].
-            rng: draws the hits that are kept.
-            of: index of the computed set of each set, shape [sets]. Sets with the same index differ in the scales
-                alone.
-        """
-        row = np.arange(len(self.computed)) if of is None else of
-        spread = np.broadcast_to(self.data.spread(discrepancy), (len(row), self.computed.shape[-1]))
-        log = np.where(self.possible[row], self._log_density(spread, row), -np.inf)
-        log_likelihood, noise, relative = _integrated(log, self.counts[row], self.aim)
-        stds = np.array([observation.std for observation in self.data.observations])
-        misfits = np.where(self.possible, self.missed**2 @ stds**-2.0, np.inf)
-        nearest = misfits.argmin(axis=1)[row]
-        hits = self.aim.hits
-        fitted, ahead = _drawn(relative, rng), _drawn(self.counts[row], rng)
-        errors = spread[:, None] * rng.standard_normal((len(row), KEPT_HITS, spread.shape[-1]))
-        return ShotScore(
-            log_likelihood=log_likelihood,
-            noise=noise,
-            misfit=misfits[row, nearest],
-            best=self.computed[row, nearest],
-            best_hit=hits[row, nearest],
-            fitted=self.computed[row[:, None], fitted],
-            fitted_hit=hits[row[:, None], fitted],
-            predicted=self.computed[row[:, None], ahead] + errors,
+
+def evaluate(fit: Fit, points: Array, uniform: Array, worker: Worker) -> Scores:
+    """Score every shot of a fit at sets of parameters. The score of a set does not depend on the other sets.
+
+    Args:
+        points: standard normal numbers, shape [sets, parameters].
+        uniform: uniform numbers of each set, shape [sets, 2 + shots]: the shift of its hit points along y and z, and
+            for each shot the number that draws a hit.
+    """
+    scores = Scores(*np.empty((len(Scores._fields), len(points), len(fit.shots))))
+    scales = discrepancies(fit, points)
+    for bench in benches(fit):
+        runs = list(_runs(fit, bench, points, uniform[:, :2]))
+        for run, outcomes in zip(runs, _outcomes(fit, bench, runs, worker), strict=True):
+            for place in bench.which:
+                spread = {kind: scale[run.which] for kind, scale in scales.items()}
+                score = score_shot(fit.shots[place], run.points, outcomes, spread, uniform[run.which, 2 + place])
+                for column, values in zip(scores, score, strict=True):
+                    column[run.which, place] = values
+    return scores
+
+
+def benches(fit: Fit) -> list[Bench]:
+    """Group the shots of a fit by the runs that they share."""
+    places_of: dict[str, list[int]] = {}
+    for place, shot in enumerate(fit.shots):
+        key = repr((shot.hit, shot.impact, shot.scatter, shot.tables, sorted(map(str, shot.own))))
+        places_of.setdefault(key, []).append(place)
+    return [Bench(fit.shots[places[0]], tuple(places)) for places in places_of.values()]
+
+
+def discrepancies(fit: Fit, points: Array) -> dict[str, Array]:
+    """Standard deviation of the discrepancy by kind at sets of parameters, each of shape [sets]."""
+    scales = {kind: np.full(len(points), value) for kind, value in fit.discrepancy.items()}
+    for column, parameter in enumerate(fit.parameters):
+        if parameter.path[0] == "discrepancy":
+            scales[str(parameter.path[1])] = parameter.at(points[:, column])
+    return scales
+
+
+def hit_points(fit: Fit, shot: MeasuredShot, plate: Plate, shifts: Array) -> HitPoints:
+    """The points of a shot; `shifts` are uniform numbers that move those of each set, shape [sets, 2]."""
+    turned = any(name != "velocity" for name, _ in shot.scatter.given)
+    solid = plate.open_area == 0.0 and plate.size is None
+    alone = not shot.scatter.given and (solid or (shot.hit is not None and shot.hit.is_exact))
+    count = 1 if alone else fit.sampling.hits
+    shots = Sampler(shot.impact, Hits(count=count, seed=fit.sampling.seed), plate, shot.scatter).shots(0, count)
+    shares = np.mod(shifts[:, None] + np.arange(count)[:, None] * POINT_STEPS, 1.0).reshape(-1, 2).T
+    group: tuple[Symmetry, ...] = (IDENTITY,)
+    cell = plate.sampled_cell
+    if shot.hit is not None:
+        hit_y, hit_z = shot.hit.at(*shares)
+    else:
+        group = group if turned or alone else symmetries(plate, shot.impact)
+        (low_y, high_y), (low_z, high_z) = irreducible_part(group)
+        hit_y, hit_z = (
+            side * (low + (high - low) * share)
+            for side, low, high, share in zip(cell, (low_y, low_z), (high_y, high_z), shares, strict=True)
         )
-
-    def _log_density(self, spread: Array, row: NDArray[np.int64]) -> Array:
-        """ln N(measured | about each point), shape [sets, points], for spreads of shape [sets, observations]."""
-        points, numbers = self.missed.shape[1:]
-        images = len(self.aim.group)
-        scaled = self.changes[row] / spread[:, None, None]
-        miss = self.missed[row].reshape(len(row), points // images, images, numbers) / spread[:, None, None]
-        # With unit variances, |I + C Cᵀ| = |I + Cᵀ C| and (I + C Cᵀ)⁻¹ = I − C (I + Cᵀ C)⁻¹ Cᵀ.
-        yy, zz = 1.0 + (scaled**2).sum(axis=-1).transpose(2, 0, 1)
-        yz = (scaled[..., 0, :] * scaled[..., 1, :]).sum(axis=-1)
-        determinant = yy * zz - yz**2
-        along = (miss * signs(self.data.observations, self.aim.group)) @ scaled.swapaxes(-1, -2)
-        along_y, along_z = along[..., 0], along[..., 1]
-        explained = zz[..., None] * along_y**2 - 2.0 * yz[..., None] * along_y * along_z + yy[..., None] * along_z**2
-        squares = (miss**2).sum(axis=-1) - explained / determinant[..., None]
-        scale = np.log(np.sqrt(2.0 * np.pi) * spread).sum(axis=-1)[:, None, None]
-        log: Array = -0.5 * (squares + np.log(determinant)[..., None]) - scale
-        return log.reshape(len(row), points)
+    number = np.tile(np.arange(count), len(shifts))
+    return HitPoints(replace(shots[number], hit_y=hit_y, hit_z=hit_z), group, cell)
 
 
-def _counted(data: Data, outcomes: Outcomes) -> Array:
-    """1 where a shot would have been measured, shape [shots]: its computation did not fail, and the selection holds."""
-    kept = ~failures(outcomes.status)
-    for condition in data.selection:
-        kept &= holds(condition, outcomes, data.standoffs)
-    return kept.astype(np.float64)
+def _runs(fit: Fit, bench: Bench, points: Array, shifts: Array) -> Iterator[Run]:
+    by_path = {
+        parameter.path: parameter.at(points[:, column])
+        for column, parameter in enumerate(fit.parameters)
+        if parameter.path[0] != "discrepancy" and parameter.path not in bench.shot.own
+    }
+    # The literal scheme counts steps, so its interval may not differ from shot to shot.
+    varying = {*COLUMN_OF} if fit.numerics.scheme == "nodal" else {*COLUMN_OF, *UNITS_OF_EXPOSURE}
+    of_scene = {path: column for path, column in by_path.items() if path not in varying}
+    for rows in _of_one_scene(of_scene, len(points)):
+        own_scene = by_path if len(rows) == 1 else of_scene  # a single set needs no columns
+        scene = fit.scene_of(bench.shot, {path: float(column[rows[0]]) for path, column in own_scene.items()})
+        plate = scene.target.layers[0]
+        own = hit_points(fit, bench.shot, plate, shifts[rows])
+        columns = columns_of({path: column[rows] for path, column in by_path.items() if path not in own_scene}, plate)
+        each = len(own.shots) // len(rows)  # sets have equal numbers of shots, one set after the other
+        of_shots: dict[str, Any] = {name: np.repeat(column, each) for name, column in columns.items()}
+        yield Run(rows, scene, own._replace(shots=replace(own.shots, **of_shots)))
 
 
-def holds(condition: Measure, outcomes: Outcomes, standoffs: Sequence[float]) -> NDArray[np.bool_]:
-    """Whether a condition such as P(perforated) or P(bending_stress < 1.5 GPa) is true of each shot."""
-    if condition.kind == "share":
-        return np.asarray(outcomes.status == STATUSES[condition.name])
-    values: Array = getattr(outcomes, condition.name)
-    if condition.standoff is not None:
-        values = values[:, place_of_standoff(standoffs, condition.standoff)]
-    (variable,) = (number for number in v.HIT_NUMBERS if number == condition.name)
-    shown = np.degrees(values) if variable.units == "degree" else values
-    return np.asarray(shown > condition.limit if condition.above else shown < condition.limit)
+def _of_one_scene(of_scene: Mapping[Path, Array], count: int) -> Iterator[NDArray[np.int64]]:
+    """Groups of rows that share one scene."""
+    if not of_scene:
+        yield np.arange(count)
+        return
+    _, which = np.unique(np.stack(list(of_scene.values()), axis=-1), axis=0, return_inverse=True)
+    for scene_number in range(which.max() + 1):
+        yield np.flatnonzero(which.reshape(-1) == scene_number)
 
 
-def _median(values: Array, weight: Array) -> Array:
-    """Median over the points of the class, shape [sets, 1]; NaN without such a point."""
-    medians = [
-        np.median(value[inside]) if inside.any() else np.nan for value, inside in zip(values, weight > 0.0, strict=True)
-    ]
-    return np.array(medians)[:, None]
+def _outcomes(fit: Fit, bench: Bench, runs: Sequence[Run], worker: Worker) -> list[Outcomes]:
+    """The outcomes that the observations of a bench need: at impact velocity, limit velocities, or both."""
+    measured = [fit.shots[place] for place in bench.which]
+    limited = [observation.is_limit for shot in measured for observation in shot.observations]
+    scenes = [(run.scene, run.points.shots) for run in runs]
+    if not any(limited):
+        return simulate_many(scenes, fit.numerics, worker)
+
+    def limit(number: int, share: Worker, _: Any) -> Limits:
+        return limit_velocity(*scenes[number], numerics=fit.numerics, device=share.device, threads=share.threads)
+
+    limits = side_by_side(limit, len(scenes), worker)
+    alone = all(limited) and not any(shot.status for shot in measured)
+    outcomes = [one.outcomes for one in limits] if alone else simulate_many(scenes, fit.numerics, worker)
+    return [result.assign(limit_velocity=one.value) for result, one in zip(outcomes, limits, strict=True)]
 
 
-def _integrated(log: Array, counts: Array, aim: HitPoints) -> tuple[Array, Array, Array]:
-    """ln of the mean over the points, and its standard error from the spread of the replicates, both of shape [sets];
-    and the contribution of each point to the mean, as a share of the largest, shape [sets, points]."""
-    highest = np.where(np.isfinite(log), log, -1e300).max(axis=1)
-    relative = np.exp(log - highest[:, None]) * counts
-    total = counts.sum(axis=1)
-    sums = relative.reshape(len(log), -1, aim.replicates, len(aim.group)).sum(axis=(1, 3)).T
+def score_shot(
+    shot: MeasuredShot, points: HitPoints, outcomes: Outcomes, discrepancy: Mapping[str, Array], uniform: Array
+) -> tuple[Array, ...]:
+    """The fields of `Scores` of one shot, each of shape [sets].
+
+    Args:
+        outcomes: of the shots of `points`.
+        discrepancy: standard deviations by kind, each of shape [sets].
+        uniform: a uniform number of each set, which draws its hit.
+    """
+    sets, images = len(uniform), len(points.group)
+    status = outcomes.status.reshape(sets, -1)
+    counted = ~failures(status)
+    possible = counted if shot.status is None else counted & (status == STATUSES[shot.status])
+    squares, misfit = (np.zeros((*status.shape, images)) for _ in range(2))
+    for number in shot.observations:
+        missed = number.miss(_with_images(number, outcomes, points.group).reshape(*status.shape, images))
+        spread = np.hypot(number.std, discrepancy[number.kind])[:, None, None]
+        squares += (missed / spread) ** 2 + 2.0 * np.log(np.sqrt(2.0 * np.pi) * spread)
+        misfit += (missed / number.std) ** 2
+    possible = possible[..., None] & ~np.isnan(squares)
+    log = np.where(possible, -0.5 * squares, -np.inf).reshape(sets, -1)
+    highest = log.max(axis=1)
+    relative = np.exp(log - np.where(np.isfinite(highest), highest, 0.0)[:, None])
+    sums = relative.reshape(*status.shape, images).sum(axis=2)
     with np.errstate(divide="ignore", invalid="ignore"):
-        log_likelihood = np.where(total > 0.0, highest + np.log(relative.sum(axis=1) / total), -np.inf)
-        spread = sums.std(axis=0, ddof=1) / sums.mean(axis=0) if aim.replicates > 1 else np.zeros(len(log))
-    log_likelihood = np.where(highest > -1e300, log_likelihood, -np.inf)
-    return log_likelihood, np.nan_to_num(spread / np.sqrt(aim.replicates), nan=np.inf), relative
+        log_likelihood = highest + np.log(sums.sum(axis=1) / (np.maximum(counted.sum(axis=1), 1) * images))
+        parts = sums.reshape(sets, -1, min(HIT_REPLICATES, status.shape[1])).sum(axis=1)
+        noise = parts.std(axis=1, ddof=1) / parts.mean(axis=1) / np.sqrt(HIT_REPLICATES)
+    ends = np.cumsum(relative, axis=1)
+    drawn = np.minimum((ends <= uniform[:, None] * ends[:, -1:]).sum(axis=1), log.shape[1] - 1)
+    row, (computed, image) = np.arange(sets), np.divmod(drawn, images)
+    at = row * status.shape[1] + computed
+    places = np.array([one.image(points.shots.hit_y[at], points.shots.hit_z[at], points.cell) for one in points.group])
+    nearest = np.where(possible, misfit, np.inf).reshape(sets, -1).min(axis=1)
+    return log_likelihood, np.nan_to_num(noise), nearest, *places[image, :, row].T
 
 
-def _drawn(weights: Array, rng: np.random.Generator) -> NDArray[np.int64]:
-    """Indices along the second axis in proportion to weights, shape [sets, KEPT_HITS]; 0 where all weights are 0."""
-    ends = np.cumsum(weights, axis=1)
-    places = rng.random((len(weights), KEPT_HITS)) * ends[:, -1:]
-    drawn: NDArray[np.int64] = np.stack(
-        [np.searchsorted(end, at, side="right") for end, at in zip(ends, places, strict=True)]
-    )
-    return np.asarray(np.minimum(drawn, weights.shape[1] - 1))
+def _with_images(number: Observation, outcomes: Outcomes, group: Sequence[Symmetry]) -> Array:
+    """A computed number of all points and their images, shape [sets · points, images]."""
+    computed, mirror = number.of(outcomes), MEASURABLE[number.name].mirror
+    signs = [1.0 if mirror is None else float(getattr(symmetry, mirror)) for symmetry in group]
+    return np.asarray(computed[:, None] * np.array(signs))

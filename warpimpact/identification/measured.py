@@ -1,4 +1,4 @@
-"""The measurements of a shot: numbers with their uncertainty in the names of the Dataset, and how the shot ended."""
+"""What was measured of a shot: where it hit, numbers in the names of the Dataset, and how it ended."""
 
 from __future__ import annotations
 
@@ -9,17 +9,18 @@ from typing import Any
 
 import numpy as np
 
-from warpimpact.identification.parameters import FitError
+from warpimpact.identification.parameters import FitError, is_distribution, read_distribution
 from warpimpact.records.outcomes import Outcomes
 from warpimpact.results import variables as v
 from warpimpact.results.measures import STATUSES
+from warpimpact.scene.distributions import EDGE, Distribution
 from warpimpact.scene.model import Array
-from warpimpact.scene.units import Angle, Speed, meant, quantity, quoted
+from warpimpact.scene.units import Angle, Length, Speed, meant, quantity, quoted
 
 KINDS = {"m s-1": ("velocity", Speed), "degree": ("angle", Angle)}
 """Kind of discrepancy and type of a number, by the units of its variable."""
 LIMIT_VELOCITY = v.Variable("limit_velocity", ("hit",), "m s-1", "impact velocity at which the core just perforates")
-"""A property of plate and core, not of one shot. The median over the hits of a class is compared."""
+"""A property of plate and core, not of one shot. The median over the hits is compared."""
 MEASURABLE = {
     str(variable): variable
     for variable in (v.RESIDUAL_VELOCITY, v.DEFLECTION, v.TILT, v.PITCH, v.YAW, v.TOTAL_YAW, LIMIT_VELOCITY)
@@ -54,15 +55,6 @@ class Observation:
         return self.name if self.at is None else f"{self.name}@{self.at * 1e3:.10g}mm"
 
     @property
-    def units(self) -> str:
-        """Units of the Dataset."""
-        return MEASURABLE[self.name].units
-
-    def shown(self, value: Any) -> Any:
-        """Values in the units of the Dataset."""
-        return np.degrees(value) if self.kind == "angle" else value
-
-    @property
     def is_limit(self) -> bool:
         """Whether it is a limit velocity."""
         return self.name == LIMIT_VELOCITY
@@ -74,11 +66,54 @@ class Observation:
 
     def miss(self, computed: Array) -> Array:
         """Computed minus measured, of the same shape; for an angle, the shorter way round."""
-        return self.shortest(computed - self.value)
+        missed = computed - self.value
+        return np.remainder(missed + np.pi, 2.0 * np.pi) - np.pi if self.kind == "angle" else missed
 
-    def shortest(self, difference: Array) -> Array:
-        """A difference of two numbers; for angles, the shorter way round."""
-        return np.remainder(difference + np.pi, 2.0 * np.pi) - np.pi if self.kind == "angle" else difference
+
+@dataclass(frozen=True)
+class HitPlace:
+    """A measured hit point: each coordinate is a number [m] or a distribution."""
+
+    y: float | Distribution
+    z: float | Distribution
+
+    @property
+    def is_exact(self) -> bool:
+        """Whether both coordinates are numbers."""
+        return isinstance(self.y, float) and isinstance(self.z, float)
+
+    def at(self, share_y: Array, share_z: Array) -> tuple[Array, Array]:
+        """Points at uniform numbers."""
+
+        def along(value: float | Distribution, share: Array) -> Array:
+            if isinstance(value, float):
+                return np.full_like(share, value)
+            return value.quantile(np.clip(share, EDGE, 1.0 - EDGE))
+
+        return along(self.y, share_y), along(self.z, share_z)
+
+
+def read_hit(given: Any) -> HitPlace | None:
+    """Read the place of a hit; None if it is unknown.
+
+    Raises:
+        ValueError: the message says what is allowed.
+    """
+    if given in (None, "unknown"):
+        return None
+    if not isinstance(given, dict) or set(given) != {"y", "z"}:
+        raise ValueError(f'got {quoted(given)}, but it must be "unknown", or a table with y and z')
+    return HitPlace(**{axis: _coordinate(value, axis) for axis, value in given.items()})
+
+
+def _coordinate(value: Any, axis: str) -> float | Distribution:
+    read = quantity(Length)
+    if is_distribution(value):
+        return read_distribution(read, value, axis)
+    try:
+        return float(read(value))
+    except ValueError as error:
+        raise ValueError(f"{axis}: {error}") from None
 
 
 def read_measured(given: Any, standoffs: Sequence[float], place: str) -> tuple[tuple[Observation, ...], str | None]:

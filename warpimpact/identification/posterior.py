@@ -1,315 +1,211 @@
-"""The posterior of a fit as a tree of Datasets, and the numbers that measure its accuracy."""
+"""The posterior of a fit as a Dataset: draws along `draw`, what the shots say of each parameter, and its view."""
 
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
+from itertools import combinations
+from typing import Any, Self
 
 import numpy as np
 import pandas as pd
 import xarray
-from numpy.typing import NDArray
 
 from warpimpact.identification.fit import Fit
-from warpimpact.identification.likelihood import KEPT_HITS, ShotScore
-from warpimpact.identification.scoring import data_of, discrepancies
+from warpimpact.identification.likelihood import Scores
 from warpimpact.results import attributes as attr
-from warpimpact.results import posterior_file
+from warpimpact.results import posterior_file as p
 from warpimpact.results.kinds import POSTERIOR
 from warpimpact.results.variables import HIT_Y, HIT_Z
-from warpimpact.scene.display import UNITS
+from warpimpact.scene.display import STORED, UNITS, Unit
 from warpimpact.scene.model import Array
 from warpimpact.scene.quantities import QUANTITIES
 from warpimpact.solver.columns import columns_of
-from warpimpact.statistics.importance import LARGEST_K, Weights, resampled
+from warpimpact.view.view import Column, Section, Table, number
 
-LARGEST_NOISE = 0.5
-"""Largest standard error of ln L, over all shots, at which the hits count as integrated out."""
+LARGEST_NOISE = 1.7
+"""Largest standard error of ln L by the hits. Chains whose noise is larger hardly move (A. Doucet and others,
+Biometrika 102 (2015) 295: 1 to 1.7 is best)."""
+LARGEST_R_HAT = 1.05
 ALIKE = 0.15
 """Largest distance between the distribution functions of prior and posterior at which they count as equal."""
-WIDE = 0.6
-"""Share of the prior within the posterior's 90 % interval (0.9 if nothing was learnt) above which little was learnt."""
+WIDE = 0.65
+"""Share of the prior within the posterior's 95 % interval above which little was learnt; 0.95 if nothing was."""
 STRONG = 0.7
 """Correlation above which two parameters are reported as a combination."""
-_DENSITY_DRAWS = 400
-"""Number of predicted rows whose probability is compared with that of the measured row."""
+_GROUPS_OF_WALKERS = 4
 
 
 @dataclass(frozen=True)
-class Sampled:
-    """Sets of parameters with their scores and weights.
+class Chains:
+    """Chains without their first third.
 
     Attributes:
-        points: standard normal numbers, shape [sets, parameters].
-        scores: one per shot.
-        block: number of consecutive sets that differ in the scales of discrepancy alone.
+        points: standard normal numbers, shape [steps, walkers, parameters].
+        blobs: what the density gave beside its logarithm, shape [steps, walkers, columns]; None if nothing.
+        computed: number of steps, those left out included.
+        effective, r_hat: effective sample size and R-hat of each parameter. R-hat compares four groups of walkers
+            (C. C. Margossian and others, "Nested R-hat", 2022).
     """
 
     points: Array
-    scores: list[ShotScore]
-    weights: Weights
-    block: int = 1
+    blobs: Any
+    computed: int
+    effective: Array
+    r_hat: Array
+    interrupted: bool
 
-    @property
-    def effective(self) -> float:
-        return self.weights.effective(self.block)
+    @classmethod
+    def of(cls, sampler: Any, *, interrupted: bool) -> Self:
+        """The chains of an emcee sampler."""
+        from arviz_stats.base import array_stats
+
+        done = int(sampler.iteration)
+        points = sampler.get_chain(discard=done // 3)
+        group = np.arange(points.shape[1]) % _GROUPS_OF_WALKERS
+        of_each = [column.T for column in np.moveaxis(points, 2, 0)]
+        effective = np.array([float(array_stats.ess(of, chain_axis=0, draw_axis=1)) for of in of_each])
+        r_hat = [float(array_stats.rhat_nested(of, group, chain_axis=0, draw_axis=1)) for of in of_each]
+        return cls(points, sampler.get_blobs(discard=done // 3), done, effective, np.array(r_hat), interrupted)
+
+    def is_converged(self, effective: int) -> bool:
+        """Whether all parameters have this effective sample size and a small R-hat."""
+        return bool(self.effective.min() >= effective and self.r_hat.max() <= LARGEST_R_HAT)
 
 
-def to_datatree(fit: Fit, sampled: Sampled, made: Mapping[str, str]) -> xarray.DataTree:
+def to_dataset(fit: Fit, chains: Chains, scores: Scores, made_by: Mapping[str, str]) -> xarray.Dataset:
     """Gather a posterior, in the units of the Datasets."""
-    rng = np.random.default_rng(np.random.SeedSequence(fit.sampling.seed, spawn_key=(2,)))
-    which = resampled(sampled.weights.values, fit.sampling.draws, rng)
-    kept = rng.integers(KEPT_HITS, size=len(which))
-    hits = np.stack([score.fitted_hit[which, kept] for score in sampled.scores], axis=1)
-    likelihood = np.stack([score.log_likelihood for score in sampled.scores], axis=-1)
-    noise = np.sqrt(sum(score.noise[which] ** 2 for score in sampled.scores))
-    groups: dict[str, xarray.Dataset] = {
-        "posterior": _parameters(fit, sampled.points[which], "draw").assign(
-            {name: (("draw", "shot"), hits[..., axis], _place(name)) for axis, name in enumerate(posterior_file.HITS)}
-        ),
-        "prior": _parameters(fit, rng.standard_normal((fit.sampling.draws, len(fit.parameters))), "draw"),
-        "sample_stats": xarray.Dataset(
-            {
-                "lp": ("draw", likelihood[which].sum(axis=1), {"long_name": "logarithm of the likelihood"}),
-                "hit_noise": ("draw", noise, {"long_name": "its standard error, by the number of hit points"}),
-                "set": ("draw", which, {"long_name": "place in the group sets"}),
-            }
-        ),
-        "log_likelihood": xarray.Dataset({posterior_file.MEASURED: (("draw", "shot"), likelihood[which])}),
-        "observed_data": _observed(fit),
-        "posterior_predictive": _computed(fit, sampled, which, kept),
+    steps, walkers, _ = chains.points.shape
+    rng = np.random.default_rng([fit.sampling.seed, 2])
+    which = rng.choice(steps * walkers, fit.sampling.draws, replace=steps * walkers < fit.sampling.draws)
+    scores = Scores(*(of.reshape(steps * walkers, -1) for of in scores))
+    over = ("draw", "shot")
+    columns: dict[str, Any] = {
+        str(HIT_Y): (over, scores.hit_y[which], {"units": "m", "long_name": HIT_Y.long_name}),
+        HIT_Z: (over, scores.hit_z[which], {"units": "m", "long_name": HIT_Z.long_name}),
+        p.LOG_LIKELIHOOD: (over, scores.log_likelihood[which], {"long_name": "logarithm of the likelihood"}),
+        p.MISFIT: (over, scores.misfit[which], {"long_name": "smallest sum of squares over the uncertainties"}),
     }
-    for name, group in groups.items():
-        if "draw" in group.dims:
-            groups[name] = group.expand_dims(chain=[0]).assign_coords(draw=np.arange(group.sizes["draw"]))
-    groups["sets"] = _parameters(fit, sampled.points, "set").assign(
-        weight=("set", sampled.weights.values, {"long_name": "normalised importance weight"}),
-        log_likelihood=(("set", "shot"), likelihood),
-        misfit=(("set", "shot"), np.stack([score.misfit for score in sampled.scores], axis=-1)),
-    )
-    groups["best"] = _best(fit, sampled)
-    shots = {"shot": _names(fit)}
-    groups = {name: group.assign_coords(shots) if "shot" in group.dims else group for name, group in groups.items()}
-    return xarray.DataTree.from_dict({"/": xarray.Dataset(attrs=_attributes(fit, sampled, made, noise)), **groups})
-
-
-def _names(fit: Fit) -> list[str]:
-    """Names of the shots; equal names get a number."""
-    names = [shot.name for shot in fit.shots]
-    return [name if names.count(name) == 1 else f"{name} [{place}]" for place, name in enumerate(names)]
-
-
-def _place(name: str) -> dict[str, str]:
-    return {"units": "m", "long_name": {"hit_y": HIT_Y, "hit_z": HIT_Z}[name].long_name}
-
-
-def _parameters(fit: Fit, points: Array, dim: str) -> xarray.Dataset:
-    """Values of the parameters at standard normal numbers."""
-    columns = {}
     for column, parameter in enumerate(fit.parameters):
-        values = parameter.at(points[:, column])
+        normal = chains.points[..., column].ravel()
+        values = parameter.at(normal[which])
         described = {
             "units": UNITS[parameter.unit].stored,
-            posterior_file.PATH: json.dumps(parameter.path),
-            "prior": parameter.prior.model_dump_json(),
+            p.PATH: json.dumps(parameter.path),
+            p.R_HAT: chains.r_hat[column],
+            p.EFFECTIVE: chains.effective[column],
+            p.VERDICT: verdict(normal),
+            p.PRIOR: _stored(parameter.unit, parameter.prior.quantile(np.linspace(0.0025, 0.9975, 200))),
         }
-        columns[parameter.name] = (dim, np.degrees(values) if parameter.unit == "rad" else values, described)
-    return xarray.Dataset(columns)
-
-
-def _along_observations(fit: Fit) -> dict[str, Any]:
-    measured = [
-        (name, number) for name, shot in zip(_names(fit), fit.shots, strict=True) for number in shot.observations
-    ]
-    return {
-        "observation": [f"{shot}: {number.label}" for shot, number in measured],
-        posterior_file.SHOT_OF: ("observation", [shot for shot, _ in measured]),
-        posterior_file.UNITS_OF: ("observation", [number.units for _, number in measured]),
-    }
-
-
-def _observed(fit: Fit) -> xarray.Dataset:
-    columns = {
-        name: _numbers(fit, [np.array([getattr(number, of) for number in shot.observations]) for shot in fit.shots])
-        for name, of in ((posterior_file.MEASURED, "value"), (posterior_file.STD, "std"))
-    }
-    return xarray.Dataset(
-        {name: ("observation", numbers) for name, numbers in columns.items()}, _along_observations(fit)
-    )
-
-
-def _numbers(fit: Fit, of_shots: Sequence[Array]) -> Array:
-    """Numbers of all observations side by side, in the units of the Dataset.
-
-    Args:
-        of_shots: numbers of the observations of each shot, along the last axis, SI.
-    """
-    shown = [
-        observation.shown(numbers[..., [index]])
-        for shot, numbers in zip(fit.shots, of_shots, strict=True)
-        for index, observation in enumerate(shot.observations)
-    ]
-    return np.concatenate([of_shots[0][..., :0], *shown], axis=-1)
-
-
-def _computed(fit: Fit, sampled: Sampled, which: NDArray[np.int64], kept: NDArray[np.int64]) -> xarray.Dataset:
-    """What another shot like each would show, and what each draw computes at its hit."""
-    scores, over = sampled.scores, ("draw", "observation")
-    predicted = _numbers(fit, [score.predicted[which, kept] for score in scores])
-    fitted = _numbers(fit, [score.fitted[which, kept] for score in scores])
-    return xarray.Dataset(
-        {
-            posterior_file.MEASURED: (over, predicted, {"long_name": "of another such shot, measured"}),
-            posterior_file.FITTED: (over, fitted, {"long_name": "computed for this shot, at its hit"}),
-        },
-        _along_observations(fit),
-    )
-
-
-def _best(fit: Fit, sampled: Sampled) -> xarray.Dataset:
-    """The set with the smallest sum of the shots' misfits at their best hits."""
-    misfit = np.stack([score.misfit for score in sampled.scores], axis=-1)
-    best = int(misfit.sum(axis=1).argmin())
-    dataset = _parameters(fit, sampled.points[[best]], "set").isel(set=0)
-    hits = np.stack([score.best_hit[best] for score in sampled.scores])
-    return dataset.assign(
-        misfit=("shot", misfit[best], {"long_name": "sum of (computed − measured)² over the squared uncertainty"}),
-        hit_y=("shot", hits[:, 0], _place("hit_y")),
-        hit_z=("shot", hits[:, 1], _place("hit_z")),
-        measured=("observation", _numbers(fit, [score.best[best] for score in sampled.scores])),
-    ).assign_coords(_along_observations(fit))
-
-
-def _attributes(fit: Fit, sampled: Sampled, made: Mapping[str, str], noise: Array) -> dict[str, Any]:
-    weights = sampled.weights
-    hit_noise = float(np.sqrt(np.mean(noise**2)))
-    rows = {
-        name: row_probability(fit, place, sampled)
-        for place, name in enumerate(_names(fit))
-        if fit.shots[place].observations
-    }
-    return {
+        columns[parameter.name] = ("draw", _stored(parameter.unit, values), described)
+    noise = float(np.sqrt((scores.noise**2).sum(axis=1).mean()))
+    converged = chains.is_converged(fit.sampling.effective) and noise <= LARGEST_NOISE and not chains.interrupted
+    attributes = {
         attr.KIND: POSTERIOR.mark,
         attr.TITLE: fit.title,
         attr.HISTORY: attr.history_line("identify"),
-        posterior_file.FIT_TEXT: fit.text,
-        **made,
+        p.FIT_TEXT: fit.text,
+        **made_by,
         attr.SEED: fit.sampling.seed,
-        posterior_file.EFFECTIVE: sampled.effective,
-        posterior_file.PARETO_K: weights.pareto_k,
-        posterior_file.HIT_NOISE: hit_noise,
-        posterior_file.CONVERGED: int(is_converged(fit, sampled, hit_noise)),
-        posterior_file.EVIDENCE: weights.log_evidence,
-        posterior_file.WANTED: fit.sampling.effective,
-        posterior_file.SETS: len(sampled.points) // sampled.block,
-        "hits": fit.sampling.hits,
-        "observations": fit.observed,
-        posterior_file.ROW_PROBABILITY: json.dumps(rows),
+        p.EFFECTIVE: chains.effective.min(),
+        p.WANTED: fit.sampling.effective,
+        p.R_HAT: chains.r_hat.max(),
+        p.HIT_NOISE: noise,
+        p.CONVERGED: int(converged),
+        p.INTERRUPTED: int(chains.interrupted),
     }
+    names = [shot.name for shot in fit.shots]
+    numbered = [name if names.count(name) == 1 else f"{name} [{place}]" for place, name in enumerate(names)]
+    return xarray.Dataset(columns, {"shot": numbered, "draw": np.arange(len(which))}, attributes)
 
 
-def material_draws(fit: Fit, tree: xarray.DataTree) -> pd.DataFrame:
+def _stored(unit: str, values: Array) -> Array:
+    return np.degrees(values) if unit == "rad" else values
+
+
+def verdict(normal: Array) -> str:
+    """What the shots say of a parameter, from its posterior on the scale where the prior is standard normal."""
+    from scipy.special import ndtr
+
+    shares = np.sort(ndtr(normal))
+    steps = np.arange(len(shares) + 1) / len(shares)
+    distance = max(np.abs(shares - steps[1:]).max(), np.abs(shares - steps[:-1]).max())
+    if distance < ALIKE:
+        return "not determined by these shots"
+    low, high = np.quantile(shares, [0.025, 0.975])
+    return "hardly determined" if high - low > WIDE else "determined"
+
+
+def parameters_of(posterior: xarray.Dataset) -> list[str]:
+    """Names of the parameters of a posterior."""
+    return [str(name) for name, array in posterior.data_vars.items() if p.PATH in array.attrs]
+
+
+def together(posterior: xarray.Dataset) -> list[tuple[str, str, float]]:
+    """Pairs of parameters that are strongly correlated in the posterior, with their rank correlation."""
+    names = parameters_of(posterior)
+    ranks = posterior[names].to_dataframe().corr("spearman").to_numpy()
+    pairs = combinations(range(len(names)), 2)
+    return [(names[i], names[k], float(ranks[i, k])) for i, k in pairs if abs(ranks[i, k]) > STRONG]
+
+
+def material_draws(fit: Fit, posterior: xarray.Dataset) -> pd.DataFrame:
     """Draws of the material, a column for each quantity that `hits.file` takes."""
-    draws = tree["posterior"].to_dataset()
-    values = {parameter.path: draws[parameter.name].values.ravel() for parameter in fit.scene_parameters}
+    values = {parameter.path: posterior[parameter.name].values for parameter in fit.scene_parameters}
     columns = columns_of(values, fit.scene_of(fit.shots[0]).target.layers[0])
     return pd.DataFrame(
         {name: column for name, column in columns.items() if name != "thickness" and QUANTITIES[name].table != "core"}
     )
 
 
-def is_converged(fit: Fit, sampled: Sampled, noise: float) -> bool:
-    """Whether the weights, and the integration over hits, are accurate enough."""
-    trusted = sampled.weights.pareto_k <= LARGEST_K and noise <= LARGEST_NOISE
-    return trusted and sampled.effective >= fit.sampling.effective
+def unit_of(array: xarray.DataArray) -> tuple[str, float]:
+    """Display unit of a parameter, and the factor to it."""
+    units = str(array.attrs.get("units", "1"))
+    unit = STORED.get(units, Unit(units, units))
+    return unit.shown, unit.factor
 
 
-def row_probability(fit: Fit, place: int, sampled: Sampled) -> float:
-    """Probability that another shot like it shows a row that is less probable than the measured one.
-
-    The density of rows is a mixture of normal distributions about the numbers that some sets predict, by their weights.
-    A row of a core that did not pass the plate counts as less probable.
-    """
-    shot, scored = fit.shots[place], sampled.scores[place]
-    rng = np.random.default_rng(np.random.SeedSequence(fit.sampling.seed, spawn_key=(3, place)))
-    which = resampled(sampled.weights.values, 2000, rng)
-    rows = scored.predicted[which, rng.integers(KEPT_HITS, size=len(which))]
-    data = data_of(fit, shot)
-    spread = data.spread(discrepancies(fit, sampled.points[which]))
-    there = ~np.isnan(rows).any(axis=1)
-    if not there.any():
-        return 0.0
-    centres, widths = rows[there], np.sqrt(2.0) * spread[there]
-
-    def density(row: Array) -> float:
-        apart = centres - row
-        for index, observation in enumerate(shot.observations):
-            apart[:, index] = observation.miss(apart[:, index] + observation.value)
-        return float(np.mean(np.exp(-0.5 * ((apart / widths) ** 2).sum(axis=1)) / widths.prod(axis=1)))
-
-    measured = density(data.values)
-    others = centres[:_DENSITY_DRAWS]
-    less = np.mean([density(row) <= measured for row in others])
-    return float(less * there.mean() + (1.0 - there.mean()))
-
-
-@dataclass(frozen=True)
-class Learnt:
-    """What the shots say about one parameter.
-
-    Attributes:
-        distance: largest difference between the distribution functions of prior and posterior.
-        kept: share of the prior within the posterior's 90 % interval; 0.9 if nothing was learnt.
-        quantiles: 5, 50 and 95 % of the posterior, in the units of the file.
-    """
-
-    distance: float
-    kept: float
-    quantiles: tuple[float, float, float]
-    prior: tuple[float, float, float]
-
-    @property
-    def verdict(self) -> str:
-        if self.distance < ALIKE:
-            return "not determined by these shots"
-        return "hardly determined" if self.kept > WIDE else "determined"
-
-
-def learnt(tree: xarray.DataTree) -> dict[str, Learnt]:
-    """Comparison of prior and posterior, by parameter."""
-    prior, posterior = (tree[name].to_dataset() for name in ("prior", "posterior"))
-    by_name = {}
-    for name in parameters_of(tree):
-        before, after = (np.sort(dataset[str(name)].values.ravel()) for dataset in (prior, posterior))
-        grid = np.concatenate([before, after])
-        shares = [np.searchsorted(of, grid, side="right") / len(of) for of in (before, after)]
-        (low, middle, high), (first, half, last) = (np.quantile(of, [0.05, 0.5, 0.95]) for of in (after, before))
-        kept = np.searchsorted(before, high, side="right") - np.searchsorted(before, low)
-        by_name[name] = Learnt(
-            float(np.abs(shares[0] - shares[1]).max()),
-            float(kept / len(before)),
-            (float(low), float(middle), float(high)),
-            (float(first), float(half), float(last)),
-        )
-    return by_name
-
-
-def together(tree: xarray.DataTree) -> list[tuple[str, str, float]]:
-    """Pairs of parameters whose combination the shots determine: names, and their rank correlation in the posterior
-    where it is strong."""
-    from scipy.stats import spearmanr
-
-    posterior, names = tree["posterior"].to_dataset(), parameters_of(tree)
-    pairs = [(name, other) for place, name in enumerate(names) for other in names[place + 1 :]]
-    ranks = [
-        (first, other, spearmanr(posterior[first].values.ravel(), posterior[other].values.ravel()))
-        for first, other in pairs
+def posterior_view(posterior: xarray.Dataset) -> list[Section]:
+    """The view of a posterior: its parameters, and its accuracy."""
+    columns = (
+        *(Column("parameter"), number("median", digits=".3g"), Column("95 % interval"), Column("95 % of the prior")),
+        *(number("R-hat", digits=".3f"), number("ESS", digits=".0f"), Column("verdict")),
+    )
+    rows = []
+    for name in parameters_of(posterior):
+        array = posterior[name]
+        unit, factor = unit_of(array)
+        low, middle, high = factor * np.quantile(array.values, [0.025, 0.5, 0.975])
+        first, last = factor * np.quantile(array.attrs[p.PRIOR], [0.025, 0.975])
+        told = (array.attrs[p.R_HAT], array.attrs[p.EFFECTIVE], array.attrs[p.VERDICT])
+        label = f"{name} [{unit}]" if unit else name
+        rows.append((label, middle, f"{low:.3g} to {high:.3g}", f"{first:.3g} to {last:.3g}", *told))
+    correlations = [
+        f"{first} and {other} are determined together more than each alone: their correlation is {value:+.2f}"
+        for first, other, value in together(posterior)
     ]
-    return [(first, other, float(rank.statistic)) for first, other, rank in ranks if abs(rank.statistic) > STRONG]
+    return [
+        Section([Table(columns, rows), *correlations], str(posterior.attrs[attr.TITLE])),
+        Section(_worth(posterior)),
+    ]
 
 
-def parameters_of(tree: xarray.DataTree) -> Sequence[str]:
-    """Names of the parameters of a posterior."""
-    return [str(name) for name in tree["prior"].to_dataset().data_vars]
+def _worth(posterior: xarray.Dataset) -> list[str]:
+    attributes = posterior.attrs
+    effective, r_hat, noise = (float(attributes[name]) for name in (p.EFFECTIVE, p.R_HAT, p.HIT_NOISE))
+    misfit = posterior[p.MISFIT].values.sum(axis=1).min()
+    lines = [
+        f"{attributes[p.SETS]} sets of parameters, smallest misfit {misfit:.3g}; effective sample size "
+        f"{effective:.0f}, R-hat {r_hat:.3f}; the hits leave ±{noise:.2g} in ln L"
+    ]
+    if attributes[p.CONVERGED]:
+        return lines
+    wanted = int(attributes[p.WANTED])
+    causes = [
+        (attributes[p.INTERRUPTED], "it was interrupted"),
+        (effective < wanted, f"the effective sample size is below {wanted}: give more sets"),
+        (r_hat > LARGEST_R_HAT, f"R-hat is above {LARGEST_R_HAT}: give more sets"),
+        (noise > LARGEST_NOISE, f"the hits leave more than ±{LARGEST_NOISE} in ln L: give more hits"),
+    ]
+    return [*lines, "NOT CONVERGED: " + "; ".join(text for failed, text in causes if failed)]

@@ -13,10 +13,10 @@ from matplotlib.figure import Figure
 
 from warpimpact.analysis.swept import sweep_view
 from warpimpact.firing.view import firing_view
-from warpimpact.identification.posterior_view import posterior_view
+from warpimpact.identification.posterior import posterior_view
 from warpimpact.optimisation.front_view import front_view
 from warpimpact.plotting.firing import firing_figure
-from warpimpact.plotting.posterior import hits_figure, measured_figure, pairs_figure
+from warpimpact.plotting.posterior import hits_figure, pairs_figure
 from warpimpact.plotting.style import data_url
 from warpimpact.plotting.sweep import sweep_figure
 from warpimpact.plotting.trajectory import FIGURES
@@ -54,7 +54,6 @@ _SHOWN = {
         posterior_view,
         figures={
             "Parameters, in pairs": pairs_figure,
-            "Measured and computed": measured_figure,
             "Where the shots hit": hits_figure,
         },
         asked=posterior_file.FIT_TEXT,
@@ -75,7 +74,7 @@ def view_of(path: Path, kind: Kind, measures: Sequence[str] = ()) -> list[Sectio
     Raises:
         ResultError: the file cannot be read, or has no such measures.
     """
-    return _view(kind, _loaded(path, kind), measures)
+    return _view(kind, files.read(path, kind), measures)
 
 
 def _view(kind: Kind, dataset: Any, measures: Sequence[str] = ()) -> list[Section]:
@@ -86,10 +85,6 @@ def _view(kind: Kind, dataset: Any, measures: Sequence[str] = ()) -> list[Sectio
     return shown.view(dataset, *asked)
 
 
-def _loaded(path: Path, kind: Kind) -> Any:
-    return files.read_tree(path) if kind is POSTERIOR else files.read(path, kind)
-
-
 def write_file_report(path: Path, kind: Kind, output: Path) -> None:
     """Write the report of a file, whole or not at all.
 
@@ -97,7 +92,7 @@ def write_file_report(path: Path, kind: Kind, output: Path) -> None:
         OutputError: the report cannot be written.
         ResultError: the file cannot be read.
     """
-    dataset, shown = _loaded(path, kind), _SHOWN[kind]
+    dataset, shown = files.read(path, kind), _SHOWN[kind]
     attributes = dataset.attrs
     title, (first, *others) = str(attributes.get(attr.TITLE, path.stem)), _view(kind, dataset)
     sections = [replace(first, title="") if first.title == title else first, *others]

@@ -13,7 +13,7 @@ import netCDF4
 
 from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
-from warpimpact.results.kinds import HIT_MAP, KINDS, POSTERIOR, SWEEP, Kind, text_kind
+from warpimpact.results.kinds import HIT_MAP, KINDS, SWEEP, Kind, text_kind
 from warpimpact.results.netcdf import write_table
 from warpimpact.results.outlines import in_a_file, in_memory
 from warpimpact.results.references import NAMES, references_of, with_references
@@ -94,16 +94,6 @@ def _cause(error: Exception, path: Path) -> str:
     return str(error)
 
 
-def write_tree(tree: xarray.DataTree, path: Path) -> None:
-    """Write a tree of Datasets, whole or not at all; an existing file is replaced.
-
-    Raises:
-        OutputError: The file cannot be written; what was there before is untouched.
-    """
-    with aside(path) as file:
-        tree.to_netcdf(file, engine="netcdf4", format="NETCDF4")
-
-
 def read(path: Path, kind: Kind = HIT_MAP) -> xarray.Dataset:
     """Read a file of a kind into memory.
 
@@ -113,19 +103,6 @@ def read(path: Path, kind: Kind = HIT_MAP) -> xarray.Dataset:
     with opened(path, kind) as dataset, readable(path):
         loaded = dataset.load()
     return loaded.set_xindex(v.HIT) if kind in (HIT_MAP, SWEEP) else loaded
-
-
-def read_tree(path: Path) -> xarray.DataTree:
-    """Read a posterior, a file of groups, into memory.
-
-    Raises:
-        ResultError: The file is missing, is not netCDF, or is no posterior.
-    """
-    check_kind(path, POSTERIOR)
-    with readable(path):
-        tree = _loaded(path)
-    _check_needed(path, tree.children, POSTERIOR)
-    return tree
 
 
 def open_result(path: str | Path, group: str | None = None) -> xarray.Dataset:
@@ -302,23 +279,9 @@ def _part(path: Path, group: str | None = None) -> xarray.Dataset:
         root = xarray.open_dataset(path, engine="netcdf4", group=group, create_default_indexes=False)
     finally:
         netCDF4.set_chunk_cache(*kept)
-    dataset = root
+    dataset = root.copy()  # its `close` is another one
     for name in root.dims:
         if name != v.HIT and name in root.coords:
             dataset = dataset.set_xindex(str(name))
     dataset.set_close(root.close)
     return dataset
-
-
-def _loaded(path: Path) -> xarray.DataTree:
-    """The groups of a file in memory, read one after the other.
-
-    Each group is closed before the next one is opened. Python would close an open tree when it collects it, in the
-    middle of another access, which crashes netCDF.
-    """
-    import xarray
-
-    with netCDF4.Dataset(path) as file:
-        names = list(file.groups)
-    groups = {name: xarray.load_dataset(path, group=name, engine="netcdf4") for name in names}
-    return xarray.DataTree.from_dict({"/": xarray.load_dataset(path, engine="netcdf4"), **groups})

@@ -56,7 +56,7 @@ POSTERIOR = Kind(
     "posterior 1",
     "warpimpact identify",
     "warpimpact report takes it",
-    posterior_file.GROUPS,
+    posterior_file.NEEDED,
 )
 FRONT = Kind(
     "a search for designs",

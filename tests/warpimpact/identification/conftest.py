@@ -4,15 +4,16 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
+import xarray
 
 from warpimpact.identification.fit import Fit
 from warpimpact.identification.fit_file import fit_from
-from warpimpact.identification.identify import identify_to_file
+from warpimpact.identification.identify import identify
 
-TEXT = (Path(__file__).parents[2] / "validation" / "calibration.toml").read_text(encoding="utf-8")
+TEXT = Path(__file__).with_name("two_shots.toml").read_text(encoding="utf-8")
 
 FitMaker = Callable[..., Fit]
-SMALL = ("[sampling]\nhits = 64", "[sampling]\nsets = 128\ndraws = 100\neffective = 60\nhits = 32")
+SMALL = ("[sampling]\nhits = 64", "[sampling]\nsets = 1024\ndraws = 100\neffective = 60\nhits = 32")
 """What makes the fit one of a second."""
 
 
@@ -41,9 +42,7 @@ def small() -> tuple[str, str]:
 
 
 @pytest.fixture(scope="session")
-def posterior(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The file of a small fit."""
+def posterior() -> xarray.Dataset:
+    """The posterior of a small fit."""
     assert SMALL[0] in TEXT
-    path = tmp_path_factory.mktemp("fit") / "posterior.nc"
-    identify_to_file(fit_from(TEXT.replace(*SMALL), "fit.toml", Path()), path, device="cpu")
-    return path
+    return identify(fit_from(TEXT.replace(*SMALL), "fit.toml", Path()), device="cpu")

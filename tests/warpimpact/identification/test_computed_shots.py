@@ -8,7 +8,7 @@ import pytest
 from warpimpact import Campaign, run
 from warpimpact.cli import main
 from warpimpact.identification.computed_shots import PRIORS, fit_of_result
-from warpimpact.identification.hit_places import HitPlace
+from warpimpact.identification.measured import HitPlace
 from warpimpact.results import attributes as attr
 from warpimpact.results import files
 

@@ -7,15 +7,13 @@ import numpy as np
 import pytest
 
 from warpimpact.identification.fit import Fit
-from warpimpact.identification.identify import sampled
+from warpimpact.identification.identify import identify
+from warpimpact.identification.likelihood import benches
 from warpimpact.identification.parameters import FitError
-from warpimpact.identification.scoring import benches
-from warpimpact.runs.choice import executor_for
-from warpimpact.runs.questions import answered
 
 FitMaker = Callable[..., Fit]
 RESISTANCE = 'resistance = { distribution = "uniform", low = "1 GPa", high = "4 GPa" }'
-ONE_SHOT = 'hit = "between holes"\nimpact = { velocity = "700 m/s" }'
+ONE_SHOT = 'hit = "unknown"\nimpact = { velocity = "700 m/s" }'
 
 
 def test_priors_are_read_in_si(make_fit: FitMaker) -> None:
@@ -60,7 +58,7 @@ def test_a_shot_may_have_its_own_plate(make_fit: FitMaker) -> None:
     assert (own.thickness, own.resistance) == (5e-3, 2e9)
     assert (other.thickness, other.resistance) == (3e-3, 1.5e9)
     assert len(benches(fit)) == 2
-    assert len(benches(make_fit())) == 1  # shots that differ in their class alone share their runs
+    assert len(benches(make_fit())) == 1  # shots that differ in their measurements alone share their runs
 
 
 @pytest.mark.parametrize(
@@ -77,19 +75,14 @@ def test_a_shot_may_have_its_own_plate(make_fit: FitMaker) -> None:
         (("[prior.plate]\nres", "[prior.plate]\nrez"), 'got the unknown key "rezistance"; did you mean "resistance"?'),
         (('low = "1 GPa"', 'low = "1 mm"'), 'low: got "1 mm", which is not a stress'),
         (('low = "1 GPa"', 'low = "-1 GPa"'), "the priors reach plate.resistance = "),
-        (('hit = "between holes"', 'hit = "between hole"'), 'got "between hole", but it must be "unknown", "through a'),
+        (('hit = "unknown"', 'hit = "between holes"'), 'got "between holes", but it must be "unknown", or a table'),
         (("[[shot]]", "[[shot]]\ntypo = 1"), 'got the unknown key "typo"'),
-        (('hit = "between holes"', "hit = { y = 1 }"), "or a table with y and z"),
+        (('hit = "unknown"', "hit = { y = 1 }"), "or a table with y and z"),
         (('std = "10 m/s"', "std = 0"), "std: got 0, but no measurement is exact: it must be greater than 0"),
         (("[10]", "[10, 20]"), "got 2 values and 2 std at 1 stand-offs"),
         (("tilt = {", "tlit = {"), 'got the unknown key "tlit"; did you mean "tilt"?'),
         (('title = "Two', 'tilte = "Two'), 'got the unknown key "tilte"'),
         (("seed = 3", "sets = 3"), "sampling.sets: got 3, but it must be greater than or equal to 64"),
-        (("title =", 'selection = ["whole"]\ntitle ='), 'selection: got "whole", but it must be one of perforated'),
-        (
-            ("title =", 'selection = ["tilt@20mm < 3 deg"]\ntitle ='),
-            "selection: got 20 mm, but the stand-offs are 50 mm;",
-        ),
         ((RESISTANCE, "resistance = 2e9"), "but a prior is a distribution such as"),
         (("[[shot]]", "[discrepancy]\nvelocity = -1\n[[shot]]"), "discrepancy"),
         (('pattern]\nshape = "circle"\ndiameter = "8 mm"\nspacing = ["12 mm", "12 mm"]', "pattern]"), "shape"),
@@ -105,12 +98,6 @@ def test_a_mistake_gets_one_sentence(make_fit: FitMaker, change: tuple[str, str]
     assert "at least 1 items" not in told  # of a list whose items are wrong
 
 
-def test_a_class_without_places_is_refused(make_fit: FitMaker) -> None:
-    solid = ('shape = "circle"\ndiameter = "8 mm"\nspacing = ["12 mm", "12 mm"]', 'shape = "none"')
-    with pytest.raises(FitError, match='got "through a hole", but no place of this plate is'):
-        make_fit(solid, ('hit = "between holes"', 'hit = "through a hole"'))
-
-
 def test_a_plate_that_weakens_by_time_has_no_limit_velocity(make_fit: FitMaker) -> None:
     limit = ('residual_velocity = { value = "600', 'limit_velocity = { value = "600')
     assert make_fit(limit).shots[0].observations[0].is_limit
@@ -119,7 +106,7 @@ def test_a_plate_that_weakens_by_time_has_no_limit_velocity(make_fit: FitMaker) 
 
 
 def test_duplicated_shots_are_told(make_fit: FitMaker) -> None:
-    same = make_fit(('"anywhere"', '"again"\nhit = "between holes"'), ("640", "600"))
+    same = make_fit(('"second"', '"again"'), ("640", "600"))
     assert "are the same in every number: they count twice" in same.warnings[0]
     assert make_fit().warnings == ()
 
@@ -135,11 +122,8 @@ def test_more_parameters_than_numbers_are_told(make_fit: FitMaker, text: str) ->
 
 def test_priors_that_exclude_the_data_are_refused(make_fit: FitMaker) -> None:
     fit = make_fit(("600 m/s", "200 m/s"), ("[sampling]", "[sampling]\nsets = 64"))
-    with (
-        pytest.raises(FitError, match=r'the priors exclude shot "between holes": the nearest of .* sets'),
-        executor_for("cpu") as executor,
-    ):
-        answered(sampled(fit), executor)
+    with pytest.raises(FitError, match=r'the priors exclude shot "first": the nearest of .* sets'):
+        identify(fit, device="cpu")
 
 
 def test_an_impossible_scene_is_found_before_anything_is_computed(make_fit: FitMaker) -> None:

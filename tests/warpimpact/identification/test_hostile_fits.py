@@ -11,7 +11,7 @@ from warpimpact.identification.fit import Fit
 from warpimpact.identification.fit_file import fit_from
 from warpimpact.identification.parameters import FitError
 
-TEXT = (Path(__file__).parents[2] / "validation" / "calibration.toml").read_text(encoding="utf-8")
+TEXT = Path(__file__).with_name("two_shots.toml").read_text(encoding="utf-8")
 DISTRIBUTION = {"distribution": ["1 mm"] * 5000, "low": 0, "high": 1}
 CASES: dict[str, tuple[tuple[Any, ...], Any, str]] = {
     "no prior": (("prior",), "x", 'prior: got "x", but it must be a table'),
@@ -27,7 +27,7 @@ CASES: dict[str, tuple[tuple[Any, ...], Any, str]] = {
     "a plate of a shot": (("shot", 0, "plate"), 7, "shot[0].plate: got 7, but it must be a table"),
     "a core": (("core",), 5, "core: got 5, but it must be a table"),
     "numerics": (("numerics",), "fine", 'numerics: got "fine", but it must be a table'),
-    "a selection": (("selection",), 5, "selection: got 5, but it must be a list"),
+    "a selection": (("selection",), 5, 'got the unknown key "selection"'),
     "a discrepancy": (("discrepancy",), 0.5, "discrepancy: got 0.5, but it must be a table"),
 }
 

@@ -35,4 +35,4 @@ def test_a_firing_test_is_inspected_and_reported(capsys: pytest.CaptureFixture[s
 def test_a_posterior_without_draws_is_no_whole_file(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     xarray.Dataset(attrs={"warpimpact_kind": "posterior 1"}).to_netcdf(tmp_path / "fit.nc")
     assert main(["inspect", str(tmp_path / "fit.nc")]) == 2
-    assert 'is no whole file of a posterior, it has no "posterior"' in capsys.readouterr().err
+    assert 'is no whole file of a posterior, it has no "hit_y"' in capsys.readouterr().err
