@@ -45,7 +45,7 @@ def add_identify(commands: Commands) -> None:
 def _identify(arguments: argparse.Namespace) -> int:
     from warpimpact.identification.computed_shots import fit_of_result
     from warpimpact.identification.fit_file import read_fit
-    from warpimpact.identification.identify import extent_of, identify
+    from warpimpact.identification.identify import identify
     from warpimpact.identification.posterior import material_draws, posterior_view
     from warpimpact.plotting.posterior import FIGURES
     from warpimpact.results import files
@@ -68,10 +68,9 @@ def _identify(arguments: argparse.Namespace) -> int:
         warn(sentence)
     device, workers, scheduler = arguments.device, arguments.workers, arguments.scheduler
     after = 0.0
-    on_cpu = scheduler is None and find_device(device).is_cpu
-    if workers is None and on_cpu:
+    if workers is None and scheduler is None and find_device(device).is_cpu:
         workers, after = min(cores(), PROCESSES), WORTHWHILE
-    say(extent_of(fit, min(workers or 1, cores()) if on_cpu else None))
+    say(f"computes at most {fit.sampling.sets} sets of parameters, {fit.sampling.hits} hits of each shot")
     with (
         memory_told(arguments.fit),
         show_progress("set") as show,

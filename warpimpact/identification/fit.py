@@ -57,16 +57,6 @@ class MeasuredShot:
     observations: tuple[Observation, ...]
     status: str | None
 
-    @property
-    def numbers(self) -> int:
-        """Number of measured values, including how the shot ended."""
-        return len(self.observations) + (self.status is not None)
-
-    @property
-    def content(self) -> tuple[Any, ...]:
-        """All fields but the name, for comparisons of two shots."""
-        return self.hit, self.impact, self.scatter, repr(self.tables), self.observations, self.status
-
 
 @dataclass(frozen=True)
 class Fit:

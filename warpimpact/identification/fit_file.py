@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path as FilePath
 from typing import Annotated, Any
 
@@ -224,13 +225,13 @@ def _doubts(shots: tuple[MeasuredShot, ...], parameters: list[Parameter]) -> lis
     """Sentences about data that a fit accepts, but that say less than they seem to."""
     doubts, before = list[str](), dict[str, str]()
     for shot in shots:
-        if (first := before.get(content := repr(shot.content))) is None:
+        if (first := before.get(content := repr(replace(shot, name="")))) is None:
             before[content] = shot.name
         else:
             doubts.append(
                 f'shots "{first}" and "{shot.name}" are the same in every number: they count twice, as two measurements'
             )
-    numbers = sum(shot.numbers for shot in shots)
+    numbers = sum(len(shot.observations) + (shot.status is not None) for shot in shots)
     if numbers < len(parameters):
         doubts.append(
             f"got {numbers} measured number{'s' if numbers > 1 else ''} against {len(parameters)} parameters: the "

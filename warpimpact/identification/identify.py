@@ -17,15 +17,13 @@ import numpy as np
 import xarray
 
 from warpimpact.identification.fit import Fit
-from warpimpact.identification.likelihood import Scores, benches, evaluate, hit_points
+from warpimpact.identification.likelihood import Scores, evaluate
 from warpimpact.identification.parameters import FitError
 from warpimpact.identification.posterior import Chains, to_dataset
 from warpimpact.results.posterior_file import SETS
 from warpimpact.runs.choice import opened
 from warpimpact.runs.executor import Executor, Job, completed
 from warpimpact.scene.model import Array
-from warpimpact.solver.limit import PASSAGES
-from warpimpact.solver.prepare import prepare
 from warpimpact.solver.worker import Worker
 
 MOST_WALKERS, WALKERS_PER_PARAMETER = 128, 8
@@ -36,8 +34,6 @@ BATCH = 16
 """Fewest sets of a job, unless there are fewer. Smaller jobs spend their time in being prepared."""
 LOOK_EVERY = 5
 """Steps between two checks of the effective sample size."""
-SCORING = 1e-4
-"""Seconds of a core for a hit beside its march, for scenes, places and scores."""
 FARTHEST = 5.0
 """Largest distance of a shot from the nearest set of the prior, in standard deviations with the discrepancy."""
 
@@ -195,29 +191,3 @@ def check_reach(fit: Fit, scores: Scores) -> None:
                 f'the priors exclude shot "{shot.name}": the nearest of {len(misfit)} sets of parameters is '
                 f"{nearest:.3g} standard deviations off. Widen the priors."
             )
-
-
-def core_seconds(fit: Fit) -> float:
-    """Approximate time that a core takes for all sets of a fit if the sampling does not end early [s]."""
-    of_a_set = 0.0
-    for bench in benches(fit):
-        scene = fit.scene_of(bench.shot)
-        hits = hit_points(fit, bench.shot, scene.target.layers[0], np.zeros((1, 2))).shots
-        measured = (observation for place in bench.which for observation in fit.shots[place].observations)
-        passages = PASSAGES if any(observation.is_limit for observation in measured) else 1
-        of_a_set += len(hits) * (SCORING + passages * prepare(scene, hits[:1], fit.numerics).seconds)
-    return of_a_set * fit.sampling.sets
-
-
-def extent_of(fit: Fit, cores: int | None) -> str:
-    """A sentence about the most that a fit will compute.
-
-    Args:
-        cores: number of cores that will compute; None where unknown, and then no time is given.
-    """
-    sentence = f"computes at most {fit.sampling.sets} sets of parameters, {fit.sampling.hits} hits of each shot"
-    if cores is None:
-        return sentence
-    seconds = core_seconds(fit) / cores
-    time = f"{seconds:.0f} s" if seconds < 90.0 else f"{seconds / 60.0:.2g} min"
-    return f"{sentence}: roughly {time} on {cores} core{'s' if cores > 1 else ''}"

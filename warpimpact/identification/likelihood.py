@@ -15,7 +15,7 @@ Markov chains with such estimates have the exact posterior (C. Andrieu, G. O. Ro
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -73,21 +73,8 @@ class HitPoints(NamedTuple):
     cell: tuple[float, float]
 
 
-@dataclass(frozen=True)
-class Bench:
-    """Measured shots that share their runs, because they differ in their measurements alone.
-
-    Attributes:
-        shot: one of the shots.
-        which: their places in the fit.
-    """
-
-    shot: MeasuredShot
-    which: tuple[int, ...]
-
-
 class Run(NamedTuple):
-    """Shots of a bench at the sets of parameters with these numbers, which share a scene."""
+    """A shot at the sets of parameters with these numbers, which share a scene."""
 
     which: NDArray[np.int64]
     scene: Scene
@@ -104,10 +91,10 @@ def evaluate(fit: Fit, points: Array, uniform: Array, worker: Worker) -> Scores:
     """
     scores = Scores(*np.empty((len(Scores._fields), len(points), len(fit.shots))))
     scales = discrepancies(fit, points)
-    for bench in benches(fit):
-        runs = list(_runs(fit, bench, points, uniform[:, :2]))
-        for run, outcomes in zip(runs, _outcomes(fit, bench, runs, worker), strict=True):
-            for place in bench.which:
+    for alike in benches(fit):
+        runs = list(_runs(fit, fit.shots[alike[0]], points, uniform[:, :2]))
+        for run, outcomes in zip(runs, _outcomes(fit, alike, runs, worker), strict=True):
+            for place in alike:
                 spread = {kind: scale[run.which] for kind, scale in scales.items()}
                 score = score_shot(fit.shots[place], run.points, outcomes, spread, uniform[run.which, 2 + place])
                 for column, values in zip(scores, score, strict=True):
@@ -115,13 +102,13 @@ def evaluate(fit: Fit, points: Array, uniform: Array, worker: Worker) -> Scores:
     return scores
 
 
-def benches(fit: Fit) -> list[Bench]:
-    """Group the shots of a fit by the runs that they share."""
+def benches(fit: Fit) -> list[list[int]]:
+    """Places of the shots that share their runs, because they differ in their measurements alone."""
     places_of: dict[str, list[int]] = {}
     for place, shot in enumerate(fit.shots):
         key = repr((shot.hit, shot.impact, shot.scatter, shot.tables, sorted(map(str, shot.own))))
         places_of.setdefault(key, []).append(place)
-    return [Bench(fit.shots[places[0]], tuple(places)) for places in places_of.values()]
+    return list(places_of.values())
 
 
 def discrepancies(fit: Fit, points: Array) -> dict[str, Array]:
@@ -156,20 +143,20 @@ def hit_points(fit: Fit, shot: MeasuredShot, plate: Plate, shifts: Array) -> Hit
     return HitPoints(replace(shots[number], hit_y=hit_y, hit_z=hit_z), group, cell)
 
 
-def _runs(fit: Fit, bench: Bench, points: Array, shifts: Array) -> Iterator[Run]:
+def _runs(fit: Fit, shot: MeasuredShot, points: Array, shifts: Array) -> Iterator[Run]:
     by_path = {
         parameter.path: parameter.at(points[:, column])
         for column, parameter in enumerate(fit.parameters)
-        if parameter.path[0] != "discrepancy" and parameter.path not in bench.shot.own
+        if parameter.path[0] != "discrepancy" and parameter.path not in shot.own
     }
     # The literal scheme counts steps, so its interval may not differ from shot to shot.
     varying = {*COLUMN_OF} if fit.numerics.scheme == "nodal" else {*COLUMN_OF, *UNITS_OF_EXPOSURE}
     of_scene = {path: column for path, column in by_path.items() if path not in varying}
     for rows in _of_one_scene(of_scene, len(points)):
         own_scene = by_path if len(rows) == 1 else of_scene  # a single set needs no columns
-        scene = fit.scene_of(bench.shot, {path: float(column[rows[0]]) for path, column in own_scene.items()})
+        scene = fit.scene_of(shot, {path: float(column[rows[0]]) for path, column in own_scene.items()})
         plate = scene.target.layers[0]
-        own = hit_points(fit, bench.shot, plate, shifts[rows])
+        own = hit_points(fit, shot, plate, shifts[rows])
         columns = columns_of({path: column[rows] for path, column in by_path.items() if path not in own_scene}, plate)
         each = len(own.shots) // len(rows)  # sets have equal numbers of shots, one set after the other
         of_shots: dict[str, Any] = {name: np.repeat(column, each) for name, column in columns.items()}
@@ -186,9 +173,9 @@ def _of_one_scene(of_scene: Mapping[Path, Array], count: int) -> Iterator[NDArra
         yield np.flatnonzero(which.reshape(-1) == scene_number)
 
 
-def _outcomes(fit: Fit, bench: Bench, runs: Sequence[Run], worker: Worker) -> list[Outcomes]:
-    """The outcomes that the observations of a bench need: at impact velocity, limit velocities, or both."""
-    measured = [fit.shots[place] for place in bench.which]
+def _outcomes(fit: Fit, alike: Sequence[int], runs: Sequence[Run], worker: Worker) -> list[Outcomes]:
+    """The outcomes that the observations of shots need: at impact velocity, limit velocities, or both."""
+    measured = [fit.shots[place] for place in alike]
     limited = [observation.is_limit for shot in measured for observation in shot.observations]
     scenes = [(run.scene, run.points.shots) for run in runs]
     if not any(limited):

@@ -89,16 +89,16 @@ def to_dataset(fit: Fit, chains: Chains, scores: Scores, made_by: Mapping[str, s
     }
     for column, parameter in enumerate(fit.parameters):
         normal = chains.points[..., column].ravel()
-        values = parameter.at(normal[which])
+        factor = np.degrees(1.0) if parameter.unit == "rad" else 1.0
         described = {
             "units": UNITS[parameter.unit].stored,
             p.PATH: json.dumps(parameter.path),
             p.R_HAT: chains.r_hat[column],
             p.EFFECTIVE: chains.effective[column],
             p.VERDICT: verdict(normal),
-            p.PRIOR: _stored(parameter.unit, parameter.prior.quantile(np.linspace(0.0025, 0.9975, 200))),
+            p.PRIOR: factor * parameter.prior.quantile(np.linspace(0.0025, 0.9975, 200)),
         }
-        columns[parameter.name] = ("draw", _stored(parameter.unit, values), described)
+        columns[parameter.name] = ("draw", factor * parameter.at(normal[which]), described)
     noise = float(np.sqrt((scores.noise**2).sum(axis=1).mean()))
     converged = chains.is_converged(fit.sampling.effective) and noise <= LARGEST_NOISE and not chains.interrupted
     attributes = {
@@ -118,10 +118,6 @@ def to_dataset(fit: Fit, chains: Chains, scores: Scores, made_by: Mapping[str, s
     names = [shot.name for shot in fit.shots]
     numbered = [name if names.count(name) == 1 else f"{name} [{place}]" for place, name in enumerate(names)]
     return xarray.Dataset(columns, {"shot": numbered, "draw": np.arange(len(which))}, attributes)
-
-
-def _stored(unit: str, values: Array) -> Array:
-    return np.degrees(values) if unit == "rad" else values
 
 
 def verdict(normal: Array) -> str:
