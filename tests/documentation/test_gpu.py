@@ -36,20 +36,6 @@ def test_one_call_measures_what_the_page_shows(tmp_path: Path, monkeypatch: pyte
     assert all(all(row) for row in rows)
 
 
-def test_answers_that_differ_fail(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(gpu, "LEVEL", 0)
-    here, there = (gpu.simulate(*gpu.scene_of(gpu.SLOTS, 8), numerics=gpu.Numerics(level=n)) for n in (0, 1))
-    assert gpu.difference(here, here)["same"]
-    assert not gpu.difference(there, here)["same"]
-    here.status[:2] = 1 - here.status[:2]
-    assert not gpu.difference(there, here)["same"]
-
-
-def test_no_gpu_is_a_sentence(capsys: pytest.CaptureFixture[str]) -> None:
-    assert gpu.main(["--device", "cuda:77"]) == 2
-    assert "gpu.py: error: " in capsys.readouterr().err
-
-
 def test_scenes_of_a_gpu_need_every_build_of_the_kernels() -> None:
     variants = []
     for name in gpu.SCENES:

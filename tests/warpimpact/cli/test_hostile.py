@@ -20,9 +20,7 @@ from warpimpact.campaign.text import CampaignError
 from warpimpact.cli import main
 from warpimpact.cli.mistakes import Plain, say
 from warpimpact.results import files
-from warpimpact.scene.unit_text import UnitError
-from warpimpact.scene.units import Length, quantity, quoted
-from warpimpact.solver.tile import check_tiles, tile_of
+from warpimpact.scene.units import Length, quantity
 
 SHIPPED = Path(__file__).parents[3] / "campaigns"
 BASE = (SHIPPED / "slotted_plate.toml").read_text(encoding="utf-8")
@@ -44,32 +42,24 @@ def with_polygons(polygons: object) -> str:
 ZIGZAG = np.random.default_rng(1).uniform((-8e-3, -4e-3), (8e-3, 4e-3), (400, 2)).tolist()
 CAMPAIGNS = {
     "nested arrays": ("a = " + "[" * 100_000 + "]" * 100_000, "nested too deep"),
-    "nested JSON": ('{"a":' + "[" * 100_000 + "]" * 100_000 + "}", "nested too deep"),
     "a long array": ("x = [" + "1," * 2_000_000 + "]\n" + BASE, "at most 1048576 characters"),
     "a tower of powers": (BASE.replace('"4 mm"', '"4 m**9**9**9"', 1), 'whose unit "m**9**9**9" is not one of names'),
-    "another tower": (BASE.replace('"4 mm"', '"4 m*(9**9)**9**9"', 1), "is not one of names"),
-    "a long unit": (BASE.replace('"4 mm"', '"4 ' + "m" * 100_000 + '"', 1), "which has more than 80 characters"),
     "a long file name": (listed("z" * 300), "which is no file name"),
-    "a long path": (listed("z" * 5000), "which is no file name"),
     "a device": (listed("/dev/zero"), "but there is no file /dev/zero"),
     "a terminal's commands": (BASE.replace('title = "', 'title = "\\u001b[31m', 1), "without control characters"),
     "a long title": (BASE.replace('title = "', 'title = "' + "t" * 5000, 1), "at most 200 characters"),
     "a long number": (BASE.replace("seed = 1", "seed = 0x" + "f" * 5000), "hits.seed: got"),
-    "a long key": (BASE + "\n[interaction]\n" + "k" * 100_000 + " = 1\n", "got the unknown key"),
     "a tiny length": (
         re.sub("degradation_length *= .*", 'degradation_length = "1 nm"', BASE),
         "at least 1/1000 of its radius",
     ),
     "a zigzag": (with_polygons([ZIGZAG]), "got polygons that cross themselves or overlap"),
     "many polygons": (with_polygons([[[0, 0], [1e-3, 0], [0, 1e-3]]] * 401), "at most 400 items"),
-    "many corners": (with_polygons([ZIGZAG * 2]), "at most 400 items"),
     "corners far away": (with_polygons([[[0, 0], [1e30, 0], [0, 1e30]]]), "at most one spacing away"),
-    "an image": (with_polygons([]).replace('"polygons"', '"mask"'), "'none', 'polygons'"),
 }
 FILES: dict[str, tuple[str, str | bytes, str]] = {
     "a long field": ("a.csv", "hit_y,hit_z\n" + "1" * 200_000 + ",1\n", "field larger than field limit"),
     "another file as hits": ("a.csv", "secret:x:0:0\nsecret\n", "line 1: the header must be hit_y,hit_z"),
-    "a row of another": ("a.csv", "hit_y,hit_z\n" + "y" * 5000 + ",1\n", "but it must be a finite number"),
 }
 
 
@@ -105,7 +95,6 @@ def test_a_hostile_file_beside_a_campaign_is_refused_in_a_sentence(
     said = _sentence(path, capsys)
     assert expected in said
     assert "secret" not in said
-    assert "y" * 81 not in said
 
 
 LIMITED = """
@@ -140,22 +129,6 @@ def test_hostile_campaigns_are_refused_within_a_gibibyte(tmp_path: Path) -> None
         assert (CAMPAIGNS | FILES)[case][-1] in said
 
 
-@pytest.mark.parametrize("command", ["plate", "inspect"])
-@pytest.mark.parametrize("name", ["/dev/zero", "x" * 5000, "y" * 300, "."])
-def test_what_is_no_file_is_refused_in_a_sentence(command: str, name: str, capsys: pytest.CaptureFixture[str]) -> None:
-    assert main([command, name]) == 2
-    assert capsys.readouterr().err.count("\n") == 1
-
-
-def test_an_output_with_too_long_a_name_is_refused_in_a_sentence(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    path = tmp_path / "a.toml"
-    path.write_text(BASE, encoding="utf-8")
-    assert main(["run", str(path), "-o", str(tmp_path / f"{'z' * 300}.nc")]) == 2
-    assert "File name too long" in capsys.readouterr().err
-
-
 def test_a_bug_is_told_with_a_file_of_details(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -183,12 +156,6 @@ def test_control_characters_are_never_printed(capsys: pytest.CaptureFixture[str]
     assert len(shown.err) < 2100
 
 
-def test_messages_quote_at_most_80_characters() -> None:
-    for value in ("x" * 10**6, ["x"] * 10**6, {"x" * 1000: 1}, 10**5000, [[[[[[[1]]]]]]]):
-        assert len(quoted(value)) <= 80
-    assert quoted(825.5) == "825.5"
-
-
 def test_a_result_shows_no_control_characters(
     make_result: Callable[..., xarray.Dataset], tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -203,13 +170,6 @@ def test_a_title_is_no_formula(make_result: Callable[..., xarray.Dataset], tmp_p
     path = tmp_path / "a.nc"
     files.write(make_result(100).assign_attrs(title=r"costs 5 $ or \frac{1}{ $"), path)
     assert main(["plot", str(path), "-o", str(tmp_path)]) == 0
-
-
-def test_memory_is_what_the_process_may_take(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("warpimpact.solver.tile.free_memory", lambda: 2**20)
-    plate = Campaign.from_text(BASE, name="a", folder=Path()).plate
-    with pytest.raises(MemoryError, match=r"the target takes .* GiB .*, but 0.000977 GiB and 20 s are allowed; give"):
-        check_tiles({tile_of(plate, 2e-6): "plate"})
 
 
 SMALL = settings(max_examples=60, deadline=None, derandomize=True, suppress_health_check=list(HealthCheck))
@@ -227,39 +187,6 @@ def test_a_campaign_file_with_anything_in_it_is_read_or_refused(at: int, taken: 
 def test_any_quantity_is_read_or_refused(text: str) -> None:
     with suppress(ValueError):
         assert np.isfinite(quantity(Length)(text))
-
-
-@pytest.mark.parametrize(
-    ("before", "after"),
-    [
-        ("coefficients = [3.0e-4, 0.24, -5.29]", "coefficients = [{}]"),
-        ('standoffs = ["50 mm", "130 mm"]', "standoffs = [{}]"),
-        ("staggered = true", "holes = [{}]"),
-    ],
-)
-def test_a_list_is_read_up_to_its_first_mistake(before: str, after: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    """A list has room for 100,000 of them."""
-    read: list[str] = []
-
-    def factor(unit: str, si_unit: str) -> float:
-        read.append(unit)
-        raise UnitError(unit)
-
-    monkeypatch.setattr("warpimpact.scene.units.factor", factor)
-    listed = [f'"1 u{k}"' for k in range(1000)]
-    if "holes" in after or "offsets" in after:
-        listed = [f'["1 mm", {one}]' for one in listed]
-    assert before in BASE
-    text = BASE.replace(before, after.format(", ".join(listed)), 1)
-    with pytest.raises(CampaignError):
-        Campaign.from_text(text, name="a.toml", folder=Path())
-    assert len(set(read)) < 10
-
-
-def test_sizes_beyond_all_plates_are_refused() -> None:
-    text = BASE.replace('length = "12 mm"', 'length = "1e300 m"', 1)
-    with pytest.raises(CampaignError, match="which is more than 1e\\+30"):
-        Campaign.from_text(text, name="a.toml", folder=Path())
 
 
 def test_an_escape_sequence_in_an_argument_reaches_no_terminal(capsys: pytest.CaptureFixture[str]) -> None:

@@ -28,13 +28,6 @@ def test_pictures_of_a_result_are_not_replaced_unasked(
         assert (tmp_path / picture).read_bytes().startswith(b"\x89PNG")
 
 
-def test_the_picture_of_a_plate_is_not_replaced_unasked(tmp_path: Path, refusal: Refusal) -> None:
-    command = ["plate", str(CAMPAIGNS / "slotted_plate.toml"), "-o", str(tmp_path / "plate.png")]
-    assert main(command) == 0
-    assert "plate.png: exists already" in refusal(command)
-    assert main([*command, "--overwrite"]) == 0
-
-
 def test_what_is_asked_for_has_a_picture_of_its_own(make_result: ResultMaker, tmp_path: Path, refusal: Refusal) -> None:
     files.write(make_result(100), tmp_path / "a.nc")
     for quantity in ("P(tilt@130mm > 30 deg)", "P(tilt@130mm < 30 deg)", "P(perforated)"):

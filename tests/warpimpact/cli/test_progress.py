@@ -1,9 +1,7 @@
 """Progress: plain lines in a log, a bar on a terminal, both with estimates and failed shots."""
 
 import io
-import re
 import sys
-import time
 from dataclasses import replace
 
 import pytest
@@ -12,8 +10,6 @@ from warpimpact.cli import main
 from warpimpact.cli.progress import Step, show_progress, show_run
 from warpimpact.results.measures import Measure
 from warpimpact.runs.progress import RunProgress
-from warpimpact.scene import Numerics
-from warpimpact.solver.accuracy import PilotResult
 from warpimpact.statistics.intervals import Estimate
 
 
@@ -60,21 +56,6 @@ def test_a_slow_run_is_not_silent(capsys: pytest.CaptureFixture[str], clock: lis
     assert len(capsys.readouterr().err.splitlines()) == 100  # of 100 minutes
 
 
-def test_a_log_speaks_every_few_seconds_at_first_and_every_minute_later(
-    capsys: pytest.CaptureFixture[str], clock: list[float]
-) -> None:
-    with show_run() as show:
-        for _ in range(600):
-            show(standing(101))
-            clock[0] += 0.1
-        assert len(capsys.readouterr().err.splitlines()) == 12  # of the first minute
-        clock[0] += 10_000.0
-        for _ in range(1800):
-            show(standing(101))
-            clock[0] += 0.1
-    assert len(capsys.readouterr().err.splitlines()) == 3
-
-
 def test_a_terminal_gets_a_bar_that_counts_what_was_resumed_as_done(monkeypatch: pytest.MonkeyPatch) -> None:
     terminal = Terminal()
     monkeypatch.setattr(sys, "stderr", terminal)
@@ -88,18 +69,6 @@ def test_a_terminal_gets_a_bar_that_counts_what_was_resumed_as_done(monkeypatch:
     assert "hit/s" in last
     assert "mean(residual_velocity) 731.25 ± 0.75 m/s" in last
     assert "3 failed" in last
-
-
-def test_a_line_tells_the_accuracy_that_the_pilot_found(capsys: pytest.CaptureFixture[str], clock: list[float]) -> None:
-    for kept, end in (
-        (True, "for 90 % of the hits, 0 failed"),
-        (False, "for 90 % of the hits, not as promised, 0 failed"),
-    ):
-        found = PilotResult(Numerics(level=2), kept, 0.9, {"residual_velocity_error": 0.42, "tilt_error": 0.7})
-        with show_run() as show:
-            clock[0] += 1.0
-            show(replace(standing(400), found=found))
-        assert capsys.readouterr().err.splitlines()[0].endswith(f"accuracy 0.42 m/s and 0.7 deg {end}")
 
 
 def test_a_log_says_what_a_pilot_tries_and_counts_no_time_of_it(
@@ -118,61 +87,6 @@ def test_a_log_says_what_a_pilot_tries_and_counts_no_time_of_it(
     assert sum("level 4" in line for line in lines) < 10
     assert [line for line in lines if line.startswith("0 of")] == ["0 of 1000 hits"]
     assert lines[-1].startswith("400 of 1000 hits, 100 hits/s, 6 s left; ")
-
-
-def test_what_may_end_early_tells_the_most_time_that_is_left(
-    capsys: pytest.CaptureFixture[str], clock: list[float]
-) -> None:
-    with show_progress("design") as show:
-        show(Step(0, 6, certain=False, text="0 on the front", now="2 of 3 pilots"))
-        clock[0] += 10.0
-        show(Step(2, 6, certain=False, text="1 on the front", now="6 designs at 64 hits"))
-        show(Step(2, 2, text="1 on the front"))
-        clock[0] += 5.0
-        show(Step(0, 2, now="solid plates"))
-        clock[0] += 5.0
-        show(Step(1, 2, now="solid plates"))
-    assert capsys.readouterr().err.splitlines() == [
-        "0 of at most 6 designs; 2 of 3 pilots",
-        "2 of at most 6 designs, 0.2 designs/s, at most 20 s left; 1 on the front, 6 designs at 64 hits",
-        "2 of 2 designs; 1 on the front",
-        "0 of 2 designs; solid plates",
-        "1 of 2 designs, 0.2 designs/s, 5 s left; solid plates",
-    ]
-
-
-def test_a_terminal_tells_the_part_that_is_under_way(monkeypatch: pytest.MonkeyPatch) -> None:
-    terminal = Terminal()
-    monkeypatch.setattr(sys, "stderr", terminal)
-    with show_progress("design") as show:
-        show(Step(0, 6, certain=False, now="16 hits"))
-        for done, now in ((3, "16 hits"), (3, "64 hits")):
-            time.sleep(0.15)  # a bar is drawn anew at most ten times a second
-            show(Step(done, 6, certain=False, now=now))
-        assert re.search(r" 3/6 at most \[[^<]*, 64 hits]", terminal.getvalue())
-        show(Step(0, 7, now="solid plates"))
-        time.sleep(0.15)
-        show(Step(0, 7, now="solid plates"))
-        assert re.search(r" 0/7 \[00:00<.*, solid plates]", terminal.getvalue())
-
-
-def test_a_short_pilot_says_nothing(capsys: pytest.CaptureFixture[str], clock: list[float]) -> None:
-    with show_run() as show:
-        show(replace(standing(0), piloting=True))
-        clock[0] += 1.9
-        show(replace(standing(0), piloting=True))
-    assert capsys.readouterr().err == ""
-
-
-def test_a_bar_keeps_its_width_beside_long_estimates(monkeypatch: pytest.MonkeyPatch) -> None:
-    terminal = Terminal()
-    monkeypatch.setattr(sys, "stderr", terminal)
-    with show_run() as show:
-        show(replace(standing(100), piloting=True, trying=3))
-        show(standing(500))
-    shown = terminal.getvalue()
-    assert "a pilot looks for the resolution, level 3" in shown
-    assert len(shown.split("\r")[-1].split("|")[1]) == 20
 
 
 def test_runs_one_after_another_begin_anew(capsys: pytest.CaptureFixture[str], clock: list[float]) -> None:

@@ -1,9 +1,6 @@
 """The commands that help to start: new and schema; and what -v and -q tell."""
 
 import json
-import subprocess
-import sys
-import tomllib
 from collections.abc import Callable
 from pathlib import Path
 
@@ -67,11 +64,6 @@ def test_new_overwrites_nothing_unasked(capsys: pytest.CaptureFixture[str]) -> N
     assert Path("slotted_plate.toml").read_text() != "mine"
 
 
-def test_an_unknown_example_is_told_with_a_likely_one(capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["new", "sloted_plate"]) == 2
-    assert 'did you mean "slotted_plate"?' in capsys.readouterr().err
-
-
 def test_the_schema_is_printed_or_written(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["schema"]) == 0
     printed = capsys.readouterr().out
@@ -104,36 +96,3 @@ def test_more_or_less_is_told(option: list[str], told: str, untold: str, capsys:
     shown = capsys.readouterr().err
     assert told in shown
     assert untold not in shown
-
-
-def test_what_is_loaded_is_told_at_the_highest_verbosity() -> None:
-    command = [sys.executable, "-c", "from warpimpact.cli import command; command()"]
-    arguments = ["run", str(CAMPAIGNS / "slotted_plate.toml"), "--count", "4", "--device", "cpu", "-vv"]
-    done = subprocess.run(command + arguments, capture_output=True, text=True, check=True)
-    assert "warpimpact.solver.device: march on cpu: loaded in" in done.stderr
-
-
-INTERRUPTED = """
-import signal, sys
-signal.signal({0}, signal.default_int_handler)
-class Raising:
-    def find_spec(self, name, *_):
-        if name == "warpimpact.cli":
-            signal.raise_signal({0})
-sys.meta_path.insert(0, Raising())
-from warpimpact.__main__ import command
-sys.argv = ["warpimpact", "new", "--list"]
-command()
-"""
-
-
-@pytest.mark.parametrize("name", ["SIGINT", "SIGTERM"])
-def test_a_signal_while_the_command_is_loaded_ends_it_in_a_sentence(name: str) -> None:
-    code = INTERRUPTED.format(f"signal.{name}")
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
-    assert (done.returncode, done.stdout, done.stderr) == (130, "", "warpimpact: interrupted\n")
-
-
-def test_the_command_listens_before_it_loads() -> None:
-    project = tomllib.loads((CAMPAIGNS.parent / "pyproject.toml").read_text(encoding="utf-8"))
-    assert project["project"]["scripts"]["warpimpact"] == "warpimpact.__main__:command"

@@ -46,32 +46,6 @@ def test_an_urgent_job_puts_off_another_which_then_ends() -> None:
     assert order == ["refine", "urgent", "refine"]
 
 
-def test_one_job_runs_at_a_time_in_the_order_of_their_urgency() -> None:
-    running, order, go = list[int](), list[int](), threading.Event()
-
-    def job(urgency: int) -> Callable[[Cancel], None]:
-        def work(_: Cancel) -> None:
-            running.append(urgency)
-            assert len(running) == 1
-            order.append(urgency)
-            time.sleep(0.01)
-            running.remove(urgency)
-
-        return work
-
-    async def every() -> None:
-        desk = Desk()
-        begun = asyncio.ensure_future(desk.do(0, until(go)))
-        await asyncio.sleep(0.05)
-        others = [asyncio.ensure_future(desk.do(urgency, job(urgency))) for urgency in (3, 1, 2)]
-        await asyncio.sleep(0.05)
-        go.set()
-        await asyncio.gather(begun, *others)
-
-    asyncio.run(every())
-    assert order == [1, 2, 3]
-
-
 @pytest.mark.parametrize("waits", [False, True])
 def test_what_nobody_awaits_ends_at_once(waits: bool) -> None:
     never, begun, ended = threading.Event(), list[str](), list[str]()

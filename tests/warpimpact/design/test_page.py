@@ -2,14 +2,12 @@
 
 import json
 import re
-import time
 import tomllib
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 from urllib.parse import urlsplit
 
-import numpy as np
 import pytest
 
 from warpimpact.analysis.comparison import compare
@@ -19,7 +17,6 @@ from warpimpact.analysis.effectiveness import effectiveness
 from warpimpact.analysis.numbers import number_text
 from warpimpact.campaign.campaign import Campaign
 from warpimpact.cli import main
-from warpimpact.cli.design import _leading_to
 from warpimpact.design.designs import from_address
 from warpimpact.results import files
 from warpimpact.runs.run import run
@@ -138,18 +135,6 @@ def test_the_address_holds_the_design_and_undo_brings_it_back(page: Any) -> None
     assert page.errors() == []
 
 
-def test_the_file_that_a_browser_is_opened_on_leads_to_the_page(
-    browser: Any, address: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setenv("HOME", str(tmp_path))
-    browser.open(_leading_to(address).as_uri())
-    browser.wait(lambda: browser.driver.current_url.startswith(address), 60.0)
-    browser.wait(lambda: "Complete" in browser.text("#status"), 180.0)
-    browser.driver.refresh()
-    browser.wait(lambda: "Complete" in browser.text("#status"), 180.0)
-    assert browser.errors() == []
-
-
 def test_addresses_hold_the_design_and_a_copied_one_not_the_token(page: Any) -> None:
     held = page.driver.execute_async_script(
         "address.unpacked(location.hash.slice(1)).then((held) => arguments[0](JSON.stringify(held)))"
@@ -245,17 +230,6 @@ def test_text_of_others_is_text(browser: Any, serve: Callable[..., str], coarse:
     assert browser.errors() == []
 
 
-def test_grey_has_a_legend(page: Any) -> None:
-    data = "{ statuses: [{ code: 1, label: 'perforated' }, { code: 2, label: 'arrested' }], main: [], variables: [] }"
-    hits = "{ status: [1, 2, 2], columns: { speed: [5, null, null] } }"
-    told = [
-        page.driver.execute_script(f"return hitMaps({data}).missing({hits}, '{variable}')")
-        for variable in ("speed", "status")
-    ]
-    assert told == ["no value: arrested 2 of 3 hits", ""]
-    assert not page.find("#grey-0")[0].is_displayed()  # all cores pass
-
-
 def test_plate_and_map_show_the_direction_of_fire(page: Any) -> None:
     assert "⊙ fire" in page.text("#plate")
     assert not page.find("#plate .fire")
@@ -267,21 +241,6 @@ def test_plate_and_map_show_the_direction_of_fire(page: Any) -> None:
     )
     assert (arrow["ax"] < 0.0, arrow["ay"]) == (True, 0.0)  # towards +y, to the right
     assert len(page.find("#plate .fire")) == 1
-
-
-def test_many_changes_leave_no_error(page: Any) -> None:
-    random = np.random.default_rng(1)
-    sliders = page.driver.execute_script(
-        "return [...document.querySelectorAll('#controls input[type=range]')]"
-        ".map((s) => [s.id, +s.min, +s.max, +s.step])"
-    )
-    for _ in range(60):
-        name, low, high, step = sliders[random.integers(len(sliders))]
-        move(page, name, round(low + step * int(random.integers((high - low) / step + 1)), 6))
-        time.sleep(0.05)
-    page.driver.execute_script("document.getElementById('designs').dispatchEvent(new Event('change'))")
-    page.wait(lambda: not page.text("#sentence") and "Complete" in page.text("#status"), 120.0)
-    assert page.errors() == []
 
 
 def test_a_grip_of_the_plate_is_dragged(page: Any) -> None:
@@ -331,19 +290,3 @@ def test_the_report_of_the_page_is_that_of_its_designs(page: Any, tmp_path: Path
     (path,) = tmp_path.glob("*.html")
     page.wait(lambda: path.read_text(encoding="utf-8").endswith("</html>"), 30.0)
     assert "this design: 1500 of 1500 cores pass" in path.read_text(encoding="utf-8")
-
-
-def test_a_second_page_does_not_disturb_the_first(page: Any) -> None:
-    first, address = page.driver.current_window_handle, page.driver.current_url
-    move(page, "control-plate-thickness", 5.5)
-    page.driver.switch_to.new_window("window")
-    page.driver.get(address)
-    page.wait(lambda: "Complete" in page.text("#status"), 120.0)
-    move(page, "control-plate-thickness", 3.0)
-    settled(page)
-    assert page.text("#numbers").startswith("thickness\n3 mm")
-    page.driver.close()
-    page.driver.switch_to.window(first)
-    page.wait(lambda: "Complete" in page.text("#status"), 120.0)
-    assert page.text("#numbers").startswith("thickness\n5.5 mm")
-    assert page.errors() == []

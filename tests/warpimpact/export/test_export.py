@@ -1,6 +1,5 @@
 """Exports hold what the result holds: tables read back, and VTK files that VTK itself reads."""
 
-import sys
 import warnings
 from collections.abc import Callable
 from pathlib import Path
@@ -23,7 +22,7 @@ from warpimpact.results import files
 from warpimpact.results.variables import SHOT_VARIABLES
 from warpimpact.runs.replay import replay
 from warpimpact.runs.run import run
-from warpimpact.scene import Hits, Plate
+from warpimpact.scene import Plate
 from warpimpact.scene.shots import EXPORTED
 
 SLOTTED_PLATE = Path(__file__).parents[3] / "campaigns" / "slotted_plate.toml"
@@ -103,33 +102,6 @@ def test_round_holes_are_circles_of_a_dxf(pattern: str, kind: str, tmp_path: Pat
         assert {round(shape.dxf.radius, 9) for shape in drawn} == {4.5}
 
 
-def test_units_in_the_header_of_a_list_count(tmp_path: Path) -> None:
-    (tmp_path / "hits.csv").write_text("hit_y [mm],hit_z [mm],obliquity [rad],velocity [km/s]\n1,2,0.1,0.8\n")
-    listed = Hits(sampling="list", file=tmp_path / "hits.csv").listed
-    assert listed is not None
-    assert {name: column.item() for name, column in listed.items()} == pytest.approx(
-        {"hit_y": 1e-3, "hit_z": 2e-3, "obliquity": 0.1, "velocity": 800.0}
-    )
-    (tmp_path / "hits.csv").write_text("hit_y [kg],hit_z\n1,2\n")
-    with pytest.raises(ValueError, match=r"hits\.csv, line 1: hit_y: .* is not a length"):
-        Hits(sampling="list", file=tmp_path / "hits.csv")
-
-
-def test_the_ending_of_a_name_decides_the_format_or_is_refused(
-    make_result: ResultMaker, history: xarray.Dataset, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    files.write(make_result(3), tmp_path / "a.nc")
-    files.write(history, tmp_path / "hit.nc")
-    for file, name, sentence in (
-        ("a.nc", "a.txt", "a.txt: the name of a table must end in .csv"),
-        ("a.nc", "a", "a: the name of a table must end in .csv"),
-        ("hit.nc", "hit.csv", "hit.csv: the history of a hit is written as a folder, so give a name without a dot"),
-    ):
-        assert main(["export", str(tmp_path / file), "-o", str(tmp_path / name)]) == 2
-        assert sentence in capsys.readouterr().err
-    assert {path.name for path in tmp_path.iterdir()} == {"a.nc", "hit.nc"}
-
-
 @pytest.fixture(scope="module")
 def history() -> xarray.Dataset:
     text = SLOTTED_PLATE.read_text().replace('"standard"', '"draft"')
@@ -179,12 +151,3 @@ def test_command_writes_a_new_folder_for_a_hit(
     assert main(["export", str(tmp_path / "hit.nc")]) == 2
     assert "hit_vtk: exists already; give a new folder with -o" in capsys.readouterr().err
     assert {path.name for path in tmp_path.iterdir()} == {"hit.nc", "hit_vtk"}
-
-
-def test_without_pyvista_the_way_to_it_is_told(
-    history: xarray.Dataset, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setitem(sys.modules, "pyvista", None)
-    with pytest.raises(files.OutputError, match=r"hit: VTK files need PyVista: pip install 'warpimpact\[vtk\]'"):
-        write_vtk(history, tmp_path / "hit")
-    assert not list(tmp_path.iterdir())

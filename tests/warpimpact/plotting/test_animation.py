@@ -5,9 +5,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-import xarray
-from matplotlib.animation import FFMpegWriter
-from matplotlib.patches import Polygon
 from PIL import Image
 
 from warpimpact import Campaign
@@ -51,20 +48,6 @@ def test_film_moves_the_core(folder: Path) -> None:
     assert dark[0] < dark[1] < dark[2]
 
 
-def test_frames_show_the_history(folder: Path) -> None:
-    history = xarray.load_dataset(folder / "a_hit1.nc")
-    made = trajectory.animation(history)
-    made._func(trajectory.FRAMES - 1)
-    made._draw_was_started = True  # matplotlib warns of a film that is never shown
-    (core,) = (patch for patch in made._fig.axes[0].patches if isinstance(patch, Polygon))
-    outline = np.asarray(core.get_xy()) * 1e-3
-    last = history.isel(time=-1)
-    nose = last["plate_position"] + float(history["station"].max()) * last["core_axis"]
-    assert outline[:, 0].max() == pytest.approx(float(nose[0]), abs=0.4e-3)
-    speed = float(history["residual_velocity"])
-    assert f"{speed:.0f} m/s" in made._fig.get_suptitle()
-
-
 def test_other_names_are_refused_before_computing(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
     command = ["replay", str(folder / "a.nc"), "--hit", "0", "--animation"]
     assert main([*command, "a.avi"]) == 2
@@ -72,9 +55,3 @@ def test_other_names_are_refused_before_computing(folder: Path, capsys: pytest.C
     assert main([*command, str(folder / "a.gif")]) == 2
     assert "a.gif: exists already" in capsys.readouterr().err
     assert not (folder / "a_hit0.nc").exists()
-
-
-def test_mp4_needs_ffmpeg(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(FFMpegWriter, "isAvailable", lambda: False)
-    with pytest.raises(files.OutputError, match=r"a\.mp4: an MP4 needs the program ffmpeg"):
-        trajectory.writer_for(Path("a.mp4"))

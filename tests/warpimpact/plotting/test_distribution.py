@@ -26,13 +26,6 @@ def test_intervals_hold_the_plane_as_often_as_they_say():
     assert np.sqrt(np.mean(local.spread**2)) == pytest.approx(3.0, rel=0.02)
 
 
-def test_hits_on_one_point_give_their_mean():
-    values = np.random.default_rng(3).normal(size=(1, NEIGHBOURS))
-    local = plane_fit(np.zeros((1, NEIGHBOURS, 2)), values)
-    assert local.value == pytest.approx(values.mean())
-    assert np.isfinite(local.half_width).all()
-
-
 def scattered(dataset):
     """Shots that arrive at different velocities."""
     velocity = dataset["impact_velocity"]
@@ -62,17 +55,6 @@ def test_uncertainty_shows_local_mean_and_interval_across_the_edges(make_result)
     assert np.median(half_width) == pytest.approx(2.08 * 2.0 / np.sqrt(NEIGHBOURS), rel=0.1)
 
 
-def test_uncertainty_is_grey_where_hits_have_no_value(make_result):
-    dataset = make_result(np.where(np.arange(512) % 4, Status.PERFORATED, Status.ARRESTED))
-    image = np.asarray(uncertainty(scattered(dataset), "tilt").axes[0].images[0].get_array())
-    assert 0.1 < np.isnan(image).mean() < 0.4
-
-
-def test_hits_that_leave_gaps_have_no_uncertainty(make_result):
-    with pytest.raises(ValueError, match="do not cover the cell"):
-        uncertainty(scattered(make_result(32)), "tilt")
-
-
 def test_probability_map_holds_the_share_at_every_place(make_result):
     dataset = make_result(4096)
     chance = 0.5 + 0.3 * np.sin(2.0 * np.pi * dataset["hit_y"].values / dataset.attrs["plate_period"][0])
@@ -92,25 +74,6 @@ def test_a_probability_of_shots_that_arrive_alike_is_not_smoothed(make_result):
     assert set(np.unique(image.get_array())) == {0.0, 1.0}
     certain = probability_map(make_result(512), "P(perforated)").axes[0].images[0]
     assert (certain.norm.vmin, certain.norm.vmax) == (0.0, 1.0)
-
-
-def test_a_share_among_the_measures_of_protection_has_a_map(make_result):
-    figure = probability_map(make_result(np.tile(MIXED, 128)), "P(stopped)")
-    passing = probability_map(make_result(np.tile(MIXED, 128)), "P(perforated)")
-    assert figure.axes[0].images[0].get_array().mean() > passing.axes[0].images[0].get_array().mean() > 0.0
-
-
-@pytest.mark.parametrize(
-    ("quantity", "complaint"),
-    [
-        ("mean(residual_velocity)", r"needs P\(…\)"),
-        ("P(bending_stress > 1 GPa)", "which needs the variable bending_stress"),
-        ("P(nonsense > 1)", "must be one of"),
-    ],
-)
-def test_probability_map_says_what_it_cannot_show(make_result, quantity: str, complaint: str):
-    with pytest.raises(ValueError, match=complaint):
-        probability_map(make_result(512), quantity)
 
 
 def test_marginals_are_the_quantiles_of_strips(make_result):
@@ -140,13 +103,6 @@ def test_uniform_results_have_marginals_and_dispersion(make_result, status):
         figure.draw_without_rendering()
 
 
-def test_a_dispersion_without_cores_says_so(make_result):
-    panels = dispersion(make_result([Status.ARRESTED] * 100)).axes
-    centre = panels[1]
-    assert not any(len(ticks) for axes in panels for ticks in (axes.get_xticks(), axes.get_yticks()))
-    assert [text.get_text() for text in centre.texts] == ["no core behind the plate"]
-
-
 @pytest.mark.parametrize("count", [400, 12000])
 def test_dispersion_shows_each_core_behind_the_plate(make_result, count):
     dataset = make_result(np.tile(MIXED, count // 4))
@@ -162,12 +118,3 @@ def test_dispersion_shows_each_core_behind_the_plate(make_result, count):
         expected = np.stack([behind["tilt"][:, 0], behind["residual_velocity"]], axis=-1)
         np.testing.assert_allclose(shown.get_offsets(), expected)
     assert sum(patch.get_height() for patch in above.patches) == count / 2
-
-
-def test_the_colours_of_a_density_are_labelled_with_plain_numbers(make_result):
-    figure = dispersion(make_result(6000))
-    figure.canvas.draw()
-    bar = figure.axes[-1]
-    labels = [label.get_text() for label in (*bar.get_xticklabels(), *bar.get_yticklabels())]
-    assert any(labels)
-    assert not any("$" in label for label in labels)

@@ -114,12 +114,6 @@ def test_flight_shows_the_core_at_the_standoffs(standoff_point: str) -> None:
         assert 0.5 * (outline[:, 0].min() + outline[:, 0].max()) == pytest.approx(middle, abs=3.0)
 
 
-def test_a_core_that_stays_in_the_plate_is_shown_on_impact_only() -> None:
-    history = history_of(resistance=1e11)
-    assert np.isnan(history["tilt"]).all()
-    assert [len(cores(trajectory.flight(history), view)) for view in (0, 1)] == [1, 1]
-
-
 def test_largest_load_is_drawn_at_its_instant(history: xarray.Dataset) -> None:
     figure = trajectory.largest_load(history)
     size = np.linalg.norm(history["force"], axis=1)
@@ -140,21 +134,6 @@ def test_largest_load_is_drawn_at_its_instant(history: xarray.Dataset) -> None:
         share = moment[across] / np.linalg.norm(moment)  # y points away from the reader of x-z: positive is clockwise
         assert angle[-1] - angle[0] == pytest.approx(300.0 * share * (1 if across == 2 else -1), abs=0.1)
         assert axes.texts[-1].get_text() == f"about {'xyz'[across]}: {moment[across]:.3g} N m".replace("-", "−")
-
-
-def test_course_shows_what_the_history_holds(history: xarray.Dataset) -> None:
-    panels = trajectory.course(history).axes
-    time = history["time"].values * 1e6
-    shown = {panel.get_ylabel(): [line.get_ydata() for line in panel.lines] for panel in panels}
-    np.testing.assert_allclose(panels[0].lines[0].get_xdata(), time)
-    np.testing.assert_allclose(np.transpose(shown["force [kN]"]), history["force"] / 1e3)
-    np.testing.assert_allclose(np.transpose(shown["moment [N m]"]), history["moment"])
-    np.testing.assert_allclose(np.transpose(shown["angular velocity [10³ rad/s]"]), history["angular_velocity"] / 1e3)
-    change = history["velocity"] - history["velocity"][0]
-    np.testing.assert_allclose(np.transpose(shown["change of velocity [m/s]"]), change)
-    np.testing.assert_allclose(shown["rotational energy [J]"][0], history["rotational_energy"])
-    yaw, _ = shown["angle of the axis [°]"]
-    assert yaw[0] == pytest.approx(np.degrees(np.arctan(np.tan(np.radians(17)) * np.cos(np.radians(40)))), abs=0.1)
 
 
 def test_plate_is_shown_at_every_snapshot_with_holes_left_out(history: xarray.Dataset) -> None:

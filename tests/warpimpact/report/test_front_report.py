@@ -3,12 +3,10 @@
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import pytest
 import xarray
 
 from warpimpact.cli import main
-from warpimpact.optimisation.front_view import front_view
 from warpimpact.results import files
 from warpimpact.results import front as f
 
@@ -36,11 +34,3 @@ def test_a_search_is_reported_alone(
         files.write(searched, tmp_path / name)
     assert main(["report", str(tmp_path / "a.nc"), str(tmp_path / "b.nc")]) == 2
     assert "one of which is a search for designs, which is reported alone" in capsys.readouterr().err
-
-
-def test_a_variable_that_counts_nowhere_on_the_front_is_no_column(searched: xarray.Dataset) -> None:
-    changed = searched.copy(deep=True)
-    changed[f.VALUE][changed[f.NUMBER].values, 0] = np.nan
-    heads = [front_view(dataset)[2].parts[0].heads for dataset in (searched, changed)]
-    assert heads[0][1].startswith(str(searched[f.NAME].values[0]))
-    assert heads[1] == [heads[0][0], *heads[0][2:]]

@@ -5,7 +5,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-import xarray
 
 from warpimpact.cli import main
 from warpimpact.firing.plan import read_test
@@ -30,9 +29,3 @@ def test_a_firing_test_is_inspected_and_reported(capsys: pytest.CaptureFixture[s
     assert "<meta name='viewport' content='width=device-width" in page  # a phone shows it at the width of its screen
     assert page.count("<img") == 1
     assert html.escape(V50_TEST.read_text(encoding="utf-8").splitlines()[0]) in page
-
-
-def test_a_posterior_without_draws_is_no_whole_file(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    xarray.Dataset(attrs={"warpimpact_kind": "posterior 1"}).to_netcdf(tmp_path / "fit.nc")
-    assert main(["inspect", str(tmp_path / "fit.nc")]) == 2
-    assert 'is no whole file of a posterior, it has no "hit_y"' in capsys.readouterr().err

@@ -23,12 +23,9 @@ from warpimpact.analysis.summary import range_note
 from warpimpact.campaign.campaign import CampaignError
 from warpimpact.cli import main
 from warpimpact.kernels.status import Status
-from warpimpact.plotting.trajectory import poses_behind, poses_in_plate, silhouette
 from warpimpact.report import hit_data, report
 from warpimpact.results import files
-from warpimpact.runs.replay import replay
 from warpimpact.runs.run import run
-from warpimpact.solver import replay as solver
 from warpimpact.view.view import html_of
 
 SLOTTED_PLATE = Path(__file__).parents[3] / "campaigns" / "slotted_plate.toml"
@@ -82,23 +79,6 @@ def test_page_holds_the_hits_of_each_result(folder: Path) -> None:
         assert np.ptp(y[0]) == pytest.approx(27.86 * np.cos(np.radians(tilt)), abs=3.0)
 
 
-def test_outlines_keep_the_shape_with_few_points(folder: Path) -> None:
-    history = replay(files.read(folder / "narrow.nc"), 3, folder=folder)
-    drawn = hit_data.trajectory_data(history)
-    for part, poses in (("inside", poses_in_plate(history)), ("behind", poses_behind(history))):
-        for core, pose in zip(drawn[part], poses.values(), strict=True):
-            for view in "yz":
-                whole, few = silhouette(history, pose, view) * 1e3, np.array(core[view]).T
-                assert len(few) < 150
-                np.testing.assert_allclose([few.min(0), few.max(0)], [whole.min(0), whole.max(0)], atol=0.02)
-                assert area(few) == pytest.approx(area(whole), rel=4e-3)
-
-
-def area(polygon: np.ndarray) -> float:
-    x, y = polygon.T
-    return abs(float(x @ np.roll(y, -1) - y @ np.roll(x, -1))) / 2
-
-
 def test_page_says_how_well_each_plate_protects(folder: Path) -> None:
     text = html.unescape(re.sub(r"<[^>]*>", " ", (folder / "a.html").read_text()))
     for name in ("narrow", "<b>wide"):
@@ -140,20 +120,6 @@ def test_page_says_what_was_compared_and_leads_to_its_parts(folder: Path) -> Non
     assert len(text) < 3e6
 
 
-def test_a_page_of_many_hits_is_small(make_result: ResultMaker, tmp_path: Path) -> None:
-    files.write(make_result(hit_data.MOST_HITS), tmp_path / "a.nc")
-    assert main(["report", str(tmp_path / "a.nc"), "--trajectories", "0"]) == 0
-    assert (tmp_path / "a.html").stat().st_size < 3e6
-
-
-def test_the_first_trajectory_is_the_one_that_tilts_most_and_only_statuses_that_occur_are_told(folder: Path) -> None:
-    page = data_of(folder / "a.html")
-    tilt = files.read(folder / "narrow.nc")["tilt"][:, -1]
-    shown = [int(hit) for hit in page["results"][0]["trajectories"]]
-    assert page["results"][0]["first"] == shown[int(np.argmax(tilt.values[shown]))]
-    assert [status["label"] for status in page["statuses"]] == ["perforated"]
-
-
 def test_page_loads_nothing_and_escapes_what_files_say(folder: Path) -> None:
     text = (folder / "a.html").read_text()
     library, script = scripts_of(text)
@@ -182,18 +148,6 @@ def test_large_results_are_thinned_evenly_and_it_is_said(
     assert counts.min() > 30  # 62.5 each
 
 
-def test_thinning_keeps_parts_of_no_sampling_out() -> None:
-    # Every fifth hit of a grid with rows of five lies on one line.
-    y, z = np.meshgrid(np.arange(5.0), np.arange(200.0))
-    grid = xarray.Dataset({"y": ("hit", y.ravel()), "z": ("hit", z.ravel())})
-    kept = hit_data.thinned(grid, 200)
-    assert kept.sizes["hit"] == 200
-    assert (kept["y"] == grid["y"][kept["hit"].values]).all()
-    assert np.bincount(kept["y"].astype(int)).min() > 20
-    assert hit_data.thinned(grid, 1000)["hit"].values.tolist() == list(range(1000))
-    assert {3, 999} <= set(hit_data.thinned(grid, 10, keep=[3, 999])["hit"].values.tolist())
-
-
 def test_trajectories_are_of_the_worst_and_of_evenly_spread_hits(make_result: ResultMaker) -> None:
     dataset = make_result(np.where(np.arange(512) % 2, Status.PERFORATED, Status.ARRESTED))
     chosen = hit_data.worst_and_spread(dataset, 16)
@@ -216,22 +170,6 @@ def test_hits_without_values_or_cover_are_reported(make_result: ResultMaker, tmp
     (shown,) = data_of(tmp_path / "a.html")["results"]
     assert shown["nearest"] is None
     assert (shown["columns"]["residual velocity"][0] is None) == (status == Status.ARRESTED)
-
-
-@pytest.mark.parametrize(
-    ("campaign", "sentence"),
-    [
-        ("x=" + "[" * 10**4 + "]" * 10**4, "nested too deep"),
-        ("null", "not valid TOML"),
-        ("layer = 5", ""),
-    ],
-)
-def test_a_damaged_campaign_is_told_at_once(
-    make_result: ResultMaker, tmp_path: Path, capsys: pytest.CaptureFixture[str], campaign: str, sentence: str
-) -> None:
-    files.write(make_result(8).assign_attrs(campaign=campaign), tmp_path / "a.nc")
-    assert main(["report", str(tmp_path / "a.nc"), "--trajectories", "0"]) == (2 if sentence else 0)
-    assert sentence in capsys.readouterr().err
 
 
 def test_what_is_missing_is_told_and_nothing_written(
@@ -320,17 +258,3 @@ def test_browser_changes_the_map_and_keeps_one_scale(browser: Any, folder: Path)
             assert scales[0][0] == -scales[0][1]
     assert "⊙ fire" in browser.text("#map-0 .annotation-text")
     assert browser.errors() == []
-
-
-def test_a_page_computes_each_trajectory_once(folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    def refused(*_: object) -> None:
-        raise AssertionError("what is left of the plate was computed")
-
-    marches = []
-    traced = solver.traced
-    monkeypatch.setattr(solver, "_left_after", refused)
-    monkeypatch.setattr(solver, "traced", lambda *given: marches.append(1) or traced(*given))
-    with files.opened(folder / "narrow.nc") as narrow:
-        report.write_report({"narrow": narrow}, tmp_path / "a.html", folders={"narrow": folder}, trajectories=5)
-    assert len(marches) == 5
-    assert len(data_of(tmp_path / "a.html")["results"][0]["trajectories"]) == 5
