@@ -39,7 +39,7 @@ def add_replay(commands: Commands) -> None:
 
 
 def _replay(arguments: argparse.Namespace) -> None:
-    from warpimpact.plotting.trajectory import FIGURES, layers, save_animation, save_figures, writer_for
+    from warpimpact.plotting.trajectory import FIGURES, save_animation, save_figures, writer_for
     from warpimpact.results import files
     from warpimpact.results.replayed_hit import hit_view
     from warpimpact.runs.replay import replay
@@ -49,7 +49,7 @@ def _replay(arguments: argparse.Namespace) -> None:
     output = arguments.output or path.with_name(f"{path.stem}_hit{arguments.hit}.nc")
     check_output(output, overwrite=arguments.overwrite)
     check_suffix(output, "a history", ".nc")
-    for figure in (*FIGURES, layers):
+    for figure in FIGURES:
         check_output(output.with_name(f"{output.stem}_{figure.__name__}.png"), overwrite=arguments.overwrite)
     if film:
         writer_for(film)

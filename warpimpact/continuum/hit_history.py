@@ -58,8 +58,7 @@ def replay_continuum(scene: Scene, shots: Shots, continuum: Continuum, snapshots
         outcomes=outcomes_of(memory, [struck]),
         history=history,
         plate_time=np.array([rows[row][0] for row, _ in shown]),
-        plate=Weakened(cell_y, cell_z, material, share.reshape(-1, *material.shape)),
-        behind={},
+        plate=Weakened(cell_y, cell_z, share.reshape(-1, *material.shape)),
         deformed=frames.deformed([frame for _, frame in shown]) if shown else None,
     )
 

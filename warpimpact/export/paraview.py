@@ -1,7 +1,7 @@
 """The history of a hit as VTK files for ParaView: the moving surface of the core, and the plate as it weakens.
 
 It needs PyVista (`pip install 'warpimpact[vtk]'`). The folder contains ``core.pvd`` and ``plate.pvd``, which list the
-other files with their times, and ``layer_1.pvd``, … of the layers behind the plate that weaken; of a hit by finite
+other files with their times; of a hit by finite
 elements, ``plate.pvd`` has the deformed elements of all layers. Lengths are in metres in the frame of the plate, times
 in seconds.
 """
@@ -18,7 +18,7 @@ import numpy as np
 import xarray
 from scipy.spatial.transform import Rotation
 
-from warpimpact.analysis.slabs import LayerField, fields_behind, plate_field, slabs
+from warpimpact.analysis.slabs import slabs
 from warpimpact.results import variables as v
 from warpimpact.results.files import OutputError
 
@@ -51,20 +51,12 @@ def write_vtk(history: xarray.Dataset, folder: Path) -> list[Path]:
             pieces = Path(aside) / "vtk"
             pieces.mkdir()
             _write_series(pieces, "core", "vtp", history[v.TIME].values, cores(history))
-            kind, meshes = (
-                ("vtu", deformed(history))
-                if v.NODE_POSITION in history
-                else ("vti", layers_of(history, plate_field(history)))
-            )
+            kind, meshes = ("vtu", deformed(history)) if v.NODE_POSITION in history else ("vti", plates(history))
             _write_series(pieces, "plate", kind, history[v.SNAPSHOT].values, meshes)
-            for field in fields_behind(history):
-                layers = layers_of(history, field)
-                _write_series(pieces, f"layer_{field.number}", "vti", history[v.SNAPSHOT].values, layers)
             pieces.rename(folder)
     except OSError as error:
         raise OutputError(f"{folder}: cannot be written ({error})") from error
-    behind = [folder / f"layer_{field.number}.pvd" for field in fields_behind(history)]
-    return [folder / "core.pvd", folder / "plate.pvd", *behind]
+    return [folder / "core.pvd", folder / "plate.pvd"]
 
 
 def cores(history: xarray.Dataset) -> Iterator[pyvista.PolyData]:
@@ -112,14 +104,14 @@ def deformed(history: xarray.Dataset) -> Iterator[pyvista.DataSet]:
         yield mesh
 
 
-def layers_of(history: xarray.Dataset, field: LayerField) -> Iterator[pyvista.ImageData]:
-    """A layer within reach of the core at every snapshot: a layer of cells with the share of the resistance left."""
+def plates(history: xarray.Dataset) -> Iterator[pyvista.ImageData]:
+    """The plate within reach of the core at every snapshot: cells with the share of the resistance left."""
     import pyvista
 
-    front, rear, _ = slabs(history, "y")[field.number]
-    y, z = field.cell_y, field.cell_z
+    front, rear, _ = slabs(history, "y")[0]
+    y, z = history[v.CELL_Y].values, history[v.CELL_Z].values
     dy, dz = y[1] - y[0], z[1] - z[0]
-    for share in field.share:
+    for share in history[v.RESISTANCE_SHARE].values:
         grid = pyvista.ImageData(
             dimensions=(2, len(y) + 1, len(z) + 1),
             spacing=(rear - front, dy, dz),

@@ -26,7 +26,7 @@ from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 from scipy.spatial import ConvexHull
 
-from warpimpact.analysis.slabs import LayerField, depth_of, fields_behind, plate_field, slabs
+from warpimpact.analysis.slabs import depth_of, slabs
 from warpimpact.analysis.surface import POINTS_AROUND, largest_in_plate, pressed
 from warpimpact.plotting.cell import struck, words
 from warpimpact.plotting.style import BLUE, GREY, VERMILION, inscribe_hit, legend_below
@@ -236,16 +236,17 @@ def plate(dataset: xarray.Dataset) -> Figure:
     Each cell of the plate is shown as a share of its initial resistance, which is less for a cell at the edge of a
     hole.
     """
-    field, times = plate_field(dataset), dataset[v.SNAPSHOT].values
+    times = dataset[v.SNAPSHOT].values
     columns = min(3, len(times))
     rows = -(-len(times) // columns)
-    along_y, along_z = weakened_ranges(field)
+    along_y, along_z = weakened_ranges(dataset)
     tall = np.ptp(along_z) / np.ptp(along_y)
     figure = Figure(figsize=(3.3 * columns + 1.2, (3.1 * tall + 0.5) * rows + 0.7), layout="constrained")
     inscribe_hit(figure, dataset, "resistance left in the plate, seen from behind")
     panels = figure.subplots(rows, columns, sharex=True, sharey=True, squeeze=False)
     for place, (panel, time) in enumerate(zip(panels.flat, times, strict=False)):
-        image = draw_left(panel, field, place)
+        image = _draw_share(panel, dataset, place)
+        panel.set(xlim=along_y, ylim=along_z)
         edge = [Stroke(linewidth=2.4, foreground="black"), Normal()]
         panel.plot(
             dataset[v.OUTLINE_Y].values * _MM,
@@ -301,7 +302,7 @@ FIGURES = (passage, flight, largest_load, pressure, course, plate)
 def save_figures(dataset: xarray.Dataset, folder: Path, stem: str) -> list[Path]:
     """Write the figures of a history as PNG files ``<stem>_<figure>.png`` and return their paths."""
     paths = []
-    for draw in (*FIGURES, layers) if v.LAYER_RESISTANCE_SHARE in dataset else FIGURES:
+    for draw in FIGURES:
         paths.append(folder / f"{stem}_{draw.__name__}.png")
         draw(dataset).savefig(paths[-1], dpi=150)
     return paths
@@ -409,40 +410,21 @@ def _line_of_fire(dataset: xarray.Dataset) -> np.ndarray:
     return np.array([np.cos(obliquity), np.sin(obliquity) * np.cos(azimuth), np.sin(obliquity) * np.sin(azimuth)])
 
 
-def layers(dataset: xarray.Dataset) -> Figure:
-    """Resistance left in every layer behind the plate that weakens, a row each, seen from behind.
-
-    Each cell shows the share of its initial resistance; holes are white.
-    """
-    fields, times = fields_behind(dataset), dataset[v.SNAPSHOT].values
-    figure = Figure(figsize=(2.5 * len(times) + 1.6, 2.9 * len(fields) + 0.9), layout="constrained")
-    inscribe_hit(figure, dataset, "resistance left in the layers, seen from behind")
-    panels = figure.subplots(len(fields), len(times), squeeze=False, sharex="row", sharey="row")
-    for row, layer in zip(panels, fields, strict=True):
-        for place, (axes, time) in enumerate(zip(row, times, strict=True)):
-            image = draw_left(axes, layer, place)
-            axes.set(title=f"{time * _US:.0f} µs", xlabel="y [mm]")
-        row[0].set_ylabel(f"layer {layer.number}, z [mm]")
-    figure.colorbar(image, ax=panels, label="share of the resistance left")
-    return figure
-
-
-def draw_left(axes: Axes, layer: LayerField, snapshot: int) -> AxesImage:
-    """Draw the share of its initial resistance that each cell has left, in the range that the core weakens."""
-    first, share = layer.share[0], layer.share[snapshot]
-    left = np.where(first >= 0.5, share / np.maximum(first, 0.5), np.nan)
-    extent = (*_edges(layer.cell_y), *_edges(layer.cell_z))
+def _draw_share(axes: Axes, dataset: xarray.Dataset, snapshot: int) -> AxesImage:
+    """Draw the share of its initial resistance that each cell of the plate has at a snapshot."""
+    share = dataset[v.RESISTANCE_SHARE].values
+    left = np.where(share[0] >= 0.5, share[snapshot] / np.maximum(share[0], 0.5), np.nan)
+    extent = (*_edges(dataset[v.CELL_Y].values), *_edges(dataset[v.CELL_Z].values))
     style: dict[str, Any] = {"cmap": "viridis", "vmin": 0.0, "vmax": 1.0, "interpolation": "nearest"}
-    image = axes.imshow(left.T, origin="lower", extent=extent, **style)
-    y, z = weakened_ranges(layer)
-    axes.set(xlim=y, ylim=z)
-    return image
+    return axes.imshow(left.T, origin="lower", extent=extent, **style)
 
 
-def weakened_ranges(layer: LayerField) -> list[tuple[float, float]]:
+def weakened_ranges(dataset: xarray.Dataset) -> list[tuple[float, float]]:
     """Ranges along y and z [mm] that the core weakened, with a margin; the whole window if it weakened nothing."""
-    weaker, ranges = layer.share[-1] < layer.share[0], []
-    for axis, cells in enumerate((layer.cell_y, layer.cell_z)):
+    share, ranges = dataset[v.RESISTANCE_SHARE].values, []
+    weaker = share[-1] < share[0]
+    for axis, name in enumerate((v.CELL_Y, v.CELL_Z)):
+        cells = dataset[name].values
         low, high = _edges(cells)
         there = cells[weaker.any(axis=1 - axis)] * _MM
         inside = (max(low, there.min() - _ROOM_ABOUT), min(high, there.max() + _ROOM_ABOUT)) if there.size else None

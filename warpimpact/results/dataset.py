@@ -16,7 +16,7 @@ from warpimpact.records.group import failures
 from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
 from warpimpact.results.kinds import HISTORY, HIT_MAP
-from warpimpact.results.layers import faces, fields, labels, own_columns, sections
+from warpimpact.results.layers import faces, labels, own_columns, sections
 from warpimpact.results.outlines import in_memory, outlines_in
 from warpimpact.results.table import HitTable
 
@@ -191,8 +191,7 @@ def history_dataset(
         v.SOLID_ALONG_Y: plate.is_solid(hit_y + section, np.array(hit_z)).astype(np.int8),
         v.SOLID_ALONG_Z: plate.is_solid(np.array(hit_y), hit_z + section).astype(np.int8),
     }
-    behind = fields(scene, replay.behind)
-    values |= sections(scene, hit, section) | behind
+    values |= sections(scene, hit, section)
     values |= outlines_in(plate, *((float(column.min()), float(column.max())) for column in replay.plate[:2]))
     coordinates: dict[str, Any] = {
         v.TIME: history.time,
@@ -210,7 +209,6 @@ def history_dataset(
     )
     thickness = float(hit.get(v.THICKNESS, plate.thickness))
     layered = (*v.LAYER_FACES, *v.LAYER_SECTIONS) if len(scene.target.layers) > 1 else ()
-    layered = (*layered, *(name for name in v.LAYER_FIELDS if name in behind))
     return dataset.assign(stored_columns((*v.HISTORY_VARIABLES, *v.OUTLINE_VARIABLES, *layered), values)).assign_attrs(
         attr.with_units(dict(attributes) | {attr.KIND: HISTORY.mark, attr.PLATE_THICKNESS: thickness})
     )

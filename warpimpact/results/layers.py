@@ -14,7 +14,6 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from warpimpact.scene import Scene, Shots, Target
-    from warpimpact.solver.replay import Weakened
 
 
 def own_columns(target: Target, shots: Shots) -> dict[str, NDArray[Any]]:
@@ -70,19 +69,3 @@ def sections(scene: Scene, hit: xarray.Dataset, section: NDArray[np.float64]) ->
         v.LAYER_SOLID_ALONG_Y: np.array(along_y).astype(np.int8),
         v.LAYER_SOLID_ALONG_Z: np.array(along_z).astype(np.int8),
     }
-
-
-def fields(scene: Scene, behind: dict[int, Weakened]) -> dict[str, NDArray[Any]]:
-    """Resistance left in the layers behind the plate in a replayed hit, by LAYER_FIELDS; empty if no layer that weakens
-    is reached. Smaller windows are filled up with NaN."""
-    if not behind:
-        return {}
-    snapshots = len(next(iter(behind.values())).share)
-    rows = max(len(layer.cell_y) for layer in behind.values())
-    columns, layers = max(len(layer.cell_z) for layer in behind.values()), len(scene.target.layers)
-    cell_y, cell_z = np.full((layers, rows), np.nan), np.full((layers, columns), np.nan)
-    share = np.full((snapshots, layers, rows, columns), np.nan)
-    for number, layer in behind.items():
-        y, z = len(layer.cell_y), len(layer.cell_z)
-        cell_y[number, :y], cell_z[number, :z], share[:, number, :y, :z] = layer.cell_y, layer.cell_z, layer.share
-    return {v.LAYER_CELL_Y: cell_y, v.LAYER_CELL_Z: cell_z, v.LAYER_RESISTANCE_SHARE: share}

@@ -132,17 +132,6 @@ LAYER_SOLID_ALONG_Z = Variable(
     "layer_solid_along_z", ("layer", "section"), "1", "1 where the layer is solid along z through the hit point, else 0"
 )
 
-_IN_WINDOW = ("snapshot", "layer", "layer_row", "layer_column")
-LAYER_CELL_Y = Variable("layer_cell_y", ("layer", "layer_row"), "m", "cell of the layer, y")
-LAYER_CELL_Z = Variable("layer_cell_z", ("layer", "layer_column"), "m", "cell of the layer, z")
-LAYER_RESISTANCE_SHARE = Variable(
-    "layer_resistance_share", _IN_WINDOW, "1", "share of the resistance left in the layer; 0 in holes"
-)
-
-LAYER_FIELDS = (LAYER_CELL_Y, LAYER_CELL_Z, LAYER_RESISTANCE_SHARE)
-"""Present only if the core reached a layer behind the plate that weakens. They have no value in a layer that does not
-weaken, and beyond the windows that are smaller than the largest. Layer 0 has its own variables."""
-
 LAYER_SECTIONS = (LAYER_SOLID_ALONG_Y, LAYER_SOLID_ALONG_Z)
 """Present only with layers behind the plate, as LAYER_FACES, which here are those of the hit."""
 

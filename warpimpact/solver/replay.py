@@ -96,18 +96,16 @@ class History:
 
 
 class Weakened(NamedTuple):
-    """Resistance left of a layer in the window where a core reached it.
+    """Resistance left of the plate in the window about the hit.
 
     Attributes:
         cell_y, cell_z: centres of the cells in the plane of the plate [m], shapes [cells_y] and [cells_z].
-        material: share of material in each cell, shape [cells_y, cells_z].
-        share: remaining share of the resistance Y, mean through the thickness, 0 in holes; of this shape, or of shape
+        share: remaining share of the resistance Y, mean through the thickness, 0 in holes; shape
             [snapshots, cells_y, cells_z].
     """
 
     cell_y: Array
     cell_z: Array
-    material: Array
     share: Array
 
 
@@ -136,7 +134,6 @@ class Replay:
         history: state of the core at every step, and at the end.
         plate_time: instants at which the plate is shown [s], shape [snapshots]; 0 is the first touch.
         plate: the plate at these instants.
-        behind: every layer behind the plate that weakens and is reached, by its number.
         deformed: the layers of a hit by finite elements.
     """
 
@@ -144,7 +141,6 @@ class Replay:
     history: History
     plate_time: Array
     plate: Weakened
-    behind: dict[int, Weakened]
     deformed: Deformed | None = None
 
 
@@ -162,7 +158,7 @@ def replay(scene: Scene, shots: Shots, *, numerics: Numerics, snapshots: int = 6
         shots: the shot alone.
         numerics: the resolution with which `simulate` computed it.
         snapshots: number of instants at which the plate is shown, evenly from the first touch to the end. For each of
-            them the shot is computed again up to there; 0 computes no field of any layer.
+            them the shot is computed again up to there; 0 computes no field.
 
     Raises:
         MemoryError: history and snapshots do not fit; the message is for the user.
@@ -174,40 +170,23 @@ def replay(scene: Scene, shots: Shots, *, numerics: Numerics, snapshots: int = 6
     steps = np.unique(np.linspace(0, len(trace) - 1, snapshots).round().astype(int))
     home, spacing = _hit(memory.prepared), memory.prepared.grid.spacing
     cell_y, cell_z = nodes_about(home, march.cells, spacing)
-    empty = Weakened(cell_y, cell_z, np.empty((0, 0)), np.empty((0, len(cell_y), len(cell_z))))
     own = {
         name: float(memory.prepared.conditions[name][-1]) for name in ("mass", "inertia_axial", "inertia_transverse")
     }
-    layers, history = {0: empty}, History.from_trace(trace, scene.core.mass_properties._replace(**own))
+    history = History.from_trace(trace, scene.core.mass_properties._replace(**own))
+    share = np.empty((0, len(cell_y), len(cell_z)))
     if len(steps):
         material = material_about(scene.target.layers[0], cell_y, cell_z, spacing)
         scratch = memory.scratch(1, march.cells)
         if memory.variant.layered and memory.variant.degrades:  # the window of a layer opens with a step
             scratch.fields.exposure.zero_()
-        plate = Weakened(cell_y, cell_z, material, material)
-        left = [_left_after(memory, march.cells, scratch, count, time_step, plate) for count in steps]
-        layers = {number: _over_time(number, left) for number in left[-1]}
+        share = np.stack([_share_after(memory, march.cells, scratch, count, time_step, material) for count in steps])
     return Replay(
         outcomes=outcomes,
         history=history,
         plate_time=history.time[steps] - 0.5 * history.step[steps] if memory.variant.layered else steps * time_step,
-        plate=layers.pop(0),
-        behind=layers,
+        plate=Weakened(cell_y, cell_z, share),
     )
-
-
-def _over_time(number: int, left: list[dict[int, Weakened]]) -> Weakened:
-    """A layer at all snapshots, in its last window. Where the window was elsewhere, the layer was still intact."""
-    last = left[-1][number]
-
-    def share(layer: Weakened | None) -> Array:
-        if layer is None or not (
-            np.array_equal(layer.cell_y, last.cell_y) and np.array_equal(layer.cell_z, last.cell_z)
-        ):
-            return last.material
-        return layer.share
-
-    return last._replace(share=np.stack([share(layer.get(number)) for layer in left]))
 
 
 def traced(scene: Scene, shots: Shots, numerics: Numerics, snapshots: int = 0) -> tuple[Marching, Any]:
@@ -222,7 +201,7 @@ def traced(scene: Scene, shots: Shots, numerics: Numerics, snapshots: int = 0) -
     device = find_device("cpu")
     first = Marching(Memory(prepared, device))
     steps = int(first.march().steps.numpy().max())
-    cells = sum(math.prod(window) for window in first.memory.prepared.windows(first.cells))
+    cells = math.prod(first.cells)
     of_a_cell = 8 * (SNAPSHOT_COPIES * snapshots + OTHER_COPIES) if snapshots else 0
     needed = HISTORY_BYTES * len(shots) * steps + of_a_cell * cells + first.memory.slot_bytes(first.cells)
     if needed > (free := free_memory()):
@@ -253,50 +232,23 @@ def _hit(prepared: Prepared) -> tuple[float, float]:
     return float(prepared.shots.hit_y[-1]), float(prepared.shots.hit_z[-1])
 
 
-def _left_after(
-    memory: Memory, cells: Cells, scratch: Any, steps: int, time_step: float, plate: Weakened
-) -> dict[int, Weakened]:
-    """What is left of the layers, by number, after some steps of the shot on the CPU.
+def _share_after(memory: Memory, cells: Cells, scratch: Any, steps: int, time_step: float, material: Array) -> Array:
+    """Share of the plate's resistance after some steps of the shot on the CPU.
 
     Args:
         cells: of the plate's window.
         scratch: of one slot.
-        plate: the plate in this window, intact.
+        material: share of material in each cell.
     """
-    prepared, variant, outcomes = memory.prepared, memory.variant, memory.outcomes()
+    prepared, outcomes, fields = memory.prepared, memory.outcomes(), scratch.fields
     memory.give_up_after((steps - 0.5) * time_step * prepared.shots.velocity[-1])
     apart(memory.launch, memory.put(np.arange(1), wp.int32), outcomes, scratch, 1, 0, 1)
-    if variant.nodal:
-        return {0: plate._replace(share=np.array(scratch.fields.share.numpy().reshape(cells), dtype=np.float64))}
-    behind = _behind(memory, scratch, cells) if variant.layered and variant.degrades else {}
-    return {0: plate._replace(share=plate.material * _share_left(memory, 0, scratch.fields, cells))} | behind
-
-
-def _behind(memory: Memory, scratch: Any, plate: Cells) -> dict[int, Weakened]:
-    """The layers behind the plate that the last shot reached and that weaken, after a march of one slot with its
-    scratch, in which the plate's window has these cells."""
-    prepared, hit = memory.prepared, _hit(memory.prepared)
-    is_open, homes = scratch.stack.open.numpy(), scratch.stack.home.numpy()
-    layers = {}
-    for k, (cells, material) in enumerate(zip(memory.prepared.windows(plate), prepared.materials, strict=True)):
-        if k > 0 and cells != (0, 0) and is_open[k]:
-            spacing, place = prepared.grids[k].spacing, (float(homes[k][1]), float(homes[k][2]))
-            y, z = nodes_about((hit[0] + place[0], hit[1] + place[1]), cells, spacing)
-            offset = float(material.offset_y[-1]), float(material.offset_z[-1])
-            solid = material_about(prepared.scene.target.layers[k], y - offset[0], z - offset[1], spacing)
-            layers[k] = Weakened(y, z, solid, solid * _share_left(memory, k, scratch.fields, plate))
-    return layers
-
-
-def _share_left(memory: Memory, layer: int, fields: Any, plate: Cells) -> Array:
-    """Share of a layer's resistance that the last shot leaves in its window, by the fields of one slot and the cells of
-    the plate's window."""
-    material, cells = memory.prepared.materials[layer], memory.prepared.windows(plate)[layer]
-    if not material.weakens:
-        return np.ones(cells)
-    first = memory.firsts(plate)[layer]
-    exposure = fields.exposure.numpy()[first : first + math.prod(cells)].reshape(cells).astype(np.float64)
-    return np.asarray(np.exp(material.decay_rate[-1] * exposure))
+    if memory.variant.nodal:
+        return np.array(fields.share.numpy().reshape(cells), dtype=np.float64)
+    if not prepared.materials[0].weakens:
+        return material
+    exposure = fields.exposure.numpy()[: math.prod(cells)].reshape(cells).astype(np.float64)
+    return np.asarray(material * np.exp(prepared.materials[0].decay_rate[-1] * exposure))
 
 
 def nodes_about(home: tuple[float, float], cells: Sequence[int], spacing: float) -> tuple[Array, Array]:
