@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 from functools import lru_cache
+from threading import Lock
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.stats import qmc
 
 from .distributions import EDGE
 from .exclusions import IRREDUCIBLE, check_together
@@ -14,12 +16,16 @@ from .plate import Plate
 from .quantities import drawn_column, drawn_columns
 from .scatter import Scatter
 from .shots import Hits, Impact, Shots
-from .sobol import Sobol
 from .symmetry import irreducible_part, symmetries_used, unsymmetric
 
 _HIT_COLUMNS, _ROWS = 2, 2**20
 """Columns of uniform numbers for y and z of the hit, before those of the quantities; column that chooses the rows of
 `Hits.file`."""
+_TOGETHER, _SINGLE = 13, 7
+"""Dimensions that are scrambled together, the hit and the first eleven quantities that scatter; part of the key of a
+further one."""
+_BITS = 30
+"""Binary digits of a Sobol coordinate."""
 
 
 class Sampler:
@@ -45,8 +51,8 @@ class Sampler:
         self._middle = 0.5 * self.cell[0] * (high_y + low_y), 0.5 * self.cell[1] * (high_z + low_z)
         scatter = scatter or Scatter()
         self._scatter = scatter.given
-        dimensions = _HIT_COLUMNS + (drawn_columns(scatter.layers) if self._scatter else 0)
-        self._sobol = [_sequence(dimensions, hits.seed, replicate) for replicate in range(replicates)]
+        self._dimensions = _HIT_COLUMNS + (drawn_columns(scatter.layers) if self._scatter else 0)
+        self._replicates = replicates
 
     def __len__(self) -> int:
         return self._hits.total(self._extent)
@@ -73,8 +79,7 @@ class Sampler:
     def _uniform(self, columns: list[int], first: int, count: int) -> list[Array]:
         """Uniform numbers in [0, 1) of these columns, shape [count] each."""
         if self._hits.sampling == "sobol":
-            points = self._net(first, count)
-            return [points[:, column] for column in columns]
+            return list(self._net(columns, first, count))
         hits = self._grid(first, count) if self._hits.sampling == "grid" else _pairs(self._hits.seed, first, count)
         return [*hits, *(stream(self._hits.seed, (column,), first, count) for column in columns[_HIT_COLUMNS:])]
 
@@ -84,14 +89,17 @@ class Sampler:
         cell = np.arange(first, first + count) % (along_y * along_z)
         return (cell // along_z + 0.5) / along_y, (cell % along_z + 0.5) / along_z
 
-    def _net(self, first: int, count: int) -> Array:
-        """Sobol points, shape [count, dimensions]; the replicates give one point in turn."""
-        replicates, last = len(self._sobol), first + count
-        points = np.empty((count, self._sobol[0].dimensions))
-        for offset, sobol in enumerate(self._sobol):
+    def _net(self, columns: list[int], first: int, count: int) -> Array:
+        """Sobol coordinates, shape [columns, count]; the replicates give one point in turn."""
+        replicates, last = self._replicates, first + count
+        points = np.empty((len(columns), count))
+        for offset in range(replicates):
             start, stop = (-((offset - end) // replicates) for end in (first, last))  # points of this replicate
             if stop > start:
-                points[start * replicates + offset - first :: replicates] = sobol.points(start, stop - start)
+                sobol = _sequence(self._dimensions, self._hits.seed, offset)
+                points[:, start * replicates + offset - first :: replicates] = sobol.points(
+                    columns, start, stop - start
+                )
         return points
 
 
@@ -105,13 +113,54 @@ def make_shots(impact: Impact, hits: Hits, plate: Plate, scatter: Scatter | None
 
 
 @lru_cache(maxsize=128)
-def _sequence(dimensions: int, seed: int, replicate: int) -> Sobol:
+def _sequence(dimensions: int, seed: int, replicate: int) -> _Sobol:
     """A scrambled sequence; it is cached because its scrambling takes as long as a hundred hits of a small plate."""
-    return Sobol(dimensions, _seed(seed, replicate))
+    return _Sobol(dimensions, seed, (replicate,) if replicate else ())
 
 
-def _seed(seed: int, replicate: int) -> np.random.SeedSequence:
-    return np.random.SeedSequence(seed, spawn_key=(replicate,) if replicate else ())
+class _Sobol:
+    """A scrambled Sobol sequence; its points can be read in any order.
+
+    SciPy scrambles the first dimensions together. Each further one is scrambled alone, so that another one changes no
+    earlier dimension.
+    """
+
+    def __init__(self, dimensions: int, seed: int, key: tuple[int, ...]) -> None:
+        self._seed, self._key, self._lock = seed, key, Lock()
+        self._scrambled = qmc.Sobol(min(dimensions, _TOGETHER), rng=self._draws())
+        self._plain = qmc.Sobol(dimensions, scramble=False)
+
+    def points(self, columns: list[int], first: int, count: int) -> Array:
+        """Coordinates of points from number `first` on, shape [columns, count]."""
+        further = [column for column in columns if column >= _TOGETHER]
+        with self._lock:
+            points = dict(enumerate(_read(self._scrambled, first, count).T))
+            plain = _read(self._plain, first, count) if further else np.empty(0)
+        points |= {column: self._alone(plain[:, column], column) for column in further}
+        return np.array([points[column] for column in columns])
+
+    def _alone(self, points: Array, column: int) -> Array:
+        """A coordinate scrambled by J. Matoušek's linear matrix and a digital shift."""
+        draws, weights = self._draws(_SINGLE, column), 1 << np.arange(_BITS, dtype=np.uint32)[::-1]
+        shift = draws.integers(2, size=_BITS, dtype=np.uint32) @ weights[::-1]
+        matrix = np.tril(draws.integers(2, size=(_BITS, _BITS), dtype=np.uint32))
+        np.fill_diagonal(matrix, 1)
+        number = np.ldexp(points, _BITS).astype(np.uint32)
+        odd = np.bitwise_count(number[:, None] & (matrix @ weights)) & 1
+        return np.ldexp((odd @ weights) ^ shift, -_BITS)
+
+    def _draws(self, *key: int) -> np.random.Generator:
+        return np.random.default_rng(np.random.SeedSequence(self._seed, spawn_key=(*self._key, *key)))
+
+
+def _read(sequence: qmc.Sobol, first: int, count: int) -> Array:
+    """Points from number `first` on, shape [count, dimensions], fastest where the last reading ended."""
+    if first < sequence.num_generated:
+        sequence.reset()
+    if first > sequence.num_generated:
+        sequence.fast_forward(first - sequence.num_generated)
+    # A first reading of a single point: SciPy warns if the first one is no power of two.
+    return np.concatenate([sequence.random(1), sequence.random(count - 1)])
 
 
 def _pairs(seed: int, first: int, count: int) -> tuple[Array, Array]:

@@ -96,6 +96,15 @@ def test_what_else_scatters_changes_no_draw() -> None:
     for sampling in ("sobol", "random"):
         alone = sampler(sampling, 64, scatter=Scatter(velocity=SCATTER.velocity)).shots(0, 64)
         assert np.array_equal(alone.velocity, sampler(sampling, 64).shots(0, 64).velocity)
+    one = {"distribution": "uniform", "low": 1e9, "high": 2e9}
+    strength, both = (
+        Scatter(strength=one),
+        Scatter(strength=one, thickness=[None, {**one, "low": 0.001, "high": 0.002}]),
+    )
+    shots = sampler("sobol", 1024, scatter=both).shots(0, 1024)
+    assert np.array_equal(shots.strength, sampler("sobol", 1024, scatter=strength).shots(0, 1024).strength)
+    ranks = np.floor(1024 * (shots.columns["strength"] - 1e9) / 1e9)
+    assert np.array_equal(np.sort(ranks), np.arange(1024))  # one point in each of 1024 intervals
 
 
 def test_far_shots_cost_what_near_ones_do() -> None:
