@@ -7,7 +7,7 @@ from typing import Annotated, Literal, Self
 
 import numpy as np
 from pydantic import Field, model_validator
-from scipy.special import ndtri
+from scipy import stats
 
 from .model import Array, Model
 
@@ -65,7 +65,7 @@ class Normal(Distribution):
     std: _Positive
 
     def quantile(self, share: Array) -> Array:
-        return np.asarray(self.std * ndtri(share) + self.mean)
+        return np.asarray(stats.norm.ppf(share, self.mean, self.std))
 
 
 class TruncatedNormal(_Bounded):
@@ -81,10 +81,8 @@ class TruncatedNormal(_Bounded):
     std: _Positive
 
     def quantile(self, share: Array) -> Array:
-        from scipy import stats
-
         ends = ((end - self.mean) / self.std for end in (self.low, self.high))
-        values = stats.truncnorm(*ends, loc=self.mean, scale=self.std).ppf(share)
+        values = stats.truncnorm.ppf(share, *ends, self.mean, self.std)
         return np.asarray(np.clip(values, self.low, self.high))  # rounding may exceed the ends
 
 
@@ -94,7 +92,7 @@ class Uniform(_Bounded):
     distribution: Literal["uniform"] = "uniform"
 
     def quantile(self, share: Array) -> Array:
-        return share * (self.high - self.low) + self.low
+        return np.asarray(stats.uniform.ppf(share, self.low, self.high - self.low))
 
 
 class Triangular(_Bounded):
@@ -115,9 +113,7 @@ class Triangular(_Bounded):
 
     def quantile(self, share: Array) -> Array:
         width = self.high - self.low
-        peak = (self.mode - self.low) / width
-        rising, falling = np.sqrt(peak * share), 1.0 - np.sqrt((1.0 - peak) * (1.0 - share))
-        return np.where(share < peak, rising, falling) * width + self.low
+        return np.asarray(stats.triang.ppf(share, (self.mode - self.low) / width, self.low, width))
 
 
 class Lognormal(Distribution):
@@ -133,7 +129,7 @@ class Lognormal(Distribution):
     sigma: _Positive
 
     def quantile(self, share: Array) -> Array:
-        return np.asarray(np.exp(self.sigma * ndtri(share)) * self.median)
+        return np.asarray(stats.lognorm.ppf(share, self.sigma, scale=self.median))
 
 
 class Weibull(Distribution):
