@@ -147,7 +147,7 @@ class _Sobol:
         np.fill_diagonal(matrix, 1)
         number = np.ldexp(points, _BITS).astype(np.uint32)
         odd = np.bitwise_count(number[:, None] & (matrix @ weights)) & 1
-        return np.ldexp((odd @ weights) ^ shift, -_BITS)
+        return np.asarray(np.ldexp((odd @ weights) ^ shift, -_BITS))
 
     def _draws(self, *key: int) -> np.random.Generator:
         return np.random.default_rng(np.random.SeedSequence(self._seed, spawn_key=(*self._key, *key)))
