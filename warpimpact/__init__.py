@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from . import plotting
-    from .analysis.comparison import Comparison, compare
+    from .analysis.comparison import compare
+    from .analysis.comparison_text import Comparison
     from .analysis.hit_map import hit_map
     from .analysis.inspection import Inspection, inspect
     from .campaign.campaign import Campaign, Output
@@ -131,7 +132,7 @@ _HOMES = {
     "Campaign": ".campaign.campaign",
     "CampaignError": ".campaign.text",
     "ClusterError": ".runs.executor",
-    "Comparison": ".analysis.comparison",
+    "Comparison": ".analysis.comparison_text",
     "Continuum": ".scene.flow",
     "DeviceError": ".solver.device",
     "Flow": ".scene.flow",

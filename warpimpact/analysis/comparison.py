@@ -24,9 +24,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import xarray
 
-from warpimpact.analysis.comparison_short import short_view
-from warpimpact.analysis.comparison_text import ComparedPlates, comparison_view
-from warpimpact.analysis.contestants import Contestant, Difference, Pair
+from warpimpact.analysis.comparison_text import Comparison, Difference, Pair, PlateScore
 from warpimpact.analysis.effectiveness import Score, Scored, depth_note, measures_of, scores
 from warpimpact.analysis.numbers import of_each
 from warpimpact.analysis.plate_text import common_name, plate_text, reference_name, solid_note, solid_plate, weights_of
@@ -49,23 +47,12 @@ from warpimpact.statistics.comparisons import (
     ratio_numbers,
 )
 from warpimpact.statistics.intervals import Array, Estimate, Estimating, estimate_of
-from warpimpact.view.view import html_of
 
 _SAME_PLACE = 1e-9
 """Rounding of a place in units of the cell."""
 _ANGLES = ("obliquity", "azimuth", "pitch", "yaw")
 _SAME_WEIGHT = 1.01
 """Largest ratio of the areal densities of plates that count as equally heavy."""
-
-
-class Comparison(ComparedPlates):
-    """Plates side by side, by their measures, with the differences that the hits show. A notebook shows the short
-    answer, and every measure behind it."""
-
-    def _repr_html_(self) -> str:
-        """HTML for a notebook."""
-        every = html_of(comparison_view(self))
-        return f"{html_of([short_view(self)])}<details><summary>Every measure</summary>{every}</details>"
 
 
 def compare(
@@ -118,7 +105,7 @@ def compare(
             interval = _apart(sides, both, of_each_pair, by_ratio=is_ratio, paired=paired)
             differences.append(Difference(measure.text, names[i], names[j], *interval))
     plates = tuple(
-        Contestant(
+        PlateScore(
             name,
             dataset.sizes["hit"],
             dataset.attrs[attr.AREAL_DENSITY],
@@ -170,7 +157,7 @@ def _depths_are_bounds(datasets: Sequence[xarray.Dataset], measures: Sequence[Se
     return max(thicknesses) > _SAME_WEIGHT * min(thicknesses) and any(map(depth_note, measures))
 
 
-def _notes_of_bases(datasets: Sequence[xarray.Dataset], plates: Sequence[Contestant]) -> Iterator[str]:
+def _notes_of_bases(datasets: Sequence[xarray.Dataset], plates: Sequence[PlateScore]) -> Iterator[str]:
     """Notes on the bases behind the plates."""
     based = [has_base(dataset) for dataset in datasets]
     if any(based) and not all(based) and attr.LIMIT not in datasets[0].attrs:

@@ -25,7 +25,7 @@ from .sensitivity import show_rows
 if TYPE_CHECKING:
     from xarray import Dataset
 
-    from warpimpact.analysis.comparison import Comparison
+    from warpimpact.analysis.comparison_text import Comparison
 
 
 def add_compare(commands: Commands) -> None:
@@ -74,8 +74,7 @@ def add_compare(commands: Commands) -> None:
 
 def _compare(arguments: argparse.Namespace) -> int:
     from warpimpact.analysis.comparison import compare
-    from warpimpact.analysis.comparison_short import short_view
-    from warpimpact.analysis.comparison_text import comparison_view
+    from warpimpact.analysis.comparison_text import comparison_view, short_view
     from warpimpact.analysis.shot_by_shot import shared_hits
     from warpimpact.analysis.summary import range_note
     from warpimpact.plotting import comparison_figure, weight_figure
@@ -127,7 +126,7 @@ def _compare(arguments: argparse.Namespace) -> int:
 
 def _sensitivity(arguments: argparse.Namespace, comparison: "Comparison") -> str:
     """The deciding measure of the plates with each change, and which changes turn their order over."""
-    from warpimpact.analysis.comparison_short import deciding
+    from warpimpact.analysis.comparison_text import deciding
     from warpimpact.campaign.plates import read_plates
     from warpimpact.results.files import ResultError
     from warpimpact.studies.sensitivity import plate_sensitivity, reversals

@@ -12,10 +12,15 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.layout_engine import ConstrainedLayoutEngine
 
-from warpimpact.analysis.comparison import Comparison
-from warpimpact.analysis.comparison_short import deciding, from_best
-from warpimpact.analysis.comparison_text import hits_used, is_ranked
-from warpimpact.analysis.contestants import Contestant, Difference
+from warpimpact.analysis.comparison_text import (
+    Comparison,
+    Difference,
+    PlateScore,
+    deciding,
+    from_best,
+    hits_used,
+    is_ranked,
+)
 from warpimpact.analysis.effectiveness import Score, depth_note
 from warpimpact.analysis.plate_text import weights_text
 from warpimpact.plotting.style import BLUE, GREY, VERMILION, add_heading, bars, hide_sides, legend_below
@@ -115,7 +120,7 @@ def _draw_differences(
         if pair.measure in names:
             line = lines.setdefault((pair.one, pair.other), len(lines))
             _, marker, colour, offset = _STYLES[names[pair.measure].measure.kind]
-            hollow = not pair.told_apart
+            hollow = not pair.is_significant
             _draw_interval(axes, line + offset, pair, (marker, colour), hollow=hollow)
     if not lines:
         axes.set_axis_off()
@@ -198,7 +203,7 @@ def _solid_plates(comparison: Comparison) -> list[str]:
 def _draw_against_weight(axes: Axes, comparison: Comparison, name: str) -> None:
     """One effect of every target, over its areal density."""
     middle = _middle([plate.areal_density for plate in comparison.plates])
-    places: dict[tuple[str, str], list[tuple[Contestant, float]]] = {}  # plates that a figure shows at one place
+    places: dict[tuple[str, str], list[tuple[PlateScore, float]]] = {}  # plates that a figure shows at one place
     for plate in comparison.plates:
         scores = _scores(plate, name)
         for kind, score in scores.items():
@@ -232,13 +237,13 @@ def _draw_needed(axes: Axes, comparison: Comparison, name: str) -> None:
     _furnish_weight(axes, _first(comparison.plates[0], name), "areal density that the target needs [kg/m²]")
 
 
-def _scores(plate: Contestant, name: str) -> dict[str, Score]:
+def _scores(plate: PlateScore, name: str) -> dict[str, Score]:
     """The scores of a plate in a quantity, by the kinds of measures that have a style."""
     scores = {score.measure.kind: score for score in plate.measures if score.measure.name == name}
     return {kind: scores[kind] for kind in _WEIGHED if kind in scores}
 
 
-def _first(plate: Contestant, name: str) -> Score:
+def _first(plate: PlateScore, name: str) -> Score:
     """The mean, or the share."""
     return next(iter(_scores(plate, name).values()))
 

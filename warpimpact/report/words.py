@@ -11,8 +11,7 @@ from jinja2 import ChoiceLoader, Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup
 
 from warpimpact.analysis.comparison import compare
-from warpimpact.analysis.comparison_short import short_view, verdict_of
-from warpimpact.analysis.comparison_text import comparison_view
+from warpimpact.analysis.comparison_text import comparison_view, short_view, verdict_of
 from warpimpact.analysis.effectiveness import depth_note, effectiveness, measures_table
 from warpimpact.analysis.estimates import estimated, means_of, slices, status_shares
 from warpimpact.analysis.inspection import verdict

@@ -13,10 +13,8 @@ import pytest
 import xarray
 
 from warpimpact import Campaign
-from warpimpact.analysis.comparison import Comparison, compare
-from warpimpact.analysis.comparison_short import short_view
-from warpimpact.analysis.comparison_text import best_rows, comparison_text
-from warpimpact.analysis.contestants import Difference
+from warpimpact.analysis.comparison import compare
+from warpimpact.analysis.comparison_text import Comparison, Difference, best_rows, comparison_text, short_view
 from warpimpact.analysis.effectiveness import effectiveness
 from warpimpact.campaign.campaign import CampaignError
 from warpimpact.campaign.plates import read_plates
@@ -63,7 +61,7 @@ def moved(dataset: xarray.Dataset) -> xarray.Dataset:
 def test_identical_plates_cannot_be_told_apart(make_plate_result) -> None:
     plate = make_plate_result(velocities(NUMBERS.uniform(0.5, 1.0, 500)), NUMBERS.uniform(0.0, 90.0, 500))
     comparison = compare([plate, plate], ["a", "b"])
-    assert not any(pair.told_apart for pair in comparison.differences)
+    assert not any(pair.is_significant for pair in comparison.differences)
     for measure in (MEAN, TAIL, TILTED):
         assert comparison.ranks(measure) == {"a": 1, "b": 1}
         assert difference(comparison, measure, "a", "b").value == 0.0
@@ -103,7 +101,7 @@ def test_rounding_tells_no_plates_apart(apart: float, told: bool, make_plate_res
     ):
         for measure in (MEAN, TAIL, "mean(residual_energy_density@130mm)"):
             pair = difference(comparison, measure, "a", "b")
-            assert (pair.told_apart, pair.value != 0.0) == (told, told)
+            assert (pair.is_significant, pair.value != 0.0) == (told, told)
             assert comparison.ranks(measure) == {"a": 1, "b": 2 if told else 1}
 
 

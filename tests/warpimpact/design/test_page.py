@@ -11,8 +11,7 @@ from urllib.parse import urlsplit
 import pytest
 
 from warpimpact.analysis.comparison import compare
-from warpimpact.analysis.comparison_short import short_view
-from warpimpact.analysis.comparison_text import comparison_view
+from warpimpact.analysis.comparison_text import comparison_view, short_view
 from warpimpact.analysis.effectiveness import effectiveness
 from warpimpact.analysis.numbers import number_text
 from warpimpact.campaign.campaign import Campaign

@@ -15,8 +15,7 @@ import xarray
 
 from warpimpact import Campaign
 from warpimpact.analysis.comparison import compare
-from warpimpact.analysis.comparison_short import short_view, verdict_of
-from warpimpact.analysis.comparison_text import comparison_view
+from warpimpact.analysis.comparison_text import comparison_view, short_view, verdict_of
 from warpimpact.analysis.effectiveness import effectiveness
 from warpimpact.analysis.numbers import number_text
 from warpimpact.analysis.summary import range_note
