@@ -25,7 +25,7 @@ import numpy as np
 import xarray
 
 from warpimpact.analysis.comparison_text import Comparison, Difference, Pair, PlateScore
-from warpimpact.analysis.effectiveness import Score, Scored, depth_note, measures_of, scores
+from warpimpact.analysis.effectiveness import Score, ScoreData, depth_note, measures_of, scores
 from warpimpact.analysis.numbers import of_each
 from warpimpact.analysis.plate_text import common_name, plate_text, reference_name, solid_note, solid_plate, weights_of
 from warpimpact.analysis.summary import breaks_promise, hits_at_two_levels, sampling_note
@@ -96,7 +96,7 @@ def compare(
         measure = scored[0].score.measure
         if not measure.has_interval or (measure.name == "base_depth" and _depths_are_bounds(datasets, of_plates)):
             continue
-        has_ratios = scored[0].of.numbers is not None and not any(math.isnan(side.score.ratio) for side in scored)
+        has_ratios = scored[0].data.numbers is not None and not any(math.isnan(side.score.ratio) for side in scored)
         if differ_in_weight and has_ratios:
             by_ratio.add(measure.text)
         for (i, j), pair in zip(pairs, used, strict=True):
@@ -127,7 +127,7 @@ def compare(
 
 
 def _apart(
-    scored: tuple[Scored, Scored],
+    scored: tuple[ScoreData, ScoreData],
     datasets: tuple[xarray.Dataset, xarray.Dataset],
     confidence: float,
     *,
@@ -205,11 +205,11 @@ def _sought_to(dataset: xarray.Dataset, measure: Measure) -> float:
     return float(attributes.get(attr.LIMIT_TOLERANCE, 0.0) * factor)
 
 
-def _side(scored: Scored, dataset: xarray.Dataset, dealt: Estimating, *, by_ratio: bool) -> _Side:
-    score, measure, evidence = scored.score, scored.score.measure, scored.of
+def _side(scored: ScoreData, dataset: xarray.Dataset, dealt: Estimating, *, by_ratio: bool) -> _Side:
+    score, measure, data = scored.score, scored.score.measure, scored.data
     shift = float(np.nan_to_num(score.numerics or 0.0)) + _sought_to(dataset, measure)
-    estimate = replace(estimate_from(measure, evidence.values, **dealt), numerics=shift)
-    numbers = evidence.values if evidence.numbers is None else evidence.numbers
+    estimate = replace(estimate_from(measure, data.values, **dealt), numerics=shift)
+    numbers = data.values if data.numbers is None else data.numbers
     if not by_ratio:
         return _Side(measure.is_binary, False, numbers, estimate)
     assert scored.solid is not None

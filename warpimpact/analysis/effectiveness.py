@@ -9,13 +9,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 import xarray
 
-from warpimpact.analysis.estimates import Evidence, asked_measures, by_hit_of, evidence
-from warpimpact.analysis.numbers import intervals_text
+from warpimpact.analysis.estimates import MeasureData, asked_measures, by_hit_of, measure_data
+from warpimpact.analysis.numbers import interval_text
 from warpimpact.analysis.plate_text import plate_text, reference_name, solid_note
 from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
@@ -80,7 +80,7 @@ class Score:
     @property
     def interval(self) -> str:
         """Its interval, with the shift by the numerics, as text."""
-        return intervals_text(self.low, self.high, self.numerics)
+        return interval_text(self.low, self.high, self.numerics)
 
     @property
     def ratio_text(self) -> str:
@@ -88,11 +88,11 @@ class Score:
         if math.isnan(self.ratio) or math.isnan(self.ratio_low):
             return ""
         numerics = None if self.numerics is None else self.numerics / self.solid
-        return intervals_text(self.ratio_low, self.ratio_high, numerics)
+        return interval_text(self.ratio_low, self.ratio_high, numerics)
 
 
 @dataclass(frozen=True)
-class Scored:
+class ScoreData:
     """A score and the numbers behind it.
 
     Attributes:
@@ -100,7 +100,7 @@ class Scored:
     """
 
     score: Score
-    of: Evidence
+    data: MeasureData
     solid: Array | None = None
 
 
@@ -123,24 +123,35 @@ def effectiveness(dataset: xarray.Dataset, texts: Sequence[str] = ()) -> list[Sc
     Raises:
         ResultError: a text is no measure, or the result lacks what it needs.
     """
-    return [scored.score for scored in scores(dataset, measures_of(dataset, texts))]
+    return [each.score for each in scores(dataset, measures_of(dataset, texts))]
 
 
-def scores(dataset: xarray.Dataset, measures: Sequence[Measure]) -> Iterator[Scored]:
+def scores(dataset: xarray.Dataset, measures: Sequence[Measure]) -> Iterator[ScoreData]:
     """Measures one after the other, beside those of the solid plate, with the numbers behind them."""
-    reference, alone = (reference_of(dataset, name) for name in ("solid", "base_alone"))
-    for scored_evidence in evidence(dataset, measures):
-        comparable = reference is not None and _is_comparable(scored_evidence.measure, dataset, reference)
-        scored = _scored(scored_evidence.shown(), dataset, reference if comparable else None)
-        yield replace(scored, score=replace(scored.score, alone=_value_of(alone, scored_evidence.measure)))
-
-
-def _value_of(reference: xarray.Dataset | None, measure: Measure) -> float:
-    """The measure of a reference; NaN where it has none."""
-    if reference is None or measure.kind == "target":
-        return math.nan
-    values = _averaged_of_solid(measure, measure.display.factor * measure.counted(by_hit_of(reference, measure)))
-    return float(np.nanmean(values)) if np.isfinite(values).any() else math.nan
+    reference, base = (reference_of(dataset, name) for name in ("solid", "base_alone"))
+    for data in (each.shown() for each in measure_data(dataset, measures)):
+        measure, estimate, solid, alone = data.measure, data.estimate, None, math.nan
+        if reference is not None and _is_comparable(measure, dataset, reference):
+            solid = _reference_numbers(measure, reference)
+        if base is not None and measure.kind != "target":
+            of_base = _reference_numbers(measure, base)
+            alone = float(np.nanmean(of_base)) if np.isfinite(of_base).any() else math.nan
+        numbers = data.values if data.numbers is None else data.numbers
+        ratio = Ratio.of(estimate, numbers, solid, {**dealing(dataset), "confidence": 0.95})
+        score = Score(
+            measure=measure,
+            value=estimate.value,
+            low=estimate.low,
+            high=estimate.high,
+            solid=ratio.reference,
+            ratio=ratio.value,
+            ratio_low=ratio.low,
+            ratio_high=ratio.high,
+            hit=None if data.worst_shot is None else int(dataset[v.HIT][data.worst_shot]),
+            numerics=estimate.numerics,
+            alone=alone,
+        )
+        yield ScoreData(score, data, solid)
 
 
 def _is_comparable(measure: Measure, dataset: xarray.Dataset, reference: xarray.Dataset) -> bool:
@@ -155,32 +166,9 @@ def _is_comparable(measure: Measure, dataset: xarray.Dataset, reference: xarray.
     return same_layer and math.isclose(*elsewhere, rel_tol=1e-9)
 
 
-def _scored(given: Evidence, dataset: xarray.Dataset, reference: xarray.Dataset | None) -> Scored:
-    measure, estimate = given.measure, given.estimate
-    solid = None
-    if reference is not None:
-        of_solid = measure.display.factor * measure.counted(by_hit_of(reference, measure))
-        solid = _averaged_of_solid(measure, of_solid)
-    numbers = given.values if given.numbers is None else given.numbers
-    against = Ratio.of(estimate, numbers, solid, {**dealing(dataset), "confidence": 0.95})
-    score = Score(
-        measure=measure,
-        value=estimate.value,
-        low=estimate.low,
-        high=estimate.high,
-        solid=against.reference,
-        ratio=against.value,
-        ratio_low=against.low,
-        ratio_high=against.high,
-        hit=None if given.worst_shot is None else int(dataset[v.HIT][given.worst_shot]),
-        numerics=estimate.numerics,
-    )
-    return Scored(score, given, solid)
-
-
-def _averaged_of_solid(measure: Measure, values: Array) -> Array:
-    """Numbers of the shots at the solid plate whose mean is its measure; for a quantile or a worst point a single
-    one."""
+def _reference_numbers(measure: Measure, reference: xarray.Dataset) -> Array:
+    """Numbers of the shots at a reference whose mean is its measure; for a quantile or a worst point a single one."""
+    values = measure.display.factor * measure.counted(by_hit_of(reference, measure))
     if measure.kind in ("quantile", "worst_point"):
         return np.array([estimate_from(measure, values).value])
     return measure.averaged(values)

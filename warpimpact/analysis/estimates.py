@@ -25,7 +25,7 @@ _LIMITS = tuple(names.value for names in v.LIMITS.values())
 
 
 @dataclass(frozen=True)
-class Evidence:
+class MeasureData:
     """A measure of a result with the numbers behind it, in the units of the Dataset unless it is `shown`.
 
     Attributes:
@@ -50,13 +50,13 @@ class Evidence:
             return None
         return int(np.argmax(np.where(known, self.measure.worse * self.values, -np.inf)))
 
-    def shown(self) -> Evidence:
-        """The evidence in the display unit of the measure."""
+    def shown(self) -> MeasureData:
+        """The same in the display unit of the measure."""
         factor = self.measure.display.factor
-        return Evidence(self.measure, self.estimate.times(factor), factor * self.values)
+        return MeasureData(self.measure, self.estimate.times(factor), factor * self.values)
 
 
-def evidence(dataset: Result, measures: Sequence[Measure]) -> Iterator[Evidence]:
+def measure_data(dataset: Result, measures: Sequence[Measure]) -> Iterator[MeasureData]:
     """Measures one after the other. Of an open file, one slice at a time and one number per hit are in memory."""
     needed = (v.STATUS, *v.GROUPS["finer"], *(name for measure in measures for name in measure.quantity.of))
     pair = finer_pair(dataset[[name for name in dict.fromkeys(needed) if name in dataset]])
@@ -72,7 +72,7 @@ def evidence(dataset: Result, measures: Sequence[Measure]) -> Iterator[Evidence]
             estimate = estimate.within(measure.least, measure.most)
         if measure.kind == "quantile" and measure.name in _LIMITS:
             estimate = _beyond(estimate, dataset.attrs.get(attr.LIMIT_HIGHEST, math.inf))
-        yield Evidence(measure, estimate, values)
+        yield MeasureData(measure, estimate, values)
 
 
 def _beyond(estimate: Estimate, highest: float) -> Estimate:
@@ -105,7 +105,7 @@ def asked_measures(dataset: Result, texts: Sequence[str], shown: Sequence[str]) 
 
 def estimated(dataset: Result, measures: Sequence[Measure]) -> dict[Measure, Estimate]:
     """Measures of a result with their intervals, in the units of the Dataset."""
-    return {of_measure.measure: of_measure.estimate for of_measure in evidence(dataset, measures)}
+    return {data.measure: data.estimate for data in measure_data(dataset, measures)}
 
 
 def status_shares(dataset: Result) -> dict[str, Estimate]:

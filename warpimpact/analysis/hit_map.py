@@ -1,14 +1,17 @@
-"""A variable of the hits as a regular map over the unit cell, which xarray itself can plot."""
+"""A variable of the hits over the unit cell: a regular map, which xarray can plot, and estimates between hits."""
 
 from __future__ import annotations
 
 import json
-from typing import TYPE_CHECKING, Literal
+from typing import Literal, NamedTuple
 
 import numpy as np
 import xarray
+from numpy.typing import NDArray
 from scipy.interpolate import LinearNDInterpolator
 from scipy.spatial import KDTree
+from scipy.stats import norm as normal
+from scipy.stats import t as student
 
 from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
@@ -16,10 +19,7 @@ from warpimpact.results.dataset import passed
 from warpimpact.results.per_hit import place_of_standoff
 from warpimpact.scene.symmetry import IDENTITY, SYMMETRIES, Symmetry
 
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    Array = NDArray[np.float64]
+Array = NDArray[np.float64]
 
 PIXELS = 200
 """Pixels along the longer side of a map."""
@@ -28,6 +28,11 @@ _FARTHEST = 2.0
 hits, 3e-6 of the places lie farther."""
 _CONTINUED = 4.0
 """Width of the strip that continues a periodic cell, in mean hit spacings."""
+NEIGHBOURS = 24
+"""Number of hits in the fit of a plane. It leaves 21 degrees of freedom for the scatter, and the fit stays local."""
+_COEFFICIENTS = 3
+_BOTH_SIDES = 0.975
+"""Share below the upper end of a 95 % interval."""
 OF_PASSED = {v.RESIDUAL_VELOCITY, v.DEFLECTION}
 """Variables that count only for cores that passed: a core that ricocheted has them in front of the plate."""
 
@@ -199,3 +204,48 @@ def _continued(hits: Array, values: Array, period: Array, margin: float) -> tupl
     moved = np.concatenate([hits + shift * period for shift in shifts])
     inside = np.all(np.abs(moved) <= period / 2 + margin, axis=1)
     return moved[inside], np.tile(values, len(shifts))[inside]
+
+
+class Local(NamedTuple):
+    """Estimates at points, each of shape [points] and in the unit of the values: the value, half the width of its
+    95 % interval, and the standard deviation of the hits about the plane."""
+
+    value: Array
+    half_width: Array
+    spread: Array
+
+
+def plane_fit(offsets: Array, values: Array) -> Local:
+    """Value at points by least squares: a plane through the values of the hits near each point (local linear
+    regression, Cleveland and Devlin 1988, with equal weights).
+
+    The interval is Student's and uses the scatter about the plane. A bend or a jump of the map among the hits widens it
+    as the scatter of shots does. It assumes independent hits. Next to an axis of symmetry, where hits and their images
+    meet, it is up to √2 too narrow.
+
+    Args:
+        offsets: from each point to its hits [m], shape [points, hits, 2].
+        values: values of the hits, shape [points, hits].
+    """
+    count = values.shape[1]
+    reach = np.abs(offsets).max(axis=(1, 2), keepdims=True)
+    design = np.concatenate([np.ones((*values.shape, 1)), offsets / np.maximum(reach, np.finfo(float).tiny)], axis=2)
+    inverse = np.linalg.pinv(design)
+    plane = np.einsum("pch,ph->pc", inverse, values)
+    residual = values - np.einsum("phc,pc->ph", design, plane)
+    freedom = count - _COEFFICIENTS
+    spread = np.sqrt(np.sum(residual**2, axis=1) / freedom)
+    error = spread * np.sqrt(np.sum(inverse[:, 0] ** 2, axis=1))
+    return Local(plane[:, 0], float(student.ppf(_BOTH_SIDES, freedom)) * error, spread)
+
+
+def share_of(hits: Array) -> tuple[Array, Array]:
+    """Share of ones among zeros and ones, and half the width of its interval (Wilson's; it assumes independent hits).
+
+    Args:
+        hits: zeros and ones, shape [points, hits]; the results have the shape [points].
+    """
+    count, share = hits.shape[1], hits.mean(axis=1)
+    z = float(normal.ppf(_BOTH_SIDES))
+    half_width = z * np.sqrt(share * (1.0 - share) / count + z**2 / (4.0 * count**2)) / (1.0 + z**2 / count)
+    return share, half_width

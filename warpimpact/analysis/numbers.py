@@ -16,27 +16,22 @@ def number_text(number: float) -> str:
     return "-" if math.isnan(number) else f"{0.0 if abs(number) < ROUNDING else number:#.4g}"
 
 
-def interval_text(low: float, high: float, text: Callable[[float], str] = number_text) -> str:
-    """A confidence interval as text: a dash if there is none, one end if the shots give only one."""
-    if math.isnan(low) and math.isnan(high):
-        return "-"
-    if math.isnan(low):
-        return f"at most {text(high)}"
-    return f"at least {text(low)}" if math.isnan(high) else f"{text(low)} to {text(high)}"
-
-
-def intervals_text(
+def interval_text(
     low: float,
     high: float,
     numerics: float | None = None,
     text: Callable[[float], str] = number_text,
     shift: Callable[[float], str] = "{:.2g}".format,
 ) -> str:
-    """An interval by the hits and the largest shift by the numerics, which is None or NaN where unknown, as text."""
-    interval = interval_text(low, high, text)
-    if interval == "-" or numerics is None or math.isnan(numerics):
-        return interval
-    return f"{interval}, numerics ± {shift(numerics)}"
+    """A confidence interval by the hits as text: a dash if there is none, one end if the shots give only one. The
+    largest shift by the numerics follows, unless it is None or NaN."""
+    if math.isnan(low) and math.isnan(high):
+        return "-"
+    if math.isnan(low):
+        interval = f"at most {text(high)}"
+    else:
+        interval = f"at least {text(low)}" if math.isnan(high) else f"{text(low)} to {text(high)}"
+    return interval if numerics is None or math.isnan(numerics) else f"{interval}, numerics ± {shift(numerics)}"
 
 
 def plus_minus(estimate: Estimate, number: str, half_width: str) -> str:

@@ -8,7 +8,7 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 from warpimpact.analysis.estimates import estimated, means_of, slices
-from warpimpact.analysis.numbers import interval_text, intervals_text
+from warpimpact.analysis.numbers import interval_text
 from warpimpact.campaign.tested_range import range_line
 from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
@@ -114,7 +114,7 @@ def summary_text(dataset: Result) -> str:
     for measure, estimate in estimated(dataset, means).items():
         if estimate.count or measure != _DEPTH:
             shown, unit = estimate.times(measure.display.factor), measure.display.shown
-            interval = intervals_text(shown.low, shown.high, shown.numerics, "{:.2f}".format, "{:.2f}".format)
+            interval = interval_text(shown.low, shown.high, shown.numerics, "{:.2f}".format, "{:.2f}".format)
             rows.append((measure.column.label, shown.value, unit, interval, shown.spread, _counted(shown.count, hits)))
     notes = (numerics_note(dataset),)
     return text_of([Section([shares, Table(columns, rows), *stop_lines(dataset), *filter(None, notes)])])
@@ -174,7 +174,7 @@ def stop_lines(dataset: Result) -> list[str]:
     if attr.STOP_QUANTITY not in attributes:
         return []
     (low, high), unit = attributes[attr.ESTIMATE_INTERVAL], STORED[attributes[attr.ESTIMATE_UNITS]]
-    interval = interval_text(unit.factor * low, unit.factor * high, "{:.6g}".format)
+    interval = interval_text(unit.factor * low, unit.factor * high, text="{:.6g}".format)
     shift = attributes.get(attr.ESTIMATE_NUMERICS, math.nan)
     numerics = "not known" if math.isnan(shift) else f"{unit.factor * shift:.2g}{unit.suffix}"
     return [

@@ -190,7 +190,7 @@ def _running(run: "RunProgress") -> str:
 
     def text_of(measure: "Measure", estimate: "Estimate") -> str:
         if measure.is_binary:  # a share is not in the middle of its interval
-            return f"{estimate.value:.4g} ({interval_text(estimate.low, estimate.high, '{:.4g}'.format)})"
+            return f"{estimate.value:.4g} ({interval_text(estimate.low, estimate.high, text='{:.4g}'.format)})"
         return plus_minus(estimate.times(measure.display.factor), ".5g", ".2g") + measure.display.suffix
 
     parts = [

@@ -41,7 +41,7 @@ def add_inspect(commands: Commands) -> None:
 
 def _inspect(arguments: argparse.Namespace) -> None:
     from warpimpact.analysis.effectiveness import effectiveness_text
-    from warpimpact.analysis.inspect import inspect_text
+    from warpimpact.analysis.inspection import inspect_text
     from warpimpact.report.one_file import view_of
     from warpimpact.results import files
     from warpimpact.results.kinds import HIT_MAP

@@ -42,7 +42,7 @@ def add_sweep(commands: Commands) -> None:
 
 
 def _sweep(arguments: argparse.Namespace) -> None:
-    from warpimpact.analysis.swept import sweep_view
+    from warpimpact.analysis.sweep_view import sweep_view
     from warpimpact.plotting.sweep import sweep_figure
     from warpimpact.results import files
     from warpimpact.results.kinds import SWEEP

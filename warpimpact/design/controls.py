@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpimpact.analysis.plate_text import plate_numbers
-from warpimpact.analysis.slabs import runs_of
+from warpimpact.analysis.replay_geometry import runs_of
 from warpimpact.campaign.campaign import Campaign
 from warpimpact.design.designs import Tables, ValidDesign
 from warpimpact.plotting.cell import words

@@ -18,7 +18,7 @@ import numpy as np
 import xarray
 from scipy.spatial.transform import Rotation
 
-from warpimpact.analysis.slabs import slabs
+from warpimpact.analysis.replay_geometry import slabs
 from warpimpact.results import variables as v
 from warpimpact.results.files import OutputError
 

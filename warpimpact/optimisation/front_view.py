@@ -56,7 +56,7 @@ OF_REFERENCE = (f.REFERENCE_RESULT, f.REFERENCE_LOW, f.REFERENCE_HIGH)
 def _cells(dataset: xarray.Dataset, names: tuple[str, str, str], place: int) -> Iterator[Any]:
     """Cells with value and interval of each objective and bound of a design."""
     for value, low, high in zip(*(dataset[name].values[place] for name in names), strict=True):
-        yield from (value, "" if low == high else interval_text(low, high, "{:.4g}".format))
+        yield from (value, "" if low == high else interval_text(low, high, text="{:.4g}".format))
 
 
 def _variables_table(dataset: xarray.Dataset) -> Table:

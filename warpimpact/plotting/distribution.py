@@ -12,8 +12,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 
-from warpimpact.analysis.hit_map import hit_points, mirrored
-from warpimpact.analysis.local import NEIGHBOURS, plane_fit, share_of
+from warpimpact.analysis.hit_map import NEIGHBOURS, hit_points, mirrored, plane_fit, share_of
 from warpimpact.plotting.cell import (
     draw_holes,
     draw_values,
@@ -121,7 +120,7 @@ def draw_dispersion(axes: Axes, dataset: xarray.Dataset, standoff: float | None 
 
 
 def uncertainty(dataset: xarray.Dataset, variable: str, standoff: float | None = None) -> Figure:
-    """A map of the mean of neighbouring hits, and of half the width of its 95 % interval (`analysis.local.plane_fit`).
+    """A map of the mean of neighbouring hits, and of half the width of its 95 % interval (`hit_map.plane_fit`).
 
     Shots must scatter, so that two shots at one place differ; otherwise neighbours say nothing about uncertainty.
 
@@ -152,7 +151,7 @@ def shots_scatter(dataset: xarray.Dataset) -> bool:
 
 
 def probability_map(dataset: xarray.Dataset, quantity: str) -> Figure:
-    """Map of a probability from the nearest hits, and half the width of its 95 % interval (`analysis.local.share_of`).
+    """Map of a probability from the nearest hits, and half the width of its 95 % interval (`hit_map.share_of`).
 
     Args:
         dataset: a result whose hits cover the cell.

@@ -11,7 +11,7 @@ import xarray
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from warpimpact.analysis.swept import Point, inputs_of, measures_of, points
+from warpimpact.analysis.sweep_view import Point, inputs_of, measures_of, points
 from warpimpact.plotting.cell import words
 from warpimpact.plotting.style import all_bars, inscribe, legend_below
 from warpimpact.results.measures import Measure
@@ -25,7 +25,7 @@ _PANEL = (5.0, 3.75)
 
 def sweep_figure(sweep: xarray.Dataset, texts: Sequence[str] = ()) -> Figure:
     """A panel for every measure, with 95 % intervals, against the first input that is a number; a line for every
-    combination of the others. Without texts of measures they are those of `analysis.swept.SHOWN_OF_SWEEPS`.
+    combination of the others. Without texts of measures they are those of `analysis.sweep_view.SHOWN_OF_SWEEPS`.
 
     Raises:
         ResultError: a text is no measure, or the sweep lacks what it needs.

@@ -26,8 +26,7 @@ from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 from scipy.spatial import ConvexHull
 
-from warpimpact.analysis.slabs import depth_of, slabs
-from warpimpact.analysis.surface import POINTS_AROUND, largest_in_plate, pressed
+from warpimpact.analysis.replay_geometry import POINTS_AROUND, depth_of, largest_in_plate, pressed, slabs
 from warpimpact.plotting.cell import struck, words
 from warpimpact.plotting.style import BLUE, GREY, VERMILION, inscribe_hit, legend_below
 from warpimpact.results import attributes as attr
@@ -155,7 +154,7 @@ def _within(axes: Axes, across: np.ndarray) -> tuple[float, str]:
 def largest_load(dataset: xarray.Dataset) -> Figure:
     """The core at its largest force, with force and moment (the paper's fig. 5b).
 
-    The force is an arrow from the middle of the pressed surface (`analysis.surface.pressed`). In each view an arc about
+    The force is an arrow from the middle of the pressed surface (`replay_geometry.pressed`). In each view an arc about
     the centre of mass turns with the moment about the axis across the view.
     """
     step = int(np.linalg.norm(dataset[v.FORCE], axis=1).argmax())
@@ -268,7 +267,7 @@ def plate(dataset: xarray.Dataset) -> Figure:
 def pressure(dataset: xarray.Dataset) -> Figure:
     """The core at its largest force; arrows into its surface show the normal stress.
 
-    Colour and length show the stress as a share of that of the untouched plate at rest (`analysis.surface.pressed`).
+    Colour and length show the stress as a share of that of the untouched plate at rest (`replay_geometry.pressed`).
     """
     step = largest_in_plate(dataset)
     surface = pressed(dataset, step)

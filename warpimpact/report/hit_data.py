@@ -12,7 +12,7 @@ from matplotlib import colormaps
 from matplotlib.colors import to_hex
 
 from warpimpact.analysis.hit_map import hit_points, mirrored, symmetries_of
-from warpimpact.analysis.slabs import runs_of, slabs
+from warpimpact.analysis.replay_geometry import runs_of, slabs
 from warpimpact.kernels.status import Status
 from warpimpact.plotting.cell import STATUS_COLOURS, Shown, limits, nearest_hits, shown, words
 from warpimpact.plotting.style import common_fire

@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 
 from matplotlib.figure import Figure
 
-from warpimpact.analysis.swept import sweep_view
+from warpimpact.analysis.sweep_view import sweep_view
 from warpimpact.firing.view import firing_view
 from warpimpact.identification.posterior import posterior_view
 from warpimpact.optimisation.front_view import front_view

@@ -15,7 +15,7 @@ from warpimpact.analysis.comparison_text import comparison_view, short_view, ver
 from warpimpact.analysis.effectiveness import depth_note, effectiveness, measures_table
 from warpimpact.analysis.estimates import estimated, means_of, slices, status_shares
 from warpimpact.analysis.inspection import verdict
-from warpimpact.analysis.numbers import interval_text, intervals_text
+from warpimpact.analysis.numbers import interval_text
 from warpimpact.analysis.plate_text import reference_name, solid_note, weights_of, weights_text
 from warpimpact.analysis.summary import numerics_note, numerics_sentence, promise_text, range_note, sampling_note
 from warpimpact.campaign.text import parsed
@@ -160,13 +160,13 @@ def _through(dataset: xarray.Dataset) -> Table:
     """How the shots ended, and the means of what comes through."""
     means = means_of([name for name in v.shown_by("report") if name in dataset], dataset[v.STANDOFF].values.tolist())
     rows = [
-        (words(status), f"{share.value:.2%}", interval_text(share.low, share.high, "{:.2%}".format))
+        (words(status), f"{share.value:.2%}", interval_text(share.low, share.high, text="{:.2%}".format))
         for status, share in status_shares(dataset).items()
     ]
     for measure, estimate in estimated(dataset, means).items():
         if estimate.count:
             shown = estimate.times(measure.display.factor)
-            interval = intervals_text(shown.low, shown.high, shown.numerics, "{:.2f}".format, "{:.2f}".format)
+            interval = interval_text(shown.low, shown.high, shown.numerics, "{:.2f}".format, "{:.2f}".format)
             name = f"mean {measure.column.label}"
             rows.append((name, measure.display.text(estimate.value, ".2f"), interval))
     return Table((Column(), Column("value", right=True), Column("95 % interval")), rows)

@@ -9,7 +9,7 @@ import numpy as np
 import xarray
 
 from warpimpact.analysis.estimates import estimated
-from warpimpact.analysis.numbers import interval_text, intervals_text
+from warpimpact.analysis.numbers import interval_text
 from warpimpact.analysis.plate_text import reference_name
 from warpimpact.analysis.proxy import proxy
 from warpimpact.analysis.summary import numerics_note
@@ -74,7 +74,7 @@ def in_short(dataset: xarray.Dataset) -> str:
         return f"limit {quantity} of {len(values)} hits: {ends}"
     parts = []
     for measure, estimate in estimated(dataset, measures_of(dataset)).items():
-        interval = interval_text(factor * estimate.low, factor * estimate.high, "{:.5g}".format)
+        interval = interval_text(factor * estimate.low, factor * estimate.high, text="{:.5g}".format)
         parts.append(f"{measure.text} {factor * estimate.value:.5g} {unit} ({interval})")
     return ", ".join(parts)
 
@@ -97,7 +97,7 @@ def _estimates(dataset: xarray.Dataset, texts: Sequence[str]) -> Table:
     rows = []
     for measure, estimate in estimated(dataset, measures_of(dataset, texts)).items():
         shown = estimate.times(measure.display.factor)
-        interval = intervals_text(shown.low, shown.high, shown.numerics, "{:.5g}".format)
+        interval = interval_text(shown.low, shown.high, shown.numerics, "{:.5g}".format)
         rows.append((measure.text, shown.value, interval, measure.title))
     columns = Column("measure"), number("value", digits=".5g"), Column("95 % interval"), Column("meaning")
     return Table(columns, rows)

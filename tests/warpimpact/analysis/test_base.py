@@ -10,7 +10,7 @@ import pytest
 import xarray
 
 from warpimpact.analysis.comparison import compare
-from warpimpact.analysis.comparison_text import best_rows, comparison_text
+from warpimpact.analysis.comparison_text import best_rows, comparison_view
 from warpimpact.analysis.effectiveness import Score, effectiveness, effectiveness_text
 from warpimpact.analysis.proxy import proxy
 from warpimpact.analysis.summary import summary_text
@@ -162,7 +162,7 @@ def test_targets_are_ranked_by_the_depth_in_bases_that_hold(make_plate_result) -
     comparison = compare([thin, good], ["thin", "good"])
     assert dict(best_rows(comparison))["depth in the base, mean"] == "not ranked"
     assert dict(best_rows(comparison))["P(base pierced)"] == "good"
-    assert "depths are not ranked" in comparison_text(comparison)
+    assert "depths are not ranked" in text_of(comparison_view(comparison))
     assert "not ranked" in {axes.get_title(loc="left") for axes in comparison_figure(comparison, every=True).axes}
 
 
@@ -180,7 +180,7 @@ def test_a_plate_without_layers_is_compared_in_what_both_have(make_plate_result,
     alone = make_plate_result(np.full(6, 500.0))
     comparison = compare([mixed, alone], ["layered", "alone"])
     assert [one.name for one in comparison.plates[0].measures] == [one.name for one in effectiveness(alone)]
-    assert "Without layers, and so without a base: alone." in comparison_text(comparison)
+    assert "Without layers, and so without a base: alone." in text_of(comparison_view(comparison))
 
 
 def limits(result: xarray.Dataset, thickness: np.ndarray, elsewhere: float) -> xarray.Dataset:
@@ -235,7 +235,7 @@ def test_what_the_solid_plate_is_stands_beside_the_ratios(quarter) -> None:
 
     plate, by_time = "The solid plate is 3 mm of 2.6 GPa, which ", of(degradation=0.8, degradation_interval=1e-6)
     whole, never = "weakens, through its whole thickness at once, to 0.8 in 1", "it stops no core, however slow"
-    for text in (effectiveness_text(by_time), comparison_text(compare([by_time, by_time], ["a", "b"]))):
+    for text in (effectiveness_text(by_time), text_of(comparison_view(compare([by_time, by_time], ["a", "b"])))):
         assert plate + whole in text
         assert never in text
     by_path = effectiveness_text(of(degradation=0.8, degradation_distance=1e-3))

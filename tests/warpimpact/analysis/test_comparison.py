@@ -14,7 +14,7 @@ import xarray
 
 from warpimpact import Campaign
 from warpimpact.analysis.comparison import compare
-from warpimpact.analysis.comparison_text import Comparison, Difference, best_rows, comparison_text, short_view
+from warpimpact.analysis.comparison_text import Comparison, Difference, best_rows, comparison_view, short_view
 from warpimpact.analysis.effectiveness import effectiveness
 from warpimpact.campaign.campaign import CampaignError
 from warpimpact.campaign.plates import read_plates
@@ -65,7 +65,7 @@ def test_identical_plates_cannot_be_told_apart(make_plate_result) -> None:
     for measure in (MEAN, TAIL, TILTED):
         assert comparison.ranks(measure) == {"a": 1, "b": 1}
         assert difference(comparison, measure, "a", "b").value == 0.0
-    text = comparison_text(comparison)
+    text = text_of(comparison_view(comparison))
     assert text.count("a and b cannot be told apart: difference 0.000 (") == 6
     assert "better than" not in text
     page = comparison._repr_html_()
@@ -81,7 +81,7 @@ def test_any_measure_may_be_compared(make_plate_result) -> None:
     assert (
         difference(comparison, median, "slow", "fast").low < -50.0 < difference(comparison, median, "slow", "fast").high
     )
-    text = comparison_text(comparison)
+    text = text_of(comparison_view(comparison))
     assert "fast higher than slow by 5.000" in text  # neither is better
     assert "tilt at 130 mm, mean [°]; neither is better" in text
     assert [label for label, _ in best_rows(comparison)] == ["residual velocity, 50 % quantile", "areal density"]
@@ -117,7 +117,7 @@ def test_plates_that_share_a_rank_cannot_be_told_apart(make_plate_result) -> Non
     ]
     comparison = compare(plates, ["first", "second", "wide"])
     assert comparison.ranks(MEAN) == {"first": 1, "second": 2, "wide": 2}
-    text = comparison_text(comparison)
+    text = text_of(comparison_view(comparison))
     assert "   first (not told apart for certain from wide)\n" in text
     assert comparison.ranks("P(stopped)") == {"first": 1, "second": 1, "wide": 1}
 
@@ -126,7 +126,7 @@ def test_an_interval_that_was_not_computed_is_told_as_such(make_plate_result) ->
     plates = [make_plate_result(velocities(np.linspace(low, 1.0, 12))) for low in (0.1, 0.5)]
     comparison = compare(plates, ["one", "other"])
     assert math.isnan(difference(comparison, TAIL, "one", "other").low)
-    text = comparison_text(comparison)
+    text = text_of(comparison_view(comparison))
     assert "of which these hits give no interval" in text
     assert "(-)" not in text
     assert next(line for line in text.splitlines() if "worst tenth  " in line).endswith("   not ranked")
@@ -140,7 +140,7 @@ def test_a_clearly_better_plate_is_first_whichever_way_is_up(make_plate_result) 
     comparison = compare(plates, ["worst", "one", "other"])
     for measure in (MEAN, TAIL, "mean(residual_energy_density@130mm)", TILTED):
         assert comparison.ranks(measure) == {"worst": 3, "one": 1, "other": 1}
-    lines = comparison_text(comparison).splitlines()
+    lines = text_of(comparison_view(comparison)).splitlines()
     assert "one better than worst by 0.1000 (0.1000 to 0.1000)" in lines
     assert "one and other cannot be told apart: difference 0.000 (0.000 to 0.000)" in lines
     best = next(line for line in lines if line.startswith("residual energy fraction, mean  "))
@@ -158,7 +158,9 @@ def test_the_same_shots_narrow_the_interval(make_plate_result) -> None:
     assert [(pair.paired, pair.independent) for pair in apart.pairs] == [
         (0, "their shots hit other places of the cell")
     ]
-    assert "compared as independent, because their shots hit other places of the cell." in comparison_text(apart)
+    assert "compared as independent, because their shots hit other places of the cell." in text_of(
+        comparison_view(apart)
+    )
     for measure in (MEAN, TAIL):
         pairs = [difference(comparison, measure, "a", "b") for comparison in (paired, apart)]
         widths = [pair.high - pair.low for pair in pairs]
@@ -185,7 +187,7 @@ def test_all_hits_count_the_common_ones_shot_by_shot(make_plate_result) -> None:
     # What is nearly the same shot by shot is told by the common shots, what has nothing in common by all of them.
     assert difference(comparison, MEAN, "a", "b").value == pytest.approx((one - alike)[:200].mean(), abs=2e-3)
     assert difference(comparison, MEAN, "a", "c").value == pytest.approx(one.mean() - other[:200].mean(), abs=3e-3)
-    text = comparison_text(comparison)
+    text = text_of(comparison_view(comparison))
     assert text.startswith("Hits: a 1000, b 200, c 200; all of them count.\n")
     assert "a and b: the first 200 hits are the same shots, compared shot by shot; the other 800 of a count" in text
     assert "b and c: the same shots, compared shot by shot." in text
@@ -210,7 +212,7 @@ def test_plates_of_different_weight_are_ranked_by_the_ratio_to_the_solid_plate(m
     pair = difference(comparison, MEAN, "light", "heavy")
     ratios = [plate.measures[0].ratio for plate in comparison.plates]
     assert pair.value == pytest.approx(ratios[0] - ratios[1])
-    text = comparison_text(comparison)
+    text = text_of(comparison_view(comparison))
     assert "The plates differ in weight (light 20 kg/m², heavy 40 kg/m²). They are ranked by the ratio" in text
     assert "residual energy fraction, mean; lower is better; ranked by the ratio to the solid plate" in text
     assert "P(stopped); higher is better; ranked without regard to weight" in text
@@ -307,7 +309,7 @@ def test_plates_that_were_asked_something_else_are_refused(change: dict, sentenc
 
 def test_what_makes_a_comparison_less_than_fair_is_said(make_plate_result) -> None:
     inexact = make_plate_result(np.full(64, 800.0), promise_kept=0)
-    text = comparison_text(compare([make_plate_result(np.full(64, 700.0)), inexact], ["kept", "broken"]))
+    text = text_of(comparison_view(compare([make_plate_result(np.full(64, 700.0)), inexact], ["kept", "broken"])))
     assert "less exact than promised: broken (warpimpact inspect)." in text
     plate = make_plate_result(velocities(np.linspace(0.5, 1.0, 100)), sampling="sobol", replicates=1)
     finer = '{"fidelity": "reference", "time_step": null}'

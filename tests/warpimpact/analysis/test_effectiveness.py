@@ -8,7 +8,7 @@ import pytest
 import xarray
 
 from warpimpact.analysis.effectiveness import Score, effectiveness, effectiveness_text
-from warpimpact.analysis.inspect import inspect_text
+from warpimpact.analysis.inspection import inspect_text
 from warpimpact.kernels.status import Status
 from warpimpact.results.files import ResultError
 

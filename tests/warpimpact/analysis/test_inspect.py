@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from warpimpact import Campaign, run
-from warpimpact.analysis.inspect import failures, inspect_text
+from warpimpact.analysis.inspection import failed_shots, inspect_text
 from warpimpact.cli import main
 from warpimpact.kernels.status import Status
 from warpimpact.plotting import save_maps
@@ -60,7 +60,7 @@ def test_failed_shots_are_listed_with_their_inputs_and_count_in_no_number(make_r
     statuses[[1, 4]] = Status.UNFINISHED, Status.NOT_FINITE
     dataset = make_result(statuses)
     monkeypatch.setattr("warpimpact.analysis.estimates.SLICE", 4)
-    shown = failures(dataset)
+    shown = failed_shots(dataset)
     (table,) = shown.parts
     assert table.heads[:5] == ["hit", "status", "hit_y [m]", "hit_z [m]", "impact_velocity [m s-1]"]
     assert [row[:2] for row in table.rows] == [(1, "unfinished"), (4, "not_finite")]

@@ -21,7 +21,7 @@ from warpimpact import (
     run,
 )
 from warpimpact.analysis.hit_map import mirrored
-from warpimpact.analysis.inspect import inspect_text
+from warpimpact.analysis.inspection import inspect_text
 from warpimpact.campaign.campaign import Output
 from warpimpact.cli import main
 from warpimpact.plotting.cell import nearest_hits, shots_text

@@ -8,7 +8,7 @@ import xarray
 from mpl_toolkits.mplot3d.art3d import Line3DCollection
 
 from warpimpact import Campaign
-from warpimpact.analysis.surface import pressed
+from warpimpact.analysis.replay_geometry import pressed
 from warpimpact.plotting.trajectory import pressure
 from warpimpact.runs.replay import replay
 from warpimpact.runs.run import run

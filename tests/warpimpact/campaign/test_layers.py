@@ -10,7 +10,7 @@ import xarray
 from warpimpact import Campaign, to_dataframe
 from warpimpact import Plate as NamedPlate
 from warpimpact.analysis.effectiveness import effectiveness
-from warpimpact.analysis.inspect import inspect_text
+from warpimpact.analysis.inspection import inspect_text
 from warpimpact.campaign.plates import read_plates
 from warpimpact.campaign.text import CampaignError
 from warpimpact.kernels.status import Status

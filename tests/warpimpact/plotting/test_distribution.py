@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from warpimpact.analysis.local import NEIGHBOURS, plane_fit
+from warpimpact.analysis.hit_map import NEIGHBOURS, plane_fit
 from warpimpact.kernels.status import Status
 from warpimpact.plotting import dispersion, marginals, probability_map, save_maps, uncertainty
 

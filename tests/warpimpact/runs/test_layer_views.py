@@ -8,7 +8,7 @@ import xarray
 from matplotlib.colors import to_hex
 
 from warpimpact import Campaign, hit_map, run, to_dataframe
-from warpimpact.analysis.inspect import inspect_text
+from warpimpact.analysis.inspection import inspect_text
 from warpimpact.kernels.status import Status
 from warpimpact.plotting import trajectory
 from warpimpact.plotting.cell import NO_VALUE, STATUS_COLOURS, shown

@@ -9,7 +9,7 @@ import xarray
 from warpimpact import Campaign
 from warpimpact.analysis.comparison import compare
 from warpimpact.analysis.effectiveness import effectiveness
-from warpimpact.analysis.inspect import inspect_text
+from warpimpact.analysis.inspection import inspect_text
 from warpimpact.kernels.status import Status
 from warpimpact.plotting.limit import limit_figure
 from warpimpact.results import files

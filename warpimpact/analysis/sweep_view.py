@@ -11,7 +11,7 @@ import numpy as np
 import xarray
 
 from warpimpact.analysis.estimates import asked_measures, estimated
-from warpimpact.analysis.numbers import interval_text, intervals_text, number_text
+from warpimpact.analysis.numbers import interval_text, number_text
 from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
 from warpimpact.results.dataset import failed
@@ -103,6 +103,6 @@ def _table(every: Sequence[Point], measure: Measure) -> Table:
     for point in every:
         estimate = point.estimates[measure].times(measure.display.factor)
         counted = estimate.count / point.hits if point.hits else 0.0
-        interval = intervals_text(estimate.low, estimate.high, estimate.numerics)
+        interval = interval_text(estimate.low, estimate.high, estimate.numerics)
         rows.append((*point.labels.values(), estimate.value, interval, counted))
     return Table(columns, rows)

@@ -1,25 +1,51 @@
-"""Normal stress on the surface of a core, from the history of a hit alone."""
+"""A replayed hit in space: its layers as slabs, and the stress on the core's surface."""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 import xarray
+from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
 
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    Array = NDArray[np.float64]
+Array = NDArray[np.float64]
 
 POINTS_AROUND = 72
 """Points around the core in every section of its profile."""
 _SPENT = 1e-9  # share of the resistance below which it counts as none
 _AT_REST = 1e-5  # share of the speed below which it is rounding: a wall that slides along itself does not close in
+
+
+class Slab(NamedTuple):
+    """One layer: its front and rear face [m], and whether it is solid at each point of the section."""
+
+    front: float
+    rear: float
+    solid: NDArray[np.bool_]
+
+
+def slabs(history: xarray.Dataset, view: str) -> list[Slab]:
+    """The plate and the layers behind it, along y or z as `view` says, through the hit point."""
+    if v.LAYER_FRONT not in history:
+        return [Slab(0.0, history.attrs[attr.PLATE_THICKNESS], history[v.SOLID_ALONG[view]].values == 1)]
+    faces = zip(history[v.LAYER_FRONT].values.tolist(), history[v.LAYER_REAR].values.tolist(), strict=True)
+    solid = history[v.LAYER_SOLID_ALONG[view]].values == 1
+    return [Slab(front, rear, here) for (front, rear), here in zip(faces, solid, strict=True)]
+
+
+def depth_of(history: xarray.Dataset) -> float:
+    """Distance from the front face of the target to the rear face of its last layer [m]."""
+    return slabs(history, "y")[-1].rear
+
+
+def runs_of(solid: NDArray[np.bool_]) -> list[tuple[int, int]]:
+    """First and last places of the parts of a section that are solid."""
+    edges = np.diff(np.concatenate([[0], solid.astype(int), [0]]))
+    return list(zip(np.flatnonzero(edges == 1).tolist(), (np.flatnonzero(edges == -1) - 1).tolist(), strict=True))
 
 
 class PressedSurface(NamedTuple):
