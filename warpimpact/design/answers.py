@@ -17,8 +17,7 @@ from warpimpact.campaign.resistances import catalogue_names
 from warpimpact.campaign.tested_range import outside_tested_range, range_line
 from warpimpact.campaign.text import CampaignError
 from warpimpact.design.controls import drawn, groups
-from warpimpact.design.designs import ROOT, Shelf, ValidDesign, stage_of, work_ahead
-from warpimpact.design.edits import choices
+from warpimpact.design.designs import ROOT, Shelf, ValidDesign, choices, stage_of, work_ahead
 from warpimpact.plotting.style import data_url
 from warpimpact.plotting.trajectory import FIGURES
 from warpimpact.report.hit_data import MOST_HITS, PAGE_PIXELS, page_data, thinned, trajectory_data
@@ -45,7 +44,7 @@ THIS_DESIGN = "this design"
 
 
 class Answers:
-    """Answers the questions of a page, in the thread of the desk, and keeps computed results.
+    """Answers the questions of a page, one at a time, and keeps computed results.
 
     Args:
         shelf: designs and files with which the page was started.

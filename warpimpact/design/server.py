@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import heapq
 import secrets
 import socket
 import traceback
@@ -11,12 +12,16 @@ from collections.abc import AsyncGenerator, AsyncIterator, Awaitable, Callable
 from contextlib import aclosing
 from functools import cache, partial
 from importlib.resources import files
-from typing import Any
+from itertools import count
+from typing import Any, TypeVar
 
 import uvicorn
 from plotly.offline import get_plotlyjs
 from starlette.applications import Starlette
 from starlette.concurrency import run_in_threadpool
+from starlette.exceptions import HTTPException
+from starlette.middleware import Middleware
+from starlette.middleware.trustedhost import TrustedHostMiddleware
 from starlette.requests import Request
 from starlette.responses import HTMLResponse, JSONResponse, PlainTextResponse, Response, StreamingResponse
 from starlette.routing import Mount, Route
@@ -24,16 +29,25 @@ from starlette.routing import Mount, Route
 import warpimpact
 from warpimpact.campaign.text import CampaignError, parsed
 from warpimpact.design.answers import Answers, named
-from warpimpact.design.designs import Shelf, Tables, ValidDesign, as_json, stages
-from warpimpact.design.desk import Desk
-from warpimpact.design.edits import changed
-from warpimpact.design.guard import Guard, TimedProtocol
+from warpimpact.design.designs import Shelf, Tables, ValidDesign, as_json, changed, stages
 from warpimpact.results.files import ResultError
 from warpimpact.scene.bounds import Implausible
 from warpimpact.scene.units import quoted
 from warpimpact.solver.device import DeviceError
 from warpimpact.solver.resolution import TooManySteps
+from warpimpact.solver.worker import Cancel, Cancelled
 
+Result = TypeVar("Result")
+
+_HEADERS = {
+    "content-security-policy": "default-src 'none'; script-src 'self'; style-src 'self' 'unsafe-inline'; "
+    "img-src 'self' data: blob:; connect-src 'self'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'",
+    "cross-origin-resource-policy": "same-origin",
+    "cross-origin-opener-policy": "same-origin",
+    "referrer-policy": "no-referrer",
+    "x-content-type-options": "nosniff",
+    "cache-control": "no-store",
+}
 _MOST_BYTES = 2**20
 """Most bytes of a request."""
 _MOST_PINS = 5
@@ -44,26 +58,82 @@ _FILES = {
 """Files of the page, by the rooms that have them."""
 _MISTAKES = (CampaignError, ResultError, DeviceError, TooManySteps, MemoryError)
 """Errors that the page shows as a sentence."""
-_FIRST, _ASKED, _REFINE = 0, 1, 2
+_FIRST, _CLICK, _REFINE = 0, 1, 2
 """Urgencies: the first map after a change, a click of the user, and the later stages."""
 _LINES = "application/x-ndjson"
 _PLOTLY = cache(get_plotlyjs)
 _STAGES = {"first": _FIRST, "draft": _REFINE, "full": _REFINE}
 
 
-def _nothing() -> None:
-    pass
+class JobQueue:
+    """Computes for any number of pages, one job at a time.
+
+    A new job puts off a less urgent running one, which begins again later. So a page that refines its map does not keep
+    another one waiting.
+    """
+
+    def __init__(self) -> None:
+        self._waiting: list[tuple[int, int, asyncio.Future[None], Cancel]] = []
+        self._running: tuple[int, int, asyncio.Future[None], Cancel] | None = None
+        self._numbers = count()
+
+    async def compute(self, urgency: int, work: Callable[[Cancel], Result]) -> Result:
+        """Return or raise what `work` does. If the awaiting task is cancelled, so is the work.
+
+        Args:
+            urgency: 0 is the most urgent.
+            work: called with the token that cancels it, in a thread.
+        """
+        number = next(self._numbers)
+        while True:
+            job = (urgency, number, asyncio.get_running_loop().create_future(), Cancel())
+            heapq.heappush(self._waiting, job)
+            if self._running is not None and self._running[0] > urgency:
+                self._running[-1].cancel()
+            self._start_next()
+            try:
+                return await self._in_turn(job, work)
+            except Cancelled:  # put off
+                pass
+            finally:
+                if self._running is job:
+                    self._running = None
+                self._start_next()
+
+    @staticmethod
+    async def _in_turn(job: tuple[int, int, asyncio.Future[None], Cancel], work: Callable[[Cancel], Result]) -> Result:
+        _, _, turn, cancel = job
+        await turn
+        thread = asyncio.ensure_future(asyncio.to_thread(work, cancel))
+        try:
+            return await asyncio.shield(thread)
+        except asyncio.CancelledError:
+            cancel.cancel()
+            await asyncio.wait({thread})
+            thread.exception()  # nobody waits for it
+            raise
+
+    def _start_next(self) -> None:
+        while self._waiting and self._running is None:
+            job = heapq.heappop(self._waiting)
+            if not job[2].cancelled():
+                self._running = job
+                job[2].set_result(None)
 
 
 def application(
-    shelf: Shelf, *, token: str, port: int, device: str = "auto", entered: Callable[[], object] = _nothing
-) -> Guard:
+    shelf: Shelf, *, token: str, device: str = "auto", entered: Callable[[], object] = lambda: None
+) -> Starlette:
     """The page and its requests as an ASGI application.
 
+    Another page in the same browser can send requests to this machine, and a name server can give this machine another
+    name. Neither knows the token, and neither has this host or this origin.
+
     Args:
+        token: first part of every path.
         entered: called whenever a browser gets the page.
     """
-    pages = _Pages(Answers(shelf, device), Desk(), entered)
+    pages = _Pages(Answers(shelf, device), JobQueue(), entered)
     routes = [
         Route("/", pages.page),
         Route("/files/{name}", _file),
@@ -72,14 +142,18 @@ def application(
     ]
     answers = (pages.change, pages.open, pages.trajectory, pages.figure, pages.report)
     routes += [Route(f"/{one.__name__}", partial(_answered, one), methods=["POST"]) for one in answers]
-    return Guard(Starlette(routes=[Mount(f"/{token}", routes=routes)]), token, port)
+    return Starlette(
+        routes=[Mount(f"/{token}", routes=routes)],
+        middleware=[Middleware(TrustedHostMiddleware, allowed_hosts=["127.0.0.1", "localhost"])],
+        exception_handlers={404: _nothing_there},
+    )
 
 
 class _Pages:
     """Handlers of the paths of the page. They keep no state of a single browser."""
 
-    def __init__(self, answers: Answers, desk: Desk, entered: Callable[[], object]) -> None:
-        self._answers, self._desk, self._shelf, self._entered = answers, desk, answers.shelf, entered
+    def __init__(self, answers: Answers, jobs: JobQueue, entered: Callable[[], object]) -> None:
+        self._answers, self._jobs, self._shelf, self._entered = answers, jobs, answers.shelf, entered
 
     async def page(self, request: Request) -> Response:
         self._entered()
@@ -91,7 +165,7 @@ class _Pages:
     async def compute(self, request: Request) -> Response:
         """Answer with the plate of a design at once, then with its maps from few hits to all of them, a line of JSON
         each. Closing the connection cancels the work."""
-
+        _check_origin(request)
         try:
             asked = await _asked(request)
             level = _whole(asked, "level", 0, 9)
@@ -124,7 +198,7 @@ class _Pages:
             ]
             designs = named(stage_design, at)
             maps = asyncio.ensure_future(
-                self._desk.do(_STAGES[name], partial(self._answers.maps, name, designs, full, level))
+                self._jobs.compute(_STAGES[name], partial(self._answers.maps, name, designs, full, level))
             )
             try:
                 if plate:
@@ -135,7 +209,7 @@ class _Pages:
                 yield told
             finally:
                 maps.cancel()
-            yield await self._desk.do(_STAGES[name], partial(self._answers.numbers, designs))
+            yield await self._jobs.compute(_STAGES[name], partial(self._answers.numbers, designs))
 
     async def change(self, asked: Tables) -> Any:
         design, _ = self._designs(asked)
@@ -149,16 +223,16 @@ class _Pages:
 
     async def trajectory(self, asked: Tables) -> Any:
         design, _ = self._designs(asked)
-        return await self._desk.do(_ASKED, partial(self._answers.trajectory, design, *_hit(asked)))
+        return await self._jobs.compute(_CLICK, partial(self._answers.trajectory, design, *_hit(asked)))
 
     async def figure(self, asked: Tables) -> Any:
         design, _ = self._designs(asked)
         name = str(asked.get("figure", ""))
-        return await self._desk.do(_ASKED, partial(self._answers.figure, design, *_hit(asked), name))
+        return await self._jobs.compute(_CLICK, partial(self._answers.figure, design, *_hit(asked), name))
 
     async def report(self, asked: Tables) -> Any:
         designs = named(*self._designs(asked))
-        return {"html": await self._desk.do(_ASKED, partial(self._answers.report, designs))}
+        return {"html": await self._jobs.compute(_CLICK, partial(self._answers.report, designs))}
 
     def _designs(self, asked: Tables) -> tuple[ValidDesign, list[tuple[str, ValidDesign]]]:
         """The design in a request, and the designs to compare with."""
@@ -175,9 +249,22 @@ async def _file(request: Request) -> Response:
         return Response(_PLOTLY(), media_type="text/javascript")
     room = next((room for room, names in _FILES.items() if name in names), None)
     if room is None:
-        return PlainTextResponse("There is no such file.", status_code=404)
+        raise HTTPException(404)
     text = files(f"warpimpact.{room}").joinpath(name).read_text(encoding="utf-8")
     return Response(text, media_type="text/css" if name.endswith("css") else "text/javascript")
+
+
+async def _nothing_there(request: Request, error: Exception) -> Response:
+    return PlainTextResponse(
+        "There is nothing at this address. Each start of warpimpact design has another token and prints its address; "
+        "warpimpact design 'ADDRESS' opens the design of an old one.",
+        status_code=404,
+    )
+
+
+def _check_origin(request: Request) -> None:
+    if request.headers.get("origin") != f"http://{request.headers['host']}":
+        raise HTTPException(403, "Only the page itself may request this.")
 
 
 async def _asked(request: Request) -> Tables:
@@ -202,6 +289,7 @@ async def _asked(request: Request) -> Tables:
 
 async def _answered(answer: Callable[[Tables], Awaitable[Any]], request: Request) -> Response:
     """The answer as JSON, or a sentence for a mistake. Closing the connection cancels the work."""
+    _check_origin(request)
     try:
         asked = await _asked(request)
         work, gone = asyncio.ensure_future(answer(asked)), asyncio.ensure_future(_gone(request))
@@ -267,12 +355,12 @@ def bound(port: int) -> socket.socket:
     return listening
 
 
-def server_of(app: Guard) -> uvicorn.Server:
+def server_of(app: Starlette) -> uvicorn.Server:
     """The server of the page."""
     return uvicorn.Server(
         uvicorn.Config(
             app,
-            http=TimedProtocol,
+            headers=list(_HEADERS.items()),
             ws="none",
             log_level="critical",
             access_log=False,
@@ -288,7 +376,7 @@ def serve(
     port: int = 0,
     device: str = "auto",
     ready: Callable[[str], object],
-    entered: Callable[[], object] = _nothing,
+    entered: Callable[[], object] = lambda: None,
 ) -> None:
     """Serve the page until a signal ends it.
 
@@ -301,7 +389,7 @@ def serve(
     """
     with bound(port) as listening:
         token, port = secrets.token_urlsafe(18), listening.getsockname()[1]
-        server = server_of(application(shelf, token=token, port=port, device=device, entered=entered))
+        server = server_of(application(shelf, token=token, device=device, entered=entered))
         listening.listen()
         ready(f"http://127.0.0.1:{port}/{token}/")
         with warnings.catch_warnings():

@@ -21,7 +21,7 @@ def served(shelf: Shelf) -> Iterator[str]:
     with bound(0) as own:
         own.listen()
         port = own.getsockname()[1]
-        server = server_of(application(shelf, token=TOKEN, port=port, device="cpu"))
+        server = server_of(application(shelf, token=TOKEN, device="cpu"))
         thread = threading.Thread(target=server.run, kwargs={"sockets": [own]})
         thread.start()
         try:

@@ -1,4 +1,4 @@
-"""The desk computes one job at a time, the most urgent first, and ends what nobody wants."""
+"""The queue computes one job at a time, the most urgent first, and ends what nobody wants."""
 
 import asyncio
 import threading
@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 
-from warpimpact.design.desk import Desk
+from warpimpact.design.server import JobQueue
 from warpimpact.solver.worker import Cancel
 
 
@@ -37,10 +37,10 @@ def test_an_urgent_job_puts_off_another_which_then_ends() -> None:
         return "at once"
 
     async def both() -> list[str]:
-        desk = Desk()
-        slow = asyncio.ensure_future(desk.do(3, first))
+        jobs = JobQueue()
+        slow = asyncio.ensure_future(jobs.compute(3, first))
         await asyncio.sleep(0.05)
-        return [await desk.do(0, urgent), await slow]
+        return [await jobs.compute(0, urgent), await slow]
 
     assert asyncio.run(both()) == ["at once", "done"]
     assert order == ["refine", "urgent", "refine"]
@@ -58,29 +58,29 @@ def test_what_nobody_awaits_ends_at_once(waits: bool) -> None:
             ended.append("work")
 
     async def left() -> float:
-        desk = Desk()
-        before = asyncio.ensure_future(desk.do(0, until(never))) if waits else None
-        job = asyncio.ensure_future(desk.do(1, work))
+        jobs = JobQueue()
+        before = asyncio.ensure_future(jobs.compute(0, until(never))) if waits else None
+        job = asyncio.ensure_future(jobs.compute(1, work))
         await asyncio.sleep(0.05)
         job.cancel()
         if before is not None:
             before.cancel()
         begin = time.perf_counter()
-        await desk.do(3, lambda _: None)
+        await jobs.compute(3, lambda _: None)
         return time.perf_counter() - begin
 
     assert asyncio.run(left()) < 1.0
     assert begun == ended == ([] if waits else ["work"])
 
 
-def test_an_error_comes_to_who_asked_and_the_desk_goes_on() -> None:
+def test_an_error_comes_to_the_page_and_the_queue_goes_on() -> None:
     def broken(_: Cancel) -> Any:
         raise ZeroDivisionError
 
     async def both() -> str:
-        desk = Desk()
+        jobs = JobQueue()
         with pytest.raises(ZeroDivisionError):
-            await desk.do(0, broken)
-        return await desk.do(0, lambda _: "goes on")
+            await jobs.compute(0, broken)
+        return await jobs.compute(0, lambda _: "goes on")
 
     assert asyncio.run(both()) == "goes on"
