@@ -22,9 +22,9 @@ from .export import add_export, add_report
 from .firing import add_test
 from .identify import add_identify
 from .limit import add_limit
-from .mistakes import Plain, bug_report, implausible_told, message_of, say
+from .mistakes import Plain, bug_report, message_of, say, show_warnings
 from .optimise import add_optimise
-from .progress import verbosity
+from .progress import set_verbosity
 from .replay import add_replay
 from .run import add_run
 from .sensitivity import add_sensitivity
@@ -78,8 +78,8 @@ def main(argv: Sequence[str] | None = None) -> int:
     with redirect_stderr(Plain(sys.stderr)):  # argparse quotes what the user typed
         arguments = parser().parse_args(argv)
     try:
-        loud = verbosity(verbose=arguments.verbose, quiet=arguments.quiet)
-        with redirect_stdout(Plain(sys.stdout)), implausible_told(), loud:
+        set_verbosity(verbose=arguments.verbose, quiet=arguments.quiet)
+        with redirect_stdout(Plain(sys.stdout)), show_warnings():
             code: int | None = arguments.command(arguments)
             sys.stdout.flush()
     except KeyboardInterrupt as interrupt:

@@ -6,7 +6,6 @@ from contextlib import ExitStack
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from .mistakes import memory_told
 from .options import (
     Commands,
     add_command,
@@ -134,7 +133,7 @@ def _sensitivity(arguments: argparse.Namespace, comparison: "Comparison") -> str
     score = deciding(comparison)
     if score is None:
         raise ResultError(f"{arguments.files[0]}: no measure ranks these plates, so no change can turn them over")
-    with memory_told(arguments.files[0]), show_rows() as progress:
+    with show_rows() as progress:
         table = plate_sensitivity(
             read_plates(arguments.files[0], count=arguments.count),
             score.name,
@@ -179,7 +178,7 @@ def _plates_run(arguments: argparse.Namespace, folder: Path) -> dict[str, Path]:
         )
     campaigns = read_plates(arguments.files[0], count=arguments.count)
     paths = {name: folder / f"{name}.nc" for name in campaigns}
-    with memory_told(arguments.files[0]), executor_of(arguments) as executor:
+    with executor_of(arguments) as executor:
         for name, campaign in campaigns.items():
             print(f"plate {name}", file=sys.stderr)
             with show_run() as progress:

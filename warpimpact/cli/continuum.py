@@ -4,7 +4,6 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from .mistakes import memory_told
 from .options import (
     Commands,
     add_command,
@@ -87,7 +86,7 @@ def _continuum(arguments: argparse.Namespace) -> int:
     check_result(output, "a result")
     campaign = campaign.computed_by(_elements(arguments, campaign))
     computing = executor_for(arguments.device, workers=arguments.workers, scheduler=arguments.scheduler, apart=True)
-    with memory_told(arguments.file), show_progress() as show, computing as executor:
+    with show_progress() as show, computing as executor:
         try:
             continuum_to_file(
                 campaign,

@@ -4,7 +4,7 @@ import argparse
 from contextlib import ExitStack
 from pathlib import Path
 
-from .mistakes import folder_told
+from .mistakes import suggest_campaign_folder
 from .options import Commands, add_campaign_folder, add_command, add_output, add_overwrite, add_results, at_least
 from .paths import check_folder, check_output, check_suffix, named
 from .progress import Step, show_progress
@@ -126,7 +126,7 @@ def _report(arguments: argparse.Namespace) -> None:
     with ExitStack() as stack:
         datasets = {name: stack.enter_context(files.opened(path)) for name, path in by_name.items()}
         show = stack.enter_context(show_progress())
-        with folder_told(", or --trajectories 0, which needs none of them"):
+        with suggest_campaign_folder(", or --trajectories 0, which needs none of them"):
             write_report(
                 datasets,
                 output,

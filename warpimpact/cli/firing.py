@@ -3,7 +3,6 @@
 import argparse
 from pathlib import Path
 
-from .mistakes import memory_told
 from .options import Commands, add_command, add_computing, add_count, add_earlier, add_output, executor_of
 from .paths import check_output, check_picture, check_suffix
 from .progress import show_run, warn
@@ -64,7 +63,7 @@ def _simulate(arguments: argparse.Namespace) -> None:
     check_suffix(output, "a test", ".nc")
     for path in (output, picture):
         check_output(path, overwrite=overwrite or resume)
-    with memory_told(arguments.test), executor_of(arguments) as executor, show_run() as progress:
+    with executor_of(arguments) as executor, show_run() as progress:
         options = {"resume": resume, "overwrite": overwrite, "progress": progress, "tell": warn}
         response = response_of(test, output, executor=executor, count=arguments.count, **options)
     dataset = simulate_test(test, response)

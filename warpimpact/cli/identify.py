@@ -4,7 +4,7 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from .mistakes import memory_told, say
+from .mistakes import say
 from .options import Commands, add_command, add_computing, add_output, add_overwrite
 from .paths import check_output, check_picture, check_result
 from .progress import Step, show_progress, warn
@@ -72,7 +72,6 @@ def _identify(arguments: argparse.Namespace) -> int:
         workers, after = min(cores(), PROCESSES), WORTHWHILE
     say(f"computes at most {fit.sampling.sets} sets of parameters, {fit.sampling.hits} hits of each shot")
     with (
-        memory_told(arguments.fit),
         show_progress("set") as show,
         executor_for(device, workers=workers, scheduler=scheduler, apart=True, after=after) as executor,
     ):

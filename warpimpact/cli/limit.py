@@ -4,7 +4,7 @@ import argparse
 from pathlib import Path
 from typing import Any
 
-from .options import Commands, add_campaign, add_command, add_measures, add_output, at_least, read_option
+from .options import Commands, add_campaign, add_command, add_measures, add_output, at_least
 from .paths import check_picture, check_place, replaces
 from .progress import warn
 from .run import add_run_options, failure_code, run_shown
@@ -78,12 +78,15 @@ def _limit(arguments: argparse.Namespace) -> int:
 def _tolerance(arguments: argparse.Namespace) -> float | None:
     """The tolerance in SI; None where none is given."""
     from warpimpact.campaign.text import CampaignError
-    from warpimpact.scene.units import PositiveLength, PositiveSpeed
+    from warpimpact.scene.units import PositiveLength, PositiveSpeed, quantity
 
     if arguments.tolerance is None:
         return None
     kind: Any = PositiveSpeed if arguments.quantity == "velocity" else PositiveLength
-    tolerance = read_option("--tolerance", kind, arguments.tolerance, CampaignError)
+    try:
+        tolerance: float = quantity(kind)(arguments.tolerance)
+    except ValueError as error:
+        raise CampaignError(f"--tolerance: {error}") from None
     if not tolerance > 0.0:
         raise CampaignError(f'--tolerance: got "{arguments.tolerance}", but it must be greater than 0')
     return tolerance

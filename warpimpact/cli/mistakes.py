@@ -10,13 +10,12 @@ import traceback
 import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager
-from pathlib import Path
 from typing import IO, Any
 
 
 def message_of(error: Exception) -> str | None:
     """The message for an error that the user can correct; None of a bug."""
-    if isinstance(error, mistakes()):
+    if isinstance(error, _user_errors()):
         return str(error)
     if isinstance(error, UnicodeEncodeError) and error.reason == "surrogates not allowed":
         return f"{ascii(error.object)[1:200]}: the name contains bytes that are not UTF-8; rename the file"
@@ -44,7 +43,7 @@ def bug_report(error: Exception) -> str:
     return f"{what}; details are in {file.name}"
 
 
-def mistakes() -> tuple[type[Exception], ...]:
+def _user_errors() -> tuple[type[Exception], ...]:
     """Classes of errors whose message is for the user."""
     from warpimpact.campaign.text import CampaignError
     from warpimpact.results.files import OutputError, ResultError
@@ -56,7 +55,7 @@ def mistakes() -> tuple[type[Exception], ...]:
 
 
 @contextmanager
-def implausible_told() -> Iterator[None]:
+def show_warnings() -> Iterator[None]:
     """Report implausible values and long computations, each once, as a line on stderr."""
     with warnings.catch_warnings():
         show, shown = warnings.showwarning, set[str]()
@@ -73,19 +72,7 @@ def implausible_told() -> Iterator[None]:
 
 
 @contextmanager
-def memory_told(campaign: Path) -> Iterator[None]:
-    """Report a lack of memory, or of time, as an error of the campaign that needs it."""
-    from warpimpact.campaign.text import CampaignError
-    from warpimpact.solver.resolution import TooManySteps
-
-    try:
-        yield
-    except (MemoryError, TooManySteps) as error:
-        raise CampaignError(f"{campaign}: {error}") from None
-
-
-@contextmanager
-def folder_told(more: str = "") -> Iterator[None]:
+def suggest_campaign_folder(more: str = "") -> Iterator[None]:
     """Add the option that may help to an error of the campaign that a result contains; `more` follows it."""
     from warpimpact.campaign.text import CampaignError
 
@@ -95,7 +82,7 @@ def folder_told(more: str = "") -> Iterator[None]:
         raise CampaignError(f"{error}; give the folder of the campaign's files with --campaign-folder{more}") from None
 
 
-_MOST_SAID = 2000
+_LONGEST_SENTENCE = 2000
 """Most characters of a sentence on the error stream."""
 
 
@@ -130,5 +117,5 @@ def plain(text: str, keep: str = "") -> str:
 def say(sentence: str) -> None:
     """Write one sentence for the user, on one line of the error stream."""
     line = plain(sentence)
-    cut = line if len(line) <= _MOST_SAID else f"{line[: _MOST_SAID - 1]}…"
+    cut = line if len(line) <= _LONGEST_SENTENCE else f"{line[: _LONGEST_SENTENCE - 1]}…"
     print(f"warpimpact: {cut}", file=Plain(sys.stderr), flush=True)

@@ -3,7 +3,6 @@
 import argparse
 from pathlib import Path
 
-from .mistakes import memory_told
 from .options import Commands, add_command, add_computing, add_earlier, add_output, executor_of
 from .paths import check_picture, check_result, replaces
 from .progress import Step, show_progress, warn
@@ -45,7 +44,6 @@ def _optimise(arguments: argparse.Namespace) -> int:
     picture = output.with_suffix(".png")
     check_picture(picture, overwrite=replaces(arguments, output))
     with (
-        memory_told(arguments.design),
         show_progress("design") as show,
         executor_of(arguments) as executor,
     ):

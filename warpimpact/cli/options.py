@@ -4,7 +4,7 @@ import argparse
 from collections.abc import Callable
 from contextlib import AbstractContextManager
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeAlias
+from typing import TYPE_CHECKING, TypeAlias
 
 if TYPE_CHECKING:
     from warpimpact.runs.executor import Executor
@@ -107,20 +107,6 @@ def executor_of(arguments: argparse.Namespace) -> "AbstractContextManager[Execut
     from warpimpact.runs.choice import executor_for
 
     return executor_for(arguments.device, workers=arguments.workers, scheduler=arguments.scheduler)
-
-
-def read_option(option: str, kind: Any, text: str, mistake: type[ValueError]) -> float:
-    """The number, in SI or `Radians`, of an option with a unit, whose type is one of scene/units.py.
-
-    Raises:
-        mistake: the message names the option and what is allowed.
-    """
-    from warpimpact.scene.units import quantity
-
-    try:
-        return quantity(kind)(text)
-    except ValueError as error:
-        raise mistake(f"{option}: {error}") from None
 
 
 def at_least(least: int) -> Callable[[str], int]:

@@ -1,5 +1,6 @@
 """Progress of a computation: a bar on a terminal, plain lines in a log."""
 
+import logging
 import sys
 import time
 from collections.abc import Callable, Iterator
@@ -26,8 +27,7 @@ _BAR_OF_MOST = "{l_bar}{bar:20}| {n_fmt}/{total_fmt} at most [{elapsed}, {rate_f
 _quiet = False
 
 
-@contextmanager
-def verbosity(*, verbose: int, quiet: bool) -> Iterator[None]:
+def set_verbosity(*, verbose: int, quiet: bool) -> None:
     """Set what a command writes beside its output and its warnings.
 
     Args:
@@ -35,32 +35,14 @@ def verbosity(*, verbose: int, quiet: bool) -> Iterator[None]:
         quiet: whether no progress is shown.
     """
     global _quiet
-    _quiet, of_before = quiet, _quiet
-    try:
-        with _logged(verbose):
-            yield
-    finally:
-        _quiet = of_before
-
-
-@contextmanager
-def _logged(verbose: int) -> Iterator[None]:
-    """Show the log of the package; at 0 show nothing of it."""
-    if not verbose:
-        yield
-        return
-    import logging
-
-    logger, handler = logging.getLogger("warpimpact"), logging.StreamHandler(Plain(sys.stderr))
-    handler.setFormatter(logging.Formatter("%(asctime)s %(name)s: %(message)s", "%H:%M:%S"))
-    before = logger.level
-    logger.addHandler(handler)
-    logger.setLevel(logging.INFO if verbose == 1 else logging.DEBUG)
-    try:
-        yield
-    finally:
-        logger.removeHandler(handler)
-        logger.setLevel(before)
+    _quiet = quiet
+    logger = logging.getLogger("warpimpact")
+    logger.handlers.clear()
+    if verbose:
+        handler = logging.StreamHandler(Plain(sys.stderr))
+        handler.setFormatter(logging.Formatter("%(asctime)s %(name)s: %(message)s", "%H:%M:%S"))
+        logger.addHandler(handler)
+        logger.setLevel(logging.INFO if verbose == 1 else logging.DEBUG)
 
 
 def warn(sentence: str) -> None:

@@ -3,7 +3,7 @@
 import argparse
 from pathlib import Path
 
-from .mistakes import folder_told
+from .mistakes import suggest_campaign_folder
 from .options import Commands, add_campaign_folder, add_command, add_output, add_overwrite, add_result, at_least
 from .paths import check_output, check_suffix
 
@@ -54,7 +54,7 @@ def _replay(arguments: argparse.Namespace) -> None:
     if film:
         writer_for(film)
         check_output(film, overwrite=arguments.overwrite)
-    with folder_told():
+    with suggest_campaign_folder():
         folder = arguments.campaign_folder or path.parent
         history = replay(result, arguments.hit, folder=folder, snapshots=arguments.snapshots)
     files.write(history, output)

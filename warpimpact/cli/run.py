@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 from warpimpact.results import attributes as attr
 
-from .mistakes import memory_told, say
+from .mistakes import say
 from .options import (
     Commands,
     add_campaign,
@@ -82,7 +82,7 @@ def run_shown(
     from warpimpact.runs.compute import HIT_MAP
     from warpimpact.runs.run import run_to_file
 
-    with memory_told(arguments.campaign), show_run() as progress, executor_of(arguments) as executor:
+    with show_run() as progress, executor_of(arguments) as executor:
         run_to_file(
             campaign,
             output,

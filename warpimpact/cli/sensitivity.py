@@ -5,7 +5,6 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-from .mistakes import memory_told
 from .options import Commands, add_campaign, add_command, add_device, add_measures, add_output, add_overwrite, at_least
 from .paths import check_output, check_picture, check_suffix
 from .progress import Step, show_progress
@@ -52,7 +51,7 @@ def _sensitivity(arguments: argparse.Namespace) -> None:
     check_suffix(output, "a table", ".csv")
     check_output(output, overwrite=arguments.overwrite)
     check_picture(picture, overwrite=arguments.overwrite)
-    with memory_told(arguments.campaign), show_rows() as progress:
+    with show_rows() as progress:
         table = sensitivity(
             campaign,
             hits=arguments.hits,

@@ -5,7 +5,6 @@ import sys
 from pathlib import Path
 from typing import Any
 
-from .mistakes import memory_told
 from .options import (
     Commands,
     add_campaign,
@@ -56,7 +55,7 @@ def _sweep(arguments: argparse.Namespace) -> None:
     check_result(output, "a sweep")
     check_picture(picture, overwrite=replaces(arguments, output))
 
-    with memory_told(arguments.campaign), show_run() as follow, executor_of(arguments) as executor:
+    with show_run() as follow, executor_of(arguments) as executor:
 
         def named(name: str) -> Any:
             print(f"point {name}", file=sys.stderr)

@@ -67,7 +67,7 @@ def test_memory_that_cannot_be_had_is_told(
         raise MemoryError("Unable to allocate 8 TiB")
 
     monkeypatch.setattr("warpimpact.runs.run.run_to_file", no_memory)
-    assert refusal(["run", str(SLOTTED_PLATE)]) == f"{SLOTTED_PLATE}: Unable to allocate 8 TiB"
+    assert refusal(["run", str(SLOTTED_PLATE)]) == "not enough memory: Unable to allocate 8 TiB"
     assert not list(in_tmp_path.iterdir())
 
 

@@ -6,8 +6,7 @@ from dataclasses import replace
 
 import pytest
 
-from warpimpact.cli import main
-from warpimpact.cli.progress import Step, show_progress, show_run
+from warpimpact.cli.progress import show_run
 from warpimpact.results.measures import Measure
 from warpimpact.runs.progress import RunProgress
 from warpimpact.statistics.intervals import Estimate
@@ -98,10 +97,3 @@ def test_runs_one_after_another_begin_anew(capsys: pytest.CaptureFixture[str], c
     lines = capsys.readouterr().err.splitlines()
     assert len(lines) == 6
     assert lines[4].startswith("500 of 1000 hits, 50 hits/s, 10 s left")
-
-
-def test_quiet_lasts_for_its_command(capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["new", "--list", "-q"]) == 0
-    with show_progress("shot") as show:
-        show(Step(1, 2, 0, ""))
-    assert "1 of 2" in capsys.readouterr().err
