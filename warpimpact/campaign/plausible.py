@@ -43,9 +43,9 @@ def doubted(scene: Scene, impact: Impact, hits: Hits) -> Iterator[str]:
         share = effective_thickness(plate, impact.velocity) / plate.thickness
         if share < LEAST_EFFECTIVE_SHARE:
             yield (
-                f"{place}: only {share:.0%} of its {1e3 * plate.thickness:.3g} mm resist a core, because it weakens. "
-                "Weakening was only fitted to 4 mm, and such a plate takes hardly more than a thinner one; give thick "
-                "plates degradation = 1"
+                f"{place}: weakens so fast that only {share:.0%} of its {1e3 * plate.thickness:.3g} mm resist a core "
+                f"at {impact.velocity:.4g} m/s, and a thicker one would resist hardly more. Weakening was only fitted "
+                "to 4 mm at 825 m/s; degradation = 1 suits thicker plates and slower cores"
             )
 
 

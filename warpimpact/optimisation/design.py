@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import warnings
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
@@ -19,6 +20,7 @@ from warpimpact.optimisation.space import Space, read_space
 from warpimpact.results.kinds import DESIGN
 from warpimpact.results.measures import Measure
 from warpimpact.results.vocabulary import WEIGHTS
+from warpimpact.scene.bounds import Implausible
 from warpimpact.scene.model import Array, Model
 from warpimpact.scene.problems import sentence
 from warpimpact.scene.units import Number, PositiveArealDensity, PositiveLength, Title, quoted
@@ -265,7 +267,9 @@ def is_even(tables: Mapping[str, Any]) -> bool:
 @lru_cache(maxsize=256)
 def _campaign(text: str, name: str, folder: Path) -> Campaign:
     """A campaign of a search, cached so that its plate keeps its tile."""
-    return Campaign.from_text(text, name=name, folder=folder)
+    with warnings.catch_warnings():
+        warnings.filterwarnings("ignore", ".* weakens so fast", Implausible)  # of a thickness that the search chose
+        return Campaign.from_text(text, name=name, folder=folder)
 
 
 def read_design(path: str | Path) -> Design:

@@ -74,11 +74,11 @@ def test_a_plate_of_which_less_than_half_resists_is_doubted(unit: str, folder: P
     assert effective_thickness(paper, 825.0) == pytest.approx(effective(4e-3))
     assert warned(plate(0.999 * most), folder) == []
     (sentence,) = warned(plate(1.001 * most), folder)
-    assert sentence.startswith("plate: only 50% of its 5.9")
-    assert sentence.endswith("give thick plates degradation = 1")
+    assert sentence.startswith("plate: weakens so fast that only 50% of its 5.9")
+    assert sentence.endswith("degradation = 1 suits thicker plates and slower cores")
     assert warned(plate(12e-3, ""), folder) == []
     behind = TEXT.replace("[impact]", f'[[layer]]\nthickness = "8 mm"\nresistance = "2 GPa"\n{weakened}[impact]')
-    assert warned(behind, folder)[0].startswith("layer 1: only 41% of its 8 mm")
+    assert warned(behind, folder)[0].startswith("layer 1: weakens so fast that only 41% of its 8 mm")
 
 
 @pytest.mark.parametrize(
