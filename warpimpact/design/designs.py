@@ -12,11 +12,12 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+import tomli_w
+
 from warpimpact.campaign.campaign import Campaign
 from warpimpact.campaign.catalogued import catalogue_of
 from warpimpact.campaign.plates import read_plates
 from warpimpact.campaign.text import CampaignError, parsed, read_text
-from warpimpact.campaign.toml import toml_text
 from warpimpact.catalogue.entries import Material, Threat
 from warpimpact.results import attributes as attr
 from warpimpact.results import files, front
@@ -74,7 +75,7 @@ class Shelf:
                 )
         if (null := next((place for place, _, value in _entries(tables) if value is None), None)) is not None:
             raise CampaignError(f"{_DESIGN_NAME}: {null}: got null, but it must be a value, or be left out")
-        text = toml_text(tables)
+        text = tomli_w.dumps(tables)
         return ValidDesign(tables, text, Campaign.from_text(text, name=_DESIGN_NAME, folder=ROOT))
 
 
@@ -104,7 +105,7 @@ def shelf_of(paths: list[Path]) -> Shelf:
     for path in paths:
         for name, text in _texts(path):
             tables = _absolute(parsed(text, str(path)), path.parent)
-            Campaign.from_text(toml_text(tables), name=str(path), folder=path.parent)
+            Campaign.from_text(tomli_w.dumps(tables), name=str(path), folder=path.parent)
             designs[name if name not in designs else f"{name} ({path})"] = tables
     files = {name for tables in designs.values() for name in _files_of(tables).values()}
     return Shelf(designs, frozenset(files))

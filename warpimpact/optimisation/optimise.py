@@ -9,11 +9,11 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import tomli_w
 import xarray
 
 from warpimpact.campaign.places import relocated
 from warpimpact.campaign.tested_range import outside_tested_range
-from warpimpact.campaign.toml import toml_text
 from warpimpact.optimisation.design import Bound, Design, FacedThreat, read_design
 from warpimpact.optimisation.objectives import Candidate, estimate
 from warpimpact.optimisation.search import (
@@ -194,7 +194,7 @@ def _levels(candidate: Candidate) -> str:
 
 def _campaign(design: Design, candidate: Candidate) -> str:
     """The campaign of a target with the first threat, as TOML."""
-    return toml_text(campaign_tables(design, candidate.tables, candidate.point, design.threats[0]))
+    return tomli_w.dumps(campaign_tables(design, candidate.tables, candidate.point, design.threats[0]))
 
 
 def campaign_tables(design: Design, tables: Mapping[str, Any], point: Array, threat: FacedThreat) -> dict[str, Any]:
@@ -250,7 +250,7 @@ def write_campaigns(
         for place, threat in enumerate(design.threats):
             tables = relocated(campaign_tables(design, target, values, threat), design.folder, folder)
             ending = f"_{place}" if len(design.threats) > 1 else ""
-            texts[folder / f"{Path(str(name)).stem}{ending}.toml"] = toml_text(tables)
+            texts[folder / f"{Path(str(name)).stem}{ending}.toml"] = tomli_w.dumps(tables)
     if overwrite:
         for stale in set(folder.glob("design_[0-9]*.toml")) - texts.keys():
             remove(stale)

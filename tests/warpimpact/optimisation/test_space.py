@@ -1,13 +1,11 @@
 """A design file is read, or refused in one sentence; points of its space become campaigns."""
 
 import math
-import tomllib
 
 import numpy as np
 import pytest
 
 from warpimpact.campaign.text import CampaignError
-from warpimpact.campaign.toml import toml_text
 from warpimpact.optimisation.objectives import corner_radius, hole_sizes, violations, weights_of
 from warpimpact.scene import CirclePattern, EllipsePattern, Plate, SlotPattern, SquarePattern
 
@@ -134,15 +132,3 @@ def test_the_weight_of_the_add_on_alone_is_bounded_and_sought(constraint: str, b
 def test_holes_that_overlap_are_no_campaign() -> None:
     one = design(HOLES.replace("5 mm", "8.5 mm"), WEIGHT_AND_ENERGY)
     assert "overlap or touch" in violations(one, one.tables(one.space.at([])))[1][0].text
-
-
-@pytest.mark.parametrize(
-    "tables",
-    [
-        {"title": 'a "plate" \\ µ', "core": {"coefficients": [3e-4, -5.29], "mass": "4 g", "flag": True}},
-        {"plate": {"thickness": 1, "pattern": {"shape": "slot", "a": 1, "b": 2.5, "c": [["1 mm", 2]]}, "x y": 1e-30}},
-        {"layer": [{"gap": 0.1, "pattern": {"shape": "none"}}, {"gap": "1 mm"}], "impact": {"v": {"low": 1}}},
-    ],
-)
-def test_tables_as_toml_are_read_again(tables: dict[str, object]) -> None:
-    assert tomllib.loads(toml_text(tables)) == tables
