@@ -9,14 +9,11 @@ import pytest
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from warpimpact import (
-    Flow,
-    OgiveCore,
-    PolynomialCore,
-)
+from warpimpact import OgiveCore, PolynomialCore
 from warpimpact.continuum.meshing import SheetMesh
 from warpimpact.continuum.one_hit import OneHit, Start
 from warpimpact.kernels.status import Status
+from warpimpact.scene.flow import Flow
 
 Array = NDArray[np.float64]
 

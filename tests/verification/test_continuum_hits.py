@@ -9,22 +9,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-from warpimpact import (
-    CirclePattern,
-    Continuum,
-    Flow,
-    Layer,
-    NoPattern,
-    Outcomes,
-    Plate,
-    PolynomialCore,
-    Record,
-    Scene,
-    Shots,
-    simulate,
-)
+from warpimpact import CirclePattern, Continuum, Layer, NoPattern, Plate, PolynomialCore, Record, Scene, Shots, simulate
 from warpimpact.continuum import many_hits, meeting, strikes
 from warpimpact.kernels.status import Status
+from warpimpact.records.outcomes import Outcomes
+from warpimpact.scene.flow import Flow
 from warpimpact.solver.worker import Worker
 
 CORE = PolynomialCore(coefficients=(3.0e-4, 0.24, -5.29), length=27.86e-3, mass=4.0e-3)

@@ -9,8 +9,9 @@ from xml.etree import ElementTree
 import numpy as np
 import pytest
 
-from warpimpact import Campaign, ConeCore, Hits, Impact, Layer, Numerics, Plate, SquarePattern, inspect, run
+from warpimpact import Campaign, ConeCore, Hits, Impact, Layer, Numerics, Plate, SquarePattern, run
 from warpimpact.analysis.comparison import compare
+from warpimpact.analysis.inspection import inspect
 from warpimpact.results import files
 from warpimpact.results.files import ResultError
 from warpimpact.scene import Target
