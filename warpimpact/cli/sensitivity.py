@@ -30,7 +30,7 @@ def add_sensitivity(commands: Commands) -> None:
 
 
 def add_hits(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("--hits", type=at_least(16), default=1024, metavar="N", help="hits of each row (default: 1024)")
+    parser.add_argument("--hits", type=at_least(16), default=256, metavar="N", help="hits of each row (default: 256)")
 
 
 @contextmanager

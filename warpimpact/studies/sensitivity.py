@@ -25,7 +25,7 @@ from warpimpact.results import variables as v
 from warpimpact.results.dataset import narrow_table
 from warpimpact.results.measures import Measure
 from warpimpact.results.tallies import estimate_from
-from warpimpact.scene import Interaction, Plate, Radians, Shots
+from warpimpact.scene import Interaction, Numerics, Plate, Radians, Shots
 from warpimpact.scene.interaction import NEAR_EDGES
 from warpimpact.scene.model import Array
 from warpimpact.scene.units import quoted
@@ -38,7 +38,8 @@ from warpimpact.statistics.intervals import estimate_of
 AS_GIVEN = "as given"
 SHOWN = ("P(base_perforated)", "P(base_pierced)", "mean(residual_velocity)", "mean(deflection)", "mean(tilt)")
 """Default measures, as far as the campaign has them; the first one decides."""
-HITS = 1024
+HITS = 256
+"""Rows differ by far more than 256 hits in common leave open."""
 UNKNOWN_SHARE = 0.3
 """How far a resistance or a strength that a user gives may be off: two steels of one hardness differ by more."""
 
@@ -165,7 +166,7 @@ def _computed(
     shots = {row: _shots(changed, hits) for row, changed in rows.items()}
     worker = Worker(device)
     found = [
-        numerics_for(campaign.scene, shots[plate, AS_GIVEN], campaign.numerics, worker)
+        numerics_for(campaign.scene, shots[plate, AS_GIVEN], _numerics(campaign), worker)
         for plate, campaign in campaigns.items()
     ]
     numerics = max(found, key=lambda each: each.level or 0)
@@ -178,6 +179,14 @@ def _computed(
         asked = asked_measures(table, texts, SHOWN)
         computed[plate][name] = {measure: measure.values(table) for measure in asked}
     return computed
+
+
+def _numerics(campaign: Campaign) -> Numerics:
+    """The campaign's own accuracy or level; else draft, whose errors all rows share."""
+    numerics = campaign.numerics
+    if numerics.explicit is not None or {"fidelity", "accuracy"} & numerics.model_fields_set:
+        return numerics
+    return numerics.model_copy(update={"fidelity": "draft"})
 
 
 def _parsed(campaigns: Mapping[str, Campaign], texts: Sequence[str]) -> list[Measure]:
