@@ -4,19 +4,15 @@ from __future__ import annotations
 
 import math
 from collections.abc import Collection
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ..catalogue.catalogue import Catalogue
 from ..catalogue.entries import Material, Threat
-from ..catalogue.strength import NINETY
+from ..catalogue.strength import NINETY, Resistance
 from ..scene import Core, Plate
+from .campaign import Campaign
 from .catalogued import SAME, known_resistance, resistance_under
-
-if TYPE_CHECKING:
-    from ..catalogue.strength import Resistance
-    from .campaign import Campaign
 
 Curve = tuple[tuple[float, ...], tuple[float, ...]]
 

@@ -8,17 +8,14 @@ import math
 import re
 from collections.abc import Iterable, Iterator, Mapping
 from functools import cache
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ..catalogue.catalogue import HERE, Catalogue
 from ..catalogue.entries import Material
 from ..scene import Core, Plate
+from .campaign import Campaign
 from .catalogued import calibres_of
-
-if TYPE_CHECKING:
-    from .campaign import Campaign
 
 Figures = Mapping[str, Mapping[str, float]]
 Sentences = Iterator[tuple[str, str]]

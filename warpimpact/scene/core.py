@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal, NamedTuple, Self
 import numpy as np
 from numpy.polynomial import Polynomial
 from pydantic import Field, ValidationInfo, model_validator
+from scipy.spatial import ConvexHull
 
 from .input_files import input_file, read_table
 from .model import Array, Model
@@ -132,8 +133,6 @@ class Core(Model, ABC):
         whose normals make one angle with the axis. The convex hull of the profile is used: hollows count as filled. The
         view from the nose equals that from the base.
         """
-        from scipy.spatial import ConvexHull  # half a second to import
-
         s = np.concatenate([np.linspace(a, b, _SILHOUETTE_STATIONS) for a, b in self._stretches()])
         outline = np.column_stack([[0.0, *s, self.length], [0.0, *self.radius(s), 0.0]])
         outline = outline[ConvexHull(outline).vertices]

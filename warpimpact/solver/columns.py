@@ -3,16 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
+from warpimpact.scene import Plate
 from warpimpact.scene.quantities import OF_THE_SCENE, QUANTITIES
 from warpimpact.solver.materials import decay_rate
-
-if TYPE_CHECKING:
-    from warpimpact.scene import Plate
 
 Array = NDArray[np.float64]
 Path = tuple[str | int, ...]

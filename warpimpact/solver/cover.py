@@ -11,19 +11,17 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import partial
 from itertools import pairwise
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from warpimpact.scene import Core, Pattern, Plate
+from warpimpact.scene.interaction import FreeSurface
 from warpimpact.scene.patterns import NoPattern
 from warpimpact.scene.patterns.geometry import Check
 from warpimpact.solver.keys import Key
 from warpimpact.solver.tile import Floats, Real, Tile, kept
-
-if TYPE_CHECKING:
-    from warpimpact.scene import Core, Pattern, Plate
-    from warpimpact.scene.interaction import FreeSurface
 
 Array = NDArray[np.float64]
 

@@ -16,6 +16,7 @@ from typing import Any, TypeVar
 
 import psutil
 import warp as wp
+from filelock import FileLock
 
 from warpimpact.kernels import lanes
 
@@ -143,8 +144,6 @@ def _load(kernel: Any, device: Any) -> None:
 def _alone(folder: Path) -> Iterator[None]:
     """Hold a lock while a module is compiled, so that processes that begin together compile it once. Without a lock
     each of them compiles it."""
-    from filelock import FileLock  # takes longer to import than some shots, and only a compiling process needs it
-
     lock = FileLock(folder.with_name(f"{folder.name}.lock"))
     with suppress(OSError, NotImplementedError):
         lock.acquire()

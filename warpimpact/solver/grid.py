@@ -5,18 +5,15 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
+from warpimpact.scene import Core, Plate, Shots
 from warpimpact.solver.cover import Cover, Pushed, cover_of
+from warpimpact.solver.materials import Materials
+from warpimpact.solver.resolution import Resolution
 from warpimpact.solver.tile import Tile, tile_of
-
-if TYPE_CHECKING:
-    from warpimpact.scene import Core, Plate, Shots
-    from warpimpact.solver.materials import Materials
-    from warpimpact.solver.resolution import Resolution
 
 Array = NDArray[np.float64]
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.spatial import KDTree
 
 from warpimpact.scene import IDENTITY, Scene, Shots, Symmetry
 from warpimpact.scene.symmetry import SYMMETRIES, of_plate
@@ -52,8 +53,6 @@ class Neighbours:
         known = np.flatnonzero(np.isfinite(self._value) & (self._value > 0.0))
         if len(known) <= NEAREST:
             return np.full((4, len(which)), np.nan)
-        from scipy.spatial import KDTree  # a fifth of a second to import
-
         value, least = self._value[known], 1e-3 * self._tolerance
         slopes = _slopes(self._conditions[0][known], value)
         weights = np.abs(slopes) / (np.std(value) + least)

@@ -3,15 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
+from warpimpact.scene import Core, Scene, Shots, Target
 from warpimpact.scene.interaction import coefficients
-
-if TYPE_CHECKING:
-    from warpimpact.scene import Core, Scene, Shots, Target
 
 Array = NDArray[np.float64]
 

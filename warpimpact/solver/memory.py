@@ -6,7 +6,7 @@ from __future__ import annotations
 import threading
 import time
 from functools import partial
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import warp as wp
@@ -14,15 +14,13 @@ from numpy.typing import NDArray
 
 from warpimpact.kernels import free_flight, lanes, march
 from warpimpact.kernels.trace import WIDTH
+from warpimpact.kernels.variant import Variant
 from warpimpact.records.group import Returned
 from warpimpact.solver.device import SMALL_MEMORY, free_memory, load
 from warpimpact.solver.grid import Cells
 from warpimpact.solver.prepare import Prepared
 from warpimpact.solver.structs import Put, empty, filled, inputs_of
 from warpimpact.solver.worker import NEVER, Cancel
-
-if TYPE_CHECKING:
-    from warpimpact.kernels.variant import Variant
 
 Array = NDArray[np.float64]
 

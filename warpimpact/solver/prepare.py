@@ -5,23 +5,19 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from warpimpact.kernels.variant import Variant
-from warpimpact.scene import exclusions
+from warpimpact.scene import Numerics, Plate, Scene, Shots, exclusions
 from warpimpact.solver.cover import Pushed
 from warpimpact.solver.grid import Cells, Grid, block_window, first_windows, grids_of, windows_behind
 from warpimpact.solver.materials import Materials, materials_of
 from warpimpact.solver.resolution import Resolution, conditions_of, layer_steps, resolve, steps_of
 from warpimpact.solver.rings import Rings, Sections, azimuths_of, rings_of, sections_of
-from warpimpact.solver.tile import check_tiles
-
-if TYPE_CHECKING:
-    from warpimpact.scene import Numerics, Plate, Scene, Shots
-    from warpimpact.solver.tile import Tile
+from warpimpact.solver.tile import Tile, check_tiles
 
 Array = NDArray[np.float64]
 

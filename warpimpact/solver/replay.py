@@ -6,7 +6,7 @@ import logging
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any, NamedTuple, Self
+from typing import Any, NamedTuple, Self
 
 import numpy as np
 import warp as wp
@@ -15,16 +15,13 @@ from scipy.spatial.transform import Rotation
 
 from warpimpact.kernels.trace import COLUMNS, WIDTH
 from warpimpact.records.outcomes import Outcomes
-from warpimpact.scene import MassProperties, Numerics, Scene, Shots
+from warpimpact.scene import MassProperties, Numerics, Plate, Scene, Shots
 from warpimpact.solver.device import find_device, free_memory
 from warpimpact.solver.grid import Cells
 from warpimpact.solver.marching import Marching, apart
 from warpimpact.solver.memory import Memory
 from warpimpact.solver.prepare import Prepared, prepare
 from warpimpact.solver.simulate import outcomes_of
-
-if TYPE_CHECKING:
-    from warpimpact.scene import Plate
 
 Array = NDArray[np.float64]
 _logger = logging.getLogger(__name__)

@@ -5,21 +5,19 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cache, lru_cache
-from typing import TYPE_CHECKING, Any
+from typing import Any
 from weakref import WeakKeyDictionary
 
 import numpy as np
 import warp as wp
 from numpy.typing import NDArray
 
+from warpimpact.scene import Core
+from warpimpact.solver.grid import Grid
 from warpimpact.solver.keys import Key
-
-if TYPE_CHECKING:
-    from warpimpact.scene import Core
-    from warpimpact.solver.grid import Grid
-    from warpimpact.solver.prepare import Prepared
-    from warpimpact.solver.rings import Rings
-    from warpimpact.solver.tile import Tile
+from warpimpact.solver.prepare import Prepared
+from warpimpact.solver.rings import Rings
+from warpimpact.solver.tile import Tile
 
 Array = NDArray[np.float64]
 

@@ -9,19 +9,17 @@ from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property, partial
 from threading import Lock
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
 
+from warpimpact.scene import Pattern, Plate
 from warpimpact.scene.patterns import WHOLE_CELL
 from warpimpact.scene.patterns.geometry import Check, no_end
 from warpimpact.solver.device import SMALL_MEMORY, free_memory
 from warpimpact.solver.keys import Key
-
-if TYPE_CHECKING:
-    from warpimpact.scene import Pattern, Plate
 
 Array = NDArray[np.float64]
 Floats = NDArray[np.floating[Any]]

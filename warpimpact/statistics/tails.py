@@ -13,6 +13,7 @@ error of the quantile.
 from __future__ import annotations
 
 import numpy as np
+from scipy.special import betainc
 
 from warpimpact.statistics.intervals import Array
 
@@ -63,7 +64,5 @@ def _jackknifed(values: Array, share: float) -> Array:
 
 def _weights(count: int, share: float) -> Array:
     """Weights of ordered numbers in a quantile, shape [count]; their sum is 1."""
-    from scipy.special import betainc
-
     ends = np.arange(count + 1) / count
     return np.asarray(np.diff(betainc((count + 1) * share, (count + 1) * (1.0 - share), ends)))

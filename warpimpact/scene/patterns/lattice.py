@@ -9,6 +9,7 @@ from typing import Annotated, Any, NamedTuple, Self
 
 import numpy as np
 from pydantic import Field, PrivateAttr, ValidationInfo, field_validator, model_validator
+from scipy.spatial import KDTree
 
 from ..exclusions import HOLES, STAGGERED, check_together
 from ..model import Array
@@ -209,10 +210,8 @@ class LatticePattern(Pattern):
         return bool(np.linalg.norm(mirrored, axis=-1).min(axis=-1).max() <= _EQUAL_LENGTHS * period.max())
 
     @cached_property
-    def _marked(self) -> tuple[Array, Array, Any]:
+    def _marked(self) -> tuple[Array, Array, KDTree]:
         """Middles of the holes of a period [m], their marks relative to these [m], and a tree of the middles."""
-        from scipy.spatial import KDTree
-
         period, marks = np.array(self.period), placed(self._marks, self._places)
         middles = marks.mean(axis=1)
         return middles, marks - middles[:, None], KDTree(middles % period % period, boxsize=period)

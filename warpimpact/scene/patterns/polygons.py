@@ -9,6 +9,7 @@ import numpy as np
 import shapely
 from numpy.typing import NDArray
 from pydantic import Field, ValidationInfo, field_validator, model_validator
+from scipy.ndimage import label
 from shapely.affinity import translate
 
 from ..exclusions import MARGIN, POLYGONS, check_together
@@ -174,8 +175,6 @@ def _in_one_piece(material: BoolArray) -> BoolArray:
     Raises:
         ValueError: the holes cut the plate apart.
     """
-    from scipy.ndimage import label
-
     rows, columns = material.shape
     labels = label(np.tile(material, (3, 3)))[0]
     middle = labels[rows : 2 * rows, columns : 2 * columns]
