@@ -157,7 +157,7 @@ SHEET = Constant(
     2.0**24,
     "units",
     "Of exposure that one sheet gives to a node, in whole numbers: rounds as float32 does, and 128 sheets fit.",
-    test="kernels/test_block.py::test_one_step_by_lanes_has_the_same_load_and_exposure",
+    test="kernels/test_block.py::test_lanes_that_run_one_after_another_compute_what_one_thread_computes",
 )
 TINY = Constant(
     1.0e-30,

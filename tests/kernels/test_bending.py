@@ -33,7 +33,6 @@ def bend(
     touches: Touches,
     struck: wp.int32,
     force: wp.float64,
-    omega: wp.vec3d,
     found: wp.array(dtype=Bending),
 ):
     """One step under a force across the axis, along the body's y, on one ring."""
@@ -49,8 +48,6 @@ def bend(
     state = State()
     state.attitude = wp.quatd(wp.float64(0.0), wp.float64(0.0), wp.float64(0.0), wp.float64(1.0))
     state.velocity = wp.vec3d(wp.float64(0.0), wp.float64(-1.0e3), wp.float64(0.0))  # the force slows it down
-    pose = Pose()
-    pose.omega = omega
     footprint = Footprint()
     footprint.first_ring = struck
     footprint.last_ring = struck
@@ -61,10 +58,10 @@ def bend(
     context.sections = sections
     clock = struct.Clock()
     clock.step = wp.float64(1.0e-9)
-    found[0] = bent(Bending(), context, footprint, pose, state, load, Change(), clock)
+    found[0] = bent(Bending(), context, footprint, Pose(), state, load, Change(), clock)
 
 
-def struck_at(share: float, device: str, omega: Any = (0.0, 0.0, 0.0), **sections: Any) -> tuple[Any, float]:
+def struck_at(share: float, device: str) -> tuple[Any, float]:
     """The bending of a rod that is struck at about this share of its length behind the nose; and the exact place
     [m]."""
     rings = rings_of(ROD, RINGS, 8)
@@ -72,8 +69,7 @@ def struck_at(share: float, device: str, omega: Any = (0.0, 0.0, 0.0), **section
     behind = 0.5 * LENGTH - rings.station
     ring = int(np.argmin(np.abs(behind - share * LENGTH) + (rings.area_radial == 0.0)))  # no disc
     struct = Sections()
-    values = vars(sections_of(ROD, rings)) | sections
-    for name, column in values.items():
+    for name, column in vars(sections_of(ROD, rings)).items():
         setattr(struct, name, wp.array(column, dtype=wp.float64, device=device))
     body, properties = Body(), ROD.mass_properties
     body.mass, body.inertia_axial = properties.mass, properties.inertia_axial
@@ -82,9 +78,7 @@ def struck_at(share: float, device: str, omega: Any = (0.0, 0.0, 0.0), **section
     touches.sums.zero_()
     touches.ring_area.zero_()
     found = wp.zeros(1, dtype=Bending, device=device)
-    wp.launch(
-        bend, 1, inputs=[surface, struct, body, touches, ring, FORCE, wp.vec3d(*omega)], outputs=[found], device=device
-    )
+    wp.launch(bend, 1, inputs=[surface, struct, body, touches, ring, FORCE], outputs=[found], device=device)
     return found.numpy()[0], float(behind[ring])
 
 
@@ -98,7 +92,7 @@ def moment_of(s: Any, at: float) -> Any:
     return FORCE * (np.maximum(s - at, 0.0) - inertia / LENGTH)
 
 
-@pytest.mark.parametrize("share", [0.0, 0.2, 0.35, 0.5, 0.9])
+@pytest.mark.parametrize("share", [0.0, 0.35, 0.9])
 def test_a_thin_rod_struck_across_bends_as_in_the_closed_form(share: float, device: str) -> None:
     found, at = struck_at(share, device)
     s = sections_of(ROD, rings_of(ROD, RINGS, 8)).station
@@ -115,12 +109,3 @@ def test_textbook_values(device: str) -> None:
     assert end["moment_station"] == pytest.approx(LENGTH / 3.0, abs=LENGTH / RINGS)
     middle, _ = struck_at(0.5, device)
     assert middle["moment"] == pytest.approx(FORCE * LENGTH / 8.0, rel=0.02)
-
-
-@pytest.mark.parametrize("omega", [(0.0, 0.0, 0.0), (2e4, 300.0, -500.0)], ids=["still", "spinning"])
-def test_nothing_is_left_behind_the_base(omega: Any, device: str) -> None:
-    last = np.zeros(len(rings_of(ROD, RINGS, 8).station))
-    last[-1] = 1.0  # [1/m³]: the "stress" of the last section is its moment
-    found, _ = struck_at(0.2, device, omega, stress=last)
-    assert found["moment"] > 1.0
-    assert found["stress"] < 1e-9 * found["moment"]

@@ -10,12 +10,9 @@ from typing import Any, NamedTuple
 import numpy as np
 import pytest
 import warp as wp
-from numpy.typing import NDArray
 
-from warpimpact.kernels import block, contact, lanes
-from warpimpact.kernels import structs as device_structs
+from warpimpact.kernels import lanes
 from warpimpact.kernels.status import Status
-from warpimpact.kernels.variant import Variant
 from warpimpact.scene import (
     CirclePattern,
     Core,
@@ -30,17 +27,13 @@ from warpimpact.scene import (
     Shots,
     Target,
 )
-from warpimpact.solver import grid, simulate, structs
-from warpimpact.solver.rings import azimuths_of, rings_of
+from warpimpact.solver import grid, simulate
 
 from ..verification.scenes import paper_plate
-from .probes import OGIVE, PAPER, astride, plate_of, poisoned, poisoned_fields, stepping
-
-Array = NDArray[np.float64]
+from .probes import OGIVE, PAPER
 
 SLOTTED = paper_plate()
 ROUND = SLOTTED.model_copy(update={"pattern": CirclePattern(diameter=5e-3, spacing=(8e-3, 8e-3))})
-BY_PATH = SLOTTED.model_copy(update={"degradation_interval": None, "degradation_distance": 0.825e-3})
 SIMPLE, BLOCK = Numerics(level=2), Numerics(level=2, layout="block")
 NORMAL, OBLIQUE = {}, {"obliquity": 0.35, "azimuth": 0.7, "yaw": 0.1, "pitch": 0.05}
 
@@ -63,22 +56,13 @@ SCENES = {
     "slots": Case(),
     "oblique and yawed": Case(impact=OBLIQUE),
     "a shank in round holes": Case(OGIVE, ROUND, {"pitch": 0.015}),
-    "degradation by path": Case(plate=BY_PATH, impact={"velocity": 350.0}),
-    "no degradation": Case(plate=SOUND),
     "stress that depends on the rate, beside the rim": Case(
         plate=SLOTTED.model_copy(update={"size": (9e-3, 30e-3)}), interaction={"linear": 0.1, "quadratic": 0.5}
     ),
     "layers": Case(impact=OBLIQUE, behind=(BASE, WEAK, TOUCHING)),
-    "layers without degradation": Case(plate=SOUND, behind=(BASE, BASE.model_copy(update={"resistance": 8e9}))),
-    "thick layers": Case(
-        plate=SLOTTED.model_copy(update={"thickness": 6e-3}),
-        behind=(WEAK.model_copy(update={"thickness": 8e-3}), TOUCHING.model_copy(update={"gap": 5e-3})),
-    ),
     "near a free surface": Case(plate=SOUND, impact=OBLIQUE, interaction={"free_surface": FreeSurface()}),
 }
-ON_CUDA = ("no degradation",)
-"""Scenes that differ from others in what is left out of a build, which takes 10 s of a core to compile on a CPU."""
-CHECKED = ("slots", "thick layers", "near a free surface")
+CHECKED = ("slots", "layers", "near a free surface")
 """Those that together read and write all arrays, whose bounds the debug mode checks."""
 IN_RELEASE = pytest.mark.skipif("config.getoption('warp_mode') == 'debug'", reason="others read and write these arrays")
 ROUNDING = {"residual_velocity": 0.1, "tilt": np.radians(0.5)}
@@ -153,9 +137,7 @@ def test_block_computes_what_one_thread_computes(name: str, device: str) -> None
     assert_same(by_block, simple)
 
 
-@pytest.mark.parametrize(
-    "name", [pytest.param(name, marks=[] if name in CHECKED else IN_RELEASE) for name in SCENES if name not in ON_CUDA]
-)
+@pytest.mark.parametrize("name", [pytest.param(name, marks=[] if name in CHECKED else IN_RELEASE) for name in SCENES])
 def test_lanes_that_run_one_after_another_compute_what_one_thread_computes(
     name: str, in_blocks: pytest.MonkeyPatch
 ) -> None:
@@ -174,64 +156,3 @@ def test_order_of_the_lanes_changes_no_outcome(in_blocks: pytest.MonkeyPatch) ->
     in_blocks.setattr(lanes, "LANE", BACKWARDS)
     in_blocks.setattr(grid, "SIZES", (2080,))  # so that kernels are built anew
     assert_same(simulate.simulate(scene, shots, numerics=BLOCK, device="cpu"), first)
-
-
-@IN_RELEASE
-def test_lanes_that_do_not_wait_are_found(in_blocks: pytest.MonkeyPatch) -> None:
-    scene, shots = scene_of("slots", 12)
-    simple = by_one_thread(scene, shots)
-    in_blocks.setattr(lanes, "WAIT", "")
-    in_blocks.setattr(grid, "SIZES", (2144,))
-    without = simulate.simulate(scene, shots, numerics=BLOCK, device="cpu")
-    with pytest.raises(AssertionError):
-        assert_same(without, simple)
-
-
-# One step: its load, and what it does to the plate, node by node.
-CELL = 0.5e-3 / 1.5
-CELLS = 240  # of a window that holds any pose, which no block on CUDA would
-LAID = {"simple": Variant(), "block": Variant(window=CELLS**2)}
-
-
-def stepped(variant: Variant, count: int) -> tuple[Any, Array]:
-    """Loads of random poses, and the exposure of their plates."""
-    kernel, struct = stepping(variant, block if variant.window else contact, 2), device_structs.build(variant)
-    put = structs.Put("cpu", variant.real)
-    around = 36  # so that a round of the lanes spans two rings
-    surface = structs.surface_of(struct.Surface, PAPER, rings_of(PAPER, 23, around), azimuths_of(around), put)
-    plate = plate_of(struct.Plate, np.ones((1, 1)), np.array([CELL, CELL]), CELL, "cpu", real=variant.real)
-    law = struct.Law()
-    law.a0, law.friction, law.onset, law.decay_rate = 2.6e9, 0.05, 2.0, np.log(0.8) / 1e-6
-    fields, touches = poisoned_fields(struct.Fields, count, CELLS, CELLS, "cpu", real=variant.real), struct.Touches()
-    patches = count * surface.rings * surface.around
-    for name, variable in struct.Touches.vars.items():
-        setattr(touches, name, poisoned(patches, variable.type.dtype, "cpu"))
-    poses = astride(count)
-    given = [
-        wp.array(poses[name], dtype=variant.quat if name == "attitude" else variant.vec3, device="cpu")
-        for name in ("position", "attitude", "velocity", "omega")
-    ]
-    outputs = [poisoned(count, kind, "cpu") for kind in (wp.bool, struct.Load)]
-    arguments = [surface, plate, 4e-3, law, fields, touches, 0, *given, 1e-6]
-    if variant.window:
-        wp.launch_tiled(kernel, dim=[count], inputs=arguments, outputs=outputs, block_dim=lanes.LANES, device="cpu")
-    else:
-        wp.launch(kernel, count, inputs=arguments, outputs=outputs, device="cpu")
-    return outputs[1].numpy(), fields.exposure.numpy().reshape(count, CELLS, CELLS)
-
-
-@pytest.mark.parametrize("lanes_of_a_block", [1, 32])
-def test_one_step_by_lanes_has_the_same_load_and_exposure(
-    lanes_of_a_block: int, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(wp.config, "enable_cpu_blocks", lanes_of_a_block > 1)
-    (expected, spread), (found, by_lanes) = (stepped(variant, 40) for variant in LAID.values())
-    assert expected["touching"].sum() > 20
-    np.testing.assert_array_equal(found["touching"], expected["touching"])
-    np.testing.assert_array_equal(found["damped"], expected["damped"])
-    assert spread.max() > 0.5e-6
-    np.testing.assert_allclose(by_lanes, spread, rtol=1e-5, atol=1e-5 * spread.max())
-    for name in ("force", "moment", "damping_vv", "damping_vw", "damping_ww"):
-        values = expected[name].reshape(len(expected), -1)
-        size = np.abs(values).max(axis=1, keepdims=True)
-        assert (np.abs(found[name].reshape(values.shape) - values) <= 2e-5 * size).all(), name

@@ -60,11 +60,7 @@ def test_no_other_number_is_chosen(file: Path) -> None:
     assert not chosen(ast.parse(file.read_text(encoding="utf-8")))
 
 
-def test_a_chosen_number_is_found() -> None:
-    assert chosen(ast.parse("still = real(1.0e-4)\nhalf = real(0.5)\nfar = wp.constant(7)")) == [1.0e-4, 7]
-
-
-@pytest.mark.parametrize(("low", "high"), [(30, 45), (9, 9), (50, 81), (12, 100)])
+@pytest.mark.parametrize(("low", "high"), [(30, 45), (12, 100)])
 def test_a_strip_of_the_filter_is_whole_vectors(low: int, high: int, device: str) -> None:
     # The columns of a box and of the filter's reach beside it, in vectors of 16 numbers of float32; or whole rows.
     use, struct = Variant().use(exposure), structs.build(Variant())

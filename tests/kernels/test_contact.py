@@ -25,7 +25,7 @@ Touches = struct.Touches
 
 CELL = 0.25e-3
 STRENGTH = 2.6e9
-SOLID, HOLE = np.ones((1, 1)), np.zeros((1, 1))  # tiles of a single cell
+SOLID = np.ones((1, 1))  # a tile of a single cell
 ALIGNED = np.array([[0.0, 0.0, 0.0, 1.0]])
 
 
@@ -127,13 +127,6 @@ def test_load_takes_power_from_the_core(device: str) -> None:
     assert found.load["touching"].sum() > 100
 
 
-def test_hole_carries_and_remembers_nothing(device: str) -> None:
-    found = loaded(surface_of(Surface, OGIVE, 12, 16, device), law_of(), device, **astride(50), tile=HOLE)
-    assert not found.load["touching"].any()
-    assert not found.load["force"].any()
-    assert not found.exposure.any()
-
-
 def test_load_sees_half_of_the_step_s_own_exposure(device: str) -> None:
     # Under a disc much wider than ℓ, T grows by dt: the mid-step force has lost β^(½ dt/Δt_β).
     disc = ProfileCore(s=(0.0, 5e-3), r=(12e-3, 12e-3), mass=1e-3)
@@ -186,7 +179,7 @@ def test_damping_tends_to_half_the_derivative_of_the_load(law: dict[str, float],
     assert errors[1] < 2 * np.pi / 384 / 8
 
 
-@pytest.mark.parametrize("length", [0.3e-3, 0.5e-3, 1.6e-3])
+@pytest.mark.parametrize("length", [0.3e-3, 1.6e-3])
 def test_window_that_just_holds_a_step_gives_what_a_wide_one_gives(length: float, device: str) -> None:
     # Neighbouring slots are poisoned, so a read across the edge is visible.
     surface = surface_of(Surface, OGIVE, 12, 16, device)

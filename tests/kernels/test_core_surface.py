@@ -147,7 +147,7 @@ def random_poses(count: int, spread: float) -> dict[str, Array]:
 # --- Share of a patch behind a face ---
 
 
-@pytest.mark.parametrize("ratio", [0.02, 0.1, 0.5, 1.0, 3.0, 50.0])
+@pytest.mark.parametrize("ratio", [0.02, 0.5, 1.0, 50.0])
 def test_share_is_that_of_two_boxes_convolved(ratio: float, device: str) -> None:
     # Mean over the motion, at 20 000 midpoints, of the sharp share of a box of ±extent.
     extent, motion = 2e-4, 2e-4 * ratio
@@ -166,16 +166,6 @@ def test_share_of_a_box_alone_has_its_corners_rounded_only(extent: float, motion
     np.testing.assert_allclose(shares, sharp, atol=0.0026)  # narrow/(8 wide) at the corners
     away = np.abs(np.abs(depth) - wide) > 0.021 * wide
     np.testing.assert_allclose(shares[away], sharp[away], atol=1e-12)
-
-
-@pytest.mark.parametrize("ratio", [0.1, 1.0, 7.3])
-def test_steps_through_a_slab_add_up_to_its_thickness(ratio: float, device: str) -> None:
-    # Σ over steps of the immersed share × way per step = h, wherever the steps begin.
-    extent, motion = 2e-4, 2e-4 * ratio
-    for phase in (0.0, 0.3, 0.9):
-        depth = 2 * motion * (np.arange(-200, 200) + phase)
-        front, rear = (share_behind(depth - face, extent, motion, device) for face in (0.0, THICKNESS))
-        assert 2 * motion * (front - rear).sum() == pytest.approx(THICKNESS, rel=1e-12)
 
 
 # --- Patches in a pose ---
@@ -202,22 +192,6 @@ def test_patches_turn_with_the_body_and_move_as_rigid_points_do(device: str) -> 
     assert (found["speed"] < 2 * fastest).all()
 
 
-def test_patches_lie_on_the_profile_and_face_outwards(device: str) -> None:
-    surface = surface_of(Surface, PAPER, 16, 32, device)
-    found = posed(surface, device, position=np.zeros((1, 3)), attitude=np.array([[0.0, 0, 0, 1]]))
-    arm, normal = found["arm"][0], found["normal"][0]
-    station = PAPER.mass_properties.centre_of_mass - arm[..., 0]
-    lateral = np.abs(normal[..., 0]) < 0.9
-    radius = np.hypot(arm[..., 1], arm[..., 2])
-    np.testing.assert_allclose(radius[lateral], PAPER.radius(station[lateral]), rtol=1e-13)
-    slope = (PAPER.radius(station[lateral] + 1e-6) - PAPER.radius(station[lateral] - 1e-6)) / 2e-6
-    ratio = normal[lateral][:, 0] / np.hypot(normal[lateral][:, 1], normal[lateral][:, 2])
-    np.testing.assert_allclose(ratio, slope, atol=2e-3)  # the chord of a sector of 1/32 turn
-    outward = arm[..., 1] * normal[..., 1] + arm[..., 2] * normal[..., 2]
-    assert (outward[lateral] > 0).all()
-    assert sorted(set(np.sign(normal[~lateral][:, 0]))) == [-1, 1]
-
-
 def test_passage_immerses_every_patch_for_the_thickness(device: str) -> None:
     # Straight flight of a tilted core: Σ over steps of immersed area × way = area × h, patch by patch.
     surface = surface_of(Surface, PAPER, 12, 16, device)
@@ -230,21 +204,6 @@ def test_passage_immerses_every_patch_for_the_thickness(device: str) -> None:
     swept = speed * dt * found["immersed"].sum(axis=0)
     expected = np.broadcast_to(found["area"][0][:, None] * THICKNESS, swept.shape)
     np.testing.assert_allclose(swept, expected, rtol=1e-11)
-
-
-def test_immersed_area_converges_to_that_of_a_fine_surface(device: str) -> None:
-    # Random poses across the slab. The reference is a fine surface, whose patches count in full or not at all.
-    poses = random_poses(12, 0.008)
-    coarse, fine = (
-        posed(surface_of(Surface, PAPER, axial, around, device), device, **poses, dt=0.0)
-        for axial, around in ((24, 48), (192, 384))
-    )
-    depth = poses["position"][:, None, None, 0] + fine["arm"][..., 0]
-    inside = (depth > 0) & (depth < THICKNESS)
-    sharp = (inside * fine["area"][:, :, None]).sum(axis=(1, 2))
-    assert (sharp > 0).sum() > 8
-    smooth = coarse["immersed"].sum(axis=(1, 2))
-    np.testing.assert_allclose(smooth, sharp, rtol=0, atol=0.01 * sharp.max())
 
 
 @pytest.mark.parametrize("ring", ["even", "odd"])

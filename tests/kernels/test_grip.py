@@ -156,19 +156,6 @@ def test_part_of_a_patch_bent_one_way_that_touches_is_the_part_that_closes_in(wa
         np.testing.assert_allclose(found["closing"][some], closing[some], rtol=0, atol=SLIDING * angle**2 / 8)
 
 
-def test_part_of_a_doubly_curved_patch_that_touches_is_that_of_a_strip(device: str) -> None:
-    # Closing speeds of a square patch on the diagonal have a triangular distribution over ±√2 V, the strip's an even
-    # one over ±V, of the same variance: shares differ by (√2 − 1)²/4 at most, and their power by (3 − 2√2)/12 V.
-    angle = 0.05
-    slant, velocity = grazing(300, angle, angle)
-    found = gripped(device, speed=1e-3, **bent(slant, angle, angle, velocity))
-    share, _, closing = closing_part(slant, angle, angle, velocity, (400, 400))
-    assert np.abs(found["share"] - share).max() < 0.25 * (np.sqrt(2) - 1) ** 2 + angle**2 + 2 / 400
-    power = np.where(share > 0, share * np.nan_to_num(closing), 0.0)
-    off = np.abs(found["share"] * found["closing"] - power)
-    assert off.max() < (3 - 2 * np.sqrt(2)) / 12 * angle * SLIDING + angle**2 * SLIDING / 20
-
-
 def test_part_of_a_patch_of_a_core_that_turns_is_where_that_closes_in(device: str) -> None:
     # ω × r changes the velocity along the patch. The load acts in the middle of what touches, so its power is that of
     # the closing speed there: a core that turns gains nothing.
@@ -232,23 +219,6 @@ def test_no_ring_is_left_out_of_which_a_part_closes_in(flank: bool, device: str)
     assert closes[touching > 0.0].all()
     assert 100 < (touching > 0.0).sum() < count
     assert not closes.all()
-
-
-def test_patch_that_closes_in_or_moves_away_as_a_whole_is_flat(device: str) -> None:
-    # Straight flight: all of a nose's patches close in, and carry the ring's own exact normal.
-    slant, velocity = grazing(500, 0.1, 0.1)
-    members = bent(slant, 0.1, 0.1, velocity)
-    meridian = members["turn_axial"] * velocity[:, 0] + members["turn_radial"] * velocity[:, 1]
-    variation = np.hypot(meridian, 0.1 * np.cos(slant) * velocity[:, 2])
-    for sign, share in ((1.0, 1.0), (-1.0, 0.0)):
-        members["closing"] = sign * variation * np.random.default_rng(12).uniform(1.01, 9.0, 500)
-        found = gripped(device, speed=1e-3, **members)
-        np.testing.assert_array_equal(found["share"], share)
-        if share:
-            np.testing.assert_array_equal(found["axial"], members["normal_axial"])
-            np.testing.assert_array_equal(found["outward"], members["normal_radial"])
-            np.testing.assert_array_equal(found["around"], 0.0)
-            np.testing.assert_array_equal(found["closing"], members["closing"])
 
 
 @pytest.mark.parametrize("onset", [1e-9, 5.0, 1e3])

@@ -10,7 +10,6 @@ from scipy.spatial.transform import Rotation
 from warpimpact.kernels.status import Status
 from warpimpact.scene import (
     CirclePattern,
-    ConeCore,
     Core,
     Impact,
     Numerics,
@@ -18,7 +17,6 @@ from warpimpact.scene import (
     Record,
     Scene,
     Shots,
-    SlotPattern,
 )
 from warpimpact.solver import replay, resolution, simulate
 
@@ -151,22 +149,6 @@ def test_shot_without_an_end_is_given_up(monkeypatch: pytest.MonkeyPatch, device
     outcomes = simulate.simulate(at(SOLID), shots_of(), numerics=DRAFT, device=device)
     assert Status(outcomes.status[0]) is Status.UNFINISHED
     assert np.isnan(outcomes.residual_velocity[0])
-
-
-@pytest.mark.skipif("config.getoption('warp_mode') == 'debug'", reason="others read and write these arrays")
-def test_load_too_small_for_its_energy_leaves_the_motion_finite(device: str) -> None:
-    # β takes all but 2^-126 of the resistance. The energy of such a kick is a number whose inverse is infinite.
-    cone = ConeCore(length=26e-3, diameter=1.3e-3, mass=1e-5)
-    slots = SlotPattern(length=12e-3, width=4e-3, spacing=(8e-3, 16e-3))
-    plate = Plate(
-        thickness=4e-3, resistance=1.1e3, shear_coefficient=5.3, degradation=0.02, degradation_interval=1e-6,
-        pattern=slots,
-    )  # fmt: skip
-    rng = np.random.default_rng(0)
-    (y, z), pitch, yaw = rng.uniform(0.0, 8e-3, (2, 400)), rng.normal(0.0, 0.035, 400), rng.normal(0.0, 0.035, 400)
-    shots = shots_of(velocity=2.0, spin=-26_700.0, obliquity=0.35, hit_y=y, hit_z=z, pitch=pitch, yaw=yaw)
-    outcomes = simulate.simulate(Scene(core=cone, target=plate), shots, numerics=DRAFT, device=device)
-    assert (outcomes.status < Status.UNFINISHED).all()
 
 
 def test_energy_that_rises_is_told(device: str) -> None:

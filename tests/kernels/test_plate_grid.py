@@ -69,19 +69,6 @@ def scatters(
         single.exposure.scatter(field, stride, index[i], y[i], z[i], amount[i])
 
 
-def meet(
-    area: wp.array(dtype=wp.float32),
-    slope: wp.array(dtype=wp.float32),
-    gain: wp.array(dtype=wp.float32),
-    at: wp.array(dtype=wp.int32),
-    tile: wp.array(dtype=wp.float32),
-    start: wp.int32,
-    count: wp.int32,
-    total: wp.array(dtype=wp.float32),
-) -> None:
-    total[0] = single.plate_grid.meet(area, slope, gain, at, tile, start, count)
-
-
 def cells(fields: Fields, windows: wp.array(dtype=Window), y: real, z: real, found: wp.array(dtype=Cell)) -> None:
     slot = wp.tid()
     found[slot] = use.plate_grid.cell_at(windows[slot], y, z)
@@ -126,7 +113,7 @@ def beneath_kernel(variant: Variant) -> Any:
     return variant.kernel(beneath)
 
 
-SCATTERS, MEET = SINGLE.kernel(scatters), SINGLE.kernel(meet)
+SCATTERS = SINGLE.kernel(scatters)
 BENEATH = {variant: beneath_kernel(variant) for variant in (VARIANT, SINGLE)}
 
 
@@ -187,7 +174,7 @@ def box_about(y: int, z: int) -> Any:
 
 
 @pytest.mark.parametrize(("variant", "rounding"), [(VARIANT, 1e-8), (SINGLE, 2e-4)], ids=["double", "single"])
-@pytest.mark.parametrize("shift", [0, 1, -1, 40_000, -40_000])
+@pytest.mark.parametrize("shift", [0, -1, 40_000])
 def test_material_is_that_of_the_cell_of_the_periodic_tile(
     shift: int, variant: Variant, rounding: float, device: str
 ) -> None:
@@ -200,29 +187,6 @@ def test_material_is_that_of_the_cell_of_the_periodic_tile(
         row, column = (np.floor(at).astype(int) % n for at, n in zip(places, TILE.shape, strict=True))
         np.testing.assert_allclose(found[sure], TILE[row, column][sure], rtol=1e-6)
         assert sure.sum() > 4900
-
-
-def test_material_on_the_edge_of_the_period_is_that_of_either_side(device: str) -> None:
-    # Rounding must not lead beyond the tile: multiples of the period, and one unit of float32 to either side.
-    edges = np.float32(PERIOD[0]) * np.arange(-20, 21, dtype=np.float32)
-    y = np.concatenate([edges, np.nextafter(edges, np.float32(1)), np.nextafter(edges, np.float32(-1))])
-    found, _ = beneath(SINGLE, np.zeros(2), y, np.zeros(len(y)), device)
-    assert set(found) == set(TILE[[0, -1], 0].astype(np.float32))
-
-
-def test_native_meeting_with_material_is_the_plain_one(device: str) -> None:
-    rng = np.random.default_rng(6)
-    tile, start, count = rng.random(500).astype(np.float32), 7, 40
-    at = rng.integers(0, 500, 60).astype(np.int32)
-    lists = rng.random((3, 60)).astype(np.float32)
-    given = [wp.array(a, device=device) for a in lists]
-    total = poisoned(1, wp.float32, device)
-    inputs = [*given, wp.array(at, device=device), wp.array(tile, device=device), start, count]
-    wp.launch(MEET, 1, inputs=inputs, outputs=[total], device=device)
-    expected = lists.copy()
-    expected[:, start : start + count] *= tile[at[start : start + count]]
-    np.testing.assert_array_equal([a.numpy() for a in given], expected)
-    assert total.numpy()[0] == pytest.approx(expected[0, start : start + count].sum(), rel=1e-6)
 
 
 @pytest.mark.parametrize("far", [0.0, 70.0])
@@ -254,21 +218,6 @@ def test_hit_is_a_node_of_its_window(device: str) -> None:
         np.testing.assert_array_equal(column, CELLS_Z // 2 - k)
         np.testing.assert_allclose(found.numpy()["y"], 0.25 * k, atol=1e-15)
         np.testing.assert_allclose(found.numpy()["z"], 0.75 * k, atol=1e-15)
-
-
-def test_interpolation_reproduces_a_linear_field(device: str) -> None:
-    laid, slot = lay_windows(device), 1
-    y, z = NODES
-    values = np.full((SLOTS, CELLS_Y, CELLS_Z), np.nan)  # a read of another window is visible
-    values[slot] = 3.0 + 2e3 * y[:, None] - 5e3 * z[None, :]
-    laid.write("exposure", values)
-    at = np.random.default_rng(2).random((500, 2))
-    at_y, at_z = y[0] + at[:, 0] * (y[-1] - y[0]), z[0] + at[:, 1] * (z[-1] - z[0])
-    found = poisoned(500, real, device)
-    inputs = [laid.fields, laid.windows, slot, laid.fields.exposure]
-    inputs += [wp.array(a, dtype=real, device=device) for a in (at_y, at_z)]
-    wp.launch(LOOK_UP, 500, inputs=inputs, outputs=[found], device=device)
-    np.testing.assert_allclose(found.numpy(), 3.0 + 2e3 * at_y - 5e3 * at_z, rtol=1e-12, atol=1e-12)
 
 
 def test_scatter_gives_each_node_its_weight(device: str) -> None:
@@ -320,25 +269,6 @@ def test_exposure_of_a_point_is_the_tent_at_the_nodes(point: tuple[float, float]
     np.testing.assert_allclose(exposure, np.outer(*tents), atol=1e-12)
 
 
-@pytest.mark.parametrize("length", [0.26e-3, 0.37e-3, 0.5e-3, 0.61e-3, 1.13e-3])
-@pytest.mark.parametrize("point", POINTS)
-def test_exposure_keeps_mass_place_and_second_moment(point: tuple[float, float], length: float, device: str) -> None:
-    # The taps' own second moment is ℓ²/6 − g²/3 or, where they are one, 0; scattering at fraction f of a cell adds
-    # g² f(1 − f).
-    slot = 1
-    laid = lay_windows(device, length=length)
-    _, exposure = exposed_at_a_point(laid, slot, *point)
-    assert exposure.min() >= 0.0
-    assert exposure.sum() == pytest.approx(1.0, rel=1e-12)
-    for axis in range(2):
-        distance = NODES[axis] - point[axis]
-        along = exposure.sum(axis=1 - axis)
-        fraction = (-distance[0] / CELL) % 1.0
-        expected = max(length**2 / 6 - CELL**2 / 3, 0.0) + CELL**2 * fraction * (1 - fraction)
-        assert along @ distance == pytest.approx(0.0, abs=1e-12 * CELL)
-        assert along @ distance**2 == pytest.approx(expected, rel=1e-9, abs=1e-12 * CELL**2)
-
-
 def test_reading_what_was_scattered_keeps_the_second_moment_of_the_tent(device: str) -> None:
     # Exposure scattered by a point and read at another, averaged over where the cells lie: K's ℓ²/6 in each
     # direction, in all. Both ways are polynomials of third order in the place within the cell: Gauss' rule is exact.
@@ -361,7 +291,7 @@ def test_reading_what_was_scattered_keeps_the_second_moment_of_the_tent(device: 
     assert moment / mass == pytest.approx(length**2 / 6, rel=1e-9)
 
 
-@pytest.mark.parametrize("length", [0.3e-3, 0.5e-3, 0.8e-3, 1.13e-3])
+@pytest.mark.parametrize("length", [0.3e-3, 0.8e-3, 1.13e-3])
 def test_step_s_gain_is_convolved_with_the_taps(length: float, device: str) -> None:
     # Random gain in a box as near the window's edge as the filter's reach allows, on a plate that has exposure.
     laid, slot, rng = lay_windows(device, length=length), 1, np.random.default_rng(7)
@@ -381,13 +311,3 @@ def test_step_s_gain_is_convolved_with_the_taps(length: float, device: str) -> N
         laid.launch(kernel, laid.plate, laid.fields, laid.windows, slot, box)
         np.testing.assert_allclose(laid.read("exposure")[slot], before[slot] + share * expected, rtol=1e-13)
     np.testing.assert_array_equal(laid.read("gain")[slot], 0.0)
-
-
-def test_mid_step_has_half_of_the_exposure_and_the_step_clears_its_gain(device: str) -> None:
-    laid = lay_windows(device)
-    middle, end = exposed_at_a_point(laid, 0, *POINTS[1])
-    assert end.any()
-    np.testing.assert_allclose(middle, end / 2, rtol=1e-14)
-    np.testing.assert_array_equal(laid.read("gain"), 0.0)
-    _, twice = exposed_at_a_point(laid, 0, *POINTS[1])
-    np.testing.assert_allclose(twice, 2 * end, rtol=1e-14)

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 import warp as wp
 
-from warpimpact.kernels import exposure, sliding, structs
+from warpimpact.kernels import sliding, structs
 from warpimpact.kernels.variant import Variant
 from warpimpact.scene import Hits, Impact, Numerics, Plate, Scene, Target, make_shots
 from warpimpact.solver import grid
@@ -19,6 +19,7 @@ from warpimpact.solver.prepare import prepare
 from warpimpact.solver.replay import traced
 
 from ..verification.scenes import PAPER_CORE, layer, paper_plate
+from .probes import records
 
 HITS = 16
 PLATE = paper_plate(degradation_interval=None, degradation_distance=0.8e-3)
@@ -72,59 +73,38 @@ def test_a_replay_keeps_all_that_the_core_has_passed(monkeypatch: pytest.MonkeyP
     np.testing.assert_array_equal(contact.steps.numpy(), wide.outcomes["steps"])
 
 
-@pytest.mark.parametrize(
-    ("rows", "columns"), [(0, 2), (0, -3), (1, 0), (2, 3), (2, -3), (-1, 4), (-4, -1), (9, 0), (0, 9)]
-)
-def test_nodes_slide_and_new_ones_are_untouched(rows: int, columns: int, device: str) -> None:
-    cells_y, cells_z, start = 5, 7, 3
-    use = Variant(degrades=True).use(exposure)
-
-    @wp.kernel(module="unique")
-    def slide(field: wp.array(dtype=wp.float32)):
-        use.exposure.slide_nodes(field, start, cells_y, cells_z, rows, columns)
-
-    before = np.random.default_rng(1).random(start + cells_y * cells_z + 2).astype(np.float32)
-    field = wp.array(before, dtype=wp.float32, device=device)
-    wp.launch(slide, 1, inputs=[field], device=device)
-    inner = slice(start, start + cells_y * cells_z)
-    wide = np.zeros((cells_y + 20, cells_z + 20), dtype=np.float32)
-    wide[10 : 10 + cells_y, 10 : 10 + cells_z] = before[inner].reshape(cells_y, cells_z)
-    expected = before.copy()
-    expected[inner] = wide[10 + rows : 10 + rows + cells_y, 10 + columns : 10 + columns + cells_z].ravel()
-    np.testing.assert_array_equal(field.numpy(), expected)
-
-
 WINDOW = (0, 9, 0, 9)  # rows, columns
+AFTER_KNOWN_AHEAD = [
+    ((6, 15, 0, 9), WINDOW, True),
+    ((20, 29, 0, 9), WINDOW, True),  # far away
+    ((6, 15, 0, 9), (-5, 9, 0, 9), True),  # it came along y, and goes on
+    ((-6, 3, 0, 9), (-5, 9, 0, 9), False),  # it came along y, and returns
+    ((0, 9, 6, 15), (0, 9, -5, 9), True),
+    ((0, 9, -6, 3), (0, 9, -5, 9), False),
+    ((4, 13, 4, 13), (-4, 9, -4, 9), True),  # aslant
+]
 
 
-@pytest.mark.parametrize(
-    ("after", "known", "ahead"),
-    [
-        ((6, 15, 0, 9), WINDOW, True),
-        ((6, 15, -4, 5), WINDOW, True),
-        ((20, 29, 0, 9), WINDOW, True),  # far away
-        ((6, 15, 0, 9), (-5, 9, 0, 9), True),  # it came along y, and goes on
-        ((-6, 3, 0, 9), (-5, 9, 0, 9), False),  # it came along y, and returns
-        ((6, 15, 0, 9), (0, 14, 0, 9), False),
-        ((0, 9, 6, 15), (0, 9, -5, 9), True),
-        ((0, 9, -6, 3), (0, 9, -5, 9), False),
-        ((0, 9, 6, 15), (0, 9, 0, 14), False),
-        ((4, 13, 4, 13), (-4, 9, -4, 9), True),  # aslant
-    ],
-)
-def test_a_window_returns_to_no_nodes_that_it_has_left(
-    after: tuple[int, ...], known: tuple[int, ...], ahead: bool, device: str
-) -> None:
+def test_a_window_returns_to_no_nodes_that_it_has_left(device: str) -> None:
     use, struct = Variant().use(sliding), structs.build(Variant())
     Box, is_ahead = struct.Box, use.sliding.is_ahead
 
     @wp.kernel(module="unique")
-    def look(boxes: wp.array(dtype=Box), found: wp.array(dtype=wp.bool)):
-        found[0] = is_ahead(boxes[0], boxes[1], boxes[2])
+    def look(
+        window: wp.array(dtype=Box),
+        after: wp.array(dtype=Box),
+        known: wp.array(dtype=Box),
+        found: wp.array(dtype=wp.bool),
+    ):
+        i = wp.tid()
+        found[i] = is_ahead(window[i], after[i], known[i])
 
-    boxes = [Box() for _ in range(3)]
-    for box, ends in zip(boxes, (WINDOW, after, known), strict=True):
-        box.y_low, box.y_high, box.z_low, box.z_high = ends
-    found = wp.zeros(1, dtype=wp.bool, device=device)
-    wp.launch(look, 1, inputs=[wp.array(boxes, dtype=Box, device=device), found], device=device)
-    assert bool(found.numpy()[0]) == ahead
+    def boxes(ends: Any) -> wp.array:
+        names = ("y_low", "y_high", "z_low", "z_high")
+        return records(Box, device, **dict(zip(names, np.transpose(ends), strict=True)))
+
+    after, known, ahead = zip(*AFTER_KNOWN_AHEAD, strict=True)
+    found = wp.zeros(len(ahead), dtype=wp.bool, device=device)
+    inputs = [boxes([WINDOW] * len(ahead)), boxes(after), boxes(known), found]
+    wp.launch(look, len(ahead), inputs=inputs, device=device)
+    assert found.numpy().tolist() == list(ahead)

@@ -63,22 +63,15 @@ class Found:
     """What came of the shots of a scene, in shots, and of the steps of those that did not fail.
 
     Attributes:
-        variant: the build of the kernels.
         statuses: how the shots ended.
-        steps: of all shots.
-        rise: largest rise of the kinetic energy in a step, in ε and impact energies.
-        steep_rise: the same, in what an error ε of the axis changes where this is more than ε.
-        gain: largest energy above that of the impact, in impact energies.
+        steep_rise: largest rise of the kinetic energy in a step, in ε and impact energies, or in what an error ε of the
+            axis changes where this is more.
         stretch: largest difference of a quaternion's length from 1, in ε.
         undefined: shots whose outcome lacks a value that their status promises, or has one that it excludes.
     """
 
-    variant: str
     statuses: list[Status]
-    steps: int
-    rise: float
     steep_rise: float
-    gain: float
     stretch: float
     undefined: int
 
@@ -139,7 +132,7 @@ def found(extreme: Extreme) -> Found:
     report, traces = Outcomes.collected(scene, shots, march.memory.report(contact)), traces_of(march.memory, contact)
     statuses = [Status(int(code)) for code in report.status]
     properties = scene.core.mass_properties
-    rises, steep, gains, stretches = [0.0], [0.0], [0.0], [0.0]
+    steep, stretches = [0.0], [0.0]
     epsilon = np.finfo(np.float32 if precision == "single" else np.float64).eps
     spinning = properties.inertia_axial * shots.spin**2
     for status, steps, impact in zip(
@@ -149,17 +142,11 @@ def found(extreme: Extreme) -> Found:
             history = History.from_trace(steps, properties)
             energy = np.append(impact, history.translational_energy + history.rotational_energy) / impact
             rise = np.diff(energy) / epsilon
-            rises.append(rise.max())
             steep.append((rise / np.maximum(1.0, _steepness(history, properties) / impact)).max())
-            gains.append(energy.max() - 1.0)
             stretches.append(np.abs(np.linalg.norm(history.attitude, axis=1) - 1.0).max() / epsilon)
     return Found(
-        variant=march.memory.variant.name,
         statuses=statuses,
-        steps=sum(map(len, traces)),
-        rise=float(np.max(rises)),
         steep_rise=float(np.max(steep)),
-        gain=float(np.max(gains)),
         stretch=float(np.max(stretches)),
         undefined=sum(not _defined(report, shot, status) for shot, status in enumerate(statuses)),
     )

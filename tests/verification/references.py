@@ -299,16 +299,6 @@ def torque_free_axis(t: ArrayLike, axis0: ArrayLike, angular_momentum: ArrayLike
     return Rotation.from_rotvec(turn).apply(axis0)
 
 
-def body_rate(t: ArrayLike, rate0: ArrayLike, inertia_axial: float, inertia_transverse: float) -> Array:
-    """Angular velocity in the body frame, x along the axis, at times t [s] (n,), shape (n, 3) [rad/s].
-
-    `rate0` (3,) is (p, q, r) at t = 0. The spin p stays; (q, r) turns about the axis at (I_a − I_t)/I_t · p.
-    """
-    rate0 = np.asarray(rate0, dtype=float)
-    turning = (inertia_axial - inertia_transverse) / inertia_transverse * rate0[0]
-    return Rotation.from_rotvec(np.multiply.outer(np.asarray(t), [turning, 0.0, 0.0])).apply(rate0)
-
-
 # --- Quadrature ---
 
 

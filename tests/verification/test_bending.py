@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from warpimpact.records.outcomes import Outcomes
-from warpimpact.scene import CirclePattern, Core, Numerics, Plate, Record, Scene, Shots, Target
+from warpimpact.scene import Core, Numerics, Plate, Record, Scene, Shots, Target
 from warpimpact.solver import prepare
 from warpimpact.solver import simulate as simulation
 from warpimpact.solver.rings import Rings, Sections, sections_of
@@ -17,6 +17,8 @@ from .scenes import PAPER_CORE, REFERENCE, layer, paper_plate, scattered_hits, s
 COUNT = 32
 
 
+LASTING = {"degradation": 0.5, "degradation_interval": 1e3}
+"""Nothing weakens within microseconds, in the build of the kernels that all tests here share."""
 PRECISE: dict[str, Any] = {"level": 2, "precision": "double"}
 
 
@@ -57,15 +59,6 @@ def test_a_straight_hit_bends_nothing(device: str) -> None:
     assert straight.largest_bending_moment[0] < 1e-8 * across.largest_bending_moment[0]
 
 
-def test_mirror_images_bend_alike(device: str) -> None:
-    y, z = scattered_hits(COUNT)
-    one = bent(paper_plate(), shots_at(y, z, yaw=3.0), device)
-    other = bent(paper_plate(), shots_at(-y, z, yaw=-3.0), device)
-    assert np.ptp(one.bending_stress) > 1e9
-    for name in ("largest_bending_moment", "bending_stress"):
-        np.testing.assert_allclose(getattr(other, name), getattr(one, name), rtol=1e-6)
-
-
 def test_asking_for_it_changes_nothing_else(device: str) -> None:
     numerics = Numerics(level=2, precision="double")
     scene = Scene(core=PAPER_CORE, target=paper_plate())
@@ -83,17 +76,10 @@ def test_bending_of_a_core_settles_as_the_numerics_get_finer() -> None:
         assert np.median(getattr(coarse, name)) == pytest.approx(np.median(getattr(fine, name)), rel=0.06)
 
 
-def test_what_touches_nothing_is_not_bent() -> None:
-    missed = bent(paper_plate(pattern=CirclePattern(diameter=12e-3, spacing=(20e-3, 20e-3))), shots_at())
-    assert missed.largest_bending_moment[0] == missed.bending_stress[0] == 0.0
-    assert np.isnan(missed.bending_section[0])
-
-
-@pytest.mark.parametrize("shares", [(0.5, 0.5), (0.2, 0.5, 0.3)])
-def test_parts_without_a_gap_bend_a_core_as_the_whole_does(shares: tuple[float, ...], device: str) -> None:
+def test_parts_without_a_gap_bend_a_core_as_the_whole_does(device: str) -> None:
     # The moment at a section comes from the loads of all layers together.
-    whole = solid_plate(thickness=6e-3, degradation=1.0)
-    parts = [whole.model_copy(update={"thickness": share * whole.thickness}) for share in shares]
+    whole = solid_plate(thickness=6e-3, **LASTING)
+    parts = [whole.model_copy(update={"thickness": share * whole.thickness}) for share in (0.2, 0.5, 0.3)]
     layers = tuple(layer(part) for part in parts[1:])
     shots = slanted_shots()
     expected = bent(whole, shots, device, time_step=1e-6)
@@ -110,8 +96,3 @@ def test_a_core_without_the_mass_of_its_slices_is_refused() -> None:
         ValueError, match=r"output.bending = true cannot be combined with core.inertia_axial: it needs the mass"
     ):
         Scene(core=core, target=paper_plate(), record=Record(bending=True))
-
-
-def test_the_literal_scheme_has_no_bending_moment() -> None:
-    with pytest.raises(ValueError, match=r'output.bending = true cannot be combined with numerics.scheme = "nodal"'):
-        bent(paper_plate(), shots_at(), scheme="nodal")

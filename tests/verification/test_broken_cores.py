@@ -1,41 +1,15 @@
 """Cores that break: when, where, by how much strength, and what is told of them (docs/model.md §8)."""
 
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
-from warpimpact import Campaign, run
-from warpimpact.analysis.effectiveness import effectiveness
-from warpimpact.campaign.text import CampaignError
 from warpimpact.records.outcomes import Outcomes
-from warpimpact.results.measures import Measure
-from warpimpact.results.tallies import Tally
-from warpimpact.scene import Record, Scatter, Scene, Shots, make_shots
+from warpimpact.scene import Hits, Impact, Record, Scatter, Scene, Shots, make_shots
 from warpimpact.solver.simulate import simulate
 
 from .scenes import PAPER_CORE, paper_plate, scattered_hits, shots_at
-
-TEXT = """\
-title = "broken"
-core = { shape = "cone", diameter = "6 mm", length = "20 mm", mass = "4 g", strength = STRENGTH }
-[plate]
-thickness = "4 mm"
-resistance = "2600 MPa"
-shear_coefficient = 0.05
-pattern = { shape = "circle", diameter = "5 mm", spacing = ["8 mm", "8 mm"] }
-[impact]
-velocity = "600 m/s"
-[hits]
-count = 256
-[numerics]
-fidelity = "draft"
-patches_axial = 14
-[output]
-bending = true
-"""
-WEIBULL = '{ distribution = "weibull", shape = 8, scale = "2 GPa" }'
 
 
 def outcomes(strength: float, shots: Shots, **scene: Any) -> Outcomes:
@@ -87,59 +61,16 @@ def test_a_broken_core_goes_on_as_it_would_have(hits: Shots) -> None:
         assert np.array_equal(getattr(weak, name), getattr(strong, name), equal_nan=True), name
 
 
-def campaign(strength: str) -> Campaign:
-    return Campaign.from_text(TEXT.replace("STRENGTH", strength), name="text", folder=Path())
-
-
 def test_strength_may_scatter_as_a_weibull_distribution() -> None:
-    given = campaign(WEIBULL)
-    strength = make_shots(given.impact, given.hits, given.plate, given.scatter).strength
-    assert strength is not None
+    weibull = {"distribution": "weibull", "shape": 8, "scale": "2 GPa"}
+
+    def drawn(**others: Any) -> Any:
+        scatter = Scatter.model_validate({"strength": weibull} | others)
+        return make_shots(Impact(velocity=600.0), Hits(count=256), paper_plate(), scatter).strength
+
+    strength = drawn()
     # P(X < x) = 1 − exp(−(x/scale)^shape)
     for x in (1.6e9, 2.0e9):
         assert np.mean(strength < x) == pytest.approx(1.0 - np.exp(-((x / 2e9) ** 8)), abs=0.02)
     # Its draws are its own: another scattering quantity does not move them.
-    both = Scatter.model_validate(
-        {"strength": given.scatter.strength, "yaw": {"distribution": "uniform", "low": -1, "high": 1}}
-    )
-    assert np.array_equal(make_shots(given.impact, given.hits, given.plate, both).strength, strength)
-
-
-def test_effectiveness_tells_of_broken_cores() -> None:
-    dataset = run(campaign(WEIBULL), device="cpu")
-    assert {"strength", "broken", "broken_time", "broken_x", "broken_section"} <= set(dataset.variables)
-    share = float(dataset["broken"].mean())
-    assert 0.0 < share < 1.0
-    measures = {measure.name: measure for measure in effectiveness(dataset)}
-    assert measures["P(broken)"].value == pytest.approx(share)
-    stopped, either = measures["P(stopped)"].value, measures["P(stopped_or_broken)"].value
-    assert max(stopped, share) - 1e-12 <= either <= stopped + share + 1e-12
-    tally = Tally(Measure.parse("P(broken)"))
-    tally.add(dataset)
-    assert tally.estimate().value == pytest.approx(share)
-
-
-@pytest.mark.parametrize(
-    ("change", "sentence"),
-    [
-        (("bending = true", "bending = false"), "core.strength needs output.bending = true"),
-        (('"2 GPa"', '"2 mm"'), "which is not a stress"),
-        (("shape = 8", "shape = 0"), "greater than 0"),
-        (("strength = ", 'strength = "-1 GPa" # '), "greater than 0"),
-    ],
-)
-def test_bad_strengths_are_refused_in_a_sentence(change: tuple[str, str], sentence: str) -> None:
-    with pytest.raises(CampaignError, match=sentence):
-        Campaign.from_text(_tables().replace(*change), name="text", folder=Path())
-
-
-def _tables() -> str:
-    core = '[core]\nshape = "cone"\ndiameter = "6 mm"\nlength = "20 mm"\nmass = "4 g"\nstrength = '
-    return TEXT.replace(TEXT[TEXT.index("core = {") : TEXT.index("[plate]")], f"{core}{WEIBULL}\n")
-
-
-def test_stopping_on_broken_cores_needs_a_strength() -> None:
-    rule = '[stop]\nquantity = "P(broken)"\nhalf_width = 0.05\nmax_count = 256\n'
-    text = TEXT.replace(", strength = STRENGTH", "") + rule
-    with pytest.raises(CampaignError, match=r"needs .*core\.strength"):
-        Campaign.from_text(text, name="text", folder=Path())
+    assert np.array_equal(drawn(yaw={"distribution": "uniform", "low": -1, "high": 1}), strength)

@@ -331,7 +331,7 @@ def test_momentum_of_a_free_plate_is_that_which_the_core_lost() -> None:
     assert momentum == pytest.approx(before - spun, abs=1e-3 * np.abs(momentum).max())
 
 
-def pressed(friction: float, *, eroded: bool = False, approach: float | None = None) -> tuple[Array, OneHit]:
+def pressed(friction: float, *, approach: float | None = None) -> tuple[Array, OneHit]:
     """Velocity that a core gains in the first kick of an element in which its side lies [m/s], and the hit.
 
     Args:
@@ -347,8 +347,6 @@ def pressed(friction: float, *, eroded: bool = False, approach: float | None = N
         nodal(hit, "inverse_mass")[:] = 0.0
     else:
         nodal(hit, "velocity")[1] = -approach
-    if eroded:
-        nodal(hit, "alive")[:] = 0.0
     hit.advance(1)
     return np.array(hit.flight["state"]["velocity"]) - start.velocity, hit
 
@@ -359,10 +357,6 @@ def test_friction_is_a_share_of_the_pressure_against_the_motion() -> None:
     assert smooth[0] == pytest.approx(0.0, abs=1e-9)
     assert rough[1] == pytest.approx(smooth[1], rel=1e-3)
     assert rough[0] == pytest.approx(0.1 * smooth[1], rel=1e-3)
-
-
-def test_nodes_that_no_element_holds_press_no_core() -> None:
-    assert (pressed(0.1, eroded=True)[0] == 0.0).all()
 
 
 def test_a_contact_damps_a_tenth_of_what_is_critical() -> None:

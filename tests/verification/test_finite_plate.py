@@ -4,12 +4,11 @@ one."""
 from dataclasses import replace
 
 import numpy as np
-import pytest
 
 from warpimpact.scene import Hits, Impact, SlotPattern, make_shots
 from warpimpact.scene.symmetry import symmetries
 
-from .scenes import SLOTS, paper_plate, shots_at, simulate, solid_plate
+from .scenes import paper_plate, shots_at, simulate, solid_plate
 
 RIM = {"size": (48e-3, 48e-3), "margin": 4e-3}
 
@@ -28,16 +27,8 @@ def test_left_out_holes_are_solid_and_kept_ones_are_holes() -> None:
     assert np.abs(simulate(paper_plate(), left_out).residual_velocity - solid).min() > 5.0
 
 
-def test_a_listed_lattice_computes_the_bits_of_the_staggered_one() -> None:
-    listed = SlotPattern(length=12e-3, width=4e-3, spacing=(16e-3, 16e-3), holes=((0, 0), (8e-3, 8e-3)))
-    shots = make_shots(Impact(velocity=825), Hits(count=64), paper_plate())
-    one, other = (simulate(paper_plate(pattern=pattern), shots) for pattern in (SLOTS, listed))
-    np.testing.assert_array_equal(one.residual_velocity, other.residual_velocity)
-    np.testing.assert_array_equal(one.tilt, other.tilt)
-
-
-@pytest.mark.parametrize("holes", [((1e-3, 0.0, 0.0),), ((0.0, 0.0, 0.2), (8e-3, 8e-3, 0.2))], ids=["aside", "turned"])
-def test_hits_on_all_of_a_plate_and_their_images_fare_alike(holes: tuple[tuple[float, float, float], ...]) -> None:
+def test_hits_on_all_of_a_plate_and_their_images_fare_alike() -> None:
+    holes = ((0.0, 0.0, 0.2), (8e-3, 8e-3, 0.2))
     pattern = SlotPattern(length=12e-3, width=4e-3, spacing=(16e-3, 16e-3), holes=holes)
     plate, impact = paper_plate(pattern=pattern, **RIM), Impact(velocity=825)
     assert len(symmetries(plate, impact)) == 2

@@ -14,7 +14,7 @@ from warpimpact.scene import CirclePattern, Layer, NoPattern, Plate, Target
 from warpimpact.solver import resolution
 
 from . import references
-from .scenes import PAPER_CORE, SLOTS, histories, layer, paper_plate, scattered_hits, shots_at, simulate, solid_plate
+from .scenes import PAPER_CORE, histories, layer, paper_plate, scattered_hits, shots_at, simulate, solid_plate
 
 CORE = PAPER_CORE.mass_properties
 RADIUS = references.PAPER_LARGEST_RADIUS
@@ -40,27 +40,18 @@ def assert_alike(got: Outcomes, expected: Outcomes, velocity: float, angle: floa
 
 
 # A patch on a seam counts by its share in either layer, so a laminate is exact at any resolution. Measured: 5e-4 m/s.
-@pytest.mark.parametrize("shares", [(0.5, 0.5), (0.2, 0.5, 0.3)])
-def test_parts_without_a_gap_are_the_whole(shares: tuple[float, ...], device: str) -> None:
+def test_parts_without_a_gap_are_the_whole(device: str) -> None:
     whole = solid_plate(thickness=6e-3, degradation=1.0, shear_coefficient=0.12)
     shots = shots_at(Y, Z, **TURNED)
-    parts = [layer(whole, thickness=share * whole.thickness) for share in shares]
+    parts = [layer(whole, thickness=share * whole.thickness) for share in (0.2, 0.5, 0.3)]
     scene: dict[str, Any] = {"shots": shots, "device": device, "time_step": 1e-6}
     expected = simulate(whole, **scene)
     front = whole.model_copy(update={"thickness": parts[0].thickness})
     assert_alike(layered(front, *parts[1:], **scene), expected, velocity=2e-3, angle=2e-3)
 
 
-def test_perforated_parts_with_one_pattern_are_the_whole(device: str) -> None:
-    whole = paper_plate(degradation=1.0)
-    scene: dict[str, Any] = {"shots": shots_at(Y, Z, **TURNED), "device": device, "time_step": 1e-6}
-    half = layer(whole, thickness=2e-3)
-    got = layered(whole.model_copy(update={"thickness": 2e-3}), half, **scene)
-    assert_alike(got, simulate(whole, **scene), velocity=2e-3, angle=5e-3)
-
-
 # The core, 27.9 mm long, touches both layers at once in all but the last of these.
-@pytest.mark.parametrize("gap", [0.0, 3e-3, 15e-3, 0.2])
+@pytest.mark.parametrize("gap", [0.0, 15e-3, 0.2])
 def test_work_of_a_normal_hit_is_that_of_all_layers(gap: float, device: str) -> None:
     # m (v0² − v²)/2 = Σ Y h πR² without friction, whatever the gaps.
     front = solid_plate(thickness=2e-3, resistance=2e9, shear_coefficient=SMOOTH, degradation=1.0)
@@ -94,24 +85,11 @@ def test_depth_in_a_base_is_that_of_the_energy_left(device: str) -> None:
     assert outcomes.depth == pytest.approx(expected, abs=0.1e-3)
 
 
-def test_far_layers_are_a_chain_of_single_plates(device: str) -> None:
-    # A core that does not turn: each plate gets what the plate before it leaves, where the line of flight meets it.
-    plates = [solid_plate(thickness=2e-3), solid_plate(thickness=3e-3, resistance=3e9, shear_coefficient=0.0)]
-    behind = layer(plates[1], gap=0.3)
-    scene: dict[str, Any] = {"device": device, "time_step": 1e-6}
-    outcomes = layered(plates[0], behind, shots=shots_at([0.0, 0.3e-3], [0.0, 0.1e-3]), **scene)
-    first = simulate(plates[0], shots_at([0.0, 0.3e-3], [0.0, 0.1e-3]), **scene)
-    second = simulate(plates[1], shots_at([0.0, 0.3e-3], [0.0, 0.1e-3], velocity=first.residual_velocity), **scene)
-    assert outcomes.layer_residual_velocity[:, 0] == pytest.approx(first.residual_velocity, abs=2e-3)
-    assert outcomes.residual_velocity == pytest.approx(second.residual_velocity, abs=0.05)
-
-
-@pytest.mark.parametrize("obliquity", [0.0, 30.0])
-def test_a_plate_behind_air_is_the_plate_where_the_line_of_flight_meets_it(obliquity: float, device: str) -> None:
+def test_a_plate_behind_air_is_the_plate_where_the_line_of_flight_meets_it(device: str) -> None:
     nothing = Plate(thickness=1e-3, resistance=0.0)
     distance, scene = 0.101, {"device": device, "time_step": 1e-6}
-    attitude = {"obliquity": obliquity, "azimuth": 40.0, "yaw": 3.0}
-    way = distance * np.tan(np.radians(obliquity))
+    attitude = {"obliquity": 30.0, "azimuth": 40.0, "yaw": 3.0}
+    way = distance * np.tan(np.radians(30.0))
     there = Y + way * np.cos(np.radians(40.0)), Z + way * np.sin(np.radians(40.0))
     expected = simulate(paper_plate(), shots_at(*there, **attitude), **scene)
     behind = layer(paper_plate(), gap=0.1)
@@ -194,9 +172,8 @@ def test_kinetic_energy_never_grows_and_momentum_is_the_impulse(device: str) -> 
         assert np.diff(history.position, axis=0) == pytest.approx(drift, abs=1e-12)
 
 
-@pytest.mark.parametrize("resistance", [0.8e9, 3e9])
-def test_a_base_that_stays_as_it_is_has_longer_steps_that_take_a_share_of_the_speed(resistance: float) -> None:
-    base = layer(solid_plate(degradation=1.0, resistance=resistance), gap=60e-3, thickness=8e-3)
+def test_a_base_that_stays_as_it_is_has_longer_steps_that_take_a_share_of_the_speed() -> None:
+    base = layer(solid_plate(degradation=1.0, resistance=3e9), gap=60e-3, thickness=8e-3)
     shots = shots_at(Y, Z, obliquity=30.0)
     share = 0.125 * resolution.LADDER[2].travel
     longest = []
@@ -231,21 +208,6 @@ def test_a_core_that_a_base_throws_aside_stays_between_the_layers(device: str) -
     assert largest > 0.15 * 825.0
 
 
-def mirrored(target: Target) -> Target:
-    """A target of patterns that are their own mirror images, mirrored in y."""
-    layers = tuple(one.model_copy(update={"offset": (-one.offset[0], one.offset[1])}) for one in target.layers[1:])
-    return Target(layers=(target.layers[0], *layers))
-
-
-def test_mirror_image(device: str) -> None:
-    scene: dict[str, Any] = {"device": device, "precision": "double"}
-    plain = simulate(STACK, shots_at(Y, Z, **TURNED), **scene)
-    got = simulate(mirrored(STACK), shots_at(-Y, Z, obliquity=15.0, azimuth=140.0, pitch=4.0, yaw=6.0), **scene)
-    assert_alike(got, plain.assign(yaw=-plain.yaw), velocity=1e-9, angle=1e-9)
-    np.testing.assert_array_equal(got.layer_status, plain.layer_status)
-    assert got.layer_tilt == pytest.approx(plain.layer_tilt, abs=1e-10, nan_ok=True)
-
-
 def test_hit_and_layers_shifted_by_a_lattice_vector(device: str) -> None:
     scene: dict[str, Any] = {"device": device, "precision": "double"}
     plain = simulate(STACK, shots_at(Y, Z, **TURNED), **scene)
@@ -257,25 +219,6 @@ def test_hit_and_layers_shifted_by_a_lattice_vector(device: str) -> None:
     )
     got = simulate(Target(layers=(STACK.layers[0], *moved)), shots_at(Y, Z, **TURNED), **scene)
     assert_alike(got, plain, velocity=1e-7, angle=1e-7)
-
-
-def test_target_turned_by_90_degrees_with_its_shot(device: str) -> None:
-    # (y, z) → (−z, y) turns slots along z into slots along −y.
-    rows = SLOTS.model_copy(update={"staggered": False})
-    columns = rows.model_copy(update={"rotation": "90 deg", "spacing": (16e-3, 8e-3)})
-    offset = (2e-3, 1e-3)
-    target = Target(layers=(paper_plate(pattern=rows), layer(paper_plate(pattern=rows), gap=6e-3, offset=offset)))
-    turned = Target(
-        layers=(
-            paper_plate(pattern=columns),
-            layer(paper_plate(pattern=columns), gap=6e-3, offset=(-offset[1], offset[0])),
-        )
-    )
-    scene: dict[str, Any] = {"device": device, "precision": "double"}
-    plain = simulate(target, shots_at(Y, Z, **TURNED), **scene)
-    got = simulate(turned, shots_at(-Z, Y, obliquity=15.0, azimuth=130.0, pitch=-6.0, yaw=-4.0), **scene)
-    assert_alike(got, plain, velocity=1e-6, angle=1e-6)
-    np.testing.assert_array_equal(got.layer_status, plain.layer_status)
 
 
 def test_ricochet_from_a_layer_is_that_of_the_target(device: str) -> None:
@@ -311,13 +254,3 @@ def test_a_core_that_slides_between_layers_stays_there(device: str, monkeypatch:
     assert (outcomes.stopped_in == -1).all()
     assert (outcomes.layer_status == [Status.MISSED, Status.RICOCHETED]).all()
     assert np.abs(outcomes.exit_position[:, 1]).min() > 1.0
-
-
-def test_a_layer_tells_how_the_computation_failed_in_it(device: str) -> None:
-    # In single precision the spin of so slender a body is what rounding leaves of its tumbling.
-    thin = PAPER_CORE.model_copy(update={"inertia_axial": 1e-7 * CORE.inertia_axial})
-    hard = solid_plate(thickness=4e-3, resistance=1e11)
-    shots = shots_at([0.0], [0.0], velocity=20.0, obliquity=28.6, pitch=57.3, spin=1e5)
-    got = layered(hard, layer(hard, gap=50e-3), shots=shots, core=thin, level=1, device=device)
-    assert (got.status == Status.GAINED_ENERGY).all()
-    assert got.layer_status.tolist() == [[Status.GAINED_ENERGY, Status.NOT_REACHED]]

@@ -10,20 +10,6 @@ from warpimpact.solver import marching
 from .scenes import REFERENCE, paper_plate, scattered_hits, shots_at, simulate, solid_plate
 
 GLANCING = {"obliquity": 70.0, "azimuth": 40.0}
-SMALL_PLATE = solid_plate(size=(10e-3, 10e-3))
-
-
-# The work of the contact, Y h πR² = 298.4 J at η = 0, is the energy of 386.3 m/s. Near the end the surfaces close more
-# slowly than contact sets in, in proportion to the step: the limit velocity is low by 3 % (standard) and 0.1 %.
-@pytest.mark.parametrize(
-    ("numerics", "velocity"), [({}, [365.0, 388.0]), ({"time_step": 1e-7}, [385.0, 388.0])], ids=["standard", "fine"]
-)
-def test_core_is_arrested_where_the_work_takes_all_its_energy(
-    numerics: dict[str, float], velocity: list[float], device: str
-) -> None:
-    plate = solid_plate(shear_coefficient=0.0, degradation=1.0)
-    outcomes = simulate(plate, shots_at(velocity=velocity), device=device, **numerics)
-    assert outcomes.status.tolist() == [Status.ARRESTED, Status.PERFORATED]
 
 
 def test_core_thrown_back_moves_away_from_the_plate(device: str) -> None:
@@ -50,7 +36,7 @@ def test_glancing_hits_end_within_the_windows_they_are_given(monkeypatch: pytest
 def test_a_flat_nose_does_not_weaken_the_plate_under_itself_alone() -> None:
     # A disc of patches wider than ℓ leaves gaps in the exposure and weakens its own cells too much: too little drag.
     core = ProfileCore(s=(0.0, 20e-3), r=(3e-3, 3e-3), mass=4e-3)
-    plate = solid_plate(shear_coefficient=0.0, degradation=0.3)
+    plate = solid_plate(shear_coefficient=1e-9, degradation=0.3)
     lost = [
         825.0 - simulate(plate, shots_at(), core=core, **numerics).residual_velocity[0] for numerics in ({}, REFERENCE)
     ]

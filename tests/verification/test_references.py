@@ -9,8 +9,7 @@ from scipy.integrate import quad, solve_ivp
 from . import references
 
 PAPER_SHOT = {"velocity": 825.0, "thickness": 4e-3, "resistance": 2.6e9}
-# Friction on a slower-yielding, thicker plate: the same work, but a shoulder that is short against the plate.
-THICK_SHOT = {"velocity": 825.0, "thickness": 16e-3, "resistance": 0.65e9}
+THICK_SHOT = {"velocity": 825.0, "thickness": 30e-3, "resistance": 0.3e9}
 DEGRADING = {"degradation": 0.8, "degradation_interval": 1e-6}
 LASTING = {"degradation": 1.0, "degradation_interval": 1e-6}
 
@@ -30,31 +29,14 @@ def test_solid_plate_meets_the_stated_figures(shear_coefficient: float, publishe
     assert residual == pytest.approx(published, abs=digit / 2)
 
 
-@pytest.mark.parametrize("shear_coefficient", [0.0, 0.05])
-@pytest.mark.parametrize(
-    "shot",
-    [PAPER_SHOT, THICK_SHOT, {"velocity": 825.0, "thickness": 30e-3, "resistance": 0.3e9}],
-    ids=["paper", "thick", "thicker than the nose is long"],
-)
-def test_without_degradation_the_quadratures_are_the_closed_form(
-    shot: dict[str, float], shear_coefficient: float
-) -> None:
+@pytest.mark.parametrize("shot", [PAPER_SHOT, THICK_SHOT], ids=["paper", "thicker than the nose is long"])
+def test_without_degradation_the_quadratures_are_the_closed_form(shot: dict[str, float]) -> None:
+    shear_coefficient = 0.05
     expected = references.solid_plate_residual(**shot, shear_coefficient=shear_coefficient)
     case = {**shot, **LASTING, "shear_coefficient": shear_coefficient}
     # The steps are accurate to 1e-6 of the speed each, some hundred of them.
     coarse = references.nonlocal_degradation_residual(**case, degradation_length=2e-3)
     assert coarse == pytest.approx(expected, rel=1e-5)
-
-
-@pytest.mark.parametrize("shear_coefficient", [0.0, 0.05])
-def test_exposure_spread_over_a_wide_length_degrades_nothing(shear_coefficient: float) -> None:
-    # T ≤ πR²/ℓ² · 40 µs = 5e-5 Δt_β at ℓ = 5 m: the work falls by less than |ln β| T/Δt_β = 1.1e-5 of its 300
-    # to 460 J, which is less than 5 mJ and makes v rise by less than 5 mJ/(m v) = 2 mm/s.
-    expected = references.solid_plate_residual(**PAPER_SHOT, shear_coefficient=shear_coefficient)
-    residual = references.nonlocal_degradation_residual(
-        **PAPER_SHOT, **DEGRADING, shear_coefficient=shear_coefficient, degradation_length=5.0
-    )
-    assert expected < residual < expected + 0.002
 
 
 # Values of a separate march of the same law on a Cartesian grid of ℓ/16, whose own error is about 2e-3 m/s.
@@ -69,31 +51,6 @@ def test_nonlocal_degradation_meets_a_cartesian_grid(
     residual = references.nonlocal_degradation_residual(**case)
     assert residual == pytest.approx(on_a_grid, abs=0.004)
     assert references.nonlocal_degradation_residual(**case, resolution=4) == pytest.approx(residual, abs=0.02)
-
-
-@pytest.mark.parametrize("radius", [0.3e-3, 0.7e-3, 3.0e-3])
-def test_tent_over_disc_meets_brute_force(radius: float) -> None:
-    length, cells = 0.5e-3, 1000
-    # A midpoint rule with n × n cells over K's support meets a disc's edge to about n^(-3/2) = 3e-5, and the
-    # twelve Gauss points of each side leave about as much at the kinks of K.
-    grid = ((np.arange(cells) + 0.5) / cells * 2 - 1) * length
-    tent = np.outer(1 - abs(grid) / length, 1 - abs(grid) / length) / length**2 * (2 * length / cells) ** 2
-    distance, angle = (radius * np.array([0.0, 0.5, 0.9, 1.0, 1.1, 1.5]), np.array([0.1, 0.7, 0.3, 0.0, 0.6, 0.78]))
-    y, z = distance * np.cos(angle), distance * np.sin(angle)
-    expected = [
-        tent[np.add.outer((y_p - grid) ** 2, (z_p - grid) ** 2) < radius**2].sum()
-        for y_p, z_p in zip(y, z, strict=True)
-    ]
-    assert references.tent_over_disc(y, z, radius, length) == pytest.approx(expected, abs=1e-4)
-
-
-def test_arrest_is_an_error_of_the_residual_velocity() -> None:
-    # The work of 298 J is the energy of 386 m/s. The slower a core is, the fewer steps it takes to its rest.
-    shot = {**PAPER_SHOT, "velocity": 200.0, "shear_coefficient": 0.0}
-    with pytest.raises(ValueError, match="arrested"):
-        references.solid_plate_residual(**shot)
-    with pytest.raises(ValueError, match="arrested"):
-        references.nonlocal_degradation_residual(**shot, **LASTING, degradation_length=2e-3, resolution=2)
 
 
 MASS, VELOCITY, STATIC, QUADRATIC, SHEAR = 5.25e-3, 800.0, 2.6e9, 7850.0, 0.05
@@ -132,11 +89,6 @@ def test_poncelet_ogive_has_the_published_nose_factor() -> None:
     assert quadratic == pytest.approx(QUADRATIC * area * (8 * crh - 1) / (24 * crh**2), rel=1e-8)
 
 
-def test_poncelet_that_rests_while_the_nose_enters_is_an_error() -> None:
-    with pytest.raises(ValueError, match="arrested"):
-        _ = references.Poncelet(references.ogive_nose(diameter=DIAMETER, crh=3.0), MASS, 100.0, STATIC, 0.0).nose_in
-
-
 @pytest.mark.parametrize("quadratic_stress", [0.0, QUADRATIC])
 def test_poncelet_rests_where_and_when_its_speed_says(quadratic_stress: float) -> None:
     nose = references.ogive_nose(diameter=DIAMETER, crh=3.0)
@@ -162,5 +114,3 @@ def test_torque_free_top_obeys_eulers_equations() -> None:
     solution = solve_ivp(euler, (0, times[-1]), [*tilt.ravel(), *rate0], "DOP853", times, rtol=1e-11, atol=1e-12)
     axis = references.torque_free_axis(times, tilt[:, 0], tilt @ (inertia * rate0), inertia[1])
     assert axis == pytest.approx(solution.y[[0, 3, 6]].T, abs=1e-8)
-    rate = references.body_rate(times, rate0, inertia[0], inertia[1])
-    assert rate == pytest.approx(solution.y[9:].T, rel=1e-8, abs=1e-8 * rate0[0])

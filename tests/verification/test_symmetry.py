@@ -68,8 +68,8 @@ BINARY_Y, BINARY_Z = np.round(np.array([Y, Z]) * 2.0**32) / 2.0**32
 @PRECISIONS
 @pytest.mark.parametrize(
     "shift",
-    [(2 * A, 0.0), (0.0, -B), (A, B / 2), (-A, B / 2), (1280 * A, -640 * B), (-1281 * A, 639.5 * B)],
-    ids=["two rows", "one column", "staggered", "staggered back", "10 m away", "10 m away, staggered"],
+    [(2 * A, 0.0), (-A, B / 2), (-1281 * A, 639.5 * B)],
+    ids=["two rows", "staggered", "10 m away, staggered"],
 )
 def test_hits_a_lattice_vector_apart_are_the_same_bit_for_bit(
     precision: str, shift: tuple[float, float], device: str

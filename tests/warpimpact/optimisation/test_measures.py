@@ -7,12 +7,6 @@ from warpimpact.campaign.text import CampaignError
 from .conftest import design
 
 
-def test_all_statistics_of_a_quantity_share_its_column() -> None:
-    measures = ("mean(residual_velocity)", "worst_tenth(residual_velocity)", "P(residual_velocity > 500 m/s)")
-    columns = design(*(f'[[objectives]]\nmeasure = "{measure}"\n' for measure in measures)).columns
-    assert [column.text for column in columns] == ["residual_velocity", measures[2]]
-
-
 @pytest.mark.parametrize(
     ("measure", "sentence"),
     [

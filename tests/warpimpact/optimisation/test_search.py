@@ -12,16 +12,15 @@ from warpimpact.analysis.effectiveness import effectiveness
 from warpimpact.campaign.text import CampaignError
 from warpimpact.cli import main
 from warpimpact.optimisation import search
-from warpimpact.optimisation.design import design_from, read_design
+from warpimpact.optimisation.design import read_design
 from warpimpact.optimisation.front_view import front_view
 from warpimpact.optimisation.objectives import Candidate, excesses
 from warpimpact.optimisation.optimise import folder_of, optimise, optimise_to_file
-from warpimpact.optimisation.search import SearchProgress, fresh_seed, front_of, spread
+from warpimpact.optimisation.search import SearchProgress, fresh_seed, front_of
 from warpimpact.results import files
 from warpimpact.results import front as f
 from warpimpact.results.files import OutputError, read
 from warpimpact.results.kinds import FRONT
-from warpimpact.runs.parts import Interrupted
 from warpimpact.view.view import text_of
 
 from .conftest import CORE, HOLES, SEARCH, WEIGHT_AND_ENERGY, design
@@ -67,12 +66,6 @@ def test_a_space_of_few_points_is_searched_whole() -> None:
         of_phase = [now for now in told if now.what == what]
         assert {now.total for now in of_phase} == {12}
         assert {0, 12} <= {now.done for now in of_phase}
-
-
-def test_the_ends_of_a_front_are_confirmed() -> None:
-    assert spread(np.arange(3), 5).tolist() == [0, 1, 2]
-    assert spread(np.array([7, 1, 5, 9, 2, 8]), 3).tolist() == [7, 5, 8]
-    assert spread(np.arange(0), 3).tolist() == []
 
 
 def test_a_symmetry_of_the_problem_is_one_of_the_front() -> None:
@@ -149,27 +142,6 @@ def test_a_folder_with_files_of_somebody_is_left_alone(tmp_path: Path) -> None:
     assert list(tmp_path.iterdir()) == [folder]
 
 
-def test_overwriting_replaces_the_designs_of_an_earlier_search(tmp_path: Path) -> None:
-    folder = folder_of(tmp_path / "front.nc")
-    folder.mkdir()
-    for name in ("design_00.toml", "design_77.toml", "notes.txt"):
-        (folder / name).write_text("of before")
-    campaigns = optimise_to_file(design(*SEARCHED, SEARCH), tmp_path / "front.nc", overwrite=True)
-    assert {path.name for path in folder.iterdir()} == {path.name for path in campaigns} | {"notes.txt"}
-    Campaign.from_toml(folder / "design_00.toml")
-
-
-def test_threats_of_like_names_have_files_of_their_own(tmp_path: Path) -> None:
-    names, velocities = ("a b", "a_b", "\U0001d41a" * 80), (600, 700, 800)
-    threats = [
-        f'[[threats]]\nname = "{name}"\nimpact = {{ velocity = {velocity} }}'
-        for name, velocity in zip(names, velocities, strict=True)
-    ]
-    one_point = design(HOLES, WEIGHT_AND_ENERGY, *threats, SEARCH)
-    campaigns = optimise_to_file(one_point, tmp_path / "front.nc")
-    assert [Campaign.from_toml(path).impact.velocity for path in campaigns] == list(velocities)
-
-
 def test_a_complete_search_is_resumed_to_its_campaigns(tmp_path: Path) -> None:
     """As after a death between the result and its campaigns; a campaign that was changed is kept."""
     file, output = tmp_path / "d.toml", tmp_path / "front.nc"
@@ -190,24 +162,6 @@ def test_a_complete_search_is_resumed_to_its_campaigns(tmp_path: Path) -> None:
     assert [path.read_text() for path in others] == before
     with pytest.raises(OutputError, match=r"exists already|contains files already"):
         optimise_to_file(read_design(file), output)
-
-
-def test_a_search_with_another_catalogue_is_not_resumed(tmp_path: Path) -> None:
-    """The contents of a file that the design names decide its numbers."""
-    entry = '[[material]]\nname = "{}"\ndensity = 7850\nresistance = 2.6e9\n'
-    (tmp_path / "own.toml").write_text(entry.format("steel"), encoding="utf-8")
-    tables = "\n".join(["catalogue = 'own.toml'", CORE, THICKNESS, WEIGHT_AND_ENERGY, SEARCH])
-    one = design_from(tables, "design.toml", tmp_path)
-
-    def stop(now: search.SearchProgress) -> None:
-        if now.done:
-            raise KeyboardInterrupt
-
-    with pytest.raises(Interrupted, match="batches are saved"):
-        optimise_to_file(one, tmp_path / "front.nc", progress=stop)
-    (tmp_path / "own.toml").write_text(entry.format("armour"), encoding="utf-8")
-    with pytest.raises(OutputError, match=r"cannot be resumed: files\.own\.toml was"):
-        optimise_to_file(one, tmp_path / "front.nc", resume=True)
 
 
 def test_no_design_within_the_bounds_is_an_outcome() -> None:
@@ -253,12 +207,6 @@ def test_a_limit_is_that_of_the_command(measure: str, tmp_path: Path) -> None:
         assert abs(fresh - float(hdquantiles(values, [0.5])[0])) < 0.1 * (score.high - score.low)
     else:
         assert fresh == pytest.approx(score.value, rel=1e-6)
-
-
-def test_a_limit_of_what_weakens_by_time_is_refused() -> None:
-    asked = '[[objectives]]\nmeasure = "mean(limit_velocity)"\n'
-    with pytest.raises(CampaignError, match="weakens by time"):
-        optimise(design("degradation = 0.8", HOLES, asked, SEARCH))
 
 
 def test_a_search_says_which_library_it_needs(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -13,26 +13,47 @@ from warpimpact.kernels.status import Status
 from warpimpact.records.outcomes import Outcomes
 from warpimpact.runs.describe import pilot_in
 from warpimpact.runs.replay import replay
-from warpimpact.scene import PRESETS, Accuracy, Hits, Numerics, Scene, Shots, Target, make_shots
+from warpimpact.scene import (
+    PRESETS,
+    Accuracy,
+    CirclePattern,
+    Hits,
+    Impact,
+    Layer,
+    Numerics,
+    OgiveCore,
+    Plate,
+    Record,
+    Scene,
+    Target,
+    make_shots,
+)
 from warpimpact.solver.accuracy import (
     ERROR_PER_CHANGE,
-    PILOT_LIMITS,
     PILOT_SECONDS,
     PilotResult,
     choose_level,
-    ended_otherwise,
     errors_text,
     hit_errors,
     limit_errors,
-    pilot_size,
     upper_digits,
 )
 from warpimpact.solver.resolution import LADDER, TooManySteps
 from warpimpact.solver.simulate import pilot_of, simulate
 from warpimpact.solver.worker import Worker
 
-from .shanked import BASE, IMPACT, OTHERS, PILOT, PLATE, SCENE, STOPPING
-
+CORE = OgiveCore(diameter=6.17e-3, crh=3, length=27e-3, mass=5.25e-3)
+PLATE = Plate(
+    thickness=6e-3,
+    resistance=2e9,
+    shear_coefficient=0.08,
+    degradation=0.85,
+    pattern=CirclePattern(diameter=7e-3, spacing=(10e-3, 17.3e-3), staggered=True),
+)
+SCENE = Scene(core=CORE, target=PLATE, record=Record(standoffs=(0.05, 0.13)))
+IMPACT = Impact(velocity="820 m/s", obliquity="12 deg", yaw="1 deg")
+OTHERS = make_shots(IMPACT, Hits(count=96, seed=6), PLATE)
+BASE = Layer(thickness=6.6e-3, resistance=5e9, gap=40e-3, shear_coefficient=0.08)
 ASKED = Accuracy(residual_velocity=1.0)
 FINEST = len(LADDER) - 3
 Speeds = Callable[[int], NDArray[np.float64]]
@@ -70,9 +91,9 @@ def chosen(
     return found, list(computed)
 
 
-@pytest.mark.parametrize("ratio", [0.5, 0.4, 0.25])
-@pytest.mark.parametrize("scale", [0.5, 4.0, 20.0])
-@pytest.mark.parametrize("hits", [1, 8, 64])
+@pytest.mark.parametrize("ratio", [0.5, 0.25])
+@pytest.mark.parametrize("scale", [0.5, 20.0])
+@pytest.mark.parametrize("hits", [1, 64])
 def test_the_coarsest_level_that_keeps_the_accuracy_is_chosen(ratio: float, scale: float, hits: int) -> None:
     of_hit = np.random.default_rng(7).uniform(0.2, 1.0, hits)
 
@@ -179,13 +200,7 @@ def test_errors_of_limits_are_relative_to_their_median(quantity: str, factor: fl
     assert limit_errors(np.zeros(4), np.zeros(4), Accuracy(limit=0.02), quantity).excess == 0.0
 
 
-def test_a_pilot_has_hits_beyond_the_share() -> None:
-    sizes = [pilot_size(Accuracy(tilt=1.0, share=share)) for share in (0.5, 0.9, 0.975, 0.99)]
-    assert sizes == [128, 128, 128, 160]
-    assert pilot_size(PRESETS["standard"], PILOT_LIMITS) == PILOT_LIMITS
-
-
-@pytest.mark.parametrize("bound", [5.0, 1.0, 0.2])
+@pytest.mark.parametrize("bound", [5.0, 0.2])
 def test_errors_above_a_bound_never_read_as_if_they_kept_it(bound: float) -> None:
     for error in bound * np.array([1.00001, 1.004, 1.04, 1.4, 30.0]):
         assert float(upper_digits(error)) > bound
@@ -196,10 +211,6 @@ def test_errors_above_a_bound_never_read_as_if_they_kept_it(bound: float) -> Non
     assert errors_text({"limit_thickness_error": math.inf}) == "inf mm"
 
 
-def found_for(numerics: Numerics, shots: Shots = PILOT, scene: Scene = SCENE) -> PilotResult:
-    return pilot_of(scene, shots, numerics, Worker("cpu"))
-
-
 def errors_of_90_percent(coarse: Outcomes, fine: Outcomes) -> tuple[float, float]:
     """Errors of residual velocity [m/s] and last tilt [degree] that 90 % of the hits are within."""
     changes = fine.residual_velocity - coarse.residual_velocity, np.degrees(fine.tilt[:, -1] - coarse.tilt[:, -1])
@@ -207,9 +218,9 @@ def errors_of_90_percent(coarse: Outcomes, fine: Outcomes) -> tuple[float, float
     return velocity, tilt
 
 
-@pytest.mark.parametrize("name", ["draft", "standard"])
-def test_a_shanked_core_gets_the_accuracy_that_the_name_promises(name: str) -> None:
-    found = found_for(Numerics(fidelity=name), make_shots(IMPACT, Hits(count=128, seed=5), PLATE))
+def test_a_shanked_core_gets_the_accuracy_that_standard_promises() -> None:
+    name = "standard"
+    found = pilot_of(SCENE, make_shots(IMPACT, Hits(count=128, seed=5), PLATE), Numerics(fidelity=name), Worker("cpu"))
     assert found.kept
     assert (found.numerics.level or 0) <= 4
     coarse, fine = (simulate(SCENE, OTHERS, numerics=one, device="cpu") for one in (found.numerics, Numerics(level=7)))
@@ -218,42 +229,10 @@ def test_a_shanked_core_gets_the_accuracy_that_the_name_promises(name: str) -> N
     assert tilt / 1.3 <= found.errors["tilt_error"] <= math.degrees(PRESETS[name].tilt)
 
 
-def test_draft_gives_errors_that_other_hits_keep_where_a_base_stops_some_of_them() -> None:
-    some, others = (make_shots(IMPACT, Hits(count=64, seed=seed), PLATE) for seed in (5, 6))
-    found = found_for(Numerics(fidelity="draft"), some, STOPPING)
-    coarse, fine = (
-        simulate(STOPPING, others, numerics=one, device="cpu") for one in (found.numerics, Numerics(level=7))
-    )
-    assert 0.2 < (fine.status == Status.ARRESTED).mean() < 0.8
-    alike = ~ended_otherwise(coarse, fine)
-    velocity, tilt = errors_of_90_percent(coarse[alike], fine[alike])
-    assert velocity / 1.3 <= found.errors["residual_velocity_error"]
-    assert tilt / 1.3 <= found.errors["tilt_error"]
-    assert np.nanquantile(np.abs(coarse.depth - fine.depth)[alike], 0.9) <= found.errors["depth_error"] < 5e-3
-    assert ended_otherwise(coarse, fine).mean() <= found.errors["status_error"] + 3.0 / 64.0
-
-
-def test_an_accuracy_in_numbers_is_what_its_name_is() -> None:
-    asked = {"residual_velocity": "5 m/s", "tilt": "5 deg"}
-    numbers, name = (found_for(one, PILOT[:8]) for one in (Numerics(accuracy=asked), Numerics(fidelity="draft")))
-    assert (numbers.numerics, numbers.phrase) == (name.numerics, name.phrase)
-    assert found_for(Numerics(fidelity="standard", precision="double"), PILOT[:8]).numerics.precision == "double"
-    with pytest.raises(ValueError, match="needs residual_velocity or tilt"):
-        found_for(Numerics(accuracy={"limit": 0.01}), PILOT[:4])
-
-
-def test_simulate_keeps_a_promise_as_a_run_does() -> None:
-    numerics = Numerics(fidelity="draft")
-    every, piloted = PILOT[:8], found_for(numerics, PILOT[:8]).numerics
-    by_name, by_level = (simulate(SCENE, every, numerics=one, device="cpu") for one in (numerics, piloted))
-    np.testing.assert_array_equal(by_name.residual_velocity, by_level.residual_velocity)
-
-
-@pytest.mark.parametrize("hits", ["count = 12", 'count = 12\nsampling = "grid"'])
-def test_a_result_has_its_promise_and_replays_on_its_level(hits: str) -> None:
+def test_a_result_has_its_promise_and_replays_on_its_level() -> None:
     text = (Path(__file__).parents[3] / "campaigns" / "slotted_plate.toml").read_text(encoding="utf-8")
     before, after = text.split("[hits]")[0], '\n[numerics]\nfidelity = "draft"\n'
-    campaign = Campaign.from_text(f"{before}[hits]\n{hits}{after}", name="t", folder=Path())
+    campaign = Campaign.from_text(f"{before}[hits]\ncount = 12{after}", name="t", folder=Path())
     result = run(campaign, device="cpu")
     found = pilot_in(result)
     assert found is not None

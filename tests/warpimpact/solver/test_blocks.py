@@ -21,17 +21,11 @@ SIMPLE, BLOCK = Numerics(level=2), Numerics(level=2, layout="block")
 THREE = np.zeros(3)
 
 
-@pytest.mark.parametrize("index", [0, 2, 4])
+@pytest.mark.parametrize("index", [0, 4])
 def test_a_window_is_in_the_smallest_block_that_holds_it(index: int) -> None:
     prepared = prepare(SCENE, shots_at(THREE), at_level(index, BLOCK))
     assert prepared.variant.window == min(size for size in grid.SIZES if size >= prepared.cells**2)
     assert 2 * 4 * max(grid.SIZES) <= 48 * 1024
-
-
-def test_levels_of_a_pilot_keep_the_layout() -> None:
-    assert at_level(2, BLOCK).layout == "block"
-    assert at_level(2, SIMPLE).layout == "simple"
-    assert prepare(SCENE, shots_at(THREE), at_level(3, BLOCK)).variant.window
 
 
 def test_windows_that_do_not_fit_a_block_are_for_the_simple_layout() -> None:
@@ -40,13 +34,6 @@ def test_windows_that_do_not_fit_a_block_are_for_the_simple_layout() -> None:
     assert not prepare(SCENE, shots_at(THREE), at_level(len(LADDER) - 1, BLOCK)).variant.window
     simple, block = (simulate.simulate(SCENE, shots, numerics=n) for n in (SIMPLE, BLOCK))
     np.testing.assert_array_equal(block.residual_velocity, simple.residual_velocity)
-
-
-def test_only_the_front_window_has_to_fit_a_block() -> None:
-    behind = Layer(**PLATE.model_dump(), gap=20e-3)
-    prepared = prepare(Scene(core=PAPER_CORE, target=Target(layers=(PLATE, behind))), shots_at(THREE), BLOCK)
-    front, base = prepared.nodes((prepared.cells,) * 2)
-    assert front <= prepared.variant.window <= max(grid.SIZES) < base
 
 
 def test_shots_that_leave_the_window_of_their_block_are_computed_in_the_simple_layout(

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from warpimpact.scene import CirclePattern, NoPattern, Pattern, Plate, SlotPattern
-from warpimpact.solver.cover import FAR, SOLID, Cover, Pushed, cover_of
+from warpimpact.scene import CirclePattern, Pattern, Plate, SlotPattern
+from warpimpact.solver.cover import FAR, Cover, Pushed, cover_of
 from warpimpact.solver.tile import check_tiles, tile_of
 
 PUSHED = Pushed(radius=3e-3, carried=0.2, gap=0.05)
@@ -64,31 +64,6 @@ def test_lengths_are_those_of_points_on_lines(pattern: Pattern) -> None:
     assert pressed > 150
     assert np.median(errors) < 2 * STEP
     assert np.quantile(errors, 0.97) < 20 * STEP
-
-
-def test_a_length_counts_alone_where_all_around_it_presses() -> None:
-    cover = cover_for(SLOTS)
-    table = cover.material[:, :-1, :-1, :-1]
-    empty = cover_for(SLOTS, PUSHED._replace(carried=0.0)).material[:, :-1, :-1, :-1]
-    y, z = (np.arange(count) * side for count, side in zip(cover.shape, (cover.dy, cover.dz), strict=True))
-    holes = SLOTS.is_hole(y[:, None], z[None, :])
-    assert (empty[:, :, holes] <= 0.0).all()  # nothing is pushed, so the tile decides
-    assert (table[:, :, holes] > 0.0).any()
-    deep = SLOTS.edge_distance(y[:, None], z[None, :]) > 0.3e-3
-    assert (table[:, :, deep] > 0.0).all()
-
-
-def test_the_last_nodes_and_the_last_direction_are_the_first_ones() -> None:
-    table = cover_for(SLOTS).material
-    assert (table[:, -1] == table[:, 0]).all()
-    assert (table[:, :, -1] == table[:, :, 0]).all()
-    assert (table[:, :, :, -1] == table[:, :, :, 0]).all()
-
-
-def test_a_plate_without_holes_has_material_everywhere_and_needs_no_room() -> None:
-    cover = cover_for(NoPattern())
-    assert (cover.material == SOLID).all()
-    assert cover.bytes < 20000
 
 
 def test_a_cover_is_kept_and_counts_with_the_tiles() -> None:

@@ -1,16 +1,12 @@
 """Shots at many scenes give the outcomes of each alone."""
 
-import threading
-import time
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
 
 from warpimpact import Campaign, Numerics, Scene, Shots, simulate
 from warpimpact.solver.many import simulate_many
-from warpimpact.solver.memory import Memory
 from warpimpact.solver.worker import Cancel, Cancelled, Worker
 
 CAMPAIGNS = Path(__file__).parents[3] / "campaigns"
@@ -22,7 +18,7 @@ def scenes_of(*names: str, hits: int) -> list[tuple[Scene, Shots]]:
     return [(one.scene, one.sampler().shots(0, hits + k)) for k, one in enumerate(campaigns)]
 
 
-@pytest.mark.parametrize("threads", [1, 2, 5])
+@pytest.mark.parametrize("threads", [1, 5])
 def test_outcomes_are_those_of_each_scene_alone(threads: int) -> None:
     scenes, told = scenes_of("slotted_plate", "round_holes", "layered_target", "slotted_plate", hits=5), []
     many = simulate_many(scenes, LEVEL, Worker("cpu", threads), lambda *now: told.append(now))
@@ -34,23 +30,6 @@ def test_outcomes_are_those_of_each_scene_alone(threads: int) -> None:
     total = sum(len(shots) for _, shots in scenes)
     assert told[-1] == (total, total)
     assert [done for done, _ in told] == sorted(done for done, _ in told)
-
-
-def test_threads_without_a_scene_help_the_last_ones(monkeypatch: pytest.MonkeyPatch) -> None:
-    launch, marching = Memory.launch, set[int]()
-
-    def recorded(*arguments: Any) -> int:
-        marching.add(threading.get_ident())
-        time.sleep(0.01)
-        return launch(*arguments)
-
-    monkeypatch.setattr(Memory, "launch", recorded)
-    simulate_many(scenes_of("slotted_plate", hits=40), LEVEL, Worker("cpu", 3))
-    assert len(marching) == 3
-
-
-def test_no_scene_needs_no_thread() -> None:
-    assert simulate_many([], LEVEL, Worker("cpu")) == []
 
 
 def test_an_error_of_a_scene_ends_the_others() -> None:

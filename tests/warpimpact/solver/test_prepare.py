@@ -21,7 +21,6 @@ from warpimpact.solver.prepare import Prepared, prepare
 CORE = PolynomialCore(coefficients=(3e-4, 0.24, -5.29), length=27.86e-3, mass=4e-3)
 PLATE = Plate(thickness=6e-3, resistance=2.6e9, degradation=0.8)
 IMPACT = Impact(velocity=825.0)
-LEVEL = Numerics(level=2)
 
 
 def prepared(plate: Plate = PLATE, *behind: Layer, **numerics: Any) -> Prepared:
@@ -42,11 +41,6 @@ def test_a_plate_that_weakens_takes_the_nodes_below_the_core_in_each_step() -> N
     assert of_steps(found) / steps - preparing.PER_NODE * nodes == pytest.approx(
         preparing.PER_PATCH * len(found.surfaces[0].rings.station) * found.resolution.patches_around
     )
-
-
-def test_a_layer_that_is_the_plate_again_takes_as_long_as_the_plate() -> None:
-    again = Layer(gap=0.05, **PLATE.model_dump(exclude_unset=True))
-    assert of_steps(prepared(PLATE, again)) == pytest.approx(2.0 * of_steps(prepared()))
 
 
 def test_twice_as_many_steps_take_twice_as_long() -> None:

@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from warpimpact.statistics.comparisons import Ratio, confidence_of_each, difference_of_independent
+from warpimpact.statistics.comparisons import Ratio, difference_of_independent
 from warpimpact.statistics.intervals import Estimate, estimate_of
 
 
@@ -18,11 +18,6 @@ def test_half_widths_of_independent_estimates_add_in_quadrature() -> None:
     low, high = difference_of_independent(estimate(10.0, 7.0, 11.0), estimate(6.0, 4.0, 10.0))
     assert low == pytest.approx(4.0 - 5.0)
     assert high == pytest.approx(4.0 + math.sqrt(5.0))
-
-
-def test_the_error_is_shared_out_over_the_intervals() -> None:
-    assert confidence_of_each(0.95, 5) == pytest.approx(0.99)
-    assert confidence_of_each(0.95, 0) == 0.95
 
 
 def test_a_ratio_to_numbers_that_differ_has_an_interval_of_its_own() -> None:

@@ -18,14 +18,6 @@ def test_what_never_happens_in_any_replicate_is_not_certain() -> None:
     assert estimate.high == pytest.approx(1.96**2 / (800 + 1.96**2), rel=1e-3)  # Wilson's for 0 of 800
 
 
-def test_moments_are_those_of_all_numbers_at_once() -> None:
-    values, dealt = np.random.default_rng(3).normal(1e6, 1.0, 1000), Dealt("mean")
-    for part in np.split(values, [1, 7, 500]):
-        dealt.add(part)
-    assert dealt.estimate().value == pytest.approx(values.mean(), rel=1e-14)
-    assert dealt.estimate().spread == pytest.approx(values.std(), rel=1e-9)
-
-
 def test_differences_of_rare_shares_are_not_certain() -> None:
     """Agresti and Min's interval where nothing differs: half a shot more in each of four cells."""
     estimate = estimate_of("difference", np.zeros(98))
@@ -45,12 +37,6 @@ def test_the_share_of_replicates_stays_between_0_and_1() -> None:
     assert estimate.low == 0.0
     assert estimate.high > estimate.value
     assert estimate_of("share", 1.0 - values, replicates=16).high == 1.0
-
-
-@pytest.mark.parametrize("kind", ["mean", "share", "quantile"])
-def test_replicates_of_one_shot_each_are_independent_shots(kind: str) -> None:
-    values = np.random.default_rng(1).integers(0, 2, 10).astype(float)
-    assert estimate_of(kind, values, replicates=16) == estimate_of(kind, values)
 
 
 @pytest.mark.parametrize(("successes", "count"), [(0, 1), (1, 1), (0, 40), (3, 40), (40, 40), (70_000, 100_000)])

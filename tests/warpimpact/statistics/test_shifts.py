@@ -64,11 +64,6 @@ def test_shots_that_count_at_one_level_alone_shift_a_mean() -> None:
     assert np.isnan(shift_of_share(np.full(4, np.nan), fine[:4]))
 
 
-@pytest.mark.parametrize("say", [0.0, 1.0])
-def test_shots_that_say_the_same_shift_no_share(say: float) -> None:
-    assert shift_of_yes(np.full(64, say), np.full(64, say)) == 0.0
-
-
 def test_the_side_that_infinite_numbers_are_on_stays() -> None:
     coarse = np.array([np.inf, 1.0, -np.inf, -1.0] * 16)
     assert shift_of_share(coarse, coarse) == 0.0
