@@ -70,9 +70,6 @@ staggered = true
 """
 SLOTTED = f'[plate]\nthickness = "4 mm"\n{MATERIAL}{SLOTS}'
 ROUND = f'[plate]\nthickness = "5 mm"\n{MATERIAL}{HOLES}'
-Scenes = list[tuple[Scene, Shots]]
-"""Scenes with their shots."""
-BY_PATH = '[plate]\ndegradation_distance = "0.8 mm"'
 NORMAL, OBLIQUE = '[impact]\nvelocity = "825 m/s"\n', '[impact]\nvelocity = "838 m/s"\nobliquity = "30 deg"\n'
 
 
@@ -138,11 +135,6 @@ def campaign_of(text: str) -> Campaign:
     bending = "bending = true\n" if "strength" in text else ""
     whole = f'title = "road"\n{text}[hits]\ncount = {RUN}\nseed = 1\n[output]\nstandoffs = ["130 mm"]\n{bending}'
     return Campaign.from_text(whole, name="road", folder=Path())
-
-
-def scenes_of(texts: Sequence[str], hits: int) -> Scenes:
-    """Scenes of texts of ROADS, each with its first shots."""
-    return [scene_and_shots(text, hits) for text in texts]
 
 
 def scene_and_shots(text: str, hits: int) -> tuple[Scene, Shots]:
