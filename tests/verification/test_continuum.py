@@ -12,7 +12,6 @@ from scipy.spatial.transform import Rotation
 from warpimpact import OgiveCore, PolynomialCore
 from warpimpact.continuum.meshing import SheetMesh
 from warpimpact.continuum.one_hit import OneHit, Start
-from warpimpact.kernels.status import Status
 from warpimpact.scene.flow import Flow
 
 Array = NDArray[np.float64]
@@ -366,31 +365,3 @@ def test_a_contact_damps_a_tenth_of_what_is_critical() -> None:
     mass, step = ELASTIC.density * 1.0e-12 / 8.0, float(hit.flight["before"])
     stiffness = min(0.5 * ELASTIC.wave_modulus * 1.0e-4, mass / step**2)
     assert 4e-3 * (slow[1] - fast[1]) == pytest.approx(0.8 * math.sqrt(stiffness * mass) * 10.0 * step, rel=0.01)
-
-
-def test_a_layer_is_marched_only_while_the_core_is_within_reach() -> None:
-    """Before, it is at rest and nobody feels it; in a gap the steps keep their length; then it stays as it was left."""
-    sheet = box((2, 8, 8))
-    near = SheetMesh(sheet.y - 4e-3, sheet.z - 4e-3, sheet.solid, sheet.x, sheet.spacing)
-    far = SheetMesh(near.y, near.z, near.solid, near.x + 50e-3, near.spacing)
-    upright, still = np.array([0.0, 0.0, 0.0, 1.0]), np.zeros(3)
-    start = Start(np.array([-18.1e-3, 1e-3, 0.0]), upright, np.array([825.0, 0.0, 0.0]), still, 4e-3, 1e-8, 1e-7, 0.0)
-    alone, both = (OneHit(CORE, start, sheets, [STEEL] * len(sheets), double=True) for sheets in ([near], [near, far]))
-    for _ in alone.steps(50):
-        both.advance(50)
-    both.advance(1)  # past the end of the hit that has one layer
-    behind = slice(both.firsts[1], both.firsts[1] + far.nodes)
-    assert alone.flight["status"] == Status.PERFORATED
-    assert np.array_equal(alone.left.numpy()[0], both.left.numpy()[0])
-    assert np.array_equal(nodal(alone, "position"), nodal(both, "position"))
-    assert both.mesh.awake.numpy().tolist() == [0, 0]
-    assert (both.mesh.crossing.numpy()[behind] == 1.0).all()  # never computed
-    step, left = step_of(both), nodal(both, "position").copy()
-    both.advance(100)
-    assert both.mesh.awake.numpy().tolist() == [0, 0]
-    assert step_of(both) == step
-    while not both.touched[1]:
-        both.advance(20)
-    assert both.mesh.awake.numpy().tolist() == [0, 1]
-    assert np.array_equal(nodal(both, "position"), left)
-    assert both.energies.imbalance < 0.01

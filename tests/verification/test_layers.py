@@ -172,42 +172,6 @@ def test_kinetic_energy_never_grows_and_momentum_is_the_impulse(device: str) -> 
         assert np.diff(history.position, axis=0) == pytest.approx(drift, abs=1e-12)
 
 
-def test_a_base_that_stays_as_it_is_has_longer_steps_that_take_a_share_of_the_speed() -> None:
-    base = layer(solid_plate(degradation=1.0, resistance=3e9), gap=60e-3, thickness=8e-3)
-    shots = shots_at(Y, Z, obliquity=30.0)
-    share = 0.125 * resolution.LADDER[2].travel
-    longest = []
-    for history in histories(Target(layers=(paper_plate(), base)), shots):
-        shortest, x = history.step.min(), history.position[:, 0]
-        assert (history.step[x < 10e-3] < 1.001 * shortest).all()  # the base of the core is still in the plate
-        longest.append(history.step.max() / shortest)
-        speed = np.linalg.norm(history.velocity, axis=1)
-        taken = np.linalg.norm(np.diff(history.velocity, axis=0), axis=1) / speed[:-1]
-        assert (taken[history.step[1:] > 1.001 * shortest] < 1.2 * share).all()  # as foreseen by the step before
-    assert max(longest) > 2.0
-
-
-def test_a_core_that_a_base_throws_aside_stays_between_the_layers(device: str) -> None:
-    base = layer(solid_plate(degradation=1.0, resistance=4e9), gap=60e-3, thickness=12e-3)
-    target, shots = Target(layers=(paper_plate(), base)), shots_at(Y, Z, obliquity=45.0)
-    outcomes = simulate(target, shots=shots, device=device, level=2)
-    impact = 0.5 * CORE.mass * 825.0**2
-    assert (outcomes.status == Status.ARRESTED).all()
-    assert outcomes.energy_loss == pytest.approx(impact)  # what is left will be lost, too
-    aside = np.flatnonzero(outcomes.stopped_in < 0)
-    assert len(aside) > 12
-    assert (outcomes.layer_status[aside, 1] == Status.RICOCHETED).all()
-    largest = 0.0
-    for history in histories(target, shots[aside]):
-        back, *along = history.velocity[-1]
-        assert back < 0.0
-        assert not history.force[-1].any()
-        crossing = history.energy - 0.5 * CORE.mass * (history.velocity[:, 1:] ** 2).sum(axis=1)
-        assert crossing[-1] < 0.15**2 * impact  # less its spin, of which it has none
-        largest = max(largest, float(np.linalg.norm(along)))
-    assert largest > 0.15 * 825.0
-
-
 def test_hit_and_layers_shifted_by_a_lattice_vector(device: str) -> None:
     scene: dict[str, Any] = {"device": device, "precision": "double"}
     plain = simulate(STACK, shots_at(Y, Z, **TURNED), **scene)

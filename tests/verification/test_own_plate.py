@@ -8,7 +8,6 @@ import pytest
 
 from warpimpact.records.outcomes import Outcomes
 from warpimpact.scene import Core, Interaction, Numerics, Plate, PolynomialCore, Record, Scene, Shots
-from warpimpact.solver import replay
 from warpimpact.solver import simulate as simulation
 
 from . import references
@@ -97,20 +96,3 @@ def test_every_shot_does_the_work_of_its_own_plate(device: str) -> None:
     assert np.ptp(work) > 300.0
     np.testing.assert_allclose(outcomes.energy_loss, work, rtol=1e-3)
     np.testing.assert_allclose(outcomes.residual_velocity**2, 825.0**2 - 2.0 * work / own["mass"], rtol=1e-3)
-
-
-def test_history_and_plate_of_a_replay_are_those_of_the_shot() -> None:
-    numerics = Numerics(level=0, precision="double")
-    core, plate = scene_of(5)
-    shown = [
-        replay.replay(Scene(core=c, target=p, interaction=INTERACTION), s, numerics=numerics)
-        for c, p, s in ((PAPER_CORE, paper_plate(**FAR), SHOTS[5:6]), (core, plate, without(SHOTS)[5:6]))
-    ]
-    own, plain = shown
-    for name in ("translational_energy", "rotational_energy", "angular_velocity", "force"):
-        np.testing.assert_allclose(getattr(own.history, name), getattr(plain.history, name), rtol=1e-7, atol=1e-6)
-    np.testing.assert_allclose(own.plate.share, plain.plate.share, rtol=1e-9)
-    lost = own.history.translational_energy + own.history.rotational_energy
-    start = 0.5 * core.mass_properties.mass * SHOTS.velocity[5] ** 2
-    start += 0.5 * core.mass_properties.inertia_axial * SHOTS.spin[5] ** 2
-    assert own.outcomes.energy_loss[0] == pytest.approx(start - lost[-1], rel=1e-9)

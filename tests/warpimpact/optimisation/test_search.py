@@ -68,23 +68,6 @@ def test_a_space_of_few_points_is_searched_whole() -> None:
         assert {0, 12} <= {now.done for now in of_phase}
 
 
-def test_a_symmetry_of_the_problem_is_one_of_the_front() -> None:
-    """Round holes with exchanged spacings are the same plate, turned."""
-    spacings = "".join(f'"plate.pattern.spacing.{axis}" = ["8 mm", "10 mm"]\n' for axis in (0, 1))
-    found = optimise(
-        design(
-            HOLES, "[variables]", spacings, WEIGHT_AND_ENERGY, SEARCH.replace("confirm_hits = 64", "confirm_hits = 256")
-        )
-    )
-    values, points = found[f.RESULT].values, found[f.VALUE].values
-    one, other = (int(np.flatnonzero((points == pair).all(axis=1))[0]) for pair in ([0, 1], [1, 0]))
-    half = np.ptp([found[name].values[0, 1] for name in (f.FRESH_LOW, f.FRESH_HIGH)])
-    assert values[one, 0] == pytest.approx(values[other, 0], rel=1e-12)
-    apart = abs(values[one, 1] - values[other, 1])
-    assert apart < 2.0 * half  # of 256 hits; the search has 64
-    assert values[one, 1] != values[other, 1]  # other hits
-
-
 SEARCHED = (
     "[variables]",
     'thickness = { low = "2 mm", high = "6 mm" }',

@@ -90,7 +90,6 @@ def test_the_limit_velocity_of_a_target_of_layers_adds_their_work() -> None:
 
 
 HOLES = PLATE.model_copy(update={"pattern": CirclePattern(diameter=5e-3, spacing=(8e-3, 8e-3))})
-BASE = Layer(thickness=3e-3, resistance=PLATE.resistance, shear_coefficient=0.05, gap=0.1)
 
 
 def scattered(count: int, **own: object) -> Shots:
@@ -108,15 +107,14 @@ def test_a_limit_depends_on_those_searched_with_it_within_the_tolerance() -> Non
     assert together.value[30:] == pytest.approx(alone.value, abs=1.0)
 
 
-@pytest.mark.parametrize(("behind", "agreeing"), [((), 0.9), ((BASE,), 0.8)], ids=["holes", "base"])
-def test_searches_take_fewer_runs_together(behind: tuple[Layer, ...], agreeing: float) -> None:
-    many, scene = scattered(48), Scene(core=CORE, target=Target(layers=(HOLES, *behind)))
+def test_searches_take_fewer_runs_together() -> None:
+    many, scene = scattered(48), Scene(core=CORE, target=HOLES)
     sought, worker, numerics = Sought("velocity", 1.0, 3000.0), Worker("cpu"), Numerics(level=0)
     together, alone = (limit.limits(scene, many, sought, numerics, worker, together=count) for count in (None, 1))
     assert together.converged.mean() > 0.95
     assert together.runs.mean() < min(7.2, 0.9 * alone.runs.mean())
     # At the coarsest level some cores pass, stop and pass again within a few m/s.
-    assert np.mean(np.abs(alone.value - together.value) <= 1.0) > agreeing
+    assert np.mean(np.abs(alone.value - together.value) <= 1.0) > 0.9
 
 
 @pytest.mark.parametrize("search", [limit_velocity, limit_thickness])

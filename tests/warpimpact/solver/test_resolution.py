@@ -32,11 +32,6 @@ def resolved(**numerics: Any) -> Resolution:
     return resolve(SCENE, Numerics(**numerics), [True])
 
 
-@pytest.mark.parametrize(("fidelity", "index"), [("draft", 0), ("standard", 2), ("reference", 4)])
-def test_a_single_setting_goes_with_the_coarsest_level_of_a_fidelity(fidelity: str, index: int) -> None:
-    assert resolved(fidelity=fidelity, patches_axial=20) == resolved(level=index, patches_axial=20)
-
-
 @pytest.mark.parametrize(
     ("numerics", "words"),
     [

@@ -12,7 +12,7 @@ from warpimpact.scene import (
     PolynomialCore,
     ProfileCore,
 )
-from warpimpact.solver.rings import SHORTER_BEHIND, azimuths_of, rings_of
+from warpimpact.solver.rings import azimuths_of, rings_of
 
 PAPER = PolynomialCore(coefficients=(3.0e-4, 0.24, -5.29), length=27.86e-3, density=7850.0)
 OGIVE = OgiveCore(diameter=6.17e-3, crh=3.0, length=27.0e-3, density=7850.0)
@@ -90,18 +90,3 @@ def test_turns_are_half_the_change_of_the_normal_over_a_ring(core: Core) -> None
     turns = np.stack([rings.turn_axial, rings.turn_radial])[:, lateral]
     np.testing.assert_allclose(turns, (high - low) / 2, rtol=0.02, atol=1e-6)
     np.testing.assert_array_equal(np.stack([rings.turn_axial, rings.turn_radial])[:, ~lateral], 0.0)
-
-
-@CORES
-def test_rings_are_shorter_behind_the_widest_station(core: Core) -> None:
-    count = 40
-    rings = rings_of(core, count, 16, discs=True)
-    lateral = rings.half_axial != 0
-    station = core.mass_properties.centre_of_mass - rings.station[lateral]
-    length = -2 * rings.half_axial[lateral]
-    stations = np.linspace(0.0, core.length, 100_001)
-    widest = stations[np.argmax(core.radius(stations) >= (1 - 1e-9) * core.max_radius)]
-    assert length.sum() == pytest.approx(core.length)
-    for part, longest in ((station < widest, 1.0), (station > widest, SHORTER_BEHIND)):
-        if part.any():
-            assert length[part].mean() == pytest.approx(longest * core.length / count, rel=0.15)
