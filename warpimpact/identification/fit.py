@@ -11,10 +11,9 @@ import numpy as np
 from pydantic import Field
 
 from warpimpact.identification.measured import HitPlace, Observation
-from warpimpact.identification.parameters import Parameter, as_read, put
+from warpimpact.identification.parameters import Parameter, Path, as_read, put
 from warpimpact.scene import Impact, Interaction, Numerics, Plate, Record, Scatter, Scene, Target
 from warpimpact.scene.model import Model
-from warpimpact.solver.columns import Path
 
 
 class Sampling(Model):

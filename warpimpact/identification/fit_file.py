@@ -19,6 +19,7 @@ from warpimpact.identification.measured import read_hit, read_measured
 from warpimpact.identification.parameters import (
     FitError,
     Parameter,
+    Path,
     corners,
     dotted,
     read_distribution,
@@ -32,7 +33,6 @@ from warpimpact.scene.model import Model
 from warpimpact.scene.problems import sentence
 from warpimpact.scene.quantities import QUANTITIES
 from warpimpact.scene.units import Angle, Speed, Title, quantity, quoted
-from warpimpact.solver.columns import Path
 from warpimpact.solver.limit import check_arrests
 
 _Table = dict[str, Any]

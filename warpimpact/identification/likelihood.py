@@ -23,13 +23,13 @@ from numpy.typing import NDArray
 
 from warpimpact.identification.fit import Fit, MeasuredShot
 from warpimpact.identification.measured import MEASURABLE, Observation
+from warpimpact.identification.parameters import COLUMN_OF, UNITS_OF_EXPOSURE, Path, columns_of
 from warpimpact.records.group import failures
 from warpimpact.records.outcomes import Outcomes
 from warpimpact.results.measures import STATUSES
 from warpimpact.scene import IDENTITY, Hits, Plate, Sampler, Scene, Shots, Symmetry
 from warpimpact.scene.model import Array
 from warpimpact.scene.symmetry import irreducible_part, symmetries
-from warpimpact.solver.columns import COLUMN_OF, UNITS_OF_EXPOSURE, Path, columns_of
 from warpimpact.solver.limit import Limits, limit_velocity
 from warpimpact.solver.many import side_by_side, simulate_many
 from warpimpact.solver.worker import Worker

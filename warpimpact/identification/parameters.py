@@ -14,9 +14,18 @@ from warpimpact.scene import AnyCore, Interaction, Plate
 from warpimpact.scene.distributions import EDGE, AnyDistribution, Distribution
 from warpimpact.scene.model import Array, Model
 from warpimpact.scene.problems import complaint
+from warpimpact.scene.quantities import OF_THE_SCENE, QUANTITIES
 from warpimpact.scene.scatter import in_si
 from warpimpact.scene.units import meant, quoted, reader_in, typed
-from warpimpact.solver.columns import COLUMN_OF, UNITS_OF_EXPOSURE, Path
+from warpimpact.solver.materials import decay_rate
+
+Path = tuple[str | int, ...]
+"""Place of a key in the tables of a scene, such as ("plate", "pattern", "spacing", 0)."""
+
+COLUMN_OF: dict[Path, str] = {(QUANTITIES[name].table, name): name for name in OF_THE_SCENE}
+"""Name of the column, by the path."""
+UNITS_OF_EXPOSURE: tuple[Path, ...] = (("plate", "degradation_interval"), ("plate", "degradation_distance"))
+"""β per Δt_β is the same law as β^(Δt₀/Δt_β) per Δt₀, so these become a degradation of the shot."""
 
 TABLES: dict[str, Any] = {"plate": Plate, "interaction": Interaction, "core": AnyCore}
 """Tables of the scene whose numbers may be parameters."""
@@ -225,3 +234,18 @@ def corners(parameters: Sequence[Parameter]) -> Iterator[dict[Path, float]]:
             yield {**medians, parameter.path: end}
     for index in range(min(2 ** len(parameters), 256)):
         yield {parameter.path: parameter.ends[index >> place & 1] for place, parameter in enumerate(parameters)}
+
+
+def columns_of(values: Mapping[Path, Array], plate: Plate) -> dict[str, Array]:
+    """Columns of Shots for some values, each of their shape.
+
+    Args:
+        values: values by path. Paths that make no column are left out.
+        plate: plate of the scene. Its degradation and unit of exposure hold where no value replaces them.
+    """
+    columns = {name: values[path] for path, name in COLUMN_OF.items() if path in values}
+    for path in UNITS_OF_EXPOSURE:
+        if path in values:
+            base = columns.get("degradation", np.full_like(values[path], plate.degradation))
+            columns["degradation"] = np.exp(decay_rate(base, 1.0) * plate.degradation_unit / values[path])
+    return columns

@@ -14,6 +14,7 @@ import xarray
 
 from warpimpact.identification.fit import Fit
 from warpimpact.identification.likelihood import Scores
+from warpimpact.identification.parameters import columns_of
 from warpimpact.results import attributes as attr
 from warpimpact.results import posterior_file as p
 from warpimpact.results.kinds import POSTERIOR
@@ -21,7 +22,6 @@ from warpimpact.results.variables import HIT_Y, HIT_Z
 from warpimpact.scene.display import STORED, UNITS, Unit
 from warpimpact.scene.model import Array
 from warpimpact.scene.quantities import QUANTITIES
-from warpimpact.solver.columns import columns_of
 from warpimpact.view.view import Column, Section, Table, number
 
 LARGEST_NOISE = 1.7
