@@ -187,7 +187,7 @@ def test_hit_and_layers_shifted_by_a_lattice_vector(device: str) -> None:
 
 def test_ricochet_from_a_layer_is_that_of_the_target(device: str) -> None:
     thin = solid_plate(thickness=0.2e-3, resistance=5e8, degradation=1.0)
-    hard = layer(thin, thickness=40e-3, resistance=3e10, gap=10e-3, shear_coefficient=0.0)
+    hard = layer(thin, thickness=40e-3, resistance=3e10, gap=10e-3, shear_coefficient=SMOOTH)
     outcomes = layered(thin, hard, shots=shots_at(Y, Z, obliquity=75.0), device=device)
     assert (outcomes.status == Status.RICOCHETED).all()
     assert (outcomes.layer_status[:, 1] == Status.RICOCHETED).all()
@@ -210,7 +210,9 @@ def test_a_core_that_slides_between_layers_stays_there(device: str, monkeypatch:
     # Through a wide hole, off the base at a small angle, and along the rear face of the plate, beside any hole.
     monkeypatch.setattr(resolution, "STEP_ALLOWANCE", 3)
     hole = CirclePattern(diameter=0.3, spacing=(1.0, 1.0))
-    front = paper_plate(thickness=10e-3, degradation=1.0, shear_coefficient=0.0, pattern=hole, degradation_length=5e-3)
+    front = paper_plate(
+        thickness=10e-3, degradation=1.0, shear_coefficient=SMOOTH, pattern=hole, degradation_length=5e-3
+    )
     base = Layer(thickness=40e-3, resistance=2e9, gap=0.2)
     shots = shots_at([-0.1, 0.05], [0.0, 2e-3], obliquity=75.0)
     outcomes = layered(front, base, shots=shots, device=device, level=0)

@@ -42,7 +42,7 @@ def shots_with(own: dict[str, np.ndarray]) -> Shots:
 
 
 SHOTS = shots_with(own_numbers())
-INTERACTION = Interaction(static=0.9, linear=0.3, quadratic=0.2)
+INTERACTION = Interaction(static=0.9)
 FAR = {"resistance": 1e9, "shear_coefficient": 0.3, "degradation": 0.3, "thickness": 9e-3}
 
 
@@ -59,8 +59,7 @@ def scene_of(shot: int) -> tuple[Core, Plate]:
 
 def simulated(core: Core, plate: Plate, shots: Shots, device: str = "cpu", **numerics: Any) -> Outcomes:
     record = Record(standoffs=STANDOFFS, standoff_point="nose")
-    law = Interaction(static=0.9) if numerics.get("scheme") == "nodal" else INTERACTION
-    scene = Scene(core=core, target=plate, interaction=law, record=record)
+    scene = Scene(core=core, target=plate, interaction=INTERACTION, record=record)
     return simulation.simulate(scene, shots, numerics=Numerics(**numerics), device=device)
 
 
