@@ -7,7 +7,7 @@ from warpimpact.kernels.status import Status
 
 from .extremes import MOST_RISE, MOST_STRETCH, drawn, found
 
-SCENES = (0, 4, 7, 12, 15, 17, 27, 32)
+SCENES = (0, 4, 7, 12, 17, 27, 32)
 """Of a seed: cores that pass, stop and ricochet within 154 to 6963 steps, at single plates and at layers, with and
 without friction, weakening, a depth, a rate and a rim, in both precisions."""
 
