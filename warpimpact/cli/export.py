@@ -102,11 +102,10 @@ def add_report(commands: Commands) -> None:
 
 
 def _report(arguments: argparse.Namespace) -> None:
-    from warpimpact.report.front_page import write_front_report
     from warpimpact.report.one_file import write_file_report
     from warpimpact.report.report import write_report
     from warpimpact.results import files
-    from warpimpact.results.kinds import FRONT, HIT_MAP
+    from warpimpact.results.kinds import HIT_MAP
 
     paths = arguments.results
     output = arguments.output or paths[0].with_suffix(".html")
@@ -116,10 +115,7 @@ def _report(arguments: argparse.Namespace) -> None:
         if kind is not HIT_MAP:
             if len(paths) > 1:
                 raise files.ResultError(f"got {len(paths)} files, one of which is {kind.name}, which is reported alone")
-            if kind is FRONT:
-                write_front_report(files.read(path, kind), output, arguments.campaign_folder or path.parent)
-            else:
-                write_file_report(path, kind, output)
+            write_file_report(path, kind, output, arguments.campaign_folder or path.parent)
             print(output)
             return
     by_name = named(paths)

@@ -17,12 +17,13 @@ from warpimpact.campaign.text import CampaignError
 from warpimpact.plotting.plate import hole_patches
 from warpimpact.plotting.style import BLUE, GREEN, VERMILION, all_bars, hide_sides, inscribe
 from warpimpact.results import front as f
+from warpimpact.scene import Plate
 
 MOST_DRAWN = 6
 """Most plates that are drawn."""
 _LONGEST_LABEL = 60
 """Most characters of a line that stands upright beside the axes."""
-_THUMBNAIL = 30.0
+THUMBNAIL = 30.0
 """Side of the drawn part of a plate [mm]."""
 _LETTERS = "ABCDEFGHIJ"
 _MARKS: tuple[Any, ...] = ("*", "P", "X", "^", "v")
@@ -30,7 +31,7 @@ _MARKS: tuple[Any, ...] = ("*", "P", "X", "^", "v")
 
 def front_figure(dataset: xarray.Dataset, folder: Path = Path()) -> Figure:
     """The front of a search by fresh hits with 95 % intervals, beside all computed designs; plates along it; and their
-    variables. `folder` has the files that the design file names."""
+    variables. `folder` has the files that the design file names. In an SVG, a point of the front links to its file."""
     confirmed = np.flatnonzero(dataset[f.CONFIRMED].values)
     places = np.linspace(0, len(confirmed) - 1, min(MOST_DRAWN, len(confirmed)))
     drawn = confirmed[np.round(places).astype(int)]
@@ -42,7 +43,7 @@ def front_figure(dataset: xarray.Dataset, folder: Path = Path()) -> Figure:
     left, right = rows[-1].subfigures(1, 2, width_ratios=(1.7, 1.0))
     _draw_front(left.subplots(), dataset, names)
     _draw_variables(right, dataset, confirmed)
-    inscribe(figure, dataset, f"of each plate {_THUMBNAIL:g} mm × {_THUMBNAIL:g} mm" if names else "")
+    inscribe(figure, dataset, f"of each plate {THUMBNAIL:g} mm × {THUMBNAIL:g} mm" if names else "")
     return figure
 
 
@@ -55,11 +56,16 @@ def _draw_plates(figure: SubFigure, dataset: xarray.Dataset, names: dict[int, st
             axes.set_axis_off()
             continue
         plate = campaign.plate
-        half = 0.5 * _THUMBNAIL
-        axes.set(xlim=(-half, half), ylim=(-half, half), facecolor="0.72")
-        for patch in hole_patches(plate, axes):
-            axes.add_patch(patch)
+        draw_thumbnail(axes, plate)
         axes.set_title(f"{letter}: {1e3 * plate.thickness:.3g} mm, {plate.open_area:.0%} open", fontsize="medium")
+
+
+def draw_thumbnail(axes: Axes, plate: Plate) -> None:
+    """Draw a part of a plate."""
+    half = 0.5 * THUMBNAIL
+    axes.set(xlim=(-half, half), ylim=(-half, half), facecolor="0.72", aspect="equal")
+    for patch in hole_patches(plate, axes):
+        axes.add_patch(patch)
 
 
 def campaign_at(dataset: xarray.Dataset, place: int, folder: Path) -> Campaign | None:
@@ -107,6 +113,8 @@ def _draw_fresh(axes: Axes, dataset: xarray.Dataset, shown: tuple[int, int], thi
         if which.any():
             style: dict[str, Any] = {"color": BLUE, "markerfacecolor": face, "markersize": 6, "capsize": 2, "zorder": 4}
             axes.errorbar(fresh[which, across], fresh[which, up], yerr=ends[:, which], fmt="o", label=label, **style)
+    links = axes.scatter(fresh[:, across], fresh[:, up], s=60, alpha=0.01, zorder=7)
+    links.set_urls([f"#{file}" for file in dataset[f.FILE].values])
     if third is not None:
         drawn = axes.scatter(fresh[:, across], fresh[:, up], c=fresh[:, third], s=36, zorder=5, cmap="viridis")
         axes.figure.colorbar(drawn, ax=axes, label=str(dataset[f.GOAL_LABEL].values[third]))

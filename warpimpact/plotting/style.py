@@ -44,12 +44,7 @@ def data_url(figure: Figure, dpi: int = 110) -> str:
     """A figure as a PNG picture in an address, for a page."""
     buffer = BytesIO()
     figure.savefig(buffer, format="png", dpi=dpi)
-    return png_url(buffer.getvalue())
-
-
-def png_url(picture: bytes) -> str:
-    """A PNG picture as an address."""
-    return f"data:image/png;base64,{b64encode(picture).decode()}"
+    return f"data:image/png;base64,{b64encode(buffer.getvalue()).decode()}"
 
 
 def hide_sides(axes: Axes, *sides: str) -> None:

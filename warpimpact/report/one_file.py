@@ -20,6 +20,7 @@ from warpimpact.plotting.posterior import hits_figure, pairs_figure
 from warpimpact.plotting.style import data_url
 from warpimpact.plotting.sweep import sweep_figure
 from warpimpact.plotting.trajectory import FIGURES
+from warpimpact.report.front_page import FRONT_STYLE, front_html
 from warpimpact.results import attributes as attr
 from warpimpact.results import files, firing, front, posterior_file
 from warpimpact.results.kinds import FIRING, FRONT, HISTORY, POSTERIOR, SWEEP, Kind
@@ -85,8 +86,11 @@ def _view(kind: Kind, dataset: Any, measures: Sequence[str] = ()) -> list[Sectio
     return shown.view(dataset, *asked)
 
 
-def write_file_report(path: Path, kind: Kind, output: Path) -> None:
+def write_file_report(path: Path, kind: Kind, output: Path, folder: Path) -> None:
     """Write the report of a file, whole or not at all.
+
+    Args:
+        folder: folder of the files that the campaigns of a search name.
 
     Raises:
         OutputError: the report cannot be written.
@@ -96,6 +100,7 @@ def write_file_report(path: Path, kind: Kind, output: Path) -> None:
     attributes = dataset.attrs
     title, (first, *others) = str(attributes.get(attr.TITLE, path.stem)), _view(kind, dataset)
     sections = [replace(first, title="") if first.title == title else first, *others]
+    clickable = front_html(dataset, folder) if kind is FRONT else ""
     figures = "".join(
         f"<h2>{name}</h2><img alt='{name}' src='{data_url(draw(dataset))}'>" for name, draw in shown.figures.items()
     )
@@ -110,8 +115,8 @@ def write_file_report(path: Path, kind: Kind, output: Path) -> None:
         "<meta name='viewport' content='width=device-width, initial-scale=1'>"
         "<meta http-equiv='Content-Security-Policy' "
         "content=\"default-src 'none'; img-src data:; style-src 'unsafe-inline'\">"
-        f"<title>{escape(title)}</title><style>{_STYLE}</style></head><body><h1>{escape(title)}</h1>"
-        f"{html_of(sections, 'h2')}{figures}{asked}<p>{made}</p></body></html>\n"
+        f"<title>{escape(title)}</title><style>{_STYLE}{FRONT_STYLE}</style></head><body><h1>{escape(title)}</h1>"
+        f"{clickable}{html_of(sections, 'h2')}{figures}{asked}<p>{made}</p></body></html>\n"
     )
     with files.aside(output) as file:
         file.write_text(page, encoding="utf-8")

@@ -54,7 +54,6 @@ def drawing(
     label: str,
     *,
     scale: float | None = None,
-    image: str = "",
     bar: bool = False,
 ) -> str:
     """An SVG drawing of what lies between two corners [m].
@@ -62,14 +61,12 @@ def drawing(
     Args:
         label: what it shows, for those who do not see it.
         scale: pixels per millimetre; without it the longer side has 260 pixels.
-        image: address of an image that fills the drawing behind the shapes.
         bar: whether a bar of 10 mm stands below.
     """
     (width, height), (left, top) = 1e3 * (np.asarray(high) - low), (1e3 * low[0], -1e3 * high[1])
     scale, room = scale or _DRAWING_PIXELS / max(width, height), 2.0 if bar else 0.0
     frame = f'x="{left:.4f}" y="{top:.4f}" width="{width:.4f}" height="{height:.4f}"'
-    parts = [f'<image {frame} href="{image}" preserveAspectRatio="none"/>'] if image else []
-    parts += [
+    parts = [
         f'<path d="{path(shape.outlines)}" fill="{shape.fill}" fill-rule="evenodd" stroke="{shape.edge}" '
         'stroke-width="0.1"/>'
         for shape in shapes
