@@ -18,14 +18,13 @@ from warpimpact import (
     Plate,
     PolynomialCore,
     Record,
-    Scatter,
     Scene,
     Shots,
     SlotPattern,
     SquarePattern,
     make_shots,
 )
-from warpimpact.scene import Pattern
+from warpimpact.scene import Pattern, Scatter
 from warpimpact.scene.distributions import Normal, Uniform
 
 CORE = PolynomialCore(coefficients=(3.0e-4, 0.24, -5.29), length=27.86e-3, mass=4.0e-3)

@@ -78,7 +78,7 @@ def _identify(arguments: argparse.Namespace) -> int:
         posterior = identify(
             fit,
             device=executor,
-            progress=lambda now: show(Step(now.done, now.total, text=_running(now), certain=False)),
+            progress=lambda now: show(Step(now.done, now.total, text=_running(now))),
         )
     files.write(posterior, output)
     print(text_of(posterior_view(posterior)))

@@ -53,9 +53,7 @@ def _optimise(arguments: argparse.Namespace) -> int:
             device=executor,
             resume=arguments.resume,
             overwrite=arguments.overwrite,
-            progress=lambda now: show(
-                Step(now.done, now.total, text=f"{now.front} on the front", certain=now.certain, now=now.what)
-            ),
+            progress=lambda now: show(Step(now.done, now.total, text=f"{now.front} on the front, {now.what}")),
             tell=warn,
         )
     dataset = files.read(output, FRONT)

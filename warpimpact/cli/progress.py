@@ -14,14 +14,12 @@ if TYPE_CHECKING:
     from warpimpact.runs.progress import RunProgress
     from warpimpact.statistics.intervals import Estimate
 
-_SILENCE, _LONGEST_SILENCE = 5.0, 60.0
-"""Longest times between two lines of a log [s]: in the first minute, and in a run of hours. Between these it is a
-twelfth of the time so far."""
+_SILENCE = 60.0
+"""Longest time between two lines of a log [s]."""
 _SHORT_PILOT = 2.0
 """Seconds after which a running pilot is announced."""
 _BAR_FORMAT = "{l_bar}{bar:20}{r_bar}"
 """Format of a bar on a terminal. Its width is fixed, because estimates beside it would leave it one character."""
-_BAR_OF_MOST = "{l_bar}{bar:20}| {n_fmt}/{total_fmt} at most [{elapsed}, {rate_fmt}{postfix}]"
 
 
 _quiet = False
@@ -58,8 +56,6 @@ class Step(NamedTuple):
         resumed: items that an earlier computation had done, which do not count for the rate.
         text: further information.
         before: what is running before the first item; its time does not count for the rate.
-        certain: whether `total` will be computed; else it is an upper bound, as is the remaining time.
-        now: the part that is running.
     """
 
     done: int
@@ -67,13 +63,6 @@ class Step(NamedTuple):
     resumed: int = 0
     text: str = ""
     before: str = ""
-    certain: bool = True
-    now: str = ""
-
-    @property
-    def words(self) -> str:
-        """The whole information in words."""
-        return ", ".join(filter(None, (self.text, self.now)))
 
 
 @contextmanager
@@ -94,12 +83,11 @@ def show_progress(unit: str = "hit") -> Iterator[Callable[[Step], None]]:
     with tqdm(unit=unit, dynamic_ncols=True, bar_format=_BAR_FORMAT, miniters=0) as bar:
 
         def show(step: Step) -> None:
-            bar.bar_format = _BAR_FORMAT if step.certain else _BAR_OF_MOST
             if step.before or bar.total is None or _another(step, int(bar.n), int(bar.total)):
                 bar.reset(step.total)
                 bar.n = step.resumed
             bar.initial = step.resumed
-            bar.set_postfix_str(step.before or step.words, refresh=bool(step.before))
+            bar.set_postfix_str(step.before or step.text, refresh=bool(step.before))
             bar.update(max(0, step.done - bar.n))
 
         yield show
@@ -111,7 +99,7 @@ def _another(step: Step, done: int, total: int) -> bool:
 
 
 class _Log:
-    """Writes a line at the start, after every tenth, and every few seconds."""
+    """Writes a line at the start, after every tenth, and every minute."""
 
     def __init__(self, unit: str) -> None:
         self._unit = unit
@@ -126,7 +114,7 @@ class _Log:
             self._begin, self._last, self._tenths, self._before = now, now, -1, ""
         self._step = step
         elapsed = now - self._begin
-        silent = now - self._last < min(_LONGEST_SILENCE, max(_SILENCE, elapsed / 12.0))
+        silent = now - self._last < _SILENCE
         if step.before:
             if elapsed < _SHORT_PILOT or (silent and step.before == self._before):
                 return
@@ -140,14 +128,11 @@ class _Log:
         print(line, file=sys.stderr, flush=True)
 
     def _line(self, step: Step, elapsed: float) -> str:
-        most = "" if step.certain else "at most "
-        line, fresh = f"{step.done} of {most}{step.total} {self._unit}s", step.done - step.resumed
-        if fresh <= 0:
-            return f"{line}; {step.now}".removesuffix("; ")
-        if elapsed <= 0.0:
-            return f"{line}; {step.words}".removesuffix("; ")
-        left = f", {most}{(step.total - step.done) * elapsed / fresh:.0f} s left"
-        return f"{line}, {fresh / elapsed:.4g} {self._unit}s/s{left}; {step.words}".removesuffix("; ")
+        line, fresh = f"{step.done} of {step.total} {self._unit}s", step.done - step.resumed
+        if fresh <= 0 or elapsed <= 0.0:
+            return line
+        left = f", {(step.total - step.done) * elapsed / fresh:.0f} s left"
+        return f"{line}, {fresh / elapsed:.4g} {self._unit}s/s{left}; {step.text}".removesuffix("; ")
 
 
 @contextmanager

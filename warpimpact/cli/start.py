@@ -99,16 +99,15 @@ def add_schema(commands: Commands) -> None:
         example=f"schema -o {_SCHEMA}",
     )
     other = parser.add_mutually_exclusive_group()
-    other.add_argument("--fit", action="store_true", help="print the schema of fits, which warpimpact identify takes")
-    other.add_argument("--test", action="store_true", help="print the schema of tests, which warpimpact test takes")
-    other.add_argument("--design", action="store_true", help="print that of designs, which warpimpact optimise takes")
+    for kind, command in (("fit", "identify"), ("test", "test"), ("design", "optimise")):
+        text = f"print the schema of {kind}s, which warpimpact {command} takes"
+        other.add_argument(f"--{kind}", action="store_const", const=kind, dest="kind", default="campaign", help=text)
     add_output(parser, "SCHEMA.json", "file (default: printed)")
     add_overwrite(parser, "an existing file")
 
 
 def _schema(arguments: argparse.Namespace) -> None:
-    kinds = [kind for kind in ("fit", "test", "design") if getattr(arguments, kind)]
-    text = _schema_text(kinds[0] if kinds else "campaign")
+    text = _schema_text(arguments.kind)
     if arguments.output is None:
         print(text, end="")
         return

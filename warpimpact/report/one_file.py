@@ -5,26 +5,40 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from html import escape
+from io import StringIO
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any, NamedTuple
 
+import xarray
+from matplotlib import colormaps
+from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
 
+from warpimpact.analysis.hit_map import mirrored
 from warpimpact.analysis.sweep_view import sweep_view
+from warpimpact.campaign.campaign import Campaign
+from warpimpact.campaign.text import parsed
 from warpimpact.firing.view import firing_view
 from warpimpact.identification.posterior import posterior_view
-from warpimpact.optimisation.front_view import front_view
+from warpimpact.optimisation.design import is_even
+from warpimpact.optimisation.front_view import OF_FRONT, design_text, front_view, numbers_of
+from warpimpact.plotting.cell import paint_pixels, pixels, tree_of
 from warpimpact.plotting.firing import firing_figure
+from warpimpact.plotting.front import THUMBNAIL, campaign_at, draw_thumbnail, front_figure
+from warpimpact.plotting.plate import hole_patches
 from warpimpact.plotting.posterior import hits_figure, pairs_figure
 from warpimpact.plotting.style import data_url
 from warpimpact.plotting.sweep import sweep_figure
 from warpimpact.plotting.trajectory import FIGURES
-from warpimpact.report.front_page import FRONT_STYLE, front_html
 from warpimpact.results import attributes as attr
-from warpimpact.results import files, firing, front, posterior_file
+from warpimpact.results import files, firing, posterior_file
+from warpimpact.results import front as f
+from warpimpact.results import variables as v
 from warpimpact.results.kinds import FIRING, FRONT, HISTORY, POSTERIOR, SWEEP, Kind
 from warpimpact.results.replayed_hit import hit_view
+from warpimpact.results.vocabulary import WEIGHTS
+from warpimpact.scene.symmetry import IDENTITY, symmetries
 from warpimpact.view.view import Section, html_of
 
 _STYLE = (
@@ -34,18 +48,25 @@ _STYLE = (
 )
 
 
+_FRONT_STYLE = (
+    "svg{max-width:100%;height:auto}.design:not(:target){display:none}"
+    ".designs:not(:has(:target)) .design:first-child{display:block}"
+)
+"""Shows the design whose point was clicked, at first that of the first point."""
+_MAP_PIXELS = 160
+"""Pixels along the longer side of a map."""
+
+
 class _Shown(NamedTuple):
     """What is shown of a kind.
 
     Attributes:
-        view: its view; for a kind with measures it takes their texts, too.
-        measured: whether it takes measures.
+        view: its view.
         figures: figures by their headings.
         asked: attribute with the text of the file behind the result.
     """
 
     view: Callable[..., list[Section]]
-    measured: bool = False
     figures: Mapping[str, Callable[[Any], Figure]] = MappingProxyType({})
     asked: str = ""
 
@@ -59,8 +80,8 @@ _SHOWN = {
         },
         asked=posterior_file.FIT_TEXT,
     ),
-    FRONT: _Shown(front_view, asked=front.DESIGN),
-    SWEEP: _Shown(sweep_view, measured=True, figures={"By input": sweep_figure}, asked=attr.CAMPAIGN),
+    FRONT: _Shown(front_view, asked=f.DESIGN),
+    SWEEP: _Shown(sweep_view, figures={"By input": sweep_figure}, asked=attr.CAMPAIGN),
     FIRING: _Shown(firing_view, figures={"What the tests report": firing_figure}, asked=firing.TEST),
     HISTORY: _Shown(hit_view, figures={draw.__name__.replace("_", " ").capitalize(): draw for draw in FIGURES}),
 }
@@ -75,15 +96,10 @@ def view_of(path: Path, kind: Kind, measures: Sequence[str] = ()) -> list[Sectio
     Raises:
         ResultError: the file cannot be read, or has no such measures.
     """
-    return _view(kind, files.read(path, kind), measures)
-
-
-def _view(kind: Kind, dataset: Any, measures: Sequence[str] = ()) -> list[Section]:
-    shown = _SHOWN[kind]
-    if measures and not shown.measured:
+    if measures and kind is not SWEEP:
         raise files.ResultError(f"--measure: got {kind.name}, but measures are those of a map of hits or a sweep")
-    asked = (measures,) if shown.measured else ()
-    return shown.view(dataset, *asked)
+    dataset = files.read(path, kind)
+    return sweep_view(dataset, measures) if kind is SWEEP else _SHOWN[kind].view(dataset)
 
 
 def write_file_report(path: Path, kind: Kind, output: Path, folder: Path) -> None:
@@ -98,9 +114,9 @@ def write_file_report(path: Path, kind: Kind, output: Path, folder: Path) -> Non
     """
     dataset, shown = files.read(path, kind), _SHOWN[kind]
     attributes = dataset.attrs
-    title, (first, *others) = str(attributes.get(attr.TITLE, path.stem)), _view(kind, dataset)
+    title, (first, *others) = str(attributes.get(attr.TITLE, path.stem)), shown.view(dataset)
     sections = [replace(first, title="") if first.title == title else first, *others]
-    clickable = front_html(dataset, folder) if kind is FRONT else ""
+    clickable = _front_html(dataset, folder) if kind is FRONT else ""
     figures = "".join(
         f"<h2>{name}</h2><img alt='{name}' src='{data_url(draw(dataset))}'>" for name, draw in shown.figures.items()
     )
@@ -115,8 +131,71 @@ def write_file_report(path: Path, kind: Kind, output: Path, folder: Path) -> Non
         "<meta name='viewport' content='width=device-width, initial-scale=1'>"
         "<meta http-equiv='Content-Security-Policy' "
         "content=\"default-src 'none'; img-src data:; style-src 'unsafe-inline'\">"
-        f"<title>{escape(title)}</title><style>{_STYLE}{FRONT_STYLE}</style></head><body><h1>{escape(title)}</h1>"
+        f"<title>{escape(title)}</title><style>{_STYLE}{_FRONT_STYLE}</style></head><body><h1>{escape(title)}</h1>"
         f"{clickable}{html_of(sections, 'h2')}{figures}{asked}<p>{made}</p></body></html>\n"
     )
     with files.aside(output) as file:
         file.write_text(page, encoding="utf-8")
+
+
+def _front_html(dataset: xarray.Dataset, folder: Path) -> str:
+    """The figure of a search, whose points are links, and a section for each design of the front.
+
+    Args:
+        folder: folder of the files that its campaigns name.
+    """
+    picture = StringIO()
+    front_figure(dataset, folder).savefig(picture, format="svg")
+    drawing = picture.getvalue().replace(' target="_blank"', "")  # a link of Matplotlib opens a new page
+    designs = (_design_html(dataset, place, folder) for place in range(dataset.sizes["front"]))
+    return (
+        "<h2>The front</h2><p>A click on a point of the front shows its plate, its map and its campaign.</p>"
+        f"{drawing[drawing.index('<svg') :]}<div class='designs'>{''.join(designs)}</div>"
+    )
+
+
+def _design_html(dataset: xarray.Dataset, place: int, folder: Path) -> str:
+    """The section of a design of the front; without a picture if a file of its campaign is gone."""
+    file, campaign = escape(str(dataset[f.FILE].values[place])), campaign_at(dataset, place, folder)
+    picture = ""
+    if campaign is not None:
+        picture = f"<img alt='plate and map of {file}' src='{data_url(_design_figure(dataset, place, campaign))}'>"
+    return (
+        f"<section class='design' id='{file}'><h2>{file}</h2>"
+        f"<p>{escape(', '.join(numbers_of(dataset, OF_FRONT, place)))}</p>"
+        f"<p>{escape(design_text(dataset, int(dataset[f.NUMBER][place])))}</p>{picture}"
+        f"<pre>{escape(str(dataset[f.CAMPAIGN].values[place]))}</pre></section>"
+    )
+
+
+def _design_figure(dataset: xarray.Dataset, place: int, campaign: Campaign) -> Figure:
+    """A part of the plate, and its cell, coloured by the first measure at the nearest hit."""
+    plate = campaign.plate
+    figure = Figure(figsize=(9.0, 3.6), layout="constrained")
+    left, right = figure.subplots(1, 2)
+    draw_thumbnail(left, plate)
+    left.set(xticks=[], yticks=[], title=f"{THUMBNAIL:g} mm × {THUMBNAIL:g} mm of the plate")
+    if f.HIT_VALUE not in dataset:
+        right.set_axis_off()
+        return figure
+    text = str(dataset[f.CAMPAIGN].values[place])
+    group = symmetries(plate, campaign.impact) if is_even(parsed(text, "front")) else (IDENTITY,)
+    points = {v.HIT_Y: f.HIT_Y, v.HIT_Z: f.HIT_Z}
+    hits = mirrored(
+        xarray.Dataset(
+            {"value": ("hit", dataset[f.HIT_VALUE].values[place, 0])},
+            {name: ("hit", dataset[stored].values[place]) for name, stored in points.items()},
+            {attr.PLATE_PERIOD: plate.pattern.unit_cell, attr.SYMMETRIES: "; ".join(map(str, group))},
+        )
+    )
+    nearest = tree_of(hits).query(pixels(hits, _MAP_PIXELS))[1]
+    drawn = paint_pixels(right, hits, hits["value"].values[nearest], (colormaps["viridis"], Normalize()))
+    for patch in hole_patches(plate, right):
+        patch.set(facecolor="none", edgecolor="white")
+        right.add_patch(patch)
+    labels = zip(dataset[f.GOAL_LABEL].values, dataset[f.GOAL].values, strict=True)
+    effects = [str(label) for label, name in labels if not str(name).startswith(tuple(WEIGHTS))]
+    label = effects[0].replace(", worst tenth", "").replace(", mean", "")
+    right.set(xlabel="hit y [mm]", ylabel="hit z [mm]", title="Where the unit cell is hit")
+    figure.colorbar(drawn, ax=right, label=label)
+    return figure
