@@ -83,11 +83,11 @@ def _values(
     """Place, kind and value of every bounded quantity."""
     yield "core: length", "core.length", core.length
     yield "core: largest diameter", "core.diameter", 2.0 * core.max_radius
+    yield "core: mass", "core.mass", core.mass_properties.mass
     if core.density is not None:
         yield "core.density", "core.density", core.density
-    yield "core: mass", "core.mass", core.mass_properties.mass
-    cylinder = math.pi * core.max_radius**2 * core.length
-    yield "core: mass over a cylinder about it", "core.mean_density", core.mass_properties.mass / cylinder
+    else:
+        yield "core: mass over volume", "core.mean_density", core.mass_properties.mass / core.volume
     for place, plate in target.named:
         for name in _OF_A_PLATE:
             if getattr(plate, name) is not None:
@@ -97,6 +97,7 @@ def _values(
         if plate.open_area > 0.0:
             for side in plate.pattern.unit_cell:
                 yield f"{place}.pattern: cell", "plate.pattern.cell", side
+            yield f"{place}.pattern.rotation", "plate.pattern.rotation", getattr(plate.pattern, "rotation", 0.0)
     for k, gap in enumerate(target.gaps[1:], start=1):
         yield f"{layer_name(k)}.gap", "layer.gap", gap
     for name, value in impact:

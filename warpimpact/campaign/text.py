@@ -7,7 +7,7 @@ from typing import Any
 
 from ..results.files import is_netcdf, kind_of
 from ..results.kinds import text_kind
-from ..scene import toml_text
+from ..scene import input_files
 from .removed_keys import check_removed
 
 
@@ -30,7 +30,7 @@ def parsed(text: str, name: str, kind: str = "") -> dict[str, Any]:
         CampaignError: the text is neither, or is another kind of file; `name` is its name in the message.
     """
     with _as_campaign():
-        tables = toml_text.parsed(text, name)
+        tables = input_files.parsed(text, name)
         check_removed(tables, name)
     other, use = text_kind(tables, kind)
     if kind and other not in ("", kind):
@@ -46,8 +46,8 @@ def read_text(path: Path) -> str:
     """
     with _as_campaign():
         try:
-            return toml_text.read_text(path)
-        except toml_text.NoTextError:
+            return input_files.read_text(path)
+        except input_files.NoTextError:
             if not is_netcdf(path):
                 raise
             kind = kind_of(path)

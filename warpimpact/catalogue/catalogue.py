@@ -16,8 +16,8 @@ from warpimpact.catalogue.entries import Material, Threat
 from warpimpact.catalogue.spelling import the_entry
 from warpimpact.catalogue.strength import Resistance, resistance_of
 from warpimpact.scene import Core
+from warpimpact.scene.input_files import parsed, read_text
 from warpimpact.scene.problems import complaint
-from warpimpact.scene.toml_text import parsed, read_text
 from warpimpact.scene.units import quoted
 
 Entry = TypeVar("Entry", Threat, Material)

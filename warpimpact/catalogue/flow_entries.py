@@ -12,8 +12,8 @@ from pydantic import Field, ValidationError
 from warpimpact.catalogue.entries import Name, evidence
 from warpimpact.catalogue.spelling import the_entry
 from warpimpact.scene.flow import Flow
+from warpimpact.scene.input_files import parsed, read_text
 from warpimpact.scene.problems import complaint
-from warpimpact.scene.toml_text import parsed, read_text
 from warpimpact.scene.units import Title
 
 FLOWS = Path(__file__).parent / "flows"

@@ -18,8 +18,7 @@ from warpimpact.results.netcdf import write_table
 from warpimpact.results.outlines import in_a_file, in_memory
 from warpimpact.results.references import NAMES, references_of, with_references
 from warpimpact.results.table import HitTable
-from warpimpact.scene.input_files import check_file
-from warpimpact.scene.toml_text import parsed, read_text
+from warpimpact.scene.input_files import check_file, parsed, read_text
 
 if TYPE_CHECKING:
     import xarray

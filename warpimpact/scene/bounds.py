@@ -77,7 +77,7 @@ USUAL = {
     "core.diameter": _length(1.0, 60.0, 1_000.0, "no gun has a larger bore"),
     "core.mass": Bounds(5e-5, 1.0, "kg", (("g", 1e-3), ("mg", 1e-6))),
     "core.density": Bounds(500.0, 25_000.0, "kg/m^3", _DENSITIES, 10.0, 25_000.0, _OF_MATTER),
-    "core.mean_density": Bounds(0.0, 25_000.0, "kg/m^3", most=25_000.0, why=_OF_MATTER),
+    "core.mean_density": Bounds(1_000.0, 25_000.0, "kg/m^3", (), 10.0, 25_000.0, _OF_MATTER),
     "plate.thickness": _length(0.1, 200.0, 1_000.0, "no bullet goes through a metre of anything"),
     "plate.size": _length(5.0, 20_000.0, 50_000.0, "no plate is larger; an unbounded one has no size"),
     "plate.resistance": Bounds(
@@ -90,6 +90,7 @@ USUAL = {
     "plate.degradation_length": _length(0.01, 20.0, 100.0, "a core weakens a plate about itself"),
     "plate.density": Bounds(500.0, 25_000.0, "kg/m^3", _DENSITIES, 10.0, 25_000.0, _OF_MATTER),
     "plate.pattern.cell": _length(0.5, 500.0, 2_000.0, "a plate with its holes as far apart is a solid one to a core"),
+    "plate.pattern.rotation": Bounds(0.0, 360.0 * _DEG, "rad", most=360.0 * _DEG, why="a turn has 360 deg"),
     "layer.gap": _length(0.05, 3_000.0),
     "impact.velocity": Bounds(
         20.0, 3000.0, "m/s", (("km/s", 1e3),), 1.0, 10_000.0, "a fall from 5 cm is faster, and no gun is as fast"

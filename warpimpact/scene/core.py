@@ -10,7 +10,7 @@ from numpy.polynomial import Polynomial
 from pydantic import Field, ValidationInfo, model_validator
 from scipy.spatial import ConvexHull
 
-from .input_files import input_file, read_table
+from .input_files import input_file, read_columns
 from .model import Array, Model
 from .units import Length, Number, PositiveDensity, PositiveInertia, PositiveLength, PositiveMass, PositiveStress, Title
 
@@ -119,6 +119,12 @@ class Core(Model, ABC):
             inertia_axial=float(self.inertia_axial or density * axial),
             inertia_transverse=float(self.inertia_transverse or density * transverse),
         )
+
+    @property
+    def volume(self) -> float:
+        """Volume [m³]."""
+        s, weight = self._quadrature()
+        return float((np.pi * self.radius(s) ** 2 * weight).sum())
 
     @cached_property
     def bounding_radius(self) -> float:
@@ -296,9 +302,9 @@ class ProfileCore(Core):
             return values
         if "s" in values or "r" in values:
             raise ValueError("file and s or r cannot be combined: a profile is given either by file or by s and r")
-        s, r = read_table(input_file(values["file"], info), ("s", "r")).T
+        columns = read_columns(input_file(values["file"], info), {"s": Length, "r": Length}, ("s", "r"))
         rest = {key: value for key, value in values.items() if key != "file"}
-        return rest | {"s": s.tolist(), "r": r.tolist()}
+        return rest | {name: column.tolist() for name, column in columns.items()}
 
     @classmethod
     def _keys(cls) -> list[str]:

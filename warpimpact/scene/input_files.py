@@ -1,26 +1,30 @@
-"""Files that a scene names: their paths, and tables of numbers in them."""
+"""Files that a user names: their paths, the tables of TOML or JSON, and columns of numbers."""
 
 import csv
+import json
 import math
 import re
 import stat
+import tomllib
 from array import array
-from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Mapping
 from pathlib import Path
-from typing import Annotated, Any, NamedTuple
+from types import MappingProxyType
+from typing import Annotated, Any
 
 import numpy as np
 from pydantic import BeforeValidator, ValidationInfo
 
 from .model import Array
-from .units import brief, quoted
+from .units import brief, quantity, quoted
 
 _LONGEST_PATH = 255
 """Characters of a path that a message quotes."""
 _NAME_AND_UNIT = re.compile(r"(\w+)\s*(?:\[\s*([^\[\]]*?)\s*\])?")
 _MOST_BYTES, _MOST_ROWS = 2**28, 2**22
 """Largest size and number of rows of a table."""
+_MOST_TEXT = 2**20
+"""Most characters of TOML or JSON."""
 
 
 def input_file(name: object, info: ValidationInfo) -> Path:
@@ -65,102 +69,120 @@ def check_file(path: Path, most: int | None = None) -> None:
 InputFile = Annotated[Path, BeforeValidator(input_file)]
 
 
-def read_table(path: Path, columns: tuple[str, ...]) -> Array:
-    """Numbers of a CSV file with exactly this header line, shape [rows, columns], read-only.
-
-    Raises:
-        ValueError: the message names the file, the line and its fault.
-    """
-    with _open_table(path) as (header, reader):
-        if header != columns:
-            raise ValueError(f"{path.name}, line 1: {_got(header, columns)}the header must be {','.join(columns)}")
-        return _rows(path, columns, reader, range(len(columns)))
-
-
-class CsvColumn(NamedTuple):
-    """A column of numbers, shape [rows], read-only; `unit` is the unit in brackets in its header, or empty."""
-
-    values: Array
-    unit: str
-
-
 def read_columns(
-    path: Path, required: tuple[str, ...], optional: tuple[str, ...], exported: Mapping[str, str]
-) -> dict[str, CsvColumn]:
-    """Columns of a CSV file by name: the required ones first in its header, then any of the optional ones.
+    path: Path, kinds: Mapping[str, Any], required: tuple[str, ...], exported: Mapping[str, str] = MappingProxyType({})
+) -> dict[str, Array]:
+    """Columns of a CSV file by name, shape [rows] each, in SI and radians, read-only.
 
-    A unit may follow a name, as in "hit_y [mm]". A file whose first column is "hit" comes from `warpimpact export`: its
-    columns may have any order and names as keys of `exported`, and columns that are neither required nor optional are
-    ignored.
+    A unit may follow a name, as in "hit_y [mm]"; without it numbers are in SI and angles in degrees. The required
+    columns come first in the header, then any of the others. A file whose first column is "hit" comes from
+    `warpimpact export`: its columns may have any order and names as keys of `exported`, and unknown ones are ignored.
+
+    Args:
+        kinds: type of the quantity of every column.
 
     Raises:
         ValueError: the message names the file, the line and its fault.
     """
-    with _open_table(path) as (header, reader):
-        matches = [_NAME_AND_UNIT.fullmatch(column) for column in header]
-        names, units = ([match[group] or "" if match else "" for match in matches] for group in (1, 2))
-        if names[:1] == ["hit"]:
-            names = [exported.get(name, name) for name in names]
-            wanted = [place for place, name in enumerate(names) if name in (*required, *optional)]
-            present = [names[place] for place in wanted]
-            is_known = set(required) <= set(present)
-        else:
-            wanted, present = list(range(len(header))), names
-            is_known = tuple(names[: len(required)]) == required and set(names[len(required) :]) <= set(optional)
-        if not is_known or len(set(present)) < len(present):
-            first = f"{','.join(required)} and then " if required else ""
-            raise ValueError(
-                f"{path.name}, line 1: {_got(header, (*required, *optional))}the header must be {first}any of "
-                f"{', '.join(optional)}"
-            )
-        rows = _rows(path, header, reader, wanted).T
-        return {name: CsvColumn(row, units[place]) for name, row, place in zip(present, rows, wanted, strict=True)}
-
-
-def _got(header: tuple[str, ...], known: tuple[str, ...]) -> str:
-    """The start of a message that quotes the header; empty if it has no known column, because an unrelated file is not
-    quoted."""
-    return f'got "{brief(",".join(header))}", but ' if set(header) & set(known) else ""
-
-
-@contextmanager
-def _open_table(path: Path) -> Iterator[tuple[tuple[str, ...], Any]]:
-    """Header of a CSV file, and the reader of its rows."""
     check_file(path, _MOST_BYTES)
     try:
         with path.open(encoding="utf-8-sig", newline="") as lines:
             reader = csv.reader(lines, skipinitialspace=True)
-            yield tuple(name.strip() for name in next(reader, [])), reader
+            header = [name.strip() for name in next(reader, [])]
+            columns = _header(path.name, header, kinds, required, exported)
+            rows = _rows(path.name, header, reader, [place for place, _ in columns.values()]).T
     except (OSError, UnicodeDecodeError, csv.Error) as error:
         raise ValueError(f"{path.name} cannot be read as a table: {error}") from None
-
-
-def _rows(path: Path, columns: tuple[str, ...], reader: Any, wanted: Sequence[int]) -> Array:
-    """Numbers of the columns at the places `wanted`."""
-    rows = array("d")
-    for row in reader:
-        if row:
-            rows.extend(_numbers(row, columns, f"{path.name}, line {reader.line_num}", wanted))
-        if len(rows) > _MOST_ROWS * len(wanted):
-            raise ValueError(f"{path.name} has more than {_MOST_ROWS} rows")
-    if not rows:
-        raise ValueError(f"{path.name} has no rows below its header")
-    table = np.array(rows).reshape(-1, len(wanted))
-    table.setflags(write=False)
+    table = {}
+    for (name, (_, unit)), values in zip(columns.items(), rows, strict=True):
+        kind = quantity(kinds[name])
+        try:
+            factor = kind(f"1 {unit}") if unit else math.radians(1.0) if kind.unit == "rad" else 1.0
+        except ValueError as error:
+            raise ValueError(f"{path.name}, line 1: {name}: {error}") from None
+        table[name] = values * factor
+        table[name].setflags(write=False)
     return table
 
 
-def _numbers(row: list[str], columns: tuple[str, ...], place: str, wanted: Sequence[int]) -> list[float]:
-    if len(row) != len(columns):
-        raise ValueError(f'{place}: got "{brief(",".join(row))}", but a row has {len(columns)} finite numbers')
-    return [_finite(row[column], f"{place}: {columns[column]}") for column in wanted]
+def _header(
+    file: str, header: list[str], kinds: Mapping[str, Any], required: tuple[str, ...], exported: Mapping[str, str]
+) -> dict[str, tuple[int, str]]:
+    """Place and unit of each column by name."""
+    matches = [_NAME_AND_UNIT.fullmatch(column) for column in header]
+    columns = [
+        (match[1], (place, match[2] or "")) if match else ("", (place, "")) for place, match in enumerate(matches)
+    ]
+    if header[:1] == ["hit"]:
+        columns = [(exported.get(name, name), column) for name, column in columns]
+        columns = [(name, column) for name, column in columns if name in kinds]
+        first: list[str] = [name for name in required if name in dict(columns)]
+    else:
+        first = [name for name, _ in columns[: len(required)]]
+    if first != list(required) or not dict(columns).keys() <= kinds.keys() or len(dict(columns)) < len(columns):
+        got = f'got "{brief(",".join(header))}", but ' if set(header) & set(kinds) else ""  # no unrelated file
+        optional = [name for name in kinds if name not in required]
+        parts = [",".join(required)] * bool(required) + [f"any of {', '.join(optional)}"] * bool(optional)
+        raise ValueError(f"{file}, line 1: {got}the header must be {' and then '.join(parts)}")
+    return dict(columns)
 
 
-def _finite(text: str, place: str) -> float:
+def _rows(file: str, header: list[str], reader: Any, places: list[int]) -> Array:
+    """Numbers of the columns at these places, shape [rows, columns]."""
+    rows = array("d")
+    for row in filter(None, reader):
+        line = f"{file}, line {reader.line_num}:"
+        if len(row) != len(header):
+            raise ValueError(f'{line} got "{brief(",".join(row))}", but a row has {len(header)} finite numbers')
+        for place in places:
+            try:
+                number = float(row[place])
+            except ValueError:
+                number = math.nan
+            if not math.isfinite(number):
+                raise ValueError(f'{line} {header[place]}: got "{brief(row[place])}", but it must be a finite number')
+            rows.append(number)
+        if len(rows) > _MOST_ROWS * len(places):
+            raise ValueError(f"{file} has more than {_MOST_ROWS} rows")
+    if not rows:
+        raise ValueError(f"{file} has no rows below its header")
+    return np.array(rows).reshape(-1, len(places))
+
+
+class NoTextError(ValueError):
+    """A file that is no text; the message is one sentence."""
+
+
+def read_text(path: Path) -> str:
+    """The text of a UTF-8 file, with or without a byte order mark, cut after the length that `parsed` refuses.
+
+    Raises:
+        ValueError: the file is missing or cannot be read; NoTextError if it is no such text.
+    """
+    check_file(path)
     try:
-        number = float(text)
-    except ValueError:
-        number = math.nan
-    if not math.isfinite(number):
-        raise ValueError(f'{place}: got "{brief(text)}", but it must be a finite number')
-    return number
+        with path.open(encoding="utf-8-sig") as file:
+            return file.read(_MOST_TEXT + 1)
+    except UnicodeDecodeError as error:
+        is_utf_16 = error.object[:2] in (b"\xff\xfe", b"\xfe\xff")
+        encoding = "UTF-16" if is_utf_16 else "not UTF-8, perhaps Windows-1252"
+        raise NoTextError(f"{path}: is not valid TOML: its encoding is {encoding}; save it as UTF-8") from None
+    except OSError as error:
+        raise ValueError(f"{path}: cannot be read ({error.strerror})") from None
+
+
+def parsed(text: str, name: str) -> dict[str, Any]:
+    """The tables of a text, TOML or JSON.
+
+    Raises:
+        ValueError: the text is neither; `name` is its name in the message.
+    """
+    if len(text) > _MOST_TEXT:
+        raise ValueError(f"{name}: at most {_MOST_TEXT} characters are read")
+    try:
+        data: dict[str, Any] = json.loads(text) if text.startswith("{") else tomllib.loads(text)
+    except ValueError as error:
+        raise ValueError(f"{name}: is not valid TOML: {brief(str(error))}") from None
+    except RecursionError:
+        raise ValueError(f"{name}: its tables and arrays are nested too deep") from None
+    return data

@@ -103,8 +103,7 @@ class Plate(Model):
     @field_validator("pattern")
     @classmethod
     def _within_the_margin(cls, pattern: Pattern, info: ValidationInfo) -> Pattern:
-        size, margin = (info.data.get(name) for name in ("size", "margin"))
-        return pattern.bounded(size, margin) if size is not None and margin is not None else pattern.unbounded
+        return pattern.bounded(info.data.get("size"), info.data.get("margin"))
 
     @model_validator(mode="before")
     @classmethod

@@ -11,12 +11,12 @@ from numpy.typing import NDArray
 from pydantic import Field, model_validator
 
 from .exclusions import SIZE, WHOLE_PLATE, check_together
-from .input_files import CsvColumn, InputFile, read_columns
+from .input_files import InputFile, read_columns
 from .model import Array, Model
 from .plate import Plate
 from .quantities import BY_LAYER, LISTED, QUANTITIES
 from .target import Target
-from .units import RIGHT_ANGLE, Angle, AngularVelocity, Obliquity, PositiveSpeed, Tilt, quantity
+from .units import RIGHT_ANGLE, Angle, AngularVelocity, Obliquity, PositiveSpeed, Tilt
 
 FARTHEST_HIT = 100.0
 """Largest distance of a hit from the origin [m]."""
@@ -25,20 +25,6 @@ _REPLICATES = 16
 interval over 16 means is 9 % wider than over infinitely many."""
 EXPORTED = {quantity.column: name for name, quantity in QUANTITIES.items() if quantity.column is not None}
 """Name of a column in an exported result → its name in a list of hits."""
-
-
-def _in_si(name: str, column: CsvColumn, file: str) -> Array:
-    """Values of a column of a list of hits, in SI and radians. An angle without a unit is in degrees."""
-    kind = quantity(QUANTITIES[name].type)
-    if not column.unit:
-        return np.radians(column.values) if kind.unit == "rad" else column.values
-    try:
-        factor = kind(f"1 {column.unit}")
-    except ValueError as error:
-        raise ValueError(f"{file}, line 1: {name}: {error}") from None
-    values: Array = column.values * factor
-    values.setflags(write=False)
-    return values
 
 
 class Impact(Model):
@@ -126,11 +112,10 @@ class Hits(Model):
         if self.file is None:
             return None
         required = ("hit_y", "hit_z") if self.sampling == "list" else ()
-        optional = tuple(name for name in LISTED if name not in required)
-        columns = read_columns(self.file, required, optional, EXPORTED)
+        columns = read_columns(self.file, {name: QUANTITIES[name].type for name in LISTED}, required, EXPORTED)
         if self.sampling != "list" and {"hit_y", "hit_z"} & columns.keys():
             raise ValueError(f'{self.file.name} has hit points. Give sampling = "list", which takes them.')
-        return {name: _in_si(name, column, self.file.name) for name, column in columns.items()}
+        return columns
 
     @property
     def scramblings(self) -> int:

@@ -89,7 +89,7 @@ def test_a_plate_of_which_less_than_half_resists_is_doubted(unit: str, folder: P
             'plate.thickness: read as 0.4 m, but 0.1 to 200 mm is usual; "0.4 mm" was probably meant, which needs its '
             "unit",
         ),
-        (('mass = "4 g"', 'mass = "40 mg"'), "core: mass: read as 4e-05 kg, but 0.05 to 1000 g is usual"),
+        (('"4 g"', '"0.1 g"'), "core: mass over volume: read as 530.516 kg/m^3, but 1000 to 25000 kg/m³ is usual"),
         (
             ('resistance = "2600 MPa"', "resistance = 2e5"),
             "plate.resistance: read as 200000 Pa, but 0.01 to 20 GPa is usual",
@@ -119,12 +119,13 @@ def test_an_implausible_value_is_told(change: tuple[str, str], sentence: str, fo
             'anything; "6 mm" was probably meant, which needs its unit; allow_implausible = true has it computed as it '
             "is",
         ),
-        (('mass = "4 g"', "mass = 4"), "text: core: mass over a cylinder about it: read as 7.07355e+06 kg/m^3, but"),
+        (('mass = "4 g"', "mass = 4"), "text: core: mass over volume: read as 2.12207e+07 kg/m^3, but"),
         (('length = "20 mm"', "length = 20"), "text: core: length: read as 20 m, but up to 1000 mm is allowed"),
         (('diameter = "6 mm"', "diameter = 6"), "text: core: largest diameter: read as 6 m, but up to 1000 mm is"),
         (('resistance = "2600 MPa"', "resistance = 2600"), "text: plate.resistance: read as 2600 Pa, but 2e-05 to 200"),
         (('velocity = "825 m/s"', "velocity = 0.825"), "text: impact.velocity: read as 0.825 m/s, but 1 to 10000 m/s"),
         (('["8 mm", "8 mm"]', "[8, 8]"), "text: plate.pattern: cell: read as 8 m, but up to 2000 mm is allowed"),
+        (('"circle",', '"circle", rotation = 500,'), "text: plate.pattern.rotation: read as 500°, but up to 360° is"),
         (("[impact]", "density = 7.85\n[impact]"), "text: plate.density: read as 7.85 kg/m^3, but 10 to 25000 kg/m"),
         (("[impact]", "degradation_length = 0.5\n[impact]"), "text: plate.degradation_length: read as 0.5 m, but"),
         (("[impact]", "degradation_interval = 4\n[impact]"), "text: plate.degradation_interval: read as 4 s, but"),

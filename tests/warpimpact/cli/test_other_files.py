@@ -14,7 +14,7 @@ from warpimpact.identification.fit_file import read_fit
 from warpimpact.optimisation.design import read_design
 from warpimpact.results import files
 from warpimpact.results.kinds import HIT_MAP
-from warpimpact.scene.toml_text import read_text
+from warpimpact.scene.input_files import read_text
 from warpimpact.solver import device as devices
 
 CAMPAIGNS = Path(__file__).parents[3] / "campaigns"

@@ -57,6 +57,16 @@ def test_a_pitch_is_the_distance_of_the_nearest_neighbours(staggered: bool, neig
         CirclePattern(diameter="6 mm", spacing="9 kg")
 
 
+def test_sides_of_holes_on_a_staggered_pitch_face_each_other() -> None:
+    hexagons = HexagonPattern(width="6 mm", spacing="6.7 mm", staggered=True)  # sold as H6 T6.7
+    assert hexagons.ligament() == pytest.approx(0.7 * MM, rel=1e-9)
+    assert hexagons.open_area == pytest.approx((6 / 6.7) ** 2)
+    assert hexagons.model_copy(update={"width": "5 mm"}).ligament() == pytest.approx(1.7 * MM, rel=1e-9)
+    squares = SquarePattern(side="4 mm", spacing="6 mm", staggered=True)
+    assert squares.unit_cell == pytest.approx((12 * MM, 6 * MM))
+    assert squares.ligament() == pytest.approx(2 * MM, rel=1e-9)
+
+
 def test_slots_are_stadiums_on_a_staggered_lattice() -> None:
     points = {
         (0, 0): True,

@@ -44,26 +44,6 @@ def area(spine: Array, rounding: float) -> float:
     return float(shapely.area(shape) + rounding * perimeter + np.pi * rounding**2)
 
 
-def distance(spine: Array, y: Array, z: Array) -> Array:
-    """Distance of points y, z from the spine [m], of their broadcast shape; negative within a polygon.
-
-    Mirrored points have the same distance from a mirrored spine, to the bit.
-    """
-    ends = list(zip(spine, np.roll(spine, -1, axis=0), strict=True))
-    nearest, within = np.array(np.inf), np.array(True)
-    for start, end in ends[: 1 if len(ends) < 3 else None]:
-        half = 0.5 * float(np.hypot(*(end - start)))
-        along_y, along_z = (end - start) / (2.0 * half) if half > 0.0 else np.zeros(2)
-        from_y, from_z = y - 0.5 * (start[0] + end[0]), z - 0.5 * (start[1] + end[1])
-        along = np.clip(from_y * along_y + from_z * along_z, -half, half)
-        to_edge = np.hypot(from_y - along * along_y, from_z - along * along_z)
-        if len(spine) < 3:
-            return np.asarray(to_edge)
-        nearest = np.minimum(nearest, to_edge)
-        within = within & (from_z * along_y - from_y * along_z > 0.0)
-    return np.where(within, -nearest, nearest)
-
-
 def chords(spines: Array, rounding: float, which: Any, z: Array, slack: float) -> tuple[Array, Array]:
     """Both ends along y [m] of lines at z [m] in shapes, with the shape of z; NaN if a line misses its shape by more
     than `slack` [m].
@@ -112,9 +92,13 @@ def shifts_into(low: Array, high: Array, period: Range, y_range: Range, z_range:
     return np.stack(np.meshgrid(along_y, along_z, indexing="ij"), axis=-1).reshape(-1, 2)
 
 
-def distance_to(geometries: Any, y: Array, z: Array) -> Array:
-    """Distance of points y, z from the nearest geometry [m], in their broadcast shape; inf if there is none."""
-    points: Any = shapely.points(*np.broadcast_arrays(y, z))
+def distance_to(geometries: Any, y: Array, z: Array, period: Range) -> Array:
+    """Distance of points y, z from the nearest geometry [m], in their broadcast shape; inf if there is none.
+
+    The geometries are those about one period, around the origin, of all that repeat with it.
+    """
+    folded = (at - side * np.round(at / side) for at, side in zip((y, z), period, strict=True))
+    points: Any = shapely.points(*np.broadcast_arrays(*folded))
     if not len(geometries):
         return np.full(points.shape, np.inf)
     tree = shapely.STRtree(geometries, node_capacity=2)  # 1.5 us per point; 6 us with the default

@@ -5,7 +5,7 @@ from abc import abstractmethod
 from copy import copy
 from functools import cached_property, partial
 from numbers import Real
-from typing import Annotated, Any, NamedTuple, Self
+from typing import Annotated, Any, ClassVar, NamedTuple, Self
 
 import numpy as np
 from pydantic import Field, PrivateAttr, ValidationInfo, field_validator, model_validator
@@ -19,11 +19,10 @@ from .geometry import (
     Check,
     Chords,
     Counts,
-    Numbers,
     Range,
     area,
     chords,
-    distance,
+    distance_to,
     geometries,
     half_shares,
     neighbours,
@@ -60,11 +59,16 @@ class LatticePattern(Pattern):
     Attributes:
         staggered: shifts every odd row of cells along y by b/2 along z.
         spacing: extent (a, b) of the cell along y and z, or one length, the pitch, which is the distance of a hole from
-            its nearest neighbours [m]. The lattice of a pitch is square; staggered it is hexagonal, with rows along z.
+            its nearest neighbours [m]. The lattice of a pitch is square; staggered it is hexagonal, with rows along z,
+            and that of squares has rows as far apart as the holes in them.
         holes: places of the holes in a cell, each with an optional rotation in addition to `rotation`; by default one
             hole on the origin.
-        rotation: rotation of every hole from +y towards +z, given in degrees or with its unit [rad].
+        rotation: rotation of every hole from +y towards +z, given in degrees or with its unit [rad]; by default 30 deg
+            for hexagons on a staggered pitch, whose sides then face each other, else 0.
     """
+
+    row_distance: ClassVar[float] = math.sqrt(0.75)
+    """Distance of the rows of a staggered pitch, as a share of the pitch."""
 
     staggered: Annotated[bool, Field(strict=True)] = False
     spacing: _PAIR
@@ -76,16 +80,21 @@ class LatticePattern(Pattern):
     @field_validator("spacing", mode="before", json_schema_input_type=_PAIR | PositiveLength)
     @classmethod
     def _of_a_pitch(cls, value: Any, info: ValidationInfo) -> Any:
-        if not isinstance(value, str | Real) or isinstance(value, bool):
+        if not is_pitch(value):
             return value
         pitch = quantity(PositiveLength)(value)
-        return (pitch * math.sqrt(0.75) if info.data.get("staggered") else pitch, pitch)
+        return (pitch * cls.row_distance if info.data.get("staggered") else pitch, pitch)
 
     @property
     @abstractmethod
     def spine(self) -> Array:
         """Corners of a convex polygon, anticlockwise, or the ends of a line, or a point, before any rotation; shape
         [corners, 2] [m]."""
+
+    @property
+    @abstractmethod
+    def inradius(self) -> float:
+        """Distance of the sides of a hole from its place [m]."""
 
     @property
     def hole_area(self) -> float:
@@ -96,20 +105,12 @@ class LatticePattern(Pattern):
     def hole_size(self) -> tuple[float, float]:
         """Diameter of the largest circle in a hole about its place, and largest extent of a hole [m]."""
         longest = np.linalg.norm(self.spine[:, None] - self.spine[None], axis=-1).max()
-        inside = float(self._depth(np.zeros(1), np.zeros(1))[0])
-        return 2.0 * inside, float(longest) + 2.0 * self.rounding
+        return 2.0 * self.inradius, float(longest) + 2.0 * self.rounding
 
     @property
     def _marks(self) -> Array:
         """Points that identify a hole of the shape, shape [marks, 2] [m]."""
         return self.spine
-
-    def _depth(self, y: Array, z: Array) -> Array:
-        """Depth of points inside the hole on the origin, not rotated [m]; negative outside.
-
-        It is 0 on the edge, and its slope is at most 1.
-        """
-        return self.rounding - distance(self.spine, y, z)
 
     def _check_shape(self) -> None:
         """Raise a ValueError if the sizes make no hole."""
@@ -143,38 +144,26 @@ class LatticePattern(Pattern):
     def open_area(self) -> float:
         return float(len(self._places) * self.hole_area / math.prod(self.period))
 
-    def bounded(self, size: tuple[float, float], margin: float) -> Self:
-        if self._plate == (size, margin):
+    def bounded(self, size: tuple[float, float] | None, margin: float | None) -> Self:
+        plate = None if size is None or margin is None else (size, margin)
+        if self._plate == plate:
             return self
-        on_plate = self._on((size, margin))
-        if not len(on_plate._places):
+        pattern = copy(self)
+        pattern.__dict__ = {name: getattr(self, name) for name in type(self).model_fields}  # no computed values
+        pattern._plate = plate
+        if size is not None and margin is not None and not len(pattern._places):
             raise ValueError(
                 f"got size = {_millimetres(size)} and margin = {1e3 * margin:g} mm, but they leave no hole on the plate"
             )
-        return on_plate
-
-    @property
-    def unbounded(self) -> Self:
-        return self if self._plate is None else self._on(None)
-
-    def _on(self, plate: tuple[tuple[float, float], float] | None) -> Self:
-        """A copy on a plate of this size and margin [m], without computed values."""
-        pattern = copy(self)
-        pattern.__dict__ = {name: getattr(self, name) for name in type(self).model_fields}
-        pattern._plate = plate
         return pattern
 
     def is_hole(self, y: Array, z: Array) -> BoolArray:
-        (period_y, period_z), (count_y, count_z) = self.period, self._bins[0]
-        y, z = y - period_y * np.round(y / period_y), z - period_z * np.round(z / period_z)
-        cell = _bin(y, period_y, count_y) * count_z + _bin(z, period_z, count_z)
-        deepest = np.full(cell.shape, -np.inf)
-        for hole_y, hole_z, cosine, sine in self._bins[1]:
-            from_y, from_z = y - hole_y[cell], z - hole_z[cell]
-            along_y = cosine[cell] * from_y + sine[cell] * from_z
-            along_z = cosine[cell] * from_z - sine[cell] * from_y
-            deepest = np.fmax(deepest, self._depth(along_y, along_z))  # a bin with fewer holes has NaN
-        return np.asarray(deepest >= -self._edge)  # an edge lies in its hole on any side
+        return distance_to(self._near, y, z, self.period) <= self.rounding + self._edge  # an edge lies in its hole
+
+    @cached_property
+    def _near(self) -> Any:
+        """Spines of the holes about a period."""
+        return self.spines(*((-reach, reach) for reach in 0.5 * np.array(self.period) + self._edge))
 
     def shares_in_holes(self, counts: tuple[int, int], sides: tuple[float, float], check: Check = no_end) -> Counts:
         ranges = [(-side, side * (count + 1)) for side, count in zip(sides, counts, strict=True)]
@@ -279,36 +268,10 @@ class LatticePattern(Pattern):
         """Distance from its hole within which a point lies on the edge [m]."""
         return _EQUAL_LENGTHS * max(self.spacing)
 
-    @cached_property
-    def _bins(self) -> tuple[tuple[int, int], list[tuple[Array, ...]]]:
-        """Numbers of bins of a period along y and z, and the holes that reach into each bin.
 
-        Entry k has the origin (y, z), the cosine and the sine of the rotation of the k-th hole of every bin, shape
-        [bins] each; NaN in a bin with fewer holes.
-        """
-        period, boxes = np.array(self.period), self._boxes(self._places)
-        finest = math.ceil(8 * math.sqrt(len(boxes)))
-        counts = np.minimum(np.ceil(2 * period / np.ptp(boxes, axis=1).max(axis=0)), finest).astype(int)
-        half = period / 2 + self._edge
-        places = self._repeated(self._places, self.period, (-half[0], half[0]), (-half[1], half[1]))
-        reaches = _bin(self._boxes(places) + np.array([[-self._edge], [self._edge]]), period, counts)
-        inside: list[list[int]] = [[] for _ in range(math.prod(counts))]
-        for hole, ((low_y, low_z), (high_y, high_z)) in enumerate(reaches):
-            for row in range(low_y, high_y + 1):
-                for column in range(low_z, high_z + 1):
-                    inside[row * counts[1] + column].append(hole)
-        columns = np.vstack(
-            [np.column_stack([places[:, :2], np.cos(places[:, 2]), np.sin(places[:, 2])]), [np.nan] * 4]
-        )
-        most = max(map(len, inside))
-        which = np.array([[*holes, *[-1] * (most - len(holes))] for holes in inside])
-        return (int(counts[0]), int(counts[1])), [tuple(columns[hole].T) for hole in which.T]
-
-
-def _bin(at: Array, period: Any, count: Any) -> Numbers:
-    """Index of the bin of each coordinate among `count` bins of a period about the origin; the outer bins have no
-    end."""
-    return np.asarray(np.clip(np.floor((at / period + 0.5) * count), 0, count - 1), dtype=np.int64)
+def is_pitch(value: Any) -> bool:
+    """Whether a spacing is one length."""
+    return isinstance(value, str | Real) and not isinstance(value, bool)
 
 
 def _millimetres(pair: Any) -> str:

@@ -62,8 +62,7 @@ class Pattern(Model, ABC):
     def edge_distance(self, y: Array, z: Array) -> Array:
         """Distance of points y, z [m] from the nearest outline of a hole, of their broadcast shape: negative in a hole,
         inf where there is none. The chords of an outline lie within 0.13 % of the radius of its arcs."""
-        y, z = (at - side * np.round(at / side) for at, side in zip((y, z), self.period, strict=True))
-        apart = distance_to(self._edges, y, z)
+        apart = distance_to(self._edges, y, z, self.period)
         return np.where(self.is_hole(y, z), -apart, apart)
 
     @cached_property
@@ -104,19 +103,14 @@ class Pattern(Model, ABC):
         """Whether (y, z) → (along_y·y, along_z·z), with 1, or −1 for a mirror image, then half a period along both if
         `centred`, changes nothing."""
 
-    @property
-    def unbounded(self) -> Self:
-        """The pattern with all its holes, without a plate that bounds it."""
-        return self
-
-    @abstractmethod
-    def bounded(self, size: tuple[float, float], margin: float) -> Self:
-        """The pattern without the holes that reach into a `margin` along the rim of a plate of this `size` [m]. The
-        size becomes its period.
+    def bounded(self, size: tuple[float, float] | None, margin: float | None) -> Self:
+        """The pattern without the holes that reach into a `margin` along the rim of a plate of this `size` [m], which
+        becomes its period. Without both it has all holes.
 
         Raises:
             ValueError: says why that is impossible.
         """
+        return self
 
 
 class NoPattern(Pattern):
@@ -152,6 +146,3 @@ class NoPattern(Pattern):
 
     def is_symmetric(self, along_y: int, along_z: int, *, centred: bool) -> bool:
         return True
-
-    def bounded(self, size: tuple[float, float], margin: float) -> Self:
-        return self

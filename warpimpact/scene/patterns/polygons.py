@@ -153,9 +153,9 @@ class PolygonsPattern(Pattern):
         image = halves[::along_y, ::along_z]
         return np.array_equal(np.roll(image, self.material.shape, axis=(0, 1)) if centred else image, halves)
 
-    def bounded(self, size: tuple[float, float], margin: float) -> Self:
-        """Raise a ValueError: a cell of polygons has no single holes to leave out."""
-        check_together({MARGIN: True, POLYGONS: True})
+    def bounded(self, size: tuple[float, float] | None, margin: float | None) -> Self:
+        """Refuse a margin: a cell of polygons has no single holes to leave out."""
+        check_together({MARGIN: margin is not None, POLYGONS: True})
         return self
 
 

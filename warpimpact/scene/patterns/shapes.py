@@ -1,14 +1,15 @@
 """The shapes of holes. Before any `rotation`, the length of a hole lies along z."""
 
 from abc import abstractmethod
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
+from pydantic import model_validator
 
 from ..model import Array
 from ..units import NonNegativeLength, PositiveLength
 from .geometry import Chords, Numbers
-from .lattice import LatticePattern
+from .lattice import LatticePattern, is_pitch
 
 _ELLIPSE_CHORDS = 720
 
@@ -30,6 +31,10 @@ class CirclePattern(LatticePattern):
         return np.zeros((1, 2))
 
     @property
+    def inradius(self) -> float:
+        return self.diameter / 2
+
+    @property
     def rounding(self) -> float:
         """The radius [m]."""
         return self.diameter / 2
@@ -45,6 +50,10 @@ class _OblongPattern(LatticePattern):
 
     length: PositiveLength
     width: PositiveLength
+
+    @property
+    def inradius(self) -> float:
+        return self.width / 2
 
     def _check_shape(self) -> None:
         if self.length < self.width:
@@ -99,9 +108,6 @@ class EllipsePattern(_OblongPattern):
     def _marks(self) -> Array:
         return self.spine[:: _ELLIPSE_CHORDS // 4]
 
-    def _depth(self, y: Array, z: Array) -> Array:
-        return self.width * (0.5 - np.hypot(y / self.width, z / self.length))
-
     def _chords(self, places: Array, *, exchanged: bool) -> Chords:
         width, length = (self.length, self.width) if exchanged else (self.width, self.length)
         places = places[:, [1, 0, 2]] * (1.0, 1.0, -1.0) if exchanged else places
@@ -132,11 +138,6 @@ class _PolygonPattern(LatticePattern):
     @abstractmethod
     def corners(self) -> Array:
         """Sharp corners, anticlockwise, shape [corners, 2] [m]."""
-
-    @property
-    @abstractmethod
-    def inradius(self) -> float:
-        """Distance of the sides from the middle [m]."""
 
     def _check_shape(self) -> None:
         if self.corner_radius >= self.inradius:
@@ -173,7 +174,6 @@ class TrianglePattern(_PolygonPattern):
 
     @property
     def inradius(self) -> float:
-        """Distance of the sides from the centroid [m]."""
         return float(self.side / np.sqrt(12))
 
 
@@ -185,6 +185,7 @@ class SquarePattern(_PolygonPattern):
         side: of the square with sharp corners [m].
     """
 
+    row_distance = 1.0
     shape: Literal["square"] = "square"
     side: PositiveLength
 
@@ -194,12 +195,11 @@ class SquarePattern(_PolygonPattern):
 
     @property
     def inradius(self) -> float:
-        """Half the side [m]."""
         return self.side / 2
 
 
 class HexagonPattern(_PolygonPattern):
-    """Regular hexagons of `width` across flats [m], two sides along z.
+    """Regular hexagons of `width` across flats [m]; two sides along z, along y on a staggered pitch.
 
     Attributes:
         shape: "hexagon".
@@ -209,6 +209,12 @@ class HexagonPattern(_PolygonPattern):
     shape: Literal["hexagon"] = "hexagon"
     width: PositiveLength
 
+    @model_validator(mode="before")
+    @classmethod
+    def _sides_face_each_other(cls, values: Any) -> Any:
+        is_staggered_pitch = isinstance(values, dict) and values.get("staggered") and is_pitch(values.get("spacing"))
+        return {"rotation": "30 deg"} | values if is_staggered_pitch else values
+
     @property
     def corners(self) -> Array:
         half, side = self.inradius, 2 * self.inradius / np.sqrt(3)
@@ -217,5 +223,4 @@ class HexagonPattern(_PolygonPattern):
 
     @property
     def inradius(self) -> float:
-        """Half the width [m]."""
         return self.width / 2
