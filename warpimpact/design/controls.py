@@ -19,7 +19,7 @@ from warpimpact.plotting.style import fire_of
 from warpimpact.scene import NoPattern, Plate, Target
 from warpimpact.scene.display import MM
 from warpimpact.scene.model import Model
-from warpimpact.scene.patterns.lattice import LatticePattern
+from warpimpact.scene.patterns.pattern import LatticePattern
 from warpimpact.scene.units import reader_in, typed
 from warpimpact.view import svg
 

@@ -5,8 +5,7 @@ from typing import Annotated
 from pydantic import Field
 
 from .geometry import WHOLE_CELL as WHOLE_CELL
-from .lattice import HolePlace, LatticePattern
-from .pattern import NoPattern, Pattern
+from .pattern import HolePlace, LatticePattern, NoPattern, Pattern
 from .polygons import PolygonsPattern
 from .shapes import CirclePattern, EllipsePattern, HexagonPattern, SlotPattern, SquarePattern, TrianglePattern
 

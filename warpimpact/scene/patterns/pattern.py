@@ -1,18 +1,47 @@
-"""The interface of all hole patterns, and the pattern without holes."""
+"""Hole patterns: their interface, none, and holes of one shape on a lattice (docs/model.md §3)."""
 
 import math
 from abc import ABC, abstractmethod
-from functools import cached_property
-from typing import Any, Literal, Self
+from copy import copy
+from functools import cached_property, partial
+from numbers import Real
+from typing import Annotated, Any, ClassVar, Literal, NamedTuple, Self
 
 import numpy as np
 import shapely
+from pydantic import Field, PrivateAttr, ValidationInfo, field_validator, model_validator
+from scipy.spatial import KDTree
 
+from ..exclusions import HOLES, STAGGERED, check_together
 from ..model import Array, Model
-from .geometry import BoolArray, Check, Counts, Range, distance_to, neighbours, no_end, pieces
+from ..units import Angle, Length, PositiveLength, quantity
+from .geometry import (
+    BoolArray,
+    Check,
+    Chords,
+    Counts,
+    Range,
+    area,
+    chords,
+    distance_to,
+    geometries,
+    half_shares,
+    neighbours,
+    no_end,
+    pieces,
+    placed,
+    shifts_into,
+)
 
 _QUARTER = 16
 """Chords per quarter of a turn in an outline; a circle loses 1.6e-3 of its area."""
+_MOST_HOLES = 20_000
+_ROWS_PER_CHECK = 64
+"""Rows of cells between two calls of `check`."""
+_EQUAL_LENGTHS = 1e-9
+"""Largest difference of two equal lengths, as a share of the period."""
+
+_PAIR = tuple[PositiveLength, PositiveLength]
 
 
 class Pattern(Model, ABC):
@@ -84,8 +113,7 @@ class Pattern(Model, ABC):
         half = half - np.maximum(0.0, np.floor((half - reach) / sides) - 2) * sides
         holes = self.spines(*((-side, side) for side in half))
         to_rim = (half - np.abs(self._corners(holes))).min(axis=(0, 2))
-        is_wide = bool((half >= reach + 2 * sides).all())
-        between = self._gap if is_wide else neighbours(holes, len(holes))[0] - 2.0 * self.rounding
+        between = neighbours(holes, len(holes))[0] - 2.0 * self.rounding
         return float(min(between, to_rim[to_rim >= 0].min(initial=np.inf)))
 
     def _corners(self, spines: Any) -> Array:
@@ -146,3 +174,241 @@ class NoPattern(Pattern):
 
     def is_symmetric(self, along_y: int, along_z: int, *, centred: bool) -> bool:
         return True
+
+
+class HolePlace(NamedTuple):
+    """Place of a hole in a cell: its origin [m] and its rotation from +y towards +z [rad]."""
+
+    y: Length
+    z: Length
+    rotation: Angle = 0.0
+
+
+class LatticePattern(Pattern):
+    """Holes of one shape in a rectangular cell that repeats.
+
+    A shape has a `spine`, which is a convex polygon, a line or a point. The hole has all points within the distance
+    `rounding` of the spine. The spine of a slot is a line; that of a triangle with rounded corners is a smaller
+    triangle.
+
+    Attributes:
+        staggered: shifts every odd row of cells along y by b/2 along z.
+        spacing: extent (a, b) of the cell along y and z, or one length, the pitch, which is the distance of a hole from
+            its nearest neighbours [m]. The lattice of a pitch is square; staggered it is hexagonal, with rows along z,
+            and that of squares has rows as far apart as the holes in them.
+        holes: places of the holes in a cell, each with an optional rotation in addition to `rotation`; by default one
+            hole on the origin.
+        rotation: rotation of every hole from +y towards +z, given in degrees or with its unit [rad]; by default 30 deg
+            for hexagons on a staggered pitch, whose sides then face each other, else 0.
+    """
+
+    row_distance: ClassVar[float] = math.sqrt(0.75)
+    """Distance of the rows of a staggered pitch, as a share of the pitch."""
+
+    staggered: Annotated[bool, Field(strict=True)] = False
+    spacing: _PAIR
+    holes: Annotated[tuple[HolePlace, ...], Field(fail_fast=True, min_length=1, max_length=_MOST_HOLES)] | None = None
+    rotation: Angle = 0.0
+    _plate: tuple[tuple[float, float], float] | None = PrivateAttr(None)
+    """Size and margin of the plate that bounds the pattern; None if it is unbounded."""
+
+    @field_validator("spacing", mode="before", json_schema_input_type=_PAIR | PositiveLength)
+    @classmethod
+    def _of_a_pitch(cls, value: Any, info: ValidationInfo) -> Any:
+        if not is_pitch(value):
+            return value
+        pitch = quantity(PositiveLength)(value)
+        return (pitch * cls.row_distance if info.data.get("staggered") else pitch, pitch)
+
+    @property
+    @abstractmethod
+    def spine(self) -> Array:
+        """Corners of a convex polygon, anticlockwise, or the ends of a line, or a point, before any rotation; shape
+        [corners, 2] [m]."""
+
+    @property
+    @abstractmethod
+    def inradius(self) -> float:
+        """Distance of the sides of a hole from its place [m]."""
+
+    @property
+    def hole_area(self) -> float:
+        """Area of one hole [m²]."""
+        return area(self.spine, self.rounding)
+
+    @property
+    def hole_size(self) -> tuple[float, float]:
+        """Diameter of the largest circle in a hole about its place, and largest extent of a hole [m]."""
+        longest = np.linalg.norm(self.spine[:, None] - self.spine[None], axis=-1).max()
+        return 2.0 * self.inradius, float(longest) + 2.0 * self.rounding
+
+    @property
+    def _marks(self) -> Array:
+        """Points that identify a hole of the shape, shape [marks, 2] [m]."""
+        return self.spine
+
+    def _check_shape(self) -> None:
+        """Raise a ValueError if the sizes make no hole."""
+
+    @model_validator(mode="after")
+    def _leaves_ligaments(self) -> Self:
+        check_together({STAGGERED: self.staggered, HOLES: self.holes is not None})
+        self._check_shape()
+        if self.open_area >= 1:
+            raise ValueError(f"got spacing = {_millimetres(self.spacing)}, but the cell must be larger than its holes")
+        gap, first, second = self._nearest
+        if gap <= self._edge:
+            raise ValueError(
+                f"got spacing = {_millimetres(self.spacing)}, which lets the holes at {_millimetres(first)} and "
+                f"{_millimetres(second)} overlap or touch, but a ligament must be left between them"
+            )
+        return self
+
+    @property
+    def unit_cell(self) -> tuple[float, float]:
+        """Extent along y and z [m] of the smallest rectangle that repeats: two rows of a staggered lattice."""
+        a, b = self.spacing
+        return (2 * a, b) if self.staggered else (a, b)
+
+    @property
+    def period(self) -> tuple[float, float]:
+        """Extent of the unit cell, or size of the plate that bounds the pattern [m]."""
+        return self.unit_cell if self._plate is None else self._plate[0]
+
+    @property
+    def open_area(self) -> float:
+        return float(len(self._places) * self.hole_area / math.prod(self.period))
+
+    def bounded(self, size: tuple[float, float] | None, margin: float | None) -> Self:
+        plate = None if size is None or margin is None else (size, margin)
+        if self._plate == plate:
+            return self
+        pattern = copy(self)
+        pattern.__dict__ = {name: getattr(self, name) for name in type(self).model_fields}  # no computed values
+        pattern._plate = plate
+        if size is not None and margin is not None and not len(pattern._places):
+            raise ValueError(
+                f"got size = {_millimetres(size)} and margin = {1e3 * margin:g} mm, but they leave no hole on the plate"
+            )
+        return pattern
+
+    def is_hole(self, y: Array, z: Array) -> BoolArray:
+        return distance_to(self._near, y, z, self.period) <= self.rounding + self._edge  # an edge lies in its hole
+
+    @cached_property
+    def _near(self) -> Any:
+        """Spines of the holes about a period."""
+        return self.spines(*((-reach, reach) for reach in 0.5 * np.array(self.period) + self._edge))
+
+    def shares_in_holes(self, counts: tuple[int, int], sides: tuple[float, float], check: Check = no_end) -> Counts:
+        ranges = [(-side, side * (count + 1)) for side, count in zip(sides, counts, strict=True)]
+        places = self._repeated(self._places, self.period, ranges[0], ranges[1])
+        extents = self._boxes(places)
+        along_y = half_shares(self._chords(places, exchanged=False), extents[:, :, 1], counts, sides, check)
+        along_z = half_shares(self._chords(places, exchanged=True), extents[:, :, 0], counts[::-1], sides[::-1], check)
+        for first in range(0, counts[0], _ROWS_PER_CHECK):
+            check()
+            along_y[first : first + _ROWS_PER_CHECK] += along_z[:, first : first + _ROWS_PER_CHECK].T
+        return along_y
+
+    def _chords(self, places: Array, *, exchanged: bool) -> Chords:
+        """Chords of the holes at these places; `exchanged` swaps y and z."""
+        spines = placed(self.spine, places)
+        return partial(chords, spines[:, ::-1, ::-1] if exchanged else spines, self.rounding)
+
+    def spines(self, y_range: Range, z_range: Range) -> Any:
+        return geometries(placed(self.spine, self._reaching(y_range, z_range)))
+
+    @property
+    def _gap(self) -> float:
+        return self._nearest[0]
+
+    def is_symmetric(self, along_y: int, along_z: int, *, centred: bool) -> bool:
+        period, mirror = np.array(self.period), np.array([along_y, along_z])
+        middles, marks, tree = self._marked
+        images = middles * mirror + (period / 2 if centred else 0.0)
+        distances, nearest = tree.query(images % period % period)
+        if distances.max() > _EQUAL_LENGTHS * period.max():
+            return False
+        mirrored = (marks * mirror)[:, :, None] - marks[nearest][:, None]
+        return bool(np.linalg.norm(mirrored, axis=-1).min(axis=-1).max() <= _EQUAL_LENGTHS * period.max())
+
+    @cached_property
+    def _marked(self) -> tuple[Array, Array, KDTree]:
+        """Middles of the holes of a period [m], their marks relative to these [m], and a tree of the middles."""
+        period, marks = np.array(self.period), placed(self._marks, self._places)
+        middles = marks.mean(axis=1)
+        return middles, marks - middles[:, None], KDTree(middles % period % period, boxsize=period)
+
+    @cached_property
+    def _cell_places(self) -> Array:
+        """Origin [m] and turn [rad] of every hole of a unit cell, shape [holes, 3]."""
+        a, b = self.spacing
+        places = np.array(self.holes or ((0.0, 0.0, 0.0), (a, b / 2, 0.0))[: 1 + self.staggered])
+        places[:, :2] -= np.round(places[:, :2] / self.unit_cell) * self.unit_cell
+        places[:, 2] += self.rotation
+        return places
+
+    @cached_property
+    def _places(self) -> Array:
+        """Origin [m] and turn [rad] of every hole of a period, shape [holes, 3]."""
+        if self._plate is None:
+            return self._cell_places
+        size, margin = self._plate
+        if (count := len(self._cell_places) * math.prod(size) / math.prod(self.unit_cell)) > _MOST_HOLES:
+            raise ValueError(
+                f"got size = {_millimetres(size)}, a plate of some {count:.3g} holes, but with a margin at most "
+                f"{_MOST_HOLES} holes are allowed"
+            )
+        inner = np.array(size) / 2 - margin
+        places = self._repeated(self._cell_places, self.unit_cell, (-inner[0], inner[0]), (-inner[1], inner[1]))
+        kept: Array = places[(np.abs(self._boxes(places)) <= inner * (1 + _EQUAL_LENGTHS)).all(axis=(1, 2))]
+        return kept
+
+    def _reaching(self, y_range: Range, z_range: Range) -> Array:
+        """Places of the holes that reach into a rectangle, shape [holes, 3]; none lies beyond the plate."""
+        if self._plate is None:
+            return self._repeated(self._places, self.period, y_range, z_range)
+        boxes, (low, high) = self._boxes(self._places), np.array([y_range, z_range]).T
+        kept: Array = self._places[((boxes[:, 0] <= high) & (boxes[:, 1] >= low)).all(axis=1)]
+        return kept
+
+    def _repeated(self, places: Array, period: tuple[float, float], y_range: Range, z_range: Range) -> Array:
+        """Places repeated by whole periods whose holes reach into a rectangle, shape [holes, 3]."""
+        shifts = [shifts_into(low, high, period, y_range, z_range) for low, high in self._boxes(places)]
+        return np.concatenate(
+            [place + np.pad(of_it, ((0, 0), (0, 1))) for place, of_it in zip(places, shifts, strict=True)]
+        )
+
+    def _boxes(self, places: Array) -> Array:
+        """Lower and upper corners (y, z) of the holes at these places, shape [holes, 2, 2] [m]."""
+        spines = placed(self.spine, places)
+        return np.stack([spines.min(axis=1) - self.rounding, spines.max(axis=1) + self.rounding], axis=1)
+
+    @cached_property
+    def _nearest(self) -> tuple[float, Array, Array]:
+        """Smallest distance between two holes of the unbounded lattice [m], and the origins of both [m]."""
+        extent, cell = np.ptp(self._boxes(self._cell_places), axis=1).max(axis=0), np.array(self.unit_cell)
+        around = [
+            np.arange(-count, count + 1) * step for count, step in zip(1 + np.ceil(extent / cell), cell, strict=True)
+        ]
+        shifts = np.stack(np.meshgrid(*around, 0.0, indexing="ij"), axis=-1).reshape(-1, 3)
+        shifts = shifts[np.argsort(np.abs(shifts).sum(axis=1), kind="stable")]  # the cell itself comes first
+        places = (shifts[:, None] + self._cell_places).reshape(-1, 3)
+        gap, first, second = neighbours(geometries(placed(self.spine, places)), len(self._cell_places))
+        return gap - 2 * self.rounding, places[first, :2], places[second, :2]
+
+    @property
+    def _edge(self) -> float:
+        """Distance from its hole within which a point lies on the edge [m]."""
+        return _EQUAL_LENGTHS * max(self.spacing)
+
+
+def is_pitch(value: Any) -> bool:
+    """Whether a spacing is one length."""
+    return isinstance(value, str | Real) and not isinstance(value, bool)
+
+
+def _millimetres(pair: Any) -> str:
+    y, z = (f"{round(1e3 * length, 6) + 0.0:g}" for length in pair)
+    return f"({y}, {z}) mm"

@@ -9,7 +9,7 @@ from pydantic import model_validator
 from ..model import Array
 from ..units import NonNegativeLength, PositiveLength
 from .geometry import Chords, Numbers
-from .lattice import LatticePattern, is_pitch
+from .pattern import LatticePattern, is_pitch
 
 _ELLIPSE_CHORDS = 720
 
