@@ -6,7 +6,6 @@ import operator
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from difflib import get_close_matches
-from itertools import islice
 from numbers import Real
 from typing import TYPE_CHECKING, Annotated, Any, TypeAlias, get_args, get_origin
 
@@ -155,22 +154,10 @@ def brief(text: str, most: int = MOST_QUOTED) -> str:
 
 def quoted(value: object) -> str:
     """A value as JSON, which equals TOML except for dates, cut to the length that messages quote."""
-    return brief(json.dumps(_part(value), ensure_ascii=False, default=str))
-
-
-def _part(value: object, depth: int = 3) -> object:
-    """The part of a value that its first `MOST_QUOTED` characters can show."""
-    if isinstance(value, str):
-        return value[:MOST_QUOTED]
-    if isinstance(value, int) and not isinstance(value, bool) and abs(value) >= 10**MOST_QUOTED:
-        return "a number of more than 80 digits"
-    if isinstance(value, dict | list | tuple) and not depth:
-        return "…"
-    if isinstance(value, dict):
-        return {_part(str(key)): _part(item, depth - 1) for key, item in islice(value.items(), MOST_QUOTED)}
-    if isinstance(value, list | tuple):
-        return [_part(item, depth - 1) for item in value[:MOST_QUOTED]]
-    return value
+    try:
+        return brief(json.dumps(value, ensure_ascii=False, default=str))
+    except (TypeError, ValueError, RecursionError):  # keys of any class, thousands of digits, or nested too deep
+        return f"a value of class {type(value).__name__}"
 
 
 def _quantity(name: str, unit: str, example: str) -> BeforeValidator:
