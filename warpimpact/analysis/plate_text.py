@@ -4,18 +4,14 @@ from __future__ import annotations
 
 import json
 import math
-from typing import TYPE_CHECKING, Any
+from collections.abc import Iterable, Mapping
+from typing import Any
+
+import xarray
 
 from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
 from warpimpact.results.references import references_of
-
-if TYPE_CHECKING:
-    from collections.abc import Iterable, Mapping
-
-    import xarray
-
-    from warpimpact.results.table import Result
 
 
 def plate_numbers(open_area: float, ligament: float, weights: Mapping[str, float]) -> dict[str, str]:
@@ -32,7 +28,7 @@ def plate_numbers(open_area: float, ligament: float, weights: Mapping[str, float
     return numbers | {name: f"{weight:.1f} kg/m²" for name, weight in weights.items()}
 
 
-def weights_of(dataset: Result) -> dict[str, float]:
+def weights_of(dataset: xarray.Dataset) -> dict[str, float]:
     """`Target.weights` of the target of a result; only the whole weight if the file does not separate add-on and
     base."""
     whole = float(dataset.attrs[attr.AREAL_DENSITY])
@@ -47,7 +43,7 @@ def weights_text(weights: Mapping[str, float]) -> str:
     return ", ".join(f"{name} {weight:.1f} kg/m²" for name, weight in weights.items())
 
 
-def plate_text(dataset: Result) -> str:
+def plate_text(dataset: xarray.Dataset) -> str:
     """Weights and open area, where a result carries them."""
     if attr.AREAL_DENSITY not in dataset.attrs:
         return ""
@@ -55,7 +51,7 @@ def plate_text(dataset: Result) -> str:
     return f", {weights.removeprefix('areal density ')}, {dataset.attrs[attr.OPEN_AREA]:.1%} open"
 
 
-def reference_name(dataset: Result) -> str:
+def reference_name(dataset: xarray.Dataset) -> str:
     """Name of the reference with which a target is compared."""
     return "solid add-on" if attr.ADD_ON_DENSITY in dataset.attrs else "solid plate"
 

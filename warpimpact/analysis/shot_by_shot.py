@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 
 import numpy as np
 import xarray
 from numpy.typing import NDArray
+from scipy.stats import spearmanr
 
 from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
@@ -93,17 +95,7 @@ def _row(
     order = np.argsort(-np.abs(apart), kind="stable")[:MOST_WORST]
     worst = ", ".join(f"{hits[k]} ({apart[k]:+.3g})" for k in order)
     head = f"{label.replace('_', ' ')}, {unit}"
-    ranked = rank_correlation(values[known], other[known])
+    ranked = math.nan
+    if len(hits) >= FEWEST_RANKED and np.ptp(values[known]) > 0.0 and np.ptp(other[known]) > 0.0:
+        ranked = float(spearmanr(values[known], other[known]).statistic)
     return head, float(known.sum()), float(apart.mean()), float(np.sqrt((apart**2).mean())), ranked, worst
-
-
-def rank_correlation(first: Array, second: Array) -> float:
-    """Spearman's correlation; NaN for fewer than three hits, or where all values are the same."""
-    if len(first) < FEWEST_RANKED:
-        return float("nan")
-    from scipy.stats import rankdata
-
-    ranks = [rankdata(values) for values in (first, second)]
-    if any(np.ptp(rank) == 0.0 for rank in ranks):
-        return float("nan")
-    return float(np.corrcoef(*ranks)[0, 1])

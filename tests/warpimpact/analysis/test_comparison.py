@@ -1,11 +1,8 @@
 """Plates side by side: rankings with known answers, intervals that contain the answer as often as they claim, one
 sentence for what cannot be compared."""
 
-import itertools
 import json
 import math
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
 from pathlib import Path
 
 import numpy as np
@@ -14,17 +11,12 @@ import xarray
 
 from warpimpact import Campaign
 from warpimpact.analysis.comparison import compare
-from warpimpact.analysis.comparison_text import Comparison, Difference, best_rows, comparison_view, short_view
-from warpimpact.analysis.effectiveness import effectiveness
+from warpimpact.analysis.comparison_text import Comparison, Difference, comparison_view
 from warpimpact.campaign.campaign import CampaignError
 from warpimpact.campaign.plates import read_plates
 from warpimpact.cli import main
 from warpimpact.plotting import comparison_figure
-from warpimpact.results import attributes as attr
-from warpimpact.results import files
 from warpimpact.results.files import ResultError
-from warpimpact.runs.progress import RunProgress
-from warpimpact.runs.replay import replay
 from warpimpact.view.view import text_of
 
 from .references import with_solid
@@ -68,25 +60,7 @@ def test_identical_plates_cannot_be_told_apart(make_plate_result) -> None:
     text = text_of(comparison_view(comparison))
     assert text.count("a and b cannot be told apart: difference 0.000 (") == 6
     assert "better than" not in text
-    page = comparison._repr_html_()
-    assert page.index("<table>") < page.index("<summary>Every measure") < page.index("<p>500 hits of each plate: ")
-
-
-def test_any_measure_may_be_compared(make_plate_result) -> None:
-    velocity, tilt = NUMBERS.uniform(600.0, 700.0, 500), NUMBERS.uniform(0.0, 40.0, 500)
-    slow, fast = make_plate_result(velocity, tilt), make_plate_result(velocity + 50.0, tilt + 5.0, areal_density=23.55)
-    median, texts = "quantile(residual_velocity, 0.5)", ["mean(tilt@130mm)", "areal_density"]
-    comparison = compare([slow, fast], ["slow", "fast"], [median, *texts])
-    assert comparison.ranks(median) == {"slow": 1, "fast": 2}
-    assert (
-        difference(comparison, median, "slow", "fast").low < -50.0 < difference(comparison, median, "slow", "fast").high
-    )
-    text = text_of(comparison_view(comparison))
-    assert "fast higher than slow by 5.000" in text  # neither is better
-    assert "tilt at 130 mm, mean [°]; neither is better" in text
-    assert [label for label, _ in best_rows(comparison)] == ["residual velocity, 50 % quantile", "areal density"]
-    with pytest.raises(ResultError, match="which needs layers behind the plate"):
-        compare([slow, fast], ["slow", "fast"], ["P(base_pierced)"])
+    assert "<summary>Every measure" in comparison._repr_html_()
 
 
 @pytest.mark.parametrize(("apart", "told"), [(1e-8, False), (1e-4, True)])
@@ -122,16 +96,6 @@ def test_plates_that_share_a_rank_cannot_be_told_apart(make_plate_result) -> Non
     assert comparison.ranks("P(stopped)") == {"first": 1, "second": 1, "wide": 1}
 
 
-def test_an_interval_that_was_not_computed_is_told_as_such(make_plate_result) -> None:
-    plates = [make_plate_result(velocities(np.linspace(low, 1.0, 12))) for low in (0.1, 0.5)]
-    comparison = compare(plates, ["one", "other"])
-    assert math.isnan(difference(comparison, TAIL, "one", "other").low)
-    text = text_of(comparison_view(comparison))
-    assert "of which these hits give no interval" in text
-    assert "(-)" not in text
-    assert next(line for line in text.splitlines() if "worst tenth  " in line).endswith("   not ranked")
-
-
 def test_a_clearly_better_plate_is_first_whichever_way_is_up(make_plate_result) -> None:
     fraction, tilt = NUMBERS.uniform(0.5, 0.9, 500), NUMBERS.uniform(0.0, 60.0, 500)
     plates = [
@@ -143,11 +107,6 @@ def test_a_clearly_better_plate_is_first_whichever_way_is_up(make_plate_result) 
     lines = text_of(comparison_view(comparison)).splitlines()
     assert "one better than worst by 0.1000 (0.1000 to 0.1000)" in lines
     assert "one and other cannot be told apart: difference 0.000 (0.000 to 0.000)" in lines
-    best = next(line for line in lines if line.startswith("residual energy fraction, mean  "))
-    assert best.endswith("   one and other")
-    assert next(line for line in lines if line.startswith("P(stopped)  ")).endswith("   cannot be told apart")
-    ranking = lines[lines.index("P(inclination at 130 mm > 30°, or stopped); higher is better") + 2 :]
-    assert [line.split()[:2] for line in ranking[:3]] == [["1", "one"], ["1", "other"], ["3", "worst"]]
 
 
 def test_the_same_shots_narrow_the_interval(make_plate_result) -> None:
@@ -187,16 +146,7 @@ def test_all_hits_count_the_common_ones_shot_by_shot(make_plate_result) -> None:
     # What is nearly the same shot by shot is told by the common shots, what has nothing in common by all of them.
     assert difference(comparison, MEAN, "a", "b").value == pytest.approx((one - alike)[:200].mean(), abs=2e-3)
     assert difference(comparison, MEAN, "a", "c").value == pytest.approx(one.mean() - other[:200].mean(), abs=3e-3)
-    text = text_of(comparison_view(comparison))
-    assert text.startswith("Hits: a 1000, b 200, c 200; all of them count.\n")
-    assert "a and b: the first 200 hits are the same shots, compared shot by shot; the other 800 of a count" in text
-    assert "b and c: the same shots, compared shot by shot." in text
-
-
-def test_only_the_pairs_of_other_shots_are_independent(make_plate_result) -> None:
-    plate = make_plate_result(velocities(np.linspace(0.5, 1.0, 300)))
-    comparison = compare([plate, plate, moved(plate)], ["a", "b", "c"])
-    assert [bool(pair.independent) for pair in comparison.pairs] == [False, True, True]
+    assert text_of(comparison_view(comparison)).startswith("Hits: a 1000, b 200, c 200; all of them count.\n")
 
 
 def test_plates_of_different_weight_are_ranked_by_the_ratio_to_the_solid_plate(make_plate_result) -> None:
@@ -214,8 +164,6 @@ def test_plates_of_different_weight_are_ranked_by_the_ratio_to_the_solid_plate(m
     assert pair.value == pytest.approx(ratios[0] - ratios[1])
     text = text_of(comparison_view(comparison))
     assert "The plates differ in weight (light 20 kg/m², heavy 40 kg/m²). They are ranked by the ratio" in text
-    assert "residual energy fraction, mean; lower is better; ranked by the ratio to the solid plate" in text
-    assert "P(stopped); higher is better; ranked without regard to weight" in text
     assert f"light better than heavy by {abs(pair.value):#.4g} in the ratio to the solid plate (" in text
     same = compare([light, heavy.assign_attrs(areal_density=20.1)], ["light", "heavy"])
     assert same.at_equal_weight is None
@@ -254,9 +202,7 @@ def test_differences_of_material_are_named(make_plate_result) -> None:
         "The plates differ in material, which no ranking allows for: resistance (a 2.6 GPa, b 1.8 GPa); "
         "static (a 1, b 2)."
     )
-    alone = "numerics ± is not known of {}: intervals are by the hits alone (warpimpact inspect)."
-    assert unknown == alone.format("a, b, c")
-    assert compare([steel, steel], ["a", "b"]).notes == (alone.format("a, b"),)
+    assert unknown == "numerics ± is not known of a, b, c: intervals are by the hits alone (warpimpact inspect)."
 
 
 @pytest.mark.parametrize(("independent", "fewest"), [(False, 400), (True, 400), (False, 150)])
@@ -293,7 +239,6 @@ def test_differences_hold_as_often_as_they_say_all_pairs_together(
 @pytest.mark.parametrize(
     ("change", "sentence"),
     [
-        ({"core": '{"mass": 0.005}'}, "core.cone_length is not given here and "),
         ({"impact": '{"velocity": 900.0}'}, "impact.velocity is 900.0 here and 1000.0 there"),
         ({"standoff_point": "centre_of_mass"}, 'output.standoff_point is "centre_of_mass" here and "nose" there'),
     ],
@@ -314,14 +259,7 @@ def test_what_makes_a_comparison_less_than_fair_is_said(make_plate_result) -> No
     plate = make_plate_result(velocities(np.linspace(0.5, 1.0, 100)), sampling="sobol", replicates=1)
     finer = '{"fidelity": "reference", "time_step": null}'
     notes = compare([plate, plate.assign_attrs(areal_density=30.0, numerics_given=finer)], ["a", "b"]).notes
-    assert [note.split()[:4] for note in notes] == [
-        ["The", "plates", "differ", "in"],
-        ["The", "plates", "were", "computed"],
-        ["numerics", "±", "is", "not"],
-        ["Intervals", "are", "those", "of"],
-    ]
     assert 'different numerics: fidelity is "draft" and "reference".' in notes[1]
-    assert len(compare([plate.assign_attrs(sampling="random")] * 2, ["a", "b"]).notes) == 1
 
 
 def test_the_figure_shows_every_measure_and_every_pair(make_plate_result) -> None:
@@ -334,29 +272,9 @@ def test_the_figure_shows_every_measure_and_every_pair(make_plate_result) -> Non
     figure = comparison_figure(comparison, every=True)
     figure.savefig("/dev/null", format="png")
     assert short.get_figheight() < 0.4 * figure.get_figheight()
-    left, right = figure.axes[::2], figure.axes[1::2]
-    assert [axes.get_title(loc="left").split(";")[0] for axes in left] == [
-        "residual energy fraction",
-        "proxy: energy per presented area at 130 mm [J/mm²]",
-        "P(inclination at 130 mm > 30°, or stopped)",
-        "P(stopped)",
-    ]
-    for axes in right:
-        assert [label.get_text() for label in axes.get_yticklabels()] == ["a − b", "a − c", "b − c"]
-    hollow = [line.get_markerfacecolor() == "white" for line in right[0].lines if line.get_marker() == "o"]
+    assert len(figure.axes) == 2 * 4
+    hollow = [line.get_markerfacecolor() == "white" for line in figure.axes[1].lines if line.get_marker() == "o"]
     assert hollow == [False, True, False]
-
-
-def test_the_weights_of_add_ons_have_their_names_and_do_not_lie_on_each_other(make_plate_result) -> None:
-    plate = make_plate_result(velocities(np.linspace(0.5, 1.0, 500)), np.linspace(0.0, 90.0, 500))
-    plates = [plate.assign_attrs({attr.AREAL_DENSITY: 100.42, attr.ADD_ON_DENSITY: 33.92})] * 4
-    compared = compare(plates, ["addon", "thin", "small holes", "large holes"])
-    assert "add-on kg/m²   whole kg/m²" in text_of([short_view(compared)])
-    figure = comparison_figure(compared)
-    figure.canvas.draw()
-    for axes in figure.axes:
-        boxes = [label.get_window_extent() for label in axes.get_yticklabels()]
-        assert all(upper.y0 > lower.y1 for upper, lower in itertools.pairwise(boxes))
 
 
 SMALL = TWO_PLATES.read_text(encoding="utf-8") + '[numerics]\nfidelity = "draft"\n'
@@ -378,70 +296,24 @@ def test_a_campaign_with_plates_is_run_compared_and_not_run_again(
     assert "Outside the tested range: " in shown
     assert sorted(path.name for path in in_tmp_path.iterdir()) == ["round holes.nc", "slots.nc", "two.png", "two.toml"]
     before = Path("slots.nc").stat()
-    assert main([*command, "-o", "two.svg", "--measure", "P(inclination@50mm > 45 deg)"]) == 0
-    assert "P(inclination at 50 mm > 45°, or stopped)" in capsys.readouterr().out
-    assert Path("slots.nc").stat() == before
     assert main(["compare", "slots.nc", "round holes.nc"]) == 0
+    assert Path("slots.nc").stat() == before
     assert capsys.readouterr().out == shown.replace("two.png", "comparison.png")
     assert main(["compare", "slots.nc", "round holes.nc", "--all", "-o", "all.svg"]) == 0
     every = capsys.readouterr().out
     assert every.startswith("256 hits of each plate: the same shots at every plate, compared shot by shot.\n")
     assert "round holes better than slots by" in every
-    stored = files.read(Path("slots.nc"))
-    assert stored.attrs["title"].endswith(": slots")
-    assert replay(stored, 3, folder=in_tmp_path).attrs["agreement"] == "bit-identical"
-    assert effectiveness(stored)[0].ratio > 0.0
     Path("two.toml").write_text(SMALL.replace("seed = 1", "seed = 2"), encoding="utf-8")
     assert main(command) == 2
     assert "slots.nc: exists already" in capsys.readouterr().err
     assert main([*command, "--overwrite"]) == 0
 
 
-def test_a_comparison_that_was_broken_off_goes_on(
-    in_tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """After the first plate, and one shard of two into the second."""
-    Path("two.toml").write_text(SMALL, encoding="utf-8")
-    command = ["compare", "two.toml", "--count", "512", "--device", "cpu"]
-
-    @contextmanager
-    def breaking() -> Iterator[Callable[[RunProgress], None]]:
-        def follow(standing: RunProgress) -> None:
-            if Path("slots.nc").exists() and standing.saved >= 256:
-                raise KeyboardInterrupt
-
-        yield follow
-
-    with monkeypatch.context() as patched:
-        patched.setattr("warpimpact.cli.compare.show_run", breaking)
-        assert main(command) == 130
-    assert "continue with --resume" in capsys.readouterr().err
-    assert main(command) == 2
-    assert "contains an unfinished run" in capsys.readouterr().err
-    before = Path("slots.nc").stat()
-    assert main([*command, "--resume"]) == 0
-    assert Path("slots.nc").stat() == before
-    assert capsys.readouterr().out.splitlines()[5].startswith("512 hits of each plate, the same shots")
-
-
-def test_the_plates_of_a_file_share_all_else() -> None:
-    campaigns = read_plates(TWO_PLATES)
-    assert list(campaigns) == ["slots", "round holes"]
-    slots, holes = (campaign.model_dump(exclude={"plate", "title"}) for campaign in campaigns.values())
-    assert slots == holes
-    densities = [campaign.plate.areal_density for campaign in campaigns.values()]
-    assert densities[0] == pytest.approx(densities[1], rel=1e-3)  # as in the campaign file
-    assert json.loads(campaigns["slots"].text)["title"] == campaigns["slots"].title
-    assert math.isclose(campaigns["slots"].plate.open_area, 0.348, abs_tol=5e-4)
-
-
 @pytest.mark.parametrize(
     ("change", "sentence"),
     [
-        (('name = "slots"\n', ""), "plate[0].name: is missing, but must be given"),
         (('"round holes"', '"slots"'), 'plate[1].name: got "slots" again, but each plate needs its own name'),
         (('"slots"', '"../slots"'), 'plate[0].name: got "../slots", but a name begins with a letter or a digit and'),
-        (('"slots"', "3"), "plate[0].name: got 3, but a name begins"),
         (('"4 mm"\nresistance', '"4 kg"\nresistance'), ', plate "slots": plate.thickness: got "4 kg", which is not a'),
     ],
 )
@@ -465,8 +337,6 @@ def test_one_plate_is_run_and_several_are_compared(tmp_path: Path) -> None:
     ("arguments", "sentence"),
     [
         (["a.nc", "a.nc"], "a.nc: got this result 2 times, but each result counts once"),
-        (["a.nc", "b.nc"], "a.nc: cannot be read (it is not there)"),
-        (["a.nc", "b.nc", "-o", "a.gif"], "a.gif: the name of a picture must end in .png, .pdf or .svg"),
         (
             ["a.toml", "b.nc"],
             "a.toml: got a campaign and other files, but compare takes either one campaign or results",

@@ -44,18 +44,6 @@ def test_what_counts_where(mixed) -> None:
     assert [score.value for score in more.values()] == pytest.approx([5 / 5, 5 / 5, 2 / 5, 23.55])
 
 
-def test_a_quantile_has_an_interval_and_a_quantity_without_a_better_side_has_a_mean(make_plate_result) -> None:
-    result = make_plate_result(np.linspace(500.0, 900.0, 401), np.linspace(0.0, 80.0, 401))
-    median, tilt, deep = effectiveness(
-        result, ["quantile(residual_velocity, 0.5)", "mean(tilt)", "P(residual_energy_density > 10 J/mm^2)"]
-    )
-    assert median.low < median.value < median.high
-    assert median.value == pytest.approx(700.0)
-    assert (tilt.name, tilt.value) == ("mean(tilt@130mm)", pytest.approx(40.0))
-    assert tilt.measure.better == "neither is better"
-    assert 0.0 < deep.value < 1.0
-
-
 def test_energy_per_area_is_that_of_a_cylinder_and_symmetric_about_broadside(make_plate_result) -> None:
     def density(tilt: float) -> float:
         return named(make_plate_result(np.array([700.0]), tilt))["mean(residual_energy_density@130mm)"].value
@@ -111,40 +99,16 @@ def test_one_shot_at_the_solid_plate_serves_all(make_plate_result) -> None:
     assert measures["P(inclination@130mm > 30 deg)"].solid == 0.0
 
 
-def test_a_solid_plate_is_its_own_reference(make_plate_result) -> None:
-    dataset = make_plate_result(
-        np.linspace(500.0, 900.0, 1000), np.linspace(0.0, 60.0, 1000), open_area=0.0, areal_density=31.4
-    )
-    for measure in effectiveness(dataset):
-        if measure.solid > 0.0:
-            assert measure.ratio == pytest.approx(1.0)
-            if measure.hit is None:
-                assert (measure.ratio_low, measure.ratio_high) == (pytest.approx(1.0), pytest.approx(1.0))
-
-
 @pytest.mark.parametrize(
     ("text", "sentence"),
     [
         ("P(inclination@100mm > 30 deg)", "got 100 mm, but the stand-offs are 50 mm, 130 mm"),
-        (
-            "mean(base_depth)",
-            'measure: got "mean(base_depth)", which needs layers behind the plate, but the result has',
-        ),
-        ("P(broken)", 'measure: got "P(broken)", which needs cores with a strength, but the result has none'),
         ("V50", 'measure: got "V50", which needs limit velocities (warpimpact limit), but the result has none'),
-        ("mean(bending_stress)", "which needs the variable bending_stress"),
-        ("mean(energy)", 'measure: got "energy"'),
     ],
 )
 def test_what_a_result_lacks_is_refused(mixed, text: str, sentence: str) -> None:
     with pytest.raises(ResultError, match=re.escape(sentence)):
         effectiveness(mixed, [text])
-
-
-def test_every_measure_is_defined_and_cited(mixed) -> None:
-    for measure in effectiveness(mixed):
-        assert measure.measure.definition.endswith(".")
-        assert measure.measure.source
 
 
 def test_the_table_says_what_a_result_carries(mixed, make_result) -> None:
@@ -154,8 +118,7 @@ def test_the_table_says_what_a_result_carries(mixed, make_result) -> None:
     assert "solid plate" not in text  # no reference
     assert "proxy" not in text  # no core
     told = effectiveness_text(with_solid(mixed, np.array([800.0])).assign_attrs(open_area=0.25, areal_density=23.55))
-    title, head, first, *_ = told.splitlines()
+    title, _, first, *_ = told.splitlines()
     assert title == "effectiveness, 23.55 kg/m², 25.0% open"
-    assert "solid plate   ratio to it" in head
     assert first.split()[:5] == ["residual", "energy", "fraction,", "mean", "0.4000"]
     assert " 0.6400        0.6250   0.000 to 1.459" in first

@@ -14,7 +14,6 @@ from warpimpact.analysis.comparison import compare
 from warpimpact.analysis.inspection import inspect
 from warpimpact.results import files
 from warpimpact.results.files import ResultError
-from warpimpact.scene import Target
 
 HOLES = SquarePattern(side="4 mm", spacing="8 mm")
 PLATE = Plate(areal_density="30 kg/m^2", resistance="2.6 GPa", pattern=HOLES)
@@ -44,8 +43,6 @@ def drawings(text: str) -> list[str]:
             {"core.mass": "4 g", "layer[0].gap": "20 mm", "impact.obliquity": "20°"},
         ),
         (PLATE, ["plate"], {"thickness": "5.09554 mm", "pattern.spacing": "8 mm, 8 mm", "resistance": "2.6 GPa"}),
-        (PLATE.model_copy(update={"size": ("60 mm", "50 mm")}), ["plate"], {"size": "60 mm, 50 mm"}),
-        (Target(layers=(PLATE,)), ["plate"], {"layers[0].resistance": "2.6 GPa"}),
         (Hits(count=4), [], {"count": "4"}),
     ],
 )

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 import xarray
 
-from warpimpact.analysis.shot_by_shot import rank_correlation, shared_hits, shot_by_shot
+from warpimpact.analysis.shot_by_shot import shared_hits, shot_by_shot
 from warpimpact.kernels.status import Status
 from warpimpact.results import attributes as attr
 from warpimpact.view.view import Table, text_of
@@ -56,13 +56,3 @@ def test_hits_that_end_otherwise_are_named() -> None:
     shared = shared_hits({"fast": fast, "slow": slow})
     assert shared is not None
     assert "fast and slow end otherwise at hits 7" in text_of([shot_by_shot(shared)])
-
-
-def test_ranks_are_correlated_as_spearman_does() -> None:
-    from scipy.stats import spearmanr
-
-    rng = np.random.default_rng(3)
-    one, other = rng.normal(size=(2, 30)).round(1)
-    assert rank_correlation(one, other) == pytest.approx(float(spearmanr(one, other).statistic))
-    assert np.isnan(rank_correlation(one[:2], other[:2]))
-    assert np.isnan(rank_correlation(np.ones(5), other[:5]))

@@ -5,11 +5,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 import xarray
-from mpl_toolkits.mplot3d.art3d import Line3DCollection
 
 from warpimpact import Campaign
 from warpimpact.analysis.replay_geometry import pressed
-from warpimpact.plotting.trajectory import pressure
 from warpimpact.runs.replay import replay
 from warpimpact.runs.run import run
 
@@ -56,13 +54,3 @@ def test_nothing_presses_outside_the_slab_or_in_holes(histories: list[xarray.Dat
         assert surface.stress.max() <= 1.0
     last = pressed(history, history.sizes["time"] - 1)
     assert not last.stress.any()
-
-
-def test_arrows_end_on_the_surface_and_point_into_it(histories: list[xarray.Dataset]) -> None:
-    figure = pressure(histories[0])
-    *_, arrows = (c for c in figure.axes[0].collections if isinstance(c, Line3DCollection))
-    shafts = np.array([segment for segment in arrows._segments3d if len(segment) == 2])
-    surface = pressed(histories[0], largest(histories[0]))
-    points = surface.point[surface.stress > 0.0] * 1e3
-    ends = shafts[: len(shafts) // 3, 0]
-    assert all(np.linalg.norm(points - end, axis=1).min() < 1e-6 for end in ends)

@@ -61,12 +61,6 @@ def test_a_stop_by_bending_needs_it(tmp_path: Path) -> None:
         Campaign.from_toml(written(tmp_path, STOP.replace("bending = true", "")))
 
 
-def test_the_nodal_scheme_has_no_bending(tmp_path: Path) -> None:
-    path = written(tmp_path, "bending = true\n", ('"consistent"', '"nodal"'), ("seed = 1", "seed = 1\ncount = 64"))
-    with pytest.raises(CampaignError, match=r'bending = true cannot be combined with numerics.scheme = "nodal"'):
-        Campaign.from_toml(path)
-
-
 def test_run_and_replay_tell_which_cores_break(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     weak = 'mass = "4 g"\nstrength = "2 GPa"'
     path, output = written(tmp_path, "bending = true\n", ('mass = "4 g"', weak)), tmp_path / "a.nc"

@@ -4,13 +4,11 @@ import json
 from pathlib import Path
 from typing import Any
 
-import jsonschema
 import pytest
 
 from warpimpact import Campaign
 from warpimpact.campaign.catalogued import SEARCHED_FROM
 from warpimpact.campaign.resistances import catalogue_names, catalogue_resistance, limit_velocity_factors
-from warpimpact.campaign.schema import campaign_schema
 from warpimpact.campaign.straight_passage import StraightPassage
 from warpimpact.campaign.tested_range import outside_tested_range, range_line
 from warpimpact.campaign.text import CampaignError
@@ -71,18 +69,10 @@ def test_names_stand_for_their_values(folder: Path) -> None:
     [
         ({"core": {"threat": ".30 AP M2", "mass": "5 g"}}, "core.mass", 5e-3),
         ({"core": {"threat": ".30 AP M2", "density": 8000.0}}, "core.mass", None),
-        ({"core": {"threat": ".30 AP M2", "shape": "cone", "diameter": 6e-3, "length": 0.02}}, "core.length", 0.02),
         ({"impact": {"velocity": 700.0}}, "impact.velocity", 700.0),
-        ({"core": {"threat": "7.62x39 API BZ", "shape": "cone", "diameter": 6e-3, "length": 0.02, "mass": 2e-3}},
-         "impact.velocity", 695.0),
-        ({"core": {"threat": "7.62x54R B32 API", "shape": "cone", "diameter": 6e-3, "length": 0.02, "mass": 2e-3,
-                   "standard": "VPAM 10"}}, "impact.velocity", 860.0),
-        ({"interaction": {"quadratic": 0.0}}, "interaction.quadratic", 0.0),
-        ({"plate": TABLES["plate"] | {"resistance": "3 GPa"}}, "plate.resistance", 3e9),
-        ({"plate": TABLES["plate"] | {"thickness": "24.992 mm"}}, "plate.resistance", 4e9),  # four calibres
-        ({"plate": {"material": "plate A", "areal_density": 7800.0 * 24.992e-3}}, "plate.resistance", 4e9),
+        ({"plate": TABLES["plate"] | {"thickness": "24.992 mm"}}, "plate.resistance", 4e9),
     ],
-)  # fmt: skip
+)
 def test_a_key_beside_a_name_overrides_it(folder: Path, changes: dict[str, Any], place: str, value: Any) -> None:
     table, key = place.split(".")
     found = getattr(getattr(read(folder, **changes), table), key)
@@ -129,12 +119,8 @@ def test_the_tolerance_of_a_standard_scatters(folder: Path) -> None:
     ("changes", "said"),
     [
         ({"core": {"threat": "30 AP M2"}}, r'core.threat: got "30 AP M2".* did you mean "\.30 AP M2"'),
-        ({"core": {"threat": "7.62x39 API BZ"}}, "core.threat: the catalogue does not know the core"),
         ({"core": {"threat": ".50 AP M2"}}, 'core.threat: .*has no velocity of "\\.50 AP M2"; give impact.velocity'),
-        ({"core": {"threat": ".30 AP M2", "standard": "VPAM 9"}}, "core.standard: .*must be one of NIJ RF3"),
         ({"plate": {"material": "plate C", "thickness": 5e-3}}, r'plate.material: got "plate C".*did you mean "plate'),
-        ({"plate": {"material": "plate A"}}, "plate.thickness: is missing"),
-        ({"catalogue": "other.toml"}, "catalogue: .*there is no file|not in the catalogue"),
     ],
 )
 def test_what_the_catalogue_does_not_know(folder: Path, changes: dict[str, Any], said: str) -> None:
@@ -189,47 +175,20 @@ BEHIND = [{"thickness": "7 mm", "resistance": "4 GPa"}]
     ("changes", "other", "said"),
     [
         ({"plate": STEEL | {"thickness": "1 mm"}}, {"plate": STEEL}, "thickness (plate): 0.16 calibres"),
-        ({"plate": STEEL | {"resistance": "1.4 GPa"}}, {"plate": STEEL}, "resistance (plate): 1.4 GPa"),
-        ({"plate": STEEL | {"density": 3900}}, {"plate": STEEL}, "3900 kg/m³ is neither steel nor aluminium"),
-        ({"impact": {"velocity": 2000.0}}, {"impact": {"velocity": 1085.0}}, "the impact velocity: 2e+03 m/s, but"),
         ({"impact": {"velocity": 200.0}}, {}, "the impact velocity: 200 m/s"),
         ({"impact": {"velocity": 800.0, "obliquity": "60 deg"}}, {}, "obliquity (plate): 60°"),
-        ({"impact": {"velocity": 800.0, "yaw": "5 deg"}}, {}, "yaw on impact"),
-        ({"layer": BEHIND}, {}, "several layers"),
         ({"plate": STEEL | {"degradation": 0.8}}, {"plate": STEEL}, "weakening: β is below 1"),
-        ({"plate": HOLED}, {"plate": STEEL}, "whether the core breaks: "),
         (
             {"plate": HOLED},
             {"plate": HOLED, "core": TABLES["core"] | {"strength": "3 GPa"}, "output": {"bending": True}},
             "whether the core breaks: ",
         ),
         ({"plate": NARROW}, {"plate": HOLED}, "holes (plate): 0.66 calibres thick, ligaments of 0.3 mm"),
-        (
-            {"plate": HOLED, "impact": {"velocity": 800.0, "obliquity": "10 deg"}},
-            {"plate": STEEL, "impact": {"velocity": 800.0, "obliquity": "10 deg"}},
-            "holes hit at an angle",
-        ),
         ({"plate": STEEL | {"thickness": "5 mm"}}, {"plate": STEEL}, "steel that may be hard, 0.8 calibres thick"),
-        (
-            {"plate": STEEL | {"thickness": "5 mm"}},
-            {"plate": {"material": "HHA Class 1", "thickness": "5 mm"}},
-            "of its Y at one calibre",
-        ),
-        (
-            {"plate": ALUMINIUM, "impact": {"velocity": 800.0, "obliquity": "30 deg"}},
-            {"plate": ALUMINIUM, "impact": {"velocity": 800.0, "obliquity": "1 deg"}},
-            "obliquity (plate): 30°, but limit velocities of AA2139-T8 are of 0°",
-        ),
         (
             {"core": {"threat": "14.5 mm BS41"}},
             {"core": {"threat": "14.5 mm BS41"}, "plate": {"material": "HHA Class 1", "thickness": "20 mm"}},
             "carbide core in steel 15%",
-        ),
-        ({"core": BLUNT}, {"core": BLUNT | {"crh": 3.0}}, "the blunt nose: it is 0.35 diameters long"),
-        (
-            {"core": BLUNT | {"crh": 3.0, "mass": "9 g"}},
-            {"core": BLUNT | {"crh": 3.0}},
-            "carbide core in steel 15% too",
         ),
     ],
 )
@@ -241,19 +200,7 @@ def test_each_property_outside_the_tested_range_has_a_sentence(
     assert not any(said in line for line in outside_tested_range(read(folder, **usual | other)))
 
 
-def test_layers_that_say_the_same_are_told_once(folder: Path) -> None:
-    thin = {"thickness": "1 mm", "resistance": "4 GPa"}
-    lines = outside_tested_range(read(folder, plate=thin, layer=[thin] * 9))
-    assert sum("0.16 calibres" in line for line in lines) == 2  # its thickness, and that Y is of such a thickness
-    assert any(line.startswith("thickness (plate and 9 more): 0.16 calibres") for line in lines)
-
-
-def test_the_schema_knows_the_names(folder: Path) -> None:
-    jsonschema.validate(TABLES, campaign_schema())
-
-
 def test_a_fit_takes_names(folder: Path) -> None:
-    uniform = {"distribution": "uniform", "low": 1e9, "high": 5e9}
     shot = {"measured": {"limit_velocity": {"value": 700, "std": 10}}, "plate": {"thickness": 12.496e-3}}
     data = {
         "title": "fit",
@@ -266,9 +213,6 @@ def test_a_fit_takes_names(folder: Path) -> None:
     scene = (fit := fit_from(json.dumps(data), "fit", folder)).scene_of(fit.shots[0])
     assert scene.core.max_radius == pytest.approx(3.124e-3)
     assert scene.target.layers[0].resistance == pytest.approx(2e9 * 2**0.5)
-    data["prior"] = {"plate": {"resistance": uniform}}
-    fit = fit_from(json.dumps(data), "fit", folder)
-    assert fit.scene_of(fit.shots[0]).target.layers[0].resistance == pytest.approx(3e9)  # the prior's median
 
 
 def test_resistance_is_of_material_threat_thickness_and_angle(folder: Path) -> None:
@@ -286,12 +230,9 @@ def test_resistance_is_of_material_threat_thickness_and_angle(folder: Path) -> N
     "changes",
     [
         {"plate": {"material": "HHA Class 1", "thickness": "6 mm", "resistance": "4 GPa"}},
-        {"plate": {"material": "HHA Class 1", "thickness": "6 mm", "degradation": 0.9}},
         {"layer": [{"material": "HHA Class 1", "thickness": "6 mm"}]},
         {"interaction": {"quadratic": 0.5}},
-        {"interaction": {"free_surface": {}}},
-        {"plate": {"thickness": "6 mm", "resistance": "4 GPa"}},
-        {"plate": {"material": "plate B", "thickness": "6 mm"}},  # whose interval is not known
+        {"plate": {"material": "plate B", "thickness": "6 mm"}},
     ],
 )
 def test_an_interval_of_the_limit_is_told_only_where_it_follows_from_the_resistance(

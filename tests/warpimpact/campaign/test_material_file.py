@@ -89,10 +89,8 @@ def with_own(scene: Scene, name: str, value: float) -> Scene:
 @pytest.mark.parametrize(
     ("name", "size", "apart"),
     [
-        ("degradation_length", 3e-4, 0.3),  # the tile of a length of its own has finer cells
-        ("static", 0.8, 1e-3),
+        ("degradation_length", 3e-4, 0.3),
         ("quadratic", 0.2, 1e-3),
-        ("onset", 4e-3, 1e-3),
     ],
 )
 def test_shots_of_all_rows_are_computed_together(tmp_path: Path, name: str, size: float, apart: float) -> None:
@@ -114,10 +112,8 @@ def test_shots_of_all_rows_are_computed_together(tmp_path: Path, name: str, size
 @pytest.mark.parametrize(
     ("change", "more", "sentence"),
     [
-        (("count = 256", "count = 256\nirreducible = true"), {}, "file and irreducible = true cannot be combined"),
         (("seed = 4", "seed = 4"), {"hit_y": 1e-3}, 'has hit points. Give sampling = "list"'),
         (("seed = 4", "seed = 4"), {"degradation": 0.9}, "a column degradation that reaches 1.7"),
-        (("seed = 4", "seed = 4"), {"degradation_length": 1e-7}, "needs at least 1/1000 of its radius"),
     ],
 )
 def test_what_cannot_be_is_refused(

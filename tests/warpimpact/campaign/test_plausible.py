@@ -91,10 +91,6 @@ def test_a_plate_of_which_less_than_half_resists_is_doubted(unit: str, folder: P
         ),
         (('"4 g"', '"0.1 g"'), "core: mass over volume: read as 530.516 kg/m^3, but 1000 to 25000 kg/m³ is usual"),
         (
-            ('resistance = "2600 MPa"', "resistance = 2e5"),
-            "plate.resistance: read as 200000 Pa, but 0.01 to 20 GPa is usual",
-        ),
-        (
             ('velocity = "825 m/s"', "velocity = 2.5"),
             'impact.velocity: read as 2.5 m/s, but 20 to 3000 m/s is usual; "2.5 km/s" was probably meant, '
             "which needs its unit",
@@ -120,15 +116,9 @@ def test_an_implausible_value_is_told(change: tuple[str, str], sentence: str, fo
             "is",
         ),
         (('mass = "4 g"', "mass = 4"), "text: core: mass over volume: read as 2.12207e+07 kg/m^3, but"),
-        (('length = "20 mm"', "length = 20"), "text: core: length: read as 20 m, but up to 1000 mm is allowed"),
-        (('diameter = "6 mm"', "diameter = 6"), "text: core: largest diameter: read as 6 m, but up to 1000 mm is"),
         (('resistance = "2600 MPa"', "resistance = 2600"), "text: plate.resistance: read as 2600 Pa, but 2e-05 to 200"),
         (('velocity = "825 m/s"', "velocity = 0.825"), "text: impact.velocity: read as 0.825 m/s, but 1 to 10000 m/s"),
-        (('["8 mm", "8 mm"]', "[8, 8]"), "text: plate.pattern: cell: read as 8 m, but up to 2000 mm is allowed"),
         (('"circle",', '"circle", rotation = 500,'), "text: plate.pattern.rotation: read as 500°, but up to 360° is"),
-        (("[impact]", "density = 7.85\n[impact]"), "text: plate.density: read as 7.85 kg/m^3, but 10 to 25000 kg/m"),
-        (("[impact]", "degradation_length = 0.5\n[impact]"), "text: plate.degradation_length: read as 0.5 m, but"),
-        (("[impact]", "degradation_interval = 4\n[impact]"), "text: plate.degradation_interval: read as 4 s, but"),
         (("[hits]", "[output]\nstandoffs = [5000]\n[hits]"), "text: output.standoffs: read as 5000 m, but up to"),
     ],
 )
@@ -136,14 +126,7 @@ def test_what_nothing_has_is_refused_unless_it_is_allowed(change: tuple[str, str
     with pytest.raises(CampaignError) as refused:
         warned(TEXT.replace(*change), folder)
     assert str(refused.value).startswith(sentence)
-    if not change[0].startswith(("diameter", "length")):  # such cores break other rules, too
-        assert warned("allow_implausible = true\n" + TEXT.replace(*change), folder)
-
-
-def test_listed_velocities_in_kilometres_per_second_are_refused(folder: Path) -> None:
-    (folder / "hits.csv").write_text("hit_y,hit_z,velocity\n0.001,0.002,0.82\n0.03,0,0.81\n")
-    with pytest.raises(CampaignError, match=r"hits.file, column velocity: read as 0.82 m/s, but 1 to 10000 m/s is"):
-        warned(TEXT, folder)
+    assert warned("allow_implausible = true\n" + TEXT.replace(*change), folder)
 
 
 def test_thin_webs_and_large_holes_get_a_word(folder: Path) -> None:
@@ -163,20 +146,6 @@ def test_what_is_refused_is_not_usual_and_has_a_reason(kind: str) -> None:
     assert bool(bounds.why) == (bounds.least > 0.0 or bounds.most < math.inf)
 
 
-def test_a_hit_list_in_millimetres_is_told(folder: Path) -> None:
-    (folder / "hits.csv").write_text("hit_y,hit_z,velocity\n1.51,0,820\n3.49,-4.76,810\n")
-    assert warned(TEXT, folder) == [
-        'hits.file, column hit_y: read as 3.49 m, but up to 80 mm is usual; "3.49 mm" was probably meant, but a '
-        "hit list is in SI",
-        'hits.file, column hit_z: read as -4.76 m, but up to 80 mm is usual; "-4.76 mm" was probably meant, but a '
-        "hit list is in SI",
-    ]
-    (folder / "hits.csv").write_text("hit_y,hit_z,velocity\n0.001,0,820\n0.001,0,8.1\n")
-    assert [sentence[:50] for sentence in warned(TEXT, folder)] == [
-        "hits.file, column velocity: read as 8.1 m/s, but 2"
-    ]
-
-
 def test_the_command_says_it_once_and_goes_on(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
     (folder / "a.toml").write_text(TEXT.replace('thickness = "4 mm"', "thickness = 0.4"))
     for _ in range(2):
@@ -187,13 +156,6 @@ def test_the_command_says_it_once_and_goes_on(folder: Path, capsys: pytest.Captu
             '"0.4 mm" was probably meant, which needs its unit\n'
         )
         assert "a test" in shown.out
-
-
-def test_the_command_refuses_and_writes_nothing(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    (folder / "a.toml").write_text(TEXT.replace('thickness = "4 mm"', "thickness = 6"))
-    assert main(["run", "a.toml"]) == 2
-    assert capsys.readouterr().err.startswith("warpimpact: error: a.toml: plate.thickness: read as 6 m, but up to")
-    assert sorted(path.name for path in folder.iterdir()) == ["a.toml", "hits.csv"]
 
 
 def test_a_campaign_made_in_python_is_told_too(folder: Path) -> None:

@@ -40,44 +40,6 @@ def test_it_takes_the_campaigns(schema: dict[str, Any], path: Path) -> None:
     assert complaints(schema, tomllib.loads(path.read_text(encoding="utf-8"))) == []
 
 
-@pytest.mark.parametrize(
-    ("table", "key", "value"),
-    [
-        ("plate", "thickness", 0.004),
-        ("plate", "size", ["200 mm", 0.3]),
-        ("impact", "obliquity", 20),
-        ("impact", "velocity", {"distribution": "normal", "mean": "820 m/s", "std": "10 m/s"}),
-        ("core", "mass", {"distribution": "discrete", "values": ["4 g", "4.1 g"], "weights": [1, 2]}),
-        ("plate", "pattern", {"shape": "circle", "diameter": "9 mm", "spacing": [0.01, 0.02], "holes": [[0, 0]]}),
-        ("stop", "half_width", "0.5 m/s"),
-    ],
-)
-def test_it_takes(schema: dict[str, Any], campaign: dict[str, Any], table: str, key: str, value: object) -> None:
-    stop = {"quantity": "mean(residual_velocity)", "half_width": 1, "max_count": 64}
-    assert complaints(schema, campaign | {table: campaign.get(table, stop) | {key: value}}) == []
-
-
-@pytest.mark.parametrize(
-    ("table", "key", "value"),
-    [
-        ("plate", "thickness", "mm 4"),
-        ("plate", "thickness", True),
-        ("plate", "thickness", 0),
-        ("plate", "degradation", 1.8),
-        ("plate", "size", ["200 mm"]),
-        ("plate", "size", ["200 mm", 0]),
-        ("plate", "pattern", {"shape": "square", "side": 1, "corner_radius": -1, "spacing": [2, 2]}),
-        ("impact", "obliquity", 95),
-        ("hits", "count", 0),
-        ("numerics", "fidelity", "fine"),
-        ("hits", "irreducible", "yes"),
-    ],
-)
-def test_it_refuses(schema: dict[str, Any], campaign: dict[str, Any], table: str, key: str, value: object) -> None:
-    found = complaints(schema, campaign | {table: campaign[table] | {key: value}})
-    assert any(place.startswith(f"$.{table}") for place in found), found
-
-
 def test_every_key_says_what_it_means(schema: dict[str, Any]) -> None:
     tables = {"campaign": schema, **schema["$defs"]}
     silent = [
@@ -89,27 +51,15 @@ def test_every_key_says_what_it_means(schema: dict[str, Any]) -> None:
     assert not silent, f"say what these keys mean, under Attributes in the docstring of their model: {silent}"
 
 
-def test_nothing_is_told_that_toml_lacks(schema: dict[str, Any]) -> None:
-    text = str(schema)
-    assert "'null'" not in text
-    assert "inf," not in text
-
-
-def test_a_profile_comes_from_a_file_or_from_numbers(schema: dict[str, Any], campaign: dict[str, Any]) -> None:
-    for core in ({"file": "core.csv"}, {"s": [0, "1 mm"], "r": [0, "1 mm"]}):
-        assert complaints(schema, campaign | {"core": {"shape": "profile", "mass": "4 g", **core}}) == []
-
-
 @pytest.mark.parametrize(
     ("table", "change"),
     [
         ("core", {"lenght": "27 mm"}),
         ("core", {"shape": "ogiv"}),
-        ("core", {"mass": "4"}),
-        ("plate", {"patern": {}}),
-        ("plate", {"resistance": -1}),
+        ("plate", {"thickness": "mm 4"}),
+        ("plate", {"degradation": 1.8}),
+        ("numerics", {"fidelity": "fine"}),
         ("plate", {"pattern": {"shape": "circle", "diametre": 1, "spacing": 2}}),
-        ("plate", {"pattern": {"shape": "circle", "diameter": 1, "spacing": [2, 0]}}),
     ],
 )
 def test_a_slip_is_marked_in_its_table(

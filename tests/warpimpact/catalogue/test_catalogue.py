@@ -94,10 +94,7 @@ def test_own_entries(own: Path) -> None:
     ("old", "new", "said"),
     [
         ("[[material]]", "[[materials]]", r"unknown key .materials.; allowed are threat, material"),
-        ('diameter = "6 mm", ', "", r"threat\[0\].core: diameter: is missing, but must be given"),
         ('"2 GPa"', '"2 mm"', r"material\[0\].resistance: got .2 mm."),
-        ("misfit", "misfits", r'material\[0\]: got the unknown key .misfits.; did you mean "misfit"'),
-        ("[[threat]]", "threat", "is not valid TOML"),
     ],
 )
 def test_own_entries_that_are_wrong(own: Path, old: str, new: str, said: str) -> None:
@@ -110,11 +107,8 @@ def test_own_entries_that_are_wrong(own: Path, old: str, new: str, said: str) ->
     ("spelling", "name"),
     [
         ("7.62 mm APM2", ".30 AP M2"),
-        ("7.62 AP M2", ".30 AP M2"),
-        ("hha class 1", "HHA Class 1"),
         ("Armox 500T", "ARMOX500"),
         ("7.62×39 BZ", "7.62x39 API BZ"),
-        ("EN AW-6061 T651", "AA6061-T651"),
     ],
 )
 def test_names_match_in_any_case_and_by_aliases(spelling: str, name: str) -> None:
@@ -125,16 +119,10 @@ def test_names_match_in_any_case_and_by_aliases(spelling: str, name: str) -> Non
     ("spelling", "said"),
     [
         ("RHA", r'several entries .*: "ARMOX370 Class 1", "BIS RHA300" or "BIS RHA360"; name one'),
-        ("MIL-DTL-46100", r'several entries .*"ARMOX500", "ATI 500-MIL", "BIS HHA" or "HHA Class 1"; name one'),
-        ("AP M2", r'several entries .*: "\.30 AP M2" or "\.50 AP M2"; name one'),
         ("Armox", r'did you mean "ARMOX370 Class 1", .* or "ARMOX ADVANCE"\?'),
         ("30 AP M2", r'did you mean "\.30 AP M2"\?'),
-        ("armx500", r'did you mean "ARMOX500"\?'),
-        # Another calibre, another temper and another steel are not meant.
         ("30 mm AP M2", "in the catalogue; warpimpact catalogue lists all"),
-        ("7.62x51 AP M2", "in the catalogue; warpimpact catalogue lists all"),
         ("AA2139-T6", "in the catalogue; warpimpact catalogue lists all"),
-        ("MARS500", "in the catalogue; warpimpact catalogue lists all"),
     ],
 )
 def test_of_an_unclear_name_those_it_may_mean_are_listed(spelling: str, said: str) -> None:

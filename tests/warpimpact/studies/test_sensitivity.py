@@ -58,12 +58,6 @@ def test_what_scatters_does_not_change() -> None:
     assert {*changes(read())} - {*changes(scattered)} == {"2° of yaw"}
 
 
-def test_only_a_core_with_a_strength_gets_another_one() -> None:
-    strong = TEXT.replace('mass = "4 g"', 'mass = "4 g", strength = "5 GPa"') + "bending = true\n"
-    strengths = [changed.core.strength for name, changed in changes(read(strong)).items() if name.startswith("a core")]
-    assert strengths == pytest.approx([3.5e9, 6.5e9])
-
-
 def test_resistance_of_the_catalogue_has_its_interval_and_follows_the_friction() -> None:
     given, changed = read(OF_CATALOGUE), changes(read(OF_CATALOGUE))
     low, high = (changed[f"Y at its {end} end"].plate.resistance for end in ("low", "high"))
@@ -120,7 +114,6 @@ def test_the_order_of_plates_turns_over_where_only_one_of_them_changes() -> None
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ("mean(colour)", "measure: got"),
         ("V50", "must be a mean, a quantile or a probability"),
         ("P(base_pierced)", r"P\(base_pierced\) needs a table \[\[layer\]\]"),
     ],

@@ -81,7 +81,13 @@ def test_a_point_keeps_its_hits_at_two_levels(tmp_path: Path) -> None:
         assert estimate.numerics is not None
 
 
-@pytest.mark.parametrize("standoffs", [[["50 mm"], ["50 mm", "130 mm"]], [["50 mm"], ["60 mm"]], [[], ["50 mm"]]])
+@pytest.mark.parametrize(
+    "standoffs",
+    [
+        [["50 mm"], ["50 mm", "130 mm"]],
+        [[], ["50 mm"]],
+    ],
+)
 def test_points_with_other_standoffs_are_joined(standoffs: list[list[str]], tmp_path: Path) -> None:
     (tmp_path / "a.toml").write_text(f'{TEXT}\n[sweep]\n"output.standoffs" = {standoffs}\n', encoding="utf-8")
     sweep = read_sweep(tmp_path / "a.toml", count=8)
@@ -91,15 +97,6 @@ def test_points_with_other_standoffs_are_joined(standoffs: list[list[str]], tmp_
         one, own = found["tilt"].isel(standoffs=number), point["standoff"]
         np.testing.assert_array_equal(one.sel(standoff=own), point["tilt"])
         assert one.drop_sel(standoff=own).isnull().all()
-
-
-def test_plates_of_some_weights_are_swept(tmp_path: Path) -> None:
-    text = TEXT.replace('thickness = "4 mm"', "") + '[sweep]\nareal_density = ["20 kg/m^2", 25]\n'
-    (tmp_path / "a.toml").write_text(text.replace("count = 24", "count = 2"), encoding="utf-8")
-    sweep = read_sweep(tmp_path / "a.toml")
-    found = joined(sweep, [run(one, device="cpu") for one in sweep.campaigns.values()])
-    np.testing.assert_allclose(found["areal_density"], [20.0, 25.0], rtol=1e-14)
-    assert found["areal_density"].attrs["units"] == "kg m-2"
 
 
 def test_a_point_is_a_result_and_a_sweep_says_that_it_is_one(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -171,14 +168,6 @@ def test_the_figure_shows_means_against_the_input(folder: Path) -> None:
     for line, values in zip(lines, expected, strict=True):
         np.testing.assert_allclose(line.get_xdata(), [0.0, 30.0])
         np.testing.assert_allclose(line.get_ydata(), values, rtol=1e-6)
-    status = sweep["status"].copy(deep=True)
-    status[{"hit": slice(None, None, 2)}] = 1
-    some = sweep_figure(sweep.assign(status=status)).axes[0]
-    assert {text.get_text() for text in some.texts} == {"50%"}
-    some.figure.canvas.draw()
-    boxes = [text.get_window_extent() for text in some.texts]
-    assert all(some.bbox.x0 < box.x0 and box.x1 < some.bbox.x1 for box in boxes)  # none on the frame
-    assert len({text.get_va() for text in some.texts}) == 2  # those of two lines at one place stand apart
 
 
 def test_a_sweep_is_asked_in_the_language_of_measures(
@@ -200,9 +189,7 @@ def test_a_sweep_is_asked_in_the_language_of_measures(
     assert [axes.get_ylabel() for axes in panels] == ["P(stopped)"]
     for text, reason in {
         "P(broken)": "needs output.bending = true and core.strength, which point 0000_obliquity_0_deg_width_3_mm lacks",
-        "mean(tilt@1m)": "needs 1 m in output.standoffs, which are 0.05 m, 0.13 m",
         "V50": "is told by warpimpact limit",
-        "mean(speed)": 'got "speed", but it must be one of',
     }.items():
         assert main(["sweep", str(folder / "a.toml"), "-o", str(tmp_path / "b.nc"), "--measure", text]) == 2
         assert reason in capsys.readouterr().err
@@ -213,12 +200,8 @@ def test_a_sweep_is_asked_in_the_language_of_measures(
     ("table", "sentence"),
     [
         ("", r"needs a table \[sweep\] of lists"),
-        ("[sweep]\nobliquity = 3\n", "sweep.obliquity: got 3, but it must be a list of values"),
         ('[sweep]\nobliqity = ["1 deg"]\n', 'got the unknown input "obliqity"; give one of core'),
-        ('[sweep]\nplate = ["thin"]\n', "sweep.plate: must be a list of tables, each with a name"),
-        ("[sweep]\nobliquity = [1, 1]\n", "sweep.obliquity: got a value twice"),
         ('[sweep]\nobliquity = ["95 deg"]\n', "obliquity = 95 deg: impact.obliquity"),
-        ('[sweep]\nobliquity = [1]\n"impact.obliquity" = [2]\n', "got two lists for one input"),
     ],
 )
 def test_what_cannot_be_swept_is_told(tmp_path: Path, table: str, sentence: str) -> None:

@@ -27,10 +27,3 @@ def test_a_drawing_has_its_scale_and_its_label() -> None:
     assert root.attrib["viewBox"] == "-4.0000 -2.0000 8.0000 4.0000"
     (shape,) = root
     assert shape.attrib["d"].count("Z") == 2  # the plate, and its hole
-
-
-def test_a_bar_stands_below_a_frame_that_clips_the_holes() -> None:
-    root = ElementTree.fromstring(svg.drawing([svg.plate([HOLE], -HALF, HALF)], -HALF, HALF, "a", bar=True))
-    frame, bar = root
-    assert (frame.attrib["y"], frame.attrib["height"]) == ("-2.0000", "4.0000")
-    assert bar.attrib["d"] == "M-4.0000,3.2000h10"

@@ -38,10 +38,6 @@ def test_html_has_the_same_cells_and_escapes_them() -> None:
     assert page.count("<th") == 3  # labels and their values have no head
 
 
-def test_a_table_without_rows_shows_its_head_alone() -> None:
-    assert text_of([Section([Table((Column("a"), number("b")), [])])]) == "a   b"
-
-
 def test_a_head_wider_than_its_column_goes_on_in_the_next_line() -> None:
     table = Table((number("energy per presented area at 130 mm", "J/mm²"), Column("design")), [(1.0, "a.toml")])
     assert text_of([Section([table])]).splitlines() == [
