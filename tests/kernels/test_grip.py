@@ -219,18 +219,3 @@ def test_no_ring_is_left_out_of_which_a_part_closes_in(flank: bool, device: str)
     assert closes[touching > 0.0].all()
     assert 100 < (touching > 0.0).sum() < count
     assert not closes.all()
-
-
-@pytest.mark.parametrize("onset", [1e-9, 5.0, 1e3])
-def test_curved_patch_takes_power_from_the_core(onset: float, device: str) -> None:
-    # With the velocity of the patch's centre, the normal's power is the closing speed's: never negative in contact.
-    slant, velocity = grazing(2000, 0.4, 0.4)
-    found = gripped(device, speed=100.0, onset=onset, **bent(slant, 0.4, 0.4, velocity))
-    normal = np.stack([found["axial"], found["outward"], found["around"]], axis=1)
-    power = (normal * velocity).sum(axis=1)
-    np.testing.assert_allclose(power, found["closing"], rtol=1e-9, atol=1e-9)
-    assert (found["closing"][found["share"] > 0] > 0).all()
-    assert ((found["share"] > 0) & (found["share"] < 1)).sum() > 500
-    # Friction is against what is left of the velocity: v·(v − c n) ≥ 0 as long as no patch spans a quarter turn.
-    sliding = velocity - found["closing"][:, None] * normal
-    assert ((sliding * velocity).sum(axis=1)[found["share"] > 0] > 0).all()

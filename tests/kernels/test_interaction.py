@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from warpimpact.kernels import interaction, structs
 from warpimpact.kernels.variant import Variant
 
-from .probes import poisoned, unit_vectors
+from .probes import poisoned
 
 Array = NDArray[np.float64]
 
@@ -20,12 +20,8 @@ real = VARIANT.real
 use, struct = VARIANT.use(interaction), structs.build(VARIANT)
 Law, Contact = struct.Law, struct.Contact
 
-FRICTION, ONSET = 0.05, 4.0
-A0, A1, A2 = 2.6e9, 4.5e6, 7850.0
+ONSET = 4.0
 SINGLE = Variant()
-FREE = Variant(double=True, rate_dependent=True, free_surface=True)
-free = FREE.use(interaction)
-FreeLaw = structs.build(FREE).Law
 single = SINGLE.use(interaction)
 SingleLaw = structs.build(SINGLE).Law
 
@@ -34,38 +30,14 @@ def law(
     law: Law,
     closing: wp.array(dtype=real),
     variation: wp.array(dtype=real),
-    sliding: wp.array(dtype=real),
     speed: wp.array(dtype=real),
-    exposures: wp.array(dtype=real),
     contacts: wp.array(dtype=Contact),
-    stresses: wp.array(dtype=real),
-    slopes: wp.array(dtype=real),
-    frictions: wp.array(dtype=real),
-    remaining: wp.array(dtype=real),
 ) -> None:
     i = wp.tid()
     found = use.interaction.contact_of(law, closing[i], variation[i], speed[i])
     touching = closing[i] + found.shift * variation[i] * variation[i]
     found.slope = use.interaction.steady_slope(law, found.share, found.slope, touching)
     contacts[i] = found
-    stresses[i] = use.interaction.normal_stress(law, closing[i], real(1.0))
-    slopes[i] = use.interaction.stress_slope(law, closing[i])
-    frictions[i] = use.interaction.friction_per_speed(law, sliding[i], speed[i])
-    remaining[i] = use.interaction.remaining(law, exposures[i])
-
-
-def free_law(
-    law: FreeLaw,
-    closing: wp.array(dtype=real),
-    velocity: real,
-    radius: real,
-    stresses: wp.array(dtype=real),
-    slopes: wp.array(dtype=real),
-) -> None:
-    i = wp.tid()
-    law.per_speed = free.interaction.per_speed(velocity, velocity)
-    stresses[i] = free.interaction.normal_stress(law, closing[i], radius)
-    slopes[i] = free.interaction.stress_slope(law, closing[i])
 
 
 def onset(law: Law, dt: real, velocity: wp.array(dtype=real), impact: real, onsets: wp.array(dtype=real)) -> None:
@@ -79,14 +51,12 @@ def exponential(law: SingleLaw, x: wp.array(dtype=wp.float32), values: wp.array(
 
 
 LAW, ONSET_SPEED = VARIANT.kernel(law), VARIANT.kernel(onset)
-FREE_LAW = FREE.kernel(free_law)
 EXPONENTIAL = SINGLE.kernel(exponential)
 
 
 def filled(struct: Any) -> Any:
     law = struct()
-    law.a0, law.a1, law.a2, law.friction, law.onset = A0, A1, A2, FRICTION, ONSET
-    law.decay_rate = np.log(0.8) / 1e-6
+    law.onset = ONSET
     return law
 
 
@@ -95,36 +65,17 @@ def applied(
     device: str,
     *,
     variation: Any = 0.0,
-    sliding: Any = 0.0,
     speed: Any = 1.0,
-    exposure: Any = 0.0,
     steadied: float = 0.0,
 ) -> SimpleNamespace:
-    given = [np.array(a) for a in np.broadcast_arrays(closing, variation, sliding, speed, exposure)]
-    names = ("stress", "slope", "friction", "remaining")
-    outputs = {name: poisoned(len(given[0]), real, device) for name in names}
+    given = [np.array(a) for a in np.broadcast_arrays(closing, variation, speed)]
     contacts = poisoned(len(given[0]), Contact, device)
     law = filled(Law)
     law.steadied = steadied
     inputs = [law, *(wp.array(a, dtype=real, device=device) for a in given)]
-    wp.launch(LAW, len(given[0]), inputs=inputs, outputs=[contacts, *outputs.values()], device=device)
+    wp.launch(LAW, len(given[0]), inputs=inputs, outputs=[contacts], device=device)
     found = contacts.numpy()
-    return SimpleNamespace(
-        fraction=found["share"],
-        rise=found["slope"],
-        shift=found["shift"],
-        **{name: array.numpy() for name, array in outputs.items()},
-    )
-
-
-def random_elements(count: int = 2000) -> tuple[Array, Array, Array]:
-    """Closing speeds from far below to far above the onset, sliding speeds and speeds of their elements."""
-    rng = np.random.default_rng(1)
-    normals = unit_vectors(rng, count)
-    velocities = unit_vectors(rng, count) * 10.0 ** rng.uniform(-3, 3, (count, 1))
-    closing = (normals * velocities).sum(axis=1)
-    sliding = np.linalg.norm(velocities - closing[:, None] * normals, axis=1)
-    return closing, sliding, np.linalg.norm(velocities, axis=1)
+    return SimpleNamespace(fraction=found["share"], rise=found["slope"], shift=found["shift"])
 
 
 VARIATIONS = pytest.mark.parametrize("variation", [1e-3 * ONSET, 0.5 * ONSET, 50.0 * ONSET])
@@ -188,7 +139,7 @@ def test_small_variation_leaves_the_ramp_as_it_is(device: str) -> None:
 def test_wall_that_slides_along_itself_does_not_touch(device: str) -> None:
     # Rounding in float32 gives v_p·n of some 1e-7 of the speed (docs/model.md §4: a small stated threshold).
     speed = 800.0
-    fraction = applied(speed * np.array([1e-7, -1e-7, 1e-6, 1e-4]), device, sliding=speed, speed=speed).fraction
+    fraction = applied(speed * np.array([1e-7, -1e-7, 1e-6, 1e-4]), device, speed=speed).fraction
     np.testing.assert_array_equal(fraction[:3], 0.0)
     assert 0 < fraction[3] < 0.1 * speed / ONSET
 
@@ -206,40 +157,6 @@ def test_onset_follows_the_step_and_a_core_that_slows_down(device: str) -> None:
     law.onset_share = 0.005
     wp.launch(ONSET_SPEED, 4, inputs=inputs, outputs=[onsets], device=device)
     np.testing.assert_allclose(onsets.numpy(), [4.0, 2.0, 0.08, 0.08], rtol=1e-12)
-
-
-def test_stress_is_the_quadratic_of_the_closing_speed(device: str) -> None:
-    closing, sliding, speed = random_elements()
-    found = applied(closing, device, sliding=sliding, speed=speed)
-    np.testing.assert_allclose(found.stress, np.polynomial.Polynomial([A0, A1, A2])(closing), rtol=1e-12)
-    np.testing.assert_allclose(found.slope, A1 + 2 * A2 * closing, rtol=1e-9)
-
-
-def test_friction_is_its_share_of_the_normal_stress_against_the_sliding(device: str) -> None:
-    closing, sliding, speed = random_elements()
-    friction = applied(closing, device, sliding=sliding, speed=speed).friction
-    np.testing.assert_allclose(friction * sliding, FRICTION, rtol=1e-12)
-
-
-def test_exposure_degrades_once_per_interval(device: str) -> None:
-    remaining = applied(np.ones(4), device, exposure=[0.0, 1e-6, 2e-6, 0.5e-6]).remaining
-    np.testing.assert_allclose(remaining, [1.0, 0.8, 0.64, np.sqrt(0.8)], rtol=1e-13)
-
-
-def test_near_a_free_surface_stress_grows_with_the_angle_of_attack_up_to_an_upright_one(device: str) -> None:
-    # Points of a core that turns may close in faster than its centre of mass flies.
-    closing, velocity, radius, share = np.linspace(0.0, 900.0, 31), 600.0, 2e-3, 1.5
-    law = filled(FreeLaw)
-    law.per_reach, law.attack = 1.0 / 4e-3, share
-    given = [wp.array(closing, dtype=real, device=device), real(velocity), real(radius)]
-    stresses, slopes = (poisoned(len(closing), real, device) for _ in range(2))
-    wp.launch(FREE_LAW, len(closing), inputs=[law, *given], outputs=[stresses, slopes], device=device)
-    sine = np.minimum(closing / velocity, 1.0)
-    np.testing.assert_allclose(
-        stresses.numpy(), A0 * (1.0 / 1.5 + share * sine) + closing * (A1 + A2 * closing), rtol=1e-12
-    )
-    rise = np.where(closing < velocity, A0 * share / velocity, 0.0)
-    np.testing.assert_allclose(slopes.numpy(), A1 + 2 * A2 * closing + rise, rtol=1e-12)
 
 
 def single_exponential(x: Array, device: str) -> Array:

@@ -23,7 +23,6 @@ Body, State, Load = struct.Body, struct.State, struct.Load
 
 COUNT = 64
 MASS, AXIAL, TRANSVERSE = 4.0e-3, 1.5e-8, 1.65e-7  # the paper's core, SI
-STEP = 1.0e-6
 STIFF = 1.0e-3  # [s], so long that the damping of these tests stops most of the motion within it
 GENERALISED_INERTIA = np.array([MASS] * 3 + [TRANSVERSE] * 3)
 
@@ -200,12 +199,6 @@ def test_drift_is_the_closed_form_of_the_symmetric_top(dt: float, device: str) -
     np.testing.assert_allclose(
         rotation.inv().apply(start.angular_momentum), inertia * turned_rate, rtol=1e-9, atol=1e-13
     )
-
-
-def test_attitude_stays_a_unit_quaternion(device: str) -> None:
-    # Unnormalised, 1e4 products in float64 drift by some 1e-14.
-    after = drifted(random_motion(), STEP, device, repeats=10_000)
-    np.testing.assert_allclose(np.linalg.norm(after["attitude"], axis=1), 1.0, rtol=0, atol=1e-15)
 
 
 def test_damped_kick_is_rosenbrock_s_step(device: str) -> None:

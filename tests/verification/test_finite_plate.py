@@ -1,12 +1,7 @@
 """Finite plates: a hit on a hole that was left out is a hit on a solid plate; elsewhere the plate is the unbounded
 one."""
 
-from dataclasses import replace
-
 import numpy as np
-
-from warpimpact.scene import Hits, Impact, SlotPattern, make_shots
-from warpimpact.scene.symmetry import symmetries
 
 from .scenes import paper_plate, shots_at, simulate, solid_plate
 
@@ -25,15 +20,3 @@ def test_left_out_holes_are_solid_and_kept_ones_are_holes() -> None:
     unbounded = simulate(paper_plate(), kept).residual_velocity
     np.testing.assert_allclose(simulate(bounded, kept).residual_velocity, unbounded, rtol=0, atol=0.02)
     assert np.abs(simulate(paper_plate(), left_out).residual_velocity - solid).min() > 5.0
-
-
-def test_hits_on_all_of_a_plate_and_their_images_fare_alike() -> None:
-    holes = ((0.0, 0.0, 0.2), (8e-3, 8e-3, 0.2))
-    pattern = SlotPattern(length=12e-3, width=4e-3, spacing=(16e-3, 16e-3), holes=holes)
-    plate, impact = paper_plate(pattern=pattern, **RIM), Impact(velocity=825)
-    assert len(symmetries(plate, impact)) == 2
-    shots = make_shots(impact, Hits(count=32, area="plate", irreducible=True), plate)
-    places = [one.image(shots.hit_y, shots.hit_z, plate.size) for one in symmetries(plate, impact)]
-    one, image = (simulate(plate, replace(shots, hit_y=y, hit_z=z)).residual_velocity for y, z in places)
-    np.testing.assert_allclose(one, image, rtol=0, atol=0.05)
-    assert np.ptp(one) > 20.0

@@ -165,12 +165,6 @@ def test_hits_that_end_otherwise_behind_layers_count_in_the_status() -> None:
     assert alone.errors["residual_velocity_error"] == ERROR_PER_CHANGE * 500.0  # a core that stops has the speed 0
 
 
-def test_errors_behind_layers_may_have_a_relative_part() -> None:
-    coarse, fine = (outcomes_of(np.full(8, speed), layered=True) for speed in (502.0, 500.0))
-    asked = Accuracy(residual_velocity=1.0, residual_velocity_share=0.01, tilt=1.0)
-    assert hit_errors(coarse, fine, asked, (True, True)).excess == pytest.approx(ERROR_PER_CHANGE * 2.0 / 6.0)
-
-
 @pytest.mark.parametrize(("gap", "free"), [(0.0, False), (20e-3, False), (40e-3, True)])
 def test_the_velocity_within_a_laminate_counts_in_no_error(gap: float, free: bool) -> None:
     layers = (PLATE, BASE.model_copy(update={"gap": gap}))

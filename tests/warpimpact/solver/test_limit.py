@@ -78,17 +78,6 @@ def test_thickness_of_a_layer_of_its_own() -> None:
     assert behind.shots.own_of(scene.target, "thickness", 1).item() == behind.lower.item()
 
 
-def test_the_limit_velocity_of_a_target_of_layers_adds_their_work() -> None:
-    base = Layer(thickness=3e-3, resistance=PLATE.resistance, shear_coefficient=0.05, gap=0.1)
-    scene = Scene(core=CORE, target=Target(layers=(PLATE, base)))
-    whole = limit_velocity(scene, shots(1), numerics=STANDARD, device="cpu").value.item()
-    parts = [
-        limit_velocity(SCENE, shots(1, thickness=np.full(1, h)), numerics=STANDARD, device="cpu").value.item()
-        for h in (4e-3, 3e-3)
-    ]
-    assert whole == pytest.approx(np.hypot(*parts), rel=0.01)
-
-
 HOLES = PLATE.model_copy(update={"pattern": CirclePattern(diameter=5e-3, spacing=(8e-3, 8e-3))})
 
 
@@ -174,17 +163,3 @@ def test_a_run_that_fails_beside_the_limit_leaves_none(monkeypatch: pytest.Monke
     assert not found.converged.item()
     assert found.outcomes.status.item() == Status.NOT_FINITE
     assert 700.0 < found.shots.velocity.item() <= 775.0
-
-
-def test_a_speed_that_grows_with_the_thickness_does_not_creep(monkeypatch: pytest.MonkeyPatch) -> None:
-    # Behind a thicker plate the core turns less, up to 40 mm: the energy tells nothing of the limit.
-    def end(some: Shots) -> tuple[Array, Array]:
-        assert some.thickness is not None
-        passes = some.thickness[:, 0] < 40e-3
-        speed = np.where(passes, 150.0 * (some.thickness[:, 0] / 4e-3) ** 0.5, 0.0)
-        return np.where(passes, Status.PERFORATED, Status.ARRESTED), speed
-
-    monkeypatch.setattr(limit, "computed", outcomes_by(end))
-    found = limit_thickness(SCENE, shots(1), numerics=STANDARD, tolerance=0.1e-3)
-    assert found.converged.item()
-    assert found.value.item() == pytest.approx(40e-3, abs=0.1e-3)

@@ -1,28 +1,21 @@
 """Tile of the plate: material by area, and the filter of the exposure."""
 
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 from scipy import ndimage
 
-from warpimpact import Campaign
-from warpimpact.runs.cost import estimate_cost
 from warpimpact.scene import (
     CirclePattern,
-    Numerics,
     Plate,
     PolygonsPattern,
     SlotPattern,
-    Target,
     TrianglePattern,
 )
 from warpimpact.solver.grid import FINER, tent_taps
-from warpimpact.solver.prepare import prepare
-from warpimpact.solver.simulate import computed
 from warpimpact.solver.tile import BLUR, check_tiles, forget_tiles, tile_of
-from warpimpact.solver.worker import Cancel, Cancelled, Worker
+from warpimpact.solver.worker import Cancelled
 
 PLATE = Plate(thickness=4e-3, resistance=2.6e9, degradation_length=0.6e-3)
 PATTERNS = [
@@ -91,28 +84,7 @@ def test_taps_keep_mass_and_second_moment(ratio: float) -> None:
     assert taps @ offsets**2 + 1 / 3 == pytest.approx(ratio**2 / 6, rel=1e-9)
 
 
-SLOTTED_PLATE = Path(__file__).parents[3] / "campaigns" / "slotted_plate.toml"
 POLYGONS = PolygonsPattern(spacing=(8e-3, 9e-3), polygons=[[(-2e-3, 0.0), (2.5e-3, -1e-3), (0.0, 2e-3)]])
-WIDE = PLATE.model_copy(update={"pattern": SlotPattern(length=12e-3, width=4e-3, spacing=(1.0, 1.0))})
-
-
-def test_the_holes_of_a_plate_are_not_built_before_somebody_computes_and_not_at_all_where_that_is_cancelled() -> None:
-    campaign = Campaign.from_toml(SLOTTED_PLATE)
-    scene = campaign.scene.model_copy(update={"target": Target(layers=(WIDE,))})
-    forget_tiles()
-    shots = campaign.sampler().shots(0, 2)
-    prepared = prepare(campaign.scene, shots, Numerics(level=0))
-    assert estimate_cost(campaign, Numerics(level=0)) is None
-    with pytest.raises(MemoryError, match=r"plate.pattern: got a period of 1 m x 1 m, .* 2 GiB"):
-        prepare(scene, shots, Numerics(level=0))
-    (tile,) = prepared.tiles
-    cancel = Cancel()
-    cancel.cancel()
-    with pytest.raises(Cancelled):
-        computed(prepared, Worker("cpu", 1, cancel))
-    assert not tile.built
-    computed(prepared, Worker("cpu", 1))
-    assert tile.built
 
 
 @pytest.mark.parametrize("pattern", [*PATTERNS, POLYGONS], ids=lambda pattern: pattern.shape)
