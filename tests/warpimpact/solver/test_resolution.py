@@ -67,7 +67,7 @@ def test_nodal_scheme_has_the_paper_s_own_resolution(level: int | None) -> None:
 
 def test_way_per_step_follows_the_plate_or_a_core_shorter_than_it() -> None:
     resolution = resolved(level=2)
-    passage = resolution.passage(np.array([1e-3, 1.0]), PLATE, weakens=False)
+    passage = resolution.passage(np.array([1e-3, 1.0]))
     way = 800.0 * resolution.step_at(800.0, 0.0, passage, np.inf)
     standard = LADDER[2].travel
     np.testing.assert_allclose(way, [standard * 1e-3, standard * SLENDER * PAPER.length])
@@ -75,7 +75,7 @@ def test_way_per_step_follows_the_plate_or_a_core_shorter_than_it() -> None:
 
 def test_step_is_bounded_by_what_contact_takes_off_the_resistance() -> None:
     resolution, velocity = resolved(level=2), 800.0
-    free = resolution.step_at(velocity, 0.0, resolution.passage(PLATE.thickness, PLATE, weakens=False), np.inf)
+    free = resolution.step_at(velocity, 0.0, resolution.passage(PLATE.thickness), np.inf)
     for degradation, interval in ((1.0, 1e-6), (0.9, 1e-6), (0.05, 1e-6), (0.05, 1e-9), (0.0, 1e-6)):
         plate = PLATE.model_copy(update={"degradation": degradation, "degradation_interval": interval})
         step = resolution.step_of(Impact(velocity=velocity), plate)
