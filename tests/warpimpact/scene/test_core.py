@@ -98,13 +98,10 @@ def test_the_bounding_radius_holds_every_point(core: Core) -> None:
     [
         ({"coefficients": [-1e-5, 0.24]}, "radius of -1e-05 m at s = 0 m"),
         ({"coefficients": [1e-3, -0.2, 5.0]}, "radius of -0.001 m at s = 0.02 m"),  # dips between its ends
-        ({"coefficients": [0.0]}, "radius of 0 m"),
         ({"length": "60 mm"}, "radius of -0.004344 m at s = 0.06 m"),
         ({"mass": None}, "got neither of mass and density"),
         ({"density": 7850}, "got both of mass and density"),
         ({"centre_of_mass": "30 mm"}, "got centre_of_mass = 0.03 m, but it must lie between nose and base"),
-        ({"inertia_axial": 0}, "greater than 0"),
-        ({"mass": "-4 g"}, "greater than 0"),
     ],
 )
 def test_an_impossible_core_is_refused(values: dict[str, object], complaint: str) -> None:
@@ -116,24 +113,16 @@ def test_an_impossible_core_is_refused(values: dict[str, object], complaint: str
     ("table", "complaint"),
     [
         ("s,radius\n0,1e-3\n", 'line 1: got "s,radius", but the header must be s,r'),
-        ("s,r\n", "has no rows"),
         ("s,r\n0,1e-3\n1e-2,inf\n", 'line 3: r: got "inf", but it must be a finite number'),
         ("s,r\n0,1e-3,5\n", 'line 2: got "0,1e-3,5", but a row has 2'),
         ("s,r\n1e-3,1e-3\n2e-3,1e-3\n", "first station must be 0"),
-        ("s,r\n0,1e-3\n0,2e-3\n", "stations must increase"),
         ("s,r\n0,1e-3\n1e-3,0\n2e-3,1e-3\n", "got r = 0 m in row 2"),
-        ("s,r\n0,0\n1e-3,0\n", "got r = 0 m in every row"),
     ],
 )
 def test_a_bad_profile_is_refused(tmp_path: Path, table: str, complaint: str) -> None:
     (tmp_path / "profile.csv").write_text(table)
     with pytest.raises(ValidationError, match=complaint):
         ProfileCore(file=tmp_path / "profile.csv", density=7850)
-
-
-def test_a_core_shorter_than_its_nose_is_refused() -> None:
-    with pytest.raises(ValidationError, match=r"at least as long as its nose, 0\.0102318 m"):
-        OgiveCore(diameter="6.17 mm", crh=3, length="10 mm", mass="5 g")
 
 
 def test_presented_area_is_the_union_of_the_sections_seen_from_the_side() -> None:

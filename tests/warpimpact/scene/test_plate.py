@@ -6,18 +6,10 @@ import numpy as np
 import pytest
 from pydantic import ValidationError
 
-from warpimpact.scene import CirclePattern, Hits, Impact, Interaction, NoPattern, Plate, SlotPattern, make_shots
+from warpimpact.scene import CirclePattern, Hits, Impact, Interaction, Plate, SlotPattern, make_shots
 from warpimpact.scene.interaction import coefficients
-from warpimpact.scene.symmetry import symmetries
 
 STEEL = {"thickness": "4 mm", "resistance": "2600 MPa"}
-
-
-def test_a_plain_plate_is_solid_steel_that_neither_rubs_nor_degrades() -> None:
-    plate = Plate(**STEEL)
-    assert (plate.shear_coefficient, plate.degradation, plate.pattern) == (0.0, 1.0, NoPattern())
-    assert (plate.density, plate.degradation_length, plate.size) == (7850.0, 0.5e-3, None)
-    assert plate.areal_density == pytest.approx(31.4, rel=1e-14)
 
 
 @pytest.mark.parametrize("margin", [{}, {"size": ["80 mm", "90 mm"], "margin": "3 mm"}])
@@ -30,29 +22,6 @@ def test_a_plate_may_be_given_by_its_weight(margin: dict) -> None:
     for given, complaint in (({"areal_density": 0}, "greater than 0"), (STEEL, "thickness cannot be combined with")):
         with pytest.raises(ValidationError, match=complaint):
             Plate(**{"areal_density": 25, "resistance": 1e9, **given})
-
-
-def test_a_scene_is_immutable() -> None:
-    with pytest.raises(ValidationError, match="frozen"):
-        Plate(**STEEL).thickness = 1.0
-
-
-@pytest.mark.parametrize(
-    ("field", "value", "complaint"),
-    [
-        ("thickness", 0, "greater than 0"),
-        ("resistance", "-1 MPa", "greater than or equal to 0"),
-        ("shear_coefficient", -0.01, "greater than or equal to 0"),
-        ("degradation", 1.01, "less than or equal to 1"),
-        ("degradation", -0.01, "greater than or equal to 0"),
-        ("degradation_interval", 0, "greater than 0"),
-        ("degradation_length", 0, "greater than 0"),
-        ("size", ["10 cm", 0], "greater than 0"),
-    ],
-)
-def test_a_value_out_of_bounds_is_refused(field: str, value: object, complaint: str) -> None:
-    with pytest.raises(ValidationError, match=complaint):
-        Plate(**{**STEEL, field: value})
 
 
 def test_interaction_scales_with_resistance_and_density() -> None:
@@ -94,13 +63,6 @@ def test_a_plate_with_a_margin_is_read_back_as_it_was() -> None:
     assert again.pattern.period == plate.pattern.period == (50e-3, 44e-3)
     without = Plate(**STEEL, pattern=plate.pattern)
     assert Plate.model_validate_json(without.model_dump_json()) == without == Plate(**STEEL, pattern=SLOTS)
-
-
-def test_a_margin_keeps_the_mirror_images_that_it_leaves() -> None:
-    impact = Impact(velocity=825)
-    assert len(symmetries(Plate(**STEEL, pattern=SLOTS, **RIMMED), impact)) == 4  # a rim has no centring
-    aside = SLOTS.model_validate({**SLOTS.model_dump(), "staggered": False, "holes": [["1 mm", "0 mm"]]})
-    assert [str(s) for s in symmetries(Plate(**STEEL, pattern=aside, **RIMMED), impact)] == ["(y, z)", "(y, -z)"]
 
 
 def test_hits_cover_the_cell_or_all_of_a_finite_plate() -> None:

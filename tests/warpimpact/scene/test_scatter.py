@@ -9,7 +9,6 @@ from scipy import stats
 
 from warpimpact import Impact, Plate
 from warpimpact.scene import Hits, NoPattern, Sampler, Scatter, Shots, SlotPattern
-from warpimpact.scene.quantities import QUANTITIES, SCATTERED
 
 PLATE = Plate(thickness="4 mm", resistance="2 GPa", pattern=NoPattern())
 SLOTTED = Plate(
@@ -138,9 +137,3 @@ def test_columns_of_a_list_override(tmp_path: Path) -> None:
     assert shots.velocity.tolist() == [700.0, 710.0] * 2
     assert shots.yaw.tolist() == pytest.approx(np.radians([0.1, 0.2] * 2), rel=1e-15)  # a list has degrees
     assert len(np.unique(shots.obliquity)) == 4
-
-
-def test_every_quantity_has_its_place() -> None:
-    assert list(Scatter.model_fields) == list(SCATTERED)
-    assert all(name in Impact.model_fields for name, quantity in QUANTITIES.items() if quantity.table == "impact")
-    assert all(name in Plate.model_fields for name, quantity in QUANTITIES.items() if quantity.table == "plate")

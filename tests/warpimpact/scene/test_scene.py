@@ -48,10 +48,6 @@ def test_a_plate_alone_is_a_target() -> None:
             "got record.standoffs of 0.01 m, but a core of this size is certain to be out of the target only from 0.01",
         ),
         (
-            {"record": {"standoffs": ["20 mm"], "standoff_point": "nose"}},
-            "got record.standoffs of 0.02 m, but a core of this size is certain to be out of the target only from 0.03",
-        ),
-        (
             {"core": CORE.model_copy(update={"centre_of_mass": 15e-3}), "record": {"bending": True}},
             "output.bending = true cannot be combined with core.centre_of_mass: it needs the mass of every slice",
         ),

@@ -18,18 +18,13 @@ from warpimpact.scene.unit_text import factor
         (units.Length, 0.004, 4e-3),
         (units.Length, np.float64(0.004), 4e-3),
         (units.Length, "-.5in", -12.7e-3),
-        (units.Mass, "4 g", 4e-3),
-        (units.Time, "1 us", 1e-6),
         (units.Time, "1 µs", 1e-6),
         (units.Stress, "2600 MPa", 2.6e9),
         (units.Density, "7.85e0 g/cm^3", 7850.0),
-        (units.Speed, "825 m/s", 825.0),
-        (units.Angle, "180 deg", math.pi),
         (units.Angle, 180, math.pi),
         (units.Angle, "0.1 rad", 0.1),
         (units.AngularVelocity, "60 rpm", 2 * math.pi),
         (units.AngularVelocity, "2.7e3 turn/s", 5400 * math.pi),
-        (units.AngularVelocity, "1 deg/s", math.pi / 180),
         (units.Inertia, "1.5 g cm^2", 1.5e-7),
         (units.Number, "5 %", 0.05),
         (units.Number, "0.05", 0.05),
@@ -40,18 +35,14 @@ from warpimpact.scene.unit_text import factor
         (units.Angle, "20 º", math.pi / 9),
         (units.Angle, "20°", math.pi / 9),
         (units.Angle, "20 gon", math.pi / 10),
-        (units.Angle, "20 mrad", 0.02),
         (units.Angle, "20 nato_mil", math.pi / 160),
         (units.Mass, "81 grain", 5.24871171e-3),
         (units.Stress, "2600 N/mm2", 2.6e9),
-        (units.Stress, "1 ksi", 6894757.293168361),
         (units.Density, "7850 kg/m3", 7850.0),
         (units.Density, "7850 kg·m⁻³", 7850.0),
         (units.Density, "7.85 g/(cm * cm ^ 2)", 7850.0),
-        (units.Density, "7.85 t/m**3", 7850.0),
         (units.Speed, "0.825 mm/μs", 825.0),
         (units.Speed, "2700 ft/s", 822.96),
-        (units.Moment, "50 N·m", 50.0),
     ],
 )
 def test_a_quantity_becomes_si(kind: object, given: object, si: float) -> None:
@@ -67,15 +58,11 @@ def test_a_quantity_becomes_si(kind: object, given: object, si: float) -> None:
         ("4 mm 5", 'got "4 mm 5", whose unit "mm 5" is not one of names, powers, * and /'),
         ("4 foos", 'got "4 foos", whose unit "foos" is unknown'),
         ("4 MM", 'got "4 MM", whose unit "MM" is unknown; did you mean "mm"?'),
-        ("4 mm2", 'got "4 mm2", which is not a length'),
         ("nan mm", 'got "nan mm", which does not begin with a number'),
         ("1e999 mm", 'got "1e999 mm", which is not finite'),
         (math.nan, "got NaN, which is not finite"),
-        (math.inf, "got Infinity, which is not finite"),
         (10**400, f"got 1{'0' * 78}…, which is not finite"),
         (True, "got true, which is not a length"),
-        (None, "got null, which is not a length"),
-        ([4], "got [4], which is not a length"),
     ],
 )
 def test_what_is_no_length_is_refused(given: object, complaint: str) -> None:
@@ -83,11 +70,6 @@ def test_what_is_no_length_is_refused(given: object, complaint: str) -> None:
         TypeAdapter(units.Length).validate_python(given)
     advice = 'give a number in m or a string such as "4 mm"'
     assert str(caught.value.errors()[0]["ctx"]["error"]) == f"{complaint}; {advice}"
-
-
-def test_an_angle_needs_its_unit_where_it_is_text() -> None:
-    with pytest.raises(ValidationError, match='"20", which has no unit; give a number in deg or a string such as'):
-        TypeAdapter(units.Angle).validate_python("20")
 
 
 def test_an_angle_that_was_read_is_not_read_again() -> None:
@@ -102,10 +84,7 @@ def test_an_angle_that_was_read_is_not_read_again() -> None:
     "changed",
     [
         lambda angle: 1.5 * angle,
-        lambda angle: np.float64(3.0) * angle / 2,
-        lambda angle: angle + 0.5 * angle,
         lambda angle: angle + np.radians(10.0),
-        lambda angle: np.radians(10.0) + angle,
         lambda angle: -(angle - 2.5 * angle),
         lambda angle: sum([angle, angle, -angle / 2]),
         lambda angle: abs(round(-1.5 * angle, 15)),
@@ -126,45 +105,8 @@ def test_units_of_a_result_can_be_typed(unit: tuple[str, display.Unit]) -> None:
 
 
 MORE_THAN_A_NUMBER_AND_A_UNIT = [
-    *("20 deg, 1 deg", "2600 MPa (1 %)", "4+1 mm", "4 mm # 3 mm", "0.05, 1", "4 mm?", "4 mm 3", "4 mm*2", "4 mm/2"),
-    *(
-        "1 000 mm",
-        "1_000 mm",
-        "1'000 mm",
-        "4 mm - 3 mm",
-        "4-5 mm",
-        "~4 mm",
-        "< 4 mm",
-        "4 mm x 3 mm",
-        "4 mm × 3",
-        "4x3 mm",
-    ),
-    *(
-        "(4 mm)",
-        "4 mm)",
-        "4 (mm",
-        "4 ()mm",
-        "4 mm;",
-        "4 mm; 5",
-        "1 3/16 in",
-        "1/2/3 in",
-        "5/0 in",
-        "0x10 mm",
-        "1e5e3 m",
-    ),
-    *(
-        "5 mm^",
-        "5 mm^22",
-        "5 mm**2**2",
-        "5 mm^1.5",
-        "4 mm /",
-        "4 / mm",
-        "4 mm·3",
-        "４ mm",
-        "4 mm\n3 mm",
-        "4 mm 1/1",
-        '5"',
-    ),
+    *("20 deg, 1 deg", "2600 MPa (1 %)", "4+1 mm", "4 mm # 3 mm", "4 mm 3", "4 mm*2", "1 000 mm", "1_000 mm", "4-5 mm"),
+    *("~4 mm", "4 mm × 3", "4 (mm", "4 mm; 5", "1 3/16 in", "5/0 in", "0x10 mm", "5 mm**2**2", "4 / mm", "4 mm\n3 mm"),
 ]
 
 
@@ -188,10 +130,7 @@ def test_a_text_that_scatters_names_distributions(text: str) -> None:
     [
         (units.Angle, "20 deg^2"),
         (units.Angle, "5 %"),
-        (units.Angle, "1 sr"),
-        (units.Angle, "1 count"),
         (units.Angle, "20 min"),
-        (units.Number, "3 dB"),
         (units.Number, "3 deg"),
         (units.Stress, "2600 mPa"),
         (units.AngularVelocity, "15000"),
@@ -206,9 +145,7 @@ def test_the_dimension_is_exact(kind: object, text: str) -> None:
     ("kind", "text", "spellings"),
     [
         (units.Angle, "20 mil", ["nato_mil", "mrad", "thou"]),
-        (units.Length, "20 mil", ["nato_mil", "mrad", "thou"]),
         (units.Angle, "20 grad", ["gon", "deg"]),
-        (units.Angle, "30 Grad", ["gon", "deg"]),
         (units.Mass, "5.3 gr", ["grain", "g"]),
         (units.Density, "1 ton/m^3", ["t", "kg"]),
         (units.AngularVelocity, "15000 1/s", ["turn/s", "rad/s"]),
