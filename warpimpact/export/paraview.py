@@ -1,9 +1,8 @@
 """The history of a hit as VTK files for ParaView: the moving surface of the core, and the plate as it weakens.
 
-It needs PyVista (`pip install 'warpimpact[vtk]'`). The folder contains ``core.pvd`` and ``plate.pvd``, which list the
-other files with their times; of a hit by finite
-elements, ``plate.pvd`` has the deformed elements of all layers. Lengths are in metres in the frame of the plate, times
-in seconds.
+It needs meshio (`pip install 'warpimpact[vtk]'`). The folder contains ``core.pvd`` and ``plate.pvd``, which list the
+other files with their times; of a hit by finite elements, ``plate.pvd`` has the deformed elements of all layers.
+Lengths are in metres in the frame of the plate, times in seconds.
 """
 
 from __future__ import annotations
@@ -23,7 +22,7 @@ from warpimpact.results import variables as v
 from warpimpact.results.files import OutputError
 
 if TYPE_CHECKING:
-    import pyvista
+    import meshio
     from numpy.typing import NDArray
 
     Array = NDArray[np.float64]
@@ -40,93 +39,79 @@ def write_vtk(history: xarray.Dataset, folder: Path) -> list[Path]:
         history: a Dataset of `results.history_dataset`.
 
     Raises:
-        OutputError: PyVista is not installed, or the folder cannot be written.
+        OutputError: meshio is not installed, or the folder cannot be written.
     """
     try:
-        import pyvista  # noqa: F401
+        import meshio  # noqa: F401
     except ImportError:
-        raise OutputError(f"{folder}: VTK files need PyVista: pip install 'warpimpact[vtk]'") from None
+        raise OutputError(f"{folder}: VTK files need meshio: pip install 'warpimpact[vtk]'") from None
     try:
         with tempfile.TemporaryDirectory(dir=folder.parent, prefix=f".{folder.name}.") as aside:
             pieces = Path(aside) / "vtk"
             pieces.mkdir()
-            _write_series(pieces, "core", "vtp", history[v.TIME].values, cores(history))
-            kind, meshes = ("vtu", deformed(history)) if v.NODE_POSITION in history else ("vti", plates(history))
-            _write_series(pieces, "plate", kind, history[v.SNAPSHOT].values, meshes)
+            _write_series(pieces, "core", history[v.TIME].values, _cores(history))
+            plates = _deformed(history) if v.NODE_POSITION in history else _weakened(history)
+            _write_series(pieces, "plate", history[v.SNAPSHOT].values, plates)
             pieces.rename(folder)
     except OSError as error:
         raise OutputError(f"{folder}: cannot be written ({error})") from error
     return [folder / "core.pvd", folder / "plate.pvd"]
 
 
-def cores(history: xarray.Dataset) -> Iterator[pyvista.PolyData]:
-    """The core's surface at every step: quadrilaterals with the velocity [m/s] of each point. The field data are the
-    velocity, the angular velocity, the force and the moment of the whole core."""
-    import pyvista
+def _cores(history: xarray.Dataset) -> Iterator[meshio.Mesh]:
+    """The core's surface at every step, with the velocity [m/s] of each point, and with the velocity, the angular
+    velocity, the force and the moment of the whole core."""
+    import meshio
 
     station, radius = history[v.STATION].values, history[v.CORE_RADIUS].values
     azimuth = np.linspace(0.0, 2.0 * np.pi, SIDES, endpoint=False)
     ring = np.stack([np.zeros(SIDES), np.cos(azimuth), np.sin(azimuth)], axis=-1)
     arms = (station[:, None, None] * [1.0, 0.0, 0.0] + radius[:, None, None] * ring).reshape(-1, 3)
-    faces = _faces(len(station))
+    here = np.arange(len(arms)).reshape(-1, SIDES)
+    after = np.roll(here, -1, axis=1)
+    quads = np.stack([here[:-1], here[1:], after[1:], after[:-1]], axis=-1).reshape(-1, 4)
+    fan = np.stack([np.zeros(SIDES - 2, dtype=int), np.arange(1, SIDES - 1), np.arange(2, SIDES)], axis=-1)
+    cells = [("quad", quads), ("triangle", np.concatenate([here[0][fan], here[-1][fan[:, ::-1]]]))]
     for step in range(history.sizes["time"]):
         now = history.isel(time=step)
         turned = Rotation.from_quat(now[v.ATTITUDE].values).apply(arms)
         velocity = now[v.VELOCITY].values + np.cross(now[v.MARCHED_ANGULAR_VELOCITY].values, turned)
-        surface = pyvista.PolyData((now[v.PLATE_POSITION].values + turned).astype(np.float32), faces)
-        surface.point_data[v.VELOCITY] = velocity.astype(np.float32)
-        for name in _BODY:
-            surface.field_data[f"core_{name}"] = now[name].values[None, :]
-        yield surface
+        data = {f"core_{name}": np.tile(now[name].values, (len(arms), 1)) for name in _BODY}
+        yield meshio.Mesh(now[v.PLATE_POSITION].values + turned, cells, {v.VELOCITY: velocity, **data})
 
 
-def _faces(rings: int) -> NDArray[np.int64]:
-    """Quadrilaterals between rings and the polygons that close nose and base, in PyVista's format."""
-    here = np.arange(SIDES)
-    nxt = (here + 1) % SIDES
-    start = SIDES * np.arange(rings - 1)[:, None]
-    quads = np.stack([start + here, start + nxt, start + nxt + SIDES, start + here + SIDES], axis=-1).reshape(-1, 4)
-    sides = np.hstack([np.full((len(quads), 1), 4), quads]).ravel()
-    base = SIDES * (rings - 1) + here
-    return np.concatenate([sides, [SIDES], here[::-1], [SIDES], base])
-
-
-def deformed(history: xarray.Dataset) -> Iterator[pyvista.DataSet]:
+def _deformed(history: xarray.Dataset) -> Iterator[meshio.Mesh]:
     """The elements that are left of all layers at every snapshot, with their plastic strain."""
-    import pyvista
+    import meshio
 
-    corners, hexahedron = history[v.ELEMENT_CORNER].values, pyvista.CellType.HEXAHEDRON
-    for place, left, strain in zip(
-        *(history[name].values for name in (v.NODE_POSITION, v.ELEMENT_LEFT, v.ELEMENT_STRAIN)), strict=True
-    ):
-        mesh = pyvista.UnstructuredGrid({hexahedron: corners[left > 0]}, place)
-        mesh.cell_data[v.ELEMENT_STRAIN] = strain[left > 0]
-        yield mesh
+    corners, fields = history[v.ELEMENT_CORNER].values, (v.NODE_POSITION, v.ELEMENT_LEFT, v.ELEMENT_STRAIN)
+    for place, left, strain in zip(*(history[name].values for name in fields), strict=True):
+        there = left > 0
+        yield meshio.Mesh(place, [("hexahedron", corners[there])], cell_data={v.ELEMENT_STRAIN: [strain[there]]})
 
 
-def plates(history: xarray.Dataset) -> Iterator[pyvista.ImageData]:
+def _weakened(history: xarray.Dataset) -> Iterator[meshio.Mesh]:
     """The plate within reach of the core at every snapshot: cells with the share of the resistance left."""
-    import pyvista
+    import meshio
 
     front, rear, _ = slabs(history, "y")[0]
-    y, z = history[v.CELL_Y].values, history[v.CELL_Z].values
-    dy, dz = y[1] - y[0], z[1] - z[0]
+    centres = [history[name].values for name in (v.CELL_Y, v.CELL_Z)]
+    edges = [np.append(at, 2.0 * at[-1] - at[-2]) - 0.5 * (at[1] - at[0]) for at in centres]
+    points = np.stack(np.meshgrid([front, rear], *edges, indexing="ij"), axis=-1).reshape(-1, 3)
+    number = np.arange(len(points)).reshape(2, len(edges[0]), len(edges[1]))
+    sides = [(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0), (0, 0, 1), (1, 0, 1), (1, 1, 1), (0, 1, 1)]
+    y, z = map(len, centres)
+    cells = np.stack([number[i, j : j + y, k : k + z].ravel() for i, j, k in sides], axis=-1)
     for share in history[v.RESISTANCE_SHARE].values:
-        grid = pyvista.ImageData(
-            dimensions=(2, len(y) + 1, len(z) + 1),
-            spacing=(rear - front, dy, dz),
-            origin=(front, y[0] - 0.5 * dy, z[0] - 0.5 * dz),
-        )
-        grid.cell_data[v.RESISTANCE_SHARE] = share.ravel(order="F")
-        yield grid
+        yield meshio.Mesh(points, [("hexahedron", cells)], cell_data={v.RESISTANCE_SHARE: [share.ravel()]})
 
 
-def _write_series(folder: Path, name: str, kind: str, times: Array, meshes: Iterator[pyvista.DataSet]) -> None:
-    """Write meshes as ``<name>_<number>.<kind>``, and ``<name>.pvd`` with the time of each."""
+def _write_series(folder: Path, name: str, times: Array, meshes: Iterator[meshio.Mesh]) -> None:
+    """Write meshes as ``<name>_<number>.vtu``, and ``<name>.pvd`` with the time of each."""
     root = ElementTree.Element("VTKFile", type="Collection", version="0.1")
     collection = ElementTree.SubElement(root, "Collection")
     for number, (time, mesh) in enumerate(zip(times, meshes, strict=True)):
-        file = f"{name}_{number:04d}.{kind}"
-        mesh.save(folder / file)
+        file = f"{name}_{number:04d}.vtu"
+        mesh.write(folder / file)
         ElementTree.SubElement(collection, "DataSet", timestep=repr(float(time)), part="0", file=file)
     ElementTree.ElementTree(root).write(folder / f"{name}.pvd", xml_declaration=True, encoding="utf-8")

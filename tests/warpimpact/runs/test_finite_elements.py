@@ -145,15 +145,14 @@ def test_a_hit_is_replayed_bit_by_bit(campaign_file: Path, tmp_path: Path) -> No
     assert np.abs(after - before).max() > 1e-3
     for axis in (1, 2):  # the outer edge moves little
         assert np.ptp(after[:, axis]) == pytest.approx(np.ptp(before[:, axis]), abs=5e-4)
-    if find_spec("pyvista"):
-        import pyvista
+    if find_spec("meshio"):
+        import meshio
 
         files_written = write_vtk(history, tmp_path / "vtk")
         assert [file.name for file in files_written] == ["core.pvd", "plate.pvd"]
-        meshes = [pyvista.read(path) for path in sorted((tmp_path / "vtk").glob("plate_*.vtu"))]
-        assert [mesh.n_cells for mesh in meshes] == history["element_left"].values.sum(axis=1).tolist()
-        assert meshes[0].volume > 0.0
-        assert meshes[-1]["element_strain"].max() > 0.1
+        meshes = [meshio.read(path) for path in sorted((tmp_path / "vtk").glob("plate_*.vtu"))]
+        assert [len(mesh.cells[0].data) for mesh in meshes] == history["element_left"].values.sum(axis=1).tolist()
+        assert meshes[-1].cell_data["element_strain"][0].max() > 0.1
 
 
 def test_the_command_computes_hits_of_a_result(
