@@ -59,7 +59,7 @@ def groups(design: ValidDesign) -> list[dict[str, Any]]:
     """The controls of a design, by the parts that they change."""
     campaign, tables = design.campaign, design.tables
     threat = campaign.core.threat
-    shot = [*_choice("threat", ["core", "threat"], threat), *([] if threat else _of_core(campaign, tables))]
+    shot = [_choice("threat", ["core", "threat"], threat), *([] if threat else _of_core(campaign, tables))]
     shot += [_slider(campaign, tables, ["impact", name], "impact") for name in _SHOT]
     groups: list[dict[str, Any]] = [{"name": "Shot", "controls": shot}]
     for number, layer in enumerate(campaign.target.layers):
@@ -80,12 +80,12 @@ def _of_plate(campaign: Campaign, tables: Tables, table: Place, plate: Plate) ->
     if table[0] == "layer":
         yield _slider(campaign, tables, [*table, "gap"], "plate")
     yield _slider(campaign, tables, [*table, "areal_density" if weighed else "thickness"], "plate")
-    yield from _choice("material", [*table, "material"], plate.material)
+    yield _choice("material", [*table, "material"], plate.material)
     if plate.material is None:
         yield _slider(campaign, tables, [*table, "resistance"], "plate")
     pattern, place = plate.pattern, [*table, "pattern"]
     shape = "none" if isinstance(pattern, NoPattern) else str(getattr(pattern, "shape", "none"))
-    yield from _choice("shape", place, shape)
+    yield _choice("shape", place, shape)
     for name, field in type(pattern).model_fields.items():
         reader = reader_in(typed(field))
         if reader is not None and reader.unit in ("m", "rad"):
@@ -104,8 +104,8 @@ def _of_plate(campaign: Campaign, tables: Tables, table: Place, plate: Plate) ->
         yield {"kind": "switch", "path": path, "label": "staggered", "value": pattern.staggered, "meaning": meaning}
 
 
-def _choice(what: str, path: Place, value: str | None) -> Iterator[dict[str, Any]]:
-    yield {"kind": "choice", "what": what, "path": path, "label": what, "value": value or ""}
+def _choice(what: str, path: Place, value: str | None) -> dict[str, Any]:
+    return {"kind": "choice", "what": what, "path": path, "label": what, "value": value or ""}
 
 
 def _slider(

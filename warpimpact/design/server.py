@@ -336,25 +336,6 @@ def _hit(asked: Tables) -> tuple[int, str, int]:
     return _whole(asked, "level", 0, 9), str(asked.get("stage", "full")), _whole(asked, "hit", 0, 2**30)
 
 
-def bound(port: int) -> socket.socket:
-    """A socket that only this machine can reach.
-
-    Args:
-        port: 0 takes any free port.
-
-    Raises:
-        OSError: the port is taken.
-    """
-    listening = socket.socket(socket.AF_INET, socket.SOCK_STREAM)
-    listening.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-    try:
-        listening.bind(("127.0.0.1", port))
-    except OSError:
-        listening.close()
-        raise
-    return listening
-
-
 def server_of(app: Starlette) -> uvicorn.Server:
     """The server of the page."""
     return uvicorn.Server(
@@ -387,10 +368,9 @@ def serve(
     Raises:
         OSError: the port is taken.
     """
-    with bound(port) as listening:
+    with socket.create_server(("127.0.0.1", port)) as listening:
         token, port = secrets.token_urlsafe(18), listening.getsockname()[1]
         server = server_of(application(shelf, token=token, device=device, entered=entered))
-        listening.listen()
         ready(f"http://127.0.0.1:{port}/{token}/")
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", Implausible)  # the page shows these

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -18,7 +18,6 @@ from warpimpact.analysis.inspection import verdict
 from warpimpact.analysis.numbers import interval_text
 from warpimpact.analysis.plate_text import reference_name, solid_note, weights_of, weights_text
 from warpimpact.analysis.summary import numerics_note, numerics_sentence, promise_text, range_note, sampling_note
-from warpimpact.campaign.text import parsed
 from warpimpact.plotting.cell import range_text, words
 from warpimpact.plotting.comparison import comparison_figure
 from warpimpact.plotting.style import data_url
@@ -74,7 +73,6 @@ def result_content(name: str, dataset: xarray.Dataset) -> dict[str, Any]:
         "campaign": attributes.get(attr.CAMPAIGN, ""),
         "promise": promise_text(dataset),
         "caveats": [*_caveats(dataset), *filter(None, [depth_note(measures), solid_note(dataset)])],
-        "tables": _tables(dataset),
         "measures": measures,
         "through": Markup(html_of(limit_view(dataset)) if is_limit else table_html(_through(dataset), means_over)),
         "protects": Markup(table_html(measures_table(measures, reference_name(dataset)), against_solid)),
@@ -125,35 +123,6 @@ def _caveats(dataset: xarray.Dataset) -> list[str]:
     model = "The core stays one rigid body, which overstates what comes through where cores break or erode."
     notes = (numerics, chance, sampling_note(dataset), numerics_note(dataset), model)
     return [sentence for sentence in notes if sentence]
-
-
-def _tables(dataset: xarray.Dataset) -> dict[str, dict[str, str]]:
-    """Tables of a campaign with its values as written; an inner table has a dotted name such as `plate.pattern`. A
-    number of hits from the command line replaces the written one."""
-    tables = dict(_flat(parsed(dataset.attrs.get(attr.CAMPAIGN, ""), "the campaign in the result"), ""))
-    if attr.COUNT in dataset.attrs and "count" in tables.get("hits", {}):
-        tables["hits"]["count"] = str(dataset.attrs[attr.COUNT])
-    return tables
-
-
-def _flat(table: Mapping[str, Any], name: str) -> Iterator[tuple[str, dict[str, str]]]:
-    """A table and its inner tables, by dotted names; the layers by their numbers."""
-    layers = table.get("layer")
-    if isinstance(layers, list):
-        numbered = {f"layer {number}": layer for number, layer in enumerate(layers, 1)}
-        table = {key: value for key, value in table.items() if key != "layer"} | numbered
-    plain = {key: _plain(value) for key, value in table.items() if not isinstance(value, dict) and value is not None}
-    if name and plain:
-        yield name, plain
-    for key, value in table.items():
-        if isinstance(value, dict):
-            yield from _flat(value, f"{name}.{key}".strip("."))
-
-
-def _plain(value: object) -> str:
-    if isinstance(value, bool):
-        return str(value).lower()
-    return ", ".join(map(str, value)) if isinstance(value, list) else str(value)
 
 
 def _through(dataset: xarray.Dataset) -> Table:

@@ -1,5 +1,6 @@
 """A page that is served in a thread of the test."""
 
+import socket
 import threading
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
@@ -16,10 +17,9 @@ CAMPAIGNS = Path(__file__).parents[3] / "campaigns"
 @contextmanager
 def served(shelf: Shelf) -> Iterator[str]:
     pytest.importorskip("uvicorn", reason="needs the extra design")
-    from warpimpact.design.server import application, bound, server_of
+    from warpimpact.design.server import application, server_of
 
-    with bound(0) as own:
-        own.listen()
+    with socket.create_server(("127.0.0.1", 0)) as own:
         port = own.getsockname()[1]
         server = server_of(application(shelf, token=TOKEN, device="cpu"))
         thread = threading.Thread(target=server.run, kwargs={"sockets": [own]})
