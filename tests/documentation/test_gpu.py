@@ -2,13 +2,9 @@
 
 import json
 import sys
-from dataclasses import fields
 from pathlib import Path
 
 import pytest
-
-from warpimpact.kernels.variant import Variant
-from warpimpact.solver.prepare import prepare
 
 sys.path.append(str(Path(__file__).parents[1] / "benchmarks"))
 
@@ -34,18 +30,3 @@ def test_one_call_measures_what_the_page_shows(tmp_path: Path, monkeypatch: pyte
     rows = list(page.rows({"gpu": values}))
     assert len(rows) == 2 + 2 + 1 + 1
     assert all(all(row) for row in rows)
-
-
-def test_scenes_of_a_gpu_need_every_build_of_the_kernels() -> None:
-    variants = []
-    for name in gpu.SCENES:
-        for way in (gpu.SIMPLE, gpu.BLOCK):
-            scene, shots = gpu.scene_of(name, 6)
-            if way == gpu.BLOCK and name in gpu.SIMPLE_ONLY:
-                with pytest.raises(ValueError, match="cannot be combined with"):
-                    prepare(scene, shots, gpu.numerics_of(name, way))
-                continue
-            variants.append(prepare(scene, shots, gpu.numerics_of(name, way)).variant)
-            assert (variants[-1].window > 0) == (way == gpu.BLOCK), name
-    for field in fields(Variant):
-        assert {bool(getattr(one, field.name)) for one in variants} == {False, True}, field.name

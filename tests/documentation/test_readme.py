@@ -2,7 +2,6 @@
 
 import re
 import shlex
-import subprocess
 import tomllib
 from pathlib import Path
 
@@ -65,21 +64,6 @@ def test_each_line_works_after_those_above_it(
     capsys.readouterr()
     exec(few_hits, {"Campaign": Campaign})
     assert "perforated" in capsys.readouterr().out
-
-
-@pytest.mark.skipif(not (CHECKOUT / ".git").exists(), reason="no checkout")
-def test_what_the_lines_write_is_ignored_by_git() -> None:
-    made = ["slotted.toml", "slotted.nc", "slotted.nc.parts/lock", "slotted_plate.png", "slotted_hit34_flight.png"]
-    made += ["slotted.csv", "slots.html", "round holes.nc", "two_plates.png", "warpimpact.schema.json"]
-    done = subprocess.run(
-        ["git", "check-ignore", "--stdin"],
-        input="\n".join([*made, "pyproject.toml", "README.md"]),
-        cwd=CHECKOUT,
-        capture_output=True,
-        text=True,
-        check=False,
-    )
-    assert done.stdout.replace('"', "").splitlines() == made
 
 
 def test_every_command_is_shown_at_work(capsys: pytest.CaptureFixture[str]) -> None:

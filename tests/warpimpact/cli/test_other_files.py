@@ -129,15 +129,6 @@ def test_a_truncated_result_is_told(
     assert "a.nc: cannot be read as a netCDF file" in refusal(["inspect", "a.nc"])
 
 
-def test_damaged_values_are_told(make_result: ResultMaker, in_tmp_path: Path, refusal: Refusal) -> None:
-    files.write(make_result(20000), Path("a.nc"))
-    data = bytearray(Path("a.nc").read_bytes())
-    data[len(data) // 3 : len(data) // 2] = bytes(len(data) // 2 - len(data) // 3)
-    Path("a.nc").write_bytes(data)
-    for command in (["inspect", "a.nc"], ["plot", "a.nc"], ["export", "a.nc"]):
-        assert "a.nc: " in refusal(command)
-
-
 def test_a_table_has_no_formulas(make_result: ResultMaker, tmp_path: Path) -> None:
     result = make_result(3).assign({"=1+1": ("hit", [-1.0, 2.0, 3.0], {"units": "m"})})
     result["status"].attrs["flag_meanings"] = "=cmd " + result["status"].attrs["flag_meanings"].split(" ", 1)[1]

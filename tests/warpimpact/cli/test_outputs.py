@@ -3,7 +3,6 @@
 from collections.abc import Callable
 from pathlib import Path
 
-import pytest
 import xarray
 
 from warpimpact.cli import main
@@ -40,26 +39,3 @@ def test_what_is_asked_for_has_a_picture_of_its_own(make_result: ResultMaker, tm
         "a_P_perforated.png",
         "a_edge_distance.png",
     }
-
-
-@pytest.mark.parametrize(
-    ("command", "sentence"),
-    [
-        (["run", "a.toml", "-o", "a.csv"], "a.csv: the name of a result must end in .nc"),
-        (["report", "a.nc", "-o", "a.pdf"], "a.pdf: the name of a report must end in .html"),
-        (["plate", "a.toml", "-o", "a.nc"], "a.nc: the name of a picture must end in .png, .pdf or .svg"),
-    ],
-)
-def test_a_name_that_promises_another_format_is_refused(
-    make_result: ResultMaker,
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
-    refusal: Refusal,
-    command: list[str],
-    sentence: str,
-) -> None:
-    monkeypatch.chdir(tmp_path)
-    files.write(make_result(4), Path("in.nc"))
-    Path("a.toml").write_text((CAMPAIGNS / "slotted_plate.toml").read_text(encoding="utf-8"), encoding="utf-8")
-    command = ["in.nc" if part == "a.nc" and place == 1 else part for place, part in enumerate(command)]
-    assert refusal(command) == sentence

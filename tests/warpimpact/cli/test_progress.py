@@ -86,14 +86,3 @@ def test_a_log_says_what_a_pilot_tries_and_counts_no_time_of_it(
     assert sum("level 4" in line for line in lines) < 10
     assert [line for line in lines if line.startswith("0 of")] == ["0 of 1000 hits"]
     assert lines[-1].startswith("400 of 1000 hits, 100 hits/s, 6 s left; ")
-
-
-def test_runs_one_after_another_begin_anew(capsys: pytest.CaptureFixture[str], clock: list[float]) -> None:
-    with show_run() as show:
-        for _ in range(2):
-            for done in (0, 500, 1000):
-                show(standing(done, resumed=0))
-                clock[0] += 10.0
-    lines = capsys.readouterr().err.splitlines()
-    assert len(lines) == 6
-    assert lines[4].startswith("500 of 1000 hits, 50 hits/s, 10 s left")

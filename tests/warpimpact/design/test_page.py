@@ -229,19 +229,6 @@ def test_text_of_others_is_text(browser: Any, serve: Callable[..., str], coarse:
     assert browser.errors() == []
 
 
-def test_plate_and_map_show_the_direction_of_fire(page: Any) -> None:
-    assert "⊙ fire" in page.text("#plate")
-    assert not page.find("#plate .fire")
-    move(page, "control-impact-obliquity", 20)
-    settled(page)
-    assert all("fire 20°" in page.text(place) for place in ("#plate", "#map-0 .annotation-text"))
-    arrow = page.driver.execute_script(
-        "return document.getElementById('map-0').layout.annotations.filter((one) => one.showarrow)[0]"
-    )
-    assert (arrow["ax"] < 0.0, arrow["ay"]) == (True, 0.0)  # towards +y, to the right
-    assert len(page.find("#plate .fire")) == 1
-
-
 def test_a_grip_of_the_plate_is_dragged(page: Any) -> None:
     from selenium.webdriver.common.action_chains import ActionChains
 
@@ -263,29 +250,3 @@ def test_a_grip_of_the_plate_is_dragged(page: Any) -> None:
     page.find("#plate .grip")[0].send_keys("\ue012")  # arrow to the left
     page.wait(lambda: float(page.values("#control-plate-pattern-width")[0]) == pytest.approx(width - 0.1, abs=0.11))
     assert page.errors() == []
-
-
-def test_a_threat_a_material_and_a_layer_are_chosen(page: Any) -> None:
-    choose = (
-        "const box = document.getElementById(arguments[0]); box.value = arguments[1];"
-        "box.dispatchEvent(new Event('change', {bubbles: true}))"
-    )
-    page.driver.execute_script(choose, "control-core-threat", ".30 AP M2")
-    page.wait(lambda: page.values("#control-impact-velocity-number") == ["878"])
-    page.press("#add-layer")
-    page.wait(lambda: page.find("#control-layer-0-gap"))
-    page.driver.execute_script(choose, "control-layer-0-pattern", "circle")
-    page.wait(lambda: page.find("#control-layer-0-pattern-diameter"))
-    page.press("#controls fieldset:last-of-type button")
-    page.wait(lambda: not page.find("#control-layer-0-gap"))
-    assert not page.text("#sentence")
-    assert page.errors() == []
-
-
-def test_the_report_of_the_page_is_that_of_its_designs(page: Any, tmp_path: Path) -> None:
-    page.driver.execute_cdp_cmd("Browser.setDownloadBehavior", {"behavior": "allow", "downloadPath": str(tmp_path)})
-    page.press("#report")
-    page.wait(lambda: list(tmp_path.glob("*.html")), 120.0)
-    (path,) = tmp_path.glob("*.html")
-    page.wait(lambda: path.read_text(encoding="utf-8").endswith("</html>"), 30.0)
-    assert "this design: 1500 of 1500 cores pass" in path.read_text(encoding="utf-8")

@@ -20,7 +20,6 @@ import xarray
 from warpimpact.campaign.text import CampaignError
 from warpimpact.catalogue.catalogue import Catalogue
 from warpimpact.catalogue.entries import Threat
-from warpimpact.cli import main
 from warpimpact.design.designs import FEWEST, FILE_KEYS, FIRST_WORK, SHAPES, changed, shelf_of, stages, work
 from warpimpact.results import attributes as attr
 from warpimpact.results import files, front
@@ -244,20 +243,6 @@ def test_threats_materials_and_layers_can_be_chosen(small: Path) -> None:
     assert len(design.campaign.layer) == 1
     assert design.campaign.impact.velocity == Catalogue().all(Threat)[".30 AP M2"].velocities[0].value
     assert shelf.checked(changed(design, shelf, "remove layer", 1, "")).campaign.layer == ()
-
-
-@pytest.mark.parametrize(
-    ("arguments", "sentence"),
-    [
-        (["nothing.toml"], "nothing.toml: cannot be read (it is not there)"),
-        ([str(CAMPAIGNS / "designs" / "lightest_plate.toml")], "this takes one design; warpimpact optimise"),
-        (["http://127.0.0.1:1/x/#rubbish"], 'holds no design behind its "#"'),
-        (["--port", "70000"], "--port: got 70000"),
-    ],
-)
-def test_a_mistake_ends_the_command(arguments: list[str], sentence: str, capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["design", "--no-browser", *arguments]) == 2
-    assert sentence in capsys.readouterr().err
 
 
 def test_a_shelf_has_every_design_of_its_files(

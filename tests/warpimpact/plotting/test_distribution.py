@@ -10,13 +10,6 @@ from warpimpact.plotting import dispersion, marginals, probability_map, save_map
 MIXED = [Status.PERFORATED, Status.ARRESTED, Status.RICOCHETED, Status.MISSED]
 
 
-def test_a_plane_is_found_exactly():
-    offsets = np.random.default_rng(1).normal(size=(5, NEIGHBOURS, 2)) * 1e-3
-    local = plane_fit(offsets, 700.0 + offsets @ [3e4, -2e4])
-    np.testing.assert_allclose(local.value, 700.0)
-    assert (local.half_width < 1e-9).all()
-
-
 def test_intervals_hold_the_plane_as_often_as_they_say():
     random, points = np.random.default_rng(2), 4000
     offsets = random.uniform(-1.0, 1.0, (points, NEIGHBOURS, 2))
@@ -68,14 +61,6 @@ def test_probability_map_holds_the_share_at_every_place(make_result):
     assert half_width.max() == pytest.approx(0.186, abs=5e-4)
 
 
-def test_a_probability_of_shots_that_arrive_alike_is_not_smoothed(make_result):
-    figure = probability_map(make_result(np.tile(MIXED, 128)), "P(perforated)")
-    (image,) = (axes.images[0] for axes in figure.axes if axes.images)
-    assert set(np.unique(image.get_array())) == {0.0, 1.0}
-    certain = probability_map(make_result(512), "P(perforated)").axes[0].images[0]
-    assert (certain.norm.vmin, certain.norm.vmax) == (0.0, 1.0)
-
-
 def test_marginals_are_the_quantiles_of_strips(make_result):
     dataset = make_result(1000)
     dataset["residual_velocity"].values[:] = 700.0 + 1e3 * dataset["hit_y"]
@@ -89,18 +74,6 @@ def test_marginals_are_the_quantiles_of_strips(make_result):
     assert sum(patch.get_width() for patch in histogram.patches) == 1000
     assert above.get_xlim() == centre.get_xlim()
     assert beside.get_ylim() == centre.get_ylim()
-
-
-@pytest.mark.parametrize("status", [Status.ARRESTED, Status.PERFORATED])
-def test_uniform_results_have_marginals_and_dispersion(make_result, status):
-    dataset = make_result([status] * 100)
-    dataset["residual_velocity"][:] = 764.0
-    for figure in (
-        marginals(dataset, "residual_velocity"),
-        dispersion(dataset),
-        uncertainty(scattered(dataset), "tilt"),
-    ):
-        figure.draw_without_rendering()
 
 
 @pytest.mark.parametrize("count", [400, 12000])

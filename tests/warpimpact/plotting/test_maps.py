@@ -1,7 +1,6 @@
 """Rendered maps: the right colour at the right place, to scale, with labelled axes."""
 
 import io
-import json
 import warnings
 
 import numpy as np
@@ -11,7 +10,6 @@ from PIL import Image
 
 from warpimpact.kernels.status import Status
 from warpimpact.plotting import overview, save_beside, save_maps, status_map, variable_map, variable_maps
-from warpimpact.results.outlines import outlines
 
 MIXED = np.array([Status.PERFORATED, Status.ARRESTED, Status.RICOCHETED, Status.MISSED])
 GREY = (0.62, 0.62, 0.62)
@@ -123,21 +121,6 @@ def test_colour_bar_states_quantity_and_unit(perforated, variable, standoff, lab
     assert (norm.vmin, norm.vmax) == pytest.approx(ends)
 
 
-@pytest.mark.parametrize("variable", ["energy_loss", "yaw"])
-def test_hole_outline_is_white_between_black_on_any_colour(perforated, variable):
-    figure = variable_map(perforated, variable)
-    (line,) = figure.axes[0].lines
-    np.testing.assert_allclose(line.get_xdata(), outlines(perforated)["y"] * 1e3)
-    np.testing.assert_allclose(line.get_ydata(), outlines(perforated)["z"] * 1e3)
-    figure.set_dpi(400)
-    picture = Picture(figure)
-    for z in np.linspace(-1.5, 1.5, 9):
-        across = [picture.colour(y, z).mean() for y in np.linspace(1.93, 2.07, 41)]
-        assert max(across[15:26]) > 0.95
-        assert min(across[:15]) < 0.05
-        assert min(across[26:]) < 0.05
-
-
 def test_few_hits_are_points(make_result):
     dataset = make_result(np.tile(MIXED, 10))
     figure = variable_map(dataset, "residual_velocity")
@@ -173,21 +156,6 @@ def test_status_map_has_a_colour_and_a_share_for_each_status_that_occurs(covered
         for y, z in points
     ]
     assert np.mean(matches) >= 0.9
-
-
-def test_overview_shows_four_aligned_maps(covered):
-    figure = overview(covered)
-    titles = [axes.get_title().split("\n")[0] for axes in figure.axes if axes.get_title()]
-    assert titles == ["residual velocity", "deflection", "tilt, 130 mm behind the plate", "status"]
-    boxes = [axes.get_position().bounds for axes in figure.axes if axes.get_title()]
-    np.testing.assert_allclose([box[2:] for box in boxes], [boxes[0][2:]] * 4)
-    assert boxes[0][0] == pytest.approx(boxes[2][0])
-    assert boxes[2][1] == pytest.approx(boxes[3][1])
-    assert all(axes.get_legend() is None for axes in figure.axes)
-    (legend,) = figure.legends
-    entries = [text.get_text() for text in legend.get_texts()]
-    statuses = [f"{name} 25.0%" for name in ("perforated", "arrested", "ricocheted", "missed")]
-    assert sorted(entries) == sorted(["no value: arrested, ricocheted", "edge of hole", *statuses])
 
 
 @pytest.mark.parametrize("status", [Status.PERFORATED, Status.ARRESTED])
@@ -244,22 +212,3 @@ def test_maps_beside_each_other_have_one_scale_of_colour_and_of_length(make_resu
     assert lengths[0] == pytest.approx(lengths[1])
     paths = save_beside({"wide": wide, "small": small}, tmp_path, "both")
     assert [path.name for path in paths] == [f"both_{name}.png" for name in ("residual_velocity", "deflection", "tilt")]
-
-
-def test_a_layer_has_its_own_holes(perforated):
-    assert np.isfinite(outlines(perforated)["y"]).any()
-    scattered = {"distribution": "uniform", "low": 1e-3, "high": 2e-3}  # as the thickness of a layer that scatters
-    behind = {"thickness": scattered, "resistance": 1e9, "pattern": {"shape": "none"}, "gap": 0.1, "offset": [0.0, 0.0]}
-    holed = behind | {"pattern": {"shape": "circle", "diameter": 1e-3, "spacing": [4e-3, 4e-3]}, "offset": [1e-3, 0.0]}
-    layered = perforated.assign_attrs(layers=json.dumps({"1": behind, "2": holed}))
-    assert len(outlines(layered, 1)["y"]) == 0
-    found = outlines(layered, 2)
-    assert np.nanmin(np.hypot(found["y"] - 1e-3, found["z"])) == pytest.approx(0.5e-3)
-
-
-@pytest.mark.parametrize("rounding", [0.0, 1e-10])
-def test_a_constant_map_has_the_colour_of_its_scale_and_no_pattern_of_rounding(make_result, rounding):
-    dataset = make_result(512)
-    dataset["residual_velocity"][:] = 764.0 + rounding * np.arange(512)
-    norm = variable_map(dataset, "residual_velocity").axes[0].images[0].norm
-    assert (norm.vmin, norm.vmax) == pytest.approx((0.0, 764.0))

@@ -13,7 +13,7 @@ from warpimpact.campaign.plates import read_plates
 from warpimpact.cli import main
 from warpimpact.plotting import plate_figure
 from warpimpact.plotting.plate import hole_dimensions, smallest_ligament
-from warpimpact.scene import ConeCore, Impact, Layer, NoPattern, Plate, SlotPattern, Target
+from warpimpact.scene import ConeCore, Layer, NoPattern, Plate, SlotPattern, Target
 from warpimpact.studies.sweep import read_sweep
 
 CAMPAIGNS = Path(__file__).parents[3] / "campaigns"
@@ -78,18 +78,6 @@ def test_a_finite_plate_is_drawn_to_its_rim_without_what_the_margin_leaves_out()
     assert figure.get_suptitle() == "a plate"
 
 
-@pytest.mark.parametrize(("azimuth", "along"), [(0.0, (1.0, 0.0)), (90.0, (0.0, 1.0)), (180.0, (-1.0, 0.0))])
-def test_the_direction_of_fire_is_an_arrow(azimuth: float, along: tuple[float, float]) -> None:
-    impact = Impact(velocity=800, obliquity="30 deg", azimuth=f"{azimuth} deg")
-    axes = plate_figure(plate(), impact=impact).axes[0]
-    (arrow,) = [text for text in axes.texts if text.arrow_patch is not None and text.get_text() == ""][-1:]
-    tail = np.array(arrow.get_position())  # in points from the head
-    np.testing.assert_allclose(-tail / np.hypot(*tail), along, atol=1e-9)
-    assert "fire 30°" in [text.get_text() for text in axes.texts]
-    straight = plate_figure(plate(), impact=Impact(velocity=800)).axes[0]
-    assert "⊙ fire" in [text.get_text() for text in straight.texts]
-
-
 def test_dimensions_are_those_of_the_plate() -> None:
     assert [dimension.text for dimension in hole_dimensions(plate(), smallest_ligament(plate()))] == [
         "4",
@@ -109,13 +97,6 @@ def test_dimensions_are_those_of_the_plate() -> None:
     )
     shown = [text.get_text() for text in plate_figure(plate()).axes[0].texts]
     assert sorted(filter(None, shown)) == ["12", "16", "16", "4", "4"]
-
-
-def test_a_solid_plate_is_steel_as_far_as_the_core_needs() -> None:
-    figure = plate_figure(plate(pattern=NoPattern()), CORE)
-    assert figure.axes[0].get_xlim() == pytest.approx((-6, 6))
-    np.testing.assert_allclose(colours(figure, (0, 5), (4, 0)), [STEEL, STEEL], atol=0.01)
-    assert "ligament" not in figure.axes[0].get_title()
 
 
 @pytest.mark.parametrize(

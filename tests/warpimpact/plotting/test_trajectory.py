@@ -114,46 +114,6 @@ def test_flight_shows_the_core_at_the_standoffs(standoff_point: str) -> None:
         assert 0.5 * (outline[:, 0].min() + outline[:, 0].max()) == pytest.approx(middle, abs=3.0)
 
 
-def test_largest_load_is_drawn_at_its_instant(history: xarray.Dataset) -> None:
-    figure = trajectory.largest_load(history)
-    size = np.linalg.norm(history["force"], axis=1)
-    step = int(size.argmax())
-    assert f"{float(history['time'][step]) * 1e6:.1f} µs" in figure.get_suptitle()
-    moment = history["moment"].values[step]
-    for view, (component, across) in enumerate(((1, 2), (2, 1))):
-        axes = figure.axes[view]
-        _, force = axes.collections
-        assert force.get_label().startswith(f"force {size[step] / 1e3:.3g} kN")
-        drawn = np.array([force.U[0], force.V[0]]) / 12.0
-        np.testing.assert_allclose(drawn, history["force"].values[step, [0, component]] / size[step], rtol=1e-6)
-        assert 0.0 <= force.X[0] <= 4.0  # in the plate
-        (arc,) = [line for line in axes.lines if line.get_label().startswith("moment")]
-        y = arc.get_ydata() - history["plate_position"].values[step, component] * 1e3
-        x = arc.get_xdata() - history["plate_position"].values[step, 0] * 1e3
-        angle = np.degrees(np.unwrap(np.arctan2(y, x)))
-        share = moment[across] / np.linalg.norm(moment)  # y points away from the reader of x-z: positive is clockwise
-        assert angle[-1] - angle[0] == pytest.approx(300.0 * share * (1 if across == 2 else -1), abs=0.1)
-        assert axes.texts[-1].get_text() == f"about {'xyz'[across]}: {moment[across]:.3g} N m".replace("-", "−")
-
-
-def test_plate_is_shown_at_every_snapshot_with_holes_left_out(history: xarray.Dataset) -> None:
-    figure = trajectory.plate(history)
-    share = history["resistance_share"]
-    panels = figure.axes[: share.sizes["snapshot"]]
-    assert [panel.get_title() for panel in panels] == [f"{t * 1e6:.1f} µs" for t in share["snapshot"].values]
-    for panel, snapshot in zip(panels, share.values, strict=True):
-        (image,) = panel.images
-        left, right, bottom, top = image.get_extent()
-        cell = float(share["cell_y"][1] - share["cell_y"][0]) * 1e3
-        assert left == pytest.approx(float(share["cell_y"][0]) * 1e3 - 0.5 * cell)
-        assert (right - left, top - bottom) == pytest.approx((cell * snapshot.shape[0], cell * snapshot.shape[1]))
-        drawn = image.get_array().T
-        np.testing.assert_array_equal(np.ma.getmaskarray(drawn), share.values[0] < 0.5)
-        shown = share.values[0] >= 0.5
-        np.testing.assert_allclose(drawn[shown], (snapshot / share.values[0])[shown])
-    assert (panels[0].images[0].get_array().compressed() == 1.0).all()  # nothing is weakened at the first touch
-
-
 def test_figures_are_written(history: xarray.Dataset, tmp_path: Path) -> None:
     paths = trajectory.save_figures(history, tmp_path, "a")
     assert [path.name for path in paths] == [

@@ -162,15 +162,6 @@ def test_trajectories_are_of_the_worst_and_of_evenly_spread_hits(make_result: Re
     assert hit_data.worst_and_spread(some, 16, first=[7])[:5] == [7, 511, 509, 507, 505]
 
 
-@pytest.mark.parametrize("status", [Status.ARRESTED, Status.MISSED])
-def test_hits_without_values_or_cover_are_reported(make_result: ResultMaker, tmp_path: Path, status: Status) -> None:
-    files.write(make_result([status] * 8), tmp_path / "a.nc")
-    assert main(["report", str(tmp_path / "a.nc"), "--trajectories", "0"]) == 0
-    (shown,) = data_of(tmp_path / "a.html")["results"]
-    assert shown["nearest"] is None
-    assert (shown["columns"]["residual velocity"][0] is None) == (status == Status.ARRESTED)
-
-
 def test_what_is_missing_is_told_and_nothing_written(
     folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
