@@ -135,7 +135,7 @@ KEPT = {
     ),
     "kept_d": solid("9 mm of ARMOX560T, solid", 9e-3, 3.8e9, 0.039, STEEL, (750.0, 950.0)),
 }
-"""Plates that no law was fitted to; its form was chosen with them known (tests/validation/laws.py)."""
+"""Plates that no law was fitted to; its form was chosen with them known."""
 
 
 def staggered_slots(width: float, length: float, across: float, along: float) -> SlotPattern:
