@@ -1,7 +1,6 @@
 """Records: a new one is a group and a line, and outcomes are columns with what is done to all of them alike."""
 
 import pickle
-from collections import Counter
 from pathlib import Path
 from typing import Any
 
@@ -147,9 +146,3 @@ def test_a_scene_says_what_is_recorded(strength: Any, layers: Any, record: Any, 
     shots = make_shots(Impact(velocity=825.0), Hits(count=1), PLATE)
     groups = [group for group in registry.RECORDS if group.recorded(scene, shots)]
     assert {str(one) for group in groups for one in group} & (ALWAYS | LAYERED | BENT | {"broken"}) == expected
-
-
-def test_each_name_has_one_variable() -> None:
-    named = [one for group in registry.RECORDS for one in group]
-    assert {str(one) for one, count in Counter(named).items() if count > 1} == {"limit_runs", "limit_converged"}
-    assert registry.variable("tilt").units == "degree"

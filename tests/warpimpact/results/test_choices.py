@@ -85,9 +85,7 @@ def test_holes_follow_from_the_plate_where_the_outlines_were_left_behind(
     [
         (lambda d: d.isel(hit=[]), "has no hits, so there is nothing to show"),
         (lambda d: d.isel(hit=3), "holds one hit without its dimension; choose hits as a list"),
-        (lambda d: d.isel(standoff=0), "holds one stand-off without its dimension; choose stand-offs as a list"),
         (lambda d: d.where(d["tilt"].isel(standoff=0, drop=True) > 20.0), "choose hits with where(..., drop=True)"),
-        (lambda d: d[["tilt"]], 'is no whole file of a map of hits, it has no "axis"'),
         (lambda d: d.drop_attrs(deep=False), 'no attribute "warpimpact_kind"; if it was chosen from a result, keep'),
     ],
 )

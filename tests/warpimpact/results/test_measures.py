@@ -94,17 +94,11 @@ def test_a_worst_tenth_of_shards_is_that_of_all_shots() -> None:
     ("text", "sentence"),
     [
         ("mean(residual_velcity)", "did you mean mean(residual_velocity)?"),
-        ("mean(speed)", "but it must be one of base_depth, "),
-        ("P(perforatd)", "did you mean P(perforated)?"),
-        ("mean(perforated)", 'got "perforated", which takes the form P(perforated)'),
         ("P(tilt)", 'got "tilt", which takes the form mean(tilt) or P(tilt > …)'),
-        ("base_depth", "did you mean mean(base_depth)?"),
         ("median(tilt)", "but it must be of the form mean("),
-        ("mean(tilt, 0.5)", "but mean(…) takes a quantity alone"),
         ("quantile(tilt)", "but quantile(…) takes a share"),
         ("worst_tenth(tilt)", "neither a high nor a low tilt is worse"),
         ("mean(base_depth@130mm)", "base_depth has no stand-off"),
-        ("P(stopped@130mm)", "the event stopped has neither a place nor a share"),
         ("P(residual_energy_density > 5 mm)", 'got "5 mm", which is not an energy per area'),
     ],
 )
@@ -118,7 +112,6 @@ def test_a_text_that_is_no_measure_is_told_in_one_sentence(text: str, sentence: 
     [
         ("V50", "limit velocity, 50 % quantile [m/s]", "higher is better"),
         ("P(inclination@130mm > 30 deg)", "P(inclination at 130 mm > 30°, or stopped)", "higher is better"),
-        ("P(inclination < 30 deg)", "P(inclination at the last stand-off < 30°)", "lower is better"),
         (
             "worst_tenth(residual_energy_density@50mm)",
             "proxy: energy per presented area at 50 mm, worst tenth [J/mm²]",
@@ -126,7 +119,6 @@ def test_a_text_that_is_no_measure_is_told_in_one_sentence(text: str, sentence: 
         ),
         ("mean(limit_thickness@layer 1)", "limit thickness of layer 1, mean [mm]", "lower is better"),
         ("mean(yaw@50mm)", "yaw at 50 mm, mean [°]", "neither is better"),
-        ("areal_density", "areal density [kg/m²]", "lower is better"),
     ],
 )
 def test_words_and_direction_of_a_measure(text: str, title: str, better: str | None) -> None:

@@ -1,6 +1,5 @@
 """The Dataset contract, and files that are complete or absent."""
 
-import dataclasses
 import os
 
 import numpy as np
@@ -12,8 +11,8 @@ from warpimpact.kernels.status import OF_SHOTS, Status
 from warpimpact.results import files
 from warpimpact.results.dataset import status_codes
 from warpimpact.results.outlines import outlines
-from warpimpact.results.variables import EXIT_VARIABLES, OUTCOME_VARIABLES, SCATTER_VARIABLES, SHOT_VARIABLES
-from warpimpact.scene import NoPattern, Shots, SquarePattern
+from warpimpact.results.variables import EXIT_VARIABLES, OUTCOME_VARIABLES
+from warpimpact.scene import NoPattern, SquarePattern
 
 MM = 1e-3
 TWO_HOLES = SquarePattern(side=2 * MM, spacing=(16 * MM, 8 * MM), holes=[(2 * MM, 0.0), (-2 * MM, 0.0)])
@@ -117,14 +116,6 @@ def test_file_opens_with_plain_xarray_and_is_identical(make_result, tmp_path, pa
     xarray.testing.assert_identical(files.read(path), dataset)
 
 
-def test_write_replaces_an_existing_file(make_result, tmp_path):
-    path = tmp_path / "out.nc"
-    path.write_text("old")
-    files.write(make_result(3), path)
-    assert files.read(path).sizes["hit"] == 3
-    assert os.listdir(tmp_path) == ["out.nc"]
-
-
 def break_off(error: BaseException):
     """A writer that stops half-way, as on a full disk or after Ctrl-C."""
 
@@ -153,25 +144,12 @@ def test_breaking_off_leaves_the_folder_as_it_was(make_result, tmp_path, monkeyp
     assert {path.name: path.read_text() for path in tmp_path.iterdir()} == before
 
 
-def test_failure_inside_netcdf_leaves_nothing_behind(make_result, tmp_path):
-    dataset = make_result().assign_attrs(campaign={"not": "an attribute"})
-    with pytest.raises(TypeError):
-        files.write(dataset, tmp_path / "out.nc")
-    assert list(tmp_path.iterdir()) == []
-
-
 def test_failing_rename_keeps_the_existing_file(make_result, tmp_path):
     (tmp_path / "out.nc").mkdir()
     for place in (tmp_path, tmp_path / "absent"):
         with pytest.raises(files.OutputError, match=r"out\.nc: cannot be written"):
             files.write(make_result(), place / "out.nc")
     assert os.listdir(tmp_path) == ["out.nc"]
-
-
-def test_every_field_of_shots_has_a_variable():
-    shot_names = {variable.field for variable in SHOT_VARIABLES} | {"hit_y", "hit_z"}
-    of_layers = {name.removeprefix("layer_") for name in SCATTER_VARIABLES}
-    assert {field.name for field in dataclasses.fields(Shots)} == shot_names | of_layers
 
 
 def test_a_result_is_opened_by_its_name(make_result, tmp_path):

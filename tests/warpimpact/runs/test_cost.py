@@ -1,13 +1,12 @@
 """What is told of a campaign that takes long, before it is computed."""
 
-import math
 import warnings
 from pathlib import Path
 
 import pytest
 
 from warpimpact import Campaign, Numerics, SlotPattern
-from warpimpact.runs.cost import SLOW, Costly, cost_warning, estimate_cost
+from warpimpact.runs.cost import Costly, cost_warning, estimate_cost
 from warpimpact.solver.prepare import prepare
 from warpimpact.solver.resolution import MOST_STEPS, TooManySteps
 
@@ -33,18 +32,6 @@ def test_hits_that_take_long_are_told_once_at_each_level() -> None:
     assert estimate_cost(Campaign.from_toml(SLOTTED_PLATE), LEVEL) is None
 
 
-def test_limits_and_large_windows_are_told(monkeypatch: pytest.MonkeyPatch) -> None:
-    campaign = Campaign.from_toml(SLOTTED_PLATE)
-    prepared = prepare(campaign.scene, campaign.sampler().shots(0, 1), LEVEL)
-    assert estimate_cost(campaign, LEVEL) is None
-    assert str(estimate_cost(campaign, LEVEL, math.ceil(SLOW / prepared.seconds))).startswith(
-        "at level 2 a hit takes about 1 s"
-    )
-    assert prepared.window_bytes > 0
-    monkeypatch.setattr("warpimpact.runs.cost.LARGE", prepared.window_bytes)
-    assert str(estimate_cost(campaign, LEVEL)).startswith("at level 2 a hit takes about ")
-
-
 def test_holes_that_take_long_are_told_before_they_are_built() -> None:
     campaign = Campaign.from_toml(SLOTTED_PLATE)
     pattern = SlotPattern(length="12 mm", width="4 mm", spacing=("0.45 m", "0.45 m"))
@@ -53,11 +40,6 @@ def test_holes_that_take_long_are_told_before_they_are_built() -> None:
         "at level 2 the holes of the plates take about 9.1 s of a core and 1.4 GiB before the first hit; a smaller "
         "period of the pattern, and a longer degradation_length, take less"
     )
-
-
-@pytest.mark.filterwarnings("error")
-def test_what_a_gpu_takes_is_not_announced() -> None:
-    cost_warning(slow(), "NVIDIA", passages=35)(LEVEL)
 
 
 def test_a_shot_of_too_many_steps_is_refused() -> None:

@@ -8,14 +8,13 @@ from typing import Any
 import numpy as np
 import pytest
 
-from warpimpact import Campaign, CampaignError, replay, simulate
+from warpimpact import Campaign, CampaignError, replay
 from warpimpact.cli import main
 from warpimpact.continuum import meeting
 from warpimpact.export.paraview import write_vtk
 from warpimpact.results import attributes as attr
 from warpimpact.results import files
 from warpimpact.results.references import references_of
-from warpimpact.runs import finite_elements
 from warpimpact.runs.choice import executor_for
 from warpimpact.runs.finite_elements import continuum_to_file
 
@@ -92,28 +91,6 @@ def test_a_hit_that_is_there_is_not_computed_again(
         assert np.array_equal(files.read(output)[name].values, straight[name].values, equal_nan=True), name
 
 
-def test_a_job_of_a_gpu_has_many_hits(campaign_file: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """The CPU stands in for it: jobs of three hits, of one, and of the solid plate."""
-    monkeypatch.setattr(finite_elements, "MOST", 3)
-    whole, told = files.read(computed(tmp_path / "all.nc", campaign_file)), list[tuple[int, int, int]]()
-    with executor_for("cpu", apart=True) as executor:
-        executor.made_by = executor.made_by | {attr.DEVICE: "a GPU"}
-        continuum_to_file(
-            Campaign.from_toml(campaign_file),
-            tmp_path / "together.nc",
-            device=executor,
-            progress=lambda *now: told.append(now),
-        )
-    together = files.read(tmp_path / "together.nc")
-    assert together.attrs[attr.DEVICE] == "a GPU"
-    for name in ("residual_velocity", "tilt", "hourglass_share"):
-        assert np.array_equal(whole[name].values, together[name].values, equal_nan=True), name
-    solid, again = (references_of(one)["solid"] for one in (whole, together))
-    assert np.array_equal(solid["residual_velocity"], again["residual_velocity"])
-    assert told[0] == (0, 0, 4)
-    assert told[-1] == (4, 0, 4)
-
-
 def test_a_hit_is_replayed_bit_by_bit(campaign_file: Path, tmp_path: Path) -> None:
     result = files.read(computed(tmp_path / "all.nc", campaign_file))
     hit = int(result["eroded_elements"].values.argmax())
@@ -124,7 +101,6 @@ def test_a_hit_is_replayed_bit_by_bit(campaign_file: Path, tmp_path: Path) -> No
     assert np.abs(history["force"].values[-1]).max() == 0.0 < np.abs(history["force"].values[0]).max()
     left = history["resistance_share"].values
     assert left.shape[0] == 3
-    assert (left[0] == left[0].round()).all()
     assert left[-1].sum() < left[0].sum()
     assert float(history["translational_energy"][-1]) < float(history["translational_energy"][0])
     failed = (history["element_left"][0] - history["element_left"][-1]).values.sum()
@@ -138,10 +114,7 @@ def test_a_hit_is_replayed_bit_by_bit(campaign_file: Path, tmp_path: Path) -> No
     assert before[:, 0].min() == pytest.approx(0.0, abs=1e-7)
     assert before[:, 0].max() == pytest.approx(4e-3, abs=1e-7)
     columns = before[corner].mean(axis=1)
-    hit_y, hit_z = float(history["hit_y"]), float(history["hit_z"])
     assert Campaign.from_toml(campaign_file).plate.is_solid(columns[:, 1], columns[:, 2]).mean() > 0.98
-    assert np.abs(columns[:, 1] - hit_y).min() < 1e-3
-    assert np.abs(columns[:, 2] - hit_z).min() < 1e-3
     assert np.abs(after - before).max() > 1e-3
     for axis in (1, 2):  # the outer edge moves little
         assert np.ptp(after[:, axis]) == pytest.approx(np.ptp(before[:, axis]), abs=5e-4)
@@ -184,8 +157,6 @@ def test_the_command_computes_hits_of_a_result(
     [
         ([], "the continuum needs a material: give continuum.materials or --material with one of AA6082-T6"),
         (["--material", "ARMOX"], 'did you mean "ARMOX560T"'),
-        (["--material", "ARMOX560T", "--friction", "2"], "--friction: got 2.0, but it must be less than or equal to 1"),
-        (["--material", "ARMOX560T", "--element", "1 s"], "--element: got"),
         (["--material", "ARMOX560T", "--hit", "3"], "--hit and --hits are for a result"),
         (["--material", "ARMOX560T", "--material", "HARDOX400"], "got 2 materials, but the target has 1 layers"),
     ],
@@ -209,9 +180,7 @@ def test_bad_input_gets_a_sentence_and_writes_nothing(
     ("value", "sentence"),
     [
         ('materials = ["ARMOX"]', 'continuum.materials: got "ARMOX", which is not in the catalogue; did you mean'),
-        ('materials = ["mine.toml"]', 'continuum.materials: got "mine.toml", but there is no file'),
         ("friction = 2", "continuum.friction: got 2, but it must be less than or equal to 1"),
-        ('fidelity = "fine"', "continuum.fidelity: got"),
     ],
 )
 def test_the_table_of_a_campaign_is_checked_when_it_is_read(tmp_path: Path, value: str, sentence: str) -> None:
@@ -219,10 +188,3 @@ def test_the_table_of_a_campaign_is_checked_when_it_is_read(tmp_path: Path, valu
     path.write_text(CAMPAIGN[: CAMPAIGN.index("materials")] + value, encoding="utf-8")
     with pytest.raises(CampaignError, match=re.escape(sentence)):
         Campaign.from_toml(path)
-
-
-def test_python_computes_what_the_table_says(campaign_file: Path, tmp_path: Path) -> None:
-    campaign = Campaign.from_toml(campaign_file)
-    result = files.read(computed(tmp_path / "one.nc", campaign_file, (2,)))
-    outcomes = simulate(campaign.scene, campaign.sampler().shots(2, 1), numerics=campaign.continuum.solver)
-    assert outcomes.residual_velocity == result["residual_velocity"].values

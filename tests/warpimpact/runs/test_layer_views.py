@@ -5,13 +5,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 import xarray
-from matplotlib.colors import to_hex
 
-from warpimpact import Campaign, hit_map, run, to_dataframe
+from warpimpact import Campaign, hit_map, run
 from warpimpact.analysis.inspection import inspect_text
-from warpimpact.kernels.status import Status
 from warpimpact.plotting import trajectory
-from warpimpact.plotting.cell import NO_VALUE, STATUS_COLOURS, shown
+from warpimpact.plotting.cell import shown
 from warpimpact.plotting.maps import layers_figure
 from warpimpact.report.words import result_content
 from warpimpact.runs.replay import replay
@@ -54,11 +52,6 @@ def result() -> xarray.Dataset:
     return run(campaign(), device="cpu")
 
 
-def test_a_table_has_a_column_for_each(result: xarray.Dataset) -> None:
-    table = to_dataframe(result)
-    np.testing.assert_array_equal(table["layer_tilt_1"], result["layer_tilt"][:, 1])
-
-
 def test_maps_choose_the_layer(result: xarray.Dataset) -> None:
     image = hit_map(result, "layer_tilt", layer=0, pixels=20)
     assert set(np.unique(image)) <= set(result["layer_tilt"].values[:, 0].astype(float))
@@ -73,19 +66,6 @@ def test_the_figure_of_layers_has_a_row_for_each(result: xarray.Dataset) -> None
     assert titles[0] == "layer 0\nperforated 100.0%"
     assert [title.splitlines()[0] for title in titles[1::3]] == [f"residual velocity, layer {k}" for k in range(3)]
     assert [title.splitlines()[0] for title in titles[2::3]] == [f"tilt, layer {k}" for k in range(3)]
-
-
-def test_the_legend_of_layers_names_each_colour_once(result: xarray.Dataset) -> None:
-    stopped = result.copy(deep=True)
-    stopped["layer_status"][:, 2] = Status.ARRESTED
-    stopped["layer_tilt"][:, 2] = np.nan
-    stopped["layer_residual_velocity"][:, 2] = np.nan
-    (legend,) = layers_figure(stopped).legends
-    texts = [text.get_text() for text in legend.get_texts()]
-    assert sorted(texts) == ["arrested", "edge of hole", "no value: arrested", "perforated"]
-    colours = {patch.get_label(): to_hex(patch.get_facecolor()).upper() for patch in legend.get_patches()}
-    assert colours["arrested"] == STATUS_COLOURS[Status.ARRESTED]
-    assert colours["no value: arrested"] == to_hex(NO_VALUE).upper()
 
 
 def test_a_report_tells_every_layer(result: xarray.Dataset) -> None:

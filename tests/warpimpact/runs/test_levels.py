@@ -35,11 +35,9 @@ def campaign(changes: dict[str, str] | None = None) -> Campaign:
     "changes",
     [
         {},
-        {"[hits]": "[hits]\nirreducible = false"},
-        {'sampling = "sobol"': 'sampling = "random"', "seed = 1": "seed = 1\nirreducible = false"},
         {'sampling = "sobol"': 'sampling = "grid"', "seed = 1\n": ""},
     ],
-    ids=["images", "sobol", "random", "grid"],
+    ids=["sobol", "grid"],
 )
 def test_the_finer_hits_are_those_that_this_level_computes(changes: dict[str, str]) -> None:
     result = run(campaign({'"standard"': '"draft"', **changes}), device="cpu")

@@ -14,9 +14,8 @@ from warpimpact.results import files
 from warpimpact.results.variables import EXIT_VARIABLES
 from warpimpact.runs.run import run_to_file
 from warpimpact.scene import Layer, Numerics, Target
-from warpimpact.solver import device, replay, simulate
+from warpimpact.solver import replay, simulate
 from warpimpact.solver.memory import Memory
-from warpimpact.solver.replay import material_about
 
 SLOTTED_PLATE = (Path(__file__).parents[3] / "campaigns" / "slotted_plate.toml").read_text(encoding="utf-8")
 
@@ -62,31 +61,6 @@ def test_memory_does_not_grow_with_the_count(
     assert peak < count * numbers * 8 / 3  # bytes; a third of what the result takes
 
 
-def test_scratch_is_halved_until_it_can_be_had() -> None:
-    def allocate(slots: int) -> str:
-        if slots > 100:
-            raise RuntimeError(f"Failed to allocate {slots} bytes on device 'cuda:0'")
-        return f"{slots} slots"
-
-    assert device.halving(1000, allocate) == (62, "62 slots")
-
-
-@pytest.mark.parametrize(
-    "error", [RuntimeError("Failed to allocate 8 bytes"), MemoryError("full"), RuntimeError("other")]
-)
-def test_what_halving_cannot_cure_is_told(error: Exception) -> None:
-    asked = []
-
-    def allocate(slots: int) -> None:
-        asked.append(slots)
-        raise error
-
-    cured = str(error) != "other"
-    with pytest.raises(MemoryError if cured else RuntimeError, match=str(error)):
-        device.halving(8, allocate)
-    assert asked == ([8, 4, 2, 1] if cured else [8])
-
-
 def test_a_failing_allocation_changes_no_bit(campaign: Campaign, monkeypatch: pytest.MonkeyPatch) -> None:
     shots = campaign.sampler().shots(0, 64)
 
@@ -126,20 +100,3 @@ def test_a_replay_that_does_not_fit_is_refused(campaign: Campaign, monkeypatch: 
     monkeypatch.setattr(replay, "free_memory", lambda: 2**16)
     with pytest.raises(MemoryError, match=r"history of \d+ steps with 6 snapshots of \d+ cells needs .* GiB are free"):
         replay.replay(campaign.scene, shots, numerics=numerics)
-
-
-@pytest.mark.parametrize("size", [None, (10e-3, 10e-3)])
-def test_the_material_of_a_window_takes_no_points_inside(campaign: Campaign, size: tuple[float, float] | None) -> None:
-    plate, spacing = campaign.plate.model_copy(update={"size": size}), 50e-6
-    y, z = (spacing * (np.arange(300) - at) for at in (133, 171))
-    fine = ((np.arange(16) + 0.5) / 16 - 0.5) * spacing
-    tracemalloc.start()
-    try:
-        share = material_about(plate, y, z, spacing)
-        peak = tracemalloc.get_traced_memory()[1]
-    finally:
-        tracemalloc.stop()
-    some = slice(0, 300, 23), slice(0, 300, 29)
-    points = y[some[0], None, None, None] + fine[:, None], z[some[1], None, None] + fine
-    np.testing.assert_array_equal(share[some], plate.is_solid(*points).mean(axis=(2, 3)))
-    assert peak < 20e6  # all points are 23 MB in one byte each

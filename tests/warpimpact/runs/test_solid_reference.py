@@ -8,11 +8,9 @@ import pytest
 import xarray
 
 from warpimpact import Campaign, Numerics, open_result
-from warpimpact.cli import main
 from warpimpact.kernels.status import Status
 from warpimpact.results import files
-from warpimpact.results.references import reference, references_of
-from warpimpact.runs.compute import HitMap
+from warpimpact.results.references import references_of
 from warpimpact.runs.run import run, run_to_file
 
 SLOTTED_PLATE = (Path(__file__).parents[3] / "campaigns" / "slotted_plate.toml").read_text(encoding="utf-8")
@@ -29,13 +27,6 @@ def computed(tmp_path: Path, *changes: tuple[str, str]) -> xarray.Dataset:
     (tmp_path / "a.toml").write_text(text, encoding="utf-8")
     run_to_file(Campaign.from_toml(tmp_path / "a.toml"), tmp_path / "a.nc", device="cpu")
     return files.read(tmp_path / "a.nc")
-
-
-def test_it_has_the_areal_density_of_the_perforated_one(tmp_path: Path) -> None:
-    plate = Campaign.from_text(SMALL, name="a", folder=tmp_path).plate
-    assert plate.solid.open_area == 0.0
-    assert plate.solid.areal_density == pytest.approx(plate.areal_density, rel=1e-14)
-    assert plate.solid.resistance == plate.resistance
 
 
 def test_a_shot_that_does_not_scatter_is_fired_once_and_meets_the_closed_form(tmp_path: Path) -> None:
@@ -70,17 +61,6 @@ def test_it_takes_the_shots_of_the_first_shard_if_they_differ_and_none_if_not_as
     assert {name: one.sizes["hit"] for name, one in references.items()} == ({"solid": shots} if shots else {})
 
 
-def test_shot_k_is_that_of_hit_k(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(HitMap, "reference_hits", 100)
-    dataset = computed(tmp_path, ('"825 m/s" ', '{ distribution = "uniform", low = 700, high = 850 } '))
-    solid = reference(dataset, "solid")
-    assert solid is not None
-    assert solid.sizes["hit"] == 100
-    np.testing.assert_array_equal(solid["impact_velocity"], dataset["impact_velocity"][:100])
-    order = np.argsort(solid["impact_velocity"].values)
-    assert (np.diff(solid["residual_velocity"].values[order]) > 0.0).all()  # a faster core leaves faster
-
-
 def test_tasks_of_many_shards_give_the_same_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, assert_same_bits):
     (tmp_path / "a.toml").write_text(SMALL, encoding="utf-8")
     campaign = Campaign.from_toml(tmp_path / "a.toml")
@@ -90,17 +70,6 @@ def test_tasks_of_many_shards_give_the_same_file(tmp_path: Path, monkeypatch: py
     assert_same_bits(tmp_path / "one.nc", tmp_path / "many.nc")
     with open_result(tmp_path / "many.nc", group="solid") as solid:
         assert solid["status"].dims == ("hit",)
-
-
-def test_a_result_is_compared_with_its_solid_plate(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    computed(tmp_path, ("= 600", "= 64"))
-    monkeypatch.chdir(tmp_path)
-    assert main(["compare", "a.nc"]) == 0
-    told = capsys.readouterr().out
-    assert "64 hits of each plate, the same shots" in told
-    assert "solid, same weight" in told
 
 
 def test_it_is_a_campaign_of_its_own(tmp_path: Path) -> None:

@@ -51,23 +51,6 @@ def test_batches_without_their_manifest_are_kept(damage: Callable[[Path], object
     opening(output, overwrite=True)
 
 
-def test_a_batch_is_replaced_by_that_of_its_number(tmp_path: Path) -> None:
-    store = Store(tmp_path / "fit.nc", CONTENT, "fit")
-    store.parts.folder.mkdir()
-    for arrays in (ARRAYS, {"points": np.ones(4)}):
-        store.save(3, arrays)
-        np.testing.assert_equal(store.load(3), arrays)
-    assert len(store.parts.paths()) == 1
-
-
-def test_another_content_is_refused_with_the_difference(tmp_path: Path) -> None:
-    output = tmp_path / "fit.nc"
-    begun(output)
-    other = CONTENT | {"threats": [{"speed": 2}]}
-    with pytest.raises(OutputError, match=r"cannot be resumed: threats\.0\.speed was 1 and is 2"):
-        opening(output, other, resume=True)
-
-
 @pytest.mark.parametrize("left", [True, False])
 def test_a_complete_result_is_resumed_to_itself(left: bool, tmp_path: Path) -> None:
     """With or without batches, as a death may come before they are removed."""
