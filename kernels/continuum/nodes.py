@@ -13,7 +13,7 @@ import warp as wp
 from .. import memory
 from ..variant import Variant
 from . import fields
-from .side_by_side import over_runs
+from .fields import over_runs
 
 
 @cache

@@ -19,7 +19,7 @@ import numpy as np
 from continuum_cases import PLATES, PUBLISHED, append, written
 
 from warpimpact import Continuum, Impact, Shots, simulate
-from warpimpact.catalogue.flow_entries import flow_entry
+from warpimpact.catalogue.catalogue import flow_entry
 from warpimpact.kernels.status import Status
 
 WIDTH, SHOTS, STEP = 0.025, 8, 1.04

@@ -14,7 +14,7 @@ from bench import cores, machine, seconds, spent, store
 from continuum_cases import CASES
 
 from warpimpact import Continuum, Numerics, simulate
-from warpimpact.catalogue.flow_entries import flow_entry
+from warpimpact.catalogue.catalogue import flow_entry
 from warpimpact.continuum.meeting import march_of
 from warpimpact.continuum.strikes import memory_of
 from warpimpact.solver.worker import Worker

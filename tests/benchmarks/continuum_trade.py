@@ -25,7 +25,7 @@ import numpy as np
 from continuum_cases import CASES, MEASURES, PLATES, Case, append, measured, written
 
 from warpimpact import Continuum, Numerics, Record, Scene, Shots, simulate
-from warpimpact.catalogue.flow_entries import flow_entry
+from warpimpact.catalogue.catalogue import flow_entry
 from warpimpact.continuum import meeting, meshing, one_hit
 from warpimpact.kernels.continuum import choices, hexahedra, passing
 

@@ -35,10 +35,9 @@ from roads import NORMAL, ROADS, base, scene_and_shots
 from roads import OBLIQUE as OBLIQUE_IMPACT
 
 from warpimpact.campaign.campaign import Campaign
-from warpimpact.catalogue.flow_entries import flow_entry
-from warpimpact.continuum.many_hits import MOST, ManyHits
+from warpimpact.catalogue.catalogue import flow_entry
 from warpimpact.continuum.meeting import Struck, march_of
-from warpimpact.continuum.strikes import memory_of, outcomes_of, simulate, together
+from warpimpact.continuum.strikes import MOST, ManyHits, memory_of, outcomes_of, simulate, together
 from warpimpact.kernels import lanes, march
 from warpimpact.runs.run import run_to_file
 from warpimpact.scene import Numerics, Scene, Shots

@@ -5,9 +5,9 @@ import numpy as np
 import pytest
 from numpy.typing import ArrayLike
 
-from warpimpact.continuum.many_hits import ManyHits
 from warpimpact.continuum.meshing import SheetMesh
 from warpimpact.continuum.one_hit import OneHit, Start
+from warpimpact.continuum.strikes import ManyHits
 from warpimpact.scene import PolynomialCore
 from warpimpact.scene.flow import Flow
 

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from warpimpact import CirclePattern, Continuum, Layer, NoPattern, Plate, PolynomialCore, Record, Scene, Shots, simulate
-from warpimpact.continuum import many_hits, meeting, strikes
+from warpimpact.continuum import meeting, strikes
 from warpimpact.kernels.status import Status
 from warpimpact.records.outcomes import Outcomes
 from warpimpact.scene.flow import Flow
@@ -169,7 +169,7 @@ def test_hits_that_march_together_end_as_those_that_march_alone(
     coarse: float, monkeypatch: pytest.MonkeyPatch, device: str
 ) -> None:
     """Two at a time, through two plates, to the rounding of other sums in single precision."""
-    monkeypatch.setattr(many_hits, "MOST", 2)
+    monkeypatch.setattr(strikes, "MOST", 2)
     target = (HOLES, Layer(thickness=2e-3, resistance=2.6e9, gap=10e-3))
     scene, continuum = Scene(core=CORE, target=target), Continuum(flows=(STEEL,), spacing=coarse)
     shots = replace(shots_at(*[(1e-3, 2e-3)] * 3, yaw=0.02, spin=1.7e4), velocity=np.array([500.0, 825.0, 650.0]))

@@ -6,7 +6,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field, ValidationInfo, field_validator
 
-from ..catalogue.flow_entries import FlowEntry, flow_entry, flow_names
+from ..catalogue.catalogue import FlowEntry, flow_entry, flow_names
 from ..scene.flow import Continuum
 from ..scene.input_files import input_file
 from ..scene.model import Model

@@ -76,15 +76,10 @@ def _filled(model: type[Plate], given: dict[str, Any]) -> dict[str, Any]:
             f"{' and '.join(missing)} must be given: the resistance of {steel.name} depends on threat, thickness and "
             'angle; give threat = ".30 AP M2" or a core, and obliquity, or else resistance'
         )
-    core, obliquity = _core(given["threat"]), OBLIQUITY.validate_python(given["obliquity"])
+    hit_by, obliquity = given["threat"], OBLIQUITY.validate_python(given["obliquity"])
+    core = hit_by if isinstance(hit_by, Core) else (hit_by if isinstance(hit_by, Threat) else threat(str(hit_by))).core
     thickness = model.model_validate(steel.table(keys, resistance=1.0)).thickness
     return steel.table(keys, Catalogue().resistance(steel, core, thickness, obliquity).median)
-
-
-def _core(given: Any) -> Core:
-    if isinstance(given, Core):
-        return given
-    return (given if isinstance(given, Threat) else threat(str(given))).core
 
 
 Plate.of_material = staticmethod(_filled)

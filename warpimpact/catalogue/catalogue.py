@@ -1,30 +1,35 @@
-"""Catalogue: threats and materials by name, those of the package and those of a user's file."""
+"""Catalogue: threats, materials and flows by name, those of the package and those of a user's file.
+
+Case, spaces and hyphens of a name do not count, and entries have aliases.
+"""
 
 from __future__ import annotations
 
 import re
 import tomllib
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from difflib import SequenceMatcher
 from functools import cache
 from pathlib import Path
 from typing import Any, TypeVar
 
-from pydantic import ValidationError
+from pydantic import Field, ValidationError
 
-from warpimpact.catalogue.entries import Material, Threat
-from warpimpact.catalogue.spelling import the_entry
+from warpimpact.catalogue.entries import Material, Name, Threat, evidence
 from warpimpact.catalogue.strength import Resistance, resistance_of
 from warpimpact.scene import Core
+from warpimpact.scene.flow import Flow
 from warpimpact.scene.input_files import parsed, read_text
 from warpimpact.scene.problems import complaint
-from warpimpact.scene.units import quoted
+from warpimpact.scene.units import MOST_QUOTED, Title, quoted
 
 Entry = TypeVar("Entry", Threat, Material)
 
 HERE = Path(__file__).parent
 FOLDERS: Mapping[type[Any], Path] = {Threat: HERE / "threats", Material: HERE / "materials"}
 """Folders of the entries of the package, one file each."""
+FLOWS = HERE / "flows"
 
 
 @dataclass(frozen=True)
@@ -72,7 +77,7 @@ class Catalogue:
             ValueError: there is none, or an alias stands for several.
         """
         entries: dict[str, Threat | Material] = {**self.all(Material), **self.all(Threat)}
-        return entries[the_entry(name, _spellings(entries))]
+        return entries[the_entry(name, entries)]
 
     def all(self, kind: type[Entry]) -> dict[str, Entry]:
         """All threats or all materials by name, those of the user first."""
@@ -90,11 +95,7 @@ class Catalogue:
         if entry is not None and entry.name == name:
             return entry
         entries = self.all(kind)
-        return entries[the_entry(name, _spellings(entries))]
-
-
-def _spellings(entries: Mapping[str, Any]) -> dict[str, tuple[str, ...]]:
-    return {name: entry.aliases for name, entry in entries.items()}
+        return entries[the_entry(name, entries)]
 
 
 def file_name(name: str) -> str:
@@ -113,13 +114,135 @@ def _entries(kind: type[Entry], tables: Any, place: str) -> dict[str, Entry]:
         raise ValueError(f"{place}: got {quoted(tables)}, but it must be a list: tables [[{place.split()[-1]}]]")
     entries: dict[str, Entry] = {}
     for number, table in enumerate(tables):
-        try:
-            entry = kind.model_validate(table)
-        except ValidationError as error:
-            first = error.errors(include_url=False)[0]
-            where = ".".join(map(str, first["loc"]))
-            raise ValueError(f"{place}[{number}]{f'.{where}' if where else ''}: {complaint(first)}") from None
+        entry: Entry = _valid(kind, table, f"{place}[{number}]", ".")
         if entry.name in entries:
             raise ValueError(f"{place}[{number}].name: got {quoted(entry.name)} again, but each entry needs its own")
         entries[entry.name] = entry
     return entries
+
+
+class FlowEntry(Flow):
+    """A material of the continuum.
+
+    Attributes:
+        name: by which `--material` finds it.
+        known, assumed: source, or assumption, by property.
+        tested: what the continuum gives for a plate test that somebody published, and what was measured, by the plate.
+    """
+
+    name: Name
+    known: dict[str, Title] = Field(default_factory=dict)
+    assumed: dict[str, Title] = Field(default_factory=dict)
+    tested: dict[str, Title] = Field(default_factory=dict)
+
+    @property
+    def flow(self) -> Flow:
+        """Its constants."""
+        return Flow(**{name: getattr(self, name) for name in Flow.model_fields})
+
+    @property
+    def evidence(self) -> str:
+        """State of the evidence in words."""
+        tests = "; ".join(f"{plate}: {words}" for plate, words in self.tested.items())
+        return evidence(self.known, self.assumed) + (f"; beside a plate test: {tests}" if tests else "")
+
+
+def flow_entry(name: str) -> FlowEntry:
+    """The material of a name, or of a TOML file.
+
+    Raises:
+        ValueError: there is no such entry, or the file has an invalid value.
+    """
+    if name.endswith(".toml"):
+        entry: FlowEntry = _valid(FlowEntry, parsed(read_text(Path(name)), name), name, ": ")
+        return entry
+    entries = _packaged()
+    try:
+        return entries[the_entry(name, entries)]
+    except ValueError as error:
+        raise ValueError(f"{error} (or a TOML file)") from None
+
+
+@cache
+def _packaged() -> dict[str, FlowEntry]:
+    tables = {path: tomllib.loads(path.read_text(encoding="utf-8")) for path in sorted(FLOWS.glob("*.toml"))}
+    return {table["name"]: FlowEntry.model_validate(table) for table in tables.values()}
+
+
+def flow_names() -> tuple[str, ...]:
+    """Names of the materials of the package."""
+    return tuple(_packaged())
+
+
+def _valid(kind: type[Any], table: Any, place: str, separator: str) -> Any:
+    """An entry of a user's file.
+
+    Raises:
+        ValueError: names the first key that is wrong.
+    """
+    try:
+        return kind.model_validate(table)
+    except ValidationError as error:
+        first = error.errors(include_url=False)[0]
+        where = ".".join(map(str, first["loc"]))
+        raise ValueError(f"{place}{f'{separator}{where}' if where else ''}: {complaint(first)}") from None
+
+
+_EQUAL_LETTERS = 0.75
+"""Smallest share of equal letters of a slip of the keyboard."""
+_FEW = 12
+"""Most entries that a message lists."""
+_CALIBRE = r"\.?\d+(?:\.\d+)?(?:mm)?"
+_ALUMINIUM = r"^(?:enaw|aa|aluminium|aluminum|al)(?=\d{4})"
+
+
+def key(name: str) -> str:
+    """What all spellings of a name have in common.
+
+    Case, spaces, hyphens and slashes do not count. "7.62 mm" is "7.62", but "30 mm" is not ".30". Aluminium alloys need
+    no prefix: "6061-T6", "AA6061-T6" and "EN AW-6061 T6" are one name.
+    """
+    compact = re.sub(r"[^a-z0-9.×]", "", name[:MOST_QUOTED].casefold()).replace("×", "x")
+    decimal = re.sub(r"(\d\.\d+)mm", r"\1", compact)
+    return re.sub(_ALUMINIUM, "", re.sub(r"\.(?!\d)", "", decimal))
+
+
+def the_entry(name: str, entries: Mapping[str, Threat | Material | FlowEntry]) -> str:
+    """Name of the entry that a name or an alias stands for.
+
+    Raises:
+        ValueError: there is none, or an alias stands for several; the message lists whom it may mean.
+    """
+    spellings = {entry: () if isinstance(one, FlowEntry) else one.aliases for entry, one in entries.items()}
+    if named := [entry for entry in spellings if key(entry) == key(name)]:
+        return named[0]
+    called = [entry for entry, aliases in spellings.items() if key(name) in map(key, aliases)]
+    if len(called) == 1:
+        return called[0]
+    if called:
+        raise ValueError(f"got {quoted(name)}, which several entries of the catalogue are: {_listed(called)}; name one")
+    meant = [entry for entry, aliases in spellings.items() if any(_close(name, word) for word in (entry, *aliases))]
+    few = f"allowed are {', '.join(spellings)}" if len(spellings) <= _FEW else "warpimpact catalogue lists all"
+    hint = f"did you mean {_listed(meant)}?" if meant else few
+    raise ValueError(f"got {quoted(name)}, which is not in the catalogue; {hint}")
+
+
+def _listed(names: Sequence[str]) -> str:
+    *others, last = (f'"{name}"' for name in names)
+    return f"{', '.join(others)} or {last}" if others else last
+
+
+def _close(name: str, spelling: str) -> bool:
+    """Whether a name is part of a spelling or a slip of it.
+
+    Numbers tell calibres and alloys apart: those of a part must be in the spelling, those of a slip are the same."""
+    given, known = key(name), key(spelling)
+    numbers, others = _numbers(given), _numbers(known)
+    if len(given) > 1 and given in known and numbers <= others:
+        return True
+    letters, other_letters = (re.sub(_CALIBRE, "", word) for word in (given, known))
+    return numbers == others and SequenceMatcher(None, letters, other_letters).ratio() >= _EQUAL_LETTERS
+
+
+def _numbers(word: str) -> set[str]:
+    return {number.removeprefix(".") for number in re.findall(_CALIBRE, word)}

@@ -64,10 +64,6 @@ def material_view(material: Material, *, is_own: bool = False) -> list[Section]:
         low, high = material.resistance_low / 1e9, material.resistance_high / 1e9
         rows.append(("Y, 90 %", f"{low:.3g} to {high:.3g} GPa, of a plate one calibre thick"))
     rows += [] if is_own else _predicted(material)
-    if material.weakening is not None:
-        weakening = material.weakening.model_dump(exclude_none=True)
-        rows.append(("weakening", ", ".join(f"{key} {value:.4g}" for key, value in weakening.items())))
-    rows += [("fitted", f"{plate}: {words}") for plate, words in material.found.items()]
     if material.hardness is not None:
         rows.append(("hardness", f"{material.hardness:g} HV"))
     rows += _rows(material)

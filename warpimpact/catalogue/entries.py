@@ -22,7 +22,6 @@ from warpimpact.scene.units import (
     PositiveMass,
     PositiveSpeed,
     PositiveStress,
-    PositiveTime,
     Speed,
     Title,
 )
@@ -121,15 +120,6 @@ class Threat(Model):
         return ("" if self.shape else "core not known; ") + evidence(self.known, self.assumed)
 
 
-class Weakening(Model):
-    """How a plate with holes weakens, as in `Plate`."""
-
-    degradation: Share
-    degradation_interval: PositiveTime | None = None
-    degradation_distance: PositiveLength | None = None
-    degradation_length: PositiveLength | None = None
-
-
 class Material(Model):
     """A material of plates, with the law that its strength was found with.
 
@@ -145,8 +135,6 @@ class Material(Model):
         resistance_low, resistance_high: ends of its 90 % interval [Pa].
         thickness_exponent: how Y grows with the thickness.
         shear_coefficient, linear, quadratic, onset: η, C, B and κ of the law.
-        weakening: how its plates weaken; None where nothing tells that.
-        found: shots, intervals and residuals of a fit that the numbers come from, in words, by the plate.
         rows: published limit velocities that it was found from, by projectile.
         sources: keys of their sources.
         thickness_low, thickness_high, calibres_low, calibres_high, obliquity_low, obliquity_high: range of these rows;
@@ -168,8 +156,6 @@ class Material(Model):
     linear: NonNegativeNumber = 0.0
     quadratic: NonNegativeNumber = 0.0
     onset: NonNegativeNumber = 0.005
-    weakening: Weakening | None = None
-    found: dict[str, Title] = Field(default_factory=dict)
     rows: dict[str, Annotated[int, Field(ge=1)]] = Field(default_factory=dict)
     sources: tuple[Title, ...] = ()
     thickness_low: Length = 0.0
@@ -195,8 +181,7 @@ class Material(Model):
     def table(self, given: Mapping[str, Any], resistance: float) -> dict[str, Any]:
         """The table of a plate of the material and of this resistance [Pa], under the keys that are given."""
         base = {"resistance": resistance, "shear_coefficient": self.shear_coefficient, "density": self.density}
-        weakening = {} if self.weakening is None else self.weakening.model_dump(exclude_none=True)
-        return base | weakening | dict(given) | {"material": self.name}
+        return base | dict(given) | {"material": self.name}
 
     @property
     def count(self) -> int:
@@ -209,8 +194,7 @@ class Material(Model):
         misfit = "" if self.misfit is None else f", error of rows left out {self.misfit:.1%} (median)"
         kind = "limit velocity" if self.count == 1 else "limit velocities"
         rows = f"{self.count} {kind}{misfit}; " if self.count else ""
-        fits = "".join(f"fitted to {plate}; " for plate in self.found)
-        return rows + fits + evidence(self.known, self.assumed)
+        return rows + evidence(self.known, self.assumed)
 
 
 def evidence(known: dict[str, str], assumed: dict[str, str]) -> str:

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from warpimpact.campaign.campaign import Campaign
-from warpimpact.continuum.many_hits import MOST
+from warpimpact.continuum.strikes import MOST
 from warpimpact.continuum.strikes import check_continuum, struck
 from warpimpact.records.outcomes import Outcomes
 from warpimpact.results import attributes as attr

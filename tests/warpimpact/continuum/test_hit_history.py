@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from warpimpact import CirclePattern, Continuum, Layer, Plate, PolynomialCore, Record, Scene, Shots, simulate
-from warpimpact.catalogue.flow_entries import flow_entry
+from warpimpact.catalogue.catalogue import flow_entry
 from warpimpact.continuum import meeting
 from warpimpact.continuum.hit_history import replay_continuum
 from warpimpact.kernels.status import Status

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from warpimpact import CirclePattern, Continuum, Layer, Plate, PolynomialCore, Record, Scene, Shots, simulate
-from warpimpact.catalogue.flow_entries import flow_entry, flow_names
+from warpimpact.catalogue.catalogue import flow_entry, flow_names
 from warpimpact.continuum import meeting, strikes
 from warpimpact.continuum.meshing import nodes_of
 from warpimpact.continuum.one_hit import Energies
