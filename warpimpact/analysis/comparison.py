@@ -35,7 +35,7 @@ from warpimpact.results.files import ResultError
 from warpimpact.results.measures import Measure
 from warpimpact.results.per_hit import base_thickness, has_base
 from warpimpact.results.tallies import dealing, estimate_from
-from warpimpact.runs.manifests import first_difference
+from warpimpact.runs.parts import first_difference
 from warpimpact.scene.quantities import QUANTITIES
 from warpimpact.scene.units import quantity as reader_of
 from warpimpact.statistics.comparisons import (

@@ -15,7 +15,7 @@ from warpimpact.campaign.text import CampaignError
 from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
 from warpimpact.results.files import ResultError
-from warpimpact.runs.manifests import first_difference
+from warpimpact.runs.parts import first_difference
 from warpimpact.scene import Plate
 from warpimpact.view.view import Column, Section, Table, number, text_of
 

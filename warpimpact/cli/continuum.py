@@ -78,7 +78,7 @@ def _continuum(arguments: argparse.Namespace) -> int:
     from warpimpact.campaign.text import CampaignError
     from warpimpact.results import attributes as attr
     from warpimpact.results.netcdf import open_table
-    from warpimpact.runs.choice import executor_for
+    from warpimpact.runs.executor import executor_for
     from warpimpact.runs.finite_elements import continuum_to_file
 
     campaign, hits = _asked(arguments)

@@ -50,7 +50,7 @@ def _identify(arguments: argparse.Namespace) -> int:
     from warpimpact.plotting.posterior import FIGURES
     from warpimpact.results import files
     from warpimpact.results.posterior_file import INTERRUPTED
-    from warpimpact.runs.choice import executor_for
+    from warpimpact.runs.executor import executor_for
     from warpimpact.solver.device import cores, find_device
     from warpimpact.view.view import text_of
 

@@ -104,7 +104,7 @@ def add_computing(parser: argparse.ArgumentParser) -> None:
 
 def executor_of(arguments: argparse.Namespace) -> "AbstractContextManager[Executor]":
     """The executor that the options of `add_computing` ask for."""
-    from warpimpact.runs.choice import executor_for
+    from warpimpact.runs.executor import executor_for
 
     return executor_for(arguments.device, workers=arguments.workers, scheduler=arguments.scheduler)
 

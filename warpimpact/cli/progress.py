@@ -165,6 +165,6 @@ def _running(run: "RunProgress") -> str:
         for measure, estimate in run.estimates.items()
         if estimate.count > 1
     ]
-    if run.found is not None:
-        parts.append(run.found.phrase)
+    if run.pilot is not None:
+        parts.append(run.pilot.phrase)
     return ", ".join([*parts, f"{run.failed} failed"])

@@ -23,7 +23,7 @@ from .progress import show_run, warn
 if TYPE_CHECKING:
     from warpimpact.campaign.campaign import Campaign
     from warpimpact.results.table import Result
-    from warpimpact.runs.task import Computation
+    from warpimpact.runs.compute import Computation
 
 
 def add_run(commands: Commands) -> None:

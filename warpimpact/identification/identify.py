@@ -21,8 +21,7 @@ from warpimpact.identification.likelihood import Scores, evaluate
 from warpimpact.identification.parameters import FitError
 from warpimpact.identification.posterior import Chains, to_dataset
 from warpimpact.results.posterior_file import SETS
-from warpimpact.runs.choice import opened
-from warpimpact.runs.executor import Executor, Job, completed
+from warpimpact.runs.executor import Executor, Job, completed, opened
 from warpimpact.scene.model import Array
 from warpimpact.solver.worker import Worker
 

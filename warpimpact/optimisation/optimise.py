@@ -32,11 +32,9 @@ from warpimpact.results import front as f
 from warpimpact.results.dataset import dataset_of
 from warpimpact.results.files import OutputError, aside
 from warpimpact.results.kinds import FRONT
-from warpimpact.runs.choice import executor_for, opened
-from warpimpact.runs.executor import Executor
+from warpimpact.runs.executor import Executor, executor_for, opened
 from warpimpact.runs.parts import is_begun, remove
-from warpimpact.runs.questions import Question, answered
-from warpimpact.runs.store import Store, content_of, stored
+from warpimpact.runs.questions import Question, Store, answered, content_of, stored
 from warpimpact.scene.model import Array
 
 

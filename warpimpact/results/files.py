@@ -14,7 +14,7 @@ import netCDF4
 from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
 from warpimpact.results.kinds import HIT_MAP, KINDS, SWEEP, Kind, text_kind
-from warpimpact.results.netcdf import write_table
+from warpimpact.results.netcdf import FILE_CHUNK, write_table
 from warpimpact.results.outlines import in_a_file, in_memory
 from warpimpact.results.references import NAMES, references_of, with_references
 from warpimpact.results.table import HitTable
@@ -43,10 +43,6 @@ def write(dataset: xarray.Dataset, path: Path) -> None:
         write_table(in_a_file(HitTable.from_xarray(dataset)), file, references=references)
 
 
-FILE_CHUNK = 2**15
-"""Hits per chunk of a joined file: 256 KiB of one variable."""
-
-
 @contextmanager
 def aside(path: Path, folder: Path | None = None, *, named: Callable[[Path], Path] | None = None) -> Iterator[Path]:
     """A temporary path on the same disk to write to. After the block the file is flushed and renamed to `path`, or to
@@ -57,24 +53,18 @@ def aside(path: Path, folder: Path | None = None, *, named: Callable[[Path], Pat
     """
     written = (folder or path.parent) / f".{path.name}.{os.getpid()}.part"
     try:
-        with told_as(path):
-            yield written
-            _flush(written, os.O_RDWR)
-            os.replace(written, named(written) if named else path)
-            if os.name == "posix":  # elsewhere a folder cannot be opened, and needs no flushing
-                _flush(path.parent, os.O_RDONLY)
+        yield written
+        _flush(written, os.O_RDWR)
+        os.replace(written, named(written) if named else path)
+        if os.name == "posix":  # elsewhere a folder cannot be opened, and needs no flushing
+            _flush(path.parent, os.O_RDONLY)
+    except OutputError:
+        raise
+    except (OSError, RuntimeError) as error:  # netCDF reports a full disk as RuntimeError
+        raise OutputError(f"{path}: cannot be written ({_cause(error, path)})") from error
     finally:
         with suppress(OSError):
             written.unlink()
-
-
-@contextmanager
-def told_as(path: Path) -> Iterator[None]:
-    """Raise errors of writing as an OutputError about this file."""
-    try:
-        yield
-    except (OSError, RuntimeError) as error:  # netCDF reports a full disk as RuntimeError
-        raise OutputError(f"{path}: cannot be written ({_cause(error, path)})") from error
 
 
 def _flush(path: Path, mode: int) -> None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -12,8 +12,10 @@ import netCDF4
 import numpy as np
 
 from warpimpact.results import variables as v
-from warpimpact.results.table import HitTable, StoredColumn
+from warpimpact.results.table import HitTable, StoredColumn, joined
 
+FILE_CHUNK = 2**15
+"""Hits per chunk of a joined file: 256 KiB of one variable."""
 _PACKED = {"zlib": True, "complevel": 1}
 
 
@@ -88,22 +90,47 @@ def _write(
         written[:] = values.astype(object) if kind is str else values
 
 
-def open_to_append(file: Path) -> Any:
-    """Open a file that `write_table` wrote in chunks, for `append`. The cache of a variable, by default megabytes, has
-    room for two chunks."""
-    target = netCDF4.Dataset(file, "a")
-    target.set_auto_maskandscale(False)
-    for variable in target.variables.values():
-        if variable.chunking() != "contiguous":
-            variable.set_var_chunk_cache(size=2 * math.prod(variable.chunking()) * variable.dtype.itemsize)
-    return target
+def write_joined(
+    tables: Iterable[HitTable],
+    hits: int,
+    file: Path,
+    attributes: Mapping[str, Any],
+    references: Mapping[str, HitTable],
+) -> None:
+    """Join tables of consecutive hits into one file, with a few of them in memory at a time.
+
+    Args:
+        hits: number of all hits.
+        attributes: global attributes, which replace those of the first table.
+        references: as in `write_table`.
+    """
+    gathered = _gathered(tables)
+    write_table(first := next(gathered), file, chunk=min(hits, FILE_CHUNK))
+    with netCDF4.Dataset(file, "a") as target:
+        target.set_auto_maskandscale(False)
+        for variable in target.variables.values():  # the cache of a variable, by default megabytes, holds two chunks
+            if variable.chunking() != "contiguous":
+                variable.set_var_chunk_cache(size=2 * math.prod(variable.chunking()) * variable.dtype.itemsize)
+        at = first.sizes[v.HIT]
+        for table in gathered:
+            for name, column in table.variables.items():
+                if v.HIT in column.dims and name in target.variables:
+                    target[name][at : at + column.shape[0]] = column.values
+            at += table.sizes[v.HIT]
+        target.setncatts(dict(attributes))
+        write_groups(references, target)
 
 
-def append(table: HitTable, target: Any, first: int) -> None:
-    """Write the columns of a HitTable along "hit" into an open file, from hit number `first` on."""
-    for name, column in table.variables.items():
-        if v.HIT in column.dims and name in target.variables:
-            target[name][first : first + column.shape[0]] = column.values
+def _gathered(tables: Iterable[HitTable]) -> Iterator[HitTable]:
+    """Tables joined to at least half a chunk, because every access to a file costs some time."""
+    waiting: list[HitTable] = []
+    for table in tables:
+        waiting.append(table)
+        if sum(part.sizes[v.HIT] for part in waiting) >= FILE_CHUNK // 2:
+            yield joined(waiting)
+            waiting = []
+    if waiting:
+        yield joined(waiting)
 
 
 @contextmanager

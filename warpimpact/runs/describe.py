@@ -15,7 +15,6 @@ from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
 from warpimpact.results.dataset import to_table
 from warpimpact.results.table import HitTable
-from warpimpact.runs.task import Task
 from warpimpact.scene import Accuracy, Impact, Numerics, Shots, Target
 from warpimpact.scene.quantities import QUANTITIES
 from warpimpact.solver.accuracy import UNITS, PilotResult
@@ -29,38 +28,35 @@ if TYPE_CHECKING:
 
 def described(
     campaign: Campaign,
-    task: Task,
+    shots: Shots,
+    pilot: PilotResult | None,
     outcomes: Outcomes,
     numerics: Numerics,
     computed: tuple[str, float],
     attributes: Mapping[str, Any],
 ) -> HitTable:
-    """The columns of a task.
+    """The columns of shots with their outcomes.
 
     Args:
+        pilot: of the campaign; None if it fixes the resolution.
         computed: the device, and the time [s].
         attributes: attributes of this kind of computation.
     """
-    resolution = resolve(campaign.scene, numerics, weakens(campaign.target, task.shots))
-    told = _numerics(campaign.numerics, campaign.impact, campaign.target, resolution)
-    told |= {attr.CATALOGUE_NAMES: "\n".join(names)} if (names := catalogue_names(campaign)) else {}
-    told |= {attr.OUTSIDE_TESTED_RANGE: json.dumps(outside_tested_range(campaign), ensure_ascii=False)}
-    told |= computed_by(campaign, computed[0], len(outcomes), computed[1])
-    told |= _pilot(campaign.numerics.asked, task.findings)
-    finer, double = _finer_hits(task.findings), is_double(campaign)
-    return described_as(campaign, task.shots, outcomes, {**told, **attributes}, double=double, finer=finer)
-
-
-def _finer_hits(findings: PilotResult | None) -> dict[str, Any]:
-    """Columns of the hits that a pilot computed at a finer level."""
-    if findings is None or findings.finer is None or findings.numbers is None:
-        return {}
-    numbers = findings.numbers[: len(findings.finer)].astype("int32")
-    return {v.FINER_HIT: numbers} | {
-        name: getattr(findings.finer, of_hits)
-        for name, of_hits in v.FINER_VARIABLES.items()
-        if of_hits in findings.finer
+    resolution = resolve(campaign.scene, numerics, weakens(campaign.target, shots))
+    names, finer = catalogue_names(campaign), dict[str, Any]()
+    if pilot is not None and pilot.finer is not None and pilot.numbers is not None:
+        stored = {name: of_hits for name, of_hits in v.FINER_VARIABLES.items() if of_hits in pilot.finer}
+        finer = {v.FINER_HIT: pilot.numbers[: len(pilot.finer)].astype("int32")}
+        finer |= {name: getattr(pilot.finer, of_hits) for name, of_hits in stored.items()}
+    every = {
+        **_numerics(campaign.numerics, campaign.impact, campaign.target, resolution),
+        **({attr.CATALOGUE_NAMES: "\n".join(names)} if names else {}),
+        attr.OUTSIDE_TESTED_RANGE: json.dumps(outside_tested_range(campaign), ensure_ascii=False),
+        **computed_by(campaign, computed[0], len(outcomes), computed[1]),
+        **_pilot(campaign.numerics.asked, pilot),
+        **attributes,
     }
+    return described_as(campaign, shots, outcomes, every, double=is_double(campaign), finer=finer)
 
 
 def described_as(
@@ -106,22 +102,22 @@ def computed_by(campaign: Campaign, device: str, computed: int, elapsed: float) 
     return attributes
 
 
-def _pilot(asked: Accuracy, findings: PilotResult | None) -> dict[str, Any]:
-    """Attributes on the accuracy that a pilot was asked for, and on its findings; none without a pilot."""
-    if findings is None:
+def _pilot(asked: Accuracy, pilot: PilotResult | None) -> dict[str, Any]:
+    """Attributes on the accuracy that a pilot was to reach, and on its result; none without a pilot."""
+    if pilot is None:
         return {}
     bounds = {name: getattr(asked, name) for name in Accuracy.model_fields}
     given = {name: value for name, value in bounds.items() if value is not None and math.isfinite(value)}
     return {
-        attr.RESOLUTION: findings.numerics.model_dump_json(),
-        attr.PROMISE_KEPT: int(findings.kept),
+        attr.RESOLUTION: pilot.numerics.model_dump_json(),
+        attr.PROMISE_KEPT: int(pilot.kept),
         attr.ACCURACY: json.dumps(given),
-        **findings.errors,
+        **pilot.errors,
     }
 
 
 def pilot_in(result: Result) -> PilotResult | None:
-    """The findings of the pilot of a result; None if its campaign fixed the resolution."""
+    """The pilot of a result; None if its campaign fixed the resolution."""
     attributes = result.attrs
     if attr.RESOLUTION not in attributes:
         return None

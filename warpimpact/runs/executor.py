@@ -1,21 +1,22 @@
-"""Executors of jobs: the devices of this machine, processes of it, or the workers of a Dask cluster (`cluster.py`).
+"""Executors of jobs: the devices of this machine, processes of it, or the workers of a Dask cluster.
 
 A job is a function with its arguments, all of which can be pickled. The function also takes `worker`, which says where
 to compute, and `report`, which it calls with its progress. The result depends only on the arguments and the kind of
-device, so every executor returns the same bits.
+device, so every executor returns the same bits. If a worker of a cluster dies, another one computes its jobs.
 """
 
 from __future__ import annotations
 
+import logging
 import multiprocessing
 import os
-import pickle
 import signal
 import threading
 import time
 from collections.abc import Callable, Generator, Iterator
-from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, ThreadPoolExecutor, wait
-from contextlib import closing, contextmanager, suppress
+from concurrent.futures import FIRST_COMPLETED, CancelledError, Future, ProcessPoolExecutor, ThreadPoolExecutor, wait
+from concurrent.futures.process import BrokenProcessPool
+from contextlib import AbstractContextManager, ExitStack, closing, contextmanager, nullcontext, suppress
 from multiprocessing import resource_tracker
 from queue import SimpleQueue
 from typing import Any, NamedTuple, Protocol, TypeVar
@@ -83,17 +84,21 @@ def completed(
         KeyboardInterrupt: a signal came.
         Exception: the error of the first job that fails.
     """
-    waiting: dict[Future[Any], Key] = {}
+    waiting: dict[Future[Any], tuple[Key, Job]] = {}
     try:
         while True:
             width = executor.width()
             while len(waiting) < width and (keyed := next(jobs, None)) is not None:
-                waiting[executor.submit(keyed[1])] = keyed[0]
+                waiting[executor.submit(keyed[1])] = keyed
             if not waiting:
                 return
             finished, _ = wait(waiting, timeout=LOOK_EVERY, return_when=FIRST_COMPLETED)
             for future in finished:
-                yield waiting.pop(future), future.result()
+                key, job = waiting.pop(future)
+                if isinstance(future.exception(), BrokenProcessPool):  # a process was killed
+                    waiting[executor.submit(job)] = key, job
+                else:
+                    yield key, future.result()
             tick()
     finally:
         for future in waiting:
@@ -159,10 +164,10 @@ class Threads:
 
 
 class Processes:
-    """Processes of this machine, which share its cores; arguments as in `choice.executor_for`.
+    """Processes of this machine, which share its cores; arguments as in `executor_for`.
 
-    If a process was killed or failed, the threads of this process compute its job or raise the error. The threads
-    compute alone for `after` seconds: a start takes some two seconds and 0.4 GB.
+    The threads of this process compute alone for `after` seconds, as a start takes some two seconds and 0.4 GB; and all
+    that is left if a process is killed.
     """
 
     is_remote = True
@@ -171,56 +176,21 @@ class Processes:
         self.made_by, self._threads, self._count, self._device = threads.made_by, threads, count, device
         self._after, self._first = after, 0.0
         self._pool: ProcessPoolExecutor | None = None
-        self._broken = False
 
     def submit(self, job: Job) -> Future[Any]:
         """Compute a job in a process, or in this one."""
         now = time.monotonic()
         self._first = self._first or now
-        if self._broken or now - self._first < self._after:
+        if now - self._first < self._after:
             return self._threads.submit(job)
-        try:
-            with _interrupts_held():
-                in_process = self._begun_pool().submit(_in_process, pickle.dumps(job))
-        except (OSError, RuntimeError):  # a process was killed, or none can be started: memory may be short
-            self._broken = True
-            return self._threads.submit(job)
-        future = Future[Any]()
-
-        def passed_on(ended: Future[Any]) -> None:
-            try:
-                self._pass_on(job, ended, future)
-            except Exception as error:  # a callback only logs it, and whoever waits for the job waits for ever
-                future.set_exception(error)
-
-        in_process.add_done_callback(passed_on)
-        return future
-
-    def _begun_pool(self) -> ProcessPoolExecutor:
         if self._pool is None:
             context, apiece = multiprocessing.get_context("spawn"), max(1, cores() // self._count)
             self._pool = ProcessPoolExecutor(self._count, context, _begin_process, (self._device, apiece))
-        return self._pool
-
-    def _pass_on(self, job: Job, ended: Future[Any], future: Future[Any]) -> None:
-        """Pass the result of a process to the future of a job. Without a result the threads compute the job."""
-        if ended.cancelled() or not future.set_running_or_notify_cancel():
-            return
-        if ended.exception() is None and ended.result() is not _FAILED:
-            future.set_result(ended.result()[0])
-            return
-        self._broken = self._broken or ended.exception() is not None
-
-        def again(here: Future[Any]) -> None:
-            if here.cancelled() or (error := here.exception()) is not None:
-                future.set_exception(InterruptedError() if here.cancelled() else error)
-            else:
-                future.set_result(here.result())
-
         try:
-            self._threads.submit(job).add_done_callback(again)
-        except RuntimeError as error:  # the threads are closed
-            future.set_exception(error)
+            with _interrupts_held():
+                return self._pool.submit(_in_process, job)
+        except (BrokenProcessPool, OSError):  # memory may be short
+            return self._threads.submit(job)
 
     def width(self) -> int:
         """Twice the number of processes, or of this process's devices and cores."""
@@ -232,13 +202,10 @@ class Processes:
 
     def close(self) -> None:
         """End the processes. Each first ends its job."""
-        self._broken = True
         if self._pool is not None:
             self._pool.shutdown(wait=False, cancel_futures=True)
 
 
-_FAILED = None
-"""Returned by a process for a job that it could not compute. A result is in a tuple."""
 _process_worker: list[Worker] = []
 """The worker of a process of `Processes`."""
 
@@ -257,12 +224,9 @@ def _end_with_parent() -> None:
         os._exit(1)
 
 
-def _in_process(pickled: bytes) -> tuple[Any] | None:
+def _in_process(job: Job) -> Any:
     """Compute a job in a process of `Processes`."""
-    with suppress(Exception):
-        job: Job = pickle.loads(pickled)
-        return (job.function(*job.arguments, worker=_process_worker[0], report=lambda value: None),)
-    return _FAILED
+    return job.function(*job.arguments, worker=_process_worker[0], report=lambda value: None)
 
 
 @contextmanager
@@ -296,3 +260,177 @@ def _devices(names: str) -> list[Any]:
     if len({kind for chosen in devices if (kind := made_by(str(chosen))[attr.DEVICE])}) > 1:
         raise DeviceError(f'device: got "{names}", but these are of different kinds, which compute different bits')
     return devices
+
+
+@contextmanager
+def executor_for(
+    device: str = "auto",
+    *,
+    workers: int | None = None,
+    scheduler: str | None = None,
+    apart: bool = False,
+    after: float = 0.0,
+    cancel: Cancel | None = None,
+) -> Iterator[Executor]:
+    """The executor that the options of a command ask for. By default the devices of this machine compute.
+
+    Args:
+        device: "auto" (every CUDA device if there is one, else the CPU), or names separated by commas.
+        workers: number of processes on this machine. They need a main module that does nothing when it is imported.
+        scheduler: address of a Dask scheduler whose workers compute.
+        apart: whether jobs spend much of their time in Python. On a CPU, each core then computes a job of its own.
+        after: seconds that this process computes before other processes are started.
+        cancel: cancels what this process computes; the futures then raise Cancelled.
+
+    Raises:
+        DeviceError: a device is absent, or devices are of different kinds, which compute different bits.
+        ClusterError: Dask is not installed, or the scheduler cannot be reached, is lost or has no workers.
+    """
+    if scheduler is not None:
+        with cluster(scheduler, device) as executor:
+            yield executor
+        return
+    with closing(Threads(device, apart=apart, cancel=cancel)) as threads:
+        if workers is None:
+            yield threads
+            return
+        with closing(Processes(workers, device, threads, after)) as processes:
+            yield processes
+
+
+def opened(device: str | Executor) -> AbstractContextManager[Executor]:
+    """An executor for device names, closed afterwards. A given executor stays open."""
+    return executor_for(device) if isinstance(device, str) else nullcontext(device)
+
+
+LONELY = 120.0
+"""Seconds that a scheduler may be without workers."""
+
+Entered = TypeVar("Entered")
+
+
+@contextmanager
+def cluster(address: str, device: str = "auto") -> Iterator[Cluster]:
+    """The workers of a scheduler, each of which computes on a device of this name.
+
+    Raises:
+        ClusterError: Dask is not installed; the scheduler cannot be reached, is lost or has no worker for LONELY
+            seconds; or jobs kill one worker after another.
+        DeviceError: the workers lack the device, or compute other bits than the first worker asked.
+    """
+    with _starting():
+        from distributed import Client, KilledWorker
+        from distributed.comm import CommClosedError
+        from distributed.utils import silence_logging_cmgr
+    with ExitStack() as stack:
+        stack.enter_context(silence_logging_cmgr(logging.CRITICAL))  # a lost scheduler is reported by our own sentence
+        with _starting():
+            try:
+                # Not the default client of the process: xarray would take its locks for the files written here.
+                client = stack.enter_context(_ended(Client(address, timeout="20s", set_as_default=False)))
+            except (OSError, ValueError) as error:
+                raise ClusterError(f'scheduler: got "{address}", which cannot be reached ({error})') from None
+        try:
+            yield Cluster(client, address, device)
+        except (CommClosedError, CancelledError) as error:  # without its scheduler a client cancels what it waits for
+            raise _lost(address, error) from None
+        except KilledWorker as error:
+            raise ClusterError(f"some shots ended one worker after another, perhaps out of memory: {error}") from None
+
+
+@contextmanager
+def _ended(part: AbstractContextManager[Entered]) -> Iterator[Entered]:
+    """Ignore that a client does not end in time on a busy machine, so that it does not hide how the computation
+    ended."""
+    entered = part.__enter__()
+    try:
+        yield entered
+    finally:
+        with suppress(OSError):  # TimeoutError among them
+            part.__exit__(None, None, None)
+
+
+@contextmanager
+def _starting() -> Iterator[None]:
+    """Turn an error of a start of Dask into a ClusterError that names the settings."""
+    try:
+        yield
+    except ClusterError:
+        raise
+    except ImportError:
+        raise ClusterError("a cluster needs Dask: pip install 'warpimpact[cluster]'") from None
+    except Exception as error:  # of any class, as settings have no check of their own
+        given = ", ".join(sorted(name for name in os.environ if name.startswith("DASK_"))) or "none"
+        what = " ".join(f"{type(error).__name__}: {error}".split())[:300]
+        raise ClusterError(
+            f"Dask does not start ({what}); check its settings: variables {given}; files in ~/.config/dask"
+        ) from error
+
+
+class Cluster:
+    """The workers of a scheduler, all of which compute the same bits. See `cluster`."""
+
+    is_remote = True
+
+    def __init__(self, client: Any, address: str, device: str) -> None:
+        self._client, self._address, self._device = client, address, device
+        self._executor, self._seen = client.get_executor(pure=False), time.monotonic()
+        self.made_by: dict[str, str] = {}
+        self.made_by = result_of(self, _made_by)
+
+    def submit(self, job: Job) -> Future[Any]:
+        """Compute a job on a worker."""
+        future: Future[Any] = self._asked(self._executor.submit, _on_worker, job, self._device, self.made_by)
+        return future
+
+    def width(self) -> int:
+        """Twice the number of the workers' threads; 2 while there are no workers."""
+        threads: int = sum(self._asked(self._client.nthreads).values())
+        now = time.monotonic()
+        if threads:
+            self._seen = now
+        elif now - self._seen > LONELY:
+            raise ClusterError(
+                f"scheduler: {self._address} has had no worker for {LONELY:g} s; start some; what is computed is "
+                "saved, continue with --resume"
+            )
+        return 2 * max(1, threads)
+
+    def reports(self) -> list[Any]:
+        """Workers do not report."""
+        return []
+
+    def _asked(self, request: Callable[..., Any], *arguments: Any) -> Any:
+        """The answer to a request to the scheduler."""
+        from distributed.client import ClosedClientError
+
+        try:
+            return request(*arguments)
+        except (OSError, ClosedClientError) as error:  # of the client: here no file is written
+            raise _lost(self._address, error) from None
+
+
+def _lost(address: str, error: BaseException) -> ClusterError:
+    return ClusterError(
+        f"scheduler: {address} was lost, perhaps killed ({type(error).__name__}); what is computed is saved, "
+        "continue with --resume"
+    )
+
+
+def _made_by(*, worker: Worker, report: Callable[[Any], object]) -> dict[str, str]:
+    return made_by(worker.device)
+
+
+def _on_worker(job: Job, device: str, kind: dict[str, str]) -> Any:
+    """Compute a job on a worker, of the `kind` of the other workers; this is empty if none was asked before.
+
+    Raises:
+        DeviceError: the worker computes other bits.
+    """
+    ours = made_by(device) if kind else {}
+    if ours != kind:
+        name = next(name for name in kind if ours[name] != kind[name])
+        raise DeviceError(
+            f'the workers differ: {name} is "{kind[name]}" on one and "{ours[name]}" on another; a run needs one kind'
+        )
+    return job.function(*job.arguments, worker=Worker(device), report=lambda value: None)

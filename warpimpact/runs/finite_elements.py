@@ -14,8 +14,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from warpimpact.campaign.campaign import Campaign
-from warpimpact.continuum.strikes import MOST
-from warpimpact.continuum.strikes import check_continuum, struck
+from warpimpact.continuum.strikes import MOST, check_continuum, struck
 from warpimpact.records.outcomes import Outcomes
 from warpimpact.results import attributes as attr
 from warpimpact.results import files
@@ -25,9 +24,8 @@ from warpimpact.results.outlines import in_memory
 from warpimpact.results.references import with_references
 from warpimpact.runs.describe import computed_by, described_as
 from warpimpact.runs.executor import Executor, Job
-from warpimpact.runs.questions import Arrays, Question, Round, RoundProgress, answered
+from warpimpact.runs.questions import Arrays, Question, Round, RoundProgress, answered, stored
 from warpimpact.runs.shards import manifest
-from warpimpact.runs.store import stored
 from warpimpact.scene import Scene, Shots
 from warpimpact.scene.flow import Continuum
 from warpimpact.solver.device import find_device

@@ -1,21 +1,101 @@
 """Questions that are answered in rounds: the results of some jobs decide which jobs come next.
 
 A question is a generator. It yields a `Round`, is sent the results of its jobs in their order, and returns its answer.
-It knows neither who computes nor what is on the disk, so its answer has the same bits everywhere.
+It knows neither who computes nor what is on the disk, so its answer has the same bits everywhere. A `Store` holds the
+results of its jobs as batches on the disk, beside the file of the answer; a batch depends only on the content and on
+earlier batches, so a resumed computation equals an undisturbed one.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Generator, Sequence
-from contextlib import closing
-from dataclasses import dataclass, fields
-from typing import Any, NamedTuple, TypeVar, cast
+import json
+import warnings
+from collections.abc import Callable, Generator, Iterator, Mapping, Sequence
+from contextlib import closing, contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
+from warpimpact.campaign.places import files_in
+from warpimpact.campaign.text import parsed
 from warpimpact.runs.executor import Executor, Job, completed
-from warpimpact.runs.store import Store
+from warpimpact.runs.parts import Form, Parts, claimed, digest, telling
+
+
+def content_of(text: str, name: str, folder: Path, made_by: Mapping[str, str]) -> dict[str, Any]:
+    """What determines every bit of a result: the tables of a design file, the contents of the files that it
+    names, versions and kind of device. `name` is that of the file in errors; names in it count from `folder`."""
+    tables = json.loads(json.dumps(parsed(text, name), default=str))
+    named = {file: folder / file for file in files_in(tables)}
+    return {**tables, "files": {file: digest(path) for file, path in named.items() if path.is_file()}, **made_by}
+
+
+@contextmanager
+def stored(
+    output: Path,
+    content: Mapping[str, Any],
+    kind: str,
+    *,
+    resume: bool,
+    overwrite: bool,
+    tell: Callable[[str], object] = warnings.warn,
+) -> Iterator[Store | None]:
+    """The `Store` of a computation while it runs; None if its result is already complete. The store is emptied when the
+    result is written. If the computation ends before, the store can be resumed.
+
+    Raises:
+        OutputError: something there must be neither resumed nor overwritten, another computation is at work, or the
+            disk is full; the message says what is saved.
+        Interrupted: the user interrupted the computation; the message says what is saved.
+    """
+    with claimed(output):
+        store = Store(output, content, kind, tell)
+        if not store.parts.begin(resume=resume, overwrite=overwrite):
+            yield None
+            return
+        with telling(store.parts.kept):
+            yield store
+        store.parts.discard()
+
+
+class Store:
+    """Batches of one computation as `Parts`, in a folder that is `claimed`."""
+
+    def __init__(
+        self, output: Path, content: Mapping[str, Any], kind: str, tell: Callable[[str], object] = warnings.warn
+    ) -> None:
+        def counted(count: int) -> str:
+            return f"{count} batch{'' if count == 1 else 'es'}"
+
+        self.parts = Parts(output, content, kind, Form("batch", ".npz"), counted, tell)
+
+    def load(self, batch: int) -> dict[str, NDArray[Any]] | None:
+        """The results of a batch; None if it was not computed.
+
+        Raises:
+            OutputError: its file is gone or was damaged.
+        """
+        if batch not in self.parts.saved:
+            return None
+        with np.load(self.parts.path(batch), allow_pickle=False) as file:
+            return dict(file)
+
+    def save(self, batch: int, arrays: Mapping[str, NDArray[Any]]) -> None:
+        """Put a batch on the disk.
+
+        Raises:
+            OutputError: the batch cannot be written.
+        """
+
+        def write(path: Path) -> None:
+            with path.open("wb") as file:
+                np.savez(file, allow_pickle=False, **arrays)
+
+        self.parts.save(batch, write)
+
 
 Arrays = dict[str, NDArray[Any]]
 """Result of a job."""
@@ -49,20 +129,6 @@ class Round:
     jobs: Sequence[Job]
     keys: Sequence[str]
     tell: Callable[[RoundProgress], object] = lambda now: None
-
-
-Part = TypeVar("Part")
-
-
-def packed(parts: Sequence[Any]) -> Arrays:
-    """Dataclasses of arrays and numbers as the result of a job."""
-    return {f"{name}_{k}": np.asarray(value) for k, part in enumerate(parts) for name, value in vars(part).items()}
-
-
-def unpacked(kind: type[Part], arrays: Arrays) -> list[Part]:
-    """The dataclasses of one kind that are `packed` in the result of a job."""
-    names = [field.name for field in fields(cast("Any", kind))]
-    return [kind(**{name: arrays[f"{name}_{k}"] for name in names}) for k in range(len(arrays) // len(names))]
 
 
 Question = Generator[Round, list[Arrays], Answer]

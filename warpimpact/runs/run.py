@@ -9,27 +9,76 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from warpimpact.campaign.campaign import Campaign
 from warpimpact.results import attributes as attr
+from warpimpact.results import variables as v
+from warpimpact.results.dataset import numbered
 from warpimpact.results.outlines import in_memory
 from warpimpact.results.references import with_references
 from warpimpact.results.table import HitTable, joined
-from warpimpact.runs.choice import executor_for, opened
-from warpimpact.runs.compute import HIT_MAP, numerics_of
+from warpimpact.runs.compute import HIT_MAP, Computation, numerics_of
 from warpimpact.runs.cost import cost_warning
 from warpimpact.runs.describe import pilot_in
-from warpimpact.runs.executor import Executor, Job, completed, result_of
-from warpimpact.runs.jobs import ranges, reference_shots, split, task_size
+from warpimpact.runs.executor import Executor, Job, completed, executor_for, opened, result_of
 from warpimpact.runs.parts import claimed, telling
-from warpimpact.runs.progress import Follow, followed
+from warpimpact.runs.progress import End, Follow, Watch, followed
 from warpimpact.runs.shards import Shards, ShardsOnDisk, extent, manifest
-from warpimpact.runs.task import Computation, Task
-from warpimpact.runs.watch import End, Watch
+from warpimpact.scene import Shots
 from warpimpact.solver.resolution import at_level
 from warpimpact.solver.worker import Cancel
 
 if TYPE_CHECKING:
     import xarray
+
+CUDA_SHOTS = 2**17
+"""Shots per task on a GPU. Fewer shots would not fill it."""
+CPU_SHOTS, CPU_SECONDS = 2**14, 0.5
+"""Most shots of a task on the CPU of this machine, and the time that it shall take, beside which its set-up on one core
+is short. A task is at least one shard; another process computes one shard per task."""
+
+
+def task_size(executor: Executor, rate: float) -> int:
+    """Shots per task, at a rate of shots per second; 0 stands for one shard."""
+    if executor.made_by[attr.DEVICE] != "cpu":
+        return CUDA_SHOTS
+    return 0 if executor.is_remote else min(CPU_SHOTS, int(CPU_SECONDS * rate))
+
+
+def reference_shots(campaign: Campaign, among: int, most: int) -> Shots:
+    """The first shots of a reference. One stands for all where the first ones differ only in their places, and all
+    layers are solid and unbounded."""
+    shots = campaign.sampler().shots(0, among)
+    elsewhere = (v.HIT_Y, v.HIT_Z, "offset_y", "offset_z")
+    conditions = [values for name, values in shots.columns.items() if name not in elsewhere]
+    unbounded = all(layer == layer.solid and layer.size is None for layer in campaign.target.layers)
+    alike = unbounded and not any(np.nan_to_num(np.ptp(values, axis=0)).any() for values in conditions)
+    return shots[: 1 if alike else max(1, most)]
+
+
+def ranges(shards: Shards, shots: Callable[[], int]) -> Iterator[range]:
+    """Ranges of missing shards. Each has about as many shots as `shots` returns when the range begins."""
+    there, first = frozenset(shards.there()), 0
+    while first < shards.count:
+        most, stop = max(1, shots() // shards.extent), first
+        while stop < min(first + most, shards.count) and stop not in there:
+            stop += 1
+        if stop > first:
+            yield range(first, stop)
+        first = max(stop, first + 1)
+
+
+def split(table: HitTable, task: range, size: int) -> Iterator[tuple[int, HitTable]]:
+    """The shards of a task, each with its share of the time. Only the first shard of a campaign keeps the variables of
+    the whole campaign."""
+    hits, of_the_campaign = table.sizes["hit"], [name for names in v.GROUPS.values() for name in names]
+    for place, index in enumerate(task):
+        shard = numbered(table.isel(hit=slice(place * size, (place + 1) * size)), first=index * size)
+        if index:
+            shard = shard.drop_vars(of_the_campaign)
+        time = table.attrs[attr.COMPUTE_TIME] * shard.sizes["hit"] / hits
+        yield index, shard.assign_attrs({attr.COMPUTE_TIME: time})
 
 
 def run(
@@ -99,7 +148,7 @@ def run_to_file(
     with claimed(output), opened(device) as computing:
         content = manifest(campaign, {**computing.made_by, **computation.content})
         total = len(campaign.sampler())
-        shards = ShardsOnDisk(output, content, total, tell, grows=campaign.stop is None)
+        shards = ShardsOnDisk(output, content, total, tell)
         if not shards.parts.begin(resume=resume, overwrite=overwrite):
             return
         with telling(shards.kept):
@@ -119,7 +168,7 @@ def _fill(campaign: Campaign, computation: Computation, shards: Shards, executor
     watch = Watch(campaign, shards, computation.measures)
     is_new, warn = 0 not in shards.there(), cost_warning(campaign, executor.made_by[attr.DEVICE], computation.passages)
     if not is_new:  # shard 0 holds the pilot's findings, and its hits at a finer level
-        watch.found = pilot_in(shards.shard(0))
+        watch.pilot = pilot_in(shards.shard(0))
     else:
 
         def piloting() -> None:
@@ -128,17 +177,16 @@ def _fill(campaign: Campaign, computation: Computation, shards: Shards, executor
                 warn(at_level(level, campaign.numerics))
             follow(replace(watch.progress(0), piloting=True, trying=level))
 
-        watch.found = result_of(executor, computation.pilot, campaign, tick=piloting)
-    warn(numerics_of(campaign, watch.found))
+        watch.pilot = result_of(executor, computation.pilot, campaign, tick=piloting)
+    warn(numerics_of(campaign, watch.pilot))
 
-    later = None if watch.found is None else replace(watch.found, finer=None, numbers=None)
+    later = None if watch.pilot is None else replace(watch.pilot, finer=None, numbers=None)
 
     def jobs() -> Iterator[tuple[range, Job]]:
         most = lambda: task_size(executor, 0.0 if campaign.stop else watch.rate)  # noqa: E731
         for task in ranges(shards, most):
             shots = sampler.shots(task.start * shards.extent, len(task) * shards.extent)
-            findings = watch.found if task.start == 0 else later
-            yield task, Job(computation.compute, (campaign, Task(shots, findings)))
+            yield task, Job(computation.compute, (campaign, shots, watch.pilot if task.start == 0 else later))
 
     with closing(completed(executor, jobs(), lambda: follow(watch.progress(sum(executor.reports()))))) as tables:
         while watch.end is None:
@@ -154,11 +202,11 @@ def _references(
     campaign: Campaign, computation: Computation, shards: Shards, executor: Executor
 ) -> dict[str, HitTable]:
     """Some hits of the references of a campaign, by their names, at the resolution that its pilot found."""
-    found, tables = pilot_in(shards.shard(0)), dict[str, HitTable]()
+    pilot, tables = pilot_in(shards.shard(0)), dict[str, HitTable]()
     for name, reference in campaign.references.items() if campaign.output.solid_reference else ():
         if (of_reference := computation.of_reference(campaign, name)) is not None:
             shots = reference_shots(reference, shards.extent, computation.reference_hits)
-            tables[name] = result_of(executor, of_reference.compute, reference, Task(shots, found))
+            tables[name] = result_of(executor, of_reference.compute, reference, shots, pilot)
     return tables
 
 

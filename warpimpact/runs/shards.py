@@ -1,7 +1,7 @@
 """The shards of a run: parts beside the result file (`parts.py`), which appears when all of them are there.
 
 A shard is the result of a fixed range of shots. A process that is killed loses the shots in progress and the shards of
-the last HELD seconds. The result file grows beside the shards meanwhile, but has no value before it is complete.
+the last HELD seconds.
 """
 
 from __future__ import annotations
@@ -20,15 +20,12 @@ from warpimpact.campaign.campaign import Campaign
 from warpimpact.results import attributes as attr
 from warpimpact.results import files
 from warpimpact.results.files import OutputError
-from warpimpact.results.incremental import IncrementalFile
-from warpimpact.results.netcdf import read_table, write_table
+from warpimpact.results.netcdf import FILE_CHUNK, read_table, write_joined, write_table
 from warpimpact.results.table import HitTable
-from warpimpact.runs.manifests import digest
-from warpimpact.runs.parts import Form, Parts
+from warpimpact.runs.parts import Form, Parts, digest
 
 _logger = logging.getLogger(__name__)
 
-_GROWING = ".growing.part"
 FEWEST, MOST, SHARDS = 2**11, 2**16, 32
 """Fewest and most shots per shard, and the number of shards within these bounds. A shard costs some 10 ms."""
 HELD = 1.0
@@ -70,28 +67,15 @@ class Shards:
 
 
 class ShardsOnDisk(Shards):
-    """The shards of one run on the disk, in a folder that is `claimed`. The latest shards are held in memory.
-
-    Args:
-        grows: whether the result file grows while shards come, so that little is left to do at the end. This needs a
-            known number of shards.
-    """
+    """The shards of one run on the disk, in a folder that is `claimed`. The latest shards are held in memory."""
 
     def __init__(
-        self,
-        output: Path,
-        content: Mapping[str, Any],
-        total: int,
-        tell: Callable[[str], object] = warnings.warn,
-        *,
-        grows: bool = False,
+        self, output: Path, content: Mapping[str, Any], total: int, tell: Callable[[str], object] = warnings.warn
     ) -> None:
         super().__init__(total, content["extent"])
         form = Form("hits", ".nc", self.extent)
         self.parts = Parts(output, content, "run", form, lambda count: f"{count} of {self.count} shards", tell)
         self._written = time.monotonic()
-        self._grows, self._grown = grows, 0
-        self._growing: IncrementalFile | None = None
 
     def there(self) -> Collection[int]:
         """Numbers of the finished shards."""
@@ -104,13 +88,7 @@ class ShardsOnDisk(Shards):
             OutputError: the held shards cannot be written.
         """
         super().save(index, table)
-        if self._grows:
-            try:
-                self._grow()
-            except OutputError:  # the disk may be full; the shards have priority over the growing file
-                self._stop_growing()
-                self._grows = False
-        if time.monotonic() - self._written >= HELD or len(self._held) * self.extent >= files.FILE_CHUNK:
+        if time.monotonic() - self._written >= HELD or len(self._held) * self.extent >= FILE_CHUNK:
             self.flush()
 
     def flush(self) -> None:
@@ -129,7 +107,6 @@ class ShardsOnDisk(Shards):
 
     def kept(self) -> str:
         """A sentence about what an interrupted run leaves."""
-        self._stop_growing()
         with suppress(OutputError):
             self.flush()
         return self.parts.kept()
@@ -141,23 +118,6 @@ class ShardsOnDisk(Shards):
             OutputError: its file is gone or was damaged.
         """
         return super().shard(index) if index in self._held else read_table(self.parts.path(index))
-
-    def _grow(self, count: int | None = None) -> None:
-        """Append to the result file the next shards in order that are finished, or those up to `count`."""
-        if self._growing is None:
-            hits = min(self.total, (self.count if count is None else count) * self.extent)
-            self._growing = IncrementalFile(self.parts.output, self.parts.folder / _GROWING, hits)
-        there = self.there()
-        while self._grown in there if count is None else self._grown < count:
-            self._growing.add(self.shard(self._grown))
-            self._grown += 1
-
-    def _stop_growing(self) -> None:
-        if self._growing is not None:
-            with suppress(OSError, RuntimeError):
-                self._growing.close()
-        self._growing, self._grown = None, 0
-        (self.parts.folder / _GROWING).unlink(missing_ok=True)
 
     def finish(
         self, count: int, attributes: Callable[[HitTable], Mapping[str, Any]], groups: Mapping[str, HitTable]
@@ -172,9 +132,9 @@ class ShardsOnDisk(Shards):
             OutputError: the file cannot be written, or a shard was damaged; the other shards are kept.
         """
         complete = {**attributes(self.shard(0)), attr.FINGERPRINT: self.parts.fingerprint}
-        self._grow(count)
-        assert self._growing is not None  # a campaign has hits
-        self._growing.complete(complete, groups)
+        hits, tables = min(self.total, count * self.extent), map(self.shard, range(count))
+        with files.aside(self.parts.output, self.parts.folder) as file:
+            write_joined(tables, hits, file, complete, groups)
         self._held.clear()
         _logger.info("%d shards joined into %s", count, self.parts.output)
         self.parts.discard()

@@ -15,11 +15,10 @@ from warpimpact.results import variables as v
 from warpimpact.results.measures import Measure
 from warpimpact.results.table import HitTable
 from warpimpact.results.vocabulary import LIMIT_VELOCITY
-from warpimpact.runs.compute import numerics_of, pilot_shots
+from warpimpact.runs.compute import Report, numerics_of, pilot_shots
 from warpimpact.runs.describe import described
 from warpimpact.runs.shards import extent
-from warpimpact.runs.task import Report, Task
-from warpimpact.scene import Target, exclusions
+from warpimpact.scene import Shots, Target, exclusions
 from warpimpact.solver.accuracy import PILOT_LIMITS, PilotResult, pilot_size
 from warpimpact.solver.limit import (
     HIGHEST_VELOCITY,
@@ -41,7 +40,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class LimitMap:
-    """The limit of every hit, as a `runs.task.Computation` for `warpimpact limit`.
+    """The limit of every hit, as a `runs.compute.Computation` for `warpimpact limit`.
 
     The hits of a shard are searched together, so a limit depends on the campaign alone, not on the task.
     """
@@ -117,13 +116,19 @@ class LimitMap:
         curve = resistance_by_thickness(solid, sought.layer, highest)
         return replace(self, sought=replace(sought, highest=highest, by_thickness=curve))
 
-    def compute(self, campaign: Campaign, task: Task, worker: Worker, report: Report = lambda done: None) -> HitTable:
+    def compute(
+        self,
+        campaign: Campaign,
+        shots: Shots,
+        pilot: PilotResult | None,
+        worker: Worker,
+        report: Report = lambda done: None,
+    ) -> HitTable:
         """Search the limits of some shots. The table has the shots as they just perforate, with their limits."""
-        sought, findings = self.sought, task.findings
-        numerics, together = numerics_of(campaign, findings), extent(len(campaign.sampler()))
+        sought, numerics, together = self.sought, numerics_of(campaign, pilot), extent(len(campaign.sampler()))
         progress = lambda done, total: report(done)  # noqa: E731
         begin = time.perf_counter()
-        searched = limits(campaign.scene, task.shots, sought, numerics, worker, progress, together)
+        searched = limits(campaign.scene, shots, sought, numerics, worker, progress, together)
         elapsed = time.perf_counter() - begin
         attributes = {
             attr.HISTORY: attr.history_line(f"limit --quantity {sought.quantity}"),
@@ -138,9 +143,9 @@ class LimitMap:
         tried = searched.shots.velocity
         if sought.quantity == "thickness":
             tried = searched.shots.own_of(campaign.target, "thickness", sought.layer)
-        put = replace(task, shots=sought.put(campaign.target, task.shots, tried))
+        put = sought.put(campaign.target, shots, tried)
         outcomes, by = searched.recorded(sought.quantity), (worker.device, elapsed)
-        return described(campaign, put, outcomes, short_steps(numerics), by, attributes)
+        return described(campaign, put, pilot, outcomes, short_steps(numerics), by, attributes)
 
     def pilot(self, campaign: Campaign, worker: Worker, report: Report = lambda level: None) -> PilotResult | None:
         """See `Computation.pilot`."""

@@ -23,8 +23,7 @@ from warpimpact.results import files
 from warpimpact.results import variables as v
 from warpimpact.results.kinds import CAMPAIGN, SWEEP
 from warpimpact.results.measures import Measure
-from warpimpact.runs.choice import opened
-from warpimpact.runs.executor import Executor
+from warpimpact.runs.executor import Executor, opened
 from warpimpact.runs.run import run_to_file
 from warpimpact.scene.units import quoted, reader_in
 

@@ -25,7 +25,6 @@ from warpimpact.results.per_hit import is_pierced, piercing_margin
 from warpimpact.results.references import references_of, with_references
 from warpimpact.results.tallies import shift_of
 from warpimpact.results.variables import LIMITS, STATUS
-from warpimpact.runs.task import Task
 from warpimpact.scene import Numerics
 from warpimpact.solver.worker import Worker
 from warpimpact.studies.limit import LimitMap
@@ -222,7 +221,7 @@ def test_the_proxy_beside_the_limit_thickness() -> None:
     """The ratio of base armour that a core needs at 0° and at 85°: 2.8 by the kernel, 4.4 by the proxy."""
     campaign = Campaign.from_toml(CAMPAIGNS / "base_armour.toml")
     job, fixed = LimitMap.of(campaign, "thickness"), campaign.model_copy(update={"numerics": Numerics(level=2)})
-    dataset = job.compute(fixed, Task(campaign.sampler().shots(0, 7)), Worker("cpu")).to_xarray()
+    dataset = job.compute(fixed, campaign.sampler().shots(0, 7), None, Worker("cpu")).to_xarray()
     thickness, found = 1e3 * dataset["limit_thickness"].values, proxy(dataset)
     assert found is not None
     assert found.inclination == pytest.approx([0, 15, 30, 45, 60, 75, 85])

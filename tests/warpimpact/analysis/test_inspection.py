@@ -79,6 +79,5 @@ def test_a_run_has_a_bar_in_a_notebook(
 ) -> None:
     notebook = SimpleNamespace(get_ipython=type(shell, (), {}))
     monkeypatch.setitem(sys.modules, "IPython", notebook)
-    monkeypatch.setattr("warpimpact.runs.progress.find_spec", lambda name: None)
     run(CAMPAIGN, device="cpu")
     assert ("16/16" in capsys.readouterr().err) == shown

@@ -12,11 +12,10 @@ from warpimpact.campaign.campaign import CampaignError
 from warpimpact.cli import main
 from warpimpact.results import files
 from warpimpact.results.variables import OUTCOME_VARIABLES
-from warpimpact.runs.compute import compute
+from warpimpact.runs.compute import HIT_MAP
 from warpimpact.runs.describe import pilot_in
 from warpimpact.runs.replay import replay
 from warpimpact.runs.run import run, run_to_file
-from warpimpact.runs.task import Task
 from warpimpact.solver.worker import Worker
 
 SLOTTED_PLATE = (Path(__file__).parents[3] / "campaigns" / "slotted_plate.toml").read_text(encoding="utf-8")
@@ -65,7 +64,7 @@ def test_a_hit_does_not_depend_on_its_company(tmp_path: Path) -> None:
     whole = run(campaign, device="cpu")
     found = pilot_in(whole)
     for hit in range(0, 64, 9):
-        alone = compute(campaign, Task(campaign.sampler().shots(hit, 1), findings=found), Worker("cpu"))
+        alone = HIT_MAP.compute(campaign, campaign.sampler().shots(hit, 1), found, Worker("cpu"))
         for name in OUTCOME_VARIABLES:
             assert np.array_equal(alone[name].values[0], whole[name][hit], equal_nan=True), name
 

@@ -18,7 +18,7 @@ from warpimpact.identification.posterior import material_draws, parameters_of, p
 from warpimpact.plotting.posterior import hits_figure, pairs_figure
 from warpimpact.results import files
 from warpimpact.results.kinds import POSTERIOR
-from warpimpact.runs.choice import executor_for
+from warpimpact.runs.executor import executor_for
 from warpimpact.scene import Hits, make_shots
 from warpimpact.solver.simulate import simulate
 from warpimpact.view.view import text_of

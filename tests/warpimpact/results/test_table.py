@@ -17,8 +17,7 @@ from warpimpact.results.dataset import numbered
 from warpimpact.results.netcdf import open_table, read_table, write_table
 from warpimpact.results.outlines import in_memory
 from warpimpact.results.table import HitTable, joined
-from warpimpact.runs.compute import compute
-from warpimpact.runs.task import Task
+from warpimpact.runs.compute import HIT_MAP
 from warpimpact.scene import Numerics
 from warpimpact.solver.worker import Worker
 
@@ -31,7 +30,7 @@ def table(request: pytest.FixtureRequest) -> HitTable:
     campaign = Campaign.from_toml(CAMPAIGNS / f"{request.param}.toml")
     campaign = campaign.model_copy(update={"numerics": Numerics(level=0)})
     shots = campaign.sampler().shots(0, 40)
-    return compute(campaign, Task(shots), Worker("cpu"))
+    return HIT_MAP.compute(campaign, shots, None, Worker("cpu"))
 
 
 def content(group: Any, name: str = "") -> Iterator[tuple[Any, ...]]:

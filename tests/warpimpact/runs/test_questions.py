@@ -15,11 +15,10 @@ import xarray
 
 from warpimpact.cli import main
 from warpimpact.results import attributes as attr
-from warpimpact.runs import choice, shards
-from warpimpact.runs.choice import executor_for
-from warpimpact.runs.executor import Executor, Job
+from warpimpact.runs import executor, shards
+from warpimpact.runs.executor import Executor, Job, executor_for
+from warpimpact.runs.questions import Store
 from warpimpact.runs.shards import ShardsOnDisk
-from warpimpact.runs.store import Store
 
 TARGET = """
 title = "small"
@@ -183,7 +182,7 @@ def test_processes_give_the_bits_of_threads(
     name: str, straight: Path, asked: Answered, two_processes: Executor, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     processes = Lent(two_processes)
-    monkeypatch.setattr(choice, "Processes", lambda *_: processes)
+    monkeypatch.setattr(executor, "Processes", lambda *_: processes)
     assert asked(name, tmp_path / "processes.nc", "--workers", "2") == 0
     assert processes.jobs
     assert_alike(tmp_path / "processes.nc", straight)

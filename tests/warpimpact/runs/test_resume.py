@@ -21,8 +21,7 @@ from warpimpact.cli import main
 from warpimpact.results import files
 from warpimpact.results.files import OutputError
 from warpimpact.runs import shards
-from warpimpact.runs.manifests import difference
-from warpimpact.runs.parts import Interrupted, folder_of
+from warpimpact.runs.parts import Interrupted, difference, folder_of
 from warpimpact.runs.progress import RunProgress
 from warpimpact.runs.run import run, run_to_file
 

@@ -15,11 +15,10 @@ from warpimpact.results import files
 from warpimpact.results.measures import Measure
 from warpimpact.results.tallies import Tally
 from warpimpact.runs.parts import Interrupted
-from warpimpact.runs.progress import RunProgress
+from warpimpact.runs.progress import RunProgress, Watch
 from warpimpact.runs.replay import replay
 from warpimpact.runs.run import run, run_to_file
 from warpimpact.runs.shards import Shards
-from warpimpact.runs.watch import Watch
 
 from ..results.test_measures import LEAST, TRIALS, TRUTHS, shard_of
 

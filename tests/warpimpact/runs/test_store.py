@@ -10,7 +10,7 @@ import pytest
 
 from warpimpact.results.files import OutputError
 from warpimpact.runs.parts import Interrupted, folder_of
-from warpimpact.runs.store import Store, stored
+from warpimpact.runs.questions import Store, stored
 
 CONTENT = {"fit": {"seed": 1}, "threats": [{"speed": 1}]}
 ARRAYS = {"points": np.arange(3.0)}

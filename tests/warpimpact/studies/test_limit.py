@@ -20,7 +20,6 @@ from warpimpact.results.measures import Measure
 from warpimpact.runs import shards
 from warpimpact.runs.replay import replay
 from warpimpact.runs.run import run_to_file
-from warpimpact.runs.task import Task
 from warpimpact.scene import Numerics, make_shots
 from warpimpact.solver.accuracy import PILOT_LIMITS
 from warpimpact.solver.limit import limit_velocity
@@ -238,8 +237,8 @@ def test_limits_do_not_depend_on_the_tasks(quantity: str, monkeypatch: pytest.Mo
     monkeypatch.setattr(shards, "FEWEST", 8)
     of = campaign(TEXT.replace('fidelity = "draft"', "level = 0"))
     job, shots = LimitMap.of(of, quantity), of.sampler().shots(0, 32)
-    whole = job.compute(of, Task(shots), Worker("cpu"))
-    parts = [job.compute(of, Task(shots[first:end]), Worker("cpu")) for first, end in ((0, 8), (8, 32))]
+    whole = job.compute(of, shots, None, Worker("cpu"))
+    parts = [job.compute(of, shots[first:end], None, Worker("cpu")) for first, end in ((0, 8), (8, 32))]
     for name in v.LIMITS[quantity]:
         values = [part[name].values for part in parts]
         np.testing.assert_array_equal(np.concatenate(values), whole[name].values)
