@@ -88,15 +88,15 @@ def asked(folder: Path) -> Iterator[Answered]:
 
 def content(path: Path) -> dict[str, Any]:
     """All that a result holds, but for when and how fast it was computed."""
-    with xarray.open_datatree(path, engine="netcdf4") as tree:
-        found: dict[str, Any] = {}
-        for node in tree.subtree:
-            for name, variable in node.to_dataset(inherit=False).variables.items():
+    found: dict[str, Any] = {}
+    for place, dataset in xarray.open_groups(path, engine="netcdf4").items():  # a reference has hits of its own
+        with dataset:
+            for name, variable in dataset.variables.items():
                 if not re.search("time|seconds|cost", str(name)):
-                    found[f"{node.path}/{name}"] = variable.values
+                    found[f"{place}/{name}"] = variable.values
             found |= {
-                f"{node.path}@{name}": value
-                for name, value in node.attrs.items()
+                f"{place}@{name}": value
+                for name, value in dataset.attrs.items()
                 if name not in OF_THE_CALL and "time" not in name and "second" not in name
             }
     return found
