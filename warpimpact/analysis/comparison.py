@@ -32,9 +32,8 @@ from warpimpact.analysis.summary import breaks_promise, hits_at_two_levels, samp
 from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
 from warpimpact.results.files import ResultError
-from warpimpact.results.measures import Measure
-from warpimpact.results.per_hit import base_thickness, has_base
-from warpimpact.results.tallies import dealing, estimate_from
+from warpimpact.results.measures import Measure, dealing, estimate_from
+from warpimpact.results.vocabulary import base_thickness, has_base
 from warpimpact.runs.parts import first_difference
 from warpimpact.scene.quantities import QUANTITIES
 from warpimpact.scene.units import quantity as reader_of

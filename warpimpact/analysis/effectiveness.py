@@ -19,10 +19,9 @@ from warpimpact.analysis.numbers import interval_text
 from warpimpact.analysis.plate_text import plate_text, reference_name, solid_note
 from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
-from warpimpact.results.measures import Measure
-from warpimpact.results.per_hit import Array
+from warpimpact.results.measures import Measure, dealing, estimate_from
 from warpimpact.results.references import reference as reference_of
-from warpimpact.results.tallies import dealing, estimate_from
+from warpimpact.results.vocabulary import Array
 from warpimpact.statistics.comparisons import Ratio
 from warpimpact.view.view import Column, Section, Table, number, text_of
 

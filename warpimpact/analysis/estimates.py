@@ -13,9 +13,8 @@ from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
 from warpimpact.results.dataset import SLICE, finer_pair
 from warpimpact.results.files import ResultError
-from warpimpact.results.measures import STATUSES, Measure
-from warpimpact.results.per_hit import Array
-from warpimpact.results.tallies import dealing, estimate_from, shift_of
+from warpimpact.results.measures import STATUSES, Measure, dealing, estimate_from, shift_of
+from warpimpact.results.vocabulary import Array
 from warpimpact.statistics.intervals import Estimate
 
 if TYPE_CHECKING:

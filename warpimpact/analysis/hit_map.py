@@ -16,7 +16,7 @@ from scipy.stats import t as student
 from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
 from warpimpact.results.dataset import passed
-from warpimpact.results.per_hit import place_of_standoff
+from warpimpact.results.vocabulary import place_of_standoff
 from warpimpact.scene.symmetry import IDENTITY, SYMMETRIES, Symmetry
 
 Array = NDArray[np.float64]

@@ -28,13 +28,13 @@ from warpimpact.analysis.summary import (
     symmetry_text,
 )
 from warpimpact.kernels.status import Status
-from warpimpact.records.group import failures
+from warpimpact.records.variable import failures
 from warpimpact.results import attributes as attr
 from warpimpact.results import files
 from warpimpact.results import variables as v
 from warpimpact.results.dataset import failed, hit_numbers, passed
+from warpimpact.results.layers import outlines
 from warpimpact.results.measures import Measure
-from warpimpact.results.outlines import outlines
 from warpimpact.statistics.intervals import Estimate
 from warpimpact.view import svg
 from warpimpact.view.view import Column, Section, Table, labelled, number, text_of

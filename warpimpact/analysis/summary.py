@@ -14,7 +14,7 @@ from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
 from warpimpact.results.dataset import finer_pair, is_choice, status_codes
 from warpimpact.results.measures import Measure
-from warpimpact.results.per_hit import has_base
+from warpimpact.results.vocabulary import has_base
 from warpimpact.scene.display import STORED
 from warpimpact.solver.accuracy import errors_text, listed, share_text
 from warpimpact.view.view import Column, Section, Table, number, text_of

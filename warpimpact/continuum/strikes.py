@@ -20,8 +20,8 @@ from warpimpact.continuum.one_hit import STEPS, OneHit, axis_of, built
 from warpimpact.kernels.continuum import abreast
 from warpimpact.kernels.continuum.fields import PIECE
 from warpimpact.kernels.status import RUNNING, WAITING, Status
-from warpimpact.records.continuum_variables import ENERGY_IMBALANCE, ERODED_ELEMENTS, HOURGLASS_SHARE
 from warpimpact.records.outcomes import Outcomes
+from warpimpact.records.registry import ENERGY_IMBALANCE, ERODED_ELEMENTS, HOURGLASS_SHARE
 from warpimpact.scene import Numerics, Scene, Shots
 from warpimpact.scene.flow import Continuum
 from warpimpact.solver.device import block_size, cores, find_device, load

@@ -24,7 +24,7 @@ from warpimpact.results import firing as f
 from warpimpact.results import variables as v
 from warpimpact.results.dataset import dataset_of, failed
 from warpimpact.results.kinds import FIRING
-from warpimpact.results.tallies import dealing
+from warpimpact.results.measures import dealing
 from warpimpact.runs.executor import Executor
 from warpimpact.runs.run import run_to_file
 from warpimpact.scene.model import Array

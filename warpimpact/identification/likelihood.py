@@ -24,8 +24,8 @@ from numpy.typing import NDArray
 from warpimpact.identification.fit import Fit, MeasuredShot
 from warpimpact.identification.measured import MEASURABLE, Observation
 from warpimpact.identification.parameters import COLUMN_OF, UNITS_OF_EXPOSURE, Path, columns_of
-from warpimpact.records.group import failures
 from warpimpact.records.outcomes import Outcomes
+from warpimpact.records.variable import failures
 from warpimpact.results.measures import STATUSES
 from warpimpact.scene import IDENTITY, Hits, Plate, Sampler, Scene, Shots, Symmetry
 from warpimpact.scene.model import Array

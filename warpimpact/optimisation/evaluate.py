@@ -14,7 +14,7 @@ import numpy as np
 from warpimpact.campaign.campaign import Campaign
 from warpimpact.campaign.resistances import resistance_by_thickness
 from warpimpact.optimisation.design import Design
-from warpimpact.records.group import failures
+from warpimpact.records.variable import failures
 from warpimpact.results import variables as v
 from warpimpact.results.dataset import narrow_table
 from warpimpact.results.measures import Measure

@@ -31,7 +31,7 @@ from warpimpact.plotting.style import MAP_SIDE, common_fire, draw_fire
 from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
 from warpimpact.results.dataset import passed
-from warpimpact.results.outlines import outlines
+from warpimpact.results.layers import outlines
 from warpimpact.scene.display import MM, STORED
 from warpimpact.scene.model import Array
 

@@ -9,8 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from warpimpact.records.group import Columns, Returned, VariableGroup
-from warpimpact.records.variable import HITS, Variable
+from warpimpact.records.variable import HITS, Columns, Returned, Variable, VariableGroup
 
 if TYPE_CHECKING:
     from warpimpact.scene import Scene, Shots

@@ -5,8 +5,17 @@ from __future__ import annotations
 import numpy as np
 
 from warpimpact.kernels.status import OF_SHOTS, Status
-from warpimpact.records.group import Columns, Returned, VariableGroup, doubles
-from warpimpact.records.variable import AT_STANDOFF, HITS, MAIN, VECTORS, Variable
+from warpimpact.records.variable import (
+    AT_STANDOFF,
+    HITS,
+    MAIN,
+    VECTORS,
+    Columns,
+    Returned,
+    Variable,
+    VariableGroup,
+    doubles,
+)
 
 STATUS = Variable("status", HITS, "1", "how the shot ended", flags=OF_SHOTS)
 RESIDUAL_VELOCITY = Variable("residual_velocity", HITS, "m s-1", "residual velocity", shown_by=MAIN)

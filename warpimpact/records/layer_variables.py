@@ -10,8 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from warpimpact.kernels.status import Status
-from warpimpact.records.group import Columns, Returned, VariableGroup
-from warpimpact.records.variable import HITS, IN_LAYER, Variable
+from warpimpact.records.variable import HITS, IN_LAYER, Columns, Returned, Variable, VariableGroup
 
 if TYPE_CHECKING:
     from warpimpact.scene import Scene, Shots

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from warpimpact.records import registry
 
 if TYPE_CHECKING:
-    from warpimpact.records.group import Returned
+    from warpimpact.records.variable import Returned
     from warpimpact.scene import Scene, Shots
 
 Which = slice | NDArray[np.int64] | NDArray[np.bool_]

@@ -20,7 +20,7 @@ from warpimpact.plotting.trajectory import Pose, poses_behind, poses_in_plate, s
 from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
 from warpimpact.results.dataset import hit_numbers
-from warpimpact.results.outlines import outlines
+from warpimpact.results.layers import outlines
 from warpimpact.scene.display import MM
 from warpimpact.scene.model import Array
 

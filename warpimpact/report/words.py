@@ -25,7 +25,7 @@ from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
 from warpimpact.results.dataset import passed
 from warpimpact.results.files import ResultError
-from warpimpact.results.outlines import outlines
+from warpimpact.results.layers import outlines
 from warpimpact.scene.display import MM
 from warpimpact.studies.limit_view import in_short, limit_view
 from warpimpact.view import svg

@@ -12,12 +12,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from warpimpact.kernels.status import Status
-from warpimpact.records.group import failures
+from warpimpact.records.variable import failures
 from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
 from warpimpact.results.kinds import HISTORY, HIT_MAP
-from warpimpact.results.layers import faces, labels, own_columns, sections
-from warpimpact.results.outlines import in_memory, outlines_in
+from warpimpact.results.layers import faces, in_memory, labels, outlines_in, own_columns, sections
 from warpimpact.results.table import HitTable
 
 if TYPE_CHECKING:

@@ -14,8 +14,8 @@ import netCDF4
 from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
 from warpimpact.results.kinds import HIT_MAP, KINDS, SWEEP, Kind, text_kind
+from warpimpact.results.layers import in_a_file, in_memory
 from warpimpact.results.netcdf import FILE_CHUNK, write_table
-from warpimpact.results.outlines import in_a_file, in_memory
 from warpimpact.results.references import NAMES, references_of, with_references
 from warpimpact.results.table import HitTable
 from warpimpact.scene.input_files import check_file, parsed, read_text

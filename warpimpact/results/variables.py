@@ -9,7 +9,7 @@ from warpimpact.records import registry
 from warpimpact.records.bending_variables import *
 from warpimpact.records.exit import *
 from warpimpact.records.layer_variables import *
-from warpimpact.records.limit_variables import *
+from warpimpact.records.registry import *
 from warpimpact.records.variable import *
 from warpimpact.scene.quantities import BY_LAYER, OF_THE_SCENE, QUANTITIES
 from warpimpact.scene.units import quantity

@@ -20,7 +20,7 @@ from warpimpact.results import attributes as attr
 from warpimpact.results import files
 from warpimpact.results import variables as v
 from warpimpact.results.dataset import stored_columns
-from warpimpact.results.outlines import in_memory
+from warpimpact.results.layers import in_memory
 from warpimpact.results.references import with_references
 from warpimpact.runs.describe import computed_by, described_as
 from warpimpact.runs.executor import Executor, Job

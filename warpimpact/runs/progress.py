@@ -12,9 +12,8 @@ from warpimpact.campaign.campaign import Campaign
 from warpimpact.campaign.stop import Stop
 from warpimpact.results import attributes as attr
 from warpimpact.results.dataset import failed, finer_pair
-from warpimpact.results.measures import Measure
+from warpimpact.results.measures import Measure, Tally, shift_of
 from warpimpact.results.table import HitTable
-from warpimpact.results.tallies import Tally, shift_of
 from warpimpact.runs.shards import Shards
 from warpimpact.solver.accuracy import PilotResult
 from warpimpact.statistics.intervals import Estimate, looks

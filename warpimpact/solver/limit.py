@@ -13,9 +13,9 @@ from functools import cache
 import numpy as np
 from numpy.typing import NDArray
 
-from warpimpact.records.group import failures
-from warpimpact.records.limit_variables import LIMITS
 from warpimpact.records.outcomes import Outcomes
+from warpimpact.records.registry import LIMITS
+from warpimpact.records.variable import failures
 from warpimpact.scene import PRESETS, Numerics, Plate, Scene, Shots, Target
 from warpimpact.solver.accuracy import PILOT_LIMITS, LevelErrors, PilotResult, choose_level, limit_errors, pilot_size
 from warpimpact.solver.limit_near import Neighbours

@@ -13,8 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpimpact.kernels.status import Status
-from warpimpact.records.group import failures
 from warpimpact.records.outcomes import Outcomes
+from warpimpact.records.variable import failures
 
 Array = NDArray[np.float64]
 

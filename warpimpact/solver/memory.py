@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from warpimpact.kernels import free_flight, lanes, march
 from warpimpact.kernels.trace import WIDTH
 from warpimpact.kernels.variant import Variant
-from warpimpact.records.group import Returned
+from warpimpact.records.variable import Returned
 from warpimpact.solver.device import SMALL_MEMORY, free_memory, load
 from warpimpact.solver.grid import Cells
 from warpimpact.solver.prepare import Prepared

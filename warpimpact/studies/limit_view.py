@@ -17,8 +17,8 @@ from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
 from warpimpact.results.files import ResultError
 from warpimpact.results.measures import NAMES, Measure
-from warpimpact.results.per_hit import needed_density
 from warpimpact.results.references import reference
+from warpimpact.results.vocabulary import needed_density
 from warpimpact.scene.quantities import QUANTITIES
 from warpimpact.scene.units import quantity as reader_of
 from warpimpact.solver.accuracy import errors_text, share_text

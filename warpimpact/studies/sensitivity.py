@@ -23,8 +23,7 @@ from warpimpact.campaign.straight_passage import StraightPassage
 from warpimpact.campaign.text import CampaignError
 from warpimpact.results import variables as v
 from warpimpact.results.dataset import narrow_table
-from warpimpact.results.measures import Measure
-from warpimpact.results.tallies import estimate_from
+from warpimpact.results.measures import Measure, estimate_from
 from warpimpact.scene import Interaction, Numerics, Plate, Radians, Shots
 from warpimpact.scene.interaction import NEAR_EDGES
 from warpimpact.scene.model import Array

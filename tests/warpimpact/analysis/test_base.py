@@ -20,11 +20,10 @@ from warpimpact.plotting import comparison_figure, weight_figure
 from warpimpact.results import attributes as attr
 from warpimpact.results.dataset import stored_columns
 from warpimpact.results.files import ResultError
-from warpimpact.results.measures import Measure
-from warpimpact.results.per_hit import is_pierced, piercing_margin
+from warpimpact.results.measures import Measure, shift_of
 from warpimpact.results.references import references_of, with_references
-from warpimpact.results.tallies import shift_of
 from warpimpact.results.variables import LIMITS, STATUS
+from warpimpact.results.vocabulary import is_pierced, piercing_margin
 from warpimpact.scene import Numerics
 from warpimpact.solver.worker import Worker
 from warpimpact.studies.limit import LimitMap

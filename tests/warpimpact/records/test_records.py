@@ -24,9 +24,8 @@ from warpimpact import (
 )
 from warpimpact.analysis.hit_map import mirrored
 from warpimpact.records import registry
-from warpimpact.records.group import Returned, VariableGroup, doubles
 from warpimpact.records.outcomes import Outcomes
-from warpimpact.records.variable import HITS, Variable
+from warpimpact.records.variable import HITS, Returned, Variable, VariableGroup, doubles
 from warpimpact.results import files
 from warpimpact.runs.run import run_to_file
 

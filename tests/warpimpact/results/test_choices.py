@@ -13,9 +13,9 @@ from warpimpact.cli import main
 from warpimpact.results import files
 from warpimpact.results import variables as v
 from warpimpact.results.dataset import is_choice
-from warpimpact.results.outlines import outlines
+from warpimpact.results.layers import outlines
+from warpimpact.results.measures import dealing
 from warpimpact.results.references import reference, with_references
-from warpimpact.results.tallies import dealing
 from warpimpact.runs.run import run
 
 SLOTTED_PLATE = (Path(__file__).parents[3] / "campaigns" / "slotted_plate.toml").read_text(encoding="utf-8")

@@ -7,8 +7,7 @@ import pytest
 import xarray
 
 from warpimpact.kernels.status import Status
-from warpimpact.results.measures import Measure
-from warpimpact.results.tallies import Tally
+from warpimpact.results.measures import Measure, Tally
 
 TRIALS, LEAST = 150, 134
 """95 % of 150 trials: 142.5 ± 2.7; three standard deviations below."""

@@ -10,7 +10,7 @@ from warpimpact import open_result
 from warpimpact.kernels.status import OF_SHOTS, Status
 from warpimpact.results import files
 from warpimpact.results.dataset import status_codes
-from warpimpact.results.outlines import outlines
+from warpimpact.results.layers import outlines
 from warpimpact.results.variables import EXIT_VARIABLES, OUTCOME_VARIABLES
 from warpimpact.scene import NoPattern, SquarePattern
 

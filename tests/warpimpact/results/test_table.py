@@ -14,8 +14,8 @@ from warpimpact.analysis.summary import summary_text
 from warpimpact.results import files
 from warpimpact.results import variables as v
 from warpimpact.results.dataset import numbered
+from warpimpact.results.layers import in_memory
 from warpimpact.results.netcdf import open_table, read_table, write_table
-from warpimpact.results.outlines import in_memory
 from warpimpact.results.table import HitTable, joined
 from warpimpact.runs.compute import HIT_MAP
 from warpimpact.scene import Numerics

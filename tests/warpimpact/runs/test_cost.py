@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from warpimpact import Campaign, Numerics, SlotPattern
-from warpimpact.runs.cost import Costly, cost_warning, estimate_cost
+from warpimpact.runs.run import Costly, cost_warning, estimate_cost
 from warpimpact.solver.prepare import prepare
 from warpimpact.solver.resolution import MOST_STEPS, TooManySteps
 

@@ -12,8 +12,7 @@ from warpimpact import Campaign
 from warpimpact.analysis.summary import summary_text
 from warpimpact.campaign.campaign import CampaignError
 from warpimpact.results import files
-from warpimpact.results.measures import Measure
-from warpimpact.results.tallies import Tally
+from warpimpact.results.measures import Measure, Tally
 from warpimpact.runs.parts import Interrupted
 from warpimpact.runs.progress import RunProgress, Watch
 from warpimpact.runs.replay import replay
