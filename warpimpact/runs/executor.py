@@ -303,7 +303,7 @@ def opened(device: str | Executor) -> AbstractContextManager[Executor]:
     return executor_for(device) if isinstance(device, str) else nullcontext(device)
 
 
-LONELY = 120.0
+NO_WORKERS_LIMIT = 120.0
 """Seconds that a scheduler may be without workers."""
 
 Entered = TypeVar("Entered")
@@ -314,22 +314,23 @@ def cluster(address: str, device: str = "auto") -> Iterator[Cluster]:
     """The workers of a scheduler, each of which computes on a device of this name.
 
     Raises:
-        ClusterError: Dask is not installed; the scheduler cannot be reached, is lost or has no worker for LONELY
-            seconds; or jobs kill one worker after another.
+        ClusterError: Dask is not installed; the scheduler cannot be reached, is lost or has no worker for
+            NO_WORKERS_LIMIT seconds; or jobs kill one worker after another.
         DeviceError: the workers lack the device, or compute other bits than the first worker asked.
     """
-    with _starting():
+    try:
         from distributed import Client, KilledWorker
         from distributed.comm import CommClosedError
         from distributed.utils import silence_logging_cmgr
+    except ImportError:
+        raise ClusterError("a cluster needs Dask: pip install 'warpimpact[cluster]'") from None
     with ExitStack() as stack:
         stack.enter_context(silence_logging_cmgr(logging.CRITICAL))  # a lost scheduler is reported by our own sentence
-        with _starting():
-            try:
-                # Not the default client of the process: xarray would take its locks for the files written here.
-                client = stack.enter_context(_ended(Client(address, timeout="20s", set_as_default=False)))
-            except (OSError, ValueError) as error:
-                raise ClusterError(f'scheduler: got "{address}", which cannot be reached ({error})') from None
+        try:
+            # Not the default client of the process: xarray would take its locks for the files written here.
+            client = stack.enter_context(_ended(Client(address, timeout="20s", set_as_default=False)))
+        except (OSError, ValueError) as error:
+            raise ClusterError(f'scheduler: got "{address}", which cannot be reached ({error})') from None
         try:
             yield Cluster(client, address, device)
         except (CommClosedError, CancelledError) as error:  # without its scheduler a client cancels what it waits for
@@ -348,23 +349,6 @@ def _ended(part: AbstractContextManager[Entered]) -> Iterator[Entered]:
     finally:
         with suppress(OSError):  # TimeoutError among them
             part.__exit__(None, None, None)
-
-
-@contextmanager
-def _starting() -> Iterator[None]:
-    """Turn an error of a start of Dask into a ClusterError that names the settings."""
-    try:
-        yield
-    except ClusterError:
-        raise
-    except ImportError:
-        raise ClusterError("a cluster needs Dask: pip install 'warpimpact[cluster]'") from None
-    except Exception as error:  # of any class, as settings have no check of their own
-        given = ", ".join(sorted(name for name in os.environ if name.startswith("DASK_"))) or "none"
-        what = " ".join(f"{type(error).__name__}: {error}".split())[:300]
-        raise ClusterError(
-            f"Dask does not start ({what}); check its settings: variables {given}; files in ~/.config/dask"
-        ) from error
 
 
 class Cluster:
@@ -389,10 +373,10 @@ class Cluster:
         now = time.monotonic()
         if threads:
             self._seen = now
-        elif now - self._seen > LONELY:
+        elif now - self._seen > NO_WORKERS_LIMIT:
             raise ClusterError(
-                f"scheduler: {self._address} has had no worker for {LONELY:g} s; start some; what is computed is "
-                "saved, continue with --resume"
+                f"scheduler: {self._address} has had no worker for {NO_WORKERS_LIMIT:g} s; start some; what is "
+                "computed is saved, continue with --resume"
             )
         return 2 * max(1, threads)
 

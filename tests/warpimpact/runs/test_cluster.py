@@ -109,7 +109,7 @@ def test_a_lost_scheduler_is_told_with_the_way_to_resume(
 
 
 def test_a_scheduler_without_workers_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("warpimpact.runs.executor.LONELY", 0.3)
+    monkeypatch.setattr("warpimpact.runs.executor.NO_WORKERS_LIMIT", 0.3)
     with (
         distributed.LocalCluster(n_workers=0, dashboard_address="127.0.0.1:0") as empty,
         pytest.raises(ClusterError, match=r"has had no worker for 0.3 s; start some; .* continue with --resume"),

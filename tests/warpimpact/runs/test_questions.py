@@ -39,15 +39,6 @@ QUESTIONS: dict[str, tuple[str, ...]] = {
     "run": ("run", CAMPAIGN),
     "limit": ("limit", TARGET + PLATE + HOLED + HITS.format(160), "--tolerance", "60 m/s"),
     "sweep": ("sweep", CAMPAIGN.replace("160", "96") + '[sweep]\nvelocity = ["700 m/s", "800 m/s"]\n'),
-    "identify": (
-        "identify",
-        TARGET.replace('[impact]\nvelocity = "825 m/s"\n', "").replace("[output]", "[record]")
-        + PLATE.replace('resistance = "2.6 GPa"\n', "")
-        + '[prior.plate]\nresistance = { distribution = "uniform", low = "1 GPa", high = "4 GPa" }\n'
-        + "[sampling]\nsets = 512\nhits = 32\neffective = 200\n"
-        + '[[shot]]\nimpact = { velocity = "825 m/s" }\n'
-        + '[shot.measured]\nresidual_velocity = { value = "780 m/s", std = "8 m/s" }\n',
-    ),
     "optimise": (
         "optimise",
         TARGET
