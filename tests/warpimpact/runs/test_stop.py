@@ -176,23 +176,9 @@ def test_a_rule_that_is_never_met_ends_at_its_largest_count(tmp_path: Path) -> N
     assert "max_count ended it" in summary_text(dataset)
 
 
-@pytest.mark.parametrize(
-    ("change", "expected"),
-    [
-        (("", ""), True),
-        (("[hits]", "[hits]\nirreducible = false"), False),
-    ],
-)
-def test_a_rule_samples_the_irreducible_part_by_default(
-    change: tuple[str, str], expected: bool, tmp_path: Path
-) -> None:
-    text = DRAFT.replace("[output]", STOP.format("mean(residual_velocity)", "1 m/s", 4096))
-    changed = text.replace(*change) if change[0] else text
-    assert not change[0] or changed != text
-    scene = Campaign.from_text(changed, name="text", folder=tmp_path)
-    assert scene.hits.irreducible is expected
-    assert Campaign.from_text(scene.text, name="text", folder=tmp_path) == scene
-    without = changed.replace(STOP.format("mean(residual_velocity)", "1 m/s", 4096), "[output]")
-    if expected:
-        counted = Campaign.from_text(without.replace("seed = 1", "seed = 1\ncount = 8"), name="text", folder=tmp_path)
-        assert not counted.hits.irreducible
+def test_a_rule_samples_the_irreducible_part_by_default(tmp_path: Path) -> None:
+    rule = STOP.format("mean(residual_velocity)", "1 m/s", 4096)
+    text, counted = DRAFT.replace("[output]", rule), DRAFT.replace("seed = 1", "seed = 1\ncount = 8")
+    whole = text.replace("[hits]", "[hits]\nirreducible = false")
+    for given, expected in ((text, True), (whole, False), (counted, False)):
+        assert Campaign.from_text(given, name="text", folder=tmp_path).hits.irreducible is expected
