@@ -86,7 +86,7 @@ def _results(
         hashlib.sha256(json.dumps([asdict(job) for job in group], default=str).encode()).hexdigest() for group in groups
     ]
     work = [Job(compute, (design, group)) for group in groups]
-    return (yield Round(work, keys, lambda now: report(min(now.done * together, len(jobs)))))
+    return (yield Round(work, keys, lambda done, _: report(min(done * together, len(jobs)))))
 
 
 def _columns_computed(

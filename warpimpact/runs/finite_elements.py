@@ -24,7 +24,7 @@ from warpimpact.results.layers import in_memory
 from warpimpact.results.references import with_references
 from warpimpact.runs.describe import computed_by, described_as
 from warpimpact.runs.executor import Executor, Job
-from warpimpact.runs.questions import Arrays, Question, Round, RoundProgress, answered, stored
+from warpimpact.runs.questions import Arrays, Round, Store, results_of, stored
 from warpimpact.runs.shards import manifest
 from warpimpact.scene import Scene, Shots
 from warpimpact.scene.flow import Continuum
@@ -68,32 +68,35 @@ def continuum_to_file(
     with stored(output, content, "continuum", resume=resume, overwrite=overwrite, tell=tell) as store:
         if store is None:
             return
-        question = _computed(campaign, hits, device.made_by[attr.DEVICE], progress)
-        dataset = answered(question, device, store)
+        dataset = _computed(campaign, hits, device, store, progress)
         dataset.attrs[attr.FINGERPRINT] = store.parts.fingerprint
         files.write(dataset, output)
 
 
 def _computed(
-    campaign: Campaign, hits: tuple[int, ...] | None, device: str, progress: Callable[[int, int, int], object]
-) -> Question[xarray.Dataset]:
+    campaign: Campaign,
+    hits: tuple[int, ...] | None,
+    executor: Executor,
+    store: Store,
+    progress: Callable[[int, int, int], object],
+) -> xarray.Dataset:
     """The result of the hits of some numbers; None is all of them."""
     sampler, elements = campaign.sampler(), campaign.continuum
     continuum, numbers = elements.solver, range(len(sampler)) if hits is None else hits
+    device = executor.made_by[attr.DEVICE]
     together = 1 if device == "cpu" else MOST
     shots = Shots.joined([sampler.shots(int(number), 1) for number in numbers])
-    asked = [(campaign.scene, shots[k : k + together], continuum) for k in range(0, len(shots), together)]
+    jobs = [(campaign.scene, shots[k : k + together], continuum) for k in range(0, len(shots), together)]
     solid = campaign.references.get("solid") if campaign.output.solid_reference else None
     if solid is not None:
-        asked.append((solid.scene, solid.sampler().shots(int(numbers[0]), 1), continuum))
+        jobs.append((solid.scene, solid.sampler().shots(int(numbers[0]), 1), continuum))
 
-    def tell(now: RoundProgress) -> None:
-        done, resumed = (min(int(jobs * together), len(shots)) for jobs in (now.done, now.resumed))
+    def report(*numbers: float) -> None:
+        done, resumed = (min(int(number * together), len(shots)) for number in numbers)
         progress(done, resumed, len(shots))
 
-    results = yield Round(
-        [Job(_hits, arguments) for arguments in asked], [_key(*arguments) for arguments in asked], tell
-    )
+    batch = Round([Job(_hits, arguments) for arguments in jobs], [_key(*arguments) for arguments in jobs], report)
+    results = results_of(batch, executor, store)
     outcomes = [Outcomes(**{name: values for name, values in row.items() if name != SECONDS}) for row in results]
     elapsed = float(sum(float(row[SECONDS][0]) for row in results))
     told = computed_by(campaign, "cpu", len(shots), elapsed)
@@ -108,7 +111,7 @@ def _computed(
     }
     references = {}
     if solid is not None:
-        table = described_as(solid, asked[-1][1], outcomes.pop(), told, double=True)
+        table = described_as(solid, jobs[-1][1], outcomes.pop(), told, double=True)
         references["solid"] = in_memory(table.to_xarray())
     table = described_as(campaign, shots, Outcomes.joined(outcomes), told, double=True)
     if hits is not None:

@@ -14,7 +14,7 @@ from collections.abc import Callable, Generator, Iterator, Mapping, Sequence
 from contextlib import closing, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, NamedTuple, TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -102,20 +102,6 @@ Arrays = dict[str, NDArray[Any]]
 Answer = TypeVar("Answer")
 
 
-class RoundProgress(NamedTuple):
-    """The progress of a round.
-
-    Attributes:
-        done: number of jobs done, with the reported shares of running ones.
-        resumed: jobs that an earlier call had computed.
-        results: results of the jobs done, by their places in the round.
-    """
-
-    done: float
-    resumed: int
-    results: dict[int, Arrays]
-
-
 @dataclass(frozen=True)
 class Round:
     """Jobs that are computed together.
@@ -123,12 +109,13 @@ class Round:
     Attributes:
         jobs: jobs. Each reports the share that is done, from 0 to 1, and returns `Arrays`.
         keys: for each job, what determines its result beside the content of the store.
-        tell: called with the progress of the round.
+        report: called with the number of jobs done, with the reported shares of running ones, and of those that an
+            earlier call had computed.
     """
 
     jobs: Sequence[Job]
     keys: Sequence[str]
-    tell: Callable[[RoundProgress], object] = lambda now: None
+    report: Callable[[float, int], object] = lambda done, resumed: None
 
 
 Question = Generator[Round, list[Arrays], Answer]
@@ -146,17 +133,17 @@ def answered(question: Question[Answer], executor: Executor, store: Store | None
     """
     first = 0
     try:
-        asked = next(question)
+        jobs = next(question)
         while True:
-            results = _results(asked, first, executor, store)
-            first += len(asked.jobs)
-            asked = question.send(results)
+            results = results_of(jobs, executor, store, first)
+            first += len(jobs.jobs)
+            jobs = question.send(results)
     except StopIteration as end:
         answer: Answer = end.value
         return answer
 
 
-def _results(asked: Round, first: int, executor: Executor, store: Store | None) -> list[Arrays]:
+def results_of(asked: Round, executor: Executor, store: Store | None, first: int = 0) -> list[Arrays]:
     """The results of a round. Its first job is number `first` of its question."""
     results: dict[int, Arrays] = {}
     for place, key in enumerate(asked.keys):
@@ -164,15 +151,14 @@ def _results(asked: Round, first: int, executor: Executor, store: Store | None) 
             results[place] = saved
     resumed = len(results)
 
-    def tell(under_way: float = 0.0) -> None:
-        asked.tell(RoundProgress(len(results) + under_way, resumed, results))
-
-    tell()
+    asked.report(resumed, resumed)
     jobs = iter([(place, job) for place, job in enumerate(asked.jobs) if place not in results])
-    with closing(completed(executor, jobs, lambda: tell(sum(executor.reports())))) as computed:
+    with closing(
+        completed(executor, jobs, lambda: asked.report(len(results) + sum(executor.reports()), resumed))
+    ) as computed:
         for place, arrays in computed:
             if store is not None:
                 store.save(first + place, {"key": np.array(asked.keys[place]), **arrays})
             results[place] = arrays
-            tell()
+            asked.report(len(results), resumed)
     return [results[place] for place in range(len(asked.jobs))]
