@@ -9,7 +9,7 @@ from .extremes import MOST_RISE, MOST_STRETCH, drawn, found
 
 SCENES = (0, 4, 7, 12, 17, 27, 32)
 """Of a seed: cores that pass, stop and ricochet within 154 to 6963 steps, at single plates and at layers, with and
-without friction, weakening, a depth, a rate and a rim, in both precisions."""
+without friction, weakening and a rate, in both precisions."""
 
 
 @pytest.mark.parametrize("index", SCENES)
@@ -22,7 +22,5 @@ def test_extremes(index: int) -> None:
     assert outcome.stretch <= MOST_STRETCH
 
 
-# A spinning disc in double precision, and a needle that tumbles while it spins.
-@pytest.mark.parametrize("index", [1079, 4002])
-def test_energy_of_spin_and_tumbling(index: int) -> None:
-    assert found(drawn(np.random.default_rng([1, index]).random, hits=3)).steep_rise <= MOST_RISE
+def test_energy_of_a_needle_that_tumbles_while_it_spins() -> None:
+    assert found(drawn(np.random.default_rng([1, 4002]).random, hits=3)).steep_rise <= MOST_RISE
