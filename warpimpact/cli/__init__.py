@@ -14,24 +14,19 @@ from typing import NoReturn
 
 from warpimpact import __version__
 
-from .catalogue import add_catalogue
 from .compare import add_compare
 from .continuum import add_continuum
 from .design import add_design
-from .export import add_export, add_report
+from .export import add_export, add_replay, add_report
 from .firing import add_test
 from .identify import add_identify
-from .limit import add_limit
 from .mistakes import Plain, bug_report, message_of, say, show_warnings
 from .optimise import add_optimise
 from .progress import set_verbosity
-from .replay import add_replay
 from .run import add_run
-from .sensitivity import add_sensitivity
-from .show import add_inspect, add_plate, add_plot
+from .show import add_catalogue, add_inspect, add_plate, add_plot, add_validate
 from .start import add_new, add_schema
-from .sweep import add_sweep
-from .validate import add_validate
+from .studies import add_limit, add_sensitivity, add_sweep
 
 _DAILY = (
     *(add_catalogue, add_new, add_design, add_run),

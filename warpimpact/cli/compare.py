@@ -19,7 +19,7 @@ from .options import (
 from .paths import check_picture, named
 from .progress import show_run, warn
 from .run import failure_code
-from .sensitivity import show_rows
+from .studies import show_rows
 
 if TYPE_CHECKING:
     from xarray import Dataset

@@ -34,6 +34,8 @@ def add_design(commands: Commands) -> None:
 
 
 def _design(arguments: argparse.Namespace) -> None:
+    from importlib.resources import files
+
     from warpimpact.campaign.text import CampaignError
     from warpimpact.design.designs import Shelf, from_address, shelf_of
 
@@ -41,7 +43,7 @@ def _design(arguments: argparse.Namespace) -> None:
         from warpimpact.design.server import serve
     except ModuleNotFoundError as error:
         raise CampaignError(f"design needs {error.name}: pip install 'warpimpact[design]'") from None
-    given = arguments.designs or [str(_example())]
+    given = arguments.designs or [str(files("warpimpact.campaigns") / "slotted_plate.toml")]
     addresses = [name for name in given if name.startswith("http://")]
     shelf = shelf_of([Path(name) for name in given if name not in addresses])
     held = {f"address {number}": from_address(address) for number, address in enumerate(addresses, 1)}
@@ -88,9 +90,3 @@ def _leading_to(address: str) -> Path:
             f'<meta http-equiv="refresh" content="0;url={address}"><a href="{address}">warpimpact design</a>'
         )
     return Path(name)
-
-
-def _example() -> Path:
-    from importlib.resources import files
-
-    return Path(str(files("warpimpact.campaigns").joinpath("slotted_plate.toml")))

@@ -1,4 +1,4 @@
-"""The commands inspect, plot and plate: text and figures of results and plates."""
+"""The commands inspect, plot, plate, catalogue and validate: text and figures of what there is."""
 
 import argparse
 import re
@@ -12,6 +12,7 @@ from .options import (
     Commands,
     add_campaign,
     add_command,
+    add_device,
     add_measures,
     add_output,
     add_overwrite,
@@ -160,3 +161,87 @@ def _plate(arguments: argparse.Namespace) -> None:
         rows.append((f"layer {place}", f"{1e3 * layer.thickness:g} mm, {behind}, {layer.open_area:.1%} open"))
     print(text_of([Section([labelled(rows), *doubted_holes(campaign.target)], campaign.title)]))
     print(output)
+
+
+def add_catalogue(commands: Commands) -> None:
+    parser = add_command(
+        commands,
+        "catalogue",
+        _catalogue,
+        summary="list threats and materials by name, or show one",
+        description="List the threats and materials that a campaign may name, or show one: core drawn, masses, "
+        "velocities of standards; strength, rows and range; what is known from where, and what is assumed.",
+        example='catalogue ".30 AP M2" -o core.png',
+    )
+    parser.add_argument("name", nargs="?", metavar="NAME", help="threat or material (default: list all)")
+    parser.add_argument("--file", type=Path, metavar="MINE.toml", help="entries of your own, as a campaign names them")
+    add_output(parser, "CORE.png", "draw the core of a threat into this picture")
+    add_overwrite(parser, "an existing picture")
+
+
+def _catalogue(arguments: argparse.Namespace) -> None:
+    from warpimpact.campaign.text import CampaignError
+    from warpimpact.catalogue.catalogue import Catalogue
+    from warpimpact.catalogue.catalogue_view import catalogue_view, material_view, threat_view
+    from warpimpact.catalogue.entries import Material, Threat
+    from warpimpact.view.view import text_of
+
+    try:
+        catalogue = Catalogue.of(arguments.file)
+        entry = None if arguments.name is None else catalogue.entry(arguments.name)
+    except ValueError as error:
+        raise CampaignError(str(error)) from None
+    core = entry.shape if isinstance(entry, Threat) else None
+    if arguments.output and core is None:
+        raise CampaignError("--output: only a threat whose core is known can be drawn")
+    if entry is None:
+        print(text_of(catalogue_view(catalogue)))
+    else:
+        is_own = isinstance(entry, Material) and catalogue.is_own(entry)
+        view = threat_view(entry) if isinstance(entry, Threat) else material_view(entry, is_own=is_own)
+        print(text_of(view))
+    if arguments.output and core is not None and entry is not None:
+        from warpimpact.plotting.plate import core_figure
+
+        check_picture(arguments.output, overwrite=arguments.overwrite)
+        core_figure(core, entry.name, entry.evidence).savefig(arguments.output, dpi=150)
+        print(arguments.output)
+
+
+def add_validate(commands: Commands) -> None:
+    parser = add_command(
+        commands,
+        "validate",
+        _validate,
+        summary="compute the published shots and compare",
+        description="Compute the paper's two shots. Compare them with the paper's model, its experiment and LS-DYNA. "
+        "Of a result, tell the hits that come closest to the two shots.",
+        example="validate",
+    )
+    parser.add_argument(
+        "campaign",
+        type=Path,
+        nargs="?",
+        metavar="CAMPAIGN.toml|RESULT.nc",
+        help="the paper's scene with two hits; lattice and numerics may differ (default: the example paper_shots); or "
+        "a result of warpimpact run",
+    )
+    add_device(parser)
+
+
+def _validate(arguments: argparse.Namespace) -> None:
+    from warpimpact.analysis.paper import check_scene, closest_table, paper_campaign, validation_table
+    from warpimpact.campaign.campaign import Campaign
+    from warpimpact.results import files
+    from warpimpact.runs.run import run
+
+    path = arguments.campaign or paper_campaign()
+    if path.suffix == ".nc":
+        try:
+            print(closest_table(files.read(path)))
+        except files.ResultError as error:
+            raise files.ResultError(f"{path}: {str(error).removeprefix(f'{path}: ')}") from None
+        return
+    campaign = Campaign.from_toml(path)
+    check_scene(campaign, str(path))
+    print(validation_table(run(campaign, device=arguments.device)))

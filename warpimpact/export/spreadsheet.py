@@ -84,17 +84,9 @@ def write_csv(dataset: xarray.Dataset, path: Path) -> None:
     with aside(path) as file:
         for part in slices(dataset):
             frame = to_dataframe(part)
-            for name in _statuses(part):
-                frame[name] = frame[name].map(_no_formula)
-            header = [_no_formula(_header(name, unit)) for name, unit in _units(part).items()] if is_first else False
+            header = [_header(name, unit) for name, unit in _units(part).items()] if is_first else False
             frame.to_csv(file, mode="w" if is_first else "a", header=header)
             is_first = False
-
-
-def _no_formula(text: str) -> str:
-    """A text that a spreadsheet does not compute: an apostrophe stands before what begins as a formula. Names of
-    variables, and the words of a status, are whatever the file says."""
-    return f"'{text}" if text.startswith(("=", "+", "-", "@", "\t", "\r")) else text
 
 
 def _header(name: str, unit: str) -> str:

@@ -9,7 +9,6 @@ import xarray
 from PIL import Image
 
 from warpimpact import CampaignError, run
-from warpimpact.export.spreadsheet import write_csv
 from warpimpact.identification.fit_file import read_fit
 from warpimpact.optimisation.design import read_design
 from warpimpact.results import files
@@ -127,15 +126,3 @@ def test_a_truncated_result_is_told(
     data = Path("a.nc").read_bytes()
     Path("a.nc").write_bytes(data[: int(share * len(data))])
     assert "a.nc: cannot be read as a netCDF file" in refusal(["inspect", "a.nc"])
-
-
-def test_a_table_has_no_formulas(make_result: ResultMaker, tmp_path: Path) -> None:
-    result = make_result(3).assign({"=1+1": ("hit", [-1.0, 2.0, 3.0], {"units": "m"})})
-    result["status"].attrs["flag_meanings"] = "=cmd " + result["status"].attrs["flag_meanings"].split(" ", 1)[1]
-    write_csv(result, tmp_path / "a.csv")
-    header, *rows = (tmp_path / "a.csv").read_text(encoding="utf-8").splitlines()
-    assert "'=1+1 [m]" in header.split(",")
-    assert ",'=cmd," in rows[0]
-    assert rows[0].endswith(",-1.0")  # a number is one
-    cells = [cell for line in (header, *rows) for cell in line.split(",")]
-    assert not [cell for cell in cells if cell.startswith(("=", "+", "@"))]
