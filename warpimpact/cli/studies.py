@@ -179,13 +179,9 @@ def add_sensitivity(commands: Commands) -> None:
     add_campaign(parser)
     add_measures(parser, "what reaches the base; residual velocity, deflection and tilt")
     add_output(parser, "TABLE.csv", "table (default: the campaign's name and _sensitivity.csv, in this folder)")
-    add_hits(parser)
+    parser.add_argument("--hits", type=at_least(16), default=256, metavar="N", help="hits of each row (default: 256)")
     add_device(parser)
     add_overwrite(parser, "an existing table and its figure")
-
-
-def add_hits(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("--hits", type=at_least(16), default=256, metavar="N", help="hits of each row (default: 256)")
 
 
 @contextmanager
