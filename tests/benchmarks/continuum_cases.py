@@ -112,31 +112,6 @@ CASES = {
     "solid_20": solid("20 mm of AA6082-T6, solid", 20e-3, 0.935e9, 0.05, "AA6082-T6", (600.0, 800.0)),
 }
 
-KEPT = {
-    "kept_a": Case(
-        "2.5 mm, holes of 4.5 mm at 6.5 mm, at 15°",
-        (Plate(thickness=2.5e-3, pattern=round_holes(4.5e-3, 6.5e-3), **PAPER),),
-        (STEEL,),
-        Impact(velocity=825.0, obliquity=15.0),
-    ),
-    "kept_b": Case(
-        "5 mm, slots of 3 × 9 mm",
-        (
-            Plate(
-                thickness=5e-3,
-                pattern=SlotPattern(length=9e-3, width=3e-3, spacing=(6.5e-3, 13e-3), staggered=True),
-                **PAPER,
-            ),
-        ),
-        (STEEL,),
-    ),
-    "kept_c": Case(
-        "8 mm, holes of 6 mm at 10 mm", (Plate(thickness=8e-3, pattern=round_holes(6e-3, 10e-3), **PAPER),), (STEEL,)
-    ),
-    "kept_d": solid("9 mm of ARMOX560T, solid", 9e-3, 3.8e9, 0.039, STEEL, (750.0, 950.0)),
-}
-"""Plates that no law was fitted to; its form was chosen with them known."""
-
 
 def staggered_slots(width: float, length: float, across: float, along: float) -> SlotPattern:
     """Staggered slots, a pitch `across` and `along` them from each other [m]."""
@@ -168,7 +143,7 @@ LIMITED = {
     "solid_20_7075": solid("20 mm of AA7075-T651, solid", 20e-3, 1.178e9, 0.039, "AA7075-T651", (700.0, 900.0)),
 }
 """Plates of which the limit velocity alone is computed (continuum_limits.py)."""
-PLATES = {**CASES, **KEPT, **FRONT, **LIMITED}
+PLATES = {**CASES, **FRONT, **LIMITED}
 
 
 class Published(NamedTuple):
