@@ -2,6 +2,7 @@
 
 from .analysis.comparison import compare
 from .analysis.hit_map import hit_map
+from .analysis.inspection import inspect
 from .campaign.campaign import Campaign
 from .campaign.text import CampaignError
 from .catalogue.by_name import Layer, Plate, material, threat
@@ -39,6 +40,7 @@ from .scene import (
     make_shots,
 )
 from .scene.flow import Continuum
+from .solver.limit import limit_thickness, limit_velocity
 from .studies.sensitivity import sensitivity
 
 __all__ = [
@@ -72,6 +74,9 @@ __all__ = [
     "compare",
     "executor_for",
     "hit_map",
+    "inspect",
+    "limit_thickness",
+    "limit_velocity",
     "make_shots",
     "material",
     "open_result",
