@@ -84,14 +84,10 @@ class Core(Model, ABC):
         """Radius [m] at stations `s` [m] within [0, length]; same shape."""
 
     @model_validator(mode="after")
-    def _weighs_something(self) -> Self:
+    def _is_a_body(self) -> Self:
         if (self.mass is None) == (self.density is None):
             given = "neither" if self.mass is None else "both"
             raise ValueError(f"got {given} of mass and density, but exactly one of them must be given")
-        return self
-
-    @model_validator(mode="after")
-    def _centre_of_mass_inside(self) -> Self:
         if self.centre_of_mass is not None and not 0 < self.centre_of_mass < self.length:
             raise ValueError(
                 f"got centre_of_mass = {self.centre_of_mass:g} m, "

@@ -19,7 +19,7 @@ from pydantic import (
 
 from .distributions import EDGE, PURE_NUMBERS, AnyDistribution, Distribution
 from .model import Model
-from .quantities import LISTED, QUANTITIES, SCATTERED, Quantity
+from .quantities import LISTED, QUANTITIES, SCATTERED
 from .shots import Shots
 from .units import Radians, in_radians, quantity
 
@@ -47,7 +47,18 @@ def in_si(read: Any, given: Mapping[str, Any]) -> dict[str, Any]:
     Raises:
         ValueError: the message names the parameter.
     """
-    return {name: part if name in PURE_NUMBERS else _read(read, name, part) for name, part in given.items()}
+    values = {}
+    for name, part in given.items():
+        try:
+            values[name] = part if name in PURE_NUMBERS else _of_each(read, part)
+        except ValueError as error:
+            raise ValueError(f"{name}: {error}") from None
+    return values
+
+
+def _of_each(change: Callable[[Any], Any], value: Any) -> Any:
+    """The changed value, or a list of the changed values of a list."""
+    return [change(number) for number in value] if isinstance(value, list | tuple) else change(value)
 
 
 _ByLayer = tuple[AnyDistribution | None, ...]
@@ -81,10 +92,9 @@ class Scatter(Model):
     def _in_si(cls, value: Any, info: ValidationInfo) -> Any:
         """Read parameters with the unit of their quantity."""
         known = SCATTERED[str(info.field_name)]
-        if not known.by_layer:
-            return _in_si(known, value)
-        layers = (value,) if isinstance(value, dict | Distribution) else value
-        return [_in_si(known, layer) for layer in layers] if isinstance(layers, list | tuple) else layers
+        if known.by_layer and isinstance(value, dict | Distribution):
+            value = (value,)
+        return _of_each(lambda given: in_si(quantity(known.type), given) if isinstance(given, dict) else given, value)
 
     @field_validator("*", mode="after")
     @classmethod
@@ -105,7 +115,7 @@ class Scatter(Model):
         if not isinstance(written, dict) or quantity(SCATTERED[info.field_name].type).unit != "rad":
             return written
         mark = in_radians if info.mode == "json" else Radians
-        return {name: part if name in PURE_NUMBERS else _marked(part, mark) for name, part in written.items()}
+        return {name: part if name in PURE_NUMBERS else _of_each(mark, part) for name, part in written.items()}
 
     @field_validator("offset_y", "offset_z")
     @classmethod
@@ -129,21 +139,6 @@ class Scatter(Model):
     def layers(self) -> int:
         """One more than the number of the last layer with a distribution."""
         return 1 + max((layer for _, layer in self.given), default=0)
-
-
-def _in_si(known: Quantity, value: Any) -> Any:
-    return in_si(quantity(known.type), value) if isinstance(value, dict) else value
-
-
-def _marked(value: Any, mark: Callable[[float], Any]) -> Any:
-    return [mark(number) for number in value] if isinstance(value, list | tuple) else mark(value)
-
-
-def _read(read: Any, name: str, value: Any) -> Any:
-    try:
-        return [read(number) for number in value] if isinstance(value, list | tuple) else read(value)
-    except ValueError as error:
-        raise ValueError(f"{name}: {error}") from None
 
 
 assert set(SCATTERED) == set(Scatter.model_fields)
