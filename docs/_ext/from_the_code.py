@@ -230,6 +230,9 @@ class FiringReference(CampaignReference):
         self.schema = file_schema(FiringTest, "")
         yield from self.file()
 
+    def meaning(self, key: str, part: dict[str, Any]) -> str:
+        return str(part.get("description", ""))  # nothing in a test file has a distribution
+
 
 class DesignReference(CampaignReference):
     """Every key of a design file beside those of a campaign, table by table, from its JSON schema."""
