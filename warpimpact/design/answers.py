@@ -21,8 +21,7 @@ from warpimpact.design.designs import ROOT, Shelf, ValidDesign, choices, stage_o
 from warpimpact.plotting.style import data_url
 from warpimpact.plotting.trajectory import FIGURES
 from warpimpact.report.hit_data import MOST_HITS, PAGE_PIXELS, page_data, thinned, trajectory_data
-from warpimpact.report.report import report_page
-from warpimpact.report.words import compared, result_content, templates
+from warpimpact.report.report import compared, report_page, result_content, templates
 from warpimpact.results import attributes as attr
 from warpimpact.results.replayed_hit import hit_view
 from warpimpact.runs.replay import replay

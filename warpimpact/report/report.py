@@ -17,16 +17,33 @@ from typing import Any
 
 import numpy as np
 import xarray
+from jinja2 import ChoiceLoader, Environment, PackageLoader, StrictUndefined
+from markupsafe import Markup
 from plotly.offline import get_plotlyjs
 
 import warpimpact
-from warpimpact.plotting.cell import words
+from warpimpact.analysis.comparison import compare
+from warpimpact.analysis.comparison_text import comparison_view, short_view, verdict_of
+from warpimpact.analysis.effectiveness import depth_note, effectiveness, measures_table
+from warpimpact.analysis.estimates import estimated, means_of, slices, status_shares
+from warpimpact.analysis.inspection import verdict
+from warpimpact.analysis.numbers import interval_text
+from warpimpact.analysis.plate_text import reference_name, solid_note, weights_of, weights_text
+from warpimpact.analysis.summary import numerics_note, numerics_sentence, promise_text, range_note, sampling_note
+from warpimpact.plotting.cell import range_text, words
+from warpimpact.plotting.comparison import comparison_figure
+from warpimpact.plotting.style import data_url
 from warpimpact.report.hit_data import MOST_HITS, page_data, thinned, trajectory_data, worst_and_spread
-from warpimpact.report.words import cell_drawings, compared, conclusion, result_content, templates
+from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
-from warpimpact.results.dataset import hit_numbers
-from warpimpact.results.files import aside
+from warpimpact.results.dataset import hit_numbers, passed
+from warpimpact.results.files import ResultError, aside
+from warpimpact.results.layers import outlines
 from warpimpact.runs.replay import replay
+from warpimpact.scene.display import MM
+from warpimpact.studies.limit_view import in_short, limit_view
+from warpimpact.view import svg
+from warpimpact.view.view import Column, Section, Table, html_of, table_html
 
 Progress = Callable[[int, int], None]
 
@@ -135,3 +152,127 @@ def _page(*, results: Sequence[dict[str, Any]], data: dict[str, Any], **content:
             **content,
         )
     )
+
+
+_PLATE_WIDTH = 240.0
+"""Width of the widest cell on the page [px]."""
+_PROVENANCE = (
+    attr.HISTORY,
+    attr.WARPIMPACT_VERSION,
+    attr.WARP_VERSION,
+    attr.DEVICE,
+    attr.NUMERICS,
+    attr.SAMPLING,
+    attr.SEED,
+    attr.REPLICATES,
+    attr.SYMMETRIES,
+    attr.FINGERPRINT,
+    attr.REFERENCES,
+)
+
+
+def templates(*rooms: str) -> Environment:
+    """The pages in some rooms, in which all text is escaped and every name must be known."""
+    loaders = [PackageLoader(f"warpimpact.{room}", "") for room in rooms]
+    return Environment(loader=ChoiceLoader(loaders), autoescape=True, undefined=StrictUndefined, trim_blocks=True)
+
+
+def result_content(name: str, dataset: xarray.Dataset) -> dict[str, Any]:
+    """Text, tables and drawing of a result for the page; of an open file, one slice at a time is in memory."""
+    attributes, measures = dataset.attrs, effectiveness(dataset)
+    is_limit = attr.LIMIT in attributes
+    hits, came_through = dataset.sizes["hit"], sum(int(passed(part).sum()) for part in slices(dataset[[v.STATUS]]))
+    means_over = f"{name}: with 95 % intervals; means are over the {came_through} of {hits} cores that passed"
+    against_solid = f"{name}: with 95 % intervals, compared with the {reference_name(dataset)} of equal areal density"
+    return {
+        "name": name,
+        "title": attributes.get(attr.TITLE, "untitled"),
+        "hits": hits,
+        "verdict": f"{in_short(dataset)}." if is_limit else verdict(dataset, measures[0]),
+        "is_limit": is_limit,
+        "asked": _asked(dataset),
+        "names": attributes.get(attr.CATALOGUE_NAMES, "").splitlines(),
+        "tested": range_note({name: dataset}),
+        "campaign": attributes.get(attr.CAMPAIGN, ""),
+        "promise": promise_text(dataset),
+        "caveats": [*_caveats(dataset), *filter(None, [depth_note(measures), solid_note(dataset)])],
+        "measures": measures,
+        "through": Markup(html_of(limit_view(dataset)) if is_limit else table_html(_through(dataset), means_over)),
+        "protects": Markup(table_html(measures_table(measures, reference_name(dataset)), against_solid)),
+        "provenance": {words(key): str(attributes[key]) for key in _PROVENANCE if key in attributes},
+        "speed": float(f"{attributes.get(attr.HITS_PER_SECOND, 0.0):.2g}"),
+    }
+
+
+def compared(datasets: Mapping[str, xarray.Dataset], *, picture: bool = True) -> dict[str, Any]:
+    """The comparison of plates as HTML, the deciding measure apart from all others, and a picture if one is wanted.
+    Without a comparison, a sentence gives the reason."""
+    try:
+        comparison = compare(list(datasets.values()), list(datasets))
+    except ResultError as error:
+        return {"view": Markup(html_of([Section([str(error)])])), "every": "", "verdict": [], "picture": ""}
+    return {
+        "view": Markup(html_of([short_view(comparison, range_note(datasets))])),
+        "every": Markup(html_of(comparison_view(comparison))),
+        "verdict": verdict_of(comparison),
+        "picture": data_url(comparison_figure(comparison), 100) if picture else "",
+    }
+
+
+def conclusion(results: Sequence[Mapping[str, Any]], comparison: Mapping[str, Any] | None) -> list[str]:
+    """The conclusion, a sentence each: which plate is best by the deciding measure, and what passes through every
+    plate."""
+    verdict = [] if comparison is None else comparison["verdict"]
+    return [*verdict, *(f"{result['name']}: {result['verdict']}" for result in results)]
+
+
+def _asked(dataset: xarray.Dataset) -> str:
+    """Hits, cell, impact and plate in one or two sentences."""
+    y, z = (f"{length * MM:.4g}" for length in dataset.attrs[attr.PLATE_PERIOD])
+    velocity, obliquity = (range_text(dataset[name]) for name in (v.IMPACT_VELOCITY, v.OBLIQUITY))
+    sampling = f", {dataset.attrs[attr.SAMPLING]} sampling" if attr.SAMPLING in dataset.attrs else ""
+    text = (
+        f"{dataset.sizes['hit']} hits{sampling}, over a cell of {y} × {z} mm, at {velocity} and obliquity {obliquity}."
+    )
+    if attr.AREAL_DENSITY in dataset.attrs:
+        text += f" The plate has {dataset.attrs[attr.OPEN_AREA]:.1%} open area; {weights_text(weights_of(dataset))}."
+    return text
+
+
+def _caveats(dataset: xarray.Dataset) -> list[str]:
+    """Reservations about the numbers of a result, a sentence each, beside every table of them."""
+    numerics = numerics_sentence(dataset)
+    chance = "Intervals describe the hits that were drawn."
+    model = "The core stays one rigid body, which overstates what comes through where cores break or erode."
+    notes = (numerics, chance, sampling_note(dataset), numerics_note(dataset), model)
+    return [sentence for sentence in notes if sentence]
+
+
+def _through(dataset: xarray.Dataset) -> Table:
+    """How the shots ended, and the means of what comes through."""
+    means = means_of([name for name in v.shown_by("report") if name in dataset], dataset[v.STANDOFF].values.tolist())
+    rows = [
+        (words(status), f"{share.value:.2%}", interval_text(share.low, share.high, text="{:.2%}".format))
+        for status, share in status_shares(dataset).items()
+    ]
+    for measure, estimate in estimated(dataset, means).items():
+        if estimate.count:
+            shown = estimate.times(measure.display.factor)
+            interval = interval_text(shown.low, shown.high, shown.numerics, "{:.2f}".format, "{:.2f}".format)
+            name = f"mean {measure.column.label}"
+            rows.append((name, measure.display.text(estimate.value, ".2f"), interval))
+    return Table((Column(), Column("value", right=True), Column("95 % interval")), rows)
+
+
+def cell_drawings(datasets: Mapping[str, xarray.Dataset]) -> list[dict[str, Any]]:
+    """The cells that were hit, drawn at one scale, and their sides [mm]."""
+    halves = {name: 0.5 * np.asarray(dataset.attrs[attr.PLATE_PERIOD]) for name, dataset in datasets.items()}
+    scale = _PLATE_WIDTH / (2.0 * MM * max(half[0] for half in halves.values()))
+    drawings = []
+    for name, dataset in datasets.items():
+        half, holes = halves[name], outlines(dataset)
+        cell = svg.plate(svg.rings(holes["y"], holes["z"]), -half, half)
+        label = f"cell of the plate {name}"
+        drawn = svg.drawing([cell], -half, half, label, scale=scale, bar=True)
+        drawings.append({"drawing": Markup(drawn), "y": 2.0 * MM * half[0], "z": 2.0 * MM * half[1]})
+    return drawings

@@ -11,7 +11,7 @@ from warpimpact.analysis.inspection import inspect_text
 from warpimpact.plotting import trajectory
 from warpimpact.plotting.cell import shown
 from warpimpact.plotting.maps import layers_figure
-from warpimpact.report.words import result_content
+from warpimpact.report.report import result_content
 from warpimpact.runs.replay import replay
 
 CAMPAIGN = """
