@@ -1,4 +1,4 @@
-"""One shot computed again with its history, and with the resistance left in the layers."""
+"""One shot computed again with its history, and with the resistance left in its plate."""
 
 from __future__ import annotations
 
