@@ -68,12 +68,6 @@ def test_the_figure_of_layers_has_a_row_for_each(result: xarray.Dataset) -> None
     assert [title.splitlines()[0] for title in titles[2::3]] == [f"tilt, layer {k}" for k in range(3)]
 
 
-def test_a_report_tells_every_layer(result: xarray.Dataset) -> None:
-    tables = result_content("a", result)["tables"]
-    assert tables["layer 1"] == {"gap": "60 mm", "thickness": "2 mm", "resistance": "2600 MPa"}
-    assert tables["layer 2"]["gap"] == "80 mm"
-
-
 def test_figures_say_what_lies_behind(result: xarray.Dataset) -> None:
     weight = result.attrs["areal_density"]
     assert f"whole target {weight:.1f} kg/m²" in inspect_text(result)
