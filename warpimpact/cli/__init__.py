@@ -18,15 +18,12 @@ from .compare import add_compare
 from .continuum import add_continuum
 from .design import add_design
 from .export import add_export, add_replay, add_report
-from .firing import add_test
-from .identify import add_identify
 from .mistakes import Plain, bug_report, message_of, say, show_warnings
-from .optimise import add_optimise
 from .progress import set_verbosity
 from .run import add_run
 from .show import add_catalogue, add_inspect, add_plate, add_plot, add_validate
 from .start import add_new, add_schema
-from .studies import add_limit, add_sensitivity, add_sweep
+from .studies import add_identify, add_limit, add_optimise, add_sensitivity, add_sweep, add_test
 
 _DAILY = (
     *(add_catalogue, add_new, add_design, add_run),

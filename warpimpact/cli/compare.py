@@ -17,9 +17,8 @@ from .options import (
     executor_of,
 )
 from .paths import check_picture, named
-from .progress import show_run, warn
+from .progress import Step, show_progress, show_run, warn
 from .run import failure_code
-from .studies import show_rows
 
 if TYPE_CHECKING:
     from xarray import Dataset
@@ -133,13 +132,13 @@ def _sensitivity(arguments: argparse.Namespace, comparison: "Comparison") -> str
     score = deciding(comparison)
     if score is None:
         raise ResultError(f"{arguments.files[0]}: no measure ranks these plates, so no change can turn them over")
-    with show_rows() as progress:
+    with show_progress() as show:
         table = plate_sensitivity(
             read_plates(arguments.files[0], count=arguments.count),
             score.name,
             shifts={plate.name: plate.score(score.name).numerics or 0.0 for plate in comparison.plates},
             device=arguments.device,
-            progress=progress,
+            progress=lambda done, total: show(Step(done, total)),
         )
     by_value = ", by value alone" if score.name in (comparison.at_equal_weight or ()) else ""
     text = table.to_string(float_format="{:.4g}".format, na_rep="-")

@@ -16,8 +16,8 @@ if TYPE_CHECKING:
 
 _SILENCE = 60.0
 """Longest time between two lines of a log [s]."""
-_SHORT_PILOT = 2.0
-"""Seconds after which a running pilot is announced."""
+_SHORT = 2.0
+"""Seconds after which a pilot is announced, and after the first item a rate."""
 _BAR_FORMAT = "{l_bar}{bar:20}{r_bar}"
 """Format of a bar on a terminal. Its width is fixed, because estimates beside it would leave it one character."""
 
@@ -80,13 +80,15 @@ def show_progress(unit: str = "hit") -> Iterator[Callable[[Step], None]]:
         return
     from tqdm import tqdm
 
-    with tqdm(unit=unit, dynamic_ncols=True, bar_format=_BAR_FORMAT, miniters=0) as bar:
+    with tqdm(unit=unit, dynamic_ncols=True, bar_format=_BAR_FORMAT, miniters=0, smoothing=0.0) as bar:
 
         def show(step: Step) -> None:
             if step.before or bar.total is None or _another(step, int(bar.n), int(bar.total)):
                 bar.reset(step.total)
-                bar.n = step.resumed
-            bar.initial = step.resumed
+                bar.n = bar.initial = step.resumed
+            elif bar.initial == step.resumed < step.done:  # kernels may have been compiled before the first item
+                bar.reset(step.total)
+                bar.n = bar.initial = step.done
             bar.set_postfix_str(step.before or step.text, refresh=bool(step.before))
             bar.update(max(0, step.done - bar.n))
 
@@ -106,17 +108,23 @@ class _Log:
         self._begin = self._last = time.monotonic()
         self._tenths, self._before = -1, ""
         self._step = Step(0, 0)
+        self._first = 0
 
     def show(self, step: Step) -> None:
         """Take in the progress of the computation."""
         now, last = time.monotonic(), self._step
-        if _another(step, last.done, last.total) or bool(step.before) != bool(last.before):  # the clock starts again
+        new = not last.total or _another(step, last.done, last.total) or bool(step.before) != bool(last.before)
+        if new:  # the clock starts again
             self._begin, self._last, self._tenths, self._before = now, now, -1, ""
+            self._first = step.resumed
+        elif self._first == step.resumed < step.done:  # kernels may have been compiled before the first item
+            self._begin, self._first = now, step.done
+        step = step if new else step._replace(done=max(step.done, last.done))  # what is under way may be given up
         self._step = step
         elapsed = now - self._begin
         silent = now - self._last < _SILENCE
         if step.before:
-            if elapsed < _SHORT_PILOT or (silent and step.before == self._before):
+            if elapsed < _SHORT or (silent and step.before == self._before):
                 return
             self._before, line = step.before, f"{step.before}, for {elapsed:.0f} s so far"
         else:
@@ -128,11 +136,11 @@ class _Log:
         print(line, file=sys.stderr, flush=True)
 
     def _line(self, step: Step, elapsed: float) -> str:
-        line, fresh = f"{step.done} of {step.total} {self._unit}s", step.done - step.resumed
-        if fresh <= 0 or elapsed <= 0.0:
-            return line
-        left = f", {(step.total - step.done) * elapsed / fresh:.0f} s left"
-        return f"{line}, {fresh / elapsed:.4g} {self._unit}s/s{left}; {step.text}".removesuffix("; ")
+        line, fresh = f"{step.done} of {step.total} {self._unit}s", step.done - self._first
+        if fresh > 0 and elapsed >= _SHORT:
+            left = (step.total - step.done) * elapsed / fresh
+            line += f", {fresh / elapsed:.4g} {self._unit}s/s, {left:.0f} s left"
+        return f"{line}; {step.text}" if step.text and step.done > step.resumed else line
 
 
 @contextmanager

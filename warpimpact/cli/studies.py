@@ -1,12 +1,11 @@
-"""The commands limit, sweep and sensitivity: one campaign with other inputs."""
+"""The commands limit, sweep, sensitivity, test, optimise and identify: many runs, one answer."""
 
 import argparse
 import sys
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
+from .mistakes import say
 from .options import (
     Commands,
     add_campaign,
@@ -24,6 +23,9 @@ from .options import (
 from .paths import check_output, check_picture, check_place, check_result, check_suffix, replaces
 from .progress import Step, show_progress, show_run, warn
 from .run import add_run_options, failure_code, run_shown
+
+if TYPE_CHECKING:
+    from warpimpact.identification.identify import FitProgress
 
 
 def add_limit(commands: Commands) -> None:
@@ -184,13 +186,6 @@ def add_sensitivity(commands: Commands) -> None:
     add_overwrite(parser, "an existing table and its figure")
 
 
-@contextmanager
-def show_rows() -> Iterator[Callable[[int, int], None]]:
-    """Show the progress of a study of sensitivity."""
-    with show_progress() as show:
-        yield lambda done, total: show(Step(done, total))
-
-
 def _sensitivity(arguments: argparse.Namespace) -> None:
     from warpimpact.campaign.campaign import Campaign
     from warpimpact.plotting.sensitivity import sensitivity_figure
@@ -202,16 +197,223 @@ def _sensitivity(arguments: argparse.Namespace) -> None:
     check_suffix(output, "a table", ".csv")
     check_output(output, overwrite=arguments.overwrite)
     check_picture(picture, overwrite=arguments.overwrite)
-    with show_rows() as progress:
+    with show_progress() as show:
         table = sensitivity(
             campaign,
             hits=arguments.hits,
             measures=arguments.measure,
             device=arguments.device,
-            progress=progress,
+            progress=lambda done, total: show(Step(done, total)),
         )
     print(table.to_string(float_format="{:.4g}".format, na_rep="-"))
     print(largest_move(table))
     table.to_csv(output)
     sensitivity_figure(table, campaign.title, arguments.hits).savefig(picture, dpi=150)
     print(f"written to {output}, figure in {picture}")
+
+
+def add_test(commands: Commands) -> None:
+    parser = add_command(
+        commands,
+        "test",
+        _test,
+        summary="V50 of fired shots; simulate firing tests and plans of proof",
+        description="SHOTS.csv has a column of velocities and one that says whether each shot perforated: print and "
+        "draw V50 by maximum likelihood and by MIL-STD-662F, spread, and interval. TEST.toml simulates a test: fire a "
+        "procedure many times at a target whose limit velocities are known or are searched first. Print and draw what "
+        "the tests report beside the truth, and the operating characteristic of n shots with at most k perforations. "
+        "The limits of a campaign go to TEST_limits.nc, which a later call takes with --resume.",
+        example="test shots.csv",
+    )
+    parser.add_argument("test", type=Path, metavar="SHOTS.csv|TEST.toml", help="fired shots, or a test to simulate")
+    add_output(parser, "FILE", "figure SHOTS.png of shots, or result TEST.nc, with its figure beside it")
+    add_computing(parser)
+    add_count(parser)
+    resume = "keep the limits that are computed, and continue what was interrupted"
+    add_earlier(parser, "test", "an existing result with its figure and its limits", resume=resume)
+
+
+def _test(arguments: argparse.Namespace) -> None:
+    if arguments.test.suffix.lower() == ".csv":
+        _evaluate(arguments)
+    else:
+        _simulate(arguments)
+
+
+def _evaluate(arguments: argparse.Namespace) -> None:
+    from warpimpact.firing.v50 import read_shots, v50
+    from warpimpact.plotting.firing import shots_figure
+
+    picture = arguments.output or Path(arguments.test.stem + ".png")
+    check_picture(picture, overwrite=arguments.overwrite)
+    shots = read_shots(arguments.test)
+    found = v50(*shots)
+    print(found)
+    shots_figure(shots, found, arguments.test.stem).savefig(picture, dpi=150)
+    print(f"figure in {picture}")
+
+
+def _simulate(arguments: argparse.Namespace) -> None:
+    from warpimpact.firing.plan import read_test
+    from warpimpact.firing.simulate import response_of, simulate_test
+    from warpimpact.firing.view import firing_view
+    from warpimpact.plotting.firing import firing_figure
+    from warpimpact.results import files
+    from warpimpact.view.view import text_of
+
+    test = read_test(arguments.test)
+    output = arguments.output or Path(arguments.test.stem + ".nc")
+    picture, resume, overwrite = output.with_suffix(".png"), arguments.resume, arguments.overwrite
+    check_suffix(output, "a test", ".nc")
+    for path in (output, picture):
+        check_output(path, overwrite=overwrite or resume)
+    with executor_of(arguments) as executor, show_run() as progress:
+        options = {"resume": resume, "overwrite": overwrite, "progress": progress, "tell": warn}
+        response = response_of(test, output, executor=executor, count=arguments.count, **options)
+    dataset = simulate_test(test, response)
+    files.write(dataset, output)
+    print(text_of(firing_view(dataset)))
+    firing_figure(dataset).savefig(picture, dpi=150)
+    print(f"written to {output}, figure in {picture}")
+
+
+NONE_WITHIN_BOUNDS = 4
+"""Exit code where no computed design keeps the bounds."""
+
+
+def add_optimise(commands: Commands) -> None:
+    parser = add_command(
+        commands,
+        "optimise",
+        _optimise,
+        summary="search the best designs: lightest, safest, and what lies between",
+        description="Search the free variables of a target for the designs that no other one beats in every objective. "
+        "Every design gets the same hits; the front is computed again with fresh hits. Write every design as netCDF, "
+        "a campaign file for each design of the front, and a figure. Exit code 4: no design keeps the bounds. Needs "
+        "pip install 'warpimpact[optimise]'.",
+        example="optimise campaigns/designs/lightest_plate.toml -o front.nc",
+    )
+    parser.add_argument("design", type=Path, metavar="DESIGN.toml", help="design file: a campaign, and what is free")
+    add_output(parser, "FRONT.nc", "result file (default: the design's name, in this folder)")
+    add_computing(parser)
+    add_earlier(parser, "search", "an existing result, its campaigns or an interrupted search")
+
+
+def _optimise(arguments: argparse.Namespace) -> int:
+    from warpimpact.optimisation.design import read_design
+    from warpimpact.optimisation.front_view import front_view
+    from warpimpact.optimisation.optimise import folder_of, optimise_to_file
+    from warpimpact.plotting.front import front_figure
+    from warpimpact.results import files, front
+    from warpimpact.results.kinds import FRONT
+    from warpimpact.view.view import text_of
+
+    design = read_design(arguments.design)
+    output = arguments.output or Path(arguments.design.stem + ".nc")
+    check_result(output, "a search")
+    picture = output.with_suffix(".png")
+    check_picture(picture, overwrite=replaces(arguments, output))
+    with (
+        show_progress("design") as show,
+        executor_of(arguments) as executor,
+    ):
+        campaigns = optimise_to_file(
+            design,
+            output,
+            device=executor,
+            resume=arguments.resume,
+            overwrite=arguments.overwrite,
+            progress=lambda now: show(Step(now.done, now.total, text=f"{now.front} on the front, {now.what}")),
+            tell=warn,
+        )
+    dataset = files.read(output, FRONT)
+    print(text_of(front_view(dataset)))
+    front_figure(dataset, design.folder).savefig(picture, dpi=150)
+    beside = f", campaigns in {folder_of(output)}" if campaigns else ""
+    print(f"written to {output}, figure in {picture}{beside}")
+    return 0 if dataset.attrs[front.OUTCOME] == front.FEASIBLE else NONE_WITHIN_BOUNDS
+
+
+PROCESSES = 16
+"""Most processes of a fit, unless the user gives a number; each takes some 0.4 GB."""
+WORTHWHILE = 2.0
+"""Seconds of computing after which processes are started. A process needs as long until it computes."""
+
+
+def add_identify(commands: Commands) -> None:
+    parser = add_command(
+        commands,
+        "identify",
+        _identify,
+        summary="find parameters with their uncertainty from measured shots",
+        description="Find the parameters of plate, interaction and core that agree with measured shots, each with its "
+        "uncertainty. Unknown hit points are integrated out. Write the posterior as a netCDF file, the draws "
+        " of the material as a CSV file that hits.file takes, and figures into the same folder. Print which "
+        "parameters the shots determine, and whether the computation has converged.",
+        example="identify campaigns/fits/paper_fit.toml -o paper_fit.nc",
+    )
+    parser.add_argument(
+        "fit",
+        type=Path,
+        metavar="FIT",
+        help="fit file: scene, measured shots, and priors of what is unknown; or a result of warpimpact continuum, "
+        "whose hits then count as measured shots",
+    )
+    add_output(parser, "POSTERIOR.nc", "file of the posterior (default: the fit's name, in this folder)")
+    add_computing(parser)
+    add_overwrite(parser, "an existing posterior")
+
+
+def _identify(arguments: argparse.Namespace) -> int:
+    from warpimpact.identification.computed_shots import fit_of_result
+    from warpimpact.identification.fit_file import read_fit
+    from warpimpact.identification.identify import identify
+    from warpimpact.identification.posterior import material_draws, posterior_view
+    from warpimpact.plotting.posterior import FIGURES
+    from warpimpact.results import files
+    from warpimpact.results.posterior_file import INTERRUPTED
+    from warpimpact.runs.executor import executor_for
+    from warpimpact.solver.device import cores, find_device
+    from warpimpact.view.view import text_of
+
+    by_elements = arguments.fit.suffix == ".nc"
+    fit = fit_of_result(arguments.fit) if by_elements else read_fit(arguments.fit)
+    output = arguments.output or Path(f"{arguments.fit.stem}_fit.nc" if by_elements else f"{arguments.fit.stem}.nc")
+    check_result(output, "a posterior")
+    check_output(output, overwrite=arguments.overwrite)
+    pictures = {output.with_name(f"{output.stem}_{name}.png"): draw for name, draw in FIGURES.items()}
+    table = output.with_suffix(".csv")
+    check_output(table, overwrite=arguments.overwrite)
+    for picture in pictures:
+        check_picture(picture, overwrite=arguments.overwrite)
+    for sentence in fit.warnings:
+        warn(sentence)
+    device, workers, scheduler = arguments.device, arguments.workers, arguments.scheduler
+    after = 0.0
+    if workers is None and scheduler is None and find_device(device).is_cpu:
+        workers, after = min(cores(), PROCESSES), WORTHWHILE
+    say(f"computes at most {fit.sampling.sets} sets of parameters, {fit.sampling.hits} hits of each shot")
+    with (
+        show_progress("set") as show,
+        executor_for(device, workers=workers, scheduler=scheduler, apart=True, after=after) as executor,
+    ):
+        posterior = identify(
+            fit,
+            device=executor,
+            progress=lambda now: show(Step(now.done, now.total, text=_running(now))),
+        )
+    files.write(posterior, output)
+    print(text_of(posterior_view(posterior)))
+    print(f"written to {output}")
+    if len(draws := material_draws(fit, posterior)):
+        draws.to_csv(table, index=False)
+        print(f"draws of the material for hits.file in {table}")
+    for picture, draw in pictures.items():
+        draw(posterior).savefig(picture, dpi=150)
+        print(picture)
+    return 130 if posterior.attrs[INTERRUPTED] else 0
+
+
+def _running(now: "FitProgress") -> str:
+    effective = "" if now.effective != now.effective else f", effective sample size {now.effective:.0f}"
+    return f"smallest misfit {now.misfit:.3g}{effective}"
