@@ -103,6 +103,8 @@ def add_export(commands: Commands) -> None:
 
 
 def _export(arguments: argparse.Namespace) -> None:
+    from warpimpact.campaign.campaign import Campaign
+    from warpimpact.export.drawing import SUFFIXES, write_drawing
     from warpimpact.export.paraview import write_vtk
     from warpimpact.export.spreadsheet import write_csv
     from warpimpact.results import files
@@ -110,7 +112,11 @@ def _export(arguments: argparse.Namespace) -> None:
 
     path, output = arguments.file, arguments.output
     if path.suffix == ".toml":
-        _export_drawing(path, output or path.with_suffix(".svg"), overwrite=arguments.overwrite)
+        output = output or path.with_suffix(".svg")
+        check_suffix(output, "a drawing", *SUFFIXES)
+        check_output(output, overwrite=arguments.overwrite)
+        write_drawing(Campaign.from_toml(path).plate, output)
+        print(output)
         return
     with files.opened(path, HIT_MAP, HISTORY) as dataset:
         if files.is_history(dataset):
@@ -131,16 +137,6 @@ def _export(arguments: argparse.Namespace) -> None:
             written = [output]
     for file in written:
         print(file)
-
-
-def _export_drawing(path: Path, output: Path, *, overwrite: bool) -> None:
-    from warpimpact.campaign.campaign import Campaign
-    from warpimpact.export.drawing import SUFFIXES, write_drawing
-
-    check_suffix(output, "a drawing", *SUFFIXES)
-    check_output(output, overwrite=overwrite)
-    write_drawing(Campaign.from_toml(path).plate, output)
-    print(output)
 
 
 def add_report(commands: Commands) -> None:
@@ -170,7 +166,7 @@ def add_report(commands: Commands) -> None:
 
 def _report(arguments: argparse.Namespace) -> None:
     from warpimpact.report.one_file import write_file_report
-    from warpimpact.report.report import write_report
+    from warpimpact.report.report import report_page
     from warpimpact.results import files
     from warpimpact.results.kinds import HIT_MAP
 
@@ -190,11 +186,12 @@ def _report(arguments: argparse.Namespace) -> None:
         datasets = {name: stack.enter_context(files.opened(path)) for name, path in by_name.items()}
         show = stack.enter_context(show_progress())
         with suggest_campaign_folder(", or --trajectories 0, which needs none of them"):
-            write_report(
+            page = report_page(
                 datasets,
-                output,
                 folders={name: arguments.campaign_folder or path.parent for name, path in by_name.items()},
                 trajectories=arguments.trajectories,
                 progress=lambda done, total: show(Step(done, total)),
             )
+    with files.aside(output) as file:
+        file.write_text(page, encoding="utf-8")
     print(output)

@@ -112,9 +112,15 @@ def shelf_of(paths: list[Path]) -> Shelf:
 
 
 def _texts(path: Path) -> Iterator[tuple[str, str]]:
-    """Name and text of every design in a file."""
+    """Name and text of every design in a file: campaigns of plates, of a front, or of a hit map."""
+    if path.suffix == ".nc" and kind_of(path) is FRONT:
+        front_file = files.read(path, FRONT)
+        for name, text in zip(front_file[front.FILE].values, front_file[front.CAMPAIGN].values, strict=True):
+            yield Path(str(name)).stem, str(text)
+        return
     if path.suffix == ".nc":
-        yield from _texts_of_results(path)
+        with opened(path) as dataset:
+            yield path.stem, str(dataset.attrs.get(attr.CAMPAIGN, ""))
         return
     text = read_text(path)
     tables = parsed(text, str(path))
@@ -128,17 +134,6 @@ def _texts(path: Path) -> Iterator[tuple[str, str]]:
             yield name, campaign.text
     else:
         yield path.stem, text
-
-
-def _texts_of_results(path: Path) -> Iterator[tuple[str, str]]:
-    """Name and text of every design in a file of results: the campaigns of a front, or that of a hit map."""
-    if kind_of(path) is not FRONT:
-        with opened(path) as dataset:
-            yield path.stem, str(dataset.attrs.get(attr.CAMPAIGN, ""))
-        return
-    front_file = files.read(path, FRONT)
-    for name, text in zip(front_file[front.FILE].values, front_file[front.CAMPAIGN].values, strict=True):
-        yield Path(str(name)).stem, str(text)
 
 
 def _entries(part: Any, place: str = "") -> Iterator[tuple[str, str | int, Any]]:

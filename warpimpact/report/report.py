@@ -37,7 +37,7 @@ from warpimpact.report.hit_data import MOST_HITS, page_data, thinned, trajectory
 from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
 from warpimpact.results.dataset import hit_numbers, passed
-from warpimpact.results.files import ResultError, aside
+from warpimpact.results.files import ResultError
 from warpimpact.results.layers import outlines
 from warpimpact.runs.replay import replay
 from warpimpact.scene.display import MM
@@ -45,34 +45,13 @@ from warpimpact.studies.limit_view import in_short, limit_view
 from warpimpact.view import svg
 from warpimpact.view.view import Column, Section, Table, html_of, table_html
 
-Progress = Callable[[int, int], None]
-
-
-def write_report(
-    datasets: Mapping[str, xarray.Dataset],
-    path: Path,
-    *,
-    folders: Mapping[str, Path],
-    trajectories: int = 32,
-    progress: Progress | None = None,
-) -> None:
-    """Write `report_page` of some results into a file, whole or not at all.
-
-    Raises:
-        OutputError: the file cannot be written.
-        ResultError, CampaignError: a hit cannot be replayed.
-    """
-    page = report_page(datasets, folders=folders, trajectories=trajectories, progress=progress)
-    with aside(path) as file:
-        file.write_text(page, encoding="utf-8")
-
 
 def report_page(
     datasets: Mapping[str, xarray.Dataset],
     *,
     folders: Mapping[str, Path],
     trajectories: int = 32,
-    progress: Progress | None = None,
+    progress: Callable[[int, int], None] | None = None,
 ) -> str:
     """The report of some results as HTML.
 
@@ -102,20 +81,26 @@ def report_page(
             done += 1
             if progress:
                 progress(done, total)
-        drawn["first"] = telling(datasets[name], hits)
+        drawn["first"] = largest_tilt(datasets[name], hits)
     comparison = compared(datasets) if len(datasets) > 1 else None
-    return _page(
-        data=data,
-        results=[
-            result | {"shown": few.sizes["hit"], "plate": plate}
-            for result, few, plate in zip(results, shown, cell_drawings(datasets), strict=True)
-        ],
+    for result, few, drawing in zip(results, shown, cell_drawings(datasets), strict=True):
+        result |= {"shown": few.sizes["hit"], "plate": drawing}
+    plotly = re.sub(r"https?://(?!www\.w3\.org/)", "", get_plotlyjs())  # addresses of maps and of where charts go
+    page = templates("report").get_template("page.html")
+    return page.render(
+        results=results,
+        plotly=_packed(plotly),
+        packed=_packed(json.dumps(data, separators=(",", ":"), allow_nan=False)),
+        variables=data["variables"],
+        first=_first([variable["key"] for variable in data["variables"]]),
+        made=f"{datetime.now(UTC):%Y-%m-%d %H:%M} UTC",
+        version=warpimpact.__version__,
         comparison=comparison,
         conclusion=conclusion(results, comparison),
     )
 
 
-def telling(dataset: xarray.Dataset, hits: Sequence[int]) -> int | None:
+def largest_tilt(dataset: xarray.Dataset, hits: Sequence[int]) -> int | None:
     """The hit whose trajectory shows most: the one with the largest tilt at the largest stand-off."""
     if not hits or not dataset.sizes["standoff"]:
         return hits[0] if hits else None
@@ -133,25 +118,6 @@ def _first(keys: Sequence[str]) -> str:
     """The variable that the maps show first: a limit if there is one."""
     wanted = [*(words(names.value) for names in v.LIMITS.values()), words(v.RESIDUAL_VELOCITY)]
     return next((key for key in wanted if key in keys), keys[0])
-
-
-def _page(*, results: Sequence[dict[str, Any]], data: dict[str, Any], **content: Any) -> str:
-    """Fill in page.html."""
-    plotly = re.sub(r"https?://(?!www\.w3\.org/)", "", get_plotlyjs())  # addresses of maps and of where charts go
-    return (
-        templates("report")
-        .get_template("page.html")
-        .render(
-            results=results,
-            plotly=_packed(plotly),
-            packed=_packed(json.dumps(data, separators=(",", ":"), allow_nan=False)),
-            variables=data["variables"],
-            first=_first([variable["key"] for variable in data["variables"]]),
-            made=f"{datetime.now(UTC):%Y-%m-%d %H:%M} UTC",
-            version=warpimpact.__version__,
-            **content,
-        )
-    )
 
 
 _PLATE_WIDTH = 240.0

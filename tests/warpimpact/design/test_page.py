@@ -166,7 +166,7 @@ def test_a_pinned_design_is_compared_shot_by_shot(page: Any, coarse: Path) -> No
     tables = tomllib.loads(coarse.read_text())
     tables["plate"]["thickness"] = "5 mm"
     thicker = Campaign.from_text(json.dumps(tables), name="thicker", folder=coarse.parent)
-    results = [run(one, device="cpu") for one in (thicker, Campaign.from_toml(coarse))]
+    results = [run(one, references=True, device="cpu") for one in (thicker, Campaign.from_toml(coarse))]
     comparison = compare(results, ["this design", "pin A"])
     assert short_view(comparison).title in page.text("#answer")
     assert "better than" not in page.text("#answer")
