@@ -40,15 +40,13 @@ class SearchProgress(NamedTuple):
     """The progress of a search.
 
     Attributes:
-        done, total: numbers of designs, first of the search, then of those with fresh hits.
-        certain: whether `total` will be reached; else it is an upper bound.
+        done, total: numbers of designs, first of the search, where `total` is the most, then of those with fresh hits.
         front: designs on the front.
         what: words for what is being computed.
     """
 
     done: int
     total: int
-    certain: bool
     front: int
     what: str
 
@@ -90,7 +88,7 @@ def search(design: Design, follow: Follow) -> Question[Searched]:
             optimiser.tell(*state.scores(points))
     if not state.candidates:
         raise CampaignError(f"{design.name}: {_why_none(list(state.refused.values()))}")
-    state.tell("", certain=True)
+    state.tell("", complete=True)
     candidates = tuple(state.candidates.values())
     return Searched(candidates, front_of(design, candidates), len(state.refused), len(state.pilots))
 
@@ -183,11 +181,11 @@ class _State:
                 broken.append([0.0, *excesses(self.design, candidate.results)])
         return np.array(objectives), np.array(broken)
 
-    def tell(self, what: str, *, certain: bool = False) -> None:
+    def tell(self, what: str, *, complete: bool = False) -> None:
         """Report the progress of the search, and what is being computed."""
         done = len(self.candidates)
-        total = done if certain else int(min(self.design.search.designs, self.design.space.size))
-        self.follow(SearchProgress(done, total, certain, self.front, what))
+        total = done if complete else int(min(self.design.search.designs, self.design.space.size))
+        self.follow(SearchProgress(done, total, self.front, what))
 
 
 def _why_none(refused: Sequence[Sequence[Violation]]) -> str:
@@ -241,7 +239,7 @@ def confirm(design: Design, searched: Searched, follow: Follow) -> Question[Conf
     threats = len(design.threats)
 
     def report(what: str) -> Report:
-        return lambda done: follow(SearchProgress(int(done / threats), len(targets), True, len(searched.front), what))
+        return lambda done: follow(SearchProgress(int(done / threats), len(targets), len(searched.front), what))
 
     jobs = [
         HitJob(target.tables, threat, count, CONFIRM_FIDELITY, seed)

@@ -60,7 +60,6 @@ def test_a_space_of_few_points_is_searched_whole() -> None:
     assert all(now.done <= now.total for now in told)
     searching = [now for now in told if not now.what.endswith("fresh hits")]
     assert [now.done for now in searching] == sorted(now.done for now in searching)
-    assert searching[-1].certain
     assert searching[-1].done == searching[-1].total == 11
     for what in ("pilots for fresh hits", "fresh hits"):
         of_phase = [now for now in told if now.what == what]
