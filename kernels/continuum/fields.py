@@ -14,8 +14,8 @@ import warp as wp
 from .. import structs
 from ..variant import Variant
 
-CORNERS, COMPONENTS = 8, 24
-"""Corners of an element, and components of the forces on them."""
+COMPONENTS = 24
+"""Components of the forces on the eight corners of an element."""
 PIECE = 8
 """Consecutive elements, or nodes, into which runs divide: what a CPU computes side by side."""
 RIGID = Variant(double=True)
@@ -78,7 +78,7 @@ def build(variant: Variant) -> SimpleNamespace:
             awake: 1 for a sheet that is marched, 0 for one that the core has not reached or has left, shape [sheets].
             touched: time of the last touch of each sheet [s], negative before.
             cylinder: about the core.
-            next_step: between this step's velocities and the next ones [s].
+            kick: between this step's velocities and the next ones [s].
             position [m], velocity [m/s], inverse_mass [1/kg] (0 where a node has no element), contact [N] and
             contact_work [J] of nodes; `near` is 1 where the core may touch.
             impedance [N s/m] of the material beyond the outer edge, of nodes by component; radiated [J] into it.

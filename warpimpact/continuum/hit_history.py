@@ -8,17 +8,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpimpact.continuum.meeting import WIDER, March, Struck, march_of
-from warpimpact.continuum.meshing import SheetMesh
 from warpimpact.continuum.one_hit import OneHit
 from warpimpact.continuum.strikes import check_continuum, memory_of, outcomes_of
 from warpimpact.kernels.status import Status
 from warpimpact.kernels.trace import WIDTH
 from warpimpact.scene import Scene, Shots
 from warpimpact.scene.flow import Continuum
+from warpimpact.scene.model import Array
 from warpimpact.solver.replay import Deformed, History, Replay, Weakened
 from warpimpact.solver.worker import Worker
-
-Array = NDArray[np.float64]
 
 STRIDE = 20
 """Steps between two rows of a history."""
@@ -46,17 +44,21 @@ def replay_continuum(scene: Scene, shots: Shots, continuum: Continuum, snapshots
     body = scene.core.mass_properties._replace(
         mass=start.mass, inertia_axial=start.inertia_axial, inertia_transverse=start.inertia_transverse
     )
-    history = History.from_trace(_trace(rows), body)
+    trace = np.array(rows)  # as a trace has it, a row holds the load that follows; the last one has none
+    trace[:-1, 14:21], trace[-1, 14:21] = trace[1:, 14:21], 0.0
     sheet = march.hit.sheets[0]
-    places = cells_of(sheet)
+    # The columns of the fine part of the mesh, which are cells of one size.
+    places = np.ix_(*(np.isclose(np.diff(edges), sheet.spacing, rtol=1e-6) for edges in sheet.edges))
     shown = frames.spread(len(rows) - 1, snapshots) if snapshots else []
     y, z = (0.5 * (edges[1:] + edges[:-1]) for edges in sheet.edges)
     cell_y, cell_z = float(shots.hit_y[0]) + y[places[0][:, 0]], float(shots.hit_z[0]) + z[places[1][0]]
     material = np.asarray(sheet.solid[places], dtype=np.float64)
-    share = np.array([_left(frame.alive, sheet, march.hit.firsts[0])[places] for _, frame in shown])
+    elements = slice(march.hit.firsts[0], march.hit.firsts[0] + sheet.nodes)
+    planes = (frame.alive[elements].reshape(len(sheet.x), *sheet.y.shape)[:-1, :-1, :-1] for _, frame in shown)
+    share = np.array([alive.mean(axis=0)[places] for alive in planes], dtype=np.float64)
     return Replay(
         outcomes=outcomes_of(memory, [struck]),
-        history=history,
+        history=History.from_trace(trace, body),
         plate_time=np.array([rows[row][0] for row, _ in shown]),
         plate=Weakened(cell_y, cell_z, share.reshape(-1, *material.shape)),
         deformed=frames.deformed([frame for _, frame in shown]) if shown else None,
@@ -143,21 +145,6 @@ def whole(frame: Frame, hit: OneHit) -> Frame:
     return Frame(position, alive, strain)
 
 
-def cells_of(sheet: SheetMesh) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
-    """The columns of the fine part of a mesh, which are cells of one size, as indices of `solid`."""
-    chosen = []
-    for edges in sheet.edges:
-        chosen.append(np.flatnonzero(np.isclose(np.diff(edges), sheet.spacing, rtol=1e-6)))
-    rows, columns = np.ix_(*chosen)
-    return np.asarray(rows), np.asarray(columns)
-
-
-def _left(alive: NDArray[np.float32], sheet: SheetMesh, first: int) -> Array:
-    """Share of the elements of each column that are left."""
-    planes = alive[first : first + sheet.nodes].reshape(len(sheet.x), *sheet.y.shape)[:-1, :-1, :-1]
-    return np.asarray(planes.mean(axis=0), dtype=np.float64)
-
-
 def _row(hit: OneHit, before: Array | None) -> Array:
     """A row of the trace (kernels/trace.py): the load is the mean since the row before."""
     flight, row = hit.flight, np.zeros(WIDTH)
@@ -169,10 +156,3 @@ def _row(hit: OneHit, before: Array | None) -> Array:
         row[14:17] = hit.start.mass * (row[8:11] - before[8:11]) / max(row[20], 1e-30)
         row[17:20] = (row[11:14] - before[11:14]) / max(row[20], 1e-30)
     return row
-
-
-def _trace(rows: list[Array]) -> Array:
-    """The rows with the load that follows each, as a trace has it; the last one has none."""
-    trace = np.array(rows)
-    trace[:-1, 14:21], trace[-1, 14:21] = trace[1:, 14:21], 0.0
-    return trace

@@ -15,9 +15,8 @@ from warpimpact.continuum.one_hit import STEPS, Energies, OneHit, Start, Unmeshe
 from warpimpact.kernels.status import Status
 from warpimpact.scene import Core, Plate, Scene, Shots
 from warpimpact.scene.flow import Continuum
+from warpimpact.scene.model import Array
 from warpimpact.solver.worker import NEVER, Cancel
-
-Array = NDArray[np.float64]
 
 FINE, PATCH, SWEPT = 2.5, 5.0, 1.0
 """Half of the fine part of a mesh, half of it all, and how far the ends of a turned core may sweep before both grow; in
@@ -200,14 +199,10 @@ def line_of_flight(obliquity: float, azimuth: float) -> Array:
 def start_of(scene: Scene, shots: Shots, number: int, friction: float, conditions: dict[str, NDArray[Any]]) -> Start:
     """How the core of a shot begins: its foremost point at the front face, as kernels/shots.py has it."""
     core = scene.core
+    names = "mass", "inertia_axial", "inertia_transverse", "velocity", "obliquity", "azimuth", "pitch", "yaw", "spin"
     mass, axial, transverse, velocity, obliquity, azimuth, pitch, yaw, spin = (
-        float(np.resize(conditions[name], len(shots))[number])
-        if name in conditions
-        else float(getattr(shots, name)[number])
-        for name in (
-            *("mass", "inertia_axial", "inertia_transverse"),
-            *("velocity", "obliquity", "azimuth", "pitch", "yaw", "spin"),
-        )
+        float(np.resize(conditions[name] if name in conditions else getattr(shots, name), len(shots))[number])
+        for name in names
     )
     flight = line_of_flight(obliquity, azimuth)
     turned = math.atan2(flight[1], flight[0]) + yaw, math.atan2(flight[2], flight[0]) + pitch

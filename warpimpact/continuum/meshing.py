@@ -10,8 +10,7 @@ from numpy.typing import NDArray
 
 from warpimpact.kernels.continuum.fields import PIECE
 from warpimpact.scene import Plate
-
-Array = NDArray[np.float64]
+from warpimpact.scene.model import Array
 
 GROWTH, COARSEST = 1.3, 5.0
 """By what a cell beyond the fine ones is wider than its neighbour, and the widest one, in fine cells."""
@@ -85,10 +84,8 @@ class SheetMesh:
     @property
     def positions(self) -> Array:
         """Of the nodes [m], shape [3, nodes]."""
-        planes = np.ones((len(self.x), 1))
-        return np.stack(
-            [np.repeat(self.x, self.plane), (planes * self.y.ravel()).ravel(), (planes * self.z.ravel()).ravel()]
-        )
+        along_y, along_z = (np.tile(at.ravel(), len(self.x)) for at in (self.y, self.z))
+        return np.stack([np.repeat(self.x, self.plane), along_y, along_z])
 
 
 def meshed(
@@ -202,8 +199,8 @@ def volumes_of(sheet: SheetMesh) -> tuple[Array, Array]:
     return volumes.ravel(), lengths.ravel()
 
 
-def runs_of(present: NDArray[np.bool_], first: int, lanes: int = PIECE) -> NDArray[np.int32]:
-    """Runs of consecutive numbers that hold all that are present, as multiples of the lanes, shape [runs, 2].
+def runs_of(present: NDArray[np.bool_], first: int) -> NDArray[np.int32]:
+    """Runs of consecutive numbers that hold all that are present, as multiples of PIECE, shape [runs, 2].
 
     Args:
         first: number of the first entry of `present`.
@@ -211,10 +208,7 @@ def runs_of(present: NDArray[np.bool_], first: int, lanes: int = PIECE) -> NDArr
     numbers = np.flatnonzero(present)
     if not len(numbers):
         return np.empty((0, 2), dtype=np.int32)
-    breaks = np.flatnonzero(np.diff(numbers) > 2 * lanes)
-    starts, stops = (
-        numbers[np.concatenate([[0], breaks + 1])],
-        numbers[np.concatenate([breaks, [len(numbers) - 1]])] + 1,
-    )
-    lengths = -(-(stops - starts) // lanes) * lanes
+    breaks = np.flatnonzero(np.diff(numbers) > 2 * PIECE)
+    starts, stops = numbers[np.append(0, breaks + 1)], numbers[np.append(breaks, -1)] + 1
+    lengths = -(-(stops - starts) // PIECE) * PIECE
     return np.asarray(first + np.stack([starts, starts + lengths], axis=1), dtype=np.int32)

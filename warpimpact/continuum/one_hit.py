@@ -19,10 +19,9 @@ from warpimpact.kernels.status import RUNNING, WAITING
 from warpimpact.kernels.variant import Variant
 from warpimpact.scene import Core
 from warpimpact.scene.flow import Flow
+from warpimpact.scene.model import Array
 from warpimpact.solver.device import find_device, load
 from warpimpact.solver.worker import NEVER, Cancel
-
-Array = NDArray[np.float64]
 
 STATIONS = 2049
 """At which the radius of the core is tabulated."""
@@ -30,11 +29,11 @@ STEPS = 100
 """Of a launch: between two of them a computation can be broken off."""
 PENALTY = 0.5
 """Share of the stiffness of an element that the contact has."""
-STATE = (
-    *("position", "velocity", "contact", "contact_work", "near", "alive", "stress", "strain", "damage", "heat"),
-    *("work", "hourglass_work", "radiated", "crossing", "force"),
-)
-"""Arrays of a mesh that a march changes."""
+FROM_ZERO = {
+    **{"velocity": 3, "contact": 3, "contact_work": 1, "stress": 6, "strain": 1, "damage": 1, "heat": 1},
+    **{"work": 1, "hourglass_work": 1, "radiated": 1, "force": fields.COMPONENTS},
+}
+"""Components of the arrays of a mesh that are 0 before a march."""
 
 
 @dataclass(frozen=True)
@@ -161,7 +160,7 @@ class OneHit:
         """Give the next layer its mesh, at rest; all else stays as it is, and the march can go on."""
         before, self.sheets = self.mesh, [*self.sheets, sheet]
         self.mesh = mesh = self._mesh()
-        for name in STATE:
+        for name in (*FROM_ZERO, "position", "near", "alive", "crossing"):  # what a march changes
             values = getattr(mesh, name).numpy().reshape(-1, mesh.size)
             values[:, : before.size] = getattr(before, name).numpy().reshape(-1, before.size)
             getattr(mesh, name).assign(values.ravel())
@@ -185,13 +184,14 @@ class OneHit:
             first += 2 * pad + sheet.nodes
         self.firsts = firsts
         size = mesh.size = first
-        position, inverse_mass, alive = np.zeros((3, size)), np.zeros(size), np.zeros(size)
-        impedance = np.zeros((3, size))
-        volume, length, runs, node_runs = np.zeros(size), np.ones(size), [], []
+        position, impedance = np.zeros((2, 3, size))
+        inverse_mass, alive, near, volume = (np.zeros(size) for _ in range(4))
+        length, runs, node_runs = np.ones(size), [], []
+        awake = [sheet.x[0] < choices.BEHIND.value for sheet in self.sheets]
         for k, (sheet, at, flow) in enumerate(zip(self.sheets, firsts, self.flows, strict=False)):
             inside = slice(at, at + sheet.nodes)
             position[:, inside], present = sheet.positions, sheet.alive
-            alive[inside] = present
+            alive[inside], near[inside] = present, awake[k]
             volume[inside], length[inside] = volumes_of(sheet)
             mass = np.zeros(size)
             for corner in (0, 1):
@@ -212,19 +212,12 @@ class OneHit:
         )
         mesh.runs, mesh.node_runs = self._put(np.ravel(runs), wp.int32), self._put(np.ravel(node_runs), wp.int32)
         given = {"position": position, "inverse_mass": inverse_mass, "alive": alive, "volume": volume, "length": length}
-        given["impedance"] = impedance
+        given |= {"impedance": impedance, "near": near}
         for name, values in given.items():
             setattr(mesh, name, self._put(values.ravel().astype(self.dtype), self.real))
-        sizes = {"velocity": 3, "contact": 3, "contact_work": 1, "stress": 6, "strain": 1, "damage": 1, "heat": 1}
-        sizes |= {"work": 1, "hourglass_work": 1, "radiated": 1, "force": fields.COMPONENTS}
-        for name, count in sizes.items():
+        for name, count in FROM_ZERO.items():
             setattr(mesh, name, wp.zeros(count * size, dtype=self.real, device=self.device))
-        awake = np.array([sheet.x[0] < choices.BEHIND.value for sheet in self.sheets])
         mesh.awake, mesh.touched = self._put(awake, wp.int32), self._put(np.full(len(awake), -1.0), wp.float64)
-        near = np.zeros(size)
-        for sheet, at, reached in zip(self.sheets, firsts, awake, strict=True):
-            near[at : at + sheet.nodes] = reached
-        mesh.near = self._put(near.astype(self.dtype), self.real)
         mesh.crossing = wp.full(size, 1.0, dtype=self.real, device=self.device)
         return mesh
 
@@ -244,11 +237,8 @@ class OneHit:
         filled.largest, filled.radii = float(radii.max()), self._put(radii, wp.float64)
         filled.friction = start.friction
         body = self.struct.rigid.Body()
-        body.mass, body.inertia_axial, body.inertia_transverse = (
-            start.mass,
-            start.inertia_axial,
-            start.inertia_transverse,
-        )
+        for name in ("mass", "inertia_axial", "inertia_transverse"):
+            setattr(body, name, getattr(start, name))
         filled.body = body
         self.start = start
         return filled

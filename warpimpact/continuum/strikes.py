@@ -9,7 +9,7 @@ import math
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from functools import partial
-from typing import Any, TypeVar
+from typing import Any
 
 import numpy as np
 import warp as wp
@@ -24,14 +24,13 @@ from warpimpact.records.outcomes import Outcomes
 from warpimpact.records.registry import ENERGY_IMBALANCE, ERODED_ELEMENTS, HOURGLASS_SHARE
 from warpimpact.scene import Numerics, Scene, Shots
 from warpimpact.scene.flow import Continuum
+from warpimpact.scene.model import Array
 from warpimpact.solver.device import block_size, cores, find_device, load
 from warpimpact.solver.marching import Progress
 from warpimpact.solver.memory import MEMORY_SHARE, Memory
 from warpimpact.solver.prepare import prepare
 from warpimpact.solver.simulate import simulate as by_fast_law
 from warpimpact.solver.worker import NEVER, Cancel, Worker
-
-Array = NDArray[np.float64]
 
 
 def simulate(
@@ -125,13 +124,6 @@ def _in_threads(compute: Callable[[int], Struck], hits: list[int], threads: int)
         yield from enumerate(pool.map(compute, hits))
 
 
-def together(marches: Iterable[March], cancel: Cancel = NEVER) -> Iterator[tuple[int, Struck]]:
-    """What became of hits that march together on their device, with their numbers, as they end."""
-    coming = (((number, march), march.hit) for number, march in enumerate(marches))
-    for (number, march), at_edge in ended(coming, lambda key: key[1].extended(), cancel):
-        yield number, march.struck(at_edge)
-
-
 def outcomes_of(memory: Memory, hits: list[Struck]) -> Outcomes:
     """The outcomes of some hits: their flight to the stand-offs is that of the fast law's cores."""
     contact, count = memory.outcomes(), len(hits)
@@ -203,7 +195,6 @@ def _angle(a: Array, b: Array) -> float:
 MOST = 256
 """Hits that march together at most: drafts of the slotted plate have 2.4 million elements then, some ten times as many
 as a large GPU has threads at a time."""
-Key = TypeVar("Key")
 
 
 class ManyHits:
@@ -294,36 +285,32 @@ def pieces_of(runs: NDArray[np.int32]) -> NDArray[np.int32]:
     return np.stack([np.repeat(runs[:, 0], counts) + PIECE * within, np.repeat(runs[:, 2], counts)], axis=1)
 
 
-def ended(
-    coming: Iterable[tuple[Key, OneHit]], extended: Callable[[Key], OneHit], cancel: Cancel = NEVER
-) -> Iterator[tuple[Key, bool]]:
-    """The key of each hit when it has ended, and whether its core had come near the outer edge of a mesh. The next hit
-    takes its place.
+def together(marches: Iterable[March], cancel: Cancel = NEVER) -> Iterator[tuple[int, Struck]]:
+    """What became of hits that march together on their device, with their numbers, as they end.
 
     Args:
-        coming: hits of one device and one precision, with their keys; as many march at a time as fit half of the free
-            memory of a GPU, but at most MOST.
-        extended: gives the next layer of a hit its mesh.
+        marches: hits of one device and one precision; as many march at a time as fit half of the free memory of a GPU,
+            but at most MOST. The next one takes the place of one that has ended.
     """
-    keyed, running, hits = iter(coming), dict[int, Key](), list[OneHit]()
-    while len(hits) < MOST and _has_room(hits) and (one := next(keyed, None)) is not None:
-        running[len(hits)] = one[0]
-        hits.append(one[1])
-    if not hits:
+    coming, first = enumerate(marches), list[tuple[int, March]]()
+    while len(first) < MOST and _has_room([march.hit for _, march in first]) and (one := next(coming, None)):
+        first.append(one)
+    if not first:
         return
-    many = ManyHits(hits)
-    del hits  # ended hits make room
+    running, many = dict(enumerate(first)), ManyHits([march.hit for _, march in first])
+    del first  # ended hits make room
     while running:
         cancel.check()
         many.advance()
         for place, (status, at_edge) in enumerate(many.look()):
             if place in running and status == WAITING and not at_edge:
-                many.put(place, extended(running[place]))
+                many.put(place, running[place][1].extended())
             elif place in running and (status != RUNNING or at_edge):
-                yield running.pop(place), bool(at_edge)
-                if (one := next(keyed, None)) is not None:
-                    running[place] = one[0]
-                    many.put(place, one[1])
+                number, march = running.pop(place)
+                yield number, march.struck(bool(at_edge))
+                if one := next(coming, None):
+                    running[place] = one
+                    many.put(place, one[1].hit)
 
 
 def _has_room(hits: list[OneHit]) -> bool:

@@ -43,11 +43,10 @@ def fit_of_result(path: Path) -> Fit:
     if tables.get("layer"):
         raise FitError(f"{path}: has layers behind its plate, but a fit is of one plate")
     plate = {key: value for key, value in tables["plate"].items() if key not in (*PRIORS, "material")}
-    given: dict[str, Any] = {key: tables[key] for key in ("core", "interaction", "catalogue") if key in tables}
     standoffs = [float(standoff) for standoff in result[v.STANDOFF].values]
     fit: dict[str, Any] = {
         "title": f"{tables['title']}: by finite elements",
-        **given,
+        **{key: tables[key] for key in ("core", "interaction", "catalogue") if key in tables},
         "plate": plate,
         "record": {"standoffs": standoffs, "standoff_point": result.attrs[attr.STANDOFF_POINT]},
         "prior": {"plate": PRIORS},

@@ -97,13 +97,8 @@ class Fit:
         for unknown in self.scene_parameters:
             if values is not None and unknown.path in values and unknown.path not in shot.own:
                 tables = put(tables, unknown.path, as_read(unknown, float(values[unknown.path])))
-        return scene_from(tables, self.record, self.folder)
-
-
-def scene_from(tables: Mapping[str, Any], record: Record, folder: FilePath) -> Scene:
-    """A scene from its tables. Parts that are already models stay the same objects."""
-    context = {"folder": folder}
-    plate = Plate.model_validate(tables["plate"], context=context)
-    interaction = Interaction.model_validate(tables.get("interaction", {}), context=context)
-    wanted = {"core": tables["core"], "target": Target(layers=(plate,)), "interaction": interaction, "record": record}
-    return Scene.model_validate(wanted, context=context)
+        context = {"folder": self.folder}
+        target = Target(layers=(Plate.model_validate(tables["plate"], context=context),))
+        interaction = Interaction.model_validate(tables.get("interaction", {}), context=context)
+        parts = {"core": tables["core"], "target": target, "interaction": interaction, "record": self.record}
+        return Scene.model_validate(parts, context=context)

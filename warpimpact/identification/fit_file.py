@@ -15,7 +15,7 @@ from warpimpact.campaign.plausible import check_plausible
 from warpimpact.campaign.text import parsed, read_text
 from warpimpact.catalogue.catalogue import Catalogue
 from warpimpact.identification.fit import Fit, MeasuredShot, Sampling
-from warpimpact.identification.measured import read_hit, read_measured
+from warpimpact.identification.measured import KINDS, read_hit, read_measured
 from warpimpact.identification.parameters import (
     FitError,
     Parameter,
@@ -32,19 +32,16 @@ from warpimpact.scene.distributions import EDGE, Distribution
 from warpimpact.scene.model import Model
 from warpimpact.scene.problems import sentence
 from warpimpact.scene.quantities import QUANTITIES
-from warpimpact.scene.units import Angle, Speed, Title, quantity, quoted
+from warpimpact.scene.units import Title, quantity, quoted
 from warpimpact.solver.limit import check_arrests
 
 _Table = dict[str, Any]
 _MOST_MEASURED = 256
-DISCREPANCY = {
-    "velocity": (Speed, {"distribution": "truncated_normal", "mean": 0, "std": 10, "low": 0, "high": 50}),
-    "angle": (
-        Angle,
-        {"distribution": "truncated_normal", "mean": "0 deg", "std": "5 deg", "low": "0 deg", "high": "25 deg"},
-    ),
+DISCREPANCY: Mapping[str, Any] = {
+    "velocity": {"distribution": "truncated_normal", "mean": 0, "std": 10, "low": 0, "high": 50},
+    "angle": {"distribution": "truncated_normal", "mean": "0 deg", "std": "5 deg", "low": "0 deg", "high": "25 deg"},
 }
-"""Quantity of a scale of discrepancy, and its default prior: half of a normal distribution."""
+"""Default prior of a scale of discrepancy: half of a normal distribution."""
 
 
 def read_fit(path: str | FilePath) -> Fit:
@@ -201,9 +198,9 @@ def _gives(tables: Any, path: Path) -> bool:
 def _discrepancy(given: _DiscrepancyTable, kinds: set[str], name: str) -> tuple[list[Parameter], dict[str, float]]:
     """Scales of discrepancy: the unknown ones as parameters, and the fixed ones by kind."""
     scales, fixed = list[Parameter](), dict[str, float]()
-    for kind, (unit, default) in DISCREPANCY.items():
+    for kind, unit in KINDS.values():
         value, read = getattr(given, kind), quantity(unit)
-        value = default if value is None else value
+        value = DISCREPANCY[kind] if value is None else value
         place = f"{name}: discrepancy.{kind}"
         if isinstance(value, dict):
             prior: Distribution = read_distribution(read, value, place)

@@ -22,8 +22,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpimpact.identification.fit import Fit, MeasuredShot
-from warpimpact.identification.measured import MEASURABLE, Observation
-from warpimpact.identification.parameters import COLUMN_OF, UNITS_OF_EXPOSURE, Path, columns_of
+from warpimpact.identification.measured import MEASURABLE
+from warpimpact.identification.parameters import COLUMN_OF, UNITS_OF_EXPOSURE, columns_of
 from warpimpact.records.outcomes import Outcomes
 from warpimpact.records.variable import failures
 from warpimpact.results.measures import STATUSES
@@ -152,7 +152,10 @@ def _runs(fit: Fit, shot: MeasuredShot, points: Array, shifts: Array) -> Iterato
     # The literal scheme counts steps, so its interval may not differ from shot to shot.
     varying = {*COLUMN_OF} if fit.numerics.scheme == "nodal" else {*COLUMN_OF, *UNITS_OF_EXPOSURE}
     of_scene = {path: column for path, column in by_path.items() if path not in varying}
-    for rows in _of_one_scene(of_scene, len(points)):
+    keys = np.stack([np.zeros(len(points)), *of_scene.values()], axis=-1)
+    _, which = np.unique(keys, axis=0, return_inverse=True)
+    for scene_number in range(which.max() + 1):
+        rows = np.flatnonzero(which.reshape(-1) == scene_number)
         own_scene = by_path if len(rows) == 1 else of_scene  # a single set needs no columns
         scene = fit.scene_of(shot, {path: float(column[rows[0]]) for path, column in own_scene.items()})
         plate = scene.target.layers[0]
@@ -161,16 +164,6 @@ def _runs(fit: Fit, shot: MeasuredShot, points: Array, shifts: Array) -> Iterato
         each = len(own.shots) // len(rows)  # sets have equal numbers of shots, one set after the other
         of_shots: dict[str, Any] = {name: np.repeat(column, each) for name, column in columns.items()}
         yield Run(rows, scene, own._replace(shots=replace(own.shots, **of_shots)))
-
-
-def _of_one_scene(of_scene: Mapping[Path, Array], count: int) -> Iterator[NDArray[np.int64]]:
-    """Groups of rows that share one scene."""
-    if not of_scene:
-        yield np.arange(count)
-        return
-    _, which = np.unique(np.stack(list(of_scene.values()), axis=-1), axis=0, return_inverse=True)
-    for scene_number in range(which.max() + 1):
-        yield np.flatnonzero(which.reshape(-1) == scene_number)
 
 
 def _outcomes(fit: Fit, alike: Sequence[int], runs: Sequence[Run], worker: Worker) -> list[Outcomes]:
@@ -206,7 +199,9 @@ def score_shot(
     possible = counted if shot.status is None else counted & (status == STATUSES[shot.status])
     squares, misfit = (np.zeros((*status.shape, images)) for _ in range(2))
     for number in shot.observations:
-        missed = number.miss(_with_images(number, outcomes, points.group).reshape(*status.shape, images))
+        mirror = MEASURABLE[number.name].mirror
+        signs = [1.0 if mirror is None else float(getattr(symmetry, mirror)) for symmetry in points.group]
+        missed = number.miss(number.of(outcomes).reshape(*status.shape, 1) * np.array(signs))
         spread = np.hypot(number.std, discrepancy[number.kind])[:, None, None]
         squares += (missed / spread) ** 2 + 2.0 * np.log(np.sqrt(2.0 * np.pi) * spread)
         misfit += (missed / number.std) ** 2
@@ -226,10 +221,3 @@ def score_shot(
     places = np.array([one.image(points.shots.hit_y[at], points.shots.hit_z[at], points.cell) for one in points.group])
     nearest = np.where(possible, misfit, np.inf).reshape(sets, -1).min(axis=1)
     return log_likelihood, np.nan_to_num(noise), nearest, *places[image, :, row].T
-
-
-def _with_images(number: Observation, outcomes: Outcomes, group: Sequence[Symmetry]) -> Array:
-    """A computed number of all points and their images, shape [sets · points, images]."""
-    computed, mirror = number.of(outcomes), MEASURABLE[number.name].mirror
-    signs = [1.0 if mirror is None else float(getattr(symmetry, mirror)) for symmetry in group]
-    return np.asarray(computed[:, None] * np.array(signs))

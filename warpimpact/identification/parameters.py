@@ -30,7 +30,6 @@ UNITS_OF_EXPOSURE: tuple[Path, ...] = (("plate", "degradation_interval"), ("plat
 TABLES: dict[str, Any] = {"plate": Plate, "interaction": Interaction, "core": AnyCore}
 """Tables of the scene whose numbers may be parameters."""
 _DISTRIBUTION: TypeAdapter[Distribution] = TypeAdapter(AnyDistribution)
-_ALONG = ("y", "z")
 
 
 class FitError(CampaignError):
@@ -141,7 +140,7 @@ def dotted(path: Path) -> str:
 def _short(path: Path) -> str:
     if isinstance(path[-1], str):
         return path[-1]
-    last = _ALONG[path[-1]] if path[-2] in ("spacing", "size") else path[-1]
+    last = "yz"[path[-1]] if path[-2] in ("spacing", "size") else path[-1]
     return f"{path[-2]}_{last}"
 
 

@@ -33,7 +33,7 @@ ALIKE = 0.15
 WIDE = 0.65
 """Share of the prior within the posterior's 95 % interval above which little was learnt; 0.95 if nothing was."""
 STRONG = 0.7
-"""Correlation above which two parameters are reported as a combination."""
+"""Rank correlation above which two parameters are reported as a combination."""
 _GROUPS_OF_WALKERS = 4
 
 
@@ -138,14 +138,6 @@ def parameters_of(posterior: xarray.Dataset) -> list[str]:
     return [str(name) for name, array in posterior.data_vars.items() if p.PATH in array.attrs]
 
 
-def together(posterior: xarray.Dataset) -> list[tuple[str, str, float]]:
-    """Pairs of parameters that are strongly correlated in the posterior, with their rank correlation."""
-    names = parameters_of(posterior)
-    ranks = posterior[names].to_dataframe().corr("spearman").to_numpy()
-    pairs = combinations(range(len(names)), 2)
-    return [(names[i], names[k], float(ranks[i, k])) for i, k in pairs if abs(ranks[i, k]) > STRONG]
-
-
 def material_draws(fit: Fit, posterior: xarray.Dataset) -> pd.DataFrame:
     """Draws of the material, a column for each quantity that `hits.file` takes."""
     values = {parameter.path: posterior[parameter.name].values for parameter in fit.scene_parameters}
@@ -168,8 +160,8 @@ def posterior_view(posterior: xarray.Dataset) -> list[Section]:
         *(Column("parameter"), number("median", digits=".3g"), Column("95 % interval"), Column("95 % of the prior")),
         *(number("R-hat", digits=".3f"), number("ESS", digits=".0f"), Column("verdict")),
     )
-    rows = []
-    for name in parameters_of(posterior):
+    names, rows = parameters_of(posterior), []
+    for name in names:
         array = posterior[name]
         unit, factor = unit_of(array)
         low, middle, high = factor * np.quantile(array.values, [0.025, 0.5, 0.975])
@@ -177,9 +169,11 @@ def posterior_view(posterior: xarray.Dataset) -> list[Section]:
         told = (array.attrs[p.R_HAT], array.attrs[p.EFFECTIVE], array.attrs[p.VERDICT])
         label = f"{name} [{unit}]" if unit else name
         rows.append((label, middle, f"{low:.3g} to {high:.3g}", f"{first:.3g} to {last:.3g}", *told))
+    ranks = posterior[names].to_dataframe().corr("spearman").to_numpy()
     correlations = [
         f"{first} and {other} are determined together more than each alone: their correlation is {value:+.2f}"
-        for first, other, value in together(posterior)
+        for (i, first), (k, other) in combinations(enumerate(names), 2)
+        if abs(value := float(ranks[i, k])) > STRONG
     ]
     return [
         Section([Table(columns, rows), *correlations], str(posterior.attrs[attr.TITLE])),
