@@ -28,7 +28,7 @@ def campaign_schema() -> Schema:
     """The JSON schema of a campaign, and of one with several plates. No key is required, as names give some of them."""
     schema = file_schema(Campaign, "warpimpact campaign")
     properties = schema["properties"]
-    del properties["scatter"]  # a file has distributions in the places of the values
+    del properties["scatter"], schema["$defs"]["Scatter"]  # a file has distributions in the places of the values
     several = {"type": "array", "items": {"type": "object"}, "minItems": 2}
     properties["plate"] = {
         "description": properties["plate"].pop("description"),

@@ -98,7 +98,7 @@ def distance_to(geometries: Any, y: Array, z: Array, period: Range) -> Array:
     The geometries are those about one period, around the origin, of all that repeat with it.
     """
     folded = (at - side * np.round(at / side) for at, side in zip((y, z), period, strict=True))
-    points: Any = shapely.points(*np.broadcast_arrays(*folded))
+    points: Any = np.asarray(shapely.points(*np.broadcast_arrays(*folded)))  # one point is no array
     if not len(geometries):
         return np.full(points.shape, np.inf)
     tree = shapely.STRtree(geometries, node_capacity=2)  # 1.5 us per point; 6 us with the default
