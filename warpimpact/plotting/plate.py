@@ -23,7 +23,6 @@ from warpimpact.plotting.style import VERMILION, add_heading, draw_fire, fire_of
 from warpimpact.scene import Core, Impact, NoPattern, Plate, Target
 from warpimpact.scene.display import MM
 from warpimpact.scene.model import Array
-from warpimpact.scene.notebook import UNIT_CELLS
 
 _PLATE_SIDE = 5.0  # of the plate on paper [inch], without axes, title and legend
 _ROOM_ACROSS, _BELOW, _ABOVE = 1.5, 1.7, 0.85
@@ -31,6 +30,8 @@ _NARROWEST = 6.0
 _SECTION = 4.2  # of a target on paper [inch]
 _FIGURE_SECTION = 2001
 _STEEL = "0.72"
+_UNIT_CELLS = 3
+"""Unit cells of an unbounded plate along each side of a drawing."""
 _NEAREST_HOLES = 40
 """Number of holes about the middle among which the smallest ligament is searched."""
 _EQUALLY_SMALL = 1.01
@@ -90,7 +91,7 @@ def drawn_extent(plate: Plate, core: Core | None) -> Array:
     if plate.size is not None:
         return np.array(plate.size)
     least = 0.0 if core is None else 4.0 * core.max_radius
-    return np.asarray(np.maximum(UNIT_CELLS * np.array(plate.pattern.unit_cell), least))
+    return np.asarray(np.maximum(_UNIT_CELLS * np.array(plate.pattern.unit_cell), least))
 
 
 def _draw_section(figure: Figure, plane: Axes, target: Target) -> None:

@@ -1,7 +1,7 @@
 """What is shot at what: immutable, validated, in SI units and radians.
 
 Change cores, plates, patterns, shots and their scatter here; a message says what was found and what is allowed. It
-imports view for drawings, and no other room: neither a kernel nor a Dataset.
+imports no other room: neither a kernel nor a Dataset.
 """
 
 from .core import AnyCore, ConeCore, Core, MassProperties, OgiveCore, PolynomialCore, ProfileCore

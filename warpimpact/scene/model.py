@@ -12,7 +12,6 @@ from pydantic import BaseModel, ConfigDict, GetJsonSchemaHandler, model_validato
 from pydantic.json_schema import JsonSchemaValue
 from pydantic_core import CoreSchema
 
-from .notebook import html_of
 from .units import meant, quoted
 
 Array = NDArray[np.float64]
@@ -86,10 +85,6 @@ class Model(BaseModel):
     def __eq__(self, other: object) -> bool:
         """Whether all fields are equal. Cached values do not count."""
         return isinstance(other, Model) and type(self) is type(other) and self._values == other._values
-
-    def _repr_html_(self) -> str:
-        """HTML for a notebook."""
-        return html_of(self)
 
     @property
     def _values(self) -> tuple[Any, ...]:

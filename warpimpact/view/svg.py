@@ -1,4 +1,4 @@
-"""SVG drawings to scale for notebooks, reports and the page of a design: plates with holes and hits, cores, layers.
+"""SVG drawings to scale for notebooks, reports and the page of a design: plates with holes and hits.
 
 Points are in metres, the first axis to the right and the second up; the SVG is in millimetres.
 """

@@ -1,4 +1,4 @@
-"""What a notebook shows of models and results: drawings that are XML, units, a verdict; and the bar of a run."""
+"""What a notebook shows of results: drawings that are XML, a verdict; and the bar of a run."""
 
 import re
 import sys
@@ -32,25 +32,6 @@ def drawings(text: str) -> list[str]:
     """Names of the drawings of a page, which is read as XML."""
     root = ElementTree.fromstring(text.replace("<br>", "<br/>"))
     return [one.attrib["aria-label"] for one in root.iter("svg")]
-
-
-@pytest.mark.parametrize(
-    ("model", "drawn", "told"),
-    [
-        (
-            CAMPAIGN,
-            ["core", "plate", "layers"],
-            {"core.mass": "4 g", "layer[0].gap": "20 mm", "impact.obliquity": "20°"},
-        ),
-        (PLATE, ["plate"], {"thickness": "5.09554 mm", "pattern.spacing": "8 mm, 8 mm", "resistance": "2.6 GPa"}),
-        (Hits(count=4), [], {"count": "4"}),
-    ],
-)
-def test_a_notebook_draws_a_model_and_gives_its_units(model, drawn: list[str], told: dict[str, str]) -> None:
-    text = model._repr_html_()
-    assert drawings(text) == drawn
-    cells = re.findall(r"<th[^>]*>([^<]*)</th><td[^>]*>([^<]*)</td>", text)
-    assert told.items() <= dict(cells).items()
 
 
 def test_a_notebook_shows_a_result_with_its_verdict(make_result, make_plate_result) -> None:
