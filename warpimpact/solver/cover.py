@@ -19,9 +19,8 @@ from numpy.typing import NDArray
 from warpimpact.scene import Core, Pattern, Plate
 from warpimpact.scene.interaction import FreeSurface
 from warpimpact.scene.patterns import NoPattern
-from warpimpact.scene.patterns.geometry import Check
 from warpimpact.solver.keys import Key
-from warpimpact.solver.tile import Floats, Real, Tile, kept
+from warpimpact.solver.tile import Check, Floats, Real, Tile, kept
 
 Array = NDArray[np.float64]
 

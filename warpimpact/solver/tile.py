@@ -17,7 +17,6 @@ from scipy import ndimage
 
 from warpimpact.scene import Pattern, Plate
 from warpimpact.scene.patterns import WHOLE_CELL
-from warpimpact.scene.patterns.geometry import Check, no_end
 from warpimpact.solver.device import SMALL_MEMORY, free_memory
 from warpimpact.solver.keys import Key
 
@@ -25,6 +24,8 @@ Array = NDArray[np.float64]
 Floats = NDArray[np.floating[Any]]
 Counts = NDArray[np.int16]
 Real = type[np.floating[Any]]
+Check = Callable[[], object]
+"""What is called often, and raises to end the work."""
 Kept = TypeVar("Kept", bound="Tile")
 
 BLUR = 3
@@ -82,7 +83,7 @@ class Tile:
 
     @cached_property
     def material(self) -> Floats:
-        return self.make(no_end)
+        return self.make(lambda: None)
 
     @cached_property
     def clearance(self) -> Floats:
@@ -190,7 +191,7 @@ def _sharp(pattern: Pattern, counts: tuple[int, int], sides: tuple[float, float]
 def _blurred(pattern: Pattern, counts: tuple[int, int], sides: tuple[float, float], real: Real, check: Check) -> Floats:
     """Material averaged over BLUR × BLUR cells of a period: exact sums of whole numbers in float32, then one
     division."""
-    inside, (rows, columns), beside = pattern.shares_in_holes(counts, sides, check), counts, BLUR // 2
+    inside, (rows, columns), beside = pattern.shares_in_holes(counts, sides), counts, BLUR // 2
     material = np.empty(counts, dtype=real)
     for band in _bands(counts):
         check()

@@ -5,7 +5,7 @@ distances and extents are exact. Spines are arrays of shape [corners, 2] [m].
 """
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from itertools import pairwise
 from typing import Any
 
@@ -19,7 +19,6 @@ BoolArray = NDArray[np.bool_]
 Counts = NDArray[np.int16]
 Numbers = NDArray[np.int64]
 Range = tuple[float, float]
-Check = Callable[[], object]
 Chords = Callable[[Numbers, Array, float], tuple[Array, Array]]
 """(number of the hole, z [m], slack [m]) of lines along y → their two ends in the hole [m], NaN if a line misses it.
 The ends have the shape of z; its last axis is along the holes."""
@@ -33,8 +32,6 @@ _EDGE = 1e-6
 """Distance from a hole, in sides of a cell, within which a line touches it."""
 _LINES_PER_LOT = 2**16
 """Approximate number of lines that are computed together."""
-_PIECE = 16
-"""Chords per piece of an outline."""
 
 
 def area(spine: Array, rounding: float) -> float:
@@ -122,22 +119,11 @@ def neighbours(geometries: Any, first: int) -> tuple[float, int, int]:
     return float(gaps[least]), int(pairs[0, least]), int(pairs[1, least])
 
 
-def pieces(rings: Sequence[Array]) -> Any:
-    """Short pieces of closed outlines, each of shape [points, 2] [m], as an array of shapely geometries."""
-    parts = [ring[at : at + _PIECE + 1] for ring in rings for at in range(0, len(ring) - 1, _PIECE)]
-    numbers = np.repeat(np.arange(len(parts)), list(map(len, parts)))
-    return shapely.linestrings(np.concatenate([*parts, np.empty((0, 2))]), indices=numbers)
-
-
 def geometries(spines: Array) -> Any:
     """Spines of shape [spines, corners, 2] [m] as an array of shapely geometries, shape [spines]."""
     corners = spines.shape[1]
     make = shapely.points if corners == 1 else shapely.linestrings if corners == 2 else shapely.polygons
     return make(spines[:, 0] if corners == 1 else spines)
-
-
-def no_end() -> None:
-    """A `check` that never ends the work."""
 
 
 def rounded(share: Array, whole: Any) -> Counts:
@@ -146,9 +132,7 @@ def rounded(share: Array, whole: Any) -> Counts:
     return np.asarray(np.floor(share * whole + (0.5 + 1e-6)), dtype=np.int16)
 
 
-def half_shares(
-    chords: Chords, extents: Array, counts: tuple[int, int], sides: tuple[float, float], check: Check
-) -> Counts:
+def half_shares(chords: Chords, extents: Array, counts: tuple[int, int], sides: tuple[float, float]) -> Counts:
     """Half the shares of cells in holes, from lines along y, in parts of WHOLE_CELL, shape `counts`.
 
     The other half comes from lines along z, so that a plate turned by a right angle has the same shares. Straight sides
@@ -156,13 +140,13 @@ def half_shares(
 
     Args:
         extents: lowest and highest z of every hole, shape [holes, 2] [m].
-        counts, sides, check: as in `Pattern.shares_in_holes`.
+        counts, sides: as in `Pattern.shares_in_holes`.
     """
     inside = np.zeros((counts[0] + 2, counts[1]), dtype=np.int16)
     ends = extents / sides[1]
     columns = np.clip(np.stack([np.floor(ends[:, 0]), np.ceil(ends[:, 1])], axis=1), 0, counts[1]).astype(np.int64)
-    for holes in _lots(LINES * (columns[:, 1] - columns[:, 0])):
-        check()
+    lot = np.cumsum(LINES * (columns[:, 1] - columns[:, 0])) // _LINES_PER_LOT
+    for holes in np.split(np.arange(len(columns)), np.flatnonzero(np.diff(lot)) + 1):
         met_columns = columns[holes, 1] - columns[holes, 0]
         hole = np.repeat(holes, met_columns)
         column = np.arange(met_columns.sum()) + np.repeat(columns[holes, 1] - np.cumsum(met_columns), met_columns)
@@ -175,15 +159,8 @@ def half_shares(
         for end, sign in ((low, 1), (high, -1)):
             _add(inside, np.clip(end[met] / sides[0], 0, counts[0]), column, weight, sign)
     for before, row in pairwise(inside):  # half the time of numpy.cumsum along the first axis
-        check()
         row += before
     return inside[: counts[0]]
-
-
-def _lots(lines: Numbers) -> list[Numbers]:
-    """Numbers of the holes in lots of about _LINES_PER_LOT lines; `lines` is the number of lines of each hole."""
-    lot = np.cumsum(lines) // _LINES_PER_LOT
-    return np.split(np.arange(len(lines)), np.flatnonzero(np.diff(lot)) + 1)
 
 
 def _add(inside: Counts, at: Array, column: Numbers, weight: Counts, sign: int) -> None:

@@ -17,7 +17,6 @@ from ..model import Array, Model
 from ..units import Angle, Length, PositiveLength, quantity
 from .geometry import (
     BoolArray,
-    Check,
     Chords,
     Counts,
     Range,
@@ -27,17 +26,15 @@ from .geometry import (
     geometries,
     half_shares,
     neighbours,
-    no_end,
-    pieces,
     placed,
     shifts_into,
 )
 
 _QUARTER = 16
 """Chords per quarter of a turn in an outline; a circle loses 1.6e-3 of its area."""
+_PIECE = 16
+"""Chords per piece of an outline, in a search for the nearest one."""
 _MOST_HOLES = 20_000
-_ROWS_PER_CHECK = 64
-"""Rows of cells between two calls of `check`."""
 _EQUAL_LENGTHS = 1e-9
 """Largest difference of two equal lengths, as a share of the period."""
 
@@ -68,9 +65,9 @@ class Pattern(Model, ABC):
         """Whether points y, z [m] lie in a hole; bool, of their broadcast shape."""
 
     @abstractmethod
-    def shares_in_holes(self, counts: tuple[int, int], sides: tuple[float, float], check: Check = no_end) -> Counts:
+    def shares_in_holes(self, counts: tuple[int, int], sides: tuple[float, float]) -> Counts:
         """Share of every cell that lies in holes, in parts of WHOLE_CELL, shape `counts`: cells of a period along y and
-        z with these sides [m], from the origin on. `check` is called often, and raises to end the work."""
+        z with these sides [m], from the origin on."""
 
     @abstractmethod
     def spines(self, y_range: Range, z_range: Range) -> Any:
@@ -99,7 +96,10 @@ class Pattern(Model, ABC):
         """Outlines around a period, cut into pieces. Those along the end of the rectangle are no nearer to a point of
         the period than its own."""
         sides = np.array(self.period)
-        return pieces(self.outlines(*((-reach, reach) for reach in 0.5 * (sides + np.hypot(*sides)))))
+        rings = self.outlines(*((-reach, reach) for reach in 0.5 * (sides + np.hypot(*sides))))
+        parts = [ring[at : at + _PIECE + 1] for ring in rings for at in range(0, len(ring) - 1, _PIECE)]
+        numbers = np.repeat(np.arange(len(parts)), list(map(len, parts)))
+        return shapely.linestrings(np.concatenate([*parts, np.empty((0, 2))]), indices=numbers)
 
     def ligament(self, size: tuple[float, float] | None = None) -> float:
         """Smallest distance between two holes, or between a whole hole and the rim of a plate of this `size` [m]; inf
@@ -162,7 +162,7 @@ class NoPattern(Pattern):
     def is_hole(self, y: Array, z: Array) -> BoolArray:
         return np.zeros(np.broadcast_shapes(np.shape(y), np.shape(z)), dtype=bool)
 
-    def shares_in_holes(self, counts: tuple[int, int], sides: tuple[float, float], check: Check = no_end) -> Counts:
+    def shares_in_holes(self, counts: tuple[int, int], sides: tuple[float, float]) -> Counts:
         return np.zeros(counts, dtype=np.int16)
 
     def spines(self, y_range: Range, z_range: Range) -> Any:
@@ -300,15 +300,13 @@ class LatticePattern(Pattern):
         """Spines of the holes about a period."""
         return self.spines(*((-reach, reach) for reach in 0.5 * np.array(self.period) + self._edge))
 
-    def shares_in_holes(self, counts: tuple[int, int], sides: tuple[float, float], check: Check = no_end) -> Counts:
+    def shares_in_holes(self, counts: tuple[int, int], sides: tuple[float, float]) -> Counts:
         ranges = [(-side, side * (count + 1)) for side, count in zip(sides, counts, strict=True)]
         places = self._repeated(self._places, self.period, ranges[0], ranges[1])
         extents = self._boxes(places)
-        along_y = half_shares(self._chords(places, exchanged=False), extents[:, :, 1], counts, sides, check)
-        along_z = half_shares(self._chords(places, exchanged=True), extents[:, :, 0], counts[::-1], sides[::-1], check)
-        for first in range(0, counts[0], _ROWS_PER_CHECK):
-            check()
-            along_y[first : first + _ROWS_PER_CHECK] += along_z[:, first : first + _ROWS_PER_CHECK].T
+        along_y = half_shares(self._chords(places, exchanged=False), extents[:, :, 1], counts, sides)
+        along_z = half_shares(self._chords(places, exchanged=True), extents[:, :, 0], counts[::-1], sides[::-1])
+        along_y += along_z.T
         return along_y
 
     def _chords(self, places: Array, *, exchanged: bool) -> Chords:

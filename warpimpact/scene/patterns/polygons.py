@@ -15,11 +15,11 @@ from shapely.affinity import translate
 from ..exclusions import MARGIN, POLYGONS, check_together
 from ..model import Array
 from ..units import Length, PositiveLength
-from .geometry import WHOLE_CELL, BoolArray, Check, Counts, Range, neighbours, no_end, rounded, shifts_into
+from .geometry import WHOLE_CELL, BoolArray, Counts, Range, neighbours, rounded, shifts_into
 from .pattern import Pattern
 
 _MOST_CELLS = 4_000_000
-_CELLS_PER_CHECK = 2**20
+_CELLS_AT_ONCE = 2**20
 _MOST_POLYGONS, _MOST_CORNERS = 400, 400  # which are read and drawn within seconds
 
 _Corners = Annotated[tuple[tuple[Length, Length], ...], Field(min_length=3, max_length=_MOST_CORNERS, fail_fast=True)]
@@ -123,12 +123,11 @@ class PolygonsPattern(Pattern):
         )
         return np.asarray(~self.material[i, j])
 
-    def shares_in_holes(self, counts: tuple[int, int], sides: tuple[float, float], check: Check = no_end) -> Counts:
+    def shares_in_holes(self, counts: tuple[int, int], sides: tuple[float, float]) -> Counts:
         along_y = _means(~self.material, counts[0], sides[0] / self.side)
         shares = np.empty(counts, dtype=np.int16)
-        rows = max(1, _CELLS_PER_CHECK // counts[1])
+        rows = max(1, _CELLS_AT_ONCE // counts[1])
         for first in range(0, counts[0], rows):
-            check()
             means = _means(along_y[first : first + rows].T, counts[1], sides[1] / self.side)
             shares[first : first + rows] = rounded(means.T, WHOLE_CELL)
         return shares
