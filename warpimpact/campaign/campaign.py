@@ -363,8 +363,7 @@ class Campaign(Model):
 
     @model_validator(mode="after")
     def _output_is_possible(self) -> Self:
-        self.output.check_bending(self.core)
-        self.output.check_standoffs(self.core)
+        self.output.check(self.core)
         return self
 
     @model_validator(mode="after")

@@ -9,7 +9,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from ..scene import Core, Hits, Impact, Plate, Record, Scene, Target
-from ..scene.bounds import USUAL, Implausible, hit_bounds, implausible, impossible
+from ..scene.bounds import USUAL, Implausible, hit_bounds
 from ..scene.quantities import QUANTITIES
 from ..scene.target import layer_name
 
@@ -30,15 +30,18 @@ def warn_of(scene: Scene, impact: Impact, hits: Hits) -> None:
 
 def check_plausible(core: Core, target: Target, record: Record, impact: Impact, hits: Hits | None = None) -> None:
     """Raise a ValueError if a value is beyond what any core or target has."""
-    if (sentence := impossible(_values(core, target, record, impact, hits))) is not None:
-        raise ValueError(sentence)
+    for place, kind, value in _values(core, target, record, impact, hits):
+        if kind in USUAL and (sentence := USUAL[kind].refusal(place, value)) is not None:
+            raise ValueError(sentence)
 
 
 def doubted(scene: Scene, impact: Impact, hits: Hits) -> Iterator[str]:
     """Sentences about values that are possible but unusual."""
     plate = scene.target.layers[0]
     usual = USUAL | {"hits": hit_bounds(plate.sampled_cell, plate.size)}
-    yield from implausible(_values(scene.core, scene.target, scene.record, impact, hits), usual)
+    for place, kind, value in _values(scene.core, scene.target, scene.record, impact, hits):
+        if kind in usual and (sentence := usual[kind].warning(place, value)) is not None:
+            yield sentence
     for place, plate in scene.target.named:
         share = effective_thickness(plate, impact.velocity) / plate.thickness
         if share < LEAST_EFFECTIVE_SHARE:

@@ -1,7 +1,6 @@
 """Usual and possible ranges of quantities, which a wrong unit usually leaves."""
 
 import math
-from collections.abc import Iterable, Mapping
 from typing import NamedTuple
 
 from .display import UNITS
@@ -42,12 +41,8 @@ class Bounds(NamedTuple):
         if value == 0.0 or ends[0] <= abs(value) <= ends[1]:
             return None
         read = self._shown(value) if self.unit == "rad" else f"{value:g} {self.unit}".rstrip()
-        return f"{place}: read as {read}, but {self._range(*ends)} is {what}{self._slip(place, value)}"
-
-    def _range(self, low: float, high: float) -> str:
-        if low == 0.0:
-            return f"up to {self._shown(high)}"
-        return f"{low * UNITS[self.unit].factor:g} to {self._shown(high)}"
+        least = f"{ends[0] * UNITS[self.unit].factor:g}" if ends[0] else "up"
+        return f"{place}: read as {read}, but {least} to {self._shown(ends[1])} is {what}{self._slip(place, value)}"
 
     def _slip(self, place: str, value: float) -> str:
         """What was probably meant."""
@@ -108,16 +103,3 @@ shallow depths may be studied. Listed hits may lie anywhere, since a pattern rep
 def hit_bounds(period: tuple[float, float], size: tuple[float, float] | None) -> Bounds:
     """Usual coordinates of listed hits [m]: within a few cells from the origin, or on a finite plate."""
     return _length(0.0, 1e3 * (10.0 * max(period) if size is None else 0.5 * max(size)))
-
-
-def implausible(values: Iterable[tuple[str, str, float]], usual: Mapping[str, Bounds] = USUAL) -> list[str]:
-    """A sentence for every value that is probably a mistake: of the place that it names, the key in `usual`, and the
-    value."""
-    warnings = (usual[kind].warning(place, value) for place, kind, value in values if kind in usual)
-    return [warning for warning in warnings if warning is not None]
-
-
-def impossible(values: Iterable[tuple[str, str, float]]) -> str | None:
-    """A sentence for the first impossible value; `values` are those of `implausible`."""
-    refusals = (USUAL[kind].refusal(place, value) for place, kind, value in values if kind in USUAL)
-    return next((refusal for refusal in refusals if refusal is not None), None)

@@ -107,13 +107,14 @@ class Plate(Model):
 
     @model_validator(mode="before")
     @classmethod
-    def _counts_time_or_path(cls, values: Any) -> Any:
+    def _goes_together(cls, values: Any) -> Any:
         if not isinstance(values, dict):
             return values
-        interval, distance = (values.get(f"degradation_{name}") for name in ("interval", "distance"))
-        check_together({BY_TIME: interval is not None, BY_PATH: distance is not None})
-        by_time = distance is None and interval is None
-        return values | {"degradation_interval": INTERVAL} if by_time else values
+        keys = {BY_TIME: "degradation_interval", BY_PATH: "degradation_distance", MARGIN: "margin", SIZE: "size"}
+        given = {option: values.get(key) is not None for option, key in keys.items()}
+        check_together(given)
+        by_default = not given[BY_TIME] and not given[BY_PATH]
+        return values | {"degradation_interval": INTERVAL} if by_default else values
 
     @property
     def degradation_unit(self) -> float:
@@ -121,11 +122,6 @@ class Plate(Model):
         given = self.degradation_interval if self.degradation_distance is None else self.degradation_distance
         assert given is not None  # one of the two is given
         return given
-
-    @model_validator(mode="after")
-    def _margin_has_a_rim(self) -> Self:
-        check_together({MARGIN: self.margin is not None, SIZE: self.size is not None})
-        return self
 
     @property
     def open_area(self) -> float:

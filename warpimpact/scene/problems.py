@@ -15,7 +15,9 @@ _MOST_PROBLEMS = 8
 def sentence(error: ValidationError, data: dict[str, Any]) -> str:
     """The first problems as a sentence, and how many more there are."""
     problems = [problem for problem in error.errors(include_url=False) if not _follows(problem, error)]
-    described = [_described(problem, data) for problem in problems[:_MOST_PROBLEMS]]
+    described = [
+        ": ".join(filter(None, (_place(problem, data), complaint(problem)))) for problem in problems[:_MOST_PROBLEMS]
+    ]
     if (more := len(problems) - len(described)) > 0:
         described.append(f"{more} more problem{'s' if more > 1 else ''}")
     return "; also ".join(described)
@@ -26,11 +28,6 @@ def _follows(problem: ErrorDetails, error: ValidationError) -> bool:
     place = problem["loc"]
     inner = (other["loc"] for other in error.errors(include_url=False) if len(other["loc"]) > len(place))
     return problem["type"] == "too_short" and any(other[: len(place)] == place for other in inner)
-
-
-def _described(problem: ErrorDetails, data: dict[str, Any]) -> str:
-    place, text = _place(problem, data), complaint(problem)
-    return f"{place}: {text}" if place else text
 
 
 def _place(problem: ErrorDetails, data: Any) -> str:

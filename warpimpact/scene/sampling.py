@@ -44,12 +44,12 @@ class Sampler:
     def __init__(
         self, impact: Impact, hits: Hits, plate: Plate, scatter: Scatter | None = None, replicates: int = 1
     ) -> None:
-        check_together({IRREDUCIBLE: hits.irreducible} | unsymmetric(scatter or Scatter()))
+        scatter = scatter or Scatter()
+        check_together({IRREDUCIBLE: hits.irreducible} | unsymmetric(scatter))
         self._impact, self._hits, self.cell = impact, hits, hits.covered(plate)
         (low_y, high_y), (low_z, high_z) = irreducible_part(symmetries_used(impact, hits, plate))
         self._extent = self.cell[0] * (high_y - low_y), self.cell[1] * (high_z - low_z)
         self._middle = 0.5 * self.cell[0] * (high_y + low_y), 0.5 * self.cell[1] * (high_z + low_z)
-        scatter = scatter or Scatter()
         self._scatter = scatter.given
         self._dimensions = _HIT_COLUMNS + (drawn_columns(scatter.layers) if self._scatter else 0)
         self._replicates = replicates

@@ -35,39 +35,28 @@ class Record(Model):
                 raise ValueError(f"got {after:g} m after {before:g} m, but stand-offs must increase")
         return standoffs
 
-    def check_bending(self, core: Core) -> None:
-        """Refuse to record the bending moment of a core that overrides its mass properties, and a strength without it.
+    def ahead(self, core: Core) -> float:
+        """Distance of the stand-off point ahead of the centre of mass [m]."""
+        return core.mass_properties.centre_of_mass if self.standoff_point == "nose" else 0.0
+
+    def check(self, core: Core) -> None:
+        """Refuse records that are impossible for a core: the bending moment if it overrides its mass properties, a
+        strength without it, and stand-offs at which it may still be in the target.
 
         Raises:
-            ValueError: the message names what the core overrides.
+            ValueError: the message names the fault and what is allowed.
         """
         overridden = ("centre_of_mass", "inertia_axial", "inertia_transverse")
         given = [f"core.{name}" for name in overridden if getattr(core, name) is not None]
         strength = core.strength is not None
         check_together({BENDING: self.bending, STRENGTH: strength, MASS_PROPERTIES: bool(given) and given[0]})
-
-    def ahead(self, core: Core) -> float:
-        """Distance of the stand-off point ahead of the centre of mass [m]."""
-        return core.mass_properties.centre_of_mass if self.standoff_point == "nose" else 0.0
-
-    def check_standoffs(self, core: Core) -> None:
-        """Refuse stand-offs at which a core may still be in the target.
-
-        Raises:
-            ValueError: the message names the stand-off and what is allowed.
-        """
         needed = core.bounding_radius + self.ahead(core)
         first = min(self.standoffs, default=needed)
         if first < needed:
             raise ValueError(
-                f"got {self._name}.standoffs of {first:g} m, "
+                f"got {type(self).__name__.lower()}.standoffs of {first:g} m, "
                 f"but a core of this size is certain to be out of the target only from {needed:.4g} m"
             )
-
-    @property
-    def _name(self) -> str:
-        """Name of the field that holds this record."""
-        return type(self).__name__.lower()
 
 
 if TYPE_CHECKING:
@@ -100,8 +89,7 @@ class Scene(Model):
 
     @model_validator(mode="after")
     def _record_is_possible(self) -> Self:
-        self.record.check_bending(self.core)
-        self.record.check_standoffs(self.core)
+        self.record.check(self.core)
         return self
 
     @property

@@ -77,20 +77,17 @@ _SPELLINGS = (
     | {"MOA": "arcmin", "rev": "turn", "revs": "turn", "turns": "turn", "kph": "kmh", "%": "percent"}
 )
 """Other spellings, and the unit of each."""
-_MIL = 'is an angle or a thousandth of an inch: write "nato_mil" (6400 to a turn), "mrad", or "thou"'
-_GRAD = 'is gon in some countries and degrees in others: write "gon" (400 to a turn) or "deg"'
-_GR = 'is grains to some and grams to others: write "grain" or "g"'
-_TON = 'is 907, 1000 or 1016 kg: write "t" for 1000 kg, or kg'
-_AMBIGUOUS = {
-    "mil": _MIL,
-    "mils": _MIL,
-    "grad": _GRAD,
-    "grade": _GRAD,
-    "gr": _GR,
-    "grs": _GR,
-    "ton": _TON,
-    "tons": _TON,
-}
+_AMBIGUOUS = (
+    dict.fromkeys(
+        ("mil", "mils"),
+        'is an angle or a thousandth of an inch: write "nato_mil" (6400 to a turn), "mrad", or "thou"',
+    )
+    | dict.fromkeys(
+        ("grad", "grade"), 'is gon in some countries and degrees in others: write "gon" (400 to a turn) or "deg"'
+    )
+    | dict.fromkeys(("gr", "grs"), 'is grains to some and grams to others: write "grain" or "g"')
+    | dict.fromkeys(("ton", "tons"), 'is 907, 1000 or 1016 kg: write "t" for 1000 kg, or kg')
+)
 """Names that mean two things to those who type them, in small letters."""
 
 _SCATTERS = re.compile(r"±|\+\s*/?\s*-|[0-9]\s*(?:\.\.|…)\s*[0-9]")
@@ -168,15 +165,12 @@ def _evaluated(text: str) -> _Unit:
         factor = _unit(match["name"]) if match["name"] else _ONE
         if match["close"]:
             factor, (value, sign) = value, outer.pop()
-        value = _times(value, factor, sign * int((match["power"] or match["attached"] or "1").strip("()")))
+        power = sign * int((match["power"] or match["attached"] or "1").strip("()"))
+        value = value[0] * factor[0] ** power, tuple(p + power * q for p, q in zip(value[1], factor[1], strict=True))
         sign = -1 if operator == "/" else 1
     if outer or operator:
         raise malformed
     return value
-
-
-def _times(unit: _Unit, other: _Unit, power: int) -> _Unit:
-    return unit[0] * other[0] ** power, tuple(p + power * q for p, q in zip(unit[1], other[1], strict=True))
 
 
 @cache
