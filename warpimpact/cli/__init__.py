@@ -1,6 +1,6 @@
 """The `warpimpact` command: arguments, progress, tables and clear errors.
 
-One file per group of commands. A command imports what is heavy when it runs; this keeps `--help` quick. Change
+`commands.py` declares them all; the module of a command is imported when it runs, which keeps `--help` quick. Change
 arguments, messages and progress here; a number is computed in another room. It imports every other room.
 """
 
@@ -14,26 +14,8 @@ from typing import NoReturn
 
 from warpimpact import __version__
 
-from .compare import add_compare
-from .continuum import add_continuum
-from .design import add_design
-from .export import add_export, add_replay, add_report
-from .mistakes import Plain, bug_report, message_of, say, show_warnings
-from .progress import set_verbosity
-from .run import add_run
-from .show import add_catalogue, add_inspect, add_plate, add_plot, add_validate
-from .start import add_new, add_schema
-from .studies import add_identify, add_limit, add_optimise, add_sensitivity, add_sweep, add_test
-
-_DAILY = (
-    *(add_catalogue, add_new, add_design, add_run),
-    *(add_compare, add_limit, add_optimise, add_report),
-)
-_EXPERT = (
-    *(add_plate, add_inspect, add_plot, add_sensitivity, add_sweep, add_test),
-    *(add_replay, add_export, add_continuum, add_identify, add_validate, add_schema),
-)
-"""Commands in the order of the help: those of a task from names to a report, and those for experts."""
+from .commands import DAILY, EXPERT
+from .messages import Plain, bug_report, message_of, say, show_log, show_warnings
 
 _EXAMPLE = """\
 warpimpact COMMAND --help explains a command. An example:
@@ -70,9 +52,9 @@ def main(argv: Sequence[str] | None = None) -> int:
     with redirect_stderr(Plain(sys.stderr)):  # argparse quotes what the user typed
         arguments = parser().parse_args(argv)
     try:
-        set_verbosity(verbose=arguments.verbose, quiet=arguments.quiet)
+        show_log(arguments.verbose)
         with redirect_stdout(Plain(sys.stdout)), show_warnings():
-            code: int | None = arguments.command(arguments)
+            code: int = arguments.command.run(arguments)
             sys.stdout.flush()
     except KeyboardInterrupt as interrupt:
         say(str(interrupt) or "interrupted")
@@ -86,7 +68,7 @@ def main(argv: Sequence[str] | None = None) -> int:
             return 2
         say(f"error: this is a bug, please report it: {bug_report(error)}")
         return 70
-    return code or 0
+    return code
 
 
 def parser() -> argparse.ArgumentParser:
@@ -100,11 +82,9 @@ def parser() -> argparse.ArgumentParser:
     program.add_argument("--version", action="version", version=f"warpimpact {__version__}")
     commands = program.add_subparsers(metavar="COMMAND", required=True, prog="warpimpact", help=argparse.SUPPRESS)
     groups = []
-    for title, adding in (("from names to a report", _DAILY), ("for experts", _EXPERT)):
-        before = len(commands.choices)
-        for add in adding:
-            add(commands)
-        summaries = [(name, str(parser.get_default("summary"))) for name, parser in commands.choices.items()][before:]
-        groups.append("\n".join([f"{title}:", *(f"    {name:<10} {summary}" for name, summary in summaries)]))
+    for title, declared in (("from names to a report", DAILY), ("for experts", EXPERT)):
+        for one in declared:
+            one.add_to(commands)
+        groups.append("\n".join([f"{title}:", *(f"    {one.name:<10} {one.summary}" for one in declared)]))
     program.epilog = "\n\n".join([*groups, _EXAMPLE])
     return program

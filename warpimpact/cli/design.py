@@ -3,43 +3,19 @@
 import argparse
 import os
 import tempfile
+import webbrowser
 from contextlib import ExitStack
+from importlib.resources import files
 from pathlib import Path
 
-from .mistakes import say
-from .options import Commands, add_command, add_device
+from warpimpact.campaign.text import CampaignError
+from warpimpact.design.designs import Shelf, from_address, shelf_of
+
+from .messages import say
 
 
-def add_design(commands: Commands) -> None:
-    parser = add_command(
-        commands,
-        "design",
-        _design,
-        summary="draw a plate in the browser; its hit map answers while a slider moves",
-        description="Open a page in the browser of this machine. It draws the plate of a campaign, and its hit map "
-        "answers while a slider moves. The page gives the campaign file and the report of what it shows. It is for "
-        "this machine alone and needs no network. Ctrl-C ends it. It needs: pip install 'warpimpact[design]'",
-        example="design campaigns/slotted_plate.toml",
-    )
-    parser.add_argument(
-        "designs",
-        nargs="*",
-        metavar="CAMPAIGN.toml",
-        help="campaigns; also results, searches of warpimpact optimise with their designs, and the address of "
-        "a page, which holds its design (default: the slotted plate)",
-    )
-    parser.add_argument("--port", type=int, default=0, metavar="N", help="port of the page (default: one that is free)")
-    parser.add_argument("--no-browser", action="store_true", help="print the address and open no browser")
-    add_device(parser)
-
-
-def _design(arguments: argparse.Namespace) -> None:
-    from importlib.resources import files
-
-    from warpimpact.campaign.text import CampaignError
-    from warpimpact.design.designs import Shelf, from_address, shelf_of
-
-    try:
+def design_command(arguments: argparse.Namespace) -> None:
+    try:  # starlette and uvicorn are optional
         from warpimpact.design.server import serve
     except ModuleNotFoundError as error:
         raise CampaignError(f"design needs {error.name}: pip install 'warpimpact[design]'") from None
@@ -50,21 +26,19 @@ def _design(arguments: argparse.Namespace) -> None:
     shelf = Shelf(held | dict(shelf.designs), shelf.files)
     if not 0 <= arguments.port < 2**16:
         raise CampaignError(f"--port: got {arguments.port}, but it must be a number from 0 to 65535")
-
     opened = ExitStack()
 
     def ready(address: str) -> None:
         print(address, flush=True)
-        if not arguments.no_browser:
-            import webbrowser
-
-            try:
-                path = _leading_to(address)
-            except OSError as error:
-                say(f"no browser is opened, because a file for it cannot be written ({error.strerror})")
-                return
-            opened.callback(path.unlink, missing_ok=True)
-            webbrowser.open(path.as_uri())
+        if arguments.no_browser:
+            return
+        try:
+            path = _redirecting_file(address)
+        except OSError as error:
+            say(f"no browser is opened, because a file for it cannot be written ({error.strerror})")
+            return
+        opened.callback(path.unlink, missing_ok=True)
+        webbrowser.open(path.as_uri())
 
     try:
         with opened:
@@ -75,8 +49,8 @@ def _design(arguments: argparse.Namespace) -> None:
         say("ended")
 
 
-def _leading_to(address: str) -> Path:
-    """A file that leads a browser to an address and that only its owner can read.
+def _redirecting_file(address: str) -> Path:
+    """Write a file that leads a browser to an address and that only its owner can read.
 
     Every user of the machine can see the command line of a browser, so the address is not part of it. The file is in
     the home folder, because browsers in a sandbox see neither temporary nor hidden files.

@@ -1,112 +1,73 @@
-"""Arguments that several commands take."""
+"""Declarations of commands, and options that several of them take."""
 
 import argparse
-from collections.abc import Callable
-from contextlib import AbstractContextManager
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from importlib import import_module
 from pathlib import Path
-from typing import TYPE_CHECKING, TypeAlias
-
-if TYPE_CHECKING:
-    from warpimpact.runs.executor import Executor
-
-Commands: TypeAlias = "argparse._SubParsersAction[argparse.ArgumentParser]"
-Command: TypeAlias = Callable[[argparse.Namespace], int | None]
+from typing import Any, NamedTuple
 
 
-def add_command(
-    commands: Commands, name: str, command: Command, *, summary: str, description: str, example: str
-) -> argparse.ArgumentParser:
-    """Add a command and return its parser. `command` returns the exit code; None means 0.
+class Option(NamedTuple):
+    """An argument of a command, as argparse takes it."""
 
-    Args:
-        summary: the line of the command in `warpimpact --help`.
+    names: tuple[str, ...]
+    settings: dict[str, Any]
+
+    def add_to(self, parser: argparse._ActionsContainer) -> None:
+        parser.add_argument(*self.names, **self.settings)
+
+
+class OneOf(NamedTuple):
+    """Options that exclude each other."""
+
+    options: tuple[Option, ...]
+
+    def add_to(self, parser: argparse._ActionsContainer) -> None:
+        group = parser.add_mutually_exclusive_group()
+        for one in self.options:
+            one.add_to(group)
+
+
+def option(*names: str, **settings: Any) -> Option:
+    """Declare an argument with the settings of argparse."""
+    return Option(names, settings)
+
+
+def one_of(*options: Option) -> OneOf:
+    """Declare options that exclude each other."""
+    return OneOf(options)
+
+
+@dataclass(frozen=True)
+class Command:
+    """A command, whose function `NAME_command` is in a module of this room.
+
+    Attributes:
+        module: its module, which is imported when the command runs: what it imports takes seconds.
+        summary: its line in `warpimpact --help`.
         example: a command line, without the program's name.
     """
-    parser = commands.add_parser(name, description=description, epilog=f"example: warpimpact {example}")
-    parser.set_defaults(command=command, summary=summary)
-    volume = parser.add_mutually_exclusive_group()
-    volume.add_argument("-v", "--verbose", action="count", default=0, help="show what is done; -vv shows more")
-    volume.add_argument("-q", "--quiet", action="store_true", help="show no progress")
-    return parser
 
+    name: str
+    module: str
+    summary: str
+    description: str
+    options: Sequence[Option | OneOf]
+    example: str
 
-def add_campaign(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument(
-        "campaign", type=Path, metavar="CAMPAIGN.toml", help="campaign file: core, plate, shots and numerics"
-    )
+    def add_to(self, commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
+        parser = commands.add_parser(
+            self.name, description=self.description, epilog=f"example: warpimpact {self.example}"
+        )
+        parser.set_defaults(command=self)
+        for one in (*self.options, *_VOLUME):
+            one.add_to(parser)
 
-
-def add_result(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("result", type=Path, metavar="RESULT.nc", help="written by warpimpact run")
-
-
-def add_results(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("results", type=Path, nargs="+", metavar="RESULT.nc", help="written by warpimpact run")
-
-
-def add_output(parser: argparse.ArgumentParser, metavar: str, text: str) -> None:
-    parser.add_argument("-o", "--output", type=Path, metavar=metavar, help=text)
-
-
-def add_measures(parser: argparse.ArgumentParser, default: str = "the measures of docs/protection.md") -> None:
-    """Add `--measure`, the measures of the results; `default` says what is shown without it."""
-    parser.add_argument(
-        "--measure",
-        action="append",
-        default=[],
-        metavar="TEXT",
-        help='what is asked, such as "worst_tenth(residual_energy_density@130mm)", "P(inclination > 40 deg)" or V50; '
-        f"may be given several times (default: {default})",
-    )
-
-
-def add_earlier(parser: argparse.ArgumentParser, what: str, replaced: str, *, resume: str = "") -> None:
-    """Add `--resume` and `--overwrite`: what happens to an earlier computation.
-
-    Args:
-        what: name of the computation.
-        replaced: what `--overwrite` replaces.
-        resume: what `--resume` does, in other words than those for any computation.
-    """
-    usual = f"continue an interrupted {what}; start a new one if there is none"
-    parser.add_argument("--resume", action="store_true", help=resume or usual)
-    add_overwrite(parser, replaced)
-
-
-def add_overwrite(parser: argparse.ArgumentParser, replaced: str) -> None:
-    parser.add_argument("--overwrite", action="store_true", help=f"replace {replaced}")
-
-
-def add_count(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("--count", type=int, metavar="N", help="number of hits, instead of the campaign's")
-
-
-def add_campaign_folder(parser: argparse.ArgumentParser, text: str) -> None:
-    parser.add_argument("--campaign-folder", type=Path, metavar="FOLDER", help=text)
-
-
-def add_device(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument(
-        "--device",
-        default="auto",
-        metavar="auto|cpu|cuda:0",
-        help="where to compute (default: auto, which is a GPU if there is one); a run takes several: cuda:0,cuda:1",
-    )
-
-
-def add_computing(parser: argparse.ArgumentParser) -> None:
-    """Add the options on where to compute: a device, processes, or a cluster; `executor_of` reads them."""
-    add_device(parser)
-    cluster = parser.add_mutually_exclusive_group()
-    cluster.add_argument("--scheduler", metavar="ADDRESS", help="compute on the workers of this Dask scheduler")
-    cluster.add_argument("--workers", type=at_least(1), metavar="N", help="compute in N processes on this machine")
-
-
-def executor_of(arguments: argparse.Namespace) -> "AbstractContextManager[Executor]":
-    """The executor that the options of `add_computing` ask for."""
-    from warpimpact.runs.executor import executor_for
-
-    return executor_for(arguments.device, workers=arguments.workers, scheduler=arguments.scheduler)
+    def run(self, arguments: argparse.Namespace) -> int:
+        """Run the command and return its exit code."""
+        module = import_module(f".{self.module}", __package__)
+        return int(getattr(module, f"{self.name}_command")(arguments) or 0)
 
 
 def at_least(least: int) -> Callable[[str], int]:
@@ -118,3 +79,64 @@ def at_least(least: int) -> Callable[[str], int]:
         return number
 
     return whole_number
+
+
+def output(metavar: str, text: str) -> Option:
+    """Declare the file that a command writes."""
+    return option("-o", "--output", type=Path, metavar=metavar, help=text)
+
+
+def folder(text: str) -> Option:
+    """Declare the folder in which a command writes files with names of its own."""
+    return option("--folder", type=Path, metavar="FOLDER", help=text)
+
+
+def overwrite(replaced: str) -> Option:
+    return option("--overwrite", action="store_true", help=f"replace {replaced}")
+
+
+def earlier(what: str, replaced: str, resume: str = "") -> tuple[Option, Option]:
+    """Declare what happens to an earlier computation, which `what` names: --resume and --overwrite."""
+    usual = f"continue an interrupted {what}; start a new one if there is none"
+    return option("--resume", action="store_true", help=resume or usual), overwrite(replaced)
+
+
+def measures(default: str = "the measures of docs/protection.md") -> Option:
+    """Declare the measures of results; `default` names those that are shown without it."""
+    return option(
+        "--measure",
+        action="append",
+        default=[],
+        metavar="TEXT",
+        help='a measure, such as "worst_tenth(residual_energy_density@130mm)", "P(inclination > 40 deg)" or V50; '
+        f"may be given several times (default: {default})",
+    )
+
+
+def campaign_folder(text: str) -> Option:
+    return option("--campaign-folder", type=Path, metavar="FOLDER", help=text)
+
+
+CAMPAIGN = option("campaign", type=Path, metavar="CAMPAIGN.toml", help="campaign file: core, plate, shots and numerics")
+RESULT = option("result", type=Path, metavar="RESULT.nc", help="written by warpimpact run")
+RESULTS = option("results", type=Path, nargs="+", metavar="RESULT.nc", help="written by warpimpact run")
+COUNT = option("--count", type=int, metavar="N", help="number of hits, instead of the campaign's")
+DEVICE = option(
+    "--device",
+    default="auto",
+    metavar="auto|cpu|cuda:0",
+    help="where to compute (default: auto, which is a GPU if there is one); a run takes several: cuda:0,cuda:1",
+)
+COMPUTING = (
+    DEVICE,
+    one_of(
+        option("--scheduler", metavar="ADDRESS", help="compute on the workers of this Dask scheduler"),
+        option("--workers", type=at_least(1), metavar="N", help="compute in N processes on this machine"),
+    ),
+)
+_VOLUME = (
+    one_of(
+        option("-v", "--verbose", action="count", default=0, help="show what is done; -vv shows more"),
+        option("-q", "--quiet", action="store_true", help="show no progress"),
+    ),
+)

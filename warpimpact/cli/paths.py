@@ -1,16 +1,21 @@
-"""Checks of paths: results get different names, and an output that cannot be written is refused before the
-computation."""
+"""Paths of a command: names of results, and outputs that are refused before anything is computed."""
 
 import argparse
 import tempfile
 from collections.abc import Sequence
 from pathlib import Path
 
+from matplotlib.figure import Figure
+
+from warpimpact.results.files import OutputError, ResultError, aside
+from warpimpact.runs.parts import is_begun
+
+PICTURES = (".png", ".pdf", ".svg")
+"""Formats of figures."""
+
 
 def named(paths: Sequence[Path]) -> dict[str, Path]:
-    """Results by different names: the stems of the files if these differ, else the whole paths."""
-    from warpimpact.results.files import ResultError
-
+    """Return results by different names: the stems of the files if these differ, else the whole paths."""
     if repeated := [path for path in paths if paths.count(path) > 1]:
         raise ResultError(f"{repeated[0]}: got this result {len(repeated)} times, but each result counts once")
     stems = [path.stem for path in paths]
@@ -18,58 +23,41 @@ def named(paths: Sequence[Path]) -> dict[str, Path]:
 
 
 def replaces(arguments: argparse.Namespace, output: Path) -> bool:
-    """Whether the command may replace files beside a result: with --overwrite, and with --resume where the result is
-    begun or complete."""
-    from warpimpact.runs.parts import is_begun
+    """Whether the command may replace the figures of a result.
 
+    It may with --overwrite, and with --resume where the result is begun or complete.
+    """
     return arguments.overwrite or (arguments.resume and is_begun(output))
 
 
-def check_output(path: Path, *, overwrite: bool) -> None:
-    """Refuse a file that cannot be written, or that exists and must not be replaced."""
-    from warpimpact.results.files import OutputError
-
-    check_place(path)
+def check_output(path: Path, *suffixes: str, overwrite: bool) -> None:
+    """Refuse a file that cannot be written, has another suffix, or exists and must not be replaced."""
+    if path.is_dir():
+        raise OutputError(f"{path}: is a folder, but the output is one file")
+    if suffixes and path.suffix.lower() not in suffixes:
+        *others, last = suffixes
+        raise OutputError(f"{path}: the name must end in {', '.join(others) + ' or ' if others else ''}{last}")
+    check_folder(path.parent)
     if path.exists() and not overwrite:
         raise OutputError(f"{path}: exists already; name another file or give --overwrite")
 
 
-def check_picture(path: Path, *, overwrite: bool) -> None:
-    """Refuse a picture that cannot be written, or that exists and must not be replaced."""
-    check_suffix(path, "a picture", ".png", ".pdf", ".svg")
-    check_output(path, overwrite=overwrite)
-
-
-def check_result(path: Path, what: str) -> None:
-    """Refuse a netCDF file that cannot be written, or with another suffix."""
-    check_place(path)
-    check_suffix(path, what, ".nc")
-
-
-def check_suffix(path: Path, what: str, *suffixes: str) -> None:
-    """Refuse a name whose suffix belongs to another format."""
-    from warpimpact.results.files import OutputError
-
-    if path.suffix.lower() not in suffixes:
-        allowed = " or ".join([", ".join(suffixes[:-1]), suffixes[-1]] if len(suffixes) > 1 else suffixes)
-        raise OutputError(f"{path}: the name of {what} must end in {allowed}")
-
-
-def check_place(path: Path) -> None:
-    """Refuse a file that cannot be written."""
-    from warpimpact.results.files import OutputError
-
-    if path.is_dir():
-        raise OutputError(f"{path}: is a folder, but the output is one file")
-    check_folder(path.parent)
-
-
 def check_folder(folder: Path) -> None:
     """Refuse a folder in which no file can be written."""
-    from warpimpact.results.files import OutputError
-
     try:
         with tempfile.TemporaryFile(dir=folder):
             pass
     except OSError as error:
         raise OutputError(f"{folder}: cannot be written into ({error.strerror})") from None
+
+
+def save_figure(figure: Figure, path: Path) -> None:
+    """Write a figure, whole or not at all."""
+    with aside(path) as file:
+        figure.savefig(file, format=path.suffix[1:].lower(), dpi=150)
+
+
+def write_text(text: str, path: Path) -> None:
+    """Write a text, whole or not at all."""
+    with aside(path) as file:
+        file.write_text(text, encoding="utf-8")

@@ -1,51 +1,22 @@
-"""Progress of a computation: a bar on a terminal, plain lines in a log."""
+"""Progress of a computation: one line that is rewritten on a terminal, lines in a log."""
 
-import logging
+import argparse
+import shutil
 import sys
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
-from .mistakes import Plain, say
+from warpimpact.analysis.numbers import interval_text, plus_minus
+from warpimpact.results.measures import Measure
+from warpimpact.runs.progress import RunProgress
+from warpimpact.statistics.intervals import Estimate
 
-if TYPE_CHECKING:
-    from warpimpact.results.measures import Measure
-    from warpimpact.runs.progress import RunProgress
-    from warpimpact.statistics.intervals import Estimate
-
-_SILENCE = 60.0
-"""Longest time between two lines of a log [s]."""
+_SILENCE = {True: 0.1, False: 60.0}
+"""Longest time between two lines [s], by whether they go to a terminal."""
 _SHORT = 2.0
 """Seconds after which a pilot is announced, and after the first item a rate."""
-_BAR_FORMAT = "{l_bar}{bar:20}{r_bar}"
-"""Format of a bar on a terminal. Its width is fixed, because estimates beside it would leave it one character."""
-
-
-_quiet = False
-
-
-def set_verbosity(*, verbose: int, quiet: bool) -> None:
-    """Set what a command writes beside its output and its warnings.
-
-    Args:
-        verbose: 1 shows the log of the package from INFO on, 2 from DEBUG on.
-        quiet: whether no progress is shown.
-    """
-    global _quiet
-    _quiet = quiet
-    logger = logging.getLogger("warpimpact")
-    logger.handlers.clear()
-    if verbose:
-        handler = logging.StreamHandler(Plain(sys.stderr))
-        handler.setFormatter(logging.Formatter("%(asctime)s %(name)s: %(message)s", "%H:%M:%S"))
-        logger.addHandler(handler)
-        logger.setLevel(logging.INFO if verbose == 1 else logging.DEBUG)
-
-
-def warn(sentence: str) -> None:
-    """Warn the user on the terminal or in the log, while the command goes on."""
-    say(f"warning: {sentence}")
 
 
 class Step(NamedTuple):
@@ -66,74 +37,61 @@ class Step(NamedTuple):
 
 
 @contextmanager
-def show_progress(unit: str = "hit") -> Iterator[Callable[[Step], None]]:
+def show_progress(arguments: argparse.Namespace, unit: str = "hit") -> Iterator[Callable[[Step], None]]:
     """Show the progress of a computation, or of several one after another.
 
     Args:
+        arguments: with --quiet nothing is shown.
         unit: name of the counted items.
     """
-    if _quiet:
-        yield lambda step: None
-        return
-    if not sys.stderr.isatty():
-        yield _Log(unit).show
-        return
-    from tqdm import tqdm
-
-    with tqdm(unit=unit, dynamic_ncols=True, bar_format=_BAR_FORMAT, miniters=0, smoothing=0.0) as bar:
-
-        def show(step: Step) -> None:
-            if step.before or bar.total is None or _another(step, int(bar.n), int(bar.total)):
-                bar.reset(step.total)
-                bar.n = bar.initial = step.resumed
-            elif bar.initial == step.resumed < step.done:  # kernels may have been compiled before the first item
-                bar.reset(step.total)
-                bar.n = bar.initial = step.done
-            bar.set_postfix_str(step.before or step.text, refresh=bool(step.before))
-            bar.update(max(0, step.done - bar.n))
-
-        yield show
+    display = _Display(unit)
+    yield (lambda step: None) if arguments.quiet else display.show
+    display.end()
 
 
-def _another(step: Step, done: int, total: int) -> bool:
-    """Whether a step belongs to another computation than the one that was at `done` of `total`."""
-    return total > 0 and (step.total != total or step.done < done == total)
+@contextmanager
+def show_run(arguments: argparse.Namespace) -> Iterator[Callable[[RunProgress], None]]:
+    """Show the progress of a run, with its running estimates."""
+    with show_progress(arguments) as show:
+        yield lambda run: show(Step(run.done, run.total, run.resumed, _running(run), _pilot(run)))
 
 
-class _Log:
-    """Writes a line at the start, after every tenth, and every minute."""
+class _Display:
+    """Writes a line at the start, after every tenth, and after a silence; on a terminal over the one before."""
 
     def __init__(self, unit: str) -> None:
         self._unit = unit
-        self._begin = self._last = time.monotonic()
-        self._tenths, self._before = -1, ""
         self._step = Step(0, 0)
-        self._first = 0
+        self._begin = self._last = time.monotonic()
+        self._first, self._phase = 0, ""
+        self._is_terminal = sys.stderr.isatty()
 
     def show(self, step: Step) -> None:
         """Take in the progress of the computation."""
         now, last = time.monotonic(), self._step
-        new = not last.total or _another(step, last.done, last.total) or bool(step.before) != bool(last.before)
-        if new:  # the clock starts again
-            self._begin, self._last, self._tenths, self._before = now, now, -1, ""
-            self._first = step.resumed
-        elif self._first == step.resumed < step.done:  # kernels may have been compiled before the first item
-            self._begin, self._first = now, step.done
-        step = step if new else step._replace(done=max(step.done, last.done))  # what is under way may be given up
+        is_other = step.total != last.total or step.done < last.done == last.total
+        if is_other or bool(step.before) != bool(last.before):
+            self._begin, self._first, self._phase = now, step.resumed, ""
+        else:  # items under way may be given up
+            step = step._replace(done=max(step.done, last.done))
+            if self._first == step.resumed < step.done:  # kernels may have been compiled before the first item
+                self._begin, self._first = now, step.done
         self._step = step
         elapsed = now - self._begin
-        silent = now - self._last < _SILENCE
-        if step.before:
-            if elapsed < _SHORT or (silent and step.before == self._before):
-                return
-            self._before, line = step.before, f"{step.before}, for {elapsed:.0f} s so far"
-        else:
-            tenths = 10 * step.done // step.total
-            if silent and tenths == self._tenths:
-                return
-            self._tenths, line = tenths, self._line(step, elapsed)
-        self._last = now
-        print(line, file=sys.stderr, flush=True)
+        phase = step.before or f"{10 * step.done // step.total}"
+        is_silent = now - self._last < _SILENCE[self._is_terminal]
+        if (is_silent and phase == self._phase) or (step.before and elapsed < _SHORT):
+            return
+        self._last, self._phase = now, phase
+        line = f"{step.before}, for {elapsed:.0f} s so far" if step.before else self._line(step, elapsed)
+        if self._is_terminal:
+            line = f"\r{line[: shutil.get_terminal_size().columns - 1]}\x1b[K"
+        print(line, end="" if self._is_terminal else "\n", file=sys.stderr, flush=True)
+
+    def end(self) -> None:
+        """Go to the next line of a terminal."""
+        if self._is_terminal and self._phase:
+            print(file=sys.stderr)
 
     def _line(self, step: Step, elapsed: float) -> str:
         line, fresh = f"{step.done} of {step.total} {self._unit}s", step.done - self._first
@@ -143,27 +101,16 @@ class _Log:
         return f"{line}; {step.text}" if step.text and step.done > step.resumed else line
 
 
-@contextmanager
-def show_run() -> "Iterator[Callable[[RunProgress], None]]":
-    """Show the progress of a run, with its running estimates."""
-    if _quiet:
-        yield lambda run: None
-        return
-    with show_progress() as show:
-        yield lambda run: show(Step(run.done, run.total, run.resumed, _running(run), _pilot(run)))
-
-
-def _pilot(run: "RunProgress") -> str:
+def _pilot(run: RunProgress) -> str:
     if not run.piloting:
         return ""
     return "a pilot looks for the resolution" + ("" if run.trying is None else f", level {run.trying}")
 
 
-def _running(run: "RunProgress") -> str:
-    """Running estimates and failed shots as one short line."""
-    from warpimpact.analysis.numbers import interval_text, plus_minus
+def _running(run: RunProgress) -> str:
+    """Write running estimates and failed shots as one short line."""
 
-    def text_of(measure: "Measure", estimate: "Estimate") -> str:
+    def text_of(measure: Measure, estimate: Estimate) -> str:
         if measure.is_binary:  # a share is not in the middle of its interval
             return f"{estimate.value:.4g} ({interval_text(estimate.low, estimate.high, text='{:.4g}'.format)})"
         return plus_minus(estimate.times(measure.display.factor), ".5g", ".2g") + measure.display.suffix

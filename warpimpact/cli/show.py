@@ -4,50 +4,32 @@ import argparse
 import re
 from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING
 
+from matplotlib.figure import Figure
+
+from warpimpact.analysis.effectiveness import effectiveness_text
+from warpimpact.analysis.inspection import inspect_text
+from warpimpact.analysis.paper import check_scene, closest_table, paper_campaign, validation_table
+from warpimpact.analysis.plate_text import plate_numbers
+from warpimpact.campaign.campaign import Campaign
+from warpimpact.campaign.plausible import doubted_holes
+from warpimpact.campaign.text import CampaignError
+from warpimpact.catalogue.catalogue import Catalogue
+from warpimpact.catalogue.catalogue_view import catalogue_view, material_view, threat_view
+from warpimpact.catalogue.entries import Material, Threat
+from warpimpact.plotting import measure_map, plate_figure, save_beside, save_maps, variable_map
+from warpimpact.plotting.plate import core_figure
+from warpimpact.report.one_file import view_of
 from warpimpact.results import attributes as attr
+from warpimpact.results import files
+from warpimpact.results.kinds import HIT_MAP
+from warpimpact.runs.run import run
+from warpimpact.view.view import Section, labelled, text_of
 
-from .options import (
-    Commands,
-    add_campaign,
-    add_command,
-    add_device,
-    add_measures,
-    add_output,
-    add_overwrite,
-    add_result,
-    add_results,
-)
-from .paths import check_folder, check_picture, named
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
+from .paths import PICTURES, check_folder, check_output, named, save_figure
 
 
-def add_inspect(commands: Commands) -> None:
-    parser = add_command(
-        commands,
-        "inspect",
-        _inspect,
-        summary="print what a result contains",
-        description="Print the origin of a result, its numbers with their intervals, and the shots that failed. Of a "
-        "sweep, a posterior, a search, a firing test or a replayed hit print what the command that wrote it prints.",
-        example="inspect slotted.nc",
-    )
-    add_result(parser)
-    add_measures(parser)
-    parser.add_argument("--campaign", action="store_true", help="print only the campaign that the result contains")
-
-
-def _inspect(arguments: argparse.Namespace) -> None:
-    from warpimpact.analysis.effectiveness import effectiveness_text
-    from warpimpact.analysis.inspection import inspect_text
-    from warpimpact.report.one_file import view_of
-    from warpimpact.results import files
-    from warpimpact.results.kinds import HIT_MAP
-    from warpimpact.view.view import text_of
-
+def inspect_command(arguments: argparse.Namespace) -> None:
     kind = files.kind_of(arguments.result)
     if kind is not HIT_MAP and not arguments.campaign:
         print(text_of(view_of(arguments.result, kind, arguments.measure)))
@@ -59,37 +41,9 @@ def _inspect(arguments: argparse.Namespace) -> None:
             print(effectiveness_text(dataset, arguments.measure) if arguments.measure else inspect_text(dataset))
 
 
-def add_plot(commands: Commands) -> None:
-    parser = add_command(
-        commands,
-        "plot",
-        _plot,
-        summary="draw maps of a result, or of several results side by side",
-        description="Draw the figures of a result as PNG files: maps, marginal distributions, residual velocity "
-        "against tilt, and maps of uncertainty where shots scatter or an error was estimated. For several results: "
-        "maps side by side with the same colour scale.",
-        example="plot slotted.nc -o maps",
-    )
-    add_results(parser)
-    add_output(parser, "FOLDER", "existing folder (default: the folder of the result)")
-    add_overwrite(parser, "existing pictures")
-    only = parser.add_mutually_exclusive_group()
-    only.add_argument(
-        "--measure",
-        metavar="TEXT",
-        help='draw only the map of this measure, such as "P(tilt@130mm > 30 deg)"; takes one result',
-    )
-    only.add_argument(
-        "--variable", metavar="NAME", help="draw only the map of this variable, such as edge_distance; takes one result"
-    )
-
-
-def _plot(arguments: argparse.Namespace) -> None:
-    from warpimpact.plotting import measure_map, save_beside, save_maps, variable_map
-    from warpimpact.results import files
-
+def plot_command(arguments: argparse.Namespace) -> None:
     datasets = {name: files.read(path) for name, path in named(arguments.results).items()}
-    folder = arguments.output or arguments.results[0].parent
+    folder = arguments.folder or arguments.results[0].parent
     check_folder(folder)
     stem = "_".join(path.stem for path in arguments.results)
     dataset, *others = datasets.values()
@@ -107,8 +61,8 @@ def _plot(arguments: argparse.Namespace) -> None:
         except ValueError as error:
             raise files.ResultError(f"{option}: {error}") from None
         picture = folder / f"{stem}_{_file_name(quantity)}.png"
-        check_picture(picture, overwrite=arguments.overwrite)
-        figure.savefig(picture, dpi=150)
+        check_output(picture, *PICTURES, overwrite=arguments.overwrite)
+        save_figure(figure, picture)
         print(picture)
         return
     overwrite = arguments.overwrite
@@ -127,33 +81,12 @@ def _file_name(quantity: str) -> str:
     return "_".join(re.findall(r"[\w.]+", spoken))
 
 
-def add_plate(commands: Commands) -> None:
-    parser = add_command(
-        commands,
-        "plate",
-        _plate,
-        summary="draw the plate of a campaign to scale",
-        description="Draw the plate of a campaign to scale, with the largest section of the core. Print open area, "
-        "smallest ligament and areal density. No shot is computed.",
-        example="plate campaigns/slotted_plate.toml",
-    )
-    add_campaign(parser)
-    add_output(parser, "PLATE.png", "picture file (default: the campaign's name with _plate, in this folder)")
-    add_overwrite(parser, "an existing picture")
-
-
-def _plate(arguments: argparse.Namespace) -> None:
-    from warpimpact.analysis.plate_text import plate_numbers
-    from warpimpact.campaign.campaign import Campaign
-    from warpimpact.campaign.plausible import doubted_holes
-    from warpimpact.plotting import plate_figure
-    from warpimpact.view.view import Section, labelled, text_of
-
+def plate_command(arguments: argparse.Namespace) -> None:
     output = arguments.output or Path(arguments.campaign.stem + "_plate.png")
-    check_picture(output, overwrite=arguments.overwrite)
+    check_output(output, *PICTURES, overwrite=arguments.overwrite)
     campaign = Campaign.from_toml(arguments.campaign)
     plate = campaign.plate
-    plate_figure(campaign.target, campaign.core, campaign.title, campaign.impact).savefig(output, dpi=150)
+    save_figure(plate_figure(campaign.target, campaign.core, campaign.title, campaign.impact), output)
     rows = [("thickness", f"{1e3 * plate.thickness:g} mm")]
     rows += plate_numbers(plate.open_area, plate.ligament, campaign.target.weights).items()
     for place, layer in enumerate(campaign.layer, start=1):
@@ -163,29 +96,7 @@ def _plate(arguments: argparse.Namespace) -> None:
     print(output)
 
 
-def add_catalogue(commands: Commands) -> None:
-    parser = add_command(
-        commands,
-        "catalogue",
-        _catalogue,
-        summary="list threats and materials by name, or show one",
-        description="List the threats and materials that a campaign may name, or show one: core drawn, masses, "
-        "velocities of standards; strength, rows and range; what is known from where, and what is assumed.",
-        example='catalogue ".30 AP M2" -o core.png',
-    )
-    parser.add_argument("name", nargs="?", metavar="NAME", help="threat or material (default: list all)")
-    parser.add_argument("--file", type=Path, metavar="MINE.toml", help="entries of your own, as a campaign names them")
-    add_output(parser, "CORE.png", "draw the core of a threat into this picture")
-    add_overwrite(parser, "an existing picture")
-
-
-def _catalogue(arguments: argparse.Namespace) -> None:
-    from warpimpact.campaign.text import CampaignError
-    from warpimpact.catalogue.catalogue import Catalogue
-    from warpimpact.catalogue.catalogue_view import catalogue_view, material_view, threat_view
-    from warpimpact.catalogue.entries import Material, Threat
-    from warpimpact.view.view import text_of
-
+def catalogue_command(arguments: argparse.Namespace) -> None:
     try:
         catalogue = Catalogue.of(arguments.file)
         entry = None if arguments.name is None else catalogue.entry(arguments.name)
@@ -201,40 +112,12 @@ def _catalogue(arguments: argparse.Namespace) -> None:
         view = threat_view(entry) if isinstance(entry, Threat) else material_view(entry, is_own=is_own)
         print(text_of(view))
     if arguments.output and core is not None and entry is not None:
-        from warpimpact.plotting.plate import core_figure
-
-        check_picture(arguments.output, overwrite=arguments.overwrite)
-        core_figure(core, entry.name, entry.evidence).savefig(arguments.output, dpi=150)
+        check_output(arguments.output, *PICTURES, overwrite=arguments.overwrite)
+        save_figure(core_figure(core, entry.name, entry.evidence), arguments.output)
         print(arguments.output)
 
 
-def add_validate(commands: Commands) -> None:
-    parser = add_command(
-        commands,
-        "validate",
-        _validate,
-        summary="compute the published shots and compare",
-        description="Compute the paper's two shots. Compare them with the paper's model, its experiment and LS-DYNA. "
-        "Of a result, tell the hits that come closest to the two shots.",
-        example="validate",
-    )
-    parser.add_argument(
-        "campaign",
-        type=Path,
-        nargs="?",
-        metavar="CAMPAIGN.toml|RESULT.nc",
-        help="the paper's scene with two hits; lattice and numerics may differ (default: the example paper_shots); or "
-        "a result of warpimpact run",
-    )
-    add_device(parser)
-
-
-def _validate(arguments: argparse.Namespace) -> None:
-    from warpimpact.analysis.paper import check_scene, closest_table, paper_campaign, validation_table
-    from warpimpact.campaign.campaign import Campaign
-    from warpimpact.results import files
-    from warpimpact.runs.run import run
-
+def validate_command(arguments: argparse.Namespace) -> None:
     path = arguments.campaign or paper_campaign()
     if path.suffix == ".nc":
         try:

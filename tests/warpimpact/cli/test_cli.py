@@ -24,6 +24,14 @@ def test_every_command_has_an_example(capsys: pytest.CaptureFixture[str]) -> Non
     assert capsys.readouterr().out == f"warpimpact {version('warpimpact')}\n"
 
 
+def test_an_output_is_a_file_and_a_folder_has_its_own_option() -> None:
+    (commands,) = (action for action in parser()._actions if isinstance(action, argparse._SubParsersAction))
+    for name, one in commands.choices.items():
+        options = {action.dest: str(action.metavar) for action in one._actions}
+        assert "FOLDER" not in options.get("output", ""), name
+        assert options.get("folder", "FOLDER") == "FOLDER", name
+
+
 def test_a_bad_campaign_is_refused(in_tmp_path: Path, refusal: Refusal) -> None:
     Path("wrong.toml").write_text(SLOTTED_PLATE.read_text().replace("= 0.8 ", "= 1.8 "))
     sentence = refusal(["run", "wrong.toml"])
@@ -66,7 +74,7 @@ def test_memory_that_cannot_be_had_is_told(
     def no_memory(*_: object, **__: object) -> None:
         raise MemoryError("Unable to allocate 8 TiB")
 
-    monkeypatch.setattr("warpimpact.runs.run.run_to_file", no_memory)
+    monkeypatch.setattr("warpimpact.cli.run.run_to_file", no_memory)
     assert refusal(["run", str(SLOTTED_PLATE)]) == "not enough memory: Unable to allocate 8 TiB"
     assert not list(in_tmp_path.iterdir())
 

@@ -16,7 +16,7 @@ from hypothesis import strategies as st
 from warpimpact.campaign.campaign import Campaign
 from warpimpact.campaign.text import CampaignError
 from warpimpact.cli import main
-from warpimpact.cli.mistakes import Plain, say
+from warpimpact.cli.messages import Plain, say
 from warpimpact.scene.units import Length, quantity
 
 SHIPPED = Path(__file__).parents[3] / "campaigns"

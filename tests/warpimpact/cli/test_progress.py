@@ -1,6 +1,8 @@
-"""Progress: plain lines in a log, a bar on a terminal, both with estimates and failed shots."""
+"""Progress: lines in a log, one line on a terminal, both with estimates and failed shots."""
 
+import argparse
 import io
+import os
 import sys
 from dataclasses import replace
 
@@ -10,6 +12,8 @@ from warpimpact.cli.progress import show_run
 from warpimpact.results.measures import Measure
 from warpimpact.runs.progress import RunProgress
 from warpimpact.statistics.intervals import Estimate
+
+LOUD = argparse.Namespace(quiet=False)
 
 
 def standing(done: int, *, failed: int = 0, resumed: int = 100) -> RunProgress:
@@ -32,7 +36,7 @@ def clock(monkeypatch: pytest.MonkeyPatch) -> list[float]:
 
 
 def test_a_log_gets_a_line_per_tenth(capsys: pytest.CaptureFixture[str], clock: list[float]) -> None:
-    with show_run() as show:
+    with show_run(LOUD) as show:
         for done in range(100, 1001, 10):
             clock[0] += 0.1
             show(standing(done, failed=done // 300))
@@ -49,33 +53,35 @@ def test_a_log_gets_a_line_per_tenth(capsys: pytest.CaptureFixture[str], clock: 
 
 
 def test_a_slow_run_is_not_silent(capsys: pytest.CaptureFixture[str], clock: list[float]) -> None:
-    with show_run() as show:
+    with show_run(LOUD) as show:
         for _ in range(100):
             show(standing(101))
             clock[0] += 60.0
     assert len(capsys.readouterr().err.splitlines()) == 100  # of 100 minutes
 
 
-def test_a_terminal_gets_a_bar_that_counts_what_was_resumed_as_done(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_terminal_gets_one_line_that_never_goes_back(monkeypatch: pytest.MonkeyPatch, clock: list[float]) -> None:
     terminal = Terminal()
     monkeypatch.setattr(sys, "stderr", terminal)
-    with show_run() as show:
-        show(standing(100))
-        show(standing(600, failed=3))
-        show(standing(590, failed=3))  # what is under way may be given up: a bar does not go back
-        show(standing(1000, failed=3))
-    last = terminal.getvalue().split("\r")[-1]
-    assert "1000/1000" in last
-    assert "hit/s" in last
-    assert "mean(residual_velocity) 731.25 ± 0.75 m/s" in last
-    assert "3 failed" in last
+    monkeypatch.setattr("shutil.get_terminal_size", lambda: os.terminal_size((120, 24)))
+    with show_run(LOUD) as show:
+        for done in (100, 200, 600, 590, 1000):  # hits under way may be given up
+            show(standing(done, failed=3))
+            clock[0] += 1.0
+    *lines, end = terminal.getvalue().split("\x1b[K")
+    assert end == "\n"
+    assert [line.split()[0] for line in lines] == ["100", "200", "600", "600", "1000"]
+    assert lines[-1].startswith(
+        "\r1000 of 1000 hits, 266.7 hits/s, 0 s left; mean(residual_velocity) 731.25 ± 0.75 m/s"
+    )
+    assert max(map(len, lines)) == 120
 
 
 def test_a_log_says_what_a_pilot_tries_and_counts_no_time_of_it(
     capsys: pytest.CaptureFixture[str], clock: list[float]
 ) -> None:
     begun = standing(0, resumed=0)
-    with show_run() as show:
+    with show_run(LOUD) as show:
         for tenth in range(700):
             show(replace(begun, piloting=True, trying=2 if tenth < 300 else 4))
             clock[0] += 0.1

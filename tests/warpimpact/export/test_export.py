@@ -151,5 +151,5 @@ def test_command_writes_a_new_folder_for_a_hit(
     assert main(["export", str(tmp_path / "hit.nc")]) == 0
     assert capsys.readouterr().out == "".join(f"{tmp_path / 'hit_vtk' / name}.pvd\n" for name in ("core", "plate"))
     assert main(["export", str(tmp_path / "hit.nc")]) == 2
-    assert "hit_vtk: exists already; give a new folder with -o" in capsys.readouterr().err
+    assert "hit_vtk: exists already; name a new folder with --folder" in capsys.readouterr().err
     assert {path.name for path in tmp_path.iterdir()} == {"hit.nc", "hit_vtk"}

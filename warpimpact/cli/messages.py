@@ -1,0 +1,121 @@
+"""What the command prints besides its output: errors, warnings and its log, without control characters.
+
+A title or a file may contain control characters, which a terminal would obey.
+"""
+
+import logging
+import os
+import sys
+import tempfile
+import traceback
+import warnings
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import IO, Any
+
+from warpimpact import __version__
+
+_LONGEST_SENTENCE = 2000
+"""Most characters of a sentence on the error stream."""
+_WARNINGS = ("Implausible", "Costly")
+"""Names of the classes of warnings that are for the user; to import them takes seconds."""
+
+
+class Plain:
+    """A stream that spells out control characters, except ends of lines and tabulators.
+
+    Args:
+        stream: stream to which the text goes.
+    """
+
+    def __init__(self, stream: IO[str]) -> None:
+        self._stream = stream
+
+    def write(self, text: str) -> int:
+        """Write the text. Characters that the stream's encoding lacks are spelt out, too."""
+        encoding = getattr(self._stream, "encoding", None) or "utf-8"
+        self._stream.write(_plain(text, "\n\t").encode(encoding, "backslashreplace").decode(encoding))
+        return len(text)
+
+    def __getattr__(self, name: str) -> Any:
+        """Take all other attributes from the stream."""
+        return getattr(self._stream, name)
+
+
+def _plain(text: str, keep: str = "") -> str:
+    """Spell out the control characters of a text, except those in `keep`."""
+    return "".join(one if one.isprintable() or one in keep else ascii(one)[1:-1] for one in text)
+
+
+def say(sentence: str) -> None:
+    """Write one sentence for the user, on one line of the error stream."""
+    line = _plain(sentence)
+    cut = line if len(line) <= _LONGEST_SENTENCE else f"{line[: _LONGEST_SENTENCE - 1]}…"
+    print(f"warpimpact: {cut}", file=Plain(sys.stderr), flush=True)
+
+
+def warn(sentence: str) -> None:
+    """Warn the user while the command goes on."""
+    say(f"warning: {sentence}")
+
+
+@contextmanager
+def show_warnings() -> Iterator[None]:
+    """Report implausible values and long computations, each once, as a line on stderr."""
+    with warnings.catch_warnings():
+        show, shown = warnings.showwarning, set[str]()
+
+        def show_once(message: Warning | str, category: type[Warning], *place: Any, **more: Any) -> None:
+            if category.__name__ not in _WARNINGS:
+                show(message, category, *place, **more)
+            elif str(message) not in shown:
+                shown.add(str(message))
+                warn(str(message))
+
+        warnings.showwarning = show_once
+        yield
+
+
+def show_log(verbose: int) -> None:
+    """Show the log of the package: from INFO on at 1, from DEBUG on at 2."""
+    logger = logging.getLogger("warpimpact")
+    logger.handlers.clear()
+    if verbose:
+        handler = logging.StreamHandler(Plain(sys.stderr))
+        handler.setFormatter(logging.Formatter("%(asctime)s %(name)s: %(message)s", "%H:%M:%S"))
+        logger.addHandler(handler)
+        logger.setLevel(logging.INFO if verbose == 1 else logging.DEBUG)
+
+
+def message_of(error: Exception) -> str | None:
+    """Return the message for an error that the user can correct; None for a bug."""
+    from warpimpact.campaign.text import CampaignError
+    from warpimpact.results.files import OutputError, ResultError
+    from warpimpact.runs.executor import ClusterError
+    from warpimpact.solver.device import DeviceError
+    from warpimpact.solver.resolution import TooManySteps
+
+    if isinstance(error, CampaignError | ClusterError | OutputError | ResultError | DeviceError | TooManySteps):
+        return str(error)
+    if isinstance(error, UnicodeEncodeError) and error.reason == "surrogates not allowed":
+        return f"{ascii(error.object)[1:200]}: the name contains bytes that are not UTF-8; rename the file"
+    if isinstance(error, MemoryError):
+        return f"not enough memory: {error}" if str(error) else "not enough memory"
+    if isinstance(error, OSError):  # from the system: a name that is too long, a full disk
+        name = f"{os.fsdecode(error.filename)[:200]}: " if isinstance(error.filename, str | bytes) else ""
+        return f"{name}{error.strerror or str(error) or type(error).__name__}"
+    return None
+
+
+def bug_report(error: Exception) -> str:
+    """Write the details of a bug to a file, and return a phrase with the error and the path."""
+    phrase = f"{type(error).__name__}: {str(error)[:200]}"
+    details = [f"warpimpact {__version__}, Python {sys.version}, {sys.platform}\n", f"{sys.argv[1:]}\n"]
+    try:
+        with tempfile.NamedTemporaryFile(
+            "w", prefix="warpimpact_bug_", suffix=".txt", delete=False, encoding="utf-8", errors="backslashreplace"
+        ) as file:
+            file.writelines([*details, *traceback.format_exception(error)])
+    except OSError as failure:
+        return f"{phrase}; no file of details could be written ({failure.strerror})"
+    return f"{phrase}; details are in {file.name}"
