@@ -20,10 +20,9 @@ gallery: $(DEVELOPED)
 	$(VENV)/bin/python campaigns/gallery.py
 	$(VENV)/bin/python tests/benchmarks/design_film.py
 
-# Figures of docs/benchmarks.md; on a quiet machine, some 13 minutes on two cores.
+# Figures of docs/benchmarks.md; on a quiet machine, some 8 minutes on two cores.
 benchmark: $(DEVELOPED)
-	$(PIP) --editable '.[bench]'
-	$(VENV)/bin/python tests/benchmarks/page.py all
+	$(VENV)/bin/python tests/benchmarks/page.py
 
 # Pages in build/docs/index.html; tutorials are executed. A warning is an error. The tests check the examples in pages.
 docs: $(DEVELOPED)

@@ -17,12 +17,12 @@ class BenchmarkTable(FromTheCode):
     def lines(self) -> Iterator[str]:
         import page
 
-        found = page.results()
+        stored = page.results()
         for name in page.KNOWN:
             self.env.note_dependency(str(page.RESULTS / f"{name}.json"))
         head = ("what", "scene", "figure", "beside what", "sample")
-        yield from table(head, [tuple(row) for row in page.rows(found)])
-        yield from (f"- {sentence}" for sentence in page.machines(found))
+        yield from table(head, [tuple(row) for row in page.rows(stored)])
+        yield from (f"- {sentence}" for sentence in page.machines(stored))
 
 
 class ContinuumTable(FromTheCode):

@@ -21,10 +21,9 @@ from warpimpact import (
     Scene,
     Shots,
     SlotPattern,
-    SquarePattern,
     make_shots,
 )
-from warpimpact.scene import Pattern, Scatter
+from warpimpact.scene import Scatter
 from warpimpact.scene.distributions import Normal, Uniform
 
 CORE = PolynomialCore(coefficients=(3.0e-4, 0.24, -5.29), length=27.86e-3, mass=4.0e-3)
@@ -113,37 +112,11 @@ CASES = {
 }
 
 
-def staggered_slots(width: float, length: float, across: float, along: float) -> SlotPattern:
-    """Staggered slots, a pitch `across` and `along` them from each other [m]."""
-    return SlotPattern(width=width, length=length, spacing=(across, along), staggered=True)
-
-
-def of_front(title: str, thickness: float, pattern: Pattern) -> Case:
-    """A design that a search found."""
-    return Case(title, (Plate(thickness=thickness, pattern=pattern, **PAPER),), (STEEL,))
-
-
-FRONT = {
-    "paper_a": of_front("1 mm, holes of 5 mm at 6.5 mm", 1e-3, round_holes(5e-3, 6.5e-3)),
-    "paper_b": of_front("1.75 mm, holes of 6.75 mm at 8.5 mm", 1.75e-3, round_holes(6.75e-3, 8.5e-3)),
-    "paper_c": of_front("3.25 mm, holes of 6.75 mm at 8.5 mm", 3.25e-3, round_holes(6.75e-3, 8.5e-3)),
-    "paper_d": of_front("5.75 mm, holes of 6.75 mm at 8.75 mm", 5.75e-3, round_holes(6.75e-3, 8.75e-3)),
-    "free_a": of_front("2.25 mm, slots of 3.5 × 13 mm", 2.25e-3, staggered_slots(3.5e-3, 13e-3, 5.25e-3, 15e-3)),
-    "free_b": of_front("5.75 mm, holes of 7.25 mm at 9.25 mm", 5.75e-3, round_holes(7.25e-3, 9.25e-3)),
-    "free_c": of_front("7 mm, slots of 6.25 × 8.5 mm", 7e-3, staggered_slots(6.25e-3, 8.5e-3, 7.25e-3, 12.5e-3)),
-    "free_d": of_front(
-        "6.75 mm, squares of 6.25 mm",
-        6.75e-3,
-        SquarePattern(side=6.25e-3, corner_radius=0.5e-3, spacing=(9.25e-3, 11.5e-3)),
-    ),
-}
-"""Designs of two fronts of campaigns/designs/lightest_plate.toml, searched with the paper's parameters and with free
-surfaces (continuum_front.py)."""
 LIMITED = {
     "solid_20_7075": solid("20 mm of AA7075-T651, solid", 20e-3, 1.178e9, 0.039, "AA7075-T651", (700.0, 900.0)),
 }
 """Plates of which the limit velocity alone is computed (continuum_limits.py)."""
-PLATES = {**CASES, **FRONT, **LIMITED}
+PLATES = {**CASES, **LIMITED}
 
 
 class Published(NamedTuple):

@@ -2,7 +2,7 @@
 
     python tests/benchmarks/continuum_tables.py            # prints the tables, and draws the figure
 
-The tables are made when the pages are built. A file that is missing leaves its table empty.
+The tables are made when the pages are built.
 """
 
 from __future__ import annotations
@@ -34,8 +34,6 @@ HEAD = tuple(f"{name.replace('_', ' at ')}, {unit}" for name, unit in MEASURES.i
 """Columns of the measures."""
 MESHES = {"draft": "trade", "standard": "standard", "reference": "reference"}
 """Files of the hits by their mesh, from coarse to fine."""
-EDGE = 0.25 * CORE.max_radius
-"""A hit point nearer to an edge than this is one at the edge [m]."""
 STEEP = 30.0
 """Tilt beyond which a core counts as turned [°]."""
 SHOTS = {
@@ -93,29 +91,9 @@ def fit_words(fitted: list[dict[str, str]], part: str) -> str:
 def error_cells(fast: Array, truth: Array) -> Iterator[str]:
     """Bias, root mean square and rank correlation of each measure."""
     for one, other in zip(fast.T, truth.T, strict=True):
-        apart = one - other
+        difference = one - other
         rank = f"{float(spearmanr(one, other).statistic):.2f}" if len(one) >= FEWEST_RANKED else "–"
-        yield f"{apart.mean():+.2g}, {np.sqrt((apart**2).mean()):.2g}, {rank}"
-
-
-def classes() -> Table:
-    """The same by where a hit lies: in a hole, at an edge, in the web between holes."""
-    rows = []
-    for plate, case in CASES.items():
-        if case.velocities is not None:
-            continue
-        hits, fast, truth = both(plate)
-        shots = case.shots(max(hits, default=0) + 1)
-        apart = case.layers[0].edge_distance(shots.hit_y, shots.hit_z)[hits]
-        for words, chosen in (
-            ("hole", apart < -EDGE),
-            ("edge", np.abs(apart) <= EDGE),
-            ("web", apart > EDGE),
-        ):
-            if chosen.sum() >= FEWEST:
-                cells = error_cells(fast[chosen], truth[chosen])
-                rows.append((plate, words, str(int(chosen.sum())), *cells))
-    return ("plate", "class", "hits", *HEAD), rows
+        yield f"{difference.mean():+.2g}, {np.sqrt((difference**2).mean()):.2g}, {rank}"
 
 
 def cost() -> Table:
@@ -141,8 +119,6 @@ def cost() -> Table:
 def ranking() -> Table:
     """Which plate ranks first by either model, of those that the paper's core hits."""
     plates = [name for name, case in CASES.items() if case.core is CORE and len(both(name)[0]) >= FEWEST_RANKED]
-    if not plates:
-        return ("measure",), []
     numbers: dict[str, Callable[[Array], float]] = {
         "mean residual velocity, m/s": lambda values: -float(values[:, 0].mean()),
         "mean tilt at 130 mm, °": lambda values: float(values[:, 2].mean()),
@@ -159,8 +135,6 @@ def ranking() -> Table:
         }
         truth = [number(values) for values in models["continuum"]]
         for model, samples in models.items():
-            if any(not len(values) for values in samples):
-                continue
             values = [number(sample) for sample in samples]
             ordered = sorted(range(len(plates)), key=lambda k, values=values: -values[k])  # type: ignore[misc]
             order = ", ".join(f"{plates[k]} {abs(values[k]):.3g}" for k in ordered)
@@ -176,15 +150,19 @@ def refinement() -> Table:
         of, than, every, failures = rows_of(MESHES[coarse]), rows_of(MESHES[fine]), [], np.zeros(2, dtype=int)
         meshes = f"{coarse} less {fine}"
         for plate in CASES:
-            apart = differences(of, than, plate)
+            difference = differences(of, than, plate)
             failed = np.array([failures_of(mesh, plate, tried(than, plate)) for mesh in (of, than)])
-            if len(apart):
-                rows.append((plate, meshes, str(len(apart)), *difference_cells(apart), "{}, {}".format(*failed)))
-            every.append(apart)
+            if len(difference):
+                rows.append(
+                    (plate, meshes, str(len(difference)), *difference_cells(difference), "{}, {}".format(*failed))
+                )
+            every.append(difference)
             failures += failed
-        apart = np.concatenate(every)
-        if len(apart):
-            rows.append(("all", meshes, str(len(apart)), *difference_cells(apart), "{}, {}".format(*failures)))
+        difference = np.concatenate(every)
+        if len(difference):
+            rows.append(
+                ("all", meshes, str(len(difference)), *difference_cells(difference), "{}, {}".format(*failures))
+            )
     return ("plate", "meshes", "hits", *HEAD, "failed of the same hits"), rows
 
 
@@ -194,10 +172,10 @@ def differences(of: list[dict[str, str]], than: list[dict[str, str]], plate: str
     return np.array([one[hit] - other[hit] for hit in sorted({*one} & {*other})]).reshape(-1, len(MEASURES))
 
 
-def difference_cells(apart: Array) -> Iterator[str]:
+def difference_cells(difference: Array) -> Iterator[str]:
     """Bias, root mean square and 90th percentile of what the measures differ by; no percentile of few hits."""
-    for column in apart.T:
-        most = f"{np.percentile(np.abs(column), 90):.2g}" if len(apart) >= FEWEST_RANKED else "–"
+    for column in difference.T:
+        most = f"{np.percentile(np.abs(column), 90):.2g}" if len(difference) >= FEWEST_RANKED else "–"
         yield f"{column.mean():+.2g}, {np.sqrt((column**2).mean()):.2g}, {most}"
 
 
@@ -212,28 +190,13 @@ def tried(rows: list[dict[str, str]], plate: str) -> set[int]:
     return {int(row["hit"]) for row in rows if row["plate"] == plate and row["model"] == "continuum"}
 
 
-def effects() -> Table:
-    """What each choice of the solver does at some hits of the slotted plate."""
-    rows: dict[str, dict[str, Array]] = {}
-    for row in rows_of("effects"):
-        if row["status"] == "0":
-            rows.setdefault(row["change"], {})[row["hit"]] = np.array([float(row[name]) for name in MEASURES])
-    given, cells = rows.pop("as it is", {}), []
-    for words, values in rows.items():
-        hits = sorted({*values} & {*given})
-        if hits:
-            apart = np.array([values[hit] - given[hit] for hit in hits])
-            cells.append((words, str(len(hits)), *difference_cells(apart)))
-    return ("change", "hits", *HEAD), cells
-
-
 def friction() -> Table:
     """What a friction of 0.03 does."""
     rows = []
     for plate in CASES:
-        apart = differences(rows_of("trade_friction"), rows_of("trade"), plate)
-        if len(apart):
-            rows.append((plate, str(len(apart)), *difference_cells(apart)))
+        difference = differences(rows_of("trade_friction"), rows_of("trade"), plate)
+        if len(difference):
+            rows.append((plate, str(len(difference)), *difference_cells(difference)))
     return ("plate", "hits", *HEAD), rows
 
 
@@ -268,19 +231,19 @@ def shots() -> Table:
             rows.append((shot, model, "", *(f"{value:.0f}" for value in values)))
         for words, of in sources.items():
             for model in ("continuum", "fast"):
-                found = measured(of, "slotted", model)
-                if not found or (model == "fast" and words != "without friction"):
+                hits_of_model = measured(of, "slotted", model)
+                if not hits_of_model or (model == "fast" and words != "without friction"):
                     continue
-                best = min(found, key=lambda hit: float((((found[hit] - aim) / NUMERICS) ** 2).sum()))
+                best = min(hits_of_model, key=lambda hit: float((((hits_of_model[hit] - aim) / NUMERICS) ** 2).sum()))
                 place = next(row for row in of if row["plate"] == "slotted" and row["hit"] == str(best))
                 at = f"({1e3 * float(place['hit_y']):.2f}, {1e3 * float(place['hit_z']):.2f})"
-                name = "fast law, paper's" if model == "fast" else f"continuum, {words}, of {len(found)} hits"
-                rows.append((shot, name, at, *(f"{value:.0f}" for value in found[best])))
+                name = "fast law, paper's" if model == "fast" else f"continuum, {words}, of {len(hits_of_model)} hits"
+                rows.append((shot, name, at, *(f"{value:.0f}" for value in hits_of_model[best])))
     return ("shot", "by", "hit, mm", "m/s", "° at 50 mm", "° at 130 mm"), rows
 
 
 TABLES: dict[str, Callable[[], Table]] = {
-    table.__name__: table for table in (errors, classes, cost, ranking, refinement, effects, friction, limits, shots)
+    table.__name__: table for table in (errors, cost, ranking, refinement, friction, limits, shots)
 }
 
 

@@ -2,12 +2,10 @@
 
     python tests/benchmarks/continuum_trade.py rows ROWS.csv [--hits 96] [--plates slotted,thin] [--fidelity standard]
     python tests/benchmarks/continuum_trade.py fit ROWS.csv FITTED.csv
-    python tests/benchmarks/continuum_trade.py effects ROWS.csv [--hits 4]
 
 `rows` appends the hits that are not in the file, one by one, so that it may be ended and continued at any time. `fit`
 finds the parameters of the fast law that meet every second hit of a plate best, and writes what they give at all hits.
-`effects` computes hits of the slotted plate with one choice of the solver changed at a time. The page's tables follow
-from these files (continuum_tables.py).
+The page's tables follow from these files (continuum_tables.py).
 """
 
 from __future__ import annotations
@@ -15,19 +13,15 @@ from __future__ import annotations
 import argparse
 import time
 from collections.abc import Callable, Iterator
-from contextlib import AbstractContextManager
 from functools import partial
 from pathlib import Path
 from typing import Any
-from unittest import mock
 
 import numpy as np
 from continuum_cases import CASES, MEASURES, PLATES, Case, append, measured, written
 
 from warpimpact import Continuum, Numerics, Record, Scene, Shots, simulate
 from warpimpact.catalogue.catalogue import flow_entry
-from warpimpact.continuum import meeting, meshing, one_hit
-from warpimpact.kernels.continuum import choices, hexahedra, passing
 
 SCALES = np.array([5.0, 5.0, 10.0])
 """What the continuum's own numerics leave open of each measure, about: misfits count in these."""
@@ -39,28 +33,6 @@ FRICTIONS, WEAKENINGS = (0.0, 0.03, 0.06, 0.1, 0.15), (0.6, 0.7, 0.8, 0.9, 1.0)
 """Shares of the resistance, shear coefficients and degradations that a fit tries."""
 TIMED = 1024
 """Hits of a plate of which the time of one by the fast law is taken."""
-
-SHARED = meshing._shared
-
-Changes = tuple[tuple[Any, str, Any], ...]
-EFFECTS: dict[str, Changes] = {
-    "as it is": (),
-    "patch of 10 radii for 5": ((meeting, "PATCH", 10.0),),
-    "patch of 4 radii for 5": ((meeting, "PATCH", 4.0),),
-    "edge held": ((meshing, "_shared", lambda lengths: 1.0e6 * SHARED(lengths)),),
-    "edge held, patch of 7 radii": (
-        (meshing, "_shared", lambda lengths: 1.0e6 * SHARED(lengths)),
-        (meeting, "PATCH", 7.0),
-    ),
-    "fine part of 3.5 radii for 2.5": ((meeting, "FINE", 3.5),),
-    "contact four times as stiff": ((one_hit, "PENALTY", 2.0),),
-    "contact a quarter as stiff": ((one_hit, "PENALTY", 0.125),),
-    "hourglass coefficient 0.05 for 0.02": ((choices, "HOURGLASS", choices.HOURGLASS._replace(value=0.05)),),
-    "elements fail below 0.1 of their length for 0.2": ((choices, "THINNEST", choices.THINNEST._replace(value=0.1)),),
-    "elements fail at 8 times their volume for 4": ((choices, "WIDEST", choices.WIDEST._replace(value=8.0)),),
-    "steps of 0.4 for 0.6 of a crossing": ((choices, "COURANT", choices.COURANT._replace(value=0.4)),),
-}
-"""What is changed in the solver, by its words: module, name and value of a constant."""
 
 
 def computed(compute: Callable[[Shots], Any], shots: Shots, hit: int) -> dict[str, object]:
@@ -103,40 +75,6 @@ def write_rows(path: Path, plates: list[str], hits: int, settings: dict[str, flo
                     append(path, head | computed(compute, shots, hit))
 
 
-def write_effects(path: Path, hits: int) -> None:
-    done = {(row["change"], row["hit"]) for row in written(path)}
-    case = CASES["slotted"]
-    shots = case.shots(hits)
-    for words, changes in EFFECTS.items():
-        with changed(changes):
-            for hit in range(hits):
-                if (words, str(hit)) not in done:
-                    append(path, {"change": words} | computed(by_elements(case), shots, hit))
-
-
-class changed(AbstractContextManager[None]):
-    """Constants of the solver have other values, and its kernels are built with them."""
-
-    def __init__(self, changes: Changes) -> None:
-        self._patches = [mock.patch.object(module, name, value) for module, name, value in changes]
-
-    def __enter__(self) -> None:
-        for patch in self._patches:
-            patch.start()
-        forget_builds()
-
-    def __exit__(self, *_: object) -> None:
-        for patch in self._patches:
-            patch.stop()
-        forget_builds()
-
-
-def forget_builds() -> None:
-    """Have the kernels built again."""
-    for module in (hexahedra, passing):
-        module.build.cache_clear()
-
-
 # --- The fast law with other parameters ---
 
 
@@ -167,9 +105,9 @@ def best_parameters(case: Case, shots: Shots, truth: np.ndarray) -> tuple[float,
     tried = [(float(share), eta, beta) for share in SHARES for eta in FRICTIONS for beta in weakenings]
     misfits = []
     for parameters in tried:
-        apart = (fast_law(with_parameters(case, *parameters), shots) - truth) / SCALES
-        held = np.isnan(apart).any(axis=1)  # a core that the fast law holds back and the continuum lets pass
-        misfits.append(float((np.where(np.isnan(apart), 0.0, apart) ** 2).mean() + 100.0 * held.mean()))
+        difference = (fast_law(with_parameters(case, *parameters), shots) - truth) / SCALES
+        held = np.isnan(difference).any(axis=1)  # a core that the fast law holds back and the continuum lets pass
+        misfits.append(float((np.where(np.isnan(difference), 0.0, difference) ** 2).mean() + 100.0 * held.mean()))
     return tried[int(np.argmin(misfits))]
 
 
@@ -197,7 +135,7 @@ def fitted_rows(rows: list[dict[str, str]]) -> Iterator[dict[str, object]]:
 
 if __name__ == "__main__":
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("what", choices=("rows", "fit", "effects"))
+    parser.add_argument("what", choices=("rows", "fit"))
     parser.add_argument("file", type=Path, nargs="+")
     parser.add_argument("--hits", type=int, default=24)
     parser.add_argument("--friction", type=float, default=0.0)
@@ -207,8 +145,6 @@ if __name__ == "__main__":
     if arguments.what == "rows":
         chosen = {"friction": arguments.friction, "fidelity": arguments.fidelity}
         write_rows(arguments.file[0], arguments.plates.split(","), arguments.hits, chosen)
-    elif arguments.what == "effects":
-        write_effects(arguments.file[0], arguments.hits)
     else:
         rows, fitted = arguments.file
         fitted.unlink(missing_ok=True)

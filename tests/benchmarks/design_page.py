@@ -4,8 +4,7 @@
     chrt -r 1 python tests/benchmarks/design_page.py        # the same ahead of other work on a busy machine
 
 A slider of the slotted plate moves. The time ends when the browser has drawn the map. In "rested" the map of the design
-before was complete; in "refining" it was still being refined, which the change ends. The processor time is that of the
-server and the browser together, which tells more on a busy machine.
+before was complete; in "refining" it was still being refined, which the change ends.
 """
 
 from __future__ import annotations
@@ -17,10 +16,9 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from typing import Any
 
-import psutil
 from bench import CAMPAIGN, machine, store
 from selenium import webdriver
 
@@ -66,11 +64,11 @@ def browser(width: int = 1280, height: int = 900) -> Iterator[Any]:
 def wait(condition: Callable[[], Any]) -> Any:
     """What a condition returns once that is true."""
     end = time.monotonic() + LONGEST
-    while not (found := condition()):
+    while not (value := condition()):
         if time.monotonic() > end:
             raise TimeoutError("the page does not answer")
         time.sleep(0.02)
-    return found
+    return value
 
 
 def is_complete(driver: Any) -> bool:
@@ -78,35 +76,20 @@ def is_complete(driver: Any) -> bool:
     return "Complete" in driver.find_element("id", "status").text
 
 
-def first_map(driver: Any, length: float) -> tuple[float, float]:
-    """Wall and processor time [s] from a change of the slider to the first map."""
-    begin = processor_time()
+def first_map(driver: Any, length: float) -> float:
+    """Wall time [s] from a change of the slider to the first map."""
     driver.execute_script(MOVE, round(length, 1))
     (milliseconds,) = wait(lambda: driver.execute_script(FIRST))
-    return 1e-3 * milliseconds, processor_time() - begin
-
-
-def processor_time() -> float:
-    """Of all processes that this one has started [s]."""
-    spent = 0.0
-    for process in psutil.Process().children(recursive=True):
-        with suppress(psutil.Error):  # it has ended
-            times = process.cpu_times()
-            spent += times.user + times.system
-    return spent
+    return 1e-3 * milliseconds
 
 
 def measured(driver: Any, between: Callable[[], Any], lengths: Sequence[float]) -> dict[str, float]:
-    """Median and 95th percentile of the wall times of some changes [s], each to a design that was not there before, and
-    median of the processor times."""
+    """Median and 95th percentile of the wall times of some changes [s], each to a design that was not there before."""
     times = []
-    for place, length in enumerate(lengths, 1):
+    for length in lengths:
         between()
         times.append(first_map(driver, length))
-        print(f"{place}/{len(lengths)} {times[-1][0]:.3f} s", file=sys.stderr)
-    wall, processor = zip(*times, strict=True)
-    p95 = statistics.quantiles(wall, n=20, method="inclusive")[-1]
-    return {"median": statistics.median(wall), "p95": p95, "processor": statistics.median(processor)}
+    return {"median": statistics.median(times), "p95": statistics.quantiles(times, n=20, method="inclusive")[-1]}
 
 
 def main() -> None:
@@ -121,8 +104,8 @@ def main() -> None:
             "refining": measured(driver, lambda: time.sleep(PAUSE), lengths[1::2]),
         }
     ahead = os.sched_getscheduler(0) != os.SCHED_OTHER
-    told = {"changes": CHANGES, "load_before": load, "ahead_of_other_work": ahead}
-    store("design_page", {**told, "seconds": seconds, "machine": machine()})
+    conditions = {"changes": CHANGES, "load_before": load, "ahead_of_other_work": ahead}
+    store("design_page", {**conditions, "seconds": seconds, "machine": machine()})
 
 
 if __name__ == "__main__":

@@ -1,14 +1,12 @@
-"""The table and the figure of the benchmark page (docs/benchmarks.md), from results/*.json.
+"""The table of the benchmark page (docs/benchmarks.md), from results/*.json.
 
-    make benchmark                                  # measures everything: some 13 minutes on two quiet cores
-    python tests/benchmarks/page.py                 # draws the figure from the results that are there
+    make benchmark                                  # measures everything: some 8 minutes on two quiet cores
 
 The table is made from the results when the pages are built. A result that is missing leaves its rows out.
 """
 
 from __future__ import annotations
 
-import argparse
 import json
 import subprocess
 import sys
@@ -21,7 +19,6 @@ from typing import Any, NamedTuple
 HERE = Path(__file__).resolve().parent
 RESULTS = HERE / "results"
 RUNS: Mapping[str, Sequence[str]] = {
-    "peers": ("peers.py",),
     "throughput": ("throughput.py",),
     "roads": ("roads.py",),
     "drawn": ("roads.py", "--seed", "1", "--scenes", "4", "--hits", "64"),
@@ -32,8 +29,6 @@ RUNS: Mapping[str, Sequence[str]] = {
 """The benchmarks behind the page, by the name of their result."""
 KNOWN = {**RUNS, "gpu": ("gpu.py",)}
 """The same and those that a machine measures only where it can."""
-FIDELITIES = ("draft", "standard", "reference")
-COLOURS = {"warpimpact": "#0072B2", "Numba": "#D55E00"}
 
 
 class Row(NamedTuple):
@@ -46,30 +41,25 @@ class Row(NamedTuple):
     sample: str
 
 
-def results(folder: Path = RESULTS) -> dict[str, Any]:
+def results() -> dict[str, Any]:
     """The results that are there, by name."""
-    return {
-        name: json.loads(path.read_text(encoding="utf-8"))
-        for name in KNOWN
-        if (path := folder / f"{name}.json").exists()
-    }
+    paths = {name: RESULTS / f"{name}.json" for name in KNOWN}
+    return {name: json.loads(path.read_text(encoding="utf-8")) for name, path in paths.items() if path.exists()}
 
 
-def rows(found: Mapping[str, Any]) -> Iterator[Row]:
+def rows(stored: Mapping[str, Any]) -> Iterator[Row]:
     """Every row of the table."""
-    parts = (_throughput, _peers, _roads, _drawn, _overheads, _continuum_speed, _design_page)
-    for part in (*parts, _gpu):
-        if (name := part.__name__.removeprefix("_")) in found:
-            yield from part(found[name])
+    for part in (_throughput, _roads, _drawn, _overheads, _continuum_speed, _design_page, _gpu):
+        if (name := part.__name__.removeprefix("_")) in stored:
+            yield from part(stored[name])
 
 
-def machines(found: Mapping[str, Any]) -> Iterator[str]:
+def machines(stored: Mapping[str, Any]) -> Iterator[str]:
     """Where and when each result was measured, a sentence each."""
-    for name, values in found.items():
-        told = values.get("machine", {})
-        if isinstance(told, dict):
-            where = f"{told['processor']}, {told['cores']} cores, Python {told['python']}"
-            yield f"`{KNOWN[name][0]}`: {where}, {told['date']}."
+    for name, values in stored.items():
+        one = values["machine"]
+        where = f"{one['processor']}, {one['cores']} cores, Python {one['python']}"
+        yield f"`{KNOWN[name][0]}`: {where}, {one['date']}."
 
 
 def _throughput(values: Mapping[str, Any]) -> Iterator[Row]:
@@ -85,48 +75,13 @@ def _throughput(values: Mapping[str, Any]) -> Iterator[Row]:
             )
 
 
-def _peers(values: Mapping[str, Any]) -> Iterator[Row]:
-    sample = f"errors: 90th percentile of {values['hits']} Sobol hits; costs: median round"
-    for scene, bout in values.get("scenes", {}).items():
-        for one in bout["ratios"]:
-            outside = "" if one["enclosed"] else ", its nearest setting"
-            yield Row(
-                f"{one['warpimpact']}, times as fast as Numba",
-                scene,
-                f"{one['ratio']:.1f}",
-                f"Numba peer at {one['residual_velocity_error']:.2f} m/s and {one['tilt_error']:.2f}° "
-                f"({one['accuracy']}{outside})",
-                sample,
-            )
-        velocity, tilt = bout["converged_answer_uncertain_by"]
-        for one in bout["contenders"]:
-            if one["program"] == "NumPy" or any(name in one["setting"] for name in FIDELITIES):
-                other = " of this law, not of the literal one" if one["program"] == "NumPy" else ""
-                yield Row(
-                    f"{one['program']}, {one['setting']}",
-                    scene,
-                    f"{one['residual_velocity_error']:.2f} m/s, {one['tilt_error']:.2f}°, "
-                    f"{one['microseconds_per_hit']:.3g} µs per hit",
-                    f"converged answer{other}, uncertain by {velocity:.2g} m/s and {tilt:.2g}°; one core",
-                    sample,
-                )
-        yield Row(
-            "standard, times the arithmetic floor",
-            scene,
-            f"{bout['floor']['above_floor']:.1f}",
-            "measured peak of one core",
-            "operations counted over 8 hits",
-        )
-
-
 def _roads(values: Mapping[str, Any]) -> Iterator[Row]:
     for name, one in values["roads"].items():
         yield Row(
             "standard, times the cost of the slotted plate",
             name,
             f"{one['ratio']:.1f}; level {one['level']}, {one['microseconds_per_hit']:.3g} µs per hit, "
-            f"{one['above_floor']:.0f} times the floor, pilot {one['pilot_share']:.0%}"
-            + ("" if one["kept"] else "; promise not kept"),
+            f"pilot {one['pilot_share']:.0%}" + ("" if one["kept"] else "; promise not kept"),
             f"processor time of a run of {values['run']} hits with its pilot",
             f"least of {values['rounds']} rounds, {values['hits']} hits",
         )
@@ -200,7 +155,7 @@ def _design_page(values: Mapping[str, Any]) -> Iterator[Row]:
             f"`warpimpact design`, from a change to the first map, {before[key]}",
             "slotted plate",
             f"{seconds['median']:.2f} s (median), {seconds['p95']:.2f} s (95 %)",
-            f"until a headless Chromium has drawn it, {seconds['processor']:.2f} s of a core; at most 0.3 s is wanted",
+            "until a headless Chromium has drawn it; at most 0.3 s is wanted",
             f"{values['changes']} changes; other load {values['load_before']:.1f}{ahead}",
         )
 
@@ -249,77 +204,16 @@ def _rounded(rate: float) -> str:
     return f"{float(f'{rate:.3g}'):,.0f}"
 
 
-def draw(found: Mapping[str, Any]) -> Any:
-    """Error against cost beside the peer, and hits per second of the fidelities."""
-    from matplotlib.figure import Figure
-
-    figure = Figure(figsize=(12, 7.6), layout="constrained")
-    upper, lower = figure.subfigures(2, 1)
-    bouts = found.get("peers", {}).get("scenes", {})
-    for axes, (scene, bout) in zip(
-        upper.subplots(1, max(1, len(bouts)), squeeze=False)[0], bouts.items(), strict=False
-    ):
-        _draw_peers(axes, scene, bout)
-    if "throughput" in found:
-        _draw_rates(lower.subplots(), found["throughput"]["scenes"])
-    told = found.get("throughput", found.get("peers", {})).get("machine", {})
-    figure.suptitle(f"{told.get('processor')}, {told.get('cores')} cores, {told.get('date')}")
-    return figure
-
-
-def _draw_peers(axes: Any, scene: str, bout: Mapping[str, Any]) -> None:
-    for program, colour in COLOURS.items():
-        some = [one for one in bout["contenders"] if one["program"] == program and one["setting"] != "coarsest"]
-        some.sort(key=lambda one: one["microseconds_per_hit"])
-        points = [(one["microseconds_per_hit"], one["tilt_error"]) for one in some]
-        best = [one for place, one in enumerate(points) if all(one[1] < other[1] for other in points[:place])]
-        axes.plot(*zip(*points, strict=True), "o", color=colour, markersize=4)
-        axes.plot(*zip(*best, strict=True), "-", color=colour, label=program)
-        for one in some:
-            for name in FIDELITIES:
-                if name in one["setting"]:
-                    place = (one["microseconds_per_hit"], one["tilt_error"])
-                    axes.annotate(
-                        name, place, xytext=(-5, -9), textcoords="offset points", fontsize="small", ha="right"
-                    )
-    axes.set(xscale="log", yscale="log", title=scene, xlabel="µs of one core per hit", ylabel="90 % error of tilt [°]")
-    axes.margins(x=0.15)
-    axes.yaxis.set_minor_formatter("{x:.1g}")
-    axes.tick_params(axis="y", which="both", labelsize="small")
-    axes.grid(which="major", color="0.9")
-    axes.legend(frameon=False, fontsize="small")
-
-
-def _draw_rates(axes: Any, scenes: Mapping[str, Any]) -> None:
-    for place, (scene, fidelities) in enumerate(scenes.items()):
-        for index, name in enumerate(fidelities):
-            at = index + 0.27 * (place - 1)
-            colour = ("#0072B2", "#56B4E9", "#009E73")[place % 3]
-            axes.bar(at, fidelities[name]["one_core"], 0.25, color=colour, label=scene if index == 0 else None)
-        axes.set_xticks(range(len(fidelities)), list(fidelities))
-    axes.set(yscale="log", ylabel="hits per second of one core")
-    axes.grid(axis="y", which="major", color="0.9")
-    axes.set_axisbelow(True)
-    axes.legend(frameon=False, fontsize="small")
-
-
-def main(argv: Sequence[str] | None = None) -> int:
-    """Draw the figure; with "all", measure first. Returns 1 if a benchmark failed."""
-    parser = argparse.ArgumentParser(
-        description="draw the figure of the benchmark page from the results that are there"
-    )
-    parser.add_argument("measure", nargs="?", choices=("all",), help="measure everything first")
+def main() -> int:
+    """Measure everything; returns 1 if a benchmark failed."""
     failed = []
-    for name, (script, *arguments) in RUNS.items() if parser.parse_args(argv).measure else ():
+    for name, (script, *arguments) in RUNS.items():
         begin = time.monotonic()
         done = subprocess.run([sys.executable, script, *arguments], cwd=HERE, check=False)
         print(f"{name}: {time.monotonic() - begin:.0f} s", flush=True)
         failed += [name] if done.returncode else []
-    path = RESULTS / "benchmarks.png"
-    draw(results()).savefig(path, dpi=110)
-    print(path)
     if failed:
-        print(f"failed, or disagree: {', '.join(failed)}", file=sys.stderr)
+        print(f"failed: {', '.join(failed)}", file=sys.stderr)
     return 1 if failed else 0
 
 

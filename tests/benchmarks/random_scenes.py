@@ -15,7 +15,6 @@ import hashlib
 import json
 import math
 import platform
-import time
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
@@ -23,6 +22,7 @@ from typing import Any, NamedTuple
 
 import matplotlib.pyplot as plt
 import numpy as np
+from bench import spent
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
@@ -190,8 +190,8 @@ class Bench:
             part = path.with_suffix(".part.npz")  # what was cut off is no answer
             np.savez(part, **_computed(case, setting, self.hits))
             part.replace(path)
-        with np.load(path) as found:
-            return Answer(found["status"], found["velocity"], found["tilt"]), float(found["cost"])
+        with np.load(path) as stored:
+            return Answer(stored["status"], stored["velocity"], stored["tilt"]), float(stored["cost"])
 
     def converged(self, case: Case) -> tuple[Answer, Answer]:
         """The answer on the finest level, and the one on the level before it."""
@@ -227,25 +227,18 @@ def _computed(case: Case, setting: Numerics, hits: int) -> dict[str, Any]:
     def run(shots: Shots) -> Any:
         return simulate(case.scene, shots, numerics=setting, device="cpu", threads=1)
 
-    def seconds(shots: Shots) -> float:
-        begin = time.process_time()
-        run(shots)
-        return time.process_time() - begin
-
     shots = case.shots(hits)
     run(shots[:1])  # builds what is kept: kernels and the tile
-    begin = time.process_time()
-    outcomes = run(shots)
-    cost = (time.process_time() - begin) / hits
-    if cost * hits < LONG:  # the set-up, and the machine's other work, are no part of the cost
+    outcomes, seconds = spent(lambda: run(shots))
+    if seconds < LONG:  # the set-up, and the machine's other work, are no part of the cost
         more = Shots.joined([shots] * 8)
-        few, many = (min(seconds(some) for _ in range(3)) for some in (shots, more))
-        cost = (many - few) / (7 * hits)
+        few, many = (min(spent(lambda some=some: run(some))[1] for _ in range(3)) for some in (shots, more))
+        seconds = (many - few) / 7
     return {
         "status": outcomes.status,
         "velocity": outcomes.residual_velocity,
         "tilt": outcomes.tilt[:, 0],
-        "cost": cost,
+        "cost": seconds / hits,
     }
 
 
@@ -270,7 +263,7 @@ class Row:
     Attributes:
         level: of LADDER.
         kept: whether the promise is kept by its own word.
-        told, error: errors of 90 % of the hits as told and as found, in residual velocity [m/s] and tilt [degree].
+        stated, error: errors of 90 % of the hits, stated and computed: residual velocity [m/s], tilt [degree].
         mean, worst_tenth: error of the mean residual velocity and of that of the fastest tenth [m/s].
         tilted: error of the share of the hits that are tilted by more than 30 degrees.
         cost: processor time of one core per hit [s].
@@ -278,7 +271,7 @@ class Row:
 
     level: float
     kept: bool
-    told: tuple[float, float]
+    stated: tuple[float, float]
     error: tuple[float, float]
     mean: float
     worst_tenth: float
@@ -292,10 +285,10 @@ def named(bench: Bench, case: Case, truth: Answer, name: str) -> Row:
     promise = pilot_of(case.scene, pilot, Numerics(fidelity=name), Worker("cpu"))
     answer, cost = bench.run(case, promise.numerics)
     velocity, tilt = off(answer, truth)
-    told = (promise.errors["residual_velocity_error"], promise.errors["tilt_error"])
-    found = (p90(velocity), p90(tilt))
+    stated = (promise.errors["residual_velocity_error"], promise.errors["tilt_error"])
+    actual = (p90(velocity), p90(tilt))
     assert promise.numerics.level is not None
-    return Row(promise.numerics.level, promise.kept, told, found, *aggregates(answer, truth), cost)
+    return Row(promise.numerics.level, promise.kept, stated, actual, *aggregates(answer, truth), cost)
 
 
 def aggregates(answer: Answer, truth: Answer) -> tuple[float, float, float]:
@@ -318,15 +311,15 @@ def limits_of(case: Case, level: int, hits: int) -> Array:
 
 def limit_claim(case: Case, name: str, answers: tuple[Array, Array]) -> dict[str, Any]:
     """Whether the pilot of limits says that it keeps a name, and whether other limits keep it."""
-    asked, (before, truth) = PRESETS[name], answers
-    assert asked.limit is not None
-    pilot = case.shots(pilot_size(asked, PILOT_LIMITS), seed=77)
+    preset, (before, truth) = PRESETS[name], answers
+    assert preset.limit is not None
+    pilot = case.shots(pilot_size(preset, PILOT_LIMITS), seed=77)
     sought = Sought("velocity", VELOCITY_TOLERANCE, HIGHEST_VELOCITY)
     promise = pilot_of_limits(case.scene, pilot, sought, Numerics(fidelity=name), Worker("cpu", 1))
     assert promise.numerics.level is not None
-    found = limits_of(case, promise.numerics.level, len(truth))
-    error, uncertain = (p90(np.nan_to_num(np.abs(one - truth), nan=math.inf)) for one in (found, before))
-    true = error <= asked.limit * float(np.median(truth)) + uncertain
+    actual = limits_of(case, promise.numerics.level, len(truth))
+    error, uncertain = (p90(np.nan_to_num(np.abs(one - truth), nan=math.inf)) for one in (actual, before))
+    true = error <= preset.limit * float(np.median(truth)) + uncertain
     return {"level": promise.numerics.level, "kept": promise.kept, "true": bool(true), "error": error}
 
 
@@ -432,8 +425,8 @@ def main() -> None:
         print(f"{index:3} {scenes[-1]['scene']:38}{cells}", flush=True)
     print(summed_up(scenes))
     if given.output:
-        told = {"seed": given.seed, "hits": given.hits, "machine": platform.machine(), "scenes": scenes}
-        given.output.write_text(json.dumps(told, indent=1) + "\n")
+        content = {"seed": given.seed, "hits": given.hits, "machine": platform.machine(), "scenes": scenes}
+        given.output.write_text(json.dumps(content, indent=1) + "\n")
         drawn(scenes).savefig(given.output.with_suffix(".png"), dpi=110)
 
 

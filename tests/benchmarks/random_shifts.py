@@ -79,11 +79,11 @@ def measured(case: Case, hits: int) -> tuple[int, bool, list[Shift]]:
         return simulate(case.scene, shots, numerics=Numerics(level=level), device="cpu", threads=1)
 
     pilot, others = case.shots(pilot_size(PRESETS["standard"]), seed=77), case.shots(hits)
-    found = pilot_of(case.scene, pilot, Numerics(), Worker("cpu", 1))
-    level = found.numerics.level
-    assert found.finer is not None
-    pair = (at(level, pilot), found.finer)
-    return level or 0, found.kept, shifts(pair, (at(level, others), at(ANSWER, others)))
+    promise = pilot_of(case.scene, pilot, Numerics(), Worker("cpu", 1))
+    level = promise.numerics.level
+    assert promise.finer is not None
+    pair = (at(level, pilot), promise.finer)
+    return level or 0, promise.kept, shifts(pair, (at(level, others), at(ANSWER, others)))
 
 
 def main() -> None:
@@ -94,7 +94,7 @@ def main() -> None:
     parser.add_argument("--hits", type=int, default=256, help="that show the shift (default: 256)")
     parser.add_argument("--layers", action="store_true", help="targets of several layers")
     given = parser.parse_args()
-    found: list[Shift] = []
+    measures: list[Shift] = []
     for index in range(given.scenes):
         case = (drawn if given.layers else draw)(given.seed, index)
         level, kept, rows = measured(case, given.hits)
@@ -103,10 +103,10 @@ def main() -> None:
             more = " MORE" if one.is_more else ""
             print(f"  {one.name} ± {one.promised:.2g}, shown {one.shown:+.2g} ± {one.unsure:.1g}{more}", end="")
         print(flush=True)
-        found += [one for one in rows if not math.isnan(one.promised + one.shown)]
-    ratios = [abs(one.shown) / one.promised for one in found if one.promised > 0.0]
+        measures += [one for one in rows if not math.isnan(one.promised + one.shown)]
+    ratios = [abs(one.shown) / one.promised for one in measures if one.promised > 0.0]
     print(
-        f"{len(found)} measures, {sum(one.is_more for one in found)} shifted by more than promised; shown over "
+        f"{len(measures)} measures, {sum(one.is_more for one in measures)} shifted by more than promised; shown over "
         f"promised: median {np.median(ratios):.2f}, worst tenth {np.quantile(ratios, 0.9):.2f}; "
         f"{time.process_time():.0f} s of a core"
     )

@@ -19,7 +19,6 @@ from pathlib import Path
 from typing import Any
 
 from bench import machine, store
-from floor import measured_peak, work_of
 from random_layers import drawn
 from random_scenes import draw
 
@@ -35,8 +34,6 @@ from warpimpact.solver.worker import NEVER, Worker
 
 RUN, SMALL = 16384, 1024
 """Hits of the run that a pilot is made for; likewise of scenes that are drawn, whose pilots may take long."""
-FLOOR_HITS = 8
-"""Hits over which the operations of the floor are counted."""
 ROUNDS, TIMED = 3, 0.4
 """Runs of each road, in turn with the slotted plate, and processor time of one of them [s]."""
 
@@ -116,18 +113,14 @@ class Road:
             count += len(outcomes_of(march.memory, march.march(None, NEVER)).status)
         return (time.process_time() - begin) / count
 
-    def floor(self) -> float:
-        """Time of the counted operations of a hit at the measured peak of a core [s] (floor.py)."""
-        return work_of(self.scene, self.shots[:FLOOR_HITS], self.numerics).operations / measured_peak()
 
-
-def road(scene: Scene, shots: Shots, pilot: Shots, asked: Numerics) -> Road:
+def road(scene: Scene, shots: Shots, pilot: Shots, numerics: Numerics) -> Road:
     """A scene and its shots with what their pilot finds."""
     worker = Worker("cpu", 1)
-    pilot_of(scene, pilot[:1], asked, worker)  # builds the kernels
+    pilot_of(scene, pilot[:1], numerics, worker)  # builds the kernels
     begin = time.process_time()
-    found = pilot_of(scene, pilot, asked, worker)
-    return Road(scene, shots, found.numerics, found.kept, time.process_time() - begin)
+    promise = pilot_of(scene, pilot, numerics, worker)
+    return Road(scene, shots, promise.numerics, promise.kept, time.process_time() - begin)
 
 
 def campaign_of(text: str) -> Campaign:
@@ -153,14 +146,13 @@ def named(text: str, hits: int) -> Road:
 
 def drawn_roads(seed: int, scenes: int, hits: int) -> dict[str, Road]:
     """Roads that nobody chose: so many single plates, then so many targets of layers."""
-    found = {}
+    roads = {}
     for kind, draws in (("plate", draw), ("layers", drawn)):
         for index in range(scenes):
             case = draws(seed, index)
             pilot = case.shots(pilot_size(PRESETS["standard"]), seed=77)
-            found[f"{kind} {index}: {case.name}"] = road(case.scene, case.shots(hits), pilot, Numerics())
-            print(f"{kind} {index}: {case.name}, pilot {found[f'{kind} {index}: {case.name}'].pilot:.1f} s", flush=True)
-    return found
+            roads[f"{kind} {index}: {case.name}"] = road(case.scene, case.shots(hits), pilot, Numerics())
+    return roads
 
 
 def main(argv: Sequence[str] | None = None) -> None:
@@ -185,7 +177,6 @@ def main(argv: Sequence[str] | None = None) -> None:
         values["roads"][name] = {
             "ratio": whole[0] / whole[1],
             "microseconds_per_hit": 1e6 * cost,
-            "above_floor": cost / one.floor(),
             "level": one.numerics.level,
             "kept": one.kept,
             "pilot_share": one.pilot / whole[0],

@@ -9,14 +9,13 @@ cost beside the slotted plate: roads.py.
 
 from __future__ import annotations
 
-import time
-from collections.abc import Callable
+from functools import partial
+from statistics import median
 from typing import Any
 
-import numpy as np
-from bench import SCENES, campaign_of, copied, cores, machine, scene_of, shots_of, store
+from bench import SCENES, campaign_of, copied, cores, machine, scene_of, seconds, shots_of, spent, store
 
-from warpimpact import Campaign, Numerics, Scene, Shots
+from warpimpact import Campaign, Numerics
 from warpimpact.solver.simulate import simulate
 
 TIMED = 0.4
@@ -27,8 +26,6 @@ LEVELS, HITS = (0, 2, 6), 1024
 """Levels of LADDER, and Sobol hits over the unit cell."""
 FEWEST = 64
 """Hits of a timed run at least; the scenes are drawn over the unit cell."""
-
-Work = Callable[[Shots], Any]
 
 
 def main() -> None:
@@ -43,31 +40,18 @@ def main() -> None:
 def rates(campaign: Campaign) -> dict[str, dict[str, float]]:
     """Hits per second of some levels: of one core, and on all cores."""
     scene, shots = scene_of(campaign), shots_of(campaign, HITS)
-    found: dict[str, dict[str, float]] = {}
+    values: dict[str, dict[str, float]] = {}
     for level in LEVELS:
-        alone, together = (_march(scene, Numerics(level=level), threads) for threads in (1, None))
-        alone(shots[:FEWEST])  # builds what is to be built
-        begin = time.process_time()
-        alone(shots[:FEWEST])
-        count = max(FEWEST, int(FEWEST * TIMED / (time.process_time() - begin)))
-        some = copied(shots, -(-count // len(shots)))[:count]
-        many = copied(shots, -(-count * cores() // len(shots)))[: count * cores()]
+        march = partial(simulate, scene, numerics=Numerics(level=level), device="cpu")
+        march(shots[:FEWEST])  # builds what is to be built
+        count = max(FEWEST, int(FEWEST * TIMED / spent(lambda march=march: march(shots[:FEWEST], threads=1))[1]))
+        many = copied(shots, -(-count * cores() // len(shots)))
         one, wall = [], []
         for _ in range(ROUNDS):
-            one.append(_seconds(alone, some, time.process_time) / len(some))
-            wall.append(_seconds(together, many, time.perf_counter) / len(many))
-        found[f"level {level}"] = {"one_core": 1.0 / float(np.median(one)), "all_cores": 1.0 / float(np.median(wall))}
-    return found
-
-
-def _march(scene: Scene, numerics: Numerics, threads: int | None) -> Work:
-    return lambda shots: simulate(scene, shots, numerics=numerics, device="cpu", threads=threads)
-
-
-def _seconds(work: Work, shots: Shots, clock: Callable[[], float]) -> float:
-    begin = clock()
-    work(shots)
-    return clock() - begin
+            one.append(spent(partial(march, many[:count], threads=1))[1] / count)
+            wall.append(seconds(partial(march, many[: count * cores()])) / (count * cores()))
+        values[f"level {level}"] = {"one_core": 1.0 / median(one), "all_cores": 1.0 / median(wall)}
+    return values
 
 
 if __name__ == "__main__":

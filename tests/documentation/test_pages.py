@@ -74,24 +74,24 @@ def test_device_functions_are_on_their_page(pages: Path) -> None:
 
 
 def test_examples_in_pages_are_right() -> None:
-    found = 0
+    examples_run = 0
     for page in DOCS.rglob("*.md"):
         examples = "\n".join(re.findall(r"```\{doctest\}\n(.*?)```", page.read_text(encoding="utf-8"), re.DOTALL))
         checked = doctest.DocTestRunner().run(
             doctest.DocTestParser().get_doctest(examples, {}, page.name, str(page), 0)
         )
         assert not checked.failed
-        found += checked.attempted
-    assert found >= 5
+        examples_run += checked.attempted
+    assert examples_run >= 5
 
 
 def test_the_benchmark_page_says_what_the_results_say(pages: Path) -> None:
     import page
 
     shown = re.sub(r"\s+", " ", text(pages / "benchmarks.html"))
-    told = list(page.rows(page.results()))
-    assert len(told) > 20
-    for cell in {cell for row in told for cell in row}:
+    rows = list(page.rows(page.results()))
+    assert len(rows) > 20
+    for cell in {cell for row in rows for cell in row}:
         assert cell.replace("`", "") in shown
     for sentence in page.machines(page.results()):
         assert sentence.replace("`", "") in shown
