@@ -88,7 +88,7 @@ def test_plate_turned_by_90_degrees_with_its_shot(precision: str, device: str) -
     spacing = np.array([8e-3, 10e-3])
     plates = [
         paper_plate(
-            pattern=PolygonsPattern(polygons=[hole.tolist()], spacing=tuple(extent.tolist()), cell_size=0.25e-3)
+            pattern=PolygonsPattern(polygons=[hole.tolist()], spacing=tuple(extent.tolist()))
         )
         for hole, extent in ((corners, spacing), (corners[:, ::-1] * (-1.0, 1.0), spacing[::-1]))
     ]

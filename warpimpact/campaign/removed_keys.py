@@ -13,6 +13,7 @@ REMOVED_KEYS: dict[str, str] = {
     "posterior": "use hits.file with the CSV file that `warpimpact identify` writes",
     "plate.pattern.shape = supershape": 'use shape = "slot", which protects no worse, or shape = "polygons"',
     "plate.pattern.shape = level_set": 'use shape = "slot", which protects no worse, or shape = "polygons"',
+    "plate.pattern.cell_size": "leave it out: polygons are exact",
     "plate.pattern.smallest_feature": "leave it out, and round the corners of the polygons",
     "published": "put published limits into a comment; warpimpact catalogue shows those of its materials",
     "procedure.name = 3pod": "use langlie",

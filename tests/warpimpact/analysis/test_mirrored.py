@@ -62,7 +62,7 @@ def glide() -> PolygonsPattern:
     hole = np.array([(-5, -6), (-3, -6), (-3, 2), (-7, 2), (-7, -2), (-5, -2)])
     shift = np.array([8, 8])
     polygons = [(1e-3 * hole).tolist(), (1e-3 * (hole * (1, -1) + shift)).tolist()]
-    return PolygonsPattern(polygons=polygons, spacing=(16e-3, 16e-3), cell_size=0.25e-3)
+    return PolygonsPattern(polygons=polygons, spacing=(16e-3, 16e-3))
 
 
 @pytest.mark.parametrize(

@@ -14,7 +14,7 @@ from warpimpact import Plate, PolygonsPattern
 from warpimpact.export.drawing import write_drawing
 from warpimpact.scene import AnyPattern, CirclePattern, Pattern
 
-CELL = {"spacing": (8e-3, 10e-3), "cell_size": 2.5e-5}
+CELL = {"spacing": (8e-3, 10e-3)}
 
 
 ENDS = ((3e-3, 5e-3), (-4e-3, -2.5e-3))  # along y; the second one a cell further overlaps the first
@@ -41,11 +41,10 @@ def test_polygons_are_the_holes() -> None:
     assert across.open_area == pytest.approx(np.pi * 2.25e-6 / 8e-5, rel=0.01)
 
 
-@pytest.mark.parametrize("cell_size", [2.5e-4, 5e-5])
-def test_the_ligament_is_that_of_the_corners(cell_size: float) -> None:
+def test_the_ligament_is_that_of_the_corners() -> None:
     lattice = CirclePattern(diameter=5e-3, spacing=(5e-3, 10e-3), staggered=True)
     spacing = (10e-3, 10e-3)
-    cells: Pattern = rounds(5e-3, (0.0, 0.0), (5e-3, 5e-3), spacing=spacing, cell_size=cell_size)
+    cells: Pattern = rounds(5e-3, (0.0, 0.0), (5e-3, 5e-3), spacing=spacing)
     between, near = (math.hypot(5.0, 5.0) - 5.0) * 1e-3, 1e-6  # of chords
     assert lattice.ligament() == pytest.approx(between)
     assert cells.ligament() == pytest.approx(between, abs=near)
@@ -72,7 +71,6 @@ def test_polygons_that_overlap_those_of_the_next_cell_unite() -> None:
     ("given", "sentence"),
     [
         ({"shape": "polygons", "polygons": [WIDE]}, "cut the plate apart"),
-        ({"shape": "polygons", "polygons": [SQUARE], "cell_size": "1 um"}, "larger cell_size"),
         ({"shape": "polygons", "polygons": [[(0, 0), (1e-3, 1e-3), (1e-3, 0), (0, 1e-3)]]}, "cross themselves"),
         ({"shape": "polygons", "polygons": [SQUARE, SQUARE]}, "cross themselves or overlap"),
         ({"shape": "polygons", "polygons": [[(0, 0), (9e-3, 0), (0, 1e-3)]]}, r"as far as \(9, 1\) mm from the middle"),

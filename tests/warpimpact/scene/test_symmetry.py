@@ -92,7 +92,7 @@ def of_cells(material: np.ndarray) -> Plate:
     holes = shapely.union_all(shapely.box(*corners.T, *(corners + 0.25 * MM).T), grid_size=1e-7)
     polygons = [hole.exterior.coords[:-1] for hole in shapely.get_parts(holes)]
     spacing = tuple(0.25 * MM * side for side in material.shape)
-    return plate(PolygonsPattern(polygons=polygons, spacing=spacing, cell_size=0.125 * MM))
+    return plate(PolygonsPattern(polygons=polygons, spacing=spacing))
 
 
 @pytest.mark.parametrize("sides", [(12, 16), (13, 16), (13, 17)])

@@ -96,7 +96,6 @@ def test_a_tile_is_built_in_small_parts_that_may_end_it(
     whole = tile_of(plate, 0.1e-3, sharp=sharp).material
     forget_tiles()
     monkeypatch.setattr("warpimpact.solver.tile.AT_ONCE", 500)
-    monkeypatch.setattr("warpimpact.scene.patterns.polygons._CELLS_AT_ONCE", 700)
     part, looks = tile_of(plate, 0.1e-3, sharp=sharp), 0
 
     def look() -> None:

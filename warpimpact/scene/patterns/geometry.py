@@ -1,12 +1,9 @@
-"""Geometry of rounded convex shapes, and shares of cells that lie in them.
+"""Geometry of holes on a plane: distances, and shares of cells that lie in them.
 
-A shape has all points within the distance `rounding` of a spine, which is a convex polygon, a line or a point. Areas,
-distances and extents are exact. Spines are arrays of shape [corners, 2] [m].
+A hole has all points within the distance `rounding` of a spine: a polygon, a line or a point [m].
 """
 
 import math
-from collections.abc import Callable
-from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -17,60 +14,15 @@ from ..model import Array
 
 BoolArray = NDArray[np.bool_]
 Counts = NDArray[np.int16]
-Numbers = NDArray[np.int64]
 Range = tuple[float, float]
-Chords = Callable[[Numbers, Array, float], tuple[Array, Array]]
-"""(number of the hole, z [m], slack [m]) of lines along y → their two ends in the hole [m], NaN if a line misses it.
-The ends have the shape of z; its last axis is along the holes."""
 
 WHOLE_CELL = 24576
 """Parts of a cell that count its share in holes as an integer; a cell inside a hole has exactly all."""
 LINES = 3
 """Evenly spaced lines in each direction through the part of a hole in a cell. The share along a line is exact."""
 _PER_LINE = WHOLE_CELL // (2 * LINES)
-_EDGE = 1e-6
-"""Distance from a hole, in sides of a cell, within which a line touches it."""
-_LINES_PER_LOT = 2**16
-"""Approximate number of lines that are computed together."""
-
-
-def area(spine: Array, rounding: float) -> float:
-    """Area of the shape [m²] (Steiner's formula)."""
-    shape = geometries(spine[None])[0]
-    perimeter = shape.length * (2.0 if len(spine) == 2 else 1.0)  # a line counts on both sides
-    return float(shapely.area(shape) + rounding * perimeter + np.pi * rounding**2)
-
-
-def chords(spines: Array, rounding: float, which: Any, z: Array, slack: float) -> tuple[Array, Array]:
-    """Both ends along y [m] of lines at z [m] in shapes, with the shape of z; NaN if a line misses its shape by more
-    than `slack` [m].
-
-    An end lies on the arc about a corner or on a straight part of the outline. Both kinds of points are in the convex
-    shape, so the outermost one is the end.
-
-    Args:
-        spines: of the shapes, shape [shapes, corners, 2] [m].
-        which: index of the shape that each line may cross, along the last axis of z.
-    """
-    low, high = np.full(z.shape, np.nan), np.full(z.shape, np.nan)
-    corners = np.moveaxis(spines, 1, 0)
-    for corner, following in zip(corners, np.roll(corners, -1, axis=0), strict=True):
-        from_y, from_z = corner.T
-        left = rounding**2 - np.square(z - from_z[which])
-        half = np.sqrt(np.maximum(left, 0.0))
-        half[left < -slack * (slack + 2.0 * rounding)] = np.nan
-        low, high = np.fmin(low, from_y[which] - half), np.fmax(high, from_y[which] + half)
-        if spines.shape[1] == 1:
-            break
-        along_y, along_z = (following - corner).T
-        with np.errstate(divide="ignore", invalid="ignore"):  # a part along y has its ends on the arcs
-            outwards = rounding / np.hypot(along_y, along_z)
-            above = z - (from_z - outwards * along_y)[which]
-            part = above * (1.0 / along_z)[which]
-            end = (from_y + outwards * along_z)[which] + above * (along_y / along_z)[which]
-        end[~((part >= 0.0) & (part <= 1.0))] = np.nan
-        low, high = np.fmin(low, end), np.fmax(high, end)
-    return low, high
+_PARTS_PER_LOT = 2**17
+"""Approximate number of parts of sides, one per column of cells, that are computed together."""
 
 
 def placed(spine: Array, places: Array) -> Array:
@@ -126,51 +78,62 @@ def geometries(spines: Array) -> Any:
     return make(spines[:, 0] if corners == 1 else spines)
 
 
-def rounded(share: Array, whole: Any) -> Counts:
-    """Shares of `whole` as integers. A half is rounded up, even after a rounding error, so that mirrored holes have
-    mirrored shares."""
-    return np.asarray(np.floor(share * whole + (0.5 + 1e-6)), dtype=np.int16)
+def shares_in(rings: list[Array], counts: tuple[int, int], sides: tuple[float, float]) -> Counts:
+    """Share of every cell that lies in polygons, in parts of WHOLE_CELL, shape `counts`.
 
-
-def half_shares(chords: Chords, extents: Array, counts: tuple[int, int], sides: tuple[float, float]) -> Counts:
-    """Half the shares of cells in holes, from lines along y, in parts of WHOLE_CELL, shape `counts`.
-
-    The other half comes from lines along z, so that a plate turned by a right angle has the same shares. Straight sides
-    of a hole are exact anywhere in a cell: sides along z end lines, and sides along y end the strip of the lines.
+    Half of it comes from lines along y and half from lines along z, so that a plate turned by a right angle has the
+    same shares. Sides along y or z are exact anywhere in a cell: they end lines, or the strip of the lines.
 
     Args:
-        extents: lowest and highest z of every hole, shape [holes, 2] [m].
-        counts, sides: as in `Pattern.shares_in_holes`.
+        rings: closed outlines, anticlockwise and apart from each other, shape [points, 2] [m] each.
+        counts, sides: number and size [m] of the cells along y and z, from the origin on.
     """
+    along_y = _half_shares(rings, counts, sides)
+    along_z = _half_shares([ring[::-1, ::-1] for ring in rings], counts[::-1], sides[::-1])
+    return along_y + along_z.T
+
+
+def _half_shares(rings: list[Array], counts: tuple[int, int], sides: tuple[float, float]) -> Counts:
+    """Half the shares of cells in polygons, from lines along y."""
     inside = np.zeros((counts[0] + 2, counts[1]), dtype=np.int16)
-    ends = extents / sides[1]
-    columns = np.clip(np.stack([np.floor(ends[:, 0]), np.ceil(ends[:, 1])], axis=1), 0, counts[1]).astype(np.int64)
-    lot = np.cumsum(LINES * (columns[:, 1] - columns[:, 0])) // _LINES_PER_LOT
-    for holes in np.split(np.arange(len(columns)), np.flatnonzero(np.diff(lot)) + 1):
-        met_columns = columns[holes, 1] - columns[holes, 0]
-        hole = np.repeat(holes, met_columns)
-        column = np.arange(met_columns.sum()) + np.repeat(columns[holes, 1] - np.cumsum(met_columns), met_columns)
-        from_z = np.maximum(column, ends[hole, 0])
-        strip = np.minimum(column + 1, ends[hole, 1]) - from_z
+    if not rings:
+        return inside[: counts[0]]
+    extents = np.array([(ring[:, 1].min(), ring[:, 1].max()) for ring in rings])
+    start, end = (np.concatenate(parts) for parts in ([r[:-1] for r in rings], [r[1:] for r in rings]))
+    (bottom, top), of = extents.T / sides[1], np.repeat(np.arange(len(rings)), [len(ring) - 1 for ring in rings])
+    low, high = np.minimum(start[:, 1], end[:, 1]) / sides[1], np.maximum(start[:, 1], end[:, 1]) / sides[1]
+    first, last = (np.clip(edge, 0, counts[1]).astype(np.int64) for edge in (np.floor(low), np.ceil(high)))
+    for lot in np.array_split(np.arange(len(of)), 1 + (last - first).sum() // _PARTS_PER_LOT):
+        columns = last[lot] - first[lot]
+        side = np.repeat(lot, columns)
+        column = np.arange(columns.sum()) + np.repeat(last[lot] - np.cumsum(columns), columns)
+        from_z = np.maximum(column, bottom[of[side]])
+        strip = np.minimum(column + 1, top[of[side]]) - from_z
         z = from_z + (np.arange(LINES)[:, None] + 0.5) / LINES * strip
-        low, high = chords(hole, z * sides[1], _EDGE * min(sides))
-        met = low < high
-        column, weight = (np.broadcast_to(values, met.shape)[met] for values in (column, rounded(strip, _PER_LINE)))
-        for end, sign in ((low, 1), (high, -1)):
-            _add(inside, np.clip(end[met] / sides[0], 0, counts[0]), column, weight, sign)
-    for before, row in pairwise(inside):  # half the time of numpy.cumsum along the first axis
-        row += before
-    return inside[: counts[0]]
+        line, part = np.nonzero((z >= low[side]) & (z < high[side]))
+        side, column, weight = side[part], column[part], _rounded(strip[part], _PER_LINE)
+        (from_y, from_z), (to_y, to_z) = start[side].T, end[side].T
+        at = from_y + (z[line, part] * sides[1] - from_z) * ((to_y - from_y) / (to_z - from_z))
+        at = np.clip(at / sides[0], 0, counts[0])
+        for sign, which in ((1, to_z < from_z), (-1, to_z > from_z)):  # going down, the hole follows along y
+            _add(inside, at[which], column[which], weight[which], sign)
+    return np.cumsum(inside, axis=0, dtype=np.int16)[: counts[0]]
 
 
-def _add(inside: Counts, at: Array, column: Numbers, weight: Counts, sign: int) -> None:
+def _add(inside: Counts, at: Array, column: NDArray[np.int64], weight: Counts, sign: int) -> None:
     """Add signed lines, from their ends `at` on [cells], to the differences between cells along y.
 
     At both ends the part of the cell that lies in the hole is rounded, so mirrored holes have mirrored shares.
     """
     cell = np.floor(at)
     part = at - cell if sign < 0 else 1.0 - (at - cell)
-    inside_cell = rounded(part, weight)
+    inside_cell = _rounded(part, weight)
     first = inside_cell if sign > 0 else weight - inside_cell
     for row, share in ((cell, first), (cell + 1, weight - first)):
         np.add.at(inside.reshape(-1), row.astype(np.int64) * inside.shape[1] + column, sign * share)
+
+
+def _rounded(share: Array, whole: Any) -> Counts:
+    """Shares of `whole` as integers. A half is rounded up, even after a rounding error, so that mirrored holes have
+    mirrored shares."""
+    return np.asarray(np.floor(share * whole + (0.5 + 1e-6)), dtype=np.int16)

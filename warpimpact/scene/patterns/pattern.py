@@ -3,7 +3,7 @@
 import math
 from abc import ABC, abstractmethod
 from copy import copy
-from functools import cached_property, partial
+from functools import cached_property
 from numbers import Real
 from typing import Annotated, Any, ClassVar, Literal, NamedTuple, Self
 
@@ -15,27 +15,16 @@ from scipy.spatial import KDTree
 from ..exclusions import HOLES, STAGGERED, check_together
 from ..model import Array, Model
 from ..units import Angle, Length, PositiveLength, quantity
-from .geometry import (
-    BoolArray,
-    Chords,
-    Counts,
-    Range,
-    area,
-    chords,
-    distance_to,
-    geometries,
-    half_shares,
-    neighbours,
-    placed,
-    shifts_into,
-)
+from .geometry import BoolArray, Counts, Range, distance_to, geometries, neighbours, placed, shares_in, shifts_into
 
 _QUARTER = 16
 """Chords per quarter of a turn in an outline; a circle loses 1.6e-3 of its area."""
+_FINE_QUARTER = 45
+"""Chords per quarter of a turn in shares of cells; they lie within 0.8e-4 of the diameter of a circle."""
 _PIECE = 16
 """Chords per piece of an outline, in a search for the nearest one."""
 _MOST_HOLES = 20_000
-_EQUAL_LENGTHS = 1e-9
+EQUAL_LENGTHS = 1e-9
 """Largest difference of two equal lengths, as a share of the period."""
 
 _PAIR = tuple[PositiveLength, PositiveLength]
@@ -61,15 +50,6 @@ class Pattern(Model, ABC):
         """Share of holes in a period."""
 
     @abstractmethod
-    def is_hole(self, y: Array, z: Array) -> BoolArray:
-        """Whether points y, z [m] lie in a hole; bool, of their broadcast shape."""
-
-    @abstractmethod
-    def shares_in_holes(self, counts: tuple[int, int], sides: tuple[float, float]) -> Counts:
-        """Share of every cell that lies in holes, in parts of WHOLE_CELL, shape `counts`: cells of a period along y and
-        z with these sides [m], from the origin on."""
-
-    @abstractmethod
     def spines(self, y_range: Range, z_range: Range) -> Any:
         """Spines of the holes that reach into a rectangle, as an array of shapely geometries."""
 
@@ -78,12 +58,28 @@ class Pattern(Model, ABC):
         """How far a hole reaches beyond its spine [m]."""
         return 0.0
 
+    @property
+    def _edge(self) -> float:
+        """Distance from its hole within which a point lies on the edge [m]."""
+        return EQUAL_LENGTHS * max(self.unit_cell)
+
+    def is_hole(self, y: Array, z: Array) -> BoolArray:
+        """Whether points y, z [m] lie in a hole or on its edge; bool, of their broadcast shape."""
+        return distance_to(self._near, y, z, self.period) <= self.rounding + self._edge
+
+    @cached_property
+    def _near(self) -> Any:
+        """Spines of the holes about a period."""
+        return self.spines(*((-reach, reach) for reach in 0.5 * np.array(self.period) + self._edge))
+
+    def shares_in_holes(self, counts: tuple[int, int], sides: tuple[float, float]) -> Counts:
+        """Share of every cell that lies in holes, in parts of WHOLE_CELL, shape `counts`: cells of a period along y and
+        z with these sides [m], from the origin on. Arcs are chords here, within 1e-4 of the size of a hole."""
+        return shares_in(self.outlines(*_about(counts, sides)), counts, sides)
+
     def outlines(self, y_range: Range, z_range: Range) -> list[Array]:
-        """Closed outlines, each of shape [points, 2] [m], of the holes that reach into a rectangle."""
-        holes = self.spines(y_range, z_range)
-        if self.rounding:
-            holes = shapely.buffer(holes, self.rounding, quad_segs=_QUARTER)
-        return [np.array(shapely.get_coordinates(hole)) for hole in holes]
+        """Closed outlines, anticlockwise, each of shape [points, 2] [m], of the holes that reach into a rectangle."""
+        return [shapely.get_coordinates(hole) for hole in shapely.orient_polygons(self.spines(y_range, z_range))]
 
     def edge_distance(self, y: Array, z: Array) -> Array:
         """Distance of points y, z [m] from the nearest outline of a hole, of their broadcast shape: negative in a hole,
@@ -159,12 +155,6 @@ class NoPattern(Pattern):
     def open_area(self) -> float:
         return 0.0
 
-    def is_hole(self, y: Array, z: Array) -> BoolArray:
-        return np.zeros(np.broadcast_shapes(np.shape(y), np.shape(z)), dtype=bool)
-
-    def shares_in_holes(self, counts: tuple[int, int], sides: tuple[float, float]) -> Counts:
-        return np.zeros(counts, dtype=np.int16)
-
     def spines(self, y_range: Range, z_range: Range) -> Any:
         return np.empty(0, dtype=object)
 
@@ -233,8 +223,10 @@ class LatticePattern(Pattern):
 
     @property
     def hole_area(self) -> float:
-        """Area of one hole [m²]."""
-        return area(self.spine, self.rounding)
+        """Area of one hole [m²] (Steiner's formula)."""
+        shape = geometries(self.spine[None])[0]
+        perimeter = shape.length * (2.0 if len(self.spine) == 2 else 1.0)  # a line counts on both sides
+        return float(shape.area + self.rounding * perimeter + np.pi * self.rounding**2)
 
     @property
     def hole_size(self) -> tuple[float, float]:
@@ -292,30 +284,20 @@ class LatticePattern(Pattern):
             )
         return pattern
 
-    def is_hole(self, y: Array, z: Array) -> BoolArray:
-        return distance_to(self._near, y, z, self.period) <= self.rounding + self._edge  # an edge lies in its hole
-
-    @cached_property
-    def _near(self) -> Any:
-        """Spines of the holes about a period."""
-        return self.spines(*((-reach, reach) for reach in 0.5 * np.array(self.period) + self._edge))
-
-    def shares_in_holes(self, counts: tuple[int, int], sides: tuple[float, float]) -> Counts:
-        ranges = [(-side, side * (count + 1)) for side, count in zip(sides, counts, strict=True)]
-        places = self._repeated(self._places, self.period, ranges[0], ranges[1])
-        extents = self._boxes(places)
-        along_y = half_shares(self._chords(places, exchanged=False), extents[:, :, 1], counts, sides)
-        along_z = half_shares(self._chords(places, exchanged=True), extents[:, :, 0], counts[::-1], sides[::-1])
-        along_y += along_z.T
-        return along_y
-
-    def _chords(self, places: Array, *, exchanged: bool) -> Chords:
-        """Chords of the holes at these places; `exchanged` swaps y and z."""
-        spines = placed(self.spine, places)
-        return partial(chords, spines[:, ::-1, ::-1] if exchanged else spines, self.rounding)
-
     def spines(self, y_range: Range, z_range: Range) -> Any:
         return geometries(placed(self.spine, self._reaching(y_range, z_range)))
+
+    def outlines(self, y_range: Range, z_range: Range) -> list[Array]:
+        return self._outlines(self._reaching(y_range, z_range), _QUARTER)
+
+    def shares_in_holes(self, counts: tuple[int, int], sides: tuple[float, float]) -> Counts:
+        places = self._repeated(self._places, self.period, *_about(counts, sides))
+        return shares_in(self._outlines(places, _FINE_QUARTER), counts, sides)
+
+    def _outlines(self, places: Array, quarter: int) -> list[Array]:
+        """Outlines of the holes at these places, with this number of chords in a quarter of a turn."""
+        hole = shapely.buffer(geometries(self.spine[None])[0], self.rounding, quad_segs=quarter)
+        return list(placed(shapely.get_coordinates(shapely.orient_polygons(hole)), places))
 
     @property
     def _gap(self) -> float:
@@ -326,10 +308,10 @@ class LatticePattern(Pattern):
         middles, marks, tree = self._marked
         images = middles * mirror + (period / 2 if centred else 0.0)
         distances, nearest = tree.query(images % period % period)
-        if distances.max() > _EQUAL_LENGTHS * period.max():
+        if distances.max() > EQUAL_LENGTHS * period.max():
             return False
         mirrored = (marks * mirror)[:, :, None] - marks[nearest][:, None]
-        return bool(np.linalg.norm(mirrored, axis=-1).min(axis=-1).max() <= _EQUAL_LENGTHS * period.max())
+        return bool(np.linalg.norm(mirrored, axis=-1).min(axis=-1).max() <= EQUAL_LENGTHS * period.max())
 
     @cached_property
     def _marked(self) -> tuple[Array, Array, KDTree]:
@@ -360,7 +342,7 @@ class LatticePattern(Pattern):
             )
         inner = np.array(size) / 2 - margin
         places = self._repeated(self._cell_places, self.unit_cell, (-inner[0], inner[0]), (-inner[1], inner[1]))
-        kept: Array = places[(np.abs(self._boxes(places)) <= inner * (1 + _EQUAL_LENGTHS)).all(axis=(1, 2))]
+        kept: Array = places[(np.abs(self._boxes(places)) <= inner * (1 + EQUAL_LENGTHS)).all(axis=(1, 2))]
         return kept
 
     def _reaching(self, y_range: Range, z_range: Range) -> Array:
@@ -396,10 +378,11 @@ class LatticePattern(Pattern):
         gap, first, second = neighbours(geometries(placed(self.spine, places)), len(self._cell_places))
         return gap - 2 * self.rounding, places[first, :2], places[second, :2]
 
-    @property
-    def _edge(self) -> float:
-        """Distance from its hole within which a point lies on the edge [m]."""
-        return _EQUAL_LENGTHS * max(self.spacing)
+
+def _about(counts: tuple[int, int], sides: tuple[float, float]) -> tuple[Range, Range]:
+    """Ranges of cells from the origin on, with one more around them [m]."""
+    (low_y, high_y), (low_z, high_z) = ((-side, side * (count + 1)) for side, count in zip(sides, counts, strict=True))
+    return (low_y, high_y), (low_z, high_z)
 
 
 def is_pitch(value: Any) -> bool:

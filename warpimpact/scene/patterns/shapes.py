@@ -8,7 +8,6 @@ from pydantic import model_validator
 
 from ..model import Array
 from ..units import NonNegativeLength, PositiveLength
-from .geometry import Chords, Numbers
 from .pattern import LatticePattern, is_pitch
 
 _ELLIPSE_CHORDS = 720
@@ -107,22 +106,6 @@ class EllipsePattern(_OblongPattern):
     @property
     def _marks(self) -> Array:
         return self.spine[:: _ELLIPSE_CHORDS // 4]
-
-    def _chords(self, places: Array, *, exchanged: bool) -> Chords:
-        width, length = (self.length, self.width) if exchanged else (self.width, self.length)
-        places = places[:, [1, 0, 2]] * (1.0, 1.0, -1.0) if exchanged else places
-
-        def ends(hole: Numbers, z: Array, _: float) -> tuple[Array, Array]:
-            middle_y, middle_z, turn = places[hole].T
-            cosine, sine, above = np.cos(turn), np.sin(turn), z - middle_z
-            # Factors of y² and y·z in a quadratic form that is 1/4 on the edge.
-            square = (cosine / width) ** 2 + (sine / length) ** 2
-            mixed = cosine * sine * (width**-2 - length**-2)
-            left = 0.25 * square - (above / (width * length)) ** 2
-            half = np.where(left >= 0.0, np.sqrt(np.maximum(0.0, left)), np.nan)
-            return middle_y - (mixed * above + half) / square, middle_y - (mixed * above - half) / square
-
-        return ends
 
 
 class _PolygonPattern(LatticePattern):
