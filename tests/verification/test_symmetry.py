@@ -87,9 +87,7 @@ def test_plate_turned_by_90_degrees_with_its_shot(precision: str, device: str) -
     corners = 0.25e-3 * np.array([(-8, -10), (8, -10), (8, -4), (-2, -4), (-2, 10), (-8, 10)])
     spacing = np.array([8e-3, 10e-3])
     plates = [
-        paper_plate(
-            pattern=PolygonsPattern(polygons=[hole.tolist()], spacing=tuple(extent.tolist()))
-        )
+        paper_plate(pattern=PolygonsPattern(polygons=[hole.tolist()], spacing=tuple(extent.tolist())))
         for hole, extent in ((corners, spacing), (corners[:, ::-1] * (-1.0, 1.0), spacing[::-1]))
     ]
     scene: dict[str, Any] = {"precision": precision, "device": device}

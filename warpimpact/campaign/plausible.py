@@ -31,7 +31,7 @@ def warn_of(scene: Scene, impact: Impact, hits: Hits) -> None:
 def check_plausible(core: Core, target: Target, record: Record, impact: Impact, hits: Hits | None = None) -> None:
     """Raise a ValueError if a value is beyond what any core or target has."""
     for place, kind, value in _values(core, target, record, impact, hits):
-        if kind in USUAL and (sentence := USUAL[kind].refusal(place, value)) is not None:
+        if kind in USUAL and (sentence := USUAL[kind].complaint(place, value, usual=False)) is not None:
             raise ValueError(sentence)
 
 
@@ -40,7 +40,7 @@ def doubted(scene: Scene, impact: Impact, hits: Hits) -> Iterator[str]:
     plate = scene.target.layers[0]
     usual = USUAL | {"hits": hit_bounds(plate.sampled_cell, plate.size)}
     for place, kind, value in _values(scene.core, scene.target, scene.record, impact, hits):
-        if kind in usual and (sentence := usual[kind].warning(place, value)) is not None:
+        if kind in usual and (sentence := usual[kind].complaint(place, value, usual=True)) is not None:
             yield sentence
     for place, plate in scene.target.named:
         share = effective_thickness(plate, impact.velocity) / plate.thickness

@@ -39,7 +39,7 @@ def at_base_alone(target: Target, shots: Shots) -> Shots:
     """Shots at the same places of the face of the base alone."""
     last = len(target.layers) - 1
     columns: dict[str, Any] = {
-        name: shots.columns[name][:, last] if shots.differs(name, last) else None for name in BY_LAYER
+        name: shots.columns[name][:, last] if shots.varies(name, last) else None for name in BY_LAYER
     }
     columns |= dict.fromkeys(("offset_y", "offset_z", "degradation_length"))
     return replace(shots, **columns)

@@ -160,7 +160,9 @@ def march_of(
     core, target = scene.core, scene.target
     start = start_of(scene, shots, number, continuum.friction, conditions)
     own = {
-        name: [float(np.resize(shots.own_of(target, name, k), len(shots))[number]) for k in range(len(target.layers))]
+        name: [
+            float(np.resize(shots.layer_value(target, name, k), len(shots))[number]) for k in range(len(target.layers))
+        ]
         for name in ("thickness", "offset_y", "offset_z")
     }
     fronts = target.fronts([np.array(value) for value in own["thickness"]])

@@ -33,10 +33,10 @@ def own_columns(target: Target, shots: Shots) -> dict[str, NDArray[Any]]:
     as `thickness` for the plate, and as `layer_thickness` for all layers if a layer behind the plate differs."""
     columns: dict[str, NDArray[Any]] = {name: values for name, values in shots.columns.items() if name not in BY_LAYER}
     for name in BY_LAYER:
-        values = [shots.own_of(target, name, k) for k in range(len(target.layers))]
-        if shots.differs(name, 0):
+        values = [shots.layer_value(target, name, k) for k in range(len(target.layers))]
+        if shots.varies(name, 0):
             columns[name] = values[0]
-        if any(shots.differs(name, k) for k in range(1, len(values))):
+        if any(shots.varies(name, k) for k in range(1, len(values))):
             columns[f"layer_{name}"] = np.stack(np.broadcast_arrays(*values, np.empty(len(shots)))[:-1], axis=1)
     return columns
 

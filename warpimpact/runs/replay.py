@@ -111,7 +111,7 @@ def _at_their_limit(scene: Scene, shots: Shots, result: xarray.Dataset, place: i
     given = scene.target.value("resistance", layer)
     if values["resistance"] == given:  # the shot has the resistance of the scene
         del values["resistance"]
-    return shots.with_own({name: np.full(len(shots), value) for name, value in values.items()}, layer)
+    return shots.assign({name: np.full(len(shots), value) for name, value in values.items()}, layer)
 
 
 def _numerics(campaign: Campaign, result: xarray.Dataset) -> Numerics:

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
-from typing import Annotated, Literal, Self
+from abc import ABC
+from collections.abc import Callable
+from typing import Annotated, Any, Literal, Self
 
 import numpy as np
 from pydantic import Field, model_validator
@@ -14,7 +15,6 @@ from .model import Array, Model
 EDGE = 2.0**-31
 """Uniform numbers lie between EDGE and 1 − EDGE. EDGE is half a step of the Sobol sequence. So a normal distribution
 ends at 6.2 standard deviations, and its range is known in advance."""
-
 
 _Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 _Finite = Annotated[float, Field(allow_inf_nan=False)]
@@ -29,9 +29,15 @@ class Distribution(Model, ABC):
 
     distribution: str
 
-    @abstractmethod
     def quantile(self, share: Array) -> Array:
         """Values that exceed these shares of the distribution, same shape."""
+        return np.asarray(_SCIPY[self.distribution](self).ppf(share))
+
+    @property
+    def ends(self) -> tuple[float, float]:
+        """Smallest and largest value that is drawn."""
+        low, high = self.quantile(np.array([EDGE, 1.0 - EDGE]))
+        return float(low), float(high)
 
 
 class _Bounded(Distribution, ABC):
@@ -51,6 +57,9 @@ class _Bounded(Distribution, ABC):
             raise ValueError(f"got low = {self.low:g} and high = {self.high:g}, but high must be above low")
         return self
 
+    def quantile(self, share: Array) -> Array:
+        return np.clip(super().quantile(share), self.low, self.high)  # rounding may exceed the ends
+
 
 class Normal(Distribution):
     """Mean and standard deviation.
@@ -63,9 +72,6 @@ class Normal(Distribution):
     distribution: Literal["normal"] = "normal"
     mean: _Finite
     std: _Positive
-
-    def quantile(self, share: Array) -> Array:
-        return np.asarray(stats.norm.ppf(share, self.mean, self.std))
 
 
 class TruncatedNormal(_Bounded):
@@ -80,19 +86,11 @@ class TruncatedNormal(_Bounded):
     mean: _Finite
     std: _Positive
 
-    def quantile(self, share: Array) -> Array:
-        ends = ((end - self.mean) / self.std for end in (self.low, self.high))
-        values = stats.truncnorm.ppf(share, *ends, self.mean, self.std)
-        return np.asarray(np.clip(values, self.low, self.high))  # rounding may exceed the ends
-
 
 class Uniform(_Bounded):
     """Evenly between low and high."""
 
     distribution: Literal["uniform"] = "uniform"
-
-    def quantile(self, share: Array) -> Array:
-        return np.asarray(stats.uniform.ppf(share, self.low, self.high - self.low))
 
 
 class Triangular(_Bounded):
@@ -111,10 +109,6 @@ class Triangular(_Bounded):
             raise ValueError(f"got mode = {self.mode:g}, but it must lie between low and high")
         return self
 
-    def quantile(self, share: Array) -> Array:
-        width = self.high - self.low
-        return np.asarray(stats.triang.ppf(share, (self.mode - self.low) / width, self.low, width))
-
 
 class Lognormal(Distribution):
     """The logarithm is normal.
@@ -128,9 +122,6 @@ class Lognormal(Distribution):
     median: _Positive
     sigma: _Positive
 
-    def quantile(self, share: Array) -> Array:
-        return np.asarray(stats.lognorm.ppf(share, self.sigma, scale=self.median))
-
 
 class Weibull(Distribution):
     """The strength of the weakest link.
@@ -143,9 +134,6 @@ class Weibull(Distribution):
     distribution: Literal["weibull"] = "weibull"
     shape: _Positive
     scale: _Positive
-
-    def quantile(self, share: Array) -> Array:
-        return np.asarray(self.scale * (-np.log1p(-share)) ** (1.0 / self.shape))
 
 
 class Discrete(Distribution):
@@ -173,10 +161,19 @@ class Discrete(Distribution):
         order = np.argsort(self.values)
         ends = np.cumsum(weights[order])
         which = np.searchsorted(ends[:-1] / ends[-1], share, side="right")
-        values: Array = np.array(self.values)[order][which]
-        return values
+        return np.asarray(np.array(self.values)[order][which])
 
 
+_SCIPY: dict[str, Callable[[Any], Any]] = {
+    "normal": lambda d: stats.norm(d.mean, d.std),
+    "truncated_normal": lambda d: stats.truncnorm(
+        (d.low - d.mean) / d.std, (d.high - d.mean) / d.std, loc=d.mean, scale=d.std
+    ),
+    "uniform": lambda d: stats.uniform(d.low, d.high - d.low),
+    "triangular": lambda d: stats.triang((d.mode - d.low) / (d.high - d.low), d.low, d.high - d.low),
+    "lognormal": lambda d: stats.lognorm(d.sigma, scale=d.median),
+    "weibull": lambda d: stats.weibull_min(d.shape, scale=d.scale),
+}
 AnyDistribution = Annotated[
     Normal | TruncatedNormal | Uniform | Triangular | Lognormal | Weibull | Discrete,
     Field(discriminator="distribution"),

@@ -68,26 +68,26 @@ class Sampler:
             **{name: np.full(count, value) for name, value in self._impact},
         )
         for ((name, layer), distribution), share in zip(self._scatter.items(), uniform, strict=True):
-            shots = shots.with_own({name: distribution.quantile(np.clip(share, EDGE, 1.0 - EDGE))}, layer)
+            shots = shots.assign({name: distribution.quantile(np.clip(share, EDGE, 1.0 - EDGE))}, layer)
         if self._hits.listed is not None:
             listed, length = self._hits.sampling == "list", len(next(iter(self._hits.listed.values())))
             uniform_rows = stream(self._hits.seed, (_ROWS,), first, count) * length
             rows = np.arange(first, first + count) % length if listed else uniform_rows.astype(np.int64)
-            shots = shots.with_own({name: column[rows] for name, column in self._hits.listed.items()})
+            shots = shots.assign({name: column[rows] for name, column in self._hits.listed.items()})
         return shots
 
     def _uniform(self, columns: list[int], first: int, count: int) -> list[Array]:
         """Uniform numbers in [0, 1) of these columns, shape [count] each."""
         if self._hits.sampling == "sobol":
             return list(self._net(columns, first, count))
-        hits = self._grid(first, count) if self._hits.sampling == "grid" else _pairs(self._hits.seed, first, count)
+        if self._hits.sampling == "grid":  # centres of cells, row by row
+            along_y, along_z = self._hits.grid(self._extent)
+            cell = np.arange(first, first + count) % (along_y * along_z)
+            hits = [(cell // along_z + 0.5) / along_y, (cell % along_z + 0.5) / along_z]
+        else:  # shot k has the draws 2k and 2k + 1
+            pairs = _draws(np.random.Philox(self._hits.seed), 2 * first, 2 * count)
+            hits = [pairs[::2], pairs[1::2]]
         return [*hits, *(stream(self._hits.seed, (column,), first, count) for column in columns[_HIT_COLUMNS:])]
-
-    def _grid(self, first: int, count: int) -> tuple[Array, Array]:
-        """Cell centres, row by row."""
-        along_y, along_z = self._hits.grid(self._extent)
-        cell = np.arange(first, first + count) % (along_y * along_z)
-        return (cell // along_z + 0.5) / along_y, (cell % along_z + 0.5) / along_z
 
     def _net(self, columns: list[int], first: int, count: int) -> Array:
         """Sobol coordinates, shape [columns, count]; the replicates give one point in turn."""
@@ -112,12 +112,6 @@ def make_shots(impact: Impact, hits: Hits, plate: Plate, scatter: Scatter | None
     return sampler.shots(0, len(sampler))
 
 
-@lru_cache(maxsize=128)
-def _sequence(dimensions: int, seed: int, replicate: int) -> _Sobol:
-    """A scrambled sequence; it is cached because its scrambling takes as long as a hundred hits of a small plate."""
-    return _Sobol(dimensions, seed, (replicate,) if replicate else ())
-
-
 class _Sobol:
     """A scrambled Sobol sequence; its points can be read in any order.
 
@@ -125,8 +119,8 @@ class _Sobol:
     earlier dimension.
     """
 
-    def __init__(self, dimensions: int, seed: int, key: tuple[int, ...]) -> None:
-        self._seed, self._key, self._lock = seed, key, Lock()
+    def __init__(self, dimensions: int, seed: int, replicate: int) -> None:
+        self._seed, self._key, self._lock = seed, (replicate,) if replicate else (), Lock()
         self._scrambled = qmc.Sobol(min(dimensions, _TOGETHER), rng=self._draws())
         self._plain = qmc.Sobol(dimensions, scramble=False)
 
@@ -153,6 +147,10 @@ class _Sobol:
         return np.random.default_rng(np.random.SeedSequence(self._seed, spawn_key=(*self._key, *key)))
 
 
+_sequence = lru_cache(maxsize=128)(_Sobol)
+"""Scrambling takes as long as a hundred hits of a small plate."""
+
+
 def _read(sequence: qmc.Sobol, first: int, count: int) -> Array:
     """Points from number `first` on, shape [count, dimensions], fastest where the last reading ended."""
     if first < sequence.num_generated:
@@ -161,12 +159,6 @@ def _read(sequence: qmc.Sobol, first: int, count: int) -> Array:
         sequence.fast_forward(first - sequence.num_generated)
     # A first reading of a single point: SciPy warns if the first one is no power of two.
     return np.concatenate([sequence.random(1), sequence.random(count - 1)])
-
-
-def _pairs(seed: int, first: int, count: int) -> tuple[Array, Array]:
-    """Two arrays of independent uniform numbers, shape [count] each: shot k has the draws 2k and 2k + 1."""
-    pairs = _draws(np.random.Philox(seed), 2 * first, 2 * count)
-    return pairs[::2], pairs[1::2]
 
 
 def stream(seed: int, key: tuple[int, ...], first: int, count: int) -> Array:

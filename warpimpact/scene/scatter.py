@@ -6,7 +6,6 @@ import math
 from collections.abc import Callable, Mapping
 from typing import Any
 
-import numpy as np
 from pydantic import (
     FieldSerializationInfo,
     SerializerFunctionWrapHandler,
@@ -17,7 +16,7 @@ from pydantic import (
     field_validator,
 )
 
-from .distributions import EDGE, PURE_NUMBERS, AnyDistribution, Distribution
+from .distributions import PURE_NUMBERS, AnyDistribution, Distribution
 from .model import Model
 from .quantities import LISTED, QUANTITIES, SCATTERED
 from .shots import Shots
@@ -34,7 +33,7 @@ def check_range(name: str, low: float, high: float) -> None:
     read = quantity(kind)
     for value in (low, high):
         try:
-            TypeAdapter(kind).validate_python(read.as_read(float(value)))
+            TypeAdapter(kind).validate_python(read.as_read(value))
         except ValidationError as error:
             allowed = error.errors()[0]["msg"].replace("Input should", "it must")
             reached = f"{math.degrees(value):.6g} deg" if read.unit == "rad" else f"{value:.6g}"
@@ -101,9 +100,8 @@ class Scatter(Model):
     def _is_possible(cls, value: Any, info: ValidationInfo) -> Any:
         for distribution in value if isinstance(value, tuple) else (value,):
             if isinstance(distribution, Distribution):
-                low, high = distribution.quantile(np.array([EDGE, 1.0 - EDGE]))
                 try:
-                    check_range(str(info.field_name), low, high)
+                    check_range(str(info.field_name), *distribution.ends)
                 except ValueError as error:
                     raise ValueError(f"got a {distribution.distribution} distribution that {error}") from None
         return value

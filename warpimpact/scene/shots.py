@@ -207,24 +207,24 @@ class Shots:
         """The arrays by name. Arrays that are None are left out."""
         return {f.name: values for f in fields(self) if (values := getattr(self, f.name)) is not None}
 
-    def own(self, name: str, otherwise: float) -> Array:
+    def value(self, name: str, otherwise: float) -> Array:
         """A quantity of every shot, shape [shots], or the value of the scene, shape [1]."""
         return self.columns.get(name, np.array([otherwise]))
 
-    def differs(self, name: str, layer: int) -> bool:
+    def varies(self, name: str, layer: int) -> bool:
         """Whether the shots have values of a quantity for a layer."""
         column = self.columns.get(name)
         return column is not None and layer < column.shape[1] and not np.isnan(column[:, layer]).all()
 
-    def own_of(self, target: Target, name: str, layer: int) -> Array:
-        """A quantity of a layer of the target; shapes as in `own`."""
+    def layer_value(self, target: Target, name: str, layer: int) -> Array:
+        """A quantity of a layer of the target; shapes as in `value`."""
         otherwise = target.value(name, layer)
-        if not self.differs(name, layer):
+        if not self.varies(name, layer):
             return np.array([otherwise])
         column = self.columns[name][:, layer]
         return np.where(np.isnan(column), otherwise, column)
 
-    def with_own(self, values: Mapping[str, Array], layer: int = 0) -> Self:
+    def assign(self, values: Mapping[str, Array], layer: int = 0) -> Self:
         """A copy with these values by quantity, shape [shots] each; quantities of layers change in this layer alone."""
         columns: dict[str, Any] = {
             name: self._put(name, column, layer) if name in BY_LAYER else column for name, column in values.items()

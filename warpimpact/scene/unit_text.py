@@ -11,31 +11,20 @@ from fractions import Fraction
 from functools import cache
 
 _BASES = ("m", "kg", "s", "rad")
-_UNITS = {
-    "km": "1000 m",
-    "cm": "0.01 m",
-    "mm": "0.001 m",
-    "µm": "0.000001 m",
+_NAMED = {
     "cc": "0.000001 m^3",
-    "nm": "0.000000001 m",
     "in": "0.0254 m",
     "thou": "0.0000254 m",
     "ft": "0.3048 m",
     "yd": "0.9144 m",
     "g": "0.001 kg",
-    "mg": "0.000001 kg",
     "t": "1000 kg",
     "lb": "0.45359237 kg",
     "oz": "0.028349523125 kg",
     "grain": "0.00006479891 kg",
-    "ms": "0.001 s",
-    "µs": "0.000001 s",
-    "ns": "0.000000001 s",
     "min": "60 s",
     "h": "3600 s",
     "Hz": "1 s^-1",
-    "kHz": "1000 s^-1",
-    "mrad": "0.001 rad",
     "deg": "0.017453292519943295 rad",
     "gon": "0.015707963267948967 rad",
     "arcmin": "0.0002908882086657216 rad",
@@ -45,26 +34,22 @@ _UNITS = {
     "rpm": "0.10471975511965977 rad/s",
     "rps": "1 turn/s",
     "N": "1 kg m/s^2",
-    "kN": "1000 N",
     "Nm": "1 N m",
     "kgf": "9.80665 N",
     "lbf": "4.4482216152605 N",
-    "Pa": "1 kg/m/s^2",
-    "kPa": "1000 Pa",
-    "MPa": "1000000 Pa",
-    "GPa": "1000000000 Pa",
+    "Pa": "1 N/m^2",
     "bar": "100000 Pa",
     "psi": "6894.757293168361 Pa",
     "ksi": "6894757.293168361 Pa",
-    "J": "1 kg m^2/s^2",
-    "mJ": "0.001 J",
-    "kJ": "1000 J",
-    "MJ": "1000000 J",
+    "J": "1 N m",
     "kmh": "1000 m/h",
     "mph": "1609.344 m/h",
     "fps": "0.3048 m/s",
     "percent": "0.01",
 }
+_PREFIXES = {"n": "1e-9", "µ": "1e-6", "m": "1e-3", "c": "1e-2", "k": "1e3", "M": "1e6", "G": "1e9"}
+_PREFIXED = {"m": "nµmck", "g": "m", "s": "nµm", "rad": "m", "N": "k", "Pa": "kMG", "J": "mkM", "Hz": "k"}
+_UNITS = _NAMED | {f"{p}{unit}": f"{_PREFIXES[p]} {unit}" for unit, prefixes in _PREFIXED.items() for p in prefixes}
 """Units of the trade, each by others."""
 _SPELLINGS = (
     {"um": "µm", "micron": "µm", "microns": "µm", "us": "µs", "sec": "s", "msec": "ms", "usec": "µs", "hr": "h"}

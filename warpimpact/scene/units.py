@@ -21,10 +21,8 @@ MOST_QUOTED = 80
 LARGEST = 1e30
 """Largest quantity in SI; results such as a volume then stay finite."""
 RIGHT_ANGLE = math.pi / 2
-_STRING = r"^\s*[-+−]?[\d.,]+([eE][-+]?\d+)?\s*%?\s*$"
-_STRING_WITH_UNIT = r"^\s*[-+−]?[\d.,]+([eE/][-+]?\d+)?\s*\S.*$"
+_STRING = r"^\s*[-+−]?[\d.,]+"
 """Strings that editors accept, in the dialect of JSON schemas; only the reader knows the units."""
-
 
 if TYPE_CHECKING:
     Read: TypeAlias = float | Any  # what a field holds, or what is read into it: a string with a unit, above all
@@ -162,11 +160,7 @@ def quoted(value: object) -> str:
 
 def _quantity(name: str, unit: str, example: str) -> BeforeValidator:
     """The reader of a quantity, with its JSON schema."""
-    schema = {
-        "type": ["number", "string", "object"],
-        "pattern": _STRING_WITH_UNIT if unit else _STRING,
-        "examples": [example],
-    }
+    schema = {"type": ["number", "string", "object"], "pattern": _STRING, "examples": [example]}
     if unit:
         schema["unit"] = "deg" if unit == "rad" else unit
     return BeforeValidator(

@@ -104,8 +104,8 @@ class Sought:
         if self.by_thickness is not None:
             thickness, share = self.by_thickness
             there = np.interp(np.log(np.maximum(values, thickness[0])), np.log(thickness), share)
-            values_of_layer["resistance"] = shots.own_of(target, "resistance", self.layer) * there
-        return shots.with_own(values_of_layer, self.layer)
+            values_of_layer["resistance"] = shots.layer_value(target, "resistance", self.layer) * there
+        return shots.assign(values_of_layer, self.layer)
 
 
 def limit_velocity(
@@ -286,7 +286,7 @@ def _search_of(scene: Scene, shots: Shots, sought: Sought) -> LimitSearch:
     """A search of the limits of all shots."""
     if sought.quantity == "velocity":
         return LimitSearch(shots.velocity, np.inf, np.zeros(len(shots)), sought.tolerance, sought.highest)
-    start = np.broadcast_to(shots.own_of(scene.target, "thickness", sought.layer), len(shots))
+    start = np.broadcast_to(shots.layer_value(scene.target, "thickness", sought.layer), len(shots))
     return LimitSearch(start, 0.0, shots.velocity, sought.tolerance, sought.highest)
 
 
@@ -319,7 +319,7 @@ def check_arrests(scene: Scene, shots: Shots | None = None) -> None:
 
 def _weakens(plate: Plate, shots: Shots | None, layer: int) -> bool:
     """Whether a layer weakens in any of the shots."""
-    if plate.degradation < 1.0 or shots is None or not shots.differs("degradation", layer):
+    if plate.degradation < 1.0 or shots is None or not shots.varies("degradation", layer):
         return plate.degradation < 1.0
     return bool((shots.columns["degradation"][:, layer] < 1.0).any())
 

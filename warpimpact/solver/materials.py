@@ -57,17 +57,17 @@ def materials_of(scene: Scene, shots: Shots) -> list[Materials]:
     """The Materials of all layers of a scene, front to back."""
     target = scene.target
     weakening = weakens(target, shots)
-    thickness = [shots.own_of(target, "thickness", k) for k in range(len(target.layers))]
+    thickness = [shots.layer_value(target, "thickness", k) for k in range(len(target.layers))]
     fronts = target.fronts(thickness)
     core, interaction, free = scene.core, scene.interaction, scene.interaction.free_surface
-    mass = shots.own("mass", core.mass_properties.mass)
+    mass = shots.value("mass", core.mass_properties.mass)
     static, linear, quadratic = (
-        shots.own(name, getattr(interaction, name)) for name in ("static", "linear", "quadratic")
+        shots.value(name, getattr(interaction, name)) for name in ("static", "linear", "quadratic")
     )
     materials = []
     for k, plate in enumerate(target.layers):
         resistance, friction, degradation, offset_y, offset_z = (
-            shots.own_of(target, name, k)
+            shots.layer_value(target, name, k)
             for name in ("resistance", "shear_coefficient", "degradation", "offset_y", "offset_z")
         )
         a0, a1, a2 = coefficients(static, linear, quadratic, resistance, plate.density)
@@ -96,7 +96,7 @@ def materials_of(scene: Scene, shots: Shots) -> list[Materials]:
 def weakens(target: Target, shots: Shots | None = None) -> list[bool]:
     """Whether each layer weakens. A layer whose degradation differs from shot to shot counts as one that does."""
     return [
-        layer.degradation < 1.0 or (shots is not None and shots.differs("degradation", k))
+        layer.degradation < 1.0 or (shots is not None and shots.varies("degradation", k))
         for k, layer in enumerate(target.layers)
     ]
 

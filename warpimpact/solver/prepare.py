@@ -181,7 +181,7 @@ def prepare(scene: Scene, shots: Shots, numerics: Numerics) -> Prepared:
         double=resolution.double,
         nodal=resolution.nodal,
         degrades=any(weakening),
-        rubs=any(plate.shear_coefficient > 0.0 or shots.differs("shear_coefficient", k) for k, plate in plates),
+        rubs=any(plate.shear_coefficient > 0.0 or shots.varies("shear_coefficient", k) for k, plate in plates),
         rate_dependent=any(
             getattr(interaction, name) > 0.0 or name in shots.columns for name in ("linear", "quadratic")
         ),
@@ -229,5 +229,5 @@ def _lengths(layers: Sequence[Plate], shots: Shots) -> tuple[list[list[float]], 
     """All different degradation lengths of the layers among the shots; and which of them each shot has, shape [1] where
     all have the same."""
     front, *behind = [layer.degradation_length for layer in layers]
-    different, which = np.unique(shots.own("degradation_length", front), return_inverse=True)
+    different, which = np.unique(shots.value("degradation_length", front), return_inverse=True)
     return [[length, *behind] for length in different.tolist()], np.asarray(which.reshape(-1), dtype=np.int64)

@@ -238,7 +238,7 @@ def layer_steps(
 ) -> list[Array]:
     """Time steps in all layers [s], each of shape [shots], for their degradation lengths [m], each of shape [1] or
     [shots]."""
-    mass = shots.own("mass", scene.core.mass_properties.mass)
+    mass = shots.value("mass", scene.core.mass_properties.mass)
     return [
         resolution.step_at(
             shots.velocity,
@@ -257,15 +257,15 @@ def conditions_of(
     """The conditions of every shot, under the names of the kernels' Shots; of shape [1] where all shots share one."""
     core, target = scene.core, scene.target
     body = core.mass_properties
-    mass, depth = shots.own("mass", body.mass), materials[-1].front + materials[-1].thickness
+    mass, depth = shots.value("mass", body.mass), materials[-1].front + materials[-1].thickness
     scale = mass / body.mass  # the whole body is scaled, so its moments of inertia are, too
     gaps = sum(target.gaps)
     return {name: values for name, values in shots.columns.items() if name not in BY_LAYER} | {
         "mass": mass,
         "inertia_axial": scale * body.inertia_axial,
         "inertia_transverse": scale * body.inertia_transverse,
-        "strength": shots.own("strength", UNBREAKABLE if core.strength is None else core.strength),
-        "onset_share": shots.own("onset", scene.interaction.onset),
+        "strength": shots.value("strength", UNBREAKABLE if core.strength is None else core.strength),
+        "onset_share": shots.value("onset", scene.interaction.onset),
         "time_step": reduce(np.minimum, steps),
         "longest_way": STEP_ALLOWANCE * (depth - gaps + 2.0 * len(materials) * core.bounding_radius) + gaps,
     }

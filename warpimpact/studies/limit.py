@@ -142,7 +142,7 @@ class LimitMap:
             attributes[attr.LIMIT_FACTORS] = list(factors)
         tried = searched.shots.velocity
         if sought.quantity == "thickness":
-            tried = searched.shots.own_of(campaign.target, "thickness", sought.layer)
+            tried = searched.shots.layer_value(campaign.target, "thickness", sought.layer)
         put = sought.put(campaign.target, shots, tried)
         outcomes, by = searched.recorded(sought.quantity), (worker.device, elapsed)
         return described(campaign, put, pilot, outcomes, short_steps(numerics), by, attributes)

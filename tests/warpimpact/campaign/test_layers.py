@@ -151,10 +151,14 @@ def test_the_references_are_a_solid_add_on_before_the_same_base_and_the_base_alo
     assert solid.target.weights == pytest.approx(given.weights, rel=1e-12)
     assert solid.target.gaps == given.gaps
     assert solid.target.layers[2] == given.layers[2]
-    np.testing.assert_array_equal(of_solid.own_of(solid.target, "thickness", 2), shots.own_of(given, "thickness", 2))
+    np.testing.assert_array_equal(
+        of_solid.layer_value(solid.target, "thickness", 2), shots.layer_value(given, "thickness", 2)
+    )
     assert not alone.layer
     assert all(getattr(alone.plate, name) == getattr(given.layers[2], name) for name in NamedPlate.model_fields)
-    np.testing.assert_array_equal(of_base.own_of(alone.target, "thickness", 0), shots.own_of(given, "thickness", 2))
+    np.testing.assert_array_equal(
+        of_base.layer_value(alone.target, "thickness", 0), shots.layer_value(given, "thickness", 2)
+    )
 
 
 def test_a_solid_add_on_of_the_catalogue_has_the_resistance_of_its_thickness() -> None:

@@ -99,7 +99,7 @@ def test_a_march_has_what_belongs_to_its_shot_and_its_layers() -> None:
     """Thickness and offset of the shot, friction and materials of the settings; nothing is computed."""
     holes = PLATE.model_copy(update={"pattern": CirclePattern(diameter=8e-3, spacing=(60e-3, 60e-3))})
     scene = Scene(core=CORE, target=(holes, Layer(thickness=2e-3, gap=10e-3, resistance=1e9)))
-    shot = SHOT.with_own({"thickness": np.array([3e-3]), "offset_y": np.array([6e-3])})
+    shot = SHOT.assign({"thickness": np.array([3e-3]), "offset_y": np.array([6e-3])})
     soft = flow_entry("AA6082-T6").flow
     continuum = Continuum(flows=(STEEL, soft), spacing=1e-3, friction=0.07)
     conditions = strikes.memory_of(scene, shot, Worker("cpu", 1)).prepared.conditions

@@ -88,9 +88,9 @@ def test_the_plate_is_layer_0() -> None:
 def test_columns_of_layers_are_put_one_beside_the_other() -> None:
     base = Layer(thickness="8 mm", resistance="1 GPa")
     target, two = Target(layers=(PLATE, base, base)), np.array([1e-3, 2e-3])
-    shots = Shots(*np.zeros((8, 2)), thickness=two).with_own({"thickness": two + 1e-3}, layer=1)
-    assert [shots.differs("thickness", layer) for layer in range(3)] == [True, True, False]
-    assert [shots.own_of(target, "thickness", layer).tolist() for layer in range(3)] == [
+    shots = Shots(*np.zeros((8, 2)), thickness=two).assign({"thickness": two + 1e-3}, layer=1)
+    assert [shots.varies("thickness", layer) for layer in range(3)] == [True, True, False]
+    assert [shots.layer_value(target, "thickness", layer).tolist() for layer in range(3)] == [
         [1e-3, 2e-3],
         [2e-3, 3e-3],
         [8e-3],

@@ -75,7 +75,7 @@ def test_thickness_of_a_layer_of_its_own() -> None:
     behind = limit_thickness(scene, shots(1), numerics=STANDARD, layer=1, device="cpu")
     assert behind.converged.all()
     assert behind.value.item() == pytest.approx(alone - 4e-3, rel=0.03)
-    assert behind.shots.own_of(scene.target, "thickness", 1).item() == behind.lower.item()
+    assert behind.shots.layer_value(scene.target, "thickness", 1).item() == behind.lower.item()
 
 
 HOLES = PLATE.model_copy(update={"pattern": CirclePattern(diameter=5e-3, spacing=(8e-3, 8e-3))})

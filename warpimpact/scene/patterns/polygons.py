@@ -82,7 +82,7 @@ class PolygonsPattern(Pattern):
         (a, b), images = self.period, []
         window = shapely.box(y_range[0], z_range[0], y_range[1], z_range[1])
         for corners in map(np.array, self.polygons):
-            for stagger in (np.array([(-a, -b), (a, b)]) / 4 if self.staggered else np.zeros((1, 2))):
+            for stagger in np.array([(-a, -b), (a, b)]) / 4 if self.staggered else np.zeros((1, 2)):
                 low, high = corners.min(axis=0) + stagger, corners.max(axis=0) + stagger
                 around = (y_range[0] - a, y_range[1] + a), (z_range[0] - b, z_range[1] + b)
                 images += [corners + stagger + shift for shift in shifts_into(low, high, self.period, *around)]
