@@ -4,8 +4,6 @@ Change axes, colours and layout here; a number that a figure shows is computed i
 analysis and the rooms below it, but neither export nor report. Text in figures is never mathtext.
 """
 
-import matplotlib as mpl
-
 from warpimpact.plotting.comparison import comparison_figure, weight_figure
 from warpimpact.plotting.distribution import dispersion, marginals, probability_map, uncertainty
 from warpimpact.plotting.limit import limit_figure
@@ -15,22 +13,17 @@ from warpimpact.plotting.maps import (
     overview,
     save_beside,
     save_maps,
-    status_map,
     variable_map,
     variable_maps,
 )
 from warpimpact.plotting.plate import plate_figure
-from warpimpact.plotting.trajectory import course, flight, largest_load, passage
-
-mpl.rcParams["text.usetex"] = False  # a matplotlibrc may ask for it, and titles are no TeX
-mpl.rcParams["text.parse_math"] = False  # a title is text: "$" is a character of it, and broken mathtext an error
+from warpimpact.plotting.trajectory import course, flight, passage, pressure
 
 __all__ = [
     "comparison_figure",
     "course",
     "dispersion",
     "flight",
-    "largest_load",
     "layers_figure",
     "limit_figure",
     "marginals",
@@ -38,10 +31,10 @@ __all__ = [
     "overview",
     "passage",
     "plate_figure",
+    "pressure",
     "probability_map",
     "save_beside",
     "save_maps",
-    "status_map",
     "uncertainty",
     "variable_map",
     "variable_maps",

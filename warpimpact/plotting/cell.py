@@ -1,33 +1,30 @@
-"""Parts of hit maps: values of hits in shown units, their colours, and the coloured unit cell.
+"""Maps of the unit cell: a variable of the hits in shown units, its colours, and the holes.
 
-If the hits cover the cell, they are drawn as an image; every pixel has the colour of the nearest hit, also across the
-cell's edges. If they are few or leave gaps, they are drawn as points. The view is against the line of fire, from
-behind the plate: y to the right, z up, x towards the viewer.
+If the hits cover the cell, every pixel has the colour of the nearest hit, also across the cell's edges. If they are few
+or leave gaps, they are drawn as points. The view is from behind the plate: y to the right, z up.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from textwrap import fill
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import xarray
 from matplotlib import colormaps
-from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.cm import ScalarMappable
 from matplotlib.colors import Colormap, ListedColormap, Normalize
-from matplotlib.patches import Patch
+from matplotlib.patches import Rectangle
 from matplotlib.patheffects import Normal, Stroke
-from matplotlib.transforms import ScaledTranslation
 from numpy.typing import NDArray
 from scipy.spatial import KDTree
 
-from warpimpact.analysis.hit_map import OF_PASSED, chosen, hit_points
+from warpimpact.analysis.hit_map import OF_PASSED, axes_of, chosen, hit_points
 from warpimpact.analysis.summary import breaks_promise
 from warpimpact.kernels.status import Status
-from warpimpact.plotting.style import MAP_SIDE, common_fire, draw_fire
+from warpimpact.plotting.style import Figure, common_fire, draw_fire
 from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
 from warpimpact.results.dataset import passed
@@ -37,32 +34,44 @@ from warpimpact.scene.model import Array
 
 Scale = tuple[Colormap, Normalize]
 
-CELL_PIXELS = 400  # along the longer side of the cell
-FEWEST_HITS = 64  # fewer are drawn as points: an image would suggest detail that they do not have
-WIDEST_GAP = 3.0  # largest distance from a pixel to its hit, in mean hit spacings; random hits reach about 2
-NO_VALUE = "0.62"  # for hits without a value
-# Colours of Okabe and Ito: they differ in every kind of colour blindness.
+MAP_SIDE = 4.2
+"""Longer side of a map on paper [inch]."""
+_ROOM = np.array([2.3, 0.9])
+"""Room for the axis labels and the colour bar of a map [inch]."""
+_TITLE_WIDTH = 40
+"""Most characters in a line of the title of a map."""
+SEEN = "seen from behind the plate"
+CELL_PIXELS = 400
+"""Pixels along the longer side of the cell."""
+FEWEST_HITS = 64
+"""Fewer hits are drawn as points: an image would suggest detail that they do not have."""
+WIDEST_GAP = 3.0
+"""Largest distance from a pixel to its hit, in mean hit spacings; random hits reach about 2."""
+NO_VALUE = "0.62"
+"""Colour of hits without a value."""
 STATUS_COLOURS = (
     *("#D55E00", "#56B4E9", "#009E73", "#E69F00", "#000000", "#CC79A7", "#F0E442", "#0072B2", "#FFFFFF"),
     *("#882255", "#999933"),
 )
 """Colours by the codes of `Status`: warm where the core comes through, cool where it is stopped or turned back, white
 where it did not reach the layer."""
-
-_SIGNED = {
-    *(v.AZIMUTH, v.IMPACT_PITCH, v.IMPACT_YAW, v.EDGE_DISTANCE),
-    *(v.PITCH, v.YAW),
-}
+_SIGNED = {v.AZIMUTH, v.IMPACT_PITCH, v.IMPACT_YAW, v.EDGE_DISTANCE, v.PITCH, v.YAW}
 
 
 class Shown(NamedTuple):
-    """A variable of the hits as it is shown: values of shape [hits], NaN where a hit has none; label of an axis; title;
-    whether it has a sign."""
+    """A variable of the hits as a map shows it.
+
+    Attributes:
+        values: in shown units, shape [hits]; NaN where a hit has none.
+        label: of the colour bar.
+        title: of the map.
+        signed: whether the colours are symmetric about a neutral zero.
+    """
 
     values: Array
     label: str
     title: str
-    signed: bool
+    signed: bool = False
 
 
 def shown(dataset: xarray.Dataset, variable: str, standoff: float | None = None, layer: int | None = None) -> Shown:
@@ -78,30 +87,21 @@ def shown(dataset: xarray.Dataset, variable: str, standoff: float | None = None,
     Raises:
         ValueError: the variable cannot be mapped, or the Dataset has no such stand-off or layer.
     """
-    array = _selected(dataset, variable, standoff, layer)
+    mapped = [name for name in (*v.HIT_NUMBERS, *v.LAYER_NUMBERS) if name in dataset]
+    if variable not in mapped:
+        raise ValueError(f'"{variable}" cannot be mapped; choose one of {", ".join(mapped)}')
+    array = chosen(dataset, variable, standoff, layer)
     unit = STORED[array.attrs["units"]]
     exists = np.isfinite(array.values) & (passed(dataset) if variable in OF_PASSED else True)
     title = name = words(variable.removeprefix("layer_"))
     if "standoff" in array.coords:
         title += f", {float(array[v.STANDOFF]) * MM:g} mm behind the {struck(dataset)}"
     if variable in v.LAYER_NUMBERS:
-        title += f", layer {_number(dataset, layer)}"
+        title += f", layer {int(dataset.sizes['layer']) - 1 if layer is None else layer}"
     if array.attrs["long_name"] != title:
         title += f"\n{array.attrs['long_name']}"
     values = np.where(exists, array.values.astype(np.float64) * unit.factor, np.nan)
     return Shown(values, f"{name} [{unit.shown}]", title, variable in _SIGNED)
-
-
-def _number(dataset: xarray.Dataset, layer: int | None) -> int:
-    return int(dataset.sizes["layer"]) - 1 if layer is None else layer
-
-
-def _selected(dataset: xarray.Dataset, variable: str, standoff: float | None, layer: int | None) -> xarray.DataArray:
-    numbers = (*v.HIT_NUMBERS, *v.LAYER_NUMBERS)
-    mapped = [name for name in numbers if name in dataset]
-    if variable not in mapped:
-        raise ValueError(f'"{variable}" cannot be mapped; choose one of {", ".join(mapped)}')
-    return chosen(dataset, variable, standoff, layer)
 
 
 def struck(dataset: xarray.Dataset) -> str:
@@ -110,6 +110,7 @@ def struck(dataset: xarray.Dataset) -> str:
 
 
 def words(name: str) -> str:
+    """A name of a variable as words."""
     return name.replace("_", " ")
 
 
@@ -130,100 +131,128 @@ def range_text(array: xarray.DataArray) -> str:
     return highest if f"{lowest}{unit.suffix}" == highest else f"{lowest} to {highest}"
 
 
-def limits(dataset: xarray.Dataset) -> Array:
-    """Range [mm] along y and z that contains the whole cell and every hit, shape [2, 2]."""
-    half = np.asarray(dataset.attrs[attr.PLATE_PERIOD]) / 2
-    hits = hit_points(dataset)
-    return np.stack([np.minimum(-half, hits.min(axis=0)), np.maximum(half, hits.max(axis=0))], axis=1) * MM
+def limits(*datasets: xarray.Dataset) -> Array:
+    """Range [mm] along y and z that contains the cells of all results and every hit, shape [2, 2]."""
+    halves = [np.asarray(dataset.attrs[attr.PLATE_PERIOD]) / 2 for dataset in datasets]
+    points = np.concatenate([*(hit_points(dataset) for dataset in datasets), halves, np.negative(halves)])
+    return np.stack([points.min(axis=0), points.max(axis=0)], axis=1) * MM
 
 
-def map_size(dataset: xarray.Dataset) -> Array:
+def map_size(*datasets: xarray.Dataset) -> Array:
     """Width and height of a map to scale [inch]."""
-    extent = np.ptp(limits(dataset), axis=1)
+    extent = np.ptp(limits(*datasets), axis=1)
     return np.asarray(MAP_SIDE * extent / extent.max())
+
+
+def map_sheet(datasets: Sequence[xarray.Dataset], columns: int) -> tuple[Figure, list[Axes]]:
+    """A figure with a panel for a map of each result, all to one scale."""
+    rows = -(-len(datasets) // columns)
+    figure = Figure(figsize=(columns, rows) * (map_size(*datasets) + _ROOM), layout="compressed")
+    panels = list(figure.subplots(rows, columns, squeeze=False).flat)
+    for axes in panels[len(datasets) :]:
+        axes.remove()
+    for axes in panels[: len(datasets)]:
+        to_scale(axes, *datasets)
+    return figure, panels[: len(datasets)]
+
+
+def to_scale(axes: Axes, *datasets: xarray.Dataset) -> None:
+    """Set axes to the cells of some results."""
+    across, up = limits(*datasets)
+    axes.set(xlim=across, ylim=up, xlabel="hit y [mm]", ylabel="hit z [mm]", aspect="equal")
+    axes.autoscale(False)
 
 
 def scale_of(columns: Sequence[Array], *, signed: bool = False) -> Scale:
     """One colour scale for all columns: symmetric about a neutral zero if the values have a sign; grey for NaN."""
-    together = np.concatenate(columns)
+    together = np.concatenate([np.ravel(column) for column in columns])
     finite = together[np.isfinite(together)]
+    lowest, highest = (finite.min(), finite.max()) if finite.size else (0.0, 1.0)
     if signed:
-        highest = np.max(np.abs(finite), initial=0.0)
+        highest = max(-lowest, highest)
         lowest = -highest
-    else:
-        lowest, highest = (finite.min(), finite.max()) if finite.size else (0.0, 1.0)
-        if np.isclose(lowest, highest):  # a scale from 0: it shows no rounding as a pattern
-            lowest, highest = min(0.0, highest), max(0.0, highest) or 1.0
+    elif np.isclose(lowest, highest):  # a scale from 0: it shows no rounding as a pattern
+        lowest, highest = min(0.0, highest), max(0.0, highest) or 1.0
     colours = colormaps["RdBu_r" if signed else "viridis"].with_extremes(bad=NO_VALUE)
     return colours, Normalize(lowest, highest)
 
 
-def draw_values(
-    axes: Axes, dataset: xarray.Dataset, values: Array, scale: Scale, layer: int | None = None
+def draw_map(
+    axes: Axes, dataset: xarray.Dataset, column: Shown, scale: Scale | None = None, layer: int | None = None
 ) -> ScalarMappable:
-    """Draw values of the hits, shape [hits], with the holes and a legend; return the artist for a colour bar. A hit
-    without a value shows how it ended, or how it ended in one layer."""
-    artist = _paint(axes, dataset, values, *scale)
-    exists = np.isfinite(values)
-    grey = [] if exists.all() else [Patch(facecolor=NO_VALUE, label=_without_value(dataset, exists, layer))]
-    _furnish(axes, dataset, grey, layer)
+    """Draw a variable with its title, the holes and the fire, with labels for a legend; return the coloured artist.
+
+    A hit without a value is grey, with how it ended as the label.
+
+    Args:
+        scale: colours; by default those of the values.
+        layer: the layer whose holes and ends are shown; by default the plate's holes and the target's ends.
+    """
+    values, exists = column.values, np.isfinite(column.values)
+    artist = _paint(axes, dataset, values, scale or scale_of([values], signed=column.signed))
+    if not exists.all():
+        ends = status_names(_statuses(dataset, layer)[~exists])
+        _label(axes, NO_VALUE, f"no value: {', '.join(ends.values())}")
+    _finish(axes, dataset, column.title, layer)
     return artist
 
 
 def draw_status(axes: Axes, dataset: xarray.Dataset, layer: int | None = None) -> None:
-    """Draw how the shots ended. The shares stand in the legend; for one layer they stand in the title, as layers share
-    a legend."""
-    status = dataset[v.STATUS].values if layer is None else dataset[v.LAYER_STATUS].values[:, layer]
-    scale = Normalize(-0.5, len(STATUS_COLOURS) - 0.5)
-    _paint(axes, dataset, status.astype(float), ListedColormap(STATUS_COLOURS), scale)
-    codes = [code for code in Status if np.any(status == code)]
-    names = {code: words(code.name.lower()) for code in codes}
-    told = {code: f"{names[code]} {np.mean(status == code):.1%}" for code in codes}
-    labels, shares = (told, "status") if layer is None else (names, f"layer {layer}\n{', '.join(told.values())}")
-    _furnish(axes, dataset, [Patch(facecolor=STATUS_COLOURS[code], label=labels[code]) for code in codes], layer)
-    axes.set_title(shares, fontsize="medium")
+    """Draw how the shots ended, with the share of each end in the title."""
+    status = _statuses(dataset, layer)
+    _paint(axes, dataset, status, (ListedColormap(STATUS_COLOURS), Normalize(-0.5, len(STATUS_COLOURS) - 0.5)))
+    names = status_names(status)
+    for code, name in names.items():
+        _label(axes, STATUS_COLOURS[code], name)
+    shares = ", ".join(f"{name} {np.mean(status == code):.1%}" for code, name in names.items())
+    _finish(axes, dataset, f"{'status' if layer is None else f'layer {layer}'}\n{shares}", layer)
 
 
-def draw_holes(axes: Axes, dataset: xarray.Dataset, layer: int | None = None) -> list[Artist]:
-    """Draw the edges of the holes of one layer (None: the plate), visible on any colour, and set the axes to the cell,
-    to scale.
+def status_names(status: NDArray[Any]) -> dict[int, str]:
+    """Words for the codes of status that occur."""
+    return {int(code): words(code.name.lower()) for code in Status if np.any(status == code)}
 
-    Returns the entry of a legend; no entry for a layer without holes.
-    """
+
+def _statuses(dataset: xarray.Dataset, layer: int | None) -> NDArray[Any]:
+    return dataset[v.STATUS].values if layer is None else dataset[v.LAYER_STATUS].values[:, layer]
+
+
+def _label(axes: Axes, colour: str, label: str) -> None:
+    axes.plot([], [], "s", color=colour, markeredgecolor="0.3", markersize=9, label=label)
+
+
+def _finish(axes: Axes, dataset: xarray.Dataset, title: str, layer: int | None) -> None:
+    """Add the holes, the direction of fire and the title."""
+    draw_hole_edges(axes, *outlines(dataset, layer or 0).values())
     (left, right), (bottom, top) = limits(dataset)
-    axes.set(xlim=(left, right), ylim=(bottom, top), xlabel="hit y [mm]", ylabel="hit z [mm]", aspect="equal")
-    holes = outlines(dataset, layer or 0)
-    if not len(holes["y"]):
-        return []
-    (edge,) = axes.plot(
-        holes["y"] * MM,
-        holes["z"] * MM,
-        color="white",
-        linewidth=1.2,
-        path_effects=[Stroke(linewidth=2.8, foreground="black"), Normal()],
-        scalex=False,
-        scaley=False,
-        label="edge of hole",
-    )
-    return [edge]
+    cell = Rectangle((left, bottom), right - left, top - bottom, transform=axes.transData)
+    for line in axes.lines:
+        line.set_clip_path(cell)
+    if (fire := common_fire(dataset)) is not None:
+        draw_fire(axes, fire)
+    axes.set_title("\n".join(fill(line, _TITLE_WIDTH) for line in title.splitlines()), fontsize="medium")
+
+
+def draw_hole_edges(axes: Axes, y: Array, z: Array) -> None:
+    """Draw edges of holes [m], with a NaN between one hole and the next, visible on any colour."""
+    if len(y):
+        around = [Stroke(linewidth=2.8, foreground="black"), Normal()]
+        axes.plot(y * MM, z * MM, color="white", linewidth=1.2, path_effects=around, label="edge of hole")
 
 
 def pixels(dataset: xarray.Dataset, count: int = CELL_PIXELS) -> Array:
-    """Centres [m] of the cell's pixels, relative to its lower left corner, shape [z, y, 2].
+    """Centres [m] of the cell's pixels, `count` of them along its longer side, shape [z, y, 2]."""
+    return np.stack(np.meshgrid(*axes_of(np.asarray(dataset.attrs[attr.PLATE_PERIOD]), count)), axis=-1)
 
-    Args:
-        count: pixels along the longer side.
-    """
+
+def nearest(
+    dataset: xarray.Dataset, points: Array, which: NDArray[np.bool_] | slice = slice(None), count: int | None = None
+) -> tuple[Any, Any]:
+    """Distances [m] and indices of the hits nearest to points [m], across the cell's edges."""
     period = np.asarray(dataset.attrs[attr.PLATE_PERIOD])
-    counts = np.ceil(count * period / period.max()).astype(int)
-    y, z = ((np.arange(n) + 0.5) / n * length for n, length in zip(counts, period, strict=True))
-    return np.stack(np.meshgrid(y, z), axis=-1)
-
-
-def tree_of(dataset: xarray.Dataset, which: NDArray[np.bool_] | slice = slice(None)) -> KDTree:
-    """Search tree of the hits for `pixels`; it continues across the cell's edges."""
-    period = np.asarray(dataset.attrs[attr.PLATE_PERIOD])
-    return KDTree((hit_points(dataset)[which] + period / 2) % period, boxsize=period)
+    tree = KDTree((hit_points(dataset)[which] + period / 2) % period % period, boxsize=period)
+    distances, places = tree.query(points + period / 2, k=count or 1)
+    return distances, places
 
 
 def nearest_hits(dataset: xarray.Dataset, count: int = CELL_PIXELS) -> NDArray[np.intp] | None:
@@ -231,58 +260,22 @@ def nearest_hits(dataset: xarray.Dataset, count: int = CELL_PIXELS) -> NDArray[n
     period, hits = np.asarray(dataset.attrs[attr.PLATE_PERIOD]), hit_points(dataset)
     if len(hits) < FEWEST_HITS or np.any(np.abs(hits) > period / 2):
         return None
-    distance, nearest = tree_of(dataset).query(pixels(dataset, count))
-    spacing = np.sqrt(period.prod() / len(hits))
-    return nearest if distance.max() <= WIDEST_GAP * spacing else None
+    distance, places = nearest(dataset, pixels(dataset, count))
+    return places if distance.max() <= WIDEST_GAP * np.sqrt(period.prod() / len(hits)) else None
 
 
 def paint_pixels(axes: Axes, dataset: xarray.Dataset, image: Array, scale: Scale) -> ScalarMappable:
     """Colour the cell by an image of shape [z, y]."""
     y, z = np.asarray(dataset.attrs[attr.PLATE_PERIOD]) / 2 * MM
-    colours, norm = scale
-    extent = (-y, y, -z, z)
-    return axes.imshow(image, cmap=colours, norm=norm, origin="lower", extent=extent, interpolation="nearest")
+    cmap, norm = scale
+    return axes.imshow(image, cmap=cmap, norm=norm, origin="lower", extent=(-y, y, -z, z), interpolation="nearest")
 
 
-def _paint(axes: Axes, dataset: xarray.Dataset, values: Array, colours: Colormap, norm: Normalize) -> ScalarMappable:
-    """Colour the cell by values of the hits, shape [hits]: as an image if hits cover it, else as points."""
-    nearest = nearest_hits(dataset)
-    if nearest is not None:
-        return paint_pixels(axes, dataset, values[nearest], (colours, norm))
+def _paint(axes: Axes, dataset: xarray.Dataset, values: Array, scale: Scale) -> ScalarMappable:
+    """Colour the cell by values of the hits: as an image if they cover it, otherwise as points."""
+    places = nearest_hits(dataset)
+    if places is not None:
+        return paint_pixels(axes, dataset, values[places], scale)
     y, z = hit_points(dataset).T * MM
-    return axes.scatter(
-        y,
-        z,
-        c=values,
-        cmap=colours,
-        norm=norm,
-        s=36,
-        edgecolors="black",
-        linewidths=0.6,
-        plotnonfinite=True,
-        zorder=3,
-    )
-
-
-def _without_value(dataset: xarray.Dataset, exists: NDArray[np.bool_], layer: int | None) -> str:
-    """Legend entry of the grey hits: their statuses."""
-    status = dataset[v.STATUS].values if layer is None else dataset[v.LAYER_STATUS].values[:, layer]
-    statuses = set(status[~exists].tolist())
-    return fill(f"no value: {', '.join(words(code.name.lower()) for code in Status if code in statuses)}", 30)
-
-
-def _furnish(axes: Axes, dataset: xarray.Dataset, entries: Sequence[Artist], layer: int | None) -> None:
-    """Add the holes, the direction of fire, and a legend below the axes."""
-    entries = [*entries, *draw_holes(axes, dataset, layer)]
-    if (fire := common_fire(dataset)) is not None:
-        draw_fire(axes, fire)
-    if entries:
-        below = axes.transAxes + ScaledTranslation(0.0, -0.5, axes.figure.dpi_scale_trans)
-        axes.legend(
-            handles=entries,
-            loc="upper center",
-            bbox_to_anchor=(0.5, 0.0),
-            bbox_transform=below,
-            ncols=2,
-            frameon=False,
-        )
+    point: dict[str, Any] = {"s": 36, "edgecolors": "black", "linewidths": 0.6, "plotnonfinite": True, "zorder": 3}
+    return axes.scatter(y, z, c=values, cmap=scale[0], norm=scale[1], **point)

@@ -9,7 +9,6 @@ from textwrap import fill
 from typing import Any
 
 from matplotlib.axes import Axes
-from matplotlib.figure import Figure
 from matplotlib.layout_engine import ConstrainedLayoutEngine
 
 from warpimpact.analysis.comparison_text import (
@@ -23,7 +22,7 @@ from warpimpact.analysis.comparison_text import (
 )
 from warpimpact.analysis.effectiveness import Score, depth_note
 from warpimpact.analysis.plate_text import weights_text
-from warpimpact.plotting.style import BLUE, GREY, VERMILION, add_heading, bars, hide_sides, legend_below
+from warpimpact.plotting.style import BLUE, GREY, VERMILION, Figure, bars, finish, hide_sides, in_style
 
 # Markers differ for a print in grey.
 _AVERAGE = ("mean, or share", "o", BLUE, -0.12)
@@ -43,6 +42,7 @@ _ROW, _MARGIN, _LINE = 0.42, 0.75, 0.15
 """Height of a row, of the margin of a panel, and of a line of the label of a row [inch]."""
 
 
+@in_style
 def comparison_figure(comparison: Comparison, *, every: bool = False) -> Figure:
     """The deciding measure: its value for every plate on the left, and the differences from the best plate on the
     right, with intervals.
@@ -67,15 +67,15 @@ def comparison_figure(comparison: Comparison, *, every: bool = False) -> Figure:
         _MARGIN + max(len(labels) * max(row, label_height), pairs * row)
         for row in (_ROW * (1.5 if len(measures) > 1 else 1.0) for measures in quantities)
     ]
-    figure = Figure(figsize=(12.0, sum(heights) + 1.1), layout=ConstrainedLayoutEngine(h_pad=0.12))
+    figure = Figure(figsize=(12.0, sum(heights)), layout=ConstrainedLayoutEngine(h_pad=0.12))
     panels = figure.subplots(len(quantities), 2, squeeze=False, height_ratios=heights)
     for measures, shown, (left, right) in zip(quantities, differences, panels, strict=True):
         _draw_plates(left, comparison, measures)
         _furnish(left, labels)
         _draw_differences(right, comparison, measures, shown)
-    legend_below(figure, 4)
     title = "Plates compared" if decides is None or every else f"Plates by {decides.measure.label}"
-    add_heading(figure, title, "95 % intervals; hollow marker: cannot be told apart", *hits_used(comparison))
+    notes = "95 % intervals; hollow marker: cannot be told apart", *hits_used(comparison)
+    finish(figure, *notes, title=title, legend=True, columns=4)
     return figure
 
 
@@ -171,6 +171,7 @@ def _furnish(axes: Axes, lines: Sequence[str]) -> None:
     axes.tick_params(axis="y", length=0.0)
 
 
+@in_style
 def weight_figure(comparison: Comparison) -> Figure | None:
     """Measures of the base, or limits, against the areal density of the whole target, with their 95 % intervals; None
     if the plates have none of them.
@@ -186,8 +187,8 @@ def weight_figure(comparison: Comparison) -> Figure | None:
     figure = Figure(figsize=(1.2 + 5.2 * len(wanted), 5.4), layout="constrained")
     for axes, name in zip(figure.subplots(1, len(wanted), squeeze=False)[0], wanted, strict=True):
         (_draw_needed if name == _THICKNESS else _draw_against_weight)(axes, comparison, name)
-    legend_below(figure, 4)
-    add_heading(figure, "Targets against their weight; 95 % intervals", *_solid_plates(comparison))
+    title = "Targets against their weight; 95 % intervals"
+    finish(figure, *_solid_plates(comparison), title=title, legend=True, columns=4)
     return figure
 
 
@@ -259,9 +260,9 @@ def _draw_point(
     one."""
     label, marker, colour, _ = style
     ends = bars(measure.value, measure.low, measure.high)
-    beside = None if across is None else bars(density, *across)
+    horizontal = None if across is None else bars(density, *across)
     point: dict[str, Any] = {"color": colour, "markersize": 6.5, "capsize": 3.0, "zorder": 3}
-    axes.errorbar(density, measure.value, yerr=ends, xerr=beside, fmt=marker, label=label, **point)
+    axes.errorbar(density, measure.value, yerr=ends, xerr=horizontal, fmt=marker, label=label, **point)
 
 
 def _middle(densities: Sequence[float]) -> float:

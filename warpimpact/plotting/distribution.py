@@ -3,20 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from textwrap import fill
+from typing import Any
 
 import numpy as np
 import xarray
 from matplotlib.axes import Axes
-from matplotlib.figure import Figure
-from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 
 from warpimpact.analysis.hit_map import NEIGHBOURS, hit_points, mirrored, plane_fit, share_of
 from warpimpact.plotting.cell import (
-    draw_holes,
-    draw_values,
+    SEEN,
+    draw_hole_edges,
+    draw_map,
+    map_sheet,
     map_size,
+    nearest,
     nearest_hits,
     paint_pixels,
     pixels,
@@ -24,22 +25,29 @@ from warpimpact.plotting.cell import (
     shots_text,
     shown,
     struck,
-    tree_of,
+    to_scale,
 )
-from warpimpact.plotting.style import BLUE, LINE, VERMILION, inscribe, names, note_lines
+from warpimpact.plotting.style import BLUE, VERMILION, Figure, finish, in_style
 from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
+from warpimpact.results.layers import outlines
 from warpimpact.results.measures import Measure
 from warpimpact.scene.display import MM
 from warpimpact.scene.model import Array
 
-_BANDS = {"5 to 95 %": (0.05, 0.95, 0.2), "25 to 75 %": (0.25, 0.75, 0.4)}  # two quantiles and the opacity
-_PER_STRIP, _MOST_STRIPS = 50, 48  # fewest hits of a strip; most strips along an axis
-_NARROW = 16  # characters of a label along 1.2 inch
-_FINE = 100  # pixels along the longer side of a smoothed map
-_MOST_POINTS = 4000  # more are drawn as a density
+_BANDS = {"5 to 95 %": (0.05, 0.95, 0.2), "25 to 75 %": (0.25, 0.75, 0.4)}
+"""Two quantiles and the opacity of each band."""
+_PER_STRIP, _MOST_STRIPS = 50, 48
+"""Fewest hits of a strip, and most strips along an axis."""
+_FINE = 100
+"""Pixels along the longer side of a smoothed map."""
+_MOST_POINTS = 4000
+"""More hits are drawn as a density."""
+_STRIP = 1.2
+"""Width of a panel beside another one [inch]."""
 
 
+@in_style
 def marginals(dataset: xarray.Dataset, variable: str, standoff: float | None = None) -> Figure:
     """A map with the distribution of its values along y, along z, and over the whole cell.
 
@@ -48,77 +56,67 @@ def marginals(dataset: xarray.Dataset, variable: str, standoff: float | None = N
     """
     dataset = mirrored(dataset)
     column = shown(dataset, variable, standoff)
-    size = map_size(dataset)
-    notes = column.title, f"{shots_text(dataset)}; seen from behind the plate"
-    left, width = 0.95, size[0] + 4.8
-    below = 1.25 + LINE * len(note_lines(width, "", [*notes, *names(dataset)]))
-    height = below + size[1] + 1.9
-    figure = Figure(figsize=(width, height))  # a layout engine does not find a place for insets of fixed size
-    centre = figure.add_axes((left / width, below / height, size[0] / width, size[1] / height))
-    artist = draw_values(centre, dataset, column.values, scale_of([column.values], signed=column.signed))
+    figure, centre, above, beside, histogram = _with_margins(map_size(dataset))
+    to_scale(centre, dataset)
+    artist = draw_map(centre, dataset, column._replace(title=""))
     exists = np.isfinite(column.values)
-    if exists.any():
-        wide, tall = 1.0 / size  # one inch as a share of the map
-        above = centre.inset_axes((0.0, 1.0 + 0.12 * tall, 1.0, 1.2 * tall), sharex=centre)
-        beside = centre.inset_axes((1.0 + 0.12 * wide, 0.0, 1.2 * wide, 1.0), sharey=centre)
-        bar = centre.inset_axes((1.0 + 1.6 * wide, 0.0, 0.17 * wide, 1.0))
-        histogram = centre.inset_axes((1.0 + 1.77 * wide, 0.0, 1.2 * wide, 1.0))
-        values, points = column.values[exists], hit_points(dataset)[exists] * MM
+    values, points = column.values[exists], hit_points(dataset)[exists] * MM
+    if len(values):
         _draw_strips(above, points[:, 0], values, upright=False)
         _draw_strips(beside, points[:, 1], values, upright=True)
-        above.set_ylabel(fill(column.label, _NARROW))
-        beside.set_xlabel(fill(column.label, _NARROW))
-        beside.xaxis.set_major_locator(MaxNLocator(2, prune="both"))  # its numbers stay apart from those of the map
-        figure.colorbar(artist, cax=bar).set_ticks([])
         histogram.hist(values, bins=min(40, 4 + len(values) // 20), orientation="horizontal", color=BLUE, alpha=0.5)
         histogram.axhline(np.median(values), color="black", lw=1.2)
+        figure.colorbar(artist, ax=histogram, location="left", aspect=25, pad=0.0).set_ticks([])
         histogram.set(ylim=artist.get_clim() if np.ptp(values) else None, xlabel="hits", ylabel=column.label)
         histogram.yaxis.tick_right()
         histogram.yaxis.set_label_position("right")
-    inscribe(figure, dataset, *notes)
+    above.set_ylabel(column.label.replace(" [", "\n["))
+    beside.set_xlabel(column.label.replace(" [", "\n["))
+    finish(figure, column.title, f"{shots_text(dataset)}; {SEEN}", result=dataset, legend=True, columns=4)
     return figure
 
 
+def _with_margins(size: Array) -> tuple[Figure, Axes, Axes, Axes, Axes]:
+    """A figure with a panel of this size [inch], one above, one on the right with its own heights, and one further
+    right."""
+    figure = Figure(figsize=(size[0] + 2 * _STRIP + 2.4, size[1] + _STRIP + 1.0), layout="compressed")
+    grid = figure.add_gridspec(2, 3, width_ratios=(size[0], _STRIP, _STRIP), height_ratios=(_STRIP, size[1]))
+    centre = figure.add_subplot(grid[1, 0])
+    above, beside = figure.add_subplot(grid[0, 0], sharex=centre), figure.add_subplot(grid[1, 1], sharey=centre)
+    above.tick_params(labelbottom=False)
+    beside.tick_params(labelleft=False)
+    return figure, centre, above, beside, figure.add_subplot(grid[1, 2])
+
+
+@in_style
 def dispersion(dataset: xarray.Dataset, standoff: float | None = None) -> Figure:
     """Residual velocity against tilt at a stand-off (None: the largest), with the distribution of each."""
-    figure = Figure(figsize=(7.5, 6.5), layout="constrained")
-    grid = {"width_ratios": [5.0, 1.2], "height_ratios": [1.2, 5.0]}
-    (above, corner), (centre, beside) = figure.subplots(2, 2, sharex="col", sharey="row", gridspec_kw=grid)
-    corner.remove()
-    tilt, velocity = draw_dispersion(centre, dataset, standoff)
-    for axes, values, orientation in ((above, tilt, "vertical"), (beside, velocity, "horizontal")):
-        if len(values):
-            axes.hist(values, bins=40, orientation=orientation, color=BLUE, alpha=0.5)
-        else:
-            axes.set(xticks=[], yticks=[])
-        axes.label_outer()
-    above.set_ylabel("hits")
-    beside.set_xlabel("hits")
-    inscribe(figure, dataset, f"cores that passed the {struck(dataset)}; {shots_text(dataset)}")
-    return figure
-
-
-def draw_dispersion(axes: Axes, dataset: xarray.Dataset, standoff: float | None = None) -> tuple[Array, Array]:
-    """Draw residual velocity against tilt, with their medians; return the drawn tilt [degree] and velocity [m/s]."""
+    figure, centre, above, beside, free = _with_margins(np.array([5.0, 5.0]))
+    free.remove()
     tilt, velocity = (shown(dataset, name, standoff) for name in (v.TILT, v.RESIDUAL_VELOCITY))
     both = np.isfinite(tilt.values) & np.isfinite(velocity.values)
     x, y = tilt.values[both], velocity.values[both]
     if len(x) > _MOST_POINTS:
-        density = axes.hexbin(x, y, gridsize=60, mincnt=1, bins="log", cmap="viridis", linewidths=0.1)
-        axes.figure.colorbar(density, ax=axes, location="bottom", shrink=0.6, label="hits per hexagon", format="{x:g}")
+        density = centre.hexbin(x, y, gridsize=60, mincnt=1, bins="log", cmap="viridis", linewidths=0.1)
+        figure.colorbar(density, ax=centre, location="bottom", shrink=0.6, label="hits per hexagon", format="{x:g}")
     else:
-        axes.scatter(x, y, s=7, color=BLUE, alpha=0.4, linewidths=0)
+        centre.scatter(x, y, s=7, color=BLUE, alpha=0.4, linewidths=0)
     if len(x):
-        axes.axvline(np.median(x), color=VERMILION, lw=1.0, ls="--", label="medians")
-        axes.axhline(np.median(y), color=VERMILION, lw=1.0, ls="--")
-        axes.legend(frameon=False, loc="best")
+        centre.axvline(np.median(x), color=VERMILION, lw=1.0, ls="--", label="medians")
+        centre.axhline(np.median(y), color=VERMILION, lw=1.0, ls="--")
+        centre.legend(frameon=False)
+        above.hist(x, bins=40, color=BLUE, alpha=0.5)
+        beside.hist(y, bins=40, color=BLUE, alpha=0.5, orientation="horizontal")
     else:
-        axes.text(0.5, 0.5, "no core behind the " + struck(dataset), transform=axes.transAxes, ha="center", va="center")
-        axes.set(xticks=[], yticks=[])
-    axes.set(xlabel=f"{tilt.title.partition(chr(10))[0]} [°]", ylabel=velocity.label)
-    return x, y
+        centre.text(0.5, 0.5, f"no core behind the {struck(dataset)}", transform=centre.transAxes, ha="center")
+    centre.set(xlabel=f"{tilt.title.partition(chr(10))[0]} [°]", ylabel=velocity.label)
+    above.set_ylabel("hits")
+    beside.set_xlabel("hits")
+    finish(figure, f"cores that passed the {struck(dataset)}; {shots_text(dataset)}", result=dataset)
+    return figure
 
 
+@in_style
 def uncertainty(dataset: xarray.Dataset, variable: str, standoff: float | None = None) -> Figure:
     """A map of the mean of neighbouring hits, and of half the width of its 95 % interval (`hit_map.plane_fit`).
 
@@ -129,13 +127,12 @@ def uncertainty(dataset: xarray.Dataset, variable: str, standoff: float | None =
     """
     dataset = mirrored(dataset)
     column = shown(dataset, variable, standoff)
-    unit = f"[{column.label.partition('[')[2]}"
     if not shots_scatter(dataset):
         raise ValueError(
             f'got "{variable}" of shots that all arrive alike, so nothing is uncertain that a map could show'
         )
     images = _local(dataset, column.values, _covered(dataset), lambda near: plane_fit(*near)[:2])
-    labels = f"local mean of {column.label}", f"half width of its 95 % interval {unit}"
+    labels = f"local mean of {column.label}", f"half width of its 95 % interval [{column.label.partition('[')[2]}"
     method = "plane through the {} nearest hits, Student's interval; bends of the map widen it"
     return _local_maps(dataset, images, labels, column.title, method)
 
@@ -150,6 +147,7 @@ def shots_scatter(dataset: xarray.Dataset) -> bool:
     return any(np.ptp(dataset[name].values) > 0.0 for name in v.shot_variables(dataset))
 
 
+@in_style
 def probability_map(dataset: xarray.Dataset, quantity: str) -> Figure:
     """Map of a probability from the nearest hits, and half the width of its 95 % interval (`hit_map.share_of`).
 
@@ -162,50 +160,42 @@ def probability_map(dataset: xarray.Dataset, quantity: str) -> Figure:
         ValueError: the quantity is no probability, the result does not have it, or the hits do not cover the cell.
     """
     dataset = mirrored(dataset)
-    values, nearest = _of_every_hit(dataset, quantity), _covered(dataset)
+    measure = Measure.parse(quantity).of(dataset)
+    if not measure.is_binary:
+        raise ValueError(f'got "{quantity}", but a map of a probability needs P(…), such as P(perforated)')
+    values, places = measure.values(dataset), _covered(dataset)
     if not shots_scatter(dataset):
         note = "each hit has one outcome, 1 or 0; nearest hit"
-        return _local_maps(dataset, values[nearest][None], [quantity], quantity, note)
-    images = _local(dataset, values, nearest, lambda near: share_of(near[1]))
+        return _local_maps(dataset, values[places][None], [quantity], quantity, note)
+    images = _local(dataset, values, places, lambda near: share_of(near[1]))
     labels = quantity, "half width of its 95 % interval"
     return _local_maps(dataset, images, labels, quantity, "share of the {} nearest hits, Wilson's interval")
 
 
-def _of_every_hit(dataset: xarray.Dataset, quantity: str) -> Array:
-    """1 or 0 of every hit, shape [hits]; NaN where it does not count."""
-    measure = Measure.parse(quantity).of(dataset)
-    if not measure.is_binary:
-        raise ValueError(f'got "{quantity}", but a map of a probability needs P(…), such as P(perforated)')
-    return measure.values(dataset)
-
-
 def _covered(dataset: xarray.Dataset) -> NDArray[np.intp]:
     """Index of the hit nearest to every pixel. Raises ValueError if the hits do not cover the cell."""
-    nearest = nearest_hits(dataset, _FINE)
-    if nearest is None:
+    places = nearest_hits(dataset, _FINE)
+    if places is None:
         raise ValueError("the hits do not cover the cell, so there is no estimate between them; more hits are needed")
-    return nearest
+    return places
 
 
 def _local_maps(dataset: xarray.Dataset, images: Array, labels: Sequence[str], title: str, method: str) -> Figure:
     """A map of each image, shape [maps, pixels_z, pixels_y]: of a local value, and of how uncertain it is. The scale of
     a probability is that of all of them."""
-    width, height = map_size(dataset)
-    figure = Figure(figsize=(len(images) * (width + 2.0) + (len(images) < 2), height + 1.9), layout="constrained")
-    panels = figure.subplots(1, len(images), sharex=True, sharey=True, squeeze=False)[0]
+    figure, panels = map_sheet([dataset] * len(images), len(images))
     for axes, image, label in zip(panels, images, labels, strict=True):
-        scale = scale_of([np.array([0.0, 1.0])] if label.startswith("P(") else [image.ravel()])
+        scale = scale_of([np.array([0.0, 1.0])] if label.startswith("P(") else [image])
         figure.colorbar(paint_pixels(axes, dataset, image, scale), ax=axes, label=label)
-        draw_holes(axes, dataset)
-    note = f"{method.format(NEIGHBOURS)}; {shots_text(dataset)}; seen from behind the plate"
-    inscribe(figure, dataset, title, note)
+        draw_hole_edges(axes, *outlines(dataset).values())
+    finish(figure, title, f"{method.format(NEIGHBOURS)}; {shots_text(dataset)}; {SEEN}", result=dataset)
     return figure
 
 
 def _local(
     dataset: xarray.Dataset,
     values: Array,
-    nearest: NDArray[np.intp],
+    places: NDArray[np.intp],
     estimate: Callable[[tuple[Array, Array]], tuple[Array, Array]],
 ) -> Array:
     """Local estimates at every pixel, shape [2, pixels_z, pixels_y]: the value, and half the width of its interval.
@@ -213,26 +203,18 @@ def _local(
     Both are NaN where the nearest hit has no value.
 
     Args:
-        estimate: computes both from offsets [m] and values of the nearest hits.
+        places: index of the hit nearest to each pixel, shape [pixels_z, pixels_y].
+        estimate: computes both from offsets [m] and values of the nearest hits with a value.
     """
-    images = np.full((2, *nearest.shape), np.nan)
-    exists = np.isfinite(values)
-    there = exists[nearest]
-    if exists.sum() >= NEIGHBOURS:
-        images[:, there] = estimate(_neighbours(dataset, values, pixels(dataset, _FINE)[there]))
-    return images
-
-
-def _neighbours(dataset: xarray.Dataset, values: Array, points: Array) -> tuple[Array, Array]:
-    """Offsets [m] and values of the hits with a value that are nearest to points of the cell, across its edges.
-
-    Args:
-        points: relative to the lower left corner of the cell [m], shape [points, 2].
-    """
+    images = np.full((2, *places.shape), np.nan)
     exists, period = np.isfinite(values), np.asarray(dataset.attrs[attr.PLATE_PERIOD])
-    _, near = tree_of(dataset, exists).query(points, k=NEIGHBOURS)
-    offsets = (hit_points(dataset)[exists] + period / 2)[near] - points[:, None]
-    return offsets - period * np.round(offsets / period), values[exists][near]
+    there = exists[places]
+    if exists.sum() >= NEIGHBOURS:
+        points = pixels(dataset, _FINE)[there]
+        _, near = nearest(dataset, points, exists, NEIGHBOURS)
+        offsets = hit_points(dataset)[exists][near] - points[:, None]
+        images[:, there] = estimate((offsets - period * np.round(offsets / period), values[exists][near]))
+    return images
 
 
 def _draw_strips(axes: Axes, places: Array, values: Array, *, upright: bool) -> None:
@@ -243,11 +225,8 @@ def _draw_strips(axes: Axes, places: Array, values: Array, *, upright: bool) -> 
     def quantiles(share: float) -> list[float]:
         return [float(np.quantile(values[strip], share)) for strip in strips]
 
-    fill = axes.fill_betweenx if upright else axes.fill_between
+    band: Any = axes.fill_betweenx if upright else axes.fill_between
     for label, (low, high, alpha) in _BANDS.items():
-        fill(middles, quantiles(low), quantiles(high), color=BLUE, alpha=alpha, lw=0, label=label)
+        band(middles, quantiles(low), quantiles(high), color=BLUE, alpha=alpha, lw=0, label=label)
     median = (quantiles(0.5), middles) if upright else (middles, quantiles(0.5))
     axes.plot(*median, color="black", lw=1.2, label="median")
-    axes.tick_params(labelleft=not upright, labelbottom=upright)
-    if not upright:
-        axes.legend(frameon=False, fontsize="small", loc="center left", bbox_to_anchor=(1.0, 0.5))

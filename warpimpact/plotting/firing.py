@@ -8,12 +8,11 @@ from typing import Any
 import numpy as np
 import xarray
 from matplotlib.axes import Axes
-from matplotlib.figure import Figure
 from scipy import special
 
 from warpimpact.firing.v50 import V50, Shots
 from warpimpact.firing.view import reported_lines, tests_title
-from warpimpact.plotting.style import BLUE, GREEN, GREY, VERMILION, add_heading, bars
+from warpimpact.plotting.style import BLUE, GREEN, GREY, VERMILION, Figure, bars, finish, in_style
 from warpimpact.results import attributes as attr
 from warpimpact.results import firing as f
 
@@ -22,43 +21,45 @@ _ABOVE = (-11, 4, -7)
 _VELOCITY = "impact velocity [m/s]"
 
 
-def shots_figure(shots: Shots, found: V50, title: str) -> Figure:
+@in_style
+def shots_figure(shots: Shots, estimate: V50, title: str) -> Figure:
     """Fired shots, the fitted probability of perforation, and V50 by maximum likelihood and by the standard."""
-    figure = Figure(figsize=(7.6, 5.0), layout="constrained")
+    figure = Figure(figsize=(7.6, 4.4), layout="constrained")
     axes = figure.subplots()
     margin = 0.15 * max(float(np.ptp(shots.velocity)), 0.02 * float(shots.velocity.max()))
     low, high = float(shots.velocity.min()) - margin, float(shots.velocity.max()) + margin
-    if found.slowest_perforation < found.fastest_stop:
-        zone = found.slowest_perforation, found.fastest_stop
+    if estimate.slowest_perforation < estimate.fastest_stop:
+        zone = estimate.slowest_perforation, estimate.fastest_stop
         axes.axvspan(*zone, color="0.92", label="zone of mixed results")
     for perforated, colour, label in ((False, BLUE, "stop"), (True, VERMILION, "perforation")):
         velocity = shots.velocity[shots.perforated == perforated]
         axes.scatter(velocity, np.full(len(velocity), float(perforated)), s=160.0, c=colour, marker="|", label=label)
-    if np.isfinite(found.spread):
+    if np.isfinite(estimate.spread):
         velocity = np.linspace(low, high, 200)
-        curve = special.ndtr((velocity - found.value) / found.spread)
+        curve = special.ndtr((velocity - estimate.value) / estimate.spread)
         axes.plot(velocity, curve, color=GREY, label="probit")
-    if np.isfinite(found.value):
-        ends = bars(found.value, *np.clip([found.low, found.high], low, high))
+    if np.isfinite(estimate.value):
+        ends = bars(estimate.value, *np.clip([estimate.low, estimate.high], low, high))
         label = "V50 with 95 % interval"
-        axes.errorbar(found.value, 0.5, xerr=ends, fmt="o", color="black", capsize=4, label=label)
-    if np.isfinite(found.standard):
-        axes.axvline(found.standard, color=GREEN, linestyle="--", linewidth=1.2, label="V50 by MIL-STD-662F")
+        axes.errorbar(estimate.value, 0.5, xerr=ends, fmt="o", color="black", capsize=4, label=label)
+    if np.isfinite(estimate.standard):
+        axes.axvline(estimate.standard, color=GREEN, linestyle="--", linewidth=1.2, label="V50 by MIL-STD-662F")
     _furnish(axes, xlabel=_VELOCITY, ylabel="probability of perforation", xlim=(low, high), ylim=(-0.08, 1.08))
-    add_heading(figure, title, *found.lines)
+    finish(figure, *estimate.lines, title=title)
     return figure
 
 
+@in_style
 def firing_figure(dataset: xarray.Dataset) -> Figure:
     """The response of the target, the reported V50 beside the true one, and the operating characteristic of a proof."""
     panels = [_draw_response]
     panels += [_draw_reported] if f.V50 in dataset else []
     panels += [_draw_proof] if f.PASS in dataset else []
-    figure = Figure(figsize=(5.4 * len(panels), 5.1), layout="constrained")
+    figure = Figure(figsize=(5.4 * len(panels), 4.2), layout="constrained")
     for draw, axes in zip(panels, np.ravel(figure.subplots(1, len(panels), squeeze=False)), strict=True):
         draw(axes, dataset)
     notes = reported_lines(dataset) if f.V50 in dataset else []
-    add_heading(figure, str(dataset.attrs[attr.TITLE]), *notes, str(dataset.attrs[f.DISCLAIMER]))
+    finish(figure, *notes, str(dataset.attrs[f.DISCLAIMER]), title=str(dataset.attrs[attr.TITLE]))
     return figure
 
 

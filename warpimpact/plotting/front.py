@@ -10,12 +10,12 @@ from typing import Any
 import numpy as np
 import xarray
 from matplotlib.axes import Axes
-from matplotlib.figure import Figure, SubFigure
+from matplotlib.figure import SubFigure
 
 from warpimpact.campaign.campaign import Campaign
 from warpimpact.campaign.text import CampaignError
-from warpimpact.plotting.plate import hole_patches
-from warpimpact.plotting.style import BLUE, GREEN, VERMILION, all_bars, hide_sides, inscribe
+from warpimpact.plotting.plate import draw_holes
+from warpimpact.plotting.style import BLUE, GREEN, STEEL, VERMILION, Figure, bars, finish, hide_sides, in_style
 from warpimpact.results import front as f
 from warpimpact.scene import Plate
 
@@ -29,6 +29,7 @@ _LETTERS = "ABCDEFGHIJ"
 _MARKS: tuple[Any, ...] = ("*", "P", "X", "^", "v")
 
 
+@in_style
 def front_figure(dataset: xarray.Dataset, folder: Path = Path()) -> Figure:
     """The front of a search by fresh hits with 95 % intervals, beside all computed designs; plates along it; and their
     variables. `folder` has the files that the design file names. In an SVG, a point of the front links to its file."""
@@ -43,7 +44,7 @@ def front_figure(dataset: xarray.Dataset, folder: Path = Path()) -> Figure:
     left, right = rows[-1].subfigures(1, 2, width_ratios=(1.7, 1.0))
     _draw_front(left.subplots(), dataset, names)
     _draw_variables(right, dataset, confirmed)
-    inscribe(figure, dataset, f"of each plate {THUMBNAIL:g} mm × {THUMBNAIL:g} mm" if names else "")
+    finish(figure, f"of each plate {THUMBNAIL:g} mm × {THUMBNAIL:g} mm" if names else "", result=dataset)
     return figure
 
 
@@ -51,7 +52,7 @@ def _draw_plates(figure: SubFigure, dataset: xarray.Dataset, names: dict[int, st
     panels = figure.subplots(1, len(names), squeeze=False)[0]
     for axes, (place, letter) in zip(panels, names.items(), strict=True):
         campaign = campaign_at(dataset, place, folder)
-        axes.set(xticks=[], yticks=[], aspect="equal")
+        axes.set(xticks=[], yticks=[])
         if campaign is None:
             axes.set_axis_off()
             continue
@@ -60,12 +61,12 @@ def _draw_plates(figure: SubFigure, dataset: xarray.Dataset, names: dict[int, st
         axes.set_title(f"{letter}: {1e3 * plate.thickness:.3g} mm, {plate.open_area:.0%} open", fontsize="medium")
 
 
+@in_style
 def draw_thumbnail(axes: Axes, plate: Plate) -> None:
     """Draw a part of a plate."""
     half = 0.5 * THUMBNAIL
-    axes.set(xlim=(-half, half), ylim=(-half, half), facecolor="0.72", aspect="equal")
-    for patch in hole_patches(plate, axes):
-        axes.add_patch(patch)
+    axes.set(xlim=(-half, half), ylim=(-half, half), facecolor=STEEL, aspect="equal")
+    draw_holes(axes, plate)
 
 
 def campaign_at(dataset: xarray.Dataset, place: int, folder: Path) -> Campaign | None:
@@ -77,47 +78,38 @@ def campaign_at(dataset: xarray.Dataset, place: int, folder: Path) -> Campaign |
 
 
 def _draw_front(axes: Axes, dataset: xarray.Dataset, names: dict[int, str]) -> None:
-    labels, limits = dataset[f.GOAL_LABEL].values, dataset[f.GOAL_LIMIT].values
-    goals = [place for place in range(len(labels)) if np.isnan(limits[place])]
+    """Draw the second objective over the first; fresh hits of a third one colour the points."""
+    labels, signs = dataset[f.GOAL_LABEL].values, dataset[f.GOAL_SIGN].values
+    goals = np.flatnonzero(np.isnan(dataset[f.GOAL_LIMIT].values))
     across, up = goals[0], goals[min(1, len(goals) - 1)]
     every, fresh = dataset[f.RESULT].values, dataset[f.FRESH].values
     axes.plot(every[:, across], every[:, up], ".", color="0.82", markersize=3, zorder=1, label="other designs")
-    if len(fresh):
-        _draw_fresh(axes, dataset, (across, up), goals[2] if len(goals) == 3 else None)
-    reference = (f.REFERENCE_RESULT, f.REFERENCE_LOW, f.REFERENCE_HIGH)
-    ends = all_bars(*(dataset[column].values[:, up] for column in reference))
-    for place, (name, mark) in enumerate(zip(dataset[f.REFERENCE].values, 4 * _MARKS, strict=False)):
-        at = dataset[f.REFERENCE_RESULT].values[place]
-        point: dict[str, Any] = {"color": VERMILION, "markersize": 11, "zorder": 5}
-        axes.errorbar(at[across], at[up], yerr=ends[:, place, None], fmt=mark, label=str(name), **point)
-    for number, (place, letter) in enumerate(names.items()):
-        at, above = (fresh[place, across], fresh[place, up]), number % 2 == 0  # neighbours may lie close together
-        axes.annotate(letter, at, xytext=(6, 6 if above else -15), textcoords="offset points", weight="bold", zorder=6)
-    better = [
-        "less is better" if dataset[f.GOAL_SIGN].values[objective] > 0 else "more is better"
-        for objective in (across, up)
-    ]
-    axes.set(xlabel=f"{labels[across]}, {better[0]}", ylabel=fill(f"{labels[up]}, {better[1]}", _LONGEST_LABEL))
-    axes.grid(color="0.92")
-    hide_sides(axes, "top", "right")
-    axes.legend(frameon=False, fontsize="small")
-
-
-def _draw_fresh(axes: Axes, dataset: xarray.Dataset, shown: tuple[int, int], third: int | None) -> None:
-    """The front by fresh hits; designs that these take from the front are hollow."""
-    across, up = shown
-    fresh, confirmed = dataset[f.FRESH].values, dataset[f.CONFIRMED].values == 1
-    ends = all_bars(*(dataset[name].values[:, up] for name in (f.FRESH, f.FRESH_LOW, f.FRESH_HIGH)))
+    confirmed = dataset[f.CONFIRMED].values == 1
+    of_fresh = [dataset[name].values[:, up] for name in (f.FRESH, f.FRESH_LOW, f.FRESH_HIGH)]
     groups = ((confirmed, "front, fresh hits, 95 %", BLUE), (~confirmed, "not on the front by fresh hits", "white"))
     for which, label, face in groups:
         if which.any():
             style: dict[str, Any] = {"color": BLUE, "markerfacecolor": face, "markersize": 6, "capsize": 2, "zorder": 4}
-            axes.errorbar(fresh[which, across], fresh[which, up], yerr=ends[:, which], fmt="o", label=label, **style)
-    links = axes.scatter(fresh[:, across], fresh[:, up], s=60, alpha=0.01, zorder=7)
-    links.set_urls([f"#{file}" for file in dataset[f.FILE].values])
-    if third is not None:
-        drawn = axes.scatter(fresh[:, across], fresh[:, up], c=fresh[:, third], s=36, zorder=5, cmap="viridis")
-        axes.figure.colorbar(drawn, ax=axes, label=str(dataset[f.GOAL_LABEL].values[third]))
+            ends = bars(*(values[which] for values in of_fresh))
+            axes.errorbar(fresh[which, across], fresh[which, up], yerr=ends, fmt="o", label=label, **style)
+    if len(fresh):
+        links = axes.scatter(fresh[:, across], fresh[:, up], s=60, alpha=0.01, zorder=7)
+        links.set_urls([f"#{file}" for file in dataset[f.FILE].values])
+    if len(fresh) and len(goals) == 3:
+        drawn = axes.scatter(fresh[:, across], fresh[:, up], c=fresh[:, goals[2]], s=36, zorder=5, cmap="viridis")
+        axes.figure.colorbar(drawn, ax=axes, label=str(labels[goals[2]]))
+    of_references = [dataset[name].values for name in (f.REFERENCE_RESULT, f.REFERENCE_LOW, f.REFERENCE_HIGH)]
+    for name, mark, at, low, high in zip(dataset[f.REFERENCE].values, 4 * _MARKS, *of_references, strict=False):
+        point: dict[str, Any] = {"color": VERMILION, "markersize": 11, "zorder": 5}
+        axes.errorbar(at[across], at[up], yerr=bars(at[up], low[up], high[up]), fmt=mark, label=str(name), **point)
+    for number, (place, letter) in enumerate(names.items()):
+        at, above = (fresh[place, across], fresh[place, up]), number % 2 == 0  # neighbours may lie close together
+        axes.annotate(letter, at, xytext=(6, 6 if above else -15), textcoords="offset points", weight="bold", zorder=6)
+    titles = [f"{labels[goal]}, {'less' if signs[goal] > 0 else 'more'} is better" for goal in (across, up)]
+    axes.set(xlabel=titles[0], ylabel=fill(titles[1], _LONGEST_LABEL))
+    axes.grid(color="0.92")
+    hide_sides(axes, "top", "right")
+    axes.legend(frameon=False, fontsize="small")
 
 
 def _draw_variables(figure: SubFigure, dataset: xarray.Dataset, places: Any) -> None:
@@ -131,9 +123,9 @@ def _draw_variables(figure: SubFigure, dataset: xarray.Dataset, places: Any) -> 
     for place, axes in zip(shown, panels, strict=True):
         axes.plot(over, values[:, place], "o-", color=GREEN, markersize=4, linewidth=0.8)
         every = dataset[f.VALUE].values[:, place]
-        if np.isfinite(every).any() and np.nanmin(every) < np.nanmax(every):
-            axes.set_ylim(np.nanmin(every) - 0.05 * np.ptp(every[np.isfinite(every)]), None)
-            axes.set_ylim(None, np.nanmax(every) + 0.05 * np.ptp(every[np.isfinite(every)]))
+        low, high = np.nanmin(every), np.nanmax(every)
+        if low < high:
+            axes.set_ylim(low - 0.05 * (high - low), high + 0.05 * (high - low))
         labels, unit = str(dataset[f.LABELS].values[place]), str(dataset[f.UNIT].values[place])
         if labels:
             axes.set_yticks(range(len(json.loads(labels))), json.loads(labels), fontsize="small")

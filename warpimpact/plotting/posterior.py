@@ -8,12 +8,11 @@ from pathlib import Path
 import numpy as np
 import xarray
 from matplotlib.axes import Axes
-from matplotlib.figure import Figure
 
 from warpimpact.identification.fit_file import fit_from
 from warpimpact.identification.posterior import parameters_of, unit_of
-from warpimpact.plotting.style import BLUE, add_heading
-from warpimpact.results import attributes as attr
+from warpimpact.plotting.plate import draw_holes
+from warpimpact.plotting.style import BLUE, STEEL, Figure, finish, in_style
 from warpimpact.results import posterior_file as p
 from warpimpact.scene.display import MM
 from warpimpact.scene.model import Array
@@ -32,11 +31,12 @@ def _values(posterior: xarray.Dataset, name: str) -> tuple[Array, Array, str]:
     return factor * array.values, prior, f"{name.replace('_', ' ')}{f' [{unit}]' if unit else ''}"
 
 
+@in_style
 def pairs_figure(posterior: xarray.Dataset) -> Figure:
     """Every two parameters against each other, and each beside its prior."""
     names = parameters_of(posterior)
     size = max(4.5, 1.75 * len(names))
-    figure = Figure(figsize=(size + 1.2, size + 0.9), layout="constrained")
+    figure = Figure(figsize=(size + 1.2, size), layout="constrained")
     panels = figure.subplots(len(names), len(names), squeeze=False)
     drawn = {name: _values(posterior, name) for name in names}
     for row, below in enumerate(names):
@@ -61,7 +61,7 @@ def pairs_figure(posterior: xarray.Dataset) -> Figure:
                 axes.set_xlabel(label_x.replace(" [", "\n["), fontsize="small")
             if column == 0 and row > 0:
                 axes.set_ylabel(label_y.replace(" [", "\n["), fontsize="small")
-    add_heading(figure, str(posterior.attrs[attr.TITLE]), f"posterior (blue) and prior (grey); {_worth(posterior)}")
+    finish(figure, f"posterior (blue) and prior (grey); {_worth(posterior)}", result=posterior)
     return figure
 
 
@@ -81,6 +81,7 @@ def _density(axes: Axes, prior: Array, posterior: Array) -> None:
     axes.hist(posterior, bins=edges, density=True, color=BLUE, alpha=0.6)
 
 
+@in_style
 def hits_figure(posterior: xarray.Dataset) -> Figure:
     """Where each shot hit, on the plate: draws of the posterior.
 
@@ -94,25 +95,23 @@ def hits_figure(posterior: xarray.Dataset) -> Figure:
     }
     across = min(3, len(fit.shots))
     down = -(-len(fit.shots) // across)
-    figure = Figure(figsize=(4.2 * across + 0.8, 5.2 * down + 1.0), layout="constrained")
+    figure = Figure(figsize=(4.2 * across + 0.8, 4.6 * down), layout="compressed")
     panels = figure.subplots(down, across, squeeze=False).ravel()
     for place, shot in enumerate(fit.shots):
         axes = panels[place]
-        scene = fit.scene_of(shot, medians)
+        plate = fit.scene_of(shot, medians).target.layers[0]
         y, z = (MM * posterior[name].values[:, place] for name in p.HITS)
-        cell = [side * MM for side in scene.target.layers[0].sampled_cell]
+        cell = [side * MM for side in plate.sampled_cell]
         far = [float(np.abs(at).max()) * 1.05 for at in (y, z)]
         half = [min(max(0.55 * side, most), _CELLS_BESIDE * side) for side, most in zip(cell, far, strict=True)]
-        ranges = [(-side / MM, side / MM) for side in half]
-        axes.set_facecolor("0.85")
-        for outline in scene.target.layers[0].pattern.outlines(*ranges):
-            axes.fill(*(MM * outline.T), facecolor="white", edgecolor="black", lw=0.8)
-        axes.scatter(y, z, s=5, color=BLUE, alpha=0.35, lw=0)
         axes.set(xlim=(-half[0], half[0]), ylim=(-half[1], half[1]), aspect="equal", xlabel="y [mm]", ylabel="z [mm]")
+        axes.set_facecolor(STEEL)
+        draw_holes(axes, plate)
+        axes.scatter(y, z, s=5, color=BLUE, alpha=0.35, lw=0)
         axes.set_title(str(posterior["shot"].values[place]))
     for axes in panels[len(fit.shots) :]:
         axes.remove()
-    add_heading(figure, str(posterior.attrs[attr.TITLE]), f"where the shots hit, {_worth(posterior)}")
+    finish(figure, f"where the shots hit, {_worth(posterior)}", result=posterior)
     return figure
 
 

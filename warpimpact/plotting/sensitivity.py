@@ -6,14 +6,14 @@ from textwrap import fill
 
 import numpy as np
 import pandas as pd
-from matplotlib.figure import Figure
 
-from warpimpact.plotting.style import BLUE, VERMILION, add_heading, hide_sides
+from warpimpact.plotting.style import BLUE, VERMILION, Figure, finish, hide_sides, in_style
 
 _ROW, _PANEL, _LABELS = 0.24, 2.6, 2.4
 """Height of a row, and widths of a panel and of the names of the changes [inch]."""
 
 
+@in_style
 def sensitivity_figure(table: pd.DataFrame, title: str = "", hits: int = 0) -> Figure:
     """Draw a bar for each change from the value as given, with a panel for each measure.
 
@@ -22,7 +22,7 @@ def sensitivity_figure(table: pd.DataFrame, title: str = "", hits: int = 0) -> F
         title: title of the campaign.
         hits: number of hits of each row, for the note.
     """
-    size = (_LABELS + _PANEL * len(table.columns), 1.4 + _ROW * len(table))
+    size = (_LABELS + _PANEL * len(table.columns), 0.9 + _ROW * len(table))
     figure = Figure(figsize=size, layout="constrained")
     panels = figure.subplots(1, len(table.columns), sharey=True, squeeze=False)[0]
     rows = np.arange(1, len(table))
@@ -40,5 +40,5 @@ def sensitivity_figure(table: pd.DataFrame, title: str = "", hits: int = 0) -> F
         hide_sides(axes, "top", "right", "left")
     panels[0].invert_yaxis()
     note = f"{hits} hits, the same with every change. " if hits else ""
-    add_heading(figure, title or "sensitivity", f"{note}A bar begins at the value as given.")
+    finish(figure, f"{note}A bar begins at the value as given.", title=title or "sensitivity")
     return figure

@@ -1,141 +1,127 @@
-"""What figures share: colours, title and notes, the direction of fire, and the bars of an interval."""
+"""What figures share: style, colours, title with notes and legend, the direction of fire, and the bars of an interval.
+
+A function that draws is decorated with `in_style`, and its figure is a `Figure` of this module: both keep the settings
+of a matplotlibrc out. `finish` is the last call on a figure.
+"""
 
 from __future__ import annotations
 
 import math
 from base64 import b64encode
-from collections.abc import Sequence
+from collections.abc import Callable
+from functools import wraps
 from io import BytesIO
 from textwrap import wrap
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, ParamSpec, TypeVar
 
 import numpy as np
 import xarray
+from matplotlib import style
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
-from matplotlib.figure import Figure
-from matplotlib.font_manager import FontProperties
+from matplotlib.figure import Figure as PlainFigure
 from matplotlib.patheffects import withStroke
 
 from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
 from warpimpact.scene.model import Array
 
-BLUE, VERMILION, GREEN = "#0072B2", "#D55E00", "#009E73"
+_STYLE: Any = ["default", {"text.parse_math": False}]
+"""The style of all figures: the defaults of Matplotlib, and "$" is a character of a title."""
+PALETTE = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")
 """Colours of Okabe and Ito: they differ in every kind of colour blindness."""
+BLUE, VERMILION, GREEN, PURPLE, *_ = PALETTE
 GREY = "0.55"
-MAP_SIDE = 4.2
-"""Longer side of a map on paper [inch]."""
-_FROM_EDGE = 0.12
-"""Distance of title and notes from the edge of a figure without layout engine [inch]."""
-_TITLE_SIZE, _SMALLEST_TITLE = 12.0, 9.0
-"""Font sizes of a title [pt]: the usual one, and the smallest for a long title."""
-_TITLE_LETTERS, _NOTE_LETTERS = 10.0, 15
-"""Average number of letters in an inch of a title of the first size, and of a note."""
-LINE = 0.15
-"""Height of a line of a note [inch]."""
+STEEL = "0.75"
+_TITLE_LETTERS, _NOTE_LETTERS = 9.0, 15.0
+"""Average number of letters in an inch of a title, and of a note."""
+_TITLE_LINE, _NOTE_LINE, _LEGEND_LINE = 0.25, 0.15, 0.22
+"""Height of a line of a title, of a note, and of a legend [inch]."""
 _FIRE_LENGTH, _FIRE_CORNER = 30.0, (0.92, 0.08)
 """Length of the arrow [points], and the place of its head in the axes, as shares of their sides."""
 _ONE_DIRECTION = 1e-3
 """Largest difference of angles that are one direction [rad]."""
 
+P = ParamSpec("P")
+T = TypeVar("T")
 
-def data_url(figure: Figure, dpi: int = 110) -> str:
+
+def in_style(draw: Callable[P, T]) -> Callable[P, T]:
+    """Make a function draw in the style of this module, whatever a user's matplotlibrc says."""
+
+    @wraps(draw)
+    def drawn(*args: P.args, **kwargs: P.kwargs) -> T:
+        with style.context(_STYLE):
+            return draw(*args, **kwargs)
+
+    return drawn
+
+
+class Figure(PlainFigure):
+    """A figure that is laid out, drawn and saved in the style of this module."""
+
+    draw = in_style(PlainFigure.draw)
+    draw_without_rendering = in_style(PlainFigure.draw_without_rendering)
+    savefig = in_style(PlainFigure.savefig)
+
+
+def data_url(figure: PlainFigure, dpi: int = 110) -> str:
     """A figure as a PNG picture in an address, for a page."""
     buffer = BytesIO()
     figure.savefig(buffer, format="png", dpi=dpi)
     return f"data:image/png;base64,{b64encode(buffer.getvalue()).decode()}"
 
 
-def hide_sides(axes: Axes, *sides: str) -> None:
-    """Hide sides of the frame of a panel: "top", "right", "left"."""
-    for side in sides:
-        axes.spines[side].set_visible(False)
+def finish(
+    figure: PlainFigure,
+    *notes: str,
+    title: str = "",
+    result: xarray.Dataset | None = None,
+    legend: bool = False,
+    columns: int | None = None,
+) -> None:
+    """Write title, notes and a shared legend outside all panels.
 
+    The figure grows by their height, so panels keep their size.
 
-def bars(value: float, low: float, high: float) -> list[list[float]] | None:
-    """The two bars of an interval about a value, as `errorbar` takes them; None where there is no interval."""
-    if math.isnan(low) or math.isnan(high):
-        return None
-    return [[max(0.0, value - low)], [max(0.0, high - value)]]
-
-
-def all_bars(values: Array, low: Array, high: Array) -> Array:
-    """The bars of many intervals, shape [2, points]; 0 where there is no interval."""
-    return np.asarray(np.nan_to_num([values - low, high - values]).clip(0.0))
-
-
-def add_heading(figure: Figure, title: str, *notes: str) -> None:
-    """Write a title in one line at the top of a figure, and each note from a line of its own below the figure.
-
-    A long title is written smaller. A title that is still wider than the figure is cut, and stands whole before the
-    notes.
+    Args:
+        notes: below the panels, each on lines of its own.
+        title: above the panels; by default the title of the result, which otherwise is the first note.
+        result: its names of the catalogue, with how well each is known, are further notes.
+        legend: whether the labels of all panels stand below the notes, each once.
+        columns: of the legend; by default all entries stand in one row.
     """
-    line, size = _in_one_line(title, figure.get_figwidth())
-    placed = figure.get_layout_engine() is None
-    top = {"y": 1.0 - _FROM_EDGE / figure.get_figheight(), "va": "top"} if placed else {}
-    figure.suptitle(line, fontsize=size, **top)
-    lines = note_lines(figure.get_figwidth(), title, notes)
-    if lines:
-        _write_notes(figure, "\n".join(lines))
-
-
-def inscribe(figure: Figure, dataset: xarray.Dataset, *notes: str, title: str = "") -> None:
-    """Write the title of a result, or another title, over a figure; below it the notes and the names of the
-    catalogue."""
-    run_title = str(dataset.attrs.get(attr.TITLE, ""))
-    add_heading(figure, title or run_title, *([run_title] if title else []), *notes, *names(dataset))
-
-
-def inscribe_hit(figure: Figure, history: xarray.Dataset, what: str) -> None:
-    """Write the number of a replayed hit and what is shown of it over a figure, its result's title and names below."""
-    inscribe(figure, history, title=f"hit {history.attrs[attr.HIT]}: {what}")
-
-
-def legend_below(figure: Figure, columns: int | None = None) -> None:
-    """Add one legend of all panels, each label once, below a figure with a layout engine; in one row without a number
-    of columns. Notes of the figure become its title, because nothing else keeps both apart."""
+    attributes, width = {} if result is None else result.attrs, figure.get_figwidth()
+    of_result = str(attributes.get(attr.TITLE, ""))
+    texts = [of_result if title else "", *notes, *attributes.get(attr.CATALOGUE_NAMES, "").splitlines()]
+    lines = [line for text in texts for line in wrap(text, int(_NOTE_LETTERS * width))]
+    heading = wrap(title or of_result, int(_TITLE_LETTERS * width))
+    if heading:
+        figure.suptitle("\n".join(heading))
     entries: dict[str, Artist] = {}
-    for axes in figure.axes:
+    for axes in figure.axes if legend else ():
         for handle, label in zip(*axes.get_legend_handles_labels(), strict=True):
             entries.setdefault(label, handle)
-    columns = columns or len(entries)
-    figure.legend(entries.values(), entries, loc="outside lower center", ncols=columns, frameon=False)
-    if notes := figure.get_supxlabel():
-        figure.supxlabel("")
-        _write_notes(figure, notes)
+    columns = columns or max(1, len(entries))
+    rows = -(-len(entries) // columns)
+    height = figure.get_figheight() + _TITLE_LINE * len(heading) + _NOTE_LINE * len(lines) + _LEGEND_LINE * rows
+    figure.set_figheight(height)
+    if entries or lines:
+        below = figure.legend(
+            entries.values(), entries, loc="outside lower center", ncols=columns, frameon=False, title="\n".join(lines)
+        )
+        below.get_title().set(color="0.3", size="small", multialignment="center")
 
 
-def note_lines(width: float, title: str, notes: Sequence[str]) -> list[str]:
-    """Lines of the notes below a figure of this width [inch]."""
-    cut = [title] if _in_one_line(title, width)[0] != title else []
-    return [line for note in [*cut, *notes] for line in wrap(note, int(_NOTE_LETTERS * width))]
+def hide_sides(axes: Axes, *sides: str) -> None:
+    """Hide sides of the frame of a panel: "top", "right", "left"."""
+    axes.spines[list(sides)].set_visible(False)
 
 
-def names(dataset: xarray.Dataset) -> list[str]:
-    """A line for each name of the catalogue that a result has, with how well it is known."""
-    return list(dataset.attrs.get(attr.CATALOGUE_NAMES, "").splitlines())
-
-
-def _in_one_line(title: str, width: float) -> tuple[str, float]:
-    """A title that fits into a width [inch], and its font size [pt]."""
-    line, letters = " ".join(title.split()), _TITLE_LETTERS * width
-    size = max(_SMALLEST_TITLE, min(_TITLE_SIZE, _TITLE_SIZE * letters / max(len(line), 1)))
-    most = int(letters * _TITLE_SIZE / size)
-    return (line if len(line) <= most else line[: most - 1].rstrip() + "…"), size
-
-
-def _write_notes(figure: Figure, text: str) -> None:
-    """Write the notes below all else; over the legend where a layout engine has placed one there."""
-    if figure.get_layout_engine() is None:
-        place = {"y": _FROM_EDGE / figure.get_figheight(), "va": "bottom"}
-        figure.supxlabel(text, fontsize="small", color="0.3", **place)
-    elif figure.legends:
-        (legend,) = figure.legends
-        legend.set_title(text, prop=FontProperties(size="small"))
-        legend.get_title().set_color("0.3")
-    else:
-        figure.supxlabel(text, fontsize="small", color="0.3")
+def bars(value: Any, low: Any, high: Any) -> Array | None:
+    """The bars of intervals about values, as `errorbar` takes them; no bar where an end is NaN."""
+    ends = np.maximum(0.0, [np.atleast_1d(value - low), np.atleast_1d(high - value)])
+    return None if np.isnan(ends).all() else ends
 
 
 def common_fire(dataset: xarray.Dataset) -> Fire | None:

@@ -9,20 +9,19 @@ from typing import Any
 import numpy as np
 import xarray
 from matplotlib.axes import Axes
-from matplotlib.figure import Figure
 
 from warpimpact.analysis.sweep_view import Point, inputs_of, measures_of, points
 from warpimpact.plotting.cell import words
-from warpimpact.plotting.style import all_bars, inscribe, legend_below
+from warpimpact.plotting.style import PALETTE, Figure, bars, finish, in_style
 from warpimpact.results.measures import Measure
 from warpimpact.scene.display import STORED
 
-_COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")  # of Okabe and Ito
 _MOST_LINES = 12
 _PANEL = (5.0, 3.75)
 """Width and height of a panel on paper [inch]."""
 
 
+@in_style
 def sweep_figure(sweep: xarray.Dataset, texts: Sequence[str] = ()) -> Figure:
     """A panel for every measure, with 95 % intervals, against the first input that is a number; a line for every
     combination of the others. Without texts of measures they are those of `analysis.sweep_view.SHOWN_OF_SWEEPS`.
@@ -32,14 +31,16 @@ def sweep_figure(sweep: xarray.Dataset, texts: Sequence[str] = ()) -> Figure:
     """
     measures, inputs = measures_of(sweep, texts), list(inputs_of(sweep))
     along = next((name for name in inputs if sweep[name].dtype.kind == "f"), inputs[0])
-    lines = _lines(sweep, measures, along)
-    rows = -(-len(measures) // 2)
-    columns = min(2, len(measures))
-    figure = Figure(figsize=(max(2, columns) * _PANEL[0], rows * _PANEL[1] + 0.5), layout="constrained")
+    lines: dict[str, list[Point]] = {}
+    for point in points(sweep, measures):
+        others = ", ".join(f"{words(name)} {label}" for name, label in point.labels.items() if name != along)
+        lines.setdefault(others, []).append(point)
+    rows, columns = -(-len(measures) // 2), min(2, len(measures))
+    figure = Figure(figsize=(max(2, columns) * _PANEL[0], rows * _PANEL[1]), layout="constrained")
     panels = figure.subplots(rows, columns, sharex=True, squeeze=False)
     for axes, measure in zip(panels.flat, measures, strict=False):
         for number, (label, line) in enumerate(list(lines.items())[:_MOST_LINES]):
-            style = {"color": _COLOURS[number % len(_COLOURS)], "label": label}
+            style = {"color": PALETTE[number % len(PALETTE)], "label": label}
             _draw(axes, measure, sweep[along], line, style, below=number % 2 == 1)
         axes.set_ylabel(fill(measure.title, 45))
         axes.grid(color="0.9")
@@ -47,30 +48,15 @@ def sweep_figure(sweep: xarray.Dataset, texts: Sequence[str] = ()) -> Figure:
             axes.set_ylim(-0.03, 1.03)
     for axes in panels.flat[len(measures) :]:
         axes.set_axis_off()
+    unit = STORED[sweep[along].attrs.get("units", "1")].shown
     for axes in panels[-1]:
-        axes.set_xlabel(_axis_label(sweep[along]))
-    if len(inputs) > 1:
-        legend_below(figure, 3)
-    counted = "; beside a value: the share of the hits that it counts, where that is not all"
-    left_out = len(lines) - _MOST_LINES
-    note = f"; {left_out} more combinations are not shown" if left_out > 0 else ""
-    hits = f"{sweep.sizes['hit']} hits at every point, 95 % intervals"
-    inscribe(figure, sweep, f"{hits}{counted}{note}")
+        axes.set_xlabel(f"{words(along)} [{unit}]" if unit else words(along))
+    counted = "beside a value: the share of the hits that it counts, where that is not all"
+    more = len(lines) - _MOST_LINES
+    note = f"{sweep.sizes['hit']} hits at every point, 95 % intervals; {counted}"
+    note += f"; {more} more combinations are not shown" if more > 0 else ""
+    finish(figure, note, result=sweep, legend=len(inputs) > 1, columns=3)
     return figure
-
-
-def _axis_label(values: xarray.DataArray) -> str:
-    shown = STORED[values.attrs.get("units", "1")].shown
-    return f"{words(str(values.name))} [{shown}]" if shown else words(str(values.name))
-
-
-def _lines(sweep: xarray.Dataset, measures: Sequence[Measure], along: str) -> dict[str, list[Point]]:
-    """The points along one input, by the label of the others."""
-    lines: dict[str, list[Point]] = {}
-    for point in points(sweep, measures):
-        label = ", ".join(f"{words(name)} {label}" for name, label in point.labels.items() if name != along)
-        lines.setdefault(label, []).append(point)
-    return lines
 
 
 def _draw(
@@ -82,7 +68,7 @@ def _draw(
     value, low, high = factor * np.array([(estimate.value, estimate.low, estimate.high) for estimate in estimates]).T
     is_number = places.dtype.kind == "f"
     x = places.values * STORED[places.attrs["units"]].factor if is_number else np.arange(len(line))
-    axes.errorbar(x, value, yerr=all_bars(value, low, high), fmt="o-", capsize=3.0, **style)
+    axes.errorbar(x, value, yerr=bars(value, low, high), fmt="o-", capsize=3.0, **style)
     if not is_number:
         axes.set_xticks(x, places.values)
     for at, height, point, estimate in zip(x, value, line, estimates, strict=True):

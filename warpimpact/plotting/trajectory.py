@@ -18,41 +18,40 @@ from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.cm import ScalarMappable
 from matplotlib.colors import Normalize
-from matplotlib.figure import Figure
 from matplotlib.image import AxesImage
 from matplotlib.patches import Polygon
-from matplotlib.patheffects import Normal, Stroke
 from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 from scipy.spatial import ConvexHull
 
 from warpimpact.analysis.replay_geometry import POINTS_AROUND, depth_of, largest_in_plate, pressed, slabs
-from warpimpact.plotting.cell import struck, words
-from warpimpact.plotting.style import BLUE, GREY, VERMILION, inscribe_hit, legend_below
+from warpimpact.plotting.cell import draw_hole_edges, struck, words
+from warpimpact.plotting.maps import save_all
+from warpimpact.plotting.style import BLUE, GREY, STEEL, VERMILION, Figure, finish, in_style
 from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
 from warpimpact.results.dataset import passed
 from warpimpact.results.files import OutputError
+from warpimpact.scene.display import MM
 from warpimpact.scene.model import Array
 
-_MM, _US = 1e3, 1e6
-_ANGLE_SHOWN = {"y": v.YAW, "z": v.PITCH}  # view → projected angle of the axis that it shows
+_US = 1e6
+_ANGLE_SHOWN = {"y": v.YAW, "z": v.PITCH}
+"""Projected angle of the axis that each view shows."""
 _COMPONENTS = {"x": "black", "y": BLUE, "z": VERMILION}
-# Blue and green as in the paper's fig. 5, but light, because the core is dark.
-_LOADS = {v.FORCE: ("#56B4E9", "kN", 1e-3), v.MOMENT: ("#009E73", "N m", 1.0)}
-_STEEL = "0.8"
-_NEAR_FRAME = 0.2  # share of the width in which a text would cross the frame
-_ARROW = 12.0  # length of the arrow of a force that lies in the view [mm]
-_ARC, _ARC_RADIUS = 300.0, 4.5  # angle [degree] and radius [mm] of the arc of a moment across the view
+_NEAR_FRAME = 0.2
+"""Share of the width in which a text would cross the frame."""
 INSTANTS = 5
 """Number of drawn poses of the core within the plate."""
 _FULL_TURN = np.linspace(0.0, 2.0 * np.pi, 73)
-_LONGEST_STRESS = 5.0  # length of the largest stress [mm]
-_SECTIONS, _SPOKES = 3, 3  # every third section and azimuth gets an arrow
+_LONGEST_STRESS = 5.0
+"""Length of the arrow of the largest stress [mm]."""
+_EVERY = 3
+"""Every third section and azimuth gets an arrow."""
 _ROOM_ABOUT = 2.0
 """Margin about the part that the core weakened [mm]."""
-FRAMES = 50
-_PER_SECOND = 20
+FRAMES, _PER_SECOND = 50, 20
+"""Frames of a film, and frames shown in a second."""
 
 
 class Pose(NamedTuple):
@@ -71,7 +70,7 @@ def poses_in_plate(dataset: xarray.Dataset) -> dict[str, Pose]:
 def poses_behind(dataset: xarray.Dataset) -> dict[str, Pose]:
     """Poses of the core at the stand-offs behind the target, by distance; empty if it does not pass."""
     standoffs = dataset[v.STANDOFF].values.tolist() if passed(dataset) else []
-    return {f"{standoff * _MM:g} mm": _pose_at(dataset, standoff) for standoff in standoffs}
+    return {f"{standoff * MM:g} mm": _pose_at(dataset, standoff) for standoff in standoffs}
 
 
 def silhouette(dataset: xarray.Dataset, pose: Pose, view: str) -> Array:
@@ -111,34 +110,37 @@ def _ahead(dataset: xarray.Dataset) -> float:
     return float(dataset[v.STATION].max()) if dataset.attrs[attr.STANDOFF_POINT] == "nose" else 0.0
 
 
+@in_style
 def passage(dataset: xarray.Dataset) -> Figure:
     """The core at equal intervals of its passage through the plate (the paper's figs. 7 and 9)."""
     poses = poses_in_plate(dataset)
-    figure, views = two_views(dataset, poses.values(), f"passage through the {struck(dataset)}", room=5.0)
+    figure, views = two_views(dataset, poses.values(), room=5.0)
     colours = colormaps["viridis"](np.linspace(0.0, 0.9, len(poses)))
     for view, axes in views.items():
         for (label, pose), colour in zip(poses.items(), colours, strict=True):
-            outline = silhouette(dataset, pose, view) * _MM
+            outline = silhouette(dataset, pose, view) * MM
             axes.add_patch(Polygon(outline, facecolor=(*colour[:3], 0.3), edgecolor=colour, lw=1.4, label=label))
-        path = dataset[v.PLATE_POSITION].sel(axis=["x", view]) * _MM
+        path = dataset[v.PLATE_POSITION].sel(axis=["x", view]) * MM
         axes.plot(path[:, 0], path[:, 1], color="black", lw=0.8, ls="--", label="centre of mass")
-    legend_below(figure)
+    _finish(figure, dataset, f"passage through the {struck(dataset)}", legend=True)
     return figure
 
 
+@in_style
 def flight(dataset: xarray.Dataset) -> Figure:
     """The core on impact, and at the stand-offs if it passes the plate (the paper's figs. 8 and 10)."""
     poses = {"impact": pose_at_step(dataset, 0), **poses_behind(dataset)}
-    figure, views = two_views(dataset, poses.values(), f"on impact and behind the {struck(dataset)}", room=15.0)
+    figure, views = two_views(dataset, poses.values(), room=15.0)
     for view, axes in views.items():
         for label, pose in poses.items():
-            outline = silhouette(dataset, pose, view) * _MM
+            outline = silhouette(dataset, pose, view) * MM
             axes.add_patch(Polygon(outline, facecolor=GREY, edgecolor="black"))
             angle = np.degrees(np.arctan2(pose.axis["xyz".index(view)], pose.axis[0]))
             angle = round(float(angle), 1) + 0.0  # no "-0.0"
             text = f"{label}: {_ANGLE_SHOWN[view]} {angle:.1f}°".replace("-", "−")
             x, side = _within(axes, outline[:, 0])
             axes.text(x, outline[:, 1].max() + 1.0, text, ha=side, va="bottom")
+    _finish(figure, dataset, f"on impact and behind the {struck(dataset)}")
     return figure
 
 
@@ -151,64 +153,10 @@ def _within(axes: Axes, across: np.ndarray) -> tuple[float, str]:
     return (float(across.max()), "right") if middle > 1.0 - _NEAR_FRAME else (float(across.mean()), "center")
 
 
-def largest_load(dataset: xarray.Dataset) -> Figure:
-    """The core at its largest force, with force and moment (the paper's fig. 5b).
-
-    The force is an arrow from the middle of the pressed surface (`replay_geometry.pressed`). In each view an arc about
-    the centre of mass turns with the moment about the axis across the view.
-    """
-    step = int(np.linalg.norm(dataset[v.FORCE], axis=1).argmax())
-    pose = pose_at_step(dataset, step)
-    what = f"under the largest force, at {float(dataset[v.TIME][step]) * _US:.1f} µs"
-    figure, views = two_views(dataset, [pose], what, room=_ARROW)
-    for view, axes in views.items():
-        axes.add_patch(Polygon(silhouette(dataset, pose, view) * _MM, facecolor=GREY, edgecolor="black"))
-        _draw_force(axes, dataset, step, view)
-        _draw_moment(axes, dataset, step, view)
-    legend_below(figure)
-    return figure
-
-
-def _draw_force(axes: Axes, dataset: xarray.Dataset, step: int, view: str) -> None:
-    """The force as an arrow from the middle of the pressed surface; its length shows its share in the view."""
-    colour, unit, factor = _LOADS[v.FORCE]
-    surface, force = pressed(dataset, step), dataset[v.FORCE][step]
-    weight, size = surface.stress * surface.area, float(np.linalg.norm(force))
-    if not (size and weight.any()):
-        return
-    middle = np.average(surface.point.reshape(-1, 3), axis=0, weights=weight.ravel())[[0, "xyz".index(view)]] * _MM
-    arrow = force.sel(axis=["x", view]).values * (_ARROW / size)
-    label = f"force {size * factor:.3g} {unit} at the contact ({_ARROW:g} mm)"
-    style: dict[str, Any] = {"angles": "xy", "scale_units": "xy", "scale": 1.0, "width": 0.006, "zorder": 4}
-    axes.quiver(*middle, *arrow, color=colour, label=label, **style)
-
-
-def _draw_moment(axes: Axes, dataset: xarray.Dataset, step: int, view: str) -> None:
-    """The moment about the axis across a view as an arc about the centre of mass."""
-    colour, unit, factor = _LOADS[v.MOMENT]
-    moment = dataset[v.MOMENT][step]
-    size, across = float(np.linalg.norm(moment)), {"y": "z", "z": "y"}[view]
-    centre = dataset[v.PLATE_POSITION][step].sel(axis=["x", view]).values * _MM
-    axes.plot(*centre, "o", color=colour, ms=4, zorder=5)
-    if not size:
-        return
-    # z points at the reader of the view x-y, and y away from the reader of the view x-z.
-    turn = float(moment.sel(axis=across)) * (1.0 if across == "z" else -1.0)
-    angle = np.linspace(0.0, np.radians(_ARC) * turn / size, 61)
-    arc = centre + _ARC_RADIUS * np.stack([np.cos(angle), np.sin(angle)], axis=-1)
-    label = f"moment {size * factor:.3g} {unit} (an arc of {_ARC:g}°)"
-    axes.plot(*arc.T, color=colour, lw=2.0, zorder=4, label=label)
-    if abs(turn) > 0.02 * size:
-        style = {"arrowstyle": "-|>", "color": colour, "mutation_scale": 16.0, "shrinkA": 0.0, "shrinkB": 0.0}
-        axes.annotate("", arc[-1], arc[-4], arrowprops=style, zorder=5)
-    text = f"about {across}: {float(moment.sel(axis=across)) * factor:.3g} {unit}".replace("-", "−")
-    axes.text(0.99, 0.97, text, transform=axes.transAxes, ha="right", va="top", color=colour)
-
-
+@in_style
 def course(dataset: xarray.Dataset) -> Figure:
     """Velocity, attitude, loads and energy against time."""
     figure = Figure(figsize=(10.0, 9.0), layout="constrained")
-    inscribe_hit(figure, dataset, f"course through the {struck(dataset)}")
     panels = figure.subplots(3, 2, sharex=True)
     time, axis = dataset[v.TIME] * _US, dataset[v.CORE_AXIS]
     velocity = dataset[v.VELOCITY]
@@ -226,9 +174,11 @@ def course(dataset: xarray.Dataset) -> Figure:
         panel.grid(color="0.9")
     for panel in panels[-1]:
         panel.set_xlabel("time [µs]")
+    _finish(figure, dataset, f"course through the {struck(dataset)}")
     return figure
 
 
+@in_style
 def plate(dataset: xarray.Dataset) -> Figure:
     """Resistance left in the plate, from the first contact to the end, seen from behind (the paper's fig. 6).
 
@@ -241,29 +191,23 @@ def plate(dataset: xarray.Dataset) -> Figure:
     along_y, along_z = weakened_ranges(dataset)
     tall = np.ptp(along_z) / np.ptp(along_y)
     figure = Figure(figsize=(3.3 * columns + 1.2, (3.1 * tall + 0.5) * rows + 0.7), layout="constrained")
-    inscribe_hit(figure, dataset, "resistance left in the plate, seen from behind")
     panels = figure.subplots(rows, columns, sharex=True, sharey=True, squeeze=False)
     for place, (panel, time) in enumerate(zip(panels.flat, times, strict=False)):
         image = _draw_share(panel, dataset, place)
         panel.set(xlim=along_y, ylim=along_z)
-        edge = [Stroke(linewidth=2.4, foreground="black"), Normal()]
-        panel.plot(
-            dataset[v.OUTLINE_Y].values * _MM,
-            dataset[v.OUTLINE_Z].values * _MM,
-            color="white",
-            lw=1.0,
-            path_effects=edge,
-        )
-        panel.plot(dataset[v.HIT_Y] * _MM, dataset[v.HIT_Z] * _MM, "+", color=VERMILION, ms=10, mew=2)
+        draw_hole_edges(panel, dataset[v.OUTLINE_Y].values, dataset[v.OUTLINE_Z].values)
+        panel.plot(dataset[v.HIT_Y] * MM, dataset[v.HIT_Z] * MM, "+", color=VERMILION, ms=10, mew=2)
         panel.set_title(f"{time * _US:.1f} µs")
     for panel in panels[-1]:
         panel.set_xlabel("y [mm]")
     for panel in panels[:, 0]:
         panel.set_ylabel("z [mm]")
     figure.colorbar(image, ax=panels, label="share of the resistance left; + is the hit point")
+    _finish(figure, dataset, "resistance left in the plate, seen from behind")
     return figure
 
 
+@in_style
 def pressure(dataset: xarray.Dataset) -> Figure:
     """The core at its largest force; arrows into its surface show the normal stress.
 
@@ -272,17 +216,15 @@ def pressure(dataset: xarray.Dataset) -> Figure:
     step = largest_in_plate(dataset)
     surface = pressed(dataset, step)
     figure = Figure(figsize=(9.0, 6.0), layout="constrained")
-    when = f"at {float(dataset[v.TIME][step]) * _US:.1f} µs"
-    inscribe_hit(figure, dataset, f"normal stress under the largest force, {when}")
     axes = figure.add_subplot(projection="3d")
-    x, y, z = np.moveaxis(np.concatenate([surface.point, surface.point[:, :1]], axis=1) * _MM, -1, 0)
-    axes.plot_wireframe(x, y, z, rcount=24, ccount=POINTS_AROUND // _SPOKES, color="0.75", linewidth=0.5)
+    x, y, z = np.moveaxis(np.concatenate([surface.point, surface.point[:, :1]], axis=1) * MM, -1, 0)
+    axes.plot_wireframe(x, y, z, rcount=24, ccount=POINTS_AROUND // _EVERY, color="0.75", linewidth=0.5)
     some = np.zeros(surface.stress.shape, dtype=bool)
-    some[::_SECTIONS, ::_SPOKES] = True
+    some[::_EVERY, ::_EVERY] = True
     some &= surface.stress > 0.0
     scale, colours = Normalize(0.0, 1.0), colormaps["viridis"]
     arrows = -surface.normal[some] * surface.stress[some][:, None] * _LONGEST_STRESS
-    tails = surface.point[some] * _MM - arrows
+    tails = surface.point[some] * MM - arrows
     axes.quiver(
         *tails.T, *arrows.T, colors=colours(scale(surface.stress[some])), linewidths=1.2, arrow_length_ratio=0.3
     )
@@ -292,46 +234,45 @@ def pressure(dataset: xarray.Dataset) -> Figure:
         side.set_major_locator(MaxNLocator(4))
     label = "normal stress, share of the untouched plate's"
     figure.colorbar(ScalarMappable(scale, colours), ax=axes, shrink=0.6, pad=0.1, label=label)
+    force, moment = (float(np.linalg.norm(dataset[name][step])) for name in (v.FORCE, v.MOMENT))
+    when = f"{force / 1e3:.3g} kN and {moment:.3g} N m at {float(dataset[v.TIME][step]) * _US:.1f} µs"
+    _finish(figure, dataset, f"normal stress under the largest force, {when}")
     return figure
 
 
-FIGURES = (passage, flight, largest_load, pressure, course, plate)
+FIGURES = (passage, flight, pressure, course, plate)
 
 
 def save_figures(dataset: xarray.Dataset, folder: Path, stem: str) -> list[Path]:
     """Write the figures of a history as PNG files ``<stem>_<figure>.png`` and return their paths."""
-    paths = []
-    for draw in FIGURES:
-        paths.append(folder / f"{stem}_{draw.__name__}.png")
-        draw(dataset).savefig(paths[-1], dpi=150)
-    return paths
+    return save_all({draw.__name__: draw(dataset) for draw in FIGURES}, folder, stem, overwrite=True)
 
 
-def two_views(
-    dataset: xarray.Dataset, poses: Iterable[Pose], what: str, *, room: float
-) -> tuple[Figure, dict[str, Axes]]:
+def _finish(figure: Figure, dataset: xarray.Dataset, what: str, *, legend: bool = False) -> None:
+    """Write the number of the hit and what a figure shows of it as the title."""
+    finish(figure, title=f"hit {dataset.attrs[attr.HIT]}: {what}", result=dataset, legend=legend)
+
+
+def two_views(dataset: xarray.Dataset, poses: Iterable[Pose], *, room: float) -> tuple[Figure, dict[str, Axes]]:
     """A figure with two views to scale that contain the plate, all poses of the core and a margin `room` [mm]."""
     poses = list(poses)
     corners = {}
     for view in _ANGLE_SHOWN:
         outlines = np.concatenate([silhouette(dataset, pose, view) for pose in poses])
         hit = [depth_of(dataset), float(dataset[v.HIT_POINT[view]])]
-        points = np.vstack([outlines, [[0.0, hit[1]], hit]]) * _MM
+        points = np.vstack([outlines, [[0.0, hit[1]], hit]]) * MM
         corners[view] = points.min(axis=0) - room, points.max(axis=0) + room
     heights = [high[1] - low[1] for low, high in corners.values()]
     width = corners["y"][1][0] - corners["y"][0][0]
     inch = min(9.0 / width, 8.0 / sum(heights))  # per mm
-    figure = Figure(figsize=(inch * width + 1.0, inch * sum(heights) + 2.0), layout="constrained")
-    inscribe_hit(figure, dataset, what)
+    figure = Figure(figsize=(inch * width + 1.0, inch * sum(heights) + 1.2), layout="compressed")
     panels = figure.subplots(2, 1, height_ratios=heights)
     for axes, (view, (low, high)) in zip(panels, corners.items(), strict=True):
         axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), aspect="equal")
         axes.set(xlabel="x [mm]", ylabel=f"{view} [mm]")
-        along = (dataset[v.SECTION] + dataset[v.HIT_POINT[view]]) * _MM
+        along = (dataset[v.SECTION] + dataset[v.HIT_POINT[view]]) * MM
         for front, rear, solid in slabs(dataset, view):
-            axes.fill_betweenx(
-                along, front * _MM, rear * _MM, where=solid, step="mid", color=_STEEL, ec="none", zorder=0
-            )
+            axes.fill_betweenx(along, front * MM, rear * MM, where=solid, step="mid", color=STEEL, ec="none", zorder=0)
         axes.autoscale(False)
     return figure, dict(zip(corners, panels, strict=True))
 
@@ -352,6 +293,7 @@ def _draw_energy(axes: Axes, time: xarray.DataArray, dataset: xarray.Dataset) ->
         side.tick_params(axis="y", colors=colour)
 
 
+@in_style
 def animation(dataset: xarray.Dataset) -> FuncAnimation:
     """Film of a history from the first contact to the end of contact, at constant time intervals.
 
@@ -362,17 +304,18 @@ def animation(dataset: xarray.Dataset) -> FuncAnimation:
     every = (pose_at_step(between, frame) for frame in range(FRAMES))
     poses = [Pose(pose.position, pose.axis / np.linalg.norm(pose.axis)) for pose in every]
     speeds = np.linalg.norm(between[v.VELOCITY], axis=1)
-    figure, panels = two_views(dataset, poses, "", room=4.0)
+    figure, panels = two_views(dataset, poses, room=4.0)
+    _finish(figure, dataset, "")
     FigureCanvasAgg(figure)
     cores = {view: Polygon(np.zeros((1, 2)), facecolor="0.55", edgecolor="black") for view in panels}
     for view, axes in panels.items():
         axes.add_patch(cores[view])
-        axes.plot(*np.array([pose.position[[0, "xyz".index(view)]] for pose in poses]).T * _MM, "k--", lw=0.8)
+        axes.plot(*np.array([pose.position[[0, "xyz".index(view)]] for pose in poses]).T * MM, "k--", lw=0.8)
     title = f"hit {dataset.attrs[attr.HIT]}"
 
     def show(frame: int) -> list[Polygon]:
         for view, core in cores.items():
-            core.set_xy(silhouette(dataset, poses[frame], view) * _MM)
+            core.set_xy(silhouette(dataset, poses[frame], view) * MM)
         tilt = np.degrees(np.arccos(np.clip(poses[frame].axis @ _line_of_fire(dataset), -1.0, 1.0)))
         figure.suptitle(f"{title}: {times[frame] * _US:5.1f} µs, {speeds[frame]:.0f} m/s, tilt {tilt:.1f}°")
         return list(cores.values())
@@ -425,7 +368,7 @@ def weakened_ranges(dataset: xarray.Dataset) -> list[tuple[float, float]]:
     for axis, name in enumerate((v.CELL_Y, v.CELL_Z)):
         cells = dataset[name].values
         low, high = _edges(cells)
-        there = cells[weaker.any(axis=1 - axis)] * _MM
+        there = cells[weaker.any(axis=1 - axis)] * MM
         inside = (max(low, there.min() - _ROOM_ABOUT), min(high, there.max() + _ROOM_ABOUT)) if there.size else None
         ranges.append(inside or (low, high))
     return ranges
@@ -434,4 +377,4 @@ def weakened_ranges(dataset: xarray.Dataset) -> list[tuple[float, float]]:
 def _edges(cells: NDArray[np.float64]) -> tuple[float, float]:
     """Outer edges of evenly spaced cells [mm]."""
     half = 0.5 * (cells[1] - cells[0])
-    return float((cells[0] - half) * _MM), float((cells[-1] + half) * _MM)
+    return float((cells[0] - half) * MM), float((cells[-1] + half) * MM)

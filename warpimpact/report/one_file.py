@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 import xarray
 from matplotlib import colormaps
 from matplotlib.colors import Normalize
-from matplotlib.figure import Figure
+from matplotlib.figure import Figure as PlainFigure
 
 from warpimpact.analysis.hit_map import mirrored
 from warpimpact.analysis.sweep_view import sweep_view
@@ -23,12 +23,12 @@ from warpimpact.firing.view import firing_view
 from warpimpact.identification.posterior import posterior_view
 from warpimpact.optimisation.design import is_even
 from warpimpact.optimisation.front_view import OF_FRONT, design_text, front_view, numbers_of
-from warpimpact.plotting.cell import paint_pixels, pixels, tree_of
+from warpimpact.plotting.cell import nearest, paint_pixels, pixels
 from warpimpact.plotting.firing import firing_figure
 from warpimpact.plotting.front import THUMBNAIL, campaign_at, draw_thumbnail, front_figure
-from warpimpact.plotting.plate import hole_patches
+from warpimpact.plotting.plate import draw_holes
 from warpimpact.plotting.posterior import hits_figure, pairs_figure
-from warpimpact.plotting.style import data_url
+from warpimpact.plotting.style import Figure, data_url, in_style
 from warpimpact.plotting.sweep import sweep_figure
 from warpimpact.plotting.trajectory import FIGURES
 from warpimpact.results import attributes as attr
@@ -67,7 +67,7 @@ class _Shown(NamedTuple):
     """
 
     view: Callable[..., list[Section]]
-    figures: Mapping[str, Callable[[Any], Figure]] = MappingProxyType({})
+    figures: Mapping[str, Callable[[Any], PlainFigure]] = MappingProxyType({})
     asked: str = ""
 
 
@@ -168,6 +168,7 @@ def _design_html(dataset: xarray.Dataset, place: int, folder: Path) -> str:
     )
 
 
+@in_style
 def _design_figure(dataset: xarray.Dataset, place: int, campaign: Campaign) -> Figure:
     """A part of the plate, and its cell, coloured by the first measure at the nearest hit."""
     plate = campaign.plate
@@ -188,11 +189,9 @@ def _design_figure(dataset: xarray.Dataset, place: int, campaign: Campaign) -> F
             {attr.PLATE_PERIOD: plate.pattern.unit_cell, attr.SYMMETRIES: "; ".join(map(str, group))},
         )
     )
-    nearest = tree_of(hits).query(pixels(hits, _MAP_PIXELS))[1]
-    drawn = paint_pixels(right, hits, hits["value"].values[nearest], (colormaps["viridis"], Normalize()))
-    for patch in hole_patches(plate, right):
-        patch.set(facecolor="none", edgecolor="white")
-        right.add_patch(patch)
+    _, places = nearest(hits, pixels(hits, _MAP_PIXELS))
+    drawn = paint_pixels(right, hits, hits["value"].values[places], (colormaps["viridis"], Normalize()))
+    draw_holes(right, plate, facecolor="none", edgecolor="white")
     labels = zip(dataset[f.GOAL_LABEL].values, dataset[f.GOAL].values, strict=True)
     effects = [str(label) for label, name in labels if not str(name).startswith(tuple(WEIGHTS))]
     label = effects[0].replace(", worst tenth", "").replace(", mean", "")

@@ -7,7 +7,6 @@ import pytest
 
 from warpimpact.cli import main
 from warpimpact.plotting import variable_map
-from warpimpact.plotting.style import names
 from warpimpact.results import attributes as attr
 from warpimpact.results import files
 
@@ -59,8 +58,8 @@ def test_names_are_carried_along(
     assert json.loads(dataset.attrs[attr.OUTSIDE_TESTED_RANGE]) == [LINES[3]]
     figure = variable_map(dataset, "residual_velocity")
     assert figure.get_suptitle() == "named"
-    below = " ".join(figure.get_supxlabel().split())
-    assert all(line in below for line in names(dataset))
+    below = " ".join(figure.legends[0].get_title().get_text().split())
+    assert all(line in below for line in dataset.attrs[attr.CATALOGUE_NAMES].splitlines())
     assert main(["report", "named.nc", "-o", "named.html"]) == 0
     page = Path("named.html").read_text(encoding="utf-8")
     assert all(line in page for line in LINES[:3])

@@ -130,7 +130,7 @@ def test_the_text_and_the_figure_say_what_it_is(dataset: xarray.Dataset) -> None
     assert any(f"not determined in {100 * undetermined:.3g} %" in line for line in lines)
     figure = firing_figure(dataset)
     assert len(figure.axes) == 3
-    assert f.SENTENCE in " ".join(figure.get_supxlabel().split())
+    assert f.SENTENCE in " ".join(figure.legends[0].get_title().get_text().split())
     standard = TARGET + '[procedure]\nname = "mil_std_662f"\nstart = 815\n'
     text = text_of(firing_view(simulate_test(firing_test(standard, "a", Path()), NORMAL)))
     assert "reports a V50 in " in text

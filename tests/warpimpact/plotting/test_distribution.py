@@ -64,8 +64,7 @@ def test_probability_map_holds_the_share_at_every_place(make_result):
 def test_marginals_are_the_quantiles_of_strips(make_result):
     dataset = make_result(1000)
     dataset["residual_velocity"].values[:] = 700.0 + 1e3 * dataset["hit_y"]
-    (centre,) = marginals(dataset, "residual_velocity").axes
-    above, beside, _, histogram = centre.child_axes
+    centre, above, beside, histogram, _ = marginals(dataset, "residual_velocity").axes
     (median,) = above.lines
     np.testing.assert_allclose(median.get_ydata(), 700.0 + median.get_xdata(), atol=0.2)
     assert len(median.get_xdata()) == 20
@@ -80,7 +79,7 @@ def test_marginals_are_the_quantiles_of_strips(make_result):
 def test_dispersion_shows_each_core_behind_the_plate(make_result, count):
     dataset = make_result(np.tile(MIXED, count // 4))
     figure = dispersion(dataset, 0.05)
-    above, centre, *_ = figure.axes
+    centre, above, *_ = figure.axes
     assert centre.get_xlabel() == "tilt, 50 mm behind the plate [°]"
     assert centre.get_ylabel() == "residual velocity [m/s]"
     shown = centre.collections[0]

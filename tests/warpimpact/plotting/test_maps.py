@@ -6,10 +6,11 @@ import warnings
 import numpy as np
 import pytest
 from matplotlib import colormaps
+from matplotlib.colors import to_rgb
 from PIL import Image
 
 from warpimpact.kernels.status import Status
-from warpimpact.plotting import overview, save_beside, save_maps, status_map, variable_map, variable_maps
+from warpimpact.plotting import overview, save_beside, save_maps, variable_map, variable_maps
 
 MIXED = np.array([Status.PERFORATED, Status.ARRESTED, Status.RICOCHETED, Status.MISSED])
 GREY = (0.62, 0.62, 0.62)
@@ -40,8 +41,9 @@ class Picture:
         return self.pixels[len(self.pixels) - 1 - int(row), int(column)]
 
 
-def legend_texts(axes):
-    return [text.get_text() for text in axes.get_legend().get_texts()]
+def legend_texts(figure):
+    (legend,) = figure.legends
+    return [text.get_text() for text in legend.get_texts()]
 
 
 def nearest_hit(dataset, y, z):
@@ -90,7 +92,7 @@ def test_hits_that_did_not_pass_the_plate_are_grey(covered, variable):
     grey = [np.allclose(picture.colour(y * 1e3, z * 1e3), GREY, atol=0.01) for y, z in points]
     stopped = np.isin(status, [Status.ARRESTED, Status.RICOCHETED])
     assert np.mean(grey == stopped) >= 0.9
-    assert legend_texts(figure.axes[0]) == ["no value: arrested, ricocheted", "edge of hole"]
+    assert legend_texts(figure) == ["no value: arrested, ricocheted", "edge of hole"]
 
 
 def test_map_is_to_scale_in_millimetres(perforated):
@@ -137,23 +139,16 @@ def test_few_hits_are_points(make_result):
 
 
 def test_status_map_has_a_colour_and_a_share_for_each_status_that_occurs(covered):
-    figure = status_map(covered)
-    entries = figure.axes[0].get_legend()
-    assert legend_texts(figure.axes[0]) == [
-        "perforated 25.0%",
-        "arrested 25.0%",
-        "ricocheted 25.0%",
-        "missed 25.0%",
-        "edge of hole",
-    ]
-    colours = [patch.get_facecolor()[:3] for patch in entries.get_patches()]
+    figure = variable_map(covered, "status")
+    assert legend_texts(figure) == ["perforated", "arrested", "ricocheted", "missed", "edge of hole"]
+    assert "perforated 25.0%" in figure.axes[0].get_title()
+    colours = [to_rgb(handle.get_color()) for handle in figure.legends[0].legend_handles]
     picture = Picture(figure)
-    points = clear_points(covered, 60)
     matches = [
         np.allclose(
             picture.colour(y * 1e3, z * 1e3), colours[covered["status"].values[nearest_hit(covered, y, z)]], atol=0.01
         )
-        for y, z in points
+        for y, z in clear_points(covered, 60)
     ]
     assert np.mean(matches) >= 0.9
 
@@ -181,7 +176,6 @@ def test_save_maps_writes_one_png_per_map(covered, tmp_path):
     paths = save_maps(covered, tmp_path / "maps", "plate")
     assert [path.name for path in paths] == [
         "plate_overview.png",
-        "plate_status.png",
         "plate_residual_velocity.png",
         "plate_deflection.png",
         "plate_tilt_50mm.png",

@@ -11,7 +11,7 @@ from matplotlib.colors import to_rgb
 from warpimpact import Campaign
 from warpimpact.campaign.plates import read_plates
 from warpimpact.cli import main
-from warpimpact.plotting import plate_figure
+from warpimpact.plotting import plate_figure, style
 from warpimpact.plotting.plate import hole_dimensions, smallest_ligament
 from warpimpact.scene import ConeCore, Layer, NoPattern, Plate, SlotPattern, Target
 from warpimpact.studies.sweep import read_sweep
@@ -20,7 +20,7 @@ CAMPAIGNS = Path(__file__).parents[3] / "campaigns"
 MM = 1e-3
 SLOTS = SlotPattern(length="12 mm", width="4 mm", spacing=["8 mm", "16 mm"], staggered=True)
 CORE = ConeCore(diameter="6 mm", length="20 mm", mass="4 g")
-STEEL, HOLE = to_rgb("0.72"), (1.0, 1.0, 1.0)
+STEEL, HOLE = to_rgb(style.STEEL), (1.0, 1.0, 1.0)
 
 
 def plate(**changes: object) -> Plate:

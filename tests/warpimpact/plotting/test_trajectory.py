@@ -119,7 +119,6 @@ def test_figures_are_written(history: xarray.Dataset, tmp_path: Path) -> None:
     assert [path.name for path in paths] == [
         "a_passage.png",
         "a_flight.png",
-        "a_largest_load.png",
         "a_pressure.png",
         "a_course.png",
         "a_plate.png",

@@ -199,7 +199,7 @@ def test_command_writes_history_and_figures(
     with xarray.open_dataset(tmp_path / "a_hit2.nc") as history:
         assert history.attrs["hit"] == 2
         np.testing.assert_array_equal(history["tilt"], result["tilt"][2])
-    figures = {"passage", "flight", "largest_load", "pressure", "course", "plate"}
+    figures = {"passage", "flight", "pressure", "course", "plate"}
     assert {path.name for path in tmp_path.glob("*.png")} == {f"a_hit2_{figure}.png" for figure in figures}
     for again, sentence in (
         (command, "a_hit2.nc: exists already"),
