@@ -22,7 +22,7 @@ def test_a_wheel_computes_from_another_folder(tmp_path: Path) -> None:
     )
     (wheel,) = tmp_path.glob("*.whl")
     zipfile.ZipFile(wheel).extractall(site)
-    pages = {path.name for path in (site / "warpimpact" / "report").iterdir()}
+    pages = {path.name for path in (site / "warpimpact" / "report" / "static").iterdir()}
     assert {"page.html", "page.css", "page.js"} <= pages
     script = (
         "import warpimpact, warpimpact.kernels.march as march\n"

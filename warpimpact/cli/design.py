@@ -9,7 +9,7 @@ from importlib.resources import files
 from pathlib import Path
 
 from warpimpact.campaign.text import CampaignError
-from warpimpact.design.designs import Shelf, from_address, shelf_of
+from warpimpact.design.designs import DesignStore, from_address, read_designs
 
 from .messages import say
 
@@ -21,9 +21,8 @@ def design_command(arguments: argparse.Namespace) -> None:
         raise CampaignError(f"design needs {error.name}: pip install 'warpimpact[design]'") from None
     given = arguments.designs or [str(files("warpimpact.campaigns") / "slotted_plate.toml")]
     addresses = [name for name in given if name.startswith("http://")]
-    shelf = shelf_of([Path(name) for name in given if name not in addresses])
-    held = {f"address {number}": from_address(address) for number, address in enumerate(addresses, 1)}
-    shelf = Shelf(held | dict(shelf.designs), shelf.files)
+    designs = {f"address {number}": from_address(address) for number, address in enumerate(addresses, 1)}
+    designs |= read_designs([Path(name) for name in given if name not in addresses])
     if not 0 <= arguments.port < 2**16:
         raise CampaignError(f"--port: got {arguments.port}, but it must be a number from 0 to 65535")
     opened = ExitStack()
@@ -42,7 +41,7 @@ def design_command(arguments: argparse.Namespace) -> None:
 
     try:
         with opened:
-            serve(shelf, port=arguments.port, device=arguments.device, ready=ready, entered=opened.close)
+            serve(DesignStore(designs), port=arguments.port, device=arguments.device, ready=ready, entered=opened.close)
     except OSError as error:
         raise CampaignError(f"--port: got {arguments.port}, but it cannot be used ({error.strerror})") from None
     except KeyboardInterrupt:

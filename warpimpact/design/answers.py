@@ -6,18 +6,19 @@ import json
 import math
 import time
 from collections import OrderedDict
-from collections.abc import Mapping, Sequence
-from typing import Any
+from collections.abc import Mapping
+from typing import Annotated, Any, Literal
 
 import xarray
+from pydantic import BaseModel, Field
 
 from warpimpact.analysis.summary import breaks_promise, numerics_sentence
 from warpimpact.campaign.plausible import doubted, doubted_holes
 from warpimpact.campaign.resistances import catalogue_names
 from warpimpact.campaign.tested_range import outside_tested_range, range_line
-from warpimpact.campaign.text import CampaignError
+from warpimpact.campaign.text import CampaignError, parsed
 from warpimpact.design.controls import drawn, groups
-from warpimpact.design.designs import ROOT, Shelf, ValidDesign, choices, stage_of, work_ahead
+from warpimpact.design.designs import ROOT, DesignStore, Tables, ValidDesign, changed, choices, stages, work
 from warpimpact.plotting.style import data_url
 from warpimpact.plotting.trajectory import FIGURES
 from warpimpact.report.hit_data import MOST_HITS, PAGE_PIXELS, page_data, thinned, trajectory_data
@@ -31,30 +32,55 @@ from warpimpact.view.view import text_of
 
 _MOST_KEPT = 256 * 2**20
 """Most bytes of results that are kept, so that a return to a design computes nothing."""
-_MOST_HISTORIES = 4
+_FIGURES = {draw.__name__.replace("_", " "): draw for draw in FIGURES}
 _COARSE = 96
 """Pixels along the longer side of a first map, which has few hits."""
-PACE, BESIDE = 1.2, 0.3
-"""Initial ratio of the time of a complete map to the time of a core (`work_ahead`), before it is measured; and its time
-beside pilot and hits, for references and tables [s]."""
+PACE, OVERHEAD = 1.8, 0.3
+"""Initial ratio of the time of a complete map to the time of a core for its hits (`work`), before it is measured; and
+the time of references and tables [s]."""
 _FIRST = "The error of the numerics is not known."
 THIS_DESIGN = "this design"
 """Name of the design on the page. The designs to compare with have names of their own."""
 
 
+class Pin(BaseModel):
+    """A design to compare with."""
+
+    name: Annotated[str, Field(max_length=80)]
+    design: Tables
+
+
+class Query(BaseModel):
+    """What the page sends; each kind of query has some of these."""
+
+    design: Tables = {}
+    pins: Annotated[list[Pin], Field(max_length=5)] = []
+    level: Annotated[int, Field(strict=True, ge=0, le=9)] = 0
+    stage: str = "full"
+    hit: Annotated[int, Field(strict=True, ge=0)] = 0
+    layer: Annotated[int, Field(strict=True, ge=0)] = 0
+    change: Literal["threat", "material", "shape", "add layer", "remove layer"] = "threat"
+    value: str = ""
+    figure: str = ""
+    name: Annotated[str, Field(max_length=80)] = "file"
+    text: str = ""
+
+
 class Answers:
-    """Answers the questions of a page, one at a time, and keeps computed results.
+    """Answers the queries of pages, one at a time, and keeps computed results.
+
+    Each may raise Cancelled by the token `cancel`.
 
     Args:
-        shelf: designs and files with which the page was started.
+        store: designs and files with which the page was started.
         device: device that computes.
     """
 
-    def __init__(self, shelf: Shelf, device: str = "auto") -> None:
-        self.shelf, self._device = shelf, device
+    def __init__(self, store: DesignStore, device: str = "auto") -> None:
+        self.store, self._device = store, device
         self._pace = PACE
         self._results: OrderedDict[str, xarray.Dataset] = OrderedDict()
-        self._histories: OrderedDict[tuple[str, int], xarray.Dataset] = OrderedDict()
+        self._replayed = ("", 0, xarray.Dataset())
         self._environment = templates("design", "report")
 
     def page(self, **content: Any) -> str:
@@ -77,11 +103,7 @@ class Answers:
         }
 
     def result(self, design: ValidDesign, cancel: Cancel) -> xarray.Dataset:
-        """The hit map of a design.
-
-        Raises:
-            Cancelled: by `cancel`.
-        """
+        """The hit map of a design."""
         text, campaign = design.text, design.campaign
         if text not in self._results:
             self._results[text] = run(
@@ -102,20 +124,18 @@ class Answers:
             designs: the designs at this stage, by name; the design of the page is the first.
             full: the designs at their last stage.
             level: level of the hits, as far as it is known.
-
-        Raises:
-            Cancelled: by `cancel`.
         """
-        new, begin = [design for design in designs.values() if design.text not in self._results], time.perf_counter()
+        is_last, begin = name == "full", time.perf_counter()
+        new = [design for design in full.values() if design.text not in self._results]
+        seconds = sum(
+            OVERHEAD + work(design.campaign, level if design.campaign.numerics.explicit is None else None)
+            for design in new
+        )
         datasets = {label: self.result(design, cancel) for label, design in designs.items()}
         cancel.check()
         design_data = datasets[THIS_DESIGN]
-        foreseen = sum(
-            BESIDE + work_ahead(design.campaign, level) for design in (new if name == "full" else full.values())
-        )
-        if name == "full" and 0.0 < foreseen < math.inf:
-            self._pace = (time.perf_counter() - begin) / foreseen
-        ahead = 0.0 if name == "full" else self._pace * foreseen
+        if is_last and 0.0 < seconds < math.inf:
+            self._pace = (time.perf_counter() - begin) / seconds
         most = MOST_HITS // len(datasets)
         resolution = json.loads(design_data.attrs[attr.RESOLUTION]) if attr.RESOLUTION in design_data.attrs else {}
         return {
@@ -123,7 +143,7 @@ class Answers:
             "stage": name,
             "hits": design_data.sizes["hit"],
             "total": full[THIS_DESIGN].campaign.hits.count or 0,
-            "ahead": ahead if math.isfinite(ahead) else 0.0,
+            "ahead": 0.0 if is_last or seconds == math.inf else self._pace * seconds,
             "numerics": _FIRST if name == "first" else numerics_sentence(design_data),
             "kept": not breaks_promise(design_data),
             "level": resolution.get("level"),
@@ -144,58 +164,45 @@ class Answers:
         html = self._environment.get_template("answer.html").render(results=results, comparison=comparison)
         return {"kind": "numbers", "html": html}
 
-    def trajectory(self, design: ValidDesign, level: int, stage: str, hit: int, cancel: Cancel) -> dict[str, Any]:
-        """The trajectory of a hit of a design at a stage.
+    def designs(self, query: Query) -> dict[str, ValidDesign]:
+        """The design of a query, and the designs to compare with, by name."""
+        designs = {THIS_DESIGN: self.store.checked(query.design)}
+        designs |= {pin.name: self.store.checked(pin.design) for pin in query.pins}
+        if len(designs) <= len(query.pins):
+            raise CampaignError("got two designs of one name to compare; give each its own")
+        return designs
 
-        Raises:
-            ResultError: there is no such hit.
-        """
-        history = self._history(stage_of(self.shelf, design, level, stage), hit, cancel)
+    def change(self, query: Query, cancel: Cancel) -> Tables:
+        """The tables of a design after a change."""
+        return changed(self.store.checked(query.design), self.store, query.change, query.layer, query.value)
+
+    def open(self, query: Query, cancel: Cancel) -> Tables:
+        """The tables of a campaign file that the browser has read."""
+        return self.store.checked(parsed(query.text, query.name)).tables
+
+    def trajectory(self, query: Query, cancel: Cancel) -> dict[str, Any]:
+        """The trajectory of a hit of a design at a stage."""
+        history = self._history(query, cancel)
         return {
-            "hit": hit,
+            "hit": query.hit,
             "text": text_of(hit_view(history)),
-            "figures": [draw.__name__.replace("_", " ") for draw in FIGURES],
+            "figures": list(_FIGURES),
             "views": trajectory_data(history),
         }
 
-    def figure(
-        self, design: ValidDesign, level: int, stage: str, hit: int, name: str, cancel: Cancel
-    ) -> dict[str, str]:
-        """A figure of a hit's history as the address of an image.
+    def figure(self, query: Query, cancel: Cancel) -> dict[str, str]:
+        """A figure of a hit's history as the address of an image."""
+        return {"image": data_url(_FIGURES[query.figure](self._history(query, cancel)))}
 
-        Raises:
-            CampaignError: there is no such figure.
-        """
-        draw = next((draw for draw in FIGURES if draw.__name__.replace("_", " ") == name), None)
-        if draw is None:
-            raise CampaignError(f'got the figure "{name[:80]}", which replay does not draw')
-        return {"image": data_url(draw(self._history(stage_of(self.shelf, design, level, stage), hit, cancel)))}
+    def _history(self, query: Query, cancel: Cancel) -> xarray.Dataset:
+        every = stages(self.store, self.store.checked(query.design), query.level)
+        design = every.get(query.stage, every["full"])
+        if self._replayed[:2] != (design.text, query.hit):
+            self._replayed = (design.text, query.hit, replay(self.result(design, cancel), query.hit))
+        return self._replayed[2]
 
-    def _history(self, design: ValidDesign, hit: int, cancel: Cancel) -> xarray.Dataset:
-        key = (design.text, hit)
-        if key not in self._histories:
-            self._histories[key] = replay(self.result(design, cancel), hit)
-            while len(self._histories) > _MOST_HISTORIES:
-                self._histories.popitem(last=False)
-        return self._histories[key]
-
-    def report(self, designs: Mapping[str, ValidDesign], cancel: Cancel) -> str:
-        """The report of some designs as HTML.
-
-        Raises:
-            Cancelled: by `cancel`.
-        """
-        datasets = {name: self.result(design, cancel) for name, design in designs.items()}
-        return report_page(datasets, folders=dict.fromkeys(datasets, ROOT), progress=lambda done, total: cancel.check())
-
-
-def named(design: ValidDesign, others: Sequence[tuple[str, ValidDesign]]) -> dict[str, ValidDesign]:
-    """A design and the designs to compare with, by names that differ.
-
-    Raises:
-        CampaignError: two have one name.
-    """
-    names = [THIS_DESIGN, *(name for name, _ in others)]
-    if len(set(names)) < len(names):
-        raise CampaignError("got two designs of one name to compare; give each its own")
-    return {THIS_DESIGN: design, **dict(others)}
+    def report(self, query: Query, cancel: Cancel) -> dict[str, str]:
+        """The report of some designs as HTML."""
+        datasets = {name: self.result(design, cancel) for name, design in self.designs(query).items()}
+        page = report_page(datasets, folders=dict.fromkeys(datasets, ROOT), progress=lambda done, total: cancel.check())
+        return {"html": page}

@@ -8,7 +8,8 @@ import zlib
 from base64 import urlsafe_b64decode
 from collections.abc import Callable, Iterator, Mapping
 from copy import deepcopy
-from dataclasses import dataclass, field
+from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -23,12 +24,11 @@ from warpimpact.results import attributes as attr
 from warpimpact.results import files, front
 from warpimpact.results.files import kind_of, opened
 from warpimpact.results.kinds import FRONT
-from warpimpact.scene import Numerics, Plate
+from warpimpact.scene import Plate
 from warpimpact.scene.patterns.pattern import LatticePattern
 from warpimpact.scene.units import quoted
-from warpimpact.solver.accuracy import pilot_size
 from warpimpact.solver.prepare import prepare
-from warpimpact.solver.resolution import LADDER, TooManySteps, at_level, coarsest_level
+from warpimpact.solver.resolution import TooManySteps, at_level
 
 Tables = dict[str, Any]
 
@@ -41,42 +41,12 @@ FIRST_WORK, FEWEST = 0.08, 64
 hits. A lower level comes before fewer hits."""
 _MOST_ADDRESS = 2**20
 """Most characters of a design in an address, unpacked."""
+_ANY_RESOLUTION = ("scheme", "precision", "layout")
+"""Keys of the numerics that are valid at any resolution."""
 ROOT = Path("/")
 """Folder of a design's files. Their names are absolute, so it does not matter."""
 _DESIGN_NAME = "design"
 """Name of a design in errors."""
-
-
-@dataclass(frozen=True)
-class Shelf:
-    """Designs and files with which a page was started.
-
-    Attributes:
-        designs: tables of the campaigns by name.
-        files: files that the campaigns name, which designs of the page may name, too.
-    """
-
-    designs: Mapping[str, Tables]
-    files: frozenset[str] = field(default_factory=frozenset)
-
-    def checked(self, tables: Tables) -> ValidDesign:
-        """A design of the page.
-
-        Raises:
-            CampaignError: it is not a valid campaign, or names a file that no campaign of the start names.
-        """
-        if not isinstance(tables, dict):
-            raise CampaignError(f"{_DESIGN_NAME}: got {quoted(tables)}, but it must be a table")
-        for place, name in _files_of(tables).items():
-            if name not in self.files:
-                raise CampaignError(
-                    f"{_DESIGN_NAME}: {place}: got {quoted(name)}, but a page reads only files that the campaigns "
-                    "name which warpimpact design was started with"
-                )
-        if (null := next((place for place, _, value in _entries(tables) if value is None), None)) is not None:
-            raise CampaignError(f"{_DESIGN_NAME}: {null}: got null, but it must be a value, or be left out")
-        text = tomli_w.dumps(tables)
-        return ValidDesign(tables, text, Campaign.from_text(text, name=_DESIGN_NAME, folder=ROOT))
 
 
 @dataclass(frozen=True)
@@ -93,10 +63,51 @@ class ValidDesign:
     text: str
     campaign: Campaign
 
+    @property
+    def is_fixed(self) -> bool:
+        """Whether the campaign fixes its resolution."""
+        return self.campaign.numerics.explicit is not None
 
-def shelf_of(paths: list[Path]) -> Shelf:
-    """Designs in files: a campaign is one design per plate; a search of warpimpact optimise gives the designs of its
-    front; a result gives its campaign.
+
+@dataclass(frozen=True)
+class DesignStore:
+    """Designs and files with which a page was started.
+
+    Attributes:
+        designs: tables of the campaigns by name.
+    """
+
+    designs: Mapping[str, Tables]
+
+    @cached_property
+    def files(self) -> frozenset[str]:
+        """Files that the campaigns name, which designs of the page may name, too."""
+        return frozenset(name for tables in self.designs.values() for name in _files_of(tables).values())
+
+    def checked(self, tables: Tables) -> ValidDesign:
+        """Validate a design of the page.
+
+        Raises:
+            CampaignError: it is not a valid campaign, or names a file that no campaign of the start names.
+        """
+        for key, name in _files_of(tables).items():
+            if name not in self.files:
+                raise CampaignError(
+                    f"{_DESIGN_NAME}: {key}: got {quoted(name)}, but a page reads only files that the campaigns name "
+                    "which warpimpact design was started with"
+                )
+        try:
+            text = tomli_w.dumps(tables)
+        except TypeError:
+            raise CampaignError(f"{_DESIGN_NAME}: got null, but a key has a value, or is left out") from None
+        return ValidDesign(tables, text, Campaign.from_text(text, name=_DESIGN_NAME, folder=ROOT))
+
+
+def read_designs(paths: list[Path]) -> dict[str, Tables]:
+    """Read the designs in files by name.
+
+    A campaign is one design per plate; a search of warpimpact optimise has the designs of its front; a result has its
+    campaign.
 
     Raises:
         CampaignError, ResultError: a file is missing or not valid.
@@ -107,8 +118,7 @@ def shelf_of(paths: list[Path]) -> Shelf:
             tables = _absolute(parsed(text, str(path)), path.parent)
             Campaign.from_text(tomli_w.dumps(tables), name=str(path), folder=path.parent)
             designs[name if name not in designs else f"{name} ({path})"] = tables
-    files = {name for tables in designs.values() for name in _files_of(tables).values()}
-    return Shelf(designs, frozenset(files))
+    return designs
 
 
 def _texts(path: Path) -> Iterator[tuple[str, str]]:
@@ -136,21 +146,19 @@ def _texts(path: Path) -> Iterator[tuple[str, str]]:
         yield path.stem, text
 
 
-def _entries(part: Any, place: str = "") -> Iterator[tuple[str, str | int, Any]]:
-    """Place, key and value of every entry of tables, and of what is in it."""
-    for key, value in part.items() if isinstance(part, dict) else enumerate(part) if isinstance(part, list) else ():
-        inner = f"{place}[{key}]" if isinstance(key, int) else f"{place}.{key}".removeprefix(".")
-        yield inner, key, value
-        yield from _entries(value, inner)
-
-
-def _files_of(tables: Tables) -> dict[str, str]:
-    """Names of the files in tables, by their places."""
-    return {place: value for place, key, value in _entries(tables) if key in FILE_KEYS and isinstance(value, str)}
+def _files_of(part: Any) -> dict[str, str]:
+    """Names of files in tables, by their keys."""
+    inner = part.items() if isinstance(part, dict) else enumerate(part) if isinstance(part, list) else ()
+    names = {}
+    for key, value in inner:
+        if key in FILE_KEYS and isinstance(value, str):
+            names[key] = value
+        names |= {f"{key}.{place}": name for place, name in _files_of(value).items()}
+    return names
 
 
 def _absolute(part: Any, folder: Path, key: str = "") -> Any:
-    """Tables with absolute names of files, so that the campaign runs from any folder."""
+    """Return tables with absolute names of files, so that the campaign runs from any folder."""
     if isinstance(part, list):
         return [_absolute(entry, folder) for entry in part]
     if isinstance(part, dict):
@@ -158,113 +166,77 @@ def _absolute(part: Any, folder: Path, key: str = "") -> Any:
     return str((folder / part).absolute()) if key in FILE_KEYS and isinstance(part, str) else part
 
 
-def stages(shelf: Shelf, design: ValidDesign, level: int) -> Iterator[tuple[str, ValidDesign]]:
-    """The stages in which a design is computed, by name: "first", few hits at one level of resolution, without a pilot;
-    "draft", more hits at draft; and "full", the campaign as it is. A stage that the campaign cannot have is left out.
+def stages(store: DesignStore, design: ValidDesign, level: int) -> dict[str, ValidDesign]:
+    """Return the stages in which a design is computed, by name.
 
-    The hits of the first stage are those of the irreducible part of the cell, if there is one.
+    "first" has few hits at one level of resolution, without a pilot, in the irreducible part of the cell if there is
+    one; "draft" has more hits at draft; "full" is the campaign as it is. A stage that the campaign cannot have is left
+    out.
 
     Args:
         level: finest level of the first stage, as the last draft has found it.
     """
-    if (first := _first(shelf, design, level)) is not None and first.text != design.text:
-        yield "first", first
-    if (draft := _draft(shelf, design)) is not None and draft.text != design.text:
-        yield "draft", draft
-    yield "full", design
+    every = {"first": _first(store, design, level)}
+    if not design.is_fixed:
+        every["draft"] = _variant(store, design, SOME, {"fidelity": "draft"})
+    return {name: one for name, one in every.items() if one and one.text != design.text} | {"full": design}
 
 
-def _draft(shelf: Shelf, design: ValidDesign) -> ValidDesign | None:
-    """A design for its draft; None if it has none."""
-    campaign = design.campaign
-    if campaign.numerics.explicit is not None:
+def _first(store: DesignStore, design: ValidDesign, level: int) -> ValidDesign | None:
+    """Return a design for its first map, as fine as FIRST_WORK allows; None if it cannot have one."""
+
+    def first(hits: int, level: int) -> ValidDesign | None:
+        few = (_variant(store, design, hits, {"level": level}, irreducible=part) for part in (True, False))
+        return next(filter(None, few), None)
+
+    finest = first(FEW, level)
+    if finest is None:
         return None
-    return _valid(shelf, _of_few_hits(design, SOME) | {"numerics": _kept(design) | {"fidelity": "draft"}})
-
-
-def _first(shelf: Shelf, design: ValidDesign, level: int) -> ValidDesign | None:
-    """A design for its first map, as fine as FIRST_WORK allows; None if it cannot have one."""
-    first = _of_first_hits(shelf, design, level, FEW)
-    if first is None:
-        return None
-    free = design.campaign.numerics.explicit is None
-    at, seconds = level, work(first.campaign)
-    while free and at > 0 and seconds > FIRST_WORK:
+    at, seconds = level, work(finest.campaign)
+    while not design.is_fixed and at > 0 and seconds > FIRST_WORK:
         at -= 1
-        seconds = work(first.campaign, first.campaign.numerics.model_copy(update={"level": at}))
-    few = FEW if seconds <= FIRST_WORK else max(FEWEST, int(FEW * FIRST_WORK / seconds) // FEWEST * FEWEST)
-    return first if (at, few) == (level, FEW) else _of_first_hits(shelf, design, at, few)
+        seconds = work(finest.campaign, at)
+    hits = FEW if seconds <= FIRST_WORK else max(FEWEST, int(FEW * FIRST_WORK / seconds) // FEWEST * FEWEST)
+    return finest if (at, hits) == (level, FEW) else first(hits, at)
 
 
-def _of_first_hits(shelf: Shelf, design: ValidDesign, level: int, few: int) -> ValidDesign | None:
-    """A design with few hits at a level, in the irreducible part of the cell where the scene allows it."""
-    numerics = design.tables.get("numerics", {})
-    if design.campaign.numerics.explicit is None:
-        numerics = _kept(design) | {"level": level}
-    few_hits = (_of_few_hits(design, few, irreducible=part) | {"numerics": numerics} for part in (True, False))
-    return next(filter(None, (_valid(shelf, tables) for tables in few_hits)), None)
-
-
-def _kept(design: ValidDesign) -> Tables:
-    """Keys of the numerics that are valid at any resolution."""
-    numerics = design.tables.get("numerics", {})
-    return {key: numerics[key] for key in ("scheme", "precision", "layout") if key in numerics}
-
-
-def work(campaign: Campaign, numerics: Numerics | None = None) -> float:
-    """Approximate seconds of a core for the hits of a campaign, the same on every machine; infinite where they cannot
-    be computed.
+def _variant(
+    store: DesignStore, design: ValidDesign, hits: int, numerics: Tables, *, irreducible: bool = False
+) -> ValidDesign | None:
+    """Return a design with at most so many hits, and without a stop rule; None if it is not valid.
 
     Args:
-        numerics: numerics that fix a resolution; by default those of the campaign.
+        numerics: resolution, where the design does not fix its own.
+        irreducible: whether the hits are those of the irreducible part of the cell.
     """
-    sampler = campaign.sampler()
+    tables = {key: value for key, value in design.tables.items() if key != "stop"}
+    if (count := design.campaign.hits.count) is not None:  # else a list keeps the hits of its file
+        tables["hits"] = dict(tables.get("hits", {})) | {"count": min(hits, count)}
+        if irreducible:
+            tables["hits"]["irreducible"] = True
+    if not design.is_fixed:
+        given = tables.get("numerics", {})
+        tables["numerics"] = {key: given[key] for key in _ANY_RESOLUTION if key in given} | numerics
     try:
-        first = prepare(campaign.scene, sampler.shots(0, 1), numerics or campaign.numerics)
-        return first.seconds * len(sampler)
-    except (ValueError, TooManySteps, MemoryError):
-        return math.inf
-
-
-def work_ahead(campaign: Campaign, level: int) -> float:
-    """Approximate seconds of a core for a campaign (`work`), including a pilot that ends at its first level, or at a
-    finer one.
-
-    Args:
-        level: level of its hits, as far as it is known.
-    """
-    if campaign.numerics.explicit is not None:
-        return work(campaign)
-    first = coarsest_level(campaign.numerics.asked.strictness)
-    last = max(first, level)
-    hits = len(campaign.sampler())
-    of_levels = [work(campaign, at_level(at, campaign.numerics)) for at in range(first, last + 3) if at < len(LADDER)]
-    return of_levels[last - first] + pilot_size(campaign.numerics.asked) / hits * sum(of_levels)
-
-
-def _valid(shelf: Shelf, tables: Tables) -> ValidDesign | None:
-    """The design in some tables; None if it is not valid."""
-    try:
-        return shelf.checked(tables)
+        return store.checked(tables)
     except CampaignError:
         return None
 
 
-def _of_few_hits(design: ValidDesign, most: int, *, irreducible: bool = False) -> Tables:
-    """Tables of a design with at most this number of hits, without a stop rule. A list keeps the hits
-    of its file."""
-    tables = {key: value for key, value in design.tables.items() if key != "stop"}
-    count = design.campaign.hits.count
-    if count is None:
-        return tables
-    part = {"irreducible": True} if irreducible else {}
-    return tables | {"hits": dict(design.tables.get("hits", {})) | {"count": min(most, count)} | part}
+def work(campaign: Campaign, level: int | None = None) -> float:
+    """Estimate the seconds of a core for the hits of a campaign, the same on every machine.
 
+    It is infinite where they cannot be computed.
 
-def stage_of(shelf: Shelf, design: ValidDesign, level: int, name: str) -> ValidDesign:
-    """A design at a stage, or at its last stage if it does not have this one."""
-    every = dict(stages(shelf, design, level))
-    return every.get(name, every["full"])
+    Args:
+        level: level of the hits; by default that of the campaign.
+    """
+    sampler = campaign.sampler()
+    numerics = campaign.numerics if level is None else at_level(level, campaign.numerics)
+    try:
+        return prepare(campaign.scene, sampler.shots(0, 1), numerics).seconds * len(sampler)
+    except (ValueError, TooManySteps, MemoryError):
+        return math.inf
 
 
 _SIZES: Mapping[str, Callable[[float], dict[str, float]]] = {
@@ -297,21 +269,16 @@ def choices(design: Tables) -> dict[str, list[str]]:
     return {"threat": threats, "material": list(catalogue.all(Material)), "shape": list(SHAPES)}
 
 
-def changed(design: ValidDesign, shelf: Shelf, what: str, layer: int, value: str) -> Tables:
-    """The tables of a design after a change.
+def changed(design: ValidDesign, store: DesignStore, change: str, layer: int, value: str) -> Tables:
+    """Return the tables of a design after a change.
 
     Args:
-        what: "threat", "material", "shape", "add layer" or "remove layer".
+        change: "threat", "material", "shape", "add layer" or "remove layer".
         layer: number of the changed layer, 0 the plate.
         value: the chosen name; "" is a core or a material of one's own.
-
-    Raises:
-        CampaignError: there is no such change.
     """
     tables = deepcopy(design.tables)
-    if not 0 <= layer < len(design.campaign.target.layers):
-        raise CampaignError(f"got layer {layer}, but the design has layers 0 to {len(design.campaign.layer)}")
-    match what:
+    match change:
         case "threat":
             _take_threat(tables, design, value)
         case "material":
@@ -319,19 +286,15 @@ def changed(design: ValidDesign, shelf: Shelf, what: str, layer: int, value: str
             if not value:
                 tables["interaction"] = design.campaign.interaction.model_dump(exclude_none=True)
         case "shape":
-            _take_shape(tables, design, shelf, layer, value)
+            _take_shape(tables, design, store, layer, value)
         case "add layer":
             front = design.campaign.target.layers[-1]
             of_front = {"material": front.material} if front.material else _own(front)
             tables["layer"] = [*tables.get("layer", []), _BASE | of_front]
-        case "remove layer" if layer > 0:
+        case "remove layer":
             tables["layer"] = [table for place, table in enumerate(tables["layer"]) if place != layer - 1]
             if not tables["layer"]:
                 del tables["layer"]
-        case _:
-            raise CampaignError(
-                f"got the change {quoted(what)}, but it must be threat, material, shape, add layer or remove layer"
-            )
     return tables
 
 
@@ -377,14 +340,12 @@ def _take_material(table: Tables, plate: Plate, name: str) -> None:
         table |= _own(plate)
 
 
-def _take_shape(tables: Tables, design: ValidDesign, shelf: Shelf, layer: int, shape: str) -> None:
+def _take_shape(tables: Tables, design: ValidDesign, store: DesignStore, layer: int, shape: str) -> None:
     """Take holes of another shape with the same area, or with the largest area that leaves ligaments."""
     table, old = _plate(tables, layer), design.campaign.target.layers[layer].pattern
     if shape == "none":
         table.pop("pattern", None)
         return
-    if shape not in _SIZES:
-        raise CampaignError(f"got the shape {quoted(shape)}, but it must be one of {', '.join(SHAPES)}")
     lattice = isinstance(old, LatticePattern)
     spacing = old.spacing if isinstance(old, LatticePattern) else _SPACING
     area = old.hole_area if isinstance(old, LatticePattern) else _OPEN * math.prod(_SPACING)
@@ -395,7 +356,7 @@ def _take_shape(tables: Tables, design: ValidDesign, shelf: Shelf, layer: int, s
         sizes = {key: _mm(length) for key, length in _SIZES[shape](area).items()}
         table["pattern"] = {"shape": shape, **sizes, "spacing": [_mm(side) for side in spacing], **kept}
         try:
-            shelf.checked(tables)
+            store.checked(tables)
         except CampaignError:
             area *= _SMALLER
         else:

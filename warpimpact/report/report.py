@@ -139,7 +139,7 @@ _PROVENANCE = (
 
 def templates(*rooms: str) -> Environment:
     """The pages in some rooms, in which all text is escaped and every name must be known."""
-    loaders = [PackageLoader(f"warpimpact.{room}", "") for room in rooms]
+    loaders = [PackageLoader(f"warpimpact.{room}", "static") for room in rooms]
     return Environment(loader=ChoiceLoader(loaders), autoescape=True, undefined=StrictUndefined, trim_blocks=True)
 
 

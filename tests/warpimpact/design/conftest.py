@@ -8,20 +8,20 @@ from pathlib import Path
 
 import pytest
 
-from warpimpact.design.designs import Shelf, shelf_of
+from warpimpact.design.designs import DesignStore, read_designs
 
 TOKEN = "a-token"
 CAMPAIGNS = Path(__file__).parents[3] / "campaigns"
 
 
 @contextmanager
-def served(shelf: Shelf) -> Iterator[str]:
+def served(store: DesignStore) -> Iterator[str]:
     pytest.importorskip("uvicorn", reason="needs the extra design")
     from warpimpact.design.server import application, server_of
 
     with socket.create_server(("127.0.0.1", 0)) as own:
         port = own.getsockname()[1]
-        server = server_of(application(shelf, token=TOKEN, device="cpu"))
+        server = server_of(application(store, token=TOKEN, device="cpu"))
         thread = threading.Thread(target=server.run, kwargs={"sockets": [own]})
         thread.start()
         try:
@@ -35,7 +35,7 @@ def served(shelf: Shelf) -> Iterator[str]:
 def serve() -> Iterator[Callable[..., str]]:
     """A function that serves a page for campaign files, and returns its address."""
     with ExitStack() as stack:
-        yield lambda *paths: stack.enter_context(served(shelf_of(list(paths))))
+        yield lambda *paths: stack.enter_context(served(DesignStore(read_designs(list(paths)))))
 
 
 @pytest.fixture(scope="module")

@@ -1,10 +1,8 @@
-"""The queue computes one job at a time, the most urgent first, and ends what nobody wants."""
+"""The queue computes one job at a time, urgent ones first, and ends what nobody wants."""
 
 import asyncio
 import threading
 import time
-from collections.abc import Callable
-from typing import Any
 
 import pytest
 
@@ -12,24 +10,19 @@ from warpimpact.design.server import JobQueue
 from warpimpact.solver.worker import Cancel
 
 
-def until(event: threading.Event) -> Callable[[Cancel], str]:
-    """Work that goes on until an event or until it is cancelled."""
-
-    def work(cancel: Cancel) -> str:
-        while not event.is_set():
-            cancel.check()
-            time.sleep(0.001)
-        return "done"
-
-    return work
+def wait(cancel: Cancel, event: threading.Event) -> None:
+    """Work until an event or until it is cancelled."""
+    while not event.wait(0.001):
+        cancel.check()
 
 
-def test_an_urgent_job_puts_off_another_which_then_ends() -> None:
+def test_an_urgent_job_puts_off_one_that_refines_which_then_ends() -> None:
     order, go = list[str](), threading.Event()
 
-    def first(cancel: Cancel) -> str:
+    def refine(cancel: Cancel) -> str:
         order.append("refine")
-        return until(go)(cancel)
+        wait(cancel, go)
+        return "done"
 
     def urgent(_: Cancel) -> str:
         order.append("urgent")
@@ -38,49 +31,46 @@ def test_an_urgent_job_puts_off_another_which_then_ends() -> None:
 
     async def both() -> list[str]:
         jobs = JobQueue()
-        slow = asyncio.ensure_future(jobs.compute(3, first))
+        slow = asyncio.ensure_future(jobs.compute(refine, refines=True))
         await asyncio.sleep(0.05)
-        return [await jobs.compute(0, urgent), await slow]
+        return [await jobs.compute(urgent), await slow]
 
     assert asyncio.run(both()) == ["at once", "done"]
     assert order == ["refine", "urgent", "refine"]
 
 
-@pytest.mark.parametrize("waits", [False, True])
-def test_what_nobody_awaits_ends_at_once(waits: bool) -> None:
-    never, begun, ended = threading.Event(), list[str](), list[str]()
+@pytest.mark.parametrize("refines", [False, True])
+def test_what_nobody_awaits_ends_at_once(refines: bool) -> None:
+    ended = list[str]()
 
-    def work(cancel: Cancel) -> None:
-        begun.append("work")
+    def endless(cancel: Cancel) -> None:
         try:
-            until(never)(cancel)
+            wait(cancel, threading.Event())
         finally:
-            ended.append("work")
+            ended.append("endless")
 
     async def left() -> float:
         jobs = JobQueue()
-        before = asyncio.ensure_future(jobs.compute(0, until(never))) if waits else None
-        job = asyncio.ensure_future(jobs.compute(1, work))
+        job, waiting = (asyncio.ensure_future(jobs.compute(endless, refines=refines)) for _ in range(2))
         await asyncio.sleep(0.05)
-        job.cancel()
-        if before is not None:
-            before.cancel()
+        for one in (job, waiting):
+            one.cancel()
         begin = time.perf_counter()
-        await jobs.compute(3, lambda _: None)
+        await jobs.compute(lambda _: None)
         return time.perf_counter() - begin
 
     assert asyncio.run(left()) < 1.0
-    assert begun == ended == ([] if waits else ["work"])
+    assert ended == ["endless"]
 
 
 def test_an_error_comes_to_the_page_and_the_queue_goes_on() -> None:
-    def broken(_: Cancel) -> Any:
+    def broken(_: Cancel) -> None:
         raise ZeroDivisionError
 
     async def both() -> str:
         jobs = JobQueue()
         with pytest.raises(ZeroDivisionError):
-            await jobs.compute(0, broken)
-        return await jobs.compute(0, lambda _: "goes on")
+            await jobs.compute(broken)
+        return await jobs.compute(lambda _: "goes on")
 
     assert asyncio.run(both()) == "goes on"

@@ -151,8 +151,8 @@ def test_addresses_hold_the_design_and_a_copied_one_not_the_token(page: Any) -> 
 def test_a_click_on_the_map_shows_that_hit(page: Any) -> None:
     page.point_at("#map-0 .nsewdrag", 0.1, 0.2, click=True)
     page.wait(lambda: "Trajectory of hit" in page.text("#note"), 60.0)
-    assert re.match(r"hit \d+ at y = ", page.text("#told"))
-    assert "bit-identical" in page.text("#told")
+    assert re.match(r"hit \d+ at y = ", page.text("#hit-text"))
+    assert "bit-identical" in page.text("#hit-text")
     assert len(page.find("#passage .scatterlayer .trace")) >= 4
     page.find("#figures button")[2].click()
     page.wait(lambda: page.find("#figure")[0].is_displayed(), 60.0)

@@ -11,13 +11,15 @@
   const done = { undo: [], redo: [], last: "" };
   let level = 0, running = null, waiting = false, changedAt = 0, shown = null, settling = 0, chosen = null, followed = null, toml = "";
 
-  const ask = (path, body, signal) => fetch(path, {
+  const post = (path, body, signal) => fetch(path, {
     method: "POST", headers: { "content-type": "application/json" }, body: JSON.stringify(body), signal,
   });
-  async function asked(path, body) {
-    const response = await ask(path, body), text = await response.text();
-    if (response.ok) return JSON.parse(text);
-    throw new Error(text.startsWith("{") ? JSON.parse(text).sentence : text || response.statusText);
+  async function query(path, body) {
+    const response = await post(path, body), text = await response.text();
+    if (!response.ok) throw new Error(text || response.statusText);
+    const value = JSON.parse(text);
+    if (value.kind === "refused") throw new Error(value.sentence);
+    return value;
   }
   const lost = (error) => (error instanceof TypeError ? "warpimpact design does not answer any more; is it still running?" : error.message);
 
@@ -47,7 +49,7 @@
   }
   async function change(what, layer, value) {
     try {
-      const design = await asked("change", { design: state.design, what, layer, value });
+      const design = await query("change", { design: state.design, change: what, layer, value });
       settle();
       state.design = design;
       touched();
@@ -143,7 +145,7 @@
       at("status").textContent = "Computing… The first map of a new kind of target takes up to a minute, once: its kernels are built.";
     }, SLOW);
     try {
-      const response = await ask("compute", { design: state.design, pins, level }, own.abort.signal);
+      const response = await post("compute", { design: state.design, pins, level }, own.abort.signal);
       if (!response.ok) throw new Error(await response.text());
       for await (const line of linesOf(response.body)) {
         if (running !== own) return;
@@ -190,7 +192,7 @@
     } else {
       accept();
       if (line.level !== null) level = line.level;
-      await show({ ...line, design: JSON.parse(text), pins, asked: own.level });
+      await show({ ...line, design: JSON.parse(text), pins, startLevel: own.level });
       if (!own.answered) {
         own.answered = true;
         performance.measure("first map", { start: own.changedAt, end: performance.now(), detail: own.times });
@@ -318,15 +320,15 @@
 
   async function choose(k, place) {
     const own = shown, result = own.data.results[k], hit = result.number[place];
-    const about = { design: k ? own.pins[k - 1].design : own.design, level: own.asked, stage: own.stage, hit };
+    const about = { design: k ? own.pins[k - 1].design : own.design, level: own.startLevel, stage: own.stage, hit };
     chosen = { result: k, hit: place };
     drawMaps();
     at("trajectory").hidden = false;
     at("note").textContent = `Following hit ${hit}…`;
     try {
-      const { text, views, figures } = await asked("trajectory", about);
+      const { text, views, figures } = await query("trajectory", about);
       at("note").textContent = `Trajectory of hit ${hit}${own.pins.length ? ` on ${k ? own.pins[k - 1].name : "this design"}` : ""}.`;
-      at("told").textContent = text;
+      at("hit-text").textContent = text;
       at("trajectory").classList.remove("stale");
       followed = views;
       await hitMaps(own.data).drawTrajectory([at("passage"), at("flight")], views);
@@ -344,7 +346,7 @@
   async function showFigure(about, figure) {
     at("note").textContent = `Drawing ${figure} of hit ${about.hit}…`;
     try {
-      const { image } = await asked("figure", { ...about, figure });
+      const { image } = await query("figure", { ...about, figure });
       Object.assign(at("figure"), { src: image, alt: `${figure} of hit ${about.hit}`, hidden: false });
       at("note").textContent = `Trajectory of hit ${about.hit}.`;
     } catch (error) {
@@ -374,7 +376,7 @@
     at("report").disabled = true;
     at("report").textContent = "Writing…";
     try {
-      const { html } = await asked("report", { design: state.design, pins: state.pins });
+      const { html } = await query("report", { design: state.design, pins: state.pins });
       download(html, `${fileName()}.html`, "text/html");
     } catch (error) {
       refuse(lost(error));
@@ -389,7 +391,7 @@
   }
   async function open(file) {
     try {
-      load(await asked("open", { text: await file.text(), name: file.name }));
+      load(await query("open", { text: await file.text(), name: file.name }));
     } catch (error) {
       refuse(lost(error));
     }
