@@ -1,6 +1,7 @@
 """Hit maps of hard bullet cores against perforated armour plates.
 
-Everything that a program needs is imported from here, and figures from `warpimpact.plotting`; other modules may change.
+What a program needs is imported from here, figures from `warpimpact.plotting`, and less common shapes of holes and
+cores from `warpimpact.scene`; other modules may change.
 """
 
 from importlib import import_module
@@ -16,7 +17,7 @@ __version__ = version("warpimpact")
 
 
 def __getattr__(name: str) -> Any:
-    """A public name at its first use: `warpimpact --help` needs none, and their libraries take two seconds."""
+    """Load a public name at its first use: `warpimpact --help` needs none, and their libraries take 2 to 8 seconds."""
     if name == "plotting":
         return import_module(".plotting", __name__)
     if name.startswith("__") and name != "__all__":

@@ -9,21 +9,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from warpimpact import (
-    CirclePattern,
-    Hits,
-    Impact,
-    Layer,
-    OgiveCore,
-    Plate,
-    PolynomialCore,
-    Record,
-    Scene,
-    Shots,
-    SlotPattern,
-    make_shots,
-)
-from warpimpact.scene import Scatter
+from warpimpact import CirclePattern, Hits, Impact, Layer, OgiveCore, Plate, Record, Scene, SlotPattern, make_shots
+from warpimpact.scene import PolynomialCore, Scatter, Shots
 from warpimpact.scene.distributions import Normal, Uniform
 
 CORE = PolynomialCore(coefficients=(3.0e-4, 0.24, -5.29), length=27.86e-3, mass=4.0e-3)

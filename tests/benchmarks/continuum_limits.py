@@ -18,9 +18,10 @@ from typing import NamedTuple
 import numpy as np
 from continuum_cases import PLATES, PUBLISHED, append, written
 
-from warpimpact import Continuum, Impact, Shots, simulate
+from warpimpact import Continuum, Impact, simulate
 from warpimpact.catalogue.catalogue import flow_entry
 from warpimpact.kernels.status import Status
+from warpimpact.scene import Shots
 
 WIDTH, SHOTS, STEP = 0.025, 8, 1.04
 """A search ends at a bracket of this share of the velocity, or after so many shots; and the step from one that is held

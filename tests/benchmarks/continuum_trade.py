@@ -20,8 +20,9 @@ from typing import Any
 import numpy as np
 from continuum_cases import CASES, MEASURES, PLATES, Case, append, measured, written
 
-from warpimpact import Continuum, Numerics, Record, Scene, Shots, simulate
+from warpimpact import Continuum, Numerics, Record, Scene, simulate
 from warpimpact.catalogue.catalogue import flow_entry
+from warpimpact.scene import Shots
 
 SCALES = np.array([5.0, 5.0, 10.0])
 """What the continuum's own numerics leave open of each measure, about: misfits count in these."""

@@ -22,8 +22,8 @@ from bench import machine, store
 from random_layers import drawn
 from random_scenes import draw
 
-from warpimpact import Campaign, Numerics, Scene, Shots
-from warpimpact.scene import PRESETS
+from warpimpact import Campaign, Numerics, Scene
+from warpimpact.scene import PRESETS, Shots
 from warpimpact.solver.accuracy import pilot_size
 from warpimpact.solver.device import find_device
 from warpimpact.solver.marching import Marching

@@ -9,9 +9,10 @@ import pytest
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from warpimpact import OgiveCore, PolynomialCore
+from warpimpact import OgiveCore
 from warpimpact.continuum.meshing import SheetMesh
 from warpimpact.continuum.one_hit import OneHit, Start
+from warpimpact.scene import PolynomialCore
 from warpimpact.scene.flow import Flow
 
 Array = NDArray[np.float64]

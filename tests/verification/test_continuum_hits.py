@@ -9,10 +9,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-from warpimpact import CirclePattern, Continuum, Layer, NoPattern, Plate, PolynomialCore, Record, Scene, Shots, simulate
+from warpimpact import CirclePattern, Continuum, Layer, Plate, Record, Scene, simulate
 from warpimpact.continuum import meeting, strikes
 from warpimpact.kernels.status import Status
 from warpimpact.records.outcomes import Outcomes
+from warpimpact.scene import NoPattern, PolynomialCore, Shots
 from warpimpact.scene.flow import Flow
 from warpimpact.solver.worker import Worker
 

@@ -10,14 +10,14 @@ import numpy as np
 import pytest
 import xarray
 
-from warpimpact import ConeCore, Plate, Record, Scene, SquarePattern
+from warpimpact import Plate, Record, Scene
 from warpimpact.kernels.status import Status
 from warpimpact.records.outcomes import Outcomes
 from warpimpact.results.dataset import to_dataset
 from warpimpact.results.kinds import HIT_MAP
 from warpimpact.results.variables import SHOT_VARIABLES
 from warpimpact.runs import shards
-from warpimpact.scene import AnyPattern, Shots
+from warpimpact.scene import AnyPattern, ConeCore, Shots, SquarePattern
 
 STANDOFFS = np.array([0.05, 0.13])
 PERIOD = (16e-3, 8e-3)

@@ -9,11 +9,12 @@ from xml.etree import ElementTree
 import numpy as np
 import pytest
 
-from warpimpact import Campaign, ConeCore, Hits, Impact, Layer, Numerics, Plate, SquarePattern, run
+from warpimpact import Campaign, Hits, Impact, Layer, Numerics, Plate, run
 from warpimpact.analysis.comparison import compare
 from warpimpact.analysis.inspection import inspect
 from warpimpact.results import files
 from warpimpact.results.files import ResultError
+from warpimpact.scene import ConeCore, SquarePattern
 
 HOLES = SquarePattern(side="4 mm", spacing="8 mm")
 PLATE = Plate(areal_density="30 kg/m^2", resistance="2.6 GPa", pattern=HOLES)

@@ -7,18 +7,7 @@ import numpy as np
 import pytest
 import xarray
 
-from warpimpact import (
-    Campaign,
-    Hits,
-    Impact,
-    Numerics,
-    Plate,
-    PolygonsPattern,
-    PolynomialCore,
-    SlotPattern,
-    hit_map,
-    run,
-)
+from warpimpact import Campaign, Hits, Impact, Numerics, Plate, PolygonsPattern, SlotPattern, hit_map, run
 from warpimpact.analysis.hit_map import mirrored
 from warpimpact.campaign.campaign import Output
 from warpimpact.cli import main
@@ -27,7 +16,7 @@ from warpimpact.report.hit_data import page_data, thinned
 from warpimpact.results import files
 from warpimpact.results.variables import OUTCOME_VARIABLES, SHOT_VARIABLES
 from warpimpact.runs.replay import replay
-from warpimpact.scene import TrianglePattern
+from warpimpact.scene import PolynomialCore, TrianglePattern
 
 SLOTTED_PLATE = Path(__file__).parents[3] / "campaigns" / "slotted_plate.toml"
 CORE = PolynomialCore(coefficients=(3.0e-4, 0.24, -5.29), length=27.86e-3, mass=4e-3)

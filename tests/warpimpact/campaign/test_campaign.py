@@ -4,8 +4,9 @@ from pathlib import Path
 
 import pytest
 
-from warpimpact import Campaign, Hits, Impact, Plate, PolynomialCore
+from warpimpact import Campaign, Hits, Impact, Plate
 from warpimpact.campaign.campaign import CampaignError
+from warpimpact.scene import PolynomialCore
 
 SLOTTED_PLATE = Path(__file__).parents[3] / "campaigns" / "slotted_plate.toml"
 

@@ -3,11 +3,12 @@
 import numpy as np
 import pytest
 
-from warpimpact import CirclePattern, Continuum, Layer, Plate, PolynomialCore, Record, Scene, Shots, simulate
+from warpimpact import CirclePattern, Continuum, Layer, Plate, Record, Scene, simulate
 from warpimpact.catalogue.catalogue import flow_entry
 from warpimpact.continuum import meeting
 from warpimpact.continuum.hit_history import replay_continuum
 from warpimpact.kernels.status import Status
+from warpimpact.scene import PolynomialCore, Shots
 
 CORE = PolynomialCore(coefficients=(3.0e-4, 0.24, -5.29), length=27.86e-3, mass=4.0e-3)
 HOLES = CirclePattern(diameter=5e-3, spacing=(9e-3, 9e-3))

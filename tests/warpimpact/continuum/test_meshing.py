@@ -3,9 +3,10 @@
 import numpy as np
 import pytest
 
-from warpimpact import CirclePattern, NoPattern, Plate, SlotPattern
+from warpimpact import CirclePattern, Plate, SlotPattern
 from warpimpact.continuum.meshing import Extent, SheetMesh, meshed, runs_of
 from warpimpact.continuum.one_hit import volumes_of
+from warpimpact.scene import NoPattern
 
 SLOTS = SlotPattern(length=12e-3, width=4e-3, spacing=(8e-3, 16e-3), staggered=True)
 ROUND = CirclePattern(diameter=5e-3, spacing=(9e-3, 9e-3))

@@ -7,12 +7,13 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from warpimpact import CirclePattern, Continuum, Layer, Plate, PolynomialCore, Record, Scene, Shots, simulate
+from warpimpact import CirclePattern, Continuum, Layer, Plate, Record, Scene, simulate
 from warpimpact.catalogue.catalogue import flow_entry, flow_names
 from warpimpact.continuum import meeting, strikes
 from warpimpact.continuum.meshing import nodes_of
 from warpimpact.continuum.one_hit import Energies
 from warpimpact.kernels.status import Status
+from warpimpact.scene import PolynomialCore, Shots
 from warpimpact.scene.flow import FINENESS
 from warpimpact.solver.device import find_device
 from warpimpact.solver.worker import Worker

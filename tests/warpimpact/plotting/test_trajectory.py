@@ -8,11 +8,12 @@ import xarray
 from matplotlib.figure import Figure
 from matplotlib.patches import Polygon
 
-from warpimpact import Campaign, CirclePattern, Hits, Impact, Numerics, Plate, PolynomialCore
+from warpimpact import Campaign, CirclePattern, Hits, Impact, Numerics, Plate
 from warpimpact.plotting import trajectory
 from warpimpact.plotting.trajectory import INSTANTS, Pose, silhouette
 from warpimpact.runs.replay import replay
 from warpimpact.runs.run import run
+from warpimpact.scene import PolynomialCore
 
 LENGTH, CENTRE = 27.86e-3, 18.05e-3
 THICKNESS = 4e-3

@@ -7,27 +7,14 @@ from typing import Any
 import numpy as np
 import pytest
 
-from warpimpact import (
-    Campaign,
-    ConeCore,
-    Hits,
-    Impact,
-    Layer,
-    Numerics,
-    Plate,
-    Record,
-    Scene,
-    SquarePattern,
-    Target,
-    make_shots,
-    simulate,
-)
+from warpimpact import Campaign, Hits, Impact, Layer, Numerics, Plate, Record, Scene, make_shots, simulate
 from warpimpact.analysis.hit_map import mirrored
 from warpimpact.records import registry
 from warpimpact.records.outcomes import Outcomes
 from warpimpact.records.variable import HITS, Returned, Variable, VariableGroup, doubles
 from warpimpact.results import files
 from warpimpact.runs.run import run_to_file
+from warpimpact.scene import ConeCore, SquarePattern, Target
 
 SIDEWAYS = Variable("sideways", HITS, "m s-1", "velocity along y at the end of contact", mirror="along_y")
 

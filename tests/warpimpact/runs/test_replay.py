@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 import xarray
 
-from warpimpact import Campaign, CirclePattern, Hits, Impact, NoPattern, Numerics, Plate, PolynomialCore
+from warpimpact import Campaign, CirclePattern, Hits, Impact, Numerics, Plate
 from warpimpact.campaign.campaign import CampaignError, Output
 from warpimpact.cli import main
 from warpimpact.kernels.status import Status
@@ -16,7 +16,7 @@ from warpimpact.results.files import ResultError
 from warpimpact.results.variables import EXIT_VARIABLES, HISTORY_COORDINATES, HISTORY_VARIABLES, OUTCOME_VARIABLES
 from warpimpact.runs.replay import replay
 from warpimpact.runs.run import run
-from warpimpact.scene import Interaction
+from warpimpact.scene import Interaction, NoPattern, PolynomialCore
 
 SLOTTED_PLATE = Path(__file__).parents[3] / "campaigns" / "slotted_plate.toml"
 NOWHERE = Path("nowhere")

@@ -7,17 +7,9 @@ import numpy as np
 import pytest
 from pydantic import ValidationError
 
-from warpimpact import (
-    Campaign,
-    CirclePattern,
-    Interaction,
-    Plate,
-    PolynomialCore,
-    ProfileCore,
-    SlotPattern,
-)
+from warpimpact import Campaign, CirclePattern, Interaction, Plate, SlotPattern
 from warpimpact.campaign.campaign import CampaignError
-from warpimpact.scene import Hits
+from warpimpact.scene import Hits, PolynomialCore, ProfileCore
 from warpimpact.scene.model import Model
 
 CAMPAIGNS = Path(__file__).parents[3] / "campaigns"

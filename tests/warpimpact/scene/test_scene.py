@@ -16,15 +16,13 @@ from warpimpact import (
     Layer,
     Numerics,
     Plate,
-    PolynomialCore,
     Record,
     Scene,
-    Shots,
-    Target,
     make_shots,
     run,
     simulate,
 )
+from warpimpact.scene import PolynomialCore, Shots, Target
 
 SLOTTED_PLATE = Path(__file__).parents[3] / "campaigns" / "slotted_plate.toml"
 CORE = PolynomialCore(coefficients=(3.0e-4, 0.24, -5.29), length=27.86e-3, mass=4e-3)

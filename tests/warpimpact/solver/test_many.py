@@ -5,7 +5,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from warpimpact import Campaign, Numerics, Scene, Shots, simulate
+from warpimpact import Campaign, Numerics, Scene, simulate
+from warpimpact.scene import Shots
 from warpimpact.solver.many import simulate_many
 from warpimpact.solver.worker import Cancel, Cancelled, Worker
 
