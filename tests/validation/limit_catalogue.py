@@ -21,23 +21,23 @@ from .limit_velocities import PREDICTIONS, errors, stored_fit
 DATABASE = "ballistic limit database, Mendeley Data 10.17632/4f92y6jzzh.2"
 HARD, THIN = 450.0, 0.65
 """Hardness of hard steel [HV], and calibres of a thin plate of it."""
-_APART = 1.25
+_LEAST_RATIO = 1.25
 """The thicknesses between which an exponent is found differ at least by this ratio."""
 
 
-def entries(rows: Rows, found: Fit, predicted: pd.DataFrame) -> list[str]:
+def entries(rows: Rows, whole_fit: Fit, predicted: pd.DataFrame) -> list[str]:
     """The text of the file of every material, from the fit that the package holds."""
-    return [_entry(rows, found, name, predicted) for name in dict.fromkeys(rows.material.tolist())]
+    return [_entry(rows, whole_fit, name, predicted) for name in dict.fromkeys(rows.material.tolist())]
 
 
-def _entry(rows: Rows, found: Fit, name: str, predicted: pd.DataFrame) -> str:
+def _entry(rows: Rows, whole_fit: Fit, name: str, predicted: pd.DataFrame) -> str:
     own = rows[rows.material == name]
     counts = {one: int((own.projectile == one).sum()) for one in PROJECTILES if (own.projectile == one).any()}
     projectile = ".30 AP M2" if ".30 AP M2" in counts else max(counts, key=lambda one: counts[one])
     of_it = own[own.projectile == projectile]
     low, high = of_it.calibres.min(), of_it.calibres.max()
-    if high < _APART * low:
-        low, high = np.sqrt(low * high / _APART), np.sqrt(low * high * _APART)
+    if high < _LEAST_RATIO * low:
+        low, high = np.sqrt(low * high / _LEAST_RATIO), np.sqrt(low * high * _LEAST_RATIO)
     mean, deviation = limit_fit(name).predicted(_plates(of_it, np.array([low, np.sqrt(low * high), high])))
     exponent = (mean[2] - mean[0]) / np.log(high / low)
     strength = float(np.exp(mean[1] - exponent * np.log(np.sqrt(low * high))))
@@ -53,9 +53,9 @@ def _entry(rows: Rows, found: Fit, name: str, predicted: pd.DataFrame) -> str:
         f'resistance_low = "{strength / spread / 1e6:.4g} MPa"',
         f'resistance_high = "{strength * spread / 1e6:.4g} MPa"',
         f"thickness_exponent = {exponent:.3f}",
-        f"shear_coefficient = {found.coefficients['friction']:.3f}",
-        f"linear = {found.coefficients['linear']:.3g}",
-        f"quadratic = {found.coefficients['quadratic']:.3g}",
+        f"shear_coefficient = {whole_fit.friction:.3f}",
+        "linear = 0",
+        "quadratic = 0",
         f"sources = {json.dumps(sorted(set(own.source.tolist())))}",
         f'thickness_low = "{1e3 * own.thickness.min():.4g} mm"',
         f'thickness_high = "{1e3 * own.thickness.max():.4g} mm"',
@@ -87,7 +87,7 @@ def figures(rows: Rows, predicted: pd.DataFrame) -> dict[str, dict[str, float]]:
     error = predicted["predicted"] / predicted["published"] - 1.0
     of, steel = predicted["split"], rows.steel[predicted["row"]]
     in_steel, in_aluminium = (error[(of == CARBIDE) & which] for which in (steel, ~steel))
-    found = {
+    values = {
         "core": _cores(rows),
         "steel": _range(rows[rows.steel]),
         "aluminium": _range(rows[~rows.steel]),
@@ -99,7 +99,7 @@ def figures(rows: Rows, predicted: pd.DataFrame) -> dict[str, dict[str, float]]:
             "aluminium rows": len(in_aluminium),
         },
     }
-    return {name: {key: round(float(value), 4) for key, value in one.items()} for name, one in found.items()}
+    return {name: {key: round(float(value), 4) for key, value in one.items()} for name, one in values.items()}
 
 
 def _cores(rows: Rows) -> dict[str, float]:

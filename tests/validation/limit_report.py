@@ -9,8 +9,8 @@ import numpy as np
 import pandas as pd
 from matplotlib.figure import Figure
 
-from .limit_model import CHOSEN, METALS, Fit
-from .limit_rows import PROJECTILES, STORED, Rows
+from .limit_model import METALS, Fit
+from .limit_rows import PROJECTILES, STORED
 from .limit_splits import CARBIDE, LAW, RIVALS
 from .limit_velocities import PREDICTIONS, SUMMARY, errors
 
@@ -24,26 +24,22 @@ _MARKS = {".30 AP M2": "o", ".50 AP M2": "s", "14.5 mm B32": "^", "14.5 mm BS41"
 _ENDS = np.array([300.0, 1150.0])
 
 
-def write(rows: Rows, fits: dict[str, Fit], found: pd.DataFrame, laws: pd.DataFrame) -> None:
+def write(whole_fit: Fit, predicted: pd.DataFrame) -> None:
     """Store predictions, summary and figure, and put the tables into the page."""
-    kept = found[found["split"].isin(KEPT) & (found["method"] == LAW)]
+    kept = predicted[predicted["split"].isin(KEPT) & (predicted["method"] == LAW)]
     kept.to_csv(PREDICTIONS, index=False)
     summary = {
-        "fits": {
-            name: {
-                "values": [float(f"{value:.6g}") for value in one.values],
-                "log_posterior": round(one.log_posterior, 2),
-                "parts": {part: round(size, 4) for part, size in one.scales.items()},
-                "coefficients": {key: round(value, 4) for key, value in one.coefficients.items()},
-            }
-            for name, one in fits.items()
+        "fit": {
+            "values": [float(f"{value:.6g}") for value in whole_fit.values],
+            "log_posterior": round(whole_fit.log_posterior, 2),
+            "parts": {part: round(size, 4) for part, size in whole_fit.scales.items()},
+            "friction": round(whole_fit.friction, 4),
         },
-        "laws": laws.to_dict("records"),
-        "splits": _records(errors(found, ["split", "method"])),
-        "plates": _records(errors(found, ["split", "projectile", "material", "method"])),
+        "splits": _records(errors(predicted, ["split", "method"])),
+        "plates": _records(errors(predicted, ["split", "projectile", "material", "method"])),
     }
     SUMMARY.write_text(json.dumps(summary, indent=1, allow_nan=False) + "\n", encoding="utf-8")
-    draw(found[found["method"] == LAW])
+    draw(predicted[predicted["method"] == LAW])
     PAGE.write_text(with_tables(PAGE.read_text(encoding="utf-8"), tables(summary)), encoding="utf-8")
 
 
@@ -52,7 +48,7 @@ def _records(table: pd.DataFrame) -> list[dict[str, Any]]:
     return [dict(one) for one in table.assign(inside=inside).to_dict("records")]
 
 
-def draw(found: pd.DataFrame) -> None:
+def draw(predicted: pd.DataFrame) -> None:
     """Store the figure: left every row predicted without a fifth of the rows, which is its own; right the tests."""
     figure = Figure(figsize=(12.0, 6.2), layout="constrained")
     panels = figure.subplots(1, 2, sharex=True, sharey=True)
@@ -65,7 +61,7 @@ def draw(found: pd.DataFrame) -> None:
         ],
     }
     for axes, (title, splits) in zip(panels, shown.items(), strict=True):
-        some = found[found["split"].isin(splits)]
+        some = predicted[predicted["split"].isin(splits)]
         for name in PROJECTILES:
             own = some[some["projectile"] == name]
             if len(own):
@@ -82,7 +78,7 @@ def draw(found: pd.DataFrame) -> None:
 
 def tables(summary: dict[str, Any]) -> dict[str, str]:
     """The tables of the page by name, as Markdown."""
-    return {"splits": _splits(summary), "plates": _plates(summary), "laws": _laws(summary), "parts": _parts(summary)}
+    return {"splits": _splits(summary), "plates": _plates(summary), "parts": _parts(summary)}
 
 
 def markdown(head: Sequence[str], rows: Iterable[Sequence[object]]) -> str:
@@ -115,18 +111,8 @@ def _plates(summary: dict[str, Any]) -> str:
     return markdown(("projectile", "material", "rows", "model", "inside 90 %", *RIVALS), rows)
 
 
-def _laws(summary: dict[str, Any]) -> str:
-    by = {(one["law"], one["split"]): one for one in summary["laws"]}
-    splits = list(dict.fromkeys(one["split"] for one in summary["laws"]))
-    rows = []
-    for law, one in summary["fits"].items():
-        cells = [f"{100 * by[law, split]['median']:.1f}, {by[law, split]['elpd']:.0f}" for split in splits]
-        rows.append((law, f"{one['coefficients']['friction']:.3f}", *cells))
-    return markdown(("law", "η", *splits), rows)
-
-
 def _parts(summary: dict[str, Any]) -> str:
-    parts = summary["fits"][CHOSEN.name]["parts"]
+    parts = summary["fit"]["parts"]
     names = dict.fromkeys(name.rpartition(", ")[0] for name in parts)
     rows = []
     for name in names:

@@ -1,10 +1,10 @@
 """Published limit velocities of solid plates, and what the model gives for the same plates per resistance.
 
 Without degradation the limit velocity v of a core of mass m and diameter d in a plate of thickness h follows from
-v² m / d³ = Y F(h/d, θ, η, C', B'), with C' = C √(ρ d³/m) and B' = B ρ d³/m (docs/model.md §4.5, 6.9). `tabulated`
-computes F with `limit_velocity` on some nodes of each core; a fit then needs no more runs.
+v² m / d³ = Y F(h/d, θ, η) (docs/model.md §4.5, 6.9). `tabulated` computes F with `limit_velocity` on some nodes of each
+core; a fit then needs no more runs.
 
-To compute the stored table again, in half an hour on one core: python -m tests.validation.limit_rows
+To compute the stored table again, in some minutes on one core: python -m tests.validation.limit_rows
 """
 
 import json
@@ -22,7 +22,7 @@ from scipy.interpolate import CubicSpline, PchipInterpolator
 from warpimpact.catalogue.catalogue import Catalogue
 from warpimpact.catalogue.entries import Threat
 from warpimpact.catalogue.strength import Plates
-from warpimpact.scene import Core, Interaction, Numerics, Plate, Scene, Shots
+from warpimpact.scene import Core, Numerics, Plate, Scene, Shots
 from warpimpact.solver.limit import limit_velocity
 
 Array = NDArray[np.float64]
@@ -39,12 +39,8 @@ NODES = {
     "calibres": (0.4, 0.65, 1.0, 1.6, 2.5, 4.0, 6.3, 10.0),
     "obliquity": (0.0, 15.0, 30.0, 45.0),
     "friction": (0.0, 0.1, 0.2),
-    "linear": (0.0, 0.25, 0.5),
-    "quadratic": (0.0, 0.25, 0.5),
 }
-"""h/d, θ [deg], η, C' and B' of the table."""
-ONSETS = (0.0, 0.02)
-"""κ for which the table has the static law, too."""
+"""h/d, θ [deg] and η of the table."""
 RESISTANCE = 1.0e9
 """At which the table is computed [Pa]."""
 HIGHEST_OBLIQUITY = 45.0
@@ -89,9 +85,9 @@ def diameters(projectiles: NDArray[np.str_]) -> Array:
 @cache
 def core(projectile: str) -> Core:
     """The core of a projectile, from the catalogue."""
-    found = Catalogue().named(Threat, str(projectile)).shape
-    assert found is not None
-    return found
+    shape = Catalogue().named(Threat, str(projectile)).shape
+    assert shape is not None
+    return shape
 
 
 def published(file: Path = PUBLISHED) -> Rows:
@@ -130,21 +126,11 @@ def joined(rows: Rows, more: Rows) -> Rows:
     return Rows(**{name: np.concatenate([values, getattr(more, name)]) for name, values in vars(rows).items()})
 
 
-def computed(
-    projectile: str,
-    plates: list[tuple[float, float, float]],
-    *,
-    linear: float = 0.0,
-    quadratic: float = 0.0,
-    onset: float = Interaction().onset,
-    start: float = 2.5,
-) -> Array:
+def computed(projectile: str, plates: list[tuple[float, float, float]], start: float = 2.5) -> Array:
     """F of some plates, shape [plates].
 
     Args:
         plates: h/d, θ [deg] and η of each.
-        linear, quadratic: C' and B'.
-        onset: κ.
         start: energy at which the searches begin, over that of the plain work.
     """
     body = core(projectile)
@@ -165,32 +151,19 @@ def computed(
         shear_coefficient=friction,
     )
     plate = Plate(thickness=float(calibres.max() * diameter), resistance=RESISTANCE, density=mass / diameter**3)
-    law = Interaction(linear=linear, quadratic=quadratic, onset=onset)
-    scene = Scene(core=body, target=plate, interaction=law)
-    found = limit_velocity(scene, shots, numerics=Numerics(level=2), tolerance=0.5, highest=4.0e3, device="cpu")
-    value = found.value**2 * mass / (RESISTANCE * diameter**3)
+    scene = Scene(core=body, target=plate)
+    limits = limit_velocity(scene, shots, numerics=Numerics(level=2), tolerance=0.5, highest=4.0e3, device="cpu")
+    value = limits.value**2 * mass / (RESISTANCE * diameter**3)
     for place in np.flatnonzero(~np.isfinite(value)) if start < 5.0 else ():  # the search went past the limit
-        law_again = {"linear": linear, "quadratic": quadratic, "onset": onset, "start": 2.0 * start}
-        value[place] = computed(projectile, [plates[place]], **law_again)[0]
+        value[place] = computed(projectile, [plates[place]], 2.0 * start)[0]
     return np.asarray(value)
 
 
 def tabulated() -> dict[str, Any]:
     """The table of all projectiles, as it is stored."""
-    shape = tuple(len(values) for values in NODES.values())
-    plates = list(product(*(NODES[name] for name in ("calibres", "obliquity", "friction"))))
-    table: dict[str, Any] = {}
-    for name in PROJECTILES:
-        found = np.empty(shape)
-        for (c, linear), (b, quadratic) in product(enumerate(NODES["linear"]), enumerate(NODES["quadratic"])):
-            found[..., c, b] = computed(name, plates, linear=linear, quadratic=quadratic).reshape(shape[:3])
-        onsets = {str(onset): computed(name, plates, onset=onset).reshape(shape[:3]) for onset in ONSETS}
-        table[name] = {"F": _rounded(found), "onset": {key: _rounded(values) for key, values in onsets.items()}}
+    plates = list(product(*NODES.values()))
+    table = {name: [float(f"{value:.5g}") for value in computed(name, plates)] for name in PROJECTILES}
     return {"nodes": NODES, "projectiles": table}
-
-
-def _rounded(values: Array) -> Any:
-    return [float(f"{value:.5g}") for value in values.ravel()]
 
 
 @cache
@@ -201,50 +174,31 @@ def _table() -> dict[str, Any]:
     return projectiles
 
 
-def unit(rows: Rows, onset: float | None = None) -> Array:
-    """ln F of rows at the nodes of η, C' and B', shape [rows, 3, 3, 3]; at another onset than that of the package the
-    static law's, which does not depend on C' and B'."""
+def unit(rows: Rows) -> Array:
+    """ln F of rows at the nodes of η, shape [rows, 3]."""
     shape = tuple(len(values) for values in NODES.values())
     calibres = np.array(NODES["calibres"])
-    found = np.empty((len(rows), *shape[2:]))
+    nodes = np.empty((len(rows), shape[2]))
     for name in set(rows.projectile):
-        one = _table()[name]
-        flat = np.array(one["F"] if onset is None else one["onset"][str(onset)])
-        values = flat.reshape(shape) if onset is None else np.broadcast_to(flat.reshape(*shape[:3], 1, 1), shape)
-        per_calibre = np.log(values / calibres[:, None, None, None, None])
+        per_calibre = np.log(np.reshape(_table()[name], shape) / calibres[:, None, None])
         here = np.flatnonzero(rows.projectile == name)
         at = CubicSpline(np.log(calibres), per_calibre)(np.log(rows.calibres[here]))
         angles = np.degrees(rows.obliquity[here])
         for angle in np.unique(angles):
             some = angles == angle
-            found[here[some]] = PchipInterpolator(NODES["obliquity"], at[some], axis=1)(angle)
-    return found + np.log(rows.calibres)[:, None, None, None]
+            nodes[here[some]] = PchipInterpolator(NODES["obliquity"], at[some], axis=1)(angle)
+    return nodes + np.log(rows.calibres)[:, None]
 
 
-def log_unit(nodes: Array, rows: Rows, friction: float, linear: float, quadratic: float) -> Array:
-    """ln F of rows for a law, interpolated between the nodes by parabolas, shape [rows].
+def log_unit(nodes: Array, friction: float) -> Array:
+    """ln F of rows, by a parabola through the nodes of η, shape [rows].
 
     Args:
         nodes: `unit` of the rows.
-        friction, linear, quadratic: η, C and B.
+        friction: η.
     """
-    share = rows.density * rows.diameter**3 / rows.mass
-    own = {
-        "friction": np.full(len(rows), friction),
-        "linear": linear * np.sqrt(share),
-        "quadratic": quadratic * share,
-    }
-    eta, c, b = (_lagrange(np.array(NODES[name]), values) for name, values in own.items())
-    return np.asarray(np.einsum("recb,re,rc,rb->r", nodes, eta, c, b))
-
-
-def _lagrange(nodes: Array, at: Array) -> Array:
-    """Weights of the nodes for polynomials through them, shape [at, nodes]."""
-    weights = np.ones((len(at), len(nodes)))
-    for i, own in enumerate(nodes):
-        for other in np.delete(nodes, i):
-            weights[:, i] *= (at - other) / (own - other)
-    return weights
+    at = np.array(NODES["friction"])
+    return np.asarray(np.vander([friction], 3) @ np.linalg.solve(np.vander(at, 3), nodes.T))[0]
 
 
 def main() -> None:

@@ -8,10 +8,10 @@ from dataclasses import dataclass
 import numpy as np
 import pandas as pd
 
-from .limit_model import CHOSEN, Fit, Mask, Model, Places, fit
+from .limit_model import Fit, Mask, Model, Places, fit
 from .limit_rows import Array, Rows
 
-LAW = CHOSEN.name
+LAW = "strength by h/d"
 RIVALS = ("De Marre, fitted", "energy per area")
 COLUMNS = ["split", "row", "projectile", "material", "fitted", "published", "method", "predicted", "low", "high"]
 CARBIDE = "core: BS41 carbide from .30"
@@ -23,7 +23,7 @@ class Split:
     """Rows that are predicted, each group from what the question leaves.
 
     Attributes:
-        name: what is asked.
+        name: of the question.
         groups: rows that are predicted together.
         fitted: of each group, the rows that are known.
         refitted: whether the sizes of the parts are found from the known rows alone; else from all rows of the fit.
@@ -61,7 +61,7 @@ def questions(rows: Rows) -> Iterator[Split]:
     plate = _labels(rows.projectile, rows.material)
     middle = pd.Series(rows.thickness).groupby(plate).transform("median").to_numpy()
     fives = np.random.default_rng(5).permutation(len(rows)) % 5
-    asked: dict[str, tuple[Mask, Callable[[int], bool]]] = {
+    splits: dict[str, tuple[Mask, Callable[[int], bool]]] = {
         "angle: from 0°": (normal, lambda k: bool((normal & (plate == plate[k])).any())),
         "scale: .50 and B32 from .30": (
             small,
@@ -76,7 +76,7 @@ def questions(rows: Rows) -> Iterator[Split]:
             lambda k: (plate == plate[k]).sum() >= LEAST_ROWS,
         ),
     }
-    for name, (known, has_some) in asked.items():
+    for name, (known, has_some) in splits.items():
         group = np.array([k for k in np.flatnonzero(~known) if has_some(k)], dtype=np.int64)
         if len(group) and known.sum() >= LEAST_ROWS:
             yield Split(name, [group], [known], refitted=True)
@@ -85,23 +85,23 @@ def questions(rows: Rows) -> Iterator[Split]:
         yield Split("a fifth out", groups, [_all_but(one, len(rows)) for one in groups], refitted=True)
 
 
-def predictions(rows: Rows, split: Split, found: Fit) -> pd.DataFrame:
+def predictions(rows: Rows, split: Split, whole_fit: Fit) -> pd.DataFrame:
     """What the model and its rivals predict of a split: columns of COLUMNS."""
     parts = list[pd.DataFrame]()
-    whole = Model(rows, found.law).weighed(found.values)
+    whole = Model(rows).weighed(whole_fit.values)
     if not split.refitted:
-        mean, variance = whole.left_out(found.values, split.groups)
-        velocity = whole.velocity(found.values, mean, variance)
+        mean, variance = whole.left_out(whole_fit.values, split.groups)
+        velocity = whole.velocity(whole_fit.values, mean, variance)
     for group, known in zip(split.groups, split.fitted, strict=True):
         if split.refitted:
-            own = fit(rows[known], found.law)
+            own = fit(rows[known])
             weights = np.ones(len(rows))
-            weights[known] = Model(rows[known], found.law).weighed(own.values).weights
-            model = Model(rows, found.law, weights)
+            weights[known] = Model(rows[known]).weighed(own.values).weights
+            model = Model(rows, weights)
             mean, variance = np.full((2, len(rows)), np.nan)
             mean[group], variance[group] = model.predicted(own.values, known, group)
             velocity = model.velocity(own.values, mean, variance)
-        answers = {found.law.name: tuple(one[group] for one in velocity)}
+        answers = {LAW: tuple(one[group] for one in velocity)}
         for name, rival in zip(RIVALS, (_de_marre, _energy), strict=True):
             answers[name] = (rival(rows, known, group), *np.full((2, len(group)), np.nan))
         plate = _labels(rows.projectile, rows.material)

@@ -94,17 +94,15 @@ STEEL_ALONE = ("curve in calibres", "curve in calibres of a projectile")
 """Parts that aluminium does without: its rows follow a power of h/d."""
 
 
-def part_names(*, by_thickness: bool = True) -> list[str]:
-    """All parts with their metal; those of Y that depends on h/d if `by_thickness`."""
+def part_names() -> list[str]:
+    """All parts with their metal."""
     metals = {name: ("steel",) if name in STEEL_ALONE else ("steel", "aluminium") for name in PART_SCALES}
-    kept = [name for name in PART_SCALES if by_thickness or ("calibres" not in name and "exponent" not in name)]
-    return [f"{name}, {metal}" for name in kept for metal in metals[name]]
+    return [f"{name}, {metal}" for name in PART_SCALES for metal in metals[name]]
 
 
-def shared(plates: Plates, others: Plates, *, by_thickness: bool = True) -> tuple[Array, dict[str, Array]]:
+def shared(plates: Plates, others: Plates) -> tuple[Array, dict[str, Array]]:
     """The common part of ln Y of plates and of others: the covariance of the parts of known size, and that of each
-    fitted part at size 1, of shape [plates, others] each; `by_thickness` as in `part_names`.
-    """
+    fitted part at size 1, of shape [plates, others] each."""
     metals = {
         "steel": np.outer(plates.steel, others.steel).astype(float),
         "aluminium": np.outer(~plates.steel, ~others.steel).astype(float),
@@ -117,8 +115,7 @@ def shared(plates: Plates, others: Plates, *, by_thickness: bool = True) -> tupl
     (excess, harder), (other_excess, other_harder) = plates.strengths, others.strengths
     fixed = metal * (0.5**2 + 0.3**2 * (np.outer(excess, other_excess) + np.outer(harder, other_harder) + angles))
     fixed += 0.1**2 * metal * np.outer(plates.bare, others.bare)
-    if by_thickness:
-        fixed += 0.2**2 * metal * np.outer(size, other_size)
+    fixed += 0.2**2 * metal * np.outer(size, other_size)
     curve = _near(size, other_size, SAME_CURVE)
     angle_alike = _same(plates.obliquity.round(3), others.obliquity.round(3))
     parts = {
@@ -135,7 +132,7 @@ def shared(plates: Plates, others: Plates, *, by_thickness: bool = True) -> tupl
         "curve in calibres": curve,
         "curve in calibres of a projectile": projectile * curve,
     }
-    named = (name.rpartition(", ") for name in part_names(by_thickness=by_thickness))
+    named = (name.rpartition(", ") for name in part_names())
     return fixed, {f"{part}, {of}": parts[part] * metals[of] for part, _, of in named}
 
 
