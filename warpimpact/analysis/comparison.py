@@ -1,45 +1,60 @@
 """Plates side by side: which protects better, by how much, and whether the hits show a difference.
 
 Shot k hits every plate at the same place of its unit cell under the same conditions. What the shots have in common then
-cancels in the differences (common random numbers), which are means of differences shot by shot with their intervals
-(statistics/intervals.py). Where one plate has more hits, the first ones are paired and the others count, too. Plates
-that were hit by different shots are compared as independent (statistics/comparisons.py). No hit is left out.
+cancels in the differences (common random numbers), which are means of differences shot by shot with their intervals.
+Where one plate has more hits, the first ones are paired and the others count, too. Plates that were hit by different
+shots are compared as independent (statistics/comparisons.py). No hit is left out.
 
 Plates of different weight are compared by their ratios to the solid plate of the same areal density.
 
-The intervals of all pairs of plates hold together, for each measure on its own: each has its share of the error
-(Bonferroni). They include the shift of both plates by the numerics and by the tolerance of a limit. Two plates are told
-apart where the interval of their difference excludes 0 by more than rounding.
+One rule: what is printed is what ranks. Every interval, of a value and of a difference, contains the shift by the
+numerics and the tolerance of a limit, and has the same confidence, so that all differences of a measure hold together
+(Bonferroni). Two plates are told apart where the interval of their difference excludes 0 by more than rounding, which
+it does where the intervals of the values do not meet. A rank is a range: from one more than the number of plates that
+are better, to the place that the plates that are worse leave open (J. Klein, T. Wright, J. Wieczorek, Journal of the
+Royal Statistical Society A 183 (2020) 1093).
 """
 
 from __future__ import annotations
 
 import json
 import math
-from collections.abc import Iterator, Sequence
-from dataclasses import replace
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
 from itertools import combinations, pairwise
 from typing import Any, NamedTuple
 
 import numpy as np
+import pandas as pd
 import xarray
 
-from warpimpact.analysis.comparison_text import Comparison, Difference, Pair, PlateScore
-from warpimpact.analysis.effectiveness import Score, ScoreData, depth_note, measures_of, scores
-from warpimpact.analysis.numbers import of_each
-from warpimpact.analysis.plate_text import common_name, plate_text, reference_name, solid_note, solid_plate, weights_of
-from warpimpact.analysis.summary import breaks_promise, hits_at_two_levels, sampling_note
+from warpimpact.analysis.effectiveness import (
+    PIERCED,
+    Score,
+    common_name,
+    depth_note,
+    measures_of,
+    plate_text,
+    reference_name,
+    scores,
+    solid_note,
+    solid_plate,
+    weights_of,
+    weights_text,
+)
+from warpimpact.analysis.estimates import estimated
+from warpimpact.analysis.inspection import breaks_promise, hits_at_two_levels, sampling_note
+from warpimpact.analysis.numbers import View, html_of, interval_text, listed, number_text, of_each, rows_of
 from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
 from warpimpact.results.files import ResultError
-from warpimpact.results.measures import Measure, dealing, estimate_from
+from warpimpact.results.measures import Measure, dealing
 from warpimpact.results.vocabulary import base_thickness, has_base
 from warpimpact.runs.parts import first_difference
 from warpimpact.scene.quantities import QUANTITIES
 from warpimpact.scene.units import quantity as reader_of
 from warpimpact.statistics.comparisons import (
     ROUNDED,
-    Ratio,
     confidence_of_each,
     difference_numbers,
     difference_of_independent,
@@ -54,6 +69,100 @@ _SAME_WEIGHT = 1.01
 """Largest ratio of the areal densities of plates that count as equally heavy."""
 
 
+@dataclass(frozen=True)
+class Comparison:
+    """Plates side by side, with the differences that the hits show. A notebook shows the short view, and every measure.
+
+    Attributes:
+        plates: by name, in the given order: hits; areal_density of the whole target [kg/m²]; add_on of it, NaN where
+            the file does not separate it; weights in words; solid: the solid reference in words.
+        measures: the compared measures by their texts.
+        scores: by measure a row for each plate in the display unit: value, low, high; solid, ratio, ratio_low,
+            ratio_high; alone; numerics, the shift that low and high contain.
+        differences: by measure a row for each pair of plates, `one` less `other`, by ratio where that ranks: value,
+            low, high, and whether it is significant. The end of an interval that does not exist is NaN.
+        pairs: a row for each pair of plates: number of paired first hits; why they are independent, or "".
+        by_ratio: measures that rank by the ratio to the solid reference.
+        differ_in_weight: whether the weights count and differ.
+        confidence: confidence at which the intervals of a measure's differences hold together.
+        reference: name of the solid references.
+        notes: further notes, a sentence each.
+        cautions: differences or unknowns of the plates that the ranks do not consider, in a few words.
+    """
+
+    plates: pd.DataFrame
+    measures: dict[str, Measure]
+    scores: dict[str, pd.DataFrame]
+    differences: dict[str, pd.DataFrame]
+    pairs: pd.DataFrame
+    by_ratio: frozenset[str]
+    differ_in_weight: bool
+    confidence: float
+    reference: str
+    notes: tuple[str, ...]
+    cautions: tuple[str, ...]
+
+    @property
+    def compared(self) -> list[Measure]:
+        """The measures without worst points, which have no interval."""
+        return [measure for measure in self.measures.values() if measure.kind != "worst_point"]
+
+    @property
+    def ranking(self) -> list[Measure]:
+        """The measures that rank plates: with a better direction and with intervals."""
+        return [one for one in self.compared if one.higher_is_better is not None and self.is_ranked(one.text)]
+
+    def is_ranked(self, text: str) -> bool:
+        """Whether a measure has intervals of differences. If not, the notes say why."""
+        return text in self.differences and bool(self.differences[text]["low"].notna().any())
+
+    def ordered(self, text: str) -> list[str]:
+        """Names of the plates, the best value (or ratio, where that ranks) first."""
+        column = self.scores[text]["ratio" if text in self.by_ratio else "value"]
+        better = self.measures[text].higher_is_better
+        return column.sort_values(ascending=not better, kind="stable", na_position="last").index.tolist()
+
+    def ranks(self, text: str) -> dict[str, tuple[int, int]]:
+        """First and last possible rank of each plate by a measure, the best value first."""
+        names = self.ordered(text)
+        better, worse = dict.fromkeys(names, 0), dict.fromkeys(names, 0)
+        for pair in rows_of(self.differences[text]) if text in self.differences else ():
+            if pair.significant:
+                first, last = (pair.one, pair.other)[:: 1 if names.index(pair.one) < names.index(pair.other) else -1]
+                worse[first] += 1
+                better[last] += 1
+        return {name: (1 + better[name], len(names) - worse[name]) for name in names}
+
+    def first(self, text: str) -> list[str]:
+        """Names of the plates that no other one is better than."""
+        return [name for name, (rank, _) in self.ranks(text).items() if rank == 1]
+
+    def from_best(self, text: str) -> pd.DataFrame:
+        """Differences of the other plates from the best one, by plate, in the order of the values."""
+        best, *others = self.ordered(text)
+        table = self.differences[text]
+        turned = table.assign(
+            one=table.other, other=table.one, value=0.0 - table.value, low=-table.high, high=-table.low
+        )
+        both = pd.concat([table, turned])
+        return both[both.other == best].set_index("one").loc[others]
+
+    def deciding(self) -> Measure | None:
+        """The first measure by which hits tell two plates apart, else the first that ranks plates; None without one.
+
+        Measures have the order of the texts, by default that of `effectiveness.SHOWN`: what reaches the base comes
+        before what flies behind the target.
+        """
+        ranking = self.ranking
+        significant = (one for one in ranking if self.differences[one.text]["significant"].any())
+        return next(significant, ranking[0] if ranking else None)
+
+    def _repr_html_(self) -> str:
+        """HTML for a notebook."""
+        every = html_of(comparison_view(self))
+        return f"{html_of(short_view(self))}<details><summary>Every measure</summary>{every}</details>"
+
+
 def compare(
     datasets: Sequence[xarray.Dataset],
     names: Sequence[str],
@@ -61,7 +170,7 @@ def compare(
     *,
     confidence: float = 0.95,
 ) -> Comparison:
-    """Compare the plates of some hit maps, by all their hits.
+    """Compare the plates of some results, by all their hits.
 
     Args:
         datasets: two or more, with the same core and impact. Of open files one number per hit is in memory.
@@ -75,73 +184,131 @@ def compare(
     """
     for dataset, name in zip(datasets[1:], names[1:], strict=True):
         _check_same_question(datasets[0], names[0], dataset, name)
-    pairs = list(combinations(range(len(datasets)), 2))
-    used = [_used(datasets[i], names[i], datasets[j], names[j]) for i, j in pairs]
-    asked = [measures_of(dataset, texts) for dataset in datasets]
-    common = set.intersection(*({measure.quantity.name for measure in measures} for measures in asked))
-    differ_in_weight, by_ratio = _differ_in_weight(datasets), set()
-    of_each_pair = confidence_of_each(confidence, len(pairs))
-    of_plates: list[list[Score]] = [[] for _ in datasets]
-    differences = list[Difference]()
-    for scored in zip(
-        *(
-            scores(dataset, [measure for measure in measures if measure.quantity.name in common])
-            for dataset, measures in zip(datasets, asked, strict=True)
-        ),
-        strict=True,
-    ):
-        for plate, side in zip(of_plates, scored, strict=True):
-            plate.append(side.score)
-        measure = scored[0].score.measure
-        if not measure.has_interval or (measure.name == "base_depth" and _depths_are_bounds(datasets, of_plates)):
+    places = list(combinations(range(len(datasets)), 2))
+    pairs = pd.DataFrame(
+        [_used(datasets[i], datasets[j]) for i, j in places],
+        columns=["paired", "independent"],
+    ).assign(one=[names[i] for i, _ in places], other=[names[j] for _, j in places])
+    of_plates = [measures_of(dataset, texts) for dataset in datasets]
+    common = set.intersection(*({measure.text for measure in measures} for measures in of_plates))
+    measures = {measure.text: measure for measure in of_plates[0] if measure.text in common}
+    each, differ, by_ratio = confidence_of_each(confidence, len(places)), _differ_in_weight(datasets), set[str]()
+    bounds = all(map(has_base, datasets)) and _depths_are_bounds(datasets)
+    tables, differences = dict[str, pd.DataFrame](), dict[str, pd.DataFrame]()
+    for scored in zip(*(scores(dataset, list(measures.values()), each) for dataset in datasets), strict=True):
+        measure = scored[0].data.measure
+        shifts = [_shift(score, dataset) for score, dataset in zip(scored, datasets, strict=True)]
+        rows = [_row(score, shift) for score, shift in zip(scored, shifts, strict=True)]
+        tables[measure.text] = pd.DataFrame(rows, index=pd.Index(names, name="plate"))
+        if not measure.has_interval or (bounds and measure.name == "base_depth"):
             continue
-        has_ratios = scored[0].data.numbers is not None and not any(math.isnan(side.score.ratio) for side in scored)
-        if differ_in_weight and has_ratios:
+        if ratios := differ and not any(math.isnan(score.ratio.low) for score in scored):
             by_ratio.add(measure.text)
-        for (i, j), pair in zip(pairs, used, strict=True):
-            both, sides, is_ratio = (datasets[i], datasets[j]), (scored[i], scored[j]), measure.text in by_ratio
-            paired = not pair.independent and measure.kind != "quantile"
-            interval = _apart(sides, both, of_each_pair, by_ratio=is_ratio, paired=paired)
-            differences.append(Difference(measure.text, names[i], names[j], *interval))
-    plates = tuple(
-        PlateScore(
-            name,
-            dataset.sizes["hit"],
-            dataset.attrs[attr.AREAL_DENSITY],
-            dataset.attrs[attr.OPEN_AREA],
-            tuple(plate),
-            solid_plate(dataset),
-            reference_name(dataset),
-            weights_of(dataset),
-        )
-        for name, dataset, plate in zip(names, datasets, of_plates, strict=True)
-    )
-    at_equal_weight = frozenset(by_ratio) if differ_in_weight else None
+        sides = [_side(score, shift, by_ratio=ratios) for score, shift in zip(scored, shifts, strict=True)]
+        compared = []
+        for (i, j), independent in zip(places, pairs.independent, strict=True):
+            options: Estimating = {**dealing(datasets[i]), "confidence": each}
+            compared.append((names[i], names[j], *_difference(sides[i], sides[j], options, paired=not independent)))
+        columns = ["one", "other", "value", "low", "high", "significant"]
+        differences[measure.text] = pd.DataFrame(compared, columns=columns)
     cautions = dict(_cautions(datasets, names))
     notes = (
-        *(*_weights(datasets, names), *cautions.values()),
-        *(*_notes(datasets, names), *_notes_of_bases(datasets, plates)),
+        *([_weights_note(datasets, names)] if differ else []),
+        *(*cautions.values(), *_notes(datasets, names, tables, bounds=bounds)),
     )
-    return Comparison(plates, tuple(differences), tuple(used), at_equal_weight, confidence, notes, tuple(cautions))
+    return Comparison(
+        plates=pd.DataFrame([_plate(dataset) for dataset in datasets], index=pd.Index(names, name="plate")),
+        measures=measures,
+        scores=tables,
+        differences=differences,
+        pairs=pairs,
+        by_ratio=frozenset(by_ratio),
+        differ_in_weight=differ,
+        confidence=confidence,
+        reference=common_name(map(reference_name, datasets)),
+        notes=notes,
+        cautions=tuple(cautions),
+    )
 
 
-def _apart(
-    scored: tuple[ScoreData, ScoreData],
-    datasets: tuple[xarray.Dataset, xarray.Dataset],
-    confidence: float,
-    *,
-    by_ratio: bool,
-    paired: bool,
-) -> tuple[float, float, float]:
-    """Difference of two plates with its interval, widened by the shift of both by the numerics. Rounding counts as
-    0."""
-    dealt = [Estimating(**dealing(dataset), confidence=confidence) for dataset in datasets]
-    side, other = (_side(*given, by_ratio=by_ratio) for given in zip(scored, datasets, dealt, strict=True))
-    value, low, high = _difference(side, other, dealt[0], paired=paired)
-    shift = (side.estimate.numerics or 0.0) + (other.estimate.numerics or 0.0)
-    rounded = ROUNDED * max(abs(side.estimate.value), abs(other.estimate.value))
-    value, low, high = (0.0 if abs(end) <= rounded else end for end in (value, low - shift, high + shift))
-    return value, low, high
+def _plate(dataset: xarray.Dataset) -> dict[str, Any]:
+    weights = weights_of(dataset)
+    return {
+        "hits": dataset.sizes["hit"],
+        "areal_density": float(dataset.attrs[attr.AREAL_DENSITY]),
+        "add_on": weights.get("add-on", math.nan),
+        "weights": weights_text(weights),
+        "solid": solid_plate(dataset),
+    }
+
+
+def _shift(score: Score, dataset: xarray.Dataset) -> float:
+    """Largest shift of a value by the numerics, and by the tolerance of a limit; 0 where it is unknown."""
+    measure, attributes = score.data.measure, dataset.attrs
+    tolerance = 0.0 if measure.is_binary else float(attributes.get(attr.LIMIT_TOLERANCE, 0.0))
+    is_weight = measure.name == "limit_areal_density"
+    factor = attributes.get(attr.LIMIT_DENSITY, 0.0) if is_weight else measure.display.factor
+    return float(np.nan_to_num(score.data.estimate.numerics or 0.0)) + tolerance * factor
+
+
+def _row(score: Score, shift: float) -> dict[str, float]:
+    """A row of `Comparison.scores`."""
+    estimate, measure, ratio = score.data.estimate, score.data.measure, score.ratio
+    wide = replace(estimate, low=estimate.low - shift, high=estimate.high + shift)
+    wide = wide.within(measure.display.factor * measure.least, measure.display.factor * measure.most)
+    of_ratio = shift / ratio.reference if ratio.reference else math.nan
+    return {
+        "value": estimate.value,
+        "low": wide.low,
+        "high": wide.high,
+        "solid": ratio.reference,
+        "ratio": ratio.value,
+        "ratio_low": float(np.fmax(ratio.low - of_ratio, 0.0)) if ratio.low == ratio.low else math.nan,
+        "ratio_high": ratio.high + of_ratio,
+        "alone": score.alone,
+        "numerics": float(np.nan_to_num(estimate.numerics or 0.0)),
+    }
+
+
+class _Side(NamedTuple):
+    """What is compared of a plate: an estimate by the hits, numbers whose mean it is, its shift, and its kind."""
+
+    estimate: Estimate
+    numbers: Array
+    shift: float
+    kind: str
+
+
+def _side(score: Score, shift: float, *, by_ratio: bool) -> _Side:
+    """The value of a plate, or its ratio to the solid reference."""
+    estimate, numbers, ratio, measure = score.data.estimate, score.data.numbers, score.ratio, score.data.measure
+    kind = "quantile" if measure.kind == "quantile" else "share" if measure.is_binary and not by_ratio else "mean"
+    if by_ratio and score.solid is not None:
+        numbers, shift = ratio_numbers(numbers, score.solid, ratio.value), shift / ratio.reference
+        estimate = replace(estimate, value=ratio.value, low=ratio.low, high=ratio.high)
+    return _Side(estimate, numbers, shift, kind)
+
+
+def _difference(one: _Side, other: _Side, options: Estimating, *, paired: bool) -> tuple[float, float, float, bool]:
+    """Difference of two plates, its interval, and whether it is significant. Rounding counts as 0.
+
+    The interval is never wider than the intervals of both values leave open.
+    """
+    a, b, shift = one.estimate, other.estimate, one.shift + other.shift
+    value, (low, high) = a.value - b.value, difference_of_independent(a, b)
+    if paired:
+        matched = one.kind == "share" and len(one.numbers) == len(other.numbers)
+        numbers = difference_numbers(one.numbers, other.numbers)
+        estimate = estimate_of("difference" if matched else "mean", numbers, **options)
+        # Shares that agree in every shot are no more certain than each of them.
+        agrees = one.kind == "share" and estimate.half_width == 0.0 and a.half_width + b.half_width > 0.0
+        if not agrees and not math.isnan(estimate.low + low + high):
+            value = value if one.kind == "quantile" else estimate.value  # pseudo-values give its error alone
+            low, high = value + estimate.low - estimate.value, value + estimate.high - estimate.value
+    low, high = float(np.fmax(low, a.low - b.high)), float(np.fmin(high, a.high - b.low))
+    rounding = ROUNDED * max(abs(end) for end in (a.value, b.value) if math.isfinite(end) or not end)
+    value, low, high = (0.0 if abs(end) <= rounding else end for end in (value, low - shift, high + shift))
+    return value, low, high, bool(low > 0.0 or high < 0.0)
 
 
 def _differ_in_weight(datasets: Sequence[xarray.Dataset]) -> bool:
@@ -150,98 +317,62 @@ def _differ_in_weight(datasets: Sequence[xarray.Dataset]) -> bool:
     return datasets[0].attrs.get(attr.LIMIT) != "thickness" and max(densities) > _SAME_WEIGHT * min(densities)
 
 
-def _depths_are_bounds(datasets: Sequence[xarray.Dataset], measures: Sequence[Sequence[Score]]) -> bool:
+def _depths_are_bounds(datasets: Sequence[xarray.Dataset]) -> bool:
     """Whether depths cannot be ranked: cores pierce a base and count as its thickness, and the thicknesses differ."""
     thicknesses = [float(np.mean(base_thickness(dataset))) for dataset in datasets]
-    return max(thicknesses) > _SAME_WEIGHT * min(thicknesses) and any(map(depth_note, measures))
+    if max(thicknesses) <= _SAME_WEIGHT * min(thicknesses):
+        return False
+    pierced = Measure.parse(PIERCED)
+    return any(estimated(dataset, [pierced])[pierced].value > 0.0 for dataset in datasets)
 
 
-def _notes_of_bases(datasets: Sequence[xarray.Dataset], plates: Sequence[PlateScore]) -> Iterator[str]:
-    """Notes on the bases behind the plates."""
-    based = [has_base(dataset) for dataset in datasets]
-    if any(based) and not all(based) and attr.LIMIT not in datasets[0].attrs:
-        alone = [plate.name for plate, is_based in zip(plates, based, strict=True) if not is_based]
-        yield f"Without layers, and so without a base: {', '.join(alone)}. Measures of a base are left out."
-        return
-    measures = [plate.measures for plate in plates]
-    if all(based) and _depths_are_bounds(datasets, measures):
-        yield (
-            "Cores pierce a base and count with its thickness as depth. The bases differ in thickness, so depths are "
-            "not ranked."
-        )
-    elif any(
-        notes := [f"{plate.name}: {depth_note(plate.measures)}" for plate in plates if depth_note(plate.measures)]
-    ):
-        yield from notes
+def _check_same_question(result: xarray.Dataset, name: str, other: xarray.Dataset, other_name: str) -> None:
+    """Refuse results with another core, impact or stand-offs.
+
+    Raises:
+        ResultError: the message names the first difference.
+    """
+    if (mismatch := first_difference(_question(result, name), _question(other, other_name))) is not None:
+        place, was, now = mismatch
+        raise ResultError(f"{other_name}: cannot be compared with {name}: {place} is {now} here and {was} there")
 
 
-def _used(result: xarray.Dataset, name: str, other: xarray.Dataset, other_name: str) -> Pair:
-    """How the hits of two results are used."""
-    common = min(result.sizes["hit"], other.sizes["hit"])
-    why = _other_shots(result.isel(hit=slice(common)), other.isel(hit=slice(common)))
-    return Pair(name, other_name, 0 if why else common, why)
-
-
-class _Side(NamedTuple):
-    """What is compared of a plate: whether it is a share or follows from one; whether it is a ratio to the solid plate;
-    numbers whose mean it is; and its estimate, with the shift by the numerics."""
-
-    is_share: bool
-    by_ratio: bool
-    numbers: Array
-    estimate: Estimate
-
-
-def _sought_to(dataset: xarray.Dataset, measure: Measure) -> float:
-    """Largest distance of a limit in a result from the stated one, in the unit of the measure; 0 for other results, and
-    for a share, where it is unknown."""
+def _question(dataset: xarray.Dataset, name: str) -> dict[str, Any]:
+    """What must be the same for plates to be compared; the angles of the impact in degrees."""
     attributes = dataset.attrs
-    if measure.is_binary:
-        return 0.0
-    factor = (
-        attributes.get(attr.LIMIT_DENSITY, 0.0) if measure.name == "limit_areal_density" else measure.display.factor
+    if not {attr.CORE, attr.IMPACT} <= attributes.keys():
+        raise ResultError(f"{name}: has no description of its core and impact, which a comparison needs; run it again")
+    impact = {
+        key: f"{math.degrees(value)!r} deg" if key in _ANGLES and isinstance(value, float) else value
+        for key, value in json.loads(attributes[attr.IMPACT]).items()
+    }
+    output = {"standoffs": dataset[v.STANDOFF].values.tolist(), "standoff_point": attributes[attr.STANDOFF_POINT]}
+    limit = {"limit": attributes[attr.LIMIT]} if attr.LIMIT in attributes else {}
+    return limit | {"core": json.loads(attributes[attr.CORE]), "impact": impact, "output": output}
+
+
+def _used(result: xarray.Dataset, other: xarray.Dataset) -> tuple[int, str]:
+    """Number of first hits that are the same shots, and why there are none; empty where there are."""
+    common = min(result.sizes["hit"], other.sizes["hit"])
+    one, two = (dataset.isel(hit=slice(common)) for dataset in (result, other))
+    if dealing(one) != dealing(two):
+        return 0, "their shots have other replicates"
+    for axis, coordinate in enumerate((v.HIT_Y, v.HIT_Z)):
+        here, there = (dataset[coordinate].values / dataset.attrs[attr.PLATE_PERIOD][axis] for dataset in (one, two))
+        if not np.allclose(here, there, rtol=0.0, atol=_SAME_PLACE):
+            return 0, "their shots hit other places of the cell"
+    for name in (*v.SHOT_VARIABLES, v.MASS):
+        if name in one and not (name in two and np.array_equal(one[name], two[name])):
+            return 0, f"their shots differ in {name}"
+    return common, ""
+
+
+def _weights_note(datasets: Sequence[xarray.Dataset], names: Sequence[str]) -> str:
+    weights = of_each(names, [plate_text(dataset).removeprefix(", ").rpartition(",")[0] for dataset in datasets])
+    return (
+        f"The plates differ in weight ({weights}). They are ranked by the ratio to the "
+        f"{common_name(map(reference_name, datasets))} of the same areal density; a measure without that ratio says so."
     )
-    return float(attributes.get(attr.LIMIT_TOLERANCE, 0.0) * factor)
-
-
-def _side(scored: ScoreData, dataset: xarray.Dataset, dealt: Estimating, *, by_ratio: bool) -> _Side:
-    score, measure, data = scored.score, scored.score.measure, scored.data
-    shift = float(np.nan_to_num(score.numerics or 0.0)) + _sought_to(dataset, measure)
-    estimate = replace(estimate_from(measure, data.values, **dealt), numerics=shift)
-    numbers = data.values if data.numbers is None else data.numbers
-    if not by_ratio:
-        return _Side(measure.is_binary, False, numbers, estimate)
-    assert scored.solid is not None
-    ratio = Ratio.of(estimate, numbers, scored.solid, dealt)
-    numbers = ratio_numbers(numbers, scored.solid, ratio.value)
-    estimate = replace(estimate, value=ratio.value, low=ratio.low, high=ratio.high, numerics=shift / ratio.reference)
-    return _Side(measure.is_binary, True, numbers, estimate)
-
-
-def _difference(side: _Side, other: _Side, dealt: Estimating, *, paired: bool) -> tuple[float, float, float]:
-    """Difference of two plates and its interval; NaN where there is none."""
-    a, b = side.estimate, other.estimate
-    independent = a.value - b.value, *difference_of_independent(a, b)
-    if not paired:
-        return independent
-    numbers = difference_numbers(side.numbers, other.numbers)
-    matched = side.is_share and not side.by_ratio and len(side.numbers) == len(other.numbers)
-    estimate = estimate_of("difference" if matched else "mean", numbers, **dealt)
-    if math.isnan(a.low + b.low):
-        return estimate.value, math.nan, math.nan
-    if side.is_share and estimate.half_width == 0.0 and a.half_width + b.half_width > 0.0:
-        return independent  # if shares agree in every shot, their difference is no more certain than the shares
-    return estimate.value, estimate.low, estimate.high
-
-
-def _weights(datasets: Sequence[xarray.Dataset], names: Sequence[str]) -> Iterator[str]:
-    if _differ_in_weight(datasets):
-        weights = of_each(names, [plate_text(dataset).removeprefix(", ").rpartition(",")[0] for dataset in datasets])
-        reference = common_name(map(reference_name, datasets))
-        yield (
-            f"The plates differ in weight ({weights}). They are ranked by the ratio to the {reference} of the same "
-            "areal density; a measure without that ratio says so."
-        )
 
 
 def _cautions(datasets: Sequence[xarray.Dataset], names: Sequence[str]) -> Iterator[tuple[str, str]]:
@@ -251,8 +382,7 @@ def _cautions(datasets: Sequence[xarray.Dataset], names: Sequence[str]) -> Itera
     if differences := "; ".join(_materials(datasets, names)):
         yield "material", f"The plates differ in material, which no ranking allows for: {differences}."
     texts = [dataset.attrs[attr.NUMERICS_GIVEN] for dataset in datasets if attr.NUMERICS_GIVEN in dataset.attrs]
-    asked = [json.loads(text) for text in texts]
-    differing = (first_difference(first, other) for first, other in pairwise(asked))
+    differing = (first_difference(json.loads(first), json.loads(other)) for first, other in pairwise(texts))
     if (caution := next(filter(None, differing), None)) is not None:
         yield (
             "different numerics",
@@ -266,76 +396,187 @@ def _cautions(datasets: Sequence[xarray.Dataset], names: Sequence[str]) -> Itera
         yield "the error of the numerics", f"{sentence} (warpimpact inspect)."
 
 
-def _notes(datasets: Sequence[xarray.Dataset], names: Sequence[str]) -> Iterator[str]:
-    solid = {name: solid_note(dataset) for name, dataset in zip(names, datasets, strict=True)}
-    alike = len(set(solid.values())) == 1
-    yield from dict.fromkeys(note if alike else f"{name}: {note}" for name, note in solid.items() if note)
-    yield from dict.fromkeys(filter(None, map(sampling_note, datasets)))
-
-
 def _materials(datasets: Sequence[xarray.Dataset], names: Sequence[str]) -> Iterator[str]:
     """Quantities in which the materials differ, with the value of every plate that has one."""
-    materials = {
-        name: json.loads(d.attrs[attr.MATERIAL])
-        for name, d in zip(names, datasets, strict=True)
-        if attr.MATERIAL in d.attrs
+    known = {
+        n: json.loads(d.attrs[attr.MATERIAL]) for n, d in zip(names, datasets, strict=True) if attr.MATERIAL in d.attrs
     }
-    for quantity in dict.fromkeys(key for material in materials.values() for key in material):
-        values = {name: material.get(quantity) for name, material in materials.items()}
+    for quantity in dict.fromkeys(key for material in known.values() for key in material):
+        values = {name: material.get(quantity) for name, material in known.items()}
         if len(set(values.values())) > 1:
             read = reader_of(QUANTITIES[quantity].type).text if quantity in QUANTITIES else "{:g}".format
             shown = [
                 "not given" if value is None else value if isinstance(value, str) else read(value)
                 for value in values.values()
             ]
-            yield f"{quantity} ({of_each(list(values), shown)})"
+            yield f"{quantity} ({of_each(values, shown)})"
 
 
-def _check_same_question(result: xarray.Dataset, name: str, other: xarray.Dataset, other_name: str) -> None:
-    """Refuse results with another core, impact or stand-offs.
-
-    Raises:
-        ResultError: the message names the first difference.
-    """
-    asked, asked_other = _question(result, name), _question(other, other_name)
-    if (mismatch := first_difference(asked, asked_other)) is not None:
-        place, was, now = mismatch
-        raise ResultError(f"{other_name}: cannot be compared with {name}: {place} is {now} here and {was} there")
-
-
-def _question(dataset: xarray.Dataset, name: str) -> dict[str, Any]:
-    """What must be the same for plates to be compared."""
-    attributes = dataset.attrs
-    if not {attr.CORE, attr.IMPACT} <= attributes.keys():
-        raise ResultError(f"{name}: has no description of its core and impact, which a comparison needs; run it again")
-    output = {"standoffs": dataset[v.STANDOFF].values.tolist(), "standoff_point": attributes[attr.STANDOFF_POINT]}
-    limit = {"limit": attributes[attr.LIMIT]} if attr.LIMIT in attributes else {}
-    return limit | {
-        "core": json.loads(attributes[attr.CORE]),
-        "impact": _in_degrees(json.loads(attributes[attr.IMPACT])),
-        "output": output,
-    }
-
-
-def _in_degrees(impact: dict[str, Any]) -> dict[str, Any]:
-    """An impact whose angles in numbers are in degrees."""
-    return {
-        name: f"{math.degrees(value)!r} deg" if name in _ANGLES and isinstance(value, float) else value
-        for name, value in impact.items()
-    }
-
-
-def _other_shots(result: xarray.Dataset, other: xarray.Dataset) -> str:
-    """Why the shots of two results differ; empty where they are the same."""
-    if dealing(result) != dealing(other):
-        return "their shots have other replicates"
-    for axis, coordinate in enumerate((v.HIT_Y, v.HIT_Z)):
-        here, there = (
-            dataset[coordinate].values / dataset.attrs[attr.PLATE_PERIOD][axis] for dataset in (result, other)
+def _notes(
+    datasets: Sequence[xarray.Dataset], names: Sequence[str], tables: Mapping[str, pd.DataFrame], *, bounds: bool
+) -> Iterator[str]:
+    """Notes on the solid references, the sampling, and the bases behind the plates."""
+    solid = {name: solid_note(dataset) for name, dataset in zip(names, datasets, strict=True)}
+    alike = len(set(solid.values())) == 1
+    yield from dict.fromkeys(note if alike else f"{name}: {note}" for name, note in solid.items() if note)
+    yield from dict.fromkeys(filter(None, map(sampling_note, datasets)))
+    based = [has_base(dataset) for dataset in datasets]
+    if any(based) and not all(based) and attr.LIMIT not in datasets[0].attrs:
+        alone = [name for name, is_based in zip(names, based, strict=True) if not is_based]
+        yield f"Without layers, and so without a base: {', '.join(alone)}. Measures of a base are left out."
+    elif bounds:
+        yield (
+            "Cores pierce a base and count with its thickness as depth. The bases differ in thickness, so depths are "
+            "not ranked."
         )
-        if not np.allclose(here, there, rtol=0.0, atol=_SAME_PLACE):
-            return "their shots hit other places of the cell"
-    for name in (*v.SHOT_VARIABLES, v.MASS):
-        if name in result and not (name in other and np.array_equal(result[name], other[name])):
-            return f"their shots differ in {name}"
-    return ""
+    else:
+        shares = tables[PIERCED]["value"].tolist() if PIERCED in tables else [0.0] * len(names)
+        yield from (f"{name}: {note}" for name, note in zip(names, map(depth_note, shares), strict=True) if note)
+
+
+def short_view(comparison: Comparison, notes: Sequence[str] = ()) -> View:
+    """The deciding measure with its ranks and differences, what is not told apart, and last more notes."""
+    measure = comparison.deciding()
+    if measure is None:
+        return {"": [*hits_used(comparison), "no measure ranks these plates", *notes]}
+    plates, text = comparison.plates, measure.text
+    (best, *_), from_best, table = comparison.ordered(text), comparison.from_best(text), _scores_table(comparison, text)
+    less = f"{'ratio' if text in comparison.by_ratio else 'value'} less {best}"
+    table[less] = ["", *map("{:+#.3g}".format, from_best.value)]
+    table["its interval"] = ["", *map(interval_text, from_best.low, from_best.high)]
+    hits = f"{plates.hits.min()}" + ("" if plates.hits.nunique() == 1 else f" to {plates.hits.max()}")
+    same = "" if comparison.pairs.independent.any() else ", the same shots"
+    left_open = f"; not allowed for: {', '.join(comparison.cautions)}" if comparison.cautions else ""
+    used = f"{hits} hits of each plate{same}{left_open}"
+    return {_title(comparison, measure): [table, _undecided(comparison, measure), used, *notes]}
+
+
+def verdict_of(comparison: Comparison) -> list[str]:
+    """Sentences about the best plate by the deciding measure, and what is not told apart; empty where none decides."""
+    measure = comparison.deciding()
+    if measure is None:
+        return []
+    best = comparison.first(measure.text)
+    first = "no two plates are told apart" if len(best) == len(comparison.plates) else f"{listed(best)} first"
+    return [f"{_title(comparison, measure)}: {first}", _undecided(comparison, measure)]
+
+
+def comparison_view(comparison: Comparison, notes: Sequence[str] = ()) -> View:
+    """What was compared, the best plates, then every measure as a ranking with differences in words."""
+    best = best_plates(comparison)
+    together = (
+        f"Intervals contain the numerics where they are known. Differences of a measure hold together at "
+        f"{comparison.confidence:.0%} (Bonferroni over the pairs)."
+    )
+    chance = "The intervals describe the hits that were drawn, not what the model leaves out."
+    view: dict[str, list[str | pd.DataFrame]] = {
+        "": [*hits_used(comparison), together, chance, *comparison.notes, *notes]
+    }
+    view["best plates"] = [best.to_frame("plate")] if len(best) else []
+    for measure in comparison.compared:
+        heading = f"{measure.title}; {measure.better}{_weighed(comparison, measure.text)}"
+        view[heading] = [_scores_table(comparison, measure.text), *_in_words(comparison, measure)]
+    return view
+
+
+def best_plates(comparison: Comparison) -> pd.Series:
+    """The plates that no other one is better than, in words, by the label of a measure."""
+    best = {}
+    for measure in comparison.compared:
+        if measure.higher_is_better is not None:
+            first, ranked = comparison.first(measure.text), comparison.is_ranked(measure.text)
+            undecided = "cannot be told apart" if ranked else "not ranked"
+            best[measure.label] = undecided if len(first) == len(comparison.plates) else listed(first)
+    return pd.Series(best, dtype=object).rename_axis("best at")
+
+
+def hits_used(comparison: Comparison) -> list[str]:
+    """How many hits were compared and how, a sentence each."""
+    hits, pairs = comparison.plates.hits, comparison.pairs
+    if hits.nunique() == 1 and not pairs.independent.any():
+        return [f"{hits.iloc[0]} hits of each plate: the same shots at every plate, compared shot by shot."]
+    lines = [f"Hits: {of_each(hits.index, map(str, hits))}; all of them count."]
+    for pair in rows_of(pairs):
+        more = {name: hits[name] - pair.paired for name in (pair.one, pair.other) if hits[name] > pair.paired}
+        how = "the same shots, compared shot by shot."
+        if pair.independent:
+            how = f"compared as independent, because {pair.independent}."
+        elif more:
+            ((larger, left),) = more.items()
+            how = (
+                f"the first {pair.paired} hits are the same shots, compared shot by shot; the other {left} of {larger} "
+                "count on their own."
+            )
+        lines.append(f"{pair.one} and {pair.other}: {how}")
+    return lines
+
+
+def _scores_table(comparison: Comparison, text: str) -> pd.DataFrame:
+    """Ranks, weights, values and ratios of the plates in a measure, the best value first."""
+    ranks = comparison.ranks(text)
+    plates, shown = comparison.plates.loc[list(ranks)], comparison.scores[text].loc[list(ranks)]
+    is_ranked = comparison.is_ranked(text) and comparison.measures[text].higher_is_better is not None
+    ends = [f"{first}" if first == last else f"{first} to {last}" for first, last in ranks.values()]
+    table = pd.DataFrame({"rank": ends if is_ranked else "-"}, index=plates.index)
+    has_base = bool(plates.add_on.notna().all())
+    if has_base:
+        table["add-on kg/m²"] = plates.add_on.map("{:.2f}".format)
+    table["whole kg/m²" if has_base else "kg/m²"] = plates.areal_density.map("{:.2f}".format)
+    table["value"] = shown.value
+    table["interval"] = [*map(interval_text, shown.low, shown.high)]
+    if shown.ratio.notna().any():
+        table[f"ratio to the {comparison.reference}"] = shown.ratio
+        table["interval of the ratio"] = [*map(interval_text, shown.ratio_low, shown.ratio_high)]
+    if shown.alone.notna().any():
+        table["base alone"] = shown.alone
+    return table
+
+
+def _title(comparison: Comparison, measure: Measure) -> str:
+    """The deciding measure, its better direction, and the measures before it that tell no plates apart."""
+    before = [other.label for other in comparison.ranking]
+    before = before[: before.index(measure.label)]
+    tell = "tells" if len(before) == 1 else "tell"
+    undecided = f" ({listed(before)} {tell} no two plates apart)" if before else ""
+    return f"{measure.title}, {measure.better}{_weighed(comparison, measure.text)}{undecided}"
+
+
+def _weighed(comparison: Comparison, text: str) -> str:
+    """By what plates of different weight are ranked, to follow a name; empty where weights are the same."""
+    if not comparison.differ_in_weight:
+        return ""
+    by_ratio = text in comparison.by_ratio
+    return f"; ranked by the ratio to the {comparison.reference}" if by_ratio else "; ranked without regard to weight"
+
+
+def _undecided(comparison: Comparison, measure: Measure) -> str:
+    """Pairs that the measure does not tell apart, and other measures in which another plate is best."""
+    pairs = comparison.differences[measure.text]
+    alike = [f"{pair.one} and {pair.other}" for pair in rows_of(pairs) if not pair.significant]
+    sentences = [f"not told apart: {'no two of them' if len(alike) == len(pairs) else '; '.join(alike) or 'none'}"]
+    best = comparison.first(measure.text)
+    for other in comparison.ranking:
+        first = comparison.first(other.text)
+        if len(first) < len(comparison.plates) and not {*best} & {*first}:
+            sentences.append(f"by {other.label}: {listed(first)} first")
+    return "; ".join(sentences)
+
+
+def _in_words(comparison: Comparison, measure: Measure) -> Iterator[str]:
+    """A sentence for every pair, such as "a better than b by 0.1 (0.05 to 0.15)"."""
+    what = f" in the ratio to the {comparison.reference}" if measure.text in comparison.by_ratio else ""
+    table = comparison.differences.get(measure.text)
+    for pair in () if table is None else rows_of(table):
+        one, other = pair.one, pair.other
+        interval, by = interval_text(pair.low, pair.high), number_text(abs(pair.value))
+        if math.isnan(pair.low) and math.isnan(pair.high):
+            yield f"{one} and {other}: difference{what} {number_text(pair.value)}, whose interval is {interval}"
+        elif not pair.significant:
+            yield f"{one} and {other} cannot be told apart: difference{what} {number_text(pair.value)} ({interval})"
+        else:
+            better = measure.higher_is_better
+            if pair.value < 0.0:
+                interval = interval_text(-pair.high, -pair.low)
+            first, last = (one, other) if (pair.value > 0.0) == (better is not False) else (other, one)
+            than = "higher than" if better is None else "better than"
+            yield f"{first} {than} {last} by {by}{what} ({interval})"

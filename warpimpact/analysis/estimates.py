@@ -1,13 +1,13 @@
-"""Measures of a result as estimates: with intervals, with shifts by the numerics, and with the numbers of the shots."""
+"""Measures of a result as estimates: with intervals, shifts by the numerics, and the numbers of the shots."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any
 
 import numpy as np
+import xarray
 
 from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
@@ -15,17 +15,15 @@ from warpimpact.results.dataset import SLICE, finer_pair
 from warpimpact.results.files import ResultError
 from warpimpact.results.measures import STATUSES, Measure, dealing, estimate_from, shift_of
 from warpimpact.results.vocabulary import Array
-from warpimpact.statistics.intervals import Estimate
-
-if TYPE_CHECKING:
-    from warpimpact.results.table import Result
+from warpimpact.statistics.intervals import Estimate, Estimating
+from warpimpact.statistics.tails import pseudo_values
 
 _LIMITS = tuple(names.value for names in v.LIMITS.values())
 
 
 @dataclass(frozen=True)
 class MeasureData:
-    """A measure of a result with the numbers behind it, in the units of the Dataset unless it is `shown`.
+    """A measure with the numbers behind it, in its display unit.
 
     Attributes:
         values: values of the shots for the measure, NaN where a shot does not count, shape [hits].
@@ -36,10 +34,11 @@ class MeasureData:
     values: Array
 
     @property
-    def numbers(self) -> Array | None:
-        """Numbers of the shots whose mean is the measure; None for a quantile, a worst point and areal density."""
-        has_none = self.measure.kind in ("quantile", "worst_point", "target")
-        return None if has_none else self.measure.averaged(self.values)
+    def numbers(self) -> Array:
+        """Numbers of the shots whose mean is the measure; of a quantile, pseudo-values (statistics/tails.py)."""
+        if self.measure.kind == "quantile":
+            return pseudo_values(self.values, self.measure.share)
+        return self.measure.averaged(self.values)
 
     @property
     def worst_shot(self) -> int | None:
@@ -49,29 +48,26 @@ class MeasureData:
             return None
         return int(np.argmax(np.where(known, self.measure.worse * self.values, -np.inf)))
 
-    def shown(self) -> MeasureData:
-        """The same in the display unit of the measure."""
-        factor = self.measure.display.factor
-        return MeasureData(self.measure, self.estimate.times(factor), factor * self.values)
 
-
-def measure_data(dataset: Result, measures: Sequence[Measure]) -> Iterator[MeasureData]:
+def measure_data(
+    dataset: xarray.Dataset, measures: Sequence[Measure], confidence: float = 0.95
+) -> Iterator[MeasureData]:
     """Measures one after the other. Of an open file, one slice at a time and one number per hit are in memory."""
     needed = (v.STATUS, *v.GROUPS["finer"], *(name for measure in measures for name in measure.quantity.of))
     pair = finer_pair(dataset[[name for name in dict.fromkeys(needed) if name in dataset]])
-    dealt = dealing(dataset)
+    options: Estimating = {**dealing(dataset), "confidence": confidence}
     key, by_hit = None, np.empty(0)
     for measure in measures:
         if key != (key := (measure.quantity, measure.standoff)):
             by_hit = by_hit_of(dataset, measure)
-        values = measure.counted(by_hit)
-        estimate = estimate_from(measure, values, **dealt)
+        values, factor = measure.counted(by_hit), measure.display.factor
+        estimate = estimate_from(measure, values, **options)
         estimate = replace(estimate, numerics=shift_of(measure, pair))
         if measure.has_interval:
             estimate = estimate.within(measure.least, measure.most)
         if measure.kind == "quantile" and measure.name in _LIMITS:
             estimate = _beyond(estimate, dataset.attrs.get(attr.LIMIT_HIGHEST, math.inf))
-        yield MeasureData(measure, estimate, values)
+        yield MeasureData(measure, estimate.times(factor), factor * values)
 
 
 def _beyond(estimate: Estimate, highest: float) -> Estimate:
@@ -80,15 +76,14 @@ def _beyond(estimate: Estimate, highest: float) -> Estimate:
     return replace(estimate, value=value, low=low, high=high)
 
 
-def by_hit_of(dataset: Result, measure: Measure) -> Array:
+def by_hit_of(dataset: xarray.Dataset, measure: Measure) -> Array:
     """The quantity of every hit, shape [hits]. Of an open file, one slice at a time is in memory."""
     names: list[str] = [name for name in (v.STATUS, *measure.quantity.of) if name in dataset]
     return np.concatenate([measure.by_hit(part) for part in slices(dataset[names])])
 
 
-def asked_measures(dataset: Result, texts: Sequence[str], shown: Sequence[str]) -> list[Measure]:
-    """The measures with these texts at the stand-offs and layers of a result; without texts those in `shown` that the
-    result has.
+def measures_named(dataset: xarray.Dataset, texts: Sequence[str], default: Sequence[str]) -> list[Measure]:
+    """The measures with these texts in a result; without texts those of `default` that the result has.
 
     Raises:
         ResultError: a text is no measure, or the result lacks what it needs.
@@ -96,33 +91,35 @@ def asked_measures(dataset: Result, texts: Sequence[str], shown: Sequence[str]) 
     try:
         if texts:
             return [Measure.parse(text).of(dataset) for text in texts]
-        known = map(Measure.parse, shown)
+        known = map(Measure.parse, default)
         return [measure.of(dataset) for measure in known if not measure.quantity.lacking(dataset)]
     except ValueError as error:
         raise ResultError(f"measure: {error}") from None
 
 
-def estimated(dataset: Result, measures: Sequence[Measure]) -> dict[Measure, Estimate]:
-    """Measures of a result with their intervals, in the units of the Dataset."""
+def estimated(dataset: xarray.Dataset, measures: Sequence[Measure]) -> dict[Measure, Estimate]:
+    """Measures of a result with their intervals, in their display units."""
     return {data.measure: data.estimate for data in measure_data(dataset, measures)}
 
 
-def status_shares(dataset: Result) -> dict[str, Estimate]:
+def status_shares(dataset: xarray.Dataset) -> dict[str, Estimate]:
     """Shares of the shots by status, for the statuses that occur."""
     shares = estimated(dataset, [Measure.parse(f"P({name})") for name in STATUSES])
     return {measure.name: estimate for measure, estimate in shares.items() if estimate.value > 0.0}
 
 
-def means_of(variables: Sequence[v.Variable], standoffs: Sequence[float]) -> list[Measure]:
-    """Means of recorded quantities. A quantity with stand-offs has a mean at each of them [m]."""
+def means_of(dataset: xarray.Dataset, variables: Sequence[v.Variable]) -> list[Measure]:
+    """Means of the recorded quantities among some. A quantity with stand-offs has a mean at each of them."""
+    standoffs = dataset[v.STANDOFF].values.tolist()
     return [
         Measure.parse(f"mean({variable})" if at is None else f"mean({variable}@{at!r}m)")
         for variable in variables
+        if variable in dataset
         for at in (standoffs if v.STANDOFF in variable.dims else [None])
     ]
 
 
-def slices(dataset: Result) -> Iterator[Any]:
+def slices(dataset: xarray.Dataset) -> Iterator[xarray.Dataset]:
     """Its hits in slices that are loaded one at a time."""
     for first in range(0, dataset.sizes["hit"], SLICE):
         yield dataset.isel(hit=slice(first, first + SLICE)).load()

@@ -1,46 +1,93 @@
-"""Text of numbers and intervals."""
+"""Numbers, intervals, tables and views as text and HTML.
+
+A view is what a person sees of a result: sentences and tables by the heading above them. A room makes its view as
+a plain dict of strings and DataFrames; here it becomes the text of a terminal, and the HTML of a notebook or a page.
+"""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
+from html import escape
+from typing import Any, TypeAlias
 
-from warpimpact.statistics.intervals import Estimate
+import pandas as pd
+
+View: TypeAlias = Mapping[str, Sequence[str | pd.DataFrame]]
+"""Sentences and tables by their heading, which may be empty. The index of a table labels its rows."""
 
 ROUNDING = 1e-5
 """Largest number that is shown as 0. In display units, smaller numbers are rounding of the computation."""
+NOT_DETERMINED = "not determined"
 
 
-def number_text(number: float) -> str:
-    """A number with four digits; a dash for NaN."""
-    return "-" if math.isnan(number) else f"{0.0 if abs(number) < ROUNDING else number:#.4g}"
+def number_text(number: float, digits: str = "#.4g") -> str:
+    """A number in a format; a dash for NaN, and 0 for what is 0 within rounding."""
+    return "-" if math.isnan(number) else format(0.0 if abs(number) < ROUNDING else number, digits)
 
 
-def interval_text(
-    low: float,
-    high: float,
-    numerics: float | None = None,
-    text: Callable[[float], str] = number_text,
-    shift: Callable[[float], str] = "{:.2g}".format,
-) -> str:
-    """A confidence interval by the hits as text: a dash if there is none, one end if the shots give only one. The
-    largest shift by the numerics follows, unless it is None or NaN."""
+def interval_text(low: float, high: float, numerics: float | None = None, digits: str = "#.4g") -> str:
+    """A confidence interval by the hits, and the largest shift by the numerics where it is known."""
+    below, above = (number_text(end, digits) for end in (low, high))
     if math.isnan(low) and math.isnan(high):
-        return "-"
-    if math.isnan(low):
-        interval = f"at most {text(high)}"
-    else:
-        interval = f"at least {text(low)}" if math.isnan(high) else f"{text(low)} to {text(high)}"
-    return interval if numerics is None or math.isnan(numerics) else f"{interval}, numerics ± {shift(numerics)}"
+        return NOT_DETERMINED
+    interval = f"at most {above}" if math.isnan(low) else f"at least {below}" if math.isnan(high) else ""
+    interval = interval or f"{below} to {above}"
+    if numerics is None or math.isnan(numerics):
+        return interval
+    return f"{interval}, numerics ± {number_text(numerics, digits if digits[-1] in 'f%' else '.2g')}"
 
 
-def plus_minus(estimate: Estimate, number: str, half_width: str) -> str:
-    """A mean ± half the width of its confidence interval (± means nothing else here), in formats such as ".5g"; no ± if
-    it has none."""
-    value = format(estimate.value, number)
-    return value if math.isnan(estimate.half_width) else f"{value} ± {format(estimate.half_width, half_width)}"
-
-
-def of_each(names: Sequence[str], values: Sequence[str]) -> str:
+def of_each(names: Iterable[str], values: Iterable[str]) -> str:
     """Text such as "a 1 m, b 2 m"."""
     return ", ".join(f"{name} {value}" for name, value in zip(names, values, strict=True))
+
+
+def listed(names: Sequence[str]) -> str:
+    """Text such as "a, b and c"."""
+    return " and ".join([", ".join(names[:-1]), names[-1]] if len(names) > 1 else names)
+
+
+def rows_of(table: pd.DataFrame) -> Iterable[Any]:
+    """The rows of a table as named tuples, whose label is `Index`."""
+    return table.itertuples()
+
+
+def text_of(view: View) -> str:
+    """A view as plain text, an empty line between sections; a heading without parts is left out."""
+    sections = []
+    for heading, parts in view.items():
+        texts = [part if isinstance(part, str) else table_text(part) for part in parts]
+        sections += ["\n".join([*([heading] if heading else []), *texts])] if texts else []
+    return "\n\n".join(sections)
+
+
+def html_of(view: View, tag: str = "h3") -> str:
+    """A view as HTML; all its text is escaped."""
+    parts = []
+    for heading, content in view.items():
+        parts += [f"<{tag}>{escape(heading)}</{tag}>"] if heading and content else []
+        parts += [f"<p>{escape(part)}</p>" if isinstance(part, str) else table_html(part) for part in content]
+    return "\n".join(parts)
+
+
+def table_text(table: pd.DataFrame) -> str:
+    """A table as plain text, two spaces between its columns."""
+    cells = _labelled(table).map(lambda cell: f" {number_text(cell) if isinstance(cell, float) else cell}")
+    text = cells.to_string(header=any(map(str.strip, table.columns)))
+    return "\n".join(map(str.rstrip, text.splitlines()))
+
+
+def table_html(table: pd.DataFrame, caption: str = "") -> str:
+    """A table as HTML, which scrolls where it is wider than the page."""
+    with pd.option_context("display.max_colwidth", None):
+        html = _labelled(table).to_html(float_format=number_text, na_rep="-", border=0)
+    head, rest = html.split("\n", 1)
+    caption = f"<caption>{escape(caption)}</caption>\n" if caption else ""
+    return f'<div class="wide">{head}\n{caption}{rest}</div>'
+
+
+def _labelled(table: pd.DataFrame) -> pd.DataFrame:
+    """The table with the name of its index in the line of the other headers."""
+    name = str(table.index.name or "")
+    return table if table.index.nlevels > 1 else table.rename_axis(index=None).rename_axis(columns=name)

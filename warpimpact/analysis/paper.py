@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Mapping, Sequence
 from importlib.resources import files
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
+import pandas as pd
 import xarray
 
+from warpimpact.analysis.numbers import text_of
 from warpimpact.campaign.campaign import Campaign
 from warpimpact.campaign.text import CampaignError
 from warpimpact.results import attributes as attr
@@ -17,7 +20,6 @@ from warpimpact.results import variables as v
 from warpimpact.results.files import ResultError
 from warpimpact.runs.parts import first_difference
 from warpimpact.scene import Plate
-from warpimpact.view.view import Column, Section, Table, number, text_of
 
 
 class Row(NamedTuple):
@@ -104,15 +106,21 @@ def computed_row(dataset: xarray.Dataset, hit: int) -> Row:
 def validation_table(dataset: xarray.Dataset) -> str:
     """Experiment, LS-DYNA, the paper's model and the Dataset's hits as one table of text; hits in the order of
     PUBLISHED."""
-    columns = [Column("shot"), Column("source")]
-    columns += [number(name.replace("_", " "), digits=".1f") for name in ("velocity", *Row._fields[1:])]
-    rows: list[tuple[Any, ...]] = []
+    rows: dict[tuple[str, str], list[str]] = {}
     for hit, (shot, published) in enumerate(PUBLISHED.items()):
         computed = computed_row(dataset, hit)
+        numbers = {**published, "warpimpact": computed}
+        rows |= {(shot, source): [f"{number:.1f}" for number in row] for source, row in numbers.items()}
         off = [f"{ours - theirs:+.1f}" for ours, theirs in zip(computed, published["paper's model"], strict=True)]
-        rows += [(shot, source, *row) for source, row in published.items()]
-        rows += [(shot, "warpimpact", *computed), (shot, "warpimpact less the paper's model", *off)]
-    return text_of([Section([Table(columns, rows)]), Section(NOTE.splitlines())])
+        rows[shot, "warpimpact less the paper's model"] = off
+    columns = [name.replace("_", " ") for name in ("velocity", *Row._fields[1:])]
+    return text_of({"": [_table(rows, columns)], "notes": NOTE.splitlines()})
+
+
+def _table(rows: Mapping[tuple[str, str], list[str]], columns: Sequence[str]) -> pd.DataFrame:
+    """Rows by shot and source."""
+    index = pd.MultiIndex.from_tuples(rows, names=["shot", "source"])
+    return pd.DataFrame(list(rows.values()), index, list(columns))
 
 
 def closest_table(dataset: xarray.Dataset) -> str:
@@ -130,11 +138,10 @@ def closest_table(dataset: xarray.Dataset) -> str:
     hits = np.column_stack([dataset[v.RESIDUAL_VELOCITY].values, tilts])
     plate = Plate.model_validate({"thickness": 1.0, "resistance": 0.0} | _pattern(dataset))
     edge = plate.pattern.edge_distance(dataset[v.HIT_Y].values, dataset[v.HIT_Z].values)
-    names = ("velocity", "tilt 50", "tilt 130")
-    columns = [Column("shot"), Column("source"), *(number(name, digits=".1f") for name in names), Column("")]
-    rows: list[tuple[Any, ...]] = []
+    rows: dict[tuple[str, str], list[str]] = {}
     for shot, published in PUBLISHED.items():
-        rows += [(shot, source, *_with_tilts(published[source]), "") for source in ("experiment", "LS-DYNA")]
+        for source in ("experiment", "LS-DYNA"):
+            rows[shot, source] = [*(f"{number:.1f}" for number in _with_tilts(published[source])), ""]
         in_hole = shot == "through a hole"
         misfit = (((hits - _with_tilts(published["experiment"])) / UNCERTAIN) ** 2).sum(axis=1)
         misfit[(edge < 0.0) != in_hole] = np.nan
@@ -143,12 +150,13 @@ def closest_table(dataset: xarray.Dataset) -> str:
         best = int(np.nanargmin(misfit))
         place = "in the hole" if in_hole else "in the web"
         where = f"hit {int(dataset[v.HIT][best])}, {place}, {1e3 * abs(edge[best]):.1f} mm from the edge"
-        rows.append((shot, "closest hit of the map", *hits[best], f"{where}; misfit {misfit[best]:.1f}"))
+        numbers = [f"{number:.1f}" for number in hits[best]]
+        rows[shot, "closest hit of the map"] = [*numbers, f"{where}; misfit {misfit[best]:.1f}"]
     note = (
         "Where in the hole or the web the two shots hit is not published, so the closest of many hits says little for "
         "the model. Misfit: sum of squares over 8 m/s, 3° and 5°."
     )
-    return text_of([Section([Table(columns, rows), note])])
+    return text_of({"": [_table(rows, ("velocity", "tilt 50", "tilt 130", "where")), note]})
 
 
 def _pattern(dataset: xarray.Dataset) -> dict[str, Any]:

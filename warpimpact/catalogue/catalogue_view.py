@@ -4,40 +4,40 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 import numpy as np
+import pandas as pd
 
 from warpimpact.catalogue.catalogue import Catalogue
 from warpimpact.catalogue.entries import Material, Threat
 from warpimpact.catalogue.strength import limit_fit, resistance_of
 from warpimpact.scene import Core
-from warpimpact.view.view import Column, Section, Table, labelled
 
 _MM, _G = 1e3, 1e3
 _COLUMNS, _ROWS = 64, 6
 """Size of the drawing of a core in characters: its length, and its radius if that were a quarter of the length."""
 _BLOCKS = " ▁▂▃▄▅▆▇█"
+View = dict[str, list[str | pd.DataFrame]]
 
 
-def catalogue_view(catalogue: Catalogue) -> list[Section]:
+def catalogue_view(catalogue: Catalogue) -> View:
     """All names, each with the state of its evidence."""
     threats = [(name, threat.evidence) for name, threat in catalogue.all(Threat).items()]
-    materials = [
-        (name, f"Y {material.resistance / 1e9:.3g} GPa", material.evidence)
-        for name, material in catalogue.all(Material).items()
-    ]
-    return [
-        Section([labelled(threats)], "threats: [core] threat = NAME"),
-        Section([Table((Column(), Column(), Column()), materials)], "materials: [plate] material = NAME"),
-    ]
+    materials = [(k, f"Y {one.resistance / 1e9:.3g} GPa, {one.evidence}") for k, one in catalogue.all(Material).items()]
+    headings = "threats: [core] threat = NAME", "materials: [plate] material = NAME"
+    return {headings[0]: _labelled(threats), headings[1]: _labelled(materials)}
 
 
-def threat_view(threat: Threat) -> list[Section]:
+def _labelled(rows: Sequence[tuple[str, str]]) -> list[str | pd.DataFrame]:
+    """Labels and texts, a line each."""
+    return [f"{label:<{max(len(one) for one, _ in rows)}}  {text}" for label, text in rows]
+
+
+def threat_view(threat: Threat) -> View:
     """A threat: its core drawn, its mass properties beside the published mass, its velocities and its evidence."""
-    rows = [] if threat.shape is None else list(_core(threat, threat.shape))
-    if threat.shape is None:
-        rows.append(("core", "not known; give its shape in [core]"))
+    unknown = [("core", "not known; give its shape in [core]")]
+    rows = unknown if threat.shape is None else list(_core(threat, threat.shape))
     rows += [("core material", threat.core_material)] if threat.core_material else []
     rows += [("core hardness", threat.core_hardness)] if threat.core_hardness else []
     rows += [("bullet", f"{_G * threat.bullet_mass:.4g} g")] if threat.bullet_mass else []
@@ -48,10 +48,10 @@ def threat_view(threat: Threat) -> list[Section]:
     if not threat.velocities:
         rows.append(("velocity", "none known; give impact.velocity"))
     picture = [] if threat.shape is None else drawn(threat.shape)
-    return [Section([*picture, labelled([*rows, *_sources(threat.known, threat.assumed)])], threat.name)]
+    return {threat.name: [*picture, *_labelled([*rows, *_sources(threat.known, threat.assumed)])]}
 
 
-def material_view(material: Material, *, is_own: bool = False) -> list[Section]:
+def material_view(material: Material, *, is_own: bool = False) -> View:
     """A material: its strength and law with their uncertainty, the rows that they come from, and its evidence. The
     numbers of a user's own one are the whole evidence."""
     law = (
@@ -70,7 +70,7 @@ def material_view(material: Material, *, is_own: bool = False) -> list[Section]:
     if material.misfit is not None and material.misfit_p90 is not None:
         inside = "" if material.coverage is None else f"; {material.coverage:.0%} inside their 90 % interval"
         rows.append(("misfit", f"{material.misfit:.1%} median, {material.misfit_p90:.1%} 90th percentile{inside}"))
-    return [Section([labelled([*rows, *_sources(material.known, material.assumed)])], material.name)]
+    return {material.name: _labelled([*rows, *_sources(material.known, material.assumed)])}
 
 
 def drawn(core: Core) -> list[str]:

@@ -7,10 +7,10 @@ from pathlib import Path
 
 from xarray import Dataset
 
-from warpimpact.analysis.comparison import compare
-from warpimpact.analysis.comparison_text import Comparison, comparison_view, deciding, short_view
+from warpimpact.analysis.comparison import Comparison, compare, comparison_view, short_view
+from warpimpact.analysis.inspection import range_note
+from warpimpact.analysis.numbers import rows_of, text_of
 from warpimpact.analysis.shot_by_shot import shared_hits, shot_by_shot
-from warpimpact.analysis.summary import range_note
 from warpimpact.campaign.plates import read_plates
 from warpimpact.campaign.text import CampaignError
 from warpimpact.plotting import comparison_figure, variable_maps, weight_figure
@@ -20,7 +20,6 @@ from warpimpact.results.files import ResultError
 from warpimpact.results.references import as_plates
 from warpimpact.runs.run import run_to_file
 from warpimpact.studies.sensitivity import plate_sensitivity, reversals
-from warpimpact.view.view import Section, text_of
 
 from .messages import warn
 from .paths import PICTURES, check_folder, check_output, named, save_figure
@@ -57,10 +56,7 @@ def compare_command(arguments: argparse.Namespace) -> int:
             _print_models(arguments, shared, (figure, tilts))
             return code
         comparison = compare(list(plates.values()), list(plates), arguments.measure)
-    if arguments.every:
-        print(text_of([*comparison_view(comparison), Section(outside)]))
-    else:
-        print(text_of([short_view(comparison, outside)]))
+    print(text_of(comparison_view(comparison, outside) if arguments.every else short_view(comparison, outside)))
     if arguments.sensitivity:
         print(_sensitivity(arguments, comparison))
     save_figure(comparison_figure(comparison, every=arguments.every), figure)
@@ -73,20 +69,20 @@ def compare_command(arguments: argparse.Namespace) -> int:
 
 def _sensitivity(arguments: argparse.Namespace, comparison: Comparison) -> str:
     """The deciding measure of the plates with each change, and which changes turn their order over."""
-    score = deciding(comparison)
-    if score is None:
+    measure = comparison.deciding()
+    if measure is None:
         raise ResultError(f"{arguments.files[0]}: no measure ranks these plates, so no change can turn them over")
     with show_progress(arguments) as show:
         table = plate_sensitivity(
             read_plates(arguments.files[0], count=arguments.count),
-            score.name,
-            shifts={plate.name: plate.score(score.name).numerics or 0.0 for plate in comparison.plates},
+            measure.text,
+            shifts={plate.Index: plate.numerics for plate in rows_of(comparison.scores[measure.text])},
             device=arguments.device,
             progress=lambda done, total: show(Step(done, total)),
         )
-    by_value = ", by value alone" if score.name in (comparison.at_equal_weight or ()) else ""
+    by_value = ", by value alone" if measure.text in comparison.by_ratio else ""
     text = table.to_string(float_format="{:.4g}".format, na_rep="-")
-    return f"\n{score.measure.title}{by_value}:\n{text}\n{reversals(table)}\n"
+    return f"\n{measure.title}{by_value}:\n{text}\n{reversals(table)}\n"
 
 
 def _print_models(arguments: argparse.Namespace, shared: dict[str, Dataset], figures: tuple[Path, Path]) -> None:
@@ -97,7 +93,7 @@ def _print_models(arguments: argparse.Namespace, shared: dict[str, Dataset], fig
             f"{arguments.files[0]}: --measure is for plates, but these are the same shots at one plate by two models, "
             "which are compared hit by hit"
         )
-    print(text_of([shot_by_shot(shared)]))
+    print(text_of(shot_by_shot(shared)))
     for path, variable in zip(figures, (v.RESIDUAL_VELOCITY, v.TILT), strict=True):
         save_figure(variable_maps(shared, variable), path)
         print(path)

@@ -6,14 +6,14 @@ from typing import Any
 
 from pydantic import ValidationError
 
-from warpimpact.analysis.summary import summary_text
+from warpimpact.analysis.inspection import summary_text
 from warpimpact.campaign.campaign import Campaign
 from warpimpact.campaign.continuum_settings import FiniteElements
 from warpimpact.campaign.text import CampaignError
 from warpimpact.results import attributes as attr
 from warpimpact.results import files
 from warpimpact.results.dataset import hit_numbers
-from warpimpact.results.netcdf import open_table
+from warpimpact.results.files import opened
 from warpimpact.runs.executor import executor_for
 from warpimpact.runs.finite_elements import continuum_to_file
 from warpimpact.runs.replay import campaign_in
@@ -46,7 +46,7 @@ def continuum_command(arguments: argparse.Namespace) -> int:
             )
         except ValueError as error:
             raise CampaignError(f"{arguments.file}: {error}") from None
-    with open_table(output) as dataset:
+    with opened(output) as dataset:
         print(summary_text(dataset))
         print(dataset.attrs[attr.CATALOGUE_NAMES])
         computer = "core" if dataset.attrs[attr.DEVICE].startswith("cpu") else "GPU"

@@ -1,6 +1,7 @@
 """Progress of a computation: one line that is rewritten on a terminal, lines in a log."""
 
 import argparse
+import math
 import shutil
 import sys
 import time
@@ -8,7 +9,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import NamedTuple
 
-from warpimpact.analysis.numbers import interval_text, plus_minus
+from warpimpact.analysis.numbers import interval_text
 from warpimpact.results.measures import Measure
 from warpimpact.runs.progress import RunProgress
 from warpimpact.statistics.intervals import Estimate
@@ -112,8 +113,10 @@ def _running(run: RunProgress) -> str:
 
     def text_of(measure: Measure, estimate: Estimate) -> str:
         if measure.is_binary:  # a share is not in the middle of its interval
-            return f"{estimate.value:.4g} ({interval_text(estimate.low, estimate.high, text='{:.4g}'.format)})"
-        return plus_minus(estimate.times(measure.display.factor), ".5g", ".2g") + measure.display.suffix
+            return f"{estimate.value:.4g} ({interval_text(estimate.low, estimate.high, digits='.4g')})"
+        mean = estimate.times(measure.display.factor)
+        half_width = "" if math.isnan(mean.half_width) else f" ± {mean.half_width:.2g}"
+        return f"{mean.value:.5g}{half_width}{measure.display.suffix}"
 
     parts = [
         f"{measure.text} {text_of(measure, estimate)}"

@@ -6,11 +6,11 @@ from pathlib import Path
 
 from xarray import Dataset
 
-from warpimpact.analysis.summary import promise_text, range_note, summary_text, symmetry_text
+from warpimpact.analysis.inspection import promise_text, range_note, summary_text, symmetry_text
 from warpimpact.campaign.campaign import Campaign
 from warpimpact.results import attributes as attr
 from warpimpact.results.dataset import failed
-from warpimpact.results.netcdf import open_table
+from warpimpact.results.files import opened
 from warpimpact.results.table import HitTable
 from warpimpact.runs.compute import HIT_MAP, Computation
 from warpimpact.runs.executor import Executor, executor_for
@@ -26,7 +26,7 @@ def run_command(arguments: argparse.Namespace) -> int:
     output = arguments.output or Path(arguments.campaign.stem + ".nc")
     check_output(output, ".nc", overwrite=True)
     run_shown(campaign, output, arguments)
-    with open_table(output) as dataset:
+    with opened(output) as dataset:
         print(summary_text(dataset))
         if attr.SYMMETRIES in dataset.attrs:
             print(symmetry_text(dataset))

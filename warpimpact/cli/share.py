@@ -4,6 +4,7 @@ import argparse
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
 
+from warpimpact.analysis.numbers import text_of
 from warpimpact.campaign.campaign import Campaign
 from warpimpact.campaign.text import CampaignError
 from warpimpact.export.drawing import SUFFIXES, write_drawing
@@ -16,7 +17,6 @@ from warpimpact.results import files
 from warpimpact.results.kinds import HISTORY, HIT_MAP
 from warpimpact.results.replayed_hit import hit_view
 from warpimpact.runs.replay import replay
-from warpimpact.view.view import text_of
 
 from .paths import check_folder, check_output, named, write_text
 from .progress import Step, show_progress

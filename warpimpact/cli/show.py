@@ -7,10 +7,10 @@ from pathlib import Path
 
 from matplotlib.figure import Figure
 
-from warpimpact.analysis.effectiveness import effectiveness_text
+from warpimpact.analysis.effectiveness import effectiveness_text, plate_numbers
 from warpimpact.analysis.inspection import inspect_text
+from warpimpact.analysis.numbers import text_of
 from warpimpact.analysis.paper import check_scene, closest_table, paper_campaign, validation_table
-from warpimpact.analysis.plate_text import plate_numbers
 from warpimpact.campaign.campaign import Campaign
 from warpimpact.campaign.plausible import doubted_holes
 from warpimpact.campaign.text import CampaignError
@@ -24,7 +24,6 @@ from warpimpact.results import attributes as attr
 from warpimpact.results import files
 from warpimpact.results.kinds import HIT_MAP
 from warpimpact.runs.run import run
-from warpimpact.view.view import Section, labelled, text_of
 
 from .paths import PICTURES, check_folder, check_output, named, save_figure
 
@@ -87,13 +86,13 @@ def plate_command(arguments: argparse.Namespace) -> None:
     campaign = Campaign.from_toml(arguments.campaign)
     plate = campaign.plate
     save_figure(plate_figure(campaign.target, campaign.core, campaign.title, campaign.impact), output)
-    rows = [("thickness", f"{1e3 * plate.thickness:g} mm")]
-    rows += plate_numbers(plate.open_area, plate.ligament, campaign.target.weights).items()
+    rows = {"thickness": f"{1e3 * plate.thickness:g} mm"}
+    rows |= plate_numbers(plate.open_area, plate.ligament, campaign.target.weights)
     for place, layer in enumerate(campaign.layer, start=1):
         behind = f"{1e3 * layer.gap:g} mm behind the one before"
-        rows.append((f"layer {place}", f"{1e3 * layer.thickness:g} mm, {behind}, {layer.open_area:.1%} open"))
-    print(text_of([Section([labelled(rows), *doubted_holes(campaign.target)], campaign.title)]))
-    print(output)
+        rows[f"layer {place}"] = f"{1e3 * layer.thickness:g} mm, {behind}, {layer.open_area:.1%} open"
+    lines = (f"{label:<17}  {text}" for label, text in rows.items())
+    print(campaign.title, *lines, *doubted_holes(campaign.target), output, sep="\n")
 
 
 def catalogue_command(arguments: argparse.Namespace) -> None:

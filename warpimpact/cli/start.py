@@ -17,7 +17,6 @@ from warpimpact.identification.fit_file import FitFile
 from warpimpact.optimisation.design import design_schema
 from warpimpact.results import kinds
 from warpimpact.scene.units import meant
-from warpimpact.view.view import Section, labelled, text_of
 
 from .commands import SCHEMA
 from .paths import check_output, write_text
@@ -29,10 +28,9 @@ _FOLDERS = (".", "fits", "firing", "designs")
 def new_command(arguments: argparse.Namespace) -> None:
     paths, name = _paths(), arguments.name.removesuffix(".toml")
     if arguments.list:
-        questions = [
-            (name, path.read_text(encoding="utf-8").splitlines()[0].removeprefix("# ")) for name, path in paths.items()
-        ]
-        print(text_of([Section([labelled(questions)])]))
+        for name, path in paths.items():
+            question = path.read_text(encoding="utf-8").splitlines()[0].removeprefix("# ")
+            print(f"{name:<{max(map(len, paths))}}  {question}")
         return
     if name not in paths:
         raise CampaignError(f'got the unknown example "{name}"; {meant(name, paths)}; warpimpact new --list lists all')

@@ -5,8 +5,8 @@ import sys
 from pathlib import Path
 from typing import Any
 
-from warpimpact.analysis.summary import range_note
-from warpimpact.analysis.sweep_view import sweep_view
+from warpimpact.analysis.inspection import range_note
+from warpimpact.analysis.numbers import text_of
 from warpimpact.campaign.campaign import Campaign
 from warpimpact.campaign.text import CampaignError
 from warpimpact.firing.plan import read_test
@@ -36,8 +36,7 @@ from warpimpact.studies.limit import LimitMap, warning_of
 from warpimpact.studies.limit_view import limit_view
 from warpimpact.studies.sensitivity import largest_move, sensitivity
 from warpimpact.studies.sweep import folder_of as points_of
-from warpimpact.studies.sweep import read_sweep, run_sweep
-from warpimpact.view.view import text_of
+from warpimpact.studies.sweep import read_sweep, run_sweep, sweep_view
 
 from .messages import say, warn
 from .paths import PICTURES, check_output, replaces, save_figure

@@ -12,7 +12,8 @@ from typing import Annotated, Any, Literal
 import xarray
 from pydantic import BaseModel, Field
 
-from warpimpact.analysis.summary import breaks_promise, numerics_sentence
+from warpimpact.analysis.inspection import breaks_promise, numerics_sentence
+from warpimpact.analysis.numbers import text_of
 from warpimpact.campaign.plausible import doubted, doubted_holes
 from warpimpact.campaign.resistances import catalogue_names
 from warpimpact.campaign.tested_range import outside_tested_range, range_line
@@ -28,7 +29,6 @@ from warpimpact.results.replayed_hit import hit_view
 from warpimpact.runs.replay import replay
 from warpimpact.runs.run import run
 from warpimpact.solver.worker import Cancel
-from warpimpact.view.view import text_of
 
 _MOST_KEPT = 256 * 2**20
 """Most bytes of results that are kept, so that a return to a design computes nothing."""

@@ -9,19 +9,19 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from warpimpact.analysis.plate_text import plate_numbers
+from warpimpact.analysis.effectiveness import plate_numbers
 from warpimpact.analysis.replay_geometry import runs_of
 from warpimpact.campaign.campaign import Campaign
 from warpimpact.design.designs import Tables, ValidDesign
 from warpimpact.plotting.cell import words
 from warpimpact.plotting.plate import Dimension, drawn_extent, hole_dimensions, smallest_ligament
 from warpimpact.plotting.style import fire_of
+from warpimpact.report import svg
 from warpimpact.scene import NoPattern, Plate, Target
 from warpimpact.scene.display import MM
 from warpimpact.scene.model import Model
 from warpimpact.scene.patterns.pattern import LatticePattern
 from warpimpact.scene.units import reader_in, typed
-from warpimpact.view import svg
 
 Place = list[str | int]
 

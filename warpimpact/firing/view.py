@@ -6,36 +6,34 @@ import json
 from typing import Any
 
 import numpy as np
+import pandas as pd
 import xarray
 
 from warpimpact.results import attributes as attr
 from warpimpact.results import firing as f
 from warpimpact.statistics.acceptance import acceptance, shown_stop_probability
 from warpimpact.statistics.intervals import estimate_of
-from warpimpact.view.view import Column, Section, Table, number
 
 
-def firing_view(dataset: xarray.Dataset) -> list[Section]:
-    """The view of a firing test: its target, what the tests report, and its proof."""
+def firing_view(dataset: xarray.Dataset) -> dict[str, list[str | pd.DataFrame]]:
+    """Sentences and tables on the target of a test, its reports and its proof, by heading."""
     settings = json.loads(dataset.attrs[f.SETTINGS])
-    return [
-        Section([dataset.attrs[f.DISCLAIMER]], str(dataset.attrs[attr.TITLE])),
-        _target(dataset),
-        *([Section(reported_lines(dataset), tests_title(dataset))] if f.V50 in dataset else []),
-        *([_proof(dataset, settings["proof"])] if f.PASS in dataset else []),
-    ]
+    view = {str(dataset.attrs[attr.TITLE]): [dataset.attrs[f.DISCLAIMER], *_target(dataset)]}
+    if f.V50 in dataset:
+        view[tests_title(dataset)] = [*reported_lines(dataset)]
+    return view | (_proof(dataset, settings["proof"]) if f.PASS in dataset else {})
 
 
-def _target(dataset: xarray.Dataset) -> Section:
+def _target(dataset: xarray.Dataset) -> list[str | pd.DataFrame]:
     """Quantiles of the limit velocities of the target."""
-    columns = [Column("target"), number("velocity", "m/s", ".5g"), Column("95 % interval")]
     names = (f.QUANTILE, f.QUANTILE_VELOCITY, f.QUANTILE_LOW, f.QUANTILE_HIGH)
     rows = []
     for share, value, low, high in zip(*(dataset[name].values for name in names), strict=True):
         ends = [f"{end:.5g}" if np.isfinite(end) else "open" for end in (low, high)]
-        rows.append((f"V{100 * share:02.0f}", value, f"{ends[0]} to {ends[1]}"))
+        rows.append((f"V{100 * share:02.0f}", f"{value:.5g}", f"{ends[0]} to {ends[1]}"))
     spread = f"Half the distance from V16 to V84 is {float(dataset.attrs[f.TRUE_SPREAD]):.3g} m/s."
-    return Section([Table(columns, rows), spread])
+    columns = ["target", "velocity [m/s]", "95 % interval"]
+    return [pd.DataFrame(rows, columns=columns).set_index("target"), spread]
 
 
 def tests_title(dataset: xarray.Dataset) -> str:
@@ -74,7 +72,7 @@ def _share(answers: np.ndarray[Any, Any]) -> str:
     return f"{100 * estimate.value:.3g} % ({100 * estimate.low:.3g} to {100 * estimate.high:.3g} %)"
 
 
-def _proof(dataset: xarray.Dataset, proof: dict[str, Any]) -> Section:
+def _proof(dataset: xarray.Dataset, proof: dict[str, Any]) -> dict[str, list[str | pd.DataFrame]]:
     """What a pass of the proof shows, and how often this target passes."""
     shots, allowed, velocity = int(dataset.attrs[f.PROOF_SHOTS]), int(proof["allowed"]), float(proof["velocity"])
     stop, confidence = float(proof["stop_probability"]), float(proof["confidence"])
@@ -92,4 +90,4 @@ def _proof(dataset: xarray.Dataset, proof: dict[str, Any]) -> Section:
         f"if all shots of a test hit the same place, it passes in {100 * same:.3g} % of the tests, in place of "
         f"{100 * passed:.3g} %",
     ]
-    return Section(sentences, f"proof: {shots} shots at {velocity:g} m/s, at most {allowed} perforate")
+    return {f"proof: {shots} shots at {velocity:g} m/s, at most {allowed} perforate": [*sentences]}

@@ -22,7 +22,6 @@ from warpimpact.results.variables import HIT_Y, HIT_Z
 from warpimpact.scene.display import STORED, UNITS, Unit
 from warpimpact.scene.model import Array
 from warpimpact.scene.quantities import QUANTITIES
-from warpimpact.view.view import Column, Section, Table, number
 
 LARGEST_NOISE = 1.7
 """Largest standard error of ln L by the hits. Chains whose noise is larger hardly move (A. Doucet and others,
@@ -154,31 +153,26 @@ def unit_of(array: xarray.DataArray) -> tuple[str, float]:
     return unit.shown, unit.factor
 
 
-def posterior_view(posterior: xarray.Dataset) -> list[Section]:
+def posterior_view(posterior: xarray.Dataset) -> dict[str, list[str | pd.DataFrame]]:
     """The view of a posterior: its parameters, and its accuracy."""
-    columns = (
-        *(Column("parameter"), number("median", digits=".3g"), Column("95 % interval"), Column("95 % of the prior")),
-        *(number("R-hat", digits=".3f"), number("ESS", digits=".0f"), Column("verdict")),
-    )
+    columns = ["parameter", "median", "95 % interval", "95 % of the prior", "R-hat", "ESS", "verdict"]
     names, rows = parameters_of(posterior), []
     for name in names:
         array = posterior[name]
         unit, factor = unit_of(array)
         low, middle, high = factor * np.quantile(array.values, [0.025, 0.5, 0.975])
         first, last = factor * np.quantile(array.attrs[p.PRIOR], [0.025, 0.975])
-        told = (array.attrs[p.R_HAT], array.attrs[p.EFFECTIVE], array.attrs[p.VERDICT])
+        quality = (f"{array.attrs[p.R_HAT]:.3f}", f"{array.attrs[p.EFFECTIVE]:.0f}", array.attrs[p.VERDICT])
         label = f"{name} [{unit}]" if unit else name
-        rows.append((label, middle, f"{low:.3g} to {high:.3g}", f"{first:.3g} to {last:.3g}", *told))
+        rows.append((label, f"{middle:.3g}", f"{low:.3g} to {high:.3g}", f"{first:.3g} to {last:.3g}", *quality))
     ranks = posterior[names].to_dataframe().corr("spearman").to_numpy()
     correlations = [
         f"{first} and {other} are determined together more than each alone: their correlation is {value:+.2f}"
         for (i, first), (k, other) in combinations(enumerate(names), 2)
         if abs(value := float(ranks[i, k])) > STRONG
     ]
-    return [
-        Section([Table(columns, rows), *correlations], str(posterior.attrs[attr.TITLE])),
-        Section(_worth(posterior)),
-    ]
+    table = pd.DataFrame(rows, columns=columns).set_index("parameter")
+    return {str(posterior.attrs[attr.TITLE]): [table, *correlations], "worth": [*_worth(posterior)]}
 
 
 def _worth(posterior: xarray.Dataset) -> list[str]:

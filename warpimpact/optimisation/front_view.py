@@ -7,15 +7,15 @@ from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
+import pandas as pd
 import xarray
 
 from warpimpact.analysis.numbers import interval_text, number_text
 from warpimpact.results import front as f
 from warpimpact.results.vocabulary import WEIGHTS
-from warpimpact.view.view import Column, Section, Table, number
 
 
-def front_view(dataset: xarray.Dataset) -> list[Section]:
+def front_view(dataset: xarray.Dataset) -> dict[str, list[str | pd.DataFrame]]:
     """The view of a search: its front with intervals, the values of its variables, and how fresh hits changed it."""
     attributes = dataset.attrs
     computed = (
@@ -23,19 +23,19 @@ def front_view(dataset: xarray.Dataset) -> list[Section]:
         f"pilots; {attributes[f.REFUSED]} more broke a constraint and were not computed"
     )
     if attributes[f.OUTCOME] == f.NONE_FEASIBLE:
-        return [Section([computed, *_nearest(dataset)])]
+        return {"": [computed, *_nearest(dataset)]}
     on_front, confirmed = int(dataset[f.ON_FRONT].sum()), dataset.sizes["front"]
     again = f"front: {on_front} designs, of which {confirmed} were computed again with fresh hits"
-    parts = ([computed, again], [_front_table(dataset)], [_variables_table(dataset)], [*_shrinkage(dataset)])
-    return [Section(part) for part in parts]
+    return {
+        "": [computed, again],
+        "objectives and bounds": [_front_table(dataset)],
+        "variables": [_variables_table(dataset), *_shrinkage(dataset)],
+    }
 
 
-def _front_table(dataset: xarray.Dataset) -> Table:
+def _front_table(dataset: xarray.Dataset) -> pd.DataFrame:
     """Objectives and bounds of the front and of the targets to compare with, by fresh hits."""
-    columns = [Column("design")]
-    for label in dataset[f.GOAL_LABEL].values:
-        name, unit = label_and_unit(label)
-        columns += [number(name, unit), Column("95 % interval")]
+    columns = ["design", *(part for label in dataset[f.GOAL_LABEL].values for part in (label, "95 % interval"))]
     rows: list[tuple[Any, ...]] = []
     for place, file in enumerate(dataset[f.FILE].values):
         notes = []
@@ -46,7 +46,7 @@ def _front_table(dataset: xarray.Dataset) -> Table:
         rows.append((file, *_cells(dataset, OF_FRONT, place), "; ".join(notes)))
     for place, name in enumerate(dataset[f.REFERENCE].values):
         rows.append((name, *_cells(dataset, OF_REFERENCE, place), ""))
-    return Table([*columns, Column("note")], rows)
+    return pd.DataFrame(rows, columns=[*columns, "note"]).set_index("design")
 
 
 OF_FRONT = (f.FRESH, f.FRESH_LOW, f.FRESH_HIGH)
@@ -56,20 +56,20 @@ OF_REFERENCE = (f.REFERENCE_RESULT, f.REFERENCE_LOW, f.REFERENCE_HIGH)
 def _cells(dataset: xarray.Dataset, names: tuple[str, str, str], place: int) -> Iterator[Any]:
     """Cells with value and interval of each objective and bound of a design."""
     for value, low, high in zip(*(dataset[name].values[place] for name in names), strict=True):
-        yield from (value, "" if low == high else interval_text(low, high, text="{:.4g}".format))
+        yield from (float(value), "" if low == high else interval_text(low, high, digits=".4g"))
 
 
-def _variables_table(dataset: xarray.Dataset) -> Table:
+def _variables_table(dataset: xarray.Dataset) -> pd.DataFrame:
     """The values of the variables that count somewhere on the front."""
     designs = dataset[f.NUMBER].values
     used = np.flatnonzero(np.isfinite(dataset[f.VALUE].values[designs]).any(axis=0))
     names, units = dataset[f.NAME].values[used], dataset[f.UNIT].values[used]
-    columns = [Column(str(name), str(unit), right=True) for name, unit in zip(names, units, strict=True)]
+    columns = [f"{name} [{unit}]" if unit else str(name) for name, unit in zip(names, units, strict=True)]
     rows = []
     for file, design in zip(dataset[f.FILE].values, designs, strict=True):
         values = [value for _, value, _ in _values(dataset, int(design))]
         rows.append((file, *(values[place] for place in used)))
-    return Table([Column("design"), *columns], rows)
+    return pd.DataFrame(rows, columns=["design", *columns]).set_index("design")
 
 
 def numbers_of(dataset: xarray.Dataset, names: tuple[str, str, str], place: int) -> list[str]:

@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 from scipy.spatial import KDTree
 
 from warpimpact.analysis.hit_map import OF_PASSED, axes_of, chosen, hit_points
-from warpimpact.analysis.summary import breaks_promise
+from warpimpact.analysis.inspection import breaks_promise
 from warpimpact.kernels.status import Status
 from warpimpact.plotting.style import Figure, common_fire, draw_fire
 from warpimpact.results import attributes as attr

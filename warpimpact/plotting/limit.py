@@ -8,16 +8,15 @@ import numpy as np
 import xarray
 from matplotlib.axes import Axes
 
+from warpimpact.analysis.effectiveness import reference_name
 from warpimpact.analysis.estimates import estimated
 from warpimpact.analysis.hit_map import hit_points
-from warpimpact.analysis.plate_text import reference_name
-from warpimpact.analysis.proxy import inclination
 from warpimpact.plotting.cell import draw_map, map_size, shown, to_scale
 from warpimpact.plotting.style import BLUE, GREY, VERMILION, Figure, finish, in_style
 from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
 from warpimpact.results.references import reference
-from warpimpact.studies.limit_view import measures_of, promise_line, shown_unit
+from warpimpact.studies.limit_view import inclination, measures_of, promise_line, shown_unit
 
 _CURVE = {
     "velocity": ("impact velocity", "share of the hits that perforate"),
@@ -107,20 +106,19 @@ def _draw_curve(axes: Axes, dataset: xarray.Dataset) -> None:
             axes.axvline(mean, linewidth=1.2, color=GREY, linestyle=style, label=label)
             low, high = axes.get_xlim()
             axes.set_xlim(min(low, mean - 0.03 * (high - low)), max(high, mean + 0.03 * (high - low)))
-    _mark_measures(axes, dataset, factor, unit)
+    _mark_measures(axes, dataset, unit)
     whose, share_label = _CURVE[quantity]
     whose = whose.format(f"layer {layer}" if layer else "the plate")
     _furnish(axes, xlabel=f"{whose} [{unit}]", ylabel=share_label, ylim=(0.0, 1.02))
 
 
-def _mark_measures(axes: Axes, dataset: xarray.Dataset, factor: float, unit: str) -> None:
+def _mark_measures(axes: Axes, dataset: xarray.Dataset, unit: str) -> None:
     """Draw the measures with their intervals on the curve, their names above it or, where there is no room, below."""
     middle = 0.5 * sum(axes.get_xlim())
     for measure, estimate in estimated(dataset, measures_of(dataset)).items():
-        level, value = measure.share, factor * estimate.value
+        level, value, ends = measure.share, estimate.value, [estimate.low, estimate.high]
         if not np.isfinite(value):
             continue
-        ends = factor * np.array([estimate.low, estimate.high])
         axes.plot(ends, [level, level], color=VERMILION, linewidth=4, alpha=0.4, solid_capstyle="butt")
         axes.plot(value, level, "o", color=VERMILION, markersize=5)
         on_right = value < middle

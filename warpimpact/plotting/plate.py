@@ -16,7 +16,7 @@ from matplotlib.colors import to_rgba
 from matplotlib.patches import Circle, PathPatch, Rectangle
 from matplotlib.path import Path
 
-from warpimpact.analysis.plate_text import plate_numbers
+from warpimpact.analysis.effectiveness import plate_numbers
 from warpimpact.plotting.style import (
     BLUE,
     PURPLE,

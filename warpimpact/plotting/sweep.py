@@ -7,14 +7,15 @@ from textwrap import fill
 from typing import Any
 
 import numpy as np
+import pandas as pd
 import xarray
 from matplotlib.axes import Axes
 
-from warpimpact.analysis.sweep_view import Point, inputs_of, measures_of, points
 from warpimpact.plotting.cell import words
 from warpimpact.plotting.style import PALETTE, Figure, bars, finish, in_style
 from warpimpact.results.measures import Measure
 from warpimpact.scene.display import STORED
+from warpimpact.studies.sweep import inputs_of, measures_of, sweep_table
 
 _MOST_LINES = 12
 _PANEL = (5.0, 3.75)
@@ -24,17 +25,22 @@ _PANEL = (5.0, 3.75)
 @in_style
 def sweep_figure(sweep: xarray.Dataset, texts: Sequence[str] = ()) -> Figure:
     """A panel for every measure, with 95 % intervals, against the first input that is a number; a line for every
-    combination of the others. Without texts of measures they are those of `analysis.sweep_view.SHOWN_OF_SWEEPS`.
+    combination of the others. Without texts of measures they are those of `studies.sweep.SHOWN`.
 
     Raises:
         ResultError: a text is no measure, or the sweep lacks what it needs.
     """
     measures, inputs = measures_of(sweep, texts), list(inputs_of(sweep))
     along = next((name for name in inputs if sweep[name].dtype.kind == "f"), inputs[0])
-    lines: dict[str, list[Point]] = {}
-    for point in points(sweep, measures):
-        others = ", ".join(f"{words(name)} {label}" for name, label in point.labels.items() if name != along)
-        lines.setdefault(others, []).append(point)
+    table, others = sweep_table(sweep, measures), [name for name in inputs if name != along]
+    lines = {"": table}
+    if others:
+        groups = (
+            (label if isinstance(label, tuple) else (label,), line) for label, line in table.groupby(others, sort=False)
+        )
+        lines = {
+            ", ".join(f"{words(n)} {one}" for n, one in zip(others, label, strict=True)): line for label, line in groups
+        }
     rows, columns = -(-len(measures) // 2), min(2, len(measures))
     figure = Figure(figsize=(max(2, columns) * _PANEL[0], rows * _PANEL[1]), layout="constrained")
     panels = figure.subplots(rows, columns, sharex=True, squeeze=False)
@@ -60,22 +66,21 @@ def sweep_figure(sweep: xarray.Dataset, texts: Sequence[str] = ()) -> Figure:
 
 
 def _draw(
-    axes: Axes, measure: Measure, places: xarray.DataArray, line: Sequence[Point], style: dict[str, Any], *, below: bool
+    axes: Axes, measure: Measure, places: xarray.DataArray, line: pd.DataFrame, style: dict[str, Any], *, below: bool
 ) -> None:
     """Draw a line with its intervals, and write the share of the hits that a value counts beside it, above or below
     the line, and left of the last place."""
-    factor, estimates = measure.display.factor, [point.estimates[measure] for point in line]
-    value, low, high = factor * np.array([(estimate.value, estimate.low, estimate.high) for estimate in estimates]).T
+    value, low, high, share = line[measure.text][["value", "low", "high", "share"]].to_numpy().T
     is_number = places.dtype.kind == "f"
     x = places.values * STORED[places.attrs["units"]].factor if is_number else np.arange(len(line))
     axes.errorbar(x, value, yerr=bars(value, low, high), fmt="o-", capsize=3.0, **style)
     if not is_number:
         axes.set_xticks(x, places.values)
-    for at, height, point, estimate in zip(x, value, line, estimates, strict=True):
-        if 0 < estimate.count < point.hits:
+    for at, height, counted in zip(x, value, share, strict=True):
+        if 0.0 < counted < 1.0:
             last = len(x) > 1 and at == x.max()
             axes.annotate(
-                f"{estimate.count / point.hits:.0%}",
+                f"{counted:.0%}",
                 (at, height),
                 (-6.0 if last else 6.0, -5.0 if below else 5.0),
                 textcoords="offset points",

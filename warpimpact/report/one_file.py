@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import replace
 from html import escape
 from io import StringIO
 from pathlib import Path
@@ -16,7 +15,7 @@ from matplotlib.colors import Normalize
 from matplotlib.figure import Figure as PlainFigure
 
 from warpimpact.analysis.hit_map import mirrored
-from warpimpact.analysis.sweep_view import sweep_view
+from warpimpact.analysis.numbers import View, html_of
 from warpimpact.campaign.campaign import Campaign
 from warpimpact.campaign.text import parsed
 from warpimpact.firing.view import firing_view
@@ -39,12 +38,12 @@ from warpimpact.results.kinds import FIRING, FRONT, HISTORY, POSTERIOR, SWEEP, K
 from warpimpact.results.replayed_hit import hit_view
 from warpimpact.results.vocabulary import WEIGHTS
 from warpimpact.scene.symmetry import IDENTITY, symmetries
-from warpimpact.view.view import Section, html_of
+from warpimpact.studies.sweep import sweep_view
 
 _STYLE = (
     "body{font:16px sans-serif;max-width:70rem;margin:2rem auto;padding:0 1rem}img{max-width:100%}pre{overflow:auto}"
-    "td,th{padding:.2rem .9rem .2rem 0;text-align:left;border-bottom:1px solid #d8d8d8}table{border-collapse:collapse}"
-    ".number{text-align:right}.wide{overflow-x:auto}"
+    "td,th{padding:.2rem .9rem .2rem 0;text-align:right;border-bottom:1px solid #d8d8d8}table{border-collapse:collapse}"
+    "th:first-child{text-align:left}.wide{overflow-x:auto}"
 )
 
 
@@ -66,7 +65,7 @@ class _Shown(NamedTuple):
         asked: attribute with the text of the file behind the result.
     """
 
-    view: Callable[..., list[Section]]
+    view: Callable[..., View]
     figures: Mapping[str, Callable[[Any], PlainFigure]] = MappingProxyType({})
     asked: str = ""
 
@@ -87,7 +86,7 @@ _SHOWN = {
 }
 
 
-def view_of(path: Path, kind: Kind, measures: Sequence[str] = ()) -> list[Section]:
+def view_of(path: Path, kind: Kind, measures: Sequence[str] = ()) -> View:
     """The view of a file of any kind but a map of hits.
 
     Args:
@@ -114,8 +113,8 @@ def write_file_report(path: Path, kind: Kind, output: Path, folder: Path) -> Non
     """
     dataset, shown = files.read(path, kind), _SHOWN[kind]
     attributes = dataset.attrs
-    title, (first, *others) = str(attributes.get(attr.TITLE, path.stem)), shown.view(dataset)
-    sections = [replace(first, title="") if first.title == title else first, *others]
+    title = str(attributes.get(attr.TITLE, path.stem))
+    view = {"" if heading == title else heading: parts for heading, parts in shown.view(dataset).items()}
     clickable = _front_html(dataset, folder) if kind is FRONT else ""
     figures = "".join(
         f"<h2>{name}</h2><img alt='{name}' src='{data_url(draw(dataset))}'>" for name, draw in shown.figures.items()
@@ -132,7 +131,7 @@ def write_file_report(path: Path, kind: Kind, output: Path, folder: Path) -> Non
         "<meta http-equiv='Content-Security-Policy' "
         "content=\"default-src 'none'; img-src data:; style-src 'unsafe-inline'\">"
         f"<title>{escape(title)}</title><style>{_STYLE}{_FRONT_STYLE}</style></head><body><h1>{escape(title)}</h1>"
-        f"{clickable}{html_of(sections, 'h2')}{figures}{asked}<p>{made}</p></body></html>\n"
+        f"{clickable}{html_of(view, 'h2')}{figures}{asked}<p>{made}</p></body></html>\n"
     )
     with files.aside(output) as file:
         file.write_text(page, encoding="utf-8")

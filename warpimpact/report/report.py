@@ -16,23 +16,38 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pandas as pd
 import xarray
 from jinja2 import ChoiceLoader, Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup
 from plotly.offline import get_plotlyjs
 
 import warpimpact
-from warpimpact.analysis.comparison import compare
-from warpimpact.analysis.comparison_text import comparison_view, short_view, verdict_of
-from warpimpact.analysis.effectiveness import depth_note, effectiveness, measures_table
+from warpimpact.analysis.comparison import compare, comparison_view, short_view, verdict_of
+from warpimpact.analysis.effectiveness import (
+    depth_note,
+    effectiveness,
+    measures_table,
+    pierced_share,
+    reference_name,
+    solid_note,
+    weights_of,
+    weights_text,
+)
 from warpimpact.analysis.estimates import estimated, means_of, slices, status_shares
-from warpimpact.analysis.inspection import verdict
-from warpimpact.analysis.numbers import interval_text
-from warpimpact.analysis.plate_text import reference_name, solid_note, weights_of, weights_text
-from warpimpact.analysis.summary import numerics_note, numerics_sentence, promise_text, range_note, sampling_note
+from warpimpact.analysis.inspection import (
+    numerics_note,
+    numerics_sentence,
+    promise_text,
+    range_note,
+    sampling_note,
+    verdict,
+)
+from warpimpact.analysis.numbers import html_of, interval_text, number_text, table_html
 from warpimpact.plotting.cell import range_text, words
 from warpimpact.plotting.comparison import comparison_figure
 from warpimpact.plotting.style import data_url
+from warpimpact.report import svg
 from warpimpact.report.hit_data import MOST_HITS, page_data, thinned, trajectory_data, worst_and_spread
 from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
@@ -42,8 +57,6 @@ from warpimpact.results.layers import outlines
 from warpimpact.runs.replay import replay
 from warpimpact.scene.display import MM
 from warpimpact.studies.limit_view import in_short, limit_view
-from warpimpact.view import svg
-from warpimpact.view.view import Column, Section, Table, html_of, table_html
 
 
 def report_page(
@@ -65,10 +78,7 @@ def report_page(
         ResultError, CampaignError: a hit cannot be replayed.
     """
     results = [result_content(name, dataset) for name, dataset in datasets.items()]
-    worst = [
-        list(dict.fromkeys(measure.hit for measure in result["measures"] if measure.hit is not None))
-        for result in results
-    ]
+    worst = [list(dict.fromkeys(hit for hit in result["measures"].hit.tolist() if hit >= 0)) for result in results]
     most = MOST_HITS // len(datasets)
     shown = [thinned(dataset, most, keep=hits) for dataset, hits in zip(datasets.values(), worst, strict=True)]
     chosen = [worst_and_spread(few, trajectories, first=hits) for few, hits in zip(shown, worst, strict=True)]
@@ -154,14 +164,14 @@ def result_content(name: str, dataset: xarray.Dataset) -> dict[str, Any]:
         "name": name,
         "title": attributes.get(attr.TITLE, "untitled"),
         "hits": hits,
-        "verdict": f"{in_short(dataset)}." if is_limit else verdict(dataset, measures[0]),
+        "verdict": f"{in_short(dataset)}." if is_limit else verdict(dataset, measures),
         "is_limit": is_limit,
         "asked": _asked(dataset),
         "names": attributes.get(attr.CATALOGUE_NAMES, "").splitlines(),
         "tested": range_note({name: dataset}),
         "campaign": attributes.get(attr.CAMPAIGN, ""),
         "promise": promise_text(dataset),
-        "caveats": [*_caveats(dataset), *filter(None, [depth_note(measures), solid_note(dataset)])],
+        "caveats": [*_caveats(dataset), *filter(None, [depth_note(pierced_share(measures)), solid_note(dataset)])],
         "measures": measures,
         "through": Markup(html_of(limit_view(dataset)) if is_limit else table_html(_through(dataset), means_over)),
         "protects": Markup(table_html(measures_table(measures, reference_name(dataset)), against_solid)),
@@ -176,9 +186,9 @@ def compared(datasets: Mapping[str, xarray.Dataset], *, picture: bool = True) ->
     try:
         comparison = compare(list(datasets.values()), list(datasets))
     except ResultError as error:
-        return {"view": Markup(html_of([Section([str(error)])])), "every": "", "verdict": [], "picture": ""}
+        return {"view": Markup(html_of({"": [str(error)]})), "every": "", "verdict": [], "picture": ""}
     return {
-        "view": Markup(html_of([short_view(comparison, range_note(datasets))])),
+        "view": Markup(html_of(short_view(comparison, range_note(datasets)))),
         "every": Markup(html_of(comparison_view(comparison))),
         "verdict": verdict_of(comparison),
         "picture": data_url(comparison_figure(comparison), 100) if picture else "",
@@ -214,20 +224,17 @@ def _caveats(dataset: xarray.Dataset) -> list[str]:
     return [sentence for sentence in notes if sentence]
 
 
-def _through(dataset: xarray.Dataset) -> Table:
+def _through(dataset: xarray.Dataset) -> pd.DataFrame:
     """How the shots ended, and the means of what comes through."""
-    means = means_of([name for name in v.shown_by("report") if name in dataset], dataset[v.STANDOFF].values.tolist())
-    rows = [
-        (words(status), f"{share.value:.2%}", interval_text(share.low, share.high, text="{:.2%}".format))
+    rows = {
+        words(status): (f"{share.value:.2%}", interval_text(share.low, share.high, digits=".2%"))
         for status, share in status_shares(dataset).items()
-    ]
-    for measure, estimate in estimated(dataset, means).items():
-        if estimate.count:
-            shown = estimate.times(measure.display.factor)
-            interval = interval_text(shown.low, shown.high, shown.numerics, "{:.2f}".format, "{:.2f}".format)
-            name = f"mean {measure.column.label}"
-            rows.append((name, measure.display.text(estimate.value, ".2f"), interval))
-    return Table((Column(), Column("value", right=True), Column("95 % interval")), rows)
+    }
+    for measure, mean in estimated(dataset, means_of(dataset, v.shown_by("report"))).items():
+        if mean.count:
+            name = f"mean {measure.column.label}, {measure.display.shown}"
+            rows[name] = number_text(mean.value, ".2f"), interval_text(mean.low, mean.high, mean.numerics, ".2f")
+    return pd.DataFrame.from_dict(rows, orient="index", columns=["value", "95 % interval"])
 
 
 def cell_drawings(datasets: Mapping[str, xarray.Dataset]) -> list[dict[str, Any]]:
@@ -237,8 +244,6 @@ def cell_drawings(datasets: Mapping[str, xarray.Dataset]) -> list[dict[str, Any]
     drawings = []
     for name, dataset in datasets.items():
         half, holes = halves[name], outlines(dataset)
-        cell = svg.plate(svg.rings(holes["y"], holes["z"]), -half, half)
-        label = f"cell of the plate {name}"
-        drawn = svg.drawing([cell], -half, half, label, scale=scale, bar=True)
+        drawn = svg.drawing(svg.rings(holes["y"], holes["z"]), half, f"cell of the plate {name}", scale)
         drawings.append({"drawing": Markup(drawn), "y": 2.0 * MM * half[0], "z": 2.0 * MM * half[1]})
     return drawings

@@ -2,16 +2,12 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+import pandas as pd
+import xarray
 
 from warpimpact.kernels.status import Status
 from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
-from warpimpact.view.view import Column, Section, Table, number
-
-if TYPE_CHECKING:
-    import xarray
-
 
 _AGREEMENT = {
     "bit-identical": "The end is bit-identical to the stored outcome.",
@@ -20,17 +16,17 @@ _AGREEMENT = {
 }
 
 
-def hit_view(history: xarray.Dataset) -> list[Section]:
+def hit_view(history: xarray.Dataset) -> dict[str, list[str | pd.DataFrame]]:
     """Where a replayed hit was, how it ended, and whether it agrees with the stored outcome."""
     place = ", ".join(f"{axis} = {float(history[v.HIT_POINT[axis]]) * 1e3:.3f} mm" for axis in "yz")
     tilts = [tilt for tilt in history[v.TILT] if tilt.notnull()]
-    numbers = [
-        ("residual velocity", float(history[v.RESIDUAL_VELOCITY]), "m/s"),
-        *((f"tilt at {float(tilt.standoff) * 1e3:g} mm", float(tilt), "°") for tilt in tilts),
-    ]
-    table = Table((Column(), number(digits=".1f"), Column()), numbers)
+    numbers = {
+        "residual velocity": f"{float(history[v.RESIDUAL_VELOCITY]):.1f} m/s",
+        **{f"tilt at {float(tilt.standoff) * 1e3:g} mm": f"{float(tilt):.1f} °" for tilt in tilts},
+    }
+    table = pd.DataFrame({"": numbers})
     end, agreement = Status(int(history[v.STATUS])).sentence, _AGREEMENT[history.attrs[attr.AGREEMENT]]
-    return [Section([end, table, *_broken(history), agreement], f"hit {history.attrs[attr.HIT]} at {place}")]
+    return {f"hit {history.attrs[attr.HIT]} at {place}": [end, table, *_broken(history), agreement]}
 
 
 def _broken(history: xarray.Dataset) -> list[str]:

@@ -21,6 +21,10 @@ from scipy import special, stats
 Array = NDArray[np.float64]
 
 
+FEWEST = 3
+"""Fewest shots whose interval is determined. That of two is as wide as a guess, but looks like a result."""
+
+
 @dataclass(frozen=True)
 class Estimate:
     """A number with its interval; NaN where there is none.
@@ -112,6 +116,8 @@ class Dealt:
         if pooled.count == 0:
             return Estimate(math.nan, math.nan, math.nan, 0, math.nan)
         value = pooled.quantile(self._share) if self._kind == "quantile" else pooled.mean
+        if pooled.count < FEWEST:
+            return Estimate(value, math.nan, math.nan, pooled.count, pooled.deviation)
         interval = self._of_replicates(pooled, value) or self._independent(pooled)
         return Estimate(value, *interval, pooled.count, pooled.deviation)
 
@@ -151,8 +157,6 @@ class Dealt:
             return _wilson(round(sample.mean * count), count, self._confidence)
         if self._kind == "difference":
             return _matched(sample, count, self._confidence)
-        if count < 2:
-            return math.nan, math.nan
         unbiased = sample.deviation * math.sqrt(count / (count - 1))
         half = _student(self._confidence, count) * unbiased
         return sample.mean - half, sample.mean + half

@@ -1,4 +1,4 @@
-"""The view of a search of limits."""
+"""What a person sees of a search of limits: every hit of a short list, measures, references, and the cost."""
 
 from __future__ import annotations
 
@@ -6,24 +6,25 @@ import json
 from collections.abc import Iterator, Sequence
 
 import numpy as np
+import pandas as pd
 import xarray
+from pydantic import TypeAdapter
 
-from warpimpact.analysis.estimates import estimated
-from warpimpact.analysis.numbers import interval_text
-from warpimpact.analysis.plate_text import reference_name
-from warpimpact.analysis.proxy import proxy
-from warpimpact.analysis.summary import numerics_note
+from warpimpact.analysis.effectiveness import reference_name
+from warpimpact.analysis.estimates import estimated, measures_named
+from warpimpact.analysis.inspection import numerics_note
+from warpimpact.analysis.numbers import View, interval_text
 from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
-from warpimpact.results.files import ResultError
 from warpimpact.results.measures import NAMES, Measure
 from warpimpact.results.references import reference
 from warpimpact.results.vocabulary import needed_density
+from warpimpact.scene import AnyCore, Core
+from warpimpact.scene.model import Array
 from warpimpact.scene.quantities import QUANTITIES
 from warpimpact.scene.units import quantity as reader_of
 from warpimpact.solver.accuracy import errors_text, share_text
 from warpimpact.solver.limit_search import MOST_RUNS
-from warpimpact.view.view import Column, Section, Table, number
 
 _MOST_LISTED = 12
 
@@ -40,27 +41,24 @@ def measures_of(dataset: xarray.Dataset, texts: Sequence[str] = ()) -> list[Meas
     Raises:
         ResultError: a text is no measure, or the result lacks what it needs.
     """
-    try:
-        limits = v.LIMITS[dataset.attrs[attr.LIMIT]].value
-        named = [text for text in NAMES if Measure.parse(text).name == limits]
-        return [Measure.parse(text).of(dataset) for text in texts or named]
-    except ValueError as error:
-        raise ResultError(f"measure: {error}") from None
+    return measures_named(dataset, texts, list(NAMES))
 
 
-def limit_view(dataset: xarray.Dataset, texts: Sequence[str] = ()) -> list[Section]:
-    """The view of a search of limits: every hit of a short list, or its measures; its references; notes.
+def limit_view(dataset: xarray.Dataset, texts: Sequence[str] = ()) -> View:
+    """Every hit of a short list, or the measures of a search; its references; notes.
 
     Args:
         texts: texts of measures, which are also shown for a short list; by default as in `measures_of`.
     """
-    short = len(dataset[v.LIMITS[dataset.attrs[attr.LIMIT]].value]) <= _MOST_LISTED
-    return [
-        *([Section([_hits(dataset)]), *_proxies(dataset)] if short else []),
-        *([] if short and not texts else [Section([_estimates(dataset, texts)])]),
-        Section([*_left_out(dataset), *_expected(dataset), *_references(dataset)]),
-        Section(list(_costs(dataset))),
-    ]
+    quantity = dataset.attrs[attr.LIMIT]
+    short = len(dataset[v.LIMITS[quantity].value]) <= _MOST_LISTED
+    view: dict[str, list[str | pd.DataFrame]] = {f"limit {quantity}": [_hits(dataset)] if short else []}
+    if short and (table := proxy(dataset)) is not None:
+        view["proxy: energy over presented area and resistance, as a depth, and its ratio to the limit"] = [table]
+    if texts or not short:
+        view["measures"] = [_estimates(dataset, texts)]
+    view["references and notes"] = [*_left_out(dataset), *_expected(dataset), *_references(dataset)]
+    return view | {"cost and accuracy": list(_costs(dataset))}
 
 
 def in_short(dataset: xarray.Dataset) -> str:
@@ -72,35 +70,33 @@ def in_short(dataset: xarray.Dataset) -> str:
     if len(values) <= _MOST_LISTED:
         ends = f"{known.min():.5g} to {known.max():.5g} {unit}" if len(known) else "not found"
         return f"limit {quantity} of {len(values)} hits: {ends}"
-    parts = []
-    for measure, estimate in estimated(dataset, measures_of(dataset)).items():
-        interval = interval_text(factor * estimate.low, factor * estimate.high, text="{:.5g}".format)
-        parts.append(f"{measure.text} {factor * estimate.value:.5g} {unit} ({interval})")
-    return ", ".join(parts)
+    return ", ".join(
+        f"{measure.text} {estimate.value:.5g} {unit} ({interval_text(estimate.low, estimate.high, digits='.5g')})"
+        for measure, estimate in estimated(dataset, measures_of(dataset)).items()
+    )
 
 
-def _hits(dataset: xarray.Dataset) -> Table:
+def _hits(dataset: xarray.Dataset) -> pd.DataFrame:
     """Every hit with its limit and the two ends that enclose it."""
     quantity = dataset.attrs[attr.LIMIT]
     unit, factor = shown_unit(quantity)
-    value, lower, upper = (factor * dataset[name].values for name in v.LIMITS[quantity][:3])
-    columns = (
-        *(number("hit", digits="d"), number("obliquity", "°", ".4g")),
-        *(number(header, unit, ".5g") for header in (f"limit {quantity}", "lower end", "upper end")),
-    )
-    obliquity = dataset[v.OBLIQUITY].values
-    return Table(columns, list(zip(range(len(value)), obliquity, value, lower, upper, strict=True)))
+    columns = {"obliquity [°]": [f"{angle:.4g}" for angle in dataset[v.OBLIQUITY].values]}
+    for head, name in zip((f"limit {quantity}", "lower end", "upper end"), v.LIMITS[quantity], strict=False):
+        columns[f"{head} [{unit}]"] = [f"{number:.5g}" for number in factor * dataset[name].values]
+    return pd.DataFrame(columns).rename_axis("hit")
 
 
-def _estimates(dataset: xarray.Dataset, texts: Sequence[str]) -> Table:
+def _estimates(dataset: xarray.Dataset, texts: Sequence[str]) -> pd.DataFrame:
     """Measures with their intervals."""
-    rows = []
-    for measure, estimate in estimated(dataset, measures_of(dataset, texts)).items():
-        shown = estimate.times(measure.display.factor)
-        interval = interval_text(shown.low, shown.high, shown.numerics, "{:.5g}".format)
-        rows.append((measure.text, shown.value, interval, measure.title))
-    columns = Column("measure"), number("value", digits=".5g"), Column("95 % interval"), Column("meaning")
-    return Table(columns, rows)
+    rows = {
+        measure.text: {
+            "value": f"{estimate.value:.5g}",
+            "95 % interval": interval_text(estimate.low, estimate.high, estimate.numerics, ".5g"),
+            "meaning": measure.title,
+        }
+        for measure, estimate in estimated(dataset, measures_of(dataset, texts)).items()
+    }
+    return pd.DataFrame.from_dict(rows, orient="index").rename_axis("measure")
 
 
 def _left_out(dataset: xarray.Dataset) -> Iterator[str]:
@@ -112,8 +108,8 @@ def _left_out(dataset: xarray.Dataset) -> Iterator[str]:
         yield f"{failed} hits failed, and count in none of these numbers"
     if beyond := int(np.isposinf(value).sum()):
         yield f"{beyond} hits have no limit {quantity} up to {factor * attributes[attr.LIMIT_HIGHEST]:g} {unit}"
-    if missed := int((value == 0.0).sum()):
-        yield f"{missed} hits touch no material"
+    if untouched := int((value == 0.0).sum()):
+        yield f"{untouched} hits touch no material"
     if open_ := int((converged == 0).sum()) - failed:
         yield f"{open_} hits were not found to {factor * attributes[attr.LIMIT_TOLERANCE]:g} {unit} in {MOST_RUNS} runs"
 
@@ -136,15 +132,22 @@ def _costs(dataset: xarray.Dataset) -> Iterator[str]:
     runs = dataset[v.LIMITS[dataset.attrs[attr.LIMIT]].runs].values
     yield f"{runs.mean():.2g} runs of a hit on average, {runs.max()} at most"
     yield promise_line(dataset)
-    yield from filter(None, [numerics_note(dataset)])
+    yield numerics_note(dataset)
 
 
 def _references(dataset: xarray.Dataset) -> Iterator[str]:
     """The limits of the solid reference and of the base alone; empty without them."""
+    quantity, density = dataset.attrs[attr.LIMIT], float(dataset.attrs[attr.AREAL_DENSITY])
     if (solid := reference(dataset, "solid")) is not None:
-        yield _of_solid(dataset, solid)
+        limit, hits = _mean_text(solid, quantity), solid.sizes["hit"]
+        if quantity == "thickness":
+            needed = float(np.nanmean(needed_density(solid, 0.0)))
+            limit += f", {needed:.4g} kg/m² (the target as given has {density:.4g} kg/m²)"
+        else:
+            limit += f", of {density:.4g} kg/m² as the target"
+        cost = f"{hits} hit{'s' if hits > 1 else ''} searched in {float(solid.attrs[attr.COMPUTE_TIME]):.2g} s"
+        yield f"{reference_name(dataset)}: limit {quantity} {limit}; {cost}"
     if (alone := reference(dataset, "base_alone")) is not None:
-        quantity = dataset.attrs[attr.LIMIT]
         yield f"base alone: limit {quantity} {_mean_text(alone, quantity)}"
 
 
@@ -153,39 +156,6 @@ def _mean_text(of_reference: xarray.Dataset, quantity: str) -> str:
     unit, factor = shown_unit(quantity)
     value = of_reference[v.LIMITS[quantity].value].values
     return f"{factor * float(np.nanmean(value)):.5g} {unit}" + (", mean" if len(value) > 1 else "")
-
-
-def _of_solid(dataset: xarray.Dataset, solid: xarray.Dataset) -> str:
-    """The limit of the solid reference, and the cost of its search."""
-    quantity, hit_count = dataset.attrs[attr.LIMIT], solid.sizes["hit"]
-    limit = _mean_text(solid, quantity)
-    density = float(dataset.attrs[attr.AREAL_DENSITY])
-    if quantity == "thickness":
-        needed = needed_density(solid, 0.0)
-        limit += f", {float(np.nanmean(needed)):.4g} kg/m²"
-        limit += f" (the target as given has {density:.4g} kg/m²)"
-    else:
-        limit += f", of {density:.4g} kg/m² as the target"
-    hits = f"{hit_count} hit{'s' if hit_count > 1 else ''}"
-    seconds = float(solid.attrs[attr.COMPUTE_TIME])
-    return f"{reference_name(dataset)}: limit {quantity} {limit}; {hits} searched in {seconds:.2g} s"
-
-
-def _proxies(dataset: xarray.Dataset) -> list[Section]:
-    """The proxy beside the limit thickness of a solid plate; empty for another search."""
-    proxies = proxy(dataset) if dataset.attrs[attr.LIMIT] == "thickness" else None
-    if proxies is None:
-        return []
-    title = "proxy: energy over presented area and resistance, as a depth, and its ratio to the limit thickness"
-    columns = (
-        *(number("hit", digits="d"), number("inclination", "°", ".4g"), number("proxy", "mm", ".4g")),
-        number("ratio", digits=".3f"),
-    )
-    rows = [
-        (hit, inclination, 1e3 * depth, ratio)
-        for hit, (inclination, depth, ratio) in enumerate(zip(*proxies, strict=True))
-    ]
-    return [Section([Table(columns, rows)], title)]
 
 
 def promise_line(dataset: xarray.Dataset) -> str:
@@ -199,3 +169,34 @@ def promise_line(dataset: xarray.Dataset) -> str:
     kept = "" if attributes[attr.PROMISE_KEPT] else ", more than was asked for"
     hits = share_text(json.loads(attributes[attr.ACCURACY])["share"])
     return f"{ends}; against a finer level {hits} are within {errors_text(attributes)}{kept}"
+
+
+def proxy(dataset: xarray.Dataset) -> pd.DataFrame | None:
+    """The proxy of every hit: kinetic energy over presented area and resistance, as a depth, and its ratio to the
+    limit thickness; None where the target is not one solid plate whose limit thickness is known."""
+    attributes, limit = dataset.attrs, v.LIMITS["thickness"].value
+    needed = {attr.CORE, attr.MATERIAL, attr.OPEN_AREA}
+    if not needed <= attributes.keys() or limit not in dataset:
+        return None
+    if attributes[attr.OPEN_AREA] > 0.0 or v.LAYER_STATUS in dataset:
+        return None
+    core: Core = TypeAdapter[Core](AnyCore).validate_json(attributes[attr.CORE])
+    resistance = dataset.get(v.RESISTANCE, json.loads(attributes[attr.MATERIAL])["resistance"])
+    mass = dataset.get(v.MASS, core.mass_properties.mass)
+    tilt = inclination(dataset)
+    energy = 0.5 * np.asarray(mass) * dataset[v.IMPACT_VELOCITY].values ** 2
+    depth = energy / (core.presented_area(tilt) * np.asarray(resistance, dtype=np.float64))
+    columns = {"inclination [°]": np.degrees(tilt), "proxy [mm]": 1e3 * depth, "ratio": depth / dataset[limit].values}
+    return pd.DataFrame(columns).rename_axis("hit")
+
+
+def inclination(dataset: xarray.Dataset) -> Array:
+    """Angle between the axis and the line of fire [rad]. The projected angles of the axis add to those of the line."""
+    names = (v.OBLIQUITY, v.AZIMUTH, v.IMPACT_PITCH, v.IMPACT_YAW)
+    obliquity, azimuth, pitch, yaw = (np.radians(dataset[name].values) for name in names)
+    along_y, along_z = np.tan(obliquity) * np.cos(azimuth), np.tan(obliquity) * np.sin(azimuth)
+    ones = np.ones_like(obliquity)
+    flight = np.stack([ones, along_y, along_z], axis=-1)
+    axis = np.stack([ones, np.tan(np.arctan(along_y) + yaw), np.tan(np.arctan(along_z) + pitch)], axis=-1)
+    across = np.linalg.norm(np.cross(axis, flight), axis=-1)
+    return np.asarray(np.arctan2(across, (axis * flight).sum(axis=-1)))

@@ -16,7 +16,7 @@ import numpy as np
 import pandas as pd
 from pydantic import ValidationError
 
-from warpimpact.analysis.estimates import asked_measures
+from warpimpact.analysis.estimates import measures_named
 from warpimpact.campaign.campaign import Campaign
 from warpimpact.campaign.resistances import catalogue_resistance, is_drawn
 from warpimpact.campaign.straight_passage import StraightPassage
@@ -174,9 +174,9 @@ def _computed(
     computed: dict[str, Values] = {plate: {} for plate in campaigns}
     for ((plate, name), changed), outcome in zip(rows.items(), outcomes, strict=True):
         labelled = changed.scene.model_copy(update={"record": campaigns[plate].output})  # stand-offs as given
-        table = narrow_table(labelled, shots[plate, name], outcome, needed)
-        asked = asked_measures(table, texts, SHOWN)
-        computed[plate][name] = {measure: measure.values(table) for measure in asked}
+        table = narrow_table(labelled, shots[plate, name], outcome, needed).to_xarray()
+        known = measures_named(table, texts, SHOWN)
+        computed[plate][name] = {measure: measure.values(table) for measure in known}
     return computed
 
 

@@ -13,20 +13,26 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pandas as pd
 import xarray
 
+from warpimpact.analysis.estimates import estimated, measures_named
+from warpimpact.analysis.numbers import View, interval_text, number_text
 from warpimpact.campaign.campaign import Campaign
 from warpimpact.campaign.places import is_table, labels_of, put, resolved, type_at, value_at
 from warpimpact.campaign.text import CampaignError, parsed, read_text
 from warpimpact.results import attributes as attr
 from warpimpact.results import files
 from warpimpact.results import variables as v
+from warpimpact.results.dataset import failed
 from warpimpact.results.kinds import CAMPAIGN, SWEEP
 from warpimpact.results.measures import Measure
 from warpimpact.runs.executor import Executor, opened
 from warpimpact.runs.run import run_to_file
 from warpimpact.scene.units import quoted, reader_in
 
+SHOWN = (f"mean({v.RESIDUAL_VELOCITY})", f"mean({v.DEFLECTION})", f"mean({v.TILT})", "P(perforated)")
+"""Default measures of a sweep, as far as it has them."""
 _OF_POINTS = {str(name) for name in v.GROUPS["plate"]}
 """Holes, which only the results of the points have."""
 _MOST = 10_000
@@ -258,3 +264,67 @@ def _attributes(sweep: Sweep, points: Sequence[xarray.Dataset]) -> dict[str, Any
         attr.CAMPAIGN: sweep.text,
         attr.SWEEP: json.dumps({swept.name: list(swept.labels) for swept in sweep.inputs}),
     }
+
+
+def measures_of(sweep: xarray.Dataset, texts: Sequence[str] = ()) -> list[Measure]:
+    """The measures with these texts for a sweep; by default those of `SHOWN`, with tilts at the largest stand-off.
+
+    Raises:
+        ResultError: a text is no measure, or the sweep lacks what it needs.
+    """
+    return measures_named(sweep, texts, SHOWN)
+
+
+def inputs_of(sweep: xarray.Dataset) -> dict[str, list[str]]:
+    """The values of every input as the campaign writes them, without inputs of which one value was chosen."""
+    return {name: labels for name, labels in json.loads(sweep.attrs[attr.SWEEP]).items() if name in sweep.dims}
+
+
+def sweep_table(sweep: xarray.Dataset, measures: Sequence[Measure]) -> pd.DataFrame:
+    """The measures at every combination of the inputs, in their display units.
+
+    Returns:
+        A row for each combination, the last input changing fastest, with an index level for each input as the campaign
+        writes it, and two levels of columns: the text of a measure; value, low, high, numerics, and share (of the hits
+        that count).
+    """
+    inputs, rows = inputs_of(sweep), {}
+    for combination in itertools.product(*map(enumerate, inputs.values())):
+        point = sweep.isel({name: place for name, (place, _) in zip(inputs, combination, strict=True)})
+        point = point.isel(hit=np.flatnonzero(point[v.STATUS].notnull().values))
+        hits, row = int((~failed(point)).sum()), dict[tuple[str, str], float]()
+        for measure, one in estimated(point, measures).items():
+            numerics = math.nan if one.numerics is None else one.numerics
+            numbers = {"value": one.value, "low": one.low, "high": one.high, "numerics": numerics}
+            numbers["share"] = one.count / hits if hits else 0.0
+            row |= {(measure.text, name): number for name, number in numbers.items()}
+        rows[tuple(label for _, label in combination)] = row
+    table = pd.DataFrame([list(row.values()) for row in rows.values()], columns=pd.MultiIndex.from_tuples(row))
+    return table.set_index(pd.MultiIndex.from_tuples(rows, names=list(inputs)))
+
+
+def sweep_view(sweep: xarray.Dataset, texts: Sequence[str] = ()) -> View:
+    """A table with a row for every combination and its measures. If there are texts of measures, each measure has a
+    table, with its shifts by the numerics, and the hits that count."""
+    measures = measures_of(sweep, texts)
+    table = sweep_table(sweep, measures).rename_axis(index=lambda name: name.replace("_", " "))
+    title = str(sweep.attrs.get(attr.TITLE, "untitled"))
+    inputs = ", ".join(inputs_of(sweep)).replace("_", " ")
+    sentence = f"{len(table)} combinations of {inputs}, with at most {sweep.sizes[v.HIT]} hits each; 95 % intervals"
+    short, view = pd.DataFrame(index=table.index), dict[str, list[str | pd.DataFrame]]({title: [sentence]})
+    for measure in measures:
+        own = table[measure.text]
+        numerics = own.numerics if texts else [None] * len(own)
+        intervals = [*map(interval_text, own.low, own.high, numerics)]
+        if texts:
+            columns = {
+                "value": own.value,
+                "95 % interval": intervals,
+                "hits that count": own.share.map("{:.1%}".format),
+            }
+            view[measure.title] = [pd.DataFrame(columns)]
+        else:
+            pairs = zip(own.value, intervals, strict=True)
+            short[measure.title] = [f"{number_text(value)} ({interval})" for value, interval in pairs]
+    more = "means are over the cores that passed; --measure TEXT tells how far the numerics may shift it"
+    return view if texts else {title: [sentence, short, more]}

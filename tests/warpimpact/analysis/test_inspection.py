@@ -40,10 +40,10 @@ def test_a_notebook_shows_a_result_with_its_verdict(make_result, make_plate_resu
     assert shown.verdict.startswith("30 of 40 cores pass. residual energy fraction, mean ")
     assert str(shown).startswith("a < b\n")
     assert drawings(shown._repr_html_()) == ["map of the hits"]
-    assert shown.drawing.count("Z") == 1 + 40  # a hole, and a mark for every hit
+    assert (shown.drawing.count("Z"), shown.drawing.count("<circle")) == (1, 40)  # a hole, and a mark for every hit
     plates = [make_plate_result(np.full(64, velocity)) for velocity in (700.0, 800.0)]
     text = compare(plates, ["a", "b"])._repr_html_()
-    rows = dict(re.findall(r"<tr><td>([^<]*)</td><td>([^<]*)</td></tr>", text))
+    rows = dict(re.findall(r"<th>([^<]*)</th>\s*<td>([^<]*)</td>\s*</tr>", text))
     assert rows["residual energy fraction, mean"] == "a"
 
 

@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 import xarray
 
+from warpimpact.analysis.numbers import text_of
 from warpimpact.analysis.shot_by_shot import shared_hits, shot_by_shot
 from warpimpact.kernels.status import Status
 from warpimpact.results import attributes as attr
-from warpimpact.view.view import Table, text_of
 
 
 def result(hits: list[int], velocity: list[float], status: list[int], attributes: dict[str, str]) -> xarray.Dataset:
@@ -32,15 +32,17 @@ def test_bias_rms_ranks_and_the_worst_hits_are_those_of_the_shared_sound_hits() 
     )
     shared = shared_hits({"slow": slow, "fast": fast})
     assert shared is not None
-    section = shot_by_shot(shared)
-    table = section.parts[1]
-    assert isinstance(table, Table)
-    row = table.rows[0]
-    apart = np.array([10.0, -4.0, 4.0])
-    assert row[1:5] == pytest.approx((3, apart.mean(), np.sqrt((apart**2).mean()), 1.0))
-    assert row[5].startswith("1 (+10)")
-    assert "1 of them failed" in text_of([section])
-    assert "tilt at 50 mm" in text_of([section])
+    view = shot_by_shot(shared)
+    row = view["shot by shot"][1].loc["residual velocity, m/s"]
+    difference = np.array([10.0, -4.0, 4.0])
+    numbers = (3, difference.mean(), np.sqrt((difference**2).mean()), 1.0)
+    assert [float(row[name]) for name in ("hits", "bias", "rms", "rank correlation")] == pytest.approx(
+        numbers, abs=5e-3
+    )
+    assert row["largest differences at hits"].startswith("1 (+10)")
+    assert "1 of them failed" in text_of(view)
+    assert "tilt at 50 mm" in text_of(view)
+    assert "contradict" not in text_of(view)
 
 
 def test_results_by_the_same_law_or_of_other_hits_are_not_compared_so() -> None:
@@ -50,9 +52,16 @@ def test_results_by_the_same_law_or_of_other_hits_are_not_compared_so() -> None:
     assert shared_hits({"a": fast, "b": moved}) is None
 
 
-def test_hits_that_end_otherwise_are_named() -> None:
-    fast = result([4, 7], [700.0, np.nan], [0, int(Status.ARRESTED)], {})
-    slow = result([4, 7], [705.0, 90.0], [0, 0], {attr.CONTINUUM: "{}"})
+def test_models_that_contradict_each_other_are_not_compared_in_numbers() -> None:
+    """Two cores arrested by one model pass at 523 and 574 m/s by the other, and one passes by both."""
+    fast = result([4, 7, 9], [0.0, 0.0, 600.0], [int(Status.ARRESTED)] * 2 + [0], {})
+    slow = result([4, 7, 9], [523.0, 574.0, 605.0], [0, 0, 0], {attr.CONTINUUM: "{}"})
     shared = shared_hits({"fast": fast, "slow": slow})
     assert shared is not None
-    assert "fast and slow end otherwise at hits 7" in text_of([shot_by_shot(shared)])
+    view = shot_by_shot(shared)
+    text = text_of(view)
+    assert "fast and slow end differently at hits 4, 7\n" in text
+    assert (
+        "The models contradict each other here: of 3 hits, 1 pass by fast and 3 pass by slow. Believe neither" in text
+    )
+    assert view["shot by shot"][-1].loc["residual velocity, m/s", "bias"] == "-5"

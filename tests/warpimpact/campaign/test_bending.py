@@ -5,6 +5,7 @@ from pathlib import Path
 import pytest
 
 from warpimpact import Campaign
+from warpimpact.analysis.numbers import text_of
 from warpimpact.campaign.campaign import CampaignError
 from warpimpact.cli import main
 from warpimpact.plotting.maps import variable_map
@@ -12,7 +13,6 @@ from warpimpact.results import files
 from warpimpact.results.replayed_hit import hit_view
 from warpimpact.results.variables import BENDING_VARIABLES, HIT_NUMBERS
 from warpimpact.runs.replay import replay
-from warpimpact.view.view import text_of
 
 SLOTTED_PLATE = (Path(__file__).parents[3] / "campaigns" / "slotted_plate.toml").read_text(encoding="utf-8")
 STOP = """

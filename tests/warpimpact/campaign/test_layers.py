@@ -186,9 +186,9 @@ def test_a_result_holds_its_references_and_tells_the_weights_apart(result: xarra
     solid, alone = (reference(result, name) for name in ("solid", "base_alone"))
     assert solid.sizes["hit"] == alone.sizes["hit"] == result.sizes["hit"]  # the base scatters
     assert (alone["status"] == Status.ARRESTED).all()
-    scores = {score.name: score for score in effectiveness(result)}
-    assert scores["P(base_perforated)"].alone == 0.0
-    assert np.isfinite(scores["mean(base_depth)"].solid)
+    scores = effectiveness(result)
+    assert scores.alone["P(base_perforated)"] == 0.0
+    assert np.isfinite(scores.solid["mean(base_depth)"])
     weights = campaign().target.weights
     text = inspect_text(result)
     assert ", ".join(f"{name} {weight:.1f} kg/m²" for name, weight in weights.items()) in text

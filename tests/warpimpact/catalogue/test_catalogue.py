@@ -4,12 +4,12 @@ from pathlib import Path
 
 import pytest
 
+from warpimpact.analysis.numbers import text_of
 from warpimpact.catalogue.catalogue import FOLDERS, Catalogue, file_name
 from warpimpact.catalogue.catalogue import key as key_of
 from warpimpact.catalogue.catalogue_view import catalogue_view, drawn, material_view, threat_view
 from warpimpact.catalogue.entries import Material, Threat
 from warpimpact.scene import ConeCore
-from warpimpact.view.view import text_of
 
 THREATS = Catalogue().all(Threat)
 CORES = [name for name, threat in THREATS.items() if threat.shape is not None]

@@ -9,6 +9,7 @@ import pytest
 import xarray
 from scipy import stats
 
+from warpimpact.analysis.numbers import text_of
 from warpimpact.campaign.text import CampaignError
 from warpimpact.cli import main
 from warpimpact.firing.plan import Gun, Langlie, MilStd662F, Procedure, Shot, firing_test
@@ -20,7 +21,6 @@ from warpimpact.results import attributes as attr
 from warpimpact.results import files
 from warpimpact.results import firing as f
 from warpimpact.results.kinds import FIRING
-from warpimpact.view.view import text_of
 
 NORMAL = Response(stats.norm.ppf((np.arange(4000) + 0.5) / 4000, 800.0, 25.0))
 TARGET = f'title = "a"\ntests = 200\n[target]\nlimits = "{Path(__file__).as_posix()}"\n'

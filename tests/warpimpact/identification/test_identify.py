@@ -9,6 +9,7 @@ import pytest
 import xarray
 from scipy.stats import multivariate_normal
 
+from warpimpact.analysis.numbers import text_of
 from warpimpact.campaigns import gallery
 from warpimpact.cli import main
 from warpimpact.identification import identify as identifying
@@ -21,7 +22,6 @@ from warpimpact.results.kinds import POSTERIOR
 from warpimpact.runs.executor import executor_for
 from warpimpact.scene import Hits, make_shots
 from warpimpact.solver.simulate import simulate
-from warpimpact.view.view import text_of
 
 FitMaker = Callable[..., Fit]
 

@@ -9,6 +9,7 @@ from scipy.stats.mstats import hdquantiles
 
 from warpimpact import Campaign
 from warpimpact.analysis.effectiveness import effectiveness
+from warpimpact.analysis.numbers import text_of
 from warpimpact.campaign.text import CampaignError
 from warpimpact.cli import main
 from warpimpact.optimisation import search
@@ -21,7 +22,6 @@ from warpimpact.results import files
 from warpimpact.results import front as f
 from warpimpact.results.files import OutputError, read
 from warpimpact.results.kinds import FRONT
-from warpimpact.view.view import text_of
 
 from .conftest import CORE, HOLES, SEARCH, WEIGHT_AND_ENERGY, design
 
@@ -182,7 +182,7 @@ def test_a_limit_is_that_of_the_command(measure: str, tmp_path: Path) -> None:
     path.write_text(path.read_text().partition("[hits]")[0] + hits)
     quantity = "velocity" if measure in ("mean(limit_velocity)", "V50") else "thickness"
     assert main(["limit", str(path), "--quantity", quantity, "-o", str(tmp_path / "limit.nc"), "-q"]) == 0
-    (score,) = effectiveness(read(tmp_path / "limit.nc"), [measure])
+    score = effectiveness(read(tmp_path / "limit.nc"), [measure]).iloc[0]
     fresh = float(found[f.FRESH][0, 0])
     if measure == "V50":  # a smooth quantile beside an order statistic
         values = read(tmp_path / "limit.nc")["limit_velocity"].values

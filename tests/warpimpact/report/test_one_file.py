@@ -6,13 +6,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from warpimpact.analysis.numbers import html_of, text_of
 from warpimpact.cli import main
 from warpimpact.firing.plan import read_test
 from warpimpact.firing.simulate import Response, simulate_test
 from warpimpact.firing.view import firing_view
 from warpimpact.results import files
 from warpimpact.results.kinds import FIRING
-from warpimpact.view.view import html_of, text_of
 
 V50_TEST = Path(__file__).parents[3] / "campaigns" / "firing" / "v50_test.toml"
 
@@ -25,7 +25,7 @@ def test_a_firing_test_is_inspected_and_reported(capsys: pytest.CaptureFixture[s
     assert capsys.readouterr().out == f"{text_of(view)}\n"
     assert main(["report", "a.nc"]) == 0
     page = Path("a.html").read_text(encoding="utf-8")
-    assert html_of(view[1:], "h2") in page
+    assert html_of(dict(list(view.items())[1:]), "h2") in page
     assert "<meta name='viewport' content='width=device-width" in page  # a phone shows it at the width of its screen
     assert page.count("<img") == 1
     assert html.escape(V50_TEST.read_text(encoding="utf-8").splitlines()[0]) in page

@@ -14,18 +14,16 @@ import pytest
 import xarray
 
 from warpimpact import Campaign
-from warpimpact.analysis.comparison import compare
-from warpimpact.analysis.comparison_text import comparison_view, short_view, verdict_of
+from warpimpact.analysis.comparison import compare, comparison_view, short_view, verdict_of
 from warpimpact.analysis.effectiveness import effectiveness
-from warpimpact.analysis.numbers import number_text
-from warpimpact.analysis.summary import range_note
+from warpimpact.analysis.inspection import range_note
+from warpimpact.analysis.numbers import html_of, number_text
 from warpimpact.campaign.campaign import CampaignError
 from warpimpact.cli import main
 from warpimpact.kernels.status import Status
 from warpimpact.report import hit_data, report
 from warpimpact.results import files
 from warpimpact.runs.run import run
-from warpimpact.view.view import html_of
 
 SLOTTED_PLATE = Path(__file__).parents[3] / "campaigns" / "slotted_plate.toml"
 TRAJECTORIES = 6
@@ -81,7 +79,7 @@ def test_page_holds_the_hits_of_each_result(folder: Path) -> None:
 def test_page_says_how_well_each_plate_protects(folder: Path) -> None:
     text = html.unescape(re.sub(r"<[^>]*>", " ", (folder / "a.html").read_text()))
     for name in ("narrow", "<b>wide"):
-        for measure in effectiveness(files.read(folder / f"{name}.nc")):
+        for measure in effectiveness(files.read(folder / f"{name}.nc")).itertuples():
             numbers = (measure.value, measure.solid, measure.ratio)
             row = r"\s+.*\s+".join(re.escape(number_text(number)) for number in numbers)
             assert re.search(rf"{re.escape(measure.measure.label)}.*\s+{row}", text)
@@ -98,7 +96,7 @@ def test_page_compares_the_plates(folder: Path, make_result: ResultMaker, tmp_pa
     assert "narrow: 400 of 400 cores pass. residual energy fraction, mean " in short
     for sentence in verdict_of(comparison):
         assert f"<li>{sentence}</li>" in short
-    assert html.unescape(html_of([short_view(comparison, range_note(stored))])) in text
+    assert html.unescape(html_of(short_view(comparison, range_note(stored)))) in text
     assert html.unescape(html_of(comparison_view(comparison))) in text
     assert text.count('<img src="data:image/png;base64,') == 1
     files.write(make_result(100), tmp_path / "other.nc")

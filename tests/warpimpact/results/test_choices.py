@@ -111,9 +111,9 @@ def test_chosen_hits_are_no_longer_dealt_out_in_turn(result: xarray.Dataset) -> 
 
 
 def test_a_number_names_the_same_hit_in_a_choice(result: xarray.Dataset) -> None:
-    worst = {measure.name: measure.hit for measure in effectiveness(result)}["worst_point(residual_energy_fraction)"]
+    worst = effectiveness(result).hit["worst_point(residual_energy_fraction)"]
     rest = result.isel(hit=slice(worst, None))
-    few = {measure.name: measure.hit for measure in effectiveness(rest)}
+    few = effectiveness(rest).hit
     assert few["worst_point(residual_energy_fraction)"] == worst == int(result["residual_velocity"].idxmax())
 
 

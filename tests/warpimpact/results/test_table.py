@@ -10,7 +10,7 @@ import pytest
 import xarray
 
 from warpimpact import Campaign
-from warpimpact.analysis.summary import summary_text
+from warpimpact.analysis.inspection import summary_text
 from warpimpact.results import files
 from warpimpact.results import variables as v
 from warpimpact.results.dataset import numbered

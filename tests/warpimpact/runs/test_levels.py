@@ -10,7 +10,8 @@ import pytest
 from warpimpact import Campaign, Numerics
 from warpimpact.analysis.comparison import compare
 from warpimpact.analysis.effectiveness import effectiveness
-from warpimpact.analysis.summary import estimated, summary_text
+from warpimpact.analysis.estimates import estimated
+from warpimpact.analysis.inspection import summary_text
 from warpimpact.results import attributes as attr
 from warpimpact.results import files
 from warpimpact.results import variables as v
@@ -110,7 +111,7 @@ def test_measures_say_what_the_numerics_may_shift_them_by_and_a_finer_level_agre
         changed = np.sum(one.values(told) != one.values(truth)) if one.is_binary else 0
         assert abs(found[one].value - exact[one].value) <= shift + 2.0 * np.sqrt(changed) / told.sizes["hit"], one
         assert exact[one].numerics is None
-    for one, other in zip(effectiveness(told), effectiveness(truth), strict=True):
+    for one, other in zip(effectiveness(told).itertuples(), effectiveness(truth).itertuples(), strict=True):
         if one.hit is None and not one.measure.is_binary:
             assert abs(one.value - other.value) <= (one.numerics or 0.0), one.name
     assert "numerics ± " in summary_text(told)

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from warpimpact import Campaign
-from warpimpact.analysis.summary import summary_text
+from warpimpact.analysis.inspection import summary_text
 from warpimpact.campaign.campaign import CampaignError
 from warpimpact.results import files
 from warpimpact.results.measures import Measure, Tally

@@ -39,11 +39,19 @@ def test_the_share_of_replicates_stays_between_0_and_1() -> None:
     assert estimate_of("share", 1.0 - values, replicates=16).high == 1.0
 
 
-@pytest.mark.parametrize(("successes", "count"), [(0, 1), (1, 1), (0, 40), (3, 40), (40, 40), (70_000, 100_000)])
+@pytest.mark.parametrize(("successes", "count"), [(0, 3), (0, 40), (3, 40), (40, 40), (70_000, 100_000)])
 def test_the_interval_of_a_share_is_wilsons(successes: int, count: int) -> None:
     found = estimate_of("share", np.repeat([1.0, 0.0], [successes, count - successes]), confidence=0.9)
     wilson = stats.binomtest(successes, count).proportion_ci(0.9, method="wilson")
     assert (found.low, found.high) == pytest.approx((wilson.low, wilson.high), rel=1e-12, abs=1e-15)
+
+
+@pytest.mark.parametrize("kind", ["mean", "share", "difference", "quantile"])
+def test_one_or_two_shots_have_no_interval(kind: str) -> None:
+    for values in (np.ones(1), np.array([1.0, 0.0])):
+        estimate = estimate_of(kind, values)
+        assert estimate.value == values.mean()
+        assert np.isnan([estimate.low, estimate.high]).all()
 
 
 def test_a_rule_looks_at_balanced_points_or_at_steps_of_a_quarter() -> None:

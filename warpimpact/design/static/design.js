@@ -235,7 +235,7 @@
   // On a narrow page a table is a list, whose entries have the heads of their columns.
   function headed(place) {
     for (const table of place.querySelectorAll("table")) {
-      const heads = [...table.querySelectorAll("th")].map(({ textContent }) => textContent);
+      const heads = [...table.querySelectorAll("thead th")].map(({ textContent }) => textContent);
       for (const row of table.rows) [...row.cells].forEach((cell, k) => { if (k && heads[k]) cell.dataset.head = heads[k]; });
     }
   }
