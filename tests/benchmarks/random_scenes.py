@@ -50,7 +50,7 @@ from warpimpact.scene import (
 )
 from warpimpact.scene.interaction import NEAR_EDGES
 from warpimpact.solver.accuracy import PILOT_LIMITS, pilot_size
-from warpimpact.solver.limit import HIGHEST_VELOCITY, VELOCITY_TOLERANCE, Sought, limit_velocity, pilot_of_limits
+from warpimpact.solver.limit import HIGHEST_VELOCITY, VELOCITY_TOLERANCE, LimitSpec, limit_velocity, pilot_of_limits
 from warpimpact.solver.resolution import Level
 from warpimpact.solver.simulate import pilot_of, simulate
 from warpimpact.solver.worker import Worker
@@ -314,8 +314,8 @@ def limit_claim(case: Case, name: str, answers: tuple[Array, Array]) -> dict[str
     preset, (before, truth) = PRESETS[name], answers
     assert preset.limit is not None
     pilot = case.shots(pilot_size(preset, PILOT_LIMITS), seed=77)
-    sought = Sought("velocity", VELOCITY_TOLERANCE, HIGHEST_VELOCITY)
-    promise = pilot_of_limits(case.scene, pilot, sought, Numerics(fidelity=name), Worker("cpu", 1))
+    spec = LimitSpec("velocity", VELOCITY_TOLERANCE, HIGHEST_VELOCITY)
+    promise = pilot_of_limits(case.scene, pilot, spec, Numerics(fidelity=name), Worker("cpu", 1))
     assert promise.numerics.level is not None
     actual = limits_of(case, promise.numerics.level, len(truth))
     error, uncertain = (p90(np.nan_to_num(np.abs(one - truth), nan=math.inf)) for one in (actual, before))

@@ -27,7 +27,7 @@ from warpimpact.solver.limit import (
     HIGHEST_VELOCITY,
     THICKNESS_TOLERANCE,
     VELOCITY_TOLERANCE,
-    Sought,
+    LimitSpec,
     limits,
     pilot_of_limits,
     thickest,
@@ -135,13 +135,15 @@ def _column(measure: Measure, table: Any) -> Array:
     return np.asarray(measure.display.factor * measure.values(table))
 
 
-def _limit_of(campaign: Campaign, measure: Measure) -> Sought:
+def _limit_of(campaign: Campaign, measure: Measure) -> LimitSpec:
     """The limit behind a measure, with the tolerance of `warpimpact limit`."""
     if measure.name == "limit_velocity":
-        return Sought("velocity", VELOCITY_TOLERANCE, HIGHEST_VELOCITY)
+        return LimitSpec("velocity", VELOCITY_TOLERANCE, HIGHEST_VELOCITY)
     layer = measure.layer or 0
     highest = thickest(campaign.scene, layer)
-    return Sought("thickness", THICKNESS_TOLERANCE, highest, layer, resistance_by_thickness(campaign, layer, highest))
+    return LimitSpec(
+        "thickness", THICKNESS_TOLERANCE, highest, layer, resistance_by_thickness(campaign, layer, highest)
+    )
 
 
 def _limits(campaign: Campaign, shots: Shots, measure: Measure, numerics: Numerics, worker: Worker) -> Array:

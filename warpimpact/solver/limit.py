@@ -1,8 +1,4 @@
-"""Limits: the impact velocity at which each shot just perforates, or the thickness of plate that it just perforates.
-
-A few shots are searched first. Their limits say where the searches of the others begin (solver/limit_near.py). Then
-each search follows its own runs (solver/limit_search.py).
-"""
+"""Limits: the impact velocity at which each shot just perforates, or the thickness of plate that it just perforates."""
 
 from __future__ import annotations
 
@@ -18,12 +14,11 @@ from warpimpact.records.registry import LIMITS
 from warpimpact.records.variable import failures
 from warpimpact.scene import PRESETS, Numerics, Plate, Scene, Shots, Target
 from warpimpact.solver.accuracy import PILOT_LIMITS, LevelErrors, PilotResult, choose_level, limit_errors, pilot_size
-from warpimpact.solver.limit_near import Neighbours
 from warpimpact.solver.limit_search import LimitSearch
 from warpimpact.solver.marching import Progress
 from warpimpact.solver.prepare import prepare
 from warpimpact.solver.resolution import at_level, coarsest_level, level_of
-from warpimpact.solver.simulate import computed, spread, spread_places
+from warpimpact.solver.simulate import computed, spread
 from warpimpact.solver.worker import Worker
 
 Array = NDArray[np.float64]
@@ -41,9 +36,6 @@ STEPS_OF_LIMITS = 6.0
 """How many times shorter the steps of a search are than those of a hit map. The step follows from the impact velocity,
 but near its limit a core is slow for a while and moves by a small share of its speed per step. With the step of a hit
 map, limit velocities in a slotted plate are wrong by 140 m/s of 210 m/s (90 % of the hits), with this one by 2 m/s."""
-
-FIRST = 8
-"""Shots that are searched before any limit is known. Each later batch is as large as the number of limits found."""
 
 
 @dataclass(frozen=True)
@@ -78,7 +70,7 @@ class Limits:
 
 
 @dataclass(frozen=True)
-class Sought:
+class LimitSpec:
     """The limit that is searched.
 
     Attributes:
@@ -96,7 +88,7 @@ class Sought:
     layer: int = 0
     by_thickness: tuple[tuple[float, ...], tuple[float, ...]] | None = None
 
-    def put(self, target: Target, shots: Shots, values: Array) -> Shots:
+    def with_trial(self, target: Target, shots: Shots, values: Array) -> Shots:
         """The shots with the values to try, shape [shots]: velocities [m/s] or thicknesses [m]."""
         if self.quantity == "velocity":
             return replace(shots, velocity=values)
@@ -132,8 +124,8 @@ def limit_velocity(
         ValueError: the plate weakens by time (`check_arrests`).
         DeviceError: the device is absent.
     """
-    sought = Sought("velocity", tolerance, highest)
-    return _limits(scene, shots, sought, numerics or Numerics(), Worker(device, threads), progress)
+    spec = LimitSpec("velocity", tolerance, highest)
+    return _limits(scene, shots, spec, numerics or Numerics(), Worker(device, threads), progress)
 
 
 def limit_thickness(
@@ -161,8 +153,8 @@ def limit_thickness(
     Raises:
         ValueError, DeviceError: as `limit_velocity`.
     """
-    sought = Sought("thickness", tolerance, thickest(scene, layer), layer)
-    return _limits(scene, shots, sought, numerics or Numerics(), Worker(device, threads), progress)
+    spec = LimitSpec("thickness", tolerance, thickest(scene, layer), layer)
+    return _limits(scene, shots, spec, numerics or Numerics(), Worker(device, threads), progress)
 
 
 def thickest(scene: Scene, layer: int) -> float:
@@ -171,18 +163,18 @@ def thickest(scene: Scene, layer: int) -> float:
 
 
 def _limits(
-    scene: Scene, shots: Shots, sought: Sought, numerics: Numerics, worker: Worker, progress: Progress | None
+    scene: Scene, shots: Shots, spec: LimitSpec, numerics: Numerics, worker: Worker, progress: Progress | None
 ) -> Limits:
     if numerics.explicit is None:
         pilot = spread(shots, pilot_size(numerics.asked, PILOT_LIMITS))
-        numerics = pilot_of_limits(scene, pilot, sought, numerics, worker).numerics
-    return limits(scene, shots, sought, numerics, worker, progress)
+        numerics = pilot_of_limits(scene, pilot, spec, numerics, worker).numerics
+    return limits(scene, shots, spec, numerics, worker, progress)
 
 
 def pilot_of_limits(
     scene: Scene,
     pilot: Shots,
-    sought: Sought,
+    spec: LimitSpec,
     numerics: Numerics,
     worker: Worker,
     trying: Callable[[int], object] = lambda level: None,
@@ -195,19 +187,19 @@ def pilot_of_limits(
     asked, draft = numerics.asked, PRESETS["draft"].limit
     if asked.limit is None or draft is None:
         raise ValueError("accuracy: needs limit, the error of a limit as a share of the median limit")
-    name = str(LIMITS[sought.quantity].value)
+    name = str(LIMITS[spec.quantity].value)
 
     @cache
     def outcomes(level: int) -> Outcomes:
         trying(level)
-        return limits(scene, pilot, sought, at_level(level, numerics), worker).recorded(sought.quantity)
+        return limits(scene, pilot, spec, at_level(level, numerics), worker).recorded(spec.quantity)
 
     @cache
     def seconds(level: int) -> float:
         return PASSAGES * len(pilot) * prepare(scene, pilot[:1], at_level(level, numerics)).seconds
 
     def errors(coarse: Outcomes, fine: Outcomes) -> LevelErrors:
-        return limit_errors(getattr(coarse, name), getattr(fine, name), asked, sought.quantity)
+        return limit_errors(getattr(coarse, name), getattr(fine, name), asked, spec.quantity)
 
     return choose_level(numerics, coarsest_level(draft / asked.limit), outcomes, errors, seconds)
 
@@ -215,79 +207,39 @@ def pilot_of_limits(
 def limits(
     scene: Scene,
     shots: Shots,
-    sought: Sought,
+    spec: LimitSpec,
     numerics: Numerics,
     worker: Worker,
     progress: Progress | None = None,
-    together: int | None = None,
 ) -> Limits:
-    """Find the limit of every shot, with numerics that fix the resolution.
-
-    A limit may change within the tolerance with the shots that are searched together, because the first limits found
-    say where the other searches begin (solver/limit_near.py).
-
-    Args:
-        together: number of shots that are searched together; None for all.
-    """
+    """Find the limit of every shot, with numerics that fix the resolution. Each run computes all pending shots."""
     check_arrests(scene, shots)
-    total, size = len(shots), together or max(1, len(shots))
-    parts = []
-    for first in range(0, total, size):
-
-        def told(done: int, _: int, first: int = first) -> None:
-            if progress is not None:
-                progress(first + done, total)
-
-        some = shots[first : first + size]
-        parts.append(_limits_of(scene, some, sought, short_steps(numerics), worker, told))
-    return _joined(parts)
-
-
-def _limits_of(
-    scene: Scene, shots: Shots, sought: Sought, numerics: Numerics, worker: Worker, progress: Progress
-) -> Limits:
-    """The limits of shots that are searched together, at fixed numerics, in batches: first FIRST shots, then up to
-    twice that number in all, and so on. Each run computes all pending shots of a batch."""
-    search, near = (
-        _search_of(scene, shots, sought),
-        Neighbours(scene, shots, (sought.quantity, sought.layer), sought.tolerance),
-    )
-    total, done, order = len(shots), 0, spread_places(len(shots), len(shots))
-    kept, failing = _Kept(total), _Kept(total)
-    while done < total:
-        batch = order[done : max(FIRST, 2 * done)]
-        search.expect(batch, near.guess(batch))
-        while len(which := batch[search.pending[batch]]):
-            tried = search.trial(which)
-            ended = computed(prepare(scene, sought.put(scene.target, shots[which], tried), numerics), worker)
-            kept.take(search.learn(which, tried, ended), which, tried, ended)
-            failing.take(np.flatnonzero(failures(ended.status)), which, tried, ended)
-            progress(done + len(batch) - int(search.pending[batch].sum()), total)
-        near.learn(batch, search)
-        done += len(batch)
+    search, which = _search_of(scene, shots, spec), np.arange(len(shots))
+    at_limit: tuple[Array, Outcomes] | None = None
+    at_failure = at_limit
+    while len(which):
+        tried = search.trial()[which]
+        trial = spec.with_trial(scene.target, shots[which], tried)
+        ended = computed(prepare(scene, trial, short_steps(numerics)), worker)
+        at_limit = _updated(at_limit, which, tried, ended, search.learn(which, tried, ended))
+        at_failure = _updated(at_failure, which, tried, ended, failures(ended.status))
+        which = np.flatnonzero(search.pending)
+        if progress is not None:
+            progress(len(shots) - len(which), len(shots))
+    assert at_limit is not None
+    assert at_failure is not None
     failed = np.flatnonzero(search.failed)
-    if len(failed):
-        kept.take(failed, np.arange(total), failing.values, failing.outcomes)
-    searched = sought.put(scene.target, shots, kept.values)
-    return Limits(search.value(), *search.ends(), search.runs, search.converged, searched, kept.outcomes)
-
-
-def _joined(parts: list[Limits]) -> Limits:
-    """Limits of some shots, one after the other."""
-    numbers = ("value", "lower", "upper", "runs", "converged")
-    return Limits(
-        **{name: np.concatenate([getattr(part, name) for part in parts]) for name in numbers},
-        shots=Shots.joined([part.shots for part in parts]),
-        outcomes=Outcomes.joined([part.outcomes for part in parts]),
+    values, outcomes = _updated(
+        at_limit, failed, at_failure[0][failed], at_failure[1][failed], np.ones(len(failed), dtype=bool)
     )
-
-
-def _search_of(scene: Scene, shots: Shots, sought: Sought) -> LimitSearch:
-    """A search of the limits of all shots."""
-    if sought.quantity == "velocity":
-        return LimitSearch(shots.velocity, np.inf, np.zeros(len(shots)), sought.tolerance, sought.highest)
-    start = np.broadcast_to(shots.layer_value(scene.target, "thickness", sought.layer), len(shots))
-    return LimitSearch(start, 0.0, shots.velocity, sought.tolerance, sought.highest)
+    return Limits(
+        search.value(),
+        *search.ends,
+        search.runs,
+        search.ended & ~search.failed,
+        spec.with_trial(scene.target, shots, values),
+        outcomes,
+    )
 
 
 def short_steps(numerics: Numerics) -> Numerics:
@@ -324,17 +276,22 @@ def _weakens(plate: Plate, shots: Shots | None, layer: int) -> bool:
     return bool((shots.columns["degradation"][:, layer] < 1.0).any())
 
 
-class _Kept:
-    """Values and outcomes of one run of every shot."""
+def _updated(
+    last: tuple[Array, Outcomes] | None,
+    which: NDArray[np.int64],
+    tried: Array,
+    ended: Outcomes,
+    counts: NDArray[np.bool_],
+) -> tuple[Array, Outcomes]:
+    """Values and outcomes of one run of every shot, where the runs that count replace those before."""
+    values, outcomes = last or (tried.copy(), ended)
+    values[which[counts]], rows = tried[counts], outcomes.with_rows(which[counts], ended[counts])
+    return values, rows
 
-    outcomes: Outcomes
 
-    def __init__(self, count: int) -> None:
-        self.values = np.empty(count)
-
-    def take(self, places: NDArray[np.int64], which: NDArray[np.int64], tried: Array, ended: Outcomes) -> None:
-        """Keep the runs at some places of `which`."""
-        if not hasattr(self, "outcomes"):
-            self.outcomes = ended[np.zeros(len(self.values), dtype=np.int64)]  # until a shot has its own
-        self.outcomes = self.outcomes.with_rows(which[places], ended[places])
-        self.values[which[places]] = tried[places]
+def _search_of(scene: Scene, shots: Shots, spec: LimitSpec) -> LimitSearch:
+    """A search of the limits of all shots."""
+    if spec.quantity == "velocity":
+        return LimitSearch(shots.velocity, np.inf, np.zeros(len(shots)), spec.tolerance, spec.highest)
+    start = np.broadcast_to(shots.layer_value(scene.target, "thickness", spec.layer), len(shots))
+    return LimitSearch(start, 0.0, shots.velocity, spec.tolerance, spec.highest)

@@ -17,7 +17,6 @@ from warpimpact.results.table import HitTable
 from warpimpact.results.vocabulary import LIMIT_VELOCITY
 from warpimpact.runs.compute import Report, numerics_of, pilot_shots
 from warpimpact.runs.describe import described
-from warpimpact.runs.shards import extent
 from warpimpact.scene import Shots, Target, exclusions
 from warpimpact.solver.accuracy import PILOT_LIMITS, PilotResult, pilot_size
 from warpimpact.solver.limit import (
@@ -25,7 +24,7 @@ from warpimpact.solver.limit import (
     PASSAGES,
     THICKNESS_TOLERANCE,
     VELOCITY_TOLERANCE,
-    Sought,
+    LimitSpec,
     check_arrests,
     limits,
     pilot_of_limits,
@@ -42,10 +41,10 @@ if TYPE_CHECKING:
 class LimitMap:
     """The limit of every hit, as a `runs.compute.Computation` for `warpimpact limit`.
 
-    The hits of a shard are searched together, so a limit depends on the campaign alone, not on the task.
+    A limit depends on its hit alone.
     """
 
-    sought: Sought
+    spec: LimitSpec
     reference_hits: ClassVar[int] = 256
     passages: ClassVar[int] = PASSAGES
 
@@ -65,13 +64,13 @@ class LimitMap:
         except ValueError as error:
             raise CampaignError(str(error)) from None
         if quantity == "velocity":
-            return cls(Sought(quantity, tolerance or VELOCITY_TOLERANCE, HIGHEST_VELOCITY))
+            return cls(LimitSpec(quantity, tolerance or VELOCITY_TOLERANCE, HIGHEST_VELOCITY))
         plates = campaign.target.layers
         if layer >= len(plates):
             raise CampaignError(f"got layer {layer}, but the target has layers 0 (the plate) to {len(plates) - 1}")
         highest = thickest(campaign.scene, layer)
         curve = resistance_by_thickness(campaign, layer, highest)
-        return cls(Sought(quantity, tolerance or THICKNESS_TOLERANCE, highest, layer, curve))
+        return cls(LimitSpec(quantity, tolerance or THICKNESS_TOLERANCE, highest, layer, curve))
 
     def check(self, texts: Sequence[str]) -> None:
         """Refuse measures that this search does not give.
@@ -85,36 +84,36 @@ class LimitMap:
             except ValueError as error:
                 raise CampaignError(f"--measure: {error}") from None
             of_velocities = measure.quantity.need is LIMIT_VELOCITY
-            if not measure.is_limit or of_velocities != (self.sought.quantity == "velocity"):
+            if not measure.is_limit or of_velocities != (self.spec.quantity == "velocity"):
                 raise CampaignError(
-                    f"--measure: {text} is not told by a search of each hit's limit {self.sought.quantity}"
+                    f"--measure: {text} is not told by a search of each hit's limit {self.spec.quantity}"
                 )
 
     @property
     def content(self) -> Mapping[str, str]:
         """What determines the bits beside the campaign."""
-        sought = self.sought
-        of_layer = f" of layer {sought.layer}" if sought.layer else ""
-        curve = ", with the resistance of each thickness" if sought.by_thickness else ""
-        return {"limit": f"{sought.quantity}{of_layer} within {sought.tolerance:g}, at most {sought.highest:g}{curve}"}
+        spec = self.spec
+        of_layer = f" of layer {spec.layer}" if spec.layer else ""
+        curve = ", with the resistance of each thickness" if spec.by_thickness else ""
+        return {"limit": f"{spec.quantity}{of_layer} within {spec.tolerance:g}, at most {spec.highest:g}{curve}"}
 
     @property
     def measures(self) -> tuple[str, ...]:
         """The running estimates: the mean limit."""
-        return (f"mean({v.LIMITS[self.sought.quantity].value})",)
+        return (f"mean({v.LIMITS[self.spec.quantity].value})",)
 
     def of_reference(self, campaign: Campaign, name: str) -> LimitMap | None:
         """See `Computation.of_reference`. The thickness of a layer in front of the base is none of the base alone."""
-        sought, base = self.sought, len(campaign.layer)
+        spec, base = self.spec, len(campaign.layer)
         if name == "base_alone":
-            searched = sought.quantity == "velocity" or sought.layer == base
-            return replace(self, sought=replace(sought, layer=0)) if searched else None
-        if sought.quantity == "velocity":
+            searched = spec.quantity == "velocity" or spec.layer == base
+            return replace(self, spec=replace(spec, layer=0)) if searched else None
+        if spec.quantity == "velocity":
             return self
         solid = campaign.references[name]
-        highest = thickest(solid.scene, sought.layer)
-        curve = resistance_by_thickness(solid, sought.layer, highest)
-        return replace(self, sought=replace(sought, highest=highest, by_thickness=curve))
+        highest = thickest(solid.scene, spec.layer)
+        curve = resistance_by_thickness(solid, spec.layer, highest)
+        return replace(self, spec=replace(spec, highest=highest, by_thickness=curve))
 
     def compute(
         self,
@@ -125,26 +124,26 @@ class LimitMap:
         report: Report = lambda done: None,
     ) -> HitTable:
         """Search the limits of some shots. The table has the shots as they just perforate, with their limits."""
-        sought, numerics, together = self.sought, numerics_of(campaign, pilot), extent(len(campaign.sampler()))
+        spec, numerics = self.spec, numerics_of(campaign, pilot)
         progress = lambda done, total: report(done)  # noqa: E731
         begin = time.perf_counter()
-        searched = limits(campaign.scene, shots, sought, numerics, worker, progress, together)
+        searched = limits(campaign.scene, shots, spec, numerics, worker, progress)
         elapsed = time.perf_counter() - begin
         attributes = {
-            attr.HISTORY: attr.history_line(f"limit --quantity {sought.quantity}"),
-            attr.LIMIT: sought.quantity,
-            attr.LIMIT_LAYER: sought.layer,
+            attr.HISTORY: attr.history_line(f"limit --quantity {spec.quantity}"),
+            attr.LIMIT: spec.quantity,
+            attr.LIMIT_LAYER: spec.layer,
             **self.weights(campaign.target),
-            attr.LIMIT_TOLERANCE: sought.tolerance,
-            attr.LIMIT_HIGHEST: sought.highest,
+            attr.LIMIT_TOLERANCE: spec.tolerance,
+            attr.LIMIT_HIGHEST: spec.highest,
         }
-        if sought.quantity == "velocity" and (factors := limit_velocity_factors(campaign)) is not None:
+        if spec.quantity == "velocity" and (factors := limit_velocity_factors(campaign)) is not None:
             attributes[attr.LIMIT_FACTORS] = list(factors)
         tried = searched.shots.velocity
-        if sought.quantity == "thickness":
-            tried = searched.shots.layer_value(campaign.target, "thickness", sought.layer)
-        put = sought.put(campaign.target, shots, tried)
-        outcomes, by = searched.recorded(sought.quantity), (worker.device, elapsed)
+        if spec.quantity == "thickness":
+            tried = searched.shots.layer_value(campaign.target, "thickness", spec.layer)
+        put = spec.with_trial(campaign.target, shots, tried)
+        outcomes, by = searched.recorded(spec.quantity), (worker.device, elapsed)
         return described(campaign, put, pilot, outcomes, short_steps(numerics), by, attributes)
 
     def pilot(self, campaign: Campaign, worker: Worker, report: Report = lambda level: None) -> PilotResult | None:
@@ -152,15 +151,15 @@ class LimitMap:
         if campaign.numerics.explicit is not None:
             return None
         pilot, numbers = pilot_shots(campaign, pilot_size(campaign.numerics.asked, PILOT_LIMITS))
-        errors = pilot_of_limits(campaign.scene, pilot, self.sought, campaign.numerics, worker, report)
+        errors = pilot_of_limits(campaign.scene, pilot, self.spec, campaign.numerics, worker, report)
         return replace(errors, numbers=numbers)
 
     def weights(self, target: Target) -> dict[str, float]:
         """Attributes that convert the thickness of the layer to the areal density of the target; none for a
         velocity."""
-        if self.sought.quantity == "velocity":
+        if self.spec.quantity == "velocity":
             return {}
-        layer = target.layers[self.sought.layer]
+        layer = target.layers[self.spec.layer]
         return {
             attr.LIMIT_DENSITY: layer.areal_density / layer.thickness,
             attr.LIMIT_ELSEWHERE: target.areal_density - layer.areal_density,
