@@ -48,8 +48,7 @@ def export_command(arguments: argparse.Namespace) -> None:
     if path.suffix == ".toml":
         output = output or path.with_suffix(".svg")
         check_output(output, *SUFFIXES, overwrite=arguments.overwrite)
-        write_drawing(Campaign.from_toml(path).plate, output)
-        print(output)
+        print(*write_drawing(Campaign.from_toml(path).plate, output), output, sep="\n")
         return
     with files.opened(path, HIT_MAP, HISTORY) as dataset:
         if files.is_history(dataset):

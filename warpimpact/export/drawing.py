@@ -3,50 +3,105 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+import shapely
 
 from warpimpact.results.files import OutputError, aside
 from warpimpact.scene import Plate
 from warpimpact.scene.display import MM
+from warpimpact.scene.model import Array
 
 SUFFIXES = (".svg", ".dxf")
-_CORNERS = 12
-"""Most points of an outline that may be a regular polygon."""
-_ROUNDNESS = 1e-6
-"""Largest spread of the distances from the middle of a round hole, as a share of its radius."""
+_SAME_PLACE = 1e-6
+"""Largest distance of two holes that are one hole of the period, in periods."""
 
 
-def write_drawing(plate: Plate, output: Path) -> None:
-    """Write the holes of a plate, or of one period of an unbounded one, with the rim of that.
+def write_drawing(plate: Plate, output: Path) -> list[str]:
+    """Write the holes of a plate, or each hole of one period of an unbounded plate once.
 
-    In an SVG drawing filled shapes are holes. A DXF drawing has closed polylines in the layers HOLES and RIM, and a
-    circle for each round hole.
+    In an SVG drawing filled shapes are holes. A DXF drawing has them in the layer HOLES, as circles and as closed
+    polylines with arcs, and the rim of the plate in the layer RIM, or the period in the layer PERIOD.
+
+    Returns:
+        What to know before cutting, a sentence each.
 
     Raises:
         OutputError: the plate has no holes, or ezdxf is not installed.
     """
-    half = 0.5 * np.array(plate.size or plate.pattern.period)
-    outlines = plate.pattern.outlines((-half[0], half[0]), (-half[1], half[1]))
-    if not outlines:
+    sides, pattern = np.array(plate.size or plate.pattern.period), plate.pattern
+    spines = pattern.spines(*((-side / 2, side / 2) for side in sides))
+    if not len(spines):
         raise OutputError(f"{output}: the plate has no holes to draw")
-    holes = [MM * outline for outline in outlines]
+    spines = _once(spines, sides) if plate.size is None else spines
+    low, high = np.split(shapely.bounds(spines), 2, axis=1) + np.array([[[-1.0]], [[1.0]]]) * pattern.rounding
+    if plate.size is None:
+        count = "one hole" if len(spines) == 1 else f"{len(spines)} holes"
+        steps = " mm and ".join(f"{side * MM:g}" for side in sides)
+        notes = [f"The drawing has one period: {count}, to be repeated every {steps} mm."]
+    else:
+        cut = int((np.maximum(high, -low) > sides / 2 * (1.0 + _SAME_PLACE)).any(axis=1).sum())
+        notes = [f"The rim cuts {cut} of {len(spines)} holes. plate.margin leaves such holes out."] if cut else []
+    holes = [_vertices(shapely.get_coordinates(spine) * MM, pattern.rounding * MM) for spine in spines]
     with aside(output) as file:
-        (_write_svg if output.suffix.lower() == ".svg" else _write_dxf)(holes, MM * half, file)
+        if output.suffix.lower() == ".svg":
+            box = np.minimum(low.min(axis=0), -sides / 2) * MM, np.maximum(high.max(axis=0), sides / 2) * MM
+            _write_svg(holes, pattern.rounding * MM, *box, file)
+        else:
+            _write_dxf(holes, "PERIOD" if plate.size is None else "RIM", sides * MM / 2, file)
+    return notes
 
 
-def _write_svg(holes: list[NDArray[np.float64]], half: NDArray[np.float64], file: Path) -> None:
-    y, z = 2.0 * half
-    paths = "".join("M" + "L".join(f"{a:.4f},{-b:.4f}" for a, b in hole) + "Z" for hole in holes)
+def _once(spines: Any, period: Array) -> Any:
+    """One spine of those that repeat with the period, each time the one nearest to the origin."""
+    middles = shapely.get_coordinates(shapely.centroid(spines))
+    order = np.argsort(np.linalg.norm(middles, axis=1), kind="stable")
+    places = np.round(middles[order] / period / _SAME_PLACE).astype(int) % round(1.0 / _SAME_PLACE)
+    return spines[order][np.unique(places, axis=0, return_index=True)[1]]
+
+
+def _vertices(corners: Array, rounding: float) -> Array:
+    """Outline of a hole, anticlockwise, shape [vertices, 3]: place, and bulge of the part that follows.
+
+    The bulge is the tangent of a quarter of the angle of an arc, 0 for a straight part.
+
+    Args:
+        corners: of the spine, a closed polygon, a line or a point, shape [corners, 2].
+        rounding: distance of the outline from the spine.
+    """
+    if len(corners) == 1:
+        return np.array([[*(corners[0] - [rounding, 0.0]), 1.0], [*(corners[0] + [rounding, 0.0]), 1.0]])
+    if len(corners) > 2:
+        corners = shapely.get_coordinates(shapely.orient_polygons(shapely.Polygon(corners)))[:-1]
+    following = np.roll(corners, -1, axis=0)
+    along = (following - corners) / np.linalg.norm(following - corners, axis=1, keepdims=True)
+    outwards = rounding * np.stack([along[:, 1], -along[:, 0]], axis=1)
+    heading = np.arctan2(along[:, 1], along[:, 0])
+    turn = (np.roll(heading, -1) - heading) % (2.0 * np.pi)
+    starts = np.column_stack([corners + outwards, np.zeros(len(corners))])
+    ends = np.column_stack([following + outwards, np.tan(turn / 4.0)])
+    return np.stack([starts, ends], axis=1).reshape(-1, 3) if rounding else starts
+
+
+def _write_svg(holes: list[Array], rounding: float, low: Array, high: Array, file: Path) -> None:
+    (left, _), (_, up), (width, height) = low, high, high - low
+    paths = "".join(_svg_path(hole, rounding) for hole in holes)
     head = (
-        f'<svg xmlns="http://www.w3.org/2000/svg" width="{y:.6g}mm" height="{z:.6g}mm" '
-        f'viewBox="{-half[0]:.6g} {-half[1]:.6g} {y:.6g} {z:.6g}">'
+        f'<svg xmlns="http://www.w3.org/2000/svg" width="{width:.6g}mm" height="{height:.6g}mm" '
+        f'viewBox="{left:.6g} {-up:.6g} {width:.6g} {height:.6g}">'
     )
     file.write_text(f'{head}\n<path fill="black" d="{paths}"/>\n</svg>\n', encoding="utf-8")
 
 
-def _write_dxf(holes: list[NDArray[np.float64]], half: NDArray[np.float64], file: Path) -> None:
+def _svg_path(hole: Array, rounding: float) -> str:
+    places = [f"{y:.4f},{-z:.4f}" for y, z, _ in [*hole, hole[0]]]
+    arc = f"A{rounding:.6g},{rounding:.6g} 0 0 0 "
+    parts = (f"{arc if bulge else 'L'}{to}" for bulge, to in zip(hole[:, 2], places[1:], strict=True))
+    return f"M{places[0]}{''.join(parts)}Z"
+
+
+def _write_dxf(holes: list[Array], frame: str, half: Array, file: Path) -> None:
     try:
         from ezdxf.document import Drawing
     except ImportError:
@@ -54,21 +109,14 @@ def _write_dxf(holes: list[NDArray[np.float64]], half: NDArray[np.float64], file
     drawing = Drawing.new("R2000")
     drawing.units = 4  # mm
     space = drawing.modelspace()
-    for layer, outlines in (("HOLES", holes), ("RIM", [half * [(-1, -1), (1, -1), (1, 1), (-1, 1)]])):
+    corners = half * [(-1, -1), (1, -1), (1, 1), (-1, 1)]
+    for layer, outlines in (("HOLES", holes), (frame, [np.column_stack([corners, np.zeros(4)])])):
         drawing.layers.add(layer)
         for outline in outlines:
-            if circle := _circle(outline):
-                space.add_circle(*circle, dxfattribs={"layer": layer})
-                continue
-            space.add_lwpolyline([tuple(point) for point in outline], close=True, dxfattribs={"layer": layer})
+            if len(outline) == 2:
+                (y, z, _), (end, _, _) = outline
+                space.add_circle((0.5 * (y + end), z), 0.5 * (end - y), dxfattribs={"layer": layer})
+            else:
+                points = [tuple(vertex) for vertex in outline.tolist()]
+                space.add_lwpolyline(points, format="xyb", close=True, dxfattribs={"layer": layer})
     drawing.saveas(file)
-
-
-def _circle(outline: NDArray[np.float64]) -> tuple[tuple[float, float], float] | None:
-    """Centre and radius [mm] of an outline that is a round hole; None for any other outline."""
-    low, high = outline.min(axis=0), outline.max(axis=0)
-    centre = 0.5 * (low + high)
-    distances = np.linalg.norm(outline - centre, axis=1)
-    radius = float(distances.max())
-    is_round = len(outline) > _CORNERS and np.ptp(distances) < _ROUNDNESS * radius
-    return ((float(centre[0]), float(centre[1])), radius) if is_round else None

@@ -11,7 +11,7 @@ import tempfile
 import xml.etree.ElementTree as ElementTree
 from collections.abc import Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import Any
 
 import numpy as np
 import xarray
@@ -20,12 +20,7 @@ from scipy.spatial.transform import Rotation
 from warpimpact.analysis.replay_geometry import slabs
 from warpimpact.results import variables as v
 from warpimpact.results.files import OutputError
-
-if TYPE_CHECKING:
-    import meshio
-    from numpy.typing import NDArray
-
-    Array = NDArray[np.float64]
+from warpimpact.scene.model import Array
 
 SIDES = 48
 """Points around the core's surface."""
@@ -58,7 +53,7 @@ def write_vtk(history: xarray.Dataset, folder: Path) -> list[Path]:
     return [folder / "core.pvd", folder / "plate.pvd"]
 
 
-def _cores(history: xarray.Dataset) -> Iterator[meshio.Mesh]:
+def _cores(history: xarray.Dataset) -> Iterator[Any]:
     """The core's surface at every step, with the velocity [m/s] of each point, and with the velocity, the angular
     velocity, the force and the moment of the whole core."""
     import meshio
@@ -80,7 +75,7 @@ def _cores(history: xarray.Dataset) -> Iterator[meshio.Mesh]:
         yield meshio.Mesh(now[v.PLATE_POSITION].values + turned, cells, {v.VELOCITY: velocity, **data})
 
 
-def _deformed(history: xarray.Dataset) -> Iterator[meshio.Mesh]:
+def _deformed(history: xarray.Dataset) -> Iterator[Any]:
     """The elements that are left of all layers at every snapshot, with their plastic strain."""
     import meshio
 
@@ -90,7 +85,7 @@ def _deformed(history: xarray.Dataset) -> Iterator[meshio.Mesh]:
         yield meshio.Mesh(place, [("hexahedron", corners[there])], cell_data={v.ELEMENT_STRAIN: [strain[there]]})
 
 
-def _weakened(history: xarray.Dataset) -> Iterator[meshio.Mesh]:
+def _weakened(history: xarray.Dataset) -> Iterator[Any]:
     """The plate within reach of the core at every snapshot: cells with the share of the resistance left."""
     import meshio
 
@@ -106,7 +101,7 @@ def _weakened(history: xarray.Dataset) -> Iterator[meshio.Mesh]:
         yield meshio.Mesh(points, [("hexahedron", cells)], cell_data={v.RESISTANCE_SHARE: [share.ravel()]})
 
 
-def _write_series(folder: Path, name: str, times: Array, meshes: Iterator[meshio.Mesh]) -> None:
+def _write_series(folder: Path, name: str, times: Array, meshes: Iterator[Any]) -> None:
     """Write meshes as ``<name>_<number>.vtu``, and ``<name>.pvd`` with the time of each."""
     root = ElementTree.Element("VTKFile", type="Collection", version="0.1")
     collection = ElementTree.SubElement(root, "Collection")

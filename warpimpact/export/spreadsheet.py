@@ -12,8 +12,9 @@ import xarray
 
 from warpimpact.analysis.estimates import slices
 from warpimpact.results import variables as v
-from warpimpact.results.dataset import hit_numbers, status_codes
+from warpimpact.results.dataset import hit_numbers
 from warpimpact.results.files import aside
+from warpimpact.scene.display import MM
 
 _ANGLE_DECIMALS = 10
 """Decimals of an angle that a user gave in degrees."""
@@ -25,50 +26,38 @@ def to_dataframe(dataset: xarray.Dataset) -> pd.DataFrame:
     A variable with stand-offs, axes or layers gets one column for each: ``tilt_130mm``, ``angular_velocity_x``,
     ``layer_tilt_0``. ``status`` and ``layer_status_0`` are words. An angle that was given as 30° is 30.
     """
-    columns: dict[str, Any] = {name: _as_given(array) for name, array in _columns(dataset)}
-    for name, variable in _statuses(dataset).items():
-        words = {code: word for word, code in status_codes(dataset, variable).items()}
-        columns[name] = [words[code] for code in columns[name].tolist()]
+    columns = {name: _values(array) for name, array in _columns(dataset)}
     return pd.DataFrame(columns, index=pd.Index(hit_numbers(dataset), name=v.HIT))
-
-
-def _statuses(dataset: xarray.Dataset) -> dict[str, v.Variable]:
-    """Columns that tell how a core ended, in the target and in each layer, with their variables."""
-    layers = dataset.sizes["layer"] if v.LAYER_STATUS in dataset else 0
-    return {v.STATUS: v.STATUS} | {f"{v.LAYER_STATUS}_{layer}": v.LAYER_STATUS for layer in range(layers)}
-
-
-def _as_given(array: xarray.DataArray) -> np.ndarray[Any, Any]:
-    """Values of a column. Angles in a file are degrees converted from radians. If a short number of degrees has the
-    same value after this conversion, it is taken as the given one."""
-    values: np.ndarray[Any, Any] = array.values
-    if array.attrs.get("units") != "degree" or values.dtype != np.float64:
-        return values
-    short = np.round(values, _ANGLE_DECIMALS)
-    return np.where(np.degrees(np.radians(short)) == values, short, values)
 
 
 def _columns(dataset: xarray.Dataset) -> Iterator[tuple[str, xarray.DataArray]]:
     """Columns of the table by their names, each of shape [hits]."""
     for name in (v.HIT_Y, v.HIT_Z, *dataset.data_vars):
         array = dataset[name]
-        if array.dims == ("hit",):
-            yield str(name), array
-        elif array.dims == ("hit", "standoff"):
-            for index, standoff in enumerate(dataset[v.STANDOFF].values):
-                yield f"{name}_{standoff * 1e3:g}mm", array[:, index]
-        elif array.dims == ("hit", "axis"):
-            for index, axis in enumerate(dataset[v.AXIS].values):
-                yield f"{name}_{axis}", array[:, index]
-        elif array.dims == ("hit", "layer"):
-            for layer in range(array.sizes["layer"]):
-                yield f"{name}_{layer}", array[:, layer]
+        match array.dims:
+            case ("hit",):
+                yield str(name), array
+            case ("hit", "standoff" | "axis" | "layer" as along):
+                for place in range(array.sizes[along]):
+                    label = dataset[along].values[place] if along in dataset.coords else place
+                    end = f"{label * MM:g}mm" if along == "standoff" else label
+                    yield f"{name}_{end}", array[:, place]
 
 
-def _units(dataset: xarray.Dataset) -> dict[str, str]:
-    """Units of the columns; a status is a word."""
-    words = _statuses(dataset)
-    return {name: "1" if name in words else str(array.attrs["units"]) for name, array in _columns(dataset)}
+def _values(array: xarray.DataArray) -> np.ndarray[Any, Any]:
+    """Values of a column: words for codes, and short numbers of degrees as they were given.
+
+    Angles in a file are degrees converted from radians. If a short number of degrees has the same value after this
+    conversion, it is taken as the given one.
+    """
+    values = array.values
+    if "flag_meanings" in array.attrs:
+        words = dict(zip(array.attrs["flag_values"].tolist(), array.attrs["flag_meanings"].split(), strict=True))
+        return np.array([words[code] for code in values.tolist()], dtype=object)
+    if array.attrs.get("units") != "degree" or values.dtype != np.float64:
+        return values
+    short = np.round(values, _ANGLE_DECIMALS)
+    return np.where(np.degrees(np.radians(short)) == values, short, values)
 
 
 def write_csv(dataset: xarray.Dataset, path: Path) -> None:
@@ -83,13 +72,13 @@ def write_csv(dataset: xarray.Dataset, path: Path) -> None:
     is_first = True
     with aside(path) as file:
         for part in slices(dataset):
-            frame = to_dataframe(part)
-            header = [_header(name, unit) for name, unit in _units(part).items()] if is_first else False
-            frame.to_csv(file, mode="w" if is_first else "a", header=header)
+            header = [_header(name, array) for name, array in _columns(part)] if is_first else False
+            to_dataframe(part).to_csv(file, mode="w" if is_first else "a", header=header)
             is_first = False
 
 
-def _header(name: str, unit: str) -> str:
+def _header(name: str, array: xarray.DataArray) -> str:
     """Text such as "spin [rad/s]"; without brackets if there is no unit."""
+    unit = "1" if "flag_meanings" in array.attrs else str(array.attrs["units"])
     shown = unit.replace(" s-1", "/s").replace("degree", "deg")
     return name if shown == "1" else f"{name} [{shown}]"

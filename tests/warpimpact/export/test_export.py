@@ -6,10 +6,13 @@ from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
 
+import ezdxf
 import numpy as np
 import pandas as pd
 import pytest
 import xarray
+from ezdxf.path import make_path
+from shapely import Polygon
 
 from warpimpact import Campaign, to_dataframe
 from warpimpact.analysis import estimates
@@ -89,17 +92,44 @@ def test_an_exported_result_is_a_list_of_hits(tmp_path: Path) -> None:
         assert EXPORTED.get(variable, variable) == variable.field
 
 
-@pytest.mark.parametrize(("pattern", "kind"), [("circle", "CIRCLE"), ("hexagon", "LWPOLYLINE")])
-def test_round_holes_are_circles_of_a_dxf(pattern: str, kind: str, tmp_path: Path) -> None:
-    import ezdxf
+SLOTS = {"shape": "slot", "length": "12 mm", "width": "4 mm", "spacing": ["8 mm", "16 mm"], "staggered": True}
+ROUND = {"shape": "circle", "diameter": "5 mm", "spacing": "8 mm", "staggered": True}
+ROUNDED = {"shape": "triangle", "side": "9 mm", "corner_radius": "1 mm", "spacing": "12 mm"}
+OWN = {"shape": "polygons", "spacing": ["9 mm", "9 mm"], "polygons": [[("-2 mm", 0), ("3 mm", 0), (0, "4 mm")]]}
 
-    size = {"diameter": 9e-3} if pattern == "circle" else {"width": 9e-3}
-    holes: Any = {"shape": pattern, "spacing": (12e-3, 12e-3), **size}
-    write_drawing(Plate(thickness=4e-3, resistance=1e9, pattern=holes), tmp_path / "a.dxf")
-    drawn = ezdxf.readfile(tmp_path / "a.dxf").modelspace().query('*[layer=="HOLES"]')
-    assert {shape.dxftype() for shape in drawn} == {kind}
-    if kind == "CIRCLE":
-        assert {round(shape.dxf.radius, 9) for shape in drawn} == {4.5}
+
+@pytest.mark.parametrize(
+    ("pattern", "kind", "count", "arcs"),
+    [(SLOTS, "LWPOLYLINE", 2, 2), (ROUND, "CIRCLE", 2, 0), (ROUNDED, "LWPOLYLINE", 1, 3), (OWN, "LWPOLYLINE", 1, 0)],
+)
+def test_a_drawing_has_every_hole_of_a_period_once(
+    pattern: Any, kind: str, count: int, arcs: int, tmp_path: Path
+) -> None:
+    plate = Plate(thickness=4e-3, resistance=1e9, pattern=pattern)
+    (note,) = write_drawing(plate, tmp_path / "a.dxf")
+    assert ("one hole" if count == 1 else f"{count} holes") in note
+    space = ezdxf.readfile(tmp_path / "a.dxf").modelspace()
+    holes = space.query('*[layer=="HOLES"]')
+    assert [hole.dxftype() for hole in holes] == [kind] * count
+    assert len(space.query('*[layer=="PERIOD"]')) == 1
+    if kind == "LWPOLYLINE":
+        assert [sum(bulge > 0.0 for (bulge,) in hole.get_points("b")) for hole in holes] == [arcs] * count
+    area = sum(Polygon([(at.x, at.y) for at in make_path(hole).flattening(1e-4)]).area for hole in holes)
+    assert area == pytest.approx(1e6 * plate.open_area * np.prod(plate.pattern.period), rel=1e-3)
+    write_drawing(plate, tmp_path / "a.svg")
+    path = ElementTree.parse(tmp_path / "a.svg").getroot()[0].attrib["d"]
+    assert (path.count("M"), path.count("A")) == (count, 2 * count if kind == "CIRCLE" else arcs * count)
+
+
+def test_holes_that_the_rim_cuts_are_counted(tmp_path: Path) -> None:
+    plate = Plate(thickness=4e-3, resistance=1e9, pattern=SLOTS, size=["40 mm", "30 mm"])
+    assert write_drawing(plate, tmp_path / "a.dxf") == [
+        "The rim cuts 6 of 13 holes. plate.margin leaves such holes out."
+    ]
+    space = ezdxf.readfile(tmp_path / "a.dxf").modelspace()
+    assert [len(space.query(f'*[layer=="{layer}"]')) for layer in ("HOLES", "RIM")] == [13, 1]
+    within = Plate(**plate.model_dump() | {"margin": "1 mm"})
+    assert write_drawing(within, tmp_path / "b.dxf") == []
 
 
 @pytest.fixture(scope="module")
