@@ -99,8 +99,8 @@ def test_plate_is_cut_through_the_hit_point(history: xarray.Dataset) -> None:
 def test_flight_shows_the_core_at_the_standoffs(standoff_point: str) -> None:
     history = history_of(standoff_point=standoff_point)
     figure = trajectory.flight(history)
-    for axes in figure.axes:  # captions go on away from the frame that they are near to
-        assert [text.get_ha() for text in axes.texts] == ["left", "center", "right"]
+    for axes in figure.axes:
+        assert [text.get_ha() for text in axes.texts] == ["center"] * 3
     for view, angle in enumerate(("yaw", "pitch")):
         assert len(cores(figure, view)) == 3
         texts = [text.get_text() for text in figure.axes[view].texts]
