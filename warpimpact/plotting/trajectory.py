@@ -125,9 +125,9 @@ def _two_views(dataset: xarray.Dataset, poses: Iterable[Pose], *, room: float) -
 
 
 def _draw_core(axes: Axes, dataset: xarray.Dataset, pose: Pose, view: str, **style: Any) -> Polygon:
-    style = {"facecolor": GREY, "edgecolor": "black"} | style
-    drawn: Polygon = axes.add_patch(Polygon(silhouette(dataset, pose, view) * MM, **style))
-    return drawn
+    core = Polygon(silhouette(dataset, pose, view) * MM, **{"facecolor": GREY, "edgecolor": "black"} | style)
+    axes.add_patch(core)
+    return core
 
 
 def _draw_path(axes: Axes, positions: Array, view: str) -> None:
@@ -194,8 +194,8 @@ def course(dataset: xarray.Dataset) -> Figure:
         side.set_ylabel(f"{words(energy)} [J]", color=colour)
         side.tick_params(axis="y", colors=colour)
     for view, angle in _ANGLE_SHOWN.items():
-        values = np.degrees(np.unwrap(np.arctan2(axis.sel(axis=view), axis.sel(axis="x"))))
-        angles.plot(time, values, color=_COMPONENTS[view], label=angle)
+        turned = np.unwrap(np.arctan2(axis.sel(axis=view), axis.sel(axis="x")))
+        angles.plot(time, np.degrees(turned), color=_COMPONENTS[view], label=angle)
     angles.set_ylabel("angle of the axis [°]")
     for panel in panels.flat:
         panel.grid(color="0.9")

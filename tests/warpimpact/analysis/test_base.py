@@ -183,7 +183,7 @@ def test_the_figure_against_weight_shows_the_base_beside_the_solid_plate(quarter
     share, depth = figure.axes
     assert share.get_ylabel() == "P(base perforated)"
     assert depth.get_ylabel() == "depth in the base [mm]"
-    points = {tuple(line.get_xydata()[0]) for line in share.lines if len(line.get_xdata()) == 1}
+    points = {tuple(point) for line in share.lines for point in line.get_xydata()}
     assert {(23.55, 0.25), (60.0, 0.25), (23.55, 1.0), (60.0, 1.0)} <= points  # 1: the solid plate is perforated
     assert {text.get_text() for text in share.texts} == {"a", "b"}
     assert depth.get_title(loc="left").startswith("lower bounds")  # a quarter of the cores pass
