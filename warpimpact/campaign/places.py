@@ -18,7 +18,8 @@ from .text import CampaignError
 _TABLES: Mapping[str, Any] = {"impact": Impact, "plate": Plate, "interaction": Interaction}
 """Tables whose keys may be given without the table, because their names are unique."""
 _WHOLE = ("core", "plate", "plate.pattern", "interaction")
-_WHOLE_OF_A_LAYER = re.compile(r"layer \d+(\.pattern)?")
+"""Tables that may be given as a whole, beside those of layers."""
+_LAYER = re.compile(r"layer \d+(\.pattern)?")
 """Tables that may be given as a whole."""
 _LAYER = re.compile(r"layer (\d{1,3})")
 _NAMES_A_FILE = ("file", "catalogue")
@@ -26,7 +27,7 @@ _NAMES_A_FILE = ("file", "catalogue")
 
 def is_table(place: str) -> bool:
     """Whether a whole table stands at a place."""
-    return place in _WHOLE or bool(_WHOLE_OF_A_LAYER.fullmatch(place))
+    return place in _WHOLE or re.fullmatch(r"layer \d+(\.pattern)?", place) is not None
 
 
 def resolved(key: str, name: str) -> str:
@@ -64,10 +65,8 @@ def labels_of(options: list[Any], where: str, *, whole: bool) -> tuple[str, ...]
     """
     if whole and not all(isinstance(option, dict) and isinstance(option.get("name"), str) for option in options):
         raise CampaignError(f"{where}: must be a list of tables, each with a name")
-    labels = tuple(
-        option["name"] if whole else option if isinstance(option, str) else json.dumps(option, default=str)
-        for option in options
-    )
+    texts = [option["name"] if whole else option for option in options]
+    labels = tuple(text if isinstance(text, str) else json.dumps(text, default=str) for text in texts)
     if wrong := next((label for label in labels if not label.isprintable()), None):
         raise CampaignError(f"{where}: got {quoted(wrong)}, but it must be one line without control characters")
     if len(set(labels)) < len(labels):

@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import math
-import warnings
 from collections.abc import Iterator
 
 import numpy as np
 
 from ..scene import Core, Hits, Impact, Plate, Record, Scene, Target
-from ..scene.bounds import USUAL, Implausible, hit_bounds
+from ..scene.bounds import USUAL, hit_bounds
 from ..scene.quantities import QUANTITIES
 from ..scene.target import layer_name
 
@@ -20,12 +19,6 @@ _THIN = 0.25
 """Ligament over thickness below which a web is called thin: a beam four times as deep as wide."""
 LEAST_EFFECTIVE_SHARE = 0.5
 """Effective thickness over thickness below which a plate that weakens is doubted. The paper's plate has 0.61."""
-
-
-def warn_of(scene: Scene, impact: Impact, hits: Hits) -> None:
-    """Warn (`Implausible`) of every value of a campaign that is possible, but unusual."""
-    for sentence in doubted(scene, impact, hits):
-        warnings.warn(sentence, Implausible, stacklevel=2)
 
 
 def check_plausible(core: Core, target: Target, record: Record, impact: Impact, hits: Hits | None = None) -> None:

@@ -12,7 +12,7 @@ from ..catalogue.entries import Material, Threat
 from ..catalogue.strength import NINETY, Resistance
 from ..scene import Core, Plate
 from .campaign import Campaign
-from .catalogued import SAME, known_resistance, resistance_under
+from .materials import SAME, known_resistance, resistance_under
 
 Curve = tuple[tuple[float, ...], tuple[float, ...]]
 
@@ -24,8 +24,8 @@ Linear interpolation is wrong by at most 0.1 %."""
 
 def catalogue_resistance(campaign: Campaign, plate: Plate, thickness: float | None = None) -> Resistance | None:
     """The resistance of a plate, or of one of another thickness [m], by the catalogue; None where Y is the user's."""
-    given = campaign.interaction, campaign.core, plate, campaign.impact.obliquity, campaign.catalogue
-    return known_resistance(*given, thickness)
+    impact = campaign.impact
+    return known_resistance(campaign.interaction, campaign.core, plate, impact.obliquity, campaign.catalogue, thickness)
 
 
 def resistance_by_thickness(campaign: Campaign, layer: int, thickest: float) -> Curve | None:
@@ -67,55 +67,44 @@ def limit_velocity_factors(campaign: Campaign) -> tuple[float, float] | None:
 
 def catalogue_names(campaign: Campaign) -> list[str]:
     """A line for each name of the catalogue in a campaign: how well it is known, and which values are the user's."""
-    catalogue = Catalogue.of(campaign.catalogue)
-    lines = [] if campaign.core.threat is None else [_of_threat(campaign.core, catalogue)]
-    named = [(place, plate) for place, plate in campaign.target.named if plate.material is not None]
-    return lines + [_of_material(campaign, place, plate, catalogue) for place, plate in named]
+    catalogue, lines = Catalogue.of(campaign.catalogue), list[str]()
+    if campaign.core.threat is not None:
+        lines.append(_of_threat(campaign.core, catalogue.all(Threat).get(campaign.core.threat)))
+    for place, plate in campaign.target.named:
+        if plate.material is not None:
+            material = catalogue.all(Material).get(plate.material)
+            known = None if material is None else _of_material(campaign, plate, material, catalogue)
+            lines.append(f"{place}: {known or f'{plate.material}, which is not in the catalogue'}")
+    return lines
 
 
-def _of_threat(core: Core, catalogue: Catalogue) -> str:
-    name = core.threat
-    threat = catalogue.all(Threat).get(str(name))
+def _of_threat(core: Core, threat: Threat | None) -> str:
     if threat is None:
-        return f"core: {name}, which is not in the catalogue"
-    entry = threat.shape
-    differences = [] if entry is None else _differences(core, entry)
-    return f"core: {name}{_own(differences)} ({threat.evidence})"
+        return f"core: {core.threat}, which is not in the catalogue"
+    entry, changed = threat.shape, list[str]()
+    if entry is not None and type(core) is not type(entry):
+        changed = ["shape"]
+    elif entry is not None:
+        names = [name for name in type(core).model_fields if name not in ("threat", "standard", "velocity_tolerance")]
+        changed = [name for name in names if not _same(getattr(core, name), getattr(entry, name))]
+    return f"core: {core.threat}{_with_another(changed)} ({threat.evidence})"
 
 
-def _differences(core: Core, entry: Core) -> list[str]:
-    """Keys in which a core differs from that of its entry."""
-    if type(core) is not type(entry):
-        return ["shape"]
-    labels = ("threat", "standard", "velocity_tolerance")
-    names = (name for name in type(core).model_fields if name not in labels)
-    return [name for name in names if not _same(getattr(core, name), getattr(entry, name))]
-
-
-def _of_material(campaign: Campaign, place: str, plate: Plate, catalogue: Catalogue) -> str:
-    material = catalogue.all(Material).get(str(plate.material))
-    if material is None:
-        return f"{place}: {plate.material}, which is not in the catalogue"
-    obliquity = campaign.impact.obliquity
-    known = resistance_under(campaign.interaction, material, campaign.core, plate, obliquity, catalogue)
-    expected = {
-        "resistance": (plate.resistance, known.median),
-        "shear_coefficient": (plate.shear_coefficient, material.shear_coefficient),
-        "density": (plate.density, material.density),
-        **{name: (getattr(campaign.interaction, name), getattr(material, name)) for name in ("linear", "quadratic")},
-        "onset": (campaign.interaction.onset, material.onset),
-        "free_surface": (campaign.interaction.free_surface, None),
-    }
-    differing = [name for name, pair in expected.items() if not _same(*pair)]
+def _of_material(campaign: Campaign, plate: Plate, material: Material, catalogue: Catalogue) -> str:
+    law, obliquity = campaign.interaction, campaign.impact.obliquity
+    known = resistance_under(law, material, campaign.core, plate, obliquity, catalogue)
+    expected = {name: (getattr(plate, name), getattr(material, name)) for name in ("shear_coefficient", "density")}
+    expected |= {name: (getattr(law, name), getattr(material, name)) for name in ("linear", "quadratic", "onset")}
+    expected = {"resistance": (plate.resistance, known.median)} | expected | {"free_surface": (law.free_surface, None)}
+    changed = [name for name, pair in expected.items() if not _same(*pair)]
     low, high = (end / 1e9 for end in known.ends)
-    is_known = known.deviation and "resistance" not in differing
+    is_known = known.deviation and "resistance" not in changed
     interval = f", {low:.3g} to {high:.3g} with 90 %" if is_known else ""
-    return (
-        f"{place}: {material.name}{_own(differing)}, Y {plate.resistance / 1e9:.3g} GPa{interval} ({material.evidence})"
-    )
+    y = plate.resistance / 1e9
+    return f"{material.name}{_with_another(changed)}, Y {y:.3g} GPa{interval} ({material.evidence})"
 
 
-def _own(names: list[str]) -> str:
+def _with_another(names: list[str]) -> str:
     return f" with another {', '.join(names).replace('_', ' ')}" if names else ""
 
 

@@ -50,14 +50,13 @@ def _plain(part: Any) -> Any:
         return [_plain(entry) for entry in part]
     if not isinstance(part, dict):
         return part
-    kept = {_BOUNDS.get(name, name): _plain(value) for name, value in part.items() if _belongs(name, value)}
+    kept = {_BOUNDS.get(name, name): _plain(value) for name, value in part.items()}
+    if isinstance(kept.get("title"), str):  # not a key of that name
+        del kept["title"]
+    if kept.get("default", 0) in (None, math.inf):
+        del kept["default"]
+    kept.pop("discriminator", None)
     choices = [choice for choice in kept.pop("oneOf", kept.pop("anyOf", [])) if choice != {"type": "null"}]
     if len(choices) == 1:
         return choices[0] | kept
     return kept | ({"anyOf": choices} if choices else {})
-
-
-def _belongs(name: str, value: Any) -> bool:
-    if name in ("title", "discriminator"):
-        return name == "title" and isinstance(value, dict)  # a key of that name
-    return name != "default" or value not in (None, math.inf)

@@ -14,12 +14,12 @@ import numpy as np
 from ..catalogue.catalogue import HERE, Catalogue
 from ..catalogue.entries import Material
 from ..scene import Core, Plate
-from .campaign import Campaign
-from .catalogued import calibres_of
+from .campaign import CORES_STAYED_WHOLE, Campaign
+from .materials import calibres_of
 
 Figures = Mapping[str, Mapping[str, float]]
 Sentences = Iterator[tuple[str, str]]
-"""What leaves the range, in a word or two, and the value found beside what was measured."""
+"""What leaves the range, in a word or two, and its value with what was measured."""
 
 _SLACK = 0.05
 """Relative distance beyond the end of a range that still counts as inside."""
@@ -95,14 +95,13 @@ def _of_shot(campaign: Campaign, figures: Figures) -> Sentences:
                 "with β below 1 an oblique plate is weaker than a straight one: with the paper's core the limit "
                 "velocity at 30° is 0.90 to 0.92 of that at 0°, where published ones of aluminium are 1.16 of it",
             )
-    if any(layer.open_area for layer in layers):
-        if oblique:
-            yield "holes hit at an angle", "the two shots whose numbers we could read were along the normal"
-        if core.strength is None:
-            yield (
-                "whether the core breaks",
-                "[core] gives no strength, so it cannot; the paper's plate is meant to break cores",
-            )
+    if oblique and any(layer.open_area for layer in layers):
+        yield "holes hit at an angle", "the two shots whose numbers we could read were along the normal"
+    if core.strength is None and (any(layer.open_area for layer in layers) or campaign.output.bending):
+        yield (
+            "whether the core breaks",
+            f"[core] gives no strength, so it cannot; {CORES_STAYED_WHOLE}",
+        )
 
 
 def _of_plate(campaign: Campaign, plate: Plate, material: Material | None, figures: Figures) -> Sentences:
@@ -134,7 +133,7 @@ def _of_plate(campaign: Campaign, plate: Plate, material: Material | None, figur
             f"one calibre where it is {thin['calibres']:.2g} calibres thick (median of {thin['materials']:.0f} steels)"
             "; check that your Y is of such a thickness",
         )
-    if (material is None or core.threat not in material.rows) and _density(core) >= _CARBIDE:
+    if (material is None or core.threat not in material.rows) and core.mass_properties.mass / core.volume >= _CARBIDE:
         bias = carbide[kind]
         yield (
             "the dense core",
@@ -151,29 +150,26 @@ def _of_rows(campaign: Campaign, plate: Plate, material: Material) -> Sentences:
     yield from _outside("thickness", 1e3 * plate.thickness, 1e3 * material.thickness_low, 1e3 * thickest, "mm", name)
     yield from _outside("thickness", calibres_of(core, plate), material.calibres_low, high, "calibres", name)
     farthest = math.inf if material.obliquity_high is None else material.obliquity_high  # 0 where no row is oblique
-    yield from _oblique(campaign, material.obliquity_low, farthest, name)
+    yield from _oblique(campaign, material.obliquity_low, farthest, name, has_rows=True)
     if core.threat not in material.rows:
         threat = "this core" if core.threat is None else f"the {core.threat}"
         yield "the threat", f"no limit velocity of {name} is of {threat}, but of {', '.join(material.rows)}"
 
 
-def _oblique(campaign: Campaign, low: float, high: float, whose: str) -> Sentences:
+def _oblique(campaign: Campaign, low: float, high: float, whose: str, *, has_rows: bool = False) -> Sentences:
     """An obliquity beyond the measured range [rad], with a tolerance for the shots of a test."""
     obliquity = campaign.impact.obliquity
-    if not low - _STRAIGHT <= obliquity <= high + _STRAIGHT:
-        yield from _outside("obliquity", math.degrees(obliquity), math.degrees(low), math.degrees(high), "°", whose)
+    beyond = max(low - obliquity, obliquity - high)
+    if beyond <= _STRAIGHT:
+        return
+    ends = math.degrees(obliquity), math.degrees(low), math.degrees(high)
+    extrapolated = f"; Y is extrapolated over {math.degrees(beyond):.3g}°" if has_rows else ""
+    for subject, text in _outside("obliquity", *ends, "°", whose):
+        yield subject, text + extrapolated
 
 
 def _similar(value: float, other: float) -> bool:
     return other / _SIMILAR_RATIO <= value <= other * _SIMILAR_RATIO
-
-
-def _density(core: Core) -> float:
-    """Mass over volume [kg/m³]."""
-    if core.density is not None:
-        return core.density
-    s = np.linspace(0.0, core.length, 2001)
-    return core.mass_properties.mass / float(np.trapezoid(np.pi * core.radius(s) ** 2, s))
 
 
 def _outside(subject: str, value: float, low: float, high: float, unit: str, whose: str = "") -> Sentences:

@@ -160,6 +160,11 @@ def flow_entry(name: str) -> FlowEntry:
     try:
         return entries[the_entry(name, entries)]
     except ValueError as error:
+        if any(key(name) in map(key, (known, *one.aliases)) for known, one in Catalogue().all(Material).items()):
+            raise ValueError(
+                f"got {quoted(name)}, of which the catalogue has the resistance, but no constants of the continuum; "
+                f"{', '.join(entries)} have them, or give a TOML file with your own"
+            ) from None
         raise ValueError(f"{error} (or a TOML file)") from None
 
 

@@ -16,11 +16,11 @@ from warpimpact.results.kinds import TEST
 from warpimpact.scene.input_files import InputFile
 from warpimpact.scene.model import Array, Model
 from warpimpact.scene.problems import sentence
-from warpimpact.scene.units import Number, PositiveSpeed, Speed, Title
+from warpimpact.scene.units import Number, PositiveSpeed, Speed, Title, Whole
 from warpimpact.statistics.acceptance import fewest_shots
 
 Share = Annotated[Number, Field(gt=0, lt=1)]
-Count = Annotated[int, Field(strict=True, ge=2, le=1000)]
+Count = Annotated[Whole, Field(ge=2, le=1000)]
 
 
 class FiringTarget(Model):
@@ -34,7 +34,7 @@ class FiringTarget(Model):
 
     campaign: InputFile | None = None
     limits: InputFile | None = None
-    count: Annotated[int, Field(strict=True, ge=1, le=2**20)] = 256
+    count: Annotated[Whole, Field(ge=1, le=2**20)] = 256
 
     @model_validator(mode="after")
     def _is_one(self) -> FiringTarget:
@@ -89,7 +89,7 @@ class MilStd662F(Model):
     start: PositiveSpeed
     first_change: PositiveSpeed = 30.0
     change: PositiveSpeed = 15.0
-    pairs: Annotated[int, Field(strict=True, ge=1, le=50)] = 3
+    pairs: Annotated[Whole, Field(ge=1, le=50)] = 3
     span: PositiveSpeed = 27.0
     most_shots: Count = 30
 
@@ -167,8 +167,8 @@ class Proof(Model):
     """
 
     velocity: PositiveSpeed
-    shots: Annotated[int, Field(strict=True, ge=1, le=100_000)] | None = None
-    allowed: Annotated[int, Field(strict=True, ge=0, le=1000)] = 0
+    shots: Annotated[Whole, Field(ge=1, le=100_000)] | None = None
+    allowed: Annotated[Whole, Field(ge=0, le=1000)] = 0
     stop_probability: Share = 0.9
     confidence: Share = 0.9
 
@@ -198,8 +198,8 @@ class FiringTest(Model):
     """
 
     title: Title
-    tests: Annotated[int, Field(strict=True, ge=1, le=100_000)] = 1000
-    seed: Annotated[int, Field(strict=True, ge=0, lt=2**63)] = 0
+    tests: Annotated[Whole, Field(ge=1, le=100_000)] = 1000
+    seed: Annotated[Whole, Field(ge=0, lt=2**63)] = 0
     target: FiringTarget
     procedure: Annotated[Procedure, Field(discriminator="name")] | None = None
     gun: Gun = Gun()

@@ -14,6 +14,7 @@ from warpimpact.identification.measured import HitPlace, Observation
 from warpimpact.identification.parameters import Parameter, Path, as_read, put
 from warpimpact.scene import Impact, Interaction, Numerics, Plate, Record, Scatter, Scene, Target
 from warpimpact.scene.model import Model
+from warpimpact.scene.units import Whole
 
 
 class Sampling(Model):
@@ -27,11 +28,11 @@ class Sampling(Model):
         seed: seed of all random numbers.
     """
 
-    sets: Annotated[int, Field(strict=True, ge=64, le=2**24)] = 16384
-    hits: Annotated[int, Field(strict=True, ge=32, le=2**16, multiple_of=8)] = 256
-    draws: Annotated[int, Field(strict=True, ge=50, le=2**16)] = 1000
-    effective: Annotated[int, Field(strict=True, ge=10, le=2**16)] = 400
-    seed: Annotated[int, Field(strict=True, ge=0, lt=2**63)] = 0
+    sets: Annotated[Whole, Field(ge=64, le=2**24)] = 16384
+    hits: Annotated[Whole, Field(ge=32, le=2**16, multiple_of=8)] = 256
+    draws: Annotated[Whole, Field(ge=50, le=2**16)] = 1000
+    effective: Annotated[Whole, Field(ge=10, le=2**16)] = 400
+    seed: Annotated[Whole, Field(ge=0, lt=2**63)] = 0
 
 
 @dataclass(frozen=True)

@@ -10,7 +10,7 @@ from typing import Annotated, Any
 import numpy as np
 from pydantic import BeforeValidator, Field, ValidationError
 
-from warpimpact.campaign.catalogued import catalogue_of, with_cores, with_materials
+from warpimpact.campaign.materials import catalogue_of, with_cores, with_materials
 from warpimpact.campaign.plausible import check_plausible
 from warpimpact.campaign.text import parsed, read_text
 from warpimpact.catalogue.catalogue import Catalogue

@@ -12,8 +12,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field, ValidationError, field_validator, model_validator
 
-from warpimpact.campaign.campaign import Campaign
-from warpimpact.campaign.needs import lacking
+from warpimpact.campaign.campaign import Campaign, lacking
 from warpimpact.campaign.schema import campaign_schema, file_schema
 from warpimpact.campaign.text import CampaignError, parsed, read_text
 from warpimpact.optimisation.space import Space, read_space
@@ -23,7 +22,7 @@ from warpimpact.results.vocabulary import WEIGHTS
 from warpimpact.scene.bounds import Implausible
 from warpimpact.scene.model import Array, Model
 from warpimpact.scene.problems import sentence
-from warpimpact.scene.units import Number, PositiveArealDensity, PositiveLength, Title, quoted
+from warpimpact.scene.units import Number, PositiveArealDensity, PositiveLength, Title, Whole, quoted
 
 _SAMPLER_HITS = 2**20
 """Number of hits of the sampler of a search. Far fewer are computed."""
@@ -177,12 +176,12 @@ class Search(Model):
         confirm_hits: hits of each of these.
     """
 
-    designs: Annotated[int, Field(strict=True, ge=1, le=1_000_000)] = 1000
-    population: Annotated[int, Field(strict=True, ge=4, le=1024)] = 40
-    seed: Annotated[int, Field(strict=True, ge=0, lt=2**31)] = 0
-    hits: Annotated[int, Field(strict=True, ge=16, le=2**20)] = 256
-    confirmed: Annotated[int, Field(strict=True, ge=1, le=200)] = 20
-    confirm_hits: Annotated[int, Field(strict=True, ge=64, le=2**22)] = 1024
+    designs: Annotated[Whole, Field(ge=1, le=1_000_000)] = 1000
+    population: Annotated[Whole, Field(ge=4, le=1024)] = 40
+    seed: Annotated[Whole, Field(ge=0, lt=2**31)] = 0
+    hits: Annotated[Whole, Field(ge=16, le=2**20)] = 256
+    confirmed: Annotated[Whole, Field(ge=1, le=200)] = 20
+    confirm_hits: Annotated[Whole, Field(ge=64, le=2**22)] = 1024
 
 
 class SearchTables(Model):

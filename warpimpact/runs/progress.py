@@ -8,8 +8,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Any
 
-from warpimpact.campaign.campaign import Campaign
-from warpimpact.campaign.stop import Stop
+from warpimpact.campaign.campaign import Campaign, Stop
 from warpimpact.results import attributes as attr
 from warpimpact.results.dataset import failed, finer_pair
 from warpimpact.results.measures import Measure, Tally, shift_of

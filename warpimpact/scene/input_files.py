@@ -7,7 +7,8 @@ import re
 import stat
 import tomllib
 from array import array
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from itertools import chain
 from pathlib import Path
 from types import MappingProxyType
 from typing import Annotated, Any
@@ -23,6 +24,11 @@ _LONGEST_PATH = 255
 _NAME_AND_UNIT = re.compile(r"(\w+)\s*(?:\[\s*([^\[\]]*?)\s*\])?")
 _MOST_BYTES, _MOST_ROWS = 2**28, 2**22
 """Largest size and number of rows of a table."""
+_WITH_A_COMMA = re.compile(r"[-+]?[0-9]*,[0-9]+(?:[eE][-+]?[0-9]+)?(?: .*)?")
+_THOUSANDS = re.compile(r"[-+]?[1-9][0-9]{0,2},[0-9]{3}")
+_BARE_VALUE = re.compile(r"""([\w.-]+)\s*=\s*([^"'\[{\s](?:[^,}\]#]|,(?=\d))*)""")
+_PLAIN_NUMBER = re.compile(r"[-+]?[0-9_]+(?:\.[0-9_]+)?(?:e[-+]?[0-9]+)?|true|false")
+_TRUTHS = {"true": "true", "yes": "true", "on": "true", "false": "false", "no": "false", "off": "false"}
 _MOST_TEXT = 2**20
 """Most characters of TOML or JSON."""
 
@@ -84,17 +90,12 @@ def read_columns(
     Raises:
         ValueError: the message names the file, the line and its fault.
     """
-    check_file(path, _MOST_BYTES)
-    try:
-        with path.open(encoding="utf-8-sig", newline="") as lines:
-            reader = csv.reader(lines, skipinitialspace=True)
-            header = [name.strip() for name in next(reader, [])]
-            columns = _header(path.name, header, kinds, required, exported)
-            rows = _rows(path.name, header, reader, [place for place, _ in columns.values()]).T
-    except (OSError, UnicodeDecodeError, csv.Error) as error:
-        raise ValueError(f"{path.name} cannot be read as a table: {error}") from None
+    rows = read_rows(path)
+    _, header = next(rows, (0, []))
+    columns = _header(path.name, header, kinds, required, exported)
+    values_by_column = _numbers(path.name, header, rows, [place for place, _ in columns.values()]).T
     table = {}
-    for (name, (_, unit)), values in zip(columns.items(), rows, strict=True):
+    for (name, (_, unit)), values in zip(columns.items(), values_by_column, strict=True):
         kind = quantity(kinds[name])
         try:
             factor = kind(f"1 {unit}") if unit else math.radians(1.0) if kind.unit == "rad" else 1.0
@@ -127,26 +128,64 @@ def _header(
     return dict(columns)
 
 
-def _rows(file: str, header: list[str], reader: Any, places: list[int]) -> Array:
+def _numbers(file: str, header: list[str], rows: Iterator[tuple[int, list[str]]], places: list[int]) -> Array:
     """Numbers of the columns at these places, shape [rows, columns]."""
-    rows = array("d")
-    for row in filter(None, reader):
-        line = f"{file}, line {reader.line_num}:"
+    numbers = array("d")
+    for number, row in rows:
+        line = f"{file}, line {number}:"
         if len(row) != len(header):
             raise ValueError(f'{line} got "{brief(",".join(row))}", but a row has {len(header)} finite numbers')
         for place in places:
             try:
-                number = float(row[place])
+                value = float(row[place])
             except ValueError:
-                number = math.nan
-            if not math.isfinite(number):
+                value = math.nan
+            if not math.isfinite(value):
                 raise ValueError(f'{line} {header[place]}: got "{brief(row[place])}", but it must be a finite number')
-            rows.append(number)
-        if len(rows) > _MOST_ROWS * len(places):
+            numbers.append(value)
+        if len(numbers) > _MOST_ROWS * len(places):
             raise ValueError(f"{file} has more than {_MOST_ROWS} rows")
-    if not rows:
+    if not numbers:
         raise ValueError(f"{file} has no rows below its header")
-    return np.array(rows).reshape(-1, len(places))
+    return np.array(numbers).reshape(-1, len(places))
+
+
+def read_rows(path: Path) -> Iterator[tuple[int, list[str]]]:
+    """Number and cells of every line of a CSV file with something in it, the header first.
+
+    Columns are separated by commas, semicolons or tabs, or as a first line such as "sep=;" says. With semicolons or
+    tabs, a comma in a number is the decimal sign and becomes a point. Lines that begin with # are comments.
+
+    Raises:
+        ValueError: the message names the file, the line and its fault.
+    """
+    check_file(path, _MOST_BYTES)
+    try:
+        with path.open(encoding="utf-8-sig", newline="") as lines:
+            top, before = "#", 0
+            separator = ""
+            while top and (top.startswith(("#", "sep=")) or not top.strip()):
+                separator = top.strip("\r\n")[4:] if top.startswith("sep=") else separator
+                top, before = next(lines, ""), before + 1
+            separator = separator or next((mark for mark in ";\t" if mark in top), ",")
+            reader = csv.reader(chain([top], lines), delimiter=separator, skipinitialspace=True)
+            for row in reader:
+                if any(map(str.strip, row)) and not row[0].startswith("#"):
+                    number = before + reader.line_num - 1
+                    yield number, [_with_a_point(cell.strip(), separator, path.name, number) for cell in row]
+    except UnicodeDecodeError:
+        raise ValueError(f"{path.name} cannot be read as a table: it is not UTF-8; save it as CSV UTF-8") from None
+    except (OSError, TypeError, csv.Error) as error:  # a TypeError of a separator of several characters
+        raise ValueError(f"{path.name} cannot be read as a table: {error}") from None
+
+
+def _with_a_point(cell: str, separator: str, file: str, line: int) -> str:
+    """A cell whose number has a point in the place of a decimal comma."""
+    if separator == "," or not _WITH_A_COMMA.fullmatch(cell):
+        return cell
+    if separator != ";" and _THOUSANDS.fullmatch(cell):
+        raise ValueError(f'{file}, line {line}: got "{cell}", whose comma may stand for thousands; write a point')
+    return cell.replace(",", ".")
 
 
 class NoTextError(ValueError):
@@ -182,7 +221,21 @@ def parsed(text: str, name: str) -> dict[str, Any]:
     try:
         data: dict[str, Any] = json.loads(text) if text.startswith("{") else tomllib.loads(text)
     except ValueError as error:
-        raise ValueError(f"{name}: is not valid TOML: {brief(str(error))}") from None
+        raise ValueError(f"{name}: is not valid TOML: {brief(str(error))}{_advice(text, str(error))}") from None
     except RecursionError:
         raise ValueError(f"{name}: its tables and arrays are nested too deep") from None
     return data
+
+
+def _advice(text: str, error: str) -> str:
+    """What to type in the place of a line that is not TOML."""
+    place = re.search(r"at line (\d+)", error)
+    line = (text.splitlines() or [""])[int(place[1]) - 1] if place else ""
+    if line.count("{") > line.count("}"):
+        return "; write a table { … } in one line"
+    for key, value in _BARE_VALUE.findall(line):
+        if (word := value.strip().lower()) in _TRUTHS:
+            return f"; write {key} = {_TRUTHS[word]}"
+        if not _PLAIN_NUMBER.fullmatch(word):
+            return f'; write quotes around a text or a number with a unit: {key} = "{brief(value.strip())}"'
+    return ""

@@ -6,9 +6,9 @@ from typing import Annotated, Any, Literal, Self
 from pydantic import Field, SerializerFunctionWrapHandler, model_serializer, model_validator
 
 from .model import Model
-from .units import PositiveAngle, PositiveLength, PositiveSpeed, PositiveTime
+from .units import PositiveAngle, PositiveLength, PositiveSpeed, PositiveTime, Whole
 
-AtLevel = Annotated[int, Field(strict=True, ge=0, le=9)]
+AtLevel = Annotated[Whole, Field(ge=0, le=9)]
 """A level of the ladder of resolutions."""
 
 
@@ -102,8 +102,8 @@ class Numerics(_AsGiven):
     scheme: Literal["consistent", "nodal"] = "consistent"
     time_step: PositiveTime | None = None
     travel: Annotated[float, Field(gt=0.0, le=2.0)] | None = None
-    patches_axial: Annotated[int, Field(strict=True, ge=4, le=4096)] | None = None
-    patches_around: Annotated[int, Field(strict=True, ge=8, le=4096, multiple_of=4)] | None = None
+    patches_axial: Annotated[Whole, Field(ge=4, le=4096)] | None = None
+    patches_around: Annotated[Whole, Field(ge=8, le=4096, multiple_of=4)] | None = None
     grid_spacing: PositiveLength | None = None
     precision: Literal["single", "double"] | None = None
     layout: Literal["simple", "block"] = "simple"

@@ -16,7 +16,7 @@ from .model import Array, Model
 from .plate import Plate
 from .quantities import BY_LAYER, LISTED, QUANTITIES
 from .target import Target
-from .units import RIGHT_ANGLE, Angle, AngularVelocity, Obliquity, PositiveSpeed, Tilt
+from .units import RIGHT_ANGLE, Angle, AngularVelocity, Obliquity, PositiveSpeed, Tilt, Whole
 
 FARTHEST_HIT = 100.0
 """Largest distance of a hit from the origin [m]."""
@@ -81,12 +81,12 @@ class Hits(Model):
     """
 
     sampling: Literal["sobol", "grid", "random", "list"] = "sobol"
-    count: Annotated[int, Field(strict=True, ge=1, le=2**30)] | None = None
-    seed: Annotated[int, Field(strict=True, ge=0, lt=2**63)] = 0
+    count: Annotated[Whole, Field(ge=1, le=2**30)] | None = None
+    seed: Annotated[Whole, Field(ge=0, lt=2**63)] = 0
     file: InputFile | None = None
     area: Literal["cell", "plate"] = "cell"
     irreducible: Annotated[bool, Field(strict=True)] = False
-    repeats: Annotated[int, Field(strict=True, ge=1, le=2**20)] = 1
+    repeats: Annotated[Whole, Field(ge=1, le=2**20)] = 1
     replicates: Literal[1, 8, 16, 32, 64] | None = None
 
     @model_validator(mode="after")

@@ -201,8 +201,14 @@ def _is_printable(text: str) -> str:
     return text
 
 
+def _whole(value: object) -> object:
+    return int(value) if isinstance(value, float) and value.is_integer() else value
+
+
 Title = Annotated[str, Field(max_length=200), AfterValidator(_is_printable)]
 """One line that figures and terminals show."""
+Whole = Annotated[int, BeforeValidator(_whole), Field(strict=True)]
+"""A whole number; TOML reads 1e4 as a float."""
 Number = Annotated[Read, _quantity("a number", "", "0.05")]
 Length = Annotated[Read, _quantity("a length", "m", "4 mm")]
 Mass = Annotated[Read, _quantity("a mass", "kg", "4 g")]

@@ -18,8 +18,8 @@ from pydantic import ValidationError
 
 from warpimpact.analysis.estimates import measures_named
 from warpimpact.campaign.campaign import Campaign
+from warpimpact.campaign.materials import StraightPassage
 from warpimpact.campaign.resistances import catalogue_resistance, is_drawn
-from warpimpact.campaign.straight_passage import StraightPassage
 from warpimpact.campaign.text import CampaignError
 from warpimpact.results import variables as v
 from warpimpact.results.dataset import narrow_table

@@ -14,8 +14,7 @@ import xarray
 from warpimpact import Campaign
 from warpimpact.analysis.comparison import Comparison, best_plates, compare, comparison_view
 from warpimpact.analysis.numbers import text_of
-from warpimpact.campaign.campaign import CampaignError
-from warpimpact.campaign.plates import read_plates
+from warpimpact.campaign.campaign import CampaignError, read_plates
 from warpimpact.cli import main
 from warpimpact.plotting import comparison_figure
 from warpimpact.results.files import ResultError

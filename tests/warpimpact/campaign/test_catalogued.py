@@ -7,9 +7,8 @@ from typing import Any
 import pytest
 
 from warpimpact import Campaign
-from warpimpact.campaign.catalogued import SEARCHED_FROM
+from warpimpact.campaign.materials import SEARCHED_FROM, StraightPassage
 from warpimpact.campaign.resistances import catalogue_names, catalogue_resistance, limit_velocity_factors
-from warpimpact.campaign.straight_passage import StraightPassage
 from warpimpact.campaign.tested_range import outside_tested_range, range_line
 from warpimpact.campaign.text import CampaignError
 from warpimpact.identification.fit_file import fit_from
@@ -156,7 +155,7 @@ def test_names_come_with_how_well_they_are_known_and_what_is_outside(folder: Pat
     assert sentences == [
         "thickness (plate): 13 mm, but limit velocities of plate A are of 3 to 12 mm",
         "thickness (plate): 2.15 calibres, but limit velocities of plate A are of 0.5 to 2 calibres",
-        "obliquity (plate): 45°, but limit velocities of plate A are of 0 to 30°",
+        "obliquity (plate): 45°, but limit velocities of plate A are of 0 to 30°; Y is extrapolated over 15°",
         "the threat (plate): no limit velocity of plate A is of the 7.62x51 P80 AP, but of .30 AP M2",
     ]
 

@@ -11,7 +11,7 @@ from warpimpact import Campaign, to_dataframe
 from warpimpact import Plate as NamedPlate
 from warpimpact.analysis.effectiveness import effectiveness
 from warpimpact.analysis.inspection import inspect_text
-from warpimpact.campaign.plates import read_plates
+from warpimpact.campaign.campaign import read_plates
 from warpimpact.campaign.text import CampaignError
 from warpimpact.kernels.status import Status
 from warpimpact.results import files

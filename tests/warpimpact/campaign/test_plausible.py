@@ -9,7 +9,7 @@ from scipy.integrate import quad
 from scipy.optimize import brentq
 
 from warpimpact import Campaign
-from warpimpact.campaign.plates import read_plates
+from warpimpact.campaign.campaign import read_plates
 from warpimpact.campaign.plausible import doubted_holes, effective_thickness
 from warpimpact.campaign.text import CampaignError
 from warpimpact.cli import main

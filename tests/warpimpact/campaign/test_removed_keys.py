@@ -1,11 +1,12 @@
 """A key that was removed is refused, with what to use instead."""
 
+import json
 from pathlib import Path
 
 import pytest
 
 from warpimpact import Campaign, CampaignError
-from warpimpact.campaign.removed_keys import REMOVED_KEYS, check_removed
+from warpimpact.campaign.text import REMOVED_KEYS, parsed
 
 
 def tables_with(key: str) -> dict[str, object]:
@@ -21,7 +22,7 @@ def tables_with(key: str) -> dict[str, object]:
 @pytest.mark.parametrize("key", REMOVED_KEYS)
 def test_a_removed_key_names_its_successor(key: str) -> None:
     with pytest.raises(ValueError, match="was removed: ") as error:
-        check_removed(tables_with(key), "old.toml")
+        parsed(json.dumps(tables_with(key)), "old.toml")
     assert str(error.value) == f"old.toml: {key} was removed: {REMOVED_KEYS[key]}"
 
 

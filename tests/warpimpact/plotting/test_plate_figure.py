@@ -9,7 +9,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.colors import to_rgb
 
 from warpimpact import Campaign
-from warpimpact.campaign.plates import read_plates
+from warpimpact.campaign.campaign import read_plates
 from warpimpact.cli import main
 from warpimpact.plotting import plate_figure, style
 from warpimpact.plotting.plate import hole_dimensions, smallest_ligament

@@ -1,22 +1,30 @@
-"""Names of the catalogue in a campaign, replaced by their entries. A key beside a name overrides its value."""
+"""Names of the catalogue in a campaign, replaced by their entries, and resistances under another law.
+
+A key beside a name overrides its value. A resistance belongs to the law with which it was determined. Under another law
+the observation stays: the limit velocity of a solid plate, or the velocity that it takes from a core
+(docs/model.md §6.2).
+"""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+from numpy.typing import ArrayLike
 from pydantic import ValidationError
 
 from ..catalogue.catalogue import Catalogue
 from ..catalogue.entries import CORE, OBLIQUITY, Material, Threat, Velocity
 from ..catalogue.strength import NINETY, Resistance
 from ..scene import Core, Interaction, Layer, Plate
+from ..scene.model import Array
 from ..scene.target import layer_name
 from ..scene.units import quoted
-from .straight_passage import StraightPassage
-from .text import CampaignError
+from .text import CampaignError, as_campaign_error
 
 _Table = dict[str, Any]
 _OF_ANY_CORE = set(Core.model_fields)
@@ -24,6 +32,14 @@ SEARCHED_FROM = 800.0
 """Impact velocity at which a search of limit velocities begins if the threat has none [m/s]."""
 SAME = 1e-6
 """Largest relative difference of a resistance from that of the catalogue at which it counts as the catalogue's."""
+_STATIONS, _DEPTHS = 1001, 200
+"""Points along a core, and steps of its way."""
+_WIDEST = 1e-6
+"""Relative difference from the largest radius at which a core counts as fully wide."""
+_FACTORS = np.geomspace(0.02, 50.0, 401)
+"""Resistances to try, over the one before."""
+_SPEEDS = 401
+"""Number of velocities behind the plate to try."""
 _LAW = ("linear", "quadratic", "onset")
 """Keys of [interaction] that belong to a material."""
 
@@ -37,10 +53,8 @@ def catalogue_of(data: Mapping[str, Any], name: str, folder: Path) -> Catalogue:
     given = data.get("catalogue")
     if not isinstance(given, str) or not (folder / given).is_file():
         return Catalogue()  # the validation of the campaign refuses a wrong name
-    try:
+    with as_campaign_error(f"{name}: catalogue: "):
         return Catalogue.of(folder / given)
-    except ValueError as error:
-        raise CampaignError(f"{name}: catalogue: {error}") from None
 
 
 def with_threat(data: _Table, catalogue: Catalogue, name: str, *, needs_velocity: bool = True) -> _Table:
@@ -87,10 +101,8 @@ def _threat(core: Any, catalogue: Catalogue, place: str) -> Threat | None:
     """The threat that a table [core] names; None if it names none."""
     if not isinstance(core, dict) or not isinstance(core.get("threat"), str):
         return None
-    try:
+    with as_campaign_error(f"{place}.threat: "):
         return catalogue.named(Threat, core["threat"])
-    except ValueError as error:
-        raise CampaignError(f"{place}.threat: {error}") from None
 
 
 def core_of(threat: Threat, given: Any, place: str) -> _Table:
@@ -135,7 +147,7 @@ def _shot(velocity: Velocity, core: Mapping[str, Any], place: str) -> Any:
     return {"distribution": "uniform", "low": low, "high": high}
 
 
-def with_materials(data: _Table, catalogue: Catalogue, name: str) -> _Table:
+def with_materials(data: _Table, catalogue: Catalogue, name: str, folder: Path = Path()) -> _Table:
     """Tables with the numbers of the materials of plate and layers, and with their law. No value is a distribution.
 
     Raises:
@@ -146,11 +158,9 @@ def with_materials(data: _Table, catalogue: Catalogue, name: str) -> _Table:
     def filled(place: str, table: Any) -> Any:
         if not isinstance(table, dict) or not isinstance(table.get("material"), str):
             return table
-        try:
+        with as_campaign_error(f"{name}: {place}.material: "):
             materials[place] = material = catalogue.named(Material, table["material"])
-        except ValueError as error:
-            raise CampaignError(f"{name}: {place}.material: {error}") from None
-        return material.table(table, _resistance(data, material, table, catalogue))
+        return material.table(table, _resistance(data, material, table, catalogue, folder))
 
     resolved = dict(data)
     if "plate" in data:
@@ -163,13 +173,15 @@ def with_materials(data: _Table, catalogue: Catalogue, name: str) -> _Table:
     return resolved | {"interaction": _law(materials, interaction, name) | interaction}
 
 
-def _resistance(data: Mapping[str, Any], material: Material, plate: Mapping[str, Any], catalogue: Catalogue) -> float:
+def _resistance(
+    data: Mapping[str, Any], material: Material, plate: Mapping[str, Any], catalogue: Catalogue, folder: Path
+) -> float:
     """Y of a plate of a material under the law of a campaign [Pa]; that of the entry if something of core, plate, law
     or shot is not valid, which the validation of the whole campaign reports better."""
     keys = {key: value for key, value in plate.items() if key != "pattern" or "areal_density" in plate}
     impact, interaction = data.get("impact", {}), data.get("interaction", {})
     try:
-        core = CORE.validate_python(data.get("core"))
+        core = CORE.validate_python(data.get("core"), context={"folder": folder})
         model = Layer if {"gap", "offset"} & set(plate) else Plate
         shot = model.model_validate(material.table(keys, 1.0))
         obliquity = OBLIQUITY.validate_python(impact.get("obliquity", 0.0) if isinstance(impact, dict) else 0.0)
@@ -239,3 +251,72 @@ def _law(materials: Mapping[str, Material], given: Mapping[str, Any], name: str)
             raise CampaignError(f"{name}: interaction.{key}: the materials were found with {places}; give one value")
         law[key] = next(iter(values))
     return law
+
+
+@dataclass(frozen=True)
+class StraightPassage:
+    """A core that goes straight on through a solid plate, without yaw.
+
+    Attributes:
+        core: the core.
+        law: stress of an element.
+        friction: η.
+        thickness: of the plate [m].
+        density: of the plate [kg/m³].
+        obliquity: of the shot [rad]; the way through the plate is as much longer.
+    """
+
+    core: Core
+    law: Interaction
+    friction: float
+    thickness: float
+    density: float
+    obliquity: float = 0.0
+
+    def entry(self, resistance: ArrayLike, leaving: ArrayLike = 0.0) -> Array:
+        """Velocity with which the core enters [m/s], of the broadcast shape of the arguments. The motion is followed
+        from the rear face back to the front face. `leaving` is the velocity behind the plate [m/s], 0 at the limit.
+        """
+        station, radius, slope = self._nose()
+        facing, law, free = slope / np.sqrt(1.0 + slope * slope), self.law, self.law.free_surface
+        touching = np.minimum(facing / law.onset, 1.0) if law.onset > 0.0 else (facing > 0.0).astype(float)
+        area = 2.0 * np.pi * radius * np.gradient(station) * touching * (slope + self.friction)
+        near, steep = np.ones_like(radius), 0.0
+        if free is not None:
+            near /= 1.0 + radius / (free.reach * self.thickness)
+            steep = free.attack
+        way = self.thickness / math.cos(self.obliquity)
+        edges = np.linspace(way + station[-1], 0.0, _DEPTHS + 1)
+        depth, step = 0.5 * (edges[1:] + edges[:-1])[:, None], edges[0] - edges[1]
+        inside = (depth > station) & (depth < station + way)
+        tip = np.pi * radius[0] ** 2 * inside[:, 0]
+        static, linear, quadratic = (
+            inside @ (area * share) + tip * at_tip
+            for share, at_tip in ((near + steep * facing, near[0] + steep), (facing, 1.0), (facing**2, 1.0))
+        )
+        strength, behind = np.broadcast_arrays(np.asarray(resistance, dtype=float), np.asarray(leaving, dtype=float))
+        by_speed, square = law.linear * np.sqrt(self.density * strength), behind**2
+        for at, once, twice in zip(static, linear, quadratic, strict=True):
+            force = law.static * strength * at + by_speed * np.sqrt(square) * once
+            force += law.quadratic * self.density * square * twice
+            square = square + 2.0 * step / self.core.mass_properties.mass * force
+        return np.asarray(np.sqrt(square))
+
+    def resistance_under(self, law: Interaction, friction: float, resistance: float, velocity: float = 0.0) -> float:
+        """Resistance Y [Pa] with which the plate takes as much from the core, which arrives with this velocity [m/s],
+        under another law and friction. If the limit velocity is not less, it is kept instead."""
+        limit, leaving = float(self.entry(resistance)), 0.0
+        if velocity > limit:
+            behind = np.linspace(0.0, velocity, _SPEEDS)
+            leaving = float(np.interp(velocity, self.entry(resistance, behind), behind))
+        tried = resistance * _FACTORS
+        entered = replace(self, law=law, friction=friction).entry(tried, leaving)
+        return float(np.exp(np.interp(np.log(max(velocity, limit)), np.log(entered), np.log(tried))))
+
+    def _nose(self) -> tuple[Array, Array, Array]:
+        """Stations, radii [m] and slopes of the core from its tip to where it is widest."""
+        station = np.linspace(0.0, self.core.length, _STATIONS)
+        radius = np.asarray(self.core.radius(station))
+        widest = int(np.argmax(radius >= self.core.max_radius * (1.0 - _WIDEST))) + 1
+        station, radius = station[:widest], radius[:widest]
+        return station, radius, np.maximum(np.gradient(radius, station), 0.0)
