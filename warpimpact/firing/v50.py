@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 import math
 import re
 from collections.abc import Sequence
@@ -14,7 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from warpimpact.campaign.text import CampaignError
-from warpimpact.scene.input_files import check_file
+from warpimpact.scene.input_files import read_rows
 from warpimpact.scene.model import Array
 from warpimpact.scene.units import PositiveSpeed, brief, quantity
 from warpimpact.statistics.quantal import fit_quantal, likelihood_interval, scale_interval
@@ -184,20 +183,14 @@ def read_shots(path: Path) -> Shots:
         CampaignError: the message names the file, the line and its fault.
     """
     try:
-        check_file(path)
-        lines = path.read_text(encoding="utf-8-sig").splitlines()
-    except UnicodeDecodeError:
-        raise CampaignError(f"{path}: is not UTF-8. Save it as CSV UTF-8.") from None
+        rows = list(read_rows(path))
     except ValueError as error:
         raise CampaignError(str(error)) from None
-    rows = [(number, line) for number, line in enumerate(lines, start=1) if line.strip(" \t;,")]
-    rows = [row for row in rows if not row[1].startswith(("#", "sep="))]
     if len(rows) < 2:
         raise CampaignError(f"{path}: has no shots. Give a header, velocity,perforated, and a row for each shot.")
-    separator = next((mark for mark in ";\t" if mark in rows[0][1]), ",")
-    header, *cells = csv.reader([line for _, line in rows], delimiter=separator, skipinitialspace=True)
-    columns, places = _columns(path, header), [f"{path}, line {number}" for number, _ in rows[1:]]
-    shots = [_shot(place, row, columns, separator != ",") for place, row in zip(places, cells, strict=False)]
+    (_, header), *rows = rows
+    columns = _columns(path, header)
+    shots = [_shot(f"{path}, line {number}", row, columns) for number, row in rows]
     return Shots(np.array([speed for speed, _ in shots]), np.array([through for _, through in shots], dtype=bool))
 
 
@@ -220,12 +213,12 @@ def _columns(path: Path, header: Sequence[str]) -> tuple[int, str, int]:
     return places[0], units[places[0]], places[1]
 
 
-def _shot(place: str, cells: Sequence[str], columns: tuple[int, str, int], comma: bool) -> tuple[float, bool]:
-    """Velocity [m/s] of a row, and whether the shot perforated. `comma`: whether a comma is the decimal sign."""
+def _shot(place: str, cells: Sequence[str], columns: tuple[int, str, int]) -> tuple[float, bool]:
+    """Velocity [m/s] of a row, and whether the shot perforated."""
     velocity, unit, result = columns
     if len(cells) <= max(velocity, result):
         raise CampaignError(f"{place}: has {len(cells)} columns, fewer than the header.")
-    text = cells[velocity].replace(",", ".") if comma else cells[velocity]
+    text = cells[velocity]
     try:
         speed = quantity(PositiveSpeed)(text if re.search(r"[a-zA-Z]{2}|/", text) else f"{text} {unit}")
     except ValueError as error:
