@@ -31,22 +31,18 @@ class Entries(Mapping[str, Entry], Generic[Entry]):
         Raises:
             ValueError: there is none, or an alias stands for several; the message lists whom it may mean.
         """
-        entry: Entry = Catalogue().named(self.kind, name)
-        return entry
+        return Catalogue().named(self.kind, name)
 
     def __getitem__(self, name: str) -> Entry:
-        """As calling it."""
         try:
             return self(name)
         except ValueError as error:
             raise KeyError(str(error)) from None
 
     def __iter__(self) -> Iterator[str]:
-        """All names."""
         return iter(Catalogue().all(self.kind))
 
     def __len__(self) -> int:
-        """Number of entries."""
         return len(Catalogue().all(self.kind))
 
     def __repr__(self) -> str:

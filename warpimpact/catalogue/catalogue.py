@@ -86,14 +86,7 @@ class Catalogue:
         return {**of_user, **{entry.name: entry for entry in packaged if entry.name not in of_user}}
 
     def named(self, kind: type[Entry], name: str) -> Entry:
-        """The entry of this name or alias; of a name of the package, only its file is read."""
-        of_user: Mapping[str, Entry] = self.of_user.get(kind, {})
-        if name in of_user:
-            return of_user[name]
-        path = FOLDERS[kind] / f"{file_name(name)}.toml"
-        entry: Entry | None = _read(kind, path) if path.is_file() else None
-        if entry is not None and entry.name == name:
-            return entry
+        """The entry of this name or alias."""
         entries = self.all(kind)
         return entries[the_entry(name, entries)]
 
@@ -168,10 +161,8 @@ def flow_entry(name: str) -> FlowEntry:
         raise ValueError(f"{error} (or a TOML file)") from None
 
 
-@cache
 def _packaged() -> dict[str, FlowEntry]:
-    tables = {path: tomllib.loads(path.read_text(encoding="utf-8")) for path in sorted(FLOWS.glob("*.toml"))}
-    return {table["name"]: FlowEntry.model_validate(table) for table in tables.values()}
+    return {entry.name: entry for entry in (_read(FlowEntry, path) for path in sorted(FLOWS.glob("*.toml")))}
 
 
 def flow_names() -> tuple[str, ...]:
