@@ -9,7 +9,7 @@ ELEMENTS := tests/verification/test_continuum.py
 
 export PYTHONDONTWRITEBYTECODE :=
 
-.PHONY: demo gallery docs test types suite benchmark clean
+.PHONY: demo gallery docs test types suite lowest benchmark clean
 
 demo: $(INSTALLED)
 	$(VENV)/bin/warpimpact run campaigns/fitted_plate.toml -o slotted.nc --overwrite
@@ -41,6 +41,10 @@ types: $(DEVELOPED)
 
 suite: $(DEVELOPED)
 	$(VENV)/bin/pytest $(PARALLEL) --durations=40
+
+# A fast part of the suite with the lowest versions that pyproject.toml allows, in an environment of its own.
+lowest:
+	$(PYTHON) tests/lowest_versions.py
 
 clean:
 	rm -rf $(VENV) build slotted.nc slotted.nc.parts slotted_*.png

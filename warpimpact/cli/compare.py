@@ -22,7 +22,7 @@ from warpimpact.runs.run import run_to_file
 from warpimpact.studies.sensitivity import plate_sensitivity, reversals
 
 from .messages import warn
-from .paths import PICTURES, check_folder, check_output, named, save_figure
+from .paths import PICTURES, check_folder, check_output, named
 from .progress import Step, show_progress, show_run
 from .run import executor_of, failure_code
 
@@ -59,10 +59,10 @@ def compare_command(arguments: argparse.Namespace) -> int:
     print(text_of(comparison_view(comparison, outside) if arguments.every else short_view(comparison, outside)))
     if arguments.sensitivity:
         print(_sensitivity(arguments, comparison))
-    save_figure(comparison_figure(comparison, every=arguments.every), figure)
+    comparison_figure(comparison, every=arguments.every).savefig(figure, dpi=150)
     print(f"{figure}{replaced}" + ("" if arguments.every else "; every measure with --all"))
     if (against_weight := weight_figure(comparison)) is not None:
-        save_figure(against_weight, beside)
+        against_weight.savefig(beside, dpi=150)
         print(beside)
     return code
 
@@ -95,7 +95,7 @@ def _print_models(arguments: argparse.Namespace, shared: dict[str, Dataset], fig
         )
     print(text_of(shot_by_shot(shared)))
     for path, variable in zip(figures, (v.RESIDUAL_VELOCITY, v.TILT), strict=True):
-        save_figure(variable_maps(shared, variable), path)
+        variable_maps(shared, variable).savefig(path, dpi=150)
         print(path)
 
 

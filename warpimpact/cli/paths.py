@@ -5,8 +5,6 @@ import tempfile
 from collections.abc import Sequence
 from pathlib import Path
 
-from matplotlib.figure import Figure
-
 from warpimpact.results.files import OutputError, ResultError, aside
 from warpimpact.runs.parts import is_begun
 
@@ -49,12 +47,6 @@ def check_folder(folder: Path) -> None:
             pass
     except OSError as error:
         raise OutputError(f"{folder}: cannot be written into ({error.strerror})") from None
-
-
-def save_figure(figure: Figure, path: Path) -> None:
-    """Write a figure, whole or not at all."""
-    with aside(path) as file:
-        figure.savefig(file, format=path.suffix[1:].lower(), dpi=150)
 
 
 def write_text(text: str, path: Path) -> None:

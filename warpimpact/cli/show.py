@@ -25,7 +25,7 @@ from warpimpact.results import files
 from warpimpact.results.kinds import HIT_MAP
 from warpimpact.runs.run import run
 
-from .paths import PICTURES, check_folder, check_output, named, save_figure
+from .paths import PICTURES, check_folder, check_output, named
 
 
 def inspect_command(arguments: argparse.Namespace) -> None:
@@ -61,7 +61,7 @@ def plot_command(arguments: argparse.Namespace) -> None:
             raise files.ResultError(f"{option}: {error}") from None
         picture = folder / f"{stem}_{_file_name(quantity)}.png"
         check_output(picture, *PICTURES, overwrite=arguments.overwrite)
-        save_figure(figure, picture)
+        figure.savefig(picture, dpi=150)
         print(picture)
         return
     overwrite = arguments.overwrite
@@ -85,7 +85,7 @@ def plate_command(arguments: argparse.Namespace) -> None:
     check_output(output, *PICTURES, overwrite=arguments.overwrite)
     campaign = Campaign.from_toml(arguments.campaign)
     plate = campaign.plate
-    save_figure(plate_figure(campaign.target, campaign.core, campaign.title, campaign.impact), output)
+    plate_figure(campaign.target, campaign.core, campaign.title, campaign.impact).savefig(output, dpi=150)
     rows = {"thickness": f"{1e3 * plate.thickness:g} mm"}
     rows |= plate_numbers(plate.open_area, plate.ligament, campaign.target.weights)
     for place, layer in enumerate(campaign.layer, start=1):
@@ -112,7 +112,7 @@ def catalogue_command(arguments: argparse.Namespace) -> None:
         print(text_of(view))
     if arguments.output and core is not None and entry is not None:
         check_output(arguments.output, *PICTURES, overwrite=arguments.overwrite)
-        save_figure(core_figure(core, entry.name, entry.evidence), arguments.output)
+        core_figure(core, entry.name, entry.evidence).savefig(arguments.output, dpi=150)
         print(arguments.output)
 
 

@@ -41,15 +41,14 @@ def new_command(arguments: argparse.Namespace) -> None:
     copies = {source.parent / file: output.parent / file for file in _named(tables)}
     for file in (output, *copies.values()):
         check_output(file, overwrite=arguments.overwrite)
-    for original, copy in copies.items():
-        write_text(original.read_text(encoding="utf-8"), copy)
     names = {kinds.FIT: "fit", kinds.TEST: "test", kinds.DESIGN: "design"}
     kind = names.get(kinds.text_kind(tables)[0], "campaign")
     schema = output.parent / (SCHEMA if kind == "campaign" else f"warpimpact.{kind}.schema.json")
-    write_text(f"#:schema {schema.name}\n{text}", output)
-    write_text(_schema_text(kind), schema)
-    for written in (output, *copies.values(), schema):
-        print(written)
+    texts = {output: f"#:schema {schema.name}\n{text}", schema: _schema_text(kind)}
+    texts |= {copy: original.read_text(encoding="utf-8") for original, copy in copies.items()}
+    for path, content in texts.items():
+        write_text(content, path)
+        print(path)
 
 
 def _paths() -> dict[str, Path]:

@@ -39,7 +39,7 @@ from warpimpact.studies.sweep import folder_of as points_of
 from warpimpact.studies.sweep import read_sweep, run_sweep, sweep_view
 
 from .messages import say, warn
-from .paths import PICTURES, check_output, replaces, save_figure
+from .paths import PICTURES, check_output, replaces, write_text
 from .progress import Step, show_progress, show_run
 from .run import executor_of, failure_code, run_shown
 
@@ -60,7 +60,7 @@ def limit_command(arguments: argparse.Namespace) -> int:
     print(text_of(limit_view(dataset, arguments.measure)))
     for line in range_note({"": dataset}, str(output)):
         print(line)
-    save_figure(limit_figure(dataset), picture)
+    limit_figure(dataset).savefig(picture, dpi=150)
     print(f"written to {output}, figure in {picture}")
     return failure_code(dataset, output)
 
@@ -104,7 +104,7 @@ def sweep_command(arguments: argparse.Namespace) -> None:
         )
     dataset = files.read(output, SWEEP)
     print(text_of(sweep_view(dataset, arguments.measure)))
-    save_figure(sweep_figure(dataset, arguments.measure), picture)
+    sweep_figure(dataset, arguments.measure).savefig(picture, dpi=150)
     for written in (output, points_of(output), picture):
         print(written)
 
@@ -125,8 +125,8 @@ def sensitivity_command(arguments: argparse.Namespace) -> None:
         )
     print(table.to_string(float_format="{:.4g}".format, na_rep="-"))
     print(largest_move(table))
-    table.to_csv(output)
-    save_figure(sensitivity_figure(table, campaign.title, arguments.hits), picture)
+    write_text(table.to_csv(), output)
+    sensitivity_figure(table, campaign.title, arguments.hits).savefig(picture, dpi=150)
     print(f"written to {output}, figure in {picture}")
 
 
@@ -143,7 +143,7 @@ def _evaluate(arguments: argparse.Namespace) -> None:
     shots = read_shots(arguments.test)
     found = v50(*shots)
     print(found)
-    save_figure(shots_figure(shots, found, arguments.test.stem), picture)
+    shots_figure(shots, found, arguments.test.stem).savefig(picture, dpi=150)
     print(f"figure in {picture}")
 
 
@@ -159,7 +159,7 @@ def _simulate(arguments: argparse.Namespace) -> None:
     dataset = simulate_test(test, response)
     files.write(dataset, output)
     print(text_of(firing_view(dataset)))
-    save_figure(firing_figure(dataset), picture)
+    firing_figure(dataset).savefig(picture, dpi=150)
     print(f"written to {output}, figure in {picture}")
 
 
@@ -188,7 +188,7 @@ def optimise_command(arguments: argparse.Namespace) -> int:
         )
     dataset = files.read(output, FRONT)
     print(text_of(front_view(dataset)))
-    save_figure(front_figure(dataset, design.folder), picture)
+    front_figure(dataset, design.folder).savefig(picture, dpi=150)
     beside = f", campaigns in {folder_of(output)}" if campaigns else ""
     print(f"written to {output}, figure in {picture}{beside}")
     return 0 if dataset.attrs[front.OUTCOME] == front.FEASIBLE else NONE_WITHIN_BOUNDS
@@ -230,10 +230,10 @@ def identify_command(arguments: argparse.Namespace) -> int:
     print(text_of(posterior_view(posterior)))
     print(f"written to {output}")
     if len(draws := material_draws(fit, posterior)):
-        draws.to_csv(table, index=False)
+        write_text(draws.to_csv(index=False), table)
         print(f"draws of the material for hits.file in {table}")
     for picture, draw in pictures.items():
-        save_figure(draw(posterior), picture)
+        draw(posterior).savefig(picture, dpi=150)
         print(picture)
     return 130 if posterior.attrs[INTERRUPTED] else 0
 

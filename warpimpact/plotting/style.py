@@ -11,6 +11,7 @@ from base64 import b64encode
 from collections.abc import Callable
 from functools import wraps
 from io import BytesIO
+from pathlib import Path
 from textwrap import wrap
 from typing import Any, NamedTuple, ParamSpec, TypeVar
 
@@ -24,6 +25,7 @@ from matplotlib.patheffects import withStroke
 
 from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
+from warpimpact.results.files import aside
 from warpimpact.scene.model import Array
 
 _STYLE: Any = ["default", {"text.parse_math": False}]
@@ -62,7 +64,16 @@ class Figure(PlainFigure):
 
     draw = in_style(PlainFigure.draw)
     draw_without_rendering = in_style(PlainFigure.draw_without_rendering)
-    savefig = in_style(PlainFigure.savefig)
+
+    @in_style
+    def savefig(self, target: Any, **options: Any) -> None:
+        """Save the figure; a file is written whole or not at all."""
+        if not isinstance(target, str | Path):
+            super().savefig(target, **options)
+            return
+        path = Path(target)
+        with aside(path) as file:
+            super().savefig(file, **{"format": path.suffix[1:].lower() or "png"} | options)
 
 
 def data_url(figure: PlainFigure, dpi: int = 110) -> str:

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -29,7 +30,7 @@ from warpimpact.plotting.style import BLUE, GREY, STEEL, VERMILION, Figure, fini
 from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
 from warpimpact.results.dataset import passed
-from warpimpact.results.files import OutputError
+from warpimpact.results.files import OutputError, aside
 from warpimpact.scene.display import MM
 from warpimpact.scene.model import Array
 
@@ -313,8 +314,11 @@ def animation(dataset: xarray.Dataset) -> FuncAnimation:
 
 
 def save_animation(dataset: xarray.Dataset, path: Path) -> None:
-    """Write the film of a history in the format that its name asks for (`writer_for`)."""
-    animation(dataset).save(path, writer=writer_for(path), dpi=80)
+    """Write the film of a history in the format that its name asks for (`writer_for`), whole or not at all."""
+    with TemporaryDirectory(dir=path.parent) as folder, aside(path) as file:
+        film = Path(folder) / path.name  # its suffix says the format
+        animation(dataset).save(film, writer=writer_for(path), dpi=80)
+        film.rename(file)
 
 
 def writer_for(path: Path) -> AbstractMovieWriter:

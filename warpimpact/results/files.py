@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import os
 import shutil
 from collections.abc import Callable, Collection, Hashable, Iterator
@@ -77,10 +78,10 @@ def _flush(path: Path, mode: int) -> None:
 
 def _cause(error: Exception, path: Path) -> str:
     """The cause of an error of the disk in words: netCDF does not say that the disk is full."""
+    is_full = isinstance(error, OSError) and error.errno in (errno.ENOSPC, errno.EDQUOT)
     with suppress(OSError):
-        if isinstance(error, RuntimeError) and shutil.disk_usage(path.parent).free < 2**20:
-            return "the disk is full"
-    return str(error)
+        is_full = is_full or shutil.disk_usage(path.parent).free < 2**16
+    return "the disk is full" if is_full else getattr(error, "strerror", None) or str(error)
 
 
 def read(path: Path, kind: Kind = HIT_MAP) -> xarray.Dataset:

@@ -1,8 +1,10 @@
 """What a command writes: no format that its name does not promise, and nothing replaced unasked."""
 
+import errno
 from collections.abc import Callable
 from pathlib import Path
 
+import pytest
 import xarray
 
 from warpimpact.cli import main
@@ -19,12 +21,25 @@ def test_pictures_of_a_result_are_not_replaced_unasked(
     for name in "ab":
         files.write(make_result(20), tmp_path / f"{name}.nc")
     one, other = (str(tmp_path / f"{name}.nc") for name in "ab")
-    for command, picture in ((["plot", one], "a_status.png"), (["plot", one, other], "a_b_tilt.png")):
+    for command, picture in ((["plot", one], "a_overview.png"), (["plot", one, other], "a_b_tilt.png")):
         (tmp_path / picture).write_text("mine")
         assert f"{picture}: exists already" in refusal(command)
         assert (tmp_path / picture).read_text() == "mine"
         assert main([*command, "--overwrite"]) == 0
         assert (tmp_path / picture).read_bytes().startswith(b"\x89PNG")
+
+
+@pytest.mark.parametrize("command", [["new", "slotted_plate"], ["plate", str(CAMPAIGNS / "slotted_plate.toml")]])
+def test_a_full_disk_is_named_and_cuts_no_file(
+    command: list[str], in_tmp_path: Path, refusal: Refusal, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def is_full(*_: object) -> None:
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    monkeypatch.setattr("warpimpact.results.files._flush", is_full)
+    assert "slotted_plate" in (sentence := refusal(command))
+    assert sentence.endswith(": cannot be written (the disk is full)")
+    assert not list(in_tmp_path.iterdir())
 
 
 def test_what_is_asked_for_has_a_picture_of_its_own(make_result: ResultMaker, tmp_path: Path, refusal: Refusal) -> None:
