@@ -66,12 +66,12 @@ class Figure(PlainFigure):
     draw_without_rendering = in_style(PlainFigure.draw_without_rendering)
 
     @in_style
-    def savefig(self, target: Any, **options: Any) -> None:
+    def savefig(self, fname: Any, **options: Any) -> None:
         """Save the figure; a file is written whole or not at all."""
-        if not isinstance(target, str | Path):
-            super().savefig(target, **options)
+        if not isinstance(fname, str | Path):
+            super().savefig(fname, **options)
             return
-        path = Path(target)
+        path = Path(fname)
         with aside(path) as file:
             super().savefig(file, **{"format": path.suffix[1:].lower() or "png"} | options)
 
