@@ -34,7 +34,6 @@ from warpimpact.analysis.effectiveness import (
     common_name,
     depth_note,
     measures_of,
-    plate_text,
     reference_name,
     scores,
     solid_note,
@@ -44,7 +43,7 @@ from warpimpact.analysis.effectiveness import (
 )
 from warpimpact.analysis.estimates import estimated
 from warpimpact.analysis.inspection import breaks_promise, hits_at_two_levels, sampling_note
-from warpimpact.analysis.numbers import View, html_of, interval_text, listed, number_text, of_each, rows_of
+from warpimpact.analysis.numbers import View, html_of, interval_text, listed, of_each, rows_of
 from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
 from warpimpact.results.files import ResultError
@@ -185,10 +184,8 @@ def compare(
     for dataset, name in zip(datasets[1:], names[1:], strict=True):
         _check_same_question(datasets[0], names[0], dataset, name)
     places = list(combinations(range(len(datasets)), 2))
-    pairs = pd.DataFrame(
-        [_used(datasets[i], datasets[j]) for i, j in places],
-        columns=["paired", "independent"],
-    ).assign(one=[names[i] for i, _ in places], other=[names[j] for _, j in places])
+    used = [(names[i], names[j], *_used(datasets[i], datasets[j])) for i, j in places]
+    pairs = pd.DataFrame(used, columns=["one", "other", "paired", "independent"])
     of_plates = [measures_of(dataset, texts) for dataset in datasets]
     common = set.intersection(*({measure.text for measure in measures} for measures in of_plates))
     measures = {measure.text: measure for measure in of_plates[0] if measure.text in common}
@@ -212,10 +209,6 @@ def compare(
         columns = ["one", "other", "value", "low", "high", "significant"]
         differences[measure.text] = pd.DataFrame(compared, columns=columns)
     cautions = dict(_cautions(datasets, names))
-    notes = (
-        *([_weights_note(datasets, names)] if differ else []),
-        *(*cautions.values(), *_notes(datasets, names, tables, bounds=bounds)),
-    )
     return Comparison(
         plates=pd.DataFrame([_plate(dataset) for dataset in datasets], index=pd.Index(names, name="plate")),
         measures=measures,
@@ -226,7 +219,7 @@ def compare(
         differ_in_weight=differ,
         confidence=confidence,
         reference=common_name(map(reference_name, datasets)),
-        notes=notes,
+        notes=(*cautions.values(), *_notes(datasets, names, tables, bounds=bounds)),
         cautions=tuple(cautions),
     )
 
@@ -367,14 +360,6 @@ def _used(result: xarray.Dataset, other: xarray.Dataset) -> tuple[int, str]:
     return common, ""
 
 
-def _weights_note(datasets: Sequence[xarray.Dataset], names: Sequence[str]) -> str:
-    weights = of_each(names, [plate_text(dataset).removeprefix(", ").rpartition(",")[0] for dataset in datasets])
-    return (
-        f"The plates differ in weight ({weights}). They are ranked by the ratio to the "
-        f"{common_name(map(reference_name, datasets))} of the same areal density; a measure without that ratio says so."
-    )
-
-
 def _cautions(datasets: Sequence[xarray.Dataset], names: Sequence[str]) -> Iterator[tuple[str, str]]:
     """What the ranks do not consider, in a few words and in a sentence."""
     if len({d.attrs.get(attr.LAYERS, "") for d in datasets}) > 1:
@@ -415,7 +400,13 @@ def _materials(datasets: Sequence[xarray.Dataset], names: Sequence[str]) -> Iter
 def _notes(
     datasets: Sequence[xarray.Dataset], names: Sequence[str], tables: Mapping[str, pd.DataFrame], *, bounds: bool
 ) -> Iterator[str]:
-    """Notes on the solid references, the sampling, and the bases behind the plates."""
+    """Notes on weights, solid references, sampling, and the bases behind the plates."""
+    if _differ_in_weight(datasets):
+        weights = of_each(names, [weights_text(weights_of(dataset), ".4g") for dataset in datasets])
+        yield (
+            f"The plates differ in weight ({weights}). They are ranked by the ratio to the solid reference of the same "
+            "areal density; a measure without that ratio says so."
+        )
     solid = {name: solid_note(dataset) for name, dataset in zip(names, datasets, strict=True)}
     alike = len(set(solid.values())) == 1
     yield from dict.fromkeys(note if alike else f"{name}: {note}" for name, note in solid.items() if note)
@@ -463,19 +454,20 @@ def verdict_of(comparison: Comparison) -> list[str]:
 
 def comparison_view(comparison: Comparison, notes: Sequence[str] = ()) -> View:
     """What was compared, the best plates, then every measure as a ranking with differences in words."""
-    best = best_plates(comparison)
     together = (
         f"Intervals contain the numerics where they are known. Differences of a measure hold together at "
         f"{comparison.confidence:.0%} (Bonferroni over the pairs)."
     )
     chance = "The intervals describe the hits that were drawn, not what the model leaves out."
-    view: dict[str, list[str | pd.DataFrame]] = {
-        "": [*hits_used(comparison), together, chance, *comparison.notes, *notes]
-    }
-    view["best plates"] = [best.to_frame("plate")] if len(best) else []
+    sentences = [*hits_used(comparison), together, chance, *comparison.notes, *notes]
+    view: dict[str, list[str | pd.DataFrame]] = {"": [*sentences]}
+    if len(best := best_plates(comparison)):
+        view["best plates"] = [best.to_frame("plate")]
     for measure in comparison.compared:
         heading = f"{measure.title}; {measure.better}{_weighed(comparison, measure.text)}"
-        view[heading] = [_scores_table(comparison, measure.text), *_in_words(comparison, measure)]
+        view[heading] = [_scores_table(comparison, measure.text)]
+        if measure.text in comparison.differences:
+            view[heading].append(_differences_table(comparison, measure))
     return view
 
 
@@ -497,17 +489,11 @@ def hits_used(comparison: Comparison) -> list[str]:
         return [f"{hits.iloc[0]} hits of each plate: the same shots at every plate, compared shot by shot."]
     lines = [f"Hits: {of_each(hits.index, map(str, hits))}; all of them count."]
     for pair in rows_of(pairs):
-        more = {name: hits[name] - pair.paired for name in (pair.one, pair.other) if hits[name] > pair.paired}
-        how = "the same shots, compared shot by shot."
-        if pair.independent:
-            how = f"compared as independent, because {pair.independent}."
-        elif more:
-            ((larger, left),) = more.items()
-            how = (
-                f"the first {pair.paired} hits are the same shots, compared shot by shot; the other {left} of {larger} "
-                "count on their own."
-            )
-        lines.append(f"{pair.one} and {pair.other}: {how}")
+        left = {name: hits[name] - pair.paired for name in (pair.one, pair.other) if hits[name] > pair.paired}
+        how = f"the first {pair.paired} hits are the same shots, compared shot by shot"
+        how += "".join(f"; the other {count} of {name} count on their own" for name, count in left.items())
+        how = f"compared as independent, because {pair.independent}" if pair.independent else how
+        lines.append(f"{pair.one} and {pair.other}: {how}.")
     return lines
 
 
@@ -562,21 +548,19 @@ def _undecided(comparison: Comparison, measure: Measure) -> str:
     return "; ".join(sentences)
 
 
-def _in_words(comparison: Comparison, measure: Measure) -> Iterator[str]:
-    """A sentence for every pair, such as "a better than b by 0.1 (0.05 to 0.15)"."""
-    what = f" in the ratio to the {comparison.reference}" if measure.text in comparison.by_ratio else ""
-    table = comparison.differences.get(measure.text)
-    for pair in () if table is None else rows_of(table):
-        one, other = pair.one, pair.other
-        interval, by = interval_text(pair.low, pair.high), number_text(abs(pair.value))
-        if math.isnan(pair.low) and math.isnan(pair.high):
-            yield f"{one} and {other}: difference{what} {number_text(pair.value)}, whose interval is {interval}"
-        elif not pair.significant:
-            yield f"{one} and {other} cannot be told apart: difference{what} {number_text(pair.value)} ({interval})"
-        else:
-            better = measure.higher_is_better
-            if pair.value < 0.0:
-                interval = interval_text(-pair.high, -pair.low)
-            first, last = (one, other) if (pair.value > 0.0) == (better is not False) else (other, one)
-            than = "higher than" if better is None else "better than"
-            yield f"{first} {than} {last} by {by}{what} ({interval})"
+def _differences_table(comparison: Comparison, measure: Measure) -> pd.DataFrame:
+    """The difference of every pair of plates, with a verdict."""
+    table, than = (
+        comparison.differences[measure.text],
+        "higher than" if measure.higher_is_better is None else "better than",
+    )
+    verdicts = []
+    for pair in rows_of(table):
+        one, other = (pair.one, pair.other)[
+            :: 1 if (pair.value > 0.0) == (measure.higher_is_better is not False) else -1
+        ]
+        verdicts.append(f"{one} {than} {other}" if pair.significant else "cannot be told apart")
+    what = "difference of the ratios" if measure.text in comparison.by_ratio else "difference"
+    intervals = [*map(interval_text, table["low"], table["high"])]
+    columns = {what: table["value"], "interval": intervals, "verdict": verdicts}
+    return pd.DataFrame(columns).set_axis(table["one"] + " less " + table["other"])

@@ -3,18 +3,21 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 import xarray
 
+from warpimpact.campaign.campaign import Campaign
+from warpimpact.campaign.text import CampaignError
 from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
 from warpimpact.results.dataset import SLICE, finer_pair
 from warpimpact.results.files import ResultError
 from warpimpact.results.measures import STATUSES, Measure, dealing, estimate_from, shift_of
 from warpimpact.results.vocabulary import Array
+from warpimpact.scene.units import quoted
 from warpimpact.statistics.intervals import Estimate, Estimating
 from warpimpact.statistics.tails import pseudo_values
 
@@ -95,6 +98,34 @@ def measures_named(dataset: xarray.Dataset, texts: Sequence[str], default: Seque
         return [measure.of(dataset) for measure in known if not measure.quantity.lacking(dataset)]
     except ValueError as error:
         raise ResultError(f"measure: {error}") from None
+
+
+def measures_of_runs(
+    texts: Sequence[str], campaigns: Mapping[str, Campaign], *, averaged: bool = False
+) -> list[Measure]:
+    """The measures with these texts, which runs of campaigns, by name, will give.
+
+    Args:
+        averaged: whether a worst hit and a number of the target are refused, too.
+
+    Raises:
+        CampaignError: a text is no measure, needs limits, or a campaign lacks what it needs.
+    """
+    measures = []
+    for text in texts:
+        try:
+            measure = Measure.parse(text)
+        except ValueError as error:
+            raise CampaignError(f"measure: {error}") from None
+        if averaged and measure.kind in ("target", "worst_point"):
+            raise CampaignError(f"measure: got {quoted(text)}, but it must be a mean, a quantile or a probability")
+        if measure.is_limit:
+            raise CampaignError(f"measure: got {quoted(text)}, which warpimpact limit computes")
+        for name, campaign in campaigns.items():
+            if keys := campaign.lacking(measure):
+                raise CampaignError(f"measure: {text} needs {keys}{f', which {name} lacks' if name else ''}")
+        measures.append(measure)
+    return measures
 
 
 def estimated(dataset: xarray.Dataset, measures: Sequence[Measure]) -> dict[Measure, Estimate]:

@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 import json
-from typing import Literal, NamedTuple
+from typing import Literal
 
 import numpy as np
 import xarray
 from numpy.typing import NDArray
+from scipy import special
 from scipy.interpolate import LinearNDInterpolator
 from scipy.spatial import KDTree
-from scipy.stats import norm as normal
-from scipy.stats import t as student
 
 from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
@@ -30,7 +29,6 @@ _CONTINUED = 4.0
 """Width of the strip that continues a periodic cell, in mean hit spacings."""
 NEIGHBOURS = 24
 """Number of hits in the fit of a plane. It leaves 21 degrees of freedom for the scatter, and the fit stays local."""
-_COEFFICIENTS = 3
 _BOTH_SIDES = 0.975
 """Share below the upper end of a 95 % interval."""
 OF_PASSED = {v.RESIDUAL_VELOCITY, v.DEFLECTION}
@@ -83,17 +81,13 @@ def hit_map(
         raise ValueError("the result has no hits")
     if np.any(np.abs(hits) > period / 2 * (1.0 + 1e-9)):
         raise ValueError("the result has hits outside the cell, so a map of the cell cannot show them")
-    on_grid = _on_grid(result, hits, values) if pixels is None else None
-    if on_grid is None:
+    if pixels is None and (on_grid := _on_grid(result, hits, values)) is not None:
+        y, z, image = on_grid
+    else:
         y, z = axes_of(period, pixels or PIXELS)
-        on_grid = (
-            y,
-            z,
-            _between(
-                hits, values, np.stack(np.meshgrid(y, z), axis=-1), period, wraps=_is_periodic(result), method=method
-            ),
-        )
-    y, z, image = on_grid
+        is_periodic = json.loads(result.attrs.get(attr.PLATE, "{}")).get("size") is None
+        places = np.stack(np.meshgrid(y, z), axis=-1)
+        image = _between(hits, values, places, period, wraps=is_periodic, method=method)
     coordinates = {name: (name, along, name.attributes) for name, along in ((v.HIT_Z, z), (v.HIT_Y, y))}
     known = {name: array[name] for name in (v.STANDOFF,) if name in array.coords}
     return xarray.DataArray(image, coordinates | known, (v.HIT_Z, v.HIT_Y), str(variable), array.attrs)
@@ -166,11 +160,6 @@ def axes_of(period: Array, count: int) -> tuple[Array, Array]:
     return y, z
 
 
-def _is_periodic(result: xarray.Dataset) -> bool:
-    """Whether the plate continues across the edges of the cell."""
-    return json.loads(result.attrs.get(attr.PLATE, "{}")).get("size") is None
-
-
 def _on_grid(result: xarray.Dataset, hits: Array, values: Array) -> tuple[Array, Array, Array] | None:
     """Places along y and z and the values there, if the hits were sampled as a grid and are all of its places."""
     if result.attrs.get(attr.SAMPLING) != "grid":
@@ -186,38 +175,23 @@ def _on_grid(result: xarray.Dataset, hits: Array, values: Array) -> tuple[Array,
 def _between(hits: Array, values: Array, places: Array, period: Array, *, wraps: bool, method: str) -> Array:
     """Values at places, shape [z, y, 2], from those of the hits."""
     spacing = float(np.sqrt(period.prod() / len(hits)))
-    if wraps:
-        hits, values = _continued(hits, values, period, _CONTINUED * spacing)
+    if wraps:  # with the hits of the neighbouring cells that lie near this one
+        shifts = [np.array([i, j]) for i in (0, -1, 1) for j in (0, -1, 1)]
+        moved = np.concatenate([hits + shift * period for shift in shifts])
+        inside = np.all(np.abs(moved) <= period / 2 + _CONTINUED * spacing, axis=1)
+        hits, values = moved[inside], np.tile(values, len(shifts))[inside]
     distance, nearest = KDTree(hits).query(places)
-    near = distance <= _FARTHEST * spacing
     image = values[nearest]
     if method == "linear":
         if len(hits) < 3:
             raise ValueError(f"the result has {len(hits)} hits, but a linear map needs three")
         image = LinearNDInterpolator(hits, values)(places)
-    return np.where(near, image, np.nan)
+    return np.where(distance <= _FARTHEST * spacing, image, np.nan)
 
 
-def _continued(hits: Array, values: Array, period: Array, margin: float) -> tuple[Array, Array]:
-    """Hits and values with those of the neighbouring cells that lie within a margin [m] of the cell."""
-    shifts = [np.array([i, j]) for i in (0, -1, 1) for j in (0, -1, 1)]
-    moved = np.concatenate([hits + shift * period for shift in shifts])
-    inside = np.all(np.abs(moved) <= period / 2 + margin, axis=1)
-    return moved[inside], np.tile(values, len(shifts))[inside]
-
-
-class Local(NamedTuple):
-    """Estimates at points, each of shape [points] and in the unit of the values: the value, half the width of its
-    95 % interval, and the standard deviation of the hits about the plane."""
-
-    value: Array
-    half_width: Array
-    spread: Array
-
-
-def plane_fit(offsets: Array, values: Array) -> Local:
-    """Value at points by least squares: a plane through the values of the hits near each point (local linear
-    regression, Cleveland and Devlin 1988, with equal weights).
+def plane_fit(offsets: Array, values: Array) -> tuple[Array, Array]:
+    """Value at points by least squares, and half the width of its 95 % interval, each of shape [points]: a plane
+    through the values of the hits near each point (local linear regression, Cleveland and Devlin 1988, equal weights).
 
     The interval is Student's and uses the scatter about the plane. A bend or a jump of the map among the hits widens it
     as the scatter of shots does. It assumes independent hits. Next to an axis of symmetry, where hits and their images
@@ -227,16 +201,14 @@ def plane_fit(offsets: Array, values: Array) -> Local:
         offsets: from each point to its hits [m], shape [points, hits, 2].
         values: values of the hits, shape [points, hits].
     """
-    count = values.shape[1]
     reach = np.abs(offsets).max(axis=(1, 2), keepdims=True)
     design = np.concatenate([np.ones((*values.shape, 1)), offsets / np.maximum(reach, np.finfo(float).tiny)], axis=2)
     inverse = np.linalg.pinv(design)
     plane = np.einsum("pch,ph->pc", inverse, values)
     residual = values - np.einsum("phc,pc->ph", design, plane)
-    freedom = count - _COEFFICIENTS
-    spread = np.sqrt(np.sum(residual**2, axis=1) / freedom)
-    error = spread * np.sqrt(np.sum(inverse[:, 0] ** 2, axis=1))
-    return Local(plane[:, 0], float(student.ppf(_BOTH_SIDES, freedom)) * error, spread)
+    freedom = values.shape[1] - design.shape[2]
+    error = np.sqrt(np.sum(residual**2, axis=1) / freedom * np.sum(inverse[:, 0] ** 2, axis=1))
+    return plane[:, 0], float(special.stdtrit(freedom, _BOTH_SIDES)) * error
 
 
 def share_of(hits: Array) -> tuple[Array, Array]:
@@ -246,6 +218,6 @@ def share_of(hits: Array) -> tuple[Array, Array]:
         hits: zeros and ones, shape [points, hits]; the results have the shape [points].
     """
     count, share = hits.shape[1], hits.mean(axis=1)
-    z = float(normal.ppf(_BOTH_SIDES))
+    z = float(special.ndtri(_BOTH_SIDES))
     half_width = z * np.sqrt(share * (1.0 - share) / count + z**2 / (4.0 * count**2)) / (1.0 + z**2 / count)
     return share, half_width

@@ -5,6 +5,7 @@ import sys
 from pathlib import Path
 from typing import Any
 
+from warpimpact.analysis.estimates import measures_of_runs
 from warpimpact.analysis.inspection import range_note
 from warpimpact.analysis.numbers import text_of
 from warpimpact.campaign.campaign import Campaign
@@ -81,7 +82,7 @@ def _tolerance(arguments: argparse.Namespace) -> float | None:
 
 def sweep_command(arguments: argparse.Namespace) -> None:
     sweep = read_sweep(arguments.campaign, count=arguments.count)
-    sweep.check(arguments.measure)
+    measures_of_runs(arguments.measure, sweep.campaigns)
     output = arguments.output or Path(arguments.campaign.stem + ".nc")
     picture = output.with_suffix(".png")
     check_output(output, ".nc", overwrite=True)

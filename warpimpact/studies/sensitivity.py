@@ -16,18 +16,16 @@ import numpy as np
 import pandas as pd
 from pydantic import ValidationError
 
-from warpimpact.analysis.estimates import measures_named
+from warpimpact.analysis.estimates import measures_named, measures_of_runs
 from warpimpact.campaign.campaign import Campaign
 from warpimpact.campaign.materials import StraightPassage
 from warpimpact.campaign.resistances import catalogue_resistance, is_drawn
-from warpimpact.campaign.text import CampaignError
 from warpimpact.results import variables as v
 from warpimpact.results.dataset import narrow_table
 from warpimpact.results.measures import Measure, estimate_from
 from warpimpact.scene import Interaction, Numerics, Plate, Radians, Shots
 from warpimpact.scene.interaction import NEAR_EDGES
 from warpimpact.scene.model import Array
-from warpimpact.scene.units import quoted
 from warpimpact.solver.many import simulate_many
 from warpimpact.solver.marching import Progress
 from warpimpact.solver.simulate import numerics_for, spread
@@ -41,9 +39,6 @@ HITS = 256
 """Rows differ by far more than 256 hits in common leave open."""
 UNKNOWN_SHARE = 0.3
 """How far a resistance or a strength that a user gives may be off: two steels of one hardness differ by more."""
-
-Values = dict[str, dict[Measure, Array]]
-"""Values of the hits by change and measure, in the units of the Dataset; NaN where a hit does not count."""
 
 
 def sensitivity(
@@ -70,13 +65,7 @@ def sensitivity(
         CampaignError: a text is no measure, or the campaign lacks what it needs.
     """
     computed = _computed({"": campaign}, measures, hits, device, progress)[""]
-    rows = {
-        name: {
-            measure.title: measure.display.factor * estimate_from(measure, values).value
-            for measure, values in by_measure.items()
-        }
-        for name, by_measure in computed.items()
-    }
+    rows = {name: {one.title: _value(one, of) for one, of in values.items()} for name, values in computed.items()}
     return pd.DataFrame.from_dict(rows, orient="index").rename_axis("change")
 
 
@@ -86,8 +75,7 @@ def largest_move(table: pd.DataFrame) -> str:
     moved = [name for name in table.columns if moves[name].max() > 0.0]
     if not moved:
         return "No change moves these numbers."
-    column = table[moved[0]]
-    most = moves[moved[0]].nlargest(3)
+    column, most = table[moved[0]], moves[moved[0]].nlargest(3)
     named = ", ".join(f"{change} ({column[change]:.4g})" for change in most[most > 0.0].index)
     return f"{column.name} is {column.iloc[0]:.4g} as given. It moves most with: {named}."
 
@@ -110,10 +98,10 @@ def plate_sensitivity(
     rows, replicates = {}, next(iter(campaigns.values())).replicates
     for name in dict.fromkeys(name for numbers in computed.values() for name in numbers):
         of_plates = {plate: numbers.get(name, numbers[AS_GIVEN]) for plate, numbers in computed.items()}
-        measure = next(iter(next(iter(of_plates.values()))))
+        (measure,) = {one for values in of_plates.values() for one in values}
         values = {plate: by_measure[measure] for plate, by_measure in of_plates.items()}
-        shown = {plate: measure.display.factor * estimate_from(measure, one).value for plate, one in values.items()}
-        rows[name] = {**shown, "best": _best(measure, values, shifts or {}, replicates)}
+        best = _best(measure, values, shifts or {}, replicates)
+        rows[name] = {plate: _value(measure, of_plate) for plate, of_plate in values.items()} | {"best": best}
     return pd.DataFrame.from_dict(rows, orient="index").rename_axis("change")
 
 
@@ -123,28 +111,30 @@ def reversals(table: pd.DataFrame) -> str:
     if not best:
         return "No plate is significantly the best as given."
     turned = [name for name, other in zip(table.index[1:], others, strict=True) if other not in ("", best)]
-    open_ = sum(other == "" for other in others)
+    undecided = others.count("")
     return (
         f"{best} stays the best with {others.count(best)} of {len(others)} changes"
         + (f"; another plate is the best with: {', '.join(turned)}" if turned else "")
-        + (f"; {open_} do not decide" if open_ else "")
+        + (f"; {undecided} do not decide" if undecided else "")
         + "."
     )
+
+
+def _value(measure: Measure, values: Array) -> float:
+    return measure.display.factor * estimate_from(measure, values).value
 
 
 def _best(measure: Measure, values: Mapping[str, Array], shifts: Mapping[str, float], replicates: int) -> str:
     """The plate that is significantly better than every other one; empty if none is."""
     sign = measure.display.factor * (1.0 if measure.higher_is_better else -1.0)
     numbers = {plate: sign * measure.averaged(of_plate) for plate, of_plate in values.items()}
-    for plate, own in numbers.items():
-        if all(
-            estimate_of("mean", own - numbers[other], replicates=replicates).low
-            > np.nan_to_num(shifts.get(plate, 0.0) + shifts.get(other, 0.0))
-            for other in numbers
-            if other != plate
-        ):
-            return plate
-    return ""
+
+    def is_better(one: str, other: str) -> bool:
+        difference = estimate_of("mean", numbers[one] - numbers[other], replicates=replicates)
+        return bool(difference.low > np.nan_to_num(shifts.get(one, 0.0) + shifts.get(other, 0.0)))
+
+    best = (one for one in numbers if all(is_better(one, other) for other in numbers if other != one))
+    return next(best, "")
 
 
 def _computed(
@@ -153,10 +143,12 @@ def _computed(
     hits: int = HITS,
     device: str = "auto",
     progress: Progress | None = None,
-) -> dict[str, Values]:
-    """Values of the hits of campaigns with each of their changes, all at the finest level that their pilots find."""
-    measures = _parsed(campaigns, texts)
-    campaigns = {plate: _over_the_cell(campaign) for plate, campaign in campaigns.items()}
+) -> dict[str, dict[str, dict[Measure, Array]]]:
+    """Values of the hits by plate, change and measure, in the units of the Dataset, NaN where a hit does not count; all
+    at the finest level that the pilots of the campaigns find."""
+    measures = measures_of_runs(texts or SHOWN, campaigns if texts else {}, averaged=True)
+    # A change may break a symmetry, so hits are over the whole cell.
+    campaigns = {plate: _with(campaign, "hits", irreducible=False) for plate, campaign in campaigns.items()}
     rows = {
         (plate, name): changed
         for plate, campaign in campaigns.items()
@@ -164,19 +156,19 @@ def _computed(
     }
     shots = {row: _shots(changed, hits) for row, changed in rows.items()}
     worker = Worker(device)
-    found = [
+    of_plates = [
         numerics_for(campaign.scene, shots[plate, AS_GIVEN], _numerics(campaign), worker)
         for plate, campaign in campaigns.items()
     ]
-    numerics = max(found, key=lambda each: each.level or 0)
+    numerics = max(of_plates, key=lambda each: each.level or 0)
     outcomes = simulate_many([(rows[row].scene, shots[row]) for row in rows], numerics, worker, progress)
     needed = {v.STATUS, v.STOPPED_IN, *(name for measure in measures for name in measure.quantity.of)}
-    computed: dict[str, Values] = {plate: {} for plate in campaigns}
+    computed: dict[str, dict[str, dict[Measure, Array]]] = {plate: {} for plate in campaigns}
     for ((plate, name), changed), outcome in zip(rows.items(), outcomes, strict=True):
         labelled = changed.scene.model_copy(update={"record": campaigns[plate].output})  # stand-offs as given
-        table = narrow_table(labelled, shots[plate, name], outcome, needed).to_xarray()
-        known = measures_named(table, texts, SHOWN)
-        computed[plate][name] = {measure: measure.values(table) for measure in known}
+        dataset = narrow_table(labelled, shots[plate, name], outcome, needed).to_xarray()
+        known = measures_named(dataset, texts, SHOWN)
+        computed[plate][name] = {measure: measure.values(dataset) for measure in known}
     return computed
 
 
@@ -186,25 +178,6 @@ def _numerics(campaign: Campaign) -> Numerics:
     if numerics.explicit is not None or {"fidelity", "accuracy"} & numerics.model_fields_set:
         return numerics
     return numerics.model_copy(update={"fidelity": "draft"})
-
-
-def _parsed(campaigns: Mapping[str, Campaign], texts: Sequence[str]) -> list[Measure]:
-    for text in texts:
-        try:
-            measure = Measure.parse(text)
-        except ValueError as error:
-            raise CampaignError(f"measure: {error}") from None
-        if measure.is_limit or measure.kind in ("target", "worst_point"):
-            raise CampaignError(f"measure: got {quoted(text)}, but it must be a mean, a quantile or a probability")
-        for name, campaign in campaigns.items():
-            if keys := campaign.lacking(measure):
-                raise CampaignError(f"measure: {text} needs {keys}{f', which {name} lacks' if name else ''}")
-    return [Measure.parse(text) for text in texts or SHOWN]
-
-
-def _over_the_cell(campaign: Campaign) -> Campaign:
-    """The campaign with hits over the whole cell, because a change may break a symmetry."""
-    return _with(campaign, "hits", irreducible=False) if campaign.hits.irreducible else campaign
 
 
 def _shots(campaign: Campaign, most: int) -> Shots:
@@ -255,13 +228,12 @@ def _catalogue_interval(campaign: Campaign, plate: Plate) -> tuple[float, float]
 
 def _resistance(end: int) -> Change:
     """Y at the low (0) or high (1) end of the catalogue's interval, or 30 % off where it is the user's."""
-
-    def keys(campaign: Campaign, plate: Plate) -> dict[str, float]:
-        share = 1.0 + UNKNOWN_SHARE * (2 * end - 1)
-        known = _catalogue_interval(campaign, plate)
-        return {"resistance": plate.resistance * share if known is None else known[end]}
-
-    return _plates(keys)
+    ends = 1.0 - UNKNOWN_SHARE, 1.0 + UNKNOWN_SHARE
+    return _plates(
+        lambda campaign, plate: {
+            "resistance": (_catalogue_interval(campaign, plate) or [plate.resistance * share for share in ends])[end]
+        }
+    )
 
 
 def _law(friction: float | None = None, **law: float) -> Change:
@@ -317,19 +289,15 @@ def _weakening(_: Campaign, plate: Plate) -> dict[str, Any]:
     return paper if plate.open_area and plate.degradation == 1.0 else {}
 
 
+def _weakens(key: str, changed: Callable[[float], float]) -> Change:
+    """Another number of the weakening of plates that weaken."""
+    return _plates(lambda _, plate: {key: changed(getattr(plate, key))} if plate.degradation < 1.0 else {})
+
+
 def _strength(campaign: Campaign, factor: float) -> Campaign:
     """The campaign with another strength of its core, if that may break."""
     strength = campaign.core.strength
     return campaign if strength is None else _with(campaign, "core", strength=factor * strength)
-
-
-def _reach(factor: float) -> Change:
-    """Another length over which plates weaken that do."""
-
-    def keys(_: Campaign, plate: Plate) -> dict[str, float]:
-        return {"degradation_length": factor * plate.degradation_length} if plate.degradation < 1.0 else {}
-
-    return _plates(keys)
 
 
 _FIT = ("resistance", "degradation", "static", "linear", "quadratic")
@@ -338,10 +306,18 @@ CHANGES: tuple[tuple[str, tuple[str, ...], Change], ...] = (
     ("Y at its high end", ("resistance",), _resistance(1)),
     ("no weakening (β = 1)", ("degradation",), _plates(lambda _, one: {"degradation": 1.0})),
     ("weakening (β = 0.8 in 1 µs)", ("degradation",), _plates(_weakening)),
-    ("weakens half as fast", ("degradation",), _plates(lambda _, one: {"degradation": one.degradation**0.5})),
-    ("weakens twice as fast", ("degradation",), _plates(lambda _, one: {"degradation": one.degradation**2})),
-    ("weakening reaches half as far", ("degradation_length",), _reach(0.5)),
-    ("weakening reaches twice as far", ("degradation_length",), _reach(2.0)),
+    ("weakens half as fast", ("degradation",), _weakens("degradation", lambda share: share**0.5)),
+    ("weakens twice as fast", ("degradation",), _weakens("degradation", lambda share: share**2)),
+    (
+        "weakening reaches half as far",
+        ("degradation_length",),
+        _weakens("degradation_length", lambda length: 0.5 * length),
+    ),
+    (
+        "weakening reaches twice as far",
+        ("degradation_length",),
+        _weakens("degradation_length", lambda length: 2.0 * length),
+    ),
     ("friction η = 0", ("shear_coefficient",), _law(0.0)),
     ("friction η = 0.1", ("shear_coefficient",), _law(0.1)),
     ("onset κ = 0", ("onset",), _law(onset=0.0)),

@@ -91,23 +91,6 @@ class Sweep:
         """Number of values of every input."""
         return tuple(len(swept.values) for swept in self.inputs)
 
-    def check(self, texts: Sequence[str]) -> None:
-        """Refuse measures that a point will not have.
-
-        Raises:
-            CampaignError: the message names the measure, the point and what it needs.
-        """
-        for text in texts:
-            try:
-                measure = Measure.parse(text)
-            except ValueError as error:
-                raise CampaignError(f"--measure: {error}") from None
-            if measure.is_limit:
-                raise CampaignError(f"--measure: {text} is told by warpimpact limit")
-            for name, campaign in self.campaigns.items():
-                if keys := campaign.lacking(measure):
-                    raise CampaignError(f"--measure: {text} needs {keys}, which point {name} lacks")
-
 
 def read_sweep(path: str | Path, *, count: int | None = None) -> Sweep:
     """Read a campaign file with a table `[sweep]` of lists.

@@ -60,7 +60,7 @@ def test_identical_plates_cannot_be_told_apart(make_plate_result) -> None:
         assert comparison.ranks(measure) == {"a": (1, 2), "b": (1, 2)}
         assert difference(comparison, measure, "a", "b").value == 0.0
     text = text_of(comparison_view(comparison))
-    assert text.count("a and b cannot be told apart: difference 0.000 (") == 6
+    assert len(re.findall(r"a less b +0.000 .* cannot be told apart\n?", text)) == 6
     assert "better than" not in text
     assert "<summary>Every measure" in comparison._repr_html_()
 
@@ -105,9 +105,9 @@ def test_a_clearly_better_plate_is_first_whichever_way_is_up(make_plate_result) 
     comparison = compare(plates, ["worst", "one", "other"])
     for measure in (MEAN, TAIL, "mean(residual_energy_density@130mm)", TILTED):
         assert comparison.ranks(measure) == {"one": (1, 2), "other": (1, 2), "worst": (3, 3)}
-    lines = text_of(comparison_view(comparison)).splitlines()
-    assert "one better than worst by 0.1000 (0.1000 to 0.1000)" in lines
-    assert "one and other cannot be told apart: difference 0.000 (0.000 to 0.000)" in lines
+    text = text_of(comparison_view(comparison))
+    assert re.search(r"worst less one +0.1000 +0.1000 to 0.1000 +one better than worst\n", text)
+    assert re.search(r"one less other +0.000 +0.000 to 0.000 +cannot be told apart\n", text)
 
 
 def test_the_same_shots_narrow_the_interval(make_plate_result) -> None:
@@ -162,7 +162,7 @@ def test_plates_of_different_weight_are_ranked_by_the_ratio_to_the_solid_plate(m
     assert pair.value == pytest.approx(ratios[0] - ratios[1])
     text = text_of(comparison_view(comparison))
     assert "The plates differ in weight (light 20 kg/m², heavy 40 kg/m²). They are ranked by the ratio" in text
-    assert f"light better than heavy by {abs(pair.value):#.4g} in the ratio to the solid plate (" in text
+    assert re.search(rf"light less heavy +{pair.value:#.4g} .* light better than heavy\n", text)
     same = compare([light, heavy.assign_attrs(areal_density=20.1)], ["light", "heavy"])
     assert not same.differ_in_weight
     assert same.ranks(MEAN) == {"heavy": (1, 1), "light": (2, 2)}
@@ -301,7 +301,7 @@ def test_a_campaign_with_plates_is_run_compared_and_not_run_again(
     assert main(["compare", "slots.nc", "round holes.nc", "--all", "-o", "all.svg"]) == 0
     every = capsys.readouterr().out
     assert every.startswith("256 hits of each plate: the same shots at every plate, compared shot by shot.\n")
-    assert "round holes better than slots by" in every
+    assert "round holes better than slots" in every
     Path("two.toml").write_text(SMALL.replace("seed = 1", "seed = 2"), encoding="utf-8")
     assert main(command) == 2
     assert "slots.nc: exists already" in capsys.readouterr().err

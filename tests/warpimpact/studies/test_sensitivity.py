@@ -114,7 +114,7 @@ def test_the_order_of_plates_turns_over_where_only_one_of_them_changes() -> None
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ("V50", "must be a mean, a quantile or a probability"),
+        ("V50", "which warpimpact limit computes"),
         ("P(base_pierced)", r"P\(base_pierced\) needs a table \[\[layer\]\]"),
     ],
 )

@@ -189,7 +189,7 @@ def test_a_sweep_is_asked_in_the_language_of_measures(
     assert [axes.get_ylabel() for axes in panels] == ["P(stopped)"]
     for text, reason in {
         "P(broken)": "needs output.bending = true and core.strength (the cores of both published shots stayed whole at",
-        "V50": "is told by warpimpact limit",
+        "V50": "which warpimpact limit computes",
     }.items():
         assert main(["sweep", str(folder / "a.toml"), "-o", str(tmp_path / "b.nc"), "--measure", text]) == 2
         assert reason in capsys.readouterr().err
