@@ -19,7 +19,7 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations, pairwise
 from typing import Any, NamedTuple
@@ -29,7 +29,6 @@ import pandas as pd
 import xarray
 
 from warpimpact.analysis.effectiveness import (
-    PIERCED,
     Score,
     common_name,
     depth_note,
@@ -41,7 +40,6 @@ from warpimpact.analysis.effectiveness import (
     weights_of,
     weights_text,
 )
-from warpimpact.analysis.estimates import estimated
 from warpimpact.analysis.inspection import breaks_promise, hits_at_two_levels, sampling_note
 from warpimpact.analysis.numbers import View, html_of, interval_text, listed, of_each, rows_of
 from warpimpact.results import attributes as attr
@@ -219,7 +217,7 @@ def compare(
         differ_in_weight=differ,
         confidence=confidence,
         reference=common_name(map(reference_name, datasets)),
-        notes=(*cautions.values(), *_notes(datasets, names, tables, bounds=bounds)),
+        notes=(*cautions.values(), *_notes(datasets, names, bounds=bounds)),
         cautions=tuple(cautions),
     )
 
@@ -315,8 +313,7 @@ def _depths_are_bounds(datasets: Sequence[xarray.Dataset]) -> bool:
     thicknesses = [float(np.mean(base_thickness(dataset))) for dataset in datasets]
     if max(thicknesses) <= _SAME_WEIGHT * min(thicknesses):
         return False
-    pierced = Measure.parse(PIERCED)
-    return any(estimated(dataset, [pierced])[pierced].value > 0.0 for dataset in datasets)
+    return any(map(depth_note, datasets))
 
 
 def _check_same_question(result: xarray.Dataset, name: str, other: xarray.Dataset, other_name: str) -> None:
@@ -397,9 +394,7 @@ def _materials(datasets: Sequence[xarray.Dataset], names: Sequence[str]) -> Iter
             yield f"{quantity} ({of_each(values, shown)})"
 
 
-def _notes(
-    datasets: Sequence[xarray.Dataset], names: Sequence[str], tables: Mapping[str, pd.DataFrame], *, bounds: bool
-) -> Iterator[str]:
+def _notes(datasets: Sequence[xarray.Dataset], names: Sequence[str], *, bounds: bool) -> Iterator[str]:
     """Notes on weights, solid references, sampling, and the bases behind the plates."""
     if _differ_in_weight(datasets):
         weights = of_each(names, [weights_text(weights_of(dataset), ".4g") for dataset in datasets])
@@ -421,8 +416,8 @@ def _notes(
             "not ranked."
         )
     else:
-        shares = tables[PIERCED]["value"].tolist() if PIERCED in tables else [0.0] * len(names)
-        yield from (f"{name}: {note}" for name, note in zip(names, map(depth_note, shares), strict=True) if note)
+        of_plates = zip(names, map(depth_note, datasets), strict=True)
+        yield from (f"{name}: {note}" for name, note in of_plates if note)
 
 
 def short_view(comparison: Comparison, notes: Sequence[str] = ()) -> View:

@@ -16,7 +16,7 @@ import numpy as np
 import pandas as pd
 import xarray
 
-from warpimpact.analysis.estimates import MeasureData, by_hit_of, measure_data, measures_named
+from warpimpact.analysis.estimates import MeasureData, by_hit_of, estimated, measure_data, measures_named
 from warpimpact.analysis.numbers import View, interval_text, rows_of, text_of
 from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
@@ -68,10 +68,7 @@ def measures_of(dataset: xarray.Dataset, texts: Sequence[str] = ()) -> list[Meas
     Raises:
         ResultError: a text is no measure, or the result lacks what it needs.
     """
-    measures = measures_named(dataset, texts, SHOWN_OF_LIMITS if attr.LIMIT in dataset.attrs else SHOWN)
-    pierced = Measure.parse(PIERCED)  # with it, readers see whether depths are lower bounds
-    is_depth = texts and any(measure.name == "base_depth" for measure in measures)
-    return [*measures, pierced] if is_depth and pierced not in measures else measures
+    return measures_named(dataset, texts, SHOWN_OF_LIMITS if attr.LIMIT in dataset.attrs else SHOWN)
 
 
 def effectiveness(dataset: xarray.Dataset, texts: Sequence[str] = ()) -> pd.DataFrame:
@@ -141,7 +138,7 @@ def effectiveness_view(dataset: xarray.Dataset, texts: Sequence[str] = ()) -> Vi
     """The scores of `effectiveness` as a table, with notes."""
     table = effectiveness(dataset, texts)
     with_solid = table.solid.notna().any()
-    notes = [depth_note(pierced_share(table)), solid_note(dataset)]
+    notes = [depth_note(dataset), solid_note(dataset)]
     if not with_solid and attr.OPEN_AREA in dataset.attrs and attr.LIMIT not in dataset.attrs:
         notes.append(
             "There is no solid plate or add-on to compare with. warpimpact run computes it into the file, unless "
@@ -175,13 +172,10 @@ def measures_table(table: pd.DataFrame, reference: str | None = "solid plate") -
     return shown.assign(**{"base alone": table.alone.to_numpy()}) if table.alone.notna().any() else shown
 
 
-def pierced_share(table: pd.DataFrame) -> float:
-    """Share of the cores that pierce the base, from scores; 0 where there is none."""
-    return float(table["value"].get(PIERCED, 0.0))
-
-
-def depth_note(share: float) -> str:
-    """A note on the depths in a base that this share of the cores pierces; empty if none does."""
+def depth_note(dataset: xarray.Dataset) -> str:
+    """A note on the depths in a base that some cores pierce; empty if none does."""
+    pierced = Measure.parse(PIERCED)
+    share = 0.0 if pierced.quantity.lacking(dataset) else estimated(dataset, [pierced])[pierced].value
     if not share > 0.0:
         return ""
     return (
