@@ -397,7 +397,9 @@ def _materials(datasets: Sequence[xarray.Dataset], names: Sequence[str]) -> Iter
 def _notes(datasets: Sequence[xarray.Dataset], names: Sequence[str], *, bounds: bool) -> Iterator[str]:
     """Notes on weights, solid references, sampling, and the bases behind the plates."""
     if _differ_in_weight(datasets):
-        weights = of_each(names, [weights_text(weights_of(dataset), ".4g") for dataset in datasets])
+        weights = of_each(
+            names, [weights_text(weights_of(one), ".4g").removeprefix("areal density ") for one in datasets]
+        )
         yield (
             f"The plates differ in weight ({weights}). They are ranked by the ratio to the solid reference of the same "
             "areal density; a measure without that ratio says so."

@@ -74,7 +74,7 @@ def html_of(view: View, tag: str = "h3") -> str:
 def table_text(table: pd.DataFrame) -> str:
     """A table as plain text, two spaces between its columns."""
     cells = _labelled(table).map(lambda cell: f" {number_text(cell) if isinstance(cell, float) else cell}")
-    text = cells.to_string(header=any(map(str.strip, table.columns)))
+    text = cells.to_string(sparsify=False, header=any(map(str.strip, table.columns)))
     return "\n".join(map(str.rstrip, text.splitlines()))
 
 

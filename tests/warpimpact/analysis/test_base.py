@@ -177,6 +177,17 @@ def test_targets_are_ranked_by_the_weight_that_they_need(make_plate_result) -> N
         compare([front, result], ["limits", "run"])
 
 
+def test_limits_are_ranked_by_their_median(make_plate_result) -> None:
+    """The mean of the one is lower, but half of its hits need more."""
+    result = make_plate_result(np.zeros(400))
+    low = limits(result, np.repeat([2e-3, 8e-3, 8.1e-3, 8.2e-3], 100), 0.0)
+    high = limits(result, np.repeat([6e-3, 7e-3, 7.1e-3, 9e-3], 100), 0.0)
+    comparison = compare([low, high], ["low mean", "low median"])
+    assert comparison.deciding().text == "H50"
+    assert comparison.first("H50") == ["low median"]
+    assert not any(text.startswith("mean") for text in comparison.measures)
+
+
 def test_the_figure_against_weight_shows_the_base_beside_the_solid_plate(quarter, make_plate_result) -> None:
     comparison = compare([quarter, quarter.assign_attrs(areal_density=60.0)], ["a", "b"])
     figure = weight_figure(comparison)

@@ -33,6 +33,7 @@ plate = { material = "HHA Class 1", thickness = "6 mm" }
 hits = { count = 4 }
 """
 MEAN = "residual velocity, mean [m/s]"
+LAYER = '[[layer]]\ngap = "100 mm"\nthickness = "6 mm"\nresistance = "1 GPa"\n'
 
 
 def read(text: str = TEXT) -> Campaign:
@@ -79,6 +80,9 @@ def test_a_row_is_a_run_of_the_changed_campaign() -> None:
         "friction η = 0": TEXT.replace("shear_coefficient = 0.05", "shear_coefficient = 0"),
         "2° of yaw": TEXT.replace("[impact]", '[impact]\nyaw = "2 deg"'),
     }
+    by_number = sensitivity(read(TEXT + LAYER), hits=16, measures=["P(base_pierced)", "mean(base_depth)"], device="cpu")
+    assert by_number.iloc[:, 0].between(0.0, 1.0).all()  # no probability above 1, no depth beyond the base of 6 mm
+    assert by_number.iloc[:, 1].between(0.0, 6.0).all()
     for name, text in texts.items():
         alone = float(run(read(text), device="cpu").residual_velocity.mean())
         assert table.loc[name, MEAN] == pytest.approx(alone, rel=1e-6), name
