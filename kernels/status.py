@@ -15,7 +15,8 @@ class Status(IntEnum):
     PERFORATED = 0
     ARRESTED = 1
     RICOCHETED = 2
-    MISSED = 3
+    UNTOUCHED = 3
+    MISSED = 3  # in kernels
     UNFINISHED = 4
     LEFT_WINDOW = 5
     NOT_FINITE = 6
@@ -39,7 +40,7 @@ _SENTENCES = {
     Status.PERFORATED: "The core touched the target and left it through the rear face.",
     Status.ARRESTED: "The core came to rest in the target, or stays between two of its layers.",
     Status.RICOCHETED: "The core touched the target and left it through the front face.",
-    Status.MISSED: "The core passed without touching material.",
+    Status.UNTOUCHED: "The core passed without touching material.",
     Status.UNFINISHED: "The core was still in the target when the step limit was reached.",
     Status.LEFT_WINDOW: "The core left the largest window of the plate that memory allows.",
     Status.NOT_FINITE: "The motion became infinite or undefined.",

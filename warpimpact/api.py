@@ -10,7 +10,7 @@ from .export.spreadsheet import to_dataframe
 from .firing.v50 import v50
 from .optimisation.optimise import optimise
 from .results.files import open_result
-from .runs.executor import executor_for
+from .runs.computer import computer
 from .runs.replay import replay
 from .runs.run import run, run_to_file
 from .scene import (
@@ -46,7 +46,7 @@ __all__ = [
     "Scene",
     "SlotPattern",
     "compare",
-    "executor_for",
+    "computer",
     "hit_map",
     "make_shots",
     "material",

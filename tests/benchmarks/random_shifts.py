@@ -54,7 +54,7 @@ class Shift(NamedTuple):
 
 def columns(outcomes: Outcomes) -> tuple[Array, Array]:
     """Residual velocities [m/s] and last tilts [degree] of the cores that passed, NaN of others."""
-    passed = np.isin(outcomes.status, [Status.PERFORATED, Status.MISSED])
+    passed = np.isin(outcomes.status, [Status.PERFORATED, Status.UNTOUCHED])
     velocity, tilt = outcomes.residual_velocity, np.degrees(outcomes.tilt[:, -1])
     return np.where(passed, velocity, np.nan), np.where(passed, tilt, np.nan)
 

@@ -116,10 +116,10 @@ def test_shot_starts_with_its_foremost_point_at_the_front_face(core: Core) -> No
         (SOLID, {}, Status.PERFORATED),
         (HARD, {}, Status.ARRESTED),
         (SOLID, {"velocity": 300.0, "obliquity": 1.4}, Status.RICOCHETED),
-        (HOLES, {}, Status.MISSED),
-        (HOLES, {"hit_y": 40e-3, "hit_z": -60e-3}, Status.MISSED),
+        (HOLES, {}, Status.UNTOUCHED),
+        (HOLES, {"hit_y": 40e-3, "hit_z": -60e-3}, Status.UNTOUCHED),
         (HOLES, {"hit_y": 10e-3}, Status.PERFORATED),
-        (SOLID.model_copy(update={"size": (10e-3, 30e-3)}), {"hit_y": 9e-3}, Status.MISSED),
+        (SOLID.model_copy(update={"size": (10e-3, 30e-3)}), {"hit_y": 9e-3}, Status.UNTOUCHED),
         (SOLID.model_copy(update={"size": (10e-3, 30e-3)}), {"hit_z": 9e-3}, Status.PERFORATED),
         (SMALL, {"hit_y": -7.5e-3}, Status.PERFORATED),  # 2.5 mm beside the plate, the core 3 mm
         (SMALL, {"hit_z": 9e-3, "obliquity": 0.25 * np.pi, "azimuth": -0.5 * np.pi}, Status.PERFORATED),
@@ -131,9 +131,9 @@ def test_status_tells_how_the_shot_ended(plate: Plate, shot: dict[str, float], s
     speed, initial = outcomes.residual_velocity[0], shot.get("velocity", 825.0)
     for name in ("tilt", "pitch", "yaw", "total_yaw"):
         seen = np.isfinite(getattr(outcomes, name)).all()
-        assert seen == (status in (Status.PERFORATED, Status.MISSED)), name
+        assert seen == (status in (Status.PERFORATED, Status.UNTOUCHED)), name
     assert np.isfinite(outcomes.deflection[0]) == (status != Status.ARRESTED)
-    if status is Status.MISSED:
+    if status is Status.UNTOUCHED:
         assert speed == pytest.approx(initial, rel=1e-6)
         assert outcomes.contact_duration[0] == 0.0
         assert outcomes.tilt[0, 0] == pytest.approx(0.0, abs=1e-5)

@@ -177,7 +177,7 @@ def _defined(report: Outcomes, shot: int, status: Status) -> bool:
     return bool(
         np.isfinite(scalars).all()
         and np.isfinite(report.angular_velocity[shot]).all()
-        and (seen == passed or status is Status.MISSED)
+        and (seen == passed or status is Status.UNTOUCHED)
     )
 
 

@@ -123,7 +123,7 @@ def test_a_layer_that_is_missed_changes_nothing(device: str) -> None:
     nearer = layered(slots, missed.model_copy(update={"gap": 1e-6}), **scene)
     for name in ("status", "residual_velocity", "deflection"):
         np.testing.assert_array_equal(getattr(nearer, name), getattr(plain, name), err_msg=name)
-    assert (plain.layer_status[:, 1] == Status.MISSED).all()
+    assert (plain.layer_status[:, 1] == Status.UNTOUCHED).all()
     assert_alike(plain, simulate(slots, **scene), velocity=1e-3, angle=np.inf)  # stand-offs lie behind all layers
     between = layered(slots, missed, base.model_copy(update={"gap": 11e-3}), **scene)
     without = layered(slots, base, **scene)
@@ -218,5 +218,5 @@ def test_a_core_that_slides_between_layers_stays_there(device: str, monkeypatch:
     outcomes = layered(front, base, shots=shots, device=device, level=0)
     assert (outcomes.status == Status.ARRESTED).all()
     assert (outcomes.stopped_in == -1).all()
-    assert (outcomes.layer_status == [Status.MISSED, Status.RICOCHETED]).all()
+    assert (outcomes.layer_status == [Status.UNTOUCHED, Status.RICOCHETED]).all()
     assert np.abs(outcomes.exit_position[:, 1]).min() > 1.0

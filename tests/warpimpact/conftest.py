@@ -16,7 +16,7 @@ from warpimpact.records.outcomes import Outcomes
 from warpimpact.results.dataset import to_dataset
 from warpimpact.results.kinds import HIT_MAP
 from warpimpact.results.variables import SHOT_VARIABLES
-from warpimpact.runs import shards
+from warpimpact.runs import chunks, compute
 from warpimpact.scene import AnyPattern, ConeCore, Shots, SquarePattern
 
 STANDOFFS = np.array([0.05, 0.13])
@@ -50,8 +50,8 @@ def outcomes_of(status: np.ndarray) -> Outcomes:
     """Outcomes that differ from hit to hit; NaN where a status has no value."""
     n = len(status)
     ramp = np.linspace(0.1, 1.0, n)
-    moves = np.isin(status, [Status.PERFORATED, Status.MISSED, Status.RICOCHETED])
-    behind = np.isin(status, [Status.PERFORATED, Status.MISSED])[:, None]
+    moves = np.isin(status, [Status.PERFORATED, Status.UNTOUCHED, Status.RICOCHETED])
+    behind = np.isin(status, [Status.PERFORATED, Status.UNTOUCHED])[:, None]
     angles = np.where(behind, ramp[:, None] * [0.5, 1.5], np.nan)
     return Outcomes(
         status=status.astype(np.int8),
@@ -108,6 +108,7 @@ def plate_result(
         "status": np.full(hits, status, dtype=np.int8),
         "impact_velocity": np.full(hits, 1000.0),
         "residual_velocity": velocity,
+        "mass": np.full(hits, CYLINDER.mass_properties.mass),
     }
     tilts = np.stack([np.zeros(hits), np.broadcast_to(tilt, hits)], axis=1)
     places = np.linspace(-0.5, 0.5, hits)
@@ -168,11 +169,11 @@ def unrendered(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 @pytest.fixture(scope="module")
-def small_shards() -> Iterator[None]:
-    """Shards as in small_shards.py."""
+def small_chunks() -> Iterator[None]:
+    """Chunks as in small_chunks.py."""
     with pytest.MonkeyPatch.context() as patched:
-        patched.setattr(shards, "FEWEST", 256)
-        patched.setattr(shards, "HELD", 0.0)
+        patched.setattr(compute, "FEWEST", 256)
+        patched.setattr(chunks, "HELD_SECONDS", 0.0)
         yield
 
 

@@ -56,7 +56,7 @@ def measure_data(
     dataset: xarray.Dataset, measures: Sequence[Measure], confidence: float = 0.95
 ) -> Iterator[MeasureData]:
     """Measures one after the other. Of an open file, one slice at a time and one number per hit are in memory."""
-    needed = (v.STATUS, *v.GROUPS["finer"], *(name for measure in measures for name in measure.quantity.of))
+    needed = (v.STATUS, *v.FINER, *(name for measure in measures for name in measure.quantity.of))
     pair = finer_pair(dataset[[name for name in dict.fromkeys(needed) if name in dataset]])
     options: Estimating = {**dealing(dataset), "confidence": confidence}
     key, by_hit = None, np.empty(0)

@@ -290,7 +290,7 @@ def breaks_promise(dataset: xarray.Dataset) -> bool:
 
 def hits_at_two_levels(dataset: xarray.Dataset) -> int:
     """Number of hits of a result that were computed at a finer level, too, for the shift by the numerics."""
-    pair = finer_pair(dataset[[v.STATUS, *(name for name in v.GROUPS["finer"] if name in dataset)]])
+    pair = finer_pair(dataset[[v.STATUS, *(name for name in v.FINER if name in dataset)]])
     return 0 if pair is None else pair[0].sizes["hit"]
 
 

@@ -18,13 +18,14 @@ from warpimpact.results import files
 from warpimpact.results import variables as v
 from warpimpact.results.files import ResultError
 from warpimpact.results.references import as_plates
+from warpimpact.runs.computer import computer
 from warpimpact.runs.run import run_to_file
 from warpimpact.studies.sensitivity import plate_sensitivity, reversals
 
 from .messages import warn
 from .paths import PICTURES, check_folder, check_output, named
 from .progress import Step, show_progress, show_run
-from .run import executor_of, failure_code
+from .run import failure_code
 
 
 def compare_command(arguments: argparse.Namespace) -> int:
@@ -108,17 +109,17 @@ def _plates_run(arguments: argparse.Namespace, folder: Path) -> dict[str, Path]:
     check_folder(folder)
     campaigns = read_plates(arguments.files[0], count=arguments.count)
     paths = {name: folder / f"{name}.nc" for name in campaigns}
-    with executor_of(arguments) as executor:
+    with computer(arguments.device, workers=arguments.workers, scheduler=arguments.scheduler, warn=warn) as device:
         for name, campaign in campaigns.items():
             print(f"plate {name}", file=sys.stderr)
             with show_run(arguments) as progress:
                 run_to_file(
                     campaign,
                     paths[name],
-                    device=executor,
+                    device=device,
                     resume=arguments.resume or (paths[name].exists() and not arguments.overwrite),
                     overwrite=arguments.overwrite,
                     progress=progress,
-                    tell=warn,
+                    warn=warn,
                 )
     return paths

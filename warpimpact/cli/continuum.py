@@ -13,17 +13,14 @@ from warpimpact.campaign.text import CampaignError
 from warpimpact.results import attributes as attr
 from warpimpact.results import files
 from warpimpact.results.dataset import hit_numbers
-from warpimpact.results.files import opened
-from warpimpact.runs.executor import executor_for
 from warpimpact.runs.finite_elements import continuum_to_file
 from warpimpact.runs.replay import campaign_in
 from warpimpact.scene.problems import complaint
 from warpimpact.solver.simulate import spread_places
 
-from .messages import warn
 from .paths import check_output
 from .progress import Step, show_progress
-from .run import failure_code
+from .run import computing, failure_code
 
 
 def continuum_command(arguments: argparse.Namespace) -> int:
@@ -31,22 +28,18 @@ def continuum_command(arguments: argparse.Namespace) -> int:
     output = arguments.output or Path(f"{arguments.file.stem}_continuum.nc")
     check_output(output, ".nc", overwrite=True)
     campaign = campaign.computed_by(_elements(arguments, campaign))
-    computing = executor_for(arguments.device, workers=arguments.workers, scheduler=arguments.scheduler, apart=True)
-    with show_progress(arguments) as show, computing as executor:
+    with show_progress(arguments) as show:
         try:
             continuum_to_file(
                 campaign,
                 output,
                 hits=hits,
-                device=executor,
-                resume=arguments.resume,
-                overwrite=arguments.overwrite,
                 progress=lambda done, resumed, total: show(Step(done, total, resumed)),
-                tell=warn,
+                **computing(arguments),
             )
         except ValueError as error:
             raise CampaignError(f"{arguments.file}: {error}") from None
-    with opened(output) as dataset:
+    with files.opened(output) as dataset:
         print(summary_text(dataset))
         print(dataset.attrs[attr.CATALOGUE_NAMES])
         computer = "core" if dataset.attrs[attr.DEVICE].startswith("cpu") else "GPU"

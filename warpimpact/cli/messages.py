@@ -91,7 +91,7 @@ def message_of(error: Exception) -> str | None:
     """Return the message for an error that the user can correct; None for a bug."""
     from warpimpact.campaign.text import CampaignError
     from warpimpact.results.files import OutputError, ResultError
-    from warpimpact.runs.executor import ClusterError
+    from warpimpact.runs.computer import ClusterError
     from warpimpact.solver.device import DeviceError
     from warpimpact.solver.resolution import TooManySteps
 

@@ -105,7 +105,7 @@ class _Display:
 def _pilot(run: RunProgress) -> str:
     if not run.piloting:
         return ""
-    return "a pilot looks for the resolution" + ("" if run.trying is None else f", level {run.trying}")
+    return "a pilot looks for the resolution" + ("" if run.level is None else f", level {run.level}")
 
 
 def _running(run: RunProgress) -> str:

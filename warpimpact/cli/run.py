@@ -3,16 +3,15 @@
 import argparse
 from contextlib import AbstractContextManager
 from pathlib import Path
+from typing import Any
 
-from xarray import Dataset
+import xarray
 
 from warpimpact.analysis.inspection import promise_text, range_note, summary_text, symmetry_text
 from warpimpact.campaign.campaign import Campaign
 from warpimpact.results import attributes as attr
+from warpimpact.results import files
 from warpimpact.results.dataset import failed
-from warpimpact.results.files import opened
-from warpimpact.results.table import HitTable
-from warpimpact.runs.compute import HIT_MAP, Computation
 from warpimpact.runs.executor import Executor, executor_for
 from warpimpact.runs.run import run_to_file
 
@@ -25,8 +24,9 @@ def run_command(arguments: argparse.Namespace) -> int:
     campaign = Campaign.from_toml(arguments.campaign, count=arguments.count)
     output = arguments.output or Path(arguments.campaign.stem + ".nc")
     check_output(output, ".nc", overwrite=True)
-    run_shown(campaign, output, arguments)
-    with opened(output) as dataset:
+    with show_run(arguments) as progress:
+        run_to_file(campaign, output, progress=progress, **computing(arguments))
+    with files.opened(output) as dataset:
         print(summary_text(dataset))
         if attr.SYMMETRIES in dataset.attrs:
             print(symmetry_text(dataset))
@@ -39,26 +39,10 @@ def run_command(arguments: argparse.Namespace) -> int:
         return failure_code(dataset, output)
 
 
-def run_shown(
-    campaign: Campaign, output: Path, arguments: argparse.Namespace, computation: Computation | None = None
-) -> None:
-    """Compute every hit of a campaign into a file as the options say, and show the progress.
-
-    Args:
-        arguments: parsed options of the command.
-        computation: what is computed of every hit; a hit map if None.
-    """
-    with show_run(arguments) as progress, executor_of(arguments) as executor:
-        run_to_file(
-            campaign,
-            output,
-            device=executor,
-            computation=computation or HIT_MAP,
-            resume=arguments.resume,
-            overwrite=arguments.overwrite,
-            progress=progress,
-            tell=warn,
-        )
+def computing(arguments: argparse.Namespace) -> dict[str, Any]:
+    """The options of a computation into a file, as `run_to_file` takes them."""
+    names = ("device", "workers", "scheduler", "resume", "overwrite")
+    return {name: getattr(arguments, name) for name in names} | {"warn": warn}
 
 
 def executor_of(arguments: argparse.Namespace) -> AbstractContextManager[Executor]:
@@ -66,7 +50,7 @@ def executor_of(arguments: argparse.Namespace) -> AbstractContextManager[Executo
     return executor_for(arguments.device, workers=arguments.workers, scheduler=arguments.scheduler)
 
 
-def failure_code(dataset: HitTable | Dataset, path: Path) -> int:
+def failure_code(dataset: xarray.Dataset, path: Path) -> int:
     """Return 3, with a message, if more shots failed than the campaign allows; else 0."""
     share = float(failed(dataset).mean())
     allowed = dataset.attrs[attr.FAILED_SHARE]

@@ -30,10 +30,11 @@ from warpimpact.plotting.sweep import sweep_figure
 from warpimpact.results import files, front
 from warpimpact.results.kinds import FRONT, SWEEP
 from warpimpact.results.posterior_file import INTERRUPTED
+from warpimpact.runs.computer import computer
 from warpimpact.runs.executor import executor_for
 from warpimpact.scene.units import PositiveLength, PositiveSpeed, quantity
 from warpimpact.solver.device import cores, find_device
-from warpimpact.studies.limit import LimitMap, warning_of
+from warpimpact.studies.limit import check_measures, limit_to_file, warning_of
 from warpimpact.studies.limit_view import limit_view
 from warpimpact.studies.sensitivity import largest_move, sensitivity
 from warpimpact.studies.sweep import folder_of as points_of
@@ -42,7 +43,7 @@ from warpimpact.studies.sweep import read_sweep, run_sweep, sweep_view
 from .messages import say, warn
 from .paths import PICTURES, check_output, replaces, write_text
 from .progress import Step, show_progress, show_run
-from .run import executor_of, failure_code, run_shown
+from .run import computing, executor_of, failure_code
 
 
 def limit_command(arguments: argparse.Namespace) -> int:
@@ -52,11 +53,19 @@ def limit_command(arguments: argparse.Namespace) -> int:
     picture = output.with_suffix(".png")
     check_output(output, ".nc", overwrite=True)
     check_output(picture, *PICTURES, overwrite=replaces(arguments, output))
-    computation = LimitMap.of(campaign, arguments.quantity, _tolerance(arguments), arguments.layer)
-    computation.check(arguments.measure)
+    check_measures(arguments.measure, arguments.quantity)
     if sentence := warning_of(campaign, arguments.quantity):
         warn(sentence)
-    run_shown(campaign, output, arguments, computation)
+    with show_run(arguments) as progress:
+        limit_to_file(
+            campaign,
+            output,
+            arguments.quantity,
+            tolerance=_tolerance(arguments),
+            layer=arguments.layer,
+            progress=progress,
+            **computing(arguments),
+        )
     dataset = files.read(output)
     print(text_of(limit_view(dataset, arguments.measure)))
     for line in range_note({"": dataset}, str(output)):
@@ -88,7 +97,10 @@ def sweep_command(arguments: argparse.Namespace) -> None:
     check_output(output, ".nc", overwrite=True)
     check_output(picture, *PICTURES, overwrite=replaces(arguments, output))
 
-    with show_run(arguments) as follow, executor_of(arguments) as executor:
+    with (
+        show_run(arguments) as follow,
+        computer(arguments.device, workers=arguments.workers, scheduler=arguments.scheduler, warn=warn) as device,
+    ):
 
         def named(name: str) -> Any:
             print(f"point {name}", file=sys.stderr)
@@ -97,11 +109,11 @@ def sweep_command(arguments: argparse.Namespace) -> None:
         run_sweep(
             sweep,
             output,
-            device=executor,
+            device=device,
             resume=arguments.resume,
             overwrite=arguments.overwrite,
             progress=named,
-            tell=warn,
+            warn=warn,
         )
     dataset = files.read(output, SWEEP)
     print(text_of(sweep_view(dataset, arguments.measure)))
@@ -154,9 +166,8 @@ def _simulate(arguments: argparse.Namespace) -> None:
     picture, resume, overwrite = output.with_suffix(".png"), arguments.resume, arguments.overwrite
     check_output(output, ".nc", overwrite=overwrite or resume)
     check_output(picture, overwrite=overwrite or resume)
-    with executor_of(arguments) as executor, show_run(arguments) as progress:
-        options = {"resume": resume, "overwrite": overwrite, "progress": progress, "tell": warn}
-        response = response_of(test, output, executor=executor, count=arguments.count, **options)
+    with show_run(arguments) as progress:
+        response = response_of(test, output, count=arguments.count, progress=progress, **computing(arguments))
     dataset = simulate_test(test, response)
     files.write(dataset, output)
     print(text_of(firing_view(dataset)))

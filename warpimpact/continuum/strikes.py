@@ -182,7 +182,7 @@ def _fill_passage(memory: Memory, hits: list[Struck]) -> None:
 
 def _layer_status(status: Status, has_left: bool, touched: bool) -> Status:
     if has_left:
-        return Status.PERFORATED if touched else Status.MISSED
+        return Status.PERFORATED if touched else Status.UNTOUCHED
     if not touched:
         return Status.NOT_REACHED
     return status if status.failed or status is Status.ARRESTED else Status.RICOCHETED

@@ -25,14 +25,12 @@ from warpimpact.results import variables as v
 from warpimpact.results.dataset import dataset_of, failed
 from warpimpact.results.kinds import FIRING
 from warpimpact.results.measures import dealing
-from warpimpact.runs.executor import Executor
-from warpimpact.runs.run import run_to_file
 from warpimpact.scene.model import Array
 from warpimpact.scene.sampling import stream
 from warpimpact.statistics.acceptance import acceptance
 from warpimpact.statistics.intervals import Estimate, Estimating, estimate_of
 from warpimpact.statistics.quantal import fit_quantal, likelihood_interval
-from warpimpact.studies.limit import LimitMap
+from warpimpact.studies.limit import limit_to_file
 
 QUANTILES = (0.5, 0.05, 0.01)
 """Shares of perforations whose velocities are given: V50, V05, V01."""
@@ -84,14 +82,12 @@ def response_of_limits(dataset: xarray.Dataset) -> Response:
     return Response(limits, dealt)
 
 
-def response_of(
-    test: FiringTest, output: Path, *, executor: Executor, count: int | None = None, **options: Any
-) -> Response:
+def response_of(test: FiringTest, output: Path, *, count: int | None = None, **options: Any) -> Response:
     """The response of the target of a test. The limits of a campaign are searched into OUTPUT_limits.nc.
 
     Args:
         count: number of hits of the campaign, instead of that in the file.
-        options: `resume`, `overwrite`, `progress` and `tell` of `run_to_file`.
+        options: as in `run_to_file`.
 
     Raises:
         CampaignError: the file that the target names gives no response.
@@ -102,9 +98,7 @@ def response_of(
         limits = output.with_name(f"{output.stem}_limits.nc")
         listed = Campaign.from_toml(test.target.campaign).hits.listed is not None
         campaign = Campaign.from_toml(test.target.campaign, count=None if listed else count or test.target.count)
-        run_to_file(
-            campaign, limits, device=executor, computation=LimitMap.of(campaign, tolerance=TOLERANCE), **options
-        )
+        limit_to_file(campaign, limits, tolerance=TOLERANCE, **options)
     assert limits is not None
     dataset = files.read(limits)
     try:

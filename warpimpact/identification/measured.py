@@ -136,7 +136,7 @@ def read_measured(given: Any, standoffs: Sequence[float], place: str) -> tuple[t
             hint = meant(name, (*MEASURABLE, "status"))
             raise FitError(f"{place}: got the unknown key {quoted(name)}; {hint}")
         observations += _numbers(name, value, standoffs, f"{place}.{name}")
-    if status not in (None, "perforated", "missed") and observations:
+    if status not in (None, "perforated", "untouched") and observations:
         raise FitError(
             f'{place}.status: "{status}" and {observations[0].label} cannot be combined: only a core that passed the '
             "plate has that number"

@@ -16,7 +16,7 @@ from warpimpact.campaign.resistances import resistance_by_thickness
 from warpimpact.optimisation.design import Design
 from warpimpact.records.variable import failures
 from warpimpact.results import variables as v
-from warpimpact.results.dataset import narrow_table
+from warpimpact.results.dataset import narrow_dataset
 from warpimpact.results.measures import Measure
 from warpimpact.runs.executor import Job
 from warpimpact.runs.questions import Arrays, Question, Round
@@ -110,7 +110,7 @@ def _columns_computed(
 
         marched = simulate_many(scenes, Numerics.model_validate_json(level), worker, progress)
         for number, (scene, of_job), outcomes in zip(same, scenes, marched, strict=True):
-            table = narrow_table(scene, of_job, outcomes, needed)
+            table = narrow_dataset(scene, of_job, outcomes, needed)
             columns[number] = np.array([_column(measure, table) for measure in design.columns])
         done += sum(len(of_job) for _, of_job in scenes)
     ended = count(1)

@@ -18,6 +18,7 @@ from warpimpact.records.variable import (
 )
 
 STATUS = Variable("status", HITS, "1", "how the shot ended", flags=OF_SHOTS)
+PERFORATED = Variable("perforated", HITS, "1", "whether the core came through: it perforated, or touched nothing")
 RESIDUAL_VELOCITY = Variable("residual_velocity", HITS, "m s-1", "residual velocity", shown_by=MAIN)
 DEFLECTION = Variable("deflection", HITS, "degree", "angle between residual velocity and line of fire", shown_by=MAIN)
 ANGULAR_VELOCITY = Variable("angular_velocity", VECTORS, "rad s-1", "angular velocity at the end of contact")
@@ -54,7 +55,9 @@ def _exits(returned: Returned) -> Columns:
     return {name: np.where(returned.failed[:, None], np.nan, values) for name, values in state.items()}
 
 
-OUTCOME_VARIABLES = VariableGroup("How the shot ended", (STATUS, *_OF_FLIGHT), lambda scene, shots: True, _ends)
+OUTCOME_VARIABLES = VariableGroup(
+    "How the shot ended", (STATUS, PERFORATED, *_OF_FLIGHT), lambda scene, shots: True, _ends
+)
 EXIT_VARIABLES = VariableGroup(
     "At the end of contact", (EXIT_VELOCITY, EXIT_AXIS, EXIT_POSITION), lambda scene, shots: True, _exits
 )

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpimpact.records import registry
+from warpimpact.records.variable import came_through
 
 if TYPE_CHECKING:
     from warpimpact.records.variable import Returned
@@ -63,6 +64,11 @@ class Outcomes:
 
     def __repr__(self) -> str:
         return f"{type(self).__name__} of {len(self)} shots: {', '.join(vars(self))}"
+
+    @property
+    def perforated(self) -> NDArray[np.bool_]:
+        """Whether each core came through the target: it perforated, or touched nothing."""
+        return came_through(self.status)
 
     def assign(self, **columns: NDArray[Any]) -> Self:
         """A copy with these columns added or replaced."""

@@ -122,6 +122,11 @@ def failures(status: NDArray[Any]) -> NDArray[np.bool_]:
     return np.isin(status, [code for code in Status if code.failed])
 
 
+def came_through(status: NDArray[Any]) -> NDArray[np.bool_]:
+    """Whether each core came through, by its status: it perforated, or touched nothing; same shape."""
+    return np.isin(status, [Status.PERFORATED, Status.UNTOUCHED])
+
+
 @dataclass(frozen=True)
 class VariableGroup(Collection[Variable]):
     """Variables that are recorded together.

@@ -7,27 +7,22 @@ and opens with plain ``xarray.open_dataset``.
 from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Mapping
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+import xarray
+from numpy.typing import NDArray
 
-from warpimpact.kernels.status import Status
-from warpimpact.records.variable import failures
+from warpimpact.records.outcomes import Outcomes
+from warpimpact.records.variable import came_through, failures
 from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
 from warpimpact.results.kinds import HISTORY, HIT_MAP
-from warpimpact.results.layers import faces, in_memory, labels, outlines_in, own_columns, sections
-from warpimpact.results.table import HitTable
-
-if TYPE_CHECKING:
-    import xarray
-    from numpy.typing import NDArray
-
-    from warpimpact.records.outcomes import Outcomes
-    from warpimpact.results.table import AResult, Result
-    from warpimpact.scene import Scene, Shots
-    from warpimpact.solver.replay import Replay
-
+from warpimpact.results.layers import faces, labels, outlines_in, own_columns, sections
+from warpimpact.scene import Scene, Shots
+from warpimpact.scene.quantities import BY_LAYER, QUANTITIES
+from warpimpact.scene.units import reader_in, typed
+from warpimpact.solver.replay import Replay
 
 _ATTRIBUTES = {
     attr.KIND: HIT_MAP.mark,
@@ -45,62 +40,62 @@ _CORE_STATIONS, _SECTION_POINTS = 101, 1601
 """Points of a core's profile and of a section of the plate in a history."""
 
 
-def to_table(
+def to_dataset(
     scene: Scene,
     shots: Shots,
     outcomes: Outcomes,
     *,
     period: tuple[float, float],
     attributes: Mapping[str, Any],
+    numbers: NDArray[Any] | None = None,
     double: bool = False,
     finer: Mapping[str, Any] | None = None,
     left_out: Collection[str] = (),
-) -> HitTable:
-    """Gather shots and outcomes into the columns of the hit map.
-
-    Hits are numbered from 0. The outlines of the holes are coordinates, so that no choice of hits repeats them per hit.
+) -> xarray.Dataset:
+    """Gather scene, shots and outcomes into the Dataset of the hit map.
 
     Args:
         outcomes: of the shots, SI and radians; NaN where there is no value.
         period: extent (y, z) of the unit cell [m], centred on the origin, over which hits and holes are drawn.
         attributes: global attributes of the run.
+        numbers: numbers of the hits in their campaign; by default from 0 on.
         double: whether the outcomes were computed in double precision. If not, they are stored in single precision;
             shots are always double.
         finer: columns of hits at a finer level, v.FINER_VARIABLES, SI and radians.
         left_out: variables that are not stored.
     """
     coordinates: dict[str, Any] = {
-        v.HIT: np.arange(len(shots), dtype=np.int32),
+        v.HIT: np.arange(len(shots), dtype=np.int32) if numbers is None else numbers.astype(np.int32),
         v.HIT_Y: shots.hit_y,
         v.HIT_Z: shots.hit_z,
         v.STANDOFF: np.array(scene.record.standoffs),
         v.AXIS: ["x", "y", "z"],
+        **(finer or {}),
+        **labels(scene.target),
     }
-    coordinates |= finer or {}
-    coordinates |= outlines_in(scene.target.layers[0], *((-0.5 * side, 0.5 * side) for side in period))
-    coordinates |= labels(scene.target)
-    along = (*v.COORDINATES, *v.OUTLINE_VARIABLES, *v.LAYER_LABELS, *v.GROUPS["finer"])
+    along = (name for name in (*v.COORDINATES, *v.LAYER_LABELS, *v.FINER) if name in coordinates)
     values = _values(scene, shots, outcomes)
     values[v.EDGE_DISTANCE] = scene.target.layers[0].edge_distance(shots.hit_y, shots.hit_z)
     zero = np.zeros(len(shots))
     values[v.EXIT_POSITION] = outcomes.exit_position + np.stack([zero, shots.hit_y, shots.hit_z], axis=-1)
     variables = (name for name in v.hit_variables() if name in values and name not in left_out)
-    single = () if double else _computed()
-    return HitTable.of(
-        stored_columns(variables, values, single),
-        stored_columns((name for name in along if name in coordinates), coordinates, single),
+    single = () if double else v.computed_variables()
+    columns = stored_columns(variables, values, single)
+    return xarray.Dataset(
+        columns,
+        {name: column for name, column in scene_columns(scene).items() if name not in columns}
+        | stored_columns(along, coordinates, single),
         _ATTRIBUTES | attr.with_units(dict(attributes) | {attr.PLATE_PERIOD: np.array(period)}),
     )
 
 
-def narrow_table(scene: Scene, shots: Shots, outcomes: Outcomes, names: Collection[str]) -> HitTable:
-    """Some columns of `to_table`, if the outcomes have them, with stand-offs and the core, for computations with many
-    small results at once."""
-    values = _values(scene, shots, outcomes)
+def narrow_dataset(scene: Scene, shots: Shots, outcomes: Outcomes, names: Collection[str]) -> xarray.Dataset:
+    """Some columns of `to_dataset`, with stand-offs and the core, for computations with many small results."""
+    values = {v.MASS: scene.core.mass_properties.mass, **_values(scene, shots, outcomes)}
     kept = [name for name in (*v.hit_variables(), *v.LAYER_FACES) if name in names and name in values]
     coordinates: dict[Any, Any] = {v.HIT: np.arange(len(shots)), v.STANDOFF: np.array(scene.record.standoffs)}
     attributes = {attr.CORE: scene.core.model_dump_json()}
-    return HitTable.of(stored_columns(kept, values), stored_columns(coordinates, coordinates), attributes)
+    return xarray.Dataset(stored_columns(kept, values), stored_columns(coordinates, coordinates), attributes)
 
 
 def _values(scene: Scene, shots: Shots, outcomes: Outcomes) -> dict[str, Any]:
@@ -108,21 +103,45 @@ def _values(scene: Scene, shots: Shots, outcomes: Outcomes) -> dict[str, Any]:
     conditions: dict[str, Any] = {variable: getattr(shots, variable.field) for variable in v.SHOT_VARIABLES}
     columns = own_columns(scene.target, shots)
     conditions |= {name: columns[name] for name in v.SCATTER_VARIABLES if name in columns}
-    return conditions | vars(outcomes) | faces(scene.target)
+    return conditions | vars(outcomes) | {v.PERFORATED: outcomes.perforated} | faces(scene.target)
 
 
-def to_dataset(scene: Scene, shots: Shots, outcomes: Outcomes, **arguments: Any) -> xarray.Dataset:
-    """The Dataset of the hit map; the arguments are those of `to_table`."""
-    return in_memory(to_table(scene, shots, outcomes, **arguments).to_xarray())
+def scene_columns(scene: Scene) -> dict[str, tuple[Any, ...]]:
+    """Every input of a scene that is one number, as scalar coordinates (CF); those of several layers along "layer".
+
+    Coordinates stay as they are where hits are chosen by ``where``.
+    """
+    plate, core, properties = scene.target.layers[0], scene.core, scene.core.mass_properties
+    known = {str(variable): variable.long_name for variable in v.SCATTER_VARIABLES}
+    columns: dict[str, tuple[Any, ...]] = {
+        "core_length": ((), core.length, _described("m", "length of the core")),
+        "core_diameter": ((), 2.0 * core.max_radius, _described("m", "diameter of the core")),
+        v.MASS: ((), properties.mass, _described("kg", v.MASS.long_name)),
+    }
+    models = {"": plate, "core": core, "pattern": plate.pattern, "interaction": scene.interaction}
+    if scene.interaction.free_surface is not None:
+        models["free_surface"] = scene.interaction.free_surface
+    for of, model in models.items():
+        for name, field in type(model).model_fields.items():
+            value, reader = getattr(model, name), reader_in(typed(field))
+            stored = name if (name in QUANTITIES and name != "density") or not of else f"{of}_{name}"
+            if stored in columns or reader is None or not isinstance(value, float):
+                continue
+            units = reader.display.stored
+            meaning = known.get(stored, f"{name} of the {of.replace('_', ' ') or 'plate'}, as in a campaign")
+            columns[stored] = ((), np.degrees(value) if units == "degree" else value, _described(units, meaning))
+    if len(scene.target.layers) > 1:
+        for name, variable in zip(BY_LAYER, v.LAYER_SCATTER, strict=True):
+            values = [scene.target.value(name, layer) for layer in range(len(scene.target.layers))]
+            columns[variable] = (("layer",), np.array(values), variable.attributes)
+    return {str(name): column for name, column in columns.items()}
 
 
-def _computed() -> set[v.Variable]:
-    """Variables that are stored in single precision unless computed in double precision."""
-    computed = v.computed_variables()
-    return computed | {name for name, variable in v.FINER_VARIABLES.items() if variable in computed}
+def _described(units: str, long_name: str) -> dict[str, str]:
+    return {"units": units, "long_name": long_name}
 
 
-def finer_pair(dataset: Result) -> tuple[Any, Any] | None:
+def finer_pair(dataset: xarray.Dataset) -> tuple[Any, Any] | None:
     """The hits of a result that were computed at a finer level, too, in memory: with their values in the result, and
     with those at the finer level. None if there are none."""
     if v.FINER_HIT not in dataset or v.HIT not in dataset.sizes:
@@ -142,21 +161,27 @@ def finer_pair(dataset: Result) -> tuple[Any, Any] | None:
         of_hits: (of_hits.dims, dataset[name].values[there], dict(dataset[of_hits].attrs))
         for name, of_hits in stored.items()
     }
-    return given, given.assign(changed)
+    finer = given.assign(changed)
+    return given, finer.assign({v.PERFORATED: (v.HITS, came_through(finer[v.STATUS].values))})
 
 
-def numbered(dataset: AResult, first: int = 0) -> AResult:
-    """A result whose hits have their numbers in the campaign, from `first` on."""
-    numbers = np.arange(first, first + dataset.sizes["hit"], dtype=np.int32)
-    return dataset.assign_coords(stored_columns((v.HIT,), {v.HIT: numbers}))
+def joined(chunks: Iterable[xarray.Dataset]) -> xarray.Dataset:
+    """Datasets of consecutive hits as one. Variables without hits, and attributes, are those of the first."""
+    first, *others = chunks
+    finer = first[[name for name in v.FINER if name in first]].coords
+    first = first.drop_vars([name for name in v.FINER if name in first])
+    hits = xarray.concat(
+        [first, *others], v.HIT, data_vars="minimal", coords="minimal", compat="override", join="override"
+    )
+    return hits.assign_coords({name: finer[name] for name in v.FINER if name in finer}).assign_attrs(first.attrs)
 
 
-def hit_numbers(dataset: Result) -> NDArray[np.int64]:
+def hit_numbers(dataset: xarray.Dataset) -> NDArray[np.int64]:
     """Numbers of the hits in their campaign, shape (hit,)."""
     return np.asarray(dataset[v.HIT].values)
 
 
-def is_choice(dataset: Result) -> bool:
+def is_choice(dataset: xarray.Dataset) -> bool:
     """Whether the hits differ from the first ones of the campaign in their order. Of an open file, one slice at a time
     is in memory."""
     if v.HIT not in dataset.coords:
@@ -216,7 +241,6 @@ def history_dataset(
 def dataset_of(columns: Mapping[v.Variable, Any], attributes: Mapping[str, Any]) -> xarray.Dataset:
     """The Dataset of a result that is no map of hits, from values in the units of their variables. Variables named as
     their dimension become coordinates."""
-    import xarray
 
     def stored(values: Any) -> NDArray[Any]:
         array = np.asarray(values)
@@ -232,29 +256,33 @@ def stored_columns(
     """Values in the units of the Dataset, with dimensions and attributes, as xarray takes them; those of the variables
     in `single` in single precision."""
     return {
-        str(variable): (variable.dims, _stored(variable, values[variable], variable in single), variable.attributes)
+        str(variable): (
+            variable.dims if np.ndim(values[variable]) else (),
+            _stored(variable, values[variable], variable in single),
+            variable.attributes,
+        )
         for variable in variables
     }
 
 
 def _stored(variable: v.Variable, values: Any, single: bool) -> Any:
-    if getattr(values, "dtype", None) == np.bool_:
-        return values.astype(np.int8)  # netCDF has no truth values
+    if getattr(values, "dtype", None) == np.bool_ and variable != v.PERFORATED:
+        return values.astype(np.int8)
     shown = np.degrees(values) if variable.units == "degree" else values
     return shown.astype(np.float32) if single and shown.dtype.kind == "f" else shown
 
 
-def status_codes(dataset: Result, variable: v.Variable = v.STATUS) -> dict[str, int]:
+def status_codes(dataset: xarray.Dataset, variable: v.Variable = v.STATUS) -> dict[str, int]:
     """Meaning → code of ``status``, or of ``layer_status``, in the order of the codes."""
     attributes = dataset[variable].attrs
     return dict(zip(attributes["flag_meanings"].split(), attributes["flag_values"].tolist(), strict=True))
 
 
-def passed(dataset: Result) -> NDArray[np.bool_]:
-    """Whether each core passed the plate, shape (hit,): it perforated the plate or missed its material."""
-    return np.isin(dataset[v.STATUS].values, [Status.PERFORATED, Status.MISSED])
+def passed(dataset: xarray.Dataset) -> NDArray[np.bool_]:
+    """Whether each core came through the target, shape (hit,)."""
+    return came_through(dataset[v.STATUS].values)
 
 
-def failed(dataset: Result) -> NDArray[np.bool_]:
+def failed(dataset: xarray.Dataset) -> NDArray[np.bool_]:
     """Whether the computation of each shot failed, shape (hit,)."""
     return failures(dataset[v.STATUS].values)

@@ -1,28 +1,27 @@
-"""Result files: written whole or not at all, joined from parts, read and checked."""
+"""Result files: written whole or not at all, appended from chunks, read and checked."""
 
 from __future__ import annotations
 
 import errno
+import math
 import os
 import shutil
-from collections.abc import Callable, Collection, Hashable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import Any
 
 import netCDF4
+import xarray
 
 from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
 from warpimpact.results.kinds import HIT_MAP, KINDS, SWEEP, Kind, text_kind
-from warpimpact.results.layers import in_a_file, in_memory
-from warpimpact.results.netcdf import FILE_CHUNK, write_table
 from warpimpact.results.references import NAMES, references_of, with_references
-from warpimpact.results.table import HitTable
 from warpimpact.scene.input_files import check_file, parsed, read_text
 
-if TYPE_CHECKING:
-    import xarray
+FILE_CHUNK = 2**15
+"""Most hits per chunk of a variable in a file: 256 KiB."""
 
 
 class OutputError(OSError):
@@ -34,25 +33,88 @@ class ResultError(ValueError):
 
 
 def write(dataset: xarray.Dataset, path: Path) -> None:
-    """Write the Dataset, with its references, to a netCDF file, whole or not at all; an existing file is replaced.
+    """Write a Dataset, with its references, to a netCDF file, whole or not at all; an existing file is replaced.
 
     Raises:
         OutputError: The file cannot be written; what was there before is untouched.
     """
+    write_joined([dataset], path)
+
+
+def write_joined(
+    chunks: Iterable[xarray.Dataset],
+    path: Path,
+    *,
+    attributes: Mapping[str, Any] | None = None,
+    references: Mapping[str, xarray.Dataset] | None = None,
+) -> None:
+    """Write Datasets of consecutive hits as one; one of them at a time is in memory.
+
+    Args:
+        attributes: global attributes, which replace those of the first one.
+        references: as in `with_references`; by default those of the first one.
+
+    Raises:
+        OutputError: The file cannot be written; what was there before is untouched.
+    """
+    remaining = iter(chunks)
+    first = next(remaining)
+    second = next(remaining, None)
     with aside(path) as file:
-        references = {name: HitTable.from_xarray(of_reference) for name, of_reference in references_of(dataset).items()}
-        write_table(in_a_file(HitTable.from_xarray(dataset)), file, references=references)
+        described = first.assign_attrs(attributes or {})
+        unlimited = [] if second is None else [v.HIT]
+        encoding = _encoding(first, FILE_CHUNK if unlimited else 0)
+        described.to_netcdf(file, engine="netcdf4", encoding=encoding, unlimited_dims=unlimited)
+        if second is not None:
+            with netCDF4.Dataset(file, "a") as target:
+                _prepare(target)
+                while second is not None:
+                    _append(second, target)
+                    second = next(remaining, None)
+        for name, reference in (references_of(first) if references is None else references).items():
+            # xarray crashes when it reads and closes groups with strings again and again.
+            strings = [label for label, column in reference.variables.items() if column.dtype.kind in "UOT"]
+            group = reference.drop_vars([*strings, *(name for name in v.FINER if name in reference)])
+            group.to_netcdf(file, "a", engine="netcdf4", group=name, encoding=_encoding(group))
+
+
+def _encoding(dataset: xarray.Dataset, chunk: int = 0) -> dict[Any, dict[str, Any]]:
+    """Compression of a Dataset, with chunks of so many hits; 0 stands for all hits, FILE_CHUNK at most."""
+    encoding: dict[Any, dict[str, Any]] = {}
+    for name, column in dataset.variables.items():
+        encoding[name] = {"_FillValue": None} if name in dataset.coords else {}  # CF: a coordinate misses no value
+        if column.ndim and column.size and column.dtype.kind in "ifb":
+            encoding[name] |= {"zlib": True, "complevel": 1}
+            hits = chunk if chunk and column.dims[0] == v.HIT else min(FILE_CHUNK, column.shape[0])
+            encoding[name]["chunksizes"] = (hits, *column.shape[1:])
+    return encoding
+
+
+def _prepare(target: Any) -> None:
+    """Let the cache of each variable, by default megabytes, hold two chunks."""
+    target.set_auto_maskandscale(False)
+    for variable in target.variables.values():
+        if variable.chunking() != "contiguous":
+            variable.set_var_chunk_cache(size=2 * math.prod(variable.chunking()) * variable.dtype.itemsize)
+
+
+def _append(dataset: xarray.Dataset, target: Any) -> None:
+    """Append hits to an open file."""
+    first = target.dimensions[v.HIT].size
+    for name, column in dataset.variables.items():
+        if v.HIT in column.dims:
+            variable = target[str(name)]
+            variable[first : first + column.shape[0]] = column.values.astype(variable.dtype)
 
 
 @contextmanager
-def aside(path: Path, folder: Path | None = None, *, named: Callable[[Path], Path] | None = None) -> Iterator[Path]:
-    """A temporary path on the same disk to write to. After the block the file is flushed and renamed to `path`, or to
-    `named(file)` if that is given. `folder` is where the temporary file lies; by default that of `path`.
+def aside(path: Path, *, named: Callable[[Path], Path] | None = None) -> Iterator[Path]:
+    """A temporary path beside `path`. After the block the file is flushed and renamed to it, or to `named(file)`.
 
     Raises:
         OutputError: The file cannot be written; what was there before is untouched.
     """
-    written = (folder or path.parent) / f".{path.name}.{os.getpid()}.part"
+    written = path.parent / f".{path.name}.{os.getpid()}.part"
     try:
         yield written
         _flush(written, os.O_RDWR)
@@ -90,7 +152,7 @@ def read(path: Path, kind: Kind = HIT_MAP) -> xarray.Dataset:
     Raises:
         ResultError: The file is missing, is not netCDF, or is not of this kind.
     """
-    with opened(path, kind) as dataset, readable(path):
+    with opened(path, kind) as dataset:
         loaded = dataset.load()
     return loaded.set_xindex(v.HIT) if kind in (HIT_MAP, SWEEP) else loaded
 
@@ -118,10 +180,8 @@ def open_result(path: str | Path, group: str | None = None) -> xarray.Dataset:
 def opened(path: Path, *kinds: Kind) -> Iterator[xarray.Dataset]:
     """Open a file of one of these kinds (by default a map of hits). Values are read when they are used.
 
-    Damage that the library finds, now or when values are read, is raised as a sentence.
-
     Raises:
-        ResultError: The file is missing, is not netCDF, or is of no such kind.
+        ResultError: The file is missing, is damaged, or is of no such kind.
     """
     try:
         with _open(path, *(kinds or (HIT_MAP,))) as dataset:
@@ -134,39 +194,26 @@ def opened(path: Path, *kinds: Kind) -> Iterator[xarray.Dataset]:
 
 def _open(path: Path, *kinds: Kind, group: str | None = None) -> xarray.Dataset:
     kind = check_kind(path, *kinds)
-    with readable(path):
-        dataset = _joined(path) if group is None else _part(path, group)
-    if group is not None:
-        return dataset
-    try:
-        _check_needed(path, {*dataset.variables, *dataset.attrs}, kind)
-        if kind is HIT_MAP:
-            _check_hits(path, dataset)
-    except ResultError:
-        dataset.close()
-        raise
-    return dataset
-
-
-def _check_needed(path: Path, there: Collection[Hashable], kind: Kind) -> None:
+    with _readable(path):
+        dataset = _part(path, group)
+        if group is not None:
+            return dataset
+        references = dict[str, xarray.Dataset]()
+        with netCDF4.Dataset(path) as file:
+            names = [name for name in NAMES if name in file.groups]
+        for name in names:
+            with _part(path, name) as inner:  # a file that stays open until Python collects it crashes netCDF
+                references[name] = inner.load()
+    there = {*dataset.variables, *dataset.attrs}
     if missing := [name for name in kind.needed if name not in there]:
+        dataset.close()
         raise ResultError(f'{path}: is no whole file of {kind.name}, it has no "{missing[0]}"')
-
-
-def _check_hits(path: Path, dataset: xarray.Dataset) -> None:
-    """Refuse hits that were chosen from a result in a way that no command can use."""
-    for dim, what, example in ((v.HIT, "hit", "isel(hit=[5])"), (v.STANDOFF, "stand-off", "isel(standoff=[0])")):
-        if dim not in dataset.sizes:
-            raise ResultError(
-                f"{path}: holds one {what} without its dimension; choose {what}s as a list, as in {example}"
-            )
-    status = dataset[v.STATUS]
-    if status.dtype.kind == "f" and bool(status.isnull().any()):
-        raise ResultError(
-            f"{path}: has hits without a status, as where(...) leaves them; choose hits with where(..., drop=True)"
-        )
-    if not dataset.sizes[v.HIT]:
-        raise ResultError(f"{path}: has no hits, so there is nothing to show")
+    if kind is HIT_MAP and not dataset.sizes.get(v.HIT):
+        dataset.close()
+        raise ResultError(f'{path}: has no hits along "hit"; choose hits as a list, as in isel(hit=[5])')
+    result = with_references(dataset, references)
+    result.set_close(dataset.close)
+    return result
 
 
 def is_history(dataset: xarray.Dataset) -> bool:
@@ -184,8 +231,8 @@ def kind_of(path: Path) -> Kind:
     """The kind of a netCDF file.
 
     Raises:
-        ResultError: the file is missing, is no regular file, is damaged, or is no netCDF file of this version of
-            warpimpact; a TOML file is named as what it is.
+        ResultError: the file is missing, is damaged, or is no netCDF file of this version of warpimpact; a TOML file is
+            named as what it is.
     """
     try:
         check_file(path)
@@ -199,18 +246,14 @@ def kind_of(path: Path) -> Kind:
         raise ResultError(
             f"{path}: " + (f"is {name}, not a result; {use}" if name else "cannot be read as a netCDF file")
         )
-    with readable(path), netCDF4.Dataset(path) as file:
-        mark = str(file.getncattr(attr.KIND)) if attr.KIND in file.ncattrs() else ""
+    with _readable(path), netCDF4.Dataset(path) as file:
+        mark = str(getattr(file, attr.KIND, ""))
         is_point = v.STATUS in file.variables and file.variables[v.STATUS].dimensions == (v.HIT,)
-    if not mark:
-        raise ResultError(
-            f'{path}: is no file of this version of warpimpact, it has no attribute "{attr.KIND}"; if it was chosen '
-            "from a result, keep the attributes"
-        )
     kind = next((kind for kind in KINDS if kind.mark == mark), None)
     if kind is None:
         raise ResultError(
-            f'{path}: is "{mark}", but this version of warpimpact reads {", ".join(kind.mark for kind in KINDS)}'
+            f'{path}: is no file of this version of warpimpact: its attribute "{attr.KIND}" is "{mark}"; this version '
+            f"reads {', '.join(kind.mark for kind in KINDS)}"
         )
     return HIT_MAP if kind is SWEEP and is_point else kind
 
@@ -228,41 +271,19 @@ def check_kind(path: Path, *wanted: Kind) -> Kind:
 
 
 @contextmanager
-def readable(path: Path) -> Iterator[None]:
-    """Raise errors of opening a file as a ResultError. An altered file leads the libraries into errors of any class."""
+def _readable(path: Path) -> Iterator[None]:
+    """Raise errors of opening a file as a ResultError."""
     try:
         yield
-    except Exception as error:
+    except (OSError, RuntimeError, ValueError) as error:
         raise ResultError(f"{path}: cannot be read as a netCDF file ({str(error)[:200]})") from error
 
 
-def _joined(path: Path) -> xarray.Dataset:
-    """The root of a file with its references, and with the contents of its other groups as coordinates."""
-    import xarray
-
-    root = _part(path)
-    dataset = root.copy()
-    with netCDF4.Dataset(path) as file:
-        groups = list(file.groups)
-    for group in v.GROUPS.keys() & {*groups}:
-        with xarray.open_dataset(path, engine="netcdf4", group=group) as inner:
-            dataset = dataset.assign_coords({name: array.variable for name, array in inner.load().data_vars.items()})
-    references = dict[str, xarray.Dataset]()
-    for name in {*NAMES} & {*groups}:
-        with _part(path, name) as inner:  # a file that stays open until Python collects it crashes netCDF
-            references[name] = inner.load()
-    dataset = with_references(in_memory(dataset), references)
-    dataset.set_close(root.close)
-    return dataset
-
-
 def _part(path: Path, group: str | None = None) -> xarray.Dataset:
-    """The root or a group of a file. The cache has room for some chunks per variable instead of tens of megabytes.
+    """The root or a group of a file, with a cache of some chunks per variable instead of tens of megabytes.
 
     Numbers of hits have no index, because the whole index would be in memory.
     """
-    import xarray
-
     _, slots, preemption = kept = netCDF4.get_chunk_cache()
     netCDF4.set_chunk_cache(4 * 8 * FILE_CHUNK, slots, preemption)
     try:

@@ -1,31 +1,18 @@
-"""Layers of a target in a Dataset: their faces, their scattered quantities, where they are solid, and their outlines.
-
-Outlines of the holes are a group of their own in a file; in memory they follow from the attributes. Along "vertex"
-their number differs from plate to plate, so results with such variables could not be joined.
-"""
+"""Layers of a target in a Dataset: faces, scattered quantities, where they are solid, and outlines."""
 
 from __future__ import annotations
 
 import json
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+import xarray
+from numpy.typing import NDArray
 
 from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
-from warpimpact.scene import Plate
+from warpimpact.scene import Plate, Scene, Shots, Target
 from warpimpact.scene.quantities import BY_LAYER
-
-if TYPE_CHECKING:
-    import xarray
-    from numpy.typing import NDArray
-
-    from warpimpact.scene import Scene, Shots, Target
-if TYPE_CHECKING:
-    import xarray
-    from numpy.typing import NDArray
-
-    from warpimpact.results.table import HitTable
 
 
 def own_columns(target: Target, shots: Shots) -> dict[str, NDArray[Any]]:
@@ -83,7 +70,7 @@ def sections(scene: Scene, hit: xarray.Dataset, section: NDArray[np.float64]) ->
     }
 
 
-def outlines(dataset: xarray.Dataset | HitTable, layer: int = 0) -> dict[str, NDArray[np.float64]]:
+def outlines(dataset: xarray.Dataset, layer: int = 0) -> dict[str, NDArray[np.float64]]:
     """Outlines of the holes of a layer (0 is the plate) [m], each of shape (vertex,), by the axis "y" and "z", with a
     NaN between two outlines. They are empty if no attribute tells the layer."""
     layers = {"0": json.loads(dataset.attrs.get(attr.PLATE, "{}")), **json.loads(dataset.attrs.get(attr.LAYERS, "{}"))}
@@ -107,17 +94,3 @@ def outlines_in(
     rows = [row for outline in plate.pattern.outlines(y_range, z_range) for row in (gap, outline)]
     vertices = np.concatenate(rows[1:]) if rows else np.empty((0, 2))
     return {v.OUTLINE_Y: vertices[:, 0], v.OUTLINE_Z: vertices[:, 1]}
-
-
-def in_memory(dataset: xarray.Dataset) -> xarray.Dataset:
-    """A map of hits without outlines along "vertex"."""
-    return dataset.drop_vars([name for name in v.OUTLINE_VARIABLES if name in dataset.coords])
-
-
-def in_a_file(table: HitTable) -> HitTable:
-    """A map of hits with its outlines along "vertex"."""
-    if v.HIT not in table.sizes or attr.PLATE_PERIOD not in table.attrs or attr.SWEEP in table.attrs:
-        return table
-    found = outlines(table)
-    columns = {str(name): (name.dims, found[axis], name.attributes) for axis, name in v.OUTLINE.items()}
-    return table.assign_coords(columns)

@@ -13,9 +13,10 @@ import re
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from difflib import get_close_matches
-from typing import TYPE_CHECKING, Any, Self, Unpack
+from typing import Any, Self, Unpack
 
 import numpy as np
+import xarray
 
 from warpimpact.kernels.status import OF_SHOTS
 from warpimpact.results import attributes as attr
@@ -38,9 +39,6 @@ from warpimpact.scene.units import quantity, quoted
 from warpimpact.statistics.intervals import Dealt, Estimate, Estimating, estimate_of
 from warpimpact.statistics.shifts import shift_of_mean, shift_of_quantile, shift_of_share, shift_of_yes
 from warpimpact.statistics.tails import has_interval, worst_tenth
-
-if TYPE_CHECKING:
-    from warpimpact.results.table import Result
 
 _KINDS: dict[str, Any] = {
     quantity(kind).display.stored: kind
@@ -260,7 +258,7 @@ class Measure:
         """An SI value in the units of the Dataset."""
         return _stored(value, self.units)
 
-    def of(self, dataset: Result) -> Self:
+    def of(self, dataset: xarray.Dataset) -> Self:
         """The measure with its place in a result: by default the largest stand-off.
 
         Raises:
@@ -281,7 +279,7 @@ class Measure:
             return replace(self, layer=layer)
         return self
 
-    def by_hit(self, dataset: Result) -> Array:
+    def by_hit(self, dataset: xarray.Dataset) -> Array:
         """The quantity or event of every shot, shape [hits]; NaN for a shot that does not count.
 
         Raises:
@@ -292,7 +290,7 @@ class Measure:
             standoff = float(dataset[v.STANDOFF].values[-1]) if self.quantity.has_standoff else math.nan
         return self.quantity.values(dataset, standoff)
 
-    def values(self, dataset: Result) -> Array:
+    def values(self, dataset: xarray.Dataset) -> Array:
         """The values of all shots of which the measure is made, shape [hits]."""
         return self.counted(self.by_hit(dataset))
 
@@ -364,7 +362,7 @@ class Tally:
         self._kept: list[Array] = []
         self._dealt = Dealt(kind, share=measure.share, **dealt)
 
-    def add(self, dataset: Result) -> None:
+    def add(self, dataset: xarray.Dataset) -> None:
         """Add the next shots."""
         values = self.measure.values(dataset)
         if self.measure.kind in ("mean", "quantile", "probability", "share"):
@@ -392,7 +390,9 @@ def estimate_from(measure: Measure, values: Array, **dealt: Unpack[Estimating]) 
     return estimate.within(measure.least, measure.most)
 
 
-def shift_of(measure: Measure, levels: tuple[Result, Result] | None, confidence: float = 0.95) -> float | None:
+def shift_of(
+    measure: Measure, levels: tuple[xarray.Dataset, xarray.Dataset] | None, confidence: float = 0.95
+) -> float | None:
     """Upper estimate of the shift of a measure by the numerics, from hits at two levels (`finer_pair`); None without
     them."""
     if levels is None or not measure.has_interval:
@@ -413,6 +413,6 @@ def shift_of(measure: Measure, levels: tuple[Result, Result] | None, confidence:
     return shift_of_mean(*averaged, **dealt)
 
 
-def dealing(dataset: Result) -> Estimating:
+def dealing(dataset: xarray.Dataset) -> Estimating:
     """Arguments of `Dealt` for the sampling of a result. Chosen hits are no longer in the order of the replicates."""
     return {"replicates": 1 if is_choice(dataset) else int(dataset.attrs.get(attr.REPLICATES, 1))}

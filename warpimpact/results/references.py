@@ -3,16 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING
 
 import numpy as np
+import xarray
 
 from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
 from warpimpact.results.dataset import hit_numbers
-
-if TYPE_CHECKING:
-    import xarray
 
 NAMES = {"solid": "solid, same weight", "base_alone": "base alone"}
 """Names of the references, which are those of their groups in a file, and their names as plates."""
@@ -53,7 +50,7 @@ def reference(dataset: xarray.Dataset, name: str) -> xarray.Dataset | None:
 def as_plates(dataset: xarray.Dataset) -> dict[str, xarray.Dataset]:
     """The references of a result by their names as plates. One that stands for all has every hit of the result."""
     plates = {label: reference(dataset, name) for name, label in NAMES.items() if name in references_of(dataset)}
-    every = dataset[[v.HIT_Y, v.HIT_Z]].coords
+    every = {name: dataset[name].variable for name in (v.HIT, v.HIT_Y, v.HIT_Z)}
     return {
         label: plate if plate.sizes["hit"] > 1 else plate.isel(hit=[0] * dataset.sizes["hit"]).assign_coords(every)
         for label, plate in plates.items()

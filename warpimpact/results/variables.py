@@ -3,7 +3,7 @@ shots (scene/quantities.py), and further ones."""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+import xarray
 
 from warpimpact.records import registry
 from warpimpact.records.bending_variables import *
@@ -13,9 +13,6 @@ from warpimpact.records.registry import *
 from warpimpact.records.variable import *
 from warpimpact.scene.quantities import BY_LAYER, OF_THE_SCENE, QUANTITIES
 from warpimpact.scene.units import quantity
-
-if TYPE_CHECKING:
-    import xarray
 
 
 def _condition(name: str, of: str = "") -> Variable:
@@ -47,7 +44,7 @@ RESISTANCE, SHEAR_COEFFICIENT, DEGRADATION, THICKNESS, MASS, STRENGTH, *_ = _OF_
 LAYER_SCATTER = tuple(_by_layer(name) for name in BY_LAYER)
 LAYER_THICKNESS = LAYER_SCATTER[BY_LAYER.index("thickness")]
 SCATTER_VARIABLES = (*_OF_THE_SCENE, *LAYER_SCATTER)
-"""Present only in a campaign in which they differ from shot to shot."""
+"""Along "hit" where they differ from shot to shot, else one number."""
 
 EDGE_DISTANCE = Variable("edge_distance", HITS, "m", "from the nearest edge of hole or plate; negative in a hole")
 OF_THE_HIT_POINT = (EDGE_DISTANCE,)
@@ -77,12 +74,8 @@ OUTLINE_Z = Variable("outline_z", ("vertex",), "m", "hole outlines in the unit c
 
 OUTLINE_VARIABLES = (OUTLINE_Y, OUTLINE_Z)
 
-GROUPS = {
-    "plate": OUTLINE_VARIABLES,
-    "finer": (*FINER_COORDINATES, *FINER_VARIABLES),
-}
-"""Groups of the file for variables that are not along "hit". In memory those of other shots are coordinates, so that no
-choice of hits repeats them per hit. For the outlines see outlines.py."""
+FINER = (*FINER_COORDINATES, *FINER_VARIABLES)
+"""These are coordinates, so that no choice of hits repeats them per hit."""
 
 VARIABLES = (*SHOT_VARIABLES, *OUTCOME_VARIABLES)
 """Present in every hit map."""
@@ -158,6 +151,12 @@ LAYER_SOLID_ALONG = {"y": LAYER_SOLID_ALONG_Y, "z": LAYER_SOLID_ALONG_Z}
 SOLID_ALONG = {"y": SOLID_ALONG_Y, "z": SOLID_ALONG_Z}
 
 
+def computed_variables() -> set[Variable]:
+    """The variables that are computed, and stored, in the precision of the numerics."""
+    computed = {variable for group in registry.RECORDS if not group.exact for variable in group}
+    return computed | {name for name, variable in FINER_VARIABLES.items() if variable in computed}
+
+
 def shown_by(command: str) -> tuple[Variable, ...]:
     """The variables of a hit map that a command shows by default."""
     return tuple(variable for variable in HIT_NUMBERS if command in variable.shown_by)
@@ -165,17 +164,12 @@ def shown_by(command: str) -> tuple[Variable, ...]:
 
 def shot_variables(dataset: xarray.Dataset) -> list[Variable]:
     """Names of the variables of the impact, of plate and core where they differ; no hit points."""
-    return [*SHOT_VARIABLES, *(name for name in SCATTER_VARIABLES if name in dataset)]
+    return [*SHOT_VARIABLES, *(name for name in SCATTER_VARIABLES if name in dataset and "hit" in dataset[name].dims)]
 
 
 def outcome_variables(dataset: xarray.Dataset) -> list[Variable]:
     """Names of the variables that say how the shots ended."""
     return [variable for variable in registry.variables() if variable in dataset.variables]
-
-
-def computed_variables() -> set[Variable]:
-    """The variables that are computed in the precision of the numerics."""
-    return {variable for group in registry.RECORDS if not group.exact for variable in group}
 
 
 def hit_variables() -> tuple[Variable, ...]:

@@ -10,9 +10,10 @@ import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
+import xarray
 from numpy.typing import NDArray
 from pydantic import TypeAdapter
 
@@ -22,11 +23,8 @@ from warpimpact.results import variables as v
 from warpimpact.results.dataset import failed, passed
 from warpimpact.scene import AnyCore, Core
 
-if TYPE_CHECKING:
-    from warpimpact.results.table import Result
-
 Array = NDArray[np.float64]
-Values = Callable[["Result", float], Array]
+Values = Callable[[xarray.Dataset, float], Array]
 """Computes the numbers of all hits of a result, shape [hits], at a stand-off [m] where they have one; NaN where a hit
 does not count."""
 
@@ -85,9 +83,9 @@ class PerHit:
     or_else: str = ""
     least: float = 0.0
     most: float = math.inf
-    margin: Callable[[Result], Array] | None = None
+    margin: Callable[[xarray.Dataset], Array] | None = None
 
-    def lacking(self, dataset: Result) -> str:
+    def lacking(self, dataset: xarray.Dataset) -> str:
         """Words for what a result lacks; empty where it lacks nothing."""
         if self.need is not None and self.need.name not in dataset and self.need.name not in dataset.attrs:
             return self.need.words
@@ -109,7 +107,7 @@ def place_of_standoff(distances: Sequence[float] | Array, standoff: float) -> in
     return int(places[0])
 
 
-def at(part: Result, variable: v.Variable, standoff: float) -> Array:
+def at(part: xarray.Dataset, variable: v.Variable, standoff: float) -> Array:
     """A variable with one number per hit, at a stand-off if it has stand-offs; NaN where it was not recorded, as at the
     solid plate."""
     if variable not in part:
@@ -118,12 +116,12 @@ def at(part: Result, variable: v.Variable, standoff: float) -> Array:
     return column[:, place_of_standoff(part[v.STANDOFF].values, standoff)] if column.ndim == 2 else column
 
 
-def of_all(part: Result, of_passed: Array, of_stopped: float) -> Array:
+def of_all(part: xarray.Dataset, of_passed: Array, of_stopped: float) -> Array:
     """Numbers where cores passed the target, one number where they did not, NaN where the computation failed."""
     return np.where(failed(part), np.nan, np.where(passed(part), of_passed, of_stopped))
 
 
-def is_so(which: Callable[[Result], NDArray[np.bool_]]) -> Values:
+def is_so(which: Callable[[xarray.Dataset], NDArray[np.bool_]]) -> Values:
     """Values of an event: 1 where `which` holds, 0 elsewhere, NaN where the computation failed."""
     return lambda part, _: np.where(failed(part), np.nan, which(part))
 
@@ -133,22 +131,21 @@ def ended_as(status: Status) -> Values:
     return is_so(lambda part: np.asarray(part[v.STATUS].values == status))
 
 
-def energy_fraction(part: Result, _: float) -> Array:
+def energy_fraction(part: xarray.Dataset, _: float) -> Array:
     return of_all(part, (at(part, v.RESIDUAL_VELOCITY, 0.0) / part[v.IMPACT_VELOCITY].values) ** 2, 0.0)
 
 
-def energy(part: Result) -> Array:
+def energy(part: xarray.Dataset) -> Array:
     """Kinetic energy of translation [J], whether the core passed or not."""
-    mass = part[v.MASS].values if v.MASS in part else _core(part.attrs[attr.CORE]).mass_properties.mass
-    return np.asarray(0.5 * mass * part[v.RESIDUAL_VELOCITY].values.astype(float) ** 2)
+    return np.asarray(0.5 * part[v.MASS].values * part[v.RESIDUAL_VELOCITY].values.astype(float) ** 2)
 
 
-def inclination(part: Result, standoff: float) -> Array:
+def inclination(part: xarray.Dataset, standoff: float) -> Array:
     tilt = at(part, v.TILT, standoff)
     return np.minimum(tilt, 180.0 - tilt)
 
 
-def energy_density(part: Result, standoff: float) -> Array:
+def energy_density(part: xarray.Dataset, standoff: float) -> Array:
     silhouette = np.interp(inclination(part, standoff), *_silhouette(part.attrs[attr.CORE]))
     return of_all(part, energy(part) / silhouette, 0.0)
 
@@ -165,29 +162,29 @@ def _silhouette(text: str) -> tuple[Array, Array]:
     return inclinations, _core(text).presented_area(np.radians(inclinations))
 
 
-def limit(part: Result, name: str) -> Array:
+def limit(part: xarray.Dataset, name: str) -> Array:
     """Limits, at most the largest value tried; NaN where the computation failed."""
     return np.where(failed(part), np.nan, np.minimum(part[name].values, part.attrs.get(attr.LIMIT_HIGHEST, np.inf)))
 
 
-def needed_density(part: Result, _: float) -> Array:
+def needed_density(part: xarray.Dataset, _: float) -> Array:
     elsewhere, density = float(part.attrs[attr.LIMIT_ELSEWHERE]), float(part.attrs[attr.LIMIT_DENSITY])
     return elsewhere + density * limit(part, _THICKNESS)
 
 
-def has_base(dataset: Result) -> bool:
+def has_base(dataset: xarray.Dataset) -> bool:
     """Whether there are layers behind the plate."""
     return v.STOPPED_IN in dataset
 
 
-def base_thickness(dataset: Result) -> Array:
+def base_thickness(dataset: xarray.Dataset) -> Array:
     """Thickness of the base [m]: one number, or shape [hits] where it scatters."""
     if v.LAYER_THICKNESS in dataset:
-        return np.asarray(dataset[v.LAYER_THICKNESS].values[:, -1])
+        return np.asarray(dataset[v.LAYER_THICKNESS].values[..., -1])
     return np.asarray(dataset[v.LAYER_REAR].values[-1] - dataset[v.LAYER_FRONT].values[-1])
 
 
-def base_depth(dataset: Result) -> Array:
+def base_depth(dataset: xarray.Dataset) -> Array:
     """How deep every core goes into the base [m], shape [hits]; NaN where the computation failed.
 
     A core that stops before the base or bounces off it counts as 0. A core that pierces or passes the base counts as
@@ -202,14 +199,14 @@ def base_depth(dataset: Result) -> Array:
     return np.where(failed(dataset), np.nan, np.where(passed(dataset), thickness, depth))
 
 
-def is_pierced(dataset: Result) -> Array:
+def is_pierced(dataset: xarray.Dataset) -> Array:
     """1 where a core comes out of the rear face of the base, whether it rests in the base or passes it, else 0; shape
     [hits]. NaN as in `base_depth`."""
     margin = piercing_margin(dataset)
     return np.where(np.isnan(margin), np.nan, margin >= 0.0)
 
 
-def piercing_margin(dataset: Result) -> Array:
+def piercing_margin(dataset: xarray.Dataset) -> Array:
     """Distance of every core's foremost point behind the rear face of the base [m], negative before it, shape [hits].
     Infinite for a core that passes the base, minus infinity for one that rests before it; NaN as in `base_depth`."""
     if not has_base(dataset):
@@ -229,6 +226,7 @@ LIMIT_VELOCITY = Need(_VELOCITY, "limit velocities (warpimpact limit)", "")
 LIMIT_THICKNESS = Need(_THICKNESS, "limit thicknesses (warpimpact limit --quantity thickness)", "")
 OTHER_LAYERS = Need(attr.LIMIT_ELSEWHERE, "limit thicknesses, and the mass of the other layers", "")
 CORE = Need(attr.CORE, "a description of its core", "")
+MASS = Need(v.MASS, "the mass of its core", "")
 
 
 _DERIVED = (
@@ -255,7 +253,7 @@ _DERIVED = (
         higher_is_better=False,
         values=lambda part, _: of_all(part, energy(part), 0.0),
         of=(v.RESIDUAL_VELOCITY, v.MASS),
-        need=CORE,
+        need=MASS,
     ),
     PerHit(
         name="residual_energy_fraction",
@@ -416,7 +414,9 @@ def _recorded() -> Iterator[PerHit]:
             continue
         every = variable in v.LIMIT_VARIABLES
 
-        def values(part: Result, standoff: float, variable: v.Variable = variable, every: bool = every) -> Array:
+        def values(
+            part: xarray.Dataset, standoff: float, variable: v.Variable = variable, every: bool = every
+        ) -> Array:
             return np.where(~failed(part) if every else passed(part), at(part, variable, standoff), np.nan)
 
         yield PerHit(
@@ -440,7 +440,7 @@ QUANTITIES: Mapping[str, PerHit] = {quantity.name: quantity for quantity in (*_D
 
 
 def _weight(name: str, label: str, of: str) -> PerHit:
-    def values(part: Result, _: float) -> Array:
+    def values(part: xarray.Dataset, _: float) -> Array:
         return np.full(part.sizes["hit"], part.attrs.get(name, part.attrs.get(attr.AREAL_DENSITY, np.nan)))
 
     return PerHit(

@@ -10,7 +10,7 @@ from __future__ import annotations
 import logging
 import time
 import warnings
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Generator, Iterable, Iterator
 from concurrent.futures import FIRST_COMPLETED, CancelledError, Executor, Future, ThreadPoolExecutor, wait
 from contextlib import ExitStack, contextmanager, suppress
 from functools import partial
@@ -62,7 +62,7 @@ class Computer:
         tick: Tick = lambda reports: None,
         *,
         per_core: bool = False,
-    ) -> Iterator[tuple[Key, Any]]:
+    ) -> Generator[tuple[Key, Any]]:
         """Yield results as they come, each with the key of its task.
 
         A task is taken when it can be computed. Closing the iterator gives up those under way.
@@ -109,7 +109,7 @@ def _completed(
     tasks: Iterable[tuple[Key, tuple[Any, ...]]],
     width: Callable[[], int],
     tick: Callable[[], object],
-) -> Iterator[tuple[Key, Any]]:
+) -> Generator[tuple[Key, Any]]:
     """Results of tasks in a pool with at most `width()` tasks in it."""
     remaining, running = iter(tasks), dict[Future[Any], Key]()
     try:
@@ -151,7 +151,7 @@ class _Cluster(Computer):
         tick: Tick = lambda reports: None,
         *,
         per_core: bool = False,
-    ) -> Iterator[tuple[Key, Any]]:
+    ) -> Generator[tuple[Key, Any]]:
         """See `Computer.map`. Workers do not report."""
         threads = 1 if per_core else self._threads
         compute = partial(_on_worker, function, self._device, threads, self.made_by)
@@ -261,6 +261,22 @@ def computer(
             raise _lost(address, error) from None
         except KilledWorker as error:
             raise ClusterError(f"some tasks ended one worker after another, perhaps out of memory: {error}") from None
+
+
+@contextmanager
+def opened(
+    device: str | Computer,
+    workers: int | None,
+    scheduler: str | None,
+    cancel: Cancel = NEVER,
+    warn: Callable[[str], object] = warnings.warn,
+) -> Iterator[Computer]:
+    """A computer as of `computer`, closed afterwards. A given computer stays open."""
+    if isinstance(device, Computer):
+        yield device
+        return
+    with computer(device, workers=workers, scheduler=scheduler, cancel=cancel, warn=warn) as opened_computer:
+        yield opened_computer
 
 
 def _close(client: Any) -> None:

@@ -4,101 +4,73 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any
+from typing import Any
+
+import xarray
 
 from warpimpact.campaign.campaign import Campaign
-from warpimpact.campaign.resistances import catalogue_names
+from warpimpact.campaign.resistances import catalogue_names, limit_velocity_factors
 from warpimpact.campaign.tested_range import outside_tested_range
-from warpimpact.records.outcomes import Outcomes
 from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
-from warpimpact.results.dataset import to_table
-from warpimpact.results.table import HitTable
-from warpimpact.scene import Accuracy, Impact, Numerics, Shots, Target
+from warpimpact.results.dataset import stored_columns
+from warpimpact.scene import Accuracy, Impact, Numerics, Target
 from warpimpact.scene.quantities import QUANTITIES
 from warpimpact.solver.accuracy import UNITS, PilotResult
-from warpimpact.solver.device import find_device
+from warpimpact.solver.limit import LimitSpec
 from warpimpact.solver.materials import weakens
 from warpimpact.solver.resolution import Resolution, resolve
 
-if TYPE_CHECKING:
-    from warpimpact.results.table import Result
-
 
 def described(
+    dataset: xarray.Dataset,
     campaign: Campaign,
-    shots: Shots,
-    pilot: PilotResult | None,
-    outcomes: Outcomes,
     numerics: Numerics,
-    computed: tuple[str, float],
-    attributes: Mapping[str, Any],
-) -> HitTable:
-    """The columns of shots with their outcomes.
+    pilot: PilotResult | None = None,
+    limit: LimitSpec | None = None,
+) -> xarray.Dataset:
+    """The first hits of a result with the attributes of the whole.
 
     Args:
+        numerics: those of the hits, which fix the resolution.
         pilot: of the campaign; None if it fixes the resolution.
-        computed: the device, and the time [s].
-        attributes: attributes of this kind of computation.
+        limit: the limit of every hit that was searched.
     """
+    shots = campaign.sampler().shots(0, dataset.sizes["hit"])
     resolution = resolve(campaign.scene, numerics, weakens(campaign.target, shots))
-    names, finer = catalogue_names(campaign), dict[str, Any]()
+    attributes = {
+        **campaign_attributes(campaign),
+        **_numerics(campaign.numerics, campaign.impact, campaign.target, resolution),
+        attr.OUTSIDE_TESTED_RANGE: json.dumps(outside_tested_range(campaign), ensure_ascii=False),
+        **_pilot(campaign.numerics.asked, pilot),
+        **({} if limit is None else _limit(campaign, limit)),
+    }
+    if names := catalogue_names(campaign):
+        attributes[attr.CATALOGUE_NAMES] = "\n".join(names)
     if pilot is not None and pilot.finer is not None and pilot.numbers is not None:
         stored = {name: of_hits for name, of_hits in v.FINER_VARIABLES.items() if of_hits in pilot.finer}
-        finer = {v.FINER_HIT: pilot.numbers[: len(pilot.finer)].astype("int32")}
+        finer: dict[str, Any] = {v.FINER_HIT: pilot.numbers[: len(pilot.finer)].astype("int32")}
         finer |= {name: getattr(pilot.finer, of_hits) for name, of_hits in stored.items()}
-    every = {
-        **_numerics(campaign.numerics, campaign.impact, campaign.target, resolution),
-        **({attr.CATALOGUE_NAMES: "\n".join(names)} if names else {}),
-        attr.OUTSIDE_TESTED_RANGE: json.dumps(outside_tested_range(campaign), ensure_ascii=False),
-        **computed_by(campaign, computed[0], len(outcomes), computed[1]),
-        **_pilot(campaign.numerics.asked, pilot),
-        **attributes,
-    }
-    return described_as(campaign, shots, outcomes, every, double=is_double(campaign), finer=finer)
+        single = () if campaign.numerics.precision == "double" else v.computed_variables()
+        dataset = dataset.assign_coords(stored_columns((name for name in v.FINER if name in finer), finer, single))
+    return dataset.assign_attrs(attr.with_units(attributes))
 
 
-def described_as(
-    campaign: Campaign,
-    shots: Shots,
-    outcomes: Outcomes,
-    attributes: Mapping[str, Any],
-    *,
-    double: bool,
-    finer: Mapping[str, Any] | None = None,
-) -> HitTable:
-    """The columns of shots of a campaign with the outcomes of all of them, and attributes that do not follow from the
-    campaign alone."""
-    return to_table(
-        campaign.scene,
-        shots,
-        outcomes,
-        period=campaign.sampler().cell,
-        attributes={**_campaign(campaign), **attributes},
-        double=double,
-        finer=finer,
-        left_out=() if campaign.output.exit_state else v.EXIT_VARIABLES,
-    )
-
-
-def is_double(campaign: Campaign) -> bool:
-    """Whether a campaign is computed, and stored, in double precision."""
-    return campaign.numerics.precision == "double"
-
-
-def computed_by(campaign: Campaign, device: str, computed: int, elapsed: float) -> dict[str, Any]:
-    """Attributes on versions, device, symmetries, and time [s] of this number of shots."""
-    chosen = find_device(device)
+def _limit(campaign: Campaign, limit: LimitSpec) -> dict[str, Any]:
+    """Attributes on the limits that were searched."""
     attributes = {
-        **attr.versions(),
-        **attr.machine(),
-        attr.DEVICE: f"{chosen.alias} ({chosen.name})",
-        attr.COMPUTE_TIME: elapsed,
-        attr.HITS_PER_SECOND: computed / elapsed,
+        attr.HISTORY: attr.history_line(f"limit --quantity {limit.quantity}"),
+        attr.LIMIT: limit.quantity,
+        attr.LIMIT_LAYER: limit.layer,
+        attr.LIMIT_TOLERANCE: limit.tolerance,
+        attr.LIMIT_HIGHEST: limit.highest,
     }
-    if campaign.hits.irreducible:
-        attributes[attr.SYMMETRIES] = "; ".join(map(str, campaign.symmetries))
+    if limit.quantity == "thickness":  # from it follows the areal density of the target
+        layer = campaign.target.layers[limit.layer]
+        attributes[attr.LIMIT_DENSITY] = layer.areal_density / layer.thickness
+        attributes[attr.LIMIT_ELSEWHERE] = campaign.target.areal_density - layer.areal_density
+    elif (factors := limit_velocity_factors(campaign)) is not None:
+        attributes[attr.LIMIT_FACTORS] = list(factors)
     return attributes
 
 
@@ -116,7 +88,7 @@ def _pilot(asked: Accuracy, pilot: PilotResult | None) -> dict[str, Any]:
     }
 
 
-def pilot_in(result: Result) -> PilotResult | None:
+def pilot_in(result: xarray.Dataset) -> PilotResult | None:
     """The pilot of a result; None if its campaign fixed the resolution."""
     attributes = result.attrs
     if attr.RESOLUTION not in attributes:
@@ -129,13 +101,8 @@ def pilot_in(result: Result) -> PilotResult | None:
     )
 
 
-def made_by(device: str) -> dict[str, str]:
-    """Versions and kind of device: with the campaign, they determine the bits of a result."""
-    chosen = find_device(device)
-    return {**attr.versions(), attr.DEVICE: "cpu" if chosen.is_cpu else chosen.name}
-
-
-def _campaign(campaign: Campaign) -> dict[str, Any]:
+def campaign_attributes(campaign: Campaign) -> dict[str, Any]:
+    """Attributes that follow from a campaign alone."""
     ligament, scatter = campaign.plate.ligament, campaign.scatter.given.items()
     # Impact quantities with their value or distribution, and the distribution of the core's mass.
     scattered = {name: law.model_dump() for (name, _), law in scatter if not QUANTITIES[name].by_layer}
@@ -155,6 +122,8 @@ def _campaign(campaign: Campaign) -> dict[str, Any]:
         attr.MATERIAL: _material(campaign),
         attr.FAILED_SHARE: campaign.output.failed_share,
     }
+    if campaign.hits.irreducible:
+        attributes[attr.SYMMETRIES] = "; ".join(map(str, campaign.symmetries))
     attributes |= {} if campaign.hits.count is None else {attr.COUNT: campaign.hits.count}
     if campaign.layer:
         attributes[attr.LAYERS] = _layers(campaign)

@@ -22,7 +22,7 @@ from queue import SimpleQueue
 from typing import Any, NamedTuple, Protocol, TypeVar
 
 from warpimpact.results import attributes as attr
-from warpimpact.runs.describe import made_by
+from warpimpact.runs.computer import ClusterError, made_by
 from warpimpact.solver.device import DeviceError, cores, find_device
 from warpimpact.solver.worker import Cancel, Worker
 
@@ -32,10 +32,6 @@ PATIENCE = 1.0
 """Seconds to wait for jobs whose results are not needed. A thread can only end between two launches of a kernel."""
 
 Key = TypeVar("Key")
-
-
-class ClusterError(RuntimeError):
-    """A cluster cannot be used; the message is for the user."""
 
 
 class Job(NamedTuple):

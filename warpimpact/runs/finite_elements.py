@@ -1,41 +1,33 @@
-"""Hits by finite elements, one job each, of a campaign or of a result, written to a result file as others are."""
+"""Hits by finite elements, of a campaign or of a result, written to a result file as others are."""
 
 from __future__ import annotations
 
-import hashlib
 import json
 import time
 import warnings
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import Any
 
 import numpy as np
+import xarray
+from numpy.typing import NDArray
 
 from warpimpact.campaign.campaign import Campaign
 from warpimpact.continuum.strikes import MOST, check_continuum, struck
-from warpimpact.records.outcomes import Outcomes
 from warpimpact.results import attributes as attr
 from warpimpact.results import files
-from warpimpact.results import variables as v
-from warpimpact.results.dataset import stored_columns
-from warpimpact.results.layers import in_memory
+from warpimpact.results.dataset import joined
 from warpimpact.results.references import with_references
-from warpimpact.runs.describe import computed_by, described_as
-from warpimpact.runs.executor import Executor, Job
-from warpimpact.runs.questions import Arrays, Round, Store, results_of, stored
-from warpimpact.runs.shards import manifest
-from warpimpact.scene import Scene, Shots
+from warpimpact.runs.chunks import open_chunks
+from warpimpact.runs.compute import dataset_of_shots, manifest
+from warpimpact.runs.computer import Computer, opened
+from warpimpact.runs.describe import campaign_attributes
+from warpimpact.scene import Shots
 from warpimpact.scene.flow import Continuum
 from warpimpact.solver.device import find_device
 from warpimpact.solver.worker import Worker
-
-if TYPE_CHECKING:
-    import xarray
-
-SECONDS = "seconds"
-"""In the result of a job: what it took [s]."""
 
 
 def continuum_to_file(
@@ -43,98 +35,90 @@ def continuum_to_file(
     output: Path,
     *,
     hits: tuple[int, ...] | None = None,
-    device: Executor,
+    device: str | Computer = "auto",
+    workers: int | None = None,
+    scheduler: str | None = None,
     resume: bool = False,
     overwrite: bool = False,
     progress: Callable[[int, int, int], object] = lambda done, resumed, total: None,
-    tell: Callable[[str], object] = warnings.warn,
+    warn: Callable[[str], object] = warnings.warn,
 ) -> None:
-    """Compute hits of a campaign by finite elements, as its table [continuum] says, into a result file; each job is on
-    the disk when it has ended.
+    """Compute hits of a campaign by finite elements, as its table [continuum] says, into a result file. Each chunk is
+    on the disk when it has ended: one hit on a CPU, where every core computes one.
 
     Args:
         hits: by their numbers in the campaign; None is all of them.
         progress: called with the hits that are done, how many of them an earlier call had computed, and all hits.
+        device, workers, scheduler, resume, overwrite, warn: as in `run_to_file`.
 
     Raises:
         ValueError: the continuum does not compute this campaign.
     """
-    solver = campaign.continuum.solver
-    content = manifest(campaign, device.made_by) | {
-        "continuum": json.loads(solver.model_dump_json()),
-        "numbers": hits and list(hits),
-    }
-    check_continuum(campaign.scene, campaign.sampler().shots(0, 1), solver)
-    with stored(output, content, "continuum", resume=resume, overwrite=overwrite, tell=tell) as store:
-        if store is None:
-            return
-        dataset = _computed(campaign, hits, device, store, progress)
-        dataset.attrs[attr.FINGERPRINT] = store.parts.fingerprint
-        files.write(dataset, output)
+    elements, sampler = campaign.continuum, campaign.sampler()
+    continuum, numbers = elements.solver, np.array(range(len(sampler)) if hits is None else hits)
+    check_continuum(campaign.scene, sampler.shots(0, 1), continuum)
+    with opened(device, workers, scheduler) as computer:
+        content = manifest(campaign, computer.made_by) | {
+            "continuum": json.loads(continuum.model_dump_json()),
+            "numbers": hits and list(hits),
+        }
+        together = 1 if computer.made_by[attr.DEVICE] == "cpu" else MOST
+        count = -(-len(numbers) // together)
+        solid = campaign.references.get("solid") if campaign.output.solid_reference else None
+        with open_chunks(output, content, resume=resume, overwrite=overwrite, warn=warn) as chunks:
+            if chunks is None:
+                return
+            done = resumed = sum(min(together, len(numbers) - k * together) for k in chunks.numbers if k < count)
+
+            def tasks() -> Iterator[tuple[int, tuple[Any, ...]]]:
+                for number in range(count):
+                    if number not in chunks.numbers:
+                        yield number, (campaign, numbers[number * together : (number + 1) * together], continuum)
+                if solid is not None and count not in chunks.numbers:
+                    yield count, (solid, numbers[:1], continuum)
+
+            def tick(shares: list[float]) -> None:
+                progress(min(done + int(sum(shares) * together), len(numbers)), resumed, len(numbers))
+
+            tick([])
+            for number, dataset in computer.map(compute_elements, tasks(), tick, per_core=True):
+                chunks.save(number, dataset)
+                done += dataset.sizes["hit"] if number < count else 0
+                tick([])
+            datasets = [chunk for number in range(count) if (chunk := chunks.load(number)) is not None]
+            references = {} if (reference := chunks.load(count)) is None else {"solid": reference}
+            seconds = float(sum(dataset.attrs[attr.COMPUTE_TIME] for dataset in datasets))
+            settings = {"materials": [entry.name for entry in elements.entries], **content["continuum"]}
+            attributes = {
+                attr.CONTINUUM: json.dumps(settings),
+                attr.NUMERICS: elements.words,
+                attr.PRECISION: "single",
+                attr.CATALOGUE_NAMES: "\n".join(f"{entry.name}: {entry.evidence}" for entry in elements.entries),
+                attr.COMPUTE_TIME: seconds,
+                attr.HITS_PER_SECOND: len(numbers) / seconds,
+                attr.FINGERPRINT: chunks.fingerprint,
+            }
+            result, *others = (
+                dataset.assign_attrs(attr.with_units(campaign_attributes(of) | attributes))
+                for dataset, of in ((joined(datasets), campaign), *((one, solid) for one in references.values()))
+                if of is not None
+            )
+            files.write(with_references(result, dict(zip(references, others, strict=True))), output)
 
 
-def _computed(
+def compute_elements(
     campaign: Campaign,
-    hits: tuple[int, ...] | None,
-    executor: Executor,
-    store: Store,
-    progress: Callable[[int, int, int], object],
+    numbers: NDArray[np.int64],
+    continuum: Continuum,
+    *,
+    worker: Worker,
+    report: Callable[[float], None],
 ) -> xarray.Dataset:
-    """The result of the hits of some numbers; None is all of them."""
-    sampler, elements = campaign.sampler(), campaign.continuum
-    continuum, numbers = elements.solver, range(len(sampler)) if hits is None else hits
-    device = executor.made_by[attr.DEVICE]
-    together = 1 if device == "cpu" else MOST
-    shots = Shots.joined([sampler.shots(int(number), 1) for number in numbers])
-    jobs = [(campaign.scene, shots[k : k + together], continuum) for k in range(0, len(shots), together)]
-    solid = campaign.references.get("solid") if campaign.output.solid_reference else None
-    if solid is not None:
-        jobs.append((solid.scene, solid.sampler().shots(int(numbers[0]), 1), continuum))
-
-    def report(*numbers: float) -> None:
-        done, resumed = (min(int(number * together), len(shots)) for number in numbers)
-        progress(done, resumed, len(shots))
-
-    batch = Round([Job(_hits, arguments) for arguments in jobs], [_key(*arguments) for arguments in jobs], report)
-    results = results_of(batch, executor, store)
-    outcomes = [Outcomes(**{name: values for name, values in row.items() if name != SECONDS}) for row in results]
-    elapsed = float(sum(float(row[SECONDS][0]) for row in results))
-    told = computed_by(campaign, "cpu", len(shots), elapsed)
-    told |= {} if device == "cpu" else {attr.DEVICE: device}
-    told |= {
-        attr.CONTINUUM: json.dumps(
-            {"materials": [entry.name for entry in elements.entries], **json.loads(continuum.model_dump_json())}
-        ),
-        attr.NUMERICS: elements.words,
-        attr.PRECISION: "single",
-        attr.CATALOGUE_NAMES: "\n".join(f"{entry.name}: {entry.evidence}" for entry in elements.entries),
-    }
-    references = {}
-    if solid is not None:
-        table = described_as(solid, jobs[-1][1], outcomes.pop(), told, double=True)
-        references["solid"] = in_memory(table.to_xarray())
-    table = described_as(campaign, shots, Outcomes.joined(outcomes), told, double=True)
-    if hits is not None:
-        table = table.assign_coords(stored_columns((v.HIT,), {v.HIT: np.array(numbers, dtype=np.int32)}))
-    return with_references(in_memory(table.to_xarray()), references)
-
-
-def _key(scene: Scene, shots: Shots, continuum: Continuum) -> str:
-    """What decides the result of a job."""
-    told = scene.model_dump_json() + continuum.model_dump_json()
-    columns = "".join(f"{name} {values.tolist()}" for name, values in shots.columns.items())
-    return hashlib.sha256((told + columns).encode()).hexdigest()
-
-
-def _hits(
-    scene: Scene, shots: Shots, continuum: Continuum, *, worker: Worker, report: Callable[[float], object]
-) -> Arrays:
-    """The outcomes of some hits, by one core or by a GPU."""
-
-    def progress(done: int, total: int) -> None:
-        report(done / total)
-
+    """Some hits of a campaign by their numbers, by one core or by a GPU. Reports the share that is done."""
     clock = time.thread_time if find_device(worker.device).is_cpu else time.perf_counter
+    shots = Shots.joined([campaign.sampler().shots(int(number), 1) for number in numbers])
     begin = clock()
-    outcomes = struck(scene, shots, continuum, replace(worker, threads=1), progress)
-    return {SECONDS: np.array([clock() - begin]), **vars(outcomes)}
+    outcomes = struck(
+        campaign.scene, shots, continuum, replace(worker, threads=1), lambda done, total: report(done / total)
+    )
+    return dataset_of_shots(campaign, shots, outcomes, numbers, worker, clock() - begin, double=True)

@@ -18,12 +18,12 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any, NamedTuple
 
+import netCDF4
 from filelock import FileLock, Timeout
 
 from warpimpact.results import attributes as attr
 from warpimpact.results import files
 from warpimpact.results.files import OutputError
-from warpimpact.results.netcdf import attribute
 
 
 def digest(path: Path) -> str:
@@ -225,8 +225,10 @@ class Parts:
     def is_complete(self) -> bool:
         """Whether the result file is the complete result of this computation."""
         try:
-            return self.output.is_file() and bool(attribute(self.output, attr.FINGERPRINT) == self.fingerprint)
-        except (OSError, RuntimeError, ValueError):
+            return (
+                self.output.is_file() and netCDF4.Dataset(self.output).getncattr(attr.FINGERPRINT) == self.fingerprint
+            )
+        except (AttributeError, OSError, RuntimeError, ValueError):
             return False
 
     def _begun(self) -> dict[str, Any] | None:

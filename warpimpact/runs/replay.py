@@ -14,10 +14,9 @@ from warpimpact.campaign.campaign import Campaign
 from warpimpact.continuum.hit_history import replay_continuum
 from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
-from warpimpact.results.dataset import history_dataset, hit_numbers, numbered, stored_columns, to_dataset
+from warpimpact.results.dataset import history_dataset, hit_numbers, stored_columns, to_dataset
 from warpimpact.results.files import ResultError
 from warpimpact.results.layers import values_of
-from warpimpact.runs.describe import is_double
 from warpimpact.scene import Numerics, Scene, Shots
 from warpimpact.scene.flow import Continuum
 from warpimpact.solver import replay as solver
@@ -68,9 +67,12 @@ def replay(result: xarray.Dataset, hit: int, *, folder: str | Path = ".", snapsh
     else:
         again = solver.replay(scene, computed, numerics=_numerics(campaign, result), snapshots=snapshots)
     period = campaign.hits.covered(campaign.plate)
-    double = is_double(campaign) or attr.CONTINUUM in result.attrs
-    ended = to_dataset(scene, computed[-1:], again.outcomes, period=period, attributes={}, double=double)
-    end = numbered(ended, hit).isel(hit=0)
+    double = campaign.numerics.precision == "double" or attr.CONTINUUM in result.attrs
+    number = np.array([hit])
+    ended = to_dataset(
+        scene, computed[-1:], again.outcomes, period=period, attributes={}, numbers=number, double=double
+    )
+    end = ended.isel(hit=0)
     stored = result.isel(hit=place)
     if not _same(end, stored, (v.HIT_Y, v.HIT_Z, *v.shot_variables(end))):
         raise ResultError(

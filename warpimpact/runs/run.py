@@ -6,41 +6,228 @@ import warnings
 from collections.abc import Callable, Iterator
 from contextlib import closing
 from dataclasses import replace
-from functools import cache
+from functools import cache, partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-import numpy as np
+import xarray
 
 from warpimpact.campaign.campaign import Campaign
+from warpimpact.records.registry import LIMITS
 from warpimpact.results import attributes as attr
-from warpimpact.results import variables as v
-from warpimpact.results.dataset import numbered
-from warpimpact.results.layers import in_memory
+from warpimpact.results import files
+from warpimpact.results.dataset import joined
 from warpimpact.results.references import with_references
-from warpimpact.results.table import HitTable, joined
-from warpimpact.runs.compute import HIT_MAP, Computation, numerics_of
-from warpimpact.runs.describe import pilot_in
-from warpimpact.runs.executor import Executor, Job, completed, executor_for, opened, result_of
-from warpimpact.runs.parts import claimed, telling
-from warpimpact.runs.progress import End, Follow, Watch, followed
-from warpimpact.runs.shards import Shards, ShardsOnDisk, extent, manifest
-from warpimpact.scene import Numerics, Shots
+from warpimpact.runs.chunks import Chunks, open_chunks
+from warpimpact.runs.compute import (
+    compute_hits,
+    compute_limits,
+    extent,
+    find_resolution,
+    limit_of_reference,
+    manifest,
+    numerics_of,
+    reference_shots,
+)
+from warpimpact.runs.computer import Computer, opened
+from warpimpact.runs.describe import described, pilot_in
+from warpimpact.runs.progress import Follow, RunProgress, Watch, followed
+from warpimpact.scene import Numerics
+from warpimpact.solver.accuracy import PilotResult
+from warpimpact.solver.limit import PASSAGES, LimitSpec
 from warpimpact.solver.prepare import prepare
 from warpimpact.solver.resolution import at_level
-from warpimpact.solver.worker import Cancel
-
-if TYPE_CHECKING:
-    import xarray
+from warpimpact.solver.worker import NEVER, Cancel
 
 SLOW, SLOW_BEFORE = 1.0, 5.0
 """Seconds of a core above which the cost is announced: of a hit, and of what comes before the first hit."""
 LARGE = 2**30
 """Bytes of the windows of a hit above which they are announced. Each thread has its own."""
+CUDA_SHOTS = 2**17
+"""Shots per task on a GPU. Fewer shots would not fill it."""
+CPU_SHOTS, CPU_SECONDS = 2**14, 0.5
+"""Most shots of a task on the CPU of this machine, and the time that it shall take, beside which its set-up on one core
+is short. A task is at least one chunk; another process computes one chunk per task."""
+REFERENCE_HITS, REFERENCE_LIMITS = 2**12, 256
+"""Most hits, and most limits, of a reference."""
 
 
 class Costly(UserWarning):
     """A computation that takes far longer than usual."""
+
+
+def run(
+    campaign: Campaign | str | Path,
+    *,
+    references: bool = False,
+    device: str = "auto",
+    progress: Follow | None = None,
+    cancel: Cancel = NEVER,
+) -> xarray.Dataset:
+    """Compute every hit of a campaign, in memory. `run(campaign.solid())` computes its solid reference.
+
+    Args:
+        campaign: the campaign, or its file.
+        references: compute some hits of its references, too, with which `inspect` and `compare` then compare it.
+        device: "auto" (every CUDA device if there is one, else the CPU), "cpu", "cuda:0", "cuda:0,cuda:1", …
+        progress: called several times a second; without it a notebook shows a bar.
+        cancel: ends the run from another thread.
+
+    Returns:
+        The Dataset of results/dataset.py, one entry per hit.
+
+    Raises:
+        CampaignError: the file is no campaign, or has a value that is not allowed.
+        DeviceError: the device is absent.
+        Cancelled: by `cancel`.
+    """
+    result = run_to_file(campaign, None, device=device, references=references, progress=progress, cancel=cancel)
+    assert result is not None
+    return result
+
+
+def run_to_file(
+    campaign: Campaign | str | Path,
+    output: str | Path | None,
+    *,
+    device: str | Computer = "auto",
+    workers: int | None = None,
+    scheduler: str | None = None,
+    limit: LimitSpec | None = None,
+    references: bool | None = None,
+    resume: bool = False,
+    overwrite: bool = False,
+    progress: Follow | None = None,
+    cancel: Cancel = NEVER,
+    warn: Callable[[str], object] = warnings.warn,
+) -> xarray.Dataset | None:
+    """Compute every hit of a campaign into a file. Computed hits are soon on the disk, in `output`.parts.
+
+    Args:
+        output: the netCDF file, which appears when it is complete. None returns the result instead.
+        campaign, progress, cancel: as in `run`.
+        device: as in `run`; or an open computer, for several runs.
+        workers, scheduler: number of processes of this machine, or address of a Dask scheduler, to compute.
+        limit: the limit that is searched for every hit; without it, the end of every hit is computed.
+        references: as in `run`; by default as the campaign has it.
+        resume: continue what is in `output`.parts; begin if there is nothing.
+        overwrite: replace an existing file, and begin anew in place of an unfinished run.
+        warn: called with a sentence for damaged chunks, which are computed again.
+
+    Raises:
+        OutputError: a file cannot be written, must not be overwritten or belongs to another campaign, or another run is
+            at work on it.
+        CampaignError, DeviceError, Cancelled: as in `run`.
+        ClusterError: the workers cannot be used.
+        Interrupted: the user interrupted the run; what is saved can be resumed.
+    """
+    campaign = campaign if isinstance(campaign, Campaign) else Campaign.from_toml(campaign)
+    path, size, sampler = None if output is None else Path(output), extent(len(campaign.sampler())), campaign.sampler()
+    compute = compute_hits if limit is None else partial(compute_limits, limit)
+    with (
+        opened(device, workers, scheduler, cancel, warn) as computer,
+        open_chunks(
+            path, manifest(campaign, computer.made_by, limit), resume=resume, overwrite=overwrite, warn=warn
+        ) as chunks,
+        followed(progress) as follow,
+    ):
+        if chunks is None:
+            return None
+        watch = Watch(campaign, chunks, size, () if limit is None else (f"mean({LIMITS[limit.quantity].value})",))
+        check_cost = cost_warning(campaign, computer.made_by[attr.DEVICE], 1 if limit is None else PASSAGES)
+
+        def piloting(levels: list[int]) -> None:
+            for level in levels:
+                check_cost(at_level(level, campaign.numerics))
+            follow(RunProgress(0, len(sampler), piloting=True, level=next(iter(levels), None)))
+
+        if (first := chunks.load(0)) is not None:
+            pilot = pilot_in(first)
+        else:
+            pilot = computer.call(find_resolution, campaign, limit, tick=piloting)
+        numerics = numerics_of(campaign, pilot)
+        check_cost(numerics)
+
+        def tasks() -> Iterator[tuple[range, tuple[Any, ...]]]:
+            for task in _ranges(chunks, watch, lambda: _task_size(computer, campaign, watch) // size):
+                yield task, (campaign, numerics, sampler.shots(task.start * size, len(task) * size), task.start * size)
+
+        follow(watch.progress(pilot))
+        results = computer.map(compute, tasks(), lambda done: follow(watch.progress(pilot, sum(done))))
+        with closing(results):
+            while not watch.ended:
+                task, dataset = next(results)
+                for number, chunk in _split(dataset, task, size):
+                    if number == 0:
+                        chunk = described(chunk, campaign, numerics_of(campaign, pilot, limit), pilot, limit)
+                    chunks.save(number, chunk)
+                    watch.add(number, chunk)
+                follow(watch.progress(pilot))
+        if references is None:
+            references = path is not None and campaign.output.solid_reference
+        of_references = _references(campaign, limit, pilot, computer) if references else {}
+        return _finished(chunks, watch, of_references, path)
+
+
+def _ranges(chunks: Chunks, watch: Watch, most: Callable[[], int]) -> Iterator[range]:
+    """Ranges of missing chunks. Each has about as many as `most` returns when the range begins."""
+    there, first = chunks.numbers, 0
+    while first < watch.count:
+        stop, last = first, min(first + max(1, most()), watch.count)
+        while stop < last and stop not in there:
+            stop += 1
+        if stop > first:
+            yield range(first, stop)
+        first = max(stop, first + 1)
+
+
+def _task_size(computer: Computer, campaign: Campaign, watch: Watch) -> int:
+    """Shots per task, at the rate so far; 0 stands for one chunk."""
+    if computer.made_by[attr.DEVICE] != "cpu":
+        return CUDA_SHOTS
+    if computer.is_remote or campaign.stop is not None or not watch.time:
+        return 0
+    return min(CPU_SHOTS, int(CPU_SECONDS * watch.hits / watch.time))
+
+
+def _split(dataset: xarray.Dataset, task: range, size: int) -> Iterator[tuple[int, xarray.Dataset]]:
+    """The chunks of a task, each with its share of the time."""
+    for place, number in enumerate(task):
+        chunk = dataset.isel(hit=slice(place * size, (place + 1) * size))
+        share = chunk.sizes["hit"] / dataset.sizes["hit"]
+        yield number, chunk.assign_attrs({attr.COMPUTE_TIME: dataset.attrs[attr.COMPUTE_TIME] * share})
+
+
+def _references(
+    campaign: Campaign, limit: LimitSpec | None, pilot: PilotResult | None, computer: Computer
+) -> dict[str, xarray.Dataset]:
+    """Some hits of the references of a campaign, by their names, at the resolution of the campaign."""
+    pilot = None if pilot is None else replace(pilot, finer=None, numbers=None)
+    datasets = dict[str, xarray.Dataset]()
+    for name, reference in campaign.references.items():
+        compute, searched, most = compute_hits, limit, REFERENCE_HITS
+        if limit is not None:
+            if (searched := limit_of_reference(limit, campaign, name)) is None:
+                continue
+            compute, most = partial(compute_limits, searched), REFERENCE_LIMITS
+        shots = reference_shots(reference, most)
+        dataset = computer.call(compute, reference, numerics_of(reference, pilot), shots, 0)
+        datasets[name] = described(dataset, reference, numerics_of(reference, pilot, searched), pilot, searched)
+    return datasets
+
+
+def _finished(
+    chunks: Chunks, watch: Watch, references: dict[str, xarray.Dataset], path: Path | None
+) -> xarray.Dataset | None:
+    """Join the chunks into the result: a file, or in memory."""
+    every = (chunk for number in range(watch.count) if (chunk := chunks.load(number)) is not None)
+    attributes = attr.with_units({attr.COMPUTE_TIME: watch.time, attr.HITS_PER_SECOND: watch.hits / watch.time})
+    attributes |= watch.stop
+    if path is not None:
+        attributes[attr.FINGERPRINT] = chunks.fingerprint
+        files.write_joined(every, path, attributes=attributes, references=references)
+        return None
+    return with_references(joined(every).assign_attrs(attributes), references)
 
 
 def cost_warning(campaign: Campaign, device: str, passages: int = 1) -> Callable[[Numerics], None]:
@@ -48,11 +235,11 @@ def cost_warning(campaign: Campaign, device: str, passages: int = 1) -> Callable
     `prepare` does: TooManySteps, MemoryError."""
 
     @cache
-    def warn(numerics: Numerics) -> None:
+    def check(numerics: Numerics) -> None:
         if device == "cpu" and (sentence := estimate_cost(campaign, numerics, passages)) is not None:
             warnings.warn(sentence, Costly, stacklevel=2)
 
-    return warn
+    return check
 
 
 def estimate_cost(campaign: Campaign, numerics: Numerics, passages: int = 1) -> str | None:
@@ -77,191 +264,3 @@ def estimate_cost(campaign: Campaign, numerics: Numerics, passages: int = 1) -> 
         f"least {prepared.steps} steps, and windows of {prepared.window_nodes:.2g} nodes, "
         f"{prepared.window_bytes / 2**30:.2g} GiB; a lower level, and a longer degradation_length, take less"
     )
-
-
-CUDA_SHOTS = 2**17
-"""Shots per task on a GPU. Fewer shots would not fill it."""
-CPU_SHOTS, CPU_SECONDS = 2**14, 0.5
-"""Most shots of a task on the CPU of this machine, and the time that it shall take, beside which its set-up on one core
-is short. A task is at least one shard; another process computes one shard per task."""
-
-
-def task_size(executor: Executor, rate: float) -> int:
-    """Shots per task, at a rate of shots per second; 0 stands for one shard."""
-    if executor.made_by[attr.DEVICE] != "cpu":
-        return CUDA_SHOTS
-    return 0 if executor.is_remote else min(CPU_SHOTS, int(CPU_SECONDS * rate))
-
-
-def reference_shots(campaign: Campaign, among: int, most: int) -> Shots:
-    """The first shots of a reference. One stands for all where the first ones differ only in their places, and all
-    layers are solid and unbounded."""
-    shots = campaign.sampler().shots(0, among)
-    elsewhere = (v.HIT_Y, v.HIT_Z, "offset_y", "offset_z")
-    conditions = [values for name, values in shots.columns.items() if name not in elsewhere]
-    unbounded = all(layer == layer.solid and layer.size is None for layer in campaign.target.layers)
-    alike = unbounded and not any(np.nan_to_num(np.ptp(values, axis=0)).any() for values in conditions)
-    return shots[: 1 if alike else max(1, most)]
-
-
-def ranges(shards: Shards, shots: Callable[[], int]) -> Iterator[range]:
-    """Ranges of missing shards. Each has about as many shots as `shots` returns when the range begins."""
-    there, first = frozenset(shards.there()), 0
-    while first < shards.count:
-        most, stop = max(1, shots() // shards.extent), first
-        while stop < min(first + most, shards.count) and stop not in there:
-            stop += 1
-        if stop > first:
-            yield range(first, stop)
-        first = max(stop, first + 1)
-
-
-def split(table: HitTable, task: range, size: int) -> Iterator[tuple[int, HitTable]]:
-    """The shards of a task, each with its share of the time. Only the first shard of a campaign keeps the variables of
-    the whole campaign."""
-    hits, of_the_campaign = table.sizes["hit"], [name for names in v.GROUPS.values() for name in names]
-    for place, index in enumerate(task):
-        shard = numbered(table.isel(hit=slice(place * size, (place + 1) * size)), first=index * size)
-        if index:
-            shard = shard.drop_vars(of_the_campaign)
-        time = table.attrs[attr.COMPUTE_TIME] * shard.sizes["hit"] / hits
-        yield index, shard.assign_attrs({attr.COMPUTE_TIME: time})
-
-
-def run(
-    campaign: Campaign | str | Path,
-    *,
-    references: bool = False,
-    device: str = "auto",
-    progress: Follow | None = None,
-    cancel: Cancel | None = None,
-) -> xarray.Dataset:
-    """Compute every hit of a campaign, in memory. `run(campaign.solid())` computes its solid reference.
-
-    Args:
-        campaign: the campaign, or its file.
-        references: compute some hits of its references, too, with which `inspect` and `compare` then compare it.
-        device: "auto" (every CUDA device if there is one, else the CPU), "cpu", "cuda:0", "cuda:0,cuda:1", …
-        progress: called several times a second; without it a notebook shows a bar.
-        cancel: ends the run from another thread.
-
-    Returns:
-        The Dataset of results/dataset.py, one entry per hit.
-
-    Raises:
-        CampaignError: the file is no campaign, or has a value that is not allowed.
-        DeviceError: the device is absent.
-        Cancelled: by `cancel`.
-    """
-    campaign = _read(campaign)
-    total = len(campaign.sampler())
-    with executor_for(device, cancel=cancel) as executor, followed(progress) as follow:
-        shards = Shards(total, extent(total))
-        end = _fill(campaign, HIT_MAP, shards, executor, follow)
-        tables = _references(campaign, HIT_MAP, shards, executor) if references else {}
-    table = joined(shards.shard(index) for index in range(end.shards))
-    result = in_memory(table.assign_attrs(_attributes(table, end)).to_xarray())
-    return with_references(result, {name: in_memory(one.to_xarray()) for name, one in tables.items()})
-
-
-def run_to_file(
-    campaign: Campaign | str | Path,
-    output: str | Path,
-    *,
-    device: str | Executor = "auto",
-    computation: Computation = HIT_MAP,
-    resume: bool = False,
-    overwrite: bool = False,
-    progress: Follow | None = None,
-    tell: Callable[[str], object] = warnings.warn,
-) -> None:
-    """Compute every hit of a campaign into a file. Computed hits are on the disk at once, in `output`.parts.
-
-    Args:
-        output: the netCDF file. It appears when it is complete.
-        campaign, device, progress: as in `run`; or an executor for the device.
-        computation: what is computed of every hit.
-        resume: continue what is in `output`.parts; begin if there is nothing.
-        overwrite: replace an existing file, and begin anew in place of an unfinished run.
-        tell: called with a sentence for each damaged part, which is computed again.
-
-    Raises:
-        OutputError: a file cannot be written, must not be overwritten or belongs to another campaign, or another run is
-            at work on it.
-        CampaignError, DeviceError: as in `run`.
-        Interrupted: the user interrupted the run; what is saved can be resumed.
-    """
-    campaign, output = _read(campaign), Path(output)
-    with claimed(output), opened(device) as computing:
-        content = manifest(campaign, {**computing.made_by, **computation.content})
-        total = len(campaign.sampler())
-        shards = ShardsOnDisk(output, content, total, tell)
-        if not shards.parts.begin(resume=resume, overwrite=overwrite):
-            return
-        with telling(shards.kept):
-            with followed(progress) as follow:
-                end = _fill(campaign, computation, shards, computing, follow)
-                references = _references(campaign, computation, shards, computing)
-            shards.finish(end.shards, lambda first: _attributes(first, end), references)
-
-
-def _read(campaign: Campaign | str | Path) -> Campaign:
-    return campaign if isinstance(campaign, Campaign) else Campaign.from_toml(campaign)
-
-
-def _fill(campaign: Campaign, computation: Computation, shards: Shards, executor: Executor, follow: Follow) -> End:
-    """Compute the missing shards until none is missing or the stop rule is met."""
-    sampler = campaign.sampler()
-    watch = Watch(campaign, shards, computation.measures)
-    is_new, warn = 0 not in shards.there(), cost_warning(campaign, executor.made_by[attr.DEVICE], computation.passages)
-    if not is_new:  # shard 0 holds the pilot's findings, and its hits at a finer level
-        watch.pilot = pilot_in(shards.shard(0))
-    else:
-
-        def piloting() -> None:
-            level = next(iter(executor.reports()), None)
-            if level is not None:
-                warn(at_level(level, campaign.numerics))
-            follow(replace(watch.progress(0), piloting=True, trying=level))
-
-        watch.pilot = result_of(executor, computation.pilot, campaign, tick=piloting)
-    warn(numerics_of(campaign, watch.pilot))
-
-    later = None if watch.pilot is None else replace(watch.pilot, finer=None, numbers=None)
-
-    def jobs() -> Iterator[tuple[range, Job]]:
-        most = lambda: task_size(executor, 0.0 if campaign.stop else watch.rate)  # noqa: E731
-        for task in ranges(shards, most):
-            shots = sampler.shots(task.start * shards.extent, len(task) * shards.extent)
-            yield task, Job(computation.compute, (campaign, shots, watch.pilot if task.start == 0 else later))
-
-    with closing(completed(executor, jobs(), lambda: follow(watch.progress(sum(executor.reports()))))) as tables:
-        while watch.end is None:
-            task, table = next(tables)
-            for index, shard in split(table, task, shards.extent):
-                shards.save(index, shard)
-                watch.add(index, shard)
-    follow(watch.progress(0))
-    return watch.end
-
-
-def _references(
-    campaign: Campaign, computation: Computation, shards: Shards, executor: Executor
-) -> dict[str, HitTable]:
-    """Some hits of the references of a campaign, by their names, at the resolution that its pilot found."""
-    pilot, tables = pilot_in(shards.shard(0)), dict[str, HitTable]()
-    for name, reference in campaign.references.items() if campaign.output.solid_reference else ():
-        if (of_reference := computation.of_reference(campaign, name)) is not None:
-            shots = reference_shots(reference, shards.extent, computation.reference_hits)
-            tables[name] = result_of(executor, of_reference.compute, reference, shots, pilot)
-    return tables
-
-
-def _attributes(table: HitTable, end: End) -> dict[str, Any]:
-    """Global attributes of a complete result that replace those of its first shard."""
-    return {
-        attr.HISTORY: attr.history_line(table.attrs[attr.HISTORY].partition(" warpimpact ")[2]),
-        attr.COMPUTE_TIME: end.compute_time,
-        attr.HITS_PER_SECOND: end.hits / end.compute_time,
-        **end.stop,
-    }

@@ -90,7 +90,7 @@ class LimitSearch:
     def learn(self, which: NDArray[np.int64], tried: Array, outcomes: Outcomes) -> NDArray[np.bool_]:
         """Take in one run of some shots; returns which of the runs show how a shot ends at its limit."""
         status = outcomes.status
-        passes, untouched = status == Status.PERFORATED, which[status == Status.MISSED]
+        passes, untouched = status == Status.PERFORATED, which[status == Status.UNTOUCHED]
         through, back = which[passes], which[~passes]
         self.runs[which] += 1
         for known, new in ((self.drives, self._drive(tried)), (self.speeds, outcomes.residual_velocity)):

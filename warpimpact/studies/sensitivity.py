@@ -21,7 +21,7 @@ from warpimpact.campaign.campaign import Campaign
 from warpimpact.campaign.materials import StraightPassage
 from warpimpact.campaign.resistances import catalogue_resistance, is_drawn
 from warpimpact.results import variables as v
-from warpimpact.results.dataset import narrow_table
+from warpimpact.results.dataset import narrow_dataset
 from warpimpact.results.measures import Measure, estimate_from
 from warpimpact.scene import Interaction, Numerics, Plate, Radians, Shots
 from warpimpact.scene.interaction import NEAR_EDGES
@@ -166,7 +166,7 @@ def _computed(
     computed: dict[str, dict[str, dict[Measure, Array]]] = {plate: {} for plate in campaigns}
     for ((plate, name), changed), outcome in zip(rows.items(), outcomes, strict=True):
         labelled = changed.scene.model_copy(update={"record": campaigns[plate].output})  # stand-offs as given
-        dataset = narrow_table(labelled, shots[plate, name], outcome, needed).to_xarray()
+        dataset = narrow_dataset(labelled, shots[plate, name], outcome, needed)
         known = measures_named(dataset, texts, SHOWN)
         computed[plate][name] = {measure: measure.values(dataset) for measure in known}
     return computed

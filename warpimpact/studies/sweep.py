@@ -27,14 +27,12 @@ from warpimpact.results import variables as v
 from warpimpact.results.dataset import failed
 from warpimpact.results.kinds import CAMPAIGN, SWEEP
 from warpimpact.results.measures import Measure
-from warpimpact.runs.executor import Executor, opened
+from warpimpact.runs.computer import Computer
 from warpimpact.runs.run import run_to_file
 from warpimpact.scene.units import quoted, reader_in
 
 SHOWN = (f"mean({v.RESIDUAL_VELOCITY})", f"mean({v.DEFLECTION})", f"mean({v.TILT})", "P(perforated)")
 """Default measures of a sweep, as far as it has them."""
-_OF_POINTS = {str(name) for name in v.GROUPS["plate"]}
-"""Holes, which only the results of the points have."""
 _MOST = 10_000
 """Most points of a sweep."""
 _OF_A_POINT = (
@@ -150,11 +148,11 @@ def run_sweep(
     sweep: Sweep,
     output: Path,
     *,
-    device: str | Executor = "auto",
+    device: str | Computer = "auto",
     resume: bool = False,
     overwrite: bool = False,
     progress: Callable[[str], Any] | None = None,
-    tell: Callable[[str], object] = warnings.warn,
+    warn: Callable[[str], object] = warnings.warn,
 ) -> None:
     """Compute every point of a sweep by `run_to_file`, and join their files into one.
 
@@ -174,12 +172,9 @@ def run_sweep(
     except OSError as error:
         raise files.OutputError(f"{folder}: cannot be written into ({error.strerror})") from None
     paths = [folder / f"{name}.nc" for name in sweep.campaigns]
-    with opened(device) as computing:
-        for (name, campaign), path in zip(sweep.campaigns.items(), paths, strict=True):
-            follow = progress(name) if progress else None
-            run_to_file(
-                campaign, path, device=computing, resume=resume, overwrite=overwrite, progress=follow, tell=tell
-            )
+    for (name, campaign), path in zip(sweep.campaigns.items(), paths, strict=True):
+        follow = progress(name) if progress else None
+        run_to_file(campaign, path, device=device, resume=resume, overwrite=overwrite, progress=follow, warn=warn)
     files.write(joined(sweep, [files.read(path) for path in paths]), output)
 
 
@@ -198,7 +193,7 @@ def joined(sweep: Sweep, points: Sequence[xarray.Dataset]) -> xarray.Dataset:
     data: dict[str, Any] = {}
     coordinates: dict[str, Any] = {swept.name: _coordinate(swept, sweep) for swept in sweep.inputs}
     for name, array in first.variables.items():
-        if str(name) in names or str(name) in _OF_POINTS:
+        if str(name) in names:
             continue
         columns = [point.variables[name] for point in same if name in point.variables]
         if len(columns) < len(same) or len({column.shape for column in columns}) > 1:

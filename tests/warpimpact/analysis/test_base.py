@@ -24,9 +24,11 @@ from warpimpact.results.measures import Measure, shift_of
 from warpimpact.results.references import references_of, with_references
 from warpimpact.results.variables import LIMITS, STATUS
 from warpimpact.results.vocabulary import is_pierced, piercing_margin
+from warpimpact.runs.compute import compute_limits
+from warpimpact.runs.describe import described
 from warpimpact.scene import Numerics
 from warpimpact.solver.worker import Worker
-from warpimpact.studies.limit import LimitMap
+from warpimpact.studies.limit import limit_of
 from warpimpact.studies.limit_view import limit_view, proxy
 
 from .references import with_solid
@@ -230,8 +232,9 @@ def test_limits_stand_over_the_weight_that_the_target_needs(make_plate_result) -
 def test_the_proxy_beside_the_limit_thickness() -> None:
     """The ratio of base armour that a core needs at 0° and at 85°: 2.8 by the kernel, 4.4 by the proxy."""
     campaign = Campaign.from_toml(CAMPAIGNS / "base_armour.toml")
-    job, fixed = LimitMap.of(campaign, "thickness"), campaign.model_copy(update={"numerics": Numerics(level=2)})
-    dataset = job.compute(fixed, campaign.sampler().shots(0, 7), None, Worker("cpu")).to_xarray()
+    limit, numerics = limit_of(campaign, "thickness"), Numerics(level=2)
+    dataset = compute_limits(limit, campaign, numerics, campaign.sampler().shots(0, 7), 0, worker=Worker("cpu"))
+    dataset = described(dataset, campaign, numerics, limit=limit)
     thickness, found = 1e3 * dataset["limit_thickness"].values, proxy(dataset)
     assert found is not None
     assert found["inclination [°]"].tolist() == pytest.approx([0, 15, 30, 45, 60, 75, 85])

@@ -20,7 +20,7 @@ from warpimpact.results.files import ResultError
 
 from .references import with_solid
 
-pytestmark = pytest.mark.usefixtures("small_shards")
+pytestmark = pytest.mark.usefixtures("small_chunks")
 TWO_PLATES = Path(__file__).parents[3] / "campaigns" / "two_plates.toml"
 TRIALS = 40
 LEAST = 34  # 95 % of 40 trials: 38 ± 1.4, three standard deviations below; intervals half as wide would hold 27 times

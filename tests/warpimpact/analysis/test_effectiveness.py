@@ -26,7 +26,14 @@ def named(dataset: xarray.Dataset, *texts: str) -> dict[str, Any]:
 @pytest.fixture
 def mixed(make_plate_result) -> xarray.Dataset:
     """Shots that end in every way."""
-    ends = [Status.PERFORATED, Status.MISSED, Status.ARRESTED, Status.RICOCHETED, Status.UNFINISHED, Status.PERFORATED]
+    ends = [
+        Status.PERFORATED,
+        Status.UNTOUCHED,
+        Status.ARRESTED,
+        Status.RICOCHETED,
+        Status.UNFINISHED,
+        Status.PERFORATED,
+    ]
     velocity = np.array([800.0, 1000.0, 0.0, 500.0, np.nan, 600.0])
     return make_plate_result(velocity, np.array([20.0, 90.0, np.nan, np.nan, np.nan, 170.0]), np.array(ends))
 

@@ -9,7 +9,7 @@ from warpimpact.kernels.status import Status
 from warpimpact.results.dataset import passed
 from warpimpact.results.measures import Measure
 
-MIXED = [Status.PERFORATED, Status.ARRESTED, Status.RICOCHETED, Status.MISSED, Status.UNFINISHED]
+MIXED = [Status.PERFORATED, Status.ARRESTED, Status.RICOCHETED, Status.UNTOUCHED, Status.UNFINISHED]
 
 
 @pytest.fixture
@@ -46,7 +46,7 @@ def test_means_count_only_what_passed_the_plate_and_exists(mixed, measure, expec
 
 def test_text_states_the_numbers_with_their_units(mixed):
     text = summary_text(mixed)
-    for status in ("perforated", "arrested", "ricocheted", "missed", "unfinished"):
+    for status in ("perforated", "arrested", "ricocheted", "untouched", "unfinished"):
         assert f"{status} 1 (20.0%)" in text
     lines = [line.split() for line in text.splitlines()]
     assert ["residual", "velocity,", "m/s", "750.00", "not", "determined", "50.00"] in lines  # of two cores

@@ -35,7 +35,7 @@ def written(tmp_path: Path, tail: str, *changes: tuple[str, str]) -> Path:
     return path
 
 
-@pytest.mark.usefixtures("small_shards")
+@pytest.mark.usefixtures("small_chunks")
 def test_from_a_campaign_to_its_result(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     path, output = written(tmp_path, STOP, ("seed = 1", "seed = 1\nirreducible = true")), tmp_path / "a.nc"
     assert main(["run", str(path), "-o", str(output), "--device", "cpu"]) == 0

@@ -119,7 +119,7 @@ def test_a_result_tells_of_every_layer(result: xarray.Dataset) -> None:
     assert result.sizes["layer"] == 3
     assert result["layer_status"].attrs["flag_meanings"].split().count("not_reached") == 1
     status = result["layer_status"].values
-    left = (status == Status.PERFORATED) | (status == Status.MISSED)
+    left = (status == Status.PERFORATED) | (status == Status.UNTOUCHED)
     for name in ("layer_residual_velocity", "layer_tilt"):
         np.testing.assert_array_equal(np.isfinite(result[name].values), left, err_msg=name)
     rests = result["stopped_in"].values >= 0

@@ -12,7 +12,7 @@ from warpimpact.campaign.campaign import CampaignError
 from warpimpact.cli import main
 from warpimpact.results import files
 from warpimpact.results.variables import OUTCOME_VARIABLES
-from warpimpact.runs.compute import HIT_MAP
+from warpimpact.runs.compute import compute_hits, numerics_of
 from warpimpact.runs.describe import pilot_in
 from warpimpact.runs.replay import replay
 from warpimpact.runs.run import run, run_to_file
@@ -64,7 +64,9 @@ def test_a_hit_does_not_depend_on_its_company(tmp_path: Path) -> None:
     whole = run(campaign, device="cpu")
     found = pilot_in(whole)
     for hit in range(0, 64, 9):
-        alone = HIT_MAP.compute(campaign, campaign.sampler().shots(hit, 1), found, Worker("cpu"))
+        alone = compute_hits(
+            campaign, numerics_of(campaign, found), campaign.sampler().shots(hit, 1), hit, worker=Worker("cpu")
+        )
         for name in OUTCOME_VARIABLES:
             assert np.array_equal(alone[name].values[0], whole[name][hit], equal_nan=True), name
 
@@ -89,7 +91,7 @@ def own(tmp_path: Path) -> Campaign:
     return campaign_with(tmp_path, (VELOCITY, NORMAL), *changes)
 
 
-@pytest.mark.usefixtures("small_shards")
+@pytest.mark.usefixtures("small_chunks")
 def test_scatter_in_plate_and_core_from_file_to_result(
     own: Campaign, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -29,7 +29,7 @@ from warpimpact.scene import Plate
 from warpimpact.scene.shots import EXPORTED
 
 SLOTTED_PLATE = Path(__file__).parents[3] / "campaigns" / "slotted_plate.toml"
-MIXED = [Status.PERFORATED, Status.ARRESTED, Status.RICOCHETED, Status.MISSED]
+MIXED = [Status.PERFORATED, Status.ARRESTED, Status.RICOCHETED, Status.UNTOUCHED]
 ResultMaker = Callable[..., xarray.Dataset]
 
 
@@ -37,7 +37,7 @@ def test_table_has_a_row_per_hit_and_a_column_per_standoff_and_axis(make_result:
     dataset = make_result(np.tile(MIXED, 5))
     frame = to_dataframe(dataset)
     assert list(frame.index) == list(range(20))
-    assert frame["status"].tolist() == ["perforated", "arrested", "ricocheted", "missed"] * 5
+    assert frame["status"].tolist() == ["perforated", "arrested", "ricocheted", "untouched"] * 5
     np.testing.assert_array_equal(frame["tilt_130mm"], dataset["tilt"][:, 1])
     np.testing.assert_array_equal(frame["angular_velocity_y"], dataset["angular_velocity"][:, 1])
     np.testing.assert_array_equal(frame["hit_z"], dataset["hit_z"])
@@ -46,7 +46,7 @@ def test_table_has_a_row_per_hit_and_a_column_per_standoff_and_axis(make_result:
     )
     assert frame.shape == (20, per_hit)
     with warnings.catch_warnings(action="error"):
-        assert set(frame.groupby("status").size().index) == {"perforated", "arrested", "ricocheted", "missed"}
+        assert set(frame.groupby("status").size().index) == {"perforated", "arrested", "ricocheted", "untouched"}
     given = np.concatenate([np.full(10, 30.0), np.linspace(0.1, 50.0, 10)])
     stored = np.degrees(np.radians(given))
     assert stored[0] != 30.0

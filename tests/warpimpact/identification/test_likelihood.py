@@ -95,7 +95,7 @@ def test_a_status_counts_the_hits_that_ended_so(score: Callable[..., Scores]) ->
     status = np.where(np.arange(SETS * POINTS) % 4 == 0, Status.ARRESTED, Status.PERFORATED)
     outcomes = outcomes_of(np.full(SETS * POINTS, 500.0), np.zeros(SETS * POINTS), status)
     assert np.exp(score((), outcomes, status="arrested").log_likelihood) == pytest.approx([0.25, 0.25])
-    none = score((), outcomes, status="missed")
+    none = score((), outcomes, status="untouched")
     assert np.isneginf(none.log_likelihood).all()
     assert np.isinf(none.misfit).all()
 

@@ -7,7 +7,7 @@ from warpimpact.analysis.hit_map import NEIGHBOURS, plane_fit
 from warpimpact.kernels.status import Status
 from warpimpact.plotting import dispersion, marginals, probability_map, save_maps, uncertainty
 
-MIXED = [Status.PERFORATED, Status.ARRESTED, Status.RICOCHETED, Status.MISSED]
+MIXED = [Status.PERFORATED, Status.ARRESTED, Status.RICOCHETED, Status.UNTOUCHED]
 
 
 def test_intervals_hold_the_plane_as_often_as_they_say():
@@ -85,7 +85,7 @@ def test_dispersion_shows_each_core_behind_the_plate(make_result, count):
     if count > 8000:
         assert shown.get_array().sum() == count / 2
     else:
-        behind = dataset.isel(hit=np.isin(dataset["status"], [Status.PERFORATED, Status.MISSED]))
+        behind = dataset.isel(hit=np.isin(dataset["status"], [Status.PERFORATED, Status.UNTOUCHED]))
         expected = np.stack([behind["tilt"][:, 0], behind["residual_velocity"]], axis=-1)
         np.testing.assert_allclose(shown.get_offsets(), expected)
     assert sum(patch.get_height() for patch in above.patches) == count / 2

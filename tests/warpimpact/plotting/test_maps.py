@@ -12,7 +12,7 @@ from PIL import Image
 from warpimpact.kernels.status import Status
 from warpimpact.plotting import overview, save_beside, save_maps, variable_map, variable_maps
 
-MIXED = np.array([Status.PERFORATED, Status.ARRESTED, Status.RICOCHETED, Status.MISSED])
+MIXED = np.array([Status.PERFORATED, Status.ARRESTED, Status.RICOCHETED, Status.UNTOUCHED])
 GREY = (0.62, 0.62, 0.62)
 
 
@@ -140,7 +140,7 @@ def test_few_hits_are_points(make_result):
 
 def test_status_map_has_a_colour_and_a_share_for_each_status_that_occurs(covered):
     figure = variable_map(covered, "status")
-    assert legend_texts(figure) == ["perforated", "arrested", "ricocheted", "missed", "edge of hole"]
+    assert legend_texts(figure) == ["perforated", "arrested", "ricocheted", "untouched", "edge of hole"]
     assert "perforated 25.0%" in figure.axes[0].get_title()
     colours = [to_rgb(handle.get_color()) for handle in figure.legends[0].legend_handles]
     picture = Picture(figure)

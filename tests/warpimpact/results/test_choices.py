@@ -11,7 +11,6 @@ from warpimpact import Campaign, open_result
 from warpimpact.analysis.effectiveness import effectiveness
 from warpimpact.cli import main
 from warpimpact.results import files
-from warpimpact.results import variables as v
 from warpimpact.results.dataset import is_choice
 from warpimpact.results.layers import outlines
 from warpimpact.results.measures import dealing
@@ -69,24 +68,12 @@ def test_a_choice_made_with_plain_xarray_is_still_a_result(
     assert f"hit: got {missing}, but the result has {few.sizes['hit']} of the hits" in capsys.readouterr().err
 
 
-def test_holes_follow_from_the_plate_where_the_outlines_were_left_behind(
-    result: xarray.Dataset, plain: xarray.Dataset
-) -> None:
-    assert v.OUTLINE_Y not in plain.variables
-    with xarray.open_dataset(plain.encoding["source"], group="plate") as stored:
-        for axis, outline in outlines(plain).items():
-            np.testing.assert_array_equal(outline, stored[v.OUTLINE[axis]])
-    without = plain.drop_attrs().assign_attrs(plate_period=plain.attrs["plate_period"])
-    assert [len(outline) for outline in outlines(without).values()] == [0, 0]
-
-
 @pytest.mark.parametrize(
     ("choose", "sentence"),
     [
-        (lambda d: d.isel(hit=[]), "has no hits, so there is nothing to show"),
-        (lambda d: d.isel(hit=3), "holds one hit without its dimension; choose hits as a list"),
-        (lambda d: d.where(d["tilt"].isel(standoff=0, drop=True) > 20.0), "choose hits with where(..., drop=True)"),
-        (lambda d: d.drop_attrs(deep=False), 'no attribute "warpimpact_kind"; if it was chosen from a result, keep'),
+        (lambda d: d.isel(hit=[]), 'has no hits along "hit"; choose hits as a list'),
+        (lambda d: d.isel(hit=3), 'has no hits along "hit"; choose hits as a list'),
+        (lambda d: d.drop_attrs(deep=False), 'its attribute "warpimpact_kind" is ""'),
     ],
 )
 def test_what_a_choice_lacks_is_told_in_a_sentence(

@@ -10,7 +10,7 @@ import pytest
 
 from warpimpact import Campaign
 from warpimpact.cli import main
-from warpimpact.runs.executor import ClusterError, Job, _made_by, _on_worker, executor_for
+from warpimpact.runs.computer import ClusterError, _made_by, _on_worker, computer
 from warpimpact.runs.progress import RunProgress
 from warpimpact.runs.run import run_to_file
 from warpimpact.solver.device import DeviceError
@@ -23,7 +23,7 @@ SCATTERED = (
     .replace('thickness = "4 mm"', 'thickness = { distribution = "uniform", low = "3.8 mm", high = "4.2 mm" }')
     .replace('"4 g"  ', '{ distribution = "normal", mean = "4 g", std = "50 mg" }  ')
 )
-pytestmark = pytest.mark.usefixtures("small_shards")
+pytestmark = pytest.mark.usefixtures("small_chunks")
 
 
 @pytest.fixture(scope="module")
@@ -56,8 +56,7 @@ def test_a_killed_worker_costs_nothing(
             killed_at.append(standing.done)
 
     output, local = tmp_path / "a.nc", tmp_path / "local.nc"
-    with executor_for("cpu", scheduler=cluster.scheduler_address) as executor:
-        run_to_file(campaign, output, device=executor, progress=kill_one)
+    run_to_file(campaign, output, device="cpu", scheduler=cluster.scheduler_address, progress=kill_one)
     assert killed_at
     assert killed_at[0] < 2500  # in mid-run
     with distributed.Client(cluster) as client:
@@ -83,10 +82,10 @@ def test_a_mistake_on_a_worker_is_told_and_leaves_nothing(
 def test_workers_that_would_compute_other_bits_are_refused() -> None:
     kind = {"warpimpact_version": "0.0.0", "warp_version": "1", "device": "cpu"}
     with pytest.raises(DeviceError, match=r'the workers differ: warpimpact_version is "0.0.0" on one and'):
-        _on_worker(Job(_made_by, ()), "cpu", kind)
+        _on_worker(_made_by, "cpu", None, kind)
 
 
-@pytest.mark.parametrize("request_", ["nthreads", "submit", None])
+@pytest.mark.parametrize("request_", ["nthreads", None])
 def test_a_lost_scheduler_is_told_with_the_way_to_resume(
     request_: str | None, campaign: Campaign, cluster: object, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -101,18 +100,18 @@ def test_a_lost_scheduler_is_told_with_the_way_to_resume(
         monkeypatch.setattr(distributed.Client, request_, unreachable)
 
     output = tmp_path / "a.nc"
-    with (
-        pytest.raises(ClusterError, match=r"was lost, perhaps killed .* continue with --resume"),
-        executor_for("cpu", scheduler=cluster.scheduler_address) as executor,
-    ):
-        run_to_file(campaign, output, device=executor, progress=lose_it)
+    with pytest.raises(ClusterError, match=r"was lost, perhaps killed .* continue with --resume"):
+        run_to_file(campaign, output, device="cpu", scheduler=cluster.scheduler_address, progress=lose_it)
 
 
 def test_a_scheduler_without_workers_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("warpimpact.runs.executor.NO_WORKERS_LIMIT", 0.3)
+    monkeypatch.setattr("warpimpact.runs.computer.WORKERLESS", 0.1)
+    monkeypatch.setattr("warpimpact.runs.computer.WORKERLESS_LIMIT", 0.5)
+    warnings: list[str] = []
     with (
         distributed.LocalCluster(n_workers=0, dashboard_address="127.0.0.1:0") as empty,
-        pytest.raises(ClusterError, match=r"has had no worker for 0.3 s; start some; .* continue with --resume"),
-        executor_for("cpu", scheduler=empty.scheduler_address),
+        pytest.raises(ClusterError, match=r"has had no worker for 0.5 s; start some; .* continue with --resume"),
+        computer("cpu", scheduler=empty.scheduler_address, warn=warnings.append),
     ):
         pass
+    assert "has no worker yet" in warnings[0]

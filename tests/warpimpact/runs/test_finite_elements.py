@@ -15,7 +15,6 @@ from warpimpact.export.paraview import write_vtk
 from warpimpact.results import attributes as attr
 from warpimpact.results import files
 from warpimpact.results.references import references_of
-from warpimpact.runs.executor import executor_for
 from warpimpact.runs.finite_elements import continuum_to_file
 
 CAMPAIGN = """
@@ -52,8 +51,7 @@ def campaign_file(tmp_path: Path) -> Path:
 
 
 def computed(path: Path, campaign: Path, hits: tuple[int, ...] | None = None, *, resume: bool = False) -> Path:
-    with executor_for("cpu", apart=True) as executor:
-        continuum_to_file(Campaign.from_toml(campaign), path, hits=hits, device=executor, resume=resume)
+    continuum_to_file(Campaign.from_toml(campaign), path, hits=hits, device="cpu", resume=resume)
     return path
 
 
@@ -82,8 +80,8 @@ def test_a_hit_that_is_there_is_not_computed_again(
         return march(self, *arguments, **more)
 
     monkeypatch.setattr(meeting.March, "ended", broken_off)
-    with pytest.raises(KeyboardInterrupt, match="saved"), executor_for("cpu", apart=False) as executor:
-        continuum_to_file(Campaign.from_toml(campaign_file), output, device=executor)
+    with pytest.raises(KeyboardInterrupt, match="saved"):
+        continuum_to_file(Campaign.from_toml(campaign_file), output, device="cpu")
     calls[:] = [None] * 3
     computed(output, campaign_file, resume=True)
     assert 3 < len(calls) < 3 + 5  # of four hits and the solid plate

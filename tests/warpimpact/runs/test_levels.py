@@ -56,20 +56,18 @@ def test_the_finer_hits_are_those_that_this_level_computes(changes: dict[str, st
     assert v.FINER_HIT not in again
 
 
-@pytest.mark.usefixtures("small_shards")
+@pytest.mark.usefixtures("small_chunks")
 def test_a_run_that_lost_its_first_shard_has_them_again(
     tmp_path: Path, assert_same_bits: Callable[[Path, Path], None], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    from warpimpact.runs.shards import ShardsOnDisk
-
     scene = campaign({"[hits]": "[hits]\nirreducible = false", "count = 256": "count = 1024"})
     straight, broken = tmp_path / "straight.nc", tmp_path / "broken.nc"
     run_to_file(scene, straight, device="cpu")
     with monkeypatch.context() as patched:
-        patched.setattr(ShardsOnDisk, "finish", lambda *arguments: 1 / 0)
+        patched.setattr(files, "write_joined", lambda *_, **__: 1 / 0)
         with pytest.raises(ZeroDivisionError):
             run_to_file(scene, broken, device="cpu")
-    first, *others = sorted(Path(f"{broken}.parts").glob("*.nc"))
+    first, *others = sorted(Path(f"{broken}.parts").glob("chunk_*.nc"))
     assert others
     first.unlink()
     run_to_file(scene, broken, device="cpu", resume=True)

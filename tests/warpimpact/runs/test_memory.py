@@ -43,7 +43,7 @@ def test_memory_does_not_grow_with_the_count(
 ) -> None:
     monkeypatch.setattr("warpimpact.runs.compute.marched", at_once)
     run_to_file(campaign, tmp_path / "first.nc", device="cpu")  # imports what is needed
-    monkeypatch.setattr("warpimpact.runs.shards.SHARDS", 48)  # 32 shards of 16384, which is quicker than 128
+    monkeypatch.setattr("warpimpact.runs.compute.CHUNKS", 48)  # 32 chunks of 16384, which is quicker than 128
     count = 2**19
     many = campaign.model_copy(update={"hits": campaign.hits.model_copy(update={"count": count})})
     output = tmp_path / "a.nc"

@@ -5,7 +5,6 @@ The list of questions is that of docs/contributing.md; each is a small file of i
 
 import re
 from collections.abc import Callable, Iterator
-from concurrent.futures import Future
 from pathlib import Path
 from typing import Any
 
@@ -15,10 +14,9 @@ import xarray
 
 from warpimpact.cli import main
 from warpimpact.results import attributes as attr
-from warpimpact.runs import executor, shards
-from warpimpact.runs.executor import Executor, Job, executor_for
+from warpimpact.runs import chunks, compute
+from warpimpact.runs.chunks import Chunks
 from warpimpact.runs.questions import Store
-from warpimpact.runs.shards import ShardsOnDisk
 
 TARGET = """
 title = "small"
@@ -72,8 +70,8 @@ def asked(folder: Path) -> Iterator[Answered]:
         return main([command, str(file), "-o", str(output), "--device", "cpu", "-q", *own, *options])
 
     with pytest.MonkeyPatch.context() as patched:
-        patched.setattr(shards, "FEWEST", 64)
-        patched.setattr(shards, "HELD", 0.0)
+        patched.setattr(compute, "FEWEST", 64)
+        patched.setattr(chunks, "HELD_SECONDS", 0.0)
         yield asked
 
 
@@ -114,37 +112,13 @@ def straight(name: str, asked: Answered, folder: Path) -> Path:
     return path
 
 
-@pytest.fixture(scope="module")
-def two_processes() -> Iterator[Executor]:
-    """The executor of `--workers 2`: the same processes for all questions, as each imports for seconds."""
-    with executor_for("cpu", workers=2) as executor:
-        yield executor
-
-
-class Lent:
-    """An executor that stays open for the next command, and counts the jobs of this one."""
-
-    def __init__(self, executor: Executor) -> None:
-        self._executor, self.jobs = executor, 0
-
-    def __getattr__(self, name: str) -> Any:
-        return getattr(self._executor, name)
-
-    def submit(self, job: Job) -> Future[Any]:
-        self.jobs += 1
-        return self._executor.submit(job)
-
-    def close(self) -> None:
-        """Leave it open."""
-
-
 @pytest.fixture
 def interrupting(monkeypatch: pytest.MonkeyPatch) -> Callable[[int], Iterator[None]]:
     """A function after which Ctrl-C comes once so many results are on the disk."""
 
     def interrupting(after: int) -> None:
         left = after
-        for kind in (ShardsOnDisk, Store):
+        for kind in (Chunks, Store):
 
             def save(self: Any, *arguments: Any, original: Any = kind.save) -> None:
                 nonlocal left
@@ -167,13 +141,3 @@ def test_resumed_equals_undisturbed(
     assert not output.exists()
     assert asked(name, output, "--resume") == 0
     assert_alike(output, straight)
-
-
-def test_processes_give_the_bits_of_threads(
-    name: str, straight: Path, asked: Answered, two_processes: Executor, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    processes = Lent(two_processes)
-    monkeypatch.setattr(executor, "Processes", lambda *_: processes)
-    assert asked(name, tmp_path / "processes.nc", "--workers", "2") == 0
-    assert processes.jobs
-    assert_alike(tmp_path / "processes.nc", straight)

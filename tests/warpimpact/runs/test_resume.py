@@ -20,26 +20,26 @@ from warpimpact import Campaign
 from warpimpact.cli import main
 from warpimpact.results import files
 from warpimpact.results.files import OutputError
-from warpimpact.runs import shards
-from warpimpact.runs.parts import Interrupted, difference, folder_of
+from warpimpact.runs.chunks import Chunks, Interrupted, first_difference, folder_of
+from warpimpact.runs.compute import manifest
 from warpimpact.runs.progress import RunProgress
 from warpimpact.runs.run import run, run_to_file
 
 SameBits = Callable[[Path, Path], None]
 SLOTTED_PLATE = (Path(__file__).parents[3] / "campaigns" / "slotted_plate.toml").read_text(encoding="utf-8")
 COARSE = SLOTTED_PLATE.replace('fidelity = "standard"', "level = 0")  # the first shot is computed at once
-COUNT = 4000  # sixteen shards, the last one short
+COUNT = 4000  # sixteen chunks, the last one short
 KILLS = 4
-LONG = "count = 1000000"  # minutes of computing, of which a test sees the first shard
+LONG = "count = 1000000"  # minutes of computing, of which a test sees the first chunk
 PATIENCE = 600.0
 """Until what must come is missing, however busy the machine [s]."""
 HERE = Path(__file__).parents[1]
-pytestmark = pytest.mark.usefixtures("small_shards")
-WARPIMPACT = (sys.executable, "-c", "import small_shards; from warpimpact.cli import command; command()")
+pytestmark = pytest.mark.usefixtures("small_chunks")
+WARPIMPACT = (sys.executable, "-c", "import small_chunks; from warpimpact.cli import command; command()")
 
 
 @pytest.fixture(scope="module")
-def campaign_file(tmp_path_factory: pytest.TempPathFactory, small_shards: None) -> Path:
+def campaign_file(tmp_path_factory: pytest.TempPathFactory, small_chunks: None) -> Path:
     path = tmp_path_factory.mktemp("campaign") / "campaign.toml"
     path.write_text(COARSE.replace("count = 4096", f"count = {COUNT}"), encoding="utf-8")
     return path
@@ -68,9 +68,9 @@ def finished(campaign: Campaign, undisturbed: Path, assert_same_bits: SameBits) 
     return finished
 
 
-def wait_for_a_shard(process: subprocess.Popen, output: Path) -> None:
+def wait_for_a_chunk(process: subprocess.Popen, output: Path) -> None:
     limit = time.monotonic() + PATIENCE
-    while not _shards(output):
+    while not _chunks(output):
         assert process.poll() is None
         assert time.monotonic() < limit
         time.sleep(0.05)
@@ -85,17 +85,17 @@ def test_runs_killed_at_any_moment_end_with_the_same_bits(
 
     monkeypatch.syspath_prepend(HERE)
     processes = multiprocessing.get_context("forkserver")
-    processes.set_forkserver_preload(["small_shards", "warpimpact.runs.run", "scipy.stats"])
+    processes.set_forkserver_preload(["small_chunks", "warpimpact.runs.run"])
     moments, output, kills, completed = random.Random(1), tmp_path / "a.nc", 0, 0
 
     def saved() -> int:
         with suppress(FileNotFoundError):  # a run that ends takes the folder away meanwhile
-            return sum(path.match("hits_*.nc") for path in map(Path, os.listdir(folder_of(output))))
+            return sum(path.match("chunk_*.nc") for path in map(Path, os.listdir(folder_of(output))))
         return 0
 
-    # The last kill, too, may come when the result is there and its shards are not yet gone.
+    # The last kill, too, may come when the result is there and its chunks are not yet gone.
     while kills < KILLS or not output.exists() or folder_of(output).exists():
-        # Progress on the disk says when, whatever the speed: up to five shards on, and a moment after.
+        # Progress on the disk says when, whatever the speed: up to five chunks on, and a moment after.
         wanted, later = saved() + moments.randint(0, 5), moments.uniform(0.0, 0.05)
         run_process = processes.Process(target=main, args=(command(output),))
         run_process.start()
@@ -125,7 +125,7 @@ def test_a_second_run_on_the_same_result_is_refused(tmp_path: Path, capsys: pyte
         [*WARPIMPACT, *command], env=os.environ | {"PYTHONPATH": str(HERE)}, stderr=subprocess.DEVNULL
     ) as first:
         try:
-            wait_for_a_shard(first, output)
+            wait_for_a_chunk(first, output)
             for manner in ("--resume", "--overwrite"):
                 assert main([*command, manner]) == 2
                 sentence = f"warpimpact: error: {output}: another run is writing it; wait for its end or name"
@@ -166,7 +166,7 @@ def test_a_kill_between_any_two_steps_on_the_disk_is_survived(
         with monkeypatch.context() as patched:
             for name in ("replace", "rmdir", "unlink"):
                 patched.setattr(os, name, dying(getattr(os, name)))
-            patched.setattr(shards.ShardsOnDisk, "kept", lambda _: "")  # a killed process cleans nothing up
+            patched.setattr(Chunks, "keep", lambda _: "")  # a killed process cleans nothing up
             try:
                 run_to_file(small, output, device="cpu", resume=True)
             except Killed:
@@ -182,11 +182,11 @@ def test_a_result_in_memory_has_the_same_bits(campaign: Campaign, undisturbed: P
         assert np.array_equal(dataset[name], stored[name], equal_nan=dataset[name].dtype.kind == "f")
 
 
-def stopped_after(shards: int, error: BaseException) -> object:
+def stopped_after(chunks: int, error: BaseException) -> object:
     """A progress function that interrupts the run."""
 
     def follow(standing: RunProgress) -> None:
-        if standing.saved >= 256 * shards:
+        if standing.saved >= 256 * chunks:
             raise error
 
     return follow
@@ -196,7 +196,7 @@ def stopped_after(shards: int, error: BaseException) -> object:
 def broken_off(campaign: Campaign, tmp_path: Path) -> Path:
     """A result file whose run was interrupted."""
     output = tmp_path / "a.nc"
-    with pytest.raises(Interrupted, match=r"^interrupted; \d+ of 16 shards are saved in .*a.nc.parts; continue with"):
+    with pytest.raises(Interrupted, match=r"^interrupted; \d+ chunks are saved in .*a.nc.parts; continue with"):
         run_to_file(campaign, output, device="cpu", progress=stopped_after(2, KeyboardInterrupt()))
     assert not output.exists()
     return output
@@ -205,7 +205,7 @@ def broken_off(campaign: Campaign, tmp_path: Path) -> Path:
 def test_an_interrupted_run_is_neither_lost_nor_overwritten_by_accident(
     broken_off: Path, campaign: Campaign, finished: Callable[..., None]
 ) -> None:
-    with pytest.raises(OutputError, match=r"contains an unfinished run .* --resume or begin anew with --overwrite"):
+    with pytest.raises(OutputError, match=r"contains an unfinished .* --resume or begin anew with --overwrite"):
         run_to_file(campaign, broken_off, device="cpu")
     standings: list[RunProgress] = []
     finished(broken_off, progress=standings.append)
@@ -243,7 +243,7 @@ def test_another_campaign_is_refused_with_the_difference(
     other.write_text(text.replace(*change), encoding="utf-8")
     with pytest.raises(OutputError, match=rf"cannot be resumed: .*{difference}"):
         run_to_file(Campaign.from_toml(other), broken_off, device="cpu", resume=True)
-    assert list(tmp_path.glob("a.nc.parts/hits_*.nc"))
+    assert list(tmp_path.glob("a.nc.parts/chunk_*.nc"))
 
 
 def test_a_file_that_the_campaign_names_counts_by_its_contents(tmp_path: Path) -> None:
@@ -253,44 +253,44 @@ def test_a_file_that_the_campaign_names_counts_by_its_contents(tmp_path: Path) -
         (tmp_path / folder).mkdir()
         (tmp_path / folder / "campaign.toml").write_text(text, encoding="utf-8")
         (tmp_path / folder / "hits.csv").write_text(f"hit_y,hit_z\n{row}\n", encoding="utf-8")
-    a, b, c = (shards.manifest(Campaign.from_toml(tmp_path / f / "campaign.toml"), {"device": "cpu"}) for f in "abc")
-    assert difference(a, b) is None
-    assert difference(a, c).startswith("hits.file was ")
-    assert difference(a, a | {"device": "NVIDIA H100"}) == 'device was "cpu" and is "NVIDIA H100"'
+    a, b, c = (manifest(Campaign.from_toml(tmp_path / f / "campaign.toml"), {"device": "cpu"}) for f in "abc")
+    assert first_difference(a, b) is None
+    assert first_difference(a, c)[0] == "hits.file"
+    assert first_difference(a, a | {"device": "NVIDIA H100"}) == ("device", '"cpu"', '"NVIDIA H100"')
 
 
-def _shards(output: Path) -> list[Path]:
-    return sorted(folder_of(output).glob("hits_*.nc"))
+def _chunks(output: Path) -> list[Path]:
+    return sorted(folder_of(output).glob("chunk_*.nc"))
 
 
-def _flip_bits(shard: Path) -> None:
-    data = bytearray(shard.read_bytes())
+def _flip_bits(chunk: Path) -> None:
+    data = bytearray(chunk.read_bytes())
     for place in range(0, len(data), 997):
         data[place] ^= 1 << place % 8
-    shard.write_bytes(data)
+    chunk.write_bytes(data)
 
 
-def _cut(shard: Path) -> None:
-    shard.write_bytes(shard.read_bytes()[:1000])
+def _cut(chunk: Path) -> None:
+    chunk.write_bytes(chunk.read_bytes()[:1000])
 
 
 @pytest.mark.filterwarnings("error")
-def test_damaged_shards_are_computed_again(campaign: Campaign, tmp_path: Path, finished: Callable[..., None]) -> None:
+def test_damaged_chunks_are_computed_again(campaign: Campaign, tmp_path: Path, finished: Callable[..., None]) -> None:
     """Two with the bytes of another, one with flipped bits, and a truncated one."""
     output = tmp_path / "a.nc"
     with pytest.raises(Interrupted):
         run_to_file(campaign, output, device="cpu", progress=stopped_after(9, KeyboardInterrupt()))
-    saved = _shards(output)
+    saved = _chunks(output)
     first, second = (path.read_bytes() for path in saved[:2])
     saved[0].write_bytes(second)
     saved[1].write_bytes(first)
     _flip_bits(saved[2])
     _cut(saved[3])
-    told: list[str] = []
+    warnings: list[str] = []
     standings: list[RunProgress] = []
-    finished(output, tell=told.append, progress=standings.append)
-    assert len(told) == 1
-    assert "and 3 more: damaged; computed again" in told[0]
+    finished(output, warn=warnings.append, progress=standings.append)
+    assert len(warnings) == 1
+    assert "and 3 more: damaged; computed again" in warnings[0]
     assert standings[0].resumed == min(256 * len(saved), COUNT) - 256 * 4
     assert not folder_of(output).exists()
 
@@ -320,11 +320,11 @@ def test_a_disk_that_is_full_at_the_end_loses_nothing(
 ) -> None:
     output = tmp_path / "a.nc"
     command = ("run", str(campaign_file), "-o", str(output), "--device", "cpu")
-    # The kernels of this campaign are in Warp's cache: shards fit, the whole file does not.
+    # The kernels of this campaign are in Warp's cache: chunks fit, the whole file does not.
     done = _with_files_up_to(undisturbed.stat().st_size // 2, *command)
     assert done.returncode == 2, done.stderr
     assert "a.nc: cannot be written" in done.stderr
-    assert f"16 of 16 shards are saved in {output}.parts; continue with --resume" in done.stderr
+    assert f"16 chunks are saved in {output}.parts; continue with --resume" in done.stderr
     assert "Traceback" not in done.stderr
     assert not output.exists()
     assert main([*command, "--resume"]) == 0
@@ -353,7 +353,7 @@ def test_ctrl_c_stops_cleanly_and_says_how_to_resume(by: signal.Signals, where: 
     with subprocess.Popen(
         command, env=os.environ | {"PYTHONPATH": str(HERE)}, stderr=subprocess.PIPE, text=True, start_new_session=True
     ) as process:
-        wait_for_a_shard(process, output)
+        wait_for_a_chunk(process, output)
         if by == signal.SIGINT:
             os.killpg(process.pid, by)
         else:
@@ -364,25 +364,25 @@ def test_ctrl_c_stops_cleanly_and_says_how_to_resume(by: signal.Signals, where: 
     assert "Traceback" not in shown
     last = [line for line in shown.splitlines() if line.startswith("warpimpact: ")][-1]
     assert last.startswith("warpimpact: interrupted; ")
-    assert last.endswith(f"shards are saved in {output}.parts; continue with --resume")
+    assert last.endswith(f"saved in {output}.parts; continue with --resume")
     shutil.rmtree(f"{output}.parts")
 
 
 HOST_WORK = """
 import sys, time
-from warpimpact.runs.compute import HitMap
+from warpimpact.runs import run
 from warpimpact.cli import command
 
 def host_work(*_, **__):  # a ligament, or the compilation of a kernel: one call, which nothing can break off
     print("at work", flush=True)
     time.sleep(3600.0)
 
-HitMap.{name} = host_work
+run.{name} = host_work
 command()
 """
 
 
-@pytest.mark.parametrize(("name", "by"), [("pilot", signal.SIGINT), ("compute", signal.SIGTERM)])
+@pytest.mark.parametrize(("name", "by"), [("find_resolution", signal.SIGINT), ("compute_hits", signal.SIGTERM)])
 def test_a_first_signal_ends_a_run_that_is_at_work_on_the_host(
     name: str, by: signal.Signals, campaign_file: Path, tmp_path: Path
 ) -> None:

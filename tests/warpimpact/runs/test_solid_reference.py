@@ -16,7 +16,7 @@ from warpimpact.runs.run import run, run_to_file
 SLOTTED_PLATE = (Path(__file__).parents[3] / "campaigns" / "slotted_plate.toml").read_text(encoding="utf-8")
 SMALL = SLOTTED_PLATE.replace('"standard"', '"draft"').replace("count = 4096", "count = 600")
 PATTERN = SMALL[SMALL.index("[plate.pattern]") : SMALL.index("[impact]")]
-pytestmark = pytest.mark.usefixtures("small_shards")
+pytestmark = pytest.mark.usefixtures("small_chunks")
 
 
 def computed(tmp_path: Path, *changes: tuple[str, str]) -> xarray.Dataset:
@@ -65,7 +65,7 @@ def test_tasks_of_many_shards_give_the_same_file(tmp_path: Path, monkeypatch: py
     (tmp_path / "a.toml").write_text(SMALL, encoding="utf-8")
     campaign = Campaign.from_toml(tmp_path / "a.toml")
     run_to_file(campaign, tmp_path / "one.nc", device="cpu")
-    monkeypatch.setattr("warpimpact.runs.run.task_size", lambda executor, rate: 2**17)
+    monkeypatch.setattr("warpimpact.runs.run._task_size", lambda *_: 2**17)
     run_to_file(campaign, tmp_path / "many.nc", device="cpu")
     assert_same_bits(tmp_path / "one.nc", tmp_path / "many.nc")
     with open_result(tmp_path / "many.nc", group="solid") as solid:

@@ -13,11 +13,10 @@ from warpimpact.analysis.inspection import summary_text
 from warpimpact.campaign.campaign import CampaignError
 from warpimpact.results import files
 from warpimpact.results.measures import Measure, Tally
-from warpimpact.runs.parts import Interrupted
+from warpimpact.runs.chunks import Chunks, Interrupted
 from warpimpact.runs.progress import RunProgress, Watch
 from warpimpact.runs.replay import replay
 from warpimpact.runs.run import run, run_to_file
-from warpimpact.runs.shards import Shards
 
 from ..results.test_measures import LEAST, TRIALS, TRUTHS, shard_of
 
@@ -27,7 +26,7 @@ DRAFT = SLOTTED_PLATE.replace('"standard"', '"draft"').replace("count = 4096\n",
 STOP = '[stop]\nquantity = "{}"\nhalf_width = "{}"\nmax_count = {}\n\n[output]'
 LEAST_STOPPED = 129
 """95 % of 150 trials: 142.5 ± 2.7; five standard deviations below, because the rule looks more than once."""
-pytestmark = pytest.mark.usefixtures("small_shards")
+pytestmark = pytest.mark.usefixtures("small_chunks")
 
 
 def campaign(tmp_path: Path, quantity: str, half_width: str, max_count: int = 2**16, **hits: object) -> Campaign:
@@ -72,6 +71,18 @@ def test_intervals_of_replicates_hold_as_often_as_they_say_and_are_narrower(
     assert np.median(widths) < (0.5 if text.startswith("mean") else 0.8) * alone.estimate().half_width
 
 
+def watched(campaign: Campaign, count: int) -> Watch:
+    """Follow made-up hits until the stop rule is met."""
+    chunks, values = Chunks(None, {}), surface(campaign, 0, count)
+    watch = Watch(campaign, chunks, 256)
+    for number in range(count // 256):
+        chunks.save(number, shard_of(values[number * 256 : (number + 1) * 256]))
+        watch.add(number)
+        if watch.ended:
+            break
+    return watch
+
+
 @pytest.mark.parametrize("sampling", ["random", "sobol"])
 def test_the_stop_rule_keeps_its_promise(sampling: str, tmp_path: Path) -> None:
     half_width = {"random": "0.02 m/s", "sobol": "0.001 m/s"}[sampling]
@@ -79,15 +90,12 @@ def test_the_stop_rule_keeps_its_promise(sampling: str, tmp_path: Path) -> None:
     held, ends = 0, []
     for seed in range(TRIALS):
         reseeded = scene.model_copy(update={"hits": scene.hits.model_copy(update={"seed": seed})})
-        watch = Watch(reseeded, Shards(2**16, 256))
-        values = surface(reseeded, 0, 2**14)
-        while watch.end is None:
-            watch.add(watch._next, shard_of(values[watch._next * 256 : (watch._next + 1) * 256]))
-        low, high = watch.end.stop["estimate_interval"]
-        assert watch.end.stop["stop_reason"] == "half_width"
+        watch = watched(reseeded, 2**14)
+        low, high = watch.stop["estimate_interval"]
+        assert watch.stop["stop_reason"] == "half_width"
         assert 0.5 * (high - low) <= float(half_width.split()[0])
         held += low <= 1.0 <= high
-        ends.append(watch.end.shards)
+        ends.append(watch.count)
     assert held >= LEAST_STOPPED
     assert np.median(ends) > 2
 
@@ -99,16 +107,13 @@ def test_the_stop_rule_keeps_its_promise(sampling: str, tmp_path: Path) -> None:
 def test_a_run_goes_on_as_long_as_hits_may_make_up_for_the_numerics(
     shift: float, reason: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    scene = campaign(tmp_path, "mean(residual_velocity)", "0.05 m/s", sampling='"random"')
+    scene = campaign(tmp_path, "mean(residual_velocity)", "0.05 m/s", max_count=2**14, sampling='"random"')
     monkeypatch.setattr(sys.modules[Watch.__module__], "shift_of", lambda *_: shift)
-    watch = Watch(scene, Shards(2**14, 256))  # which leave ± 0.006 m/s
-    values = surface(scene, 0, 2**14)
-    while watch.end is None:
-        watch.add(watch._next, shard_of(values[watch._next * 256 : (watch._next + 1) * 256]))
-    low, high = watch.end.stop["estimate_interval"]
-    assert watch.end.stop["stop_reason"] == reason
+    watch = watched(scene, 2**14)  # which leave ± 0.006 m/s
+    low, high = watch.stop["estimate_interval"]
+    assert watch.stop["stop_reason"] == reason
     assert 0.5 * (high - low) <= (0.05 - shift if reason == "half_width" else 0.025)
-    assert watch.end.hits < 2**13  # where more are of no use the half that is left to hits is met
+    assert watch.hits < 2**13  # where more are of no use the half that is left to hits is met
 
 
 @pytest.mark.parametrize(

@@ -18,15 +18,14 @@ from warpimpact.report.report import report_page
 from warpimpact.results import files
 from warpimpact.results import variables as v
 from warpimpact.results.measures import Measure
-from warpimpact.runs import shards
+from warpimpact.runs import compute
 from warpimpact.runs.replay import replay
-from warpimpact.runs.run import run_to_file
 from warpimpact.scene import Numerics, make_shots
 from warpimpact.solver.accuracy import PILOT_LIMITS
 from warpimpact.solver.limit import limit_velocity
 from warpimpact.solver.limit_search import MOST_RUNS
 from warpimpact.solver.worker import Worker
-from warpimpact.studies.limit import LimitMap
+from warpimpact.studies.limit import limit_of, limit_to_file
 from warpimpact.studies.limit_view import limit_view
 
 CAMPAIGNS = Path(__file__).parents[3] / "campaigns"
@@ -56,8 +55,7 @@ def campaign(text: str = TEXT) -> Campaign:
 
 
 def search(of: Campaign, path: Path, **how: object) -> xarray.Dataset:
-    job = LimitMap.of(of, str(how.pop("quantity", "velocity")))
-    run_to_file(of, path, device="cpu", computation=job, **how)
+    limit_to_file(of, path, device="cpu", **how)
     return files.read(path)
 
 
@@ -163,8 +161,7 @@ shear_coefficient = 0.05
 def test_thickness_of_the_base_behind_a_perforated_plate(tmp_path: Path) -> None:
     given = TEXT.replace("count = 64", "count = 4").replace(PROMISED, GIVEN)
     behind = campaign(given + LAYER)
-    job = LimitMap.of(behind, "thickness", layer=1)
-    run_to_file(behind, tmp_path / "base.nc", device="cpu", computation=job)
+    limit_to_file(behind, tmp_path / "base.nc", "thickness", layer=1, device="cpu")
     found = files.read(tmp_path / "base.nc")
     passed = (found["status"] == Status.PERFORATED).values
     assert passed.any()
@@ -173,7 +170,7 @@ def test_thickness_of_the_base_behind_a_perforated_plate(tmp_path: Path) -> None
     assert "thickness of layer 1" in text_of(limit_view(found))
     assert replay(found, 2, folder=Path()).attrs["agreement"] == "bit-identical"
     with pytest.raises(CampaignError, match=r"got layer 2, but the target has layers 0 \(the plate\) to 1"):
-        LimitMap.of(behind, "thickness", layer=2)
+        limit_of(behind, "thickness", layer=2)
 
 
 @pytest.mark.parametrize(
@@ -188,7 +185,7 @@ def test_thickness_of_the_base_behind_a_perforated_plate(tmp_path: Path) -> None
 )  # fmt: skip
 def test_what_has_no_limits_is_refused_in_a_sentence(change: tuple[str, str], sentence: str) -> None:
     with pytest.raises(CampaignError, match=sentence):
-        LimitMap.of(campaign(TEXT.replace(*change)))
+        limit_of(campaign(TEXT.replace(*change)))
 
 
 def test_the_command_writes_a_result_and_a_figure(
@@ -234,11 +231,13 @@ OF = ["shots", "[1]"]
 
 @pytest.mark.parametrize("quantity", ["velocity", "thickness"])
 def test_limits_do_not_depend_on_the_tasks(quantity: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(shards, "FEWEST", 8)
+    monkeypatch.setattr(compute, "FEWEST", 8)
     of = campaign(TEXT.replace('fidelity = "draft"', "level = 0"))
-    job, shots = LimitMap.of(of, quantity), of.sampler().shots(0, 32)
-    whole = job.compute(of, shots, None, Worker("cpu"))
-    parts = [job.compute(of, shots[first:end], None, Worker("cpu")) for first, end in ((0, 8), (8, 32))]
+    limit, shots = limit_of(of, quantity), of.sampler().shots(0, 32)
+    whole, *parts = (
+        compute.compute_limits(limit, of, of.numerics, shots[first:end], first, worker=Worker("cpu"))
+        for first, end in ((0, 32), (0, 8), (8, 32))
+    )
     for name in v.LIMITS[quantity]:
         values = [part[name].values for part in parts]
         np.testing.assert_array_equal(np.concatenate(values), whole[name].values)

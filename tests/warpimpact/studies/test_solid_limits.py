@@ -12,8 +12,7 @@ from warpimpact.analysis.effectiveness import effectiveness
 from warpimpact.analysis.numbers import text_of
 from warpimpact.results import files
 from warpimpact.results.references import references_of
-from warpimpact.runs.run import run_to_file
-from warpimpact.studies.limit import LimitMap
+from warpimpact.studies.limit import limit_to_file
 from warpimpact.studies.limit_view import limit_view
 
 LAYER = '[[layer]]\ngap = "60 mm"\nthickness = "2 mm"\nresistance = "2600 MPa"\n'
@@ -45,7 +44,7 @@ NONE = '{ shape = "none" }'
 def search(path: Path, quantity: str = "velocity", of_layer: int = 0, **given: str) -> xarray.Dataset:
     text = TEXT.format(**{"pattern": HOLES, "layer": "", "solid": "true"} | given)
     of = Campaign.from_text(text, name="text", folder=Path())
-    run_to_file(of, path, device="cpu", computation=LimitMap.of(of, quantity, layer=of_layer))
+    limit_to_file(of, path, quantity, layer=of_layer, device="cpu")
     return files.read(path)
 
 
@@ -69,7 +68,7 @@ def test_it_is_the_search_of_a_solid_plate_that_is_as_heavy(velocity: xarray.Dat
     alone = search(tmp_path / "a.nc", pattern=NONE)
     thin = TEXT.format(pattern=NONE, layer="", solid="true").replace('"4 mm"', f"{density / 7850.0}")
     of = Campaign.from_text(thin, name="text", folder=Path(), count=1)
-    run_to_file(of, tmp_path / "b.nc", device="cpu", computation=LimitMap.of(of))
+    limit_to_file(of, tmp_path / "b.nc", device="cpu")
     assert not references_of(alone)  # it is its own
     expected = files.read(tmp_path / "b.nc")["limit_velocity"].values
     assert limit_of(velocity) == pytest.approx(expected.item(), abs=1.0)
@@ -80,7 +79,7 @@ def test_the_base_alone_is_a_plate_of_its_own(tmp_path: Path) -> None:
     with_base = search(tmp_path / "a.nc", layer=LAYER)
     text = TEXT.format(pattern=NONE, layer="", solid="true").replace('"4 mm"', '"2 mm"')
     base = Campaign.from_text(text.replace("shear_coefficient = 0.05", ""), name="text", folder=Path(), count=1)
-    run_to_file(base, tmp_path / "b.nc", device="cpu", computation=LimitMap.of(base))
+    limit_to_file(base, tmp_path / "b.nc", device="cpu")
     expected = files.read(tmp_path / "b.nc")["limit_velocity"].values
     assert limit_of(with_base, "base_alone") == pytest.approx(expected.item(), abs=1.0)
     measure = effectiveness(with_base).loc["V50"]
