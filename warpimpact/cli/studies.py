@@ -21,12 +21,9 @@ from warpimpact.identification.posterior import material_draws, posterior_view
 from warpimpact.optimisation.design import read_design
 from warpimpact.optimisation.front_view import front_view
 from warpimpact.optimisation.optimise import folder_of, optimise_to_file
-from warpimpact.plotting.firing import firing_figure, shots_figure
 from warpimpact.plotting.front import front_figure
-from warpimpact.plotting.limit import limit_figure
 from warpimpact.plotting.posterior import FIGURES
-from warpimpact.plotting.sensitivity import sensitivity_figure
-from warpimpact.plotting.sweep import sweep_figure
+from warpimpact.plotting.studies import firing_figure, limit_figure, sensitivity_figure, shots_figure, sweep_figure
 from warpimpact.results import files, front
 from warpimpact.results.kinds import FRONT, SWEEP
 from warpimpact.results.posterior_file import INTERRUPTED

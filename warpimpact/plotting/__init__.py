@@ -5,18 +5,21 @@ analysis and the rooms below it, but neither export nor report. Text in figures 
 """
 
 from warpimpact.plotting.comparison import comparison_figure, weight_figure
-from warpimpact.plotting.distribution import dispersion, marginals, probability_map, uncertainty
-from warpimpact.plotting.limit import limit_figure
 from warpimpact.plotting.maps import (
+    dispersion,
     layers_figure,
+    marginals,
     measure_map,
     overview,
+    probability_map,
     save_beside,
     save_maps,
+    uncertainty,
     variable_map,
     variable_maps,
 )
 from warpimpact.plotting.plate import plate_figure
+from warpimpact.plotting.studies import limit_figure
 from warpimpact.plotting.trajectory import course, flight, passage, pressure
 
 __all__ = [

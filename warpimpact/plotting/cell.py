@@ -24,7 +24,7 @@ from scipy.spatial import KDTree
 from warpimpact.analysis.hit_map import OF_PASSED, axes_of, chosen, hit_points
 from warpimpact.analysis.inspection import breaks_promise
 from warpimpact.kernels.status import Status
-from warpimpact.plotting.style import Figure, common_fire, draw_fire
+from warpimpact.plotting.style import Figure, common_fire, draw_fire, sheet
 from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
 from warpimpact.results.dataset import passed
@@ -146,14 +146,10 @@ def map_size(*datasets: xarray.Dataset) -> Array:
 
 def map_sheet(datasets: Sequence[xarray.Dataset], columns: int) -> tuple[Figure, list[Axes]]:
     """A figure with a panel for a map of each result, all to one scale."""
-    rows = -(-len(datasets) // columns)
-    figure = Figure(figsize=(columns, rows) * (map_size(*datasets) + _ROOM), layout="compressed")
-    panels = list(figure.subplots(rows, columns, squeeze=False).flat)
-    for axes in panels[len(datasets) :]:
-        axes.remove()
-    for axes in panels[: len(datasets)]:
+    figure, panels = sheet(len(datasets), columns, map_size(*datasets) + _ROOM)
+    for axes in panels:
         to_scale(axes, *datasets)
-    return figure, panels[: len(datasets)]
+    return figure, panels
 
 
 def to_scale(axes: Axes, *datasets: xarray.Dataset) -> None:

@@ -14,10 +14,9 @@ from matplotlib.figure import SubFigure
 
 from warpimpact.campaign.campaign import Campaign
 from warpimpact.campaign.text import CampaignError
-from warpimpact.plotting.plate import draw_holes
-from warpimpact.plotting.style import BLUE, GREEN, STEEL, VERMILION, Figure, bars, finish, hide_sides, in_style
+from warpimpact.plotting.plate import draw_plate
+from warpimpact.plotting.style import BLUE, GREEN, VERMILION, Figure, bars, finish, furnish, hide_sides, in_style
 from warpimpact.results import front as f
-from warpimpact.scene import Plate
 
 MOST_DRAWN = 6
 """Most plates that are drawn."""
@@ -57,16 +56,8 @@ def _draw_plates(figure: SubFigure, dataset: xarray.Dataset, names: dict[int, st
             axes.set_axis_off()
             continue
         plate = campaign.plate
-        draw_thumbnail(axes, plate)
+        draw_plate(axes, plate, (THUMBNAIL / 2, THUMBNAIL / 2))
         axes.set_title(f"{letter}: {1e3 * plate.thickness:.3g} mm, {plate.open_area:.0%} open", fontsize="medium")
-
-
-@in_style
-def draw_thumbnail(axes: Axes, plate: Plate) -> None:
-    """Draw a part of a plate."""
-    half = 0.5 * THUMBNAIL
-    axes.set(xlim=(-half, half), ylim=(-half, half), facecolor=STEEL, aspect="equal")
-    draw_holes(axes, plate)
 
 
 def campaign_at(dataset: xarray.Dataset, place: int, folder: Path) -> Campaign | None:
@@ -106,10 +97,8 @@ def _draw_front(axes: Axes, dataset: xarray.Dataset, names: dict[int, str]) -> N
         at, above = (fresh[place, across], fresh[place, up]), number % 2 == 0  # neighbours may lie close together
         axes.annotate(letter, at, xytext=(6, 6 if above else -15), textcoords="offset points", weight="bold", zorder=6)
     titles = [f"{labels[goal]}, {'less' if signs[goal] > 0 else 'more'} is better" for goal in (across, up)]
-    axes.set(xlabel=titles[0], ylabel=fill(titles[1], _LONGEST_LABEL))
-    axes.grid(color="0.92")
+    furnish(axes, xlabel=titles[0], ylabel=fill(titles[1], _LONGEST_LABEL))
     hide_sides(axes, "top", "right")
-    axes.legend(frameon=False, fontsize="small")
 
 
 def _draw_variables(figure: SubFigure, dataset: xarray.Dataset, places: Any) -> None:
@@ -126,9 +115,9 @@ def _draw_variables(figure: SubFigure, dataset: xarray.Dataset, places: Any) -> 
         low, high = np.nanmin(every), np.nanmax(every)
         if low < high:
             axes.set_ylim(low - 0.05 * (high - low), high + 0.05 * (high - low))
-        labels, unit = str(dataset[f.LABELS].values[place]), str(dataset[f.UNIT].values[place])
+        labels, unit = json.loads(str(dataset[f.LABELS].values[place]) or "[]"), str(dataset[f.UNIT].values[place])
         if labels:
-            axes.set_yticks(range(len(json.loads(labels))), json.loads(labels), fontsize="small")
+            axes.set_yticks(range(len(labels)), labels)
         name = str(names[place]).removeprefix("plate.").removeprefix("pattern.")
         axes.set_title(f"{name} [{unit}]" if unit else name, fontsize="small", loc="left", pad=2)
         axes.tick_params(labelsize="small")

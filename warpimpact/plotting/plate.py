@@ -71,12 +71,10 @@ def plate_figure(
     axes, *others = figure.subplots(
         1, 1 + bool(depth), sharey=True, squeeze=False, width_ratios=[extent[0], *([depth] if depth else [])]
     )[0]
-    across, up = extent / 2
-    axes.set(xlim=(-across, across), ylim=(-up, up), aspect="equal", xlabel="y [mm]", ylabel="z [mm]")
     thick = f"plate, {plate.thickness * MM:g} mm thick"
     axes.add_patch(Rectangle((0, 0), 0, 0, facecolor=STEEL, edgecolor="black", label=thick))
-    axes.set_facecolor(STEEL)
-    draw_holes(axes, plate)
+    draw_plate(axes, plate, extent / 2)
+    axes.set(xlabel="y [mm]", ylabel="z [mm]")
     if not isinstance(plate.pattern, NoPattern):
         _draw_frame(axes, plate.pattern.unit_cell, label="unit cell", edgecolor=BLUE, linestyle="--")
     if plate.size is not None and plate.margin is not None:
@@ -90,7 +88,7 @@ def plate_figure(
     if impact is not None:
         draw_fire(axes, fire_of(impact.obliquity, impact.azimuth))
     for section in others:
-        _draw_section(section, target, up)
+        _draw_section(section, target, extent[1] / 2)
     numbers = plate_numbers(plate.open_area, plate.ligament, target.weights)
     parts = (f"{name} {number}".replace(" ", "\u00a0") for name, number in numbers.items())  # no break within a part
     note = "to scale, dimensions in mm, smallest ligament in pink; seen from behind the plate"
@@ -104,6 +102,13 @@ def drawn_extent(plate: Plate, core: Core | None) -> Array:
         return np.array(plate.size)
     least = 0.0 if core is None else 4.0 * core.max_radius
     return np.asarray(np.maximum(_UNIT_CELLS * np.array(plate.pattern.unit_cell), least))
+
+
+@in_style
+def draw_plate(axes: Axes, plate: Plate, half: Sequence[float] | Array) -> None:
+    """Draw the part of a plate that reaches as far as `half` along y and z [mm]."""
+    axes.set(xlim=(-half[0], half[0]), ylim=(-half[1], half[1]), aspect="equal", facecolor=STEEL)
+    draw_holes(axes, plate)
 
 
 def draw_holes(axes: Axes, plate: Plate, **style: Any) -> None:

@@ -7,12 +7,12 @@ from pathlib import Path
 
 import numpy as np
 import xarray
-from matplotlib.axes import Axes
 
 from warpimpact.identification.fit_file import fit_from
 from warpimpact.identification.posterior import parameters_of, unit_of
-from warpimpact.plotting.plate import draw_holes
-from warpimpact.plotting.style import BLUE, STEEL, Figure, finish, in_style
+from warpimpact.plotting.cell import words
+from warpimpact.plotting.plate import draw_plate
+from warpimpact.plotting.style import BLUE, Figure, finish, in_style, sheet
 from warpimpact.results import posterior_file as p
 from warpimpact.scene.display import MM
 from warpimpact.scene.model import Array
@@ -23,12 +23,13 @@ _CELLS_BESIDE = 5.0
 """Most cells of holes that a figure shows on either side of the middle. A fit searches hits in the first."""
 
 
-def _values(posterior: xarray.Dataset, name: str) -> tuple[Array, Array, str]:
-    """Draws of a parameter and of its prior in its display unit, and its label."""
-    array = posterior[name]
-    unit, factor = unit_of(array)
-    prior = np.random.default_rng(len(name)).choice(factor * array.attrs[p.PRIOR], array.size)
-    return factor * array.values, prior, f"{name.replace('_', ' ')}{f' [{unit}]' if unit else ''}"
+def _values(posterior: xarray.Dataset, name: str) -> tuple[Array, Array, Array, str]:
+    """Draws of a parameter and of its prior in its display unit, limits of their axis, and its label."""
+    unit, factor = unit_of(posterior[name])
+    values, prior = factor * posterior[name].values, factor * posterior[name].attrs[p.PRIOR]
+    prior = np.random.default_rng(len(name)).choice(prior, values.size)
+    ends = np.quantile(np.concatenate([prior, values]), [0.002, 0.998])
+    return values, prior, ends + np.ptp(ends) * np.array([-0.03, 0.03]), words(name) + (f"\n[{unit}]" if unit else "")
 
 
 @in_style
@@ -38,29 +39,27 @@ def pairs_figure(posterior: xarray.Dataset) -> Figure:
     size = max(4.5, 1.75 * len(names))
     figure = Figure(figsize=(size + 1.2, size), layout="constrained")
     panels = figure.subplots(len(names), len(names), squeeze=False)
-    drawn = {name: _values(posterior, name) for name in names}
-    for row, below in enumerate(names):
-        for column, across in enumerate(names):
-            axes = panels[row, column]
-            if column > row:
-                axes.remove()
-                continue
-            (x, prior, label_x), (y, prior_below, label_y) = drawn[across], drawn[below]
-            if row == column:
-                _density(axes, prior, x)
-                axes.set_title(posterior[across].attrs[p.VERDICT].replace(" by these shots", ""), fontsize="x-small")
-                axes.set_yticks([])
-            else:
-                shown = slice(None, None, max(1, len(x) // _POINTS))
-                axes.scatter(prior[shown], prior_below[shown], s=2, color=_GREY, alpha=0.25, lw=0)
-                axes.scatter(x[shown], y[shown], s=4, color=BLUE, alpha=0.45, lw=0)
-                axes.set_ylim(_limits(prior_below, y))
-            axes.set_xlim(_limits(prior, x))
-            axes.tick_params(labelsize="x-small", labelbottom=row == len(names) - 1, labelleft=column == 0 and row > 0)
-            if row == len(names) - 1:
-                axes.set_xlabel(label_x.replace(" [", "\n["), fontsize="small")
-            if column == 0 and row > 0:
-                axes.set_ylabel(label_y.replace(" [", "\n["), fontsize="small")
+    drawn = [_values(posterior, name) for name in names]
+    for (row, column), axes in np.ndenumerate(panels):
+        (x, prior, limits, label), (y, prior_below, limits_below, label_below) = drawn[column], drawn[row]
+        if row == column:
+            for values, colour in ((prior, _GREY), (x, BLUE)):
+                axes.hist(
+                    values, bins=np.linspace(limits[0], limits[1], 31).tolist(), density=True, color=colour, alpha=0.55
+                )
+            axes.set_title(posterior[names[row]].attrs[p.VERDICT].replace(" by these shots", ""), fontsize="x-small")
+            axes.set(yticks=[], xlim=limits)
+        else:
+            some = slice(None, None, max(1, len(x) // _POINTS))
+            axes.scatter(prior[some], prior_below[some], s=2, color=_GREY, alpha=0.25, lw=0)
+            axes.scatter(x[some], y[some], s=4, color=BLUE, alpha=0.45, lw=0)
+            axes.set(xlim=limits, ylim=limits_below)
+            axes.set_ylabel(label_below, fontsize="small")
+        axes.set_xlabel(label, fontsize="small")
+        axes.tick_params(labelsize="x-small")
+        axes.label_outer()
+        if column > row:
+            axes.remove()
     finish(figure, f"posterior (blue) and prior (grey); {_worth(posterior)}", result=posterior)
     return figure
 
@@ -68,17 +67,6 @@ def pairs_figure(posterior: xarray.Dataset) -> Figure:
 def _worth(posterior: xarray.Dataset) -> str:
     ended = "" if posterior.attrs[p.CONVERGED] else ", NOT CONVERGED"
     return f"effective sample size {posterior.attrs[p.EFFECTIVE]:.0f}{ended}"
-
-
-def _limits(prior: Array, posterior: Array) -> tuple[float, float]:
-    low, high = np.quantile(np.concatenate([prior, posterior]), [0.002, 0.998])
-    return float(low - 0.03 * (high - low)), float(high + 0.03 * (high - low))
-
-
-def _density(axes: Axes, prior: Array, posterior: Array) -> None:
-    edges = np.linspace(*_limits(prior, posterior), 31).tolist()
-    axes.hist(prior, bins=edges, density=True, color=_GREY, alpha=0.5)
-    axes.hist(posterior, bins=edges, density=True, color=BLUE, alpha=0.6)
 
 
 @in_style
@@ -93,24 +81,15 @@ def hits_figure(posterior: xarray.Dataset) -> Figure:
         for scene_parameter in fit.scene_parameters
         if scene_parameter.unit != "rad"
     }
-    across = min(3, len(fit.shots))
-    down = -(-len(fit.shots) // across)
-    figure = Figure(figsize=(4.2 * across + 0.8, 4.6 * down), layout="compressed")
-    panels = figure.subplots(down, across, squeeze=False).ravel()
-    for place, shot in enumerate(fit.shots):
-        axes = panels[place]
+    figure, panels = sheet(len(fit.shots), 3, (4.5, 4.6))
+    for place, (axes, shot) in enumerate(zip(panels, fit.shots, strict=True)):
         plate = fit.scene_of(shot, medians).target.layers[0]
-        y, z = (MM * posterior[name].values[:, place] for name in p.HITS)
-        cell = [side * MM for side in plate.sampled_cell]
-        far = [float(np.abs(at).max()) * 1.05 for at in (y, z)]
-        half = [min(max(0.55 * side, most), _CELLS_BESIDE * side) for side, most in zip(cell, far, strict=True)]
-        axes.set(xlim=(-half[0], half[0]), ylim=(-half[1], half[1]), aspect="equal", xlabel="y [mm]", ylabel="z [mm]")
-        axes.set_facecolor(STEEL)
-        draw_holes(axes, plate)
-        axes.scatter(y, z, s=5, color=BLUE, alpha=0.35, lw=0)
-        axes.set_title(str(posterior["shot"].values[place]))
-    for axes in panels[len(fit.shots) :]:
-        axes.remove()
+        hits = MM * np.stack([posterior[name].values[:, place] for name in p.HITS])
+        cell, far = MM * np.array(plate.sampled_cell), 1.05 * np.abs(hits).max(axis=1)
+        half = np.minimum(np.maximum(0.55 * cell, far), _CELLS_BESIDE * cell)
+        draw_plate(axes, plate, half)
+        axes.scatter(hits[0], hits[1], s=5, color=BLUE, alpha=0.35, lw=0)
+        axes.set(xlabel="y [mm]", ylabel="z [mm]", title=str(posterior["shot"].values[place]))
     finish(figure, f"where the shots hit, {_worth(posterior)}", result=posterior)
     return figure
 

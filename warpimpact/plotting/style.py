@@ -8,12 +8,12 @@ from __future__ import annotations
 
 import math
 from base64 import b64encode
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import wraps
 from io import BytesIO
 from pathlib import Path
 from textwrap import wrap
-from typing import Any, NamedTuple, ParamSpec, TypeVar
+from typing import Any, Literal, NamedTuple, ParamSpec, TypeVar
 
 import numpy as np
 import xarray
@@ -76,6 +76,19 @@ class Figure(PlainFigure):
             super().savefig(file, **{"format": path.suffix[1:].lower() or "png"} | options)
 
 
+def sheet(
+    count: int, columns: int, size: Sequence[float], layout: Literal["compressed", "constrained"] = "compressed"
+) -> tuple[Figure, list[Axes]]:
+    """A figure with a number of panels, row by row, each with its room of a size [inch]."""
+    columns = min(columns, count)
+    rows = -(-count // columns)
+    figure = Figure(figsize=(columns * size[0], rows * size[1]), layout=layout)
+    panels = list(figure.subplots(rows, columns, squeeze=False).flat)
+    for axes in panels[count:]:
+        axes.remove()
+    return figure, panels[:count]
+
+
 def data_url(figure: PlainFigure, dpi: int = 110) -> str:
     """A figure as a PNG picture in an address, for a page."""
     buffer = BytesIO()
@@ -122,6 +135,15 @@ def finish(
             entries.values(), entries, loc="outside lower center", ncols=columns, frameon=False, title="\n".join(lines)
         )
         below.get_title().set(color="0.3", size="small", multialignment="center")
+
+
+def furnish(axes: Axes, *, along: Literal["x", "y", "both"] = "both", legend: bool = True, **labels: Any) -> None:
+    """Set labels and limits of a panel; add grid lines, and a legend if anything has a label."""
+    axes.set(**labels)
+    axes.grid(axis=along, color="0.9")
+    axes.set_axisbelow(True)
+    if legend and axes.get_legend_handles_labels()[0]:
+        axes.legend(fontsize="small", framealpha=0.9, edgecolor="none")
 
 
 def hide_sides(axes: Axes, *sides: str) -> None:

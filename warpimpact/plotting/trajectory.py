@@ -26,7 +26,7 @@ from scipy.spatial import ConvexHull
 from warpimpact.analysis.replay_geometry import POINTS_AROUND, depth_of, largest_in_plate, pressed, slabs
 from warpimpact.plotting.cell import draw_hole_edges, struck, words
 from warpimpact.plotting.maps import save_all
-from warpimpact.plotting.style import BLUE, GREY, STEEL, VERMILION, Figure, finish, in_style
+from warpimpact.plotting.style import BLUE, GREY, STEEL, VERMILION, Figure, finish, in_style, sheet
 from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
 from warpimpact.results.dataset import passed
@@ -221,13 +221,9 @@ def plate(dataset: xarray.Dataset) -> Figure:
     weaker = left.where(left[-1] < left[0], drop=True)
     weaker = weaker if weaker.size else left
     ranges = [weaker[name].values[[0, -1]] + [-_ROOM_ABOUT, _ROOM_ABOUT] for name in (v.CELL_Y, v.CELL_Z)]
-    columns = min(3, len(left))
-    rows = -(-len(left) // columns)
-    tall = np.ptp(ranges[1]) / np.ptp(ranges[0])
-    figure = Figure(figsize=(3.3 * columns + 1.2, (3.1 * tall + 0.5) * rows), layout="compressed")
-    panels = figure.subplots(rows, columns, sharex=True, sharey=True, squeeze=False)
+    figure, panels = sheet(len(left), 3, (3.6, 0.8 + 3.1 * np.ptp(ranges[1]) / np.ptp(ranges[0])))
     style: dict[str, Any] = {"cmap": "viridis", "vmin": 0.0, "vmax": 1.0, "add_colorbar": False, "add_labels": False}
-    for panel, image in zip(panels.flat, left, strict=False):
+    for panel, image in zip(panels, left, strict=True):
         drawn = image.plot.imshow(x=v.CELL_Y, y=v.CELL_Z, ax=panel, **style)
         panel.set(xlim=ranges[0], ylim=ranges[1], aspect="equal", xlabel="y [mm]", ylabel="z [mm]")
         panel.label_outer()

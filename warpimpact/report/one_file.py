@@ -23,12 +23,11 @@ from warpimpact.identification.posterior import posterior_view
 from warpimpact.optimisation.design import is_even
 from warpimpact.optimisation.front_view import OF_FRONT, design_text, front_view, numbers_of
 from warpimpact.plotting.cell import nearest, paint_pixels, pixels
-from warpimpact.plotting.firing import firing_figure
-from warpimpact.plotting.front import THUMBNAIL, campaign_at, draw_thumbnail, front_figure
-from warpimpact.plotting.plate import draw_holes
+from warpimpact.plotting.front import THUMBNAIL, campaign_at, front_figure
+from warpimpact.plotting.plate import draw_holes, draw_plate
 from warpimpact.plotting.posterior import hits_figure, pairs_figure
+from warpimpact.plotting.studies import firing_figure, sweep_figure
 from warpimpact.plotting.style import Figure, data_url, in_style
-from warpimpact.plotting.sweep import sweep_figure
 from warpimpact.plotting.trajectory import FIGURES
 from warpimpact.results import attributes as attr
 from warpimpact.results import files, firing, posterior_file
@@ -173,7 +172,7 @@ def _design_figure(dataset: xarray.Dataset, place: int, campaign: Campaign) -> F
     plate = campaign.plate
     figure = Figure(figsize=(9.0, 3.6), layout="constrained")
     left, right = figure.subplots(1, 2)
-    draw_thumbnail(left, plate)
+    draw_plate(left, plate, (THUMBNAIL / 2, THUMBNAIL / 2))
     left.set(xticks=[], yticks=[], title=f"{THUMBNAIL:g} mm × {THUMBNAIL:g} mm of the plate")
     if f.HIT_VALUE not in dataset:
         right.set_axis_off()

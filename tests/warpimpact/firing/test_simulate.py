@@ -16,7 +16,7 @@ from warpimpact.firing.plan import Gun, Langlie, MilStd662F, Procedure, Shot, fi
 from warpimpact.firing.simulate import Response, response_of_limits, simulate_test
 from warpimpact.firing.view import firing_view
 from warpimpact.kernels.status import Status
-from warpimpact.plotting.firing import firing_figure
+from warpimpact.plotting.studies import firing_figure
 from warpimpact.results import attributes as attr
 from warpimpact.results import files
 from warpimpact.results import firing as f

@@ -13,7 +13,7 @@ from warpimpact.analysis.numbers import text_of
 from warpimpact.campaign.text import CampaignError
 from warpimpact.cli import main
 from warpimpact.kernels.status import Status
-from warpimpact.plotting.limit import limit_figure
+from warpimpact.plotting.studies import limit_figure
 from warpimpact.report.report import report_page
 from warpimpact.results import files
 from warpimpact.results import variables as v

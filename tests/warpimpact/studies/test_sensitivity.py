@@ -8,7 +8,7 @@ import pytest
 from warpimpact import Campaign, run, sensitivity
 from warpimpact.campaign.text import CampaignError
 from warpimpact.cli import main
-from warpimpact.plotting.sensitivity import sensitivity_figure
+from warpimpact.plotting.studies import sensitivity_figure
 from warpimpact.studies.sensitivity import changes, largest_move, plate_sensitivity, reversals
 
 TEXT = """title = "slots"

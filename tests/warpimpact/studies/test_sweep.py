@@ -11,7 +11,7 @@ from warpimpact.analysis.estimates import estimated
 from warpimpact.campaign.campaign import CampaignError
 from warpimpact.campaign.places import resolved
 from warpimpact.cli import main
-from warpimpact.plotting.sweep import sweep_figure
+from warpimpact.plotting.studies import sweep_figure
 from warpimpact.results import files
 from warpimpact.results.kinds import SWEEP
 from warpimpact.results.measures import Measure

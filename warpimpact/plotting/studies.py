@@ -1,0 +1,304 @@
+"""Figures of studies: limits, sweeps, sensitivity, and firing tests."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from textwrap import fill
+from typing import Any
+
+import numpy as np
+import pandas as pd
+import xarray
+from matplotlib.axes import Axes
+from scipy import special
+
+from warpimpact.analysis.effectiveness import reference_name
+from warpimpact.analysis.estimates import estimated
+from warpimpact.analysis.hit_map import hit_points
+from warpimpact.firing.v50 import V50, Shots
+from warpimpact.firing.view import reported_lines, tests_title
+from warpimpact.plotting.cell import draw_map, map_size, shown, to_scale, words
+from warpimpact.plotting.style import (
+    BLUE,
+    GREEN,
+    GREY,
+    PALETTE,
+    VERMILION,
+    Figure,
+    bars,
+    finish,
+    furnish,
+    hide_sides,
+    in_style,
+    sheet,
+)
+from warpimpact.results import attributes as attr
+from warpimpact.results import firing as f
+from warpimpact.results import variables as v
+from warpimpact.results.measures import Measure
+from warpimpact.results.references import reference
+from warpimpact.scene.display import STORED
+from warpimpact.studies.limit_view import inclination, measures_of, promise_line, shown_unit
+from warpimpact.studies.sweep import inputs_of, sweep_table
+from warpimpact.studies.sweep import measures_of as measures_of_sweep
+
+_CURVE = {
+    "velocity": ("impact velocity", "share of the hits that perforate"),
+    "thickness": ("thickness of {}", "share of the hits whose limit is thinner"),
+}
+_NAMED_ABOVE = 0.03, 0.15
+"""Shares between which a name stands above its point; V01 and V05 are often close together."""
+_MOST_LINES = 12
+"""Most lines in a panel of a sweep."""
+_PANEL = (5.0, 3.75)
+"""Width and height of a panel on paper [inch]."""
+_ROW, _MEASURE, _CHANGES = 0.24, 2.6, 2.4
+"""Of a sensitivity: height of a row, and widths of a panel and of the names of the changes [inch]."""
+_VELOCITY = "impact velocity [m/s]"
+
+
+@in_style
+def limit_figure(dataset: xarray.Dataset) -> Figure:
+    """The map of the limits beside their cumulative distribution, with V50 and V05 and their 95 % intervals. For hits
+    at one place, the limits against the obliquity."""
+    if len(dataset[v.OBLIQUITY]) > 1 and not np.ptp(hit_points(dataset), axis=0).any():
+        figure = Figure(figsize=(7.4, 4.6), layout="constrained")
+        _draw_over_obliquity(figure.subplots(), dataset)
+    else:
+        column = shown(dataset, v.LIMITS[dataset.attrs[attr.LIMIT]].value)
+        column = column._replace(values=np.where(np.isinf(column.values), np.nan, column.values), title="")
+        width, height = map_size(dataset)
+        figure = Figure(figsize=(width + 7.6, max(height + 1.2, 4.4)), layout="constrained")
+        at, curve = figure.subplots(1, 2, width_ratios=[width + 1.4, 5.2])
+        to_scale(at, dataset)
+        figure.colorbar(draw_map(at, dataset, column), ax=at, label=column.label)
+        _draw_curve(curve, dataset)
+    finish(figure, f"{dataset.sizes['hit']} hits, {promise_line(dataset)}", result=dataset)
+    return figure
+
+
+def _draw_over_obliquity(axes: Axes, dataset: xarray.Dataset) -> None:
+    """Draw the limits of hits at one place against the obliquity, beside the secant law through the least oblique hit.
+    If all hits have one obliquity, draw them against the inclination of the core."""
+    quantity = dataset.attrs[attr.LIMIT]
+    unit, factor = shown_unit(quantity)
+    value, obliquity = dataset[v.LIMITS[quantity].value].values, dataset[v.OBLIQUITY].values
+    yawed = np.ptp(obliquity) == 0.0
+    along = np.degrees(inclination(dataset)) if yawed else obliquity
+    axes.plot(along, factor * value, "o", color=BLUE, label=f"limit {quantity}")
+    first = int(np.argmin(obliquity))
+    if not yawed and np.isfinite(value[first]):
+        angles = np.linspace(obliquity.min(), obliquity.max())
+        growth = np.cos(np.radians(obliquity[first])) / np.cos(np.radians(angles))
+        law, label = (growth, "as 1/cos") if quantity == "velocity" else (1.0 / growth, "as cos")
+        axes.plot(angles, factor * value[first] * law, color="0.5", linewidth=1.0, label=f"{label}(obliquity)")
+    if (of_solid := reference(dataset, "solid")) is not None:
+        solid = np.broadcast_to(of_solid[v.LIMITS[quantity].value].values, value.shape)
+        axes.plot(along, factor * solid, "D", color=GREY, fillstyle="none", label=_solid_label(dataset))
+    across = "between axis and line of fire on impact" if yawed else "obliquity"
+    furnish(axes, xlabel=f"{across} [°]", ylabel=f"limit {quantity} [{unit}]")
+
+
+def _solid_label(dataset: xarray.Dataset) -> str:
+    """Label of the solid reference."""
+    if dataset.attrs[attr.LIMIT] == "thickness":
+        return "with the solid add-on" if attr.ADD_ON_DENSITY in dataset.attrs else "solid plate"
+    solid = reference(dataset, "solid")
+    several = ", mean" if solid is not None and solid.sizes["hit"] > 1 else ""
+    return f"{reference_name(dataset)} of equal areal density{several}"
+
+
+def _draw_curve(axes: Axes, dataset: xarray.Dataset) -> None:
+    """Draw the cumulative share of the limits, with the references and measures. Limits beyond the largest value tried
+    keep it below 1."""
+    quantity, layer = dataset.attrs[attr.LIMIT], int(dataset.attrs[attr.LIMIT_LAYER])
+    unit, factor = shown_unit(quantity)
+    values = dataset[v.LIMITS[quantity].value].values
+    values = factor * np.sort(values[~np.isnan(values)])
+    finite = values[np.isfinite(values)]
+    if len(finite):
+        margin = 0.05 * max(np.ptp(finite), 0.02 * finite.max())
+        share = np.arange(len(finite) + 1) / len(values)
+        ends = finite[0] - margin, finite[-1] + margin
+        axes.step([ends[0], *finite, ends[1]], [*share, share[-1]], where="post", color=BLUE, linewidth=1.5)
+        axes.set_xlim(ends)
+    for name, label, style in (("solid", _solid_label(dataset), "--"), ("base_alone", "base alone", "-.")):
+        known = reference(dataset, name)
+        mean = np.nan if known is None else factor * float(np.nanmean(known[v.LIMITS[quantity].value].values))
+        if np.isfinite(mean):
+            axes.axvline(mean, linewidth=1.2, color=GREY, linestyle=style, label=label)
+            low, high = axes.get_xlim()
+            axes.set_xlim(min(low, mean - 0.03 * (high - low)), max(high, mean + 0.03 * (high - low)))
+    for measure, estimate in estimated(dataset, measures_of(dataset)).items():
+        if np.isfinite(estimate.value):
+            _mark_quantile(axes, measure.text, unit, measure.share, estimate.value, estimate.low, estimate.high)
+    whose, share_label = _CURVE[quantity]
+    whose = whose.format(f"layer {layer}" if layer else "the plate")
+    furnish(axes, xlabel=f"{whose} [{unit}]", ylabel=share_label, ylim=(0.0, 1.02))
+
+
+def _mark_quantile(axes: Axes, text: str, unit: str, share: float, value: float, low: float, high: float) -> None:
+    """Mark a quantile with its interval on a cumulative curve, its name above it or, where there is no room, below."""
+    axes.plot([low, high], [share, share], color=VERMILION, linewidth=4, alpha=0.4, solid_capstyle="butt")
+    axes.plot(value, share, "o", color=VERMILION, markersize=5)
+    low_share, high_share = _NAMED_ABOVE
+    on_right = value < 0.5 * sum(axes.get_xlim())
+    offset = (8 if on_right else -8, -12 if on_right and not low_share < share < high_share else 5)
+    style: dict[str, Any] = {"textcoords": "offset points", "ha": "left" if on_right else "right"}
+    axes.annotate(f"{text} = {value:.4g} {unit}", (value, share), offset, **style)
+
+
+@in_style
+def sweep_figure(sweep: xarray.Dataset, texts: Sequence[str] = ()) -> Figure:
+    """A panel for every measure, with 95 % intervals, against the first input that is a number; a line for every
+    combination of the others. Without texts of measures they are those of `studies.sweep.SHOWN`.
+
+    Raises:
+        ResultError: a text is no measure, or the sweep lacks what it needs.
+    """
+    measures, inputs = measures_of_sweep(sweep, texts), list(inputs_of(sweep))
+    along = next((name for name in inputs if sweep[name].dtype.kind == "f"), inputs[0])
+    table, others = sweep_table(sweep, measures), [name for name in inputs if name != along]
+    lines = {"": table}
+    if others:
+        groups = table.groupby(others, sort=False)
+        lines = {", ".join(map("{} {}".format, map(words, others), label)): line for label, line in groups}
+    unit = STORED[sweep[along].attrs.get("units", "1")].shown
+    across = f"{words(along)} [{unit}]" if unit else words(along)
+    figure, panels = sheet(len(measures), 2, _PANEL, "constrained")
+    for axes, measure in zip(panels, measures, strict=True):
+        for number, (label, line) in enumerate(list(lines.items())[:_MOST_LINES]):
+            style = {"color": PALETTE[number % len(PALETTE)], "label": label}
+            _draw_line(axes, measure, sweep[along], line, style)
+        furnish(axes, legend=False, xlabel=across, ylabel=fill(measure.title, 45))
+        if measure.is_binary:
+            axes.set_ylim(-0.03, 1.03)
+    counted = "beside a value: the share of the hits that it counts, where that is not all"
+    more = len(lines) - _MOST_LINES
+    note = f"{sweep.sizes['hit']} hits at every point, 95 % intervals; {counted}"
+    note += f"; {more} more combinations are not shown" if more > 0 else ""
+    finish(figure, note, result=sweep, legend=len(inputs) > 1, columns=3)
+    return figure
+
+
+def _draw_line(
+    axes: Axes, measure: Measure, places: xarray.DataArray, line: pd.DataFrame, style: dict[str, Any]
+) -> None:
+    """Draw a line with its intervals, and beside a value the share of the hits that it counts if that is not all."""
+    value, low, high, share = line[measure.text][["value", "low", "high", "share"]].to_numpy().T
+    is_number = places.dtype.kind == "f"
+    x = places.values * STORED[places.attrs["units"]].factor if is_number else np.arange(len(line))
+    axes.errorbar(x, value, yerr=bars(value, low, high), fmt="o-", capsize=3.0, **style)
+    if not is_number:
+        axes.set_xticks(x, places.values)
+    of_text: dict[str, Any] = {"textcoords": "offset points", "fontsize": "x-small", "color": style["color"]}
+    for at, height, counted in zip(x, value, share, strict=True):
+        if 0.0 < counted < 1.0:
+            axes.annotate(f"{counted:.0%}", (at, height), (4.0, 4.0), **of_text)
+
+
+@in_style
+def sensitivity_figure(table: pd.DataFrame, title: str = "", hits: int = 0) -> Figure:
+    """Draw a bar for each change from the value as given, with a panel for each measure.
+
+    Args:
+        table: table of `sensitivity`.
+        title: title of the campaign.
+        hits: number of hits of each row, for the note.
+    """
+    size = (_CHANGES + _MEASURE * len(table.columns), 0.9 + _ROW * len(table))
+    figure = Figure(figsize=size, layout="constrained")
+    panels = figure.subplots(1, len(table.columns), sharey=True, squeeze=False)[0]
+    rows = np.arange(1, len(table))
+    for axes, (name, values) in zip(panels, table.items(), strict=True):
+        given = float(values.iloc[0])
+        moves = values.iloc[1:].to_numpy(float) - given
+        axes.barh(rows, moves, left=given, color=np.where(moves > 0.0, VERMILION, BLUE), height=0.7)
+        axes.axvline(given, color="0.2", linewidth=1.0)
+        axes.set_title(fill(str(name), 28), fontsize="medium")
+        axes.set_yticks(rows, table.index[1:])
+        axes.tick_params(axis="y", length=0)
+        furnish(axes, along="x", legend=False)
+        axes.margins(x=0.08)
+        hide_sides(axes, "top", "right", "left")
+    panels[0].invert_yaxis()
+    note = f"{hits} hits, the same with every change. " if hits else ""
+    finish(figure, f"{note}A bar begins at the value as given.", title=title or "sensitivity")
+    return figure
+
+
+@in_style
+def shots_figure(shots: Shots, estimate: V50, title: str) -> Figure:
+    """Fired shots, the fitted probability of perforation, and V50 by maximum likelihood and by the standard."""
+    figure = Figure(figsize=(7.6, 4.4), layout="constrained")
+    axes = figure.subplots()
+    margin = 0.15 * max(float(np.ptp(shots.velocity)), 0.02 * float(shots.velocity.max()))
+    low, high = float(shots.velocity.min()) - margin, float(shots.velocity.max()) + margin
+    if estimate.slowest_perforation < estimate.fastest_stop:
+        zone = estimate.slowest_perforation, estimate.fastest_stop
+        axes.axvspan(*zone, color="0.92", label="zone of mixed results")
+    for perforated, colour, label in ((False, BLUE, "stop"), (True, VERMILION, "perforation")):
+        velocity = shots.velocity[shots.perforated == perforated]
+        axes.scatter(velocity, np.full(len(velocity), float(perforated)), s=160.0, c=colour, marker="|", label=label)
+    if np.isfinite(estimate.spread):
+        velocity = np.linspace(low, high, 200)
+        curve = special.ndtr((velocity - estimate.value) / estimate.spread)
+        axes.plot(velocity, curve, color=GREY, label="probit")
+    if np.isfinite(estimate.value):
+        ends = bars(estimate.value, *np.clip([estimate.low, estimate.high], low, high))
+        label = "V50 with 95 % interval"
+        axes.errorbar(estimate.value, 0.5, xerr=ends, fmt="o", color="black", capsize=4, label=label)
+    if np.isfinite(estimate.standard):
+        axes.axvline(estimate.standard, color=GREEN, linestyle="--", linewidth=1.2, label="V50 by MIL-STD-662F")
+    furnish(axes, xlabel=_VELOCITY, ylabel="probability of perforation", xlim=(low, high), ylim=(-0.08, 1.08))
+    finish(figure, *estimate.lines, title=title)
+    return figure
+
+
+@in_style
+def firing_figure(dataset: xarray.Dataset) -> Figure:
+    """The response of the target, the reported V50 beside the true one, and the operating characteristic of a proof."""
+    panels = [_draw_response]
+    panels += [_draw_reported] if f.V50 in dataset else []
+    panels += [_draw_proof] if f.PASS in dataset else []
+    figure = Figure(figsize=(5.4 * len(panels), 4.2), layout="constrained")
+    for draw, axes in zip(panels, np.ravel(figure.subplots(1, len(panels), squeeze=False)), strict=True):
+        draw(axes, dataset)
+    notes = reported_lines(dataset) if f.V50 in dataset else []
+    finish(figure, *notes, str(dataset.attrs[f.DISCLAIMER]), title=str(dataset.attrs[attr.TITLE]))
+    return figure
+
+
+def _draw_response(axes: Axes, dataset: xarray.Dataset) -> None:
+    velocity, low, high = (dataset[name].values for name in (f.VELOCITY, f.SHARE_LOW, f.SHARE_HIGH))
+    axes.fill_between(velocity, low, high, color=BLUE, alpha=0.2, linewidth=0, label="95 % interval")
+    axes.plot(velocity, dataset[f.SHARE].values, color=BLUE, linewidth=1.5)
+    furnish(axes, title="target", xlabel=_VELOCITY, ylabel="probability of perforation", ylim=(-0.06, 1.03))
+    columns = (f.QUANTILE, f.QUANTILE_VELOCITY, f.QUANTILE_LOW, f.QUANTILE_HIGH)
+    for share, *quantile in zip(*(dataset[name].values.tolist() for name in columns), strict=True):
+        if np.isfinite(quantile[0]):
+            _mark_quantile(axes, f"V{100 * share:02.0f}", "m/s", share, *quantile)
+
+
+def _draw_reported(axes: Axes, dataset: xarray.Dataset) -> None:
+    v50, true = dataset[f.V50].values, float(dataset.attrs[f.TRUE_V50])
+    known = v50[np.isfinite(v50)]
+    if len(known):
+        axes.hist(
+            np.clip(known, *np.quantile(known, [0.005, 0.995])), bins=40, color=BLUE, alpha=0.55, label="reported"
+        )
+    axes.axvline(true, color="black", linewidth=1.5, label=f"true V50, {true:.4g} m/s")
+    furnish(axes, title=tests_title(dataset), xlabel="reported V50 [m/s]", ylabel="tests")
+
+
+def _draw_proof(axes: Axes, dataset: xarray.Dataset) -> None:
+    velocity, proof = dataset[f.VELOCITY].values, json.loads(dataset.attrs[f.SETTINGS])["proof"]
+    stop = 1.0 - dataset[f.PROOF_PERFORATION].values
+    axes.plot(velocity, stop, color="0.6", linewidth=1.2, label="P(stop) of one shot")
+    axes.plot(velocity, dataset[f.PASS].values, color=BLUE, label="plan passes, shots anywhere")
+    same = dataset[f.PASS_SAME_PLACE].values
+    axes.plot(velocity, same, color=GREEN, linestyle="-.", label="plan passes, all shots at one place")
+    axes.axvline(proof["velocity"], color=VERMILION, linestyle="--", linewidth=1.2, label="velocity of the proof")
+    title = f"proof: {int(dataset.attrs[f.PROOF_SHOTS])} shots, at most {proof['allowed']} perforate"
+    furnish(axes, title=title, xlabel=_VELOCITY, ylabel="probability", ylim=(-0.03, 1.03))
