@@ -136,7 +136,7 @@ class VariableGroup(Collection[Variable]):
         variables: in the order of a file.
         recorded: whether a computation of these shots at this scene records them; never if something else fills them.
         filled: columns by variable, SI and radians.
-        beside: variables of the Dataset without an axis along the shots that go with the group.
+        constants: variables of the Dataset without an axis along the shots that go with the group.
         measured: whether measures, as in mean(tilt@130mm), and maps of the variables are allowed.
         exact: whether columns stay in double precision when shots are computed in single precision.
     """
@@ -145,7 +145,7 @@ class VariableGroup(Collection[Variable]):
     variables: tuple[Variable, ...]
     recorded: Callable[[Scene, Shots], bool] = lambda scene, shots: False
     filled: Callable[[Returned], Columns] = lambda returned: {}
-    beside: tuple[Variable, ...] = ()
+    constants: tuple[Variable, ...] = ()
     measured: bool = True
     exact: bool = False
 

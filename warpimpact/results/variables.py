@@ -6,9 +6,6 @@ from __future__ import annotations
 import xarray
 
 from warpimpact.records import registry
-from warpimpact.records.bending_variables import *
-from warpimpact.records.exit import *
-from warpimpact.records.layer_variables import *
 from warpimpact.records.registry import *
 from warpimpact.records.variable import *
 from warpimpact.scene.quantities import BY_LAYER, OF_THE_SCENE, QUANTITIES
@@ -175,5 +172,5 @@ def outcome_variables(dataset: xarray.Dataset) -> list[Variable]:
 def hit_variables() -> tuple[Variable, ...]:
     """All variables that a map of hits may have beside its coordinates, in the order of a file."""
     always, *others = registry.RECORDS
-    optional = (variable for group in others for variable in (*group, *group.beside))
+    optional = (variable for group in others for variable in (*group, *group.constants))
     return tuple(dict.fromkeys((*SHOT_VARIABLES, EDGE_DISTANCE, *always, *SCATTER_VARIABLES, *optional)))

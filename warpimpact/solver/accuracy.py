@@ -19,8 +19,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpimpact.kernels.status import Status
-from warpimpact.records.layer_variables import LAYER_RESIDUAL_VELOCITY
 from warpimpact.records.outcomes import Outcomes
+from warpimpact.records.registry import LAYER_RESIDUAL_VELOCITY
 from warpimpact.records.variable import failures
 from warpimpact.scene import Accuracy, Numerics
 from warpimpact.solver.resolution import LADDER, TooManySteps, at_level

@@ -11,8 +11,8 @@ from warpimpact.identification.fit import Fit, MeasuredShot
 from warpimpact.identification.likelihood import HitPoints, Scores, evaluate, hit_points, score_shot
 from warpimpact.identification.measured import Observation
 from warpimpact.kernels.status import Status
-from warpimpact.records.exit import OUTCOME_VARIABLES
 from warpimpact.records.outcomes import Outcomes
+from warpimpact.records.registry import OUTCOME_VARIABLES
 from warpimpact.scene import IDENTITY, Shots, Symmetry
 from warpimpact.solver.simulate import simulate
 from warpimpact.solver.worker import Worker
