@@ -1,7 +1,5 @@
 """All commands: what they are for, and the arguments that they take."""
 
-from pathlib import Path
-
 from .options import (
     CAMPAIGN,
     COMPUTING,
@@ -10,15 +8,19 @@ from .options import (
     RESULT,
     RESULTS,
     Command,
-    at_least,
     campaign_folder,
+    choice,
     earlier,
+    file,
+    flag,
     folder,
     measures,
+    number,
     one_of,
     option,
     output,
     overwrite,
+    text,
 )
 
 SCHEMA = "warpimpact.schema.json"
@@ -32,8 +34,8 @@ DAILY = (
         "List the threats and materials that a campaign may name, or show one: core drawn, masses, velocities of "
         "standards; strength, rows and range; what is known from where, and what is assumed.",
         [
-            option("name", nargs="?", metavar="NAME", help="threat or material (default: list all)"),
-            option("--file", type=Path, metavar="MINE.toml", help="entries of your own, as a campaign names them"),
+            text("name", "NAME", "threat or material (default: list all)", nargs="?"),
+            file("--file", "MINE.toml", "entries of your own, as a campaign names them"),
             output("CORE.png", "draw the core of a threat into this picture"),
             overwrite("an existing picture"),
         ],
@@ -46,8 +48,8 @@ DAILY = (
         "Copy a campaign, a fit, a test or a design that comes with warpimpact, and the files that it names. Write its "
         f"schema, such as {SCHEMA}, so that an editor can complete and check the keys.",
         [
-            option("name", metavar="NAME", nargs="?", default="", help="name of an example"),
-            option("--list", action="store_true", help="list the examples, each with the question that it answers"),
+            text("name", "NAME", "name of an example", nargs="?", default=""),
+            flag("--list", "list the examples, each with the question that it answers"),
             output("CAMPAIGN.toml", "campaign file (default: NAME.toml in this folder)"),
             overwrite("existing files"),
         ],
@@ -61,15 +63,14 @@ DAILY = (
         "slider moves. The page gives the campaign file and the report of what it shows. It is for this machine alone "
         "and needs no network. Ctrl-C ends it. It needs: pip install 'warpimpact[design]'",
         [
-            option(
+            text(
                 "designs",
+                "CAMPAIGN.toml",
+                "campaigns, results, searches with their designs, or the address of a page (default: slotted_plate)",
                 nargs="*",
-                metavar="CAMPAIGN.toml",
-                help="campaigns; also results, searches of warpimpact optimise with their designs, and the address of "
-                "a page, which holds its design (default: the slotted plate)",
             ),
             option("--port", type=int, default=0, metavar="N", help="port of the page (default: one that is free)"),
-            option("--no-browser", action="store_true", help="print the address and open no browser"),
+            flag("--no-browser", "print the address and open no browser"),
             DEVICE,
         ],
         example="design campaigns/slotted_plate.toml",
@@ -98,39 +99,20 @@ DAILY = (
         "compared hit by hit, with their maps side by side. A campaign with several plates is run first: each plate "
         "gives NAME.nc. A plate whose result exists is not run again.",
         [
-            option(
+            file(
                 "files",
-                type=Path,
+                "RESULT.nc",
+                "results, one with references, or a campaign with several [[plate]]",
                 nargs="+",
-                metavar="RESULT.nc",
-                help="two or more results of warpimpact run; one, which is compared with its references; or one "
-                "campaign with several [[plate]] tables",
             ),
-            output(
-                "FIGURE.png",
-                "figure as PNG, PDF or SVG (default: comparison.png, or the campaign's name, in this folder)",
-            ),
+            output("FIGURE.png", "figure as PNG, PDF or SVG (default: comparison.png, or the campaign's name)"),
             folder("of a campaign: folder of the results NAME.nc (default: the folder of the figure)"),
             measures(),
-            option(
-                "--all",
-                action="store_true",
-                dest="every",
-                help="print and draw every measure, every pair of plates, and what was compared how",
-            ),
-            option(
-                "--sensitivity",
-                action="store_true",
-                help="rank the plates of a campaign by the deciding measure with each change of what nobody measured, "
-                "too",
-            ),
+            flag("--all", "show every measure, every pair of plates, and what was compared how", dest="every"),
+            flag("--sensitivity", "of a campaign: rank with each change of what nobody measured, too"),
             *COMPUTING,
             COUNT,
-            *earlier(
-                "campaign",
-                "an existing figure; of a campaign, compute all plates again",
-                resume="continue an interrupted campaign",
-            ),
+            *earlier("campaign", "an existing figure; of a campaign, compute all plates again"),
         ],
         example="compare campaigns/two_plates.toml, or: warpimpact compare slotted.nc round.nc",
     ),
@@ -146,25 +128,9 @@ DAILY = (
             CAMPAIGN,
             measures("V50 and V05, or H50 and H05 of thicknesses"),
             output("LIMIT.nc", "result file (default: the campaign's name and _limit.nc); the figure is LIMIT.png"),
-            option(
-                "--quantity",
-                choices=("velocity", "thickness"),
-                default="velocity",
-                help="what to find: the impact velocity, or the thickness of the plate (default: velocity)",
-            ),
-            option(
-                "--layer",
-                type=at_least(0),
-                default=0,
-                metavar="N",
-                help="layer whose thickness to find: 0 is the plate (default), 1 the first layer behind it",
-            ),
-            option(
-                "--tolerance",
-                metavar="TOLERANCE",
-                help='how far the two ends of a limit may lie apart, such as "0.5 m/s" or "0.02 mm" (default: 1 m/s, '
-                "0.01 mm)",
-            ),
+            choice("--quantity", ("velocity", "thickness"), "what to find (default: velocity)", default="velocity"),
+            number("--layer", "layer whose thickness to find (default: 0, the plate)", default=0),
+            text("--tolerance", "TOLERANCE", 'width of a limit, such as "0.5 m/s" (default: 1 m/s, 0.01 mm)'),
             *COMPUTING,
             COUNT,
             *earlier("search", "an existing result or an interrupted search"),
@@ -180,7 +146,7 @@ DAILY = (
         "campaign file for each design of the front, and a figure. Exit code 4: no design keeps the bounds. Needs pip "
         "install 'warpimpact[optimise]'.",
         [
-            option("design", type=Path, metavar="DESIGN.toml", help="design file: a campaign, and what is free"),
+            file("design", "DESIGN.toml", "design file: a campaign, and what is free"),
             output("FRONT.nc", "result file (default: the design's name, in this folder)"),
             *COMPUTING,
             *earlier("search", "an existing result, its campaigns or an interrupted search"),
@@ -198,13 +164,7 @@ DAILY = (
         [
             RESULTS,
             output("REPORT.html", "report file (default: the name of the first result with .html, in its folder)"),
-            option(
-                "--trajectories",
-                type=at_least(0),
-                default=32,
-                metavar="N",
-                help="number of hits to replay per result: the worst hits, and others spread evenly (default: 32)",
-            ),
+            number("--trajectories", "hits of each result to replay: the worst, and others (default: 32)", default=32),
             campaign_folder("folder of the files that the campaigns name (default: the folder of each result)"),
             overwrite("an existing report"),
         ],
@@ -236,7 +196,7 @@ EXPERT = (
         [
             RESULT,
             measures(),
-            option("--campaign", action="store_true", help="print only the campaign that the result contains"),
+            flag("--campaign", "print only the campaign that the result contains"),
         ],
         example="inspect slotted.nc",
     ),
@@ -252,16 +212,8 @@ EXPERT = (
             folder("existing folder of the pictures (default: the folder of the result)"),
             overwrite("existing pictures"),
             one_of(
-                option(
-                    "--measure",
-                    metavar="TEXT",
-                    help='draw only the map of this measure, such as "P(tilt@130mm > 30 deg)"; takes one result',
-                ),
-                option(
-                    "--variable",
-                    metavar="NAME",
-                    help="draw only the map of this variable, such as edge_distance; takes one result",
-                ),
+                text("--measure", "TEXT", 'the map of this measure of one result, as "P(tilt@130mm > 30 deg)"'),
+                text("--variable", "NAME", "the map of this variable of one result, as edge_distance"),
             ),
         ],
         example="plot slotted.nc --folder maps",
@@ -277,7 +229,7 @@ EXPERT = (
             CAMPAIGN,
             measures("what reaches the base; residual velocity, deflection and tilt"),
             output("TABLE.csv", "table (default: the campaign's name and _sensitivity.csv, in this folder)"),
-            option("--hits", type=at_least(16), default=256, metavar="N", help="hits of each row (default: 256)"),
+            number("--hits", "hits of each row (default: 256)", least=16, default=256),
             DEVICE,
             overwrite("an existing table and its figure"),
         ],
@@ -296,11 +248,7 @@ EXPERT = (
             output("SWEEP.nc", "file of the sweep (default: the campaign's name, in this folder)"),
             *COMPUTING,
             COUNT,
-            *earlier(
-                "sweep",
-                "an existing sweep with its points and its figure",
-                resume="keep the points that are complete, and compute the rest",
-            ),
+            *earlier("sweep", "an existing sweep with its points and its figure"),
         ],
         example="sweep campaigns/obliquity_sweep.toml -o sweep.nc",
     ),
@@ -314,15 +262,11 @@ EXPERT = (
         "report and the truth, and the operating characteristic of n shots with at most k perforations. The limits of "
         "a campaign go to TEST_limits.nc, which a later call takes with --resume.",
         [
-            option("test", type=Path, metavar="SHOTS.csv|TEST.toml", help="fired shots, or a test to simulate"),
+            file("test", "SHOTS.csv|TEST.toml", "fired shots, or a test to simulate"),
             output("FILE", "figure SHOTS.png of shots, or result TEST.nc, whose figure is TEST.png"),
             *COMPUTING,
             COUNT,
-            *earlier(
-                "test",
-                "an existing result with its figure and its limits",
-                resume="keep the limits that are computed, and continue what was interrupted",
-            ),
+            *earlier("test", "an existing result with its figure and its limits"),
         ],
         example="test shots.csv",
     ),
@@ -337,20 +281,9 @@ EXPERT = (
             RESULT,
             option("--hit", type=int, required=True, metavar="N", help="number of the hit in the result, from 0"),
             output("HIT.nc", "history file (default: RESULT_hitN.nc in the folder of the result)"),
-            campaign_folder(
-                "folder of the files that the campaign names, such as a hit list (default: the result's folder)"
-            ),
-            option(
-                "--snapshots",
-                type=at_least(2),
-                default=6,
-                metavar="N",
-                help="instants at which the history shows what is left of the target, each of which takes memory and "
-                "time",
-            ),
-            option(
-                "--animation", type=Path, metavar="HIT.gif", help="also write a film of the hit; HIT.mp4 needs FFmpeg"
-            ),
+            campaign_folder("folder of the files that the campaign names (default: the result's folder)"),
+            number("--snapshots", "instants that show what is left of the target (default: 6)", least=2, default=6),
+            file("--animation", "HIT.gif", "also write a film of the hit; HIT.mp4 needs FFmpeg"),
             overwrite("an existing history"),
         ],
         example="replay slotted.nc --hit 34",
@@ -363,16 +296,8 @@ EXPERT = (
         "core.pvd and plate.pvd in ParaView. VTK needs: pip install 'warpimpact[vtk]'. Or write the holes of a "
         "campaign's plate as an SVG or DXF drawing in mm. DXF needs: pip install 'warpimpact[cad]'.",
         [
-            option(
-                "file",
-                type=Path,
-                metavar="RESULT.nc|HIT.nc|CAMPAIGN.toml",
-                help="written by warpimpact run or replay, or a campaign file",
-            ),
-            output(
-                "RESULT.csv|PLATE.svg|PLATE.dxf",
-                "CSV file or drawing (default: the file's name with .csv or .svg, in its folder)",
-            ),
+            file("file", "RESULT.nc|HIT.nc|CAMPAIGN.toml", "written by warpimpact run or replay, or a campaign file"),
+            output("FILE", "CSV file or drawing (default: the file's name with .csv or .svg, in its folder)"),
             folder("new folder of VTK files (default: the name of the history with _vtk, in its folder)"),
             overwrite("an existing file"),
         ],
@@ -387,42 +312,22 @@ EXPERT = (
         "compare takes it together with a result of the fast law. Its materials have constants of their own "
         "(docs/continuum.md). Options come before the campaign's table [continuum].",
         [
-            option("file", type=Path, metavar="FILE", help="a campaign, or a result of warpimpact run"),
+            file("file", "FILE", "a campaign, or a result of warpimpact run"),
             output("RESULT.nc", "result file (default: the file's name with _continuum, in this folder)"),
             COUNT,
             one_of(
-                option(
-                    "--hit",
-                    type=at_least(0),
-                    action="append",
-                    metavar="N",
-                    help="of a result: this hit; may be given several times",
-                ),
-                option(
-                    "--hits", type=at_least(1), metavar="N", help="of a result: number of hits, spread over the map"
-                ),
+                number("--hit", "of a result: this hit; may be given several times", action="append"),
+                number("--hits", "of a result: number of hits, spread over the map", least=1),
             ),
-            option(
+            text(
                 "--material",
+                "NAME",
+                "material of the continuum, or a TOML file; again for each layer behind (default: the campaign's)",
                 action="append",
-                metavar="NAME",
-                help="material of the continuum, or a TOML file with its constants; given again for each layer behind "
-                "(default: continuum.materials, or plate.material)",
             ),
-            option(
-                "--friction",
-                type=float,
-                metavar="MU",
-                help="between core and target (default: continuum.friction, which is 0 by default)",
-            ),
-            option(
-                "--fidelity",
-                choices=("draft", "standard", "reference"),
-                help="size of the elements (default: continuum.fidelity, which is draft by default)",
-            ),
-            option(
-                "--element", metavar="LENGTH", help='size of the elements, such as "0.5 mm", in place of a fidelity'
-            ),
+            text("--friction", "MU", "between core and target (default: continuum.friction)", type=float),
+            choice("--fidelity", ("draft", "standard", "reference"), "size of the elements (default: the campaign's)"),
+            text("--element", "LENGTH", 'size of the elements, such as "0.5 mm", in place of a fidelity'),
             *COMPUTING,
             *earlier("computation", "an existing result or an interrupted computation"),
         ],
@@ -437,13 +342,7 @@ EXPERT = (
         "CSV file that hits.file takes, and figures into the same folder. Print which parameters the shots determine, "
         "and whether the computation has converged.",
         [
-            option(
-                "fit",
-                type=Path,
-                metavar="FIT",
-                help="fit file: scene, measured shots, and priors of what is unknown; or a result of warpimpact "
-                "continuum, whose hits then count as measured shots",
-            ),
+            file("fit", "FIT", "fit file, or a result of warpimpact continuum, whose hits count as measured shots"),
             output("POSTERIOR.nc", "file of the posterior (default: the fit's name, in this folder)"),
             *COMPUTING,
             overwrite("an existing posterior"),
@@ -457,14 +356,7 @@ EXPERT = (
         "Compute the paper's two shots. Compare them with the paper's model, its experiment and LS-DYNA. Of a result, "
         "tell the hits that come closest to the two shots.",
         [
-            option(
-                "campaign",
-                type=Path,
-                nargs="?",
-                metavar="CAMPAIGN.toml|RESULT.nc",
-                help="the paper's scene with two hits; lattice and numerics may differ (default: the example "
-                "paper_shots); or a result of warpimpact run",
-            ),
+            file("campaign", "FILE", "the paper's two shots (default: paper_shots), or a result", nargs="?"),
             DEVICE,
         ],
         example="validate",

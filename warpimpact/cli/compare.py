@@ -33,9 +33,9 @@ def compare_command(arguments: argparse.Namespace) -> int:
     default = arguments.files[0].stem if is_campaign else "comparison"
     figure = arguments.output or Path(f"{default}.png")
     # The figure of a campaign belongs to it as its results do.
-    beside = figure.with_stem(f"{figure.stem}_weight")
+    by_weight = figure.with_stem(f"{figure.stem}_weight")
     tilts = figure.with_stem(f"{figure.stem}_tilt")
-    for picture in (figure, beside, tilts):
+    for picture in (figure, by_weight, tilts):
         check_output(picture, *PICTURES, overwrite=arguments.overwrite or (is_campaign and arguments.output is None))
     if arguments.sensitivity and not is_campaign:
         raise files.ResultError(
@@ -63,8 +63,8 @@ def compare_command(arguments: argparse.Namespace) -> int:
     comparison_figure(comparison, every=arguments.every).savefig(figure, dpi=150)
     print(f"{figure}{replaced}" + ("" if arguments.every else "; every measure with --all"))
     if (against_weight := weight_figure(comparison)) is not None:
-        against_weight.savefig(beside, dpi=150)
-        print(beside)
+        against_weight.savefig(by_weight, dpi=150)
+        print(by_weight)
     return code
 
 

@@ -1,4 +1,4 @@
-"""What the command prints besides its output: errors, warnings and its log, without control characters.
+"""What the command prints next to its output: errors, warnings and its log, without control characters.
 
 A title or a file may contain control characters, which a terminal would obey.
 """

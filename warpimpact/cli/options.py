@@ -81,6 +81,31 @@ def at_least(least: int) -> Callable[[str], int]:
     return whole_number
 
 
+def text(name: str, metavar: str, text: str, **settings: Any) -> Option:
+    """Declare a text."""
+    return option(name, metavar=metavar, help=text, **settings)
+
+
+def choice(name: str, choices: Sequence[str], text: str, **settings: Any) -> Option:
+    """Declare one of some words."""
+    return option(name, choices=choices, help=text, **settings)
+
+
+def number(name: str, text: str, *, least: int = 0, **settings: Any) -> Option:
+    """Declare a whole number that is at least `least`."""
+    return option(name, type=at_least(least), metavar="N", help=text, **settings)
+
+
+def flag(name: str, text: str, **settings: Any) -> Option:
+    """Declare an option without a value."""
+    return option(name, action="store_true", help=text, **settings)
+
+
+def file(name: str, metavar: str, text: str, **settings: Any) -> Option:
+    """Declare a file."""
+    return option(name, type=Path, metavar=metavar, help=text, **settings)
+
+
 def output(metavar: str, text: str) -> Option:
     """Declare the file that a command writes."""
     return option("-o", "--output", type=Path, metavar=metavar, help=text)
@@ -88,17 +113,17 @@ def output(metavar: str, text: str) -> Option:
 
 def folder(text: str) -> Option:
     """Declare the folder in which a command writes files with names of its own."""
-    return option("--folder", type=Path, metavar="FOLDER", help=text)
+    return file("--folder", "FOLDER", text)
 
 
 def overwrite(replaced: str) -> Option:
-    return option("--overwrite", action="store_true", help=f"replace {replaced}")
+    return flag("--overwrite", f"replace {replaced}")
 
 
 def earlier(what: str, replaced: str, resume: str = "") -> tuple[Option, Option]:
     """Declare what happens to an earlier computation, which `what` names: --resume and --overwrite."""
     usual = f"continue an interrupted {what}; start a new one if there is none"
-    return option("--resume", action="store_true", help=resume or usual), overwrite(replaced)
+    return flag("--resume", resume or usual), overwrite(replaced)
 
 
 def measures(default: str = "the measures of docs/protection.md") -> Option:
@@ -114,12 +139,12 @@ def measures(default: str = "the measures of docs/protection.md") -> Option:
 
 
 def campaign_folder(text: str) -> Option:
-    return option("--campaign-folder", type=Path, metavar="FOLDER", help=text)
+    return file("--campaign-folder", "FOLDER", text)
 
 
-CAMPAIGN = option("campaign", type=Path, metavar="CAMPAIGN.toml", help="campaign file: core, plate, shots and numerics")
-RESULT = option("result", type=Path, metavar="RESULT.nc", help="written by warpimpact run")
-RESULTS = option("results", type=Path, nargs="+", metavar="RESULT.nc", help="written by warpimpact run")
+CAMPAIGN = file("campaign", "CAMPAIGN.toml", "campaign file: core, plate, shots and numerics")
+RESULT = file("result", "RESULT.nc", "written by warpimpact run")
+RESULTS = file("results", "RESULT.nc", "written by warpimpact run", nargs="+")
 COUNT = option("--count", type=int, metavar="N", help="number of hits, instead of the campaign's")
 DEVICE = option(
     "--device",
@@ -131,7 +156,7 @@ COMPUTING = (
     DEVICE,
     one_of(
         option("--scheduler", metavar="ADDRESS", help="compute on the workers of this Dask scheduler"),
-        option("--workers", type=at_least(1), metavar="N", help="compute in N processes on this machine"),
+        number("--workers", "compute in N processes on this machine", least=1),
     ),
 )
 _VOLUME = (

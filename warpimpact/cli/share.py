@@ -11,7 +11,7 @@ from warpimpact.export.drawing import SUFFIXES, write_drawing
 from warpimpact.export.paraview import write_vtk
 from warpimpact.export.spreadsheet import write_csv
 from warpimpact.plotting.trajectory import FIGURES, save_animation, save_figures, writer_for
-from warpimpact.report.one_file import write_file_report
+from warpimpact.report.one_file import file_page
 from warpimpact.report.report import report_page
 from warpimpact.results import files
 from warpimpact.results.kinds import HISTORY, HIT_MAP
@@ -76,7 +76,7 @@ def report_command(arguments: argparse.Namespace) -> None:
         if kind is not HIT_MAP:
             if len(paths) > 1:
                 raise files.ResultError(f"got {len(paths)} files, one of which is {kind.name}, which is reported alone")
-            write_file_report(path, kind, output, arguments.campaign_folder or path.parent)
+            write_text(file_page(path, kind, arguments.campaign_folder or path.parent), output)
             print(output)
             return
     by_name = named(paths)

@@ -31,7 +31,6 @@ WORST_SHARE = 0.25
 PAGE_PIXELS = 160
 """Pixels along the longer side of a map."""
 _CORE_BEHIND = "#707070"  # colour of the core behind the plate
-_VALUE_DIGITS = 5
 _TURN = 1.5  # turn of an outline from point to point [degree]; its error is 0.01 mm of a core's profile
 
 
@@ -167,9 +166,5 @@ def _solid_boxes(history: xarray.Dataset, view: str) -> list[list[float]]:
 
 
 def _rounded(values: Array) -> list[float | None]:
-    """Values rounded to `_VALUE_DIGITS` digits; None for NaN."""
-    size = np.abs(values, out=np.ones_like(values), where=np.isfinite(values) & (values != 0.0))
-    power = np.clip(_VALUE_DIGITS - 1 - np.floor(np.log10(size)), -300.0, 300.0)
-    up, down = 10.0 ** np.maximum(power, 0.0), 10.0 ** np.maximum(-power, 0.0)  # whole powers, which are exact
-    rounded = np.rint(values * up / down) / up * down
-    return [value if math.isfinite(value) else None for value in rounded.tolist()]
+    """Round values to five digits; None for NaN."""
+    return [float(f"{value:.5g}") if math.isfinite(value) else None for value in values.tolist()]

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from html import escape
 from io import StringIO
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any, NamedTuple
 
 import xarray
+from markupsafe import Markup
 from matplotlib import colormaps
 from matplotlib.colors import Normalize
 from matplotlib.figure import Figure as PlainFigure
@@ -29,6 +29,7 @@ from warpimpact.plotting.posterior import hits_figure, pairs_figure
 from warpimpact.plotting.studies import firing_figure, sweep_figure
 from warpimpact.plotting.style import Figure, data_url, in_style
 from warpimpact.plotting.trajectory import FIGURES
+from warpimpact.report.report import templates
 from warpimpact.results import attributes as attr
 from warpimpact.results import files, firing, posterior_file
 from warpimpact.results import front as f
@@ -39,54 +40,37 @@ from warpimpact.results.vocabulary import WEIGHTS
 from warpimpact.scene.symmetry import IDENTITY, symmetries
 from warpimpact.studies.sweep import sweep_view
 
-_STYLE = (
-    "body{font:16px sans-serif;max-width:70rem;margin:2rem auto;padding:0 1rem}img{max-width:100%}pre{overflow:auto}"
-    "td,th{padding:.2rem .9rem .2rem 0;text-align:right;border-bottom:1px solid #d8d8d8}table{border-collapse:collapse}"
-    "th:first-child{text-align:left}.wide{overflow-x:auto}"
-)
-
-
-_FRONT_STYLE = (
-    "svg{max-width:100%;height:auto}.design:not(:target){display:none}"
-    ".designs:not(:has(:target)) .design:first-child{display:block}"
-)
-"""Shows the design whose point was clicked, at first that of the first point."""
 _MAP_PIXELS = 160
 """Pixels along the longer side of a map."""
 
 
-class _Shown(NamedTuple):
+class _Contents(NamedTuple):
     """What is shown of a kind.
 
     Attributes:
-        view: its view.
+        view: its tables and sentences.
         figures: figures by their headings.
-        asked: attribute with the text of the file behind the result.
+        input: attribute with the text of the file behind the result.
     """
 
     view: Callable[..., View]
     figures: Mapping[str, Callable[[Any], PlainFigure]] = MappingProxyType({})
-    asked: str = ""
+    input: str = ""
 
 
-_SHOWN = {
-    POSTERIOR: _Shown(
-        posterior_view,
-        figures={
-            "Parameters, in pairs": pairs_figure,
-            "Where the shots hit": hits_figure,
-        },
-        asked=posterior_file.FIT_TEXT,
-    ),
-    FRONT: _Shown(front_view, asked=f.DESIGN),
-    SWEEP: _Shown(sweep_view, figures={"By input": sweep_figure}, asked=attr.CAMPAIGN),
-    FIRING: _Shown(firing_view, figures={"What the tests report": firing_figure}, asked=firing.TEST),
-    HISTORY: _Shown(hit_view, figures={draw.__name__.replace("_", " ").capitalize(): draw for draw in FIGURES}),
+_FIT_FIGURES = {"Parameters, in pairs": pairs_figure, "Where the shots hit": hits_figure}
+_HIT_FIGURES = {draw.__name__.replace("_", " ").capitalize(): draw for draw in FIGURES}
+_CONTENTS = {
+    POSTERIOR: _Contents(posterior_view, _FIT_FIGURES, posterior_file.FIT_TEXT),
+    FRONT: _Contents(front_view, input=f.DESIGN),
+    SWEEP: _Contents(sweep_view, {"By input": sweep_figure}, attr.CAMPAIGN),
+    FIRING: _Contents(firing_view, {"What the tests report": firing_figure}, firing.TEST),
+    HISTORY: _Contents(hit_view, _HIT_FIGURES),
 }
 
 
 def view_of(path: Path, kind: Kind, measures: Sequence[str] = ()) -> View:
-    """The view of a file of any kind but a map of hits.
+    """Return the tables and sentences of a file of any kind but a map of hits.
 
     Args:
         measures: texts of measures; by default those of the kind.
@@ -97,73 +81,51 @@ def view_of(path: Path, kind: Kind, measures: Sequence[str] = ()) -> View:
     if measures and kind is not SWEEP:
         raise files.ResultError(f"--measure: got {kind.name}, but measures are those of a map of hits or a sweep")
     dataset = files.read(path, kind)
-    return sweep_view(dataset, measures) if kind is SWEEP else _SHOWN[kind].view(dataset)
+    return sweep_view(dataset, measures) if kind is SWEEP else _CONTENTS[kind].view(dataset)
 
 
-def write_file_report(path: Path, kind: Kind, output: Path, folder: Path) -> None:
-    """Write the report of a file, whole or not at all.
+def file_page(path: Path, kind: Kind, folder: Path) -> str:
+    """Return the report of a file as HTML.
 
     Args:
         folder: folder of the files that the campaigns of a search name.
 
     Raises:
-        OutputError: the report cannot be written.
         ResultError: the file cannot be read.
     """
-    dataset, shown = files.read(path, kind), _SHOWN[kind]
-    attributes = dataset.attrs
-    title = str(attributes.get(attr.TITLE, path.stem))
-    view = {"" if heading == title else heading: parts for heading, parts in shown.view(dataset).items()}
-    clickable = _front_html(dataset, folder) if kind is FRONT else ""
-    figures = "".join(
-        f"<h2>{name}</h2><img alt='{name}' src='{data_url(draw(dataset))}'>" for name, draw in shown.figures.items()
-    )
-    asked = (
-        f"<h2>What was asked</h2><pre>{escape(str(attributes[shown.asked]))}</pre>" if shown.asked in attributes else ""
-    )
-    made = escape(
-        ", ".join(str(attributes[name]) for name in (attr.HISTORY, attr.WARPIMPACT_VERSION) if name in attributes)
-    )
-    page = (
-        "<!DOCTYPE html><html lang='en'><head><meta charset='utf-8'>"
-        "<meta name='viewport' content='width=device-width, initial-scale=1'>"
-        "<meta http-equiv='Content-Security-Policy' "
-        "content=\"default-src 'none'; img-src data:; style-src 'unsafe-inline'\">"
-        f"<title>{escape(title)}</title><style>{_STYLE}{_FRONT_STYLE}</style></head><body><h1>{escape(title)}</h1>"
-        f"{clickable}{html_of(view, 'h2')}{figures}{asked}<p>{made}</p></body></html>\n"
-    )
-    with files.aside(output) as file:
-        file.write_text(page, encoding="utf-8")
-
-
-def _front_html(dataset: xarray.Dataset, folder: Path) -> str:
-    """The figure of a search, whose points are links, and a section for each design of the front.
-
-    Args:
-        folder: folder of the files that its campaigns name.
-    """
-    picture = StringIO()
-    front_figure(dataset, folder).savefig(picture, format="svg")
-    drawing = picture.getvalue().replace(' target="_blank"', "")  # a link of Matplotlib opens a new page
-    designs = (_design_html(dataset, place, folder) for place in range(dataset.sizes["front"]))
+    dataset, contents = files.read(path, kind), _CONTENTS[kind]
+    title = str(dataset.attrs.get(attr.TITLE, path.stem))
+    view = {"" if heading == title else heading: parts for heading, parts in contents.view(dataset).items()}
+    made = [str(dataset.attrs[name]) for name in (attr.HISTORY, attr.WARPIMPACT_VERSION) if name in dataset.attrs]
+    front = StringIO()
+    if kind is FRONT:
+        front_figure(dataset, folder).savefig(front, format="svg")
+    drawing = front.getvalue().replace(' target="_blank"', "")  # a link of Matplotlib opens a new page
     return (
-        "<h2>The front</h2><p>A click on a point of the front shows its plate, its map and its campaign.</p>"
-        f"{drawing[drawing.index('<svg') :]}<div class='designs'>{''.join(designs)}</div>"
+        templates("report")
+        .get_template("file.html")
+        .render(
+            title=title,
+            front=Markup(drawing[drawing.find("<svg") :]),
+            designs=[_design(dataset, place, folder) for place in range(dataset.sizes.get("front", 0))],
+            view=Markup(html_of(view, "h2")),
+            figures=[(name, data_url(draw(dataset))) for name, draw in contents.figures.items()],
+            input=dataset.attrs.get(contents.input, ""),
+            made=", ".join(made),
+        )
     )
 
 
-def _design_html(dataset: xarray.Dataset, place: int, folder: Path) -> str:
-    """The section of a design of the front; without a picture if a file of its campaign is gone."""
-    file, campaign = escape(str(dataset[f.FILE].values[place])), campaign_at(dataset, place, folder)
-    picture = ""
-    if campaign is not None:
-        picture = f"<img alt='plate and map of {file}' src='{data_url(_design_figure(dataset, place, campaign))}'>"
-    return (
-        f"<section class='design' id='{file}'><h2>{file}</h2>"
-        f"<p>{escape(', '.join(numbers_of(dataset, OF_FRONT, place)))}</p>"
-        f"<p>{escape(design_text(dataset, int(dataset[f.NUMBER][place])))}</p>{picture}"
-        f"<pre>{escape(str(dataset[f.CAMPAIGN].values[place]))}</pre></section>"
-    )
+def _design(dataset: xarray.Dataset, place: int, folder: Path) -> dict[str, str]:
+    """Return what is shown of a design of the front; no picture if a file of its campaign is gone."""
+    campaign = campaign_at(dataset, place, folder)
+    return {
+        "file": str(dataset[f.FILE].values[place]),
+        "numbers": ", ".join(numbers_of(dataset, OF_FRONT, place)),
+        "text": design_text(dataset, int(dataset[f.NUMBER][place])),
+        "picture": "" if campaign is None else data_url(_design_figure(dataset, place, campaign)),
+        "campaign": str(dataset[f.CAMPAIGN].values[place]),
+    }
 
 
 @in_style

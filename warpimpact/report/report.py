@@ -94,6 +94,7 @@ def report_page(
     comparison = compared(datasets) if len(datasets) > 1 else None
     for result, few, drawing in zip(results, shown, cell_drawings(datasets), strict=True):
         result |= {"shown": few.sizes["hit"], "plate": drawing}
+    verdicts = [] if comparison is None else comparison["verdict"]
     plotly = re.sub(r"https?://(?!www\.w3\.org/)", "", get_plotlyjs())  # addresses of maps and of where charts go
     page = templates("report").get_template("page.html")
     return page.render(
@@ -105,7 +106,7 @@ def report_page(
         made=f"{datetime.now(UTC):%Y-%m-%d %H:%M} UTC",
         version=warpimpact.__version__,
         comparison=comparison,
-        conclusion=conclusion(results, comparison),
+        conclusion=[*verdicts, *(f"{result['name']}: {result['verdict']}" for result in results)],
     )
 
 
@@ -129,6 +130,8 @@ def _first(keys: Sequence[str]) -> str:
     return next((key for key in wanted if key in keys), keys[0])
 
 
+_CHANCE = "Intervals describe the hits that were drawn."
+_RIGID = "The core stays one rigid body, which overstates what comes through where cores break or erode."
 _PLATE_WIDTH = 240.0
 """Width of the widest cell on the page [px]."""
 _PROVENANCE = (
@@ -165,7 +168,7 @@ def result_content(name: str, dataset: xarray.Dataset) -> dict[str, Any]:
         "hits": hits,
         "verdict": f"{in_short(dataset)}." if is_limit else verdict(dataset, measures),
         "is_limit": is_limit,
-        "asked": _asked(dataset),
+        "scene": _scene_text(dataset),
         "names": attributes.get(attr.CATALOGUE_NAMES, "").splitlines(),
         "tested": range_note({name: dataset}),
         "campaign": attributes.get(attr.CAMPAIGN, ""),
@@ -180,8 +183,10 @@ def result_content(name: str, dataset: xarray.Dataset) -> dict[str, Any]:
 
 
 def compared(datasets: Mapping[str, xarray.Dataset], *, picture: bool = True) -> dict[str, Any]:
-    """The comparison of plates as HTML, the deciding measure apart from all others, and a picture if one is wanted.
-    Without a comparison, a sentence gives the reason."""
+    """Return the comparison of plates as HTML, its deciding measure alone, and a picture if one is wanted.
+
+    Without a comparison, a sentence gives the reason.
+    """
     try:
         comparison = compare(list(datasets.values()), list(datasets))
     except ResultError as error:
@@ -194,14 +199,7 @@ def compared(datasets: Mapping[str, xarray.Dataset], *, picture: bool = True) ->
     }
 
 
-def conclusion(results: Sequence[Mapping[str, Any]], comparison: Mapping[str, Any] | None) -> list[str]:
-    """The conclusion, a sentence each: which plate is best by the deciding measure, and what passes through every
-    plate."""
-    verdict = [] if comparison is None else comparison["verdict"]
-    return [*verdict, *(f"{result['name']}: {result['verdict']}" for result in results)]
-
-
-def _asked(dataset: xarray.Dataset) -> str:
+def _scene_text(dataset: xarray.Dataset) -> str:
     """Hits, cell, impact and plate in one or two sentences."""
     y, z = (f"{length * MM:.4g}" for length in dataset.attrs[attr.PLATE_PERIOD])
     velocity, obliquity = (range_text(dataset[name]) for name in (v.IMPACT_VELOCITY, v.OBLIQUITY))
@@ -215,11 +213,8 @@ def _asked(dataset: xarray.Dataset) -> str:
 
 
 def _caveats(dataset: xarray.Dataset) -> list[str]:
-    """Reservations about the numbers of a result, a sentence each, beside every table of them."""
-    numerics = numerics_sentence(dataset)
-    chance = "Intervals describe the hits that were drawn."
-    model = "The core stays one rigid body, which overstates what comes through where cores break or erode."
-    notes = (numerics, chance, sampling_note(dataset), numerics_note(dataset), model)
+    """Return the reservations about the numbers of a result, a sentence each."""
+    notes = (numerics_sentence(dataset), _CHANCE, sampling_note(dataset), numerics_note(dataset), _RIGID)
     return [sentence for sentence in notes if sentence]
 
 

@@ -26,6 +26,6 @@ def test_a_firing_test_is_inspected_and_reported(capsys: pytest.CaptureFixture[s
     assert main(["report", "a.nc"]) == 0
     page = Path("a.html").read_text(encoding="utf-8")
     assert html_of(dict(list(view.items())[1:]), "h2") in page
-    assert "<meta name='viewport' content='width=device-width" in page  # a phone shows it at the width of its screen
+    assert '<meta name="viewport" content="width=device-width' in page  # a phone shows it at the width of its screen
     assert page.count("<img") == 1
     assert html.escape(V50_TEST.read_text(encoding="utf-8").splitlines()[0]) in page

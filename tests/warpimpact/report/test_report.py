@@ -92,7 +92,7 @@ def test_page_compares_the_plates(folder: Path, make_result: ResultMaker, tmp_pa
     with files.opened(folder / "narrow.nc") as narrow, files.opened(folder / "<b>wide.nc") as wide:
         stored = dict(zip(names, [narrow, wide], strict=True))
         comparison = compare(list(stored.values()), names)
-    short = text[: text.index('id="asked"', text.index("<main>"))]
+    short = text[: text.index('id="scene"', text.index("<main>"))]
     assert "narrow: 400 of 400 cores pass. residual energy fraction, mean " in short
     for sentence in verdict_of(comparison):
         assert f"<li>{sentence}</li>" in short
@@ -208,8 +208,8 @@ def test_browser_shows_a_hit_on_hover_and_its_trajectory_on_click(browser: Any, 
     assert velocity == pytest.approx(float(dataset["residual_velocity"][hit]), abs=0.06)
 
     point_at(browser, *place * 1e3, click=True)
-    browser.wait(lambda: browser.text("#told-0").startswith("hit ") and "nearest" in browser.text("#note-0"))
-    picked = int(re.match(r"hit (\d+): perforated", browser.text("#told-0"))[1])
+    browser.wait(lambda: browser.text("#hit-text-0").startswith("hit ") and "nearest" in browser.text("#note-0"))
+    picked = int(re.match(r"hit (\d+): perforated", browser.text("#hit-text-0"))[1])
     assert picked in near
     trajectories = [int(hit) for hit in data_of(folder / "a.html")["results"][0]["trajectories"]]
     away = points[trajectories] - points[picked]

@@ -16,7 +16,7 @@ function hitMaps(data) {
   const statusOf = (code) => data.statuses.find((status) => status.code === code);
   const split = (label) => label.match(/^(.*) \[(.*)\]$/).slice(1);
 
-  function told(result, hit, keys) {
+  function hitLines(result, hit, keys) {
     const lines = data.variables.filter(({ key }) => keys.includes(key)).map(({ key, label }) => {
       const [name, unit] = split(label);
       return `${name}: ${number(result.columns[key][hit])}${unit === "°" ? "" : " "}${unit}`;
@@ -28,7 +28,7 @@ function hitMaps(data) {
   // The label at the pointer for every hit, short enough for a phone.
   function hovers(result, variable) {
     const keys = data.variables.map(({ key }) => key).filter((key) => key === variable || data.main.includes(key));
-    return result.number.map((_, hit) => told(result, hit, keys).join("<br>"));
+    return result.number.map((_, hit) => hitLines(result, hit, keys).join("<br>"));
   }
 
   function valuesOf(result, variable) {
@@ -191,9 +191,9 @@ function hitMaps(data) {
     if (variable === STATUS) return "";
     const without = result.status.filter((_, hit) => result.columns[variable][hit] === null);
     const counts = data.statuses.map(({ code, label }) => [without.filter((one) => one === code).length, label]);
-    const told = counts.filter(([count]) => count).map(([count, label]) => `${label} ${count}`);
-    return told.length ? `no value: ${told.join(", ")} of ${result.status.length} hits` : "";
+    const parts = counts.filter(([count]) => count).map(([count, label]) => `${label} ${count}`);
+    return parts.length ? `no value: ${parts.join(", ")} of ${result.status.length} hits` : "";
   }
 
-  return { distance, drawMap, drawTrajectory, hitOf, missing, number, told };
+  return { distance, drawMap, drawTrajectory, hitOf, missing, number, hitLines };
 }

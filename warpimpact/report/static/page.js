@@ -13,13 +13,13 @@
   const library = document.createElement("script");
   library.textContent = await unpacked("plotly");
   document.head.append(library);
-  const { distance, drawMap, drawTrajectory, hitOf, number, told } = hitMaps(data);
+  const { distance, drawMap, drawTrajectory, hitOf, number, hitLines } = hitMaps(data);
   const element = (name, result) => document.getElementById(`${name}-${result.index}`);
   const draw = (result) => drawMap(element("map", result), result, picker.value, result);
 
   function choose(result, hit) {
     result.chosen = hit;
-    element("told", result).textContent = told(
+    element("hit-text", result).textContent = hitLines(
       result, hit, data.variables.map(({ key }) => key),
     ).join("\n");
     const note = element("note", result);
