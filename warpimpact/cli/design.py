@@ -41,7 +41,7 @@ def design_command(arguments: argparse.Namespace) -> None:
 
     try:
         with opened:
-            serve(DesignStore(designs), port=arguments.port, device=arguments.device, ready=ready, entered=opened.close)
+            serve(DesignStore(designs), port=arguments.port, device=arguments.device, ready=ready)
     except OSError as error:
         raise CampaignError(f"--port: got {arguments.port}, but it cannot be used ({error.strerror})") from None
     except KeyboardInterrupt:

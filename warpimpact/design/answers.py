@@ -17,7 +17,7 @@ from warpimpact.analysis.numbers import text_of
 from warpimpact.campaign.plausible import doubted, doubted_holes
 from warpimpact.campaign.resistances import catalogue_names
 from warpimpact.campaign.tested_range import outside_tested_range, range_line
-from warpimpact.campaign.text import CampaignError, parsed
+from warpimpact.campaign.text import parsed
 from warpimpact.design.controls import drawn, groups
 from warpimpact.design.designs import ROOT, DesignStore, Tables, ValidDesign, changed, choices, stages, work
 from warpimpact.plotting.style import data_url
@@ -30,8 +30,8 @@ from warpimpact.runs.replay import replay
 from warpimpact.runs.run import run
 from warpimpact.solver.worker import Cancel
 
-_MOST_KEPT = 256 * 2**20
-"""Most bytes of results that are kept, so that a return to a design computes nothing."""
+_MOST_KEPT = 24
+"""Most results that are kept, so that a return to a design computes nothing."""
 _FIGURES = {draw.__name__.replace("_", " "): draw for draw in FIGURES}
 _COARSE = 96
 """Pixels along the longer side of a first map, which has few hits."""
@@ -43,18 +43,11 @@ THIS_DESIGN = "this design"
 """Name of the design on the page. The designs to compare with have names of their own."""
 
 
-class Pin(BaseModel):
-    """A design to compare with."""
-
-    name: Annotated[str, Field(max_length=80)]
-    design: Tables
-
-
 class Query(BaseModel):
     """What the page sends; each kind of query has some of these."""
 
     design: Tables = {}
-    pins: Annotated[list[Pin], Field(max_length=5)] = []
+    pins: Annotated[dict[Annotated[str, Field(max_length=80)], Tables], Field(max_length=5)] = {}
     level: Annotated[int, Field(strict=True, ge=0, le=9)] = 0
     stage: str = "full"
     hit: Annotated[int, Field(strict=True, ge=0)] = 0
@@ -109,7 +102,7 @@ class Answers:
             self._results[text] = run(
                 campaign, references=True, device=self._device, progress=lambda _: None, cancel=cancel
             )
-            while len(self._results) > 1 and sum(result.nbytes for result in self._results.values()) > _MOST_KEPT:
+            if len(self._results) > _MOST_KEPT:
                 self._results.popitem(last=False)
         self._results.move_to_end(text)
         return self._results[text]
@@ -166,11 +159,8 @@ class Answers:
 
     def designs(self, query: Query) -> dict[str, ValidDesign]:
         """The design of a query, and the designs to compare with, by name."""
-        designs = {THIS_DESIGN: self.store.checked(query.design)}
-        designs |= {pin.name: self.store.checked(pin.design) for pin in query.pins}
-        if len(designs) <= len(query.pins):
-            raise CampaignError("got two designs of one name to compare; give each its own")
-        return designs
+        every = {THIS_DESIGN: query.design} | query.pins
+        return {name: self.store.checked(tables) for name, tables in every.items()}
 
     def change(self, query: Query, cancel: Cancel) -> Tables:
         """The tables of a design after a change."""

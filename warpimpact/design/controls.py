@@ -8,11 +8,12 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from pydantic import BaseModel
 
 from warpimpact.analysis.effectiveness import plate_numbers
 from warpimpact.analysis.replay_geometry import runs_of
 from warpimpact.campaign.campaign import Campaign
-from warpimpact.design.designs import Tables, ValidDesign
+from warpimpact.design.designs import ValidDesign
 from warpimpact.plotting.cell import words
 from warpimpact.plotting.plate import Dimension, drawn_extent, hole_dimensions, smallest_ligament
 from warpimpact.plotting.style import fire_of
@@ -57,50 +58,43 @@ _AXES = ("along y", "along z")
 
 def groups(design: ValidDesign) -> list[dict[str, Any]]:
     """The controls of a design, by the parts that they change."""
-    campaign, tables = design.campaign, design.tables
-    threat = campaign.core.threat
-    shot = [_choice("threat", ["core", "threat"], threat), *([] if threat else _of_core(campaign, tables))]
-    shot += [_slider(campaign, tables, ["impact", name], "impact") for name in _SHOT]
+    core, threat = design.campaign.core, design.campaign.core.threat
+    shot = [_choice("threat", ["core", "threat"], threat)]
+    if not threat:
+        keys = (name for name in type(core).model_fields if ("core", name) in _RANGES)
+        shot += [_slider(design, ["core", name]) for name in keys if getattr(core, name) is not None]
+    shot += [_slider(design, ["impact", name]) for name in _SHOT]
     groups: list[dict[str, Any]] = [{"name": "Shot", "controls": shot}]
-    for number, layer in enumerate(campaign.target.layers):
+    for number, layer in enumerate(design.campaign.target.layers):
         table: Place = ["layer", number - 1] if number else ["plate"]
         name = f"Layer {number}" if number else "Plate"
-        groups.append({"name": name, "layer": number, "controls": list(_of_plate(campaign, tables, table, layer))})
+        groups.append({"name": name, "layer": number, "controls": list(_of_plate(design, table, layer))})
     return groups
 
 
-def _of_core(campaign: Campaign, tables: Tables) -> Iterator[dict[str, Any]]:
-    for name in type(campaign.core).model_fields:
-        if ("core", name) in _RANGES and getattr(campaign.core, name) is not None:
-            yield _slider(campaign, tables, ["core", name], "core")
-
-
-def _of_plate(campaign: Campaign, tables: Tables, table: Place, plate: Plate) -> Iterator[dict[str, Any]]:
-    weighed = "areal_density" in (_value(tables, table) or {})
+def _of_plate(design: ValidDesign, table: Place, plate: Plate) -> Iterator[dict[str, Any]]:
+    weighed = "areal_density" in (_value(design.tables, table) or {})
     if table[0] == "layer":
-        yield _slider(campaign, tables, [*table, "gap"], "plate")
-    yield _slider(campaign, tables, [*table, "areal_density" if weighed else "thickness"], "plate")
+        yield _slider(design, [*table, "gap"])
+    yield _slider(design, [*table, "areal_density" if weighed else "thickness"])
     yield _choice("material", [*table, "material"], plate.material)
     if plate.material is None:
-        yield _slider(campaign, tables, [*table, "resistance"], "plate")
+        yield _slider(design, [*table, "resistance"])
     pattern, place = plate.pattern, [*table, "pattern"]
-    shape = "none" if isinstance(pattern, NoPattern) else str(getattr(pattern, "shape", "none"))
-    yield _choice("shape", place, shape)
+    yield _choice("shape", place, getattr(pattern, "shape", "none"))
     for name, field in type(pattern).model_fields.items():
         reader = reader_in(typed(field))
         if reader is not None and reader.unit in ("m", "rad"):
-            yield _slider(campaign, tables, [*place, name], "pattern")
+            yield _slider(design, [*place, name])
     if hasattr(pattern, "spacing"):
-        if isinstance(_value(tables, [*place, "spacing"]), list):
+        spacing = [*place, "spacing"]
+        if isinstance(_value(design.tables, spacing), list):
             for axis, label in enumerate(_AXES):
-                slider = _slider(campaign, tables, [*place, "spacing", axis], "pattern", "spacing")
-                yield slider | {"label": f"spacing {label}"}
+                yield _slider(design, [*spacing, axis]) | {"label": f"spacing {label}"}
         else:
-            pitch = pattern.spacing[1] * _UNITS["m"][1]
-            yield _slider(campaign, tables, [*place, "spacing"], "pattern", "spacing", pitch) | {"label": "pitch"}
+            yield _slider(design, spacing, pattern.spacing[1]) | {"label": "pitch"}
     if hasattr(pattern, "staggered"):
-        meaning = pattern.meanings().get("staggered", "")
-        path = [*place, "staggered"]
+        meaning, path = pattern.meanings().get("staggered", ""), [*place, "staggered"]
         yield {"kind": "switch", "path": path, "label": "staggered", "value": pattern.staggered, "meaning": meaning}
 
 
@@ -108,36 +102,27 @@ def _choice(what: str, path: Place, value: str | None) -> dict[str, Any]:
     return {"kind": "choice", "what": what, "path": path, "label": what, "value": value or ""}
 
 
-def _slider(
-    campaign: Campaign, tables: Tables, path: Place, table: str, key: str | None = None, value: float | None = None
-) -> dict[str, Any]:
-    """A slider for the value at a place.
-
-    Args:
-        table: table of its range.
-        key: key of its declaration, if it is not the last key of the place.
-        value: value in the unit of the slider, if the campaign does not have it at this place.
-    """
-    name = key or str(path[-1])
-    owner: Model = _value(campaign, path[:-1] if key is None else path[: path.index(key)])
+def _slider(design: ValidDesign, path: Place, value: float | None = None) -> dict[str, Any]:
+    """A slider for the value at a place; `value` is in SI, by default that of the campaign."""
+    *tables, name = (part for part in path if isinstance(part, str))
+    table = "plate" if tables == ["layer"] else tables[-1]
+    owner: Model = _value(design.campaign, path[: path.index(name)])
     field = type(owner).model_fields.get(name)
     reader = None if field is None else reader_in(typed(field))
     si = "m" if name == "spacing" else "kg/m^2" if name == "areal_density" else reader.unit if reader else ""
     unit, size = _UNITS.get(si, (si, 1.0))
-    if value is None:
-        held = _value(campaign, path)
-        value = 0.0 if held is None else float(held) * size
+    shown = float(f"{size * (_value(design.campaign, path) or 0.0 if value is None else value):.6g}")
     low, high, step = _RANGES.get((table, name), _HOLE)
     return {
         "kind": "slider",
         "path": path,
         "label": words(name),
         "unit": unit,
-        "value": float(f"{value:.6g}"),
+        "value": shown,
         "low": low,
-        "high": max(high, value),
+        "high": max(high, shown),
         "step": step,
-        "scatters": isinstance(_value(tables, path), dict),
+        "scatters": isinstance(_value(design.tables, path), dict),
         "meaning": owner.meanings().get(name, ""),
     }
 
@@ -145,12 +130,10 @@ def _slider(
 def _value(holder: Any, path: Place) -> Any:
     """The value at a place in models or in tables; None if there is none."""
     for part in path:
-        if isinstance(holder, dict):
-            holder = holder.get(part)
-        elif isinstance(holder, list | tuple):
-            holder = holder[part] if isinstance(part, int) and part < len(holder) else None
-        else:
-            holder = getattr(holder, str(part), None)
+        try:
+            holder = getattr(holder, part) if isinstance(part, str) and isinstance(holder, BaseModel) else holder[part]
+        except (AttributeError, KeyError, IndexError, TypeError):
+            return None
     return holder
 
 

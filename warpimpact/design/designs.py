@@ -123,24 +123,14 @@ def read_designs(paths: list[Path]) -> dict[str, Tables]:
 def _texts(path: Path) -> Iterator[tuple[str, str]]:
     """Name and text of every design in a file: campaigns of plates, of a front, or of a hit map."""
     if path.suffix == ".nc" and kind_of(path) is FRONT:
-        front_file = files.read(path, FRONT)
-        for name, text in zip(front_file[front.FILE].values, front_file[front.CAMPAIGN].values, strict=True):
+        dataset = files.read(path, FRONT)
+        for name, text in zip(dataset[front.FILE].values, dataset[front.CAMPAIGN].values, strict=True):
             yield Path(str(name)).stem, str(text)
-        return
-    if path.suffix == ".nc":
-        with opened(path) as dataset:
-            yield path.stem, str(dataset.attrs.get(attr.CAMPAIGN, ""))
-        return
-    text = read_text(path)
-    tables = parsed(text, str(path))
-    if "variables" in tables:
-        raise CampaignError(
-            f"{path}: variables: this takes one design; warpimpact optimise {path} searches the best ones into a "
-            "file, which this takes"
-        )
-    if isinstance(tables.get("plate"), list):
-        for name, campaign in read_plates(path).items():
-            yield name, campaign.text
+    elif path.suffix == ".nc":
+        with opened(path) as result:
+            yield path.stem, str(result.attrs.get(attr.CAMPAIGN, ""))
+    elif isinstance(parsed(text := read_text(path), str(path), "a campaign").get("plate"), list):
+        yield from ((name, campaign.text) for name, campaign in read_plates(path).items())
     else:
         yield path.stem, text
 

@@ -113,22 +113,15 @@ async def _in_thread(work: Callable[[Cancel], Result], cancel: Cancel) -> Result
         thread.exception()  # asyncio reports one that nobody takes
 
 
-def application(
-    store: DesignStore, *, token: str, device: str = "auto", entered: Callable[[], object] = lambda: None
-) -> Starlette:
+def application(store: DesignStore, *, token: str, device: str = "auto") -> Starlette:
     """The page and its queries as an ASGI application.
 
     Another page in the same browser can send requests to this machine, and a name server can give this machine another
-    name. Neither knows the token, and neither has this host or this origin.
-
-    Args:
-        token: first part of every path.
-        entered: called whenever a browser gets the page.
+    name. Neither knows the token, which begins every path, and neither has this host or this origin.
     """
     answers, jobs = Answers(store, device), JobQueue()
 
     async def page(request: Request) -> Response:
-        entered()
         return HTMLResponse(answers.page(version=warpimpact.__version__))
 
     async def start(request: Request) -> Response:
@@ -231,26 +224,18 @@ def server_of(app: Starlette) -> uvicorn.Server:
     )
 
 
-def serve(
-    store: DesignStore,
-    *,
-    port: int = 0,
-    device: str = "auto",
-    ready: Callable[[str], object],
-    entered: Callable[[], object] = lambda: None,
-) -> None:
+def serve(store: DesignStore, *, port: int = 0, device: str = "auto", ready: Callable[[str], object]) -> None:
     """Serve the page until a signal ends it.
 
     Args:
         ready: called with the address of the page.
-        entered: called whenever a browser gets the page.
 
     Raises:
         OSError: the port is taken.
     """
     with socket.create_server(("127.0.0.1", port)) as listening:
         token, port = secrets.token_urlsafe(18), listening.getsockname()[1]
-        server = server_of(application(store, token=token, device=device, entered=entered))
+        server = server_of(application(store, token=token, device=device))
         ready(f"http://127.0.0.1:{port}/{token}/")
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", Implausible)  # the page shows these

@@ -42,13 +42,13 @@ def test_names_are_carried_along(
     Path("own.toml").write_text(OWN, encoding="utf-8")
     Path("named.toml").write_text(CAMPAIGN, encoding="utf-8")
     assert main(["run", "named.toml", "--device", "cpu"]) == 0
-    told = capsys.readouterr().out.splitlines()
-    assert f"{LINES[0]} Details: warpimpact inspect named.nc" in told
-    assert LINES[1] not in told
-    assert LINES[3] not in told
+    lines = capsys.readouterr().out.splitlines()
+    assert f"{LINES[0]} Details: warpimpact inspect named.nc" in lines
+    assert LINES[1] not in lines
+    assert LINES[3] not in lines
     assert main(["inspect", "named.nc"]) == 0
-    told = capsys.readouterr().out.splitlines()
-    assert [line for line in LINES if line not in told] == []
+    lines = capsys.readouterr().out.splitlines()
+    assert [line for line in LINES if line not in lines] == []
     assert main(["run", "named.toml", "--count", "8", "-o", "other.nc", "--device", "cpu"]) == 0
     capsys.readouterr()
     assert main(["compare", "named.nc", "other.nc"]) == 0

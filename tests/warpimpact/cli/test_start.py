@@ -1,4 +1,4 @@
-"""The commands that help to start: new and schema; and what -v and -q tell."""
+"""The commands that help to start: new and schema; and what -v and -q show."""
 
 import json
 from collections.abc import Callable
@@ -55,7 +55,7 @@ def test_another_new_file_can_be_read(name: str, kind: str, is_read: Callable[[s
     assert [path.name for path in Path().glob("*.json")] == [f"warpimpact.{kind}.schema.json"]
 
 
-def test_new_overwrites_nothing_unasked(capsys: pytest.CaptureFixture[str]) -> None:
+def test_new_overwrites_nothing(capsys: pytest.CaptureFixture[str]) -> None:
     Path("slotted_plate.toml").write_text("mine")
     assert main(["new", "slotted_plate"]) == 2
     assert "exists already" in capsys.readouterr().err
@@ -84,15 +84,15 @@ def test_a_new_file_names_itself_in_its_commands(capsys: pytest.CaptureFixture[s
 
 
 @pytest.mark.parametrize(
-    ("option", "told", "untold"),
+    ("option", "shown", "hidden"),
     [
         ([], "64 of 64 hits", "warpimpact.solver"),
         (["-q"], "", "of 64 hits"),
         (["-v"], "warpimpact.solver.accuracy: pilot: level 2 errs by", "warpimpact.solver.device"),
     ],
 )
-def test_more_or_less_is_told(option: list[str], told: str, untold: str, capsys: pytest.CaptureFixture[str]) -> None:
+def test_more_or_less_is_shown(option: list[str], shown: str, hidden: str, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["run", str(CAMPAIGNS / "slotted_plate.toml"), "--count", "64", "--device", "cpu", *option]) == 0
-    shown = capsys.readouterr().err
-    assert told in shown
-    assert untold not in shown
+    lines = capsys.readouterr().err
+    assert shown in lines
+    assert hidden not in lines

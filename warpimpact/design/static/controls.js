@@ -1,14 +1,14 @@
 "use strict";
+// An element with some properties and what is in it.
+function make(name, properties, ...inner) {
+  const element = Object.assign(document.createElement(name), properties);
+  element.append(...inner);
+  return element;
+}
 // Sliders, numbers and choices. `set(path, value)` changes a value of the design, `change(what, layer, value)` more.
 function controlsOf(place, { set, change }) {
   let shape = "";
   const update = new Map();
-  const make = (name, attributes = {}, ...inner) => {
-    const element = document.createElement(name);
-    Object.assign(element, attributes);
-    element.append(...inner);
-    return element;
-  };
   const decimals = (step) => Math.max(0, -Math.floor(Math.log10(step) + 1e-9));
   const written = (value, { unit }) => (unit ? `${value} ${unit}` : value);
 

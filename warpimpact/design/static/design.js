@@ -21,6 +21,7 @@
     if (value.kind === "refused") throw new Error(value.sentence);
     return value;
   }
+  const byName = (pins) => Object.fromEntries(pins.map(({ name, design }) => [name, design]));
   const lost = (error) => (error instanceof TypeError ? "warpimpact design does not answer any more; is it still running?" : error.message);
 
   function refuse(sentence) {
@@ -145,7 +146,7 @@
       at("status").textContent = "Computing… The first map of a new kind of target takes up to a minute, once: its kernels are built.";
     }, SLOW);
     try {
-      const response = await post("compute", { design: state.design, pins, level }, own.abort.signal);
+      const response = await post("compute", { design: state.design, pins: byName(pins), level }, own.abort.signal);
       if (!response.ok) throw new Error(await response.text());
       for await (const line of linesOf(response.body)) {
         if (running !== own) return;
@@ -217,19 +218,10 @@
     const rows = Object.entries({ thickness: plate.thickness, ...plate.numbers });
     const cells = rows.flatMap(([name, value]) => [["dt", name, ""], ["dd", value, ""]]);
     for (const note of notes) cells.push(["dt", "note", "warns"], ["dd", note, ""]);
-    at("numbers").replaceChildren(...cells.map(([tag, words, kind]) => {
-      const element = document.createElement(tag);
-      element.textContent = words;
-      element.className = kind;
-      return element;
-    }));
+    at("numbers").replaceChildren(...cells.map(([tag, words, className]) => make(tag, { className }, words)));
     const [summary, ...details] = tested;
     at("tested").firstElementChild.textContent = summary;
-    at("tested").lastElementChild.replaceChildren(...details.map((words) => {
-      const element = document.createElement("li");
-      element.textContent = words;
-      return element;
-    }));
+    at("tested").lastElementChild.replaceChildren(...details.map((words) => make("li", {}, words)));
   }
 
   // On a narrow page a table is a list, whose entries have the heads of their columns.
@@ -246,11 +238,10 @@
     const same = shown && shown.stage === line.stage && JSON.stringify(shown.design) === JSON.stringify(line.design);
     shown = line;
     if (!same) chosen = null;
-    const status = document.createElement("strong"), soon = line.ahead >= 1 ? `: complete in about ${about(line.ahead)}` : "";
+    const soon = line.ahead >= 1 ? `: complete in about ${about(line.ahead)}` : "";
     const more = line.stage === "full" ? "" : ` The map gets finer while nothing moves${soon}.`;
-    status.textContent = NAMES[line.stage];
     const of = line.stage !== "full" && line.total > line.hits ? `${line.hits} of ${line.total}` : line.hits;
-    at("status").replaceChildren(status, `: ${of} hits. ${line.numerics}${more}`);
+    at("status").replaceChildren(make("strong", {}, NAMES[line.stage]), `: ${of} hits. ${line.numerics}${more}`);
     at("status").classList.toggle("warns", !line.kept);
     fillVariables(line.data);
     at("hit-number").max = line.hits - 1;
@@ -295,25 +286,11 @@
     }));
   }
   function mapPlace(k) {
-    const place = document.createElement("div"), name = document.createElement("h3"), map = document.createElement("div");
-    name.id = `name-${k}`;
-    name.className = "pinned";
-    name.append(document.createElement("span"));
-    if (k) {
-      const remove = document.createElement("button");
-      remove.textContent = "Unpin";
-      remove.addEventListener("click", () => { state.pins.splice(k - 1, 1); settle(); touched(); });
-      name.append(remove);
-    }
-    map.id = `map-${k}`;
-    map.className = "map";
-    const grey = document.createElement("p"), swatch = document.createElement("span");
-    swatch.className = "swatch";
-    grey.id = `grey-${k}`;
-    grey.className = "soft";
-    grey.append(swatch, "");
-    place.append(name, map, grey);
-    return place;
+    const unpin = () => { state.pins.splice(k - 1, 1); settle(); touched(); };
+    const name = make("h3", { id: `name-${k}`, className: "pinned" }, make("span"));
+    if (k) name.append(make("button", { onclick: unpin }, "Unpin"));
+    const grey = make("p", { id: `grey-${k}`, className: "soft" }, make("span", { className: "swatch" }), "");
+    return make("div", {}, name, make("div", { id: `map-${k}`, className: "map" }), grey);
   }
 
   // A hit -----------------------------------------------------------------------------------------------------------
@@ -333,12 +310,7 @@
       followed = views;
       await hitMaps(own.data).drawTrajectory([at("passage"), at("flight")], views);
       at("figure").hidden = true;
-      at("figures").replaceChildren(...figures.map((name) => {
-        const button = document.createElement("button");
-        button.textContent = name;
-        button.addEventListener("click", () => showFigure(about, name));
-        return button;
-      }));
+      at("figures").replaceChildren(...figures.map((name) => make("button", { onclick: () => showFigure(about, name) }, name)));
     } catch (error) {
       at("note").textContent = lost(error);
     }
@@ -376,7 +348,7 @@
     at("report").disabled = true;
     at("report").textContent = "Writing…";
     try {
-      const { html } = await query("report", { design: state.design, pins: state.pins });
+      const { html } = await query("report", { design: state.design, pins: byName(state.pins) });
       download(html, `${fileName()}.html`, "text/html");
     } catch (error) {
       refuse(lost(error));
