@@ -47,7 +47,7 @@ from warpimpact.results import variables as v
 from warpimpact.results.files import ResultError
 from warpimpact.results.measures import Measure, dealing
 from warpimpact.results.vocabulary import base_thickness, has_base
-from warpimpact.runs.parts import first_difference
+from warpimpact.runs.chunks import first_difference
 from warpimpact.scene.quantities import QUANTITIES
 from warpimpact.scene.units import quantity as reader_of
 from warpimpact.statistics.comparisons import (

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from warpimpact.results.files import OutputError, ResultError, aside
-from warpimpact.runs.parts import is_begun
+from warpimpact.runs.chunks import is_begun
 
 PICTURES = (".png", ".pdf", ".svg")
 """Formats of figures."""

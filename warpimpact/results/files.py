@@ -171,9 +171,7 @@ def open_result(path: str | Path, group: str | None = None) -> xarray.Dataset:
         ResultError: the file is missing, is not netCDF, or is not a warpimpact result.
     """
     dataset = _open(Path(path), HIT_MAP, group=group)
-    result = dataset.set_xindex(v.HIT)
-    result.set_close(dataset.close)
-    return result
+    return _closing(dataset, dataset.set_xindex(v.HIT))
 
 
 @contextmanager
@@ -204,6 +202,9 @@ def _open(path: Path, *kinds: Kind, group: str | None = None) -> xarray.Dataset:
         for name in names:
             with _part(path, name) as inner:  # a file that stays open until Python collects it crashes netCDF
                 references[name] = inner.load()
+    if kind is HIT_MAP and attr.PLATE_PERIOD in dataset.variables:  # a point of a sweep of periods
+        period = dataset[attr.PLATE_PERIOD].values
+        dataset = _closing(dataset, dataset.drop_vars(attr.PLATE_PERIOD).assign_attrs({attr.PLATE_PERIOD: period}))
     there = {*dataset.variables, *dataset.attrs}
     if missing := [name for name in kind.needed if name not in there]:
         dataset.close()
@@ -211,9 +212,13 @@ def _open(path: Path, *kinds: Kind, group: str | None = None) -> xarray.Dataset:
     if kind is HIT_MAP and not dataset.sizes.get(v.HIT):
         dataset.close()
         raise ResultError(f'{path}: has no hits along "hit"; choose hits as a list, as in isel(hit=[5])')
-    result = with_references(dataset, references)
-    result.set_close(dataset.close)
-    return result
+    return _closing(dataset, with_references(dataset, references))
+
+
+def _closing(opened: xarray.Dataset, dataset: xarray.Dataset) -> xarray.Dataset:
+    """A Dataset that closes the file of an opened one."""
+    dataset.set_close(opened.close)
+    return dataset
 
 
 def is_history(dataset: xarray.Dataset) -> bool:
@@ -294,5 +299,4 @@ def _part(path: Path, group: str | None = None) -> xarray.Dataset:
     for name in root.dims:
         if name != v.HIT and name in root.coords:
             dataset = dataset.set_xindex(str(name))
-    dataset.set_close(root.close)
-    return dataset
+    return _closing(root, dataset)

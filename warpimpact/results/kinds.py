@@ -42,7 +42,7 @@ SWEEP = Kind(
     "warpimpact sweep",
     "warpimpact inspect and report take it; its points, in the folder beside it, are results, as is what isel(INPUT=0) "
     "chooses of it",
-    (*_OF_HITS, attr.SWEEP),
+    (*_OF_HITS[:-1], attr.SWEEP),
 )
 HISTORY = Kind(
     "the history of a hit",

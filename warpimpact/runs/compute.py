@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import json
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import replace
 from typing import Any
 
@@ -14,6 +15,7 @@ from numpy.typing import NDArray
 
 from warpimpact.campaign.campaign import Campaign
 from warpimpact.campaign.resistances import resistance_by_thickness
+from warpimpact.campaign.text import CampaignError
 from warpimpact.records.outcomes import Outcomes
 from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
@@ -25,6 +27,7 @@ from warpimpact.solver.device import find_device
 from warpimpact.solver.limit import LimitSpec, limits, pilot_of_limits, short_steps, thickest
 from warpimpact.solver.memory import Memory
 from warpimpact.solver.prepare import prepare
+from warpimpact.solver.resolution import TooManySteps
 from warpimpact.solver.simulate import marched, pilot_of, spread_places
 from warpimpact.solver.worker import Worker
 
@@ -51,6 +54,17 @@ def manifest(campaign: Campaign, made_by: dict[str, str], limit: LimitSpec | Non
     return {"campaign": content, **sizes, **made_by, **searched}
 
 
+@contextmanager
+def model_errors() -> Iterator[None]:
+    """Raise as CampaignError what the model cannot compute."""
+    try:
+        yield
+    except TooManySteps:
+        raise
+    except ValueError as error:
+        raise error if isinstance(error, CampaignError) else CampaignError(str(error)) from None
+
+
 def compute_hits(
     campaign: Campaign,
     numerics: Numerics,
@@ -62,7 +76,8 @@ def compute_hits(
 ) -> xarray.Dataset:
     """How shots of a campaign end; `first` is the number of the first one. Reports how many are done."""
     begin = time.perf_counter()
-    memory = Memory(prepare(campaign.scene, shots, numerics), find_device(worker.device), worker.cancel)
+    with model_errors():
+        memory = Memory(prepare(campaign.scene, shots, numerics), find_device(worker.device), worker.cancel)
     building = memory.build()
     outcomes = marched(memory, worker, lambda done, total: report(done))
     elapsed = time.perf_counter() - begin - building
@@ -81,7 +96,8 @@ def compute_limits(
 ) -> xarray.Dataset:
     """The limits of shots of a campaign, with the shots as they just perforate."""
     begin = time.perf_counter()
-    searched = limits(campaign.scene, shots, limit, numerics, worker, lambda done, total: report(done))
+    with model_errors():
+        searched = limits(campaign.scene, shots, limit, numerics, worker, lambda done, total: report(done))
     elapsed = time.perf_counter() - begin
     tried = searched.shots.velocity
     if limit.quantity == "thickness":
@@ -130,12 +146,13 @@ def find_resolution(
     numerics = campaign.numerics
     if numerics.explicit is not None:
         return None
-    if limit is None:
-        shots, numbers = pilot_shots(campaign, pilot_size(numerics.asked))
-        pilot = pilot_of(campaign.scene, shots, numerics, worker, report)
-    else:
-        shots, numbers = pilot_shots(campaign, pilot_size(numerics.asked, PILOT_LIMITS))
-        pilot = pilot_of_limits(campaign.scene, shots, limit, numerics, worker, report)
+    with model_errors():
+        if limit is None:
+            shots, numbers = pilot_shots(campaign, pilot_size(numerics.asked))
+            pilot = pilot_of(campaign.scene, shots, numerics, worker, report)
+        else:
+            shots, numbers = pilot_shots(campaign, pilot_size(numerics.asked, PILOT_LIMITS))
+            pilot = pilot_of_limits(campaign.scene, shots, limit, numerics, worker, report)
     return replace(pilot, numbers=numbers)
 
 

@@ -11,11 +11,11 @@ import logging
 import time
 import warnings
 from collections.abc import Callable, Generator, Iterable, Iterator
-from concurrent.futures import FIRST_COMPLETED, CancelledError, Executor, Future, ThreadPoolExecutor, wait
+from concurrent.futures import FIRST_COMPLETED, CancelledError, Future, ThreadPoolExecutor, wait
 from contextlib import ExitStack, contextmanager, suppress
 from functools import partial
 from queue import SimpleQueue
-from typing import Any, TypeVar
+from typing import Any, NamedTuple, TypeVar
 
 import warp
 
@@ -29,17 +29,21 @@ WORKERLESS, WORKERLESS_LIMIT = 5.0, 120.0
 """Seconds without a worker after which a scheduler is reported, and given up."""
 
 Key = TypeVar("Key")
+Task = Callable[..., Any]
 Tick = Callable[[list[Any]], object]
+Warn = Callable[[str], object]
 
 
 class ClusterError(RuntimeError):
     """A cluster cannot be used; the message is for the user."""
 
 
-def made_by(device: str) -> dict[str, str]:
-    """Versions and kind of device: with the campaign, they determine the bits of a result."""
-    chosen = find_device(device)
-    return {**attr.versions(), attr.DEVICE: "cpu" if chosen.is_cpu else chosen.name}
+class _Pool(NamedTuple):
+    """Where tasks wait: how to submit one, how many may be there, and the last report of each running one."""
+
+    submit: Callable[..., Future[Any]]
+    width: Callable[[], int]
+    reports: Callable[[], list[Any]]
 
 
 class Computer:
@@ -57,7 +61,7 @@ class Computer:
 
     def map(
         self,
-        function: Callable[..., Any],
+        function: Task,
         tasks: Iterable[tuple[Key, tuple[Any, ...]]],
         tick: Tick = lambda reports: None,
         *,
@@ -73,12 +77,35 @@ class Computer:
             per_core: let each core of a CPU compute a task. By default one task has all cores.
         """
         workers = self._workers
-        if per_core and self.made_by[attr.DEVICE] == "cpu":
-            workers = [Worker("cpu", 1, workers[0].cancel)] * cores()
-        if len(workers) == 1:
+        if per_core and self.made_by.get(attr.DEVICE) == "cpu":
+            workers = [Worker("cpu", 1, workers[0].cancel if workers else NEVER)] * cores()
+        if len(workers) == 1 and not self.is_remote:
             for key, arguments in tasks:
                 yield key, function(*arguments, worker=workers[0], report=lambda value: tick([value]))
             return
+        remaining, running = iter(tasks), dict[Future[Any], Key]()
+        with self._pool(function, workers, per_core) as (submit, width, reports):
+            try:
+                while True:
+                    most = width()
+                    while len(running) < most and (task := next(remaining, None)) is not None:
+                        running[submit(*task[1])] = task[0]
+                    if not running:
+                        return
+                    for future in wait(running, timeout=LOOK_EVERY, return_when=FIRST_COMPLETED).done:
+                        yield running.pop(future), future.result()
+                    tick(reports())
+            finally:
+                for future in running:
+                    future.cancel()
+
+    def call(self, function: Task, *arguments: Any, tick: Tick = lambda reports: None) -> Any:
+        """The result of one task."""
+        return next(self.map(function, [(None, arguments)], tick))[1]
+
+    @contextmanager
+    def _pool(self, function: Task, workers: list[Worker], per_core: bool) -> Iterator[_Pool]:
+        """A thread for each worker."""
         stop, idle, reports = Cancel(workers[0].cancel), SimpleQueue[Worker](), dict[object, Any]()
         for worker in workers:
             idle.put(Worker(worker.device, worker.threads, stop))
@@ -93,38 +120,10 @@ class Computer:
 
         pool = ThreadPoolExecutor(len(workers))
         try:
-            yield from _completed(pool, compute, tasks, lambda: len(workers), lambda: tick([*reports.copy().values()]))
+            yield _Pool(partial(pool.submit, compute), lambda: len(workers), lambda: [*reports.copy().values()])
         finally:
             stop.cancel()
             pool.shutdown(wait=False, cancel_futures=True)
-
-    def call(self, function: Callable[..., Any], *arguments: Any, tick: Tick = lambda reports: None) -> Any:
-        """The result of one task."""
-        return next(iter(self.map(function, [(None, arguments)], tick)))[1]
-
-
-def _completed(
-    pool: Executor,
-    function: Callable[..., Any],
-    tasks: Iterable[tuple[Key, tuple[Any, ...]]],
-    width: Callable[[], int],
-    tick: Callable[[], object],
-) -> Generator[tuple[Key, Any]]:
-    """Results of tasks in a pool with at most `width()` tasks in it."""
-    remaining, running = iter(tasks), dict[Future[Any], Key]()
-    try:
-        while True:
-            most = width()
-            while len(running) < most and (task := next(remaining, None)) is not None:
-                running[pool.submit(function, *task[1])] = task[0]
-            if not running:
-                return
-            for future in wait(running, timeout=LOOK_EVERY, return_when=FIRST_COMPLETED).done:
-                yield running.pop(future), future.result()
-            tick()
-    finally:
-        for future in running:
-            future.cancel()
 
 
 class _Cluster(Computer):
@@ -136,26 +135,18 @@ class _Cluster(Computer):
 
     is_remote = True
 
-    def __init__(
-        self, client: Any, address: str, device: str, threads: int | None, warn: Callable[[str], object]
-    ) -> None:
+    def __init__(self, client: Any, address: str, device: str, threads: int | None, warn: Warn) -> None:
         self._client, self._address, self._device, self._threads, self._warn = client, address, device, threads, warn
         self._seen, self._warned = time.monotonic(), False
         super().__init__({}, [])
-        self.made_by = self.call(_made_by)
+        self.made_by = self.call(lambda *, worker, report: made_by(worker.device))
 
-    def map(
-        self,
-        function: Callable[..., Any],
-        tasks: Iterable[tuple[Key, tuple[Any, ...]]],
-        tick: Tick = lambda reports: None,
-        *,
-        per_core: bool = False,
-    ) -> Generator[tuple[Key, Any]]:
-        """See `Computer.map`. Workers do not report."""
+    @contextmanager
+    def _pool(self, function: Task, workers: list[Worker], per_core: bool) -> Iterator[_Pool]:
+        """The workers, which do not report."""
         threads = 1 if per_core else self._threads
-        compute = partial(_on_worker, function, self._device, threads, self.made_by)
-        return _completed(self._client.get_executor(pure=False), compute, tasks, self._width, lambda: tick([]))
+        submit = partial(self._client.get_executor(pure=False).submit, _on_worker, function)
+        yield _Pool(partial(submit, self._device, threads, self.made_by), self._width, list)
 
     def _width(self) -> int:
         """Twice the number of the workers' threads, so that none waits for its next task."""
@@ -163,39 +154,28 @@ class _Cluster(Computer):
             threads: int = sum(self._client.nthreads().values())
         except OSError as error:
             raise _lost(self._address, error) from None
-        now = time.monotonic()
+        without = time.monotonic() - self._seen
         if threads:
-            self._seen = now
-        elif now - self._seen > WORKERLESS_LIMIT:
+            self._seen = time.monotonic()
+        elif without > WORKERLESS_LIMIT:
             raise ClusterError(
                 f"scheduler: {self._address} has had no worker for {WORKERLESS_LIMIT:g} s; start some; what is "
                 "computed is saved, continue with --resume"
             )
-        elif now - self._seen > WORKERLESS and not self._warned:
+        elif without > WORKERLESS and not self._warned:
             self._warned = True
             self._warn(f"scheduler: {self._address} has no worker yet; waiting up to {WORKERLESS_LIMIT:g} s")
         return 2 * max(1, threads)
 
 
-def _lost(address: str, error: BaseException) -> ClusterError:
-    return ClusterError(
-        f"scheduler: {address} was lost, perhaps killed ({type(error).__name__}); what is computed is saved, "
-        "continue with --resume"
-    )
+def made_by(device: str) -> dict[str, str]:
+    """Versions and kind of device: with the campaign, they determine the bits of a result."""
+    chosen = find_device(device)
+    return {**attr.versions(), attr.DEVICE: "cpu" if chosen.is_cpu else chosen.name}
 
 
-def _made_by(*, worker: Worker, report: Callable[[Any], object]) -> dict[str, str]:
-    return made_by(worker.device)
-
-
-def _on_worker(
-    function: Callable[..., Any], device: str, threads: int | None, kind: dict[str, str], *arguments: Any
-) -> Any:
-    """Compute a task on a worker of the `kind` of the other workers, which is empty if none is known.
-
-    Raises:
-        DeviceError: the worker computes other bits.
-    """
+def _on_worker(function: Task, device: str, threads: int | None, kind: dict[str, str], *arguments: Any) -> Any:
+    """Compute a task on a worker, of the `kind` of the other workers; this is empty if none is known."""
     own = made_by(device) if kind else {}
     if own != kind:
         name = next(name for name in kind if own[name] != kind[name])
@@ -207,17 +187,18 @@ def _on_worker(
 
 @contextmanager
 def computer(
-    device: str = "auto",
+    device: str | Computer = "auto",
     *,
     workers: int | None = None,
     scheduler: str | None = None,
     cancel: Cancel = NEVER,
-    warn: Callable[[str], object] = warnings.warn,
+    warn: Warn = warnings.warn,
 ) -> Iterator[Computer]:
     """Open what computes. By default that are the devices of this machine.
 
     Args:
-        device: "auto" (every CUDA device if there is one, else the CPU), or names separated by commas.
+        device: "auto" (every CUDA device if there is one, else the CPU), or names separated by commas. A computer is
+            returned as it is, and stays open.
         workers: number of processes of this machine, which share its cores. They need a main module that does nothing
             when it is imported.
         scheduler: address of a Dask scheduler whose workers compute.
@@ -228,10 +209,18 @@ def computer(
         DeviceError: a device is absent, or devices are of different kinds, which compute different bits.
         ClusterError: Dask is not installed, or the scheduler cannot be reached, is lost or has no workers.
     """
-    if workers is None and scheduler is None:
+    if isinstance(device, Computer):
+        yield device
+    elif workers is None and scheduler is None:
         devices = _devices(device)
         yield Computer(made_by(devices[0]), [Worker(name, cancel=cancel) for name in devices])
-        return
+    else:
+        with _dask(device, workers, scheduler, warn) as cluster:
+            yield cluster
+
+
+@contextmanager
+def _dask(device: str, workers: int | None, scheduler: str | None, warn: Warn) -> Iterator[Computer]:
     try:
         from distributed import Client, KilledWorker, LocalCluster
         from distributed.client import ClosedClientError
@@ -252,7 +241,6 @@ def computer(
         try:
             # Not the default client of the process: xarray would take its locks for the files written here.
             client = Client(address, timeout="20s", set_as_default=False)
-            stack.callback(_close, client)
         except (OSError, ValueError) as error:
             raise ClusterError(f'scheduler: got "{address}", which cannot be reached ({error})') from None
         try:
@@ -261,27 +249,16 @@ def computer(
             raise _lost(address, error) from None
         except KilledWorker as error:
             raise ClusterError(f"some tasks ended one worker after another, perhaps out of memory: {error}") from None
+        finally:
+            with suppress(OSError):  # a client that does not end in time must not hide how the computation ended
+                client.close()
 
 
-@contextmanager
-def opened(
-    device: str | Computer,
-    workers: int | None,
-    scheduler: str | None,
-    cancel: Cancel = NEVER,
-    warn: Callable[[str], object] = warnings.warn,
-) -> Iterator[Computer]:
-    """A computer as of `computer`, closed afterwards. A given computer stays open."""
-    if isinstance(device, Computer):
-        yield device
-        return
-    with computer(device, workers=workers, scheduler=scheduler, cancel=cancel, warn=warn) as opened_computer:
-        yield opened_computer
-
-
-def _close(client: Any) -> None:
-    with suppress(OSError):  # that it does not end in time on a busy machine must not hide how the computation ended
-        client.close()
+def _lost(address: str, error: BaseException) -> ClusterError:
+    cause = type(error).__name__
+    return ClusterError(
+        f"scheduler: {address} was lost, perhaps killed ({cause}); what is computed is saved, continue with --resume"
+    )
 
 
 def _devices(names: str) -> list[str]:

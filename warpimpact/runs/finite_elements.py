@@ -22,7 +22,7 @@ from warpimpact.results.dataset import joined
 from warpimpact.results.references import with_references
 from warpimpact.runs.chunks import open_chunks
 from warpimpact.runs.compute import dataset_of_shots, manifest
-from warpimpact.runs.computer import Computer, opened
+from warpimpact.runs.computer import Computer, computer
 from warpimpact.runs.describe import campaign_attributes
 from warpimpact.scene import Shots
 from warpimpact.scene.flow import Continuum
@@ -57,12 +57,12 @@ def continuum_to_file(
     elements, sampler = campaign.continuum, campaign.sampler()
     continuum, numbers = elements.solver, np.array(range(len(sampler)) if hits is None else hits)
     check_continuum(campaign.scene, sampler.shots(0, 1), continuum)
-    with opened(device, workers, scheduler) as computer:
-        content = manifest(campaign, computer.made_by) | {
+    with computer(device, workers=workers, scheduler=scheduler) as computing:
+        content = manifest(campaign, computing.made_by) | {
             "continuum": json.loads(continuum.model_dump_json()),
             "numbers": hits and list(hits),
         }
-        together = 1 if computer.made_by[attr.DEVICE] == "cpu" else MOST
+        together = 1 if computing.made_by[attr.DEVICE] == "cpu" else MOST
         count = -(-len(numbers) // together)
         solid = campaign.references.get("solid") if campaign.output.solid_reference else None
         with open_chunks(output, content, resume=resume, overwrite=overwrite, warn=warn) as chunks:
@@ -81,7 +81,7 @@ def continuum_to_file(
                 progress(min(done + int(sum(shares) * together), len(numbers)), resumed, len(numbers))
 
             tick([])
-            for number, dataset in computer.map(compute_elements, tasks(), tick, per_core=True):
+            for number, dataset in computing.map(compute_elements, tasks(), tick, per_core=True):
                 chunks.save(number, dataset)
                 done += dataset.sizes["hit"] if number < count else 0
                 tick([])

@@ -26,10 +26,11 @@ from warpimpact.runs.compute import (
     find_resolution,
     limit_of_reference,
     manifest,
+    model_errors,
     numerics_of,
     reference_shots,
 )
-from warpimpact.runs.computer import Computer, opened
+from warpimpact.runs.computer import Computer, computer
 from warpimpact.runs.describe import described, pilot_in
 from warpimpact.runs.progress import Follow, RunProgress, Watch, followed
 from warpimpact.scene import Numerics
@@ -125,16 +126,16 @@ def run_to_file(
     path, size, sampler = None if output is None else Path(output), extent(len(campaign.sampler())), campaign.sampler()
     compute = compute_hits if limit is None else partial(compute_limits, limit)
     with (
-        opened(device, workers, scheduler, cancel, warn) as computer,
+        computer(device, workers=workers, scheduler=scheduler, cancel=cancel, warn=warn) as computing,
         open_chunks(
-            path, manifest(campaign, computer.made_by, limit), resume=resume, overwrite=overwrite, warn=warn
+            path, manifest(campaign, computing.made_by, limit), resume=resume, overwrite=overwrite, warn=warn
         ) as chunks,
         followed(progress) as follow,
     ):
         if chunks is None:
             return None
         watch = Watch(campaign, chunks, size, () if limit is None else (f"mean({LIMITS[limit.quantity].value})",))
-        check_cost = cost_warning(campaign, computer.made_by[attr.DEVICE], 1 if limit is None else PASSAGES)
+        check_cost = cost_warning(campaign, computing.made_by[attr.DEVICE], 1 if limit is None else PASSAGES)
 
         def piloting(levels: list[int]) -> None:
             for level in levels:
@@ -144,16 +145,16 @@ def run_to_file(
         if (first := chunks.load(0)) is not None:
             pilot = pilot_in(first)
         else:
-            pilot = computer.call(find_resolution, campaign, limit, tick=piloting)
+            pilot = computing.call(find_resolution, campaign, limit, tick=piloting)
         numerics = numerics_of(campaign, pilot)
         check_cost(numerics)
 
         def tasks() -> Iterator[tuple[range, tuple[Any, ...]]]:
-            for task in _ranges(chunks, watch, lambda: _task_size(computer, campaign, watch) // size):
+            for task in _ranges(chunks, watch, lambda: _task_size(computing, campaign, watch) // size):
                 yield task, (campaign, numerics, sampler.shots(task.start * size, len(task) * size), task.start * size)
 
         follow(watch.progress(pilot))
-        results = computer.map(compute, tasks(), lambda done: follow(watch.progress(pilot, sum(done))))
+        results = computing.map(compute, tasks(), lambda done: follow(watch.progress(pilot, sum(done))))
         with closing(results):
             while not watch.ended:
                 task, dataset = next(results)
@@ -165,7 +166,7 @@ def run_to_file(
                 follow(watch.progress(pilot))
         if references is None:
             references = path is not None and campaign.output.solid_reference
-        of_references = _references(campaign, limit, pilot, computer) if references else {}
+        of_references = _references(campaign, limit, pilot, computing) if references else {}
         return _finished(chunks, watch, of_references, path)
 
 
@@ -181,11 +182,11 @@ def _ranges(chunks: Chunks, watch: Watch, most: Callable[[], int]) -> Iterator[r
         first = max(stop, first + 1)
 
 
-def _task_size(computer: Computer, campaign: Campaign, watch: Watch) -> int:
+def _task_size(computing: Computer, campaign: Campaign, watch: Watch) -> int:
     """Shots per task, at the rate so far; 0 stands for one chunk."""
-    if computer.made_by[attr.DEVICE] != "cpu":
+    if computing.made_by[attr.DEVICE] != "cpu":
         return CUDA_SHOTS
-    if computer.is_remote or campaign.stop is not None or not watch.time:
+    if computing.is_remote or campaign.stop is not None or not watch.time:
         return 0
     return min(CPU_SHOTS, int(CPU_SECONDS * watch.hits / watch.time))
 
@@ -199,7 +200,7 @@ def _split(dataset: xarray.Dataset, task: range, size: int) -> Iterator[tuple[in
 
 
 def _references(
-    campaign: Campaign, limit: LimitSpec | None, pilot: PilotResult | None, computer: Computer
+    campaign: Campaign, limit: LimitSpec | None, pilot: PilotResult | None, computing: Computer
 ) -> dict[str, xarray.Dataset]:
     """Some hits of the references of a campaign, by their names, at the resolution of the campaign."""
     pilot = None if pilot is None else replace(pilot, finer=None, numbers=None)
@@ -211,7 +212,7 @@ def _references(
                 continue
             compute, most = partial(compute_limits, searched), REFERENCE_LIMITS
         shots = reference_shots(reference, most)
-        dataset = computer.call(compute, reference, numerics_of(reference, pilot), shots, 0)
+        dataset = computing.call(compute, reference, numerics_of(reference, pilot), shots, 0)
         datasets[name] = described(dataset, reference, numerics_of(reference, pilot, searched), pilot, searched)
     return datasets
 
@@ -246,7 +247,8 @@ def estimate_cost(campaign: Campaign, numerics: Numerics, passages: int = 1) -> 
     """A sentence about the cost of hits on a CPU, with numerics that fix the resolution; None where it is low. An
     unhindered first hit of the campaign stands for all."""
     sampler = campaign.sampler()
-    prepared = prepare(campaign.scene, sampler.shots(0, 1), numerics)
+    with model_errors():
+        prepared = prepare(campaign.scene, sampler.shots(0, 1), numerics)
     seconds, hits = passages * prepared.seconds, len(sampler)
     level = "" if numerics.level is None else f"at level {numerics.level} "
     if seconds < SLOW and prepared.window_bytes < LARGE:

@@ -205,6 +205,10 @@ def joined(sweep: Sweep, points: Sequence[xarray.Dataset]) -> xarray.Dataset:
         else:
             stacked = np.stack([column.values for column in columns]).reshape(sweep.shape + array.shape)
             into[str(name)] = ((*names, *array.dims), stacked, array.attrs)
+    periods = np.array([point.attrs[attr.PLATE_PERIOD] for point in same])
+    if np.ptp(periods, axis=0).any():
+        sides = {"units": "m", "long_name": "extent of the unit cell along y and z"}
+        data[attr.PLATE_PERIOD] = (*names, "side"), periods.reshape(*sweep.shape, 2), sides
     return xarray.Dataset(data, coordinates, _attributes(sweep, same))
 
 

@@ -10,7 +10,7 @@ import pytest
 
 from warpimpact import Campaign
 from warpimpact.cli import main
-from warpimpact.runs.computer import ClusterError, _made_by, _on_worker, computer
+from warpimpact.runs.computer import ClusterError, _on_worker, computer
 from warpimpact.runs.progress import RunProgress
 from warpimpact.runs.run import run_to_file
 from warpimpact.solver.device import DeviceError
@@ -82,7 +82,7 @@ def test_a_mistake_on_a_worker_is_told_and_leaves_nothing(
 def test_workers_that_would_compute_other_bits_are_refused() -> None:
     kind = {"warpimpact_version": "0.0.0", "warp_version": "1", "device": "cpu"}
     with pytest.raises(DeviceError, match=r'the workers differ: warpimpact_version is "0.0.0" on one and'):
-        _on_worker(_made_by, "cpu", None, kind)
+        _on_worker(print, "cpu", None, kind)
 
 
 @pytest.mark.parametrize("request_", ["nthreads", None])
