@@ -70,21 +70,6 @@ def test_a_mistake_is_told_in_one_sentence(tmp_path: Path, right: str, wrong: st
     assert str(caught.value) == f"{path}: {sentence.format(folder=tmp_path)}"
 
 
-@pytest.mark.parametrize(
-    ("write", "sentence"),
-    [
-        (lambda path: None, "cannot be read (it is not there)"),
-        (lambda path: path.write_text("a = 1\nb 2"), "is not valid TOML: Expected '=' after a key"),
-    ],
-)
-def test_what_is_no_toml_file_is_told_in_one_sentence(tmp_path: Path, write: object, sentence: str) -> None:
-    path = tmp_path / "wrong.toml"
-    write(path)
-    with pytest.raises(CampaignError) as caught:
-        Campaign.from_toml(path)
-    assert str(caught.value).startswith(f"{path}: {sentence}")
-
-
 def test_file_names_count_from_the_campaign_file(tmp_path: Path) -> None:
     (tmp_path / "profile.csv").write_text("s,r\n0,0\n0.02,0.003\n")
     (tmp_path / "hits.csv").write_text("hit_y,hit_z\n0.001,0.002\n")

@@ -7,16 +7,12 @@ import numpy as np
 import pytest
 import xarray
 
-from warpimpact import Campaign, to_dataframe
+from warpimpact import Campaign
 from warpimpact import Plate as NamedPlate
-from warpimpact.analysis.effectiveness import effectiveness
-from warpimpact.analysis.inspection import inspect_text
 from warpimpact.campaign.campaign import read_plates
 from warpimpact.campaign.text import CampaignError
 from warpimpact.kernels.status import Status
 from warpimpact.results import files
-from warpimpact.results.references import reference
-from warpimpact.runs.replay import replay
 from warpimpact.runs.run import run_to_file
 
 CAMPAIGN = """
@@ -171,51 +167,3 @@ def test_a_solid_add_on_of_the_catalogue_has_the_resistance_of_its_thickness() -
     scattered = campaign(plate=PLATE.replace('"2600 MPa"', '{ distribution = "uniform", low = 2e9, high = 3e9 }'))
     shots = scattered.sampler().shots(0, 4)
     np.testing.assert_array_equal(scattered.solid().sampler().shots(0, 4).resistance, shots.resistance)
-
-
-def test_layers_of_a_result_have_names_and_their_status_is_a_word(result: xarray.Dataset) -> None:
-    assert result["layer"].values.tolist() == [0, 1, 2]
-    assert result["layer_name"].values.tolist() == ["plate", "layer 1", "layer 2"]
-    assert result["layer_material"].values.tolist() == ["", "", ""]
-    frame = to_dataframe(result)
-    codes = result["layer_status"].values[:, 2].tolist()
-    assert frame["layer_status_2"].tolist() == [Status(code).name.lower() for code in codes]
-
-
-def test_a_result_holds_its_references_and_tells_the_weights_apart(result: xarray.Dataset) -> None:
-    solid, alone = (reference(result, name) for name in ("solid", "base_alone"))
-    assert solid.sizes["hit"] == alone.sizes["hit"] == result.sizes["hit"]  # the base scatters
-    assert (alone["status"] == Status.ARRESTED).all()
-    scores = effectiveness(result)
-    assert scores.alone["P(base_perforated)"] == 0.0
-    assert np.isfinite(scores.solid["mean(base_depth)"])
-    weights = campaign().target.weights
-    text = inspect_text(result)
-    assert ", ".join(f"{name} {weight:.1f} kg/m²" for name, weight in weights.items()) in text
-    assert weights["add-on"] + weights["base"] == pytest.approx(weights["whole target"])
-    assert f"as heavy as the add-on ({weights['add-on']:.4g} kg/m²), before the same base" in text
-    (head,) = [line for line in text.splitlines() if "ratio to it  " in line]
-    assert head.split("ratio to it")[0].endswith("solid add-on   ")
-    assert head.endswith("base alone")
-
-
-@pytest.mark.parametrize(
-    "hit",
-    [
-        7,
-    ],
-)
-def test_replay_gives_the_stored_end_and_every_layer(result: xarray.Dataset, hit: int) -> None:
-    history = replay(result, hit, folder=Path())
-    assert history.attrs["agreement"] == "bit-identical"
-    faces = np.stack([history["layer_front"], history["layer_rear"]], axis=1)
-    thickness = result["layer_thickness"].values[hit]
-    np.testing.assert_allclose(faces[:, 1] - faces[:, 0], thickness, rtol=1e-12)
-    assert faces[2, 0] == pytest.approx(62e-3)
-    assert history["layer_solid_along_y"].values[2].all()
-    holed = campaign(offset=UNKNOWN, thickness=ABOUT).layer[0]
-    y = history["section"].values + float(history["hit_y"]) - result["layer_offset_y"].values[hit, 1]
-    solid = holed.is_solid(y, np.array(float(history["hit_z"]) - 1e-3))
-    np.testing.assert_array_equal(history["layer_solid_along_y"].values[1], solid)
-    assert (np.diff(history["time"]) > 0.0).all()
-    assert history["resistance_share"].max() <= 1.0

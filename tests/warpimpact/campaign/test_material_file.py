@@ -10,7 +10,7 @@ from warpimpact.campaign.campaign import Campaign
 from warpimpact.campaign.text import CampaignError
 from warpimpact.runs.replay import replay
 from warpimpact.runs.run import run
-from warpimpact.scene import Scene, Shots
+from warpimpact.scene import Scene
 from warpimpact.scene.quantities import QUANTITIES
 from warpimpact.solver.simulate import simulate
 
@@ -67,15 +67,6 @@ def test_columns_of_a_row_stay_together(tmp_path: Path, sampling: str) -> None:
     assert shots.shear_coefficient[:, 0] == pytest.approx(0.1 * share)
     assert shots.thickness is None
     assert abs(np.corrcoef(share, shots.hit_y)[0, 1]) < 0.2  # of 256 independent pairs: ± 0.06
-
-
-def test_a_row_is_a_function_of_the_seed_and_the_number(tmp_path: Path) -> None:
-    sampler = campaign(tmp_path).sampler()
-    whole = sampler.shots(0, 256)
-    parts = Shots.joined([sampler.shots(first, count) for first, count in ((0, 7), (7, 100), (107, 149))])
-    assert (whole.resistance == parts.resistance).all()
-    other = campaign(tmp_path, ("seed = 4", "seed = 5")).sampler().shots(0, 256)
-    assert (whole.resistance != other.resistance).mean() > 0.9
 
 
 def with_own(scene: Scene, name: str, value: float) -> Scene:

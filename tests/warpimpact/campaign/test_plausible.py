@@ -1,6 +1,5 @@
 """Values that are possible but probably not meant: a warning that names value, unit and the likely slip."""
 
-import math
 import warnings
 from pathlib import Path
 
@@ -12,8 +11,7 @@ from warpimpact import Campaign
 from warpimpact.campaign.campaign import read_plates
 from warpimpact.campaign.plausible import doubted_holes, effective_thickness
 from warpimpact.campaign.text import CampaignError
-from warpimpact.cli import main
-from warpimpact.scene.bounds import USUAL, Implausible
+from warpimpact.scene.bounds import Implausible
 from warpimpact.studies.sweep import read_sweep
 
 CAMPAIGNS = Path(__file__).parents[3] / "campaigns"
@@ -137,28 +135,3 @@ def test_thin_webs_and_large_holes_get_a_word(folder: Path) -> None:
     assert told(("", "")) == []
     assert told(('diameter = "5 mm"', 'diameter = "7.9 mm"')) == [" open area of 77%", " ligaments of 0.1 mm"]
     assert told(('thickness = "4 mm"', 'thickness = "13 mm"')) == [" ligaments of 3 mm"]
-
-
-@pytest.mark.parametrize("kind", USUAL)
-def test_what_is_refused_is_not_usual_and_has_a_reason(kind: str) -> None:
-    bounds = USUAL[kind]
-    assert bounds.least <= bounds.low < bounds.high <= bounds.most
-    assert bool(bounds.why) == (bounds.least > 0.0 or bounds.most < math.inf)
-
-
-def test_the_command_says_it_once_and_goes_on(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    (folder / "a.toml").write_text(TEXT.replace('thickness = "4 mm"', "thickness = 0.4"))
-    for _ in range(2):
-        assert main(["plate", "a.toml", "--overwrite"]) == 0
-        shown = capsys.readouterr()
-        assert shown.err == (
-            "warpimpact: warning: plate.thickness: read as 0.4 m, but 0.1 to 200 mm is usual; "
-            '"0.4 mm" was probably meant, which needs its unit\n'
-        )
-        assert "a test" in shown.out
-
-
-def test_a_campaign_made_in_python_is_told_too(folder: Path) -> None:
-    campaign = Campaign.from_text(TEXT, name="text", folder=folder)
-    with pytest.warns(Implausible, match="plate.thickness: read as 0.4 m"):
-        campaign.model_copy(update={"plate": campaign.plate.model_copy(update={"thickness": 0.4})})

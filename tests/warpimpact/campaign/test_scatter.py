@@ -1,7 +1,6 @@
 """Scatter from a campaign file to its result, and a sentence for each mistake."""
 
 import math
-import pickle
 from pathlib import Path
 
 import numpy as np
@@ -11,12 +10,8 @@ from warpimpact import Campaign
 from warpimpact.campaign.campaign import CampaignError
 from warpimpact.cli import main
 from warpimpact.results import files
-from warpimpact.results.variables import OUTCOME_VARIABLES
-from warpimpact.runs.compute import compute_hits, numerics_of
-from warpimpact.runs.describe import pilot_in
 from warpimpact.runs.replay import replay
 from warpimpact.runs.run import run, run_to_file
-from warpimpact.solver.worker import Worker
 
 SLOTTED_PLATE = (Path(__file__).parents[3] / "campaigns" / "slotted_plate.toml").read_text(encoding="utf-8")
 
@@ -48,27 +43,6 @@ def test_a_distribution_stands_in_the_place_of_its_value(tmp_path: Path) -> None
     np.testing.assert_allclose(dataset.impact_yaw, np.degrees(shots.yaw), rtol=1e-15)
     assert np.ptp(dataset.impact_velocity.values) > 30.0
     assert replay(dataset, 40, folder=tmp_path).attrs["agreement"] == "bit-identical"
-
-
-def test_a_campaign_in_python_comes_back_from_its_text_and_from_another_process(tmp_path: Path) -> None:
-    campaign = campaign_with(tmp_path, (VELOCITY, NORMAL))
-    by_hand = Campaign(**{name: getattr(campaign, name) for name in Campaign.model_fields})
-    assert Campaign.from_text(by_hand.text, name="text", folder=tmp_path).model_dump() == by_hand.model_dump()
-    assert pickle.loads(pickle.dumps(campaign)).model_dump() == campaign.model_dump()
-
-
-def test_a_hit_does_not_depend_on_its_company(tmp_path: Path) -> None:
-    """The window on the plate is as large as the steepest shot of a batch needs."""
-    changes = 'obliquity = { distribution = "uniform", low = 0, high = "50 deg" }\nspin = 1e4'
-    campaign = campaign_with(tmp_path, (VELOCITY, f"{NORMAL}\n{changes}"))
-    whole = run(campaign, device="cpu")
-    found = pilot_in(whole)
-    for hit in range(0, 64, 9):
-        alone = compute_hits(
-            campaign, numerics_of(campaign, found), campaign.sampler().shots(hit, 1), hit, worker=Worker("cpu")
-        )
-        for name in OUTCOME_VARIABLES:
-            assert np.array_equal(alone[name].values[0], whole[name][hit], equal_nan=True), name
 
 
 OWN = {
@@ -112,15 +86,6 @@ def test_scatter_in_plate_and_core_from_file_to_result(
         assert history.attrs["plate_thickness"] == shots.thickness[hit]
     assert main(["inspect", str(tmp_path / "a.nc")]) == 0
     assert capsys.readouterr().out.splitlines()[-1] == f"0 of {count} shots failed"
-
-
-def test_a_list_may_bring_its_own_plates(tmp_path: Path) -> None:
-    rows = ("hit_y,hit_z,degradation,mass", "0,0.006,1,4e-3", "0,0.006,0.8,4e-3", "0,0.006,0.8,8e-3")
-    (tmp_path / "hits.csv").write_text("\n".join(rows))
-    hits = SLOTTED_PLATE.split("[hits]\n")[1].split("[numerics]")[0].replace("4096", "64")
-    campaign = campaign_with(tmp_path, (hits, 'sampling = "list"\nfile = "hits.csv"\n'))
-    lasting, weakening, heavy = run(campaign, device="cpu").residual_velocity.values
-    assert lasting < weakening < heavy
 
 
 @pytest.mark.parametrize(

@@ -5,11 +5,9 @@ from pathlib import Path
 import pytest
 
 from warpimpact.analysis.numbers import text_of
-from warpimpact.catalogue.catalogue import FOLDERS, Catalogue, file_name
-from warpimpact.catalogue.catalogue import key as key_of
-from warpimpact.catalogue.catalogue_view import catalogue_view, drawn, material_view, threat_view
+from warpimpact.catalogue.catalogue import Catalogue
+from warpimpact.catalogue.catalogue_view import catalogue_view, material_view, threat_view
 from warpimpact.catalogue.entries import Material, Threat
-from warpimpact.scene import ConeCore
 
 THREATS = Catalogue().all(Threat)
 CORES = [name for name, threat in THREATS.items() if threat.shape is not None]
@@ -43,12 +41,6 @@ def own(tmp_path: Path) -> Path:
     return path
 
 
-@pytest.mark.parametrize("kind", [Threat, Material])
-def test_a_file_has_the_name_of_its_entry(kind: type) -> None:
-    names = {file_name(one.name) for one in Catalogue().all(kind).values()}
-    assert names == {path.stem for path in FOLDERS[kind].glob("*.toml")}
-
-
 # Mass of the volume at the density of the material, beside the published mass. Where the length follows from the mass
 # it is rounded to 0.01 mm; nose and length of the .30 AP M2 are second-hand, and its volume is 3.6 % too large.
 @pytest.mark.parametrize("name", CORES)
@@ -71,13 +63,6 @@ def test_what_is_open_is_called_assumed(name: str) -> None:
             assert any(line.startswith(mark) and key.replace("_", " ") in line for line in text.splitlines())
     shaped = {"core", "nose", "length"} & {*threat.known, *threat.assumed}
     assert shaped or threat.shape is None  # no shape without a word on where it comes from
-
-
-def test_a_profile_is_drawn_to_scale() -> None:
-    rows = drawn(ConeCore(diameter=8e-3, length=32e-3, mass=1e-3))
-    assert [len(row) for row in rows[:-1]] == [64] * len(rows[:-1])
-    filled = sum(" ▁▂▃▄▅▆▇█".index(character) for row in rows[:-2] for character in row) / 8.0
-    assert filled == pytest.approx(0.5 * 64 * 4.0, rel=0.02)  # a triangle, 64 columns long and 4 rows high
 
 
 def test_own_entries(own: Path) -> None:
@@ -128,13 +113,3 @@ def test_names_match_in_any_case_and_by_aliases(spelling: str, name: str) -> Non
 def test_of_an_unclear_name_those_it_may_mean_are_listed(spelling: str, said: str) -> None:
     with pytest.raises(ValueError, match=said):
         Catalogue().entry(spelling)
-
-
-@pytest.mark.parametrize("kind", [Threat, Material])
-def test_no_alias_is_a_name_or_says_nothing_new(kind: type) -> None:
-    entries = Catalogue().all(kind)
-    names = {key_of(name) for name in entries}
-    for entry in entries.values():
-        aliases = [key_of(alias) for alias in entry.aliases]
-        assert len({*aliases}) == len(aliases)
-        assert not names & {*aliases}

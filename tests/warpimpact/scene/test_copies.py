@@ -10,7 +10,6 @@ from pydantic import ValidationError
 from warpimpact import Campaign, CirclePattern, Interaction, Plate, SlotPattern
 from warpimpact.campaign.campaign import CampaignError
 from warpimpact.scene import Hits, PolynomialCore, ProfileCore
-from warpimpact.scene.model import Model
 
 CAMPAIGNS = Path(__file__).parents[3] / "campaigns"
 MM = 1e-3
@@ -71,35 +70,12 @@ def thinner(campaign: Campaign) -> Campaign:
     return campaign.model_copy(update={"plate": campaign.plate.model_copy(update={"thickness": "3 mm"})})
 
 
-@pytest.mark.parametrize(
-    ("value", "update", "complaint"),
-    [
-        (PLATE, {"thicknes": 1.0}, 'got the unknown key "thicknes"; did you mean "thickness"?'),
-        (PLATE, {"thickness": -1.0}, "greater than 0"),
-        (ROUND, {"diameter": 9e-3}, "overlap or touch"),
-    ],
-)
-def test_a_copy_that_cannot_be_is_refused(value: Model, update: dict[str, Any], complaint: str) -> None:
-    with pytest.raises(ValidationError) as caught:
-        value.model_copy(update=update)
-    assert complaint in str(caught.value)
-
-
 def test_nothing_computed_goes_along() -> None:
     assert CORE.mass_properties.mass == 4e-3
     assert CORE.model_copy(update={"mass": 8e-3}).mass_properties.mass == 8e-3
     slots = SlotPattern(length=12 * MM, width=4 * MM, spacing=(8 * MM, 16 * MM))
     assert slots.ligament() == pytest.approx(4 * MM)
     assert slots.model_copy(update={"spacing": (10 * MM, 18 * MM)}).ligament() == pytest.approx(6 * MM)
-
-
-def test_a_pattern_keeps_no_rim_of_another_plate() -> None:
-    rimmed = PLATE.model_copy(update={"size": (40 * MM, 40 * MM), "margin": 3 * MM})
-    assert rimmed.open_area < PLATE.open_area
-    assert rimmed.model_copy(update={"thickness": 5 * MM}).pattern is rimmed.pattern
-    assert rimmed.model_copy(update={"margin": None}).open_area == PLATE.open_area
-    other = rimmed.model_copy(update={"size": (60 * MM, 60 * MM)})
-    assert other == Plate(**dict(PLATE) | {"size": (60 * MM, 60 * MM), "margin": 3 * MM})
 
 
 @pytest.mark.parametrize("text", [LISTED, SCATTERED, PLAIN], ids=["listed", "scattered", "plain"])

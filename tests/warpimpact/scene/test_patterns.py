@@ -67,44 +67,6 @@ def test_sides_of_holes_on_a_staggered_pitch_face_each_other() -> None:
     assert squares.ligament() == pytest.approx(2 * MM, rel=1e-9)
 
 
-def test_slots_are_stadiums_on_a_staggered_lattice() -> None:
-    points = {
-        (0, 0): True,
-        (1.99, 4): True,
-        (2.01, 0): False,
-        (0, 5.99): True,
-        (0, 6.01): False,
-        (1.5, 5.5): False,  # the corner that a round end leaves
-        (8, 0): False,  # between the slots of an odd row
-        (8, 8): True,
-        (-8, -8): True,
-        (16, 16): True,
-    }
-    y, z = MM * np.array(list(points), dtype=float).T
-    assert SLOT.is_hole(y, z).tolist() == list(points.values())
-    assert SLOT.period == (16 * MM, 16 * MM)
-
-
-@LATTICES
-def test_a_pattern_repeats_with_its_period(pattern: LatticePattern) -> None:
-    y, z = np.random.default_rng(1).uniform(-20 * MM, 20 * MM, (2, 20000))
-    here = pattern.is_hole(y, z)
-    assert np.array_equal(here, pattern.is_hole(y + 3 * pattern.period[0], z - 2 * pattern.period[1]))
-    assert 0 < here.mean() < 1
-
-
-@LATTICES
-def test_outlines_enclose_the_holes(pattern: LatticePattern) -> None:
-    span = (-11 * MM, 12 * MM)
-    y, z = np.random.default_rng(2).uniform(*span, (2, 20000))
-    outlines = pattern.outlines(span, span)
-    points = np.column_stack([y, z])
-    enclosed = np.any([Polygon(outline).contains_points(points) for outline in outlines], axis=0)
-    # 64 chords around a circle leave out 1.6e-3 of its area.
-    assert np.mean(enclosed != pattern.is_hole(y, z)) < 1.6e-3
-    assert all(np.allclose(outline[0], outline[-1], atol=1e-12) for outline in outlines)
-
-
 @LATTICES
 def test_an_edge_is_as_far_as_the_nearest_outline(pattern: LatticePattern) -> None:
     y, z = np.random.default_rng(3).uniform(-20 * MM, 20 * MM, (2, 2000))
@@ -190,22 +152,6 @@ def test_to_the_rim_counts_what_the_rim_leaves_whole() -> None:
     assert CIRCLE.ligament((4 * MM, 4 * MM)) == math.inf  # no plate is left around it
 
 
-def test_a_free_lattice_of_two_holes_is_the_staggered_one() -> None:
-    listed = SLOT.model_validate(
-        SLOT.model_dump() | {"staggered": False, "spacing": (16 * MM, 16 * MM), "holes": ((0, 0), (8 * MM, 8 * MM))}
-    )
-    y, z = np.random.default_rng(3).uniform(-30 * MM, 30 * MM, (2, 20000))
-    assert np.array_equal(listed.is_hole(y, z), SLOT.is_hole(y, z))
-    assert (listed.period, listed.open_area, listed.ligament()) == (SLOT.period, SLOT.open_area, SLOT.ligament())
-
-
-def test_a_turn_of_the_pattern_adds_to_those_of_its_holes() -> None:
-    # Up and down, turned by a quarter: to the left and to the right.
-    turned = UP_AND_DOWN.model_validate(UP_AND_DOWN.model_dump() | {"rotation": "90 deg"})
-    assert turned.is_hole(np.array([-5.5 * MM, 5 * MM]), np.zeros(2)).tolist() == [True, False]
-    assert turned.is_hole(np.array([10.62 * MM + 5.5 * MM]), np.array([3.46 * MM])).all()
-
-
 SHAPES = st.sampled_from(
     [
         CirclePattern(diameter=4 * MM, spacing=(1, 1)),
@@ -217,31 +163,6 @@ SHAPES = st.sampled_from(
     ]
 )
 TURNS = st.floats(-math.pi, math.pi)
-
-
-@st.composite
-def lattices(draw: st.DrawFn) -> LatticePattern:
-    """Any shape, turned, twice in a cell: each within a circle of 6 mm, and these 0.5 mm apart or more."""
-    shape = draw(SHAPES)
-    offset = draw(st.floats(-4 * MM, 4 * MM))
-    holes = [
-        [offset, 0.0, math.degrees(draw(TURNS))],
-        [offset + 8 * MM, draw(st.floats(-9 * MM, 9 * MM)), math.degrees(draw(TURNS))],
-    ]
-    spacing = (16 * MM, draw(st.floats(6.5 * MM, 9 * MM)))
-    return type(shape).model_validate(shape.model_dump() | {"spacing": spacing, "holes": holes})
-
-
-@settings(deadline=None, max_examples=15)
-@given(pattern=lattices())
-def test_a_ligament_is_the_least_distance_between_points_of_two_outlines(pattern: LatticePattern) -> None:
-    outlines = pattern.outlines((-16 * MM, 16 * MM), (-13 * MM, 13 * MM))
-    rings = [shapely.LinearRing(outline) for outline in outlines]
-    one, other = np.triu_indices(len(rings), 1)
-    # Chords of a rounding of up to 2 mm lie up to 2.4 um within it, on either side.
-    assert shapely.distance(np.array(rings)[one], np.array(rings)[other]).min() == pytest.approx(
-        pattern.ligament(), abs=5e-3 * MM
-    )
 
 
 @settings(deadline=None, max_examples=25)
@@ -352,14 +273,3 @@ def test_a_margin_leaves_out_whole_holes() -> None:
     assert np.mean(on_plate.is_hole(y, z) != kept) < 1e-3
     assert not on_plate.is_hole(y, z)[(np.abs(y) > 22 * MM) | (np.abs(z) > 19 * MM)].any()
     assert all(on_plate.is_symmetric(*along, centred=False) for along in ((1, -1), (-1, 1), (-1, -1)))
-
-
-def test_a_margin_that_a_hole_just_reaches_keeps_it() -> None:
-    holes = CIRCLE.bounded((25 * MM, 9 * MM), 2 * MM)  # three of them, to 9.5 mm; 10.5 mm are left
-    assert holes.open_area == pytest.approx(3 * CIRCLE.hole_area / (225 * MM**2), rel=1e-14)
-    assert CIRCLE.bounded((23 * MM, 9 * MM), 2 * MM).open_area * 23 == pytest.approx(holes.open_area * 25, rel=1e-14)
-    assert CIRCLE.bounded((22.9 * MM, 9 * MM), 2 * MM).open_area * 22.9 < holes.open_area * 12
-    with pytest.raises(ValueError, match=r"got size = \(8, 9\) mm and margin = 2 mm, but they leave no hole"):
-        CIRCLE.bounded((8 * MM, 9 * MM), 2 * MM)
-    with pytest.raises(ValueError, match=r"a plate of some 1.59e\+06 holes, but with a margin at most 20000"):
-        CIRCLE.bounded((10, 10), 2 * MM)

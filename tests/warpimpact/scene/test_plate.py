@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 from pydantic import ValidationError
 
-from warpimpact.scene import CirclePattern, Hits, Impact, Interaction, Plate, SlotPattern, make_shots
-from warpimpact.scene.interaction import coefficients
+from warpimpact.scene import CirclePattern, Hits, Impact, Plate, SlotPattern, make_shots
 
 STEEL = {"thickness": "4 mm", "resistance": "2600 MPa"}
 
@@ -22,16 +21,6 @@ def test_a_plate_may_be_given_by_its_weight(margin: dict) -> None:
     for given, complaint in (({"areal_density": 0}, "greater than 0"), (STEEL, "thickness cannot be combined with")):
         with pytest.raises(ValidationError, match=complaint):
             Plate(**{"areal_density": 25, "resistance": 1e9, **given})
-
-
-def test_interaction_scales_with_resistance_and_density() -> None:
-    plate = Plate(thickness=1, resistance=4e8, density=2500)
-    assert coefficients(1.0, 0.0, 0.0, plate.resistance, plate.density) == (4e8, 0.0, 0.0)
-    assert coefficients(3.0, 0.5, 1.5, plate.resistance, plate.density) == pytest.approx(
-        (1.2e9, 0.5e6, 3750.0), rel=1e-14
-    )
-    with pytest.raises(ValidationError, match="greater than or equal to 0"):
-        Interaction(linear=-1)
 
 
 SLOTS = SlotPattern(length="12 mm", width="4 mm", spacing=["8 mm", "16 mm"], staggered=True)
@@ -54,15 +43,6 @@ def test_the_rim_of_a_finite_plate_is_an_edge() -> None:
     assert solid.edge_distance(y, z) == pytest.approx([22e-3, 1e-3, -1e-3, -5e-3])
     assert Plate(**STEEL, pattern=SLOTS, **RIMMED).edge_distance(y, z) == pytest.approx([-2e-3, 1e-3, -1e-3, -5e-3])
     assert np.isnan(Plate(**STEEL).edge_distance(y, z)).all()
-
-
-def test_a_plate_with_a_margin_is_read_back_as_it_was() -> None:
-    plate = Plate(**STEEL, pattern=SLOTS, **RIMMED)
-    again = Plate.model_validate_json(plate.model_dump_json())
-    assert again == plate
-    assert again.pattern.period == plate.pattern.period == (50e-3, 44e-3)
-    without = Plate(**STEEL, pattern=plate.pattern)
-    assert Plate.model_validate_json(without.model_dump_json()) == without == Plate(**STEEL, pattern=SLOTS)
 
 
 def test_hits_cover_the_cell_or_all_of_a_finite_plate() -> None:

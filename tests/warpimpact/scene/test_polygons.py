@@ -1,17 +1,14 @@
 """Polygons: areas, ligaments, what is refused, and drawings."""
 
 import math
-from pathlib import Path
 from typing import Any
-from xml.etree import ElementTree
 
 import numpy as np
 import pytest
 import shapely
 from pydantic import TypeAdapter, ValidationError
 
-from warpimpact import Plate, PolygonsPattern
-from warpimpact.export.drawing import write_drawing
+from warpimpact import PolygonsPattern
 from warpimpact.scene import AnyPattern, CirclePattern, Pattern
 
 CELL = {"spacing": (8e-3, 10e-3)}
@@ -79,12 +76,3 @@ def test_polygons_that_overlap_those_of_the_next_cell_unite() -> None:
 def test_a_form_that_is_no_plate_is_refused(given: dict[str, Any], sentence: str) -> None:
     with pytest.raises(ValidationError, match=sentence):
         TypeAdapter[Any](AnyPattern).validate_python({"spacing": ["8 mm", "8 mm"], **given})
-
-
-def test_a_drawing_has_the_holes(tmp_path: Path) -> None:
-    pattern = PolygonsPattern(spacing=(9e-3, 9e-3), polygons=[[(-2e-3, 0), (3e-3, 0), (0, 4e-3)]])
-    write_drawing(Plate(thickness=4e-3, resistance=1e9, pattern=pattern), tmp_path / "own.svg")
-    (path,) = ElementTree.parse(tmp_path / "own.svg").getroot()
-    rings = path.attrib["d"].removeprefix("M").removesuffix("Z").split("ZM")
-    holes = [shapely.Polygon([tuple(map(float, point.split(","))) for point in ring.split("L")]) for ring in rings]
-    assert sum(hole.area for hole in holes) / 81.0 == pytest.approx(pattern.open_area, rel=1e-9)

@@ -106,13 +106,6 @@ def test_what_else_scatters_changes_no_draw() -> None:
     assert np.array_equal(np.sort(ranks), np.arange(1024))  # one point in each of 1024 intervals
 
 
-def test_far_shots_cost_what_near_ones_do() -> None:
-    for sampling in ("sobol", "random"):
-        far = sampler(sampling, 2**26).shots(2**26 - 10, 100)
-        assert len(far) == 10
-        assert len(np.unique(far.velocity)) == 10
-
-
 def test_replicates_are_independent_nets() -> None:
     shots = sampler("sobol", 8 * 256, replicates=8).shots(0, 8 * 256)
     for replicate in range(8):

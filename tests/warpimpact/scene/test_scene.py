@@ -12,7 +12,6 @@ from warpimpact import (
     Campaign,
     Hits,
     Impact,
-    Interaction,
     Layer,
     Numerics,
     Plate,
@@ -22,18 +21,11 @@ from warpimpact import (
     run,
     simulate,
 )
-from warpimpact.scene import PolynomialCore, Shots, Target
+from warpimpact.scene import PolynomialCore, Target
 
 SLOTTED_PLATE = Path(__file__).parents[3] / "campaigns" / "slotted_plate.toml"
 CORE = PolynomialCore(coefficients=(3.0e-4, 0.24, -5.29), length=27.86e-3, mass=4e-3)
 PLATE = Plate(thickness=4e-3, resistance=2.6e9)
-
-
-def test_a_plate_alone_is_a_target() -> None:
-    scene = Scene(core=CORE, target=PLATE)
-    assert scene == Scene(core=CORE, target=Target(layers=(PLATE,)))
-    assert scene.target.layers[0] is PLATE
-    assert (scene.interaction, scene.record) == (Interaction(), Record())
 
 
 @pytest.mark.parametrize(
@@ -81,15 +73,3 @@ def test_the_plate_is_layer_0() -> None:
     assert [place for place, _ in target.named] == ["plate", "layer 1", "layer 2"]
     with pytest.raises(ValueError, match=r"gap = 0.01 m .* of the first layer"):
         Target(layers=(behind,))
-
-
-def test_columns_of_layers_are_put_one_beside_the_other() -> None:
-    base = Layer(thickness="8 mm", resistance="1 GPa")
-    target, two = Target(layers=(PLATE, base, base)), np.array([1e-3, 2e-3])
-    shots = Shots(*np.zeros((8, 2)), thickness=two).assign({"thickness": two + 1e-3}, layer=1)
-    assert [shots.varies("thickness", layer) for layer in range(3)] == [True, True, False]
-    assert [shots.layer_value(target, "thickness", layer).tolist() for layer in range(3)] == [
-        [1e-3, 2e-3],
-        [2e-3, 3e-3],
-        [8e-3],
-    ]

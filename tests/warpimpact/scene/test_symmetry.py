@@ -95,23 +95,6 @@ def of_cells(material: np.ndarray) -> Plate:
     return plate(PolygonsPattern(polygons=polygons, spacing=spacing))
 
 
-@pytest.mark.parametrize("sides", [(12, 16), (13, 16), (13, 17)])
-def test_of_polygons_are_those_of_their_cells(sides: tuple[int, int]) -> None:
-    blank = np.ones(sides)
-    blank[3:-3, 5:-5] = 0
-    assert found(of_cells(blank)) == {*ALL}
-    for notch, expected in (
-        ([(3, 5)], {"(y, z)"}),
-        ([(3, 5), (-4, -6)], {"(y, z)", "(-y, -z)"}),
-        ([(3, 5), (-4, 5)], {"(y, z)", "(-y, z)"}),
-        ([(3, 5), (3, -6)], {"(y, z)", "(y, -z)"}),
-    ):
-        notched = blank.copy()
-        for cell in notch:
-            notched[cell] = 1
-        assert found(of_cells(notched)) == expected
-
-
 def test_polygons_may_be_centred_or_glide() -> None:
     material = np.ones((12, 16))
     material[1:3, 6:10] = 0
@@ -157,22 +140,6 @@ def test_images_of_a_hit_see_the_plate_alike(pattern: Pattern) -> None:
     solid = np.array([scene.is_solid(*place) for place in places])
     assert 0.0 < solid.mean() < 1.0
     assert (solid == solid[:1]).all()
-
-
-def test_sobol_hits_fill_the_irreducible_part_evenly() -> None:
-    shots = make_shots(STRAIGHT, HITS.model_copy(update={"replicates": 1}), plate(SLOTS))
-    boxes = np.histogram2d(shots.hit_y, shots.hit_z, bins=16, range=[[0.0, 4 * MM], [0.0, 8 * MM]])[0]
-    assert (boxes == 4).all()
-
-
-def test_a_grid_is_the_grid_of_the_whole_cell() -> None:
-    part, whole = (
-        make_shots(STRAIGHT, Hits(sampling="grid", count=count, irreducible=count == 32), plate(SLOTS))
-        for count in (32, 256)
-    )
-    inside = (whole.hit_y > 0.0) & (whole.hit_y < 4 * MM) & (whole.hit_z > 0.0)
-    np.testing.assert_allclose(part.hit_y, whole.hit_y[inside], atol=1e-9)
-    np.testing.assert_allclose(part.hit_z, whole.hit_z[inside], atol=1e-9)
 
 
 @pytest.mark.parametrize("name", ["obliquity", "azimuth", "pitch", "yaw", "spin"])
