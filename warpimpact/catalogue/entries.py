@@ -9,27 +9,14 @@ from typing import Annotated, Any
 from pydantic import Field, TypeAdapter, ValidationError, ValidationInfo, field_validator
 
 from warpimpact.catalogue.strength import NINETY, Resistance
-from warpimpact.scene import AnyCore, Core
+from warpimpact.scene import AnyCore, Core, units
 from warpimpact.scene.model import Model
 from warpimpact.scene.problems import complaint
-from warpimpact.scene.units import (
-    Length,
-    NonNegativeNumber,
-    Number,
-    Obliquity,
-    PositiveDensity,
-    PositiveLength,
-    PositiveMass,
-    PositiveSpeed,
-    PositiveStress,
-    Speed,
-    Title,
-)
 
 CORE: TypeAdapter[Core] = TypeAdapter(AnyCore)
-OBLIQUITY: TypeAdapter[float] = TypeAdapter(Obliquity)
-Name = Annotated[Title, Field(min_length=1, max_length=80)]
-Share = Annotated[Number, Field(ge=0, le=1)]
+OBLIQUITY: TypeAdapter[float] = TypeAdapter(units.Obliquity)
+Name = Annotated[units.Title, Field(min_length=1, max_length=80)]
+Share = Annotated[units.Number, Field(ge=0, le=1)]
 
 
 class Velocity(Model):
@@ -43,9 +30,9 @@ class Velocity(Model):
     """
 
     standard: Name
-    value: PositiveSpeed
-    tolerance: Speed | None = None
-    range: PositiveLength | None = None
+    value: units.PositiveSpeed
+    tolerance: units.Speed | None = None
+    range: units.PositiveLength | None = None
 
 
 class Threat(Model):
@@ -67,14 +54,14 @@ class Threat(Model):
     name: Name
     aliases: tuple[Name, ...] = ()
     shape: AnyCore | None = Field(None, alias="core")
-    core_density: PositiveDensity | None = None
-    core_mass: PositiveMass | None = None
-    core_material: Title = ""
-    core_hardness: Title = ""
-    bullet_mass: PositiveMass | None = None
+    core_density: units.PositiveDensity | None = None
+    core_mass: units.PositiveMass | None = None
+    core_material: units.Title = ""
+    core_hardness: units.Title = ""
+    bullet_mass: units.PositiveMass | None = None
     velocities: tuple[Velocity, ...] = ()
-    known: dict[str, Title]
-    assumed: dict[str, Title] = Field(default_factory=dict)
+    known: dict[str, units.Title]
+    assumed: dict[str, units.Title] = Field(default_factory=dict)
 
     @field_validator("shape", mode="before")
     @classmethod
@@ -147,29 +134,29 @@ class Material(Model):
 
     name: Name
     aliases: tuple[Name, ...] = ()
-    density: PositiveDensity
-    resistance: PositiveStress
-    resistance_low: PositiveStress | None = None
-    resistance_high: PositiveStress | None = None
-    thickness_exponent: Number = 0.0
-    shear_coefficient: NonNegativeNumber = 0.05
-    linear: NonNegativeNumber = 0.0
-    quadratic: NonNegativeNumber = 0.0
-    onset: NonNegativeNumber = 0.005
+    density: units.PositiveDensity
+    resistance: units.PositiveStress
+    resistance_low: units.PositiveStress | None = None
+    resistance_high: units.PositiveStress | None = None
+    thickness_exponent: units.Number = 0.0
+    shear_coefficient: units.NonNegativeNumber = 0.05
+    linear: units.NonNegativeNumber = 0.0
+    quadratic: units.NonNegativeNumber = 0.0
+    onset: units.NonNegativeNumber = 0.005
     rows: dict[str, Annotated[int, Field(ge=1)]] = Field(default_factory=dict)
-    sources: tuple[Title, ...] = ()
-    thickness_low: Length = 0.0
-    thickness_high: Length | None = None
-    calibres_low: NonNegativeNumber = 0.0
-    calibres_high: NonNegativeNumber | None = None
-    obliquity_low: Obliquity = 0.0
-    obliquity_high: Obliquity | None = None
+    sources: tuple[units.Title, ...] = ()
+    thickness_low: units.Length = 0.0
+    thickness_high: units.Length | None = None
+    calibres_low: units.NonNegativeNumber = 0.0
+    calibres_high: units.NonNegativeNumber | None = None
+    obliquity_low: units.Obliquity = 0.0
+    obliquity_high: units.Obliquity | None = None
     misfit: Share | None = None
-    misfit_p90: NonNegativeNumber | None = None
+    misfit_p90: units.NonNegativeNumber | None = None
     coverage: Share | None = None
-    hardness: NonNegativeNumber | None = None
-    known: dict[str, Title] = Field(default_factory=dict)
-    assumed: dict[str, Title] = Field(default_factory=dict)
+    hardness: units.NonNegativeNumber | None = None
+    known: dict[str, units.Title] = Field(default_factory=dict)
+    assumed: dict[str, units.Title] = Field(default_factory=dict)
 
     def resistance_at(self, calibres: float) -> Resistance:
         """Resistance of a plate by the numbers of the entry alone, with its thickness in diameters of the core."""

@@ -134,7 +134,8 @@ def _numbers(file: str, header: list[str], rows: Iterator[tuple[int, list[str]]]
     for number, row in rows:
         line = f"{file}, line {number}:"
         if len(row) != len(header):
-            raise ValueError(f'{line} got "{brief(",".join(row))}", but a row has {len(header)} finite numbers')
+            got = f'{line} got "{brief(",".join(row))}", but a row has {len(header)} finite numbers'
+            raise ValueError(got + ", separated by commas" * (len(row) > len(header)))
         for place in places:
             try:
                 value = float(row[place])

@@ -3,7 +3,6 @@
 import inspect
 import re
 from collections.abc import Mapping
-from copy import deepcopy
 from typing import Any, ClassVar, Self
 
 import numpy as np
@@ -25,14 +24,6 @@ class Model(BaseModel):
     model_config = ConfigDict(frozen=True, extra="forbid")
     in_python: ClassVar[tuple[str, ...]] = ()
     """Keys that files do not have."""
-
-    @classmethod
-    def __pydantic_init_subclass__(cls, **kwargs: Any) -> None:
-        """Give the class a signature of names and defaults: types of fields would fill the first screen of `help`."""
-        super().__pydantic_init_subclass__(**kwargs)
-        fields = inspect.signature(cls).parameters.values()
-        short = [inspect.Parameter(field.name, field.kind, default=field.default) for field in fields]
-        cls.__signature__ = inspect.Signature(short)
 
     @classmethod
     def __get_pydantic_json_schema__(cls, core_schema: CoreSchema, handler: GetJsonSchemaHandler) -> JsonSchemaValue:
@@ -74,13 +65,13 @@ class Model(BaseModel):
 
         Args:
             update: new values of fields, as the model takes them; file names are relative to the working directory.
-            deep: whether the unchanged values are copied, too.
+            deep: without effect, as values cannot change.
 
         Raises:
             ValidationError: a field is unknown, or the copy is not valid.
         """
         kept = {name: value for name, value in self if name in self.model_fields_set}
-        return type(self).model_validate((deepcopy(kept) if deep else kept) | dict(update or {}))
+        return type(self).model_validate(kept | dict(update or {}))
 
     def __eq__(self, other: object) -> bool:
         """Whether all fields are equal. Cached values do not count."""

@@ -7,27 +7,18 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Self
 import numpy as np
 from pydantic import BaseModel, Field, ModelWrapValidatorHandler, ValidationInfo, field_validator, model_validator
 
+from . import units
 from .exclusions import AREAL_DENSITY, BY_PATH, BY_TIME, MARGIN, SIZE, THICKNESS, check_together
 from .model import Array, Model
 from .patterns import AnyPattern, NoPattern, Pattern
 from .patterns.geometry import BoolArray
-from .units import (
-    NonNegativeNumber,
-    NonNegativeStress,
-    Number,
-    PositiveArealDensity,
-    PositiveDensity,
-    PositiveLength,
-    PositiveTime,
-    Title,
-)
 
 INTERVAL = 1.0e-6
 """Default of Δt_β if Δs_β is not given [s], as in the paper's rows (docs/model.md §4)."""
 
 
 class _Weight(BaseModel):
-    areal_density: PositiveArealDensity
+    areal_density: units.PositiveArealDensity
 
 
 class Plate(Model):
@@ -54,22 +45,22 @@ class Plate(Model):
         pattern: shape and lattice of the holes; with a margin, only the holes on the plate.
     """
 
-    thickness: PositiveLength
+    thickness: units.PositiveLength
     if TYPE_CHECKING:  # a material gives the resistance; the other two are taken, but are no fields
-        resistance: NonNegativeStress = 0.0
+        resistance: units.NonNegativeStress = 0.0
         threat: Any = None
         obliquity: float | str | None = None
     else:
-        resistance: NonNegativeStress
-    shear_coefficient: NonNegativeNumber = 0.0
-    degradation: Annotated[Number, Field(ge=0, le=1)] = 1.0
-    degradation_interval: PositiveTime | None = None
-    degradation_distance: PositiveLength | None = None
-    degradation_length: PositiveLength = 0.5e-3
-    density: PositiveDensity = 7850.0
-    material: Title | None = None
-    size: tuple[PositiveLength, PositiveLength] | None = None
-    margin: PositiveLength | None = None
+        resistance: units.NonNegativeStress
+    shear_coefficient: units.NonNegativeNumber = 0.0
+    degradation: Annotated[units.Number, Field(ge=0, le=1)] = 1.0
+    degradation_interval: units.PositiveTime | None = None
+    degradation_distance: units.PositiveLength | None = None
+    degradation_length: units.PositiveLength = 0.5e-3
+    density: units.PositiveDensity = 7850.0
+    material: units.Title | None = None
+    size: tuple[units.PositiveLength, units.PositiveLength] | None = None
+    margin: units.PositiveLength | None = None
     pattern: AnyPattern = NoPattern()
     in_python: ClassVar[tuple[str, ...]] = ("threat", "obliquity")
     of_material: ClassVar[Callable[[type["Plate"], dict[str, Any]], dict[str, Any]] | None] = None

@@ -10,22 +10,7 @@ from typing import Annotated, Any, NamedTuple
 
 from pydantic import Field
 
-from .units import (
-    Angle,
-    AngularVelocity,
-    Length,
-    NonNegativeNumber,
-    NonNegativeStress,
-    Number,
-    Obliquity,
-    PositiveDensity,
-    PositiveLength,
-    PositiveMass,
-    PositiveSpeed,
-    PositiveStress,
-    PositiveTime,
-    Tilt,
-)
+from . import units
 
 
 class Quantity(NamedTuple):
@@ -50,42 +35,35 @@ class Quantity(NamedTuple):
     column: str | None = None
 
 
+_SHARE = Annotated[units.Number, Field(ge=0, le=1)]
+_PLACE = "place of its origin in the plane of the plate"
 QUANTITIES: Mapping[str, Quantity] = {
-    "hit_y": Quantity("hits", Length, "hit point on the front face, y", scatters=False),
-    "hit_z": Quantity("hits", Length, "hit point on the front face, z", scatters=False),
-    "velocity": Quantity("impact", PositiveSpeed, "impact velocity", column="impact_velocity"),
-    "obliquity": Quantity("impact", Obliquity, "angle between line of fire and plate normal"),
-    "azimuth": Quantity("impact", Angle, "direction of the obliquity, from +y towards +z"),
-    "pitch": Quantity(
-        "impact", Tilt, "pitch of the core on impact, relative to the line of fire", column="impact_pitch"
-    ),
-    "yaw": Quantity("impact", Tilt, "yaw of the core on impact, relative to the line of fire", column="impact_yaw"),
-    "spin": Quantity("impact", AngularVelocity, "spin of the core about its axis on impact"),
-    "resistance": Quantity("plate", NonNegativeStress, "resistance", by_layer=True),
-    "shear_coefficient": Quantity("plate", NonNegativeNumber, "friction per normal stress", by_layer=True),
+    "hit_y": Quantity("hits", units.Length, "hit point on the front face, y", scatters=False),
+    "hit_z": Quantity("hits", units.Length, "hit point on the front face, z", scatters=False),
+    "velocity": Quantity("impact", units.PositiveSpeed, "impact velocity", column="impact_velocity"),
+    "obliquity": Quantity("impact", units.Obliquity, "angle between line of fire and plate normal"),
+    "azimuth": Quantity("impact", units.Angle, "direction of the obliquity, from +y towards +z"),
+    "pitch": Quantity("impact", units.Tilt, "pitch of the core, relative to the line of fire", column="impact_pitch"),
+    "yaw": Quantity("impact", units.Tilt, "yaw of the core, relative to the line of fire", column="impact_yaw"),
+    "spin": Quantity("impact", units.AngularVelocity, "spin of the core about its axis on impact"),
+    "resistance": Quantity("plate", units.NonNegativeStress, "resistance", by_layer=True),
+    "shear_coefficient": Quantity("plate", units.NonNegativeNumber, "friction per normal stress", by_layer=True),
     "degradation": Quantity(
-        "plate",
-        Annotated[Number, Field(ge=0, le=1)],
-        "share that an interval of contact leaves of the resistance",
-        by_layer=True,
+        "plate", _SHARE, "share of the resistance that an interval of contact leaves", by_layer=True
     ),
-    "thickness": Quantity("plate", PositiveLength, "thickness", by_layer=True),
-    "mass": Quantity("core", PositiveMass, "mass of the core"),
-    "strength": Quantity("core", PositiveStress, "strength of the core, a nominal bending stress"),
-    "offset_y": Quantity(
-        "layer", Length, "place of its origin in the plane of the plate, y", by_layer=True, listed=False
-    ),
-    "offset_z": Quantity(
-        "layer", Length, "place of its origin in the plane of the plate, z", by_layer=True, listed=False
-    ),
-    "degradation_interval": Quantity("plate", PositiveTime, scatters=False, listed=False),
-    "degradation_distance": Quantity("plate", PositiveLength, scatters=False, listed=False),
-    "degradation_length": Quantity("plate", PositiveLength, "length within which it weakens", scatters=False),
-    "density": Quantity("plate", PositiveDensity, scatters=False, listed=False),
-    "static": Quantity("interaction", NonNegativeNumber, "normal stress at rest per resistance", scatters=False),
-    "linear": Quantity("interaction", NonNegativeNumber, "linear coefficient of the normal stress", scatters=False),
-    "quadratic": Quantity("interaction", NonNegativeNumber, "quadratic coefficient of it", scatters=False),
-    "onset": Quantity("interaction", NonNegativeNumber, "closing speed of full contact per speed", scatters=False),
+    "thickness": Quantity("plate", units.PositiveLength, "thickness", by_layer=True),
+    "mass": Quantity("core", units.PositiveMass, "mass of the core"),
+    "strength": Quantity("core", units.PositiveStress, "strength of the core, a nominal bending stress"),
+    "offset_y": Quantity("layer", units.Length, f"{_PLACE}, y", by_layer=True, listed=False),
+    "offset_z": Quantity("layer", units.Length, f"{_PLACE}, z", by_layer=True, listed=False),
+    "degradation_interval": Quantity("plate", units.PositiveTime, scatters=False, listed=False),
+    "degradation_distance": Quantity("plate", units.PositiveLength, scatters=False, listed=False),
+    "degradation_length": Quantity("plate", units.PositiveLength, "length within which it weakens", scatters=False),
+    "density": Quantity("plate", units.PositiveDensity, scatters=False, listed=False),
+    "static": Quantity("interaction", units.NonNegativeNumber, "normal stress at rest per resistance", scatters=False),
+    "linear": Quantity("interaction", units.NonNegativeNumber, "linear part of the normal stress", scatters=False),
+    "quadratic": Quantity("interaction", units.NonNegativeNumber, "quadratic part of it", scatters=False),
+    "onset": Quantity("interaction", units.NonNegativeNumber, "closing speed of full contact", scatters=False),
 }
 """All quantities by name."""
 SCATTERED = {name: quantity for name, quantity in QUANTITIES.items() if quantity.scatters}

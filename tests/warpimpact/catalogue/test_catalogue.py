@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from warpimpact.analysis.numbers import text_of
-from warpimpact.catalogue.catalogue import Catalogue
+from warpimpact.catalogue.catalogue import Catalogue, flow_entry
 from warpimpact.catalogue.catalogue_view import catalogue_view, material_view, threat_view
 from warpimpact.catalogue.entries import Material, Threat
 
@@ -113,3 +113,8 @@ def test_names_match_in_any_case_and_by_aliases(spelling: str, name: str) -> Non
 def test_of_an_unclear_name_those_it_may_mean_are_listed(spelling: str, said: str) -> None:
     with pytest.raises(ValueError, match=said):
         Catalogue().entry(spelling)
+
+
+def test_of_a_material_without_constants_of_the_continuum_those_with_them_are_listed() -> None:
+    with pytest.raises(ValueError, match=r"resistance, but no constants of the continuum; .*AA6082-T6.* have them"):
+        flow_entry("hha class 1")

@@ -158,3 +158,85 @@ def test_what_means_two_things_is_refused_with_both_spellings(kind: object, text
         TypeAdapter(kind).validate_python(text)
     message = str(caught.value.errors()[0]["ctx"]["error"])
     assert all(spelling in message for spelling in spellings)
+
+
+TYPED = {
+    "4mm": 4e-3,
+    " 4 mm ": 4e-3,
+    "4.0mm": 4e-3,
+    "+4 mm": 4e-3,
+    ".4 cm": 4e-3,
+    "4e-3 m": 4e-3,
+    "4000 µm": 4e-3,
+    "4000um": 4e-3,
+    "4000 microns": 4e-3,
+    "1/4 in": 6.35e-3,
+    "1/4inch": 6.35e-3,
+    "250 thou": 6.35e-3,
+    "0,5 ft": 0.1524,
+    "4 millimeters": 4e-3,
+    "4 (mm)": 4e-3,
+    "4 MM": None,
+    "4 Mm": None,
+    "4": None,
+    "4 mm thick": None,
+    "~4 mm": None,
+    "4-5 mm": None,
+    "4 to 5 mm": None,
+    "4 or 5 mm": None,
+    "approx. 4 mm": None,
+    "≈4 mm": None,
+    ">4 mm": None,
+    "4 mm?": None,
+    "4 mm, 5 mm": None,
+    "4 mm / 2": None,
+    "2 x 4 mm": None,
+    "2x4mm": None,
+    "4'": None,
+    '4"': None,
+    "1 1/4 in": None,
+    "1.250,5 mm": None,
+    "4 mmm": None,
+    "4 m m": None,
+    "four mm": None,
+    "4 mm (nominal)": None,
+    "1e3": None,
+}
+
+
+@pytest.mark.parametrize(("text", "si"), TYPED.items(), ids=TYPED)
+def test_what_people_type_is_read_as_meant_or_refused(text: str, si: float | None) -> None:
+    if si is None:
+        with pytest.raises(ValidationError, match=r"which|whose"):
+            TypeAdapter(units.Length).validate_python(text)
+    else:
+        assert TypeAdapter(units.Length).validate_python(text) == pytest.approx(si, rel=1e-14)
+
+
+@pytest.mark.parametrize(
+    ("kind", "text", "si"),
+    [
+        (units.Mass, "5.25 gr", None),
+        (units.Mass, "5.25 grams", 5.25e-3),
+        (units.Stress, "0.5 gpa", None),
+        (units.Stress, "2,6 GPa", 2.6e9),
+        (units.Stress, "500 Mpa", None),
+        (units.Stress, "400 ksi", 2757902917.2673444),
+        (units.Speed, "1e3 m/s", 1e3),
+        (units.Speed, "800m/s", 800.0),
+        (units.Speed, "800 m/sec", 800.0),
+        (units.Speed, "800 ms", None),
+        (units.Speed, "800 m s", None),
+        (units.Density, "7,85 g/cc", 7850.0),
+        (units.Angle, "-20°", -math.pi / 9),
+        (units.Angle, "20 degrees", math.pi / 9),
+        (units.Number, "50 %", 0.5),
+        (units.Number, "1/2", 0.5),
+    ],
+)
+def test_what_people_type_of_other_quantities(kind: object, text: str, si: float | None) -> None:
+    if si is None:
+        with pytest.raises(ValidationError, match=r"which|whose"):
+            TypeAdapter(kind).validate_python(text)
+    else:
+        assert TypeAdapter(kind).validate_python(text) == pytest.approx(si, rel=1e-14)
