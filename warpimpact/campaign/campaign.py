@@ -23,6 +23,7 @@ from pydantic import (
     model_validator,
 )
 
+from ..catalogue.strength import Resistance
 from ..results.kinds import CAMPAIGN
 from ..results.measures import Measure
 from ..results.variables import BENDING_VARIABLES, BROKEN_VARIABLES, DEPTH
@@ -269,8 +270,7 @@ class Campaign(Model):
         """
 
         def of_its_thickness(plate: Plate, solid: Plate) -> Plate:
-            of = self.interaction, self.core, plate, self.impact.obliquity, self.catalogue
-            known = None if solid == plate else known_resistance(*of, solid.thickness)
+            known = None if solid == plate else self.catalogue_resistance(plate, solid.thickness)
             return solid if known is None else solid.model_copy(update={"resistance": known.median})
 
         pairs = zip(self.target.layers, self.target.solid.layers, strict=True)
@@ -293,6 +293,11 @@ class Campaign(Model):
             reference.__dict__.pop(name, None)
         reference._source, reference._sampler = "", sampler
         return reference
+
+    def catalogue_resistance(self, plate: Plate, thickness: float | None = None) -> Resistance | None:
+        """The resistance of a plate, or of one of another thickness [m], by the catalogue; None where Y is the
+        user's."""
+        return known_resistance(self.interaction, self.core, plate, self.impact.obliquity, self.catalogue, thickness)
 
     def lacking(self, measure: Measure) -> str:
         """Keys that the campaign needs for a measure of its hits and does not have; empty if it lacks none."""

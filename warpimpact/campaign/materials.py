@@ -18,7 +18,7 @@ from numpy.typing import ArrayLike
 from pydantic import ValidationError
 
 from ..catalogue.catalogue import Catalogue
-from ..catalogue.entries import CORE, OBLIQUITY, Material, Threat, Velocity
+from ..catalogue.entries import CORE, OBLIQUITY, Material, Threat
 from ..catalogue.strength import NINETY, Resistance
 from ..scene import Core, Interaction, Layer, Plate
 from ..scene.model import Array
@@ -64,19 +64,16 @@ def with_threat(data: _Table, catalogue: Catalogue, name: str, *, needs_velocity
     Raises:
         CampaignError: the catalogue has no such threat, or its entry lacks a needed value.
     """
-    core = data.get("core")
+    core, impact = data.get("core"), data.get("impact", {})
     threat = _threat(core, catalogue, f"{name}: core")
     if threat is None:
         return data
     assert isinstance(core, dict)  # it names a threat
     resolved = data | {"core": core_of(threat, core, f"{name}: core")}
-    impact = data.get("impact", {})
     if not isinstance(impact, dict) or "velocity" in impact:
         return resolved
-    if not needs_velocity and not threat.velocities and core.get("standard") is None:
-        return resolved | {"impact": {"velocity": SEARCHED_FROM} | impact}
-    velocity = _velocity(threat, core.get("standard"), f"{name}: core.standard")
-    return resolved | {"impact": {"velocity": _shot(velocity, core, f"{name}: core.velocity_tolerance")} | impact}
+    velocity = _velocity(threat, core, f"{name}: core", needs_velocity=needs_velocity)
+    return resolved | {"impact": {"velocity": velocity} | impact}
 
 
 def with_cores(data: _Table, catalogue: Catalogue, name: str) -> _Table:
@@ -89,10 +86,9 @@ def with_cores(data: _Table, catalogue: Catalogue, name: str) -> _Table:
     if (threat := _threat(core, catalogue, f"{name}: core")) is not None:
         resolved["core"] = core_of(threat, core, f"{name}: core")
     if isinstance(shots, list):
-        named = (f"{name}: shot[{place}]" for place in range(len(shots)))
         resolved["shot"] = [
-            with_cores(shot, catalogue, place) if isinstance(shot, dict) else shot
-            for shot, place in zip(shots, named, strict=True)
+            with_cores(shot, catalogue, f"{name}: shot[{k}]") if isinstance(shot, dict) else shot
+            for k, shot in enumerate(shots)
         ]
     return resolved
 
@@ -125,24 +121,21 @@ def core_of(threat: Threat, given: Any, place: str) -> _Table:
     return base | given_core
 
 
-def _velocity(threat: Threat, standard: Any, place: str) -> Velocity:
-    known = {velocity.standard: velocity for velocity in threat.velocities}
+def _velocity(threat: Threat, core: Mapping[str, Any], place: str, *, needs_velocity: bool) -> Any:
+    """The impact velocity of a threat by its standard, or its distribution."""
+    known, standard = {velocity.standard: velocity for velocity in threat.velocities}, core.get("standard")
+    if not known and standard is None and not needs_velocity:
+        return SEARCHED_FROM
     if not known:
-        key = f"{place.removesuffix('standard')}threat"
-        raise CampaignError(f'{key}: the catalogue has no velocity of "{threat.name}"; give impact.velocity')
-    if standard is None:
-        return threat.velocities[0]
-    if standard not in known:
-        raise CampaignError(f"{place}: got {quoted(standard)}, but it must be one of {', '.join(known)}")
-    return known[standard]
-
-
-def _shot(velocity: Velocity, core: Mapping[str, Any], place: str) -> Any:
-    """An impact velocity, or its distribution."""
+        raise CampaignError(f'{place}.threat: the catalogue has no velocity of "{threat.name}"; give impact.velocity')
+    if standard is not None and standard not in known:
+        raise CampaignError(f"{place}.standard: got {quoted(standard)}, but it must be one of {', '.join(known)}")
+    velocity = threat.velocities[0] if standard is None else known[standard]
     if core.get("velocity_tolerance") is not True:
         return velocity.value
     if velocity.tolerance is None:
-        raise CampaignError(f"{place}: the catalogue has no tolerance of {velocity.standard}; give impact.velocity")
+        unknown = f"the catalogue has no tolerance of {velocity.standard}; give impact.velocity"
+        raise CampaignError(f"{place}.velocity_tolerance: {unknown}")
     low, high = velocity.value - velocity.tolerance, velocity.value + velocity.tolerance
     return {"distribution": "uniform", "low": low, "high": high}
 
@@ -170,7 +163,14 @@ def with_materials(data: _Table, catalogue: Catalogue, name: str, folder: Path =
     interaction = data.get("interaction", {})
     if not materials or not isinstance(interaction, dict):
         return resolved
-    return resolved | {"interaction": _law(materials, interaction, name) | interaction}
+    law: dict[str, float] = {}  # one for the whole target
+    for key in _LAW:
+        values = {getattr(material, key): place for place, material in materials.items()}
+        if len(values) > 1 and key not in interaction:
+            places = " and ".join(f"{value:g} ({place})" for value, place in values.items())
+            raise CampaignError(f"{name}: interaction.{key}: the materials were found with {places}; give one value")
+        law[key] = next(iter(values))
+    return resolved | {"interaction": law | interaction}
 
 
 def _resistance(
@@ -239,18 +239,6 @@ def known_resistance(
 def calibres_of(core: Core, plate: Plate) -> float:
     """Thickness of a plate in diameters of the core."""
     return plate.thickness / (2.0 * core.max_radius)
-
-
-def _law(materials: Mapping[str, Material], given: Mapping[str, Any], name: str) -> dict[str, float]:
-    """The law of resistance of the materials. The whole target has one law."""
-    law: dict[str, float] = {}
-    for key in _LAW:
-        values = {getattr(material, key): place for place, material in materials.items()}
-        if len(values) > 1 and key not in given:
-            places = " and ".join(f"{value:g} ({place})" for value, place in values.items())
-            raise CampaignError(f"{name}: interaction.{key}: the materials were found with {places}; give one value")
-        law[key] = next(iter(values))
-    return law
 
 
 @dataclass(frozen=True)

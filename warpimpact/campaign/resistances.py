@@ -9,10 +9,10 @@ import numpy as np
 
 from ..catalogue.catalogue import Catalogue
 from ..catalogue.entries import Material, Threat
-from ..catalogue.strength import NINETY, Resistance
+from ..catalogue.strength import NINETY
 from ..scene import Core, Plate
 from .campaign import Campaign
-from .materials import SAME, known_resistance, resistance_under
+from .materials import SAME, resistance_under
 
 Curve = tuple[tuple[float, ...], tuple[float, ...]]
 
@@ -22,21 +22,15 @@ the width within which the fit takes thicknesses as nearly equal (`catalogue.str
 Linear interpolation is wrong by at most 0.1 %."""
 
 
-def catalogue_resistance(campaign: Campaign, plate: Plate, thickness: float | None = None) -> Resistance | None:
-    """The resistance of a plate, or of one of another thickness [m], by the catalogue; None where Y is the user's."""
-    impact = campaign.impact
-    return known_resistance(campaign.interaction, campaign.core, plate, impact.obliquity, campaign.catalogue, thickness)
-
-
 def resistance_by_thickness(campaign: Campaign, layer: int, thickest: float) -> Curve | None:
     """Thicknesses of a layer, ascending to the thickest [m], and its resistance there, where the catalogue gives it;
     None elsewhere. The resistance of the layer is 1."""
     plate = campaign.target.layers[layer]
-    known = None if is_drawn(campaign, "resistance", [layer]) else catalogue_resistance(campaign, plate)
+    known = None if is_drawn(campaign, "resistance", [layer]) else campaign.catalogue_resistance(plate)
     if known is None:
         return None
     thicknesses = np.geomspace(_THINNEST * thickest, thickest, _POINTS).tolist()
-    others = (catalogue_resistance(campaign, plate, thickness) for thickness in thicknesses)
+    others = (campaign.catalogue_resistance(plate, thickness) for thickness in thicknesses)
     return tuple(thicknesses), tuple(other.median / known.median for other in others if other is not None)
 
 
@@ -58,7 +52,7 @@ def limit_velocity_factors(campaign: Campaign) -> tuple[float, float] | None:
     alone = not campaign.layer and plate == plate.solid and plate.degradation == 1.0
     if not alone or law.linear or law.quadratic or law.free_surface:
         return None
-    known = catalogue_resistance(campaign, plate)
+    known = campaign.catalogue_resistance(plate)
     if known is None or not known.deviation:
         return None
     factor = math.exp(0.5 * NINETY * math.hypot(known.deviation, known.test))

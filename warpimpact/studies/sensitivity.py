@@ -19,7 +19,7 @@ from pydantic import ValidationError
 from warpimpact.analysis.estimates import measures_named, measures_of_runs
 from warpimpact.campaign.campaign import Campaign
 from warpimpact.campaign.materials import StraightPassage
-from warpimpact.campaign.resistances import catalogue_resistance, is_drawn
+from warpimpact.campaign.resistances import is_drawn
 from warpimpact.results import variables as v
 from warpimpact.results.dataset import narrow_dataset
 from warpimpact.results.measures import Measure, estimate_from
@@ -222,7 +222,7 @@ def _with(campaign: Campaign, table: str, **keys: Any) -> Campaign:
 
 def _catalogue_interval(campaign: Campaign, plate: Plate) -> tuple[float, float] | None:
     """90 % interval of the catalogue's Y of a plate [Pa]; None where Y is the user's."""
-    known = catalogue_resistance(campaign, plate)
+    known = campaign.catalogue_resistance(plate)
     return known.ends if known is not None and known.deviation else None
 
 

@@ -8,7 +8,7 @@ import pytest
 
 from warpimpact import Campaign
 from warpimpact.campaign.materials import SEARCHED_FROM, StraightPassage
-from warpimpact.campaign.resistances import catalogue_names, catalogue_resistance, limit_velocity_factors
+from warpimpact.campaign.resistances import catalogue_names, limit_velocity_factors
 from warpimpact.campaign.tested_range import outside_tested_range, range_line
 from warpimpact.campaign.text import CampaignError
 from warpimpact.identification.fit_file import fit_from
@@ -96,7 +96,7 @@ def test_under_another_law_a_material_keeps_its_limit_velocity(thickness: str, o
         """At the ends of the interval of Y, and at its median."""
         tables = TABLES | {"plate": plate, "interaction": interaction, "impact": impact}
         campaign = Campaign.from_text(json.dumps(tables | {"catalogue": None}), name="named.toml", folder=Path())
-        known = catalogue_resistance(campaign, campaign.plate)
+        known = campaign.catalogue_resistance(campaign.plate)
         assert known is not None
         target = campaign.plate
         given = campaign.interaction, target.shear_coefficient, target.thickness, target.density
