@@ -6,7 +6,7 @@ from numpy.typing import NDArray
 from scipy import special
 
 from warpimpact.firing.plan import Langlie, MilStd662F, Procedure
-from warpimpact.firing.simulate import Firings, Response, fire, reported
+from warpimpact.firing.simulate import Firings, Response, fire, reports
 from warpimpact.results import firing as f
 from warpimpact.statistics.acceptance import acceptance
 
@@ -42,8 +42,8 @@ def test_ten_shots_report_what_all_1024_sequences_of_answers_give(name: str) -> 
     procedure = PROCEDURES[name]
     firings, probability = every_path(procedure)
     assert probability.sum() == pytest.approx(1.0, abs=1e-9)
-    drawn = reported(simulated(procedure, NORMAL, 4000), procedure)
-    exact = reported(firings, procedure)
+    drawn = reports(simulated(procedure, NORMAL, 4000), procedure)
+    exact = reports(firings, procedure)
     for one, other in ((exact[name], drawn[name]) for name in (f.V50, f.SPREAD) if np.isfinite(exact[name]).any()):
         known, found = np.isfinite(one), other[np.isfinite(other)]
         share = probability[known].sum()
@@ -62,7 +62,7 @@ def test_a_target_of_one_limit_is_enclosed(name: str) -> None:
     procedure = PROCEDURES[name].model_copy(update={"shots": 16} if name == "langlie" else {"pairs": 1})
     firings = simulated(procedure, np.array([787.0]), 5)
     assert (firings.perforated == (firings.velocity > 787.0))[firings.used].all()
-    found = reported(firings, procedure)
+    found = reports(firings, procedure)
     below = np.where(firings.used & ~firings.perforated, firings.velocity, -np.inf).max(axis=1)
     above = np.where(firings.used & firings.perforated, firings.velocity, np.inf).min(axis=1)
     assert (below < 787.0).all()
@@ -89,11 +89,11 @@ def test_coverage_counted_on_1000_tests_is_that_of_all_sequences() -> None:
     """How often the 95 % interval of ten shots contains V50: short tests claim too much."""
     procedure = PROCEDURES["langlie"]
     firings, probability = every_path(procedure)
-    exact = reported(firings, procedure)
+    exact = reports(firings, procedure)
     known = np.isfinite(exact[f.V50]) & ~np.isnan(exact[f.V50_LOW])
     held = (exact[f.V50_LOW] <= MEAN) & (exact[f.V50_HIGH] >= MEAN)
     coverage = probability[known & held].sum() / probability[known].sum()
-    drawn = reported(simulated(procedure, NORMAL, 1000), procedure)
+    drawn = reports(simulated(procedure, NORMAL, 1000), procedure)
     counted = ((drawn[f.V50_LOW] <= MEAN) & (drawn[f.V50_HIGH] >= MEAN))[~np.isnan(drawn[f.V50_LOW])]
     assert counted.mean() == pytest.approx(coverage, abs=4.0 * np.sqrt(coverage * (1.0 - coverage) / len(counted)))
     assert 0.6 < coverage < 0.94

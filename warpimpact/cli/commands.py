@@ -263,7 +263,7 @@ EXPERT = (
         "a campaign go to TEST_limits.nc, which a later call takes with --resume.",
         [
             file("test", "SHOTS.csv|TEST.toml", "fired shots, or a test to simulate"),
-            output("FILE", "figure SHOTS.png of shots, or result TEST.nc, whose figure is TEST.png"),
+            output("FILE", "result: SHOTS_v50.csv of shots, or TEST.nc; the figure has its name with .png"),
             *COMPUTING,
             COUNT,
             *earlier("test", "an existing result with its figure and its limits"),

@@ -13,7 +13,7 @@ from typing import Any
 from warpimpact.campaign.schema import campaign_schema, file_schema
 from warpimpact.campaign.text import CampaignError
 from warpimpact.firing.plan import FiringTest
-from warpimpact.identification.fit_file import FitFile
+from warpimpact.identification.fit import FitFile
 from warpimpact.optimisation.design import design_schema
 from warpimpact.results import kinds
 from warpimpact.scene.units import meant

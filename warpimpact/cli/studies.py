@@ -2,8 +2,12 @@
 
 import argparse
 import sys
+from contextlib import AbstractContextManager
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
+
+import pandas as pd
 
 from warpimpact.analysis.estimates import measures_of_runs
 from warpimpact.analysis.inspection import range_note
@@ -11,26 +15,23 @@ from warpimpact.analysis.numbers import text_of
 from warpimpact.campaign.campaign import Campaign
 from warpimpact.campaign.text import CampaignError
 from warpimpact.firing.plan import read_test
-from warpimpact.firing.simulate import response_of, simulate_test
+from warpimpact.firing.simulate import firing_view, response_of, simulate_test
 from warpimpact.firing.v50 import read_shots, v50
-from warpimpact.firing.view import firing_view
 from warpimpact.identification.computed_shots import fit_of_result
-from warpimpact.identification.fit_file import read_fit
-from warpimpact.identification.identify import FitProgress, identify
+from warpimpact.identification.fit import read_fit
+from warpimpact.identification.identify import identify
 from warpimpact.identification.posterior import material_draws, posterior_view
 from warpimpact.optimisation.design import read_design
-from warpimpact.optimisation.front_view import front_view
-from warpimpact.optimisation.optimise import folder_of, optimise_to_file
+from warpimpact.optimisation.front import folder_of, front_view
+from warpimpact.optimisation.optimise import optimise
 from warpimpact.plotting.front import front_figure
 from warpimpact.plotting.posterior import FIGURES
 from warpimpact.plotting.studies import firing_figure, limit_figure, sensitivity_figure, shots_figure, sweep_figure
 from warpimpact.results import files, front
-from warpimpact.results.kinds import FRONT, SWEEP
+from warpimpact.results.kinds import SWEEP
 from warpimpact.results.posterior_file import INTERRUPTED
-from warpimpact.runs.computer import computer
-from warpimpact.runs.executor import executor_for
+from warpimpact.runs.computer import Computer, computer
 from warpimpact.scene.units import PositiveLength, PositiveSpeed, quantity
-from warpimpact.solver.device import cores, find_device
 from warpimpact.studies.limit import check_measures, limit_to_file, warning_of
 from warpimpact.studies.limit_view import limit_view
 from warpimpact.studies.sensitivity import largest_move, sensitivity
@@ -40,7 +41,7 @@ from warpimpact.studies.sweep import read_sweep, run_sweep, sweep_view
 from .messages import say, warn
 from .paths import PICTURES, check_output, replaces, write_text
 from .progress import Step, show_progress, show_run
-from .run import computing, executor_of, failure_code
+from .run import computing, failure_code
 
 
 def limit_command(arguments: argparse.Namespace) -> int:
@@ -148,13 +149,16 @@ def test_command(arguments: argparse.Namespace) -> None:
 
 
 def _evaluate(arguments: argparse.Namespace) -> None:
-    picture = arguments.output or Path(arguments.test.stem + ".png")
-    check_output(picture, *PICTURES, overwrite=arguments.overwrite)
+    output = arguments.output or Path(f"{arguments.test.stem}_v50.csv")
+    picture = output.with_suffix(".png")
+    check_output(output, ".csv", overwrite=arguments.overwrite)
+    check_output(picture, overwrite=arguments.overwrite)
     shots = read_shots(arguments.test)
-    found = v50(*shots)
-    print(found)
-    shots_figure(shots, found, arguments.test.stem).savefig(picture, dpi=150)
-    print(f"figure in {picture}")
+    result = v50(*shots)
+    print(result)
+    write_text(pd.Series(asdict(result), name="value").to_csv(index_label="number"), output)
+    shots_figure(shots, result, arguments.test.stem).savefig(picture, dpi=150)
+    print(f"written to {output}, figure in {picture}")
 
 
 def _simulate(arguments: argparse.Namespace) -> None:
@@ -181,60 +185,45 @@ def optimise_command(arguments: argparse.Namespace) -> int:
     output = arguments.output or Path(arguments.design.stem + ".nc")
     check_output(output, ".nc", overwrite=True)
     picture = output.with_suffix(".png")
-    check_output(picture, *PICTURES, overwrite=replaces(arguments, output))
-    with (
-        show_progress(arguments, "design") as show,
-        executor_of(arguments) as executor,
-    ):
-        campaigns = optimise_to_file(
+    check_output(picture, overwrite=replaces(arguments, output))
+    with show_progress(arguments, "design") as show, _computer_of(arguments) as machine:
+        dataset = optimise(
             design,
             output,
-            device=executor,
+            device=machine,
             resume=arguments.resume,
             overwrite=arguments.overwrite,
-            progress=lambda now: show(Step(now.done, now.total, text=f"{now.front} on the front, {now.what}")),
-            tell=warn,
+            progress=lambda done, total, text: show(Step(done, total, text=text)),
+            warn=warn,
         )
-    dataset = files.read(output, FRONT)
     print(text_of(front_view(dataset)))
     front_figure(dataset, design.folder).savefig(picture, dpi=150)
-    beside = f", campaigns in {folder_of(output)}" if campaigns else ""
-    print(f"written to {output}, figure in {picture}{beside}")
+    campaigns = f", campaigns in {folder_of(output)}" if dataset.sizes["front"] else ""
+    print(f"written to {output}, figure in {picture}{campaigns}")
     return 0 if dataset.attrs[front.OUTCOME] == front.FEASIBLE else NONE_WITHIN_BOUNDS
 
 
-PROCESSES = 16
-"""Most processes of a fit, unless the user gives a number; each takes some 0.4 GB."""
-WORTHWHILE = 2.0
-"""Seconds of computing after which processes are started. A process needs as long until it computes."""
+def _computer_of(arguments: argparse.Namespace) -> AbstractContextManager[Computer]:
+    """Return the computer for --device, --workers and --scheduler."""
+    return computer(arguments.device, workers=arguments.workers, scheduler=arguments.scheduler, warn=warn)
 
 
 def identify_command(arguments: argparse.Namespace) -> int:
     by_elements = arguments.fit.suffix == ".nc"
     fit = fit_of_result(arguments.fit) if by_elements else read_fit(arguments.fit)
     output = arguments.output or Path(f"{arguments.fit.stem}_fit.nc" if by_elements else f"{arguments.fit.stem}.nc")
-    check_output(output, ".nc", overwrite=arguments.overwrite)
     pictures = {output.with_name(f"{output.stem}_{name}.png"): draw for name, draw in FIGURES.items()}
     table = output.with_suffix(".csv")
-    check_output(table, overwrite=arguments.overwrite)
-    for picture in pictures:
-        check_output(picture, *PICTURES, overwrite=arguments.overwrite)
-    for sentence in fit.warnings:
-        warn(sentence)
-    device, workers, scheduler = arguments.device, arguments.workers, arguments.scheduler
-    after = 0.0
-    if workers is None and scheduler is None and find_device(device).is_cpu:
-        workers, after = min(cores(), PROCESSES), WORTHWHILE
-    say(f"computes at most {fit.sampling.sets} sets of parameters, {fit.sampling.hits} hits of each shot")
-    with (
-        show_progress(arguments, "set") as show,
-        executor_for(device, workers=workers, scheduler=scheduler, apart=True, after=after) as executor,
-    ):
-        posterior = identify(
-            fit,
-            device=executor,
-            progress=lambda now: show(Step(now.done, now.total, text=_running(now))),
-        )
+    check_output(output, ".nc", overwrite=arguments.overwrite)
+    for path in (table, *pictures):
+        check_output(path, overwrite=arguments.overwrite)
+    if fit.warning:
+        warn(fit.warning)
+    sampling = fit.file.sampling
+    say(f"computes at most {sampling.sets} sets of parameters, {sampling.hits} hits of each shot")
+    with show_progress(arguments, "set") as show, _computer_of(arguments) as machine:
+        progress = lambda done, total, text: show(Step(done, total, text=text))  # noqa: E731
+        posterior = identify(fit, device=machine, progress=progress)
     files.write(posterior, output)
     print(text_of(posterior_view(posterior)))
     print(f"written to {output}")
@@ -245,8 +234,3 @@ def identify_command(arguments: argparse.Namespace) -> int:
         draw(posterior).savefig(picture, dpi=150)
         print(picture)
     return 130 if posterior.attrs[INTERRUPTED] else 0
-
-
-def _running(now: "FitProgress") -> str:
-    effective = "" if now.effective != now.effective else f", effective sample size {now.effective:.0f}"
-    return f"smallest misfit {now.misfit:.3g}{effective}"

@@ -5,15 +5,19 @@ The random numbers of shot k of test t depend on the seed, t and k alone.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+import json
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
+import pandas as pd
 import xarray
 from numpy.typing import NDArray
 from scipy import special
 
+from warpimpact.analysis.numbers import View
 from warpimpact.campaign.campaign import Campaign
 from warpimpact.campaign.text import CampaignError
 from warpimpact.firing.plan import FiringTest, MilStd662F, Procedure, Proof, Shot
@@ -27,8 +31,8 @@ from warpimpact.results.kinds import FIRING
 from warpimpact.results.measures import dealing
 from warpimpact.scene.model import Array
 from warpimpact.scene.sampling import stream
-from warpimpact.statistics.acceptance import acceptance
-from warpimpact.statistics.intervals import Estimate, Estimating, estimate_of
+from warpimpact.statistics.acceptance import acceptance, shown_stop_probability
+from warpimpact.statistics.intervals import Estimate, estimate_of
 from warpimpact.statistics.quantal import fit_quantal, likelihood_interval
 from warpimpact.studies.limit import limit_to_file
 
@@ -49,21 +53,23 @@ class Response:
 
     Attributes:
         limits: velocities [m/s] above which each place perforates, infinite where none does.
-        dealt: how places are dealt to the replicates of the sampling.
+        replicates: number of scramblings that the places belong to in turn.
     """
 
     limits: Array
-    dealt: Estimating = field(default_factory=Estimating)
+    replicates: int = 1
 
     def estimate(self, velocity: float) -> Estimate:
         """The probability of perforation with its 95 % interval over the places."""
-        return estimate_of("share", (self.limits < velocity).astype(float), **self.dealt)
+        return estimate_of("share", (self.limits < velocity).astype(float), replicates=self.replicates)
 
     def quantile(self, share: float) -> Estimate:
         """The velocity at which this share of the places perforates, with its 95 % interval; infinite if none is."""
-        finite = estimate_of("quantile", np.minimum(self.limits, _NONE), share=share, **self.dealt)
-        value, low, high = (np.inf if end > 0.1 * _NONE else end for end in (finite.value, finite.low, finite.high))
-        return replace(finite, value=value, low=low, high=high)
+        estimate = estimate_of("quantile", np.minimum(self.limits, _NONE), share=share, replicates=self.replicates)
+        value, low, high = (
+            np.inf if end > 0.1 * _NONE else end for end in (estimate.value, estimate.low, estimate.high)
+        )
+        return replace(estimate, value=value, low=low, high=high)
 
 
 def response_of_limits(dataset: xarray.Dataset) -> Response:
@@ -78,8 +84,7 @@ def response_of_limits(dataset: xarray.Dataset) -> Response:
     limits = dataset[v.LIMITS["velocity"].value].values.astype(float)[sound]
     if not np.isfinite(limits).any():
         raise ValueError("has no limit velocity: no hit perforates at any velocity that was tried, or all have failed")
-    dealt: Estimating = dealing(dataset) if sound.all() else {"replicates": 1}
-    return Response(limits, dealt)
+    return Response(limits, dealing(dataset)["replicates"] if sound.all() else 1)
 
 
 def response_of(test: FiringTest, output: Path, *, count: int | None = None, **options: Any) -> Response:
@@ -93,13 +98,11 @@ def response_of(test: FiringTest, output: Path, *, count: int | None = None, **o
         CampaignError: the file that the target names gives no response.
         ResultError: the file is no result.
     """
-    limits = test.target.limits
+    limits = test.target.limits or output.with_name(f"{output.stem}_limits.nc")
     if test.target.campaign is not None:
-        limits = output.with_name(f"{output.stem}_limits.nc")
         listed = Campaign.from_toml(test.target.campaign).hits.listed is not None
         campaign = Campaign.from_toml(test.target.campaign, count=None if listed else count or test.target.count)
         limit_to_file(campaign, limits, tolerance=TOLERANCE, **options)
-    assert limits is not None
     dataset = files.read(limits)
     try:
         return response_of_limits(dataset)
@@ -134,17 +137,7 @@ def fire(procedure: Procedure, limits: Array, errors: Array) -> Firings:
     return Firings(velocity, perforated, used)
 
 
-def fired(test: FiringTest, procedure: Procedure, limits: Array) -> Firings:
-    """Fire all tests at places that are drawn with equal probability."""
-    shape = test.tests, procedure.most_shots
-    places, velocities = (
-        np.stack([stream(test.seed, (column, shot), 0, shape[0]) for shot in range(shape[1])], axis=1)
-        for column in (_PLACES, _VELOCITIES)
-    )
-    return fire(procedure, limits[(places * len(limits)).astype(int)], test.gun.errors(velocities))
-
-
-def reported(firings: Firings, procedure: Procedure) -> dict[Variable, Array]:
+def reports(firings: Firings, procedure: Procedure) -> dict[Variable, Array]:
     """The report of every test [m/s], NaN where it has none: the mean of the standard, or the probit."""
     velocity, perforated, used = firings
     v50, spread, low, high = np.full((4, len(velocity)), np.nan)
@@ -162,21 +155,19 @@ def reported(firings: Firings, procedure: Procedure) -> dict[Variable, Array]:
 def simulate_test(test: FiringTest, response: Response) -> xarray.Dataset:
     """Fire a test many times at a target whose response is known."""
     limits, velocity = response.limits, _grid(response, test.proof)
-    shares = [response.estimate(float(speed)) for speed in velocity]
-    quantiles = [response.quantile(share) for share in QUANTILES]
-    columns: dict[Variable, Any] = {
-        f.VELOCITY: velocity,
-        f.SHARE: [share.value for share in shares],
-        f.SHARE_LOW: [share.low for share in shares],
-        f.SHARE_HIGH: [share.high for share in shares],
-        f.QUANTILE: np.array(QUANTILES),
-        f.QUANTILE_VELOCITY: [quantile.value for quantile in quantiles],
-        f.QUANTILE_LOW: [quantile.low for quantile in quantiles],
-        f.QUANTILE_HIGH: [quantile.high for quantile in quantiles],
-    }
+    shares = _estimates([response.estimate(float(speed)) for speed in velocity])
+    quantiles = _estimates([response.quantile(share) for share in QUANTILES])
+    columns: dict[Variable, Any] = {f.VELOCITY: velocity, f.QUANTILE: np.array(QUANTILES)}
+    columns |= zip((f.SHARE, f.SHARE_LOW, f.SHARE_HIGH), shares, strict=True)
+    columns |= zip((f.QUANTILE_VELOCITY, f.QUANTILE_LOW, f.QUANTILE_HIGH), quantiles, strict=True)
     if test.procedure is not None:
-        firings = fired(test, test.procedure, limits)
-        columns |= reported(firings, test.procedure) | {
+        number = range(test.procedure.most_shots)
+        places, errors = (
+            np.stack([stream(test.seed, (column, shot), 0, test.tests) for shot in number], axis=1)
+            for column in (_PLACES, _VELOCITIES)
+        )
+        firings = fire(test.procedure, limits[(places * len(limits)).astype(int)], test.gun.errors(errors))
+        columns |= reports(firings, test.procedure) | {
             f.SHOT_VELOCITY: np.where(firings.used, firings.velocity, np.nan),
             f.SHOT_PERFORATED: np.where(firings.used, firings.perforated, -1).astype(np.int8),
         }
@@ -205,6 +196,11 @@ def simulate_test(test: FiringTest, response: Response) -> xarray.Dataset:
     return dataset_of(columns, f.FIXED | attributes)
 
 
+def _estimates(estimates: Sequence[Estimate]) -> Array:
+    """Values, lower and upper ends, shape [3, estimates]."""
+    return np.array([(estimate.value, estimate.low, estimate.high) for estimate in estimates]).T
+
+
 def _grid(response: Response, proof: Proof | None) -> Array:
     """Velocities of the curves, from where nothing perforates to where all does. The proof's velocity is among them."""
     finite = response.limits[np.isfinite(response.limits)]
@@ -212,3 +208,86 @@ def _grid(response: Response, proof: Proof | None) -> Array:
     low, high = np.min([*finite, *of_proof]), np.max([*finite, *of_proof])
     margin = 0.05 * max(high - low, 0.02 * high)
     return np.unique([*np.linspace(max(1.0, low - margin), high + margin, _CURVE_POINTS), *of_proof])
+
+
+def firing_view(dataset: xarray.Dataset) -> View:
+    """The target of a test, the reports of the tests, and the meaning of the plan of a proof."""
+    quantiles = pd.DataFrame(
+        {
+            "velocity [m/s]": [f"{value:.5g}" for value in dataset[f.QUANTILE_VELOCITY].values],
+            "95 % interval": [
+                " to ".join(f"{end:.5g}" if np.isfinite(end) else "open" for end in ends)
+                for ends in zip(dataset[f.QUANTILE_LOW].values, dataset[f.QUANTILE_HIGH].values, strict=True)
+            ],
+        },
+        pd.Index([f"V{100 * share:02.0f}" for share in dataset[f.QUANTILE].values], name="target"),
+    )
+    spread = f"Half the distance from V16 to V84 is {float(dataset.attrs[f.TRUE_SPREAD]):.3g} m/s."
+    view: dict[str, list[str | pd.DataFrame]] = {
+        str(dataset.attrs[attr.TITLE]): [str(dataset.attrs[f.DISCLAIMER]), quantiles, spread]
+    }
+    if f.V50 in dataset:
+        view[tests_title(dataset)] = [*report_lines(dataset)]
+    if f.PASS in dataset:
+        title, *lines = _proof_lines(dataset)
+        view[title] = [*lines]
+    return view
+
+
+def tests_title(dataset: xarray.Dataset) -> str:
+    """Procedure, and numbers of tests and of their shots."""
+    shots = (dataset[f.SHOT_PERFORATED].values >= 0).sum(axis=1)
+    count = f"{shots.min()}" if np.ptp(shots) == 0 else f"{shots.min()} to {shots.max()}, mean {shots.mean():.3g},"
+    name = json.loads(dataset.attrs[f.SETTINGS])["procedure"]["name"]
+    return f"{name}: {len(shots)} tests of {count} shots"
+
+
+def report_lines(dataset: xarray.Dataset) -> list[str]:
+    """The reports of the tests, beside the truth."""
+    v50, spread, low, high = (dataset[name].values for name in (f.V50, f.SPREAD, f.V50_LOW, f.V50_HIGH))
+    true, known, bounded = float(dataset.attrs[f.TRUE_V50]), ~np.isnan(v50), ~np.isnan(low)
+    if not known.any():
+        return ["no test reports a V50"]
+    lines = [] if known.all() else [f"reports a V50 in {_share(known)} of the tests"]
+    off = v50[known] - true
+    lines.append(f"reported V50: {off.mean():+.3g} m/s off on average, standard deviation {off.std():.3g} m/s")
+    if bounded.any():
+        is_spread = np.isfinite(spread)
+        median = f"{np.median(spread[is_spread]):.3g}" if is_spread.any() else "-"
+        held = ((low <= true) & (true <= high))[bounded]
+        is_open = (np.isinf(low) | np.isinf(high))[bounded]
+        lines += [
+            f"reported spread: median {median} m/s, of {float(dataset.attrs[f.TRUE_SPREAD]):.3g} m/s; not determined "
+            f"in {_share(~is_spread)}",
+            f"reported 95 % interval of V50: contains the true V50 in {_share(held)}; open in {_share(is_open)}",
+        ]
+    return lines
+
+
+def _share(answers: NDArray[np.bool_]) -> str:
+    """A share of the tests with its interval."""
+    estimate = estimate_of("share", answers.astype(float))
+    return f"{100 * estimate.value:.3g} % ({100 * estimate.low:.3g} to {100 * estimate.high:.3g} %)"
+
+
+def _proof_lines(dataset: xarray.Dataset) -> list[str]:
+    """The plan of the proof, what a pass of it shows, and how often this target passes."""
+    proof, shots = json.loads(dataset.attrs[f.SETTINGS])["proof"], int(dataset.attrs[f.PROOF_SHOTS])
+    allowed, velocity, stop, confidence = (
+        proof[key] for key in ("allowed", "velocity", "stop_probability", "confidence")
+    )
+    row = int(np.abs(dataset[f.VELOCITY].values - velocity).argmin())
+    perforation, passed, same = (float(dataset[name][row]) for name in (f.PROOF_PERFORATION, f.PASS, f.PASS_SAME_PLACE))
+    consumer = float(acceptance(shots, allowed, 1.0 - stop))
+    is_good = 1.0 - perforation >= stop
+    risk = f"rejects it in {100 * (1.0 - passed):.3g} %" if is_good else f"accepts it in {100 * passed:.3g} %"
+    shown = 100 * shown_stop_probability(shots, allowed, confidence)
+    return [
+        f"proof: {shots} shots at {velocity:g} m/s, at most {allowed} perforate",
+        f"a pass shows P(stop) >= {shown:.3g} % at {100 * confidence:g} % confidence, if every shot may hit any place",
+        f"a target of P(stop) = {100 * stop:g} % passes in {100 * consumer:.3g} % of the tests",
+        f"this target: P(stop) = {100 * (1.0 - perforation):.4g} %; the plan {risk} of the tests "
+        f"({'producer' if is_good else 'consumer'}'s risk)",
+        f"if all shots of a test hit the same place, it passes in {100 * same:.3g} % of the tests, in place of "
+        f"{100 * passed:.3g} %",
+    ]

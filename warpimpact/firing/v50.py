@@ -18,16 +18,16 @@ from warpimpact.scene.model import Array
 from warpimpact.scene.units import PositiveSpeed, brief, quantity
 from warpimpact.statistics.quantal import fit_quantal, likelihood_interval, scale_interval
 
-Flags = NDArray[np.bool_]
-
 FOOT = 0.3048
 STANDARD_SPANS = {2: 60 * FOOT, 3: 90 * FOOT, 5: 125 * FOOT}
 """Largest span [m/s] of so many stops and as many perforations, as publications quote MIL-STD-662F (1997)."""
 FEW_SHOTS = 20
 """Shots below which the 95 % interval contains V50 in 82 to 89 % of simulated tests (docs/firing.md)."""
 
-_VELOCITY = ("velocity", "speed", "v", "impact velocity", "impact speed", "striking velocity", "strike velocity")
-_RESULT = ("perforated", "perforation", "complete", "complete penetration", "result", "outcome")
+_HEADERS = {
+    "velocities": ("velocity", "speed", "v", "impact velocity", "impact speed", "striking velocity", "strike velocity"),
+    "results": ("perforated", "perforation", "complete", "complete penetration", "result", "outcome"),
+}
 _UNIT = re.compile(r"(?P<name>[a-z ]*?)[ ,:]*(?:\[(?P<square>.*)\]|\((?P<round>.*)\)|(?P<bare>m/s|ft/s|fps))?")
 _YES = ("yes", "y", "true", "1", "cp", "complete", "perforated", "perforation")
 _NO = ("no", "n", "false", "0", "pp", "partial", "stopped", "stop", "arrested")
@@ -37,7 +37,7 @@ class Shots(NamedTuple):
     """Fired shots: velocities [m/s], and whether each perforated."""
 
     velocity: Array
-    perforated: Flags
+    perforated: NDArray[np.bool_]
 
 
 @dataclass(frozen=True)
@@ -71,7 +71,24 @@ class V50:
     @property
     def lines(self) -> list[str]:
         """V50, spread, V50 by the standard, and what the shots do not determine: a sentence each."""
-        return [self._value, self._spread, self._standard, self.undetermined]
+        value = f"not determined by {self.shots} shots"
+        if not math.isnan(self.value):
+            value = f"{self.value:.4g} m/s, 95 % interval {_interval(self.low, self.high, 4)}"
+        spread = "not determined" if math.isnan(self.spread) else f"{self.spread:.3g} m/s"
+        if not math.isnan(self.spread_low):
+            spread += f", 95 % interval {_interval(self.spread_low, self.spread_high, 3)}"
+        if 0.0 < (width := self.fastest_stop - self.slowest_perforation) < math.inf:
+            spread += f"; zone of mixed results {width:.3g} m/s"
+        spans = ", ".join(f"{pairs} + {pairs} shots within {span:.3g} m/s" for pairs, span in STANDARD_SPANS.items())
+        standard = f"none, no {spans}"
+        if self.pairs:
+            standard = (
+                f"{self.standard:.4g} m/s, mean of {self.pairs} stops and {self.pairs} perforations within "
+                f"{self.span:.3g} m/s (allowed {STANDARD_SPANS[self.pairs]:.3g} m/s)"
+            )
+        by = ("V50 by maximum likelihood", "spread", "V50 by MIL-STD-662F")
+        texts = (value, spread, standard)
+        return [*(f"{name}: {text}" for name, text in zip(by, texts, strict=True)), self.undetermined]
 
     def __str__(self) -> str:
         return "\n".join(self.lines)
@@ -94,32 +111,6 @@ class V50:
         if self.shots < FEW_SHOTS:
             return f"Fewer than {FEW_SHOTS} shots: 82 to 89 % of such intervals contain V50 (docs/firing.md)."
         return "V50 and spread are determined."
-
-    @property
-    def _value(self) -> str:
-        if math.isnan(self.value):
-            return f"V50 by maximum likelihood: not determined by {self.shots} shots"
-        return f"V50 by maximum likelihood: {self.value:.4g} m/s, 95 % interval {_interval(self.low, self.high, 4)}"
-
-    @property
-    def _spread(self) -> str:
-        width = self.fastest_stop - self.slowest_perforation
-        zone = f"; zone of mixed results {width:.3g} m/s" if 0.0 < width < math.inf else ""
-        if math.isnan(self.spread_low):
-            return f"spread: not determined{zone}"
-        known = "not determined" if math.isnan(self.spread) else f"{self.spread:.3g} m/s"
-        return f"spread: {known}, 95 % interval {_interval(self.spread_low, self.spread_high, 3)}{zone}"
-
-    @property
-    def _standard(self) -> str:
-        if self.pairs:
-            allowed = STANDARD_SPANS[self.pairs]
-            return (
-                f"V50 by MIL-STD-662F: {self.standard:.4g} m/s, mean of {self.pairs} stops and {self.pairs} "
-                f"perforations within {self.span:.3g} m/s (allowed {allowed:.3g} m/s)"
-            )
-        spans = ", ".join(f"{pairs} + {pairs} shots within {span:.3g} m/s" for pairs, span in STANDARD_SPANS.items())
-        return f"V50 by MIL-STD-662F: none, no {spans}"
 
 
 def _interval(low: float, high: float, digits: int) -> str:
@@ -152,17 +143,12 @@ def v50(velocity: ArrayLike, perforated: ArrayLike) -> V50:
         fit = fit_quantal(*sample)
         low, high = (float(end[0]) for end in likelihood_interval(*sample, fit))
         fitted = (float(fit.location[0]), low, high, float(fit.scale[0]), *scale_interval(speed, through, fit))
+    standard = (math.nan, 0, math.nan)
+    for pairs, span in STANDARD_SPANS.items():
+        if (chosen := within_span(stops, perforations, pairs, span + 1e-9)) is not None:
+            standard = float(np.mean(chosen)), pairs, max(chosen) - min(chosen)
     ends = max(stops, default=-math.inf), min(perforations, default=math.inf)
-    return V50(*fitted, *_by_standard(stops, perforations), *ends, len(speed), len(perforations))
-
-
-def _by_standard(stops: list[float], perforations: list[float]) -> tuple[float, int, float]:
-    """Mean, pairs and span of the most pairs that MIL-STD-662F allows; NaN and 0 pairs if none."""
-    for pairs in sorted(STANDARD_SPANS, reverse=True):
-        chosen = within_span(stops, perforations, pairs, STANDARD_SPANS[pairs] + 1e-9)
-        if chosen is not None:
-            return float(np.mean(chosen)), pairs, max(chosen) - min(chosen)
-    return math.nan, 0, math.nan
+    return V50(*fitted, *standard, *ends, len(speed), len(perforations))
 
 
 def within_span(stops: Sequence[float], perforations: Sequence[float], pairs: int, span: float) -> list[float] | None:
@@ -183,51 +169,42 @@ def read_shots(path: Path) -> Shots:
         CampaignError: the message names the file, the line and its fault.
     """
     try:
-        rows = list(read_rows(path))
+        rows = [*read_rows(path)]
     except ValueError as error:
         raise CampaignError(str(error)) from None
     if len(rows) < 2:
         raise CampaignError(f"{path}: has no shots. Give a header, velocity,perforated, and a row for each shot.")
-    (_, header), *rows = rows
-    columns = _columns(path, header)
-    shots = [_shot(f"{path}, line {number}", row, columns) for number, row in rows]
+    (_, header), *cells = rows
+    (velocity, unit), (result, _) = (_column(path, header, what) for what in _HEADERS)
+    shots = []
+    for number, row in cells:
+        place = f"{path}, line {number}"
+        if len(row) <= max(velocity, result):
+            raise CampaignError(f"{place}: has {len(row)} columns, fewer than the header.")
+        text, answer = row[velocity], row[result].strip()
+        try:
+            speed = quantity(PositiveSpeed)(text if re.search(r"[a-zA-Z]{2}|/", text) else f"{text} {unit}")
+            if speed <= 0.0:
+                raise ValueError(f'got "{text}", but it must be greater than 0')
+        except ValueError as error:
+            raise CampaignError(f"{place}: velocity: {error}") from None
+        if answer.lower() not in (*_YES, *_NO):
+            allowed = f"{', '.join(_YES[:6])} or {', '.join(_NO[:6])}"
+            raise CampaignError(f'{place}: got the result "{brief(answer)}". Give {allowed}.')
+        shots.append((speed, answer.lower() in _YES))
     return Shots(np.array([speed for speed, _ in shots]), np.array([through for _, through in shots], dtype=bool))
 
 
-def _columns(path: Path, header: Sequence[str]) -> tuple[int, str, int]:
-    """Places of the velocities and the results, and the unit of the velocities."""
-    units, names = list[str](), list[str]()
-    for name in header:
+def _column(path: Path, header: Sequence[str], what: str) -> tuple[int, str]:
+    """Place of the column of velocities or results, and its unit."""
+    columns = []
+    for place, name in enumerate(header):
         match = _UNIT.fullmatch(name.lower().replace("_", " ").strip())
-        names.append(match["name"].strip() if match else "")
-        units.append((match["square"] or match["round"] or match["bare"] or "m/s").strip() if match else "")
-    places = []
-    for what, known in (("velocities", _VELOCITY), ("results", _RESULT)):
-        found = [place for place, name in enumerate(names) if name in known]
-        if len(found) != 1:
-            raise CampaignError(
-                f'{path}: got the header "{brief(",".join(header))}" with {len(found)} columns of {what}. '
-                f"Give one column, named {', '.join(known)}."
-            )
-        places += found
-    return places[0], units[places[0]], places[1]
-
-
-def _shot(place: str, cells: Sequence[str], columns: tuple[int, str, int]) -> tuple[float, bool]:
-    """Velocity [m/s] of a row, and whether the shot perforated."""
-    velocity, unit, result = columns
-    if len(cells) <= max(velocity, result):
-        raise CampaignError(f"{place}: has {len(cells)} columns, fewer than the header.")
-    text = cells[velocity]
-    try:
-        speed = quantity(PositiveSpeed)(text if re.search(r"[a-zA-Z]{2}|/", text) else f"{text} {unit}")
-    except ValueError as error:
-        raise CampaignError(f"{place}: velocity: {error}") from None
-    if speed <= 0.0:
-        raise CampaignError(f'{place}: velocity: got "{text}", but it must be greater than 0')
-    answer = cells[result].strip().lower()
-    if answer not in (*_YES, *_NO):
+        if match and match["name"].strip() in _HEADERS[what]:
+            columns.append((place, (match["square"] or match["round"] or match["bare"] or "m/s").strip()))
+    if len(columns) != 1:
         raise CampaignError(
-            f'{place}: got the result "{brief(cells[result])}". Give {", ".join(_YES[:6])} or {", ".join(_NO[:6])}.'
+            f'{path}: got the header "{brief(",".join(header))}" with {len(columns)} columns of {what}. Give one '
+            f"column, named {', '.join(_HEADERS[what])}."
         )
-    return speed, answer in _YES
+    return columns[0]

@@ -9,9 +9,7 @@ from typing import Any
 import numpy as np
 
 from warpimpact.campaign.text import parsed
-from warpimpact.identification.fit import Fit
-from warpimpact.identification.fit_file import fit_from
-from warpimpact.identification.parameters import FitError
+from warpimpact.identification.fit import Fit, FitError, fit_from
 from warpimpact.results import attributes as attr
 from warpimpact.results import files
 from warpimpact.results import variables as v

@@ -9,19 +9,20 @@ likelihood.
 from __future__ import annotations
 
 from collections.abc import Callable
-from contextlib import closing
+from contextlib import nullcontext
 from importlib.util import find_spec
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 import xarray
+from scipy.special import ndtri
+from scipy.stats.qmc import Sobol
 
-from warpimpact.identification.fit import Fit
+from warpimpact.identification.fit import Fit, FitError
 from warpimpact.identification.likelihood import Scores, evaluate
-from warpimpact.identification.parameters import FitError
 from warpimpact.identification.posterior import Chains, to_dataset
 from warpimpact.results.posterior_file import SETS
-from warpimpact.runs.executor import Executor, Job, completed, opened
+from warpimpact.runs.computer import Computer, computer
 from warpimpact.scene.model import Array
 from warpimpact.solver.worker import Worker
 
@@ -30,32 +31,18 @@ MOST_WALKERS, WALKERS_PER_PARAMETER = 128, 8
 FROM_PRIOR = 4
 """Sets from the prior per walker, among which the walkers start."""
 BATCH = 16
-"""Fewest sets of a job, unless there are fewer. Smaller jobs spend their time in being prepared."""
+"""Sets of a task. Smaller ones spend their time in being prepared."""
 LOOK_EVERY = 5
 """Steps between two checks of the effective sample size."""
 FARTHEST = 5.0
 """Largest distance of a shot from the nearest set of the prior, in standard deviations with the discrepancy."""
+Progress = Callable[[int, int, str], object]
+"""Called with the number of computed sets, the most that are computed, and words on the quality so far."""
 
 
-class FitProgress(NamedTuple):
-    """The progress of a fit.
-
-    Attributes:
-        done, total: sets of parameters; `total` is an upper bound.
-        effective: effective sample size so far; NaN before the first check.
-        misfit: smallest sum over shots of Σ (miss/σ)² so far.
-    """
-
-    done: int
-    total: int
-    effective: float
-    misfit: float
-
-
-Follow = Callable[[FitProgress], object]
-
-
-def identify(fit: Fit, *, device: str | Executor = "auto", progress: Follow = lambda now: None) -> xarray.Dataset:
+def identify(
+    fit: Fit, *, device: str | Computer = "auto", progress: Progress = lambda done, total, text: None
+) -> xarray.Dataset:
     """The posterior of a fit (posterior.py). An interrupt ends the sampling, and the draws so far are the result.
 
     Raises:
@@ -64,62 +51,55 @@ def identify(fit: Fit, *, device: str | Executor = "auto", progress: Follow = la
     """
     if missing := [name for name in ("emcee", "arviz_stats") if find_spec(name) is None]:
         raise FitError(f"identify needs {missing[0]}: pip install 'warpimpact[identify]'")
-    with opened(device) as executor:
-        density = _Density(fit, executor, progress)
+    with computer(device) if isinstance(device, str) else nullcontext(device) as machine:
+        density = _Density(fit, machine, progress)
         start = prior_points(fit, FROM_PRIOR * walkers_of(fit))
         scored = density(start)
         check_reach(fit, density.scores(scored))
         chains = sampled(density, start, scored, fit)
-        posterior = to_dataset(fit, chains, density.scores(chains.blobs), executor.made_by)
-        return posterior.assign_attrs({SETS: density.progress.done})
+        posterior = to_dataset(fit, chains, density.scores(chains.blobs), machine.made_by)
+        return posterior.assign_attrs({SETS: density.done})
 
 
 def walkers_of(fit: Fit) -> int:
     """Number of walkers, a multiple of 4."""
     fewest = max(8, WALKERS_PER_PARAMETER * len(fit.parameters))
-    return int(np.clip(fit.sampling.sets // 64 // 4 * 4, fewest, max(fewest, MOST_WALKERS)))
+    return int(np.clip(fit.file.sampling.sets // 64 // 4 * 4, fewest, max(fewest, MOST_WALKERS)))
 
 
 def prior_points(fit: Fit, count: int) -> Array:
     """Scrambled Sobol points of the prior as standard normal numbers, shape [count, parameters]."""
-    from scipy.special import ndtri
-    from scipy.stats.qmc import Sobol
-
-    uniform = Sobol(len(fit.parameters), rng=np.random.default_rng(fit.sampling.seed)).random(count)
+    uniform = Sobol(len(fit.parameters), rng=np.random.default_rng(fit.file.sampling.seed)).random(count)
     return np.asarray(ndtri(np.clip(uniform, 2.0**-31, 1.0 - 2.0**-31)))
 
 
 class _Density:
-    """ln (prior · likelihood) of sets of parameters, followed by their scores, in jobs of an executor."""
+    """ln (prior · likelihood) of sets of parameters, followed by their scores."""
 
-    def __init__(self, fit: Fit, executor: Executor, follow: Follow) -> None:
-        self._fit, self._executor, self._follow = fit, executor, follow
-        self._calls = 0
-        self.progress = FitProgress(0, fit.sampling.sets, np.nan, np.inf)
+    def __init__(self, fit: Fit, machine: Computer, progress: Progress) -> None:
+        self._fit, self._machine, self._progress = fit, machine, progress
+        self._calls, self.done, self._misfit = 0, 0, np.inf
 
     def __call__(self, points: Array) -> Array:
         """Shape [sets, 1 + scores · shots]."""
-        shots = len(self._fit.shots)
-        uniform = np.random.default_rng([self._fit.sampling.seed, self._calls]).random((len(points), 2 + shots))
+        shots, seed = len(self._fit.shots), self._fit.file.sampling.seed
+        uniform = np.random.default_rng([seed, self._calls]).random((len(points), 2 + shots))
         self._calls += 1
-        batches = np.array_split(np.arange(len(points)), min(-(-len(points) // BATCH), self._executor.width()))
-        jobs = ((k, Job(_scored, (self._fit, points[rows], uniform[rows]))) for k, rows in enumerate(batches))
-        found: dict[int, Scores] = {}
-        before = self.progress
-        with closing(completed(self._executor, jobs, lambda: None)) as results:
-            for k, scores in results:
-                found[k] = scores
-                misfit = min(self.progress.misfit, float(scores.misfit.sum(axis=1).min()))
-                done = before.done + sum(len(batches[place]) for place in found)
-                self.report(self.progress._replace(done=done, misfit=misfit))
-        columns = np.concatenate([np.concatenate(found[k], axis=1) for k in range(len(batches))])
+        batches = [slice(first, first + BATCH) for first in range(0, len(points), BATCH)]
+        tasks = ((k, (self._fit, points[rows], uniform[rows])) for k, rows in enumerate(batches))
+        parts = dict[int, Scores]()
+        for k, scores in self._machine.map(_scored, tasks, per_core=True):
+            parts[k] = scores
+            self.done += len(scores.misfit)
+            self._misfit = min(self._misfit, float(scores.misfit.sum(axis=1).min()))
+            self.report("")
+        columns = np.concatenate([np.concatenate(parts[k], axis=1) for k in range(len(batches))])
         log = columns[:, :shots].sum(axis=1) - 0.5 * (points**2).sum(axis=1)
         return np.concatenate([log[:, None], columns], axis=1)
 
-    def report(self, now: FitProgress) -> None:
-        """Keep and tell the progress."""
-        self.progress = now
-        self._follow(now)
+    def report(self, text: str) -> None:
+        """Report the progress; `text` follows the misfit."""
+        self._progress(self.done, self._fit.file.sampling.sets, f"smallest misfit {self._misfit:.3g}{text}")
 
     def scores(self, columns: Array) -> Scores:
         """The scores in the last columns of an array, shape [..., columns]."""
@@ -142,17 +122,17 @@ def sampled(density: Any, start: Array, scored: Array, fit: Fit) -> Chains:
     import emcee
 
     walkers, (count, dimensions) = walkers_of(fit), start.shape
-    rng = np.random.default_rng([fit.sampling.seed, 1])
+    rng = np.random.default_rng([fit.file.sampling.seed, 1])
     log_likelihood = scored[:, 0] + 0.5 * (start**2).sum(axis=1)
     chosen = np.argsort(log_likelihood + rng.gumbel(size=count))[-walkers:]  # without replacement, by likelihood
     state = emcee.State(
         start[chosen],
         log_prob=scored[chosen, 0],
         blobs=scored[chosen, 1:],
-        random_state=np.random.RandomState(fit.sampling.seed % 2**32).get_state(),
+        random_state=np.random.RandomState(fit.file.sampling.seed % 2**32).get_state(),
     )
     sampler = emcee.EnsembleSampler(walkers, dimensions, density, moves=emcee.moves.KDEMove(), vectorize=True)
-    steps = max(3 * LOOK_EVERY, (fit.sampling.sets - count) // walkers)
+    steps = max(3 * LOOK_EVERY, (fit.file.sampling.sets - count) // walkers)
     interrupted = False
     try:
         for step, _ in enumerate(sampler.sample(state, iterations=steps), start=1):
@@ -160,8 +140,8 @@ def sampled(density: Any, start: Array, scored: Array, fit: Fit) -> Chains:
                 continue
             chains = Chains.of(sampler, interrupted=False)
             if isinstance(density, _Density):
-                density.report(density.progress._replace(effective=chains.effective.min()))
-            if chains.is_converged(fit.sampling.effective):
+                density.report(f", effective sample size {chains.effective.min():.0f}")
+            if chains.is_converged(fit.file.sampling.effective):
                 break
     except KeyboardInterrupt:
         if sampler.iteration < 3 * LOOK_EVERY:

@@ -3,9 +3,9 @@
     L = mean over points h of N(measured | computed at h, σ² + δ²)
 
 The points cover the cell of the plate, or the measured place with its uncertainty. σ is the uncertainty of the
-measurement and δ the discrepancy of the model. A core that ends otherwise than the measured one counts as 0, and a
-computation that failed not at all. Given the parameters, shots are independent, as are the discrepancies of their
-numbers.
+measurement and δ the discrepancy of the model. A core that ends otherwise than the measured one counts as 0, and so
+does a set whose scene is not possible; a computation that failed does not count at all. Given the parameters, shots are
+independent, as are the discrepancies of their numbers.
 
 Every set of parameters has points of its own, at random shifts. Their mean estimates the likelihood without bias, and
 Markov chains with such estimates have the exact posterior (C. Andrieu, G. O. Roberts, Annals of Statistics 37 (2009)
@@ -20,10 +20,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+from pydantic import ValidationError
 
-from warpimpact.identification.fit import Fit, MeasuredShot
-from warpimpact.identification.measured import MEASURABLE
-from warpimpact.identification.parameters import COLUMN_OF, UNITS_OF_EXPOSURE, columns_of
+from warpimpact.identification.fit import COLUMN_OF, MIRRORS, UNITS_OF_EXPOSURE, Fit, MeasuredShot, columns_of
 from warpimpact.records.outcomes import Outcomes
 from warpimpact.records.variable import failures
 from warpimpact.results.measures import STATUSES
@@ -89,10 +88,11 @@ def evaluate(fit: Fit, points: Array, uniform: Array, worker: Worker) -> Scores:
         uniform: uniform numbers of each set, shape [sets, 2 + shots]: the shift of its hit points along y and z, and
             for each shot the number that draws a hit.
     """
-    scores = Scores(*np.empty((len(Scores._fields), len(points), len(fit.shots))))
+    shape = len(points), len(fit.shots)
+    scores = Scores(np.full(shape, -np.inf), np.zeros(shape), np.full(shape, np.inf), np.zeros(shape), np.zeros(shape))
     scales = discrepancies(fit, points)
-    for alike in benches(fit):
-        runs = list(_runs(fit, fit.shots[alike[0]], points, uniform[:, :2]))
+    for alike in alike_shots(fit):
+        runs = [*_runs(fit, fit.shots[alike[0]], points, uniform[:, :2])]
         for run, outcomes in zip(runs, _outcomes(fit, alike, runs, worker), strict=True):
             for place in alike:
                 spread = {kind: scale[run.which] for kind, scale in scales.items()}
@@ -102,21 +102,21 @@ def evaluate(fit: Fit, points: Array, uniform: Array, worker: Worker) -> Scores:
     return scores
 
 
-def benches(fit: Fit) -> list[list[int]]:
+def alike_shots(fit: Fit) -> list[list[int]]:
     """Places of the shots that share their runs, because they differ in their measurements alone."""
     places_of: dict[str, list[int]] = {}
     for place, shot in enumerate(fit.shots):
-        key = repr((shot.hit, shot.impact, shot.scatter, shot.tables, sorted(map(str, shot.own))))
+        key = repr((shot.hit, shot.impact, shot.scatter, shot.tables, sorted(shot.own)))
         places_of.setdefault(key, []).append(place)
-    return list(places_of.values())
+    return [*places_of.values()]
 
 
 def discrepancies(fit: Fit, points: Array) -> dict[str, Array]:
     """Standard deviation of the discrepancy by kind at sets of parameters, each of shape [sets]."""
     scales = {kind: np.full(len(points), value) for kind, value in fit.discrepancy.items()}
     for column, parameter in enumerate(fit.parameters):
-        if parameter.path[0] == "discrepancy":
-            scales[str(parameter.path[1])] = parameter.at(points[:, column])
+        if not parameter.is_of_scene:
+            scales[parameter.place.removeprefix("discrepancy.")] = parameter.at(points[:, column])
     return scales
 
 
@@ -125,8 +125,8 @@ def hit_points(fit: Fit, shot: MeasuredShot, plate: Plate, shifts: Array) -> Hit
     turned = any(name != "velocity" for name, _ in shot.scatter.given)
     solid = plate.open_area == 0.0 and plate.size is None
     alone = not shot.scatter.given and (solid or (shot.hit is not None and shot.hit.is_exact))
-    count = 1 if alone else fit.sampling.hits
-    shots = Sampler(shot.impact, Hits(count=count, seed=fit.sampling.seed), plate, shot.scatter).shots(0, count)
+    count, seed = 1 if alone else fit.file.sampling.hits, fit.file.sampling.seed
+    shots = Sampler(shot.impact, Hits(count=count, seed=seed), plate, shot.scatter).shots(0, count)
     shares = np.mod(shifts[:, None] + np.arange(count)[:, None] * POINT_STEPS, 1.0).reshape(-1, 2).T
     group: tuple[Symmetry, ...] = (IDENTITY,)
     cell = plate.sampled_cell
@@ -144,23 +144,27 @@ def hit_points(fit: Fit, shot: MeasuredShot, plate: Plate, shifts: Array) -> Hit
 
 
 def _runs(fit: Fit, shot: MeasuredShot, points: Array, shifts: Array) -> Iterator[Run]:
-    by_path = {
-        parameter.path: parameter.at(points[:, column])
+    """The runs of a shot, without those of sets whose scene is not possible."""
+    by_place = {
+        parameter.place: parameter.at(points[:, column])
         for column, parameter in enumerate(fit.parameters)
-        if parameter.path[0] != "discrepancy" and parameter.path not in shot.own
+        if parameter.is_of_scene and parameter.place not in shot.own
     }
     # The literal scheme counts steps, so its interval may not differ from shot to shot.
-    varying = {*COLUMN_OF} if fit.numerics.scheme == "nodal" else {*COLUMN_OF, *UNITS_OF_EXPOSURE}
-    of_scene = {path: column for path, column in by_path.items() if path not in varying}
+    varying = {*COLUMN_OF} if fit.file.numerics.scheme == "nodal" else {*COLUMN_OF, *UNITS_OF_EXPOSURE}
+    of_scene = {place: column for place, column in by_place.items() if place not in varying}
     keys = np.stack([np.zeros(len(points)), *of_scene.values()], axis=-1)
     _, which = np.unique(keys, axis=0, return_inverse=True)
     for scene_number in range(which.max() + 1):
         rows = np.flatnonzero(which.reshape(-1) == scene_number)
-        own_scene = by_path if len(rows) == 1 else of_scene  # a single set needs no columns
-        scene = fit.scene_of(shot, {path: float(column[rows[0]]) for path, column in own_scene.items()})
+        own_scene = by_place if len(rows) == 1 else of_scene  # a single set needs no columns
+        try:
+            scene = fit.scene_of(shot, {place: float(column[rows[0]]) for place, column in own_scene.items()})
+        except ValidationError:
+            continue
         plate = scene.target.layers[0]
         own = hit_points(fit, shot, plate, shifts[rows])
-        columns = columns_of({path: column[rows] for path, column in by_path.items() if path not in own_scene}, plate)
+        columns = columns_of({at: column[rows] for at, column in by_place.items() if at not in own_scene}, plate)
         each = len(own.shots) // len(rows)  # sets have equal numbers of shots, one set after the other
         of_shots: dict[str, Any] = {name: np.repeat(column, each) for name, column in columns.items()}
         yield Run(rows, scene, own._replace(shots=replace(own.shots, **of_shots)))
@@ -170,16 +174,16 @@ def _outcomes(fit: Fit, alike: Sequence[int], runs: Sequence[Run], worker: Worke
     """The outcomes that the observations of shots need: at impact velocity, limit velocities, or both."""
     measured = [fit.shots[place] for place in alike]
     limited = [observation.is_limit for shot in measured for observation in shot.observations]
-    scenes = [(run.scene, run.points.shots) for run in runs]
+    scenes, numerics = [(run.scene, run.points.shots) for run in runs], fit.file.numerics
     if not any(limited):
-        return simulate_many(scenes, fit.numerics, worker)
+        return simulate_many(scenes, numerics, worker)
 
     def limit(number: int, share: Worker, _: Any) -> Limits:
-        return limit_velocity(*scenes[number], numerics=fit.numerics, device=share.device, threads=share.threads)
+        return limit_velocity(*scenes[number], numerics=numerics, device=share.device, threads=share.threads)
 
     limits = side_by_side(limit, len(scenes), worker)
     alone = all(limited) and not any(shot.status for shot in measured)
-    outcomes = [one.outcomes for one in limits] if alone else simulate_many(scenes, fit.numerics, worker)
+    outcomes = [one.outcomes for one in limits] if alone else simulate_many(scenes, numerics, worker)
     return [result.assign(limit_velocity=one.value) for result, one in zip(outcomes, limits, strict=True)]
 
 
@@ -199,7 +203,7 @@ def score_shot(
     possible = counted if shot.status is None else counted & (status == STATUSES[shot.status])
     squares, misfit = (np.zeros((*status.shape, images)) for _ in range(2))
     for number in shot.observations:
-        mirror = MEASURABLE[number.name].mirror
+        mirror = MIRRORS.get(number.name)
         signs = [1.0 if mirror is None else float(getattr(symmetry, mirror)) for symmetry in points.group]
         missed = number.miss(number.of(outcomes).reshape(*status.shape, 1) * np.array(signs))
         spread = np.hypot(number.std, discrepancy[number.kind])[:, None, None]

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping
 from dataclasses import dataclass
 from itertools import combinations
@@ -11,10 +10,11 @@ from typing import Any, Self
 import numpy as np
 import pandas as pd
 import xarray
+from scipy import stats
 
-from warpimpact.identification.fit import Fit
+from warpimpact.analysis.numbers import View
+from warpimpact.identification.fit import Fit, columns_of
 from warpimpact.identification.likelihood import Scores
-from warpimpact.identification.parameters import columns_of
 from warpimpact.results import attributes as attr
 from warpimpact.results import posterior_file as p
 from warpimpact.results.kinds import POSTERIOR
@@ -76,8 +76,8 @@ class Chains:
 def to_dataset(fit: Fit, chains: Chains, scores: Scores, made_by: Mapping[str, str]) -> xarray.Dataset:
     """Gather a posterior, in the units of the Datasets."""
     steps, walkers, _ = chains.points.shape
-    rng = np.random.default_rng([fit.sampling.seed, 2])
-    which = rng.choice(steps * walkers, fit.sampling.draws, replace=steps * walkers < fit.sampling.draws)
+    rng = np.random.default_rng([fit.file.sampling.seed, 2])
+    which = rng.choice(steps * walkers, fit.file.sampling.draws, replace=steps * walkers < fit.file.sampling.draws)
     scores = Scores(*(of.reshape(steps * walkers, -1) for of in scores))
     over = ("draw", "shot")
     columns: dict[str, Any] = {
@@ -91,7 +91,7 @@ def to_dataset(fit: Fit, chains: Chains, scores: Scores, made_by: Mapping[str, s
         factor = np.degrees(1.0) if parameter.unit == "rad" else 1.0
         described = {
             "units": UNITS[parameter.unit].stored,
-            p.PATH: json.dumps(parameter.path),
+            p.PATH: parameter.place,
             p.R_HAT: chains.r_hat[column],
             p.EFFECTIVE: chains.effective[column],
             p.VERDICT: verdict(normal),
@@ -99,16 +99,16 @@ def to_dataset(fit: Fit, chains: Chains, scores: Scores, made_by: Mapping[str, s
         }
         columns[parameter.name] = ("draw", factor * parameter.at(normal[which]), described)
     noise = float(np.sqrt((scores.noise**2).sum(axis=1).mean()))
-    converged = chains.is_converged(fit.sampling.effective) and noise <= LARGEST_NOISE and not chains.interrupted
+    converged = chains.is_converged(fit.file.sampling.effective) and noise <= LARGEST_NOISE and not chains.interrupted
     attributes = {
         attr.KIND: POSTERIOR.mark,
-        attr.TITLE: fit.title,
+        attr.TITLE: fit.file.title,
         attr.HISTORY: attr.history_line("identify"),
         p.FIT_TEXT: fit.text,
         **made_by,
-        attr.SEED: fit.sampling.seed,
+        attr.SEED: fit.file.sampling.seed,
         p.EFFECTIVE: chains.effective.min(),
-        p.WANTED: fit.sampling.effective,
+        p.WANTED: fit.file.sampling.effective,
         p.R_HAT: chains.r_hat.max(),
         p.HIT_NOISE: noise,
         p.CONVERGED: int(converged),
@@ -121,14 +121,9 @@ def to_dataset(fit: Fit, chains: Chains, scores: Scores, made_by: Mapping[str, s
 
 def verdict(normal: Array) -> str:
     """What the shots say of a parameter, from its posterior on the scale where the prior is standard normal."""
-    from scipy.special import ndtr
-
-    shares = np.sort(ndtr(normal))
-    steps = np.arange(len(shares) + 1) / len(shares)
-    distance = max(np.abs(shares - steps[1:]).max(), np.abs(shares - steps[:-1]).max())
-    if distance < ALIKE:
+    if stats.ks_1samp(normal, stats.norm.cdf, method="asymp").statistic < ALIKE:
         return "not determined by these shots"
-    low, high = np.quantile(shares, [0.025, 0.975])
+    low, high = stats.norm.cdf(np.quantile(normal, [0.025, 0.975]))
     return "hardly determined" if high - low > WIDE else "determined"
 
 
@@ -139,7 +134,7 @@ def parameters_of(posterior: xarray.Dataset) -> list[str]:
 
 def material_draws(fit: Fit, posterior: xarray.Dataset) -> pd.DataFrame:
     """Draws of the material, a column for each quantity that `hits.file` takes."""
-    values = {parameter.path: posterior[parameter.name].values for parameter in fit.scene_parameters}
+    values = {parameter.place: posterior[parameter.name].values for parameter in fit.scene_parameters}
     columns = columns_of(values, fit.scene_of(fit.shots[0]).target.layers[0])
     return pd.DataFrame(
         {name: column for name, column in columns.items() if name != "thickness" and QUANTITIES[name].table != "core"}
@@ -153,29 +148,33 @@ def unit_of(array: xarray.DataArray) -> tuple[str, float]:
     return unit.shown, unit.factor
 
 
-def posterior_view(posterior: xarray.Dataset) -> dict[str, list[str | pd.DataFrame]]:
-    """The view of a posterior: its parameters, and its accuracy."""
-    columns = ["parameter", "median", "95 % interval", "95 % of the prior", "R-hat", "ESS", "verdict"]
-    names, rows = parameters_of(posterior), []
+def posterior_view(posterior: xarray.Dataset) -> View:
+    """What the shots say of each parameter, and how good the computation is."""
+    names, rows = parameters_of(posterior), dict[str, dict[str, str]]()
     for name in names:
         array = posterior[name]
         unit, factor = unit_of(array)
         low, middle, high = factor * np.quantile(array.values, [0.025, 0.5, 0.975])
         first, last = factor * np.quantile(array.attrs[p.PRIOR], [0.025, 0.975])
-        quality = (f"{array.attrs[p.R_HAT]:.3f}", f"{array.attrs[p.EFFECTIVE]:.0f}", array.attrs[p.VERDICT])
-        label = f"{name} [{unit}]" if unit else name
-        rows.append((label, f"{middle:.3g}", f"{low:.3g} to {high:.3g}", f"{first:.3g} to {last:.3g}", *quality))
+        rows[f"{name} [{unit}]" if unit else name] = {
+            "median": f"{middle:.3g}",
+            "95 % interval": f"{low:.3g} to {high:.3g}",
+            "95 % of the prior": f"{first:.3g} to {last:.3g}",
+            "R-hat": f"{array.attrs[p.R_HAT]:.3f}",
+            "ESS": f"{array.attrs[p.EFFECTIVE]:.0f}",
+            "verdict": array.attrs[p.VERDICT],
+        }
     ranks = posterior[names].to_dataframe().corr("spearman").to_numpy()
     correlations = [
-        f"{first} and {other} are determined together more than each alone: their correlation is {value:+.2f}"
-        for (i, first), (k, other) in combinations(enumerate(names), 2)
+        f"{one} and {other} are determined together more than each alone: their correlation is {value:+.2f}"
+        for (i, one), (k, other) in combinations(enumerate(names), 2)
         if abs(value := float(ranks[i, k])) > STRONG
     ]
-    table = pd.DataFrame(rows, columns=columns).set_index("parameter")
-    return {str(posterior.attrs[attr.TITLE]): [table, *correlations], "worth": [*_worth(posterior)]}
+    table = pd.DataFrame.from_dict(rows, orient="index").rename_axis("parameter")
+    return {str(posterior.attrs[attr.TITLE]): [table, *correlations], "quality": _quality(posterior)}
 
 
-def _worth(posterior: xarray.Dataset) -> list[str]:
+def _quality(posterior: xarray.Dataset) -> list[str]:
     attributes = posterior.attrs
     effective, r_hat, noise = (float(attributes[name]) for name in (p.EFFECTIVE, p.R_HAT, p.HIT_NOISE))
     misfit = posterior[p.MISFIT].values.sum(axis=1).min()

@@ -10,6 +10,7 @@ from functools import cached_property, lru_cache
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
+import numpy as np
 from pydantic import Field, ValidationError, field_validator, model_validator
 
 from warpimpact.campaign.campaign import Campaign, lacking
@@ -109,7 +110,7 @@ class Bound(_Goal):
         return 1.0 if self.at_most is not None else -1.0
 
 
-class FacedThreat(Model):
+class DesignThreat(Model):
     """A threat, given by the keys of the campaign that it replaces.
 
     Attributes:
@@ -184,15 +185,22 @@ class Search(Model):
     confirm_hits: Annotated[Whole, Field(ge=64, le=2**22)] = 1024
 
 
-class SearchTables(Model):
+class DesignFile(Model):
     """The tables of a design file beside those of a campaign and its variables."""
 
     objectives: Annotated[tuple[Objective, ...], Field(min_length=1, max_length=3)]
     bounds: Annotated[tuple[Bound, ...], Field(max_length=16)] = ()
-    threats: Annotated[tuple[FacedThreat, ...], Field(max_length=16)] = ()
+    threats: Annotated[tuple[DesignThreat, ...], Field(min_length=1, max_length=16)] = (DesignThreat(name="threat"),)
     references: Annotated[tuple[Reference, ...], Field(max_length=16)] = ()
     constraints: Constraints = Constraints()
     search: Search = Search()
+
+    @model_validator(mode="after")
+    def _has_different_names(self) -> DesignFile:
+        names = [*(threat.name for threat in self.threats), *(target.name for target in self.references)]
+        if twice := next((name for name in names if names.count(name) > 1), None):
+            raise ValueError(f'got the name "{twice}" twice, but each threat and reference needs its own')
+        return self
 
 
 @dataclass(frozen=True)
@@ -200,38 +208,48 @@ class Design:
     """A design file.
 
     Attributes:
-        title: title of the campaign.
         text: text of the file.
         name, folder: name of the file in errors, and folder from which file names in it count.
         base: tables of the campaign.
         space: free variables.
-        objectives, bounds, threats, references, constraints, search: as in the file. Without threats there is the
-            threat of the campaign, without a name.
-        columns: numbers of every hit, of which the measures are made.
+        file: tables of the search. Without threats there is the threat of the campaign.
     """
 
-    title: str
     text: str
     name: str
     folder: Path
     base: Mapping[str, Any]
     space: Space
-    objectives: tuple[Objective, ...]
-    bounds: tuple[Bound, ...]
-    threats: tuple[FacedThreat, ...]
-    references: tuple[Reference, ...]
-    constraints: Constraints
-    search: Search
-    columns: tuple[Measure, ...]
+    file: DesignFile
+
+    @property
+    def title(self) -> str:
+        """Title of the campaign."""
+        return str(self.base.get("title", ""))
 
     @property
     def goals(self) -> tuple[Objective | Bound, ...]:
         """Objectives and bounds."""
-        return (*self.objectives, *self.bounds)
+        return (*self.file.objectives, *self.file.bounds)
+
+    @cached_property
+    def columns(self) -> tuple[Measure, ...]:
+        """Numbers of every hit, of which the measures are made."""
+        return tuple(dict.fromkeys(goal.spec.column for goal in self.goals if goal.spec.kind != "target"))
+
+    @property
+    def fresh_seed(self) -> int:
+        """Seed of hits that the search has not computed."""
+        return int(np.random.SeedSequence(self.file.search.seed, spawn_key=(24,)).generate_state(1)[0] >> 1)
 
     def tables(self, values: Array) -> dict[str, Any]:
         """The tables of the campaign of a point of the space."""
         return self.space.tables(self.base, values, self.name)
+
+    def against(self, tables: Mapping[str, Any], threat: DesignThreat) -> dict[str, Any]:
+        """The tables of a target with the keys of a threat."""
+        core = dict(threat.core) or tables.get("core", {})
+        return dict(tables) | {"core": core, "impact": tables.get("impact", {}) | threat.impact}
 
     def campaign(self, tables: Mapping[str, Any], threat: int = 0, seed: int | None = None) -> Campaign:
         """The campaign of a target and a threat: hits in the irreducible part of the cell, where it has one.
@@ -244,19 +262,14 @@ class Design:
         Raises:
             CampaignError: the campaign is not valid.
         """
-        data = self.against(tables, self.threats[threat])
-        seed = self.search.seed if seed is None else seed
-        sampling = {"sampling": "sobol", "count": _SAMPLER_HITS, "seed": seed, "irreducible": is_even(tables)}
+        data = self.against(tables, self.file.threats[threat])
+        seed = self.file.search.seed if seed is None else seed
+        sampling = {"sampling": "sobol", "count": _SAMPLER_HITS, "seed": seed, "irreducible": is_irreducible(tables)}
         data["hits"] = {key: value for key, value in data.get("hits", {}).items() if key == "area"} | sampling
         return _campaign(json.dumps(data, default=str, ensure_ascii=False), self.name, self.folder)
 
-    def against(self, tables: Mapping[str, Any], threat: FacedThreat) -> dict[str, Any]:
-        """The tables of a target with the keys of a threat."""
-        core = dict(threat.core) or tables.get("core", {})
-        return dict(tables) | {"core": core, "impact": tables.get("impact", {}) | threat.impact}
 
-
-def is_even(tables: Mapping[str, Any]) -> bool:
+def is_irreducible(tables: Mapping[str, Any]) -> bool:
     """Whether the symmetries of a target depend only on plate and shot."""
     layers, impact = tables.get("layer", ()), tables.get("impact", {})
     holed = any({"pattern", "size"} & {*layer} for layer in layers)
@@ -284,47 +297,31 @@ def read_design(path: str | Path) -> Design:
 def design_from(text: str, name: str, folder: Path) -> Design:
     """Read a design from its text; `name` is the name of the file in errors."""
     data = parsed(text, name, DESIGN)
-    own_tables = {key: data.pop(key) for key in ("variables", *SearchTables.model_fields) if key in data}
+    tables = {key: data.pop(key) for key in ("variables", *DesignFile.model_fields) if key in data}
     if "stop" in data:
         raise CampaignError(f"{name}: stop: a design file takes no [stop]; [search] sets the hits")
-    space = read_space(own_tables.pop("variables", {}), name)
+    space = read_space(tables.pop("variables", {}), name)
     try:
-        own = SearchTables.model_validate(own_tables)
+        file = DesignFile.model_validate(tables)
     except ValidationError as error:
-        raise CampaignError(f"{name}: {sentence(error, own_tables)}") from None
-    threats = own.threats or (FacedThreat(name="threat"),)
-    names = [threat.name for threat in threats] + [reference.name for reference in own.references]
-    if twice := next((name for name in names if names.count(name) > 1), None):
-        raise CampaignError(f'{name}: got the name "{twice}" twice, but each threat and reference needs its own')
-    layered = "layer" in data or any(variable.place == "layer" for variable in space.variables)
+        raise CampaignError(f"{name}: {sentence(error, tables)}") from None
+    output = data.get("output", {})
+    has: dict[str, Any] = {
+        "standoffs": [] if output.get("standoffs") == [] else None,
+        "layered": "layer" in data or any(variable.place == "layer" for variable in space.variables),
+        "bending": output.get("bending") is True,
+        "breakable": True,
+    }
     for table in ("objectives", "bounds"):
-        for k, goal in enumerate(getattr(own, table)):
-            _check_needs(f"{name}: {table}[{k}]", goal, data.get("output", {}), layered=layered)
-    measures = (goal.spec for goal in (*own.objectives, *own.bounds))
-    columns = dict.fromkeys(measure.column for measure in measures if measure.kind != "target")
-    return Design(
-        title=str(data.get("title", "")),
-        text=text,
-        name=name,
-        folder=folder,
-        base=data,
-        space=space,
-        columns=tuple(columns),
-        **dict(own) | {"threats": threats},
-    )
-
-
-def _check_needs(place: str, goal: Objective | Bound, output: Mapping[str, Any], *, layered: bool) -> None:
-    """Refuse a measure if the campaign, with layers behind the plate or not, lacks what it needs."""
-    standoffs: list[float] | None = [] if output.get("standoffs") == [] else None
-    bends = output.get("bending") is True
-    if keys := lacking(goal.spec, standoffs=standoffs, layered=layered, bending=bends, breakable=True):
-        raise CampaignError(f'{place}.measure = "{goal.measure}" needs {keys}')
+        for k, goal in enumerate(getattr(file, table)):
+            if keys := lacking(goal.spec, **has):
+                raise CampaignError(f'{name}: {table}[{k}].measure = "{goal.measure}" needs {keys}')
+    return Design(text=text, name=name, folder=folder, base=data, space=space, file=file)
 
 
 def design_schema() -> dict[str, Any]:
     """The JSON schema of a design file: of a campaign, what is free in it, and what is sought."""
-    campaign, own = campaign_schema(), file_schema(SearchTables, "warpimpact design")
+    campaign, own = campaign_schema(), file_schema(DesignFile, "warpimpact design")
     variables = {
         "description": 'Free variables by their places, such as "plate.pattern.width": a range with low, high and, '
         "where it has one, a step; or a list of values, or of tables with names.",

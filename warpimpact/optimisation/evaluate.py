@@ -2,24 +2,24 @@
 
 from __future__ import annotations
 
-import hashlib
-import json
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import asdict, dataclass
-from itertools import count
+from dataclasses import dataclass, field, replace
+from functools import partial
 from typing import Any
 
 import numpy as np
+import xarray
 
 from warpimpact.campaign.campaign import Campaign
 from warpimpact.campaign.resistances import resistance_by_thickness
 from warpimpact.optimisation.design import Design
+from warpimpact.optimisation.objectives import goal_numbers, mean_of
 from warpimpact.records.variable import failures
 from warpimpact.results import variables as v
 from warpimpact.results.dataset import narrow_dataset
 from warpimpact.results.measures import Measure
-from warpimpact.runs.executor import Job
-from warpimpact.runs.questions import Arrays, Question, Round
+from warpimpact.runs.chunks import Chunks
+from warpimpact.runs.computer import Computer
 from warpimpact.scene import Numerics, Shots
 from warpimpact.scene.model import Array
 from warpimpact.solver.accuracy import PILOT_LIMITS, pilot_size
@@ -36,106 +36,153 @@ from warpimpact.solver.many import side_by_side, simulate_many
 from warpimpact.solver.simulate import pilot_of
 from warpimpact.solver.worker import Worker
 
-JOBS_TOGETHER = 16
-"""Number of jobs that a worker computes side by side and saves together."""
+BATCH = 16
+"""Number of hit jobs that are computed side by side and saved together."""
 
 
 @dataclass(frozen=True)
-class HitJob:
-    """The hits of a target by a threat.
+class DesignPoint:
+    """A target, before or after its hits are computed.
 
     Attributes:
-        tables: tables of the target's campaign.
-        threat: number of the threat in the design file.
-        count: number of hits. Hits of the same number are paired across designs.
-        level: numerics as JSON.
-        seed: seed of the hits.
+        values: values of the variables, shape [variables]; empty for a reference.
+        tables: tables of its campaign.
+        weights: masses per area [kg/m²], by the names of the measures (results/measures.py).
+        numerics: numerics for every threat, as JSON.
+        results: objectives and bounds, shape [goals]; NaN where no hit counts.
     """
 
-    tables: Mapping[str, Any]
-    threat: int
-    count: int
-    level: str
-    seed: int
+    values: Array
+    tables: dict[str, Any]
+    weights: Mapping[str, float]
+    numerics: tuple[str, ...] = ()
+    results: Array = field(default_factory=lambda: np.zeros(0))
 
 
 Report = Callable[[float], object]
-"""Called with the number of jobs done, fractions included."""
+"""Called with the share that is done."""
+Job = tuple[dict[str, Any], int, str]
+"""Tables of a target, number of a threat, and numerics as JSON; for a pilot, its fidelity."""
 
 
-def columns_of(design: Design, jobs: Sequence[HitJob], report: Report) -> Question[list[Array]]:
-    """`Design.columns` of the hits of jobs, each of shape [columns, hits], as a round of a question."""
-    results = yield from _results(_columns_computed, design, jobs, JOBS_TOGETHER, report)
-    return [columns for arrays in results for columns in arrays.values()]
+class Evaluator:
+    """Computes the hits of designs, except those in the chunks of an earlier search.
+
+    Attributes:
+        pilots: numerics that pilots have given, as JSON, by fidelity, alternative and threat.
+    """
+
+    def __init__(self, design: Design, machine: Computer, chunks: Chunks) -> None:
+        self.design, self.made_by = design, machine.made_by
+        self.pilots = dict[tuple[str, str, int], str]()
+        self._machine, self._chunks, self._begun = machine, chunks, 0
+
+    def evaluate(
+        self,
+        points: Sequence[DesignPoint],
+        alternatives: Sequence[str],
+        fidelity: str,
+        hits: int,
+        seed: int,
+        report: Callable[[str, float], object],
+    ) -> tuple[list[DesignPoint], Array]:
+        """Designs with their results, and the numbers of their hits, shape [designs, threats, columns, hits].
+
+        Args:
+            alternatives: a name of each design. Designs of the same name share the pilot of the first one.
+            fidelity: of the pilots.
+            report: called with "pilots" or "designs", and the share of them that is done.
+        """
+        design, threats = self.design, range(len(self.design.file.threats))
+        counted = [*zip(points, alternatives, strict=True)] if design.columns else []
+        keys = [(fidelity, name, threat) for _, name in counted for threat in threats]
+        targets = [(point.tables, threat) for point, _ in counted for threat in threats]
+        first = dict[tuple[str, str, int], Job]()
+        for key, target in zip(keys, targets, strict=True):
+            if key not in self.pilots:
+                first.setdefault(key, (*target, fidelity))
+        pilots = self._computed(_pilot_level, [(job, seed) for job in first.values()], partial(report, "pilots"))
+        self.pilots |= zip(first, (str(pilot.attrs["numerics"]) for pilot in pilots), strict=True)
+        jobs = [(*target, self.pilots[key]) for key, target in zip(keys, targets, strict=True)]
+        batches = [(jobs[start : start + BATCH], hits, seed) for start in range(0, len(jobs), BATCH)]
+        parts = self._computed(_hit_columns, batches, partial(report, "designs"))
+        shape = len(points), len(threats), len(design.columns), hits if jobs else 1
+        columns = np.array([of_job for part in parts for of_job in part["columns"].values]).reshape(shape)
+        evaluated = []
+        for number, (point, of_point) in enumerate(zip(points, columns, strict=True)):
+            numerics = tuple(level for _, _, level in jobs[number * len(threats) : (number + 1) * len(threats)])
+            means = [mean_of(goal_numbers(design, point.weights, of_point, goal)[0]) for goal in design.goals]
+            evaluated.append(replace(point, numerics=numerics, results=np.array(means)))
+        return evaluated, columns
+
+    def _computed(
+        self,
+        function: Callable[..., xarray.Dataset],
+        tasks: Sequence[tuple[Any, ...]],
+        report: Report,
+    ) -> list[xarray.Dataset]:
+        """Results of tasks. Those of a search have the same numbers each time it runs, and so have their chunks."""
+        numbers = range(self._begun, self._begun + len(tasks))
+        self._begun += len(tasks)
+        done = {number: saved for number in numbers if (saved := self._chunks.load(number)) is not None}
+        missing = [(n, (self.design, *task)) for n, task in zip(numbers, tasks, strict=True) if n not in done]
+
+        def tick(parts: Sequence[float] = ()) -> None:
+            report((len(done) + sum(parts)) / max(1, len(tasks)))
+
+        tick()
+        for number, dataset in self._machine.map(function, missing, tick):
+            self._chunks.save(number, dataset)
+            done[number] = dataset
+            tick()
+        return [done[number] for number in numbers]
 
 
-def levels_of(design: Design, jobs: Sequence[HitJob], report: Report) -> Question[list[str]]:
-    """The levels that the pilots of jobs find, as a round of a question."""
-    results = yield from _results(_level_computed, design, jobs, 1, report)
-    return [str(arrays["level"]) for arrays in results]
-
-
-def _results(
-    compute: Callable[..., Arrays], design: Design, jobs: Sequence[HitJob], together: int, report: Report
-) -> Question[list[Arrays]]:
-    """The results of jobs, of which some are computed together."""
-    if not jobs:
-        return []
-    groups = [jobs[first : first + together] for first in range(0, len(jobs), together)]
-    keys = [
-        hashlib.sha256(json.dumps([asdict(job) for job in group], default=str).encode()).hexdigest() for group in groups
-    ]
-    work = [Job(compute, (design, group)) for group in groups]
-    return (yield Round(work, keys, lambda done, _: report(min(done * together, len(jobs)))))
-
-
-def _columns_computed(
-    design: Design, jobs: Sequence[HitJob], *, worker: Worker, report: Callable[[float], object]
-) -> Arrays:
+def _hit_columns(
+    design: Design,
+    jobs: Sequence[Job],
+    hits: int,
+    seed: int,
+    *,
+    worker: Worker,
+    report: Report,
+) -> xarray.Dataset:
     """Compute jobs side by side. The result of a job does not depend on the other jobs."""
-    campaigns = [design.campaign(job.tables, job.threat, job.seed) for job in jobs]
-    shots = [campaign.sampler().shots(0, job.count) for campaign, job in zip(campaigns, jobs, strict=True)]
-    searches = [
-        (number, row) for number in range(len(jobs)) for row, measure in enumerate(design.columns) if measure.is_limit
-    ]
-    steps, total, done = 1 + len(searches), sum(map(len, shots)), 0
+    campaigns = [design.campaign(tables, threat, seed) for tables, threat, _ in jobs]
+    numerics = [Numerics.model_validate_json(level) for _, _, level in jobs]
+    shots = [campaign.sampler().shots(0, hits) for campaign in campaigns]
     needed = {v.STATUS, v.STOPPED_IN, *(name for measure in design.columns for name in measure.quantity.of)}
-    columns: dict[int, Array] = {}
-    for level in dict.fromkeys(job.level for job in jobs):
-        same = [number for number, job in enumerate(jobs) if job.level == level]
+    columns = np.full((len(jobs), len(design.columns), hits), np.nan)
+    for level in dict.fromkeys(level for _, _, level in jobs):
+        same = [number for number, job in enumerate(jobs) if job[2] == level]
         scenes = [(campaigns[number].scene, shots[number]) for number in same]
 
-        def progress(now: int, _: int, before: int = done) -> None:
-            report((before + now) / total / steps)
+        def progress(now: int, total: int) -> None:
+            report(0.9 * now / total)
 
-        marched = simulate_many(scenes, Numerics.model_validate_json(level), worker, progress)
+        marched = simulate_many(scenes, numerics[same[0]], worker, progress)
         for number, (scene, of_job), outcomes in zip(same, scenes, marched, strict=True):
             table = narrow_dataset(scene, of_job, outcomes, needed)
-            columns[number] = np.array([_column(measure, table) for measure in design.columns])
-        done += sum(len(of_job) for _, of_job in scenes)
-    ended = count(1)
+            columns[number] = [_column(measure, table) for measure in design.columns]
+    searches = [(number, row) for number in range(len(jobs)) for row, one in enumerate(design.columns) if one.is_limit]
 
     def search(which: int, share: Worker, _: Any) -> Array:
         number, row = searches[which]
-        numerics = Numerics.model_validate_json(jobs[number].level)
-        found = _limits(campaigns[number], shots[number], design.columns[row], numerics, share)
-        report((1 + next(ended)) / steps)
-        return found
+        return _limits(campaigns[number], shots[number], design.columns[row], numerics[number], share)
 
-    for (number, row), found in zip(searches, side_by_side(search, len(searches), worker), strict=True):
-        columns[number][row] = found
-    return {str(number): columns[number] for number in range(len(jobs))}
+    for (number, row), values in zip(searches, side_by_side(search, len(searches), worker), strict=True):
+        columns[number, row] = values
+    return xarray.Dataset({"columns": (("job", "column", "hit"), columns)})
 
 
 def _column(measure: Measure, table: Any) -> Array:
-    """A measure of every hit of a table in its display unit; NaN where the table lacks it, as before a search of
-    limits."""
+    """A measure of every hit in its display unit; NaN where the table lacks it, as before a search of limits."""
     if measure.quantity.lacking(table):
         return np.full(table.sizes["hit"], np.nan)
     return np.asarray(measure.display.factor * measure.values(table))
 
 
-def _limit_of(campaign: Campaign, measure: Measure) -> LimitSpec:
+def _limit_spec(campaign: Campaign, measure: Measure) -> LimitSpec:
     """The limit behind a measure, with the tolerance of `warpimpact limit`."""
     if measure.name == "limit_velocity":
         return LimitSpec("velocity", VELOCITY_TOLERANCE, HIGHEST_VELOCITY)
@@ -148,29 +195,27 @@ def _limit_of(campaign: Campaign, measure: Measure) -> LimitSpec:
 
 def _limits(campaign: Campaign, shots: Shots, measure: Measure, numerics: Numerics, worker: Worker) -> Array:
     """The values of a measure of limits, in its display unit, shape [shots]; NaN where the computation failed."""
-    limit, target = _limit_of(campaign, measure), campaign.scene.target
-    found = limits(campaign.scene, shots, limit, numerics, worker)
-    value = np.where(failures(found.outcomes.status), np.nan, np.minimum(found.value, limit.highest))
+    spec, target = _limit_spec(campaign, measure), campaign.scene.target
+    searched = limits(campaign.scene, shots, spec, numerics, worker)
+    value = np.where(failures(searched.outcomes.status), np.nan, np.minimum(searched.value, spec.highest))
     if measure.name == "limit_areal_density":
-        layer = target.layers[limit.layer]
+        layer = target.layers[spec.layer]
         value = target.areal_density + layer.areal_density * (value / layer.thickness - 1.0)
     return np.asarray(measure.display.factor * measure.counted(value))
 
 
-def _level_computed(
-    design: Design, jobs: Sequence[HitJob], *, worker: Worker, report: Callable[[float], object]
-) -> Arrays:
-    """The level that a pilot finds for one job, whose `level` is the fidelity, unless the campaign fixes the
-    resolution."""
-    (job,) = jobs
-    campaign = design.campaign(job.tables, job.threat, job.seed)
-    found = [campaign.numerics]
+def _pilot_level(design: Design, job: Job, seed: int, *, worker: Worker, report: Report) -> xarray.Dataset:
+    """The numerics that a pilot finds, unless the campaign fixes the resolution."""
+    tables, threat, fidelity = job
+    campaign = design.campaign(tables, threat, seed)
+    levels = [campaign.numerics]
     if campaign.numerics.explicit is None:
-        numerics = campaign.numerics.model_copy(update={"fidelity": job.level, "accuracy": None})
+        numerics = campaign.numerics.model_copy(update={"fidelity": fidelity, "accuracy": None})
         scene, shots = campaign.scene, campaign.sampler().shots(0, pilot_size(numerics.asked))
         some = shots[: pilot_size(numerics.asked, PILOT_LIMITS)]
-        searched = [_limit_of(campaign, measure) for measure in design.columns if measure.is_limit]
-        found = [pilot_of_limits(scene, some, limit, numerics, worker).numerics for limit in searched]
-        if len(searched) < len(design.columns):
-            found.append(pilot_of(scene, shots, numerics, worker).numerics)
-    return {"level": np.array(max(found, key=lambda numerics: numerics.level or 0).model_dump_json())}
+        specs = [_limit_spec(campaign, measure) for measure in design.columns if measure.is_limit]
+        levels = [pilot_of_limits(scene, some, spec, numerics, worker).numerics for spec in specs]
+        if len(specs) < len(design.columns):
+            levels.append(pilot_of(scene, shots, numerics, worker).numerics)
+    finest = max(levels, key=lambda numerics: numerics.level or 0)
+    return xarray.Dataset(attrs={"numerics": finest.model_dump_json()})

@@ -9,8 +9,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass, field
-from functools import cache, partial
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -25,31 +23,12 @@ from warpimpact.scene.model import Array
 from warpimpact.scene.patterns.pattern import LatticePattern
 from warpimpact.solver.limit import check_arrests
 from warpimpact.statistics.comparisons import ROUNDED
-from warpimpact.statistics.intervals import Estimate, estimate_of
+from warpimpact.statistics.intervals import estimate_of
 from warpimpact.statistics.tails import pseudo_values
 
 INVALID = "a campaign that is valid"
 SCRAMBLINGS = 16
 """Number of scramblings of the hits of a search: hit k belongs to scrambling k modulo this number."""
-
-
-@dataclass(frozen=True)
-class Candidate:
-    """A target, before or after its hits are computed.
-
-    Attributes:
-        point: values of the variables, shape [variables]; empty for a reference.
-        tables: tables of its campaign.
-        weights: masses per area [kg/m²], by the names of the measures (results/measures.py).
-        levels: numerics for every threat, as JSON.
-        results: objectives and bounds, shape [goals]; NaN where no hit counts.
-    """
-
-    point: Array
-    tables: dict[str, Any]
-    weights: Mapping[str, float]
-    levels: tuple[str, ...] = ()
-    results: Array = field(default_factory=lambda: np.zeros(0))
 
 
 def weights_of(target: Target) -> dict[str, float]:
@@ -58,57 +37,55 @@ def weights_of(target: Target) -> dict[str, float]:
     return {attr.AREAL_DENSITY: target.areal_density, attr.ADD_ON_DENSITY: weights.get("add-on", target.areal_density)}
 
 
-def results_of(design: Design, weights: Mapping[str, float], columns: Array) -> Array:
-    """Objectives and bounds, shape [goals]; NaN where no hit counts.
+def goal_numbers(
+    design: Design, weights: Mapping[str, float], columns: Array, goal: Objective | Bound
+) -> tuple[Array, str]:
+    """Numbers whose mean is a goal, shape [hits], and the threat that they are of; "" if of all threats, or of none.
 
     Args:
+        weights: masses per area of the target.
         columns: numbers of every hit by each threat, shape [threats, columns, hits].
     """
-    return np.array([_mean(_numbers(design, weights, columns, goal)) for goal in design.goals])
-
-
-def _numbers(design: Design, weights: Mapping[str, float], columns: Array, goal: Objective | Bound) -> Array:
-    """Numbers of the hits whose mean is an objective or a bound, shape [hits]: those of the worst threat, or averages
-    over the threats."""
-    measure = goal.spec
+    measure, threats = goal.spec, design.file.threats
     if measure.kind == "target":
-        return np.array([weights[measure.name]])
+        return np.array([weights[measure.name]]), ""
     numbers = columns[:, design.columns.index(measure.column)]
     if measure.kind == "quantile":  # of Harrell and Davis, a smooth function of the hits (statistics/tails.py)
         numbers = np.array([pseudo_values(of_hits, measure.share) for of_hits in numbers])
     elif not measure.is_binary:
         numbers = np.array([measure.averaged(measure.counted(of_hits)) for of_hits in numbers])
     if goal.threats == "mean":
-        of_threats = np.array([threat.weight for threat in design.threats])
-        return np.asarray(of_threats @ numbers / of_threats.sum())
-    signed = goal.sign * np.array([_mean(of_hits) for of_hits in numbers])
-    return np.asarray(numbers[int(np.argmax(np.nan_to_num(signed, nan=np.inf)))])
+        shares = np.array([threat.weight for threat in threats])
+        return np.asarray(shares @ numbers / shares.sum()), ""
+    signed = goal.sign * np.array([mean_of(of_hits) for of_hits in numbers])
+    worst = int(np.argmax(np.nan_to_num(signed, nan=np.inf)))
+    return np.asarray(numbers[worst]), threats[worst].name
 
 
-def _mean(numbers: Array) -> float:
+def mean_of(numbers: Array) -> float:
+    """Mean of the numbers that count; NaN if none does."""
     known = numbers[~np.isnan(numbers)]
     return float(known.mean()) if len(known) else float("nan")
 
 
-def estimate(design: Design, weights: Mapping[str, float], columns: Array, goal: Objective | Bound) -> Estimate:
-    """An objective or a bound with its interval."""
-    numbers = _numbers(design, weights, columns, goal)
+def interval_of(design: Design, goal: Objective | Bound, numbers: Array) -> tuple[float, float, float]:
+    """A goal with the ends of its interval, from `goal_numbers`."""
     if goal.spec.kind == "target":
-        return Estimate(numbers[0], numbers[0], numbers[0], columns.shape[2], 0.0)
-    averaged = goal.threats == "mean" and len(design.threats) > 1
-    is_share = goal.spec.is_binary and not averaged
-    return estimate_of("share" if is_share else "mean", numbers, replicates=SCRAMBLINGS)
+        return (float(numbers[0]),) * 3
+    is_share = goal.spec.is_binary and (goal.threats == "worst" or len(design.file.threats) == 1)
+    estimate = estimate_of("share" if is_share else "mean", numbers, replicates=SCRAMBLINGS)
+    return estimate.value, estimate.low, estimate.high
 
 
 def to_minimise(design: Design, results: Array) -> Array:
     """Objectives, signed such that they are to be minimised; infinite where no hit counts."""
-    signs = np.array([objective.sign for objective in design.objectives])
+    signs = np.array([objective.sign for objective in design.file.objectives])
     return np.nan_to_num(signs * results[: len(signs)], nan=np.inf, posinf=np.inf, neginf=-np.inf)
 
 
 def excesses(design: Design, results: Array) -> Array:
     """Violation of each bound as a share of its limit; 0 where it is kept to rounding, 1 where no hit counts."""
-    bounded = zip(design.bounds, results[len(design.objectives) :], strict=True)
+    bounded = zip(design.file.bounds, results[len(design.file.objectives) :], strict=True)
     over = [bound.sign * (value - bound.limit) / (abs(bound.limit) or 1.0) for bound, value in bounded]
     shares = np.nan_to_num(np.array(over), nan=1.0)
     return np.where(shares > ROUNDED, shares, 0.0)
@@ -120,7 +97,7 @@ class Violation(NamedTuple):
     Attributes:
         constraint: its key in [constraints], or INVALID.
         share: relative size of the violation.
-        text: found value and allowed range in words.
+        text: value and allowed range in words.
     """
 
     constraint: str
@@ -136,42 +113,23 @@ def violations(design: Design, tables: Mapping[str, Any]) -> tuple[Campaign | No
             check_arrests(campaign.scene)
     except ValueError as error:  # a CampaignError is one, too
         return None, (Violation(INVALID, 1.0, str(error).removeprefix(f"{design.name}: ")),)
-    return campaign, tuple(_violations(design, campaign))
+    return campaign, tuple(_violations(design.file.constraints, campaign.target))
 
 
-def _violations(design: Design, campaign: Campaign) -> Iterator[Violation]:
-    target = campaign.target
-    for measure, density in weights_of(target).items():
-        for key in (f"smallest_{measure}", f"largest_{measure}"):
-            yield from _broken(design.constraints, key, partial(float, density), WEIGHTS[measure].label, "kg/m²")
-    for name, plate in target.named:
-        if plate.open_area > 0.0:
-            for key, value, what, unit in _of_holes(plate):
-                for of_hole in _broken(design.constraints, key, value, what, unit):
-                    yield of_hole._replace(text=f"{name}: {of_hole.text}")
+def _violations(constraints: Constraints, target: Target) -> Iterator[Violation]:
+    for key, limit in constraints:
+        if limit is not None and (name := key.partition("_")[2]) in WEIGHTS:
+            yield from _violation(key, limit, WEIGHTS[name].label, weights_of(target)[name], "kg/m²")
+    for place, plate in target.named:
+        for key, (unit, number_of) in _OF_HOLES.items():
+            if plate.open_area > 0.0 and (limit := getattr(constraints, key)) is not None:
+                what = f"{place}: {key.partition('_')[2].replace('_', ' ')}"
+                yield from _violation(key, limit, what, number_of(plate), unit)
 
 
-def _of_holes(plate: Plate) -> tuple[tuple[str, Callable[[], float], str, str], ...]:
-    """Constraints of the holes of a plate: key, the bounded number in SI, and its name and unit in a sentence."""
-    sizes = cache(lambda: hole_sizes(plate))
-    return (
-        ("smallest_open_area", lambda: plate.open_area, "open area", ""),
-        ("largest_open_area", lambda: plate.open_area, "open area", ""),
-        ("smallest_ligament", lambda: plate.ligament, "ligament", "mm"),
-        ("smallest_hole", lambda: sizes()[0], "hole", "mm"),
-        ("largest_hole", lambda: sizes()[1], "hole", "mm"),
-        ("smallest_corner_radius", lambda: corner_radius(plate), "corner radius", "mm"),
-    )
-
-
-def _broken(
-    constraints: Constraints, key: str, number: Callable[[], float], what: str, unit: str
-) -> Iterator[Violation]:
-    """The violation of a constraint by a number, which is computed only if the constraint is given."""
-    if (given := getattr(constraints, key)) is None:
-        return
-    scale = 1e3 if unit == "mm" else 1.0
-    value, limit, sign = scale * number(), scale * given, 1.0 if key.startswith("smallest") else -1.0
+def _violation(key: str, limit: float, what: str, value: float, unit: str) -> Iterator[Violation]:
+    sign, scale = 1.0 if key.startswith("smallest") else -1.0, 1e3 if unit == "mm" else 1.0
+    value, limit = scale * value, scale * limit
     if sign * value < sign * limit * (1.0 - sign * 1e-9):
         end = "least" if sign > 0.0 else "most"
         text = f"{what} of {value:.4g} {unit}, but it must be at {end} {limit:.4g} {unit}"
@@ -179,8 +137,10 @@ def _broken(
 
 
 def hole_sizes(plate: Plate) -> tuple[float, float]:
-    """Diameter of the largest circle in the narrowest hole, and greatest extent of the widest hole [m]; within a
-    thousandth of the extent where the pattern is no lattice."""
+    """Diameter of the largest circle in the narrowest hole, and greatest extent of the widest hole [m].
+
+    Within a thousandth of the extent where the pattern is no lattice.
+    """
     if isinstance(plate.pattern, LatticePattern):
         return plate.pattern.hole_size
     narrow, wide = math.inf, 0.0
@@ -198,3 +158,14 @@ def corner_radius(plate: Plate) -> float:
     if isinstance(pattern, EllipsePattern):
         return float(pattern.width**2 / (2.0 * pattern.length))
     return float(pattern.rounding) if isinstance(pattern, LatticePattern) else math.inf
+
+
+_OF_HOLES: dict[str, tuple[str, Callable[[Plate], float]]] = {
+    "smallest_open_area": ("", lambda plate: plate.open_area),
+    "largest_open_area": ("", lambda plate: plate.open_area),
+    "smallest_ligament": ("mm", lambda plate: plate.ligament),
+    "smallest_hole": ("mm", lambda plate: hole_sizes(plate)[0]),
+    "largest_hole": ("mm", lambda plate: hole_sizes(plate)[1]),
+    "smallest_corner_radius": ("mm", corner_radius),
+}
+"""Constraints of the holes of a plate: unit in a sentence, and the bounded number in SI."""

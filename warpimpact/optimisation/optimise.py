@@ -1,49 +1,69 @@
-"""From a design file to its front: search, fresh hits, file and campaigns."""
+"""The search for designs: generation, evaluation, next generation; then the front by fresh hits.
+
+NSGA-II of pymoo asks for points, and every feasible one gets the same hits. A search selects lucky hits, so its own
+numbers are biased, and its front is computed again. Other optimisers: tests/benchmarks/NOTES.md.
+"""
 
 from __future__ import annotations
 
 import json
 import warnings
-from collections.abc import Callable, Mapping
+from collections import Counter
+from collections.abc import Callable, Iterable, Sequence
+from contextlib import nullcontext
+from dataclasses import replace
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-import tomli_w
 import xarray
+from numpy.typing import NDArray
 
-from warpimpact.campaign.places import relocated
-from warpimpact.campaign.tested_range import outside_tested_range
-from warpimpact.optimisation.design import Bound, Design, FacedThreat, read_design
-from warpimpact.optimisation.objectives import Candidate, estimate
-from warpimpact.optimisation.search import (
-    Confirmed,
-    Follow,
-    Searched,
-    check_installed,
-    confirm,
-    fresh_seed,
-    references,
-    search,
-)
+from warpimpact.campaign.places import files_in
+from warpimpact.campaign.text import CampaignError, parsed
+from warpimpact.optimisation.design import Design, read_design
+from warpimpact.optimisation.evaluate import DesignPoint, Evaluator
+from warpimpact.optimisation.front import check_folder, folder_of, to_dataset, write_campaigns
+from warpimpact.optimisation.objectives import Violation, excesses, to_minimise, violations, weights_of
 from warpimpact.results import attributes as attr
 from warpimpact.results import files
 from warpimpact.results import front as f
-from warpimpact.results.dataset import dataset_of
-from warpimpact.results.files import OutputError, aside
 from warpimpact.results.kinds import FRONT
-from warpimpact.runs.executor import Executor, executor_for, opened
-from warpimpact.runs.parts import is_begun, remove
-from warpimpact.runs.questions import Question, Store, answered, content_of, stored
+from warpimpact.runs.chunks import digest, is_begun, open_chunks
+from warpimpact.runs.computer import Computer, computer
 from warpimpact.scene.model import Array
 
+IDLE = 25
+"""Generations without a new feasible design after which a search ends."""
+SEARCH_FIDELITY, CONFIRM_FIDELITY = "draft", "standard"
+"""Fidelity of the pilots of a search and of its front, unless the campaign fixes a resolution."""
 
-def optimise(design: Design | str | Path, *, device: str = "auto", progress: Follow | None = None) -> xarray.Dataset:
-    """Search the best designs, in memory.
+
+Progress = Callable[[int, int, str], object]
+"""Called with numbers of designs, done and in all, and with words for the front and what is being computed."""
+
+
+def optimise(
+    design: Design | str | Path,
+    output: Path | None = None,
+    *,
+    device: str | Computer = "auto",
+    resume: bool = False,
+    overwrite: bool = False,
+    progress: Progress = lambda done, total, text: None,
+    warn: Callable[[str], object] = warnings.warn,
+) -> xarray.Dataset:
+    """Search the best designs: the front of the objectives, computed again with fresh hits.
 
     Args:
         design: the design, or its file.
-        device: "auto" (CUDA if there is one, else the CPU), "cpu" or "cuda:0".
+        output: result file; the campaigns of the front go into `folder_of(output)`. By default nothing is written.
+        device: "auto" (CUDA if there is one, else the CPU), "cpu", "cuda:0", or an open computer.
+        resume: continue an interrupted search; of a complete one, write the campaigns that are missing.
+        overwrite: replace an existing result with its campaigns, and begin anew in place of an unfinished search.
+        warn: called with a sentence for damaged chunks, which are computed again, and for each changed campaign, which
+            is kept.
 
     Returns:
         The Dataset of results/front.py: every computed design, and the front by fresh hits.
@@ -51,213 +71,198 @@ def optimise(design: Design | str | Path, *, device: str = "auto", progress: Fol
     Raises:
         CampaignError: the file has a value that is not allowed, or no design keeps the constraints.
         DeviceError: the device is absent.
-    """
-    design = design if isinstance(design, Design) else read_design(design)
-    with executor_for(device) as executor:
-        return _answered(design, executor, progress)
-
-
-def optimise_to_file(
-    design: Design,
-    output: Path,
-    *,
-    device: str | Executor = "auto",
-    resume: bool = False,
-    overwrite: bool = False,
-    progress: Follow | None = None,
-    tell: Callable[[str], object] = warnings.warn,
-) -> list[Path]:
-    """Search the best designs into a file, with a campaign file for each design of the front in `folder_of(output)`.
-    Computed designs are on the disk at once, in `output`.parts.
-
-    Args:
-        resume: continue what is in `output`.parts; for a complete search, write the missing campaigns.
-        overwrite: replace an existing result with its campaigns, and begin anew in place of an unfinished search.
-        tell: called with a sentence for each damaged part, which is computed again, and for each changed campaign,
-            which is kept.
-
-    Returns:
-        The campaign files.
-
-    Raises:
         OutputError: a file cannot be written, must not be overwritten or belongs to another search.
-        CampaignError: no design keeps the constraints.
         Interrupted: the user interrupted the search; what is saved can be resumed.
     """
-    folder = folder_of(output)
-    check_campaigns(folder, overwrite=overwrite or (resume and is_begun(output)))
-    with opened(device) as computing:
-        content = content_of(design.text, design.name, design.folder, computing.made_by)
-        with stored(output, content, "search", resume=resume, overwrite=overwrite, tell=tell) as store:
-            if store is not None:
-                dataset = _answered(design, computing, progress, store)
-                files.write(dataset.assign_attrs({attr.FINGERPRINT: store.parts.fingerprint}), output)
-    return write_campaigns(design, files.read(output, FRONT), folder, overwrite=overwrite, tell=tell)
+    design = design if isinstance(design, Design) else read_design(design)
+    if missing := [library for library in ("pymoo", "moocore") if find_spec(library) is None]:
+        raise CampaignError(f"a search needs {missing[0]}: pip install 'warpimpact[optimise]'")
+    if output is not None:
+        check_folder(folder_of(output), overwrite=overwrite or (resume and is_begun(output)))
+    tables = json.loads(json.dumps(parsed(design.text, design.name), default=str))
+    named = {file: design.folder / file for file in files_in(tables)}
+    content = {**tables, "files": {file: digest(path) for file, path in named.items() if path.is_file()}}
+    with (
+        computer(device) if isinstance(device, str) else nullcontext(device) as machine,
+        open_chunks(output, content | machine.made_by, resume=resume, overwrite=overwrite, warn=warn) as chunks,
+    ):
+        if chunks is not None:
+            dataset = _search(design, Evaluator(design, machine, chunks), progress)
+            if output is not None:
+                files.write(dataset.assign_attrs({attr.FINGERPRINT: chunks.fingerprint}), output)
+    if output is not None:
+        dataset = files.read(output, FRONT)
+        write_campaigns(design, dataset, folder_of(output), overwrite=overwrite, warn=warn)
+    return dataset
 
 
-def folder_of(output: Path) -> Path:
-    """Folder of the campaigns of the designs of a front."""
-    return output.with_name(f"{output.stem}_designs")
+def _search(design: Design, evaluator: Evaluator, progress: Progress) -> xarray.Dataset:
+    """The search, and its front by fresh hits."""
+    references = reference_points(design)  # refused before anything is computed
+    search, plan = Search(evaluator, progress), design.file.search
+    if design.space.size <= plan.designs:
+        points = design.space.points()
+        for first in range(0, len(points), plan.population):
+            search.compute(points[first : first + plan.population])
+    else:
+        _evolve(search, design)
+    if not search.points:
+        raise CampaignError(f"{design.name}: {_why_none([*search.refused.values()])}")
+    every, front, pilots = [*search.points.values()], search.front, len(evaluator.pilots)
+    numbers = front[np.round(np.linspace(0, len(front) - 1, min(plan.confirmed, len(front)))).astype(np.int64)]
+    chosen = [every[number] for number in numbers] + references
+    progress(len(every), len(every), f"{len(front)} on the front")
+
+    def report(what: str, share: float) -> None:
+        progress(int(share * len(chosen)), len(chosen), f"{len(front)} on the front, {what} by fresh hits")
+
+    unique, hits = [str(place) for place in range(len(chosen))], plan.confirm_hits
+    confirmed, columns = evaluator.evaluate(chosen, unique, CONFIRM_FIDELITY, hits, design.fresh_seed, report)
+    still = np.isin(np.arange(len(numbers)), front_of(design, confirmed[: len(numbers)]))
+    attributes = evaluator.made_by | {f.REFUSED: len(search.refused), f.PILOTS: pilots}
+    return to_dataset(design, every, front, numbers, confirmed, columns, still, attributes)
 
 
-def _answered(
-    design: Design, executor: Executor, progress: Follow | None, store: Store | None = None
-) -> xarray.Dataset:
-    check_installed()
-    references(design)  # refused before anything is computed
+class Search:
+    """The state of a search.
 
-    def question() -> Question[tuple[Searched, Confirmed]]:
-        searched = yield from search(design, progress or (lambda now: None))
-        return searched, (yield from confirm(design, searched, progress or (lambda now: None)))
+    Attributes:
+        points: computed designs, by their values.
+        refused: violations of the designs that break a constraint.
+        idle: generations since the last new design.
+        front: numbers of the designs on the front, sorted by the first objective.
+    """
 
-    return to_dataset(design, *answered(question(), executor, store), executor.made_by)
+    def __init__(self, evaluator: Evaluator, progress: Progress) -> None:
+        self._design, self._evaluator, self._progress = evaluator.design, evaluator, progress
+        self.points, self.refused = dict[bytes, DesignPoint](), dict[bytes, tuple[Violation, ...]]()
+        self.idle, self.front = 0, np.zeros(0, dtype=np.int64)
+
+    def compute(self, generation: Iterable[Array]) -> None:
+        """Compute the new feasible points of a generation, as far as the budget goes."""
+        design, plan, new = self._design, self._design.file.search, dict[bytes, DesignPoint]()
+        for values in generation:
+            key = values.tobytes()
+            if key in self.points or key in self.refused:
+                continue
+            if len(self.points) + len(new) == plan.designs:
+                break
+            tables = design.tables(values)
+            campaign, broken = violations(design, tables)
+            if campaign is None or broken:
+                self.refused[key] = broken
+            else:
+                new[key] = DesignPoint(values, tables, weights_of(campaign.target))
+        self.idle = 0 if new else self.idle + 1
+        total = int(min(plan.designs, design.space.size))
+
+        def report(what: str, share: float) -> None:
+            self._progress(len(self.points), total, f"{len(self.front)} on the front, {what} {share:.0%}")
+
+        is_choice = [bool(variable.labels) for variable in design.space.variables]
+        names, hits = [str(point.values[is_choice]) for point in new.values()], plan.hits
+        points, _ = self._evaluator.evaluate([*new.values()], names, SEARCH_FIDELITY, hits, plan.seed, report)
+        self.points |= zip(new, points, strict=True)
+        self.front = front_of(design, [*self.points.values()])
+        report("designs", 1.0)
+
+    def scores(self, generation: Iterable[Array]) -> tuple[Array, Array]:
+        """Objectives to minimise and violations of the points of a generation."""
+        objectives, broken, file = [], [], self._design.file
+        for values in generation:
+            if (point := self.points.get(values.tobytes())) is not None:
+                objectives.append(np.nan_to_num(to_minimise(self._design, point.results), posinf=1e30))
+                broken.append([0.0, *excesses(self._design, point.results)])
+            else:
+                shares = [violation.share for violation in self.refused.get(values.tobytes(), ())]
+                objectives.append(np.zeros(len(file.objectives)))
+                broken.append([sum(shares), *np.zeros(len(file.bounds))])
+        return np.array(objectives), np.array(broken)
 
 
-def to_dataset(design: Design, searched: Searched, confirmed: Confirmed, made_by: Mapping[str, str]) -> xarray.Dataset:
-    """The Dataset of results/front.py."""
-    goals, variables, front = design.goals, design.space.variables, len(confirmed.numbers)
-    names = [goal.measure for goal in goals]
-    fresh, rivals = confirmed.candidates[:front], confirmed.candidates[front:]
-    count = len(searched.candidates)
-    columns: dict[Any, Any] = {
-        f.NAME: _texts(variable.name for variable in variables),
-        f.UNIT: _texts(variable.unit for variable in variables),
-        f.LABELS: _texts(json.dumps(free.labels, ensure_ascii=False) if free.labels else "" for free in variables),
-        f.GOAL: _texts(name if names.count(name) == 1 else f"{name}_{place}" for place, name in enumerate(names)),
-        f.GOAL_LABEL: _texts(goal.spec.title for goal in goals),
-        f.GOAL_SIGN: [int(goal.sign) for goal in goals],
-        f.GOAL_LIMIT: [goal.limit if isinstance(goal, Bound) else np.nan for goal in goals],
-        f.VALUE: np.array([one.point for one in searched.candidates]).reshape(count, len(variables)),
-        f.RESULT: np.array([one.results for one in searched.candidates]).reshape(count, len(goals)),
-        f.LEVELS: _texts(_levels(one) for one in searched.candidates),
-        f.ON_FRONT: np.isin(np.arange(count), searched.front).astype(np.int8),
-        f.NUMBER: confirmed.numbers,
-        f.CONFIRMED: confirmed.on_front.astype(np.int8),
-        f.CAMPAIGN: _texts(_campaign(design, one) for one in fresh),
-        f.FILE: _texts(f"design_{number:02d}.toml" for number in range(front)),
-        f.FRESH_LEVELS: _texts(_levels(one) for one in fresh),
-        f.OUTSIDE: _texts(_outside(design, one) for one in fresh),
-        f.REFERENCE: _texts(reference.name for reference in design.references),
-        f.REFERENCE_CAMPAIGN: _texts(_campaign(design, one) for one in rivals),
-    }
-    ends = np.array(
-        [
-            [
-                [number.value, number.low, number.high]
-                for number in (estimate(design, one.weights, hits, goal) for goal in goals)
-            ]
-            for one, hits in zip(confirmed.candidates, confirmed.columns, strict=True)
-        ]
-    ).reshape(len(confirmed.candidates), len(goals), 3)
-    columns |= zip((f.FRESH, f.FRESH_LOW, f.FRESH_HIGH), np.moveaxis(ends[:front], -1, 0), strict=True)
-    columns |= zip(
-        (f.REFERENCE_RESULT, f.REFERENCE_LOW, f.REFERENCE_HIGH), np.moveaxis(ends[front:], -1, 0), strict=True
+def _evolve(search: Search, design: Design) -> None:
+    """Compute generations of NSGA-II until the budget is spent, or no other designs come."""
+    from pymoo.algorithms.moo.nsga2 import NSGA2
+    from pymoo.core.evaluator import Evaluator as PymooEvaluator
+    from pymoo.core.mixed import MixedVariableDuplicateElimination, MixedVariableMating, MixedVariableSampling
+    from pymoo.core.problem import Problem
+    from pymoo.core.termination import NoTermination
+    from pymoo.core.variable import Choice, Integer, Real
+    from pymoo.problems.static import StaticProblem
+
+    plan, kinds = design.file.search, dict[str, Any]()
+    for number, variable in enumerate(design.space.variables):  # coordinates of `DesignVariable.at`
+        if variable.labels:
+            kinds[f"{number:03d}"] = Choice(options=list(range(len(variable.labels))))
+        elif variable.count is None:
+            kinds[f"{number:03d}"] = Real(bounds=(0.0, 1.0))
+        else:
+            kinds[f"{number:03d}"] = Integer(bounds=(0, variable.count - 1))
+    problem = Problem(vars=kinds, n_obj=len(design.file.objectives), n_ieq_constr=1 + len(design.file.bounds))
+    duplicates = MixedVariableDuplicateElimination()
+    algorithm = NSGA2(
+        pop_size=plan.population,
+        sampling=MixedVariableSampling(),
+        mating=MixedVariableMating(eliminate_duplicates=duplicates),
+        eliminate_duplicates=duplicates,
     )
-    if design.columns and front:
-        seed, hits = fresh_seed(design), confirmed.columns.shape[-1]
-        shots = [design.campaign(one.tables, seed=seed).sampler().shots(0, hits) for one in fresh]
-        columns |= {f.HIT_Y: [some.hit_y for some in shots], f.HIT_Z: [some.hit_z for some in shots]}
-        columns[f.HIT_VALUE] = confirmed.columns[:front, 0]
-    attributes = {
-        attr.REFERENCES: f.REFERENCES,
-        **made_by,
-        attr.KIND: FRONT.mark,
-        attr.TITLE: design.title,
-        attr.HISTORY: attr.history_line("optimise"),
-        attr.SEED: design.search.seed,
-        f.DESIGN: design.text,
-        f.OUTCOME: f.FEASIBLE if front else f.NONE_FEASIBLE,
-        f.HITS: design.search.hits if design.columns else 0,
-        f.REFUSED: searched.refused,
-        f.PILOTS: searched.pilots,
-    }
-    # a selected value keeps its unit and its label
-    return dataset_of(columns, attributes).set_coords([f.UNIT, f.GOAL_LABEL])
+    algorithm.setup(problem, termination=NoTermination(), seed=plan.seed, verbose=False)
+    while len(search.points) < plan.designs and search.idle < IDLE:
+        population = algorithm.ask()
+        if population is None or not len(population):
+            return
+        generation = [design.space.at([float(one[name]) for name in kinds]) for one in population.get("X")]
+        search.compute(generation)
+        objectives, broken = search.scores(generation)
+        PymooEvaluator().eval(StaticProblem(problem, F=objectives, G=broken), population)
+        algorithm.tell(infills=population)
 
 
-def _outside(design: Design, candidate: Candidate) -> str:
-    """In what the plates of a design lie outside the tested range: the words before the plate's name."""
-    sentences = outside_tested_range(design.campaign(candidate.tables))
-    heads = (sentence.partition(": ")[0] for sentence in sentences)
-    return ", ".join(dict.fromkeys(head.partition(" (")[0] for head in heads if " (" in head))
-
-
-def _texts(texts: Any) -> Any:
-    return np.array(list(texts), dtype=object)
-
-
-def _levels(candidate: Candidate) -> str:
-    return json.dumps([json.loads(level) for level in candidate.levels])
-
-
-def _campaign(design: Design, candidate: Candidate) -> str:
-    """The campaign of a target with the first threat, as TOML."""
-    return tomli_w.dumps(campaign_tables(design, candidate.tables, candidate.point, design.threats[0]))
-
-
-def campaign_tables(design: Design, tables: Mapping[str, Any], point: Array, threat: FacedThreat) -> dict[str, Any]:
-    """The tables of the campaign of a target and a threat, for `warpimpact run`. A reference has no point."""
-    made: dict[str, Any] = json.loads(json.dumps(design.against(tables, threat), default=str))
-    made.setdefault("hits", {"sampling": "sobol", "count": 4096, "seed": design.search.seed})
-    named = f", {threat.name}" if len(design.threats) > 1 else ""
-    values = design.space.text(point) if len(point) else ""
-    return made | {"title": " ".join(f"{design.title}{named}: {values}"[:200].split()).rstrip(":")}
-
-
-def check_campaigns(folder: Path, *, overwrite: bool) -> None:
-    """Refuse a folder for campaigns that is not empty, before anything is computed.
+def reference_points(design: Design) -> list[DesignPoint]:
+    """The reference targets, before their hits are computed.
 
     Raises:
-        OutputError: the folder has content, or is a file.
+        CampaignError: a reference is no campaign; the message names it.
     """
-    if folder.exists() and not folder.is_dir():
-        raise OutputError(f"{folder}: is no folder, but the campaigns of the designs need one of this name")
-    if not overwrite and folder.is_dir() and any(folder.iterdir()):
-        raise OutputError(
-            f"{folder}: contains files already, and the campaigns of the designs belong there; name another file or "
-            "give --overwrite"
-        )
+    points = []
+    for place, reference in enumerate(design.file.references):
+        tables: dict[str, Any] = {**design.base, "plate": reference.plate}
+        if reference.layer is not None:
+            tables["layer"] = [*reference.layer]
+        named = replace(design, name=f'{design.name}: references[{place}] "{reference.name}"')
+        points.append(DesignPoint(np.zeros(0), tables, weights_of(named.campaign(tables).target)))
+    return points
 
 
-def write_campaigns(
-    design: Design,
-    dataset: xarray.Dataset,
-    folder: Path,
-    *,
-    overwrite: bool,
-    tell: Callable[[str], object] = warnings.warn,
-) -> list[Path]:
-    """Write a campaign file per design of the front, and per threat if there are several.
+def _why_none(refused: Sequence[Sequence[Violation]]) -> str:
+    """A sentence about the constraint that rules out most of the designs."""
+    counts = Counter(name for broken in refused for name in {violation.constraint for violation in broken})
+    name, count = counts.most_common(1)[0]
+    of_it = (violation for broken in refused for violation in broken if violation.constraint == name)
+    nearest = min(of_it, key=lambda violation: violation.share).text
+    if count == len(refused):
+        return f"constraints: none of {count} designs keeps {name}; the nearest has {nearest}"
+    return (
+        f"constraints: none of {len(refused)} designs keeps all; {count} break {name}, and the nearest of them has "
+        f"{nearest}"
+    )
 
-    Args:
-        overwrite: replace campaigns of an earlier search, and remove those of designs that are no longer on the front;
-            otherwise a changed file is kept.
-        tell: called with a sentence for each file that is kept.
 
-    Returns:
-        The campaign files.
+def front_of(design: Design, points: Sequence[DesignPoint]) -> NDArray[np.int64]:
+    """Numbers of the designs within the bounds that no other one dominates, sorted by the first objective.
 
-    Raises:
-        OutputError: a file cannot be written.
+    Of designs that agree in seven digits the first counts.
     """
-    numbers, names = dataset[f.NUMBER].values, dataset[f.FILE].values
-    texts = {}
-    for number, name in zip(numbers, names, strict=True):
-        values = dataset[f.VALUE].values[int(number)]
-        target = design.tables(values)
-        for place, threat in enumerate(design.threats):
-            tables = relocated(campaign_tables(design, target, values, threat), design.folder, folder)
-            ending = f"_{place}" if len(design.threats) > 1 else ""
-            texts[folder / f"{Path(str(name)).stem}{ending}.toml"] = tomli_w.dumps(tables)
-    if overwrite:
-        for stale in set(folder.glob("design_[0-9]*.toml")) - texts.keys():
-            remove(stale)
-    if texts:
-        folder.mkdir(parents=True, exist_ok=True)
-    for path, text in texts.items():
-        if overwrite or not path.exists():
-            with aside(path) as file:
-                file.write_text(text, encoding="utf-8")
-        elif not path.is_file() or path.read_bytes() != text.encode():
-            tell(f"{path}: differs from the design of the front and is kept; --overwrite replaces it")
-    return list(texts)
+    import moocore
+
+    objectives = [to_minimise(design, point.results) for point in points]
+    within = [
+        number
+        for number, (values, point) in enumerate(zip(objectives, points, strict=True))
+        if np.isfinite(values).all() and not excesses(design, point.results).any()
+    ]
+    if not within:
+        return np.zeros(0, dtype=np.int64)
+    rounded = np.array([[float(f"{number:.7g}") for number in objectives[place]] for place in within])
+    front = np.array(within)[moocore.is_nondominated(rounded)]
+    return np.array(sorted(front, key=lambda number: tuple(objectives[number])), dtype=np.int64)

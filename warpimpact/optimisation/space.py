@@ -17,8 +17,6 @@ from warpimpact.scene.unit_text import number_and_unit
 from warpimpact.scene.units import LARGEST, float_of, quoted
 
 MOST_VARIABLES = 64
-MOST_VALUES = 100_000
-_RANGE = {"low", "high", "step"}
 _RANGE_DIGITS = 6
 """Significant digits of a value of a range without a step."""
 
@@ -56,8 +54,10 @@ class DesignVariable:
         return None if self.step is None else 1 + math.floor((self.high - self.low) / self.step + 1e-9)
 
     def at(self, coordinate: float) -> float:
-        """The value at a coordinate, which is a share of a continuous range, else the number of a value. The value of a
-        choice is the number of the option."""
+        """The value at a coordinate: a share of a continuous range, else the number of a value.
+
+        The value of a choice is the number of the option.
+        """
         if self.labels:
             return float(int(coordinate))
         if self.count is None:
@@ -87,13 +87,12 @@ class Space:
 
     @property
     def size(self) -> float:
-        """Number of points; infinite for a continuous space. Points that differ only in variables without effect are
-        counted, too."""
+        """Number of points, also of those that differ in unused variables only; infinite if continuous."""
         counts = [variable.count for variable in self.variables]
         return math.inf if None in counts else float(math.prod(count for count in counts if count is not None))
 
     def at(self, coordinates: Sequence[float]) -> Array:
-        """Values at coordinates (`DesignVariable.at`), shape [variables]; NaN for variables without effect."""
+        """Values at coordinates (`DesignVariable.at`), shape [variables]; NaN for unused variables."""
         values = np.full(len(self.variables), math.nan)
         for number, (variable, coordinate) in enumerate(zip(self.variables, coordinates, strict=True)):
             if variable.under is None or values[variable.under[0]] == variable.under[1]:
@@ -108,12 +107,12 @@ class Space:
 
     def tables(self, base: Mapping[str, Any], values: Array, name: str) -> dict[str, Any]:
         """The tables of the campaign of a point, from those of the design file, whose name is for errors."""
-        data = json.loads(json.dumps(base, default=str))
+        data: dict[str, Any] = json.loads(json.dumps(base, default=str))
         for variable, value in zip(self.variables, values, strict=True):
             if not math.isnan(value):
                 written = json.loads(json.dumps(variable.written(value), default=str))
                 put(data, variable.place, written, f"{name}: variables")
-        return dict(data)
+        return data
 
     def text(self, values: Array) -> str:
         """A point as text."""
@@ -141,77 +140,55 @@ def read_space(given: Any, name: str) -> Space:
 
 
 def _read(variables: list[DesignVariable], name: str, place: str, given: Any, where: str, under: Any = None) -> None:
-    """Add a variable and those below its alternatives."""
+    """Add a variable, and those below its alternatives."""
     if isinstance(given, dict) and "low" in given:
-        variables.append(_range(name, place, given, where, under))
-    elif isinstance(given, list) and given:
-        _read_choice(variables, name, place, given, where, under)
-    else:
+        variables.append(DesignVariable(name, place, **_range(given, where), under=under))
+        return
+    if not (isinstance(given, list) and given):
         raise CampaignError(
             f"{where}: got {quoted(given)}, but it must be a range, as "
             '{ low = "3 mm", high = "8 mm", step = "0.5 mm" }, or a list of values'
         )
-
-
-def _range(name: str, place: str, given: dict[str, Any], where: str, under: Any) -> DesignVariable:
-    if unknown := next((key for key in given if key not in _RANGE), None):
-        raise CampaignError(f"{where}: got the unknown key {quoted(unknown)}; allowed are low, high, step")
-    if "high" not in given:
-        raise CampaignError(f"{where}.high: is missing, but must be given")
-    numbers, units = {}, {}
-    for key, value in given.items():
-        try:
-            is_text = isinstance(value, str)
-            numbers[key], units[key] = number_and_unit(value) if is_text else (float_of(value), "")
-        except (TypeError, ValueError):
-            numbers[key] = math.nan
-        if isinstance(value, bool) or not abs(numbers[key]) <= LARGEST:
-            raise CampaignError(
-                f"{where}.{key}: got {quoted(value)}, but it must be a number or a string with a unit, at most "
-                f"{LARGEST:g}"
-            )
-    if len(set(units.values())) > 1:
-        raise CampaignError(f"{where}: got the units {', '.join(map(quoted, units.values()))}, but they must be one")
-    low, high, step = numbers["low"], numbers["high"], numbers.get("step")
-    if not low <= high:
-        raise CampaignError(f"{where}: got low = {low:g} and high = {high:g}, but low must not be greater")
-    if step is not None and not (step > 0.0 and (high - low) / step <= MOST_VALUES):
-        raise CampaignError(
-            f"{where}.step: got {step:g}, but it must be greater than 0 and divide the range into at most {MOST_VALUES}"
-        )
-    return DesignVariable(name, place, low, high, step, units["low"], under=under)
-
-
-def _read_choice(
-    variables: list[DesignVariable], name: str, place: str, given: list[Any], where: str, under: Any
-) -> None:
-    """A list of values, or of tables with names. Ranges and lists in a table are variables below the choice."""
     whole = is_table(place) or place == "layer" or all(isinstance(option, dict) for option in given)
     if not whole and any(isinstance(option, dict | list) for option in given):
         raise CampaignError(f"{where}: got {quoted(given)}, but it must be a list of values")
-    labels = labels_of(given, where, whole=whole)
-    number, values, below = len(variables), [], []
-    for option, option_value in enumerate(given):
-        if not whole:
-            values.append(option_value)
-            continue
-        table = {key: part for key, part in option_value.items() if key != "name"}
-        inner: Any = table.get("layer", []) if place == "layer" else table
-        values.append(inner)
-        below += [(option, path, part) for path, part in _free(inner)]
+    labels, values = labels_of(given, where, whole=whole), given
+    if whole:
+        tables = [{key: part for key, part in option.items() if key != "name"} for option in given]
+        values = [table.get("layer", []) for table in tables] if place == "layer" else tables
+    number = len(variables)
     variables.append(DesignVariable(name, place, labels=labels, values=tuple(values), under=under))
-    for option, path, part in below:
-        _read(
-            variables,
-            f"{name}[{labels[option]}].{path}",
-            f"{place}.{path}",
-            part,
-            f"{where}[{option}].{path}",
-            (number, option),
-        )
+    for option, value in enumerate(values if whole else ()):
+        for path, part in _ranges_in(value):
+            inner = f"{name}[{labels[option]}].{path}", f"{place}.{path}", part, f"{where}[{option}].{path}"
+            _read(variables, *inner, (number, option))
 
 
-def _free(inside: Any, path: str = "") -> Iterator[tuple[str, Any]]:
+def _range(given: dict[str, Any], where: str) -> dict[str, Any]:
+    """Low, high, step and unit of a range."""
+    numbers, units = dict[str, float](), dict[str, str]()
+    for key, value in given.items():
+        if key not in ("low", "high", "step"):
+            raise CampaignError(f"{where}: got the unknown key {quoted(key)}; allowed are low, high, step")
+        try:
+            numbers[key], units[key] = number_and_unit(value) if isinstance(value, str) else (float_of(value), "")
+        except (TypeError, ValueError):
+            numbers[key] = math.nan
+        if isinstance(value, bool) or not abs(numbers[key]) <= LARGEST:
+            raise CampaignError(f"{where}.{key}: got {quoted(value)}, but it must be a number or a string with a unit")
+    if "high" not in given:
+        raise CampaignError(f"{where}.high: is missing, but must be given")
+    low, high, step = numbers["low"], numbers["high"], numbers.get("step", math.inf)
+    if len(set(units.values())) > 1:
+        raise CampaignError(f"{where}: got the units {', '.join(map(quoted, units.values()))}, but they must be one")
+    if not low <= high:
+        raise CampaignError(f"{where}: got low = {low:g} and high = {high:g}, but low must not be greater")
+    if step <= 0.0:
+        raise CampaignError(f"{where}.step: got {step:g}, but it must be greater than 0")
+    return numbers | {"unit": units["low"]}
+
+
+def _ranges_in(inside: Any, path: str = "") -> Iterator[tuple[str, Any]]:
     """The ranges in a table, with their places."""
     entries = inside.items() if isinstance(inside, dict) else enumerate(inside) if isinstance(inside, list) else ()
     for key, entry in entries:
@@ -219,4 +196,4 @@ def _free(inside: Any, path: str = "") -> Iterator[tuple[str, Any]]:
         if isinstance(entry, dict) and "low" in entry:
             yield place, entry
         else:
-            yield from _free(entry, place)
+            yield from _ranges_in(entry, place)

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import xarray
 
-from warpimpact.identification.fit_file import fit_from
+from warpimpact.identification.fit import fit_from
 from warpimpact.identification.posterior import parameters_of, unit_of
 from warpimpact.plotting.cell import words
 from warpimpact.plotting.plate import draw_plate
@@ -77,7 +77,7 @@ def hits_figure(posterior: xarray.Dataset) -> Figure:
     """
     fit = fit_from(str(posterior.attrs[p.FIT_TEXT]), "the fit of this posterior", Path())
     medians = {
-        scene_parameter.path: float(np.median(posterior[scene_parameter.name]))
+        scene_parameter.place: float(np.median(posterior[scene_parameter.name]))
         for scene_parameter in fit.scene_parameters
         if scene_parameter.unit != "rad"
     }

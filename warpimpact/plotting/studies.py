@@ -16,8 +16,8 @@ from scipy import special
 from warpimpact.analysis.effectiveness import reference_name
 from warpimpact.analysis.estimates import estimated
 from warpimpact.analysis.hit_map import hit_points
+from warpimpact.firing.simulate import report_lines, tests_title
 from warpimpact.firing.v50 import V50, Shots
-from warpimpact.firing.view import reported_lines, tests_title
 from warpimpact.plotting.cell import draw_map, map_size, shown, to_scale, words
 from warpimpact.plotting.style import (
     BLUE,
@@ -265,7 +265,7 @@ def firing_figure(dataset: xarray.Dataset) -> Figure:
     figure = Figure(figsize=(5.4 * len(panels), 4.2), layout="constrained")
     for draw, axes in zip(panels, np.ravel(figure.subplots(1, len(panels), squeeze=False)), strict=True):
         draw(axes, dataset)
-    notes = reported_lines(dataset) if f.V50 in dataset else []
+    notes = report_lines(dataset) if f.V50 in dataset else []
     finish(figure, *notes, str(dataset.attrs[f.DISCLAIMER]), title=str(dataset.attrs[attr.TITLE]))
     return figure
 

@@ -15,13 +15,13 @@ from matplotlib.colors import Normalize
 from matplotlib.figure import Figure as PlainFigure
 
 from warpimpact.analysis.hit_map import mirrored
-from warpimpact.analysis.numbers import View, html_of
+from warpimpact.analysis.numbers import View, html_of, table_html
 from warpimpact.campaign.campaign import Campaign
 from warpimpact.campaign.text import parsed
-from warpimpact.firing.view import firing_view
+from warpimpact.firing.simulate import firing_view
 from warpimpact.identification.posterior import posterior_view
-from warpimpact.optimisation.design import is_even
-from warpimpact.optimisation.front_view import OF_FRONT, design_text, front_view, numbers_of
+from warpimpact.optimisation.design import is_irreducible
+from warpimpact.optimisation.front import front_table, front_view, variables_table
 from warpimpact.plotting.cell import nearest, paint_pixels, pixels
 from warpimpact.plotting.front import THUMBNAIL, campaign_at, front_figure
 from warpimpact.plotting.plate import draw_holes, draw_plate
@@ -121,8 +121,8 @@ def _design(dataset: xarray.Dataset, place: int, folder: Path) -> dict[str, str]
     campaign = campaign_at(dataset, place, folder)
     return {
         "file": str(dataset[f.FILE].values[place]),
-        "numbers": ", ".join(numbers_of(dataset, OF_FRONT, place)),
-        "text": design_text(dataset, int(dataset[f.NUMBER][place])),
+        "numbers": table_html(front_table(dataset).iloc[[place]]),
+        "variables": table_html(variables_table(dataset, dataset[f.NUMBER].values[[place]], [""])),
         "picture": "" if campaign is None else data_url(_design_figure(dataset, place, campaign)),
         "campaign": str(dataset[f.CAMPAIGN].values[place]),
     }
@@ -140,7 +140,7 @@ def _design_figure(dataset: xarray.Dataset, place: int, campaign: Campaign) -> F
         right.set_axis_off()
         return figure
     text = str(dataset[f.CAMPAIGN].values[place])
-    group = symmetries(plate, campaign.impact) if is_even(parsed(text, "front")) else (IDENTITY,)
+    group = symmetries(plate, campaign.impact) if is_irreducible(parsed(text, "front")) else (IDENTITY,)
     points = {v.HIT_Y: f.HIT_Y, v.HIT_Z: f.HIT_Z}
     hits = mirrored(
         xarray.Dataset(

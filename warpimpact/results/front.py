@@ -35,6 +35,7 @@ CONFIRMED = Variable(
 CAMPAIGN = Variable("front_campaign", ("front",), "1", "campaign of the first threat, as TOML")
 FILE = Variable("front_file", ("front",), "1", "name of its campaign file")
 FRESH_LEVELS = Variable("front_numerics", ("front",), "1", "numerics by threat, as JSON")
+WORST = Variable("front_worst_threat", ("front", "goal"), "1", "threat whose hits count; empty if all count, or none")
 OUTSIDE = Variable("front_outside", ("front",), "1", "in what its plates lie outside the tested range")
 HIT_Y = Variable("front_hit_y", ("front", "hit"), "m", "hit point in the irreducible part of the cell, y")
 HIT_Z = Variable("front_hit_z", ("front", "hit"), "m", "hit point in the irreducible part of the cell, z")
@@ -54,5 +55,5 @@ OUTCOME, FEASIBLE, NONE_FEASIBLE = "outcome", "front", "no design within the bou
 HITS, REFUSED, PILOTS = "hits_per_design", "refused_designs", "pilots"
 """Attributes: hits of a design by each threat, designs that broke a constraint, and pilots of the search."""
 REFERENCES = "docs/howto/optimise.md of warpimpact"
-NEEDED = tuple(name for name in VARIABLES if name not in (HIT_Y, HIT_Z, HIT_VALUE))
-"""Variables of every search; the others are there if its plates have such hits."""
+NEEDED = tuple(name for name in VARIABLES if name not in (WORST, HIT_Y, HIT_Z, HIT_VALUE))
+"""Variables of every search; the others are there if it has several threats, or its plates have such hits."""

@@ -11,7 +11,7 @@ from warpimpact.campaign.materials import SEARCHED_FROM, StraightPassage
 from warpimpact.campaign.resistances import catalogue_names, limit_velocity_factors
 from warpimpact.campaign.tested_range import outside_tested_range, range_line
 from warpimpact.campaign.text import CampaignError
-from warpimpact.identification.fit_file import fit_from
+from warpimpact.identification.fit import fit_from
 
 OWN = """
 [[material]]

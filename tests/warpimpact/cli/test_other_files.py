@@ -9,7 +9,7 @@ import xarray
 from PIL import Image
 
 from warpimpact import CampaignError, run
-from warpimpact.identification.fit_file import read_fit
+from warpimpact.identification.fit import read_fit
 from warpimpact.optimisation.design import read_design
 from warpimpact.results import files
 from warpimpact.results.kinds import HIT_MAP

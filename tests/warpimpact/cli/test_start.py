@@ -9,7 +9,7 @@ import pytest
 from warpimpact import Campaign
 from warpimpact.cli import main
 from warpimpact.firing.plan import read_test
-from warpimpact.identification.fit_file import read_fit
+from warpimpact.identification.fit import read_fit
 from warpimpact.optimisation.design import read_design
 
 CAMPAIGNS = Path(__file__).parents[3] / "campaigns"

@@ -13,8 +13,7 @@ from warpimpact.analysis.numbers import text_of
 from warpimpact.campaign.text import CampaignError
 from warpimpact.cli import main
 from warpimpact.firing.plan import Gun, Langlie, MilStd662F, Procedure, Shot, firing_test
-from warpimpact.firing.simulate import Response, response_of_limits, simulate_test
-from warpimpact.firing.view import firing_view
+from warpimpact.firing.simulate import Response, firing_view, response_of_limits, simulate_test
 from warpimpact.kernels.status import Status
 from warpimpact.plotting.studies import firing_figure
 from warpimpact.results import attributes as attr

@@ -4,6 +4,7 @@ import math
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 import pytest
 import statsmodels.api as sm
 
@@ -125,9 +126,12 @@ def test_the_command_prints_four_lines_and_draws(capsys: pytest.CaptureFixture[s
     rows = "".join(f"{speed},{answer}\n" for speed, answer in zip(VELOCITY, PERFORATED, strict=True))
     Path("shots.csv").write_text("velocity [m/s],perforated\n" + rows, encoding="utf-8")
     assert main(["test", "shots.csv"]) == 0
-    assert capsys.readouterr().out == f"{v50(VELOCITY, PERFORATED)}\nfigure in shots.png\n"
-    assert Path("shots.png").exists()
+    written = "written to shots_v50.csv, figure in shots_v50.png"
+    assert capsys.readouterr().out == f"{v50(VELOCITY, PERFORATED)}\n{written}\n"
+    assert Path("shots_v50.png").exists()
+    numbers = pd.read_csv("shots_v50.csv", index_col="number")["value"]
+    assert numbers["value"] == v50(VELOCITY, PERFORATED).value
     assert main(["test", "shots.csv"]) == 2
     for text in ("800,1\n810,1\n", "800,0\n"):
         Path("shots.csv").write_text("velocity,perforated\n" + text, encoding="utf-8")
-        assert main(["test", "shots.csv", "-o", "b.svg", "--overwrite"]) == 0
+        assert main(["test", "shots.csv", "-o", "b.csv", "--overwrite"]) == 0

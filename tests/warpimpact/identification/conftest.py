@@ -6,8 +6,7 @@ from pathlib import Path
 import pytest
 import xarray
 
-from warpimpact.identification.fit import Fit
-from warpimpact.identification.fit_file import fit_from
+from warpimpact.identification.fit import Fit, fit_from
 from warpimpact.identification.identify import identify
 
 TEXT = Path(__file__).with_name("two_shots.toml").read_text(encoding="utf-8")

@@ -19,7 +19,7 @@ from warpimpact.identification.posterior import material_draws, parameters_of, p
 from warpimpact.plotting.posterior import hits_figure, pairs_figure
 from warpimpact.results import files
 from warpimpact.results.kinds import POSTERIOR
-from warpimpact.runs.executor import executor_for
+from warpimpact.runs.computer import computer
 from warpimpact.scene import Hits, make_shots
 from warpimpact.solver.simulate import simulate
 
@@ -50,16 +50,16 @@ def test_a_linear_model_has_its_exact_posterior(make_fit: FitMaker, noise: float
 def test_known_parameters_are_recovered(make_fit: FitMaker) -> None:
     """Eight shots of a plate with Y = 2 GPa and η = 0.05, at hits that the fit does not know."""
     base = make_fit(("[sampling]", "[sampling]\nsets = 4096"))
-    truth = {("plate", "resistance"): 2e9, ("plate", "shear_coefficient"): 0.05}
+    truth = {"plate.resistance": 2e9, "plate.shear_coefficient": 0.05}
     scene, rng = base.scene_of(base.shots[0], truth), np.random.default_rng(4)
     plate = scene.target.layers[0]
     given = base.shots[0]
     shots = make_shots(given.impact, Hits(count=8, sampling="random", seed=7), plate)
-    outcomes = simulate(scene, shots, numerics=base.numerics, device="cpu")
+    outcomes = simulate(scene, shots, numerics=base.file.numerics, device="cpu")
     measured = []
     for k in range(8):
         numbers = tuple(
-            replace(one, value=float(one.of(outcomes)[k] + one.std * rng.standard_normal()))
+            one._replace(value=float(one.of(outcomes)[k] + one.std * rng.standard_normal()))
             for one in given.observations
         )
         measured.append(replace(given, name=f"shot {k}", observations=numbers))
@@ -83,8 +83,8 @@ def test_a_posterior_has_draws_and_their_quality(posterior: xarray.Dataset) -> N
 
 
 def test_nobody_changes_a_bit(make_fit: FitMaker, small: tuple[str, str], posterior: xarray.Dataset) -> None:
-    with executor_for("cpu", workers=2) as executor:
-        again = identify(make_fit(small), device=executor)
+    with computer("cpu", workers=2) as machine:
+        again = identify(make_fit(small), device=machine)
     xarray.testing.assert_equal(again, posterior)
 
 

@@ -7,9 +7,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from warpimpact.identification.fit import Fit, MeasuredShot
+from warpimpact.identification.fit import Fit, MeasuredShot, Observation
 from warpimpact.identification.likelihood import HitPoints, Scores, evaluate, hit_points, score_shot
-from warpimpact.identification.measured import Observation
 from warpimpact.kernels.status import Status
 from warpimpact.records.outcomes import Outcomes
 from warpimpact.records.registry import OUTCOME_VARIABLES
@@ -20,8 +19,8 @@ from warpimpact.solver.worker import Worker
 FitMaker = Callable[..., Fit]
 POINTS, SETS = 16, 2
 CPU = Worker("cpu")
-VELOCITY = Observation("residual_velocity", None, None, 600.0, 10.0)
-YAW = Observation("yaw", 0, 0.05, np.radians(170.0), np.radians(3.0))
+VELOCITY = Observation("residual_velocity", None, 600.0, 10.0)
+YAW = Observation("yaw", 0, np.radians(170.0), np.radians(3.0))
 SCALES = {"velocity": np.array([0.0, 5.0]), "angle": np.radians([0.0, 4.0])}
 MIRRORED = (IDENTITY, Symmetry(-1, 1, False))
 
@@ -123,7 +122,7 @@ def test_hits_cover_the_cell(make_fit: FitMaker) -> None:
     plate = fit.scene_of(fit.shots[0]).target.layers[0]
     points = hit_points(fit, fit.shots[0], plate, np.array([[0.2, 0.7]]))
     assert len(points.group) == 4
-    assert len(points.shots) == fit.sampling.hits
+    assert len(points.shots) == fit.file.sampling.hits
     images = [one.image(points.shots.hit_y, points.shots.hit_z, points.cell) for one in points.group]
     y, z = np.concatenate(images, axis=1)
     inside = plate.pattern.is_hole(y, z)
@@ -154,12 +153,12 @@ def test_an_interval_of_degradation_is_a_degradation_of_the_shot(make_fit: FitMa
     )
     points = np.zeros((2, len(fit.parameters)))
     points[1, [one.name for one in fit.parameters].index("degradation_interval")] = 1.0
-    values = {one.path: float(one.at(points[1:, i])[0]) for i, one in enumerate(fit.parameters)}
+    values = {one.place: float(one.at(points[1:, i])[0]) for i, one in enumerate(fit.parameters)}
     scene = fit.scene_of(fit.shots[0], values)
-    assert scene.target.layers[0].degradation_interval == values["plate", "degradation_interval"]
+    assert scene.target.layers[0].degradation_interval == values["plate.degradation_interval"]
     uniform = np.full((2, 4), 0.3)
     own = hit_points(fit, fit.shots[0], scene.target.layers[0], uniform[1:, :2])
-    alone = simulate(scene, own.shots, numerics=fit.numerics, device="cpu")
+    alone = simulate(scene, own.shots, numerics=fit.file.numerics, device="cpu")
     scales = {"velocity": np.array([0.0]), "angle": np.array([0.0])}
     plain = replace(fit, parameters=fit.scene_parameters, discrepancy={"velocity": 0.0, "angle": 0.0})
     found = evaluate(plain, points[:, : len(plain.parameters)], uniform, CPU)

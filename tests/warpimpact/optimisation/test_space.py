@@ -96,8 +96,8 @@ def test_sizes_of_holes(pattern: CirclePattern, narrow: float, wide: float, corn
 )
 def test_constraints_are_checked_before_anything_is_computed(constraint: str, broken: str) -> None:
     one = design(HOLES, WEIGHT_AND_ENERGY, "[constraints]", constraint)
-    _, found = violations(one, one.tables(one.space.at([])))
-    assert [broken in violation.text for violation in found] == ([True] if broken else [])
+    _, broken_ones = violations(one, one.tables(one.space.at([])))
+    assert [broken in violation.text for violation in broken_ones] == ([True] if broken else [])
 
 
 @pytest.mark.parametrize(
@@ -110,13 +110,33 @@ def test_constraints_are_checked_before_anything_is_computed(constraint: str, br
 )
 def test_the_weight_of_the_add_on_alone_is_bounded_and_sought(constraint: str, broken: str) -> None:
     base = '[[layer]]\nthickness = "10 mm"\nresistance = "1 GPa"\n'
-    sought = WEIGHT_AND_ENERGY.replace('"areal_density"', '"add_on_areal_density"')
-    assert sought != WEIGHT_AND_ENERGY
-    one = design(HOLES, sought, base, "[constraints]", constraint)
-    campaign, found = violations(one, one.tables(one.space.at([])))
-    texts = [violation.text for violation in found if violation.text.startswith("areal density")]
+    goals = WEIGHT_AND_ENERGY.replace('"areal_density"', '"add_on_areal_density"')
+    assert goals != WEIGHT_AND_ENERGY
+    one = design(HOLES, goals, base, "[constraints]", constraint)
+    campaign, every = violations(one, one.tables(one.space.at([])))
+    texts = [violation.text for violation in every if violation.text.startswith("areal density")]
     assert [text.startswith(broken) for text in texts] == ([True] if broken else [])
     assert campaign is not None
     weights = weights_of(campaign.target)
     assert weights["add_on_areal_density"] == pytest.approx(weights["areal_density"] - 78.5)
-    assert one.objectives[0].spec.quantity.label == "areal density of the add-on"
+    assert one.file.objectives[0].spec.quantity.label == "areal density of the add-on"
+
+
+@pytest.mark.parametrize(
+    ("measure", "sentence"),
+    [
+        ('"base_depht"', "did you mean mean(base_depth)?"),
+        ('"mean(tilt)"', "neither is better"),
+        (
+            '"worst_point(base_depth)"',
+            "a search takes a mean, a worst tenth, a quantile, a probability or areal_density",
+        ),
+        ('"mean(bending_stress)"\ngoal = "minimise"', "needs output.bending = true"),
+        ('"mean(broken_time)"\ngoal = "minimise"', "needs output.bending = true and core.strength"),
+        ('"P(stopped)"\nangle = "30 deg"', 'got the unknown key "angle"'),
+    ],
+)
+def test_a_measure_that_no_search_takes_is_refused(measure: str, sentence: str) -> None:
+    with pytest.raises(CampaignError) as error:
+        design(f"[[objectives]]\nmeasure = {measure}\n")
+    assert sentence in str(error.value)

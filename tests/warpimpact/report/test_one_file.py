@@ -9,8 +9,7 @@ import pytest
 from warpimpact.analysis.numbers import html_of, text_of
 from warpimpact.cli import main
 from warpimpact.firing.plan import read_test
-from warpimpact.firing.simulate import Response, simulate_test
-from warpimpact.firing.view import firing_view
+from warpimpact.firing.simulate import Response, firing_view, simulate_test
 from warpimpact.results import files
 from warpimpact.results.kinds import FIRING
 
