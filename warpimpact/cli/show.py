@@ -17,7 +17,7 @@ from warpimpact.campaign.text import CampaignError
 from warpimpact.catalogue.catalogue import Catalogue
 from warpimpact.catalogue.catalogue_view import catalogue_view, material_view, threat_view
 from warpimpact.catalogue.entries import Material, Threat
-from warpimpact.plotting import measure_map, plate_figure, save_beside, save_maps, variable_map
+from warpimpact.plotting import measure_map, plate_figure, save_maps, save_side_by_side, variable_map
 from warpimpact.plotting.plate import core_figure
 from warpimpact.report.one_file import view_of
 from warpimpact.results import attributes as attr
@@ -66,7 +66,7 @@ def plot_command(arguments: argparse.Namespace) -> None:
         return
     overwrite = arguments.overwrite
     saved = (
-        save_beside(datasets, folder, stem, overwrite=overwrite)
+        save_side_by_side(datasets, folder, stem, overwrite=overwrite)
         if others
         else save_maps(dataset, folder, stem, overwrite=overwrite)
     )

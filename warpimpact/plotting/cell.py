@@ -38,7 +38,7 @@ MAP_SIDE = 4.2
 """Longer side of a map on paper [inch]."""
 _ROOM = np.array([2.3, 0.9])
 """Room for the axis labels and the colour bar of a map [inch]."""
-_TITLE_WIDTH = 40
+_TITLE_WIDTH = 50
 """Most characters in a line of the title of a map."""
 SEEN = "seen from behind the plate"
 CELL_PIXELS = 400
@@ -55,23 +55,28 @@ STATUS_COLOURS = (
 )
 """Colours by the codes of `Status`: warm where the core comes through, cool where it is stopped or turned back, white
 where it did not reach the layer."""
+_OF_STATUS: Scale = ListedColormap(STATUS_COLOURS), Normalize(-0.5, len(STATUS_COLOURS) - 0.5)
 _SIGNED = {v.AZIMUTH, v.IMPACT_PITCH, v.IMPACT_YAW, v.EDGE_DISTANCE, v.PITCH, v.YAW}
 
 
 class Shown(NamedTuple):
-    """A variable of the hits as a map shows it.
+    """A variable as a map shows it.
 
     Attributes:
-        values: in shown units, shape [hits]; NaN where a hit has none.
-        label: of the colour bar.
+        values: in shown units, of shape [hits], or of shape [z, y] for an image of the cell; NaN where there is none.
+        label: of the colour bar; empty for codes of status.
         title: of the map.
         signed: whether the colours are symmetric about a neutral zero.
+        layer: the layer whose holes and ends are shown; None for the plate's holes and the target's ends.
+        scale: colours; by default those of the values.
     """
 
     values: Array
     label: str
-    title: str
+    title: str = ""
     signed: bool = False
+    layer: int | None = None
+    scale: Scale | None = None
 
 
 def shown(dataset: xarray.Dataset, variable: str, standoff: float | None = None, layer: int | None = None) -> Shown:
@@ -95,16 +100,24 @@ def shown(dataset: xarray.Dataset, variable: str, standoff: float | None = None,
     exists = np.isfinite(array.values) & (passed(dataset) if variable in OF_PASSED else True)
     title = name = words(variable.removeprefix("layer_"))
     if "standoff" in array.coords:
-        title += f", {float(array[v.STANDOFF]) * MM:g} mm behind the {struck(dataset)}"
+        title += f", {float(array[v.STANDOFF]) * MM:g} mm behind the {target_word(dataset)}"
     if variable in v.LAYER_NUMBERS:
         title += f", layer {int(dataset.sizes['layer']) - 1 if layer is None else layer}"
     if array.attrs["long_name"] != title:
         title += f"\n{array.attrs['long_name']}"
     values = np.where(exists, array.values.astype(np.float64) * unit.factor, np.nan)
-    return Shown(values, f"{name} [{unit.shown}]", title, variable in _SIGNED)
+    return Shown(values, f"{name} [{unit.shown}]", title, variable in _SIGNED, layer)
 
 
-def struck(dataset: xarray.Dataset) -> str:
+def shown_status(dataset: xarray.Dataset, layer: int | None = None) -> Shown:
+    """How the shots ended, with the share of each end in the title."""
+    status = _statuses(dataset, layer)
+    shares = (f"{name} {np.mean(status == code):.1%}" for code, name in status_names(status).items())
+    title = f"{'status' if layer is None else f'layer {layer}'}\n{', '.join(shares)}"
+    return Shown(status.astype(float), "", title, layer=layer, scale=_OF_STATUS)
+
+
+def target_word(dataset: xarray.Dataset) -> str:
     """The word for what the shots are fired at: plate, or target if there are layers."""
     return "target" if v.LAYER_STATUS in dataset else "plate"
 
@@ -118,7 +131,7 @@ def shots_text(dataset: xarray.Dataset) -> str:
     """Number of hits and the share that passed, velocity and obliquity; whether the numerics break their promise."""
     velocity, obliquity = (range_text(dataset[name]) for name in (v.IMPACT_VELOCITY, v.OBLIQUITY))
     share = float(passed(dataset).mean())
-    share_text = "" if share == 1.0 else f" ({share:.1%} passed the {struck(dataset)})"
+    share_text = "" if share == 1.0 else f" ({share:.1%} passed the {target_word(dataset)})"
     broken = "; numerics less exact than promised" if breaks_promise(dataset) else ""
     hits = int((dataset["image"] == 0).sum()) if "image" in dataset.coords else dataset.sizes["hit"]
     return f"{hits} hits{share_text}, {velocity}, obliquity {obliquity}{broken}"
@@ -173,35 +186,30 @@ def scale_of(columns: Sequence[Array], *, signed: bool = False) -> Scale:
     return colours, Normalize(lowest, highest)
 
 
-def draw_map(
-    axes: Axes, dataset: xarray.Dataset, column: Shown, scale: Scale | None = None, layer: int | None = None
-) -> ScalarMappable:
+def draw_map(axes: Axes, dataset: xarray.Dataset, column: Shown) -> ScalarMappable:
     """Draw a variable with its title, the holes and the fire, with labels for a legend; return the coloured artist.
 
     A hit without a value is grey, with how it ended as the label.
-
-    Args:
-        scale: colours; by default those of the values.
-        layer: the layer whose holes and ends are shown; by default the plate's holes and the target's ends.
     """
     values, exists = column.values, np.isfinite(column.values)
-    artist = _paint(axes, dataset, values, scale or scale_of([values], signed=column.signed))
-    if not exists.all():
-        ends = status_names(_statuses(dataset, layer)[~exists])
-        _label(axes, NO_VALUE, f"no value: {', '.join(ends.values())}")
-    _finish(axes, dataset, column.title, layer)
+    artist = _paint(axes, dataset, values, column.scale or scale_of([values], signed=column.signed))
+    colours = {}
+    if column.scale is _OF_STATUS:
+        colours = {name: STATUS_COLOURS[code] for code, name in status_names(values).items()}
+    elif values.ndim == 1 and not exists.all():
+        ends = status_names(_statuses(dataset, column.layer)[~exists])
+        colours = {f"no value: {', '.join(ends.values())}": NO_VALUE}
+    for label, colour in colours.items():
+        axes.plot([], [], "s", color=colour, markeredgecolor="0.3", markersize=9, label=label)
+    draw_hole_edges(axes, *outlines(dataset, column.layer or 0).values())
+    (left, right), (bottom, top) = limits(dataset)
+    cell = Rectangle((left, bottom), right - left, top - bottom, transform=axes.transData)
+    for line in axes.lines:
+        line.set_clip_path(cell)
+    if (fire := common_fire(dataset)) is not None:
+        draw_fire(axes, fire)
+    axes.set_title("\n".join(fill(line, _TITLE_WIDTH) for line in column.title.splitlines()), fontsize="medium")
     return artist
-
-
-def draw_status(axes: Axes, dataset: xarray.Dataset, layer: int | None = None) -> None:
-    """Draw how the shots ended, with the share of each end in the title."""
-    status = _statuses(dataset, layer)
-    _paint(axes, dataset, status, (ListedColormap(STATUS_COLOURS), Normalize(-0.5, len(STATUS_COLOURS) - 0.5)))
-    names = status_names(status)
-    for code, name in names.items():
-        _label(axes, STATUS_COLOURS[code], name)
-    shares = ", ".join(f"{name} {np.mean(status == code):.1%}" for code, name in names.items())
-    _finish(axes, dataset, f"{'status' if layer is None else f'layer {layer}'}\n{shares}", layer)
 
 
 def status_names(status: NDArray[Any]) -> dict[int, str]:
@@ -211,22 +219,6 @@ def status_names(status: NDArray[Any]) -> dict[int, str]:
 
 def _statuses(dataset: xarray.Dataset, layer: int | None) -> NDArray[Any]:
     return dataset[v.STATUS].values if layer is None else dataset[v.LAYER_STATUS].values[:, layer]
-
-
-def _label(axes: Axes, colour: str, label: str) -> None:
-    axes.plot([], [], "s", color=colour, markeredgecolor="0.3", markersize=9, label=label)
-
-
-def _finish(axes: Axes, dataset: xarray.Dataset, title: str, layer: int | None) -> None:
-    """Add the holes, the direction of fire and the title."""
-    draw_hole_edges(axes, *outlines(dataset, layer or 0).values())
-    (left, right), (bottom, top) = limits(dataset)
-    cell = Rectangle((left, bottom), right - left, top - bottom, transform=axes.transData)
-    for line in axes.lines:
-        line.set_clip_path(cell)
-    if (fire := common_fire(dataset)) is not None:
-        draw_fire(axes, fire)
-    axes.set_title("\n".join(fill(line, _TITLE_WIDTH) for line in title.splitlines()), fontsize="medium")
 
 
 def draw_hole_edges(axes: Axes, y: Array, z: Array) -> None:
@@ -268,9 +260,10 @@ def paint_pixels(axes: Axes, dataset: xarray.Dataset, image: Array, scale: Scale
 
 
 def _paint(axes: Axes, dataset: xarray.Dataset, values: Array, scale: Scale) -> ScalarMappable:
-    """Colour the cell by values of the hits: as an image if they cover it, otherwise as points."""
-    places = nearest_hits(dataset)
-    if places is not None:
+    """Colour the cell by an image, or by values of hits: as an image if these cover it, otherwise as points."""
+    if values.ndim == 2:
+        return paint_pixels(axes, dataset, values, scale)
+    if (places := nearest_hits(dataset)) is not None:
         return paint_pixels(axes, dataset, values[places], scale)
     y, z = hit_points(dataset).T * MM
     point: dict[str, Any] = {"s": 36, "edgecolors": "black", "linewidths": 0.6, "plotnonfinite": True, "zorder": 3}

@@ -16,28 +16,25 @@ from warpimpact.analysis.hit_map import NEIGHBOURS, hit_points, mirrored, plane_
 from warpimpact.plotting.cell import (
     SEEN,
     Shown,
-    draw_hole_edges,
     draw_map,
-    draw_status,
     map_sheet,
     map_size,
     nearest,
     nearest_hits,
-    paint_pixels,
     pixels,
     scale_of,
     shots_text,
     shown,
+    shown_status,
     status_names,
-    struck,
+    target_word,
     to_scale,
 )
 from warpimpact.plotting.style import BLUE, VERMILION, Figure, finish, in_style
 from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
 from warpimpact.results.dataset import passed
-from warpimpact.results.files import OutputError, aside
-from warpimpact.results.layers import outlines
+from warpimpact.results.files import OutputError
 from warpimpact.results.measures import Measure
 from warpimpact.scene.display import MM
 from warpimpact.scene.model import Array
@@ -53,7 +50,7 @@ _FINE = 100
 _MOST_POINTS = 4000
 """More hits are drawn as a density."""
 _STRIP = 1.2
-"""Width of a panel beside another one [inch]."""
+"""Width of a panel next to another one [inch]."""
 
 
 @in_style
@@ -69,7 +66,7 @@ def variable_map(dataset: xarray.Dataset, variable: str, standoff: float | None 
         ValueError: the variable cannot be mapped, or the Dataset has no such stand-off.
     """
     dataset = mirrored(dataset)
-    return _maps(dataset, [(None if variable == v.STATUS else shown(dataset, variable, standoff), None)], 1)
+    return _maps(dataset, [shown_status(dataset) if variable == v.STATUS else shown(dataset, variable, standoff)], 1)
 
 
 @in_style
@@ -88,7 +85,7 @@ def measure_map(dataset: xarray.Dataset, text: str) -> Figure:
     values = measure.display.factor * measure.by_hit(dataset)
     finite = np.where(np.isfinite(values), values, np.nan)
     column = Shown(finite, measure.axis, measure.column.label, signed=measure.least < 0.0)
-    return _maps(dataset, [(column, None)], 1)
+    return _maps(dataset, [column], 1)
 
 
 @in_style
@@ -99,7 +96,7 @@ def variable_maps(datasets: Mapping[str, xarray.Dataset], variable: str, standof
     scale = scale_of([column.values for column in columns], signed=columns[0].signed)
     figure, panels = map_sheet(list(datasets.values()), _MOST_COLUMNS)
     for axes, (name, dataset), column in zip(panels, datasets.items(), columns, strict=True):
-        artist = draw_map(axes, dataset, column._replace(title=f"{name}\n{shots_text(dataset)}"), scale)
+        artist = draw_map(axes, dataset, column._replace(title=f"{name}\n{shots_text(dataset)}", scale=scale))
     figure.colorbar(artist, ax=panels, label=columns[0].label)
     note = f"{SEEN}s; colours and lengths to the same scale"
     finish(figure, note, title=columns[0].title.partition("\n")[0], legend=True)
@@ -118,10 +115,10 @@ def overview(dataset: xarray.Dataset) -> Figure:
     columns = [shown(dataset, variable) for variable in _MAIN if variable != v.TILT or len(standoffs)]
     if len(names) == 1 and len(standoffs) > 1:
         columns.insert(2, shown(dataset, v.TILT, float(standoffs[0])))
-    panels: list[_Panel] = [(column, None) for column in columns if np.isfinite(column.values).any()]
-    if panels and len(names) == 1:
-        return _maps(dataset, panels, 2, f"; all {', '.join(names.values())}")
-    return _maps(dataset, [*panels, (None, None)], 2)
+    columns = [column for column in columns if np.isfinite(column.values).any()]
+    if columns and len(names) == 1:
+        return _maps(dataset, columns, 2, f"all {', '.join(names.values())}")
+    return _maps(dataset, [*columns, shown_status(dataset)], 2)
 
 
 @in_style
@@ -131,43 +128,34 @@ def layers_figure(dataset: xarray.Dataset) -> Figure:
     A layer that no core left shows their depth. Where all cores ended alike, the note says so in place of a map.
     """
     dataset = mirrored(dataset)
-    rows, alike = list[list[_Panel | None]](), ""
+    rows, notes = list[list[Shown | None]](), ["layer 0 is the plate"]
     for layer in range(dataset.sizes["layer"]):
         columns = [shown(dataset, variable, layer=layer) for variable in v.LAYER_NUMBERS]
         if not np.isfinite(columns[0].values).any():
             depth = shown(dataset, v.DEPTH)
             values = np.where(dataset[v.STOPPED_IN].values == layer, depth.values, np.nan)
             title = f"depth in layer {layer}\nthat any point of the core reached"
-            columns = [depth._replace(values=values, title=title)]
+            columns = [depth._replace(values=values, title=title, layer=layer)]
         names = status_names(dataset[v.LAYER_STATUS].values[:, layer])
         if len(names) == 1:
-            alike += f"; layer {layer}: all {', '.join(names.values())}"
-        status: _Panel | None = (None, layer) if len(names) > 1 else None
-        rows.append([status, *((column, layer) for column in columns), None][:3])
+            notes.append(f"layer {layer}: all {', '.join(names.values())}")
+        rows.append([shown_status(dataset, layer) if len(names) > 1 else None, *columns, None][:3])
     first = 0 if any(row[0] for row in rows) else 1
-    panels = [panel for row in rows for panel in row[first:]]
-    return _maps(dataset, panels, 3 - first, f"; layer 0 is the plate{alike}")
+    return _maps(dataset, [panel for row in rows for panel in row[first:]], 3 - first, "; ".join(notes))
 
 
-_Panel = tuple[Shown | None, int | None]
-"""A variable, or None for the status, and the layer of a map."""
-
-
-def _maps(dataset: xarray.Dataset, panels: Sequence[_Panel | None], columns: int, note: str = "") -> Figure:
+def _maps(dataset: xarray.Dataset, columns: Sequence[Shown | None], across: int, *notes: str) -> Figure:
     """Maps of one result, row by row, with one legend; None leaves a place free."""
-    figure, places = map_sheet([dataset] * len(panels), columns)
-    for axes, panel in zip(places, panels, strict=True):
-        if panel is None:
+    figure, panels = map_sheet([dataset] * len(columns), across)
+    for axes, column in zip(panels, columns, strict=True):
+        if column is None:
             axes.remove()
             continue
-        column, layer = panel
-        if column is None:
-            draw_status(axes, dataset, layer)
-            continue
-        artist = draw_map(axes, dataset, column, layer=layer)
-        if np.isfinite(column.values).any():
+        artist = draw_map(axes, dataset, column)
+        if column.label and np.isfinite(column.values).any():
             figure.colorbar(artist, ax=axes, label=column.label)
-    finish(figure, f"{shots_text(dataset)}; {SEEN}{note}", result=dataset, legend=True, columns=2 * columns)
+    text = f"{shots_text(dataset)}; {SEEN}"
+    finish(figure, *notes, text, result=dataset, legend=True, columns=2 * across)
     return figure
 
 
@@ -180,14 +168,14 @@ def marginals(dataset: xarray.Dataset, variable: str, standoff: float | None = N
     """
     dataset = mirrored(dataset)
     column = shown(dataset, variable, standoff)
-    figure, centre, above, beside, histogram = _with_margins(map_size(dataset))
+    figure, centre, above, right, histogram = _with_margins(map_size(dataset))
     to_scale(centre, dataset)
     artist = draw_map(centre, dataset, column._replace(title=""))
     exists = np.isfinite(column.values)
     values, points = column.values[exists], hit_points(dataset)[exists] * MM
     if len(values):
         _draw_strips(above, points[:, 0], values, upright=False)
-        _draw_strips(beside, points[:, 1], values, upright=True)
+        _draw_strips(right, points[:, 1], values, upright=True)
         histogram.hist(values, bins=min(40, 4 + len(values) // 20), orientation="horizontal", color=BLUE, alpha=0.5)
         histogram.axhline(np.median(values), color="black", lw=1.2)
         figure.colorbar(artist, ax=histogram, location="left", aspect=25, pad=0.0).set_ticks([])
@@ -195,7 +183,7 @@ def marginals(dataset: xarray.Dataset, variable: str, standoff: float | None = N
         histogram.yaxis.tick_right()
         histogram.yaxis.set_label_position("right")
     above.set_ylabel(column.label.replace(" [", "\n["))
-    beside.set_xlabel(column.label.replace(" [", "\n["))
+    right.set_xlabel(column.label.replace(" [", "\n["))
     finish(figure, column.title, f"{shots_text(dataset)}; {SEEN}", result=dataset, legend=True, columns=4)
     return figure
 
@@ -206,16 +194,16 @@ def _with_margins(size: Array) -> tuple[Figure, Axes, Axes, Axes, Axes]:
     figure = Figure(figsize=(size[0] + 2 * _STRIP + 2.4, size[1] + _STRIP + 1.0), layout="compressed")
     grid = figure.add_gridspec(2, 3, width_ratios=(size[0], _STRIP, _STRIP), height_ratios=(_STRIP, size[1]))
     centre = figure.add_subplot(grid[1, 0])
-    above, beside = figure.add_subplot(grid[0, 0], sharex=centre), figure.add_subplot(grid[1, 1], sharey=centre)
+    above, right = figure.add_subplot(grid[0, 0], sharex=centre), figure.add_subplot(grid[1, 1], sharey=centre)
     above.tick_params(labelbottom=False)
-    beside.tick_params(labelleft=False)
-    return figure, centre, above, beside, figure.add_subplot(grid[1, 2])
+    right.tick_params(labelleft=False)
+    return figure, centre, above, right, figure.add_subplot(grid[1, 2])
 
 
 @in_style
 def dispersion(dataset: xarray.Dataset, standoff: float | None = None) -> Figure:
     """Residual velocity against tilt at a stand-off (None: the largest), with the distribution of each."""
-    figure, centre, above, beside, free = _with_margins(np.array([5.0, 5.0]))
+    figure, centre, above, right, free = _with_margins(np.array([5.0, 5.0]))
     free.remove()
     tilt, velocity = (shown(dataset, name, standoff) for name in (v.TILT, v.RESIDUAL_VELOCITY))
     both = np.isfinite(tilt.values) & np.isfinite(velocity.values)
@@ -230,13 +218,13 @@ def dispersion(dataset: xarray.Dataset, standoff: float | None = None) -> Figure
         centre.axhline(np.median(y), color=VERMILION, lw=1.0, ls="--")
         centre.legend(frameon=False)
         above.hist(x, bins=40, color=BLUE, alpha=0.5)
-        beside.hist(y, bins=40, color=BLUE, alpha=0.5, orientation="horizontal")
+        right.hist(y, bins=40, color=BLUE, alpha=0.5, orientation="horizontal")
     else:
-        centre.text(0.5, 0.5, f"no core behind the {struck(dataset)}", transform=centre.transAxes, ha="center")
+        centre.text(0.5, 0.5, f"no core behind the {target_word(dataset)}", transform=centre.transAxes, ha="center")
     centre.set(xlabel=f"{tilt.title.partition(chr(10))[0]} [°]", ylabel=velocity.label)
     above.set_ylabel("hits")
-    beside.set_xlabel("hits")
-    finish(figure, f"cores that passed the {struck(dataset)}; {shots_text(dataset)}", result=dataset)
+    right.set_xlabel("hits")
+    finish(figure, f"cores that passed the {target_word(dataset)}; {shots_text(dataset)}", result=dataset)
     return figure
 
 
@@ -257,8 +245,8 @@ def uncertainty(dataset: xarray.Dataset, variable: str, standoff: float | None =
         )
     images = _local(dataset, column.values, _covered(dataset), lambda near: plane_fit(*near)[:2])
     labels = f"local mean of {column.label}", f"half width of its 95 % interval [{column.label.partition('[')[2]}"
-    method = "plane through the {} nearest hits, Student's interval; bends of the map widen it"
-    return _local_maps(dataset, images, labels, column.title, method)
+    method = f"plane through the {NEIGHBOURS} nearest hits, Student's interval; bends of the map widen it"
+    return _maps(dataset, [*map(Shown, images, labels)], 2, column.title, method)
 
 
 def is_uncertain(dataset: xarray.Dataset) -> bool:
@@ -288,12 +276,13 @@ def probability_map(dataset: xarray.Dataset, quantity: str) -> Figure:
     if not measure.is_binary:
         raise ValueError(f'got "{quantity}", but a map of a probability needs P(…), such as P(perforated)')
     values, places = measure.values(dataset), _covered(dataset)
+    whole = scale_of([np.array([0.0, 1.0])])
     if not shots_scatter(dataset):
         note = "each hit has one outcome, 1 or 0; nearest hit"
-        return _local_maps(dataset, values[places][None], [quantity], quantity, note)
-    images = _local(dataset, values, places, lambda near: share_of(near[1]))
-    labels = quantity, "half width of its 95 % interval"
-    return _local_maps(dataset, images, labels, quantity, "share of the {} nearest hits, Wilson's interval")
+        return _maps(dataset, [Shown(values[places], quantity, scale=whole)], 1, note)
+    share, half_width = _local(dataset, values, places, lambda near: share_of(near[1]))
+    columns = [Shown(share, quantity, scale=whole), Shown(half_width, "half width of its 95 % interval")]
+    return _maps(dataset, columns, 2, f"share of the {NEIGHBOURS} nearest hits, Wilson's interval")
 
 
 def _covered(dataset: xarray.Dataset) -> NDArray[np.intp]:
@@ -302,18 +291,6 @@ def _covered(dataset: xarray.Dataset) -> NDArray[np.intp]:
     if places is None:
         raise ValueError("the hits do not cover the cell, so there is no estimate between them; more hits are needed")
     return places
-
-
-def _local_maps(dataset: xarray.Dataset, images: Array, labels: Sequence[str], title: str, method: str) -> Figure:
-    """A map of each image, shape [maps, pixels_z, pixels_y]: of a local value, and of how uncertain it is. The scale of
-    a probability is that of all of them."""
-    figure, panels = map_sheet([dataset] * len(images), len(images))
-    for axes, image, label in zip(panels, images, labels, strict=True):
-        scale = scale_of([np.array([0.0, 1.0])] if label.startswith("P(") else [image])
-        figure.colorbar(paint_pixels(axes, dataset, image, scale), ax=axes, label=label)
-        draw_hole_edges(axes, *outlines(dataset).values())
-    finish(figure, title, f"{method.format(NEIGHBOURS)}; {shots_text(dataset)}; {SEEN}", result=dataset)
-    return figure
 
 
 def _local(
@@ -382,7 +359,7 @@ def save_maps(dataset: xarray.Dataset, folder: Path, stem: str, *, overwrite: bo
     return save_all(figures, folder, stem, overwrite=overwrite)
 
 
-def save_beside(
+def save_side_by_side(
     datasets: Mapping[str, xarray.Dataset], folder: Path, stem: str, *, overwrite: bool = False
 ) -> list[Path]:
     """Write maps of several results side by side as PNG files ``<stem>_<map>.png`` and return their paths.
@@ -407,6 +384,5 @@ def save_all(figures: Mapping[str, PlainFigure], folder: Path, stem: str, *, ove
     if not overwrite and (existing := next(filter(Path.exists, paths), None)):
         raise OutputError(f"{existing}: exists already; name another folder or give --overwrite")
     for path, figure in paths.items():
-        with aside(path) as file:
-            figure.savefig(file, format="png", dpi=150)
+        figure.savefig(path, dpi=150)
     return list(paths)

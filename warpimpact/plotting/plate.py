@@ -43,7 +43,7 @@ _NEAREST_HOLES = 40
 _EQUALLY_SMALL = 1.01
 """Largest ratio of a ligament to the smallest one at which both count as equally small, because outlines are polygons.
 The written length is the exact one of the plate."""
-_BESIDE_HOLE, _BELOW_HOLE = 0.1, 0.05
+_FROM_SIDE, _FROM_BOTTOM = 0.1, 0.05
 """Distance of the dimensions of a hole from it, in periods."""
 _CORE_WIDTH = 7.5
 """Width of the figure of a core [inch]."""
@@ -158,11 +158,11 @@ def hole_dimensions(plate: Plate, ligament: Dimension | None) -> list[Dimension]
     low_y, low_z, high_y, high_z = holes[0].bounds
     period_y, period_z = plate.pattern.unit_cell
     on_the_right = ligament is not None and ligament.start[0] + ligament.end[0] < 0.0  # where the ligament is not
-    beside = high_y + _BESIDE_HOLE * period_y if on_the_right else low_y - _BESIDE_HOLE * period_y
-    below = low_z - _BELOW_HOLE * period_z
+    upright = high_y + _FROM_SIDE * period_y if on_the_right else low_y - _FROM_SIDE * period_y
+    below = low_z - _FROM_BOTTOM * period_z
     return [
         _dimension((low_y, below), (high_y, below)),
-        _dimension((beside, low_z), (beside, high_z)),
+        _dimension((upright, low_z), (upright, high_z)),
         _dimension((-period_y / 2, period_z / 2), (period_y / 2, period_z / 2)),
         _dimension((-period_y / 2, -period_z / 2), (-period_y / 2, period_z / 2))._replace(on_left=True),
     ]

@@ -19,7 +19,7 @@ from warpimpact.scene.model import Array
 
 _GREY = "0.6"
 _POINTS = 600
-_CELLS_BESIDE = 5.0
+_MOST_CELLS = 5.0
 """Most cells of holes that a figure shows on either side of the middle. A fit searches hits in the first."""
 
 
@@ -86,7 +86,7 @@ def hits_figure(posterior: xarray.Dataset) -> Figure:
         plate = fit.scene_of(shot, medians).target.layers[0]
         hits = MM * np.stack([posterior[name].values[:, place] for name in p.HITS])
         cell, far = MM * np.array(plate.sampled_cell), 1.05 * np.abs(hits).max(axis=1)
-        half = np.minimum(np.maximum(0.55 * cell, far), _CELLS_BESIDE * cell)
+        half = np.minimum(np.maximum(0.55 * cell, far), _MOST_CELLS * cell)
         draw_plate(axes, plate, half)
         axes.scatter(hits[0], hits[1], s=5, color=BLUE, alpha=0.35, lw=0)
         axes.set(xlabel="y [mm]", ylabel="z [mm]", title=str(posterior["shot"].values[place]))

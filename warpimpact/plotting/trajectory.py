@@ -24,7 +24,7 @@ from matplotlib.ticker import MaxNLocator
 from scipy.spatial import ConvexHull
 
 from warpimpact.analysis.replay_geometry import POINTS_AROUND, depth_of, largest_in_plate, pressed, slabs
-from warpimpact.plotting.cell import draw_hole_edges, struck, words
+from warpimpact.plotting.cell import draw_hole_edges, target_word, words
 from warpimpact.plotting.maps import save_all
 from warpimpact.plotting.style import BLUE, GREY, STEEL, VERMILION, Figure, finish, in_style, sheet
 from warpimpact.results import attributes as attr
@@ -152,7 +152,7 @@ def passage(dataset: xarray.Dataset) -> Figure:
             style: dict[str, Any] = {"facecolor": (*colour[:3], 0.3), "edgecolor": colour, "lw": 1.4, "label": label}
             _draw_core(axes, dataset, pose, view, **style)
         _draw_path(axes, dataset[v.PLATE_POSITION].values, view)
-    _finish(figure, dataset, f"passage through the {struck(dataset)}", legend=True)
+    _finish(figure, dataset, f"passage through the {target_word(dataset)}", legend=True)
     return figure
 
 
@@ -168,7 +168,7 @@ def flight(dataset: xarray.Dataset) -> Figure:
             angle = round(float(angle), 1) + 0.0  # no "-0.0"
             text = f"{label}: {_ANGLE_SHOWN[view]} {angle:.1f}°".replace("-", "−")
             axes.text(outline[:, 0].mean(), outline[:, 1].max() + 1.0, text, ha="center", va="bottom")
-    _finish(figure, dataset, f"on impact and behind the {struck(dataset)}")
+    _finish(figure, dataset, f"on impact and behind the {target_word(dataset)}")
     return figure
 
 
@@ -204,7 +204,7 @@ def course(dataset: xarray.Dataset) -> Figure:
             panel.legend(frameon=False)
     for panel in panels[-1]:
         panel.set_xlabel("time [µs]")
-    _finish(figure, dataset, f"course through the {struck(dataset)}")
+    _finish(figure, dataset, f"course through the {target_word(dataset)}")
     return figure
 
 

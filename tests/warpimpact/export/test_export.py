@@ -1,6 +1,5 @@
 """Exports hold what the result holds: tables read back, and VTK files."""
 
-import warnings
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -41,12 +40,7 @@ def test_table_has_a_row_per_hit_and_a_column_per_standoff_and_axis(make_result:
     np.testing.assert_array_equal(frame["tilt_130mm"], dataset["tilt"][:, 1])
     np.testing.assert_array_equal(frame["angular_velocity_y"], dataset["angular_velocity"][:, 1])
     np.testing.assert_array_equal(frame["hit_z"], dataset["hit_z"])
-    per_hit = sum(
-        dataset[name].size // 20 for name in {*dataset.data_vars, "hit_y", "hit_z"} if "hit" in dataset[name].dims
-    )
-    assert frame.shape == (20, per_hit)
-    with warnings.catch_warnings(action="error"):
-        assert set(frame.groupby("status").size().index) == {"perforated", "arrested", "ricocheted", "untouched"}
+    assert frame.shape == (20, 2 + sum(array.size // 20 for array in dataset.data_vars.values() if "hit" in array.dims))
     given = np.concatenate([np.full(10, 30.0), np.linspace(0.1, 50.0, 10)])
     stored = np.degrees(np.radians(given))
     assert stored[0] != 30.0
@@ -63,9 +57,7 @@ def test_csv_holds_every_bit_whatever_the_slices(
     assert main(["export", str(tmp_path / "a.nc")]) == 0
     assert capsys.readouterr().out == f"{tmp_path / 'a.csv'}\n"
     read = pd.read_csv(tmp_path / "a.csv", index_col="hit", engine="python")
-    assert {"hit_y [m]", "impact_velocity [m/s]", "spin [rad/s]", "tilt_130mm [deg]", "exit_axis_x", "status"} <= set(
-        read
-    )
+    assert {"hit_y [m]", "impact_velocity [m/s]", "spin [rad/s]", "tilt_130mm [deg]", "status"} <= set(read)
     frame = to_dataframe(dataset)
     assert [name.partition(" [")[0] for name in read] == list(frame)
     for written, name in zip(read, frame, strict=True):
@@ -138,15 +130,12 @@ def history() -> xarray.Dataset:
     return replay(run(Campaign.from_text(text, name="a", folder=Path(), count=2), device="cpu"), 1, folder=Path())
 
 
-def series(path: Path) -> list[tuple[float, Path]]:
-    return [
-        (float(e.attrib["timestep"]), path.parent / e.attrib["file"]) for e in ElementTree.parse(path).iter("DataSet")
-    ]
-
-
 def test_vtk_reads_the_core_and_the_plate_back(history: xarray.Dataset, tmp_path: Path) -> None:
     meshio = pytest.importorskip("meshio")
-    core, plate = (series(path) for path in write_vtk(history, tmp_path / "hit"))
+    core, plate = (
+        [(float(e.attrib["timestep"]), path.parent / e.attrib["file"]) for e in ElementTree.parse(path).iter("DataSet")]
+        for path in write_vtk(history, tmp_path / "hit")
+    )
     assert [time for time, _ in core] == history["time"].values.tolist()
     assert [time for time, _ in plate] == history["snapshot"].values.tolist()
     for step in (0, -1):
@@ -165,11 +154,8 @@ def test_vtk_reads_the_core_and_the_plate_back(history: xarray.Dataset, tmp_path
     layer = meshio.read(plate[-1][1])
     assert (layer.points[:, 0].min(), layer.points[:, 0].max()) == (0.0, pytest.approx(4e-3))
     centres = layer.points[layer.cells_dict["hexahedron"]].mean(axis=1)
-    share = history["resistance_share"][-1].sel(
-        cell_y=xarray.DataArray(centres[:, 1], dims="cell"),
-        cell_z=xarray.DataArray(centres[:, 2], dims="cell"),
-        method="nearest",
-    )
+    y, z = (xarray.DataArray(centres[:, axis], dims="cell") for axis in (1, 2))
+    share = history["resistance_share"][-1].sel(cell_y=y, cell_z=z, method="nearest")
     np.testing.assert_array_equal(layer.cell_data["resistance_share"][0], share)
 
 
