@@ -112,14 +112,14 @@ def _plates_run(arguments: argparse.Namespace, folder: Path) -> dict[str, Path]:
     with computer(arguments.device, workers=arguments.workers, scheduler=arguments.scheduler, warn=warn) as device:
         for name, campaign in campaigns.items():
             print(f"plate {name}", file=sys.stderr)
-            with show_run(arguments) as progress:
-                run_to_file(
-                    campaign,
-                    paths[name],
-                    device=device,
-                    resume=arguments.resume or (paths[name].exists() and not arguments.overwrite),
-                    overwrite=arguments.overwrite,
-                    progress=progress,
-                    warn=warn,
-                )
+            is_there = paths[name].exists() and not arguments.overwrite
+            options = {"resume": arguments.resume or is_there, "overwrite": arguments.overwrite}
+            try:
+                with show_run(arguments) as progress:
+                    run_to_file(campaign, paths[name], device=device, progress=progress, warn=warn, **options)
+            except files.OutputError as error:
+                if not is_there:
+                    raise
+                remedy = "give --folder FOLDER for the results of this one, or --overwrite"
+                raise files.OutputError(f"{paths[name]}: is the result of another campaign; {remedy}") from error
     return paths

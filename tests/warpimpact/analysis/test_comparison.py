@@ -322,8 +322,9 @@ def test_a_campaign_with_plates_is_run_compared_and_not_run_again(
     assert "round holes better than slots" in every
     Path("two.toml").write_text(SMALL.replace("seed = 1", "seed = 2"), encoding="utf-8")
     assert main(command) == 2
-    assert "slots.nc: exists already" in capsys.readouterr().err
-    assert main([*command, "--overwrite"]) == 0
+    assert "slots.nc: is the result of another campaign; give --folder FOLDER" in capsys.readouterr().err
+    Path("second").mkdir()
+    assert main([*command, "--folder", "second"]) == 0
 
 
 @pytest.mark.parametrize(

@@ -104,4 +104,4 @@ def test_a_run_without_standoffs_is_told_and_drawn(tmp_path: Path) -> None:
     told = inspect_text(files.read(tmp_path / "a.nc"))
     assert "deflection" in told
     assert "tilt" not in told
-    assert len(save_maps(dataset, tmp_path, "a")) == 5
+    assert all(path.is_file() for path in save_maps(dataset, tmp_path, "a"))
