@@ -45,7 +45,7 @@ from warpimpact.analysis.numbers import View, html_of, interval_text, listed, of
 from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
 from warpimpact.results.files import ResultError
-from warpimpact.results.measures import Measure, dealing
+from warpimpact.results.measures import Measure, sampling_design
 from warpimpact.results.vocabulary import base_thickness, has_base
 from warpimpact.runs.chunks import first_difference
 from warpimpact.scene.quantities import QUANTITIES
@@ -57,7 +57,7 @@ from warpimpact.statistics.comparisons import (
     difference_of_independent,
     ratio_numbers,
 )
-from warpimpact.statistics.intervals import Array, Estimate, Estimating, estimate_of
+from warpimpact.statistics.intervals import Array, Estimate, SamplingDesign, estimate_of
 
 _SAME_PLACE = 1e-9
 """Rounding of a place in units of the cell."""
@@ -202,7 +202,7 @@ def compare(
         sides = [_side(score, shift, by_ratio=ratios) for score, shift in zip(scored, shifts, strict=True)]
         compared = []
         for (i, j), independent in zip(places, pairs.independent, strict=True):
-            options: Estimating = {**dealing(datasets[i]), "confidence": each}
+            options: SamplingDesign = {**sampling_design(datasets[i]), "confidence": each}
             compared.append((names[i], names[j], *_difference(sides[i], sides[j], options, paired=not independent)))
         columns = ["one", "other", "value", "low", "high", "significant"]
         differences[measure.text] = pd.DataFrame(compared, columns=columns)
@@ -280,7 +280,7 @@ def _side(score: Score, shift: float, *, by_ratio: bool) -> _Side:
     return _Side(estimate, numbers, shift, kind)
 
 
-def _difference(one: _Side, other: _Side, options: Estimating, *, paired: bool) -> tuple[float, float, float, bool]:
+def _difference(one: _Side, other: _Side, options: SamplingDesign, *, paired: bool) -> tuple[float, float, float, bool]:
     """Difference of two plates, its interval, and whether it is significant. Rounding counts as 0.
 
     The interval is never wider than the intervals of both values leave open.
@@ -345,7 +345,7 @@ def _used(result: xarray.Dataset, other: xarray.Dataset) -> tuple[int, str]:
     """Number of first hits that are the same shots, and why there are none; empty where there are."""
     common = min(result.sizes["hit"], other.sizes["hit"])
     one, two = (dataset.isel(hit=slice(common)) for dataset in (result, other))
-    if dealing(one) != dealing(two):
+    if sampling_design(one) != sampling_design(two):
         return 0, "their shots have other replicates"
     for axis, coordinate in enumerate((v.HIT_Y, v.HIT_Z)):
         here, there = (dataset[coordinate].values / dataset.attrs[attr.PLATE_PERIOD][axis] for dataset in (one, two))

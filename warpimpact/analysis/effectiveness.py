@@ -20,7 +20,7 @@ from warpimpact.analysis.estimates import MeasureData, by_hit_of, estimated, mea
 from warpimpact.analysis.numbers import View, interval_text, rows_of, text_of
 from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
-from warpimpact.results.measures import Measure, dealing, estimate_from
+from warpimpact.results.measures import Measure, estimate_from, sampling_design
 from warpimpact.results.references import reference as reference_of
 from warpimpact.results.references import references_of
 from warpimpact.results.vocabulary import Array
@@ -110,7 +110,7 @@ def scores(dataset: xarray.Dataset, measures: Sequence[Measure], confidence: flo
             of_base = _reference_numbers(measure, base)
             alone = float(np.nanmean(of_base)) if np.isfinite(of_base).any() else math.nan
         numbers = data.values if measure.kind in ("quantile", "worst_point", "target") else data.numbers
-        ratio = Ratio.of(data.estimate, numbers, solid, {**dealing(dataset), "confidence": confidence})
+        ratio = Ratio.of(data.estimate, numbers, solid, {**sampling_design(dataset), "confidence": confidence})
         yield Score(data, solid, ratio, alone)
 
 

@@ -15,10 +15,10 @@ from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
 from warpimpact.results.dataset import SLICE, finer_pair
 from warpimpact.results.files import ResultError
-from warpimpact.results.measures import STATUSES, Measure, dealing, estimate_from, shift_of
+from warpimpact.results.measures import STATUSES, Measure, estimate_from, sampling_design, shift_of
 from warpimpact.results.vocabulary import Array
 from warpimpact.scene.units import quoted
-from warpimpact.statistics.intervals import Estimate, Estimating
+from warpimpact.statistics.intervals import Estimate, SamplingDesign
 from warpimpact.statistics.tails import pseudo_values
 
 _LIMITS = tuple(names.value for names in v.LIMITS.values())
@@ -58,7 +58,7 @@ def measure_data(
     """Measures one after the other. Of an open file, one slice at a time and one number per hit are in memory."""
     needed = (v.STATUS, *v.FINER, *(name for measure in measures for name in measure.quantity.of))
     pair = finer_pair(dataset[[name for name in dict.fromkeys(needed) if name in dataset]])
-    options: Estimating = {**dealing(dataset), "confidence": confidence}
+    options: SamplingDesign = {**sampling_design(dataset), "confidence": confidence}
     key, by_hit = None, np.empty(0)
     for measure in measures:
         if key != (key := (measure.quantity, measure.standoff)):

@@ -28,7 +28,7 @@ from warpimpact.results import firing as f
 from warpimpact.results import variables as v
 from warpimpact.results.dataset import dataset_of, failed
 from warpimpact.results.kinds import FIRING
-from warpimpact.results.measures import dealing
+from warpimpact.results.measures import sampling_design
 from warpimpact.scene.model import Array
 from warpimpact.scene.sampling import stream
 from warpimpact.statistics.acceptance import acceptance, shown_stop_probability
@@ -84,7 +84,7 @@ def response_of_limits(dataset: xarray.Dataset) -> Response:
     limits = dataset[v.LIMITS["velocity"].value].values.astype(float)[sound]
     if not np.isfinite(limits).any():
         raise ValueError("has no limit velocity: no hit perforates at any velocity that was tried, or all have failed")
-    return Response(limits, dealing(dataset)["replicates"] if sound.all() else 1)
+    return Response(limits, sampling_design(dataset)["replicates"] if sound.all() else 1)
 
 
 def response_of(test: FiringTest, output: Path, *, count: int | None = None, **options: Any) -> Response:

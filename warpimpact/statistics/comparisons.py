@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from warpimpact.statistics.intervals import Array, Estimate, Estimating, estimate_of
+from warpimpact.statistics.intervals import Array, Estimate, SamplingDesign, estimate_of
 
 ROUNDED = 1e-6
 """Largest relative difference of two numbers by rounding alone, after some operations in single precision."""
@@ -69,7 +69,7 @@ class Ratio(NamedTuple):
     high: float = math.nan
 
     @classmethod
-    def of(cls, estimate: Estimate, numbers: Array, reference: Array | None, dealt: Estimating) -> Ratio:
+    def of(cls, estimate: Estimate, numbers: Array, reference: Array | None, design: SamplingDesign) -> Ratio:
         """Ratio of the estimate, the mean of numbers of shape [shots], to the mean of a reference: numbers of the first
         shots, or one number for all; None without a reference."""
         known = np.empty(0) if reference is None else reference[~np.isnan(reference)]
@@ -79,11 +79,11 @@ class Ratio(NamedTuple):
             return cls(mean)
         ratio, low, high = (number / mean for number in (estimate.value, estimate.low, estimate.high))
         if np.ptp(known) > 0.0 and estimate.spread > 0.0 and not math.isnan(low):
-            low, high = _fieller(numbers, reference, ratio, dealt)
+            low, high = _fieller(numbers, reference, ratio, design)
         return cls(mean, ratio, low, high)
 
 
-def _fieller(numbers: Array, reference: Array, ratio: float, dealt: Estimating) -> tuple[float, float]:
+def _fieller(numbers: Array, reference: Array, ratio: float, design: SamplingDesign) -> tuple[float, float]:
     """Interval of the ratio r of two means of non-negative numbers: all r for which the interval of the mean of
     numbers − r·reference contains 0. It has no upper end (NaN) if the interval of the reference contains 0.
 
@@ -91,7 +91,7 @@ def _fieller(numbers: Array, reference: Array, ratio: float, dealt: Estimating) 
     """
     numerator, denominator = ratio_numbers(numbers, reference, 0.0), ratio_numbers(0.0 * numbers, reference, -1.0)
     samples = numerator, denominator, numerator - denominator
-    a, b, ab = (estimate_of("mean", sample, **dealt).half_width ** 2 for sample in samples)
+    a, b, ab = (estimate_of("mean", sample, **design).half_width ** 2 for sample in samples)
     # (ratio - r)² ≤ a - (a + b - ab) r + b r²
     square, half, constant = 1.0 - b, ratio - 0.5 * (a + b - ab), ratio**2 - a
     root = math.sqrt(max(0.0, half**2 - square * constant))

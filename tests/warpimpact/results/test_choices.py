@@ -13,7 +13,7 @@ from warpimpact.cli import main
 from warpimpact.results import files
 from warpimpact.results.dataset import is_choice
 from warpimpact.results.layers import outlines
-from warpimpact.results.measures import dealing
+from warpimpact.results.measures import sampling_design
 from warpimpact.results.references import reference, with_references
 from warpimpact.runs.run import run
 
@@ -90,11 +90,11 @@ def test_what_a_choice_lacks_is_told_in_a_sentence(
     assert told.count("\n") == 1
 
 
-def test_chosen_hits_are_no_longer_dealt_out_in_turn(result: xarray.Dataset) -> None:
+def test_chosen_hits_are_no_longer_sample_out_in_turn(result: xarray.Dataset) -> None:
     first = result.isel(hit=slice(64))
     assert [is_choice(one) for one in (result, first, result.isel(hit=slice(1, None)))] == [False, False, True]
-    assert dealing(first)["replicates"] == 16
-    assert dealing(result.isel(hit=slice(None, None, 2)))["replicates"] == 1
+    assert sampling_design(first)["replicates"] == 16
+    assert sampling_design(result.isel(hit=slice(None, None, 2)))["replicates"] == 1
 
 
 def test_a_number_names_the_same_hit_in_a_choice(result: xarray.Dataset) -> None:

@@ -4,16 +4,14 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from warpimpact.statistics.intervals import Dealt, estimate_of, looks
+from warpimpact.statistics.intervals import estimate_of, looks
 
 TRIALS = 500
 LEAST = 460  # 95 % of 500 trials: 475 ± 4.9, three standard deviations below
 
 
 def test_what_never_happens_in_any_replicate_is_not_certain() -> None:
-    dealt = Dealt("share", replicates=8)
-    dealt.add(np.zeros(800))
-    estimate = dealt.estimate()
+    estimate = estimate_of("share", np.zeros(800), replicates=8)
     assert estimate.value == 0.0
     assert estimate.high == pytest.approx(1.96**2 / (800 + 1.96**2), rel=1e-3)  # Wilson's for 0 of 800
 
