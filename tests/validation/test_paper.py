@@ -28,7 +28,7 @@ def test_the_papers_model_rows_are_met(paper_shots: xarray.Dataset, hit: int, sh
 
 def test_the_table_shows_every_source_and_the_difference(paper_shots: xarray.Dataset) -> None:
     table = validation_table(paper_shots)
-    lines = [re.split(r"\s{3,}", line) for line in table.splitlines()]
+    lines = [re.split(r"\s{2,}", line) for line in table.splitlines()]
     for shot, rows in PUBLISHED.items():
         for source, row in rows.items():
             assert [shot, source, f"{row.residual_velocity:.1f}"] in [line[:3] for line in lines]

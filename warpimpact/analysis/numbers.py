@@ -74,7 +74,7 @@ def html_of(view: View, tag: str = "h3") -> str:
 def table_text(table: pd.DataFrame) -> str:
     """A table as plain text, two spaces between its columns."""
     cells = _labelled(table).map(lambda cell: f" {number_text(cell) if isinstance(cell, float) else cell}")
-    text = cells.to_string(sparsify=False, header=any(map(str.strip, table.columns)))
+    text = cells.to_string(header=any(map(str.strip, table.columns)))
     return "\n".join(map(str.rstrip, text.splitlines()))
 
 
@@ -88,6 +88,6 @@ def table_html(table: pd.DataFrame, caption: str = "") -> str:
 
 
 def _labelled(table: pd.DataFrame) -> pd.DataFrame:
-    """The table with the name of its index in the line of the other headers."""
-    name = str(table.index.name or "")
-    return table if table.index.nlevels > 1 else table.rename_axis(index=None).rename_axis(columns=name)
+    """The table with one index, whose name is in the line of the other headers."""
+    table = table.reset_index(level=[*range(1, table.index.nlevels)]) if table.index.nlevels > 1 else table
+    return table.rename_axis(index=None).rename_axis(columns=str(table.index.name or ""))

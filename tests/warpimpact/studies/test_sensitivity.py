@@ -82,7 +82,7 @@ def test_a_row_is_a_run_of_the_changed_campaign() -> None:
     }
     by_number = sensitivity(read(TEXT + LAYER), hits=16, measures=["P(base_pierced)", "mean(base_depth)"], device="cpu")
     assert by_number.iloc[:, 0].between(0.0, 1.0).all()  # no probability above 1, no depth beyond the base of 6 mm
-    assert by_number.iloc[:, 1].between(0.0, 6.0).all()
+    assert by_number.iloc[:, 1].between(0.0, 6.0 + 1e-9).all()
     for name, text in texts.items():
         alone = float(run(read(text), device="cpu").residual_velocity.mean())
         assert table.loc[name, MEAN] == pytest.approx(alone, rel=1e-6), name

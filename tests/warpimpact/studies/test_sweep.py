@@ -174,7 +174,7 @@ def test_a_sweep_is_asked_in_the_language_of_measures(
     point = sorted(folder_of(folder / "a.nc").glob("*.nc"))[4]  # 30°, 4 mm
     assert main(["inspect", str(point), "--measure", "quantile(residual_velocity, 0.05)"]) == 0
     alone = next(line for line in capsys.readouterr().out.splitlines() if "5 % quantile" in line)
-    assert shown[10].split()[:5] == ["30", "deg", "4", "mm", alone.split()[6]]
+    assert shown[9].split()[:5] == ["30", "deg", "4", "mm", alone.split()[6]]
     assert main(["report", sweep, "-o", str(tmp_path / "a.html")]) == 0
     page = (tmp_path / "a.html").read_text(encoding="utf-8")
     assert "P(perforated)" in page
