@@ -7,8 +7,6 @@ import subprocess
 import sys
 from pathlib import Path
 
-import pytest
-
 import warpimpact
 from warpimpact.campaign.schema import campaign_schema
 from warpimpact.cli import parser
@@ -16,82 +14,73 @@ from warpimpact.results import variables
 
 DOCS = Path(__file__).parents[2] / "docs"
 sys.path.append(str(Path(__file__).parents[1] / "benchmarks"))
+REFERENCE = ("campaign", "commands", "python", "results", "device")
+
+import page  # noqa: E402
 
 
-@pytest.fixture(scope="module")
-def pages(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """All pages as HTML, tutorials without their outputs; a warning is an error."""
-    folder = tmp_path_factory.mktemp("pages")
-    command = [sys.executable, "-m", "sphinx", "-W", "--keep-going", "-j", "auto", "-b", "html"]
-    done = subprocess.run(
-        [*command, "-D", "nb_execution_mode=off", "-d", folder / "trees", DOCS, folder],
-        capture_output=True,
-        text=True,
-        check=False,
-    )
-    assert done.returncode == 0, done.stderr[-5000:] + done.stdout[-2000:]
-    return folder
-
-
-def text(page: Path) -> str:
+def text(file: Path) -> str:
     """What a person reads on a page."""
-    (article,) = re.findall(r"<article.*?</article>", page.read_text(encoding="utf-8"), re.DOTALL)
+    (article,) = re.findall(r"<article.*?</article>", file.read_text(encoding="utf-8"), re.DOTALL)
     return html.unescape(re.sub(r"<[^>]*>", "", article))
 
 
-def test_every_key_of_a_campaign_is_on_its_page(pages: Path) -> None:
-    shown, schema = text(pages / "reference" / "campaign.html"), campaign_schema()
+def test_the_pages_are_whole(tmp_path: Path) -> None:
+    """All pages as HTML, tutorials without their outputs; a warning is an error. In one test, they are built once."""
+    command = [sys.executable, "-m", "sphinx", "-W", "--keep-going", "-b", "html", "-D", "nb_execution_mode=off"]
+    done = subprocess.run(
+        [*command, "-d", tmp_path / "trees", DOCS, tmp_path], capture_output=True, text=True, check=False
+    )
+    assert done.returncode == 0, done.stderr[-5000:] + done.stdout[-2000:]
+    reference = {name: text(tmp_path / "reference" / f"{name}.html") for name in REFERENCE}
+    _has_every_key_of_a_campaign(reference["campaign"])
+    _has_every_command(reference["commands"])
+    assert not [name for name in warpimpact.__all__ if not name.startswith("_") and name not in reference["python"]]
+    assert not [name for name in variables.OUTCOME_VARIABLES if name not in reference["results"]]
+    _has_every_device_function(reference["device"])
+    _says_what_the_results_say(text(tmp_path / "benchmarks.html"))
+
+
+def _has_every_key_of_a_campaign(page: str) -> None:
+    schema = campaign_schema()
     keys = {key for table in (schema, *schema["$defs"].values()) for key in table.get("properties", {})}
     assert len(keys) > 60
-    assert not [key for key in keys if not re.search(rf"\b{key}\b", shown)]
-    assert "title" in shown.partition("[core]")[0]
-    assert "2^30" in shown  # of hits.count
-    assert "7850 kg/m^3" in shown  # default with its unit
+    assert not [key for key in keys if not re.search(rf"\b{key}\b", page)]
+    assert "title" in page.partition("[core]")[0]
+    assert "2^30" in page  # of hits.count
+    assert "7850 kg/m^3" in page  # default with its unit
 
 
-def test_every_command_is_on_its_page(pages: Path) -> None:
-    shown = text(pages / "reference" / "commands.html")
+def _has_every_command(page: str) -> None:
     (commands,) = [action.choices for action in parser()._actions if hasattr(action.choices, "items")]
     for name, command in commands.items():
-        assert f"warpimpact {name}" in shown
-        assert all(option in shown for action in command._actions for option in action.option_strings)
-    assert all(re.search(rf"^{code}$", shown, re.MULTILINE) for code in (0, 2, 3, 70, 130, 141))
+        assert f"warpimpact {name}" in page
+        assert all(option in page for action in command._actions for option in action.option_strings)
+    assert all(re.search(rf"^{code}$", page, re.MULTILINE) for code in (0, 2, 3, 70, 130, 141))
 
 
-def test_every_public_name_and_every_variable_is_on_its_page(pages: Path) -> None:
-    shown = text(pages / "reference" / "python.html")
-    assert not [name for name in warpimpact.__all__ if not name.startswith("_") and name not in shown]
-    shown = text(pages / "reference" / "results.html")
-    assert not [name for name in variables.OUTCOME_VARIABLES if name not in shown]
-
-
-def test_device_functions_are_on_their_page(pages: Path) -> None:
-    shown = text(pages / "reference" / "device.html")
+def _has_every_device_function(page: str) -> None:
     source = "".join(path.read_text(encoding="utf-8") for path in (DOCS.parent / "kernels").glob("*.py"))
     functions = re.findall(r"@wp\.func\n\s+def (\w+)", source)
     assert len(functions) > 50
-    assert not [name for name in functions if name not in shown]
+    assert not [name for name in functions if name not in page]
+
+
+def _says_what_the_results_say(shown: str) -> None:
+    words = re.sub(r"\s+", " ", shown)
+    rows = list(page.rows(page.results()))
+    assert len(rows) > 20
+    for cell in [*(cell for row in rows for cell in row), *page.machines(page.results())]:
+        assert cell.replace("`", "") in words
 
 
 def test_examples_in_pages_are_right() -> None:
     examples_run = 0
-    for page in DOCS.rglob("*.md"):
-        examples = "\n".join(re.findall(r"```\{doctest\}\n(.*?)```", page.read_text(encoding="utf-8"), re.DOTALL))
+    for file in DOCS.rglob("*.md"):
+        examples = "\n".join(re.findall(r"```\{doctest\}\n(.*?)```", file.read_text(encoding="utf-8"), re.DOTALL))
         checked = doctest.DocTestRunner().run(
-            doctest.DocTestParser().get_doctest(examples, {}, page.name, str(page), 0)
+            doctest.DocTestParser().get_doctest(examples, {}, file.name, str(file), 0)
         )
         assert not checked.failed
         examples_run += checked.attempted
     assert examples_run >= 5
-
-
-def test_the_benchmark_page_says_what_the_results_say(pages: Path) -> None:
-    import page
-
-    shown = re.sub(r"\s+", " ", text(pages / "benchmarks.html"))
-    rows = list(page.rows(page.results()))
-    assert len(rows) > 20
-    for cell in {cell for row in rows for cell in row}:
-        assert cell.replace("`", "") in shown
-    for sentence in page.machines(page.results()):
-        assert sentence.replace("`", "") in shown

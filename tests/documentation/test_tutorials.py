@@ -20,6 +20,8 @@ from matplotlib.figure import Figure
 
 from warpimpact.cli import main
 
+from .smaller import make_campaigns_smaller, smaller
+
 TUTORIALS = Path(__file__).parents[2] / "docs" / "tutorials"
 PROGRAMS = os.pathsep.join([str(Path(sys.executable).parent), os.environ["PATH"]])
 
@@ -34,6 +36,7 @@ def shell(line: str) -> None:
     """Run a line that begins with "!"; the command runs in this process, where no other program takes its output."""
     if line.startswith("warpimpact ") and "|" not in line:
         assert not main(shlex.split(line)[1:]), line
+        make_campaigns_smaller(Path())
     else:
         subprocess.run(line, shell=True, check=True, env=os.environ | {"PATH": PROGRAMS})
 
@@ -54,7 +57,7 @@ def test_a_tutorial_runs_and_shows_a_picture(page: Path, tmp_path: Path, monkeyp
     shown: list[object] = []
     monkeypatch.setattr(pyplot, "show", lambda: shown.append(pyplot.gcf()))
     names: dict[str, object] = {"get_ipython": lambda: SimpleNamespace(system=shell)}
-    shown += [run_cell(cell, names) for cell in cells(page)]
+    shown += [run_cell(smaller(cell), names) for cell in cells(page)]
     pictures = [picture for picture in shown if isinstance(picture, (Figure, Image))]
     assert pictures
     for picture in pictures:
