@@ -109,18 +109,21 @@ def _append(dataset: xarray.Dataset, target: Any) -> None:
 
 @contextmanager
 def aside(path: Path, *, named: Callable[[Path], Path] | None = None) -> Iterator[Path]:
-    """A temporary path beside `path`. After the block the file is flushed and renamed to it, or to `named(file)`.
+    """A temporary path next to `path`. After the block the file is flushed and renamed to it, or to `named(file)`.
+
+    Where `path` is a symbolic link, the file that it leads to is written, and the link stays.
 
     Raises:
         OutputError: The file cannot be written; what was there before is untouched.
     """
-    written = path.parent / f".{path.name}.{os.getpid()}.part"
+    target = Path(os.path.realpath(path))
+    written = target.parent / f".{target.name}.{os.getpid()}.part"
     try:
         yield written
         _flush(written, os.O_RDWR)
-        os.replace(written, named(written) if named else path)
+        os.replace(written, named(written) if named else target)
         if os.name == "posix":  # elsewhere a folder cannot be opened, and needs no flushing
-            _flush(path.parent, os.O_RDONLY)
+            _flush(target.parent, os.O_RDONLY)
     except OutputError:
         raise
     except (OSError, RuntimeError) as error:  # netCDF reports a full disk as RuntimeError

@@ -185,3 +185,13 @@ def test_what_is_no_result_is_told(make_result, tmp_path):
         for read in (files.read, open_result):
             with pytest.raises(files.ResultError, match=rf"{name}\.nc: {told}"):
                 read(tmp_path / f"{name}.nc")
+
+
+def test_a_symbolic_link_is_written_through(make_result, tmp_path):
+    (tmp_path / "disk").mkdir()
+    (tmp_path / "a.nc").symlink_to("disk/b.nc")
+    for count in (3, 5):  # a link to no file yet, and to one
+        files.write(make_result(count), tmp_path / "a.nc")
+        assert (tmp_path / "a.nc").is_symlink()
+        assert files.read(tmp_path / "disk" / "b.nc").sizes["hit"] == count
+    assert {path.name for path in tmp_path.iterdir()} == {"a.nc", "disk"}
