@@ -45,15 +45,15 @@ def test_ten_shots_report_what_all_1024_sequences_of_answers_give(name: str) -> 
     drawn = reports(simulated(procedure, NORMAL, 4000), procedure)
     exact = reports(firings, procedure)
     for one, other in ((exact[name], drawn[name]) for name in (f.V50, f.SPREAD) if np.isfinite(exact[name]).any()):
-        known, found = np.isfinite(one), other[np.isfinite(other)]
+        known, reported = np.isfinite(one), other[np.isfinite(other)]
         share = probability[known].sum()
         mean = (probability[known] * one[known]).sum() / share
         deviation = np.sqrt((probability[known] * (one[known] - mean) ** 2).sum() / share)
-        assert found.mean() == pytest.approx(mean, abs=4.0 * deviation / np.sqrt(len(found)))
+        assert reported.mean() == pytest.approx(mean, abs=4.0 * deviation / np.sqrt(len(reported)))
         fourth = (probability[known] * (one[known] - mean) ** 4).sum() / share
-        error = np.sqrt((fourth - deviation**4) / len(found)) / (2.0 * deviation)
-        assert found.std() == pytest.approx(deviation, abs=4.0 * error)
-        assert len(found) / 4000 == pytest.approx(share, abs=4.0 * np.sqrt(share * (1.0 - share) / 4000) + 1e-9)
+        error = np.sqrt((fourth - deviation**4) / len(reported)) / (2.0 * deviation)
+        assert reported.std() == pytest.approx(deviation, abs=4.0 * error)
+        assert len(reported) / 4000 == pytest.approx(share, abs=4.0 * np.sqrt(share * (1.0 - share) / 4000) + 1e-9)
 
 
 @pytest.mark.parametrize("name", PROCEDURES)
@@ -62,16 +62,16 @@ def test_a_target_of_one_limit_is_enclosed(name: str) -> None:
     procedure = PROCEDURES[name].model_copy(update={"shots": 16} if name == "langlie" else {"pairs": 1})
     firings = simulated(procedure, np.array([787.0]), 5)
     assert (firings.perforated == (firings.velocity > 787.0))[firings.used].all()
-    found = reports(firings, procedure)
+    reported = reports(firings, procedure)
     below = np.where(firings.used & ~firings.perforated, firings.velocity, -np.inf).max(axis=1)
     above = np.where(firings.used & firings.perforated, firings.velocity, np.inf).min(axis=1)
     assert (below < 787.0).all()
     assert (above >= 787.0).all()
-    assert found[f.V50] == pytest.approx(0.5 * (below + above))
-    assert np.isnan(found[f.SPREAD]).all()
+    assert reported[f.V50] == pytest.approx(0.5 * (below + above))
+    assert np.isnan(reported[f.SPREAD]).all()
     if name == "langlie":  # it halves the range
         assert above[0] - below[0] <= 200.0 / 2**7
-        assert ((found[f.V50_LOW] <= 787.0) & (found[f.V50_HIGH] >= 787.0)).all()
+        assert ((reported[f.V50_LOW] <= 787.0) & (reported[f.V50_HIGH] >= 787.0)).all()
 
 
 def test_a_plate_of_two_values_is_known_by_hand() -> None:

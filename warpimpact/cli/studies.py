@@ -45,8 +45,8 @@ from .run import computing, failure_code
 
 
 def limit_command(arguments: argparse.Namespace) -> int:
-    is_sought = arguments.quantity == "velocity"
-    campaign = Campaign.from_toml(arguments.campaign, count=arguments.count, needs_velocity=not is_sought)
+    needs_velocity = arguments.quantity != "velocity"
+    campaign = Campaign.from_toml(arguments.campaign, count=arguments.count, needs_velocity=needs_velocity)
     output = arguments.output or Path(arguments.campaign.stem + "_limit.nc")
     picture = output.with_suffix(".png")
     check_output(output, ".nc", overwrite=True)

@@ -201,20 +201,16 @@ class MeasuredSpeed(Model):
     std: PositiveSpeed
 
 
-class MeasuredAngle(Model):
-    """An angle and its standard uncertainty."""
-
-    value: Angle
-    std: Annotated[Angle, Field(gt=0)]
-
-
 def _by_standoff(given: Any) -> Any:
     values = given if isinstance(given, list) else [given]
     return [None if isinstance(value, float) and math.isnan(value) else value for value in values]
 
 
 class MeasuredAngles(Model):
-    """Angles and their standard uncertainties, one for each stand-off; nan for one that was not measured."""
+    """Angles and their standard uncertainties, one for each stand-off; nan for one that was not measured.
+
+    A single number is a list of one.
+    """
 
     value: Annotated[tuple[Angle | None, ...], BeforeValidator(_by_standoff)]
     std: Annotated[tuple[Annotated[Angle, Field(gt=0)] | None, ...], BeforeValidator(_by_standoff)]
@@ -237,7 +233,7 @@ class Measured(Model):
 
     residual_velocity: MeasuredSpeed | None = None
     limit_velocity: MeasuredSpeed | None = None
-    deflection: MeasuredAngle | None = None
+    deflection: MeasuredAngles | None = None
     tilt: MeasuredAngles | None = None
     pitch: MeasuredAngles | None = None
     yaw: MeasuredAngles | None = None
@@ -557,16 +553,17 @@ def _shot(
 def _observations(measured: Measured, name: str, standoffs: Sequence[float], place: str) -> Iterator[Observation]:
     """The measured numbers of a name."""
     given = getattr(measured, name)
-    if isinstance(given, MeasuredSpeed | MeasuredAngle):
+    if isinstance(given, MeasuredSpeed):
         yield Observation(name, None, float(given.value), float(given.std))
     elif isinstance(given, MeasuredAngles):
+        places = [None] if name == "deflection" else [*range(len(standoffs))]
         stds = given.std * len(given.value) if len(given.std) == 1 else given.std
-        if not len(given.value) == len(stds) == len(standoffs):
+        if not len(given.value) == len(stds) == len(places):
             raise FitError(
-                f"{place}.measured.{name}: got {len(given.value)} values and {len(stds)} std at {len(standoffs)} "
+                f"{place}.measured.{name}: got {len(given.value)} values and {len(stds)} std at {len(places)} "
                 "stand-offs, but each stand-off of [record] takes one; nan stands for one that was not measured"
             )
-        for index, (value, std) in enumerate(zip(given.value, stds, strict=True)):
+        for index, value, std in zip(places, given.value, stds, strict=True):
             if value is not None and std is not None:
                 yield Observation(name, index, float(value), float(std))
 

@@ -16,7 +16,6 @@ from warpimpact.scene.model import Array
 from warpimpact.scene.unit_text import number_and_unit
 from warpimpact.scene.units import LARGEST, float_of, quoted
 
-MOST_VARIABLES = 64
 _RANGE_DIGITS = 6
 """Significant digits of a value of a range without a step."""
 
@@ -131,8 +130,6 @@ def read_space(given: Any, name: str) -> Space:
     variables: list[DesignVariable] = []
     for key, value in given.items():
         _read(variables, key, resolved(key, f"{name}: variables"), value, f"{name}: variables.{key}")
-    if len(variables) > MOST_VARIABLES:
-        raise CampaignError(f"{name}: variables: got {len(variables)}, but at most {MOST_VARIABLES} are searched")
     places = [variable.place for variable in variables if variable.under is None]
     if twice := next((place for place in places if places.count(place) > 1), None):
         raise CampaignError(f"{name}: variables: got two variables for {twice}")

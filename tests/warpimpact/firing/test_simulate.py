@@ -96,9 +96,9 @@ def test_limits_answer_as_a_map() -> None:
 
 @pytest.mark.parametrize("share", [0.01, 0.05, 0.5, 0.9])
 def test_quantiles_of_a_normal_response(share: float) -> None:
-    found = NORMAL.quantile(share)
-    assert found.value == pytest.approx(stats.norm.ppf(share, 800.0, 25.0), abs=0.05)
-    assert found.low < found.value < found.high
+    result = NORMAL.quantile(share)
+    assert result.value == pytest.approx(stats.norm.ppf(share, 800.0, 25.0), abs=0.05)
+    assert result.low < result.value < result.high
 
 
 def test_shot_k_of_test_t_does_not_depend_on_their_numbers(dataset: xarray.Dataset) -> None:
@@ -154,13 +154,13 @@ output = { standoffs = ["50 mm"], solid_reference = false }
     assert main(["test", str(tmp_path / "a.toml"), "-o", str(output), "-q", "--device", "cpu"]) == 0
     assert f.SENTENCE in capsys.readouterr().out
     assert (tmp_path / "a.png").exists()
-    found, limit = files.read(output, FIRING), float(files.read(tmp_path / "a_limits.nc").limit_velocity[0])
-    assert found.attrs[f.TRUE_V50] == pytest.approx(limit, abs=1.0)
-    assert found[f.V50].values == pytest.approx(np.full(20, limit), abs=20.0)
-    assert found.attrs["Conventions"] == "CF-1.11"
-    assert json.loads(found.attrs[f.SETTINGS])["target"]["count"] == 8
-    assert all({"units", "long_name"} <= set(found[name].attrs) for name in found.variables)
+    result, limit = files.read(output, FIRING), float(files.read(tmp_path / "a_limits.nc").limit_velocity[0])
+    assert result.attrs[f.TRUE_V50] == pytest.approx(limit, abs=1.0)
+    assert result[f.V50].values == pytest.approx(np.full(20, limit), abs=20.0)
+    assert result.attrs["Conventions"] == "CF-1.11"
+    assert json.loads(result.attrs[f.SETTINGS])["target"]["count"] == 8
+    assert all({"units", "long_name"} <= set(result[name].attrs) for name in result.variables)
     assert main(["test", str(tmp_path / "a.toml"), "-o", str(output)]) == 2
     (tmp_path / "b.toml").write_text(test.replace('campaign = "solid.toml"\ncount = 8', 'limits = "a_limits.nc"'))
     assert main(["test", str(tmp_path / "b.toml"), "-o", str(tmp_path / "b.nc"), "-q"]) == 0
-    assert np.array_equal(files.read(tmp_path / "b.nc", FIRING)[f.V50].values, found[f.V50].values)
+    assert np.array_equal(files.read(tmp_path / "b.nc", FIRING)[f.V50].values, result[f.V50].values)

@@ -17,21 +17,21 @@ PERFORATED = [0, 0, 0, 1, 0, 1, 0, 1, 1, 1]
 
 
 def test_v50_and_spread_are_those_of_a_probit() -> None:
-    found = v50(VELOCITY, PERFORATED)
+    result = v50(VELOCITY, PERFORATED)
     at, slope = sm.Probit(PERFORATED, sm.add_constant(np.array(VELOCITY) - 800.0)).fit(disp=0).params
-    assert found.value == pytest.approx(800.0 - at / slope, abs=1e-3)
-    assert found.spread == pytest.approx(1.0 / slope, rel=1e-4)
-    assert found.low < found.value < found.high
-    assert found.spread_low < found.spread < found.spread_high
+    assert result.value == pytest.approx(800.0 - at / slope, abs=1e-3)
+    assert result.spread == pytest.approx(1.0 / slope, rel=1e-4)
+    assert result.low < result.value < result.high
+    assert result.spread_low < result.spread < result.spread_high
 
 
 def test_the_standard_takes_the_most_pairs_within_its_span() -> None:
     """Five fastest stops and five slowest perforations span 61 m/s, three 30 m/s, two 17 m/s."""
     assert {pairs: round(span / FOOT) for pairs, span in STANDARD_SPANS.items()} == {2: 60, 3: 90, 5: 125}
-    found = v50(VELOCITY, PERFORATED)
-    assert (found.pairs, found.span) == (2, 17.0)
-    assert found.standard == pytest.approx(np.mean([801.0, 812.0, 795.0, 806.0]))
-    assert found.lines[2].endswith("mean of 2 stops and 2 perforations within 17 m/s (allowed 18.3 m/s)")
+    result = v50(VELOCITY, PERFORATED)
+    assert (result.pairs, result.span) == (2, 17.0)
+    assert result.standard == pytest.approx(np.mean([801.0, 812.0, 795.0, 806.0]))
+    assert result.lines[2].endswith("mean of 2 stops and 2 perforations within 17 m/s (allowed 18.3 m/s)")
     none = v50([700.0, 800.0, 900.0], [0, 1, 1])
     assert (none.pairs, math.isnan(none.standard)) == (0, True)
     assert none.lines[2].startswith("V50 by MIL-STD-662F: none, no 2 + 2 shots within 18.3 m/s")
@@ -50,25 +50,25 @@ def test_the_standard_takes_the_most_pairs_within_its_span() -> None:
         ([780, 790, 800, 820], [1, 0, 1, 1], None, "The interval of V50 is open"),
     ],
 )
-def test_what_shots_do_not_determine_is_said(
+def test_what_shots_do_not_determine_has_a_sentence(
     velocity: list[float], perforated: list[int], value: float | None, line: str
 ) -> None:
-    found = v50(velocity, perforated)
+    result = v50(velocity, perforated)
     if value is not None:
-        assert found.value == pytest.approx(value, nan_ok=True)
-        assert math.isnan(found.spread)
-    assert line in found.lines[3]
-    assert str(found).count("\n") == 3
+        assert result.value == pytest.approx(value, nan_ok=True)
+        assert math.isnan(result.spread)
+    assert line in result.lines[3]
+    assert str(result).count("\n") == 3
 
 
 def test_a_published_up_and_down_test_is_within_the_intervals() -> None:
     """Seven survivals, and failures at 280 (two) and 300 (three), in steps of 20: V50 282 and, since the sums are too
     small for the formula of Dixon and Mood, a spread of 0.53 steps."""
-    found = v50([280, 280, 300, 300, 300, 260, 260, 260, 260, 280, 280, 280], [1] * 5 + [0] * 7)
-    assert found.low < 282.0 < found.high
-    assert found.value == pytest.approx(282.0, abs=2.0)
-    assert math.isnan(found.spread)
-    assert found.spread_low == 0.0 < 10.6 < found.spread_high
+    result = v50([280, 280, 300, 300, 300, 260, 260, 260, 260, 280, 280, 280], [1] * 5 + [0] * 7)
+    assert result.low < 282.0 < result.high
+    assert result.value == pytest.approx(282.0, abs=2.0)
+    assert math.isnan(result.spread)
+    assert result.spread_low == 0.0 < 10.6 < result.spread_high
 
 
 @pytest.mark.parametrize(

@@ -41,10 +41,10 @@ def test_a_linear_model_has_its_exact_posterior(make_fit: FitMaker, noise: float
     chains = sampled(density, start, density(start), fit)
     precision = np.eye(4) + matrix.T @ matrix / std**2
     mean, spread = np.linalg.solve(precision, matrix.T @ data / std**2), np.sqrt(np.diag(np.linalg.inv(precision)))
-    found = chains.points.reshape(-1, 4)
+    sample = chains.points.reshape(-1, 4)
     assert chains.is_converged(2000)
-    assert np.abs(found.mean(axis=0) - mean) / spread == pytest.approx(0.0, abs=5.0 / np.sqrt(2000.0))
-    assert found.std(axis=0) == pytest.approx(spread, rel=0.1)
+    assert np.abs(sample.mean(axis=0) - mean) / spread == pytest.approx(0.0, abs=5.0 / np.sqrt(2000.0))
+    assert sample.std(axis=0) == pytest.approx(spread, rel=0.1)
 
 
 def test_known_parameters_are_recovered(make_fit: FitMaker) -> None:

@@ -73,7 +73,7 @@ def test_the_likelihood_is_the_mean_over_the_hits(
     computed: Outcomes, score: Callable[..., Scores], group: tuple[Symmetry, ...]
 ) -> None:
     """The image of a hit has the yaw with the other sign."""
-    found = score((VELOCITY, YAW), computed, group=group)
+    scored = score((VELOCITY, YAW), computed, group=group)
     for one in range(SETS):
         densities = []
         for place in range(one * POINTS, (one + 1) * POINTS):
@@ -87,7 +87,7 @@ def test_the_likelihood_is_the_mean_over_the_hits(
                 ):
                     density *= np.exp(-0.5 * (miss / spread) ** 2) / (np.sqrt(2.0 * np.pi) * spread)
                 densities.append(density)
-        assert found.log_likelihood[one] == pytest.approx(np.log(np.mean(densities)) + np.log(np.degrees(1.0)))
+        assert scored.log_likelihood[one] == pytest.approx(np.log(np.mean(densities)) + np.log(np.degrees(1.0)))
 
 
 def test_a_status_counts_the_hits_that_ended_so(score: Callable[..., Scores]) -> None:
@@ -112,9 +112,9 @@ def test_hits_follow_their_posterior(score: Callable[..., Scores]) -> None:
     sets = 4000
     velocity = np.tile([600.0, 620.0], sets)
     uniform, scales = np.random.default_rng(0).random(sets), {"velocity": np.zeros(sets), "angle": np.zeros(sets)}
-    found = score((VELOCITY,), outcomes_of(velocity, np.zeros(2 * sets)), uniform=uniform, scales=scales)
-    assert (found.hit_y == 1.0).mean() == pytest.approx(1.0 / (1.0 + np.exp(2.0)), abs=0.01)
-    assert (found.misfit == 0.0).all()
+    scored = score((VELOCITY,), outcomes_of(velocity, np.zeros(2 * sets)), uniform=uniform, scales=scales)
+    assert (scored.hit_y == 1.0).mean() == pytest.approx(1.0 / (1.0 + np.exp(2.0)), abs=0.01)
+    assert (scored.misfit == 0.0).all()
 
 
 def test_hits_cover_the_cell(make_fit: FitMaker) -> None:
@@ -161,9 +161,9 @@ def test_an_interval_of_degradation_is_a_degradation_of_the_shot(make_fit: FitMa
     alone = simulate(scene, own.shots, numerics=fit.file.numerics, device="cpu")
     scales = {"velocity": np.array([0.0]), "angle": np.array([0.0])}
     plain = replace(fit, parameters=fit.scene_parameters, discrepancy={"velocity": 0.0, "angle": 0.0})
-    found = evaluate(plain, points[:, : len(plain.parameters)], uniform, CPU)
+    scored = evaluate(plain, points[:, : len(plain.parameters)], uniform, CPU)
     expected = Scores(*score_shot(fit.shots[0], own, alone, scales, uniform[1:, 2]))
-    assert found.log_likelihood[1, 0] == pytest.approx(expected.log_likelihood[0], abs=0.02)
+    assert scored.log_likelihood[1, 0] == pytest.approx(expected.log_likelihood[0], abs=0.02)
 
 
 def test_a_score_depends_on_no_other_set(make_fit: FitMaker) -> None:

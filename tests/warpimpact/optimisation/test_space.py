@@ -108,7 +108,7 @@ def test_constraints_are_checked_before_anything_is_computed(constraint: str, br
         ('largest_add_on_areal_density = "22 kg/m^2"', ""),
     ],
 )
-def test_the_weight_of_the_add_on_alone_is_bounded_and_sought(constraint: str, broken: str) -> None:
+def test_the_weight_of_the_add_on_alone_is_bounded_and_minimised(constraint: str, broken: str) -> None:
     base = '[[layer]]\nthickness = "10 mm"\nresistance = "1 GPa"\n'
     goals = WEIGHT_AND_ENERGY.replace('"areal_density"', '"add_on_areal_density"')
     assert goals != WEIGHT_AND_ENERGY
