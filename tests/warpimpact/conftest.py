@@ -211,6 +211,8 @@ class Browser:
             "Emulation.setDeviceMetricsOverride",
             {"width": width, "height": 900, "deviceScaleFactor": 1, "mobile": width < 600},
         )
+        self.driver.get("about:blank")
+        self.errors()  # of the page before, whose server may have ended
         self.driver.get(address)
 
     def find(self, selector: str) -> list:

@@ -9,12 +9,12 @@ from typing import Annotated, Any, ClassVar, Literal, NamedTuple, Self
 
 import numpy as np
 import shapely
-from pydantic import Field, PrivateAttr, ValidationInfo, field_validator, model_validator
+from pydantic import Field, PrivateAttr, ValidationInfo, field_serializer, field_validator, model_validator
 from scipy.spatial import KDTree
 
 from ..exclusions import HOLES, STAGGERED, check_together
 from ..model import Array, Model
-from ..units import Angle, Length, PositiveLength, quantity
+from ..units import Angle, Length, PositiveLength, in_radians, quantity
 from .geometry import BoolArray, Counts, Range, distance_to, geometries, neighbours, placed, shares_in, shifts_into
 
 _QUARTER = 16
@@ -201,6 +201,11 @@ class LatticePattern(Pattern):
     rotation: Angle = 0.0
     _plate: tuple[tuple[float, float], float] | None = PrivateAttr(None)
     """Size and margin of the plate that bounds the pattern; None if it is unbounded."""
+
+    @field_serializer("holes", when_used="json-unless-none")
+    def _with_units(self, holes: tuple[HolePlace, ...]) -> list[tuple[float, float, str]]:
+        """Write angles as text; pydantic before 2.14 ignores the types of a NamedTuple and writes plain numbers."""
+        return [(float(hole.y), float(hole.z), in_radians(hole.rotation)) for hole in holes]
 
     @field_validator("spacing", mode="before", json_schema_input_type=_PAIR | PositiveLength)
     @classmethod
