@@ -4,7 +4,7 @@ INSTALLED := $(VENV)/.installed
 DEVELOPED := $(VENV)/.developed
 PIP := PYTHONWARNINGS='ignore:Editable installation' $(VENV)/bin/pip install --quiet --disable-pip-version-check --no-compile
 PARALLEL := --numprocesses auto --dist worksteal
-THREADS := 'tests/verification/test_any_company.py::test_threads_and_chunks_change_no_bit[2-5-single]'
+THREADS := 'tests/verification/test_any_company.py::test_threads_and_chunks_change_no_bit[2-0.0-single]'
 ELEMENTS := tests/verification/test_continuum.py
 
 export PYTHONDONTWRITEBYTECODE :=

@@ -34,7 +34,7 @@ from warpimpact.runs.run import run_to_file
 from warpimpact.scene import Numerics
 from warpimpact.scene.flow import Continuum
 from warpimpact.solver.device import find_device
-from warpimpact.solver.marching import Marching
+from warpimpact.solver.marching import march
 from warpimpact.solver.memory import Memory
 from warpimpact.solver.prepare import prepare
 from warpimpact.solver.worker import Worker
@@ -156,7 +156,7 @@ def rates(name: str, device: str, sizes: Sizes) -> dict[str, dict[int, float]]:
             shots = copied(some, -(-count // len(some)))[:count]
             memory = Memory(prepare(scene, shots, Numerics(level=LEVEL, layout=layout)), find_device(device))
             memory.build()
-            taken = min(seconds(lambda memory=memory: Marching(memory).march()) for _ in range(2))
+            taken = min(seconds(lambda memory=memory: march(memory)) for _ in range(2))
             by_count[count] = count / taken
             count *= GROWTH
         print(f"{name}, {layout}: {max(by_count.values()):.4g} hits/s", flush=True)

@@ -25,12 +25,9 @@ from random_scenes import draw
 from warpimpact import Campaign, Numerics, Scene
 from warpimpact.scene import PRESETS, Shots
 from warpimpact.solver.accuracy import pilot_size
-from warpimpact.solver.device import find_device
-from warpimpact.solver.marching import Marching
-from warpimpact.solver.memory import Memory
 from warpimpact.solver.prepare import prepare
-from warpimpact.solver.simulate import outcomes_of, pilot_of
-from warpimpact.solver.worker import NEVER, Worker
+from warpimpact.solver.simulate import computed, pilot_of
+from warpimpact.solver.worker import Worker
 
 RUN, SMALL = 16384, 1024
 """Hits of the run that a pilot is made for; likewise of scenes that are drawn, whose pilots may take long."""
@@ -109,8 +106,7 @@ class Road:
         """Processor time of a hit [s]."""
         begin, count = time.process_time(), 0
         while time.process_time() - begin < TIMED:
-            march = Marching(Memory(prepare(self.scene, self.shots, self.numerics), find_device("cpu")), 1)
-            count += len(outcomes_of(march.memory, march.march(None, NEVER)).status)
+            count += len(computed(prepare(self.scene, self.shots, self.numerics), Worker("cpu", 1)))
         return (time.process_time() - begin) / count
 
 

@@ -62,8 +62,8 @@ def slanted_shots(count: int = 40) -> Shots:
 def launched(core: Core, shots: Shots) -> dict[str, Array]:
     """How shots start: first rows of their traces through a plate without resistance, drifted back."""
     numerics = Numerics(level=0, precision="double", time_step=1e-6)
-    histories = replay.trace(Scene(core=core, target=WEIGHTLESS), shots, numerics=numerics)
-    first = np.array([history[0] for history in histories])
+    memory, _, contact = replay.traced(Scene(core=core, target=WEIGHTLESS), shots, numerics)
+    first = np.array([history[0] for history in replay.traces_of(memory, contact)])
     assert (first[:, 0] == 0.5e-6).all()
     return {
         "position": first[:, 1:4] - 0.5e-6 * first[:, 8:11],

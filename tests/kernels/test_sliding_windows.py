@@ -13,7 +13,7 @@ from warpimpact.scene import Hits, Impact, Numerics, Plate, Scene, Target, make_
 from warpimpact.solver import grid
 from warpimpact.solver.device import find_device
 from warpimpact.solver.grid import Cells
-from warpimpact.solver.marching import Marching
+from warpimpact.solver.marching import march
 from warpimpact.solver.memory import Memory
 from warpimpact.solver.prepare import prepare
 from warpimpact.solver.replay import traced
@@ -36,10 +36,10 @@ def marched(target: tuple[Plate, ...], impact: dict[str, float], device: str, *,
     scene = Scene(core=PAPER_CORE, target=Target(layers=target))
     shots = make_shots(Impact(velocity=825.0, **impact), Hits(count=HITS, seed=2), target[0])
     prepared = replace(prepare(scene, shots, Numerics(level=0)), slide=slide)
-    march = Marching(Memory(prepared, find_device(device)))
-    first, found = march.cells, march.march()
+    memory = Memory(prepared, find_device(device))
+    _, last, outcomes = march(memory)
     names = ("status", "steps", "velocity", "position", "axis", "angular_momentum", "energy_loss")
-    return Marched({name: getattr(found, name).numpy() for name in names}, first, march.cells)
+    return Marched({name: getattr(outcomes, name).numpy() for name in names}, (prepared.cells,) * 2, last)
 
 
 @pytest.mark.parametrize(
@@ -68,8 +68,8 @@ def test_a_replay_keeps_all_that_the_core_has_passed(monkeypatch: pytest.MonkeyP
     wide = marched(target, impact, "cpu", slide=False)
     scene = Scene(core=PAPER_CORE, target=Target(layers=target))
     shots = make_shots(Impact(velocity=825.0, **impact), Hits(count=HITS, seed=2), PLATE)
-    march, contact = traced(scene, shots, Numerics(level=0))
-    assert march.cells == wide.last
+    _, cells, contact = traced(scene, shots, Numerics(level=0))
+    assert cells == wide.last
     np.testing.assert_array_equal(contact.steps.numpy(), wide.outcomes["steps"])
 
 

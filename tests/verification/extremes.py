@@ -128,8 +128,8 @@ def found(extreme: Extreme) -> Found:
     """Compute the shots of a scene with their histories, at draft, on the CPU."""
     scene, shots, precision = extreme
     numerics = Numerics(level=0, precision=precision)
-    march, contact = traced(scene, shots, numerics)
-    report, traces = Outcomes.collected(scene, shots, march.memory.report(contact)), traces_of(march.memory, contact)
+    memory, _, contact = traced(scene, shots, numerics)
+    report, traces = memory.report(contact), traces_of(memory, contact)
     statuses = [Status(int(code)) for code in report.status]
     properties = scene.core.mass_properties
     steep, stretches = [0.0], [0.0]

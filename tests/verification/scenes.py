@@ -139,10 +139,10 @@ class History:
 def histories(
     plate: Plate, shots: Shots, *, core: Core = PAPER_CORE, interaction: Interaction = STATIC, **numerics: Any
 ) -> list[History]:
-    """`warpimpact.solver.replay.trace` with named columns."""
+    """Traces of shots with named columns."""
     scene = Scene(core=core, target=plate, interaction=interaction)
-    traced = replay.trace(scene, shots, numerics=Numerics(**{"level": 2} | numerics))
-    return [_history(core, rows.astype(float)) for rows in traced]
+    memory, _, contact = replay.traced(scene, shots, Numerics(**{"level": 2} | numerics))
+    return [_history(core, rows) for rows in replay.traces_of(memory, contact)]
 
 
 def _history(core: Core, rows: Array) -> History:

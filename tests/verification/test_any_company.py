@@ -90,22 +90,25 @@ def test_a_shot_has_the_same_bits_alone_and_in_another_order(name: str, device: 
 
 
 @pytest.mark.parametrize("name", CASES)
-@pytest.mark.parametrize(("threads", "chunk"), [(1, 64), (2, 5)])
-def test_threads_and_chunks_change_no_bit(name: str, threads: int, chunk: int, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(marching, "LARGEST_CHUNK", chunk)
+@pytest.mark.parametrize(("threads", "seconds"), [(1, 0.25), (2, 0.0)])
+def test_threads_and_chunks_change_no_bit(
+    name: str, threads: int, seconds: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(marching, "SHORTEST", 0.0)
+    monkeypatch.setattr(marching, "LONGEST", seconds)
     assert_expected(computed(name, threads=threads), name, "cpu")
 
 
 @pytest.fixture
 def marched(monkeypatch: pytest.MonkeyPatch) -> list[int]:
     """Numbers of shots that march in windows of one size."""
-    counts, march_some = list[int](), marching.Marching._march_some
+    counts, march_some = list[int](), marching._march_some
 
-    def counted(self: marching.Marching, pending: Any, *rest: Any) -> None:
-        counts.append(len(pending))
-        march_some(self, pending, *rest)
+    def counted(*arguments: Any) -> None:
+        counts.append(len(arguments[3]))
+        march_some(*arguments)
 
-    monkeypatch.setattr(marching.Marching, "_march_some", counted)
+    monkeypatch.setattr(marching, "_march_some", counted)
     return counts
 
 

@@ -144,7 +144,7 @@ def outcomes_of(memory: Memory, hits: list[Struck]) -> Outcomes:
         array.assign(np.asarray(values, dtype=array.numpy().dtype).reshape(array.numpy().shape))
     if memory.variant.layered:
         _fill_passage(memory, hits)
-    outcomes = Outcomes.collected(memory.prepared.scene, memory.prepared.shots, memory.report(contact))
+    outcomes = memory.report(contact)
     energies = [hit.energies for hit in hits]
     return outcomes.assign(
         **{

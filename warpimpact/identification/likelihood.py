@@ -30,7 +30,7 @@ from warpimpact.scene import IDENTITY, Hits, Plate, Sampler, Scene, Shots, Symme
 from warpimpact.scene.model import Array
 from warpimpact.scene.symmetry import irreducible_part, symmetries
 from warpimpact.solver.limit import Limits, limit_velocity
-from warpimpact.solver.many import side_by_side, simulate_many
+from warpimpact.solver.many import in_threads, simulate_many
 from warpimpact.solver.worker import Worker
 
 HIT_REPLICATES = 8
@@ -178,10 +178,10 @@ def _outcomes(fit: Fit, alike: Sequence[int], runs: Sequence[Run], worker: Worke
     if not any(limited):
         return simulate_many(scenes, numerics, worker)
 
-    def limit(number: int, share: Worker, _: Any) -> Limits:
+    def limit(number: int, share: Worker) -> Limits:
         return limit_velocity(*scenes[number], numerics=numerics, device=share.device, threads=share.threads)
 
-    limits = side_by_side(limit, len(scenes), worker)
+    limits = in_threads(limit, len(scenes), worker)
     alone = all(limited) and not any(shot.status for shot in measured)
     outcomes = [one.outcomes for one in limits] if alone else simulate_many(scenes, numerics, worker)
     return [result.assign(limit_velocity=one.value) for result, one in zip(outcomes, limits, strict=True)]

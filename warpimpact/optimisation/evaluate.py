@@ -32,7 +32,7 @@ from warpimpact.solver.limit import (
     pilot_of_limits,
     thickest,
 )
-from warpimpact.solver.many import side_by_side, simulate_many
+from warpimpact.solver.many import in_threads, simulate_many
 from warpimpact.solver.simulate import pilot_of
 from warpimpact.solver.worker import Worker
 
@@ -166,11 +166,11 @@ def _hit_columns(
             columns[number] = [_column(measure, table) for measure in design.columns]
     searches = [(number, row) for number in range(len(jobs)) for row, one in enumerate(design.columns) if one.is_limit]
 
-    def search(which: int, share: Worker, _: Any) -> Array:
+    def search(which: int, share: Worker) -> Array:
         number, row = searches[which]
         return _limits(campaigns[number], shots[number], design.columns[row], numerics[number], share)
 
-    for (number, row), values in zip(searches, side_by_side(search, len(searches), worker), strict=True):
+    for (number, row), values in zip(searches, in_threads(search, len(searches), worker), strict=True):
         columns[number, row] = values
     return xarray.Dataset({"columns": (("job", "column", "hit"), columns)})
 

@@ -1,94 +1,72 @@
-"""Shots at many scenes, such as designs of a plate or sets of parameters, computed side by side."""
+"""Shots at many scenes, such as designs of a plate or sets of parameters, a scene per thread."""
 
 from __future__ import annotations
 
-import threading
 from collections.abc import Callable, Sequence
-from concurrent.futures import FIRST_EXCEPTION, ThreadPoolExecutor, wait
+from concurrent.futures import ThreadPoolExecutor, as_completed
 from dataclasses import replace
+from threading import Lock
 from typing import TypeVar
 
 from warpimpact.records.outcomes import Outcomes
 from warpimpact.scene import Numerics, Scene, Shots
 from warpimpact.solver.device import find_device, launching
-from warpimpact.solver.marching import Helpers, Progress
-from warpimpact.solver.memory import Memory
+from warpimpact.solver.marching import Progress
 from warpimpact.solver.prepare import prepare
-from warpimpact.solver.simulate import marched
-from warpimpact.solver.worker import Cancel, Cancelled, Worker
+from warpimpact.solver.simulate import computed
+from warpimpact.solver.worker import Cancel, Worker
 
 Value = TypeVar("Value")
-_ANY = Worker()
 
 
 def simulate_many(
     scenes: Sequence[tuple[Scene, Shots]],
     numerics: Numerics,
-    worker: Worker = _ANY,
+    worker: Worker | None = None,
     progress: Progress | None = None,
 ) -> list[Outcomes]:
     """Compute the shots of many scenes. The outcomes of each are those of `simulate`, bit for bit.
-
-    On a CPU, each thread prepares and marches a scene of its own. Threads that have no scene left help to march the
-    last ones. A GPU computes one scene after another. Only the scenes in progress take scratch memory.
 
     Args:
         scenes: scenes with their shots. They may differ in everything: cores, layers, records.
         numerics: a fixed resolution, such as Numerics(level=2), for all scenes. There is no pilot.
         progress: called with (shots done, all shots), by any thread.
 
-    Returns:
-        The outcomes of the scenes, in their order.
-
     Raises:
         DeviceError: the device is absent.
-        ValueError, MemoryError: as in `prepare`, for the first scene that cannot be computed.
+        ValueError, MemoryError: as in `prepare`, for a scene that cannot be computed.
     """
-    device, lock, total = find_device(worker.device), threading.Lock(), sum(len(shots) for _, shots in scenes)
-    done = [0] * len(scenes)
+    done, total, lock = [0] * len(scenes), sum(len(shots) for _, shots in scenes), Lock()
 
-    def outcomes(number: int, share: Worker, helpers: Helpers | None) -> Outcomes:
-        def told(some: int, _: int) -> None:
+    def compute(number: int, share: Worker) -> Outcomes:
+        def report(now: int, _: int) -> None:
             with lock:
-                done[number] = some
+                done[number] = now
                 if progress is not None:
                     progress(sum(done), total)
 
-        memory = Memory(prepare(*scenes[number], numerics), device, share.cancel)
-        return marched(memory, replace(share, threads=1), told, helpers)
+        return computed(prepare(*scenes[number], numerics), share, report)
 
-    return side_by_side(outcomes, len(scenes), worker)
+    return in_threads(compute, len(scenes), worker or Worker())
 
 
-def side_by_side(
-    compute: Callable[[int, Worker, Helpers | None], Value], count: int, worker: Worker = _ANY
-) -> list[Value]:
-    """The values of `compute` for the numbers 0 … count − 1, in order; on a CPU, one per thread at a time.
+def in_threads(compute: Callable[[int, Worker], Value], count: int, worker: Worker) -> list[Value]:
+    """The values of `compute` for the numbers 0 … count − 1, in order: on a CPU one per thread, on a GPU one by one.
 
     Args:
-        compute: called with a number, a worker with a share of the threads that no other call has, and the helpers that
-            may join when they have nothing else to do.
+        compute: called with a number, and a worker with a share of the threads.
 
     Raises:
         DeviceError: the device is absent.
     """
     threads = launching(worker.threads) if find_device(worker.device).is_cpu else 1
     stop, pool = Cancel(worker.cancel), ThreadPoolExecutor(threads)
-
-    def computed(number: int) -> Value:
-        stop.check()
-        left = count - number
-        helpers = Helpers(pool, threads - 1) if left <= threads > 1 else None
-        return compute(number, replace(worker, threads=-(-threads // left), cancel=stop), helpers)
-
+    share = replace(worker, threads=max(1, threads // max(1, count)), cancel=stop)
     try:
-        futures = [pool.submit(computed, number) for number in range(count)]
-        wait(futures, return_when=FIRST_EXCEPTION)
+        values = [pool.submit(compute, number, share) for number in range(count)]
+        for value in as_completed(values):
+            value.result()  # raises the first error
     finally:  # after an error or an interrupt the other results are not needed, and nobody waits for them
         stop.cancel()
         pool.shutdown(wait=False, cancel_futures=True)
-    ended = [future for future in futures if future.done() and not future.cancelled()]
-    errors = [error for future in ended if (error := future.exception()) is not None]
-    for error in sorted(errors, key=lambda error: isinstance(error, Cancelled)):
-        raise error
-    return [future.result() for future in futures]
+    return [value.result() for value in values]

@@ -3,8 +3,10 @@ results."""
 
 from __future__ import annotations
 
+import math
 import threading
 import time
+from dataclasses import replace
 from functools import partial
 from typing import Any
 
@@ -15,6 +17,7 @@ from numpy.typing import NDArray
 from warpimpact.kernels import free_flight, lanes, march
 from warpimpact.kernels.trace import WIDTH
 from warpimpact.kernels.variant import Variant
+from warpimpact.records.outcomes import Outcomes
 from warpimpact.records.variable import Returned
 from warpimpact.solver.device import SMALL_MEMORY, free_memory, load
 from warpimpact.solver.grid import Cells
@@ -71,6 +74,14 @@ class Memory:
         ways = np.resize(longest_way, max(len(longest_way), len(self.prepared.shots)))
         ways[-1] = way
         self.inputs.shots.longest_way = self.put(ways, wp.float64)
+
+    def with_windows(self, cells: Cells) -> Memory:
+        """A memory for windows of these cells, by the simple layout if they do not fit a block."""
+        if not 0 < self.variant.window < math.prod(cells):
+            return self
+        wider = Memory(replace(self.prepared, variant=replace(self.variant, window=0)), self.device)
+        wider.passage, wider.history = self.passage, self.history  # these hold the finished shots
+        return wider
 
     def outcomes(self) -> Any:
         """Empty arrays for the outcomes of all shots."""
@@ -155,8 +166,8 @@ class Memory:
             stack.first_cells = put(self.prepared.windows_behind(self.prepared.first_cells), wp.int32)
         return filled(stage.Scratch, fields=fields, touches=touches, stack=stack)
 
-    def launch(self, order: Any, outcomes: Any, scratch: Any, slots: int, first: int, count: int) -> int:
-        """March `count` shots from order[first] on; returns their number."""
+    def launch(self, order: Any, outcomes: Any, scratch: Any, slots: int, first: int, count: int) -> None:
+        """March `count` shots from order[first] on."""
         results = filled(
             self.stage.Results, outcomes=outcomes, passage=self.passage, bending=self.bending, trace=self.history
         )
@@ -165,10 +176,9 @@ class Memory:
             launch = partial(wp.launch_tiled, dim=[count], block_dim=lanes.LANES)
         inputs = [first, slots, order, self.inputs, scratch]
         launch(self.stage.kernel, inputs=inputs, outputs=[results], device=self.device)
-        return count
 
-    def report(self, contact: Any) -> Returned:
-        """Compute the free flight to the stand-offs; returns all results of the shots on the device."""
+    def report(self, contact: Any) -> Outcomes:
+        """Compute the free flight to the stand-offs of shots that have marched; returns all that the scene records."""
         scene, count = self.prepared.scene, len(self.prepared.shots)
         flight, standoffs = self.flight, np.array(scene.record.standoffs, dtype=np.float64)
         report = empty(self.stage.Report, self.device, (count,), (count, len(standoffs)))
@@ -177,7 +187,8 @@ class Memory:
         inputs = [self.inputs.shots, self.inputs.target, contact, self.put(standoffs, wp.float64), ahead]
         wp.launch(flight.kernel, count, inputs=inputs, outputs=[report], device=self.device)
         status = contact.status.numpy().astype(np.int8)
-        return Returned(status, contact, report, self.bending.numpy(), self.passage)
+        returned = Returned(status, contact, report, self.bending.numpy(), self.passage)
+        return Outcomes.collected(scene, self.prepared.shots, returned)
 
 
 _BUILDING = threading.Lock()

@@ -18,10 +18,9 @@ from warpimpact.records.outcomes import Outcomes
 from warpimpact.scene import MassProperties, Numerics, Plate, Scene, Shots
 from warpimpact.solver.device import find_device, free_memory
 from warpimpact.solver.grid import Cells
-from warpimpact.solver.marching import Marching, apart
+from warpimpact.solver.marching import March, march
 from warpimpact.solver.memory import Memory
 from warpimpact.solver.prepare import Prepared, prepare
-from warpimpact.solver.simulate import outcomes_of
 
 Array = NDArray[np.float64]
 _logger = logging.getLogger(__name__)
@@ -141,12 +140,6 @@ class Replay:
     deformed: Deformed | None = None
 
 
-def trace(scene: Scene, shots: Shots, *, numerics: Numerics) -> list[Array]:
-    """Histories of shots on the CPU: one array [steps + 1, WIDTH] per shot (kernels/trace.py)."""
-    march, contact = traced(scene, shots, numerics)
-    return traces_of(march.memory, contact)
-
-
 def replay(scene: Scene, shots: Shots, *, numerics: Numerics, snapshots: int = 6) -> Replay:
     """Compute one shot again on the CPU, with its history. The outcome equals that of `simulate` on the same CPU, bit
     for bit.
@@ -160,13 +153,13 @@ def replay(scene: Scene, shots: Shots, *, numerics: Numerics, snapshots: int = 6
     Raises:
         MemoryError: history and snapshots do not fit; the message is for the user.
     """
-    march, contact = traced(scene, shots, numerics, snapshots)
-    memory, trace = march.memory, traces_of(march.memory, contact)[-1]
-    outcomes = outcomes_of(memory, contact)[-1:]  # before snapshots overwrite the results of the march
+    memory, cells, contact = traced(scene, shots, numerics, snapshots)
+    trace = traces_of(memory, contact)[-1]
+    outcomes = memory.report(contact)[-1:]  # before snapshots overwrite the results of the march
     time_step = float(memory.prepared.conditions["time_step"][-1])
     steps = np.unique(np.linspace(0, len(trace) - 1, snapshots).round().astype(int))
     home, spacing = _hit(memory.prepared), memory.prepared.grid.spacing
-    cell_y, cell_z = nodes_about(home, march.cells, spacing)
+    cell_y, cell_z = nodes_about(home, cells, spacing)
     own = {
         name: float(memory.prepared.conditions[name][-1]) for name in ("mass", "inertia_axial", "inertia_transverse")
     }
@@ -174,10 +167,10 @@ def replay(scene: Scene, shots: Shots, *, numerics: Numerics, snapshots: int = 6
     share = np.empty((0, len(cell_y), len(cell_z)))
     if len(steps):
         material = material_about(scene.target.layers[0], cell_y, cell_z, spacing)
-        scratch = memory.scratch(1, march.cells)
+        scratch = memory.scratch(1, cells)
         if memory.variant.layered and memory.variant.degrades:  # the window of a layer opens with a step
             scratch.fields.exposure.zero_()
-        share = np.stack([_share_after(memory, march.cells, scratch, count, time_step, material) for count in steps])
+        share = np.stack([_share_after(memory, cells, scratch, count, time_step, material) for count in steps])
     return Replay(
         outcomes=outcomes,
         history=history,
@@ -186,8 +179,8 @@ def replay(scene: Scene, shots: Shots, *, numerics: Numerics, snapshots: int = 6
     )
 
 
-def traced(scene: Scene, shots: Shots, numerics: Numerics, snapshots: int = 0) -> tuple[Marching, Any]:
-    """March shots on the CPU with their histories; returns the march, and the outcomes on the device.
+def traced(scene: Scene, shots: Shots, numerics: Numerics, snapshots: int = 0) -> March:
+    """March shots on the CPU with their histories.
 
     They march twice, because the largest number of steps that a shot may take is thousands of times the real one.
 
@@ -196,8 +189,8 @@ def traced(scene: Scene, shots: Shots, numerics: Numerics, snapshots: int = 0) -
     """
     prepared = replace(prepare(scene, shots, numerics), slide=False)
     device = find_device("cpu")
-    first = Marching(Memory(prepared, device))
-    steps = int(first.march().steps.numpy().max())
+    first = march(Memory(prepared, device))
+    steps = int(first.outcomes.steps.numpy().max())
     cells = math.prod(first.cells)
     of_a_cell = 8 * (SNAPSHOT_COPIES * snapshots + OTHER_COPIES) if snapshots else 0
     needed = HISTORY_BYTES * len(shots) * steps + of_a_cell * cells + first.memory.slot_bytes(first.cells)
@@ -210,11 +203,9 @@ def traced(scene: Scene, shots: Shots, numerics: Numerics, snapshots: int = 0) -
     _logger.info(
         "a history of %d steps and %d snapshots of %d cells, %.3g GiB", steps, snapshots, cells, needed / 2**30
     )
-    march = Marching(Memory(replace(prepared, rows=steps + 1), device))
-    if len(shots) == 1:  # several shots would all get the widest window
-        march.widen(first.cells)
-        march.sizes = 1  # a shot that left this window would take more steps in a wider one
-    return march, march.march()
+    # Several shots would all get the widest window. One that left this window would take more steps in a wider one.
+    cells_again = first.cells if len(shots) == 1 else None
+    return march(Memory(replace(prepared, rows=steps + 1), device), cells=cells_again)
 
 
 def traces_of(memory: Memory, contact: Any) -> list[Array]:
@@ -239,7 +230,7 @@ def _share_after(memory: Memory, cells: Cells, scratch: Any, steps: int, time_st
     """
     prepared, outcomes, fields = memory.prepared, memory.outcomes(), scratch.fields
     memory.give_up_after((steps - 0.5) * time_step * prepared.shots.velocity[-1])
-    apart(memory.launch, memory.put(np.arange(1), wp.int32), outcomes, scratch, 1, 0, 1)
+    memory.launch(memory.put(np.arange(1), wp.int32), outcomes, scratch, 1, 0, 1)
     if memory.variant.nodal:
         return np.array(fields.share.numpy().reshape(cells), dtype=np.float64)
     if not prepared.materials[0].weakens:

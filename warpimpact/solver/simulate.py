@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from functools import cache
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,7 +13,7 @@ from warpimpact.records.outcomes import Outcomes
 from warpimpact.scene import Numerics, Scene, Shots
 from warpimpact.solver.accuracy import LevelErrors, PilotResult, choose_level, hit_errors, pilot_size
 from warpimpact.solver.device import find_device
-from warpimpact.solver.marching import Helpers, Marching, Progress
+from warpimpact.solver.marching import Progress, march
 from warpimpact.solver.memory import Memory
 from warpimpact.solver.prepare import Prepared, prepare
 from warpimpact.solver.resolution import at_level, coarsest_level
@@ -56,17 +55,13 @@ def simulate(
 
 def computed(prepared: Prepared, worker: Worker, progress: Progress | None = None) -> Outcomes:
     """Compute a prepared scene; see `simulate`."""
-    memory = Memory(prepared, find_device(worker.device), worker.cancel)
-    return marched(memory, worker, progress)
+    return marched(Memory(prepared, find_device(worker.device), worker.cancel), worker, progress)
 
 
-def marched(
-    memory: Memory, worker: Worker, progress: Progress | None = None, helpers: Helpers | None = None
-) -> Outcomes:
-    """Compute a scene in the memory of a device, with threads that may help."""
-    march = Marching(memory, worker.threads, helpers)
-    contact = march.march(progress, worker.cancel)
-    return outcomes_of(march.memory, contact)
+def marched(memory: Memory, worker: Worker, progress: Progress | None = None) -> Outcomes:
+    """Compute a scene in the memory of a device."""
+    end = march(memory, worker.threads, progress, worker.cancel)
+    return end.memory.report(end.outcomes)
 
 
 def numerics_for(scene: Scene, shots: Shots, numerics: Numerics, worker: Worker) -> Numerics:
@@ -121,8 +116,3 @@ def spread_places(places: int, count: int) -> NDArray[np.int64]:
     digits = max(1, (count - 1).bit_length())
     order = np.array([int(f"{k:0{digits}b}"[::-1], 2) for k in range(2**digits)])
     return np.asarray(np.linspace(0, places, count, endpoint=False).astype(np.int64)[order[order < count]])
-
-
-def outcomes_of(memory: Memory, contact: Any) -> Outcomes:
-    """Outcomes of the shots after their march."""
-    return Outcomes.collected(memory.prepared.scene, memory.prepared.shots, memory.report(contact))

@@ -36,7 +36,7 @@ from warpimpact.results import attributes as attr
 from warpimpact.results import files, front
 from warpimpact.scene.input_files import input_file
 from warpimpact.scene.model import Model
-from warpimpact.solver.marching import Marching
+from warpimpact.solver import simulate
 
 CAMPAIGNS = Path(__file__).parents[3] / "campaigns"
 
@@ -211,13 +211,13 @@ def test_a_first_map_takes_little(small: Path) -> None:
 def test_who_leaves_ends_the_work(address: str, small: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     tables = tables_of(small)
     tables["hits"]["count"] = 2**18
-    marched, march = [], Marching.march
+    marched, march = [], simulate.march
 
-    def marching(self: Marching, progress: Any, cancel: Any) -> Any:
+    def marching(memory: Any, threads: Any, progress: Any, cancel: Any) -> Any:
         marched.append(cancel)
-        return march(self, progress, cancel)
+        return march(memory, threads, progress, cancel)
 
-    monkeypatch.setattr(Marching, "march", marching)
+    monkeypatch.setattr(simulate, "march", marching)
     place = urlsplit(address)
     connection = http.client.HTTPConnection(place.hostname, place.port, timeout=60)
     headers = {"Origin": f"http://{place.netloc}"}

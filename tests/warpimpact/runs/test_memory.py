@@ -95,8 +95,8 @@ def test_windows_that_do_not_fit_are_refused(campaign: Campaign, monkeypatch: py
 
 def test_a_replay_that_does_not_fit_is_refused(campaign: Campaign, monkeypatch: pytest.MonkeyPatch) -> None:
     shots, numerics = campaign.sampler().shots(0, 1), Numerics(level=0)
-    march, contact = replay.traced(campaign.scene, shots, numerics)
-    assert march.memory.prepared.rows == contact.steps.numpy().max() + 1  # a shot may take thousands of times as many
+    memory, _, contact = replay.traced(campaign.scene, shots, numerics)
+    assert memory.prepared.rows == contact.steps.numpy().max() + 1  # a shot may take thousands of times as many
     monkeypatch.setattr(replay, "free_memory", lambda: 2**16)
     with pytest.raises(MemoryError, match=r"history of \d+ steps with 6 snapshots of \d+ cells needs .* GiB are free"):
         replay.replay(campaign.scene, shots, numerics=numerics)

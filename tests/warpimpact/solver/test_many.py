@@ -21,16 +21,16 @@ def scenes_of(*names: str, hits: int) -> list[tuple[Scene, Shots]]:
 
 @pytest.mark.parametrize("threads", [1, 5])
 def test_outcomes_are_those_of_each_scene_alone(threads: int) -> None:
-    scenes, told = scenes_of("slotted_plate", "round_holes", "layered_target", "slotted_plate", hits=5), []
-    many = simulate_many(scenes, LEVEL, Worker("cpu", threads), lambda *now: told.append(now))
+    scenes, progress = scenes_of("slotted_plate", "round_holes", "layered_target", "slotted_plate", hits=5), []
+    many = simulate_many(scenes, LEVEL, Worker("cpu", threads), lambda *now: progress.append(now))
     for found, (scene, shots) in zip(many, scenes, strict=True):
         alone = simulate(scene, shots, numerics=LEVEL, device="cpu", threads=1)
         assert vars(found).keys() == vars(alone).keys()
         for name, values in vars(alone).items():
             assert np.array_equal(getattr(found, name), values, equal_nan=values.dtype.kind == "f"), name
     total = sum(len(shots) for _, shots in scenes)
-    assert told[-1] == (total, total)
-    assert [done for done, _ in told] == sorted(done for done, _ in told)
+    assert progress[-1] == (total, total)
+    assert [done for done, _ in progress] == sorted(done for done, _ in progress)
 
 
 def test_an_error_of_a_scene_ends_the_others() -> None:
