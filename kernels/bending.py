@@ -24,7 +24,7 @@ def build(variant: Variant) -> SimpleNamespace:
 
     @wp.func
     def mean_force(sums: struct.Sums, dv: vec3, dw: vec3):
-        """Mean force on a ring over the step [N], if the velocities change by (dv, dw) more than foreseen."""
+        """Mean force on a ring over the step [N], if the velocities change by (dv, dw) more than predicted."""
         return sums.force - half * (use.damping.damping_vv(sums) * dv + use.damping.damping_vw(sums) * dw)
 
     @wp.func
@@ -46,11 +46,11 @@ def build(variant: Variant) -> SimpleNamespace:
         pose: struct.Pose,
         state: struct.State,
         load: struct.Load,
-        foreseen: struct.Change,
+        predicted: struct.Change,
         clock: struct.Clock,
     ):
         """The larger of `before` and the bending in one step, whose load changes the velocities in `state`. The loads
-        on the rings are taken at half of the foreseen change.
+        on the rings are taken at half of the predicted change.
 
         A slice at ξ ahead of the centre of mass accelerates across the axis by a + (α + ω_x J ω) × ξ. Its moment per
         rotary inertia is α − ω_x J ω. Here J ω = axis × ω. The terms with ω_x come from the spin: Euler's equations for
@@ -74,8 +74,8 @@ def build(variant: Variant) -> SimpleNamespace:
                 area = touches.total_area[here]
             if area > zero:
                 sums = touches.sums[here]
-                force += share * mean_force(sums, felt_v - foreseen.velocity, felt_w - foreseen.omega)
-                moment += share * mean_moment(sums, felt_v - foreseen.velocity, felt_w - foreseen.omega)
+                force += share * mean_force(sums, felt_v - predicted.velocity, felt_w - predicted.omega)
+                moment += share * mean_moment(sums, felt_v - predicted.velocity, felt_w - predicted.omega)
             inertial = body.mass * (
                 sections.first[index] * push
                 + sections.second[index] * (turning + spun)

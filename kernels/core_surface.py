@@ -45,18 +45,18 @@ def build(variant: Variant) -> SimpleNamespace:
         return pose
 
     @wp.func
-    def ring_in(table: reals, surface: struct.Surface, pose: struct.Pose, number: wp.int32, apart: wp.int32):
-        """The ring of a number in a table of the members of rings, which lie `apart` from each other."""
+    def ring_in(table: reals, surface: struct.Surface, pose: struct.Pose, number: wp.int32, stride: wp.int32):
+        """The ring of a number in a table of the members of rings, `stride` from each other."""
         ring = struct.Ring()
         ring.station = read(table, number)
-        ring.radius = read(table, number + apart)
-        ring.area = read(table, number + 2 * apart)
-        ring.normal_axial = read(table, number + 3 * apart)
-        ring.normal_radial = read(table, number + 4 * apart)
-        ring.half_axial = read(table, number + 5 * apart)
-        ring.half_radial = read(table, number + 6 * apart)
-        ring.turn_axial = read(table, number + 7 * apart)
-        ring.turn_radial = read(table, number + 8 * apart)
+        ring.radius = read(table, number + stride)
+        ring.area = read(table, number + 2 * stride)
+        ring.normal_axial = read(table, number + 3 * stride)
+        ring.normal_radial = read(table, number + 4 * stride)
+        ring.half_axial = read(table, number + 5 * stride)
+        ring.half_radial = read(table, number + 6 * stride)
+        ring.turn_axial = read(table, number + 7 * stride)
+        ring.turn_radial = read(table, number + 8 * stride)
         ring.centre = pose.position + ring.station * pose.axis
         ring.sector = half_turn / real(surface.around)
         return ring

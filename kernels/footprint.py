@@ -97,8 +97,8 @@ def build(variant: Variant) -> SimpleNamespace:
     @wp.func
     def clearance_at(plate: struct.Plate, window: struct.Window, y: real, z: real):
         """A lower bound of a point's distance from material: in a hole, or beside a finite plate [m]."""
-        beside = wp.max(wp.max(window.low_y - y, y - window.high_y), wp.max(window.low_z - z, z - window.high_z))
-        return wp.max(beside, plate.clear[use.plate_grid.tile_at(plate, window, y, z)])
+        distance = wp.max(wp.max(window.low_y - y, y - window.high_y), wp.max(window.low_z - z, z - window.high_z))
+        return wp.max(distance, plate.clear[use.plate_grid.tile_at(plate, window, y, z)])
 
     @wp.func
     def is_clear(plate: struct.Plate, window: struct.Window, footprint: struct.Footprint, pushed: real):
@@ -112,7 +112,7 @@ def build(variant: Variant) -> SimpleNamespace:
         return clearance_at(plate, window, y, z) > reach + pushed
 
     @wp.func
-    def is_beside(window: struct.Window, footprint: struct.Footprint, cells: wp.int32):
+    def is_close(window: struct.Window, footprint: struct.Footprint, cells: wp.int32):
         """Whether the core comes back elsewhere: a window with this number of cells in each direction would hold none
         of the nodes around the rings in the slab."""
         first_y, first_z = window.home_y - cells // 2, window.home_z - cells // 2

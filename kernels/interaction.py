@@ -85,7 +85,7 @@ def build(variant: Variant) -> SimpleNamespace:
 
         Where a core swings between two walls from step to step, the chord down to no contact replaces the derivative,
         because full contact has no slope, and a long step carries the core across the whole ramp. The change of the
-        last step is foreseen, so the chord adds an error of second order.
+        last step is predicted, so the chord adds an error of second order.
         """
         return wp.where(closing < law.steadied, share / wp.max(closing, tiny), slope)
 

@@ -150,13 +150,13 @@ def build(variant: Variant) -> SimpleNamespace:
         if (
             touch.last_ring >= 0
             and not stack.near[here]
-            and use.footprint.is_beside(stack.window[here], touch, layer_value(stack.first_cells, layer, context.shot))
+            and use.footprint.is_close(stack.window[here], touch, layer_value(stack.first_cells, layer, context.shot))
         ):
             open_layer(context, layer, pose, vec3())
             seen = in_layer(context, layer, pose)
             touch = use.footprint.footprint_of(surface, plate, stack.window[here], seen, dt)
         window = stack.window[here]
-        beside = use.footprint.clearance_at(plate, window, seen.position[1], seen.position[2])
+        distance = use.footprint.clearance_at(plate, window, seen.position[1], seen.position[2])
         if touch.last_ring >= 0 and use.footprint.is_clear(plate, window, touch, use.footprint.pushes(surface)):
             touch.last_ring = -1
             touch.inside = True
@@ -164,7 +164,7 @@ def build(variant: Variant) -> SimpleNamespace:
             if target.slide and target.weakens[layer] and not touch.inside:
                 if slide(context, layer, touch):
                     touch = use.footprint.footprint_of(surface, plate, stack.window[here], seen, dt)
-        return touch, wp.max(zero, beside - surface.bounding_radius - use.footprint.pushes(surface))
+        return touch, wp.max(zero, distance - surface.bounding_radius - use.footprint.pushes(surface))
 
     @wp.func
     def find_reach(
@@ -306,7 +306,7 @@ def build(variant: Variant) -> SimpleNamespace:
         for k in range(target.count):
             front, rear = faces_of(target, k, shot)
             inside = reach.foremost > front and reach.rearmost < rear
-            use.passage.conclude(context.passage, shot, k, final, inside, reach.deepest - front)
+            use.passage.conclude(context.passage, shot, k, final, inside, wp.min(reach.deepest, rear) - front)
         return final
 
     return SimpleNamespace(**locals())

@@ -121,7 +121,7 @@ def build(variant: Variant) -> SimpleNamespace:
         A step finds what the core can touch at mid-step, loads the core, kicks it there, and drifts it to the middle of
         the next step (kernels/clock.py). Velocities therefore change at mid-steps only, where positions are known: the
         method is of second order, and exact where nothing touches. A load depends on the velocities at mid-step, half
-        of whose change is still to come. This half is foreseen from the last step.
+        of whose change is still to come. This half is predicted from the last step.
 
         The trace has no build of its own, so a shot computes the same bits with and without it.
         """

@@ -189,10 +189,10 @@ def build(variant: Variant) -> SimpleNamespace:
     @wp.func
     def in_step(change: struct.Change, share: real):
         """The change in a step that is `share` times as long, under the same load."""
-        foreseen = struct.Change()
-        foreseen.velocity = share * change.velocity
-        foreseen.omega = share * change.omega
-        return foreseen
+        predicted = struct.Change()
+        predicted.velocity = share * change.velocity
+        predicted.omega = share * change.omega
+        return predicted
 
     @wp.func
     def swings(body: struct.Body, before: struct.Change, last: struct.Change):

@@ -5,7 +5,7 @@ from .analysis.hit_map import hit_map
 from .campaign.campaign import Campaign
 from .campaign.text import CampaignError
 from .catalogue.by_name import Layer, Plate, material, threat
-from .continuum.strikes import simulate
+from .continuum.simulate import simulate
 from .export.spreadsheet import to_dataframe
 from .firing.v50 import v50
 from .optimisation.optimise import optimise

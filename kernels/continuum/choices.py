@@ -65,7 +65,7 @@ SLOW = Constant(5.0, "m/s", "Sliding speed below which friction sets in graduall
 ON_AXIS = Constant(1.0e-12, "m", "Keeps the normal at a point on the core's axis finite.")
 OUTSIDE = Constant(1.0e3, "m", "Farther away than any core, where a search for its ends begins.")
 
-# The march (passing.py)
+# The march (march_one.py)
 COURANT = Constant(
     0.6,
     "shortest time of a wave across an element",

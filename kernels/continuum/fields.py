@@ -162,7 +162,7 @@ def build(variant: Variant) -> SimpleNamespace:
                 consecutive elements.
             node_pieces: the same of nodes.
             flights: how far it is, shape [1].
-            left: as in the march of one hit (passing.py).
+            left: as in the march of one hit (march_one.py).
         """
 
         core: Core

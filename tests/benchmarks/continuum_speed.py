@@ -15,8 +15,8 @@ from continuum_cases import CASES
 
 from warpimpact import Continuum, Numerics, simulate
 from warpimpact.catalogue.catalogue import flow_entry
-from warpimpact.continuum.meeting import march_of
-from warpimpact.continuum.strikes import memory_of
+from warpimpact.continuum.encounter import march_of
+from warpimpact.continuum.simulate import memory_of
 from warpimpact.solver.worker import Worker
 
 CASE = CASES["slotted"]

@@ -28,8 +28,8 @@ from roads import NORMAL, OBLIQUE, ROADS, base, scene_and_shots
 
 from warpimpact.campaign.campaign import Campaign
 from warpimpact.catalogue.catalogue import flow_entry
-from warpimpact.continuum.meeting import Struck, march_of
-from warpimpact.continuum.strikes import MOST, ManyHits, memory_of, outcomes_of, simulate, together
+from warpimpact.continuum.encounter import HitResult, march_of
+from warpimpact.continuum.simulate import MOST, ManyHits, memory_of, outcomes_of, simulate, together
 from warpimpact.runs.run import run_to_file
 from warpimpact.scene import Numerics
 from warpimpact.scene.flow import Continuum
@@ -173,7 +173,7 @@ def elements(device: str, sizes: Sizes) -> dict[str, Any]:
     marches = [march_of(scene, shots, k, continuum, memory.prepared.conditions, device) for k in numbers]
     ManyHits([marches.pop(0).hit]).advance(1)  # compiles
     counts = np.array([sum(int(sheet.alive.sum()) for sheet in march.hit.sheets) for march in marches])
-    hits: dict[int, Struck] = {}
+    hits: dict[int, HitResult] = {}
     taken = seconds(lambda: hits.update(together(marches)))
     there = outcomes_of(memory, [hits[number] for number in range(len(shots))])
     here = simulate(scene, shots[:COMPARED_ELEMENTS], numerics=continuum, device="cpu")

@@ -7,7 +7,7 @@ from numpy.typing import ArrayLike
 
 from warpimpact.continuum.meshing import SheetMesh
 from warpimpact.continuum.one_hit import OneHit, Start
-from warpimpact.continuum.strikes import ManyHits
+from warpimpact.continuum.simulate import ManyHits
 from warpimpact.scene import PolynomialCore
 from warpimpact.scene.flow import Flow
 

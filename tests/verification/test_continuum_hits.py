@@ -10,7 +10,8 @@ import numpy as np
 import pytest
 
 from warpimpact import CirclePattern, Continuum, Layer, Plate, Record, Scene, simulate
-from warpimpact.continuum import meeting, strikes
+from warpimpact.continuum import encounter
+from warpimpact.continuum import simulate as elements
 from warpimpact.kernels.status import Status
 from warpimpact.records.outcomes import Outcomes
 from warpimpact.scene import NoPattern, PolynomialCore, Shots
@@ -53,8 +54,8 @@ def computed(plate: Plate, shots: Shots, **settings: Any) -> Outcomes:
 def _small_patch() -> Iterator[None]:
     """Patches that are too small for a result: what these tests show does not depend on that, and they take half."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(meeting, "FINE", 1.7)
-        patch.setattr(meeting, "PATCH", 4.0)
+        patch.setattr(encounter, "FINE", 1.7)
+        patch.setattr(encounter, "PATCH", 4.0)
         yield
 
 
@@ -62,7 +63,7 @@ def _small_patch() -> Iterator[None]:
 def coarse(monkeypatch: pytest.MonkeyPatch) -> float:
     """Elements that are too coarse for a result [m], whose hourglasses take much; what they show does not depend on
     that."""
-    monkeypatch.setattr(meeting, "LARGEST_HOURGLASS_SHARE", 1.0)
+    monkeypatch.setattr(encounter, "LARGEST_HOURGLASS_SHARE", 1.0)
     return 1.0e-3
 
 
@@ -143,8 +144,8 @@ def test_a_layer_has_its_mesh_where_the_core_crosses_it(coarse: float) -> None:
     fire: there is the middle of the fine part, up to half an element."""
     scene = Scene(core=CORE, target=(HOLES, Layer(thickness=2e-3, resistance=2.6e9, gap=100e-3)))
     shots = shots_at((2e-3, 0.0), velocity=600.0)
-    conditions = strikes.memory_of(scene, shots, Worker("cpu", 1)).prepared.conditions
-    march = meeting.march_of(scene, shots, 0, Continuum(flows=(STEEL,), spacing=coarse), conditions)
+    conditions = elements.memory_of(scene, shots, Worker("cpu", 1)).prepared.conditions
+    march = encounter.march_of(scene, shots, 0, Continuum(flows=(STEEL,), spacing=coarse), conditions)
     list(march.hit.steps())
     assert march.hit.waits
     state, before = march.hit.flight["state"], march.hit.mesh
@@ -160,23 +161,23 @@ def test_a_layer_has_its_mesh_where_the_core_crosses_it(coarse: float) -> None:
         assert np.array_equal(kept[:, : before.size], first), name
     assert hit.mesh.touched.numpy().tolist() == [before.touched.numpy()[0], -1.0]
     assert before.touched.numpy()[0] > 0.0
-    struck = march.ended()
-    assert struck.status == Status.PERFORATED
-    assert struck.touched.tolist() == [True, True]
-    assert struck.energies.imbalance < 0.01
+    result = march.ended()
+    assert result.status == Status.PERFORATED
+    assert result.touched.tolist() == [True, True]
+    assert result.energies.imbalance < 0.01
 
 
 def test_hits_that_march_together_end_as_those_that_march_alone(
     coarse: float, monkeypatch: pytest.MonkeyPatch, device: str
 ) -> None:
     """Two at a time, through two plates, to the rounding of other sums in single precision."""
-    monkeypatch.setattr(strikes, "MOST", 2)
+    monkeypatch.setattr(elements, "MOST", 2)
     target = (HOLES, Layer(thickness=2e-3, resistance=2.6e9, gap=10e-3))
     scene, continuum = Scene(core=CORE, target=target), Continuum(flows=(STEEL,), spacing=coarse)
     shots = replace(shots_at(*[(1e-3, 2e-3)] * 3, yaw=0.02, spin=1.7e4), velocity=np.array([500.0, 825.0, 650.0]))
-    conditions = strikes.memory_of(scene, shots, Worker("cpu", 1)).prepared.conditions
-    march = partial(meeting.march_of, scene, shots, continuum=continuum, conditions=conditions)
-    together = dict(strikes.together(march(number=k, device=device) for k in range(3)))
+    conditions = elements.memory_of(scene, shots, Worker("cpu", 1)).prepared.conditions
+    march = partial(encounter.march_of, scene, shots, continuum=continuum, conditions=conditions)
+    together = dict(elements.together(march(number=k, device=device) for k in range(3)))
     assert sorted(together) == [0, 1, 2]
     for number, other in together.items():
         alone = march(number=number).ended()

@@ -114,7 +114,7 @@ def meshed(
 
 def nodes_of(thickness: float, spacing: float, extents: tuple[Extent, Extent]) -> int:
     """Nodes of such a mesh."""
-    along_y, along_z = (len(_line(extent, spacing)) for extent in extents)
+    along_y, along_z = (2 * (fine + len(wider)) + 1 for fine, wider in (_cells(extent, spacing) for extent in extents))
     return (_planes(thickness, spacing) + 1) * along_y * along_z
 
 
@@ -125,12 +125,20 @@ def _planes(thickness: float, spacing: float) -> int:
 
 def _line(extent: Extent, spacing: float) -> Array:
     """Coordinates of nodes along one axis: even in the fine part, then wider from cell to cell."""
-    count = max(2, round(extent.fine / spacing))
-    cells = [spacing] * count
-    while sum(cells) < extent.half:
-        cells.append(min(GROWTH * cells[-1], COARSEST * spacing))
-    half = np.concatenate([[0.0], np.cumsum(cells)])
+    fine, wider = _cells(extent, spacing)
+    half = np.concatenate([[0.0], np.cumsum([spacing] * fine + wider)])
     return np.asarray(extent.middle + np.concatenate([-half[:0:-1], half]))
+
+
+def _cells(extent: Extent, spacing: float) -> tuple[int, list[float]]:
+    """Number of the fine cells on one side of the middle, and widths of the wider ones beyond [m]."""
+    fine, width, wider = max(2, round(extent.fine / spacing)), spacing, list[float]()
+    reach = fine * spacing
+    while reach < extent.half:
+        width = min(GROWTH * width, COARSEST * spacing)
+        wider.append(width)
+        reach += width
+    return fine, wider
 
 
 def _onto_edges(

@@ -14,7 +14,7 @@ import warp as wp
 from numpy.typing import NDArray
 
 from warpimpact.continuum.meshing import SheetMesh, runs_of, volumes_of
-from warpimpact.kernels.continuum import choices, fields, passing
+from warpimpact.kernels.continuum import choices, fields, march_one
 from warpimpact.kernels.status import RUNNING, WAITING
 from warpimpact.kernels.variant import Variant
 from warpimpact.scene import Core
@@ -27,6 +27,8 @@ STATIONS = 2049
 """At which the radius of the core is tabulated."""
 STEPS = 100
 """Of a launch: between two of them a computation can be broken off."""
+NODE_NUMBERS = 55
+"""Numbers of a march for each node, with its element."""
 PENALTY = 0.5
 """Share of the stiffness of an element that the contact has."""
 FROM_ZERO = {
@@ -87,8 +89,8 @@ class Energies:
         """What is missing or too much, as a share of what was lost. A contact that gives energy counts, too."""
         if self.lost <= 0.0:
             return 0.0 if self.given == 0.0 else float("inf")
-        apart = abs(self.given - self.kinetic - self.work - self.hourglass - self.radiated)
-        return (apart + max(0.0, -self.contact)) / self.lost
+        missing = abs(self.given - self.kinetic - self.work - self.hourglass - self.radiated)
+        return (missing + max(0.0, -self.contact)) / self.lost
 
     @property
     def hourglass_share(self) -> float:
@@ -130,7 +132,7 @@ class OneHit:
         unmeshed: Sequence[Unmeshed] = (),
     ) -> None:
         self.device, self.variant = find_device(device), Variant(double=double)
-        self.stage = built(passing, self.variant)
+        self.stage = built(march_one, self.variant)
         self.struct = self.stage.struct
         if self.device.is_cpu:
             load(self.stage.kernel, self.device)
@@ -261,8 +263,8 @@ class OneHit:
 
     @property
     def bytes(self) -> int:
-        """That its mesh takes with those to come: 55 numbers of its precision for each node of the grid."""
-        return 55 * self.dtype.itemsize * (int(self.mesh.size) + sum(layer.nodes for layer in self.unmeshed))
+        """That its mesh takes with those to come."""
+        return NODE_NUMBERS * self.dtype.itemsize * (int(self.mesh.size) + sum(layer.nodes for layer in self.unmeshed))
 
     @property
     def flight(self) -> Any:

@@ -15,7 +15,7 @@ import xarray
 from numpy.typing import NDArray
 
 from warpimpact.campaign.campaign import Campaign
-from warpimpact.continuum.strikes import MOST, check_continuum, struck
+from warpimpact.continuum.simulate import MOST, check_continuum, check_cost, simulate_elements
 from warpimpact.results import attributes as attr
 from warpimpact.results import files
 from warpimpact.results.dataset import joined
@@ -26,7 +26,7 @@ from warpimpact.runs.computer import Computer, computer
 from warpimpact.runs.describe import campaign_attributes
 from warpimpact.scene import Shots
 from warpimpact.scene.flow import Continuum
-from warpimpact.solver.device import find_device
+from warpimpact.solver.device import cores, find_device
 from warpimpact.solver.worker import Worker
 
 
@@ -63,6 +63,10 @@ def continuum_to_file(
             "numbers": hits and list(hits),
         }
         together = 1 if computing.made_by[attr.DEVICE] == "cpu" else MOST
+        if together == 1:
+            some = Shots.joined([sampler.shots(int(k), 1) for k in numbers[:: max(1, len(numbers) // 16)]])
+            if announcement := check_cost(campaign.scene, some, continuum, min(cores(), len(numbers))):
+                warn(announcement)
         count = -(-len(numbers) // together)
         solid = campaign.references.get("solid") if campaign.output.solid_reference else None
         with open_chunks(output, content, resume=resume, overwrite=overwrite, warn=warn) as chunks:
@@ -118,7 +122,7 @@ def compute_elements(
     clock = time.thread_time if find_device(worker.device).is_cpu else time.perf_counter
     shots = Shots.joined([campaign.sampler().shots(int(number), 1) for number in numbers])
     begin = clock()
-    outcomes = struck(
+    outcomes = simulate_elements(
         campaign.scene, shots, continuum, replace(worker, threads=1), lambda done, total: report(done / total)
     )
     return dataset_of_shots(campaign, shots, outcomes, numbers, worker, clock() - begin, double=True)

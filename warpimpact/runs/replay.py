@@ -11,7 +11,7 @@ import numpy as np
 import xarray
 
 from warpimpact.campaign.campaign import Campaign
-from warpimpact.continuum.hit_history import replay_continuum
+from warpimpact.continuum.replay import replay_continuum
 from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
 from warpimpact.results.dataset import history_dataset, hit_numbers, stored_columns, to_dataset

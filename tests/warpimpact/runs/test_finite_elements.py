@@ -73,7 +73,7 @@ def test_a_hit_that_is_there_is_not_computed_again(
     output, straight = tmp_path / "cut.nc", files.read(computed(tmp_path / "straight.nc", campaign_file))
     march, calls = meeting.March.ended, []
 
-    def broken_off(self: meeting.March, *arguments: Any, **more: Any) -> meeting.Struck:
+    def broken_off(self: meeting.March, *arguments: Any, **more: Any) -> meeting.HitResult:
         calls.append(self)
         if len(calls) == 3:
             raise KeyboardInterrupt

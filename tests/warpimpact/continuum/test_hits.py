@@ -9,7 +9,8 @@ import pytest
 
 from warpimpact import CirclePattern, Continuum, Layer, Plate, Record, Scene, simulate
 from warpimpact.catalogue.catalogue import flow_entry, flow_names
-from warpimpact.continuum import meeting, strikes
+from warpimpact.continuum import encounter
+from warpimpact.continuum import simulate as elements
 from warpimpact.continuum.meshing import nodes_of
 from warpimpact.continuum.one_hit import Energies
 from warpimpact.kernels.status import Status
@@ -53,15 +54,15 @@ def test_what_is_not_computed_is_refused(scene: Scene, shots: Shots, continuum: 
     ],
 )
 def test_a_hit_that_loses_energy_to_its_numerics_is_a_failure(energies: Energies, status: Status) -> None:
-    assert meeting.judged(Status.PERFORATED, energies) is status
-    assert meeting.judged(Status.NOT_FINITE, energies) is Status.NOT_FINITE
+    assert encounter.status_by_energies(Status.PERFORATED, energies) is status
+    assert encounter.status_by_energies(Status.NOT_FINITE, energies) is Status.NOT_FINITE
 
 
 def test_a_gpu_computes_the_hits_of_a_scene_together(monkeypatch: pytest.MonkeyPatch) -> None:
     """The CPU stands in for it. The slower hit ends last, and the outcomes have the order of the shots."""
-    monkeypatch.setattr(meeting, "LARGEST_HOURGLASS_SHARE", 1.0)
+    monkeypatch.setattr(encounter, "LARGEST_HOURGLASS_SHARE", 1.0)
     gpu = SimpleNamespace(is_cpu=False, alias="cpu")
-    monkeypatch.setattr(strikes, "find_device", lambda name: gpu if name == "gpu" else find_device(name))
+    monkeypatch.setattr(elements, "find_device", lambda name: gpu if name == "gpu" else find_device(name))
     shots = replace(Shots.joined([SHOT, SHOT]), velocity=np.array([500.0, 825.0]))
     told: list[tuple[int, int]] = []
     there, here = (
@@ -103,8 +104,8 @@ def test_a_march_has_what_belongs_to_its_shot_and_its_layers() -> None:
     shot = SHOT.assign({"thickness": np.array([3e-3]), "offset_y": np.array([6e-3])})
     soft = flow_entry("AA6082-T6").flow
     continuum = Continuum(flows=(STEEL, soft), spacing=1e-3, friction=0.07)
-    conditions = strikes.memory_of(scene, shot, Worker("cpu", 1)).prepared.conditions
-    march = meeting.march_of(scene, shot, 0, continuum, conditions)
+    conditions = elements.memory_of(scene, shot, Worker("cpu", 1)).prepared.conditions
+    march = encounter.march_of(scene, shot, 0, continuum, conditions)
     assert march.hit.start.friction == 0.07
     assert march.hit.flows == [STEEL, soft]
     march.extended()
@@ -120,24 +121,24 @@ def test_a_march_has_what_belongs_to_its_shot_and_its_layers() -> None:
 
 def test_a_core_that_reaches_the_edge_of_the_mesh_has_left_it(monkeypatch: pytest.MonkeyPatch, device: str) -> None:
     """It is computed again with wider meshes, and has left the widest one, if that is narrow. One hit is told once."""
-    monkeypatch.setattr(meeting, "FINE", 0.5)
-    monkeypatch.setattr(meeting, "PATCH", 0.6)
+    monkeypatch.setattr(encounter, "FINE", 0.5)
+    monkeypatch.setattr(encounter, "PATCH", 0.6)
     told: list[tuple[int, int]] = []
     narrow, scene = Continuum(flows=(STEEL,), spacing=1e-3), Scene(core=CORE, target=PLATE)
     again = simulate(scene, SHOT, numerics=narrow, progress=lambda done, total: told.append((done, total)))
     assert again.status[0] == Status.HOURGLASSED
     assert told == [(1, 1)]
-    monkeypatch.setattr(strikes, "WIDER", (1.0,))
+    monkeypatch.setattr(elements, "WIDER", (1.0,))
     assert simulate(scene, SHOT, numerics=narrow).status[0] == Status.LEFT_WINDOW
-    conditions = strikes.memory_of(scene, SHOT, Worker("cpu", 1)).prepared.conditions
-    ((number, together),) = strikes.together([meeting.march_of(scene, SHOT, 0, narrow, conditions, device)])
+    conditions = elements.memory_of(scene, SHOT, Worker("cpu", 1)).prepared.conditions
+    ((number, together),) = elements.together([encounter.march_of(scene, SHOT, 0, narrow, conditions, device)])
     assert (number, together.status) == (0, Status.LEFT_WINDOW)
 
 
 def test_a_mesh_covers_what_a_turned_core_sweeps_and_its_way_through_the_layer() -> None:
     """A core that flies along (1, 0.5, 0) and lies across, with an arm of a, sweeps a − r beyond a radius along z; the
     layer is h thick, so it goes on by 0.5 h along y. Memory is set aside for as many nodes as the mesh has."""
-    layer = meeting.Meeting(CORE, PLATE, (0.0, 0.0), 0.1, 1e-3, 1.6)
+    layer = encounter.Encounter(CORE, PLATE, (0.0, 0.0), 0.1, 1e-3, 1.6)
     state = np.array([0.02, 0.01, 0.0]), np.array([600.0, 300.0, 0.0]), np.array([0.0, 0.0, 1.0])
     along_y, along_z = layer.extents(*state)
     nose, radius, way = CORE.mass_properties.centre_of_mass, CORE.max_radius, 0.25 * PLATE.thickness

@@ -5,13 +5,13 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from warpimpact.continuum.meshing import Extent, SheetMesh, meshed, nodes_of
-from warpimpact.continuum.one_hit import STEPS, Energies, OneHit, Start, Unmeshed, axis_of
+from warpimpact.continuum.one_hit import NODE_NUMBERS, STEPS, Energies, OneHit, Start, Unmeshed, axis_of
 from warpimpact.kernels.status import Status
 from warpimpact.scene import Core, Plate, Scene, Shots
 from warpimpact.scene.flow import Continuum
@@ -25,12 +25,17 @@ WIDER = 1.0, 1.6, 2.5
 """By how much its meshes are wider, each time that a hit is computed again because its core came near their edge."""
 SLOWEST = 0.1
 """Least share of its speed at which a core approaches a layer, for the place where it will cross it."""
+COSTED = 16
+"""Shots whose cost is estimated, of many."""
+STEP, PER_ELEMENT, HOST_BYTES = 0.12, 6.0e-8, 150
+"""Usual step, in times of a wave across a fine element at rest; time of a core per element and step [s]; and memory of
+a node while its mesh is made, beside the arrays of the march [bytes]. Measured on holes of 5 mm at 0.5 and 0.2 mm."""
 LARGEST_IMBALANCE, LARGEST_HOURGLASS_SHARE = 0.02, 0.12
 """Of the energy that the core lost: a hit beyond is a failure of the computation."""
 
 
 @dataclass(frozen=True)
-class Struck:
+class HitResult:
     """What became of one hit.
 
     Attributes:
@@ -51,7 +56,7 @@ class Struck:
 
 
 @dataclass(frozen=True)
-class Meeting:
+class Encounter:
     """A layer and a core that it will meet.
 
     Attributes:
@@ -75,15 +80,19 @@ class Meeting:
         speed = max(float(velocity[0]), SLOWEST * float(np.linalg.norm(velocity)))
         nose = self.core.mass_properties.centre_of_mass
         arm, radius, thickness = max(nose, self.core.length - nose), self.core.max_radius, self.plate.thickness
-        found = []
+        extents = []
         for along in (1, 2):
             drift = float(velocity[along]) / speed
             crossing = float(position[along]) + drift * (self.front - float(position[0]))
             way, swept = 0.5 * abs(drift) * thickness, arm * abs(float(axis[along]) - drift * float(axis[0]))
             more = way + max(0.0, swept - SWEPT * radius)
             fine, half = (self.wider * (share * radius + more) for share in (FINE, PATCH))
-            found.append(Extent(crossing + 0.5 * drift * thickness, fine, half))
-        return found[0], found[1]
+            extents.append(Extent(crossing + 0.5 * drift * thickness, fine, half))
+        return extents[0], extents[1]
+
+    def nodes(self, position: Array, velocity: Array, axis: Array) -> int:
+        """Nodes of that mesh, about as many as elements."""
+        return nodes_of(self.plate.thickness, self.spacing, self.extents(position, velocity, axis))
 
     def mesh(self, position: Array, velocity: Array, axis: Array) -> SheetMesh:
         """The mesh about the place where a core of this state will cross the layer."""
@@ -93,8 +102,8 @@ class Meeting:
 class March:
     """One hit, ready to march. A layer has its mesh when the core is in front of it, where the core will cross it."""
 
-    def __init__(self, hit: OneHit, meetings: Sequence[Meeting]) -> None:
-        self.hit, self._meetings = hit, list(meetings)
+    def __init__(self, hit: OneHit, encounters: Sequence[Encounter]) -> None:
+        self.hit, self._encounters = hit, list(encounters)
         self._edge = self._at_edge()
 
     def _at_edge(self) -> NDArray[np.intp]:
@@ -105,34 +114,34 @@ class March:
     def extended(self) -> OneHit:
         """The hit, whose next layer has its mesh now."""
         state = self.hit.flight["state"]
-        mesh = self._meetings.pop(0).mesh(state["position"], state["velocity"], axis_of(state["attitude"]))
+        mesh = self._encounters.pop(0).mesh(state["position"], state["velocity"], axis_of(state["attitude"]))
         self.hit.extend(mesh)
         self._edge = self._at_edge()
         return self.hit
 
     def ended(
         self, cancel: Cancel = NEVER, *, every: int = STEPS, follow: Callable[[OneHit], object] = lambda hit: None
-    ) -> Struck:
+    ) -> HitResult:
         """March to the end; `follow` is called at regular numbers of steps."""
         while True:
             for _ in self.hit.steps(every, cancel):
                 follow(self.hit)
                 if self.hit.mesh.near.numpy()[self._edge].any():
-                    return self.struck(at_edge=True)
+                    return self.result(at_edge=True)
             if not self.hit.waits:
-                return self.struck(at_edge=False)
+                return self.result(at_edge=False)
             self.extended()
 
-    def struck(self, at_edge: bool) -> Struck:
+    def result(self, at_edge: bool) -> HitResult:
         """What became of the hit, which has ended, or whose core is near the outer edge of a mesh."""
         flight, energies = self.hit.flight, self.hit.energies
-        status = Status.LEFT_WINDOW if at_edge else judged(Status(int(flight["status"])), energies)
+        status = Status.LEFT_WINDOW if at_edge else status_by_energies(Status(int(flight["status"])), energies)
         alive = self.hit.mesh.alive.numpy()
         eroded = sum(int(sheet.alive.sum()) for sheet in self.hit.sheets) - int((alive > 0.0).sum())
-        return Struck(status, flight, self.hit.touched, self.hit.left.numpy(), energies, eroded)
+        return HitResult(status, flight, self.hit.touched, self.hit.left.numpy(), energies, eroded)
 
 
-def judged(status: Status, energies: Energies) -> Status:
+def status_by_energies(status: Status, energies: Energies) -> Status:
     """The status of a hit, by its energies, too."""
     if status.failed or energies.lost <= 0.0:
         return status
@@ -157,8 +166,18 @@ def march_of(
         device: that has its arrays.
         wider: one of WIDER.
     """
-    core, target = scene.core, scene.target
     start = start_of(scene, shots, number, continuum.friction, conditions)
+    first, *later = encounters_of(scene, shots, number, continuum, wider)
+    arriving = start.position, start.velocity, axis_of(start.attitude)
+    unmeshed = [Unmeshed(one.front, one.front + one.plate.thickness, one.nodes(*arriving)) for one in later]
+    flows = [continuum.flow(k) for k in range(1 + len(later))]
+    hit = OneHit(scene.core, start, [first.mesh(*arriving)], flows, continuum.double, device, unmeshed)
+    return March(hit, later)
+
+
+def encounters_of(scene: Scene, shots: Shots, number: int, continuum: Continuum, wider: float = 1.0) -> list[Encounter]:
+    """The layers that the core of one of the shots will meet."""
+    core, target = scene.core, scene.target
     own = {
         name: [
             float(np.resize(shots.layer_value(target, name, k), len(shots))[number]) for k in range(len(target.layers))
@@ -167,8 +186,8 @@ def march_of(
     }
     fronts = target.fronts([np.array(value) for value in own["thickness"]])
     home = float(shots.hit_y[number]), float(shots.hit_z[number])
-    meetings = [
-        Meeting(
+    return [
+        Encounter(
             core,
             layer.model_copy(update={"thickness": own["thickness"][k]}),
             (home[0] - own["offset_y"][k], home[1] - own["offset_z"][k]),
@@ -178,18 +197,31 @@ def march_of(
         )
         for k, (layer, spacing) in enumerate(zip(target.layers, continuum.spacings(core, target), strict=True))
     ]
-    arriving = start.position, start.velocity, axis_of(start.attitude)
-    unmeshed = [
-        Unmeshed(
-            later.front,
-            later.front + later.plate.thickness,
-            nodes_of(later.plate.thickness, later.spacing, later.extents(*arriving)),
-        )
-        for later in meetings[1:]
-    ]
-    flows = [continuum.flow(k) for k in range(len(meetings))]
-    hit = OneHit(core, start, [meetings[0].mesh(*arriving)], flows, continuum.double, device, unmeshed)
-    return March(hit, meetings[1:])
+
+
+class Cost(NamedTuple):
+    """What the most expensive of some hits takes: elements, memory [bytes], and time of a core [s]."""
+
+    elements: int
+    bytes: int
+    seconds: float
+
+
+def cost_of(scene: Scene, shots: Shots, continuum: Continuum) -> Cost:
+    """The cost of the most expensive of some shots, from a passage that nothing slows down; nothing is meshed."""
+    body = scene.core.mass_properties
+    conditions = {name: np.array([value]) for name, value in body._asdict().items()}
+    costs = []
+    for number in range(0, len(shots), max(1, len(shots) // COSTED)):
+        start = start_of(scene, shots, int(number), continuum.friction, conditions)
+        encounters = encounters_of(scene, shots, int(number), continuum)
+        nodes = sum(one.nodes(start.position, start.velocity, axis_of(start.attitude)) for one in encounters)
+        step = min(STEP * one.spacing / continuum.flow(k).wave_speed for k, one in enumerate(encounters))
+        way = encounters[-1].front + encounters[-1].plate.thickness + scene.core.length
+        steps = way / (step * max(float(start.velocity[0]), 1e-3))
+        size = nodes * ((8 if continuum.double else 4) * NODE_NUMBERS + HOST_BYTES)
+        costs.append(Cost(nodes, size, PER_ELEMENT * nodes * steps))
+    return max(costs, key=lambda cost: cost.bytes)
 
 
 def line_of_flight(obliquity: float, azimuth: float) -> Array:

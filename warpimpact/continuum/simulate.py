@@ -1,6 +1,6 @@
 """Hits by finite elements: from a scene and shots to the outcomes that the fast law has, too.
 
-On a GPU many hits march together, by a thread for each node and each element of all (kernels/continuum/abreast.py).
+On a GPU many hits march together, by a thread for each node and each element of all (kernels/continuum/march_many.py).
 """
 
 from __future__ import annotations
@@ -15,9 +15,9 @@ import numpy as np
 import warp as wp
 from numpy.typing import NDArray
 
-from warpimpact.continuum.meeting import WIDER, March, Struck, line_of_flight, march_of
+from warpimpact.continuum.encounter import WIDER, HitResult, March, cost_of, line_of_flight, march_of
 from warpimpact.continuum.one_hit import STEPS, OneHit, axis_of, built
-from warpimpact.kernels.continuum import abreast
+from warpimpact.kernels.continuum import march_many
 from warpimpact.kernels.continuum.fields import PIECE
 from warpimpact.kernels.status import RUNNING, WAITING, Status
 from warpimpact.records.outcomes import Outcomes
@@ -25,7 +25,7 @@ from warpimpact.records.registry import ENERGY_IMBALANCE, ERODED_ELEMENTS, HOURG
 from warpimpact.scene import Numerics, Scene, Shots
 from warpimpact.scene.flow import Continuum
 from warpimpact.scene.model import Array
-from warpimpact.solver.device import block_size, cores, find_device, load
+from warpimpact.solver.device import block_size, cores, find_device, free_memory, load
 from warpimpact.solver.marching import Progress
 from warpimpact.solver.memory import MEMORY_SHARE, Memory
 from warpimpact.solver.prepare import prepare
@@ -66,7 +66,7 @@ def simulate(
     if not isinstance(numerics, Continuum):
         given: dict[str, Any] = {"device": device, "threads": threads, "progress": progress, "cancel": cancel}
         return by_fast_law(scene, shots, numerics=numerics, **given)
-    return struck(scene, shots, numerics, Worker(device, threads, cancel), progress)
+    return simulate_elements(scene, shots, numerics, Worker(device, threads, cancel), progress)
 
 
 def check_continuum(scene: Scene, shots: Shots, continuum: Continuum) -> None:
@@ -81,7 +81,7 @@ def check_continuum(scene: Scene, shots: Shots, continuum: Continuum) -> None:
         raise ValueError(f"got {len(continuum.flows)} materials, but the target has {len(scene.target.layers)} layers")
 
 
-def struck(
+def simulate_elements(
     scene: Scene,
     shots: Shots,
     continuum: Continuum,
@@ -91,15 +91,18 @@ def struck(
     """Compute the shots by finite elements, on a GPU or in the threads of a worker; see `simulate`."""
     check_continuum(scene, shots, continuum)
     memory, device = memory_of(scene, shots, worker), find_device(worker.device)
+    threads = min(worker.threads or cores(), len(shots)) if device.is_cpu else 1
+    if device.is_cpu:
+        check_cost(scene, shots, continuum, threads)
     march = partial(march_of, scene, shots, continuum=continuum, conditions=memory.prepared.conditions)
 
-    def computed(numbers: list[int], wider: float) -> Iterator[tuple[int, Struck]]:
+    def computed(numbers: list[int], wider: float) -> Iterator[tuple[int, HitResult]]:
         if not device.is_cpu:
             return together((march(k, device=device.alias, wider=wider) for k in numbers), worker.cancel)
         compute = lambda k: march(k, wider=wider).ended(worker.cancel)  # noqa: E731
-        return _in_threads(compute, numbers, worker.threads or cores())
+        return _in_threads(compute, numbers, threads)
 
-    hits: dict[int, Struck] = {}
+    hits: dict[int, HitResult] = {}
     for wider in WIDER:
         numbers = [number for number in range(len(shots)) if number not in hits]
         for place, hit in computed(numbers, wider):
@@ -110,12 +113,43 @@ def struck(
     return outcomes_of(memory, [hits[number] for number in range(len(shots))])
 
 
+MOST_SECONDS = 7200.0
+"""Most time of a core that a hit may take on a CPU [s]."""
+ANNOUNCED_SECONDS, ANNOUNCED_BYTES = 20.0, 2**28
+"""Time and memory of a hit from which they are announced."""
+
+
+def check_cost(scene: Scene, shots: Shots, continuum: Continuum, threads: int, free: int | None = None) -> str:
+    """What the most expensive hit takes on a CPU, in words, before anything is meshed; empty if that is little.
+
+    Args:
+        threads: hits that are computed at a time.
+        free: free memory [bytes]; by default that of the machine.
+
+    Raises:
+        MemoryError: it takes too much memory or time; the message is for the user.
+    """
+    cost = cost_of(scene, shots, continuum)
+    element, needed = 1e3 * min(continuum.spacings(scene.core, scene.target)), threads * cost.bytes / 2**30
+    words = (
+        f"a hit takes up to {cost.elements:.2g} elements of {element:.2g} mm, {cost.bytes / 2**30:.2g} GiB and some "
+        f"{cost.seconds:.2g} s of a core, more if the core stops"
+    )
+    allowed = MEMORY_SHARE * (free_memory() if free is None else free) / 2**30
+    if needed > allowed or cost.seconds > MOST_SECONDS:
+        raise MemoryError(
+            f"{words}; {threads} at a time take {needed:.2g} GiB, but {allowed:.2g} GiB and {MOST_SECONDS:.0f} s are "
+            "allowed; give larger elements (--element)"
+        )
+    return words if cost.seconds >= ANNOUNCED_SECONDS or cost.bytes >= ANNOUNCED_BYTES else ""
+
+
 def memory_of(scene: Scene, shots: Shots, worker: Worker) -> Memory:
     """What the free flight behind the target needs of some shots, on the CPU."""
     return Memory(prepare(scene, shots, Numerics(level=0, precision="double")), find_device("cpu"), worker.cancel)
 
 
-def _in_threads(compute: Callable[[int], Struck], hits: list[int], threads: int) -> Iterator[tuple[int, Struck]]:
+def _in_threads(compute: Callable[[int], HitResult], hits: list[int], threads: int) -> Iterator[tuple[int, HitResult]]:
     """Results with their places, in their order; one thread is that of the caller."""
     if threads == 1:
         yield from enumerate(map(compute, hits))
@@ -124,7 +158,7 @@ def _in_threads(compute: Callable[[int], Struck], hits: list[int], threads: int)
         yield from enumerate(pool.map(compute, hits))
 
 
-def outcomes_of(memory: Memory, hits: list[Struck]) -> Outcomes:
+def outcomes_of(memory: Memory, hits: list[HitResult]) -> Outcomes:
     """The outcomes of some hits: their flight to the stand-offs is that of the fast law's cores."""
     contact, count = memory.outcomes(), len(hits)
     columns: dict[str, list[Any]] = {name: [] for name in contact._cls.vars}
@@ -155,7 +189,7 @@ def outcomes_of(memory: Memory, hits: list[Struck]) -> Outcomes:
     )
 
 
-def _fill_passage(memory: Memory, hits: list[Struck]) -> None:
+def _fill_passage(memory: Memory, hits: list[HitResult]) -> None:
     """How each core left each layer, as kernels/passage.py has it."""
     passage, shots, target = memory.passage, memory.prepared.shots, memory.prepared.scene.target
     layers = len(target.layers)
@@ -177,7 +211,8 @@ def _fill_passage(memory: Memory, hits: list[Struck]) -> None:
             state = hit.flight["state"]
             nose = memory.prepared.scene.core.mass_properties.centre_of_mass
             foremost = state["position"][0] + nose * axis_of(state["attitude"])[0]
-            columns["depth"][k] = foremost - target.faces[resting[-1], 0]
+            front, rear = target.faces[resting[-1]]
+            columns["depth"][k] = min(foremost, rear) - front
 
 
 def _layer_status(status: Status, has_left: bool, touched: bool) -> Status:
@@ -205,14 +240,14 @@ class ManyHits:
 
     def __init__(self, hits: Sequence[OneHit]) -> None:
         self.device, variant = hits[0].device, hits[0].variant
-        self.stage = built(abreast, variant)
+        self.stage = built(march_many, variant)
         for kernel in vars(self.stage.kernels).values():
             load(kernel, self.device)
         count, room = len(hits), partial(wp.zeros, device=self.device)
         self._places: list[Any] = [None] * count  # with all arrays whose addresses the device has
         self._hits = room(count, dtype=self.stage.struct.Hit)
-        self._loads = room((count, abreast.PARTS), dtype=self.stage.Load)
-        self._crossings = room((count, abreast.PARTS), dtype=variant.real)
+        self._loads = room((count, march_many.PARTS), dtype=self.stage.Load)
+        self._crossings = room((count, march_many.PARTS), dtype=variant.real)
         self._cylinders = room(count, dtype=self.stage.struct.Cylinder)
         self._seen = room((count, 2), dtype=wp.int32)
         self._most = 0, 0  # nodes and elements of a hit
@@ -239,7 +274,7 @@ class ManyHits:
     def _launches(self) -> list[Any]:
         """Those of a step, recorded."""
         count, hits, (nodes, elements) = len(self._places), self._hits, self._most
-        parts = count, abreast.PARTS
+        parts = count, march_many.PARTS
         step: dict[str, tuple[Any, list[Any]]] = {
             "press": (parts, [hits, self._loads]),
             "push": (count, [hits, self._loads, self._cylinders]),
@@ -273,7 +308,7 @@ class ManyHits:
     def look(self) -> NDArray[np.int32]:
         """The status of each hit, and 1 where its core is near the outer edge of a mesh, shape [hits, 2]."""
         self._seen.zero_()
-        self._launch("look", (len(self._places), abreast.PARTS), [self._hits, self._seen])
+        self._launch("look", (len(self._places), march_many.PARTS), [self._hits, self._seen])
         return np.array(self._seen.numpy())
 
 
@@ -285,7 +320,7 @@ def pieces_of(runs: NDArray[np.int32]) -> NDArray[np.int32]:
     return np.stack([np.repeat(runs[:, 0], counts) + PIECE * within, np.repeat(runs[:, 2], counts)], axis=1)
 
 
-def together(marches: Iterable[March], cancel: Cancel = NEVER) -> Iterator[tuple[int, Struck]]:
+def together(marches: Iterable[March], cancel: Cancel = NEVER) -> Iterator[tuple[int, HitResult]]:
     """What became of hits that march together on their device, with their numbers, as they end.
 
     Args:
@@ -307,7 +342,7 @@ def together(marches: Iterable[March], cancel: Cancel = NEVER) -> Iterator[tuple
                 many.put(place, running[place][1].extended())
             elif place in running and (status != RUNNING or at_edge):
                 number, march = running.pop(place)
-                yield number, march.struck(bool(at_edge))
+                yield number, march.result(bool(at_edge))
                 if one := next(coming, None):
                     running[place] = one
                     many.put(place, one[1].hit)

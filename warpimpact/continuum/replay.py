@@ -7,9 +7,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from warpimpact.continuum.meeting import WIDER, March, Struck, march_of
+from warpimpact.continuum.encounter import WIDER, HitResult, March, march_of
 from warpimpact.continuum.one_hit import OneHit
-from warpimpact.continuum.strikes import check_continuum, memory_of, outcomes_of
+from warpimpact.continuum.simulate import check_continuum, memory_of, outcomes_of
 from warpimpact.kernels.status import Status
 from warpimpact.kernels.trace import WIDTH
 from warpimpact.scene import Scene, Shots
@@ -37,8 +37,8 @@ def replay_continuum(scene: Scene, shots: Shots, continuum: Continuum, snapshots
     memory = memory_of(scene, shots, Worker("cpu", 1))
     for wider in WIDER:
         march = march_of(scene, shots, 0, continuum, memory.prepared.conditions, wider=wider)
-        struck, rows, frames = _followed(march, has_frames=snapshots > 0)
-        if struck.status is not Status.LEFT_WINDOW:
+        result, rows, frames = _followed(march, has_frames=snapshots > 0)
+        if result.status is not Status.LEFT_WINDOW:
             break
     start = march.hit.start
     body = scene.core.mass_properties._replace(
@@ -57,7 +57,7 @@ def replay_continuum(scene: Scene, shots: Shots, continuum: Continuum, snapshots
     planes = (frame.alive[elements].reshape(len(sheet.x), *sheet.y.shape)[:-1, :-1, :-1] for _, frame in shown)
     share = np.array([alive.mean(axis=0)[places] for alive in planes], dtype=np.float64)
     return Replay(
-        outcomes=outcomes_of(memory, [struck]),
+        outcomes=outcomes_of(memory, [result]),
         history=History.from_trace(trace, body),
         plate_time=np.array([rows[row][0] for row, _ in shown]),
         plate=Weakened(cell_y, cell_z, share.reshape(-1, *material.shape)),
@@ -65,7 +65,7 @@ def replay_continuum(scene: Scene, shots: Shots, continuum: Continuum, snapshots
     )
 
 
-def _followed(march: March, *, has_frames: bool) -> tuple[Struck, list[Array], Frames]:
+def _followed(march: March, *, has_frames: bool) -> tuple[HitResult, list[Array], Frames]:
     """What became of a hit, the rows of its trace, and frames of its meshes."""
     rows, frames = list[Array](), Frames(march)
 

@@ -6,7 +6,7 @@ import pytest
 from warpimpact import CirclePattern, Continuum, Layer, Plate, Record, Scene, simulate
 from warpimpact.catalogue.catalogue import flow_entry
 from warpimpact.continuum import meeting
-from warpimpact.continuum.hit_history import replay_continuum
+from warpimpact.continuum.replay import replay_continuum
 from warpimpact.kernels.status import Status
 from warpimpact.scene import PolynomialCore, Shots
 

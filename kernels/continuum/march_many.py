@@ -2,7 +2,7 @@
 
 Sums over a hit have a fixed order, which no other hit changes: first PARTS partial sums, each over every PARTS-th node,
 then the sum of these. So a hit has the same bits in every launch, whichever hits are beside it. The order differs from
-that of the march of one hit (passing.py), so the last digits of the two differ.
+that of the march of one hit (march_one.py), so the last digits of the two differ.
 """
 
 from functools import cache
@@ -13,7 +13,7 @@ import warp as wp
 from .. import memory
 from ..status import RUNNING
 from ..variant import Variant
-from . import fields, hexahedra, nodes, passing, penalty
+from . import fields, hexahedra, march_one, nodes, penalty
 from .fields import PIECE
 
 PARTS = 256
@@ -25,7 +25,7 @@ def build(variant: Variant) -> SimpleNamespace:
     """The kernels of a step for one variant, in their order."""
     struct, real = fields.build(variant), variant.real
     read = memory.build(real).read
-    contact, march = penalty.build(variant), passing.build(variant)
+    contact, march = penalty.build(variant), march_one.build(variant)
     move_node, deform_element = nodes.build(variant).move, hexahedra.build(variant).deform
     Load = wp.types.vector(6, wp.float64)
     zero, half = wp.float64(0.0), wp.float64(0.5)
