@@ -11,7 +11,6 @@ import numpy as np
 import pytest
 import warp as wp
 
-from warpimpact.kernels import lanes
 from warpimpact.kernels.status import Status
 from warpimpact.scene import (
     CirclePattern,
@@ -68,8 +67,6 @@ IN_RELEASE = pytest.mark.skipif("config.getoption('warp_mode') == 'debug'", reas
 ROUNDING = {"residual_velocity": 0.1, "tilt": np.radians(0.5)}
 ROUNDING |= {"layer_residual_velocity": 0.1, "layer_tilt": np.radians(0.5), "depth": 1e-5}
 """Largest difference by another order of summation [m/s, rad, m]: some hits near an edge multiply it."""
-BACKWARDS = "(WP_TILE_BLOCK_DIM - 1 - WP_TILE_THREAD_IDX)"
-"""Number of a lane: of two lanes that depend on their order, the other one comes first."""
 
 
 @pytest.fixture
@@ -147,12 +144,3 @@ def test_lanes_that_run_one_after_another_compute_what_one_thread_computes(
     again = simulate.simulate(scene, shots, numerics=BLOCK, device="cpu")
     for column, values in vars(by_block).items():
         np.testing.assert_array_equal(getattr(again, column), values, err_msg=column)
-
-
-@IN_RELEASE
-def test_order_of_the_lanes_changes_no_outcome(in_blocks: pytest.MonkeyPatch) -> None:
-    scene, shots = scene_of("slots", 12)
-    first = simulate.simulate(scene, shots, numerics=BLOCK, device="cpu")
-    in_blocks.setattr(lanes, "LANE", BACKWARDS)
-    in_blocks.setattr(grid, "SIZES", (2080,))  # so that kernels are built anew
-    assert_same(simulate.simulate(scene, shots, numerics=BLOCK, device="cpu"), first)

@@ -11,7 +11,6 @@ from scipy.spatial.transform import Rotation
 
 from warpimpact.kernels import contact, structs
 from warpimpact.kernels.variant import Variant
-from warpimpact.scene import ProfileCore
 
 from .probes import CONE, OGIVE, astride, plate_of, poisoned, poisoned_fields, poisoned_touches, stepping, surface_of
 
@@ -113,30 +112,6 @@ def test_straight_flight_deep_in_a_plate_meets_the_work_per_way(
     assert gained == pytest.approx(1e-6 * np.pi * core.max_radius**2, rel=min(tolerance, 1e-5))
     if friction == 0:
         assert gained == pytest.approx(-1e-6 * force[0] / STRENGTH, rel=1e-12)
-
-
-def test_load_takes_power_from_the_core(device: str) -> None:
-    poses = astride(200)
-    law = law_of(a1=1e6, a2=7850.0, onset=5.0, friction=0.2, decay_rate=np.log(0.8) / 1e-6)
-    tile = (np.random.default_rng(5).random((9, 13)) < 0.5).astype(float)
-    found = loaded(surface_of(Surface, OGIVE, 12, 16, device), law, device, **poses, tile=tile)
-    power = (found.force * poses["velocity"]).sum(axis=1) + (found.moment * poses["omega"]).sum(axis=1)
-    assert (power <= 0).all()
-    # A patch that closes in no faster than the threshold of contact touches without a load.
-    assert not (power < 0)[~found.load["touching"]].any()
-    assert found.load["touching"].sum() > 100
-
-
-def test_load_sees_half_of_the_step_s_own_exposure(device: str) -> None:
-    # Under a disc much wider than ℓ, T grows by dt: the mid-step force has lost β^(½ dt/Δt_β).
-    disc = ProfileCore(s=(0.0, 5e-3), r=(12e-3, 12e-3), mass=1e-3)
-    surface = surface_of(Surface, disc, 24, 384, device)
-    pose = {"position": np.array([[0.5e-3, 0.0, 0.0]]), "attitude": ALIGNED, "velocity": np.array([[800.0, 0, 0]])}
-    fresh, weak = (
-        loaded(surface, law_of(decay_rate=rate), device, **pose).force[0, 0] for rate in (0.0, np.log(0.8) / 1e-6)
-    )
-    assert fresh == pytest.approx(-STRENGTH * np.pi * disc.max_radius**2, rel=1e-12)
-    assert weak / fresh == pytest.approx(np.sqrt(0.8), rel=4e-3)
 
 
 @pytest.mark.parametrize(

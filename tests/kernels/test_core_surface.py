@@ -11,7 +11,7 @@ from scipy.spatial.transform import Rotation
 from warpimpact.kernels import core_surface, structs
 from warpimpact.kernels.variant import Variant
 
-from .probes import CONE, PAPER, attitudes, poisoned, surface_of
+from .probes import CONE, PAPER, poisoned, surface_of
 
 Array = NDArray[np.float64]
 
@@ -139,11 +139,6 @@ def posed(
     return {name: array.numpy() for name, array in outputs.items()}
 
 
-def random_poses(count: int, spread: float) -> dict[str, Array]:
-    rng = np.random.default_rng(count)
-    return {"position": spread * rng.uniform(-1, 1, (count, 3)), "attitude": attitudes(rng, count)}
-
-
 # --- Share of a patch behind a face ---
 
 
@@ -157,39 +152,7 @@ def test_share_is_that_of_two_boxes_convolved(ratio: float, device: str) -> None
     np.testing.assert_allclose(share_behind(depth, extent, motion, device), expected, atol=1e-7)
 
 
-@pytest.mark.parametrize(("extent", "motion"), [(1e-4, 0.0), (0.0, 1e-4), (1e-4, 1e-7)])
-def test_share_of_a_box_alone_has_its_corners_rounded_only(extent: float, motion: float, device: str) -> None:
-    wide = max(extent, motion)
-    depth = np.linspace(-1.5, 1.5, 301) * wide
-    sharp = np.clip(0.5 + depth / (2 * wide), 0, 1)
-    shares = share_behind(depth, extent, motion, device)
-    np.testing.assert_allclose(shares, sharp, atol=0.0026)  # narrow/(8 wide) at the corners
-    away = np.abs(np.abs(depth) - wide) > 0.021 * wide
-    np.testing.assert_allclose(shares[away], sharp[away], atol=1e-12)
-
-
 # --- Patches in a pose ---
-
-
-def test_patches_turn_with_the_body_and_move_as_rigid_points_do(device: str) -> None:
-    poses, still = random_poses(5, 0.01), np.array([[0.0, 0, 0, 1]])
-    velocity, omega = np.array([500.0, -90.0, 40.0]), np.array([2e4, -1e4, 3e4])
-    surface = surface_of(Surface, PAPER, 8, 12, device)
-    found = posed(surface, device, **poses, velocity=velocity, omega=omega)
-    body = posed(surface, device, position=np.zeros((1, 3)), attitude=still)
-    for i, turned in enumerate(Rotation.from_quat(poses["attitude"])):
-        for name in ("arm", "normal"):
-            expected = turned.apply(body[name][0].reshape(-1, 3)).reshape(body[name][0].shape)
-            np.testing.assert_allclose(found[name][i], expected, atol=1e-14)
-    expected = velocity + np.cross(omega, found["arm"])
-    np.testing.assert_allclose(found["velocity"], expected, rtol=1e-13, atol=1e-10)
-    closing = (expected * found["normal"]).sum(axis=-1)
-    np.testing.assert_allclose(found["closing"], closing, rtol=1e-12, atol=1e-10)
-    for name in ("outward_x", "around_x"):  # less the directions' own
-        np.testing.assert_allclose(found[name], 0.0, atol=1e-15)
-    fastest = np.linalg.norm(expected, axis=-1).max(axis=(1, 2))
-    assert (fastest <= found["speed"]).all()
-    assert (found["speed"] < 2 * fastest).all()
 
 
 def test_passage_immerses_every_patch_for_the_thickness(device: str) -> None:
@@ -204,31 +167,6 @@ def test_passage_immerses_every_patch_for_the_thickness(device: str) -> None:
     swept = speed * dt * found["immersed"].sum(axis=0)
     expected = np.broadcast_to(found["area"][0][:, None] * THICKNESS, swept.shape)
     np.testing.assert_allclose(swept, expected, rtol=1e-11)
-
-
-@pytest.mark.parametrize("ring", ["even", "odd"])
-def test_patch_along_the_face_is_in_or_out_at_once(ring: str, device: str) -> None:
-    # A cone that lies with one line of its mantle in the face: patches there, of every other ring, have no extent
-    # across it.
-    around = 16
-    half_angle = np.arctan2(CONE.max_radius, CONE.cone_length)
-    azimuth = np.pi / around if ring == "even" else 0.0
-    axis = np.array([np.sin(half_angle), 0.0, np.cos(half_angle)])
-    outward = np.array([np.cos(half_angle), 0.0, -np.sin(half_angle)])
-    sideways = np.cross(axis, outward)
-    right = np.cos(azimuth) * outward - np.sin(azimuth) * sideways
-    up = np.sin(azimuth) * outward + np.cos(azimuth) * sideways
-    attitude = Rotation.from_matrix(np.stack([axis, right, up], axis=1)).as_quat()
-    tip = CONE.mass_properties.centre_of_mass * axis[0]  # all of the line is as deep
-    gaps = np.array([-5e-6, 5e-6])
-    position = np.stack([gaps - tip, 0 * gaps, 0 * gaps], axis=1)
-    surface = surface_of(Surface, CONE, 20, around, device)
-    found = posed(surface, device, position=position, attitude=np.stack([attitude] * 2), dt=0.0)
-    mantle = found["normal"][0, :, 0, 0] > 0.999
-    assert mantle.sum() == 6
-    out, inside = found["immersed"][:, mantle, 0]
-    np.testing.assert_allclose(out, 0.0, atol=1e-15)
-    np.testing.assert_allclose(inside, found["area"][0, mantle], rtol=1e-12)
 
 
 @pytest.mark.parametrize("slant", [0.1, np.pi])

@@ -1,6 +1,5 @@
 """Grip of a curved patch: the part that closes in, its normal and its closing speed (docs/model.md §4)."""
 
-import math
 from typing import Any
 
 import numpy as np
@@ -45,30 +44,6 @@ def grips(
 
 
 GRIPS = VARIANT.kernel(grips)
-
-
-def bounds(
-    law: Law,
-    velocities: wp.array(dtype=VARIANT.vec3),
-    omegas: wp.array(dtype=VARIANT.vec3),
-    rings: wp.array(dtype=Ring),
-    shares: wp.array(dtype=real),
-    closes: wp.array(dtype=wp.bool),
-) -> None:
-    i = wp.tid()
-    pose = struct.Pose()
-    pose.velocity = velocities[i]
-    pose.omega = omegas[i]
-    share = real(0.0)
-    for k in range(64):
-        azimuth = real(k) * real(2.0 * math.pi / 64.0)
-        patch = use.core_surface.patch_at(pose, rings[i], wp.cos(azimuth), wp.sin(azimuth))
-        share = wp.max(share, use.grip.grip_of(law, pose, rings[i], patch).share)
-    shares[i] = share
-    closes[i] = use.core_surface.closes(pose, rings[i])
-
-
-BOUNDS = VARIANT.kernel(bounds)
 
 
 def gripped(device: str, *, speed: float, onset: float = 1e-9, **columns: Any) -> Any:
@@ -154,68 +129,3 @@ def test_part_of_a_patch_bent_one_way_that_touches_is_the_part_that_closes_in(wa
         np.testing.assert_allclose(found["share"], share, rtol=0, atol=tolerance)
         np.testing.assert_allclose(means[some], normal[some], rtol=0, atol=angle**2 / 2)
         np.testing.assert_allclose(found["closing"][some], closing[some], rtol=0, atol=SLIDING * angle**2 / 8)
-
-
-def test_part_of_a_patch_of_a_core_that_turns_is_where_that_closes_in(device: str) -> None:
-    # ω × r changes the velocity along the patch. The load acts in the middle of what touches, so its power is that of
-    # the closing speed there: a core that turns gains nothing.
-    count, bend, half = 400, 0.02, 0.8e-3
-    rng = np.random.default_rng(13)
-    slant, swing = rng.uniform(-0.5, 0.5, count), rng.uniform(2e3, 2e4, count) * rng.choice([-1, 1], count)
-    normal_axial, normal_radial = np.sin(slant), np.cos(slant)
-    half_axial, half_radial = -half * normal_radial, half * normal_axial
-    sliding = rng.uniform(-1.0, 1.0, count) * SLIDING
-    variation = bend * sliding - half * swing
-    closing = rng.uniform(-1.3, 1.3, count) * np.abs(variation)
-    velocity = np.stack([closing * normal_axial + sliding * normal_radial,
-                         closing * normal_radial - sliding * normal_axial, np.zeros(count)], axis=1)  # fmt: skip
-    members = bent(slant, bend, 0.0, velocity)
-    place = {"station": np.full(count, 0.01), "radius": np.full(count, 0.003), "swing": swing}
-    found = gripped(device, speed=1e-3, **members, **place, half_axial=half_axial, half_radial=half_radial)
-
-    along = (2 * (np.arange(20_000) + 0.5) / 20_000 - 1)[:, None]
-    angle = slant + bend * along
-    axial, outward = velocity[:, 0] - along * half_radial * swing, velocity[:, 1] + along * half_axial * swing
-    closes = np.sin(angle) * axial + np.cos(angle) * outward
-    touching = closes > 0
-    share = touching.mean(axis=0)
-    some = (share > 0.01) & (found["share"] > 0.01)
-    assert (some & (share < 0.99)).sum() > 200
-    middle, speed = (
-        np.where(touching, x, 0.0).sum(axis=0) / np.maximum(1, touching.sum(axis=0)) for x in (along, closes)
-    )
-    curved = bend * (bend * SLIDING + np.abs(half * swing))  # of second order
-    assert (np.abs(found["share"] - share) <= curved / np.abs(variation)).all()
-    assert np.median(curved / np.abs(variation)) < 0.03
-    np.testing.assert_allclose(found["closing"][some], speed[some], atol=curved.max())
-    station, radius = 0.01 + middle * half_axial, 0.003 + middle * half_radial
-    np.testing.assert_allclose(found["station"][some], station[some], atol=0.05 * half)
-    np.testing.assert_allclose(found["radius"][some], radius[some], atol=0.05 * half)
-    there = velocity[:, :2] + swing[:, None] * np.stack([0.003 - found["radius"], found["station"] - 0.01], axis=1)
-    power = found["axial"] * there[:, 0] + found["outward"] * there[:, 1]
-    np.testing.assert_allclose(power[some], found["closing"][some], atol=curved.max())
-
-
-@pytest.mark.parametrize("flank", [True, False])
-def test_no_ring_is_left_out_of_which_a_part_closes_in(flank: bool, device: str) -> None:
-    # Cores that move away from their own flank, or back, and of which the ends of a ring swing the other way.
-    count = 20_000
-    rng = np.random.default_rng(14)
-    slant, half = rng.uniform(-0.3, 0.3, count), rng.uniform(1e-4, 2e-3, count)
-    slant = slant if flank else 0.5 * np.pi - np.abs(slant)  # normals point outwards
-    members = bent(slant, rng.uniform(-0.02, 0.02, count), 0.05, np.zeros((count, 3)))
-    place = {"station": rng.uniform(-1e-3, 1e-3, count), "radius": rng.uniform(1e-4, 4e-3, count)}
-    halves = {"half_axial": -half * members["normal_radial"], "half_radial": half * members["normal_axial"]}
-    names = Ring.numpy_dtype()["names"]
-    rings = records(Ring, device, **{k: v for k, v in (members | place | halves).items() if k in names})
-    away = -np.sign(np.sin(slant))[:, None] * np.array([1.0, 0.0, 0.0])
-    velocities, omegas = away * rng.uniform(0.0, 30.0, (count, 1)), rng.normal(0.0, 1e4, (count, 3))
-    omegas[:, 0] = 0.0
-    law, found = Law(), (wp.empty(count, dtype=real, device=device), wp.empty(count, dtype=wp.bool, device=device))
-    law.onset = 1e-9
-    given = [wp.array(x, dtype=VARIANT.vec3, device=device) for x in (velocities, omegas)]
-    wp.launch(BOUNDS, count, inputs=[law, *given, rings], outputs=list(found), device=device)
-    touching, closes = (array.numpy() for array in found)
-    assert closes[touching > 0.0].all()
-    assert 100 < (touching > 0.0).sum() < count
-    assert not closes.all()

@@ -99,18 +99,6 @@ def test_share_of_a_patch_is_the_mean_of_its_parts(variation: float, device: str
 
 
 @VARIATIONS
-def test_what_touches_lies_where_the_patch_weighed_by_its_shares_lies(variation: float, device: str) -> None:
-    closing = (variation + ONSET) * np.linspace(-1, 2, 301)
-    places, speeds, shares = spread(closing, variation)
-    found = applied(closing, device, variation=variation)
-    some = shares.mean(axis=1) > 0.002
-    place = (places * shares).mean(axis=1)[some] / shares.mean(axis=1)[some]
-    np.testing.assert_allclose(found.shift[some] * variation, place, rtol=0, atol=2e-3)
-    # Where all of it touches fully it is the patch's own middle, to the last bit.
-    np.testing.assert_array_equal(found.shift[(speeds > 1.01 * ONSET + 1e-3 * variation).all(axis=1)], 0.0)
-
-
-@VARIATIONS
 def test_slope_is_the_derivative_of_the_share(variation: float, device: str) -> None:
     closing, dv = (variation + ONSET) * np.linspace(-1.5, 1.5, 401), 1e-6 * ONSET
     low, here, high = (applied(closing + d, device, variation=variation) for d in (-dv, 0.0, dv))
@@ -120,28 +108,12 @@ def test_slope_is_the_derivative_of_the_share(variation: float, device: str) -> 
     assert kinks.mean() < 0.02
 
 
-def test_steadied_contact_damps_by_its_chord(device: str) -> None:
-    # Up to the speed that is asked for; the slope beyond it, and of a flat patch on the ramp both are the same.
-    closing = np.array([0.5, 1.0, 2.0, 7.9, 8.1]) * ONSET
-    here, steadied = (applied(closing, device, steadied=s) for s in (0.0, 8 * ONSET))
-    np.testing.assert_allclose(here.rise * ONSET, [1, 1, 0, 0, 0], rtol=1e-4)
-    np.testing.assert_allclose(steadied.rise * ONSET, [1, 1, 1 / 2, 1 / 7.9, 0], rtol=1e-4)
-
-
 def test_small_variation_leaves_the_ramp_as_it_is(device: str) -> None:
     closing = ONSET * np.linspace(-1, 2, 301)
     for variation in (0.0, 1e-30, 1e-12):
         found = applied(closing, device, variation=variation)
         np.testing.assert_allclose(found.fraction, (closing / ONSET).clip(0, 1), rtol=0, atol=1e-5)
         assert np.abs(found.shift * variation).max() < 1e-9
-
-
-def test_wall_that_slides_along_itself_does_not_touch(device: str) -> None:
-    # Rounding in float32 gives v_p·n of some 1e-7 of the speed (docs/model.md §4: a small stated threshold).
-    speed = 800.0
-    fraction = applied(speed * np.array([1e-7, -1e-7, 1e-6, 1e-4]), device, speed=speed).fraction
-    np.testing.assert_array_equal(fraction[:3], 0.0)
-    assert 0 < fraction[3] < 0.1 * speed / ONSET
 
 
 def test_onset_follows_the_step_and_a_core_that_slows_down(device: str) -> None:

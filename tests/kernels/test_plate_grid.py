@@ -57,18 +57,6 @@ def look_up(
     values[i] = use.exposure.gather(field, windows[slot].cells_z, cell.index, cell.y, cell.z)
 
 
-def scatters(
-    stride: wp.int32,
-    index: wp.array(dtype=wp.int32),
-    y: wp.array(dtype=wp.float32),
-    z: wp.array(dtype=wp.float32),
-    amount: wp.array(dtype=wp.float32),
-    field: wp.array(dtype=wp.float32),
-) -> None:
-    for i in range(len(index)):
-        single.exposure.scatter(field, stride, index[i], y[i], z[i], amount[i])
-
-
 def cells(fields: Fields, windows: wp.array(dtype=Window), y: real, z: real, found: wp.array(dtype=Cell)) -> None:
     slot = wp.tid()
     found[slot] = use.plate_grid.cell_at(windows[slot], y, z)
@@ -113,7 +101,6 @@ def beneath_kernel(variant: Variant) -> Any:
     return variant.kernel(beneath)
 
 
-SCATTERS = SINGLE.kernel(scatters)
 BENEATH = {variant: beneath_kernel(variant) for variant in (VARIANT, SINGLE)}
 
 
@@ -205,34 +192,6 @@ def test_finite_plate_ends_at_its_rim(far: float, variant: Variant, rounding: fl
 
 
 # --- Grid ---
-
-
-def test_hit_is_a_node_of_its_window(device: str) -> None:
-    laid = lay_windows(device)
-    for k, (y, z) in enumerate([(0.0, 0.0), (0.25 * CELL, -0.25 * CELL)]):
-        found = poisoned(SLOTS, Cell, device)
-        wp.launch(CELLS, SLOTS, inputs=[laid.fields, laid.windows, y, z], outputs=[found], device=device)
-        slot, row, column = np.unravel_index(found.numpy()["index"], (SLOTS, CELLS_Y, CELLS_Z))
-        np.testing.assert_array_equal(slot, np.arange(SLOTS))
-        np.testing.assert_array_equal(row, CELLS_Y // 2)
-        np.testing.assert_array_equal(column, CELLS_Z // 2 - k)
-        np.testing.assert_allclose(found.numpy()["y"], 0.25 * k, atol=1e-15)
-        np.testing.assert_allclose(found.numpy()["z"], 0.75 * k, atol=1e-15)
-
-
-def test_scatter_gives_each_node_its_weight(device: str) -> None:
-    # Neighbours, too: each adds to the value of the last one.
-    rng = np.random.default_rng(5)
-    stride, count = 37, 1000
-    index = rng.integers(0, 60, count).astype(np.int32)
-    y, z, amount = rng.random((3, count)).astype(np.float32)
-    inputs = [stride, *(wp.array(a, device=device) for a in (index, y, z, amount))]
-    field, expected = wp.zeros(37 * 4, dtype=wp.float32, device=device), np.zeros(37 * 4)
-    wp.launch(SCATTERS, 1, inputs=inputs, outputs=[field], device=device)
-    for row, along_y in ((0, 1.0 - y), (1, y)):
-        for column, along_z in ((0, 1.0 - z), (1, z)):
-            np.add.at(expected, index + row * stride + column, amount.astype(float) * along_y * along_z)
-    np.testing.assert_allclose(field.numpy(), expected, rtol=1e-5)
 
 
 # --- Filter ---

@@ -227,21 +227,6 @@ def test_damped_kick_is_rosenbrock_s_step(device: str) -> None:
     np.testing.assert_allclose(applied[:, 3:], impulse[:, 3:], rtol=0, atol=1e-9 * np.abs(impulse[:, 3:]).max())
 
 
-def test_damped_kick_is_of_second_order(device: str) -> None:
-    # A load F = −J u of damping D = J/2 takes u to exp(−dt M⁻¹J) u.
-    start, matrices = random_motion(), drag()
-    u = np.concatenate([start.velocity, start.omega], axis=1)
-    inertia = mass_matrices(start)
-    rates, modes = np.linalg.eig(np.linalg.solve(inertia, 2 * matrices))
-    errors = []
-    for dt in (0.4 / np.abs(rates).max(), 0.2 / np.abs(rates).max()):
-        load = -2 * np.einsum("nij,nj->ni", matrices, u)
-        after, _ = kicked(start, dt, device, force=load[:, :3], moment=load[:, 3:], **damping(matrices))
-        decayed = modes @ (np.exp(-dt * rates)[..., None] * np.linalg.solve(modes, u[..., None]))
-        errors.append(np.abs(after["velocity"] - decayed[:, :3, 0].real).max())
-    assert errors[1] < errors[0] / 6  # eight, of the local error of a method of second order
-
-
 @pytest.mark.parametrize("dt", [1e-5, 1e-3])
 @pytest.mark.parametrize("with_drag", [False, True])
 def test_kick_never_raises_the_energy(with_drag: bool, dt: float, device: str) -> None:
@@ -268,76 +253,3 @@ def test_overshooting_kick_stops_at_the_least_energy_along_it(overshoot: float, 
     np.testing.assert_allclose(after["velocity"], start.velocity - applied * along, rtol=0, atol=1e-9)
     np.testing.assert_allclose(means["force"], -applied * MASS * along, rtol=0, atol=1e-11)
     np.testing.assert_array_equal(after["angular_momentum"], start.angular_momentum)
-
-
-SINGLE = Variant(double=False)
-single = SINGLE.use(rigid_body)
-
-
-def single_energy(
-    body: structs.build(SINGLE).Body,
-    axes: wp.array(dtype=SINGLE.vec3),
-    momenta: wp.array(dtype=SINGLE.vec3),
-    energies: wp.array(dtype=SINGLE.real),
-) -> None:
-    i = wp.tid()
-    energies[i] = single.rigid_body.kinetic_energy(body, axes[i], SINGLE.vec3(), momenta[i])
-
-
-SINGLE_ENERGY = SINGLE.kernel(single_energy)
-
-
-def test_energy_of_a_spinning_disc_is_exact_in_single_precision(device: str) -> None:
-    # A thin disc has I_a = 2 I_t, and about its axis the energy ½ I_a ω²: the parts of L² along and across the axis
-    # differ by rounding alone. Measured: within 2 eps of what the rounded inputs say.
-    rng, axial = np.random.default_rng(2), 1.5e-8
-    axes = unit_vectors(rng, COUNT).astype(np.float32)
-    spin = np.geomspace(1e2, 1e6, COUNT)
-    body = structs.build(SINGLE).Body()
-    body.mass, body.inertia_axial, body.inertia_transverse = MASS, axial, 0.5 * axial
-    momenta = (axial * spin[:, None] * axes).astype(np.float32)
-    found = poisoned(COUNT, SINGLE.real, device)
-    inputs = [body, *(wp.array(some, dtype=SINGLE.vec3, device=device) for some in (axes, momenta))]
-    wp.launch(SINGLE_ENERGY, COUNT, inputs=inputs, outputs=[found], device=device)
-    size = np.linalg.norm(momenta.astype(np.float64), axis=1)  # the axis is rounded, too, and counts as along L
-    assert found.numpy() / (0.5 * size**2 / axial) == pytest.approx(1.0, abs=6 * 2.0**-23)
-
-
-def swing(
-    body: Body, before: wp.array(dtype=struct.Change), last: struct.Change, swings: wp.array(dtype=wp.bool)
-) -> None:
-    i = wp.tid()
-    swings[i] = use.rigid_body.swings(body, before[i], last)
-
-
-SWING = VARIANT.kernel(swing)
-
-
-def test_a_core_swings_when_a_step_turns_back_the_last_one(device: str) -> None:
-    # Changes across the axis that are smaller than 1e-4 of those along it are rounding.
-    across = np.array([-1.0, -1.2e-4, -0.8e-4, 0.0, 0.8e-4, 1.0])
-    before = records(struct.Change, device, velocity=np.stack([np.ones(6), across, 0.0 * across], axis=1))
-    last, swings = struct.Change(), poisoned(6, wp.bool, device)
-    last.velocity = vec3(1.0, 1.0e-4, 0.0)
-    wp.launch(SWING, 6, inputs=[paper_body(), before, last], outputs=[swings], device=device)
-    np.testing.assert_array_equal(swings.numpy(), [True, True, False, False, False, False])
-
-
-def passing(
-    body: Body, axis: vec3, momentum: vec3, ahead: real, velocity: real, distance: real, axes: wp.array(dtype=vec3)
-) -> None:
-    axes[0] = use.rigid_body.axis_at(body, axis, momentum, ahead, velocity, distance)
-
-
-PASSING = VARIANT.kernel(passing)
-
-
-def test_a_point_that_swings_at_half_of_the_speed_of_flight_is_found(device: str) -> None:
-    # The axis turns about z from 30° to 90°, where the point swings straight along x: each iteration halves the error.
-    ahead, velocity, rate = 1.0e-2, 100.0, 5.0e3
-    time = np.deg2rad(60.0) / rate
-    axes = wp.empty(1, dtype=vec3, device=device)
-    start = vec3(*np.cos(np.deg2rad([30.0, 60.0, 90.0])))
-    inputs = [paper_body(), start, vec3(0.0, 0.0, TRANSVERSE * rate), ahead, velocity, velocity * time]
-    wp.launch(PASSING, 1, inputs=inputs, outputs=[axes], device=device)
-    np.testing.assert_allclose(axes.numpy()[0], [0.0, 1.0, 0.0], atol=1e-12)

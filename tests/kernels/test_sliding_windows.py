@@ -5,10 +5,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import pytest
-import warp as wp
 
-from warpimpact.kernels import sliding, structs
-from warpimpact.kernels.variant import Variant
 from warpimpact.scene import Hits, Impact, Numerics, Plate, Scene, Target, make_shots
 from warpimpact.solver import grid
 from warpimpact.solver.device import find_device
@@ -19,7 +16,6 @@ from warpimpact.solver.prepare import prepare
 from warpimpact.solver.replay import traced
 
 from ..verification.scenes import PAPER_CORE, layer, paper_plate
-from .probes import records
 
 HITS = 16
 PLATE = paper_plate(degradation_interval=None, degradation_distance=0.8e-3)
@@ -71,40 +67,3 @@ def test_a_replay_keeps_all_that_the_core_has_passed(monkeypatch: pytest.MonkeyP
     _, cells, contact = traced(scene, shots, Numerics(level=0))
     assert cells == wide.last
     np.testing.assert_array_equal(contact.steps.numpy(), wide.outcomes["steps"])
-
-
-WINDOW = (0, 9, 0, 9)  # rows, columns
-AFTER_KNOWN_AHEAD = [
-    ((6, 15, 0, 9), WINDOW, True),
-    ((20, 29, 0, 9), WINDOW, True),  # far away
-    ((6, 15, 0, 9), (-5, 9, 0, 9), True),  # it came along y, and goes on
-    ((-6, 3, 0, 9), (-5, 9, 0, 9), False),  # it came along y, and returns
-    ((0, 9, 6, 15), (0, 9, -5, 9), True),
-    ((0, 9, -6, 3), (0, 9, -5, 9), False),
-    ((4, 13, 4, 13), (-4, 9, -4, 9), True),  # aslant
-]
-
-
-def test_a_window_returns_to_no_nodes_that_it_has_left(device: str) -> None:
-    use, struct = Variant().use(sliding), structs.build(Variant())
-    Box, is_ahead = struct.Box, use.sliding.is_ahead
-
-    @wp.kernel(module="unique")
-    def look(
-        window: wp.array(dtype=Box),
-        after: wp.array(dtype=Box),
-        known: wp.array(dtype=Box),
-        found: wp.array(dtype=wp.bool),
-    ):
-        i = wp.tid()
-        found[i] = is_ahead(window[i], after[i], known[i])
-
-    def boxes(ends: Any) -> wp.array:
-        names = ("y_low", "y_high", "z_low", "z_high")
-        return records(Box, device, **dict(zip(names, np.transpose(ends), strict=True)))
-
-    after, known, ahead = zip(*AFTER_KNOWN_AHEAD, strict=True)
-    found = wp.zeros(len(ahead), dtype=wp.bool, device=device)
-    inputs = [boxes([WINDOW] * len(ahead)), boxes(after), boxes(known), found]
-    wp.launch(look, len(ahead), inputs=inputs, device=device)
-    assert found.numpy().tolist() == list(ahead)

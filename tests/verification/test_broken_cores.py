@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from warpimpact.records.outcomes import Outcomes
-from warpimpact.scene import Hits, Impact, Record, Scatter, Scene, Shots, make_shots
+from warpimpact.scene import Record, Scene, Shots
 from warpimpact.solver.simulate import simulate
 
 from .scenes import PAPER_CORE, paper_plate, scattered_hits, shots_at
@@ -36,41 +36,7 @@ def test_a_core_is_broken_where_its_stress_passes_its_strength(hits: Shots) -> N
     assert (ended.broken_x[~whole] <= 825.0 * ended.broken_time[~whole] - 0.9 * ended.broken_section[~whole]).all()
 
 
-def test_a_stronger_core_breaks_later(hits: Shots) -> None:
-    weak, strong = outcomes(2.0e9, hits), outcomes(3.0e9, hits)
-    both = strong.broken == 1.0
-    assert both.any()
-    assert (weak.broken[both] == 1.0).all()
-    assert (weak.broken_time[both] <= strong.broken_time[both]).all()
-    assert (weak.broken_time[both] < strong.broken_time[both]).any()
-
-
-def test_a_strength_at_the_largest_stress_is_passed_when_that_is_reached(hits: Shots) -> None:
-    largest = outcomes(2.0e9, hits).bending_stress
-    own = dict(hits.columns)
-    just = outcomes(2.0e9, Shots(**own, strength=0.9999 * largest))
-    never = outcomes(2.0e9, Shots(**own, strength=1.0001 * largest))
-    assert (just.broken == 1.0).all()
-    assert just.broken_section == pytest.approx(just.bending_stress_section)
-    assert (never.broken == 0.0).all()
-
-
 def test_a_broken_core_goes_on_as_it_would_have(hits: Shots) -> None:
     weak, strong = outcomes(1.0, hits), outcomes(1e12, hits)
     for name in ("status", "residual_velocity", "tilt", "bending_stress"):
         assert np.array_equal(getattr(weak, name), getattr(strong, name), equal_nan=True), name
-
-
-def test_strength_may_scatter_as_a_weibull_distribution() -> None:
-    weibull = {"distribution": "weibull", "shape": 8, "scale": "2 GPa"}
-
-    def drawn(**others: Any) -> Any:
-        scatter = Scatter.model_validate({"strength": weibull} | others)
-        return make_shots(Impact(velocity=600.0), Hits(count=256), paper_plate(), scatter).strength
-
-    strength = drawn()
-    # P(X < x) = 1 − exp(−(x/scale)^shape)
-    for x in (1.6e9, 2.0e9):
-        assert np.mean(strength < x) == pytest.approx(1.0 - np.exp(-((x / 2e9) ** 8)), abs=0.02)
-    # Its draws are its own: another scattering quantity does not move them.
-    assert np.array_equal(drawn(yaw={"distribution": "uniform", "low": -1, "high": 1}), strength)

@@ -7,7 +7,6 @@ from typing import Any
 import numpy as np
 import pytest
 from numpy.typing import NDArray
-from scipy.spatial.transform import Rotation
 
 from warpimpact import OgiveCore
 from warpimpact.continuum.meshing import SheetMesh
@@ -159,24 +158,6 @@ def test_a_wave_leaves_through_the_edge() -> None:
     assert energies.kinetic + energies.work + energies.hourglass + energies.radiated == pytest.approx(begun, rel=2e-3)
 
 
-def test_an_element_takes_the_work_of_its_flow() -> None:
-    """Stretched along x and pressed along y at the rate a, an element flows at ε̇ = 2a/√3 and takes ∫ (A + B ε) dε."""
-    flow = Flow(yield_stress=4.0e8, hardening=3.0e8, taylor_quinney=0.0, fracture_work=1.0e20)
-    sheet = box((1, 1, 1))
-    hit, rate = alone(sheet, flow, free=False), 1.0e4
-    gradient, time = np.diag([rate, -rate, 0.0]), 0.0
-    while time < 2.0e-5:
-        time += step_of(hit)
-        stretch(hit, gradient)
-    strain = 2.0 / math.sqrt(3.0) * rate * time
-    three = 3.0 * flow.shear_modulus
-    plastic = float(nodal(hit, "strain")[0, 0])
-    assert plastic == pytest.approx((three * strain - flow.yield_stress) / (three + flow.hardening), rel=1e-3)
-    stored = (flow.yield_stress + flow.hardening * plastic) ** 2 / (2.0 * three)
-    work = flow.yield_stress * plastic + 0.5 * flow.hardening * plastic**2 + stored
-    assert hit.energies.work == pytest.approx(1.0e-9 * work, rel=1e-3)
-
-
 COLD = {"yield_stress": 4.0e8, "taylor_quinney": 0.0, "fracture_work": 1.0e20}
 
 
@@ -297,18 +278,6 @@ def test_an_element_fails_where_it_is_too_thin_or_too_wide(rate: float, share: f
         nodal(hit, "velocity")[:] = gradient @ nodal(hit, "position")
         hit.advance(1)
     assert np.ptp(nodal(hit, "position")[0]) == pytest.approx(share * 1.0e-3, rel=0.03)
-
-
-def test_a_free_core_precesses_about_its_angular_momentum() -> None:
-    """By the angle |L| t / I across the axis: Euler's equations of a symmetric top."""
-    momentum, transverse = np.array([2.0e-4, 0.0, 3.0e-4]), 1.65e-7
-    start = start_at((-1.0, 0.0, 0.0), 1.0, momentum, inertia_transverse=transverse)
-    hit = OneHit(CORE, start, [box((1, 1, 1))], [ELASTIC], double=True)
-    hit.advance(4000)
-    turned = Rotation.from_quat(np.array(hit.flight["state"]["attitude"])).apply([1.0, 0.0, 0.0])
-    precession = Rotation.from_rotvec(momentum * float(hit.flight["time"]) / transverse)
-    assert np.linalg.norm(precession.as_rotvec()) > 0.1
-    assert turned == pytest.approx(precession.apply([1.0, 0.0, 0.0]), abs=1e-6)
 
 
 def test_momentum_of_a_free_plate_is_that_which_the_core_lost() -> None:

@@ -127,18 +127,6 @@ def test_two_meshes_agree_on_a_solid_plate() -> None:
     assert coarse.residual_velocity[0] == pytest.approx(finer.residual_velocity[0], abs=0.05 * lost)
 
 
-def test_layers_apart_are_the_chain_of_their_plates(coarse: float) -> None:
-    """The first of two plates takes what it takes alone; the second one meets the core that the first one left."""
-    first = computed(SOLID, shots_at((0.0, 0.0)), spacing=coarse)
-    behind = {"thickness": 4e-3, "resistance": 2.6e9, "gap": 40e-3}
-    target = Scene(core=CORE, target=(SOLID, Layer(**behind)), record=Record(standoffs=(0.05,)))
-    both = simulate(target, shots_at((0.0, 0.0)), numerics=Continuum(flows=(STEEL,), spacing=coarse))
-    assert both.layer_status[0].tolist() == [Status.PERFORATED] * 2
-    assert both.layer_residual_velocity[0, 0] == pytest.approx(first.residual_velocity[0], abs=0.5)
-    assert both.residual_velocity[0] < both.layer_residual_velocity[0, 0] - 50.0
-    assert both.layer_residual_velocity[0, 1] == pytest.approx(both.residual_velocity[0], abs=1.0)
-
-
 def test_a_layer_has_its_mesh_where_the_core_crosses_it(coarse: float) -> None:
     """A core that the edge of a hole has turned aside meets the second plate more than a radius beside its line of
     fire: there is the middle of the fine part, up to half an element."""

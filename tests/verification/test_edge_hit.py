@@ -2,12 +2,11 @@
 
 import numpy as np
 import pytest
-from scipy.signal import fftconvolve
 
 from warpimpact.kernels.status import Status
-from warpimpact.scene import ConeCore, ProfileCore
+from warpimpact.scene import ConeCore
 
-from .scenes import Array, shots_at, simulate, solid_plate
+from .scenes import shots_at, simulate, solid_plate
 
 VELOCITY, THICKNESS, HALF_SIZE = 825.0, 4e-3, 10e-3
 LASTING = {"degradation": 0.5, "degradation_interval": 1e3}
@@ -53,45 +52,3 @@ def test_half_a_cone_on_an_edge_receives_its_impulse(along: str, turning: list[f
     assert outcomes.deflection[0] == pytest.approx(lateral / mass / VELOCITY, rel=4e-3)
     expected = angular / inertia * np.array(turning)
     assert outcomes.angular_velocity[0] == pytest.approx(expected, rel=5e-3, abs=1e-9 * abs(expected).max())
-
-
-ROD = ProfileCore(s=(0.0, 25e-3), r=(RADIUS, RADIUS), mass=4e-3)
-WEAKENING = {"degradation": 0.3, "degradation_interval": 1e-6, "degradation_length": 0.5e-3}
-
-
-def rod_impulse(points_per_length: int = 40) -> tuple[float, float]:
-    """Impulse along −x [N s] and angular impulse about z [N m s] on a flat-nosed rod whose half y < 0 meets the plate.
-
-    The half disc D touches for τ = h/v. Beneath it dT/dt = A, A = ∫_D K: only material adds to it. So a point of it
-    resists with ∫ Y β^(A t/Δt_β) dt = Y (1 − e^(−κAτ))/(κA), κ = −ln β/Δt_β. Quadrature on a grid.
-    """
-    length = WEAKENING["degradation_length"]
-    spacing = length / points_per_length
-    y, z = spacing * (np.arange(-240, 0) + 0.5)[:, None], spacing * (np.arange(-240, 240) + 0.5)
-    touched = (y**2 + z**2 < RADIUS**2).astype(float)
-    tent = 1 - np.abs(np.arange(-points_per_length, points_per_length + 1)) / points_per_length
-    covered: Array = fftconvolve(touched, np.outer(tent, tent) / points_per_length**2, mode="same")
-    decay = -np.log(WEAKENING["degradation"]) / WEAKENING["degradation_interval"] * np.maximum(covered, 1e-9)
-    resistance = WEAK * touched * -np.expm1(-decay * THICKNESS / VELOCITY) / decay * spacing**2
-    return float(resistance.sum()), float((y * resistance).sum())
-
-
-# Rings of 0.2 mm and cells of ℓ/4, which spread the edge. Measured: 0.5 % and 1 % less; 5 % less if holes add exposure,
-# too. Degradation takes 81 % of the impulse.
-def test_exposure_is_gained_from_material_alone(device: str) -> None:
-    plate = solid_plate(size=(2 * HALF_SIZE, 2 * HALF_SIZE), resistance=WEAK, shear_coefficient=1e-9, **WEAKENING)
-    outcomes = simulate(
-        plate,
-        shots_at(HALF_SIZE),
-        core=ROD,
-        device=device,
-        precision="double",
-        patches_axial=128,
-        patches_around=128,
-        grid_spacing=0.125e-3,
-        time_step=1e-7,
-    )
-    impulse_x, angular = rod_impulse()
-    mass, _, _, inertia = ROD.mass_properties
-    assert VELOCITY - outcomes.residual_velocity[0] == pytest.approx(impulse_x / mass, rel=0.01)
-    assert outcomes.angular_velocity[0, 2] == pytest.approx(angular / inertia, rel=0.02)

@@ -93,23 +93,3 @@ def test_arrest_in_a_plate_thicker_than_the_depth_of_rest(case: Case) -> None:
 def tip_depth(core: Core, history: History) -> np.ndarray:
     """Depth of the tip at mid-step [m], from the second step on."""
     return (history.position + core.mass_properties.centre_of_mass * history.axis)[1:, 0]
-
-
-@pytest.mark.parametrize("precision", ["single", "double"])
-@pytest.mark.parametrize(("obliquity", "azimuth"), [(0.0, 0.0), (60.0, 200.0)])
-def test_shank_that_moves_along_itself_does_not_touch(
-    precision: str, obliquity: float, azimuth: float, device: str
-) -> None:
-    # A plate too weak to turn the core: contact lasts until the lower rim of the cone leaves the rear face. The
-    # shank would add 15 mm/v, 18 µs.
-    outcomes = simulate(
-        lasting_plate(4e-3, 0.05, resistance=1.0),
-        shots_at(0.3e-3, 0.1e-3, obliquity=obliquity, azimuth=azimuth),
-        core=CONE.core,
-        precision=precision,
-        device=device,
-    )
-    tilt, axial_speed = np.deg2rad(obliquity), VELOCITY * np.cos(np.deg2rad(obliquity))
-    way = 4e-3 + CONE.nose.length * np.cos(tilt) + CONE.core.max_radius * np.sin(tilt)
-    ring, step = CONE.core.length / 32, 0.2 * CONE.core.length / 7 / VELOCITY
-    assert outcomes.contact_duration[0] == pytest.approx(way / axial_speed, abs=ring / axial_speed + 2 * step)

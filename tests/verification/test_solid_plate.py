@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from warpimpact.kernels.status import Status
-from warpimpact.scene import ConeCore, Impact, Interaction, Numerics, OgiveCore, ProfileCore, Scene
+from warpimpact.scene import Impact, Interaction, Numerics, ProfileCore, Scene
 from warpimpact.solver import materials
 from warpimpact.solver.resolution import resolve
 
@@ -75,41 +75,6 @@ def test_onset_takes_its_share_of_the_work(onset: float, stated: float, device: 
     plate, law = solid_plate(degradation=1.0), Interaction(onset=onset)
     outcomes = simulate(plate, shots_at(*HITS), interaction=law, **REFERENCE, device=device)
     assert outcomes.residual_velocity == pytest.approx(expected, abs=0.06)
-
-
-# An ogive runs into its shank without a kink, a cone has one. Measured: within 0.1 m/s of some 170 m/s.
-@pytest.mark.parametrize(("shape", "onset"), [("ogive", 0.005), ("cone", 0.02)])
-def test_onset_on_a_core_with_a_shank(shape: str, onset: float, device: str) -> None:
-    if shape == "ogive":
-        core: OgiveCore | ConeCore = OgiveCore(diameter=6.17e-3, length=27e-3, crh=3.0, mass=5.25e-3)
-        nose = references.ogive_nose(diameter=6.17e-3, crh=3.0)
-    else:
-        core = ConeCore(diameter=6e-3, length=25e-3, cone_length=10e-3, mass=5.25e-3)
-        nose = references.cone_nose(diameter=6e-3, length=10e-3)
-    expected = references.solid_plate_residual(
-        **PAPER_SHOT, shear_coefficient=0.1, onset=onset, nose=nose, mass=core.mass_properties.mass
-    )
-    plate = solid_plate(shear_coefficient=0.1, degradation=1.0)
-    outcomes = simulate(
-        plate, shots_at(*HITS), core=core, interaction=Interaction(onset=onset), **REFERENCE, device=device
-    )
-    assert outcomes.residual_velocity == pytest.approx(expected, abs=0.1)
-
-
-def test_a_core_at_an_angle_of_its_own_converges_at_second_order_in_the_step(device: str) -> None:
-    # A shank that slides along the wall of its channel rests on the onset: without one the answer has no limit.
-    core = OgiveCore(diameter=6.17e-3, length=27e-3, crh=3.0, mass=5.25e-3)
-    plate = solid_plate(thickness=8e-3, shear_coefficient=0.12, degradation=1.0)
-    shots = shots_at(*HITS, pitch=0.9)
-    left = np.array(
-        [
-            simulate(plate, shots, core=core, precision="double", time_step=step, device=device).residual_velocity
-            for step in (1.6e-6, 0.8e-6, 0.4e-6, 0.2e-6)
-        ]
-    )
-    changes = np.abs(np.diff(left, axis=0)).max(axis=1)
-    assert (changes[1:] < 0.5 * changes[:-1]).all()
-    assert changes[-1] < 0.1
 
 
 # At the reference's patches, 0.29 mm, and cells, ℓ/8. Measured: 0.006 and 0.04 m/s at η = 0; 0.08 and 0.17 m/s at

@@ -8,14 +8,13 @@ import numpy as np
 import pytest
 
 from warpimpact import CirclePattern, Continuum, Layer, Plate, Record, Scene, simulate
-from warpimpact.catalogue.catalogue import flow_entry, flow_names
+from warpimpact.catalogue.catalogue import flow_entry
 from warpimpact.continuum import encounter
 from warpimpact.continuum import simulate as elements
 from warpimpact.continuum.meshing import nodes_of
 from warpimpact.continuum.one_hit import Energies
 from warpimpact.kernels.status import Status
 from warpimpact.scene import PolynomialCore, Shots
-from warpimpact.scene.flow import FINENESS
 from warpimpact.solver.device import find_device
 from warpimpact.solver.worker import Worker
 
@@ -146,26 +145,6 @@ def test_a_mesh_covers_what_a_turned_core_sweeps_and_its_way_through_the_layer()
     assert along_y == pytest.approx((0.05 + way, 1.6 * (2.5 * radius + way), 1.6 * (5.0 * radius + way)))
     assert along_z == pytest.approx((0.0, 1.6 * (2.5 * radius + swept), 1.6 * (5.0 * radius + swept)))
     assert nodes_of(PLATE.thickness, 1e-3, (along_y, along_z)) == layer.mesh(*state).nodes
-
-
-def test_elements_follow_core_thickness_and_ligament() -> None:
-    scene = Scene(core=CORE, target=PLATE)
-    draft = Continuum(flows=(STEEL,)).spacings(scene.core, scene.target)[0]
-    assert draft == pytest.approx(CORE.max_radius / 6.0)
-    thin = Scene(core=CORE, target=PLATE.model_copy(update={"thickness": 1e-3}))
-    assert Continuum(flows=(STEEL,)).spacings(thin.core, thin.target) == [0.25e-3]
-    for fidelity, share in FINENESS.items():
-        spacing = Continuum(flows=(STEEL,), fidelity=fidelity).spacings(scene.core, scene.target)[0]
-        assert spacing == pytest.approx(share * draft)
-
-
-@pytest.mark.parametrize("name", flow_names())
-def test_a_material_says_what_is_known_and_what_is_assumed(name: str) -> None:
-    entry = flow_entry(name)
-    assert entry.name == name
-    assert entry.assumed
-    assert ("beside a plate test" in entry.evidence) == bool(entry.tested)
-    assert 4000.0 < entry.wave_speed < 7000.0
 
 
 def test_a_set_of_ones_own_is_a_table(tmp_path: Path) -> None:

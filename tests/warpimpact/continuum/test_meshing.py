@@ -58,13 +58,6 @@ def test_a_mirrored_plate_has_the_mirrored_mesh() -> None:
     assert np.array_equal(mesh.solid, mesh.solid[::-1, ::-1])
 
 
-def test_a_finite_plate_ends_at_its_rim() -> None:
-    plate = Plate(thickness=4e-3, resistance=2.6e9, size=(20e-3, 20e-3))
-    mesh = meshed(plate, (8e-3, 0.0), 0.0, 0.5e-3, EXTENTS)
-    edge = mesh.y[:-1, :-1][mesh.solid].max()
-    assert edge == pytest.approx(2e-3, abs=0.5e-3)
-
-
 def test_runs_hold_all_elements_in_whole_lanes() -> None:
     present = np.zeros(200, dtype=bool)
     present[[3, 4, 9, 60, 61, 199]] = True

@@ -17,8 +17,6 @@ from warpimpact.scene import (
     PRESETS,
     Accuracy,
     CirclePattern,
-    Hits,
-    Impact,
     Layer,
     Numerics,
     OgiveCore,
@@ -26,7 +24,6 @@ from warpimpact.scene import (
     Record,
     Scene,
     Target,
-    make_shots,
 )
 from warpimpact.solver.accuracy import (
     ERROR_PER_CHANGE,
@@ -39,8 +36,6 @@ from warpimpact.solver.accuracy import (
     upper_digits,
 )
 from warpimpact.solver.resolution import LADDER, TooManySteps
-from warpimpact.solver.simulate import pilot_of, simulate
-from warpimpact.solver.worker import Worker
 
 CORE = OgiveCore(diameter=6.17e-3, crh=3, length=27e-3, mass=5.25e-3)
 PLATE = Plate(
@@ -51,8 +46,6 @@ PLATE = Plate(
     pattern=CirclePattern(diameter=7e-3, spacing=(10e-3, 17.3e-3), staggered=True),
 )
 SCENE = Scene(core=CORE, target=PLATE, record=Record(standoffs=(0.05, 0.13)))
-IMPACT = Impact(velocity="820 m/s", obliquity="12 deg", yaw="1 deg")
-OTHERS = make_shots(IMPACT, Hits(count=96, seed=6), PLATE)
 BASE = Layer(thickness=6.6e-3, resistance=5e9, gap=40e-3, shear_coefficient=0.08)
 ASKED = Accuracy(residual_velocity=1.0)
 FINEST = len(LADDER) - 3
@@ -144,14 +137,6 @@ def test_a_pilot_ends_where_hits_take_too_long_or_do_not_fit() -> None:
         assert unknown.phrase == "accuracy unknown for 90 % of the hits, not as promised"
 
 
-def test_a_share_of_the_hits_may_have_larger_errors() -> None:
-    def few_jump(level: int) -> NDArray[np.float64]:
-        return 500.0 + np.where(np.arange(64) < 3, 100.0 * (level % 4 // 2), 0.1)
-
-    assert chosen(few_jump)[0].kept
-    assert not chosen(few_jump, Accuracy(residual_velocity=1.0, share=0.95))[0].kept
-
-
 def test_hits_that_end_otherwise_behind_layers_count_in_the_status() -> None:
     speeds = np.full(64, 500.0)
     fine = outcomes_of(speeds, layered=True)
@@ -203,24 +188,6 @@ def test_errors_above_a_bound_never_read_as_if_they_kept_it(bound: float) -> Non
     errors = {"tilt_error": 0.3, "residual_velocity_error": 1.04, "depth_error": 1.23e-4, "status_error": 0.0}
     assert errors_text(errors) == "1.1 m/s, 0.3 deg and 0.13 mm of depth"
     assert errors_text({"limit_thickness_error": math.inf}) == "inf mm"
-
-
-def errors_of_90_percent(coarse: Outcomes, fine: Outcomes) -> tuple[float, float]:
-    """Errors of residual velocity [m/s] and last tilt [degree] that 90 % of the hits are within."""
-    changes = fine.residual_velocity - coarse.residual_velocity, np.degrees(fine.tilt[:, -1] - coarse.tilt[:, -1])
-    velocity, tilt = (float(np.quantile(np.nan_to_num(np.abs(change)), 0.9)) for change in changes)
-    return velocity, tilt
-
-
-def test_a_shanked_core_gets_the_accuracy_that_standard_promises() -> None:
-    name = "standard"
-    found = pilot_of(SCENE, make_shots(IMPACT, Hits(count=128, seed=5), PLATE), Numerics(fidelity=name), Worker("cpu"))
-    assert found.kept
-    assert (found.numerics.level or 0) <= 4
-    coarse, fine = (simulate(SCENE, OTHERS, numerics=one, device="cpu") for one in (found.numerics, Numerics(level=7)))
-    velocity, tilt = errors_of_90_percent(coarse, fine)
-    assert velocity / 1.3 <= found.errors["residual_velocity_error"] <= PRESETS[name].residual_velocity
-    assert tilt / 1.3 <= found.errors["tilt_error"] <= math.degrees(PRESETS[name].tilt)
 
 
 def test_a_result_has_its_promise_and_replays_on_its_level() -> None:

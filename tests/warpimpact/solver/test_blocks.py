@@ -21,13 +21,6 @@ SIMPLE, BLOCK = Numerics(level=2), Numerics(level=2, layout="block")
 THREE = np.zeros(3)
 
 
-@pytest.mark.parametrize("index", [0, 4])
-def test_a_window_is_in_the_smallest_block_that_holds_it(index: int) -> None:
-    prepared = prepare(SCENE, shots_at(THREE), at_level(index, BLOCK))
-    assert prepared.variant.window == min(size for size in grid.SIZES if size >= prepared.cells**2)
-    assert 2 * 4 * max(grid.SIZES) <= 48 * 1024
-
-
 def test_windows_that_do_not_fit_a_block_are_for_the_simple_layout() -> None:
     shots = shots_at(THREE, obliquity=69.0)
     assert not prepare(SCENE, shots, BLOCK).variant.window

@@ -41,19 +41,6 @@ def test_a_search_converges_from_any_start(velocity: float) -> None:
     )
 
 
-def test_what_touches_nothing_has_no_limit_to_search() -> None:
-    holes = PLATE.model_copy(update={"pattern": CirclePattern(diameter=12e-3, spacing=(20e-3, 20e-3))})
-    scene = Scene(core=CORE, target=holes)
-    velocity, thickness = (
-        search(scene, shots(1), numerics=STANDARD, device="cpu") for search in (limit_velocity, limit_thickness)
-    )
-    assert (velocity.value.item(), velocity.lower.item(), velocity.upper.item()) == (0.0, 0.0, 0.0)
-    assert thickness.value.item() == thickness.lower.item() == np.inf
-    for limits in (velocity, thickness):
-        assert limits.runs.item() == 1
-        assert limits.converged.item()
-
-
 def test_a_limit_beyond_the_largest_value_tried_is_infinite() -> None:
     strong = PLATE.model_copy(update={"thickness": 0.2})
     velocity = limit_velocity(

@@ -13,7 +13,6 @@ from warpimpact.scene import (
     PolynomialCore,
     Scene,
 )
-from warpimpact.solver.materials import FASTEST_DECAY, decay_rate
 from warpimpact.solver.resolution import (
     LADDER,
     NODAL_SETTINGS,
@@ -45,17 +44,6 @@ def test_a_resolution_is_asked_for_in_one_way(numerics: dict[str, Any], words: s
         Numerics(**numerics)
 
 
-@pytest.mark.parametrize(
-    ("name", "value", "scheme"), [("time_step", 3e-7, "consistent"), ("grid_spacing", 0.1e-3, "nodal")]
-)
-def test_single_setting_goes_before_level_and_scheme(name: str, value: float, scheme: str) -> None:
-    given: dict[str, Any] = {"scheme": scheme, "level": 5}
-    plain = resolved(**given)
-    changed = resolved(**given, **{name: value})
-    assert getattr(changed, name) == value
-    assert {k for k in vars(plain) if getattr(plain, k) != getattr(changed, k)} == {name}
-
-
 @pytest.mark.parametrize("level", [None, 4])
 def test_nodal_scheme_has_the_paper_s_own_resolution(level: int | None) -> None:
     resolution = resolved(scheme="nodal", level=level)
@@ -83,10 +71,3 @@ def test_step_is_bounded_by_what_contact_takes_off_the_resistance() -> None:
         if 0.0 < degradation < 1.0:
             bound = WEAKENING * LADDER[2].travel * interval / -np.log(degradation)
         assert step == pytest.approx(min(free, max(bound, 0.25 * free)))
-
-
-def test_decay_rate_is_that_of_an_interval_of_contact() -> None:
-    rates = decay_rate(np.array([0.8, 1.0, 0.0]), 2e-6)
-    np.testing.assert_allclose(0.8, np.exp(rates[0] * 2e-6), rtol=1e-15)
-    assert rates[1] == 0.0
-    assert rates[2] == -FASTEST_DECAY

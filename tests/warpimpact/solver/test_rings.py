@@ -1,7 +1,5 @@
 """Rings of the core: a closed surface, whose areas and volume are the core's."""
 
-from typing import Any
-
 import numpy as np
 import pytest
 
@@ -46,21 +44,6 @@ def test_volume_of_the_rings_converges_to_the_core_s(core: Core) -> None:
     assert errors[2] < max(errors[0] / 8, 1e-4)
 
 
-@CORES
-def test_rings_lie_end_to_end_with_the_breaks_on_their_edges(core: Core) -> None:
-    rings = rings_of(core, 20, 16)
-    station = core.mass_properties.centre_of_mass - rings.station
-    lateral = rings.half_axial != 0
-    low, high = (station[lateral] + sign * rings.half_axial[lateral] for sign in (1, -1))
-    np.testing.assert_allclose(low[1:], high[:-1], atol=1e-15)
-    assert low[0] == pytest.approx(0.0, abs=1e-15)
-    assert high[-1] == pytest.approx(core.length)
-    for station_of_break in core.breaks:
-        assert np.abs(high - station_of_break).min() < 1e-12
-    np.testing.assert_allclose(rings.radius[lateral], core.radius(station[lateral]), rtol=1e-12)
-    np.testing.assert_allclose(-rings.half_radial[lateral], (core.radius(low) - core.radius(high)) / 2, atol=1e-12)
-
-
 @pytest.mark.parametrize("around", [5, 16])
 def test_azimuths_are_their_own_mirror_images_half_a_patch_on_from_ring_to_ring(around: int) -> None:
     even, odd = azimuths_of(around).reshape(2, around)
@@ -71,22 +54,3 @@ def test_azimuths_are_their_own_mirror_images_half_a_patch_on_from_ring_to_ring(
         mirrored = directions.conj()
         apart = np.abs(directions[:, None] - mirrored)
         np.testing.assert_allclose(apart.min(axis=1), 0.0, atol=1e-12)
-
-
-@CORES
-def test_turns_are_half_the_change_of_the_normal_over_a_ring(core: Core) -> None:
-    # From the middles of neighbouring rings: exact to second order within a smooth stretch of the profile.
-    rings = rings_of(core, 400, 16)
-    lateral = rings.half_axial != 0
-    station = core.mass_properties.centre_of_mass - rings.station[lateral]
-    half = np.abs(rings.half_axial[lateral])
-    inside = 1e-4 * half
-
-    def normals(at: Any) -> Any:
-        slope = (core.radius(at + inside) - core.radius(at - inside)) / (2 * inside)
-        return np.stack([slope, np.ones_like(slope)]) / np.hypot(slope, 1.0)
-
-    low, high = normals(station - 0.99 * half), normals(station + 0.99 * half)
-    turns = np.stack([rings.turn_axial, rings.turn_radial])[:, lateral]
-    np.testing.assert_allclose(turns, (high - low) / 2, rtol=0.02, atol=1e-6)
-    np.testing.assert_array_equal(np.stack([rings.turn_axial, rings.turn_radial])[:, ~lateral], 0.0)

@@ -12,20 +12,6 @@ from warpimpact.solver.memory import Memory
 CAMPAIGN = Path(__file__).parents[3] / "campaigns" / "slotted_plate.toml"
 
 
-def test_every_shot_is_launched_once(monkeypatch: pytest.MonkeyPatch) -> None:
-    campaign, launched, launch = Campaign.from_toml(CAMPAIGN), list[int](), Memory.launch
-
-    def recorded(self: Memory, *arguments: Any) -> int:
-        launched.extend(range(arguments[-2], sum(arguments[-2:])))
-        return launch(self, *arguments)
-
-    monkeypatch.setattr(Memory, "launch", recorded)
-    monkeypatch.setattr("warpimpact.solver.marching.MAX_DOUBLINGS", 1)
-    shots = campaign.sampler().shots(0, 700)
-    simulate(campaign.scene, shots, numerics=Numerics(level=0), device="cpu", threads=3)
-    assert sorted(launched) == [*range(700)]
-
-
 def test_an_interrupt_does_not_wait_for_a_long_shot(monkeypatch: pytest.MonkeyPatch) -> None:
     campaign, launch, over = Campaign.from_toml(CAMPAIGN), Memory.launch, Event()
     begun, ended = list[int](), list[int]()

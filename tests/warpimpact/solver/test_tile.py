@@ -4,7 +4,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-from scipy import ndimage
 
 from warpimpact.scene import (
     CirclePattern,
@@ -14,7 +13,7 @@ from warpimpact.scene import (
     TrianglePattern,
 )
 from warpimpact.solver.grid import FINER, tent_taps
-from warpimpact.solver.tile import BLUR, check_tiles, forget_tiles, tile_of
+from warpimpact.solver.tile import check_tiles, forget_tiles, tile_of
 from warpimpact.solver.worker import Cancelled
 
 PLATE = Plate(thickness=4e-3, resistance=2.6e9, degradation_length=0.6e-3)
@@ -36,29 +35,6 @@ def test_tile_has_the_plate_s_share_of_material(pattern: Any) -> None:
     assert max(tile.dy, tile.dz) <= spacing
     extent = np.array(tile.material.shape) * (tile.dy, tile.dz)
     np.testing.assert_allclose(extent, pattern.period, rtol=1e-12)
-
-
-HAIRLINES = SlotPattern(
-    length="6 mm",
-    width="0.05 mm",
-    spacing=["12 mm", "8 mm"],
-    holes=[["0 mm", "0 mm", "20 deg"], ["6 mm", "3 mm", "-70 deg"]],
-)
-
-
-@pytest.mark.parametrize(("pattern", "spacing"), [(HAIRLINES, 0.25e-3), (PATTERNS[0], 0.15e-3), (PATTERNS[1], 0.08e-3)])
-def test_tile_looks_closely_only_where_edges_are_and_misses_none(pattern: Any, spacing: float) -> None:
-    tile = tile_of(PLATE.model_copy(update={"pattern": pattern}), spacing)
-    samples = 24
-    y, z = (
-        (np.arange(samples * n) + 0.5) * d / samples
-        for n, d in zip(tile.material.shape, (tile.dy, tile.dz), strict=True)
-    )
-    solid = ~pattern.is_hole(y[:, None], z)
-    sharp = solid.reshape(tile.material.shape[0], samples, -1, samples).mean(axis=(1, 3))
-    shares = ndimage.uniform_filter(sharp, BLUR, mode="wrap")
-    np.testing.assert_allclose(tile.material, shares, rtol=0, atol=1.0 / samples)  # of an edge along a row of points
-    assert tile.material.mean() == pytest.approx(1.0 - pattern.open_area, abs=1e-4)
 
 
 def test_tile_is_kept_for_the_next_shots_but_not_for_another_pattern() -> None:
