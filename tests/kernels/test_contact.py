@@ -152,23 +152,3 @@ def test_damping_tends_to_half_the_derivative_of_the_load(law: dict[str, float],
     # First order in the patches, and at most an eighth of the angle of a patch.
     assert errors[1] < errors[0] / 6
     assert errors[1] < 2 * np.pi / 384 / 8
-
-
-@pytest.mark.parametrize("length", [0.3e-3, 1.6e-3])
-def test_window_that_just_holds_a_step_gives_what_a_wide_one_gives(length: float, device: str) -> None:
-    # Neighbouring slots are poisoned, so a read across the edge is visible.
-    surface = surface_of(Surface, OGIVE, 12, 16, device)
-    pose = {"position": np.array([[-3e-3, 0.0, 0.0]]), "attitude": ALIGNED, "velocity": np.array([[800.0, 0, 0]])}
-    law, wide = law_of(decay_rate=np.log(0.8) / 1e-6), 96
-
-    def within(window: tuple[int, int]) -> Loaded:
-        return loaded(surface, law, device, **pose, cells=window, length=length, spare=1)
-
-    expected = within((wide, wide))
-    assert expected.load["touching"].all()
-    for axis in ("y", "z"):
-        windows = [(cells, wide) if axis == "y" else (wide, cells) for cells in range(wide - 2, 0, -2)]
-        *_, narrowest = (found for found in map(within, windows) if found.inside[0])
-        cut = tuple(slice(wide // 2 - n // 2, wide // 2 + n // 2) for n in narrowest.exposure.shape[1:])
-        np.testing.assert_array_equal(narrowest.force, expected.force)
-        np.testing.assert_array_equal(narrowest.exposure[0], expected.exposure[0][cut])

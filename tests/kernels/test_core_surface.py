@@ -152,6 +152,17 @@ def test_share_is_that_of_two_boxes_convolved(ratio: float, device: str) -> None
     np.testing.assert_allclose(share_behind(depth, extent, motion, device), expected, atol=1e-7)
 
 
+@pytest.mark.parametrize(("extent", "motion"), [(1e-4, 0.0), (0.0, 1e-4), (1e-4, 1e-7)])
+def test_share_of_a_box_alone_has_its_corners_rounded_only(extent: float, motion: float, device: str) -> None:
+    wide = max(extent, motion)
+    depth = np.linspace(-1.5, 1.5, 301) * wide
+    sharp = np.clip(0.5 + depth / (2 * wide), 0, 1)
+    shares = share_behind(depth, extent, motion, device)
+    np.testing.assert_allclose(shares, sharp, atol=0.0026)  # narrow/(8 wide) at the corners
+    away = np.abs(np.abs(depth) - wide) > 0.021 * wide
+    np.testing.assert_allclose(shares[away], sharp[away], atol=1e-12)
+
+
 # --- Patches in a pose ---
 
 
@@ -167,6 +178,31 @@ def test_passage_immerses_every_patch_for_the_thickness(device: str) -> None:
     swept = speed * dt * found["immersed"].sum(axis=0)
     expected = np.broadcast_to(found["area"][0][:, None] * THICKNESS, swept.shape)
     np.testing.assert_allclose(swept, expected, rtol=1e-11)
+
+
+@pytest.mark.parametrize("ring", ["even", "odd"])
+def test_patch_along_the_face_is_in_or_out_at_once(ring: str, device: str) -> None:
+    # A cone that lies with one line of its mantle in the face: patches there, of every other ring, have no extent
+    # across it.
+    around = 16
+    half_angle = np.arctan2(CONE.max_radius, CONE.cone_length)
+    azimuth = np.pi / around if ring == "even" else 0.0
+    axis = np.array([np.sin(half_angle), 0.0, np.cos(half_angle)])
+    outward = np.array([np.cos(half_angle), 0.0, -np.sin(half_angle)])
+    sideways = np.cross(axis, outward)
+    right = np.cos(azimuth) * outward - np.sin(azimuth) * sideways
+    up = np.sin(azimuth) * outward + np.cos(azimuth) * sideways
+    attitude = Rotation.from_matrix(np.stack([axis, right, up], axis=1)).as_quat()
+    tip = CONE.mass_properties.centre_of_mass * axis[0]  # all of the line is as deep
+    gaps = np.array([-5e-6, 5e-6])
+    position = np.stack([gaps - tip, 0 * gaps, 0 * gaps], axis=1)
+    surface = surface_of(Surface, CONE, 20, around, device)
+    found = posed(surface, device, position=position, attitude=np.stack([attitude] * 2), dt=0.0)
+    mantle = found["normal"][0, :, 0, 0] > 0.999
+    assert mantle.sum() == 6
+    out, inside = found["immersed"][:, mantle, 0]
+    np.testing.assert_allclose(out, 0.0, atol=1e-15)
+    np.testing.assert_allclose(inside, found["area"][0, mantle], rtol=1e-12)
 
 
 @pytest.mark.parametrize("slant", [0.1, np.pi])

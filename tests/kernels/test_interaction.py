@@ -98,22 +98,20 @@ def test_share_of_a_patch_is_the_mean_of_its_parts(variation: float, device: str
     np.testing.assert_allclose(fraction, shares.mean(axis=1), rtol=0, atol=1e-5 / ONSET + 1e-6 * variation / ONSET)
 
 
-@VARIATIONS
-def test_slope_is_the_derivative_of_the_share(variation: float, device: str) -> None:
-    closing, dv = (variation + ONSET) * np.linspace(-1.5, 1.5, 401), 1e-6 * ONSET
-    low, here, high = (applied(closing + d, device, variation=variation) for d in (-dv, 0.0, dv))
-    difference = (high.fraction - low.fraction) / (2 * dv)
-    # A patch that turns by little has kinks.
-    kinks = np.abs(difference - here.rise) > 2e-3 / ONSET
-    assert kinks.mean() < 0.02
-
-
 def test_small_variation_leaves_the_ramp_as_it_is(device: str) -> None:
     closing = ONSET * np.linspace(-1, 2, 301)
     for variation in (0.0, 1e-30, 1e-12):
         found = applied(closing, device, variation=variation)
         np.testing.assert_allclose(found.fraction, (closing / ONSET).clip(0, 1), rtol=0, atol=1e-5)
         assert np.abs(found.shift * variation).max() < 1e-9
+
+
+def test_wall_that_slides_along_itself_does_not_touch(device: str) -> None:
+    # Rounding in float32 gives v_p·n of some 1e-7 of the speed (docs/model.md §4: a small stated threshold).
+    speed = 800.0
+    fraction = applied(speed * np.array([1e-7, -1e-7, 1e-6, 1e-4]), device, speed=speed).fraction
+    np.testing.assert_array_equal(fraction[:3], 0.0)
+    assert 0 < fraction[3] < 0.1 * speed / ONSET
 
 
 def test_onset_follows_the_step_and_a_core_that_slows_down(device: str) -> None:

@@ -253,3 +253,43 @@ def test_overshooting_kick_stops_at_the_least_energy_along_it(overshoot: float, 
     np.testing.assert_allclose(after["velocity"], start.velocity - applied * along, rtol=0, atol=1e-9)
     np.testing.assert_allclose(means["force"], -applied * MASS * along, rtol=0, atol=1e-11)
     np.testing.assert_array_equal(after["angular_momentum"], start.angular_momentum)
+
+
+def swing(
+    body: Body, before: wp.array(dtype=struct.Change), last: struct.Change, swings: wp.array(dtype=wp.bool)
+) -> None:
+    i = wp.tid()
+    swings[i] = use.rigid_body.swings(body, before[i], last)
+
+
+SWING = VARIANT.kernel(swing)
+
+
+def test_a_core_swings_when_a_step_turns_back_the_last_one(device: str) -> None:
+    # Changes across the axis that are smaller than 1e-4 of those along it are rounding.
+    across = np.array([-1.0, -1.2e-4, -0.8e-4, 0.0, 0.8e-4, 1.0])
+    before = records(struct.Change, device, velocity=np.stack([np.ones(6), across, 0.0 * across], axis=1))
+    last, swings = struct.Change(), poisoned(6, wp.bool, device)
+    last.velocity = vec3(1.0, 1.0e-4, 0.0)
+    wp.launch(SWING, 6, inputs=[paper_body(), before, last], outputs=[swings], device=device)
+    np.testing.assert_array_equal(swings.numpy(), [True, True, False, False, False, False])
+
+
+def passing(
+    body: Body, axis: vec3, momentum: vec3, ahead: real, velocity: real, distance: real, axes: wp.array(dtype=vec3)
+) -> None:
+    axes[0] = use.rigid_body.axis_at(body, axis, momentum, ahead, velocity, distance)
+
+
+PASSING = VARIANT.kernel(passing)
+
+
+def test_a_point_that_swings_at_half_of_the_speed_of_flight_is_found(device: str) -> None:
+    # The axis turns about z from 30° to 90°, where the point swings straight along x: each iteration halves the error.
+    ahead, velocity, rate = 1.0e-2, 100.0, 5.0e3
+    time = np.deg2rad(60.0) / rate
+    axes = wp.empty(1, dtype=vec3, device=device)
+    start = vec3(*np.cos(np.deg2rad([30.0, 60.0, 90.0])))
+    inputs = [paper_body(), start, vec3(0.0, 0.0, TRANSVERSE * rate), ahead, velocity, velocity * time]
+    wp.launch(PASSING, 1, inputs=inputs, outputs=[axes], device=device)
+    np.testing.assert_allclose(axes.numpy()[0], [0.0, 1.0, 0.0], atol=1e-12)

@@ -10,7 +10,6 @@ from warpimpact.scene import Interaction, Layer, Numerics, Plate, Record, Scene,
 from warpimpact.solver import grid, marching
 from warpimpact.solver.simulate import simulate
 
-from .extremes import drawn
 from .scenes import BASE, PAPER_CORE, STANDOFFS, paper_plate, scattered_hits, shots_at
 
 SHOTS = 24
@@ -38,11 +37,9 @@ CASES = {
     "bending": Case(bending=True),
     "layers": Case(behind=(BASE,)),
     "plates of their own": Case(varies=("resistance", "thickness", "degradation", "mass")),
-    "turned back at two layers": Case(),
 }
 """All kinds of targets and schemes. The block layout has a build for every size of window, and another build may round
-otherwise: tests/kernels/test_block.py. The last scene is drawn: cores come again where their own first window ends
-and that of another shot does not."""
+otherwise: tests/kernels/test_block.py."""
 RANGES = {"resistance": (1.5e9, 3.5e9), "thickness": (2e-3, 6e-3), "degradation": (0.6, 0.95), "mass": (3e-3, 6e-3)}
 
 
@@ -50,9 +47,6 @@ RANGES = {"resistance": (1.5e9, 3.5e9), "thickness": (2e-3, 6e-3), "degradation"
 def scene_of(name: str) -> tuple[Scene, Shots, Numerics]:
     """Velocities, obliquities and attitudes that differ from hit to hit, so that windows and steps do."""
     case, rng = CASES[name], np.random.default_rng(1)
-    if name == "turned back at two layers":
-        scene, shots, precision = drawn(np.random.default_rng([1, 221]).random, hits=3)
-        return scene, shots, Numerics(level=0, precision=precision)
     arrivals = {"velocity": (300.0, 900.0), "obliquity": (0.0, 60.0), "azimuth": (0.0, 360.0), "spin": (0.0, 2e4)}
     arrivals |= dict.fromkeys(("pitch", "yaw"), (-10.0, 10.0))
     hits = scattered_hits(SHOTS) + rng.normal(0.0, 2e-3, (2, SHOTS))
@@ -112,8 +106,7 @@ def marched(monkeypatch: pytest.MonkeyPatch) -> list[int]:
     return counts
 
 
-# The last core may come again beyond its window, so that the width of its own first one counts.
-@pytest.mark.parametrize("name", [name for name in CASES if name != "turned back at two layers"])
+@pytest.mark.parametrize("name", CASES)
 def test_shots_that_leave_narrow_windows_have_the_bits_of_wide_ones(
     name: str, marched: list[int], monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -118,43 +118,6 @@ def test_a_core_that_touches_nothing_flies_on_as_by_the_fast_law() -> None:
     assert slow.energy_loss[0] == 0.0
 
 
-def test_two_meshes_agree_on_a_solid_plate() -> None:
-    """The scheme is of second order but for erosion: from 0.8 to 0.57 mm the velocity moves by less than 5 % of its
-    loss."""
-    coarse, finer = (computed(SOLID, shots_at((0.0, 0.0)), spacing=spacing) for spacing in (0.8e-3, 0.57e-3))
-    lost = 825.0 - finer.residual_velocity[0]
-    assert 50.0 < lost < 250.0
-    assert coarse.residual_velocity[0] == pytest.approx(finer.residual_velocity[0], abs=0.05 * lost)
-
-
-def test_a_layer_has_its_mesh_where_the_core_crosses_it(coarse: float) -> None:
-    """A core that the edge of a hole has turned aside meets the second plate more than a radius beside its line of
-    fire: there is the middle of the fine part, up to half an element."""
-    scene = Scene(core=CORE, target=(HOLES, Layer(thickness=2e-3, resistance=2.6e9, gap=100e-3)))
-    shots = shots_at((2e-3, 0.0), velocity=600.0)
-    conditions = elements.memory_of(scene, shots, Worker("cpu", 1)).prepared.conditions
-    march = encounter.march_of(scene, shots, 0, Continuum(flows=(STEEL,), spacing=coarse), conditions)
-    list(march.hit.steps())
-    assert march.hit.waits
-    state, before = march.hit.flight["state"], march.hit.mesh
-    position, velocity = np.array(state["position"]), np.array(state["velocity"])
-    crossing = position[1] + velocity[1] / velocity[0] * (104e-3 - position[0])
-    assert abs(crossing) > CORE.max_radius
-    hit = march.extended()
-    along = hit.sheets[1].edges[0]
-    fine = np.diff(along) < 1.01 * coarse
-    assert 0.5 * (along[:-1][fine].min() + along[1:][fine].max()) == pytest.approx(crossing, abs=0.5 * coarse)
-    for name in ("position", "velocity", "stress", "alive", "work"):
-        kept, first = (getattr(mesh, name).numpy().reshape(-1, mesh.size) for mesh in (hit.mesh, before))
-        assert np.array_equal(kept[:, : before.size], first), name
-    assert hit.mesh.touched.numpy().tolist() == [before.touched.numpy()[0], -1.0]
-    assert before.touched.numpy()[0] > 0.0
-    result = march.ended()
-    assert result.status == Status.PERFORATED
-    assert result.touched.tolist() == [True, True]
-    assert result.energies.imbalance < 0.01
-
-
 def test_hits_that_march_together_end_as_those_that_march_alone(
     coarse: float, monkeypatch: pytest.MonkeyPatch, device: str
 ) -> None:

@@ -1,7 +1,6 @@
 """What the continuum refuses, and which of its hits are failures."""
 
 from dataclasses import replace
-from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
@@ -145,12 +144,3 @@ def test_a_mesh_covers_what_a_turned_core_sweeps_and_its_way_through_the_layer()
     assert along_y == pytest.approx((0.05 + way, 1.6 * (2.5 * radius + way), 1.6 * (5.0 * radius + way)))
     assert along_z == pytest.approx((0.0, 1.6 * (2.5 * radius + swept), 1.6 * (5.0 * radius + swept)))
     assert nodes_of(PLATE.thickness, 1e-3, (along_y, along_z)) == layer.mesh(*state).nodes
-
-
-def test_a_set_of_ones_own_is_a_table(tmp_path: Path) -> None:
-    file = tmp_path / "mine.toml"
-    file.write_text('name = "mine"\nyield_stress = "900 MPa"\nfracture_work = "400 MPa"\n', encoding="utf-8")
-    assert flow_entry(str(file)).flow.yield_stress == 900e6
-    file.write_text('name = "mine"\nyield_stress = "fast"\nfracture_work = "400 MPa"\n', encoding="utf-8")
-    with pytest.raises(ValueError, match=r"mine.toml: yield_stress: got \"fast\""):
-        flow_entry(str(file))

@@ -16,14 +16,7 @@ from warpimpact.runs.replay import replay
 from warpimpact.scene import (
     PRESETS,
     Accuracy,
-    CirclePattern,
-    Layer,
     Numerics,
-    OgiveCore,
-    Plate,
-    Record,
-    Scene,
-    Target,
 )
 from warpimpact.solver.accuracy import (
     ERROR_PER_CHANGE,
@@ -37,16 +30,6 @@ from warpimpact.solver.accuracy import (
 )
 from warpimpact.solver.resolution import LADDER, TooManySteps
 
-CORE = OgiveCore(diameter=6.17e-3, crh=3, length=27e-3, mass=5.25e-3)
-PLATE = Plate(
-    thickness=6e-3,
-    resistance=2e9,
-    shear_coefficient=0.08,
-    degradation=0.85,
-    pattern=CirclePattern(diameter=7e-3, spacing=(10e-3, 17.3e-3), staggered=True),
-)
-SCENE = Scene(core=CORE, target=PLATE, record=Record(standoffs=(0.05, 0.13)))
-BASE = Layer(thickness=6.6e-3, resistance=5e9, gap=40e-3, shear_coefficient=0.08)
 ASKED = Accuracy(residual_velocity=1.0)
 FINEST = len(LADDER) - 3
 Speeds = Callable[[int], NDArray[np.float64]]
@@ -148,16 +131,6 @@ def test_hits_that_end_otherwise_behind_layers_count_in_the_status() -> None:
         assert found.errors["residual_velocity_error"] == 0.0
     alone = hit_errors(outcomes_of(speeds), outcomes_of(np.where(np.arange(64) < 7, 0.0, speeds)), ASKED, (True,))
     assert alone.errors["residual_velocity_error"] == ERROR_PER_CHANGE * 500.0  # a core that stops has the speed 0
-
-
-@pytest.mark.parametrize(("gap", "free"), [(0.0, False), (20e-3, False), (40e-3, True)])
-def test_the_velocity_within_a_laminate_counts_in_no_error(gap: float, free: bool) -> None:
-    layers = (PLATE, BASE.model_copy(update={"gap": gap}))
-    assert SCENE.model_copy(update={"target": Target(layers=layers)}).free_behind == (free, True)
-    coarse = outcomes_of(np.zeros(4), layered=True)
-    fine = coarse.assign(layer_residual_velocity=np.array([[9.0, 0.0]] * 4))
-    error = hit_errors(coarse, fine, ASKED, (free, True)).errors["residual_velocity_error"]
-    assert error == 9.0 * free * ERROR_PER_CHANGE
 
 
 def test_a_computation_that_fails_has_no_bound_and_what_is_not_asked_for_none() -> None:

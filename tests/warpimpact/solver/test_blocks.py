@@ -1,12 +1,9 @@
 """The block layout on request: what it takes, what it refuses, and windows that do not fit a block."""
 
-import re
-from typing import Any
-
 import numpy as np
 import pytest
 
-from warpimpact.scene import Numerics, Plate, Record, Scene
+from warpimpact.scene import Numerics, Plate, Scene
 from warpimpact.solver import grid, simulate
 from warpimpact.solver.prepare import prepare
 from warpimpact.solver.resolution import LADDER, at_level
@@ -38,17 +35,3 @@ def test_shots_that_leave_the_window_of_their_block_are_computed_in_the_simple_l
     simple, block = (simulate.simulate(SCENE, shots, numerics=n) for n in (SIMPLE, BLOCK))
     np.testing.assert_array_equal(block.status, simple.status)
     np.testing.assert_array_equal(block.residual_velocity, simple.residual_velocity)
-
-
-@pytest.mark.parametrize(
-    ("scene", "numerics", "words"),
-    [
-        ({}, {"precision": "double"}, 'numerics.precision = "double"'),
-        ({}, {"scheme": "nodal"}, 'numerics.scheme = "nodal"'),
-        ({"record": Record(bending=True)}, {}, "output.bending = true"),
-    ],
-)
-def test_what_a_block_does_not_compute_is_refused(scene: dict[str, Any], numerics: dict[str, Any], words: str) -> None:
-    whole = Scene(**{"core": PAPER_CORE, "target": PLATE} | scene)
-    with pytest.raises(ValueError, match=re.escape(f'numerics.layout = "block" cannot be combined with {words}: a')):
-        simulate.simulate(whole, shots_at(THREE), numerics=Numerics(layout="block", **numerics))
