@@ -10,6 +10,8 @@ from __future__ import annotations
 
 import logging
 import math
+import time
+import warnings
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from decimal import ROUND_CEILING, Context
@@ -35,6 +37,8 @@ A limit takes the time of some 35 hits."""
 PILOT_SECONDS = 10.0
 """Seconds of a core that a pilot may take, as foreseen (`Prepared.seconds`), so that a level depends on no machine. It
 bounds a hit to some 10 ms; single plates get to the end of the ladder."""
+LONGEST_PILOT = 60.0
+"""Seconds after which a pilot ends. Cores that tumble or stop take longer than foreseen."""
 ERROR_PER_CHANGE = 1.5
 """Error of a level over its change to the level two finer: 1.33 where errors halve from level to level, and a margin
 (tests/benchmarks/random_scenes.py). Errors that differ by less count as equal."""
@@ -55,6 +59,10 @@ class LevelErrors(NamedTuple):
 
     errors: Mapping[str, float]
     excess: float
+
+
+class TooLong(Exception):
+    """A pilot would take longer than it may."""
 
 
 @dataclass(frozen=True)
@@ -104,7 +112,19 @@ def choose_level(
         errors: errors of a level, from its outcomes and those two levels finer.
         seconds: foreseen time of the pilot's hits at a level.
     """
-    tried: dict[int, LevelErrors] = {}
+    tried, taken = dict[int, LevelErrors](), dict[int, float]()
+
+    def timed(level: int) -> Outcomes:
+        if level not in taken:
+            if (
+                sum(taken.values()) + max((2.0 ** (level - at) * taken[at] for at in taken), default=0.0)
+                > LONGEST_PILOT
+            ):
+                raise TooLong
+            begin = time.perf_counter()
+            outcomes(level)
+            taken[level] = time.perf_counter() - begin
+        return outcomes(level)
 
     def result(level: int) -> PilotResult:
         (found, excess), share = tried[level], numerics.asked.share
@@ -114,8 +134,15 @@ def choose_level(
         try:
             if tried and sum(seconds(at) for at in range(first, level + 3)) > PILOT_SECONDS:
                 break
-            tried[level] = errors(outcomes(level), outcomes(level + 2))
+            tried[level] = errors(timed(level), timed(level + 2))
         except (MemoryError, TooManySteps):
+            break
+        except TooLong:
+            warnings.warn(
+                f"the pilot ended after {sum(taken.values()):.0f} s, as its hits at level {max(taken)} took "
+                f"{taken[max(taken)]:.2g} s: the resolution may be too coarse; give numerics.level to choose it",
+                stacklevel=2,
+            )
             break
         _logger.info("pilot: level %d errs by %s", level, errors_text(tried[level].errors))
         if tried[level].excess <= 1.0:

@@ -18,7 +18,7 @@ from warpimpact.solver.limit_search import LimitSearch
 from warpimpact.solver.marching import Progress
 from warpimpact.solver.prepare import prepare
 from warpimpact.solver.resolution import at_level, coarsest_level, level_of
-from warpimpact.solver.simulate import computed, spread
+from warpimpact.solver.simulate import build_kernels, computed, spread
 from warpimpact.solver.worker import Worker
 
 Array = NDArray[np.float64]
@@ -201,7 +201,9 @@ def pilot_of_limits(
     def errors(coarse: Outcomes, fine: Outcomes) -> LevelErrors:
         return limit_errors(getattr(coarse, name), getattr(fine, name), asked, spec.quantity)
 
-    return choose_level(numerics, coarsest_level(draft / asked.limit), outcomes, errors, seconds)
+    first = coarsest_level(draft / asked.limit)
+    build_kernels(scene, pilot, at_level(first, numerics), worker)
+    return choose_level(numerics, first, outcomes, errors, seconds)
 
 
 def limits(

@@ -103,7 +103,14 @@ def pilot_of(
     def errors(coarse: Outcomes, fine: Outcomes) -> LevelErrors:
         return hit_errors(coarse, fine, asked, scene.free_behind)
 
-    return choose_level(numerics, coarsest_level(asked.strictness), outcomes, errors, seconds)
+    first = coarsest_level(asked.strictness)
+    build_kernels(scene, pilot, at_level(first, numerics), worker)
+    return choose_level(numerics, first, outcomes, errors, seconds)
+
+
+def build_kernels(scene: Scene, shots: Shots, numerics: Numerics, worker: Worker) -> None:
+    """Compile what shots need, so that it counts in no time that they take."""
+    Memory(prepare(scene, shots, numerics), find_device(worker.device), worker.cancel).build()
 
 
 def spread(shots: Shots, most: int) -> Shots:

@@ -18,6 +18,7 @@ from warpimpact.scene import (
     Accuracy,
     Numerics,
 )
+from warpimpact.solver import accuracy as choice
 from warpimpact.solver.accuracy import (
     ERROR_PER_CHANGE,
     PILOT_SECONDS,
@@ -118,6 +119,13 @@ def test_a_pilot_ends_where_hits_take_too_long_or_do_not_fit() -> None:
         unknown, _ = chosen(speeds, first=3)
         assert (unknown.kept, unknown.numerics.level, unknown.errors) == (False, 3, {})
         assert unknown.phrase == "accuracy unknown for 90 % of the hits, not as promised"
+
+
+def test_a_pilot_ends_by_the_time_that_it_takes_and_says_so(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(choice, "LONGEST_PILOT", 0.0)
+    with pytest.warns(UserWarning, match="pilot ended after 0 s.*give numerics.level"):
+        unknown, levels = chosen(lambda level: np.full(8, 500.0))
+    assert (unknown.kept, unknown.errors, levels) == (False, {}, [0])
 
 
 def test_hits_that_end_otherwise_behind_layers_count_in_the_status() -> None:
