@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 import math
-import threading
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
-from types import ModuleType
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -15,13 +13,13 @@ from numpy.typing import NDArray
 
 from warpimpact.continuum.meshing import SheetMesh, runs_of, volumes_of
 from warpimpact.kernels.continuum import choices, fields, march_one
-from warpimpact.kernels.status import RUNNING, WAITING
+from warpimpact.kernels.status import RUNNING
 from warpimpact.kernels.variant import Variant
 from warpimpact.scene import Core
 from warpimpact.scene.flow import Flow
 from warpimpact.scene.model import Array
 from warpimpact.solver.device import find_device, load
-from warpimpact.solver.worker import NEVER, Cancel
+from warpimpact.solver.memory import built
 
 STATIONS = 2049
 """At which the radius of the core is tabulated."""
@@ -80,31 +78,17 @@ class Energies:
     radiated: float = 0.0
 
     @property
-    def contact(self) -> float:
-        """In the springs, the damping and the friction of the contact."""
-        return self.lost - self.given
-
-    @property
     def imbalance(self) -> float:
         """What is missing or too much, as a share of what was lost. A contact that gives energy counts, too."""
         if self.lost <= 0.0:
             return 0.0 if self.given == 0.0 else float("inf")
         missing = abs(self.given - self.kinetic - self.work - self.hourglass - self.radiated)
-        return (missing + max(0.0, -self.contact)) / self.lost
+        return (missing + max(0.0, self.given - self.lost)) / self.lost
 
     @property
     def hourglass_share(self) -> float:
         """Of what was lost."""
         return self.hourglass / self.lost if self.lost > 0.0 else 0.0
-
-
-_BUILDING = threading.Lock()
-
-
-def built(march: ModuleType, variant: Variant) -> Any:
-    """The build of a march for a variant: one, whichever threads ask for it."""
-    with _BUILDING:
-        return march.build(variant)
 
 
 class OneHit:
@@ -143,20 +127,10 @@ class OneHit:
         self.core = self._core(core, start)
         self.limits, rear = self.struct.Limits(), max([*(layer.rear for layer in unmeshed), float(sheets[-1].x[-1])])
         self.limits.rear, self.limits.longest = rear, 30.0 * (rear + core.length) / self.speed
-        self.limits.unmeshed = self._next_front
+        self.limits.unmeshed = unmeshed[0].front if unmeshed else math.inf
         self.left = self._put(np.full((len(sheets) + len(unmeshed), 7), np.nan), wp.float64)
         self.flights = self._flights(start)
         self.limits.impact_energy = self.core_energy
-
-    @property
-    def _next_front(self) -> float:
-        """Front face of the next layer that has no mesh [m]; infinite if all have one."""
-        return self.unmeshed[0].front if self.unmeshed else math.inf
-
-    @property
-    def waits(self) -> bool:
-        """Whether the core is in front of a layer that has no mesh yet."""
-        return bool(self.flight["status"] == WAITING)
 
     def extend(self, sheet: SheetMesh) -> None:
         """Give the next layer its mesh, at rest; all else stays as it is, and the march can go on."""
@@ -170,7 +144,7 @@ class OneHit:
         mesh.touched = self._put([*before.touched.numpy(), -1.0], wp.float64)
         mesh.cylinder, mesh.kick = before.cylinder, before.kick
         del self.unmeshed[0]
-        self.limits.unmeshed = self._next_front
+        self.limits.unmeshed = self.unmeshed[0].front if self.unmeshed else math.inf
         flights = self.flights.numpy()
         flights["status"] = RUNNING
         self.flights.assign(flights)
@@ -280,13 +254,6 @@ class OneHit:
             outputs=[self.flights, self.left],
             device=self.device,
         )
-
-    def steps(self, every: int = STEPS, cancel: Cancel = NEVER) -> Iterator[None]:
-        """March to the end, or to the next layer that has no mesh; yields at regular numbers of steps."""
-        while self.flight["status"] == RUNNING:
-            cancel.check()
-            self.advance(every)
-            yield
 
     @property
     def touched(self) -> NDArray[np.bool_]:

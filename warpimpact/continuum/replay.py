@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -20,8 +21,6 @@ from warpimpact.solver.worker import Worker
 
 STRIDE = 20
 """Steps between two rows of a history."""
-MOST_FRAMES = 64
-"""Frames of a mesh that are kept until the end of the hit is known; then they are thinned to every other one."""
 CORNERS = ((0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0), (0, 0, 1), (1, 0, 1), (1, 1, 1), (0, 1, 1))
 """Corners of an element along x, y and z, in the order of VTK."""
 
@@ -37,9 +36,14 @@ def replay_continuum(scene: Scene, shots: Shots, continuum: Continuum, snapshots
     memory = memory_of(scene, shots, Worker("cpu", 1))
     for wider in WIDER:
         march = march_of(scene, shots, 0, continuum, memory.prepared.conditions, wider=wider)
-        result, rows, frames = _followed(march, has_frames=snapshots > 0)
+        result, rows, _ = _followed(march, [])
         if result.status is not Status.LEFT_WINDOW:
             break
+    shown = np.unique(np.linspace(0, len(rows) - 1, snapshots).round().astype(int))
+    frames = list[Frame]()
+    if snapshots:
+        march = march_of(scene, shots, 0, continuum, memory.prepared.conditions, wider=wider)
+        _, _, frames = _followed(march, shown)
     start = march.hit.start
     body = scene.core.mass_properties._replace(
         mass=start.mass, inertia_axial=start.inertia_axial, inertia_transverse=start.inertia_transverse
@@ -49,33 +53,19 @@ def replay_continuum(scene: Scene, shots: Shots, continuum: Continuum, snapshots
     sheet = march.hit.sheets[0]
     # The columns of the fine part of the mesh, which are cells of one size.
     places = np.ix_(*(np.isclose(np.diff(edges), sheet.spacing, rtol=1e-6) for edges in sheet.edges))
-    shown = frames.spread(len(rows) - 1, snapshots) if snapshots else []
     y, z = (0.5 * (edges[1:] + edges[:-1]) for edges in sheet.edges)
     cell_y, cell_z = float(shots.hit_y[0]) + y[places[0][:, 0]], float(shots.hit_z[0]) + z[places[1][0]]
     material = np.asarray(sheet.solid[places], dtype=np.float64)
     elements = slice(march.hit.firsts[0], march.hit.firsts[0] + sheet.nodes)
-    planes = (frame.alive[elements].reshape(len(sheet.x), *sheet.y.shape)[:-1, :-1, :-1] for _, frame in shown)
+    planes = (frame.alive[elements].reshape(len(sheet.x), *sheet.y.shape)[:-1, :-1, :-1] for frame in frames)
     share = np.array([alive.mean(axis=0)[places] for alive in planes], dtype=np.float64)
     return Replay(
         outcomes=outcomes_of(memory, [result]),
         history=History.from_trace(trace, body),
-        plate_time=np.array([rows[row][0] for row, _ in shown]),
+        plate_time=np.array([rows[row][0] for row in shown]),
         plate=Weakened(cell_y, cell_z, share.reshape(-1, *material.shape)),
-        deformed=frames.deformed([frame for _, frame in shown]) if shown else None,
+        deformed=deformed(frames, march.hit) if frames else None,
     )
-
-
-def _followed(march: March, *, has_frames: bool) -> tuple[HitResult, list[Array], Frames]:
-    """What became of a hit, the rows of its trace, and frames of its meshes."""
-    rows, frames = list[Array](), Frames(march)
-
-    def follow(hit: OneHit) -> None:
-        rows.append(_row(hit, rows[-1] if rows else None))
-        if has_frames:
-            frames.see(len(rows) - 1)
-
-    follow(march.hit)
-    return march.ended(every=STRIDE, follow=follow), rows, frames
 
 
 class Frame(NamedTuple):
@@ -86,51 +76,37 @@ class Frame(NamedTuple):
     strain: NDArray[np.float32]
 
 
-class Frames:
-    """Frames of a hit, evenly spread over its rows so far, and few."""
+def _followed(march: March, shown: Sequence[int] | NDArray[np.intp]) -> tuple[HitResult, list[Array], list[Frame]]:
+    """What became of a hit, the rows of its trace, and the meshes at some of them."""
+    rows, frames = list[Array](), list[Frame]()
 
-    def __init__(self, march: March) -> None:
-        self._march, self._kept, self._every = march, dict[int, Frame](), 1
-        self._last: tuple[int, Frame] | None = None
+    def follow(hit: OneHit) -> None:
+        if len(rows) in shown:
+            arrays = (getattr(hit.mesh, name).numpy().astype(np.float32) for name in Frame._fields)
+            frames.append(Frame(*arrays))
+        rows.append(_row(hit, rows[-1] if rows else None))
 
-    def see(self, row: int) -> None:
-        """Keep the mesh as it is at a row of the history."""
-        mesh = self._march.hit.mesh
-        names = ("position", "alive", "strain")
-        self._last = row, Frame(*(getattr(mesh, name).numpy().astype(np.float32) for name in names))
-        if row % self._every == 0:
-            self._kept[row] = self._last[1]
-        if len(self._kept) > MOST_FRAMES:
-            self._every *= 2
-            self._kept = {row: frame for row, frame in self._kept.items() if row % self._every == 0}
+    follow(march.hit)
+    return march.ended(every=STRIDE, follow=follow), rows, frames
 
-    def spread(self, rows: int, count: int) -> list[tuple[int, Frame]]:
-        """So many frames from the first row to the last one, with their rows."""
-        assert self._last is not None
-        there = self._kept | dict([self._last])
-        numbers = np.array(sorted(there))
-        wanted = np.linspace(0, rows, count)
-        nearest = np.unique([numbers[np.abs(numbers - row).argmin()] for row in wanted])
-        return [(int(row), there[int(row)]) for row in nearest]
 
-    def deformed(self, frames: list[Frame]) -> Deformed:
-        """The elements that there were at the beginning, and their nodes."""
-        hit = self._march.hit
-        elements, corners = list[NDArray[np.intp]](), list[NDArray[np.intp]]()
-        for sheet, first in zip(hit.sheets, hit.firsts, strict=True):
-            present = first + np.flatnonzero(sheet.alive)
-            offsets = [x * sheet.plane + y * sheet.row + z for x, y, z in CORNERS]
-            elements.append(present)
-            corners.append(present[:, None] + np.array(offsets))
-        numbers, chosen = np.concatenate(elements), np.concatenate(corners)
-        nodes, renumbered = np.unique(chosen, return_inverse=True)
-        frames = [whole(frame, hit) for frame in frames]
-        return Deformed(
-            corners=renumbered.reshape(chosen.shape).astype(np.int32),
-            position=np.array([frame.position.reshape(3, -1)[:, nodes].T for frame in frames]),
-            left=np.array([frame.alive[numbers] > 0.0 for frame in frames]),
-            strain=np.array([frame.strain[numbers] for frame in frames]),
-        )
+def deformed(frames: list[Frame], hit: OneHit) -> Deformed:
+    """The elements that there were at the beginning, and their nodes."""
+    elements, corners = list[NDArray[np.intp]](), list[NDArray[np.intp]]()
+    for sheet, first in zip(hit.sheets, hit.firsts, strict=True):
+        present = first + np.flatnonzero(sheet.alive)
+        offsets = [x * sheet.plane + y * sheet.row + z for x, y, z in CORNERS]
+        elements.append(present)
+        corners.append(present[:, None] + np.array(offsets))
+    numbers, chosen = np.concatenate(elements), np.concatenate(corners)
+    nodes, renumbered = np.unique(chosen, return_inverse=True)
+    frames = [whole(frame, hit) for frame in frames]
+    return Deformed(
+        corners=renumbered.reshape(chosen.shape).astype(np.int32),
+        position=np.array([frame.position.reshape(3, -1)[:, nodes].T for frame in frames]),
+        left=np.array([frame.alive[numbers] > 0.0 for frame in frames]),
+        strain=np.array([frame.strain[numbers] for frame in frames]),
+    )
 
 
 def whole(frame: Frame, hit: OneHit) -> Frame:

@@ -6,7 +6,7 @@ On a GPU many hits march together, by a thread for each node and each element of
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from functools import partial
 from typing import Any
@@ -16,7 +16,7 @@ import warp as wp
 from numpy.typing import NDArray
 
 from warpimpact.continuum.encounter import WIDER, HitResult, March, cost_of, line_of_flight, march_of
-from warpimpact.continuum.one_hit import STEPS, OneHit, axis_of, built
+from warpimpact.continuum.one_hit import STEPS, OneHit, axis_of
 from warpimpact.kernels.continuum import march_many
 from warpimpact.kernels.continuum.fields import PIECE
 from warpimpact.kernels.status import RUNNING, WAITING, Status
@@ -24,10 +24,9 @@ from warpimpact.records.outcomes import Outcomes
 from warpimpact.records.registry import ENERGY_IMBALANCE, ERODED_ELEMENTS, HOURGLASS_SHARE
 from warpimpact.scene import Numerics, Scene, Shots
 from warpimpact.scene.flow import Continuum
-from warpimpact.scene.model import Array
 from warpimpact.solver.device import block_size, cores, find_device, free_memory, load
 from warpimpact.solver.marching import Progress
-from warpimpact.solver.memory import MEMORY_SHARE, Memory
+from warpimpact.solver.memory import MEMORY_SHARE, Memory, built
 from warpimpact.solver.prepare import prepare
 from warpimpact.solver.simulate import simulate as by_fast_law
 from warpimpact.solver.worker import NEVER, Cancel, Worker
@@ -64,17 +63,14 @@ def simulate(
         ValueError, MemoryError: as in `prepare`; or the continuum does not compute this (`check_continuum`).
     """
     if not isinstance(numerics, Continuum):
-        given: dict[str, Any] = {"device": device, "threads": threads, "progress": progress, "cancel": cancel}
-        return by_fast_law(scene, shots, numerics=numerics, **given)
+        return by_fast_law(
+            scene, shots, numerics=numerics, device=device, threads=threads, progress=progress, cancel=cancel
+        )
     return simulate_elements(scene, shots, numerics, Worker(device, threads, cancel), progress)
 
 
 def check_continuum(scene: Scene, shots: Shots, continuum: Continuum) -> None:
-    """Refuse what the continuum does not compute.
-
-    Raises:
-        ValueError: names what it is.
-    """
+    """Refuse what the continuum does not compute, by a ValueError that names it."""
     if scene.record.bending:
         raise ValueError("the continuum has no bending moment of its rigid core; leave out output.bending")
     if len(continuum.flows) > len(scene.target.layers):
@@ -98,9 +94,14 @@ def simulate_elements(
 
     def computed(numbers: list[int], wider: float) -> Iterator[tuple[int, HitResult]]:
         if not device.is_cpu:
-            return together((march(k, device=device.alias, wider=wider) for k in numbers), worker.cancel)
+            yield from together((march(k, device=device.alias, wider=wider) for k in numbers), worker.cancel)
+            return
         compute = lambda k: march(k, wider=wider).ended(worker.cancel)  # noqa: E731
-        return _in_threads(compute, numbers, threads)
+        if threads == 1:  # in this thread, whose time counts
+            yield from enumerate(map(compute, numbers))
+            return
+        with ThreadPoolExecutor(threads) as pool:
+            yield from enumerate(pool.map(compute, numbers))
 
     hits: dict[int, HitResult] = {}
     for wider in WIDER:
@@ -119,15 +120,11 @@ ANNOUNCED_SECONDS, ANNOUNCED_BYTES = 20.0, 2**28
 """Time and memory of a hit from which they are announced."""
 
 
-def check_cost(scene: Scene, shots: Shots, continuum: Continuum, threads: int, free: int | None = None) -> str:
+def check_cost(scene: Scene, shots: Shots, continuum: Continuum, threads: int) -> str:
     """What the most expensive hit takes on a CPU, in words, before anything is meshed; empty if that is little.
 
-    Args:
-        threads: hits that are computed at a time.
-        free: free memory [bytes]; by default that of the machine.
-
     Raises:
-        MemoryError: it takes too much memory or time; the message is for the user.
+        MemoryError: so many at a time take too much memory, or one too much time; the message is for the user.
     """
     cost = cost_of(scene, shots, continuum)
     element, needed = 1e3 * min(continuum.spacings(scene.core, scene.target)), threads * cost.bytes / 2**30
@@ -135,7 +132,7 @@ def check_cost(scene: Scene, shots: Shots, continuum: Continuum, threads: int, f
         f"a hit takes up to {cost.elements:.2g} elements of {element:.2g} mm, {cost.bytes / 2**30:.2g} GiB and some "
         f"{cost.seconds:.2g} s of a core, more if the core stops"
     )
-    allowed = MEMORY_SHARE * (free_memory() if free is None else free) / 2**30
+    allowed = MEMORY_SHARE * free_memory() / 2**30
     if needed > allowed or cost.seconds > MOST_SECONDS:
         raise MemoryError(
             f"{words}; {threads} at a time take {needed:.2g} GiB, but {allowed:.2g} GiB and {MOST_SECONDS:.0f} s are "
@@ -147,15 +144,6 @@ def check_cost(scene: Scene, shots: Shots, continuum: Continuum, threads: int, f
 def memory_of(scene: Scene, shots: Shots, worker: Worker) -> Memory:
     """What the free flight behind the target needs of some shots, on the CPU."""
     return Memory(prepare(scene, shots, Numerics(level=0, precision="double")), find_device("cpu"), worker.cancel)
-
-
-def _in_threads(compute: Callable[[int], HitResult], hits: list[int], threads: int) -> Iterator[tuple[int, HitResult]]:
-    """Results with their places, in their order; one thread is that of the caller."""
-    if threads == 1:
-        yield from enumerate(map(compute, hits))
-        return
-    with ThreadPoolExecutor(threads) as pool:
-        yield from enumerate(pool.map(compute, hits))
 
 
 def outcomes_of(memory: Memory, hits: list[HitResult]) -> Outcomes:
@@ -204,7 +192,7 @@ def _fill_passage(memory: Memory, hits: list[HitResult]) -> None:
             columns["status"][k, layer] = _layer_status(hit.status, has_left, bool(hit.touched[layer]))
             if has_left:
                 columns["velocity"][k, layer] = np.linalg.norm(velocity)
-                columns["tilt"][k, layer] = _angle(axis, flight)
+                columns["tilt"][k, layer] = math.atan2(np.linalg.norm(np.cross(axis, flight)), axis @ flight)
         resting = [layer for layer in range(layers) if columns["status"][k, layer] == Status.ARRESTED]
         if hit.status is Status.ARRESTED and resting:
             columns["stopped_in"][k] = resting[-1]
@@ -221,10 +209,6 @@ def _layer_status(status: Status, has_left: bool, touched: bool) -> Status:
     if not touched:
         return Status.NOT_REACHED
     return status if status.failed or status is Status.ARRESTED else Status.RICOCHETED
-
-
-def _angle(a: Array, b: Array) -> float:
-    return math.atan2(float(np.linalg.norm(np.cross(a, b))), float(a @ b))
 
 
 MOST = 256

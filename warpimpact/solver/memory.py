@@ -8,6 +8,7 @@ import threading
 import time
 from dataclasses import replace
 from functools import partial
+from types import ModuleType
 from typing import Any
 
 import numpy as np
@@ -51,7 +52,7 @@ class Memory:
             tile.build(cancel.check)
         variant, scene, count = prepared.variant, prepared.scene, len(prepared.shots)
         self.prepared, self.device, self.variant = prepared, device, variant
-        self.stage, self.flight = built(variant)
+        self.stage, self.flight = built(march, variant), built(free_flight, variant)
         self.put = Put(device.alias, variant.real)
         self.inputs, self._kept = inputs_of(self.stage, prepared, self.put)
         self.rings = max(len(surface.rings.station) for surface in prepared.surfaces)
@@ -194,7 +195,7 @@ class Memory:
 _BUILDING = threading.Lock()
 
 
-def built(variant: Variant) -> tuple[Any, Any]:
-    """The builds of the march and of the free flight for a variant. Threads that ask at the same time build it once."""
+def built(module: ModuleType, variant: Variant) -> Any:
+    """The build of a module for a variant: one, whichever threads ask for it."""
     with _BUILDING:
-        return march.build(variant), free_flight.build(variant)
+        return module.build(variant)

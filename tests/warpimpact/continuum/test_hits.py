@@ -41,6 +41,13 @@ def test_what_is_not_computed_is_refused(scene: Scene, shots: Shots, continuum: 
         simulate(scene, shots, numerics=continuum)
 
 
+@pytest.mark.parametrize("spacing", [1.0e-5, 1.0e-9])
+def test_a_hit_that_takes_too_much_is_refused_before_it_is_meshed(spacing: float) -> None:
+    fine = Continuum(flows=(STEEL,), spacing=spacing)
+    with pytest.raises(MemoryError, match=r"a hit takes up to .* elements of .* mm, .* GiB and .* s.*--element"):
+        simulate(Scene(core=CORE, target=PLATE), SHOT, numerics=fine, device="cpu", threads=1)
+
+
 @pytest.mark.parametrize(
     ("energies", "status"),
     [
