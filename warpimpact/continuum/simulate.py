@@ -97,11 +97,8 @@ def simulate_elements(
             yield from together((march(k, device=device.alias, wider=wider) for k in numbers), worker.cancel)
             return
         compute = lambda k: march(k, wider=wider).ended(worker.cancel)  # noqa: E731
-        if threads == 1:  # in this thread, whose time counts
-            yield from enumerate(map(compute, numbers))
-            return
-        with ThreadPoolExecutor(threads) as pool:
-            yield from enumerate(pool.map(compute, numbers))
+        with ThreadPoolExecutor(threads) as pool:  # one thread computes here, where its time counts
+            yield from enumerate(map(compute, numbers) if threads == 1 else pool.map(compute, numbers))
 
     hits: dict[int, HitResult] = {}
     for wider in WIDER:
