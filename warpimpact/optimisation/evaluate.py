@@ -211,8 +211,8 @@ def _pilot_level(design: Design, job: Job, seed: int, *, worker: Worker, report:
     levels = [campaign.numerics]
     if campaign.numerics.explicit is None:
         numerics = campaign.numerics.model_copy(update={"fidelity": fidelity, "accuracy": None})
-        scene, shots = campaign.scene, campaign.sampler().shots(0, pilot_size(numerics.asked))
-        some = shots[: pilot_size(numerics.asked, PILOT_LIMITS)]
+        scene, shots = campaign.scene, campaign.sampler().shots(0, pilot_size(numerics.required))
+        some = shots[: pilot_size(numerics.required, PILOT_LIMITS)]
         specs = [_limit_spec(campaign, measure) for measure in design.columns if measure.is_limit]
         levels = [pilot_of_limits(scene, some, spec, numerics, worker).numerics for spec in specs]
         if len(specs) < len(design.columns):

@@ -148,10 +148,10 @@ def find_resolution(
         return None
     with model_errors():
         if limit is None:
-            shots, numbers = pilot_shots(campaign, pilot_size(numerics.asked))
+            shots, numbers = pilot_shots(campaign, pilot_size(numerics.required))
             pilot = pilot_of(campaign.scene, shots, numerics, worker, report)
         else:
-            shots, numbers = pilot_shots(campaign, pilot_size(numerics.asked, PILOT_LIMITS))
+            shots, numbers = pilot_shots(campaign, pilot_size(numerics.required, PILOT_LIMITS))
             pilot = pilot_of_limits(campaign.scene, shots, limit, numerics, worker, report)
     return replace(pilot, numbers=numbers)
 

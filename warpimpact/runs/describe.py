@@ -42,7 +42,7 @@ def described(
         **campaign_attributes(campaign),
         **_numerics(campaign.numerics, campaign.impact, campaign.target, resolution),
         attr.OUTSIDE_TESTED_RANGE: json.dumps(outside_tested_range(campaign), ensure_ascii=False),
-        **_pilot(campaign.numerics.asked, pilot),
+        **_pilot(campaign.numerics.required, pilot),
         **({} if limit is None else _limit(campaign, limit)),
     }
     if names := catalogue_names(campaign):

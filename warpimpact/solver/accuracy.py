@@ -127,7 +127,7 @@ def choose_level(
         return outcomes(level)
 
     def result(level: int) -> PilotResult:
-        (found, excess), share = tried[level], numerics.asked.share
+        (found, excess), share = tried[level], numerics.required.share
         return PilotResult(at_level(level, numerics), excess <= 1.0, share, found, outcomes(level + 2))
 
     for level in range(first, len(LADDER) - 2):
@@ -148,7 +148,7 @@ def choose_level(
         if tried[level].excess <= 1.0:
             return result(level)
     if not tried:
-        return PilotResult(at_level(first, numerics), False, numerics.asked.share)
+        return PilotResult(at_level(first, numerics), False, numerics.required.share)
     alike = ERROR_PER_CHANGE * min(of_level.excess for of_level in tried.values())
     return result(next(level for level, of_level in tried.items() if of_level.excess <= alike))
 

@@ -166,7 +166,7 @@ def _limits(
     scene: Scene, shots: Shots, spec: LimitSpec, numerics: Numerics, worker: Worker, progress: Progress | None
 ) -> Limits:
     if numerics.explicit is None:
-        pilot = spread(shots, pilot_size(numerics.asked, PILOT_LIMITS))
+        pilot = spread(shots, pilot_size(numerics.required, PILOT_LIMITS))
         numerics = pilot_of_limits(scene, pilot, spec, numerics, worker).numerics
     return limits(scene, shots, spec, numerics, worker, progress)
 
@@ -184,7 +184,7 @@ def pilot_of_limits(
     Raises:
         ValueError: the accuracy has no bound on limits.
     """
-    asked, draft = numerics.asked, PRESETS["draft"].limit
+    asked, draft = numerics.required, PRESETS["draft"].limit
     if asked.limit is None or draft is None:
         raise ValueError("accuracy: needs limit, the error of a limit as a share of the median limit")
     name = str(LIMITS[spec.quantity].value)

@@ -102,7 +102,7 @@ def at_level(index: int, numerics: Numerics) -> Numerics:
 
 def level_of(numerics: Numerics) -> Level:
     """The level that supplies the settings which the numerics do not give."""
-    return LADDER[coarsest_level(numerics.asked.strictness) if numerics.level is None else numerics.level]
+    return LADDER[coarsest_level(numerics.required.strictness) if numerics.level is None else numerics.level]
 
 
 def coarsest_level(strictness: float) -> int:

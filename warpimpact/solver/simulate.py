@@ -68,7 +68,7 @@ def numerics_for(scene: Scene, shots: Shots, numerics: Numerics, worker: Worker)
     """Numerics that fix the resolution: the given ones, or what a pilot of some of the shots finds."""
     if numerics.explicit is not None:
         return numerics
-    return pilot_of(scene, spread(shots, pilot_size(numerics.asked)), numerics, worker).numerics
+    return pilot_of(scene, spread(shots, pilot_size(numerics.required)), numerics, worker).numerics
 
 
 def pilot_of(
@@ -87,7 +87,7 @@ def pilot_of(
     Raises:
         ValueError: the accuracy has no bound on outcomes.
     """
-    asked = numerics.asked
+    asked = numerics.required
     if math.isinf(asked.residual_velocity) and math.isinf(asked.tilt):
         raise ValueError("accuracy: needs residual_velocity or tilt; a limit alone is for a search of limits")
 

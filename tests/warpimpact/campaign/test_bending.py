@@ -61,6 +61,6 @@ def test_run_and_replay_tell_which_cores_break(tmp_path: Path) -> None:
     assert 0 < broken.sum() < 64
     hit = int(broken.argmax())
     time, section = (float(dataset[name][hit]) for name in ("broken_time", "broken_section"))
-    told = text_of(hit_view(replay(dataset, hit)))
-    assert f"passed the core's strength after {1e6 * time:.1f} µs, {1e3 * section:.1f} mm behind the nose." in told
+    shown = text_of(hit_view(replay(dataset, hit)))
+    assert f"passed the core's strength after {1e6 * time:.1f} µs, {1e3 * section:.1f} mm behind the nose." in shown
     assert "stayed below the core's strength" in text_of(hit_view(replay(dataset, int(broken.argmin()))))

@@ -60,7 +60,7 @@ MISTAKES = {
 
 
 @pytest.mark.parametrize(("right", "wrong", "sentence"), MISTAKES.values(), ids=MISTAKES)
-def test_a_mistake_is_told_in_one_sentence(tmp_path: Path, right: str, wrong: str, sentence: str) -> None:
+def test_a_mistake_is_shown_in_one_sentence(tmp_path: Path, right: str, wrong: str, sentence: str) -> None:
     assert CAMPAIGN.count(right) == 1
     (tmp_path / "bad_hits.csv").write_text("hit_y,hit_z\n0,0\n0,oops\n")
     path = tmp_path / "wrong.toml"

@@ -72,10 +72,10 @@ def test_names_stand_for_their_values(folder: Path) -> None:
         ({"plate": TABLES["plate"] | {"thickness": "24.992 mm"}}, "plate.resistance", 4e9),
     ],
 )
-def test_a_key_beside_a_name_overrides_it(folder: Path, changes: dict[str, Any], place: str, value: Any) -> None:
+def test_a_key_with_a_name_overrides_it(folder: Path, changes: dict[str, Any], place: str, value: Any) -> None:
     table, key = place.split(".")
-    found = getattr(getattr(read(folder, **changes), table), key)
-    assert found == (None if value is None else pytest.approx(value))
+    got = getattr(getattr(read(folder, **changes), table), key)
+    assert got == (None if value is None else pytest.approx(value))
 
 
 def test_layers_have_materials(folder: Path) -> None:
@@ -115,15 +115,15 @@ def test_the_tolerance_of_a_standard_scatters(folder: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("changes", "said"),
+    ("changes", "sentence"),
     [
         ({"core": {"threat": "30 AP M2"}}, r'core.threat: got "30 AP M2".* did you mean "\.30 AP M2"'),
         ({"core": {"threat": ".50 AP M2"}}, 'core.threat: .*has no velocity of "\\.50 AP M2"; give impact.velocity'),
         ({"plate": {"material": "plate C", "thickness": 5e-3}}, r'plate.material: got "plate C".*did you mean "plate'),
     ],
 )
-def test_what_the_catalogue_does_not_know(folder: Path, changes: dict[str, Any], said: str) -> None:
-    with pytest.raises(CampaignError, match=said):
+def test_what_the_catalogue_does_not_know(folder: Path, changes: dict[str, Any], sentence: str) -> None:
+    with pytest.raises(CampaignError, match=sentence):
         read(folder, **changes)
 
 
@@ -171,7 +171,7 @@ BEHIND = [{"thickness": "7 mm", "resistance": "4 GPa"}]
 
 # Beside each the same without what was not measured.
 @pytest.mark.parametrize(
-    ("changes", "other", "said"),
+    ("changes", "other", "sentence"),
     [
         ({"plate": STEEL | {"thickness": "1 mm"}}, {"plate": STEEL}, "thickness (plate): 0.16 calibres"),
         ({"impact": {"velocity": 200.0}}, {}, "the impact velocity: 200 m/s"),
@@ -192,11 +192,11 @@ BEHIND = [{"thickness": "7 mm", "resistance": "4 GPa"}]
     ],
 )
 def test_each_property_outside_the_tested_range_has_a_sentence(
-    folder: Path, changes: dict[str, Any], other: dict[str, Any], said: str
+    folder: Path, changes: dict[str, Any], other: dict[str, Any], sentence: str
 ) -> None:
     usual = {"plate": STEEL, "impact": {"velocity": 800.0}}
-    assert any(said in line for line in outside_tested_range(read(folder, **usual | changes)))
-    assert not any(said in line for line in outside_tested_range(read(folder, **usual | other)))
+    assert any(sentence in line for line in outside_tested_range(read(folder, **usual | changes)))
+    assert not any(sentence in line for line in outside_tested_range(read(folder, **usual | other)))
 
 
 def test_a_fit_takes_names(folder: Path) -> None:
@@ -234,7 +234,7 @@ def test_resistance_is_of_material_threat_thickness_and_angle(folder: Path) -> N
         {"plate": {"material": "plate B", "thickness": "6 mm"}},
     ],
 )
-def test_an_interval_of_the_limit_is_told_only_where_it_follows_from_the_resistance(
+def test_an_interval_of_the_limit_is_shown_only_where_it_follows_from_the_resistance(
     folder: Path, changes: dict[str, Any]
 ) -> None:
     plate = {"material": "HHA Class 1", "thickness": "6 mm"}

@@ -122,9 +122,9 @@ def test_a_result_tells_of_every_layer(result: xarray.Dataset) -> None:
     np.testing.assert_array_equal(np.isfinite(result["depth"]), rests)
     assert (status[rests, result["stopped_in"].values[rests]] == Status.ARRESTED).all()
     np.testing.assert_allclose(result["layer_front"], [0.0, 54e-3, 62e-3])
-    told = json.loads(result.attrs["layers"])
-    assert told["1"]["offset_y"]["distribution"] == "uniform"
-    assert told["2"]["gap"] == 5e-3
+    shown = json.loads(result.attrs["layers"])
+    assert shown["1"]["offset_y"]["distribution"] == "uniform"
+    assert shown["2"]["gap"] == 5e-3
 
 
 def test_layers_scatter_and_say_so(result: xarray.Dataset) -> None:

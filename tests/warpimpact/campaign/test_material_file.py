@@ -78,13 +78,13 @@ def with_own(scene: Scene, name: str, value: float) -> Scene:
 
 
 @pytest.mark.parametrize(
-    ("name", "size", "apart"),
+    ("name", "size", "distance"),
     [
         ("degradation_length", 3e-4, 0.3),
         ("quadratic", 0.2, 1e-3),
     ],
 )
-def test_shots_of_all_rows_are_computed_together(tmp_path: Path, name: str, size: float, apart: float) -> None:
+def test_shots_of_all_rows_are_computed_together(tmp_path: Path, name: str, size: float, distance: float) -> None:
     listed = campaign(tmp_path, ("count = 256", "count = 16"), **{name: size})
     shots, result = listed.sampler().shots(0, 16), run(listed, device="cpu")
     for place in (0, 9):
@@ -94,7 +94,7 @@ def test_shots_of_all_rows_are_computed_together(tmp_path: Path, name: str, size
         without = replace(shot, **{name: None})
         scene = with_own(listed.scene, name, float(result[name][place]))
         own = simulate(scene, without, numerics=numerics, device="cpu").residual_velocity
-        assert alone == pytest.approx(own, abs=apart)
+        assert alone == pytest.approx(own, abs=distance)
         of_campaign = simulate(listed.scene, without, numerics=numerics, device="cpu").residual_velocity
         assert alone != pytest.approx(of_campaign, abs=1e-2)
     assert replay(result, 9, folder=tmp_path).attrs["agreement"] == "bit-identical"

@@ -99,7 +99,7 @@ def test_a_plate_of_which_less_than_half_resists_is_doubted(unit: str, folder: P
         ),
     ],
 )
-def test_an_implausible_value_is_told(change: tuple[str, str], sentence: str, folder: Path) -> None:
+def test_an_implausible_value_is_shown(change: tuple[str, str], sentence: str, folder: Path) -> None:
     assert not warned(TEXT, folder)
     assert warned(TEXT.replace(*change), folder) == [sentence]
 
@@ -128,10 +128,10 @@ def test_what_nothing_has_is_refused_unless_it_is_allowed(change: tuple[str, str
 
 
 def test_thin_webs_and_large_holes_get_a_word(folder: Path) -> None:
-    def told(change: tuple[str, str]) -> list[str]:
+    def shown(change: tuple[str, str]) -> list[str]:
         campaign = Campaign.from_text(TEXT.replace(*change), name="text", folder=folder)
         return [sentence.split(",")[0].split(":", 2)[1] for sentence in doubted_holes(campaign.target)]
 
-    assert told(("", "")) == []
-    assert told(('diameter = "5 mm"', 'diameter = "7.9 mm"')) == [" open area of 77%", " ligaments of 0.1 mm"]
-    assert told(('thickness = "4 mm"', 'thickness = "13 mm"')) == [" ligaments of 3 mm"]
+    assert shown(("", "")) == []
+    assert shown(('diameter = "5 mm"', 'diameter = "7.9 mm"')) == [" open area of 77%", " ligaments of 0.1 mm"]
+    assert shown(('thickness = "4 mm"', 'thickness = "13 mm"')) == [" ligaments of 3 mm"]

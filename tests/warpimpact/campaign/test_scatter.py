@@ -102,7 +102,7 @@ def test_scatter_in_plate_and_core_from_file_to_result(
         ('{ distribution = "discrete", values = [1, 2], weights = [1] }', "got 2 values and 1 weights"),
     ],
 )
-def test_a_mistake_is_told_in_one_sentence(tmp_path: Path, distribution: str, sentence: str) -> None:
+def test_a_mistake_is_shown_in_one_sentence(tmp_path: Path, distribution: str, sentence: str) -> None:
     with pytest.raises(CampaignError) as caught:
         campaign_with(tmp_path, (VELOCITY, distribution))
     shown = str(caught.value).removeprefix(f"{tmp_path / 'campaign.toml'}: ")
@@ -124,7 +124,7 @@ def test_axes_that_would_flip_are_refused(tmp_path: Path) -> None:
         ("hit_y,hit_z,speed\n0,0,3\n", 'line 1: got "hit_y,hit_z,speed", but the header must be hit_y,hit_z and then'),
     ],
 )
-def test_a_bad_list_is_told(tmp_path: Path, text: str, sentence: str) -> None:
+def test_a_bad_list_is_shown(tmp_path: Path, text: str, sentence: str) -> None:
     (tmp_path / "hits.csv").write_text(text)
     hits = SLOTTED_PLATE.split("[hits]\n")[1].split("[numerics]")[0].replace("4096", "64")
     with pytest.raises(CampaignError, match=sentence):

@@ -45,8 +45,8 @@ def test_every_key_says_what_it_means(schema: dict[str, Any]) -> None:
     silent = [
         f"{table}.{key}"
         for table, one in tables.items()
-        for key, told in one.get("properties", {}).items()
-        if table != "Scatter" and len(told.get("description", "")) < 5
+        for key, shown in one.get("properties", {}).items()
+        if table != "Scatter" and len(shown.get("description", "")) < 5
     ]
     assert not silent, f"say what these keys mean, under Attributes in the docstring of their model: {silent}"
 
@@ -65,9 +65,9 @@ def test_every_key_says_what_it_means(schema: dict[str, Any]) -> None:
 def test_a_slip_is_marked_in_its_table(
     schema: dict[str, Any], campaign: dict[str, Any], table: str, change: dict[str, Any]
 ) -> None:
-    found = complaints(schema, campaign | {table: campaign[table] | change})
-    assert found
-    assert all(place.startswith(f"$.{table}") for place in found)
+    got = complaints(schema, campaign | {table: campaign[table] | change})
+    assert got
+    assert all(place.startswith(f"$.{table}") for place in got)
 
 
 @pytest.mark.parametrize("path", FIRING, ids=lambda path: path.stem)

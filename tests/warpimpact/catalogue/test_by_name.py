@@ -33,7 +33,7 @@ def test_a_plate_of_a_material_is_that_of_a_campaign(size: dict[str, Any]) -> No
 
 
 @pytest.mark.parametrize(
-    ("given", "said"),
+    ("given", "sentence"),
     [
         (
             {},
@@ -42,8 +42,8 @@ def test_a_plate_of_a_material_is_that_of_a_campaign(size: dict[str, Any]) -> No
         ({"threat": "7.62x39 BZ", "obliquity": 0}, "does not know the core"),
     ],
 )
-def test_a_plate_of_a_material_says_what_it_needs(given: dict[str, Any], said: str) -> None:
-    with pytest.raises(ValidationError, match=said):
+def test_a_plate_of_a_material_says_what_it_needs(given: dict[str, Any], sentence: str) -> None:
+    with pytest.raises(ValidationError, match=sentence):
         Plate(material="HHA Class 1", thickness="6 mm", **given)
 
 

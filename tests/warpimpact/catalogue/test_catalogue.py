@@ -76,15 +76,15 @@ def test_own_entries(own: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("old", "new", "said"),
+    ("old", "new", "sentence"),
     [
         ("[[material]]", "[[materials]]", r"unknown key .materials.; allowed are threat, material"),
         ('"2 GPa"', '"2 mm"', r"material\[0\].resistance: got .2 mm."),
     ],
 )
-def test_own_entries_that_are_wrong(own: Path, old: str, new: str, said: str) -> None:
+def test_own_entries_that_are_wrong(own: Path, old: str, new: str, sentence: str) -> None:
     own.write_text(OWN.replace(old, new), encoding="utf-8")
-    with pytest.raises(ValueError, match=said):
+    with pytest.raises(ValueError, match=sentence):
         Catalogue.of(own)
 
 
@@ -101,7 +101,7 @@ def test_names_match_in_any_case_and_by_aliases(spelling: str, name: str) -> Non
 
 
 @pytest.mark.parametrize(
-    ("spelling", "said"),
+    ("spelling", "sentence"),
     [
         ("RHA", r'several entries .*: "ARMOX370 Class 1", "BIS RHA300" or "BIS RHA360"; name one'),
         ("Armox", r'did you mean "ARMOX370 Class 1", .* or "ARMOX ADVANCE"\?'),
@@ -110,8 +110,8 @@ def test_names_match_in_any_case_and_by_aliases(spelling: str, name: str) -> Non
         ("AA2139-T6", "in the catalogue; warpimpact catalogue lists all"),
     ],
 )
-def test_of_an_unclear_name_those_it_may_mean_are_listed(spelling: str, said: str) -> None:
-    with pytest.raises(ValueError, match=said):
+def test_of_an_unclear_name_those_it_may_mean_are_listed(spelling: str, sentence: str) -> None:
+    with pytest.raises(ValueError, match=sentence):
         Catalogue().entry(spelling)
 
 

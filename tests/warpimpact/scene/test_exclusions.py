@@ -10,8 +10,8 @@ def test_a_pair_is_refused_in_either_order_and_nothing_else_is() -> None:
         *((rule, " cannot be combined with ") for rule in EXCLUDED),
         *((rule, " needs ") for rule in NEEDS),
     ):
-        found = middle == " needs "
+        got = middle == " needs "
         with pytest.raises(ValueError, match=middle):
-            check_together({rule.other: not found, rule.what: True})
-        check_together({rule.what: True, rule.other: found})
+            check_together({rule.other: not got, rule.what: True})
+        check_together({rule.what: True, rule.other: got})
         check_together({rule.what: True})

@@ -70,10 +70,10 @@ def test_sides_of_holes_on_a_staggered_pitch_face_each_other() -> None:
 @LATTICES
 def test_an_edge_is_as_far_as_the_nearest_outline(pattern: LatticePattern) -> None:
     y, z = np.random.default_rng(3).uniform(-20 * MM, 20 * MM, (2, 2000))
-    found = pattern.edge_distance(y, z)
-    assert np.array_equal(found < 0, pattern.is_hole(y, z))
+    got = pattern.edge_distance(y, z)
+    assert np.array_equal(got < 0, pattern.is_hole(y, z))
     around = shapely.MultiLineString(pattern.outlines((-40 * MM, 40 * MM), (-40 * MM, 40 * MM)))
-    assert np.allclose(abs(found), shapely.distance(around, shapely.points(y, z)), rtol=0, atol=1e-12)
+    assert np.allclose(abs(got), shapely.distance(around, shapely.points(y, z)), rtol=0, atol=1e-12)
 
 
 def circles(holes: list[Any]) -> CirclePattern:
@@ -250,8 +250,8 @@ def two_slots(*turns: float, **changes: Any) -> SlotPattern:
     ],
 )
 def test_symmetries_of_turned_and_listed_holes(pattern: LatticePattern, expected: set[Any]) -> None:
-    found = {along for along in ((1, -1), (-1, 1), (-1, -1)) if pattern.is_symmetric(*along, centred=False)}
-    assert found | ({"centred"} if pattern.is_symmetric(1, 1, centred=True) else set()) == expected
+    got = {along for along in ((1, -1), (-1, 1), (-1, -1)) if pattern.is_symmetric(*along, centred=False)}
+    assert got | ({"centred"} if pattern.is_symmetric(1, 1, centred=True) else set()) == expected
 
 
 def test_a_margin_leaves_out_whole_holes() -> None:

@@ -38,7 +38,7 @@ def plate(pattern: Pattern, **changes: Any) -> Plate:
     return Plate(**{"thickness": 4 * MM, "resistance": 2.6e9, "pattern": pattern} | changes)
 
 
-def found(plate: Plate, impact: Impact = STRAIGHT) -> set[str]:
+def got(plate: Plate, impact: Impact = STRAIGHT) -> set[str]:
     return {str(symmetry) for symmetry in symmetries(plate, impact)}
 
 
@@ -64,7 +64,7 @@ ALL = ("(y, z)", "(-y, z)", "(y, -z)", "(-y, -z)")
     ids=["slots", "holes", "solid", "rows", "triangles", "specks", "slots with a rim", "triangles with a rim"],
 )
 def test_of_a_plate(scene: Plate, expected: set[str]) -> None:
-    assert found(scene) == expected
+    assert got(scene) == expected
 
 
 @pytest.mark.parametrize(
@@ -83,7 +83,7 @@ def test_of_a_plate(scene: Plate, expected: set[str]) -> None:
     ids=lambda value: "-".join(value) if isinstance(value, dict) else "",
 )
 def test_of_a_shot(impact: dict[str, Any], expected: set[str]) -> None:
-    assert found(plate(SLOTS), Impact(velocity=825, **impact)) == expected
+    assert got(plate(SLOTS), Impact(velocity=825, **impact)) == expected
 
 
 def of_cells(material: np.ndarray) -> Plate:
@@ -99,11 +99,11 @@ def test_polygons_may_be_centred_or_glide() -> None:
     material = np.ones((12, 16))
     material[1:3, 6:10] = 0
     material[7:9, [14, 15, 0, 1]] = 0  # the hole again, half a cell on along both sides
-    assert found(of_cells(material)) == centred("(y, z)", "(y, -z)")
+    assert got(of_cells(material)) == centred("(y, z)", "(y, -z)")
     material[1, 6] = material[7, 14] = 1
-    assert found(of_cells(material)) == centred("(y, z)")
+    assert got(of_cells(material)) == centred("(y, z)")
     material[7, 14], material[7, 1] = 0, 1
-    assert found(of_cells(material)) == {"(y, z)", "(y, -z) + centring"}
+    assert got(of_cells(material)) == {"(y, z)", "(y, -z) + centring"}
 
 
 def groups() -> list[tuple[Symmetry, ...]]:

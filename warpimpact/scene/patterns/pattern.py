@@ -84,8 +84,8 @@ class Pattern(Model, ABC):
     def edge_distance(self, y: Array, z: Array) -> Array:
         """Distance of points y, z [m] from the nearest outline of a hole, of their broadcast shape: negative in a hole,
         inf where there is none. The chords of an outline lie within 0.13 % of the radius of its arcs."""
-        apart = distance_to(self._edges, y, z, self.period)
-        return np.where(self.is_hole(y, z), -apart, apart)
+        distance = distance_to(self._edges, y, z, self.period)
+        return np.where(self.is_hole(y, z), -distance, distance)
 
     @cached_property
     def _edges(self) -> Any:
