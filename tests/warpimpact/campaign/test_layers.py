@@ -133,7 +133,6 @@ def test_layers_scatter_and_say_so(result: xarray.Dataset) -> None:
     assert len(np.unique(thickness[:, 2])) == len(np.unique(offset[:, 1])) == result.sizes["hit"]
     assert np.abs(offset[:, 1]).max() <= 4.5e-3
     assert (offset[:, [0, 2]] == 0.0).all()
-    assert "layer_resistance" not in result
     # Draws depend on seed and number alone.
     every = campaign(offset=UNKNOWN, thickness=ABOUT).sampler()
     np.testing.assert_array_equal(every.shots(5, 4).offset_y, every.shots(0, 16).offset_y[5:9])

@@ -188,7 +188,7 @@ def test_a_turned_hole_is_the_hole_turned(shape: LatticePattern, turn: float) ->
 )
 def test_shares_of_cells_in_holes_are_those_of_many_points(pattern: Any, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("warpimpact.scene.patterns.geometry._PARTS_PER_LOT", 100)  # several lots
-    counts, points = (57, 46), 24
+    counts, points = (57, 46), 12
     sides = pattern.period[0] / counts[0], pattern.period[1] / counts[1]
     y, z = ((np.arange(points * n) + 0.5) * side / points for n, side in zip(counts, sides, strict=True))
     by_points = pattern.is_hole(y[:, None], z).reshape(counts[0], points, counts[1], points).mean(axis=(1, 3))
