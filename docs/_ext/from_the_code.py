@@ -299,7 +299,7 @@ class VariableReference(FromTheCode):
             "Hit point": variables.OF_THE_HIT_POINT,
             "Plate and core, where they scatter": variables.SCATTER_VARIABLES,
             **{group.title: (*group, *group.constants) for group in RECORDS},
-            "At a finer level (group `finer`)": (*variables.FINER_COORDINATES, *variables.FINER_VARIABLES),
+            "At a finer level": (*variables.FINER_COORDINATES, *variables.FINER_VARIABLES),
         }
         for title, group in groups.items():
             yield from [f"## {title}", ""]

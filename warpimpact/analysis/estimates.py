@@ -13,12 +13,12 @@ from warpimpact.campaign.campaign import Campaign
 from warpimpact.campaign.text import CampaignError
 from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
-from warpimpact.results.dataset import SLICE, finer_pair
+from warpimpact.results.dataset import SLICE, failed, finer_pair
 from warpimpact.results.files import ResultError
 from warpimpact.results.measures import STATUSES, Measure, estimate_from, sampling_design, shift_of
 from warpimpact.results.vocabulary import Array
 from warpimpact.scene.units import quoted
-from warpimpact.statistics.intervals import Estimate, SamplingDesign
+from warpimpact.statistics.intervals import Estimate, SamplingDesign, estimate_of
 from warpimpact.statistics.tails import pseudo_values
 
 _LIMITS = tuple(names.value for names in v.LIMITS.values())
@@ -135,8 +135,11 @@ def estimated(dataset: xarray.Dataset, measures: Sequence[Measure]) -> dict[Meas
 
 def status_shares(dataset: xarray.Dataset) -> dict[str, Estimate]:
     """Shares of the shots by status, for the statuses that occur."""
-    shares = estimated(dataset, [Measure.parse(f"P({name})") for name in STATUSES])
-    return {measure.name: estimate for measure, estimate in shares.items() if estimate.value > 0.0}
+    parts = [(part[v.STATUS].values, failed(part)) for part in slices(dataset[[v.STATUS]])]
+    status, none = (np.concatenate(columns) for columns in zip(*parts, strict=True))
+    values = {name: np.where(none, np.nan, status == code) for name, code in STATUSES.items()}
+    shares = {name: estimate_of("share", of_name, **sampling_design(dataset)) for name, of_name in values.items()}
+    return {name: share for name, share in shares.items() if share.value > 0.0}
 
 
 def means_of(dataset: xarray.Dataset, variables: Sequence[v.Variable]) -> list[Measure]:

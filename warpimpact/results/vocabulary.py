@@ -17,7 +17,7 @@ import xarray
 from numpy.typing import NDArray
 from pydantic import TypeAdapter
 
-from warpimpact.kernels.status import OF_SHOTS, Status
+from warpimpact.kernels.status import Status
 from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
 from warpimpact.results.dataset import failed, passed
@@ -362,6 +362,14 @@ EVENTS: Mapping[str, PerHit] = {
             margin=piercing_margin,
         ),
         PerHit(
+            name="perforated",
+            label="perforated",
+            definition="Share of the shots that come through the target: they perforate it, or touch nothing of it.",
+            source=f"complete penetration as in {MIL_STD_662F}",
+            higher_is_better=False,
+            values=is_so(passed),
+        ),
+        PerHit(
             name="stopped",
             label="stopped",
             definition="Share of the shots that do not pass the target: arrested in it, or ricocheted off it.",
@@ -394,11 +402,10 @@ EVENTS: Mapping[str, PerHit] = {
                 name=status.name.lower(),
                 label=status.name.lower(),
                 definition=f"Share of the shots whose status is {status.name.lower()}.",
-                higher_is_better=status.name in ("ARRESTED", "RICOCHETED"),
+                higher_is_better=status is not Status.UNTOUCHED,
                 values=ended_as(status),
             )
-            for status in OF_SHOTS
-            if not status.failed
+            for status in (Status.ARRESTED, Status.RICOCHETED, Status.UNTOUCHED)
         ),
     )
 }
