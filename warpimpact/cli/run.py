@@ -1,7 +1,6 @@
 """The command run: compute the hit map of a campaign."""
 
 import argparse
-from contextlib import AbstractContextManager
 from pathlib import Path
 from typing import Any
 
@@ -12,7 +11,6 @@ from warpimpact.campaign.campaign import Campaign
 from warpimpact.results import attributes as attr
 from warpimpact.results import files
 from warpimpact.results.dataset import failed
-from warpimpact.runs.executor import Executor, executor_for
 from warpimpact.runs.run import run_to_file
 
 from .messages import say, warn
@@ -43,11 +41,6 @@ def computing(arguments: argparse.Namespace) -> dict[str, Any]:
     """The options of a computation into a file, as `run_to_file` takes them."""
     names = ("device", "workers", "scheduler", "resume", "overwrite")
     return {name: getattr(arguments, name) for name in names} | {"warn": warn}
-
-
-def executor_of(arguments: argparse.Namespace) -> AbstractContextManager[Executor]:
-    """Return the executor for --device, --workers and --scheduler."""
-    return executor_for(arguments.device, workers=arguments.workers, scheduler=arguments.scheduler)
 
 
 def failure_code(dataset: xarray.Dataset, path: Path) -> int:

@@ -1,7 +1,4 @@
-"""Whoever computes and whatever interrupts, a command that computes ends with the same file.
-
-The list of questions is that of docs/contributing.md; each is a small file of its own kind.
-"""
+"""A command that was interrupted and resumed ends with the file of an undisturbed one."""
 
 import re
 from collections.abc import Callable, Iterator
@@ -16,7 +13,6 @@ from warpimpact.cli import main
 from warpimpact.results import attributes as attr
 from warpimpact.runs import chunks, compute
 from warpimpact.runs.chunks import Chunks
-from warpimpact.runs.questions import Store
 
 TARGET = """
 title = "small"
@@ -33,7 +29,7 @@ PLATE = '[plate]\nthickness = "4 mm"\nresistance = "2.6 GPa"\n'
 BASE = '[[layer]]\nthickness = "8 mm"\nresistance = "1 GPa"\n'
 HITS = '[hits]\nsampling = "sobol"\ncount = {}\n'
 CAMPAIGN = TARGET + PLATE + HOLED + HITS.format(160)
-QUESTIONS: dict[str, tuple[str, ...]] = {
+COMMANDS: dict[str, tuple[str, ...]] = {
     "run": ("run", CAMPAIGN),
     "limit": ("limit", TARGET + PLATE + HOLED + HITS.format(160), "--tolerance", "60 m/s"),
     "sweep": ("sweep", CAMPAIGN.replace("160", "96") + '[sweep]\nvelocity = ["700 m/s", "800 m/s"]\n'),
@@ -50,21 +46,21 @@ QUESTIONS: dict[str, tuple[str, ...]] = {
 """By name: the command, its file, and options."""
 OF_THE_CALL = {attr.HISTORY, attr.COMPUTE_TIME, attr.HITS_PER_SECOND}
 
-Answered = Callable[..., int]
+Called = Callable[..., int]
 
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    return tmp_path_factory.mktemp("questions")
+    return tmp_path_factory.mktemp("commands")
 
 
 @pytest.fixture(scope="module")
-def asked(folder: Path) -> Iterator[Answered]:
-    """A function that asks a question, and returns the exit code. Runs have several shards."""
+def called(folder: Path) -> Iterator[Called]:
+    """A function that calls a command, and returns the exit code. Runs have several chunks."""
     (folder / "target.toml").write_text(TARGET + PLATE + HOLED + BASE + HITS.format(64), encoding="utf-8")
 
-    def asked(name: str, output: Path, *options: str) -> int:
-        command, text, *own = QUESTIONS[name]
+    def called(name: str, output: Path, *options: str) -> int:
+        command, text, *own = COMMANDS[name]
         file = folder / f"{name}.toml"
         file.write_text(text, encoding="utf-8")
         return main([command, str(file), "-o", str(output), "--device", "cpu", "-q", *own, *options])
@@ -72,7 +68,7 @@ def asked(folder: Path) -> Iterator[Answered]:
     with pytest.MonkeyPatch.context() as patched:
         patched.setattr(compute, "FEWEST", 64)
         patched.setattr(chunks, "HELD_SECONDS", 0.0)
-        yield asked
+        yield called
 
 
 def content(path: Path) -> dict[str, Any]:
@@ -98,46 +94,40 @@ def assert_alike(one: Path, other: Path) -> None:
         assert np.array_equal(value, second[name], equal_nan=np.asarray(value).dtype.kind == "f"), name
 
 
-@pytest.fixture(scope="module", params=QUESTIONS)
+@pytest.fixture(scope="module", params=COMMANDS)
 def name(request: pytest.FixtureRequest) -> str:
     """Of a question; the tests of one follow each other, as they share the straight answer."""
     return str(request.param)
 
 
 @pytest.fixture(scope="module")
-def straight(name: str, asked: Answered, folder: Path) -> Path:
+def straight(name: str, called: Called, folder: Path) -> Path:
     """The answer of threads that nothing disturbs."""
     path = folder / f"{name}.nc"
-    assert asked(name, path) == 0
+    assert called(name, path) == 0
     return path
 
 
 @pytest.fixture
-def interrupting(monkeypatch: pytest.MonkeyPatch) -> Callable[[int], Iterator[None]]:
-    """A function after which Ctrl-C comes once so many results are on the disk."""
+def interrupting(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Ctrl-C comes once two chunks are on the disk."""
+    left, original = 2, Chunks.save
 
-    def interrupting(after: int) -> None:
-        left = after
-        for kind in (Chunks, Store):
+    def save(self: Chunks, *arguments: Any) -> None:
+        nonlocal left
+        original(self, *arguments)
+        left -= 1
+        if left == 0:
+            raise KeyboardInterrupt
 
-            def save(self: Any, *arguments: Any, original: Any = kind.save) -> None:
-                nonlocal left
-                original(self, *arguments)
-                left -= 1
-                if left == 0:
-                    raise KeyboardInterrupt
-
-            monkeypatch.setattr(kind, "save", save)
-
-    return interrupting
+    monkeypatch.setattr(Chunks, "save", save)
 
 
 def test_resumed_equals_undisturbed(
-    name: str, straight: Path, asked: Answered, interrupting: Any, tmp_path: Path
+    name: str, straight: Path, called: Called, interrupting: None, tmp_path: Path
 ) -> None:
-    interrupting(2)
     output = tmp_path / "resumed.nc"
-    assert asked(name, output) == 130
+    assert called(name, output) == 130
     assert not output.exists()
-    assert asked(name, output, "--resume") == 0
+    assert called(name, output, "--resume") == 0
     assert_alike(output, straight)
