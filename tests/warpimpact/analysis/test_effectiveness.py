@@ -96,17 +96,6 @@ def test_intervals_of_the_ratio_hold_as_often_as_they_say(make_plate_result, cou
         assert np.median(widths) < 0.6  # a change of both plates is no error of the ratio
 
 
-def test_one_shot_at_the_solid_plate_serves_all(make_plate_result) -> None:
-    dataset = with_solid(make_plate_result(np.linspace(500.0, 900.0, 1000)), np.array([800.0]))
-    measures = named(dataset)
-    mean, worst = measures["mean(residual_energy_fraction)"], measures["worst_point(residual_energy_fraction)"]
-    assert (mean.solid, mean.ratio) == (pytest.approx(0.64), pytest.approx(mean.value / 0.64))
-    assert (mean.ratio_low, mean.ratio_high) == (pytest.approx(mean.low / 0.64), pytest.approx(mean.high / 0.64))
-    assert worst.ratio == pytest.approx(0.81 / 0.64)
-    assert math.isnan(measures["P(inclination@130mm > 30 deg)"].ratio)  # the solid plate tilts no core
-    assert measures["P(inclination@130mm > 30 deg)"].solid == 0.0
-
-
 @pytest.mark.parametrize(
     ("text", "sentence"),
     [

@@ -37,15 +37,6 @@ def test_stress_adds_up_to_the_recorded_force(histories: list[xarray.Dataset]) -
         assert np.linalg.norm(force) == pytest.approx(size, rel=0.3)
 
 
-def test_surface_is_closed_but_for_its_discs(histories: list[xarray.Dataset]) -> None:
-    history = histories[0]
-    surface = pressed(history, 5)
-    np.testing.assert_allclose(np.linalg.norm(surface.normal, axis=-1), 1.0)
-    total = np.sum(surface.area[..., None] * surface.normal, axis=(0, 1))
-    nose, base = history["core_radius"].values[[0, -1]]
-    np.testing.assert_allclose(total, np.pi * (base**2 - nose**2) * history["core_axis"][5], rtol=1e-6, atol=1e-12)
-
-
 def test_nothing_presses_outside_the_slab_or_in_holes(histories: list[xarray.Dataset]) -> None:
     for history in histories:
         surface = pressed(history, largest(history))
