@@ -257,7 +257,13 @@ class ShotTable(_WithScene):
     """A measured shot; its own values of the scene override those of the fit."""
 
     name: Title = ""
-    hit: Annotated[HitPlace | None, BeforeValidator(lambda given: None if given == "unknown" else given)] = None
+    hit: Annotated[
+        HitPlace | None,
+        BeforeValidator(
+            lambda given: None if given == "unknown" else given,
+            json_schema_input_type=HitPlace | Literal["unknown"],
+        ),
+    ] = None
     impact: _Table = Field(default_factory=dict)
     measured: Measured
 
