@@ -117,7 +117,7 @@ ITERATIONS = Constant(
     "iterations",
     "Of the time of flight to a stand-off: enough for a point that swings at half of the speed of flight.",
     "1.3",
-    "kernels/test_rigid_body.py::test_a_point_that_swings_at_half_of_the_speed_of_flight_is_found",
+    "kernels/test_rigid_body.py::test_a_point_that_swings_at_half_of_the_speed_of_flight_is_located",
 )
 SMALL_ANGLE = Constant(
     0.02,

@@ -31,26 +31,26 @@ def bend(
     sections: Sections,
     body: Body,
     touches: Touches,
-    struck: wp.int32,
+    hit_ring: wp.int32,
     force: wp.float64,
-    found: wp.array(dtype=Bending),
+    actual: wp.array(dtype=Bending),
 ):
     """One step under a force across the axis, along the body's y, on one ring."""
     load = Load()
     load.force = wp.vec3d(wp.float64(0.0), force, wp.float64(0.0))
-    load.moment = wp.vec3d(wp.float64(0.0), wp.float64(0.0), surface.of_rings[struck] * force)
+    load.moment = wp.vec3d(wp.float64(0.0), wp.float64(0.0), surface.of_rings[hit_ring] * force)
     load.touching = True
-    touches.total_area[struck] = wp.float64(1.0)
-    sums = touches.sums[struck]
+    touches.total_area[hit_ring] = wp.float64(1.0)
+    sums = touches.sums[hit_ring]
     sums.force = load.force
     sums.moment = load.moment
-    touches.sums[struck] = sums
+    touches.sums[hit_ring] = sums
     state = State()
     state.attitude = wp.quatd(wp.float64(0.0), wp.float64(0.0), wp.float64(0.0), wp.float64(1.0))
     state.velocity = wp.vec3d(wp.float64(0.0), wp.float64(-1.0e3), wp.float64(0.0))  # the force slows it down
     footprint = Footprint()
-    footprint.first_ring = struck
-    footprint.last_ring = struck
+    footprint.first_ring = hit_ring
+    footprint.last_ring = hit_ring
     context = struct.Context()
     context.surface = surface
     context.body = body
@@ -58,10 +58,10 @@ def bend(
     context.sections = sections
     clock = struct.Clock()
     clock.step = wp.float64(1.0e-9)
-    found[0] = bent(Bending(), context, footprint, Pose(), state, load, Change(), clock)
+    actual[0] = bent(Bending(), context, footprint, Pose(), state, load, Change(), clock)
 
 
-def struck_at(share: float, device: str) -> tuple[Any, float]:
+def hit_at(share: float, device: str) -> tuple[Any, float]:
     """The bending of a rod that is struck at about this share of its length behind the nose; and the exact place
     [m]."""
     rings = rings_of(ROD, RINGS, 8)
@@ -77,9 +77,9 @@ def struck_at(share: float, device: str) -> tuple[Any, float]:
     touches = poisoned_touches(Touches, 1, surface, device)
     touches.sums.zero_()
     touches.ring_area.zero_()
-    found = wp.zeros(1, dtype=Bending, device=device)
-    wp.launch(bend, 1, inputs=[surface, struct, body, touches, ring, FORCE], outputs=[found], device=device)
-    return found.numpy()[0], float(behind[ring])
+    actual = wp.zeros(1, dtype=Bending, device=device)
+    wp.launch(bend, 1, inputs=[surface, struct, body, touches, ring, FORCE], outputs=[actual], device=device)
+    return actual.numpy()[0], float(behind[ring])
 
 
 def moment_of(s: Any, at: float) -> Any:
@@ -93,11 +93,11 @@ def moment_of(s: Any, at: float) -> Any:
 
 
 @pytest.mark.parametrize("share", [0.0, 0.35, 0.9])
-def test_a_thin_rod_struck_across_bends_as_in_the_closed_form(share: float, device: str) -> None:
-    found, at = struck_at(share, device)
+def test_a_thin_rod_hit_across_bends_as_in_the_closed_form(share: float, device: str) -> None:
+    actual, at = hit_at(share, device)
     s = sections_of(ROD, rings_of(ROD, RINGS, 8)).station
     expected = np.abs(moment_of(s, at))
-    assert found["moment"] == pytest.approx(expected.max(), rel=1e-4)  # it is not infinitely thin
-    assert np.abs(moment_of(found["moment_station"], at)) == pytest.approx(expected.max(), rel=1e-4)
-    assert found["stress"] == pytest.approx(4.0 * found["moment"] / (np.pi * RADIUS**3), rel=1e-12)
-    assert found["stress_station"] == found["moment_station"]
+    assert actual["moment"] == pytest.approx(expected.max(), rel=1e-4)  # it is not infinitely thin
+    assert np.abs(moment_of(actual["moment_station"], at)) == pytest.approx(expected.max(), rel=1e-4)
+    assert actual["stress"] == pytest.approx(4.0 * actual["moment"] / (np.pi * RADIUS**3), rel=1e-12)
+    assert actual["stress_station"] == actual["moment_station"]

@@ -100,15 +100,15 @@ def test_straight_flight_deep_in_a_plate_meets_the_work_per_way(
     # 1e-5 of the speed, and the second order of its bend.
     surface = surface_of(Surface, core, 128, 32, device)
     pose = {"position": np.array([[0.5, 0.0, 0.0]]), "attitude": ALIGNED, "velocity": np.array([[800.0, 0, 0]])}
-    found = loaded(surface, law_of(friction=friction), device, **pose, thickness=1.0)
+    actual = loaded(surface, law_of(friction=friction), device, **pose, thickness=1.0)
     nose = core.radius(core.nose_length * (np.arange(4000) + 0.5) / 4000).mean() * core.nose_length
     expected = STRENGTH * (np.pi * core.max_radius**2 + 2 * np.pi * friction * nose)
-    force, moment = found.force[0], found.moment[0]
+    force, moment = actual.force[0], actual.moment[0]
     assert force[0] == pytest.approx(-expected, rel=tolerance)
     np.testing.assert_allclose(force[1:], 0.0, atol=1e-9 * expected)
     np.testing.assert_allclose(moment, 0.0, atol=1e-9 * expected * core.length)
     # The exposure gained, ∫ T dy dz, is the projected area in contact for one step.
-    gained = found.exposure.sum() * CELL**2
+    gained = actual.exposure.sum() * CELL**2
     assert gained == pytest.approx(1e-6 * np.pi * core.max_radius**2, rel=min(tolerance, 1e-5))
     if friction == 0:
         assert gained == pytest.approx(-1e-6 * force[0] / STRENGTH, rel=1e-12)

@@ -47,7 +47,7 @@ ELEMENTAL = ("stress", "strain", "damage", "heat", "work", "hourglass_work", "fo
 """Arrays of elements, which mean nothing where no element is."""
 
 
-def apart(values: ArrayLike, expected: ArrayLike) -> float:
+def separation(values: ArrayLike, expected: ArrayLike) -> float:
     """Largest difference, as a share of the largest number."""
     return float(np.abs(np.subtract(values, expected)).max() / np.abs(expected).max())
 
@@ -66,12 +66,12 @@ def test_hits_take_the_same_steps_together_as_one_by_one(double: bool, rounding:
         for name in ("time", "step", "before", "first_touch", "last_touch", "steps", "status"):
             assert other.flight[name] == pytest.approx(one.flight[name], rel=rounding), name
         for name in ("position", "velocity", "attitude", "angular_momentum"):
-            assert apart(other.flight["state"][name], one.flight["state"][name]) < rounding, name
+            assert separation(other.flight["state"][name], one.flight["state"][name]) < rounding, name
         there = one.mesh.alive.numpy() > 0.0
         for name in ("position", "velocity", "contact_work", "radiated", "near", *ELEMENTAL):
             given, expected = (getattr(hit.mesh, name).numpy().reshape(-1, one.mesh.size) for hit in (other, one))
             where = there if name in ELEMENTAL else slice(None)
-            assert apart(given[:, where], expected[:, where]) < 100 * rounding, name
+            assert separation(given[:, where], expected[:, where]) < 100 * rounding, name
         assert other.mesh.alive.numpy().tolist() == one.mesh.alive.numpy().tolist()
         assert other.mesh.awake.numpy().tolist() == one.mesh.awake.numpy().tolist()
         assert other.mesh.touched.numpy() == pytest.approx(one.mesh.touched.numpy(), rel=rounding)

@@ -174,9 +174,9 @@ def test_passage_immerses_every_patch_for_the_thickness(device: str) -> None:
     x = np.arange(-0.03, 0.04, speed * dt)
     position = np.stack([x, 0 * x, 0 * x], axis=1)
     attitude = np.broadcast_to(attitude, (len(x), 4))
-    found = posed(surface, device, position=position, attitude=attitude, velocity=(speed, 0, 0), dt=dt)
-    swept = speed * dt * found["immersed"].sum(axis=0)
-    expected = np.broadcast_to(found["area"][0][:, None] * THICKNESS, swept.shape)
+    actual = posed(surface, device, position=position, attitude=attitude, velocity=(speed, 0, 0), dt=dt)
+    swept = speed * dt * actual["immersed"].sum(axis=0)
+    expected = np.broadcast_to(actual["area"][0][:, None] * THICKNESS, swept.shape)
     np.testing.assert_allclose(swept, expected, rtol=1e-11)
 
 
@@ -197,12 +197,12 @@ def test_patch_along_the_face_is_in_or_out_at_once(ring: str, device: str) -> No
     gaps = np.array([-5e-6, 5e-6])
     position = np.stack([gaps - tip, 0 * gaps, 0 * gaps], axis=1)
     surface = surface_of(Surface, CONE, 20, around, device)
-    found = posed(surface, device, position=position, attitude=np.stack([attitude] * 2), dt=0.0)
-    mantle = found["normal"][0, :, 0, 0] > 0.999
+    actual = posed(surface, device, position=position, attitude=np.stack([attitude] * 2), dt=0.0)
+    mantle = actual["normal"][0, :, 0, 0] > 0.999
     assert mantle.sum() == 6
-    out, inside = found["immersed"][:, mantle, 0]
+    out, inside = actual["immersed"][:, mantle, 0]
     np.testing.assert_allclose(out, 0.0, atol=1e-15)
-    np.testing.assert_allclose(inside, found["area"][0, mantle], rtol=1e-12)
+    np.testing.assert_allclose(inside, actual["area"][0, mantle], rtol=1e-12)
 
 
 @pytest.mark.parametrize("slant", [0.1, np.pi])
@@ -212,9 +212,9 @@ def test_ring_out_of_reach_of_the_slab_has_nothing_immersed(slant: float, device
     turned = Rotation.from_rotvec(rng.uniform(-slant, slant, (400, 3)))
     poses = {"position": rng.uniform(-0.015, 0.015, (400, 3)), "attitude": turned.as_quat()}
     surface = surface_of(Surface, CONE, 16, 16, device)
-    found = posed(surface, device, **poses, velocity=(100.0, 50.0, 0.0), omega=(3e4, -5e4, 4e4), dt=1e-5)
-    out_of_reach = (found["high"] <= 0) | (found["low"] >= THICKNESS)
-    touching = (found["immersed"] > 0).any(axis=2)
+    actual = posed(surface, device, **poses, velocity=(100.0, 50.0, 0.0), omega=(3e4, -5e4, 4e4), dt=1e-5)
+    out_of_reach = (actual["high"] <= 0) | (actual["low"] >= THICKNESS)
+    touching = (actual["immersed"] > 0).any(axis=2)
     assert touching.sum() > 1000
     assert not (out_of_reach & touching).any()
     assert (~out_of_reach & ~touching).sum() < touching.sum() / 2  # and the reach is not far too large

@@ -36,7 +36,7 @@ def footprints(
     velocity: vec3,
     omega: vec3,
     dt: real,
-    found: wp.array(dtype=Footprint),
+    actual: wp.array(dtype=Footprint),
     immersed: wp.array2d(dtype=wp.int32),
     rows: wp.array3d(dtype=wp.int32),
     columns: wp.array3d(dtype=wp.int32),
@@ -46,7 +46,7 @@ def footprints(
     fields = use.exposure.fields_of_slot(fields, i)
     window = use.exposure.open_window(plate, real(THICKNESS), fields, 0, wp.vec2d())
     pose = use.core_surface.pose_of(surface, position[i], attitude[i], velocity, omega)
-    found[i] = use.footprint.footprint_of(surface, plate, window, pose, dt)
+    actual[i] = use.footprint.footprint_of(surface, plate, window, pose, dt)
     for k in range(surface.rings):
         ring = use.core_surface.ring_at(surface, pose, k)
         immersed[i, k] = 0
@@ -93,21 +93,21 @@ def footprints_of(
 def test_footprint_holds_every_cell_and_ring_that_a_step_touches(device: str) -> None:
     count, cells = 200, 240
     motion = {"velocity": (600.0, 300.0, -90.0), "omega": (2e4, 5e4, -3e4)}
-    found, immersed, rows, columns = footprints_of(astride(count), (cells, cells), device, **motion)
+    actual, immersed, rows, columns = footprints_of(astride(count), (cells, cells), device, **motion)
     ring = np.arange(immersed.shape[1])
-    within = (ring >= found["first_ring"][:, None]) & (ring <= found["last_ring"][:, None])
+    within = (ring >= actual["first_ring"][:, None]) & (ring <= actual["last_ring"][:, None])
     touched = immersed == 1
     some = touched.any(axis=1)
     assert some.sum() > count / 2
     assert not (touched & ~within).any()
-    assert found["inside"].all()
+    assert actual["inside"].all()
     for cell, low, high in ((rows, "y_low", "y_high"), (columns, "z_low", "z_high")):
         lowest = np.where(touched, cell.min(axis=2), cells).min(axis=1)
         highest = np.where(touched, cell.max(axis=2) + 1, -1).max(axis=1)
-        assert (found["box"][low] <= lowest)[some].all()
-        assert (found["box"][high] >= highest)[some].all()
+        assert (actual["box"][low] <= lowest)[some].all()
+        assert (actual["box"][high] >= highest)[some].all()
         # And it is not far too large: every step works on the whole box.
         tight = some & (touched.sum(axis=1) == within.sum(axis=1))
         assert tight.sum() > count / 10
-        assert (found["box"][low] >= lowest - 4)[tight].all()
-        assert (found["box"][high] <= highest + 4)[tight].all()
+        assert (actual["box"][low] >= lowest - 4)[tight].all()
+        assert (actual["box"][high] <= highest + 4)[tight].all()

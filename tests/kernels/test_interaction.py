@@ -34,10 +34,10 @@ def law(
     contacts: wp.array(dtype=Contact),
 ) -> None:
     i = wp.tid()
-    found = use.interaction.contact_of(law, closing[i], variation[i], speed[i])
-    touching = closing[i] + found.shift * variation[i] * variation[i]
-    found.slope = use.interaction.steady_slope(law, found.share, found.slope, touching)
-    contacts[i] = found
+    actual = use.interaction.contact_of(law, closing[i], variation[i], speed[i])
+    touching = closing[i] + actual.shift * variation[i] * variation[i]
+    actual.slope = use.interaction.steady_slope(law, actual.share, actual.slope, touching)
+    contacts[i] = actual
 
 
 def onset(law: Law, dt: real, velocity: wp.array(dtype=real), impact: real, onsets: wp.array(dtype=real)) -> None:
@@ -74,8 +74,8 @@ def applied(
     law.steadied = steadied
     inputs = [law, *(wp.array(a, dtype=real, device=device) for a in given)]
     wp.launch(LAW, len(given[0]), inputs=inputs, outputs=[contacts], device=device)
-    found = contacts.numpy()
-    return SimpleNamespace(fraction=found["share"], rise=found["slope"], shift=found["shift"])
+    actual = contacts.numpy()
+    return SimpleNamespace(fraction=actual["share"], rise=actual["slope"], shift=actual["shift"])
 
 
 VARIATIONS = pytest.mark.parametrize("variation", [1e-3 * ONSET, 0.5 * ONSET, 50.0 * ONSET])
@@ -101,9 +101,9 @@ def test_share_of_a_patch_is_the_mean_of_its_parts(variation: float, device: str
 def test_small_variation_leaves_the_ramp_as_it_is(device: str) -> None:
     closing = ONSET * np.linspace(-1, 2, 301)
     for variation in (0.0, 1e-30, 1e-12):
-        found = applied(closing, device, variation=variation)
-        np.testing.assert_allclose(found.fraction, (closing / ONSET).clip(0, 1), rtol=0, atol=1e-5)
-        assert np.abs(found.shift * variation).max() < 1e-9
+        actual = applied(closing, device, variation=variation)
+        np.testing.assert_allclose(actual.fraction, (closing / ONSET).clip(0, 1), rtol=0, atol=1e-5)
+        assert np.abs(actual.shift * variation).max() < 1e-9
 
 
 def test_wall_that_slides_along_itself_does_not_touch(device: str) -> None:
@@ -141,8 +141,8 @@ def single_exponential(x: Array, device: str) -> Array:
 
 def test_single_precision_exponential_is_numpy_s(device: str) -> None:
     x = np.concatenate([np.linspace(-87.3, 87.3, 200_001), np.linspace(-1e-3, 1e-3, 2001)]).astype(np.float32)
-    found, expected = single_exponential(x, device).astype(float), np.exp(x.astype(float))
+    actual, expected = single_exponential(x, device).astype(float), np.exp(x.astype(float))
     # x log2(e) is rounded: half a unit of the last place of up to 126 is 126 ln 2 × 2^-24 at the ends.
     bound = 3e-7 + np.abs(x) * 2.0**-23
-    assert (np.abs(found / expected - 1) < bound).all()
+    assert (np.abs(actual / expected - 1) < bound).all()
     assert single_exponential(np.array([0.0, -0.0]), device).tolist() == [1.0, 1.0]

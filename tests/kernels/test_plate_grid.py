@@ -57,9 +57,9 @@ def look_up(
     values[i] = use.exposure.gather(field, windows[slot].cells_z, cell.index, cell.y, cell.z)
 
 
-def cells(fields: Fields, windows: wp.array(dtype=Window), y: real, z: real, found: wp.array(dtype=Cell)) -> None:
+def cells(fields: Fields, windows: wp.array(dtype=Window), y: real, z: real, actual: wp.array(dtype=Cell)) -> None:
     slot = wp.tid()
-    found[slot] = use.plate_grid.cell_at(windows[slot], y, z)
+    actual[slot] = use.plate_grid.cell_at(windows[slot], y, z)
 
 
 def gain(fields: Fields, windows: wp.array(dtype=Window), slot: wp.int32, y: real, z: real, amount: real) -> None:
@@ -168,11 +168,11 @@ def test_material_is_that_of_the_cell_of_the_periodic_tile(
     # Up to 90 m away, where float32 coordinates would be cells off.
     y, z = np.random.default_rng(3).uniform(-8e-3, 8e-3, (2, 5000))
     for hit in HITS:
-        found, _ = beneath(variant, hit + shift * PERIOD, y, z, device)
+        actual, _ = beneath(variant, hit + shift * PERIOD, y, z, device)
         places = np.stack([(at + a) / p * n for at, a, p, n in zip(hit, (y, z), PERIOD, TILE.shape, strict=True)])
         sure = (np.abs(places - np.round(places)) > rounding).all(axis=0)  # not on a line between cells
         row, column = (np.floor(at).astype(int) % n for at, n in zip(places, TILE.shape, strict=True))
-        np.testing.assert_allclose(found[sure], TILE[row, column][sure], rtol=1e-6)
+        np.testing.assert_allclose(actual[sure], TILE[row, column][sure], rtol=1e-6)
         assert sure.sum() > 4900
 
 
@@ -182,13 +182,13 @@ def test_finite_plate_ends_at_its_rim(far: float, variant: Variant, rounding: fl
     # The share of half a cell of the grid about a point that lies within the rim, here 70 m away too.
     size, y, z = np.array([3.3e-3, 2.5e-3]) + 2 * far, *np.random.default_rng(4).uniform(-4e-3, 4e-3, (2, 5000))
     for hit in HITS / 10 + far:
-        _, found = beneath(variant, hit, y, z, device, size=size)
+        _, actual = beneath(variant, hit, y, z, device, size=size)
         shares = []
         for points, at, extent in zip((y, z), hit, size, strict=True):
             edges = np.clip(at + points[:, None] + [-CELL / 4, CELL / 4], -extent / 2, extent / 2)
             shares.append(np.diff(edges, axis=1)[:, 0] / (CELL / 2))
-        np.testing.assert_allclose(found, np.prod(shares, axis=0), atol=rounding)
-        assert {0.0, 1.0} < set(found)
+        np.testing.assert_allclose(actual, np.prod(shares, axis=0), atol=rounding)
+        assert {0.0, 1.0} < set(actual)
 
 
 # --- Grid ---
@@ -240,11 +240,11 @@ def test_reading_what_was_scattered_keeps_the_second_moment_of_the_tent(device: 
         laid.write("exposure", np.zeros((SLOTS, CELLS_Y, CELLS_Z)))
         exposed_at_a_point(laid, slot, at, 0.0)
         read = ((np.arange(-count, count)[:, None] + fractions) * CELL).reshape(-1)
-        found = poisoned(len(read), real, device)
+        actual = poisoned(len(read), real, device)
         inputs = [laid.fields, laid.windows, slot, laid.fields.exposure]
         inputs += [wp.array(a, dtype=real, device=device) for a in (read, np.zeros(len(read)))]
-        wp.launch(LOOK_UP, len(read), inputs=inputs, outputs=[found], device=device)
-        density = weight * np.tile(weights, 2 * count) * found.numpy()
+        wp.launch(LOOK_UP, len(read), inputs=inputs, outputs=[actual], device=device)
+        density = weight * np.tile(weights, 2 * count) * actual.numpy()
         mass += density.sum()
         moment += density @ (read - at) ** 2
     assert moment / mass == pytest.approx(length**2 / 6, rel=1e-9)

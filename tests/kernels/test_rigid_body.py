@@ -275,21 +275,21 @@ def test_a_core_swings_when_a_step_turns_back_the_last_one(device: str) -> None:
     np.testing.assert_array_equal(swings.numpy(), [True, True, False, False, False, False])
 
 
-def passing(
+def moving(
     body: Body, axis: vec3, momentum: vec3, ahead: real, velocity: real, distance: real, axes: wp.array(dtype=vec3)
 ) -> None:
     axes[0] = use.rigid_body.axis_at(body, axis, momentum, ahead, velocity, distance)
 
 
-PASSING = VARIANT.kernel(passing)
+MOVING = VARIANT.kernel(moving)
 
 
-def test_a_point_that_swings_at_half_of_the_speed_of_flight_is_found(device: str) -> None:
+def test_a_point_that_swings_at_half_of_the_speed_of_flight_is_located(device: str) -> None:
     # The axis turns about z from 30° to 90°, where the point swings straight along x: each iteration halves the error.
     ahead, velocity, rate = 1.0e-2, 100.0, 5.0e3
     time = np.deg2rad(60.0) / rate
     axes = wp.empty(1, dtype=vec3, device=device)
     start = vec3(*np.cos(np.deg2rad([30.0, 60.0, 90.0])))
     inputs = [paper_body(), start, vec3(0.0, 0.0, TRANSVERSE * rate), ahead, velocity, velocity * time]
-    wp.launch(PASSING, 1, inputs=inputs, outputs=[axes], device=device)
+    wp.launch(MOVING, 1, inputs=inputs, outputs=[axes], device=device)
     np.testing.assert_allclose(axes.numpy()[0], [0.0, 1.0, 0.0], atol=1e-12)

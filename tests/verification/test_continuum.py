@@ -265,9 +265,9 @@ def pressed(friction: float, *, approach: float | None = None) -> tuple[Array, O
     """
     core = OgiveCore(diameter=6e-3, length=20e-3, crh=3.0, mass=4e-3)
     sheet = box((1, 1, 1), 1.0e-4)
-    beside = SheetMesh(sheet.y + 2.99e-3, sheet.z - 5.0e-5, sheet.solid, sheet.x - 5.0e-3, sheet.spacing)
+    adjacent = SheetMesh(sheet.y + 2.99e-3, sheet.z - 5.0e-5, sheet.solid, sheet.x - 5.0e-3, sheet.spacing)
     start = start_at((0.0, 0.0, 0.0), 100.0, friction=friction)
-    hit = OneHit(core, start, [beside], [ELASTIC], double=True)
+    hit = OneHit(core, start, [adjacent], [ELASTIC], double=True)
     hit.mesh.impedance.zero_()
     if approach is None:
         nodal(hit, "inverse_mass")[:] = 0.0

@@ -91,7 +91,7 @@ def test_all_lengths_twice_as_long_leave_velocities_and_angles(device: str) -> N
     assert_same(outcomes(2.0), outcomes(1.0))
 
 
-def test_mirror_images_and_hits_a_lattice_vector_apart_do_the_same(device: str) -> None:
+def test_mirror_images_and_hits_shifted_by_a_lattice_vector_do_the_same(device: str) -> None:
     scene: dict[str, Any] = {"interaction": INERT, "precision": "double", "device": device}
     plain = simulate(PLATE, shots_at(Y, Z, **ATTITUDE), **scene)
     assert_same(simulate(PLATE, shots_at(Y + 8e-3, Z + 8e-3, **ATTITUDE), **scene), plain)

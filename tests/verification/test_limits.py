@@ -21,7 +21,9 @@ SMOOTH = 1e-9
 """No friction to speak of, in the build of the kernels that has it."""
 
 
-def found(plate: Plate, shots: Shots, *, core: Core = PAPER_CORE, law: Interaction | None = None, **how: Any) -> Limits:
+def actual(
+    plate: Plate, shots: Shots, *, core: Core = PAPER_CORE, law: Interaction | None = None, **how: Any
+) -> Limits:
     """Limit velocities, after the checks that hold of any."""
     scene = Scene(core=core, target=plate, interaction=law or Interaction())
     limits = limit_velocity(scene, shots, **{"numerics": REFERENCE, "tolerance": 0.5, "device": "cpu"} | how)
@@ -40,14 +42,14 @@ def test_energy_at_the_limit_is_the_work_of_the_plate(shear_coefficient: float, 
     expected = np.sqrt(825.0**2 - references.solid_plate_residual(velocity=825.0, **shot) ** 2)
     plate, law = solid_plate(degradation=1.0, shear_coefficient=shear_coefficient), Interaction(onset=onset)
     # A search may begin far above the limit, near it, or far below.
-    limits = found(plate, shots_at([0.0, 0.3e-3, 0.0], velocity=[825.0, 480.0, 60.0]), law=law)
+    limits = actual(plate, shots_at([0.0, 0.3e-3, 0.0], velocity=[825.0, 480.0, 60.0]), law=law)
     assert limits.value == pytest.approx(expected, abs=tolerance)
     assert limits.runs.mean() < 9.0
 
 
 def test_limit_thickness_and_limit_velocity_are_one_limit() -> None:
     plate = solid_plate(degradation=1.0)
-    limits = found(plate, shots_at(), tolerance=0.1)
+    limits = actual(plate, shots_at(), tolerance=0.1)
     scene = Scene(core=PAPER_CORE, target=plate)
     shots = shots_at(velocity=[limits.value[0], limits.value[0] * np.sqrt(2.0)])
     thick = limit_thickness(scene, shots, numerics=REFERENCE, tolerance=2e-6, device="cpu")
@@ -76,17 +78,17 @@ def test_limit_velocity_of_poncelets_law() -> None:
     expected = brentq(left, 300.0, 800.0, xtol=0.01)
     plate = solid_plate(thickness=12e-3, resistance=1.2e9, shear_coefficient=shear_coefficient, degradation=1.0)
     law = Interaction(static=1.0, quadratic=1.0)
-    assert found(plate, shots_at(), core=core, law=law).value == pytest.approx(expected, abs=0.2)
+    assert actual(plate, shots_at(), core=core, law=law).value == pytest.approx(expected, abs=0.2)
 
 
 def test_a_core_passes_at_the_upper_end_and_is_stopped_at_the_lower_one() -> None:
     hit_y, hit_z = scattered_hits(24)
     plate = paper_plate(degradation_interval=None, degradation_distance=0.825e-3)
     shots = shots_at(hit_y, hit_z, obliquity=30.0, yaw=2.0)
-    limits = found(plate, shots, numerics=MIDDLE, tolerance=1.0)
+    limits = actual(plate, shots, numerics=MIDDLE, tolerance=1.0)
     assert (limits.upper - limits.lower <= 1.0).all()
     assert (limits.outcomes.status == Status.PERFORATED).all()
     assert (limits.shots.velocity == limits.upper).all()
     below = replace(shots, velocity=limits.lower)
-    again = found(plate, below, numerics=MIDDLE, tolerance=1.0, highest=float(limits.lower.max()))
+    again = actual(plate, below, numerics=MIDDLE, tolerance=1.0, highest=float(limits.lower.max()))
     assert (again.outcomes.status[again.runs == 1] != Status.PERFORATED).all()

@@ -20,10 +20,10 @@ def scaled(speed: float, device: str, **material: Any) -> Array:
     tilt at both stand-offs, deflection and status; oblique and yawed, one of the hits arrested by nothing."""
     plate: Plate = paper_plate(resistance=2.6e9 * (speed / SPEEDS[0]) ** 2, **material)
     shots = shots_at(*HITS, velocity=speed, obliquity=12.0, azimuth=50.0, yaw=2.0)
-    found = simulate(plate, shots, precision="double", device=device)
-    kept = 1.0 - found.energy_loss / found.energy_loss.max()
-    share = np.square(found.residual_velocity / speed)
-    return np.column_stack([share, kept, found.tilt, found.deflection, found.status])
+    actual = simulate(plate, shots, precision="double", device=device)
+    kept = 1.0 - actual.energy_loss / actual.energy_loss.max()
+    share = np.square(actual.residual_velocity / speed)
+    return np.column_stack([share, kept, actual.tilt, actual.deflection, actual.status])
 
 
 @pytest.mark.parametrize("material", [BY_PATH, {"degradation": 1.0}], ids=["by path", "lasting"])

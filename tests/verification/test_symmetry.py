@@ -71,7 +71,7 @@ BINARY_Y, BINARY_Z = np.round(np.array([Y, Z]) * 2.0**32) / 2.0**32
     [(2 * A, 0.0), (-A, B / 2), (-1281 * A, 639.5 * B)],
     ids=["two rows", "staggered", "10 m away, staggered"],
 )
-def test_hits_a_lattice_vector_apart_are_the_same_bit_for_bit(
+def test_hits_shifted_by_a_lattice_vector_are_the_same_bit_for_bit(
     precision: str, shift: tuple[float, float], device: str
 ) -> None:
     scene: dict[str, Any] = {"precision": precision, "device": device, "grid_spacing": 2.0**-12}

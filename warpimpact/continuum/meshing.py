@@ -155,11 +155,11 @@ def _onto_edges(
 
     at_y, at_z = y[between], z[between]
     for _ in range(2):  # the distance is exact, its gradient across a corner is not
-        apart = distance(at_y, at_z)
+        separation = distance(at_y, at_z)
         slope_y = (distance(at_y + reach, at_z) - distance(at_y - reach, at_z)) / (2.0 * reach)
         slope_z = (distance(at_y, at_z + reach) - distance(at_y, at_z - reach)) / (2.0 * reach)
         steep = np.maximum(slope_y**2 + slope_z**2, 0.25)
-        at_y, at_z = at_y - apart * slope_y / steep, at_z - apart * slope_z / steep
+        at_y, at_z = at_y - separation * slope_y / steep, at_z - separation * slope_z / steep
     moves = np.zeros((2, *y.shape))
     moves[0][between], moves[1][between] = at_y - y[between], at_z - z[between]
     widest = FARTHEST_MOVE * np.minimum(np.gradient(y[:, 0])[:, None], np.gradient(z[0])[None, :])

@@ -127,8 +127,8 @@ def choose_level(
         return outcomes(level)
 
     def result(level: int) -> PilotResult:
-        (found, excess), share = tried[level], numerics.required.share
-        return PilotResult(at_level(level, numerics), excess <= 1.0, share, found, outcomes(level + 2))
+        (actual, excess), share = tried[level], numerics.required.share
+        return PilotResult(at_level(level, numerics), excess <= 1.0, share, actual, outcomes(level + 2))
 
     for level in range(first, len(LADDER) - 2):
         try:

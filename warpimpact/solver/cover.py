@@ -72,8 +72,8 @@ def cover_of(plate: Plate, spacing: float, pushed: Pushed, *, double: bool) -> C
     """The cover of a plate whose tile has cells of at most `spacing` [m]. Nothing is computed yet."""
     key: Key[Pattern] = Key(plate.pattern)
     real: Real = np.float64 if double else np.float32
-    asked = (key, spacing, pushed, real, IN_AN_EIGHTH, COARSER, RADII)
-    return kept(asked, lambda: _planned(key.value, COARSER * spacing, pushed, real))
+    required = (key, spacing, pushed, real, IN_AN_EIGHTH, COARSER, RADII)
+    return kept(required, lambda: _planned(key.value, COARSER * spacing, pushed, real))
 
 
 def _planned(pattern: Pattern, spacing: float, pushed: Pushed, real: Real) -> Cover:
@@ -157,12 +157,12 @@ def _joined(first: Array, second: Array, next_first: Array, next_second: Array |
 
 def _between(values: Array, rows: int, columns: int, parts: int) -> Array:
     """Values of a periodic grid some parts of rows and columns on; one of them is whole."""
-    (row, beside), (column, along) = divmod(rows, parts), divmod(columns, parts)
+    (row, adjacent), (column, along) = divmod(rows, parts), divmod(columns, parts)
     here = np.roll(values, (-row, -column), axis=(0, 1))
-    if not (beside or along):
+    if not (adjacent or along):
         return here
-    next_one = np.roll(values, (-row - (beside > 0), -column - (along > 0)), axis=(0, 1))
-    return np.asarray(here + ((beside + along) / parts) * (next_one - here))
+    next_one = np.roll(values, (-row - (adjacent > 0), -column - (along > 0)), axis=(0, 1))
+    return np.asarray(here + ((adjacent + along) / parts) * (next_one - here))
 
 
 def _cover(solid: NDArray[np.bool_], ahead: Array, behind: tuple[Array, Array], pushed: Pushed, radii: Array) -> Array:

@@ -184,8 +184,8 @@ def pilot_of_limits(
     Raises:
         ValueError: the accuracy has no bound on limits.
     """
-    asked, draft = numerics.required, PRESETS["draft"].limit
-    if asked.limit is None or draft is None:
+    required, draft = numerics.required, PRESETS["draft"].limit
+    if required.limit is None or draft is None:
         raise ValueError("accuracy: needs limit, the error of a limit as a share of the median limit")
     name = str(LIMITS[spec.quantity].value)
 
@@ -199,9 +199,9 @@ def pilot_of_limits(
         return PASSAGES * len(pilot) * prepare(scene, pilot[:1], at_level(level, numerics)).seconds
 
     def errors(coarse: Outcomes, fine: Outcomes) -> LevelErrors:
-        return limit_errors(getattr(coarse, name), getattr(fine, name), asked, spec.quantity)
+        return limit_errors(getattr(coarse, name), getattr(fine, name), required, spec.quantity)
 
-    first = coarsest_level(draft / asked.limit)
+    first = coarsest_level(draft / required.limit)
     build_kernels(scene, pilot, at_level(first, numerics), worker)
     return choose_level(numerics, first, outcomes, errors, seconds)
 

@@ -121,8 +121,8 @@ def _stations(key: Key[Core], count: int) -> tuple[Array, Array]:
     core = key.value
     breaks, widest = core.breaks if len(core.breaks) < count else (), _widest_station(core)
     inner = np.unique([*breaks, widest])
-    apart = np.diff(inner, prepend=0.0, append=core.length) > 1e-6 * core.length
-    knots = np.array([0.0, *inner[apart[:-1] & apart[1:]], core.length])
+    distinct = np.diff(inner, prepend=0.0, append=core.length) > 1e-6 * core.length
+    knots = np.array([0.0, *inner[distinct[:-1] & distinct[1:]], core.length])
     apiece = np.where(knots[:-1] < widest - 1e-6 * core.length, 1.0, SHORTER_BEHIND) * core.length / count
     shares = np.maximum(1, np.round(np.diff(knots) / apiece)).astype(int)
     edges = [np.linspace(a, b, n, endpoint=False) for a, b, n in zip(knots[:-1], knots[1:], shares, strict=True)]

@@ -87,8 +87,8 @@ def pilot_of(
     Raises:
         ValueError: the accuracy has no bound on outcomes.
     """
-    asked = numerics.required
-    if math.isinf(asked.residual_velocity) and math.isinf(asked.tilt):
+    required = numerics.required
+    if math.isinf(required.residual_velocity) and math.isinf(required.tilt):
         raise ValueError("accuracy: needs residual_velocity or tilt; a limit alone is for a search of limits")
 
     @cache
@@ -101,9 +101,9 @@ def pilot_of(
         return len(pilot) * prepare(scene, pilot[:1], at_level(level, numerics)).seconds
 
     def errors(coarse: Outcomes, fine: Outcomes) -> LevelErrors:
-        return hit_errors(coarse, fine, asked, scene.free_behind)
+        return hit_errors(coarse, fine, required, scene.free_behind)
 
-    first = coarsest_level(asked.strictness)
+    first = coarsest_level(required.strictness)
     build_kernels(scene, pilot, at_level(first, numerics), worker)
     return choose_level(numerics, first, outcomes, errors, seconds)
 

@@ -113,11 +113,11 @@ def tile_of(plate: Plate, spacing: float, *, sharp: bool = False, double: bool =
     return kept((key, spacing, sharp, real), lambda: _planned(key, spacing, sharp, real))
 
 
-def kept(asked: Any, planned: Callable[[], Kept]) -> Kept:
+def kept(required: Any, planned: Callable[[], Kept]) -> Kept:
     """The tile for a key, planned now or before."""
     with _KEEPING:
-        tile: Kept = _KEPT.pop(asked, None) or planned()
-        _KEPT[asked] = tile
+        tile: Kept = _KEPT.pop(required, None) or planned()
+        _KEPT[required] = tile
         if len(_KEPT) > MOST_KEPT:
             _KEPT.popitem(last=False)
     return tile
@@ -136,10 +136,10 @@ def forget_tiles() -> None:
 def _make_room(needed: int) -> None:
     """Drop the tiles that were asked for longest ago, until another one of `needed` bytes fits."""
     with _KEEPING:
-        for asked in [asked for asked, tile in _KEPT.items() if tile.built]:
+        for required in [required for required, tile in _KEPT.items() if tile.built]:
             if sum(tile.bytes for tile in _KEPT.values() if tile.built) + needed <= MOST_BYTES:
                 break
-            del _KEPT[asked]
+            del _KEPT[required]
 
 
 def check_tiles(tiles: Mapping[Tile, str]) -> None:
@@ -191,12 +191,12 @@ def _sharp(pattern: Pattern, counts: tuple[int, int], sides: tuple[float, float]
 def _blurred(pattern: Pattern, counts: tuple[int, int], sides: tuple[float, float], real: Real, check: Check) -> Floats:
     """Material averaged over BLUR × BLUR cells of a period: exact sums of whole numbers in float32, then one
     division."""
-    inside, (rows, columns), beside = pattern.shares_in_holes(counts, sides), counts, BLUR // 2
+    inside, (rows, columns), adjacent = pattern.shares_in_holes(counts, sides), counts, BLUR // 2
     material = np.empty(counts, dtype=real)
     for band in _bands(counts):
         check()
-        around = inside[np.arange(band.start - beside, band.stop + beside) % rows]
-        wide = (WHOLE_CELL - np.pad(around, ((0, 0), (beside, beside)), mode="wrap")).astype(real)
+        around = inside[np.arange(band.start - adjacent, band.stop + adjacent) % rows]
+        wide = (WHOLE_CELL - np.pad(around, ((0, 0), (adjacent, adjacent)), mode="wrap")).astype(real)
         material[band] = _sums(_sums(wide, band.stop - band.start).T, columns).T
         material[band] /= BLUR**2 * WHOLE_CELL
     return material

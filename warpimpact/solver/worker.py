@@ -13,16 +13,16 @@ class Cancel:
 
     def __init__(self, outer: "Cancel | None" = None) -> None:
         """Create a token that is also cancelled with an outer one."""
-        self._asked, self._outer = threading.Event(), outer
+        self._requested, self._outer = threading.Event(), outer
 
     def cancel(self) -> None:
         """Cancel all computations that were given this token."""
-        self._asked.set()
+        self._requested.set()
 
     @property
     def cancelled(self) -> bool:
         """Whether the token, or its outer one, was cancelled."""
-        return self._asked.is_set() or (self._outer is not None and self._outer.cancelled)
+        return self._requested.is_set() or (self._outer is not None and self._outer.cancelled)
 
     def check(self) -> None:
         """Raise Cancelled if the token was cancelled."""

@@ -22,17 +22,17 @@ def mesh_of(pattern: SlotPattern | CirclePattern | NoPattern, hit: tuple[float, 
 
 
 @pytest.mark.parametrize("pattern", [SLOTS, ROUND])
-def test_nodes_beside_a_hole_lie_on_its_edge(pattern: SlotPattern | CirclePattern) -> None:
+def test_nodes_at_a_hole_lie_on_its_edge(pattern: SlotPattern | CirclePattern) -> None:
     hit = (1.3e-3, 0.7e-3)
     mesh = mesh_of(pattern, hit)
     around = np.pad(mesh.solid, 1, mode="edge").astype(int)
     count = around[:-1, :-1] + around[1:, :-1] + around[:-1, 1:] + around[1:, 1:]
     fine = (np.abs(mesh.y) < 7e-3) & (np.abs(mesh.z) < 7e-3)
-    beside = (count > 0) & (count < 4) & fine
-    assert beside.sum() > 50
-    apart = np.abs(plate_of(pattern).edge_distance(mesh.y[beside] + hit[0], mesh.z[beside] + hit[1]))
-    assert np.quantile(apart, 0.95) < 0.02 * mesh.spacing
-    assert apart.max() < mesh.spacing
+    adjacent = (count > 0) & (count < 4) & fine
+    assert adjacent.sum() > 50
+    separation = np.abs(plate_of(pattern).edge_distance(mesh.y[adjacent] + hit[0], mesh.z[adjacent] + hit[1]))
+    assert np.quantile(separation, 0.95) < 0.02 * mesh.spacing
+    assert separation.max() < mesh.spacing
 
 
 def test_the_mass_of_the_mesh_is_that_of_the_plate_with_its_holes() -> None:

@@ -31,7 +31,7 @@ from warpimpact.solver.accuracy import (
 )
 from warpimpact.solver.resolution import LADDER, TooManySteps
 
-ASKED = Accuracy(residual_velocity=1.0)
+REQUIRED = Accuracy(residual_velocity=1.0)
 FINEST = len(LADDER) - 3
 Speeds = Callable[[int], NDArray[np.float64]]
 
@@ -49,7 +49,7 @@ def outcomes_of(speeds: NDArray[np.float64], *, layered: bool = False, arrested:
 
 def chosen(
     speeds: Speeds,
-    accuracy: Accuracy = ASKED,
+    accuracy: Accuracy = REQUIRED,
     seconds: Callable[[int], float] = lambda level: 0.0,
     first: int = 0,
 ) -> tuple[PilotResult, list[int]]:
@@ -64,8 +64,8 @@ def chosen(
     def errors(coarse: Outcomes, fine: Outcomes) -> object:
         return hit_errors(coarse, fine, accuracy, (True,))
 
-    found = choose_level(Numerics(accuracy=accuracy), first, outcomes, errors, seconds)  # type: ignore[arg-type]
-    return found, list(computed)
+    actual = choose_level(Numerics(accuracy=accuracy), first, outcomes, errors, seconds)  # type: ignore[arg-type]
+    return actual, list(computed)
 
 
 @pytest.mark.parametrize("ratio", [0.5, 0.25])
@@ -77,11 +77,11 @@ def test_the_coarsest_level_that_keeps_the_accuracy_is_chosen(ratio: float, scal
     def error(level: int) -> NDArray[np.float64]:
         return scale * ratio**level * of_hit
 
-    found, levels = chosen(lambda level: 500.0 + error(level))
-    level = found.numerics.level
+    actual, levels = chosen(lambda level: 500.0 + error(level))
+    level = actual.numerics.level
     assert level is not None
-    assert found.kept
-    estimate, true = found.errors["residual_velocity_error"], float(np.quantile(error(level), 0.9, method="lower"))
+    assert actual.kept
+    estimate, true = actual.errors["residual_velocity_error"], float(np.quantile(error(level), 0.9, method="lower"))
     assert true <= estimate <= 1.0
     assert max(levels) == level + 2
     change = np.sort(error(level - 1) - error(level + 1))
@@ -89,11 +89,11 @@ def test_the_coarsest_level_that_keeps_the_accuracy_is_chosen(ratio: float, scal
 
 
 def test_an_accuracy_that_no_level_keeps_is_not_promised() -> None:
-    found, _ = chosen(lambda level: np.full(8, 500.0 + 1e4 * 0.5**level))
-    assert (found.kept, found.numerics.level) == (False, FINEST)  # where errors fall, the finest level is best
+    actual, _ = chosen(lambda level: np.full(8, 500.0 + 1e4 * 0.5**level))
+    assert (actual.kept, actual.numerics.level) == (False, FINEST)  # where errors fall, the finest level is best
     change = 1e4 * (0.5**FINEST - 0.5 ** (FINEST + 2))
-    assert found.errors["residual_velocity_error"] == pytest.approx(ERROR_PER_CHANGE * change)
-    assert found.phrase.endswith("for 90 % of the hits, not as promised")
+    assert actual.errors["residual_velocity_error"] == pytest.approx(ERROR_PER_CHANGE * change)
+    assert actual.phrase.endswith("for 90 % of the hits, not as promised")
     stalled, _ = chosen(lambda level: np.full(8, 500.0 + 30.0 * 0.5**level + 40.0 * (level // 2 % 2)))
     assert (stalled.kept, stalled.numerics.level) == (False, 0)  # where errors stall, the coarsest one is as good
 
@@ -105,8 +105,8 @@ def test_a_pilot_ends_where_hits_take_too_long_or_do_not_fit() -> None:
     def halved(level: int) -> NDArray[np.float64]:
         return np.full(8, 500.0 + 1e4 * 0.5**level)
 
-    found, levels = chosen(halved, seconds=slow)
-    assert (found.kept, found.numerics.level, max(levels)) == (False, 2, 4)
+    actual, levels = chosen(halved, seconds=slow)
+    assert (actual.kept, actual.numerics.level, max(levels)) == (False, 2, 4)
     assert chosen(halved, seconds=lambda level: 1e9)[0].numerics.level == 0  # the first level is always tried
     for error in (MemoryError, TooManySteps):
 
@@ -133,20 +133,20 @@ def test_hits_that_end_otherwise_behind_layers_count_in_the_status() -> None:
     fine = outcomes_of(speeds, layered=True)
     for arrested, excess in ((0, 0.0), (1, 1.0 / 0.64), (2, 2.0 / 0.64)):
         coarse = outcomes_of(np.where(np.arange(64) < arrested, 0.0, speeds), layered=True, arrested=arrested)
-        found = hit_errors(coarse, fine, PRESETS["standard"], (True, True))
-        assert found.excess == pytest.approx(excess)
-        assert found.errors["status_error"] == arrested / 64
-        assert found.errors["residual_velocity_error"] == 0.0
-    alone = hit_errors(outcomes_of(speeds), outcomes_of(np.where(np.arange(64) < 7, 0.0, speeds)), ASKED, (True,))
+        actual = hit_errors(coarse, fine, PRESETS["standard"], (True, True))
+        assert actual.excess == pytest.approx(excess)
+        assert actual.errors["status_error"] == arrested / 64
+        assert actual.errors["residual_velocity_error"] == 0.0
+    alone = hit_errors(outcomes_of(speeds), outcomes_of(np.where(np.arange(64) < 7, 0.0, speeds)), REQUIRED, (True,))
     assert alone.errors["residual_velocity_error"] == ERROR_PER_CHANGE * 500.0  # a core that stops has the speed 0
 
 
-def test_a_computation_that_fails_has_no_bound_and_what_is_not_asked_for_none() -> None:
+def test_a_computation_that_fails_has_no_bound_and_what_is_not_required_none() -> None:
     coarse = outcomes_of(np.full(2, 500.0))
     failed = coarse.assign(status=np.array([Status.UNFINISHED, 0], dtype=np.int8))
-    assert math.isinf(hit_errors(coarse, failed, ASKED, (True,)).excess)
+    assert math.isinf(hit_errors(coarse, failed, REQUIRED, (True,)).excess)
     turned = coarse.assign(tilt=np.full((2, 1), 2.0))
-    assert hit_errors(coarse, turned, ASKED, (True,)).excess == 0.0
+    assert hit_errors(coarse, turned, REQUIRED, (True,)).excess == 0.0
     assert hit_errors(coarse, turned, Accuracy(tilt="1 rad"), (True,)).excess == 2.0 * ERROR_PER_CHANGE
 
 
@@ -176,9 +176,9 @@ def test_a_result_has_its_promise_and_replays_on_its_level() -> None:
     before, after = text.split("[hits]")[0], '\n[numerics]\nfidelity = "draft"\n'
     campaign = Campaign.from_text(f"{before}[hits]\ncount = 12{after}", name="t", folder=Path())
     result = run(campaign, device="cpu")
-    found = pilot_in(result)
-    assert found is not None
-    assert found.kept
+    actual = pilot_in(result)
+    assert actual is not None
+    assert actual.kept
     assert result.attrs["promise_kept"] == 1
-    assert 0.0 < result.attrs["residual_velocity_error"] == found.errors["residual_velocity_error"] <= 5.0
+    assert 0.0 < result.attrs["residual_velocity_error"] == actual.errors["residual_velocity_error"] <= 5.0
     assert replay(result, 5, folder=Path()).attrs["agreement"] == "bit-identical"

@@ -122,21 +122,21 @@ def test_a_run_that_fails_far_from_the_limit_spoils_nothing(monkeypatch: pytest.
         return status, speed
 
     monkeypatch.setattr(limit, "computed", outcomes_by(end))
-    found = limit_velocity(SCENE, shots(2, 825.0), numerics=STANDARD)
-    assert found.converged.all()
-    assert found.value == pytest.approx([775.0] * 2, abs=1.0)
-    assert (found.outcomes.status == Status.PERFORATED).all()
+    actual = limit_velocity(SCENE, shots(2, 825.0), numerics=STANDARD)
+    assert actual.converged.all()
+    assert actual.value == pytest.approx([775.0] * 2, abs=1.0)
+    assert (actual.outcomes.status == Status.PERFORATED).all()
 
 
-def test_a_run_that_fails_beside_the_limit_leaves_none(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_run_that_fails_at_the_limit_leaves_none(monkeypatch: pytest.MonkeyPatch) -> None:
     def end(some: Shots) -> tuple[Array, Array]:
         passes = some.velocity > 775.0
         status = np.where(passes, Status.PERFORATED, np.where(some.velocity > 700.0, Status.NOT_FINITE, 1))
         return status, np.where(passes, 100.0, 0.0)
 
     monkeypatch.setattr(limit, "computed", outcomes_by(end))
-    found = limit_velocity(SCENE, shots(1), numerics=STANDARD)
-    assert np.isnan(found.value.item())
-    assert not found.converged.item()
-    assert found.outcomes.status.item() == Status.NOT_FINITE
-    assert 700.0 < found.shots.velocity.item() <= 775.0
+    actual = limit_velocity(SCENE, shots(1), numerics=STANDARD)
+    assert np.isnan(actual.value.item())
+    assert not actual.converged.item()
+    assert actual.outcomes.status.item() == Status.NOT_FINITE
+    assert 700.0 < actual.shots.velocity.item() <= 775.0

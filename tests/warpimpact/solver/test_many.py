@@ -23,11 +23,11 @@ def scenes_of(*names: str, hits: int) -> list[tuple[Scene, Shots]]:
 def test_outcomes_are_those_of_each_scene_alone(threads: int) -> None:
     scenes, progress = scenes_of("slotted_plate", "round_holes", "layered_target", "slotted_plate", hits=5), []
     many = simulate_many(scenes, LEVEL, Worker("cpu", threads), lambda *now: progress.append(now))
-    for found, (scene, shots) in zip(many, scenes, strict=True):
+    for actual, (scene, shots) in zip(many, scenes, strict=True):
         alone = simulate(scene, shots, numerics=LEVEL, device="cpu", threads=1)
-        assert vars(found).keys() == vars(alone).keys()
+        assert vars(actual).keys() == vars(alone).keys()
         for name, values in vars(alone).items():
-            assert np.array_equal(getattr(found, name), values, equal_nan=values.dtype.kind == "f"), name
+            assert np.array_equal(getattr(actual, name), values, equal_nan=values.dtype.kind == "f"), name
     total = sum(len(shots) for _, shots in scenes)
     assert progress[-1] == (total, total)
     assert [done for done, _ in progress] == sorted(done for done, _ in progress)

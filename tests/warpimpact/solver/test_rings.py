@@ -38,8 +38,8 @@ def test_volume_of_the_rings_converges_to_the_core_s(core: Core) -> None:
     errors = []
     for axial in (16, 32, 64):
         rings = rings_of(core, axial, 256)
-        found = 256 / 3 * (rings.station @ rings.area_axial + rings.radius @ rings.area_radial)
-        errors.append(abs(found / volume - 1))
+        actual = 256 / 3 * (rings.station @ rings.area_axial + rings.radius @ rings.area_radial)
+        errors.append(abs(actual / volume - 1))
     assert errors[0] < 0.01
     assert errors[2] < max(errors[0] / 8, 1e-4)
 
@@ -52,5 +52,5 @@ def test_azimuths_are_their_own_mirror_images_half_a_patch_on_from_ring_to_ring(
     for azimuths in (even, odd):
         directions = np.exp(1j * azimuths)
         mirrored = directions.conj()
-        apart = np.abs(directions[:, None] - mirrored)
-        np.testing.assert_allclose(apart.min(axis=1), 0.0, atol=1e-12)
+        separation = np.abs(directions[:, None] - mirrored)
+        np.testing.assert_allclose(separation.min(axis=1), 0.0, atol=1e-12)
