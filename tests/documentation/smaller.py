@@ -3,7 +3,7 @@
 import re
 from pathlib import Path
 
-MOST = {"count": 64, "hits": 16, "designs": 12, "sets": 128}
+MOST = {"count": 64, "hits": 32, "designs": 12, "sets": 128}
 """Largest values of keys of a campaign, and of arguments with these names."""
 
 
