@@ -54,7 +54,7 @@ PAPER = (CAMPAIGNS / "paper_shots.toml").read_text(encoding="utf-8")
         (('"130 mm"]', '"140 mm"]'), "output.standoffs is [0.05, 0.14] here and [0.05, 0.13] there"),
     ],
 )
-def test_only_the_papers_scene_is_set_beside_the_paper(change: tuple[str, str], difference: str) -> None:
+def test_only_the_papers_scene_is_compared_with_the_paper(change: tuple[str, str], difference: str) -> None:
     assert change[0] in PAPER
     other = Campaign.from_text(PAPER.replace(*change), name="other", folder=CAMPAIGNS)
     with pytest.raises(CampaignError) as caught:

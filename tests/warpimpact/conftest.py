@@ -99,7 +99,10 @@ def make_result() -> ResultMaker:
 
 
 def plate_result(
-    velocity: np.ndarray, tilt: np.ndarray | float = 0.0, status: np.ndarray | int = Status.PERFORATED, **told: object
+    velocity: np.ndarray,
+    tilt: np.ndarray | float = 0.0,
+    status: np.ndarray | int = Status.PERFORATED,
+    **message: object,
 ) -> xarray.Dataset:
     """What measures and comparisons take of a result: cylinders of 1000 m/s with these residual velocities [m/s], tilts
     at 130 mm [degree] and ends."""
@@ -125,7 +128,7 @@ def plate_result(
             "open_area": 0.25,
             "numerics_given": '{"fidelity": "draft", "time_step": null}',
         }
-        | told,
+        | message,
     )
 
 

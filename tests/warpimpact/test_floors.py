@@ -42,7 +42,7 @@ def test_imports_go_down_only(installed: Path) -> None:
         ("plotting/cell.py", "import warpimpact.export.spreadsheet", "warpimpact.plotting is not allowed to import"),
     ],
 )
-def test_an_import_upwards_is_found(installed: Path, file: str, line: str, sentence: str) -> None:
+def test_an_import_upwards_is_detected(installed: Path, file: str, line: str, sentence: str) -> None:
     broken = installed / "warpimpact" / file
     broken.write_text(broken.read_text(encoding="utf-8") + f"\n{line}\n", encoding="utf-8")
     done = linted(installed)

@@ -24,7 +24,7 @@ from .run import computing, failure_code
 
 
 def continuum_command(arguments: argparse.Namespace) -> int:
-    campaign, hits = _asked(arguments)
+    campaign, hits = _campaign_and_hits(arguments)
     output = arguments.output or Path(f"{arguments.file.stem}_continuum.nc")
     check_output(output, ".nc", overwrite=True)
     campaign = campaign.computed_by(_elements(arguments, campaign))
@@ -48,7 +48,7 @@ def continuum_command(arguments: argparse.Namespace) -> int:
         return failure_code(dataset, output)
 
 
-def _asked(arguments: argparse.Namespace) -> "tuple[Campaign, tuple[int, ...] | None]":
+def _campaign_and_hits(arguments: argparse.Namespace) -> "tuple[Campaign, tuple[int, ...] | None]":
     """The campaign, and the numbers of the hits; None for all hits."""
     if arguments.file.suffix == ".toml":
         if arguments.hit or arguments.hits:
@@ -78,11 +78,11 @@ def _elements(arguments: argparse.Namespace, campaign: "Campaign") -> "FiniteEle
     named = campaign.plate.material
     given: dict[str, Any] = {"materials": (named,)} if named and not campaign.continuum.materials else {}
     options = {"materials": "material", "friction": "friction", "fidelity": "fidelity", "spacing": "element"}
-    told = {field: value for field, option in options.items() if (value := getattr(arguments, option)) is not None}
-    if "fidelity" in told:
-        told.setdefault("spacing", None)
+    settings = {field: value for field, option in options.items() if (value := getattr(arguments, option)) is not None}
+    if "fidelity" in settings:
+        settings.setdefault("spacing", None)
     try:
-        elements = FiniteElements.model_validate(campaign.continuum.model_dump() | given | told)
+        elements = FiniteElements.model_validate(campaign.continuum.model_dump() | given | settings)
         _ = elements.entries
     except ValidationError as error:
         problem = error.errors(include_url=False)[0]

@@ -46,11 +46,11 @@ def plot_command(arguments: argparse.Namespace) -> None:
     check_folder(folder)
     stem = "_".join(path.stem for path in arguments.results)
     dataset, *others = datasets.values()
-    asked: dict[str, tuple[str | None, Callable[..., Figure]]] = {
+    figures: dict[str, tuple[str | None, Callable[..., Figure]]] = {
         "--measure": (arguments.measure, measure_map),
         "--variable": (arguments.variable, variable_map),
     }
-    for option, (quantity, draw) in asked.items():
+    for option, (quantity, draw) in figures.items():
         if quantity is None:
             continue
         if others:

@@ -135,7 +135,7 @@ def application(store: DesignStore, *, token: str, device: str = "auto") -> Star
     return Starlette(
         routes=[Mount(f"/{token}", routes=routes)],
         middleware=[Middleware(TrustedHostMiddleware, allowed_hosts=["127.0.0.1", "localhost"])],
-        exception_handlers={404: _not_found},
+        exception_handlers={404: _missing},
     )
 
 
@@ -201,7 +201,7 @@ def _refusal(error: Exception) -> dict[str, str]:
     return {"kind": "refused", "sentence": f"This is a bug of warpimpact; the terminal has its details. {bug}"}
 
 
-async def _not_found(request: Request, error: Exception) -> Response:
+async def _missing(request: Request, error: Exception) -> Response:
     return PlainTextResponse(
         "There is nothing at this address. Each start of warpimpact design has another token and prints its address; "
         "warpimpact design 'ADDRESS' opens the design of an old one.",

@@ -87,5 +87,5 @@ _TABLES = {
 
 def text_kind(tables: Collection[str], wanted: str = "") -> tuple[str, str]:
     """The kind of a TOML file with these tables, the wanted one if it may be that, and its use; empty if unknown."""
-    found = [kind for names, kind in _TABLES.items() if {*names} & {*tables}]
-    return next((kind for kind in found if kind[0] == wanted), found[0] if found else ("", ""))
+    matching = [kind for names, kind in _TABLES.items() if {*names} & {*tables}]
+    return next((kind for kind in matching if kind[0] == wanted), matching[0] if matching else ("", ""))

@@ -337,15 +337,15 @@ def _meant(text: str) -> str:
     return f"; did you mean {form}?"
 
 
-def _place(text: str | None, asked: PerHit) -> dict[str, Any]:
+def _place(text: str | None, number: PerHit) -> dict[str, Any]:
     """Stand-off or layer behind an @."""
     if text is None:
         return {}
     layer = _LAYER.fullmatch(text)
-    if layer and asked.has_layer:
+    if layer and number.has_layer:
         return {"layer": int(layer[1])}
-    if not asked.has_standoff:
-        raise ValueError(f'got "{asked.name}@{text}", but {asked.name} has no stand-off')
+    if not number.has_standoff:
+        raise ValueError(f'got "{number.name}@{text}", but {number.name} has no stand-off')
     return {"standoff": quantity(units.Length)(text)}
 
 

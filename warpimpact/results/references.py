@@ -35,16 +35,16 @@ def reference(dataset: xarray.Dataset, name: str) -> xarray.Dataset | None:
     is_alone = attr.LIMIT not in dataset.attrs and v.LAYER_STATUS not in dataset.variables
     if name == "solid" and is_alone and dataset.attrs.get(attr.OPEN_AREA) == 0.0:
         return dataset
-    found = references_of(dataset).get(name)
-    if found is None or dataset[v.STATUS].dims != (v.HIT,):
+    reference = references_of(dataset).get(name)
+    if reference is None or dataset[v.STATUS].dims != (v.HIT,):
         return None
-    numbers, hits = hit_numbers(dataset), found.sizes["hit"]
+    numbers, hits = hit_numbers(dataset), reference.sizes["hit"]
     if len(np.unique(numbers)) < len(numbers):
         return None  # joined results have several references
     if hits == 1:
-        return found
+        return reference
     numbers = numbers[: np.argmax(np.append(numbers, hits) >= hits)]  # the first hits that have a reference
-    return found.isel(hit=numbers) if len(numbers) else None
+    return reference.isel(hit=numbers) if len(numbers) else None
 
 
 def as_plates(dataset: xarray.Dataset) -> dict[str, xarray.Dataset]:

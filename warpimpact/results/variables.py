@@ -47,7 +47,7 @@ EDGE_DISTANCE = Variable("edge_distance", HITS, "m", "from the nearest edge of h
 OF_THE_HIT_POINT = (EDGE_DISTANCE,)
 
 
-def _beside(variable: Variable, kind: str, along: str, what: str) -> Variable:
+def _along(variable: Variable, kind: str, along: str, what: str) -> Variable:
     """A variable of shots other than the hits, along a dimension of their own."""
     dims = tuple(along if dim == "hit" else dim for dim in variable.dims)
     return Variable(f"{kind}_{variable}", dims, variable.units, f"{variable.long_name}, {what}")
@@ -59,7 +59,7 @@ _RECORDED = dict.fromkeys(
 FINER_HIT = Variable("finer_hit", ("finer",), "1", "number of a hit that was computed at a finer level, too")
 FINER_COORDINATES = (FINER_HIT,)
 FINER_VARIABLES = {
-    _beside(variable, "finer", "finer", "at a finer level"): variable
+    _along(variable, "finer", "finer", "at a finer level"): variable
     for variable in (*_RECORDED, STOPPED_IN, DEPTH, *LIMIT_VARIABLES)
     if variable.is_number_of_hit or variable in (STATUS, STOPPED_IN, BROKEN)
 }

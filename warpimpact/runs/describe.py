@@ -74,11 +74,11 @@ def _limit(campaign: Campaign, limit: LimitSpec) -> dict[str, Any]:
     return attributes
 
 
-def _pilot(asked: Accuracy, pilot: PilotResult | None) -> dict[str, Any]:
+def _pilot(bounds_wanted: Accuracy, pilot: PilotResult | None) -> dict[str, Any]:
     """Attributes on the accuracy that a pilot was to reach, and on its result; none without a pilot."""
     if pilot is None:
         return {}
-    bounds = {name: getattr(asked, name) for name in Accuracy.model_fields}
+    bounds = {name: getattr(bounds_wanted, name) for name in Accuracy.model_fields}
     given = {name: value for name, value in bounds.items() if value is not None and math.isfinite(value)}
     return {
         attr.RESOLUTION: pilot.numerics.model_dump_json(),
@@ -154,7 +154,7 @@ def _numerics(numerics: Numerics, impact: Impact, target: Target, resolution: Re
     """The numerics as given, and as used with every choice made: as a line of text and as numbers."""
     precision = "double" if resolution.double else "single"
     return {
-        attr.NUMERICS: f"{_asked(numerics)}, {numerics.scheme} scheme, "
+        attr.NUMERICS: f"{_wanted(numerics)}, {numerics.scheme} scheme, "
         f"time_step {resolution.step_in(impact, target):.4g} s, "
         f"patches_axial {resolution.patches_axial}, patches_around {resolution.patches_around}, "
         f"grid_spacing {resolution.grid_spacing:.4g} m, precision {precision}",
@@ -167,7 +167,7 @@ def _numerics(numerics: Numerics, impact: Impact, target: Target, resolution: Re
     }
 
 
-def _asked(numerics: Numerics) -> str:
+def _wanted(numerics: Numerics) -> str:
     """What determined the resolution."""
     if numerics.explicit is None:
         return "accuracy in numbers" if numerics.accuracy is not None else f"{numerics.fidelity} fidelity"

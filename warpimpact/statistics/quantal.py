@@ -44,10 +44,10 @@ def fit_quantal(levels: Array, answers: Flags, used: Flags) -> QuantalFit:
     """Fit of maximum likelihood of every test, from arrays of shape [tests, shots]."""
     below, above = _ends(levels, answers, used)
     overlap = below > above
-    apart = np.isfinite(below) & np.isfinite(above) & ~overlap
+    separate = np.isfinite(below) & np.isfinite(above) & ~overlap
     location, scale = np.full((2, len(levels)), np.nan)
-    location[apart] = 0.5 * (below + above)[apart]
-    likelihood = np.where(apart, _of_a_step(levels, answers, used, below == above), np.nan)
+    location[separate] = 0.5 * (below + above)[separate]
+    likelihood = np.where(separate, _of_a_step(levels, answers, used, below == above), np.nan)
     if overlap.any():
         maximum = _newton(levels[overlap], answers[overlap], used[overlap])
         location[overlap], scale[overlap], likelihood[overlap] = maximum

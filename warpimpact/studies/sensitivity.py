@@ -190,15 +190,15 @@ def _shots(campaign: Campaign, most: int) -> Shots:
 
 def changes(campaign: Campaign) -> dict[str, Campaign]:
     """The campaign with one thing otherwise, by the name of the change. Columns of shots do not change."""
-    found, layers = dict[str, Campaign](), range(len(campaign.target.layers))
+    changed_campaigns, layers = dict[str, Campaign](), range(len(campaign.target.layers))
     for name, quantities, change in CHANGES:
         if any(is_drawn(campaign, quantity, layers) for quantity in quantities):
             continue
         with warnings.catch_warnings(), suppress(ValidationError):  # not every change is a campaign
             warnings.simplefilter("ignore")
             if (changed := change(campaign)) != campaign:
-                found[name] = changed
-    return found
+                changed_campaigns[name] = changed
+    return changed_campaigns
 
 
 Change = Callable[[Campaign], Campaign]

@@ -153,11 +153,11 @@ def test_a_plate_without_layers_is_compared_in_what_both_have(make_plate_result,
 def limits(result: xarray.Dataset, thickness: np.ndarray, elsewhere: float) -> xarray.Dataset:
     """The result of a search of the limit thickness of a base [m] behind so many kg/m²."""
     ends = (thickness, thickness, np.ones(len(thickness)), np.ones(len(thickness), dtype=bool))
-    found = result.assign(
+    actual = result.assign(
         stored_columns(LIMITS["thickness"], dict(zip(LIMITS["thickness"], (thickness, *ends), strict=True)))
     )
-    told = {"limit": "thickness", "limit_layer": 1, "limit_highest": 20e-3, "limit_density": 8000.0}
-    return found.assign_attrs(told | {"limit_elsewhere": elsewhere})
+    message = {"limit": "thickness", "limit_layer": 1, "limit_highest": 20e-3, "limit_density": 8000.0}
+    return actual.assign_attrs(message | {"limit_elsewhere": elsewhere})
 
 
 def test_targets_are_ranked_by_the_weight_that_they_need(make_plate_result) -> None:
@@ -190,7 +190,7 @@ def test_limits_are_ranked_by_their_median(make_plate_result) -> None:
     assert not any(text.startswith("mean") for text in comparison.measures)
 
 
-def test_the_figure_against_weight_shows_the_base_beside_the_solid_plate(quarter, make_plate_result) -> None:
+def test_the_figure_against_weight_shows_the_base_next_to_the_solid_plate(quarter, make_plate_result) -> None:
     comparison = compare([quarter, quarter.assign_attrs(areal_density=60.0)], ["a", "b"])
     figure = weight_figure(comparison)
     share, depth = figure.axes
@@ -204,7 +204,7 @@ def test_the_figure_against_weight_shows_the_base_beside_the_solid_plate(quarter
     assert weight_figure(compare([alone, alone], ["a", "b"])) is None
 
 
-def test_what_the_solid_plate_is_stands_beside_the_ratios(quarter) -> None:
+def test_what_the_solid_plate_is_stands_next_to_the_ratios(quarter) -> None:
 
     def of(**material: float) -> xarray.Dataset:
         steel = {"resistance": 2.6e9, "density": 7850.0} | material
@@ -229,17 +229,17 @@ def test_limits_stand_over_the_weight_that_the_target_needs(make_plate_result) -
     assert weight_figure(compare([one, other], ["one", "other"])) is not None
 
 
-def test_the_proxy_beside_the_limit_thickness() -> None:
+def test_the_proxy_next_to_the_limit_thickness() -> None:
     """The ratio of base armour that a core needs at 0° and at 85°: 2.8 by the kernel, 4.4 by the proxy."""
     campaign = Campaign.from_toml(CAMPAIGNS / "base_armour.toml")
     limit, numerics = limit_of(campaign, "thickness"), Numerics(level=2)
     dataset = compute_limits(limit, campaign, numerics, campaign.sampler().shots(0, 7), 0, worker=Worker("cpu"))
     dataset = described(dataset, campaign, numerics, limit=limit)
-    thickness, found = 1e3 * dataset["limit_thickness"].values, proxy(dataset)
-    assert found is not None
-    assert found["inclination [°]"].tolist() == pytest.approx([0, 15, 30, 45, 60, 75, 85])
+    thickness, actual = 1e3 * dataset["limit_thickness"].values, proxy(dataset)
+    assert actual is not None
+    assert actual["inclination [°]"].tolist() == pytest.approx([0, 15, 30, 45, 60, 75, 85])
     assert thickness[[0, -1]] == pytest.approx([6.3, 2.3], abs=0.1)
     assert thickness[0] / thickness[-1] == pytest.approx(2.8, abs=0.1)
-    assert found["proxy [mm]"][0] / found["proxy [mm]"][6] == pytest.approx(4.44, abs=0.01)
-    assert found["ratio"].tolist() == pytest.approx([1.51, 1.01, 1.01, 1.08, 1.10, 1.04, 0.95], abs=0.03)
+    assert actual["proxy [mm]"][0] / actual["proxy [mm]"][6] == pytest.approx(4.44, abs=0.01)
+    assert actual["ratio"].tolist() == pytest.approx([1.51, 1.01, 1.01, 1.08, 1.10, 1.04, 0.95], abs=0.03)
     assert "proxy" in text_of(limit_view(dataset))

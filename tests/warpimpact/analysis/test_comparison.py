@@ -51,7 +51,7 @@ def moved(dataset: xarray.Dataset) -> xarray.Dataset:
     return dataset.assign_coords(hit_y=dataset["hit_y"] * 0.5)
 
 
-def test_identical_plates_cannot_be_told_apart(make_plate_result) -> None:
+def test_identical_plates_cannot_be_distinguished(make_plate_result) -> None:
     plate = make_plate_result(velocities(NUMBERS.uniform(0.5, 1.0, 500)), NUMBERS.uniform(0.0, 90.0, 500))
     comparison = compare([plate, plate], ["a", "b"])
     assert not any(table["significant"].any() for table in comparison.differences.values())
@@ -114,11 +114,11 @@ def test_plates_whose_printed_intervals_do_not_meet_have_different_ranks(
             scores, ranks = comparison.scores[text], comparison.ranks(text)
             for pair in table.itertuples():
                 one, other = scores.loc[pair.one], scores.loc[pair.other]
-                apart = one.high < other.low or other.high < one.low
-                assert pair.significant or not apart
+                distance = one.high < other.low or other.high < one.low
+                assert pair.significant or not distance
                 first, last = sorted([ranks[pair.one], ranks[pair.other]])
                 assert pair.significant or first[1] >= last[0]  # ranks of plates that may be equal meet
-                decided += apart
+                decided += distance
     assert decided > 12
 
 

@@ -114,8 +114,8 @@ def test_the_table_says_what_a_result_carries(mixed, make_result) -> None:
     assert "residual energy fraction, mean" in text
     assert "solid plate" not in text  # no reference
     assert "proxy" not in text  # no core
-    told = effectiveness_text(with_solid(mixed, np.array([800.0])).assign_attrs(open_area=0.25, areal_density=23.55))
-    title, _, first, *_ = told.splitlines()
+    message = effectiveness_text(with_solid(mixed, np.array([800.0])).assign_attrs(open_area=0.25, areal_density=23.55))
+    title, _, first, *_ = message.splitlines()
     assert title == "effectiveness, 23.55 kg/m², 25.0% open"
     assert first.split()[:5] == ["residual", "energy", "fraction,", "mean", "0.4000"]
     assert first.split()[-5:] == ["0.6400", "0.6250", "0.000", "to", "1.459"]

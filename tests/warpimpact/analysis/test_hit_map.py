@@ -88,7 +88,7 @@ def test_a_grid_is_its_own_map(repeats: int) -> None:
         ({"variable": "tilt", "pixels": 0}, "pixels: got 0, but it must be at least 1"),
     ],
 )
-def test_what_cannot_be_mapped_is_told(make_result: ResultMaker, change: dict[str, object], sentence: str) -> None:
+def test_what_cannot_be_mapped_is_reported(make_result: ResultMaker, change: dict[str, object], sentence: str) -> None:
     with pytest.raises(ValueError, match=sentence):
         warpimpact.hit_map(make_result(10), **change)
 

@@ -80,8 +80,8 @@ def test_a_run_goes_on_and_ends_with_3_when_too_many_failed(
     assert main(["run", str(tmp_path / "a.toml"), "-o", str(output), "--device", "cpu"]) == code
     shown = capsys.readouterr()
     assert "300 failed" in shown.err
-    told = "1 of the shots failed, more than output.failed_share = 0.5" in shown.err
-    assert told == (code == 3)
+    message = "1 of the shots failed, more than output.failed_share = 0.5" in shown.err
+    assert message == (code == 3)
     assert (files.read(output)["status"] == Status.UNFINISHED).all()
     assert main(["inspect", str(output)]) == 0
     shown = capsys.readouterr().out
@@ -89,19 +89,19 @@ def test_a_run_goes_on_and_ends_with_3_when_too_many_failed(
     assert sum(" unfinished " in line for line in shown.splitlines()) == 300
 
 
-def test_the_accuracy_is_told(result: Path) -> None:
+def test_the_accuracy_is_reported(result: Path) -> None:
     lines = inspect_text(files.read(result)).splitlines()
     (accuracy,) = (line for line in lines if line.startswith("accuracy"))
     assert "draft keeps its promise (5 m/s and 5 deg for 90 % of the hits); estimated errors: " in accuracy
 
 
-def test_a_run_without_standoffs_is_told_and_drawn(tmp_path: Path) -> None:
+def test_a_run_without_standoffs_is_reported_and_drawn(tmp_path: Path) -> None:
     text = DRAFT.replace('["50 mm", "130 mm"]', "[]")
     campaign = Campaign.from_text(text, name="a", folder=tmp_path, count=64)
     dataset = run(campaign, device="cpu")
     assert dataset.sizes["standoff"] == 0
     files.write(dataset, tmp_path / "a.nc")
-    told = inspect_text(files.read(tmp_path / "a.nc"))
-    assert "deflection" in told
-    assert "tilt" not in told
+    message = inspect_text(files.read(tmp_path / "a.nc"))
+    assert "deflection" in message
+    assert "tilt" not in message
     assert all(path.is_file() for path in save_maps(dataset, tmp_path, "a"))

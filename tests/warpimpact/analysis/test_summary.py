@@ -40,8 +40,8 @@ def test_passed_means_perforated_or_missed(mixed):
     ],
 )
 def test_means_count_only_what_passed_the_plate_and_exists(mixed, measure, expected):
-    (found,) = estimated(mixed, [Measure.parse(measure).of(mixed)]).values()
-    assert (found.count, found.value, found.spread) == expected
+    (actual,) = estimated(mixed, [Measure.parse(measure).of(mixed)]).values()
+    assert (actual.count, actual.value, actual.spread) == expected
 
 
 def test_text_states_the_numbers_with_their_units(mixed):

@@ -68,7 +68,7 @@ def test_an_absent_device_is_refused(in_tmp_path: Path, refusal: Refusal) -> Non
     assert not list(in_tmp_path.iterdir())
 
 
-def test_memory_that_cannot_be_had_is_told(
+def test_memory_that_cannot_be_had_is_reported(
     in_tmp_path: Path, refusal: Refusal, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def no_memory(*_: object, **__: object) -> None:
@@ -79,7 +79,7 @@ def test_memory_that_cannot_be_had_is_told(
     assert not list(in_tmp_path.iterdir())
 
 
-def test_results_are_drawn_beside_each_other(
+def test_results_are_drawn_side_by_side(
     in_tmp_path: Path, capsys: pytest.CaptureFixture[str], refusal: Refusal, make_result: Callable[..., xarray.Dataset]
 ) -> None:
     Path("b").mkdir()

@@ -42,7 +42,7 @@ def test_a_full_disk_is_named_and_cuts_no_file(
     assert not list(in_tmp_path.iterdir())
 
 
-def test_what_is_asked_for_has_a_picture_of_its_own(make_result: ResultMaker, tmp_path: Path, refusal: Refusal) -> None:
+def test_what_is_requested_has_a_picture_of_its_own(make_result: ResultMaker, tmp_path: Path, refusal: Refusal) -> None:
     files.write(make_result(100), tmp_path / "a.nc")
     for quantity in ("P(tilt@130mm > 30 deg)", "P(tilt@130mm < 30 deg)", "P(perforated)"):
         assert main(["plot", str(tmp_path / "a.nc"), "--measure", quantity]) == 0

@@ -63,15 +63,15 @@ def test_probability_map_holds_the_share_at_every_place(make_result):
 def test_marginals_are_the_quantiles_of_strips(make_result):
     dataset = make_result(1000)
     dataset["residual_velocity"].values[:] = 700.0 + 1e3 * dataset["hit_y"]
-    centre, above, beside, histogram, _ = marginals(dataset, "residual_velocity").axes
+    centre, above, neighbour, histogram, _ = marginals(dataset, "residual_velocity").axes
     (median,) = above.lines
     np.testing.assert_allclose(median.get_ydata(), 700.0 + median.get_xdata(), atol=0.2)
     assert len(median.get_xdata()) == 20
-    (median,) = beside.lines
+    (median,) = neighbour.lines
     np.testing.assert_allclose(median.get_xdata(), 700.0, atol=4.0)
     assert sum(patch.get_width() for patch in histogram.patches) == 1000
     assert above.get_xlim() == centre.get_xlim()
-    assert beside.get_ylim() == centre.get_ylim()
+    assert neighbour.get_ylim() == centre.get_ylim()
 
 
 @pytest.mark.parametrize("count", [400, 12000])

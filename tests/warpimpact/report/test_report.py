@@ -32,8 +32,8 @@ ResultMaker = Callable[..., xarray.Dataset]
 
 def data_of(path: Path) -> dict:
     """The data that the page's script reads."""
-    (found,) = re.findall(r'<script id="data" type="application/gzip">(.*?)</script>', path.read_text())
-    return json.loads(gzip.decompress(b64decode(found)))
+    (actual,) = re.findall(r'<script id="data" type="application/gzip">(.*?)</script>', path.read_text())
+    return json.loads(gzip.decompress(b64decode(actual)))
 
 
 def scripts_of(text: str) -> tuple[str, str]:
@@ -131,7 +131,7 @@ def test_page_loads_nothing_and_escapes_what_files_say(folder: Path) -> None:
     assert own.count("</script>") == 2  # those of the data and of Plotly; titles contain others
 
 
-def test_large_results_are_thinned_evenly_and_it_is_said(
+def test_large_results_are_thinned_evenly_and_it_is_reported(
     make_result: ResultMaker, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     dataset = make_result(5000)
@@ -160,7 +160,7 @@ def test_trajectories_are_of_the_worst_and_of_evenly_spread_hits(make_result: Re
     assert hit_data.worst_and_spread(some, 16, first=[7])[:5] == [7, 511, 509, 507, 505]
 
 
-def test_what_is_missing_is_told_and_nothing_written(
+def test_what_is_missing_is_reported_and_nothing_written(
     folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     result, page = str(folder / "narrow.nc"), str(tmp_path / "a.html")

@@ -33,8 +33,8 @@ def report(path: Path) -> str:
 
 def test_a_hit_map_complies(result: xarray.Dataset, tmp_path: Path) -> None:
     files.write(result, tmp_path / "a.nc")
-    told = report(tmp_path / "a.nc")
-    assert "All tests passed!" in told, told
+    message = report(tmp_path / "a.nc")
+    assert "All tests passed!" in message, message
 
 
 def test_a_firing_test_complies(tmp_path: Path) -> None:
@@ -42,5 +42,5 @@ def test_a_firing_test_complies(tmp_path: Path) -> None:
     text = (CAMPAIGNS / "firing" / "v50_test.toml").read_text(encoding="utf-8").replace("tests = 1000", "tests = 20")
     test = firing_test(text.replace('campaign = "plate_and_base.toml"', 'limits = "limits.nc"'), "a", tmp_path)
     files.write(simulate_test(test, Response(np.linspace(800.0, 1100.0, 20))), tmp_path / "a.nc")
-    told = report(tmp_path / "a.nc")
-    assert "All tests passed!" in told, told
+    message = report(tmp_path / "a.nc")
+    assert "All tests passed!" in message, message

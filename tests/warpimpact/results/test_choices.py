@@ -76,7 +76,7 @@ def test_a_choice_made_with_plain_xarray_is_still_a_result(
         (lambda d: d.drop_attrs(deep=False), 'its attribute "warpimpact_kind" is ""'),
     ],
 )
-def test_what_a_choice_lacks_is_told_in_a_sentence(
+def test_what_a_choice_lacks_is_reported_in_a_sentence(
     plain: xarray.Dataset,
     tmp_path: Path,
     capsys: pytest.CaptureFixture[str],
@@ -85,9 +85,9 @@ def test_what_a_choice_lacks_is_told_in_a_sentence(
 ) -> None:
     choose(plain).to_netcdf(tmp_path / "b.nc")
     assert main(["inspect", str(tmp_path / "b.nc")]) == 2
-    told = capsys.readouterr().err
-    assert sentence in told
-    assert told.count("\n") == 1
+    message = capsys.readouterr().err
+    assert sentence in message
+    assert message.count("\n") == 1
 
 
 def test_chosen_hits_are_no_longer_sample_out_in_turn(result: xarray.Dataset) -> None:

@@ -94,7 +94,7 @@ def test_a_worst_tenth_of_shards_is_that_of_all_shots() -> None:
         ("P(residual_energy_density > 5 mm)", 'got "5 mm", which is not an energy per area'),
     ],
 )
-def test_a_text_that_is_no_measure_is_told_in_one_sentence(text: str, sentence: str) -> None:
+def test_a_text_that_is_no_measure_is_reported_in_one_sentence(text: str, sentence: str) -> None:
     with pytest.raises(ValueError, match=re.escape(sentence)):
         Measure.parse(text)
 

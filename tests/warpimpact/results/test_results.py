@@ -113,10 +113,10 @@ def test_status_carries_its_flags(make_result, tmp_path):
 
 
 def test_outlines_are_separated_by_nan(make_result):
-    found = outlines(make_result(pattern=TWO_HOLES))
+    actual = outlines(make_result(pattern=TWO_HOLES))
     right, left = np.array([2.0, 0.0, 0.0, 2.0, 2.0]), np.array([1.0, 1.0, -1.0, -1.0, 1.0])
-    np.testing.assert_allclose(found["y"] * 1e3, [*(right + 1.0), np.nan, *(right - 3.0)], atol=1e-12)
-    np.testing.assert_allclose(found["z"] * 1e3, [*left, np.nan, *left], atol=1e-12)
+    np.testing.assert_allclose(actual["y"] * 1e3, [*(right + 1.0), np.nan, *(right - 3.0)], atol=1e-12)
+    np.testing.assert_allclose(actual["z"] * 1e3, [*left, np.nan, *left], atol=1e-12)
 
 
 @pytest.mark.parametrize("pattern", [NoPattern(), TWO_HOLES])
@@ -174,16 +174,16 @@ def test_a_result_is_opened_by_its_name(make_result, tmp_path):
             assert np.array_equal(result.residual_velocity, written.residual_velocity)
 
 
-def test_what_is_no_result_is_told(make_result, tmp_path):
+def test_what_is_no_result_is_reported(make_result, tmp_path):
     (tmp_path / "notes.nc").write_text("not netCDF")
     make_result().drop_vars("tilt").to_netcdf(tmp_path / "other.nc")
-    for name, told in (
+    for name, message in (
         ("absent", r"cannot be read \(it is not there\)"),
         ("notes", "cannot be read as a netCDF file"),
         ("other", 'is no whole file of a map of hits, it has no "tilt"'),
     ):
         for read in (files.read, open_result):
-            with pytest.raises(files.ResultError, match=rf"{name}\.nc: {told}"):
+            with pytest.raises(files.ResultError, match=rf"{name}\.nc: {message}"):
                 read(tmp_path / f"{name}.nc")
 
 

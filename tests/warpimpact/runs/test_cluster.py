@@ -66,7 +66,7 @@ def test_a_killed_worker_costs_nothing(
     assert_same_bits(output, local)
 
 
-def test_a_mistake_on_a_worker_is_told_and_leaves_nothing(
+def test_a_mistake_on_a_worker_is_reported_and_leaves_nothing(
     cluster: object, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     path = tmp_path / "campaign.toml"
@@ -86,7 +86,7 @@ def test_workers_that_would_compute_other_bits_are_refused() -> None:
 
 
 @pytest.mark.parametrize("request_", ["nthreads", None])
-def test_a_lost_scheduler_is_told_with_the_way_to_resume(
+def test_a_lost_scheduler_is_reported_with_the_way_to_resume(
     request_: str | None, campaign: Campaign, cluster: object, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """A client cancels what it waits for, and raises an error of connecting where it asks for anything."""
@@ -104,7 +104,7 @@ def test_a_lost_scheduler_is_told_with_the_way_to_resume(
         run_to_file(campaign, output, device="cpu", scheduler=cluster.scheduler_address, progress=lose_it)
 
 
-def test_a_scheduler_without_workers_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_scheduler_without_workers_is_reported(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("warpimpact.runs.computer.WORKERLESS", 0.1)
     monkeypatch.setattr("warpimpact.runs.computer.WORKERLESS_LIMIT", 0.5)
     warnings: list[str] = []

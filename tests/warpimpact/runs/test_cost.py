@@ -22,7 +22,7 @@ def slow() -> Campaign:
     return campaign.model_copy(update={"plate": plate, "impact": impact})
 
 
-def test_hits_that_take_long_are_told_once_at_each_level() -> None:
+def test_hits_that_take_long_are_reported_once_at_each_level() -> None:
     warn = cost_warning(slow(), "cpu", passages=35)
     with pytest.warns(Costly, match=r"^at level 2 a hit takes about \d.* s of a core, and 4096 hits .* h: .* GiB"):
         warn(LEVEL)
@@ -32,7 +32,7 @@ def test_hits_that_take_long_are_told_once_at_each_level() -> None:
     assert estimate_cost(Campaign.from_toml(SLOTTED_PLATE), LEVEL) is None
 
 
-def test_holes_that_take_long_are_told_before_they_are_built() -> None:
+def test_holes_that_take_long_are_reported_before_they_are_built() -> None:
     campaign = Campaign.from_toml(SLOTTED_PLATE)
     pattern = SlotPattern(length="12 mm", width="4 mm", spacing=("0.45 m", "0.45 m"))
     wide = campaign.model_copy(update={"plate": campaign.plate.model_copy(update={"pattern": pattern})})

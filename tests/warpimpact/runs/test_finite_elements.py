@@ -142,9 +142,9 @@ def test_the_command_computes_hits_of_a_result(
     assert main(command) == 2
     assert "exists already" in capsys.readouterr().err
     assert main(["compare", "map.nc", "map_continuum.nc", "-o", "both.png"]) == 0
-    told = capsys.readouterr().out
-    assert "of the 2 hits that both have" in told
-    assert "interval" not in told
+    message = capsys.readouterr().out
+    assert "of the 2 hits that both have" in message
+    assert "interval" not in message
     assert {path.name for path in tmp_path.glob("*.png")} == {"both.png", "both_tilt.png"}
     assert main(["compare", "map.nc", "map_continuum.nc", "--measure", "stopped", "-o", "other.png"]) == 2
     assert "compared hit by hit" in capsys.readouterr().err

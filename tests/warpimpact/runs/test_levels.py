@@ -87,11 +87,11 @@ def test_a_file_and_a_choice_of_its_hits_keep_them(tmp_path: Path) -> None:
 
 def test_measures_say_what_the_numerics_may_shift_them_by_and_a_finer_level_agrees() -> None:
     every = {"[hits]": "[hits]\nirreducible = false", "count = 256": "count = 1024"}
-    told, truth = (
+    message, truth = (
         run(campaign(every).model_copy(update={"numerics": numerics}), device="cpu")
         for numerics in (Numerics(), Numerics(level=6))
     )
-    asked = [
+    requested = [
         Measure.parse(text)
         for text in (
             "mean(residual_velocity)",
@@ -101,32 +101,32 @@ def test_measures_say_what_the_numerics_may_shift_them_by_and_a_finer_level_agre
             "P(perforated)",
         )
     ]
-    found, exact = estimated(told, asked), estimated(truth, asked)
-    for one in asked:
-        shift = found[one].numerics
+    actual, exact = estimated(message, requested), estimated(truth, requested)
+    for one in requested:
+        shift = actual[one].numerics
         assert shift is not None
         # The hits whose yes turns to no are few: chance, which the interval by the hits has.
-        changed = np.sum(one.values(told) != one.values(truth)) if one.is_binary else 0
-        assert abs(found[one].value - exact[one].value) <= shift + 2.0 * np.sqrt(changed) / told.sizes["hit"], one
+        changed = np.sum(one.values(message) != one.values(truth)) if one.is_binary else 0
+        assert abs(actual[one].value - exact[one].value) <= shift + 2.0 * np.sqrt(changed) / message.sizes["hit"], one
         assert exact[one].numerics is None
-    for one, other in zip(effectiveness(told).itertuples(), effectiveness(truth).itertuples(), strict=True):
+    for one, other in zip(effectiveness(message).itertuples(), effectiveness(truth).itertuples(), strict=True):
         if one.hit is None and not one.measure.is_binary:
             assert abs(one.value - other.value) <= (one.numerics or 0.0), one.name
-    assert "numerics ± " in summary_text(told)
+    assert "numerics ± " in summary_text(message)
     assert summary_text(truth).count("numerics ±") == 1
     assert "numerics ± is not known: numerics.level is given, so no hits" in summary_text(truth)
-    assert "numerics ± is not known: none of these hits" in summary_text(told.isel(hit=slice(900, None)))
-    assert any("numerics ± is not known of b: " in note for note in compare([told, truth], ["a", "b"]).notes)
+    assert "numerics ± is not known: none of these hits" in summary_text(message.isel(hit=slice(900, None)))
+    assert any("numerics ± is not known of b: " in note for note in compare([message, truth], ["a", "b"]).notes)
 
 
 def test_a_stop_rule_counts_the_shift_by_the_numerics() -> None:
     def ran(half_width: str, **changes: str) -> dict[str, object]:
-        asked = {"[output]": STOP.format(half_width), "count = 256\n": ""} | changes
-        return dict(run(campaign(asked), device="cpu").attrs)
+        requested = {"[output]": STOP.format(half_width), "count = 256\n": ""} | changes
+        return dict(run(campaign(requested), device="cpu").attrs)
 
-    told = ran("2 deg")
-    low, high = told[attr.ESTIMATE_INTERVAL]  # type: ignore[misc]
-    assert told[attr.STOP_REASON] == "half_width"
-    assert 0.5 * (high - low) + float(str(told[attr.ESTIMATE_NUMERICS])) <= 2.0
+    message = ran("2 deg")
+    low, high = message[attr.ESTIMATE_INTERVAL]  # type: ignore[misc]
+    assert message[attr.STOP_REASON] == "half_width"
+    assert 0.5 * (high - low) + float(str(message[attr.ESTIMATE_NUMERICS])) <= 2.0
     no_use = ran("1.2 deg", **{'fidelity = "standard"': 'fidelity = "draft"'})
     assert no_use[attr.STOP_REASON] == "numerics"

@@ -149,7 +149,7 @@ def test_count_of_the_command_line_counts(tmp_path: Path) -> None:
     assert replay(result, 5, folder=NOWHERE).attrs["agreement"] == "bit-identical"
 
 
-def test_another_end_is_told(result: xarray.Dataset) -> None:
+def test_another_end_is_reported(result: xarray.Dataset) -> None:
     for error, agreement in ((0.0, "bit-identical"), (1e-3, "within rounding"), (1.0, "different")):
         other = result.assign(residual_velocity=result["residual_velocity"] + error)
         assert replay(other, 0, folder=NOWHERE).attrs["agreement"] == agreement

@@ -73,18 +73,18 @@ def called(folder: Path) -> Iterator[Called]:
 
 def content(path: Path) -> dict[str, Any]:
     """All that a result holds, but for when and how fast it was computed."""
-    found: dict[str, Any] = {}
+    actual: dict[str, Any] = {}
     for place, dataset in xarray.open_groups(path, engine="netcdf4").items():  # a reference has hits of its own
         with dataset:
             for name, variable in dataset.variables.items():
                 if not re.search("time|seconds|cost", str(name)):
-                    found[f"{place}/{name}"] = variable.values
-            found |= {
+                    actual[f"{place}/{name}"] = variable.values
+            actual |= {
                 f"{place}@{name}": value
                 for name, value in dataset.attrs.items()
                 if name not in OF_THE_CALL and "time" not in name and "second" not in name
             }
-    return found
+    return actual
 
 
 def assert_alike(one: Path, other: Path) -> None:

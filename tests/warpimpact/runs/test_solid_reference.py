@@ -54,7 +54,7 @@ def test_a_shot_that_does_not_scatter_is_fired_once_and_meets_the_closed_form(tm
     ],
     ids=["scatter", "rim", "off", "solid already"],
 )
-def test_it_takes_the_shots_of_the_first_shard_if_they_differ_and_none_if_not_asked(
+def test_it_takes_the_shots_of_the_first_shard_if_they_differ_and_none_if_not_requested(
     tmp_path: Path, change: tuple[str, str], shots: int
 ) -> None:
     references = references_of(computed(tmp_path, change))
@@ -80,7 +80,7 @@ def test_it_is_a_campaign_of_its_own(tmp_path: Path) -> None:
     level = Numerics.model_validate_json(dataset.attrs["resolution"])
     alone = run(campaign.model_copy(update={"numerics": level}).solid(), device="cpu")
     np.testing.assert_array_equal(references_of(dataset)["solid"]["residual_velocity"], alone["residual_velocity"])
-    beside = references_of(run(campaign, references=True, device="cpu"))
-    np.testing.assert_array_equal(beside["solid"]["residual_velocity"], alone["residual_velocity"])
+    neighbour = references_of(run(campaign, references=True, device="cpu"))
+    np.testing.assert_array_equal(neighbour["solid"]["residual_velocity"], alone["residual_velocity"])
     with pytest.raises(files.ResultError, match="group"):
         open_result(tmp_path / "a.nc", group="base_alone")

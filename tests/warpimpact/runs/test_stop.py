@@ -127,7 +127,9 @@ def test_a_run_goes_on_as_long_as_hits_may_make_up_for_the_numerics(
         ("mean(residual_velocity)", "1 deg", 'stop.half_width: got "1 deg", which is not a speed'),
     ],
 )
-def test_a_wrong_rule_is_told_in_one_sentence(quantity: str, half_width: str, sentence: str, tmp_path: Path) -> None:
+def test_a_wrong_rule_is_reported_in_one_sentence(
+    quantity: str, half_width: str, sentence: str, tmp_path: Path
+) -> None:
     with pytest.raises(CampaignError) as caught:
         campaign(tmp_path, quantity, half_width)
     assert sentence in str(caught.value)
@@ -148,13 +150,13 @@ def test_a_rule_takes_the_place_of_the_count(tmp_path: Path) -> None:
 def test_a_run_stops_at_the_same_shot_however_it_was_computed(tmp_path: Path, assert_same_bits: SameBits) -> None:
     scene = campaign(tmp_path, "P(tilt@130mm > 30 deg)", "0.1", max_count=20000)
     dataset = run(scene, device="cpu")
-    told = dataset.attrs
-    assert told["stop_reason"] == "half_width"
+    message = dataset.attrs
+    assert message["stop_reason"] == "half_width"
     assert dataset.sizes["hit"] in (512, 1024, 2048, 4096)
-    low, high = told["estimate_interval"]
-    assert 0.0 < 0.5 * (high - low) + told["estimate_numerics"] <= 0.1
+    low, high = message["estimate_interval"]
+    assert 0.0 < 0.5 * (high - low) + message["estimate_numerics"] <= 0.1
     share = np.array([(dataset["tilt"].values[r::16, 1] > 30.0).mean() for r in range(16)])
-    assert told["estimate"] == pytest.approx(share.mean(), rel=1e-12)
+    assert message["estimate"] == pytest.approx(share.mean(), rel=1e-12)
 
     def interrupt(standing: RunProgress) -> None:
         if standing.saved >= 256:
@@ -168,7 +170,7 @@ def test_a_run_stops_at_the_same_shot_however_it_was_computed(tmp_path: Path, as
     assert_same_bits(straight, resumed)
     stored = files.read(resumed)
     assert stored.sizes == dataset.sizes
-    assert stored.attrs["estimate"] == told["estimate"]
+    assert stored.attrs["estimate"] == message["estimate"]
     assert "P(tilt@130mm > 30 deg) = 0." in summary_text(stored)
     last = stored.sizes["hit"] - 1
     assert replay(stored, last, folder=tmp_path).attrs["agreement"] == "bit-identical"

@@ -17,10 +17,10 @@ def test_the_fewest_shots_at_90_percent_are_the_published_ones(allowed: int, sho
 @pytest.mark.parametrize("perforations", [0, 1, 5, 22])
 def test_the_bound_is_that_of_clopper_and_pearson(perforations: int) -> None:
     if perforations < 22:
-        found = stats.binomtest(22 - perforations, 22, alternative="greater").proportion_ci(0.9, method="exact").low
+        actual = stats.binomtest(22 - perforations, 22, alternative="greater").proportion_ci(0.9, method="exact").low
     else:
-        found = 0.0
-    assert shown_stop_probability(22, perforations, 0.9) == pytest.approx(found)
+        actual = 0.0
+    assert shown_stop_probability(22, perforations, 0.9) == pytest.approx(actual)
 
 
 def test_shots_at_the_same_place_show_less() -> None:

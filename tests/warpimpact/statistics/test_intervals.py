@@ -24,7 +24,7 @@ def test_differences_of_rare_shares_are_not_certain() -> None:
     held, numbers = 0, np.random.default_rng(2)
     for _ in range(TRIALS):
         drawn = numbers.choice([-1.0, 0.0, 1.0], p=[0.01, 0.96, 0.03], size=200)
-        held += (told := estimate_of("difference", drawn)).low <= 0.02 <= told.high
+        held += (message := estimate_of("difference", drawn)).low <= 0.02 <= message.high
     assert held >= LEAST
 
 
@@ -39,9 +39,9 @@ def test_the_share_of_replicates_stays_between_0_and_1() -> None:
 
 @pytest.mark.parametrize(("successes", "count"), [(0, 3), (0, 40), (3, 40), (40, 40), (70_000, 100_000)])
 def test_the_interval_of_a_share_is_wilsons(successes: int, count: int) -> None:
-    found = estimate_of("share", np.repeat([1.0, 0.0], [successes, count - successes]), confidence=0.9)
+    actual = estimate_of("share", np.repeat([1.0, 0.0], [successes, count - successes]), confidence=0.9)
     wilson = stats.binomtest(successes, count).proportion_ci(0.9, method="wilson")
-    assert (found.low, found.high) == pytest.approx((wilson.low, wilson.high), rel=1e-12, abs=1e-15)
+    assert (actual.low, actual.high) == pytest.approx((wilson.low, wilson.high), rel=1e-12, abs=1e-15)
 
 
 @pytest.mark.parametrize("kind", ["mean", "share", "difference", "quantile"])

@@ -25,11 +25,11 @@ def test_the_fit_is_that_of_statsmodels(count: int) -> None:
     assert fit.overlap.sum() > 30
     for row in np.flatnonzero(fit.overlap):
         x, y = levels[row, used[row]], answers[row, used[row]].astype(float)
-        found = sm.Probit(y, sm.add_constant(x - 800.0)).fit(disp=0, method="newton", maxiter=200)
-        at, slope = found.params
+        actual = sm.Probit(y, sm.add_constant(x - 800.0)).fit(disp=0, method="newton", maxiter=200)
+        at, slope = actual.params
         assert fit.location[row] == pytest.approx(800.0 - at / slope, abs=1e-4)
         assert fit.scale[row] == pytest.approx(1.0 / slope, rel=1e-5)
-        assert fit.log_likelihood[row] == pytest.approx(found.llf, rel=1e-8)
+        assert fit.log_likelihood[row] == pytest.approx(actual.llf, rel=1e-8)
 
 
 def test_ends_of_the_likelihood_interval_lie_where_the_profile_has_fallen_by_half_of_chi_square() -> None:

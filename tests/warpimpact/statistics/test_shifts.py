@@ -17,11 +17,11 @@ def held(shift: Callable[[Array, Array], float], true: float, *, bias: float, no
     """In how many trials the shift of shots uniform in 0 … 1, whose errors have a bias and a noise, is at least the
     true one; and its median."""
     rng = np.random.default_rng(5)
-    found = []
+    actual = []
     for _ in range(TRIALS):
         coarse = rng.random(SHOTS)
-        found.append(shift(coarse, coarse + bias + noise * rng.standard_normal(SHOTS)))
-    return int(np.sum(np.array(found) >= true)), float(np.median(found))
+        actual.append(shift(coarse, coarse + bias + noise * rng.standard_normal(SHOTS)))
+    return int(np.sum(np.array(actual) >= true)), float(np.median(actual))
 
 
 @pytest.mark.parametrize("bias", [0.0, 0.01, -0.03])

@@ -57,13 +57,13 @@ def test_pseudo_values_are_those_of_the_jackknife() -> None:
     values, count = np.random.default_rng(1).normal(size=20), 20
     whole = hdquantiles(values, [0.3])[0]
     without = [hdquantiles(np.delete(values, k), [0.3])[0] for k in range(count)]
-    found = pseudo_values(values, 0.3)
-    np.testing.assert_allclose(found, count * whole - (count - 1) * np.array(without), rtol=1e-9)
+    actual = pseudo_values(values, 0.3)
+    np.testing.assert_allclose(actual, count * whole - (count - 1) * np.array(without), rtol=1e-9)
 
 
 def test_shots_that_do_not_count_have_no_pseudo_value() -> None:
     values = np.random.default_rng(1).normal(size=25)
     values[3], values[5] = np.nan, np.inf
-    found = pseudo_values(values, 0.5)
-    assert np.flatnonzero(np.isnan(found)).tolist() == [3]
+    actual = pseudo_values(values, 0.5)
+    assert np.flatnonzero(np.isnan(actual)).tolist() == [3]
     assert np.isnan(pseudo_values(values[:FEWEST_SHOTS], 0.5)).all()

@@ -76,14 +76,14 @@ def test_the_dataset_is_that_of_shots_that_just_perforate(result: xarray.Dataset
 
 
 def test_it_tells_its_error_against_a_finer_level(result: xarray.Dataset) -> None:
-    told = result.attrs
-    assert told["promise_kept"] == 1
-    assert 0.0 < told["limit_velocity_error"] < 0.02 * float(result["limit_velocity"].median())
+    message = result.attrs
+    assert message["promise_kept"] == 1
+    assert 0.0 < message["limit_velocity_error"] < 0.02 * float(result["limit_velocity"].median())
     # The error holds: a finer level, whose own error is smaller, gives limits within it.
     scene, shots = campaign().scene, make_shots(campaign().impact, campaign().hits, campaign().plate)
     fine = limit_velocity(scene, shots, numerics=Numerics(level=4), device="cpu", tolerance=0.5)
     change = fine.value - result["limit_velocity"].values
-    assert np.quantile(np.abs(change), 0.9) <= told["limit_velocity_error"]
+    assert np.quantile(np.abs(change), 0.9) <= message["limit_velocity_error"]
     # So does what the numerics may shift a mean or V50 by: some of the hits have their limits at that level.
     at = result["finer_hit"].values
     assert len(at) == PILOT_LIMITS
@@ -124,10 +124,10 @@ def test_a_hit_can_be_replayed(result: xarray.Dataset) -> None:
 
 def test_thickness_of_a_campaign(tmp_path: Path) -> None:
     solid = TEXT.replace('pattern = { shape = "circle", diameter = "5 mm", spacing = ["8 mm", "8 mm"] }', "")
-    found = search(campaign(solid.replace("count = 64", "count = 4")), tmp_path / "thickness.nc", quantity="thickness")
-    assert (found["thickness"] == found["limit_thickness_lower"]).all()
-    assert (found["limit_thickness"] > 4e-3).all()
-    assert "mm" in text_of(limit_view(found))
+    actual = search(campaign(solid.replace("count = 64", "count = 4")), tmp_path / "thickness.nc", quantity="thickness")
+    assert (actual["thickness"] == actual["limit_thickness_lower"]).all()
+    assert (actual["limit_thickness"] > 4e-3).all()
+    assert "mm" in text_of(limit_view(actual))
 
 
 def test_the_resistance_of_the_catalogue_follows_the_thickness(tmp_path: Path) -> None:
@@ -136,7 +136,7 @@ def test_the_resistance_of_the_catalogue_follows_the_thickness(tmp_path: Path) -
     text += (
         '[impact]\nvelocity = "800 m/s"\n[hits]\ncount = 1\n[numerics]\nlevel = 0\n[output]\nstandoffs = ["0.5 m"]\n'
     )
-    found = [
+    actual = [
         search(
             campaign(f'{text}[plate]\nmaterial = "HHA Class 1"\nthickness = "{thickness} mm"\n'),
             tmp_path / f"{thickness}.nc",
@@ -144,9 +144,9 @@ def test_the_resistance_of_the_catalogue_follows_the_thickness(tmp_path: Path) -
         )
         for thickness in (5, 10)
     ]
-    thin, thick = (float(limit["limit_thickness"][0]) for limit in found)
+    thin, thick = (float(limit["limit_thickness"][0]) for limit in actual)
     assert thin == pytest.approx(thick, abs=2e-5)
-    assert replay(found[0], 0, folder=Path()).attrs["agreement"] == "bit-identical"
+    assert replay(actual[0], 0, folder=Path()).attrs["agreement"] == "bit-identical"
 
 
 LAYER = """
@@ -162,13 +162,13 @@ def test_thickness_of_the_base_behind_a_perforated_plate(tmp_path: Path) -> None
     given = TEXT.replace("count = 64", "count = 4").replace(PROMISED, GIVEN)
     behind = campaign(given + LAYER)
     limit_to_file(behind, tmp_path / "base.nc", "thickness", layer=1, device="cpu")
-    found = files.read(tmp_path / "base.nc")
-    passed = (found["status"] == Status.PERFORATED).values
+    actual = files.read(tmp_path / "base.nc")
+    passed = (actual["status"] == Status.PERFORATED).values
     assert passed.any()
-    last = found["layer_thickness"].values[:, 1]
-    assert (last[passed] == found["limit_thickness_lower"].values[passed]).all()
-    assert "thickness of layer 1" in text_of(limit_view(found))
-    assert replay(found, 2, folder=Path()).attrs["agreement"] == "bit-identical"
+    last = actual["layer_thickness"].values[:, 1]
+    assert (last[passed] == actual["limit_thickness_lower"].values[passed]).all()
+    assert "thickness of layer 1" in text_of(limit_view(actual))
+    assert replay(actual, 2, folder=Path()).attrs["agreement"] == "bit-identical"
     with pytest.raises(CampaignError, match=r"got layer 2, but the target has layers 0 \(the plate\) to 1"):
         limit_of(behind, "thickness", layer=2)
 
@@ -192,18 +192,18 @@ def test_the_command_writes_a_result_and_a_figure(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.chdir(tmp_path)
-    asked = ["--measure", "quantile(limit_velocity, 0.25)"]
-    assert main(["limit", str(CAMPAIGNS / "limit_velocity.toml"), "--device", "cpu", *asked]) == 0
-    told = capsys.readouterr().out
-    assert "limit velocity" in told
-    assert "written to limit_velocity_limit.nc, figure in limit_velocity_limit.png" in told
+    requested = ["--measure", "quantile(limit_velocity, 0.25)"]
+    assert main(["limit", str(CAMPAIGNS / "limit_velocity.toml"), "--device", "cpu", *requested]) == 0
+    message = capsys.readouterr().out
+    assert "limit velocity" in message
+    assert "written to limit_velocity_limit.nc, figure in limit_velocity_limit.png" in message
     assert (tmp_path / "limit_velocity_limit.png").stat().st_size > 10_000
-    found = files.read(tmp_path / "limit_velocity_limit.nc")
+    actual = files.read(tmp_path / "limit_velocity_limit.nc")
     # Published for the bare core at 0, 15, 30, 45 deg: 514, 535, 597, 723 m/s; the resistance is fitted to the first.
-    assert found["limit_velocity"].values == pytest.approx([514.0, 535.0, 597.0, 723.0], rel=0.06)
-    assert found["limit_velocity"].values[0] == pytest.approx(514.0, abs=1.5)
-    line = next(line for line in told.splitlines() if line.startswith("quantile(limit_velocity, 0.25)"))
-    assert main(["inspect", "limit_velocity_limit.nc", *asked]) == 0
+    assert actual["limit_velocity"].values == pytest.approx([514.0, 535.0, 597.0, 723.0], rel=0.06)
+    assert actual["limit_velocity"].values[0] == pytest.approx(514.0, abs=1.5)
+    line = next(line for line in message.splitlines() if line.startswith("quantile(limit_velocity, 0.25)"))
+    assert main(["inspect", "limit_velocity_limit.nc", *requested]) == 0
     (same,) = (line for line in capsys.readouterr().out.splitlines() if "25 % quantile" in line)
     assert float(same.split()[6]) == pytest.approx(float(line.split()[2]), rel=1e-3)
     assert main(["limit", str(CAMPAIGNS / "limit_velocity.toml"), "--device", "cpu"]) == 2

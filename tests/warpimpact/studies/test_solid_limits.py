@@ -107,13 +107,13 @@ def test_a_limit_velocity_has_measures_and_a_ratio(velocity: xarray.Dataset) -> 
 
 
 @pytest.mark.parametrize(("more", "ranks"), [(1.0, [(1, 2), (1, 2)]), (3.0, [(2, 2), (1, 1)])])
-def test_limits_within_their_tolerance_are_not_told_apart(
+def test_limits_within_their_tolerance_are_not_distinguished(
     velocity: xarray.Dataset, more: float, ranks: list[tuple[int, int]]
 ) -> None:
     """Each limit is known to 1 m/s."""
     other = velocity.assign(limit_velocity=velocity["limit_velocity"] + more)
-    found = compare([velocity, other], ["one", "other"])
-    assert [found.ranks("V50")[name] for name in ("one", "other")] == ranks
+    actual = compare([velocity, other], ["one", "other"])
+    assert [actual.ranks("V50")[name] for name in ("one", "other")] == ranks
 
 
 def test_of_a_thickness_it_tells_the_areal_density_that_a_solid_plate_needs(thickness: xarray.Dataset) -> None:

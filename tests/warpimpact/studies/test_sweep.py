@@ -57,9 +57,9 @@ def test_a_layer_is_swept_by_its_number(tmp_path: Path) -> None:
     sweep = read_sweep(tmp_path / "a.toml")
     assert [one.name for one in sweep.inputs] == ["layer_2_thickness", "layer_1_pattern"]
     assert [one.layer[1].thickness for one in sweep.campaigns.values()] == [3e-3, 5e-3]
-    found = joined(sweep, [run(one, device="cpu") for one in sweep.campaigns.values()])
-    assert found["layer_2_thickness"].values.tolist() == [3e-3, 5e-3]
-    assert found["layer_2_thickness"].attrs == {"units": "m", "long_name": "layer 2.thickness"}
+    actual = joined(sweep, [run(one, device="cpu") for one in sweep.campaigns.values()])
+    assert actual["layer_2_thickness"].values.tolist() == [3e-3, 5e-3]
+    assert actual["layer_2_thickness"].attrs == {"units": "m", "long_name": "layer 2.thickness"}
     (tmp_path / "a.toml").write_text(TEXT + given, encoding="utf-8")
     with pytest.raises(CampaignError, match=r'got "layer 2.thickness", but the campaign has no \[\[layer\]\]'):
         read_sweep(tmp_path / "a.toml")
@@ -74,10 +74,10 @@ def test_a_point_keeps_its_hits_at_two_levels(tmp_path: Path) -> None:
     sweep, measure = read_sweep(tmp_path / "a.toml"), Measure.parse("mean(tilt@130mm)")
     points = [run(one, device="cpu") for one in sweep.campaigns.values()]
     files.write(joined(sweep, points), tmp_path / "a.nc")
-    found = files.read(tmp_path / "a.nc", SWEEP)
+    actual = files.read(tmp_path / "a.nc", SWEEP)
     for number, point in enumerate(points):
         estimate = estimated(point, [measure])[measure]
-        assert estimated(found.isel(impact_velocity=number), [measure])[measure] == estimate
+        assert estimated(actual.isel(impact_velocity=number), [measure])[measure] == estimate
         assert estimate.numerics is not None
 
 
@@ -86,9 +86,9 @@ def test_points_with_other_standoffs_are_joined(tmp_path: Path) -> None:
     (tmp_path / "a.toml").write_text(f'{TEXT}\n[sweep]\n"output.standoffs" = {standoffs}\n', encoding="utf-8")
     sweep = read_sweep(tmp_path / "a.toml", count=8)
     points = [run(one, device="cpu") for one in sweep.campaigns.values()]
-    found = joined(sweep, points)
+    actual = joined(sweep, points)
     for number, point in enumerate(points):
-        one, own = found["tilt"].isel(standoffs=number), point["standoff"]
+        one, own = actual["tilt"].isel(standoffs=number), point["standoff"]
         np.testing.assert_array_equal(one.sel(standoff=own), point["tilt"])
         assert one.drop_sel(standoff=own).isnull().all()
 
@@ -164,7 +164,7 @@ def test_the_figure_shows_means_against_the_input(folder: Path) -> None:
         np.testing.assert_allclose(line.get_ydata(), values, rtol=1e-6)
 
 
-def test_a_sweep_is_asked_in_the_language_of_measures(
+def test_a_sweep_is_requested_in_the_language_of_measures(
     folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     sweep = str(folder / "a.nc")
@@ -198,7 +198,7 @@ def test_a_sweep_is_asked_in_the_language_of_measures(
         ('[sweep]\nobliquity = ["95 deg"]\n', "obliquity = 95 deg: impact.obliquity"),
     ],
 )
-def test_what_cannot_be_swept_is_told(tmp_path: Path, table: str, sentence: str) -> None:
+def test_what_cannot_be_swept_is_reported(tmp_path: Path, table: str, sentence: str) -> None:
     (tmp_path / "a.toml").write_text(TEXT + table, encoding="utf-8")
     with pytest.raises(CampaignError, match=sentence):
         read_sweep(tmp_path / "a.toml")
