@@ -1,5 +1,7 @@
-"""The house: rooms import downwards only and keep their budgets of lines."""
+"""The house: rooms import downwards only, keep their budgets of lines, and names say what a thing is."""
 
+import ast
+import re
 import shutil
 import subprocess
 import sys
@@ -9,6 +11,8 @@ from pathlib import Path
 import pytest
 
 CHECKOUT = Path(__file__).parents[2]
+REFUSED = {"told", "said", "asked", "beside", "apart", "found"}
+"""Words that no name contains: they say how a thing came about, not what it is."""
 ROOMS = [path.parent for path in CHECKOUT.glob("warpimpact/*/__init__.py")]
 
 
@@ -104,3 +108,41 @@ def test_rooms_keep_their_budget(rooms: str) -> None:
 def test_every_source_file_has_a_budget() -> None:
     total = sum(lines_of(rooms) for rooms in budgets() if rooms != "tests")
     assert total == lines(CHECKOUT / "kernels") + lines(CHECKOUT / "warpimpact")
+
+
+def defined_names(tree: ast.AST) -> set[str]:
+    """Functions, classes, arguments, variables and attributes that a file defines; those of libraries are only used."""
+    names = set[str]()
+    for node in ast.walk(tree):
+        match node:
+            case ast.FunctionDef(name=name) | ast.AsyncFunctionDef(name=name) | ast.ClassDef(name=name):
+                names.add(name)
+            case ast.arg(arg=name) | ast.Name(id=name, ctx=ast.Store()) | ast.Attribute(attr=name, ctx=ast.Store()):
+                names.add(name)
+            case ast.alias(asname=str(name)) | ast.ExceptHandler(name=str(name)) | ast.MatchAs(name=str(name)):
+                names.add(name)
+    return names
+
+
+def words(name: str) -> set[str]:
+    """Words of a name in snake_case or CamelCase."""
+    return {word.lower() for word in re.findall(r"[A-Z]?[a-z]+|[A-Z]+(?![a-z])", name)}
+
+
+def test_words_of_names_are_split() -> None:
+    tree = ast.parse("class NotFound: ...\ndef told_of(asked, *, BESIDE=1):\n    x.apart = foundation = asked\n")
+    assert {name for name in defined_names(tree) if words(name) & REFUSED} == {
+        "NotFound",
+        "told_of",
+        "asked",
+        "BESIDE",
+        "apart",
+    }
+
+
+def test_names_say_what_a_thing_is() -> None:
+    files = [
+        file for room in ("warpimpact", "kernels", "campaigns", "tests") for file in (CHECKOUT / room).rglob("*.py")
+    ]
+    names = {file: defined_names(ast.parse(file.read_text(encoding="utf-8"))) | {file.stem} for file in files}
+    assert not [(file.name, name) for file in files for name in names[file] if words(name) & REFUSED]
