@@ -178,7 +178,8 @@ class CampaignReference(FromTheCode):
 
     def default(self, part: dict[str, Any]) -> str:
         default = part.get("default")
-        if default is None or default == [] or isinstance(default, dict):
+        first = default[0] if isinstance(default, list) and default else default
+        if first in (None, []) or isinstance(first, dict):
             return ""
         unit = part.get("unit", "") or part.get("items", {}).get("unit", "")
         told = str(default).lower() if isinstance(default, bool) else f'"{default}"' if isinstance(default, str) else ""

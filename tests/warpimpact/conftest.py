@@ -9,6 +9,7 @@ import netCDF4
 import numpy as np
 import pytest
 import xarray
+from matplotlib.figure import Figure
 
 from warpimpact import Plate, Record, Scene
 from warpimpact.kernels.status import Status
@@ -168,7 +169,12 @@ def in_tmp_path(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 @pytest.fixture
 def unrendered(monkeypatch: pytest.MonkeyPatch) -> None:
     """Figures are laid out, and no picture is written."""
-    monkeypatch.setattr("matplotlib.figure.Figure.savefig", lambda figure, *_, **__: figure.draw_without_rendering())
+
+    def laid_out(figure: Figure, file: Path, **_: object) -> None:
+        figure.draw_without_rendering()
+        Path(file).touch()
+
+    monkeypatch.setattr("matplotlib.figure.Figure.savefig", laid_out)
 
 
 @pytest.fixture(scope="module")

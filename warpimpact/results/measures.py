@@ -36,7 +36,7 @@ from warpimpact.results.vocabulary import (
 from warpimpact.scene import units
 from warpimpact.scene.display import STORED, Unit
 from warpimpact.scene.units import quantity, quoted
-from warpimpact.statistics.intervals import Estimate, SamplingDesign, estimate_of
+from warpimpact.statistics.intervals import Estimate, RunningSums, SamplingDesign, estimate_of
 from warpimpact.statistics.shifts import shift_of_mean, shift_of_quantile, shift_of_share, shift_of_yes
 from warpimpact.statistics.tails import has_interval, worst_tenth
 
@@ -350,19 +350,29 @@ def _place(text: str | None, number: PerHit) -> dict[str, Any]:
 
 
 class Tally:
-    """Gathers a measure over shots, in the order of their numbers, with one number per shot."""
+    """Gathers a measure over shots, in the order of their numbers.
+
+    A mean and a share need sums; other kinds keep one number per shot.
+    """
 
     def __init__(self, measure: Measure, **design: Unpack[SamplingDesign]) -> None:
         self.measure, self._design = measure, design
-        self._parts: list[Array] = []
+        self._kind = "share" if measure.is_binary else measure.kind
+        self._sums, self._parts = RunningSums(**design), [np.empty(0)]
 
     def add(self, dataset: xarray.Dataset) -> None:
         """Add the next shots."""
-        self._parts.append(self.measure.values(dataset))
+        values = self.measure.values(dataset)
+        if self._kind in ("mean", "share"):
+            self._sums.add(values)
+        else:
+            self._parts.append(values)
 
     def estimate(self) -> Estimate:
         """The estimate from the shots so far."""
-        return estimate_from(self.measure, np.concatenate([np.empty(0), *self._parts]), **self._design)
+        if self._kind in ("mean", "share"):
+            return self._sums.estimate(self._kind).within(self.measure.least, self.measure.most)
+        return estimate_from(self.measure, np.concatenate(self._parts), **self._design)
 
 
 def estimate_from(measure: Measure, values: Array, **design: Unpack[SamplingDesign]) -> Estimate:

@@ -27,7 +27,7 @@ from warpimpact.results import attributes as attr
 from warpimpact.results import files
 from warpimpact.results.files import OutputError
 
-HELD_SECONDS, HELD_BYTES = 2.0, 2**26
+HELD_SECONDS, HELD_BYTES = 2.0, 2**23
 """Longest time and most bytes for which chunks are only in memory. A computation shorter than this writes none."""
 _NAME = re.compile(r"chunk_(\d{8})_([0-9a-f]{16})\.nc")
 

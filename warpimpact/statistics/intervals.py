@@ -105,6 +105,47 @@ def estimate_of(
     return Estimate(value, *interval, len(counted), float(counted.std()))
 
 
+class RunningSums:
+    """Sums over shots that give a mean, or a share, its interval; their memory does not grow with the shots."""
+
+    def __init__(self, replicates: int = 1, confidence: float = 0.95) -> None:
+        """No shots yet; arguments as in `estimate_of`."""
+        self._confidence, self._shots, self._origin = confidence, 0, math.nan
+        self._count, self._total, self._squares = np.zeros((3, replicates))
+
+    def add(self, values: Array) -> None:
+        """Add the numbers of the next shots; NaN where a shot does not count."""
+        replicates, known = len(self._count), ~np.isnan(values)
+        replicate = ((self._shots + np.arange(len(values))) % replicates)[known]
+        self._shots += len(values)
+        if math.isnan(self._origin) and len(replicate):
+            self._origin = float(values[known][0])  # squares of differences lose fewer digits
+        moved = values[known] - self._origin
+        for sums, weights in ((self._count, None), (self._total, moved), (self._squares, moved**2)):
+            sums += np.bincount(replicate, weights, replicates)
+
+    def estimate(self, kind: str) -> Estimate:
+        """The estimate of a "mean" or a "share", as `estimate_of` gives it of all numbers."""
+        count, filled = round(self._count.sum()), self._count > 0
+        if not count:
+            return Estimate(math.nan, math.nan, math.nan, 0, math.nan)
+        mean = self._total.sum() / count
+        value, results = float(self._origin + mean), self._total[filled] / self._count[filled]
+        spread = math.sqrt(max(0.0, self._squares.sum() / count - mean**2))
+        half = _student(self._confidence, len(results)) * float(np.std(results, ddof=1)) if len(results) > 1 else 0.0
+        if count < FEWEST:
+            low = high = math.nan
+        elif 1 < len(results) < count and (half > 0.0 or kind == "mean"):
+            low, high = value - half, value + half
+        elif kind == "share":
+            return Estimate(value, *_wilson(round(value * count), count, self._confidence), count, spread)
+        else:
+            half = _student(self._confidence, count) * spread * math.sqrt(count / (count - 1))
+            low, high = value - half, value + half
+        estimate = Estimate(value, low, high, count, spread)
+        return estimate.within(0.0, 1.0) if kind == "share" else estimate
+
+
 def _of_replicates(
     kind: str, groups: Sequence[Array], values: Array, value: float, share: float, confidence: float
 ) -> tuple[float, float] | None:

@@ -106,9 +106,9 @@ def test_a_picture_is_neither(in_tmp_path: Path, refusal: Refusal) -> None:
 @pytest.mark.parametrize(
     ("mark", "sentence"),
     [
-        ("hit map 2", 'is "hit map 2", but this version of warpimpact reads hit map 1, sweep 1,'),
+        ("hit map 1", 'its attribute "warpimpact_kind" is "hit map 1"; this version reads hit map 2, sweep 2,'),
         ("posterior 1", "is a posterior, as warpimpact identify writes, not a map of hits"),
-        ("", 'is no file of this version of warpimpact, it has no attribute "warpimpact_kind"'),
+        ("", 'is no file of this version of warpimpact: its attribute "warpimpact_kind" is "";'),
     ],
 )
 def test_another_version_or_kind_is_named(

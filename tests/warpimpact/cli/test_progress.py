@@ -83,7 +83,7 @@ def test_a_log_says_what_a_pilot_tries_and_counts_no_time_of_it(
     begun = standing(0, resumed=0)
     with show_run(LOUD) as show:
         for tenth in range(700):
-            show(replace(begun, piloting=True, trying=2 if tenth < 300 else 4))
+            show(replace(begun, piloting=True, level=2 if tenth < 300 else 4))
             clock[0] += 0.1
         for done, seconds in ((0, 20.0), (1, 3.0), (0, 0.99), (400, 0.0)):  # kernels are compiled before the first hit
             show(standing(done, resumed=0))

@@ -45,7 +45,7 @@ def test_a_new_campaign_can_be_read(name: str, capsys: pytest.CaptureFixture[str
     ("name", "kind", "is_read"),
     [
         ("paper_fit", "fit", lambda path: len(read_fit(path).shots) == 2),
-        ("lightest_plate", "design", lambda path: len(read_design(path).objectives) == 2),
+        ("lightest_plate", "design", lambda path: len(read_design(path).file.objectives) == 2),
         ("v50_test", "test", lambda path: read_test(path).target.campaign == Path("plate_and_base.toml").absolute()),
     ],
 )

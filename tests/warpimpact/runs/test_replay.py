@@ -194,7 +194,7 @@ def test_command_writes_history_and_figures(
     command = ["replay", str(tmp_path / "a.nc"), "--hit", "2"]
     assert main(command) == 0
     shown = capsys.readouterr().out
-    assert f"residual velocity{float(result['residual_velocity'][2]):8.1f}   m/s\n" in shown
+    assert f"residual velocity  {float(result['residual_velocity'][2]):6.1f} m/s\n" in shown
     assert "The end is bit-identical to the stored outcome.\n" in shown
     with xarray.open_dataset(tmp_path / "a_hit2.nc") as history:
         assert history.attrs["hit"] == 2

@@ -104,7 +104,7 @@ def test_v50_and_v05_are_quantiles_over_the_hits(result: xarray.Dataset) -> None
     line = next(line for line in text_of(limit_view(result)).splitlines() if line.startswith("V50 "))
     assert line.split()[1] == f"{v50.value:.5g}"
     page = report_page({"limit": result}, folders={"limit": Path()}, trajectories=0)
-    assert page.index(f"<li>limit: V50 {v50.value:.5g} m/s") < page.index('<h2 id="asked">')
+    assert page.index(f"<li>limit: V50 {v50.value:.5g} m/s") < page.index('<h2 id="scene">')
 
 
 def test_a_limit_beyond_reach_makes_a_quantile_infinite_and_no_mean(result: xarray.Dataset) -> None:
@@ -215,7 +215,7 @@ def test_the_command_writes_a_result_and_a_figure(
     [
         (["--tolerance", "0 m/s"], "must be greater than 0"),
         (["--quantity", "thickness", "--tolerance", "1 m/s"], "which is not a length"),
-        (["--measure", "P(perforated)"], "--measure: P(perforated) is not told by a search"),
+        (["--measure", "P(perforated)"], "--measure: P(perforated) does not follow from each hit's limit velocity"),
     ],
 )
 def test_what_a_search_cannot_tell_is_refused(
