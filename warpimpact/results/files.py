@@ -7,9 +7,10 @@ import math
 import os
 import shutil
 from collections.abc import Callable, Iterable, Iterator, Mapping
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager, suppress
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import netCDF4
 import xarray
@@ -22,6 +23,9 @@ from warpimpact.scene.input_files import check_file, parsed, read_text
 
 FILE_CHUNK = 2**15
 """Most hits per chunk of a variable in a file: 256 KiB."""
+
+
+Value = TypeVar("Value")
 
 
 class OutputError(OSError):
@@ -105,6 +109,12 @@ def _append(dataset: xarray.Dataset, target: Any) -> None:
         if v.HIT in column.dims:
             variable = target[str(name)]
             variable[first : first + column.shape[0]] = column.values.astype(variable.dtype)
+
+
+def undisturbed(function: Callable[..., Value], *arguments: Any, **options: Any) -> Value:
+    """Call a function on a thread of its own: a signal amid a call could leave a lock of xarray taken for ever."""
+    with ThreadPoolExecutor(1) as pool:
+        return pool.submit(function, *arguments, **options).result()
 
 
 @contextmanager

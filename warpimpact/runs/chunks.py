@@ -238,7 +238,7 @@ class Chunks:
         if number not in self._saved:
             return None
         try:
-            return xarray.load_dataset(self._saved[number], engine="netcdf4")
+            return files.undisturbed(xarray.load_dataset, self._saved[number], engine="netcdf4")
         except (OSError, ValueError, RuntimeError) as error:
             raise OutputError(f"{self._saved[number]}: this chunk is missing or damaged ({error})") from None
 
@@ -265,7 +265,7 @@ class Chunks:
             number = min(self._held)
             before = self._saved.get(number)
             with files.aside(self._folder / "chunk", named=partial(self._path, number)) as file:
-                self._held[number].to_netcdf(file, engine="netcdf4")
+                files.undisturbed(self._held[number].to_netcdf, file, engine="netcdf4")
             if before not in (None, self._saved[number]):
                 _remove(before)
             del self._held[number]
