@@ -111,7 +111,7 @@ def _append(dataset: xarray.Dataset, target: Any) -> None:
             variable[first : first + column.shape[0]] = column.values.astype(variable.dtype)
 
 
-def undisturbed(function: Callable[..., Value], *arguments: Any, **options: Any) -> Value:
+def call_in_thread(function: Callable[..., Value], *arguments: Any, **options: Any) -> Value:
     """Call a function on a thread of its own: a signal amid a call could leave a lock of xarray taken for ever."""
     with ThreadPoolExecutor(1) as pool:
         return pool.submit(function, *arguments, **options).result()

@@ -28,7 +28,8 @@ from warpimpact.results import files
 from warpimpact.results.files import OutputError
 
 HELD_SECONDS, HELD_BYTES = 2.0, 2**23
-"""Longest time and most bytes for which chunks are only in memory. A computation shorter than this writes none."""
+"""Longest time for which chunks are only in memory, and most bytes that are kept there. A shorter computation writes
+none."""
 _NAME = re.compile(r"chunk_(\d{8})_([0-9a-f]{16})\.nc")
 
 
@@ -155,7 +156,7 @@ class Chunks:
     def __init__(self, output: Path | None, content: Mapping[str, Any]) -> None:
         self.output, self._content = output, json.loads(json.dumps(content))
         self.fingerprint = hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()[:16]
-        self._saved, self._held = dict[int, Path](), dict[int, xarray.Dataset]()
+        self._saved, self._held, self._unsaved = dict[int, Path](), dict[int, xarray.Dataset](), set[int]()
         self._written = time.monotonic()
         self._folder = Path() if output is None else folder_of(output)
         self._manifest = self._folder / "manifest.json"
@@ -238,7 +239,7 @@ class Chunks:
         if number not in self._saved:
             return None
         try:
-            return files.undisturbed(xarray.load_dataset, self._saved[number], engine="netcdf4")
+            return files.call_in_thread(xarray.load_dataset, self._saved[number], engine="netcdf4")
         except (OSError, ValueError, RuntimeError) as error:
             raise OutputError(f"{self._saved[number]}: this chunk is missing or damaged ({error})") from None
 
@@ -249,11 +250,12 @@ class Chunks:
             OutputError: it cannot be written.
         """
         self._held[number] = dataset
-        if (
-            time.monotonic() - self._written > HELD_SECONDS
-            or sum(held.nbytes for held in self._held.values()) > HELD_BYTES
-        ):
+        self._unsaved.add(number)
+        too_many = sum(held.nbytes for held in self._held.values()) > HELD_BYTES
+        if too_many or time.monotonic() - self._written > HELD_SECONDS:
             self.flush()
+        if too_many and self.output is not None:
+            self._held.clear()
 
     def flush(self) -> None:
         """Put all chunks on the disk.
@@ -261,14 +263,14 @@ class Chunks:
         Raises:
             OutputError: a chunk cannot be written. It stays in memory.
         """
-        while self.output is not None and self._held:
-            number = min(self._held)
+        while self.output is not None and self._unsaved:
+            number = min(self._unsaved)
             before = self._saved.get(number)
             with files.aside(self._folder / "chunk", named=partial(self._path, number)) as file:
-                files.undisturbed(self._held[number].to_netcdf, file, engine="netcdf4")
+                files.call_in_thread(self._held[number].to_netcdf, file, engine="netcdf4")
             if before not in (None, self._saved[number]):
                 _remove(before)
-            del self._held[number]
+            self._unsaved.remove(number)
         self._written = time.monotonic()
 
     def _path(self, number: int, written: Path) -> Path:

@@ -226,7 +226,7 @@ def _finished(
     attributes |= watch.stop
     if path is not None:
         attributes[attr.FINGERPRINT] = chunks.fingerprint
-        files.undisturbed(files.write_joined, every, path, attributes=attributes, references=references)
+        files.call_in_thread(files.write_joined, every, path, attributes=attributes, references=references)
         return None
     return with_references(joined(every).assign_attrs(attributes), references)
 

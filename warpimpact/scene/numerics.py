@@ -122,7 +122,7 @@ class Numerics(_AsGiven):
         return "scheme" if self.scheme == "nodal" else next(iter(given), None)
 
     @model_validator(mode="after")
-    def _is_given_once(self) -> Self:
+    def _sets_one_resolution(self) -> Self:
         other = "level" if self.level is not None else "accuracy" if self.accuracy is not None else None
         if "fidelity" in self.model_fields_set and other is not None:
             raise ValueError(f"fidelity and {other} cannot be combined: each sets the resolution")

@@ -16,7 +16,7 @@ from warpimpact.statistics.intervals import Estimate
 LOUD = argparse.Namespace(quiet=False)
 
 
-def standing(done: int, *, failed: int = 0, resumed: int = 100) -> RunProgress:
+def progress_at(done: int, *, failed: int = 0, resumed: int = 100) -> RunProgress:
     velocity = Estimate(731.25, 730.5, 732.0, done, 10.0)
     tilt = Estimate(23.0, 22.0, 24.0, done, 5.0)
     measures = (Measure.parse("mean(residual_velocity)"), Measure.parse("mean(tilt@130mm)"))
@@ -39,7 +39,7 @@ def test_a_log_gets_a_line_per_tenth(capsys: pytest.CaptureFixture[str], clock: 
     with show_run(LOUD) as show:
         for done in range(100, 1001, 10):
             clock[0] += 0.1
-            show(standing(done, failed=done // 300))
+            show(progress_at(done, failed=done // 300))
     lines = capsys.readouterr().err.splitlines()
     assert len(lines) == 10
     assert lines[0] == "100 of 1000 hits"
@@ -55,7 +55,7 @@ def test_a_log_gets_a_line_per_tenth(capsys: pytest.CaptureFixture[str], clock: 
 def test_a_slow_run_is_not_silent(capsys: pytest.CaptureFixture[str], clock: list[float]) -> None:
     with show_run(LOUD) as show:
         for _ in range(100):
-            show(standing(101))
+            show(progress_at(101))
             clock[0] += 60.0
     assert len(capsys.readouterr().err.splitlines()) == 100  # of 100 minutes
 
@@ -66,7 +66,7 @@ def test_a_terminal_gets_one_line_that_never_goes_back(monkeypatch: pytest.Monke
     monkeypatch.setattr("shutil.get_terminal_size", lambda: os.terminal_size((120, 24)))
     with show_run(LOUD) as show:
         for done in (100, 200, 600, 590, 1000):  # hits under way may be given up
-            show(standing(done, failed=3))
+            show(progress_at(done, failed=3))
             clock[0] += 1.0
     *lines, end = terminal.getvalue().split("\x1b[K")
     assert end == "\n"
@@ -80,13 +80,13 @@ def test_a_terminal_gets_one_line_that_never_goes_back(monkeypatch: pytest.Monke
 def test_a_log_says_what_a_pilot_tries_and_counts_no_time_of_it(
     capsys: pytest.CaptureFixture[str], clock: list[float]
 ) -> None:
-    begun = standing(0, resumed=0)
+    begun = progress_at(0, resumed=0)
     with show_run(LOUD) as show:
         for tenth in range(700):
             show(replace(begun, piloting=True, level=2 if tenth < 300 else 4))
             clock[0] += 0.1
         for done, seconds in ((0, 20.0), (1, 3.0), (0, 0.99), (400, 0.0)):  # kernels are compiled before the first hit
-            show(standing(done, resumed=0))
+            show(progress_at(done, resumed=0))
             clock[0] += seconds
     lines = capsys.readouterr().err.splitlines()
     assert lines[0] == "a pilot looks for the resolution, level 2, for 2 s so far"

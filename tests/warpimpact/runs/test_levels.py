@@ -3,6 +3,7 @@
 import json
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -120,12 +121,12 @@ def test_measures_say_what_the_numerics_may_shift_them_by_and_a_finer_level_agre
 
 
 def test_a_stop_rule_counts_the_shift_by_the_numerics() -> None:
-    def ran(half_width: str, **changes: str) -> dict[str, object]:
+    def ran(half_width: str, **changes: str) -> dict[Any, Any]:
         requested = {"[output]": STOP.format(half_width), "count = 256\n": ""} | changes
         return dict(run(campaign(requested), device="cpu").attrs)
 
     message = ran("2 deg")
-    low, high = message[attr.ESTIMATE_INTERVAL]  # type: ignore[misc]
+    low, high = message[attr.ESTIMATE_INTERVAL]
     assert message[attr.STOP_REASON] == "half_width"
     assert 0.5 * (high - low) + float(str(message[attr.ESTIMATE_NUMERICS])) <= 2.0
     no_use = ran("1.2 deg", **{'fidelity = "standard"': 'fidelity = "draft"'})

@@ -22,6 +22,7 @@ from warpimpact.solver import accuracy as choice
 from warpimpact.solver.accuracy import (
     ERROR_PER_CHANGE,
     PILOT_SECONDS,
+    LevelErrors,
     PilotResult,
     choose_level,
     errors_text,
@@ -61,10 +62,10 @@ def chosen(
             computed[level] = outcomes_of(speeds(level))
         return computed[level]
 
-    def errors(coarse: Outcomes, fine: Outcomes) -> object:
+    def errors(coarse: Outcomes, fine: Outcomes) -> LevelErrors:
         return hit_errors(coarse, fine, accuracy, (True,))
 
-    actual = choose_level(Numerics(accuracy=accuracy), first, outcomes, errors, seconds)  # type: ignore[arg-type]
+    actual = choose_level(Numerics(accuracy=accuracy), first, outcomes, errors, seconds)
     return actual, list(computed)
 
 

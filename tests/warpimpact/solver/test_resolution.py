@@ -39,7 +39,7 @@ def resolved(**numerics: Any) -> Resolution:
         ({"accuracy": {}}, "needs at least one of residual_velocity"),
     ],
 )
-def test_a_resolution_is_given_in_one_way(numerics: dict[str, Any], words: str) -> None:
+def test_two_settings_of_one_resolution_are_refused(numerics: dict[str, Any], words: str) -> None:
     with pytest.raises(ValidationError, match=words):
         Numerics(**numerics)
 
