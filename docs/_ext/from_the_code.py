@@ -56,7 +56,7 @@ class MeasureReference(FromTheCode):
 
     def lines(self) -> Iterator[str]:
         from warpimpact.results.vocabulary import EVENTS, QUANTITIES
-        from warpimpact.scene.display import STORED
+        from warpimpact.scene.units import STORED
 
         for what, entries in (("quantity", QUANTITIES), ("event", EVENTS)):
             rows = [
@@ -80,7 +80,7 @@ class CampaignReference(FromTheCode):
     def lines(self) -> Iterator[str]:
         from warpimpact.campaign.campaign import Campaign
         from warpimpact.campaign.schema import campaign_schema, file_schema
-        from warpimpact.scene.distributions import Distribution
+        from warpimpact.scene.scatter import Distribution
 
         self.schema = file_schema(Campaign, "") | {"properties": campaign_schema()["properties"]}
         yield from self.file()

@@ -11,7 +11,7 @@ import numpy as np
 
 from warpimpact import CirclePattern, Hits, Impact, Layer, OgiveCore, Plate, Record, Scene, SlotPattern, make_shots
 from warpimpact.scene import PolynomialCore, Scatter, Shots
-from warpimpact.scene.distributions import Normal, Uniform
+from warpimpact.scene.scatter import Normal, Uniform
 
 CORE = PolynomialCore(coefficients=(3.0e-4, 0.24, -5.29), length=27.86e-3, mass=4.0e-3)
 BULLET_CORE = OgiveCore(diameter=6.248e-3, crh=3.0, length=27.5e-3, mass=5.3e-3)

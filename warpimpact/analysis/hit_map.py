@@ -16,7 +16,7 @@ from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
 from warpimpact.results.dataset import passed
 from warpimpact.results.vocabulary import place_of_standoff
-from warpimpact.scene.symmetry import IDENTITY, SYMMETRIES, Symmetry
+from warpimpact.scene.sampling import IDENTITY, SYMMETRIES, Symmetry
 
 Array = NDArray[np.float64]
 

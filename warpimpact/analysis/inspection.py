@@ -34,7 +34,7 @@ from warpimpact.results.dataset import failed, finer_pair, hit_numbers, is_choic
 from warpimpact.results.layers import outlines
 from warpimpact.results.measures import Measure
 from warpimpact.results.vocabulary import has_base
-from warpimpact.scene.display import STORED
+from warpimpact.scene.units import STORED
 from warpimpact.solver.accuracy import errors_text, listed, share_text
 from warpimpact.statistics.intervals import Estimate
 

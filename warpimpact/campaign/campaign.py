@@ -45,15 +45,12 @@ from ..scene import (
     exclusions,
     symmetries_used,
 )
-from ..scene.bounds import Implausible
-from ..scene.distributions import Distribution
 from ..scene.input_files import InputFile
-from ..scene.model import Model
-from ..scene.problems import sentence
-from ..scene.quantities import BY_LAYER, SCATTERED
-from ..scene.scatter import check_range
+from ..scene.model import Model, sentence
+from ..scene.quantities import BY_LAYER, SCATTERED, Implausible
+from ..scene.sampling import unsymmetric
+from ..scene.scatter import Distribution, check_range
 from ..scene.shots import FARTHEST_HIT
-from ..scene.symmetry import unsymmetric
 from ..scene.target import MOST_LAYERS, layer_name
 from ..scene.units import Number, PositiveLength, Radians, Title, Whole, in_radians, quantity, quoted
 from .continuum_settings import FiniteElements

@@ -8,8 +8,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from ..scene import Core, Hits, Impact, Plate, Record, Scene, Target
-from ..scene.bounds import USUAL, hit_bounds
-from ..scene.quantities import QUANTITIES
+from ..scene.quantities import QUANTITIES, USUAL, hit_bounds
 from ..scene.target import layer_name
 
 _OF_A_PLATE = [name for name in Plate.model_fields if f"plate.{name}" in USUAL and name != "size"]

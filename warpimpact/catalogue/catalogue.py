@@ -21,7 +21,7 @@ from warpimpact.catalogue.strength import Resistance, resistance_of
 from warpimpact.scene import Core
 from warpimpact.scene.flow import Flow
 from warpimpact.scene.input_files import parsed, read_text
-from warpimpact.scene.problems import complaint
+from warpimpact.scene.model import complaint
 from warpimpact.scene.units import MOST_QUOTED, Title, quoted
 
 Entry = TypeVar("Entry", Threat, Material)

@@ -10,8 +10,7 @@ from pydantic import Field, TypeAdapter, ValidationError, ValidationInfo, field_
 
 from warpimpact.catalogue.strength import NINETY, Resistance
 from warpimpact.scene import AnyCore, Core, units
-from warpimpact.scene.model import Model
-from warpimpact.scene.problems import complaint
+from warpimpact.scene.model import Model, complaint
 
 CORE: TypeAdapter[Core] = TypeAdapter(AnyCore)
 OBLIQUITY: TypeAdapter[float] = TypeAdapter(units.Obliquity)

@@ -15,7 +15,7 @@ from warpimpact.results import files
 from warpimpact.results.dataset import hit_numbers
 from warpimpact.runs.finite_elements import continuum_to_file
 from warpimpact.runs.replay import campaign_in
-from warpimpact.scene.problems import complaint
+from warpimpact.scene.model import complaint
 from warpimpact.solver.simulate import spread_places
 
 from .paths import check_output

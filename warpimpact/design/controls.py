@@ -19,10 +19,9 @@ from warpimpact.plotting.plate import Dimension, drawn_extent, hole_dimensions, 
 from warpimpact.plotting.style import fire_of
 from warpimpact.report import svg
 from warpimpact.scene import NoPattern, Plate, Target
-from warpimpact.scene.display import MM
 from warpimpact.scene.model import Model
-from warpimpact.scene.patterns.pattern import LatticePattern
-from warpimpact.scene.units import reader_in, typed
+from warpimpact.scene.pattern import LatticePattern
+from warpimpact.scene.units import MM, reader_in, typed
 
 Place = list[str | int]
 

@@ -24,7 +24,7 @@ from warpimpact.results import files, front
 from warpimpact.results.files import kind_of, opened
 from warpimpact.results.kinds import FRONT
 from warpimpact.scene import Plate
-from warpimpact.scene.patterns.pattern import LatticePattern
+from warpimpact.scene.pattern import LatticePattern
 from warpimpact.scene.units import quoted
 from warpimpact.solver.prepare import prepare
 from warpimpact.solver.resolution import TooManySteps, at_level

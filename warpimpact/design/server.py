@@ -29,8 +29,8 @@ from warpimpact.campaign.text import CampaignError
 from warpimpact.design.answers import THIS_DESIGN, Answers, Query
 from warpimpact.design.designs import DesignStore, as_json, stages
 from warpimpact.results.files import ResultError
-from warpimpact.scene.bounds import Implausible
-from warpimpact.scene.problems import sentence
+from warpimpact.scene.model import sentence
+from warpimpact.scene.quantities import Implausible
 from warpimpact.solver.device import DeviceError
 from warpimpact.solver.resolution import TooManySteps
 from warpimpact.solver.worker import Cancel, Cancelled

@@ -10,8 +10,8 @@ import shapely
 
 from warpimpact.results.files import OutputError, aside
 from warpimpact.scene import Plate
-from warpimpact.scene.display import MM
 from warpimpact.scene.model import Array
+from warpimpact.scene.units import MM
 
 SUFFIXES = (".svg", ".dxf")
 _SAME_PLACE = 1e-6

@@ -14,7 +14,7 @@ from warpimpact.analysis.estimates import slices
 from warpimpact.results import variables as v
 from warpimpact.results.dataset import hit_numbers
 from warpimpact.results.files import aside
-from warpimpact.scene.display import MM
+from warpimpact.scene.units import MM
 
 _ANGLE_DECIMALS = 10
 """Decimals of an angle that a user gave in degrees."""

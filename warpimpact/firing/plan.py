@@ -14,8 +14,7 @@ from warpimpact.campaign.text import CampaignError, parsed, read_text
 from warpimpact.firing.v50 import within_span
 from warpimpact.results.kinds import TEST
 from warpimpact.scene.input_files import InputFile
-from warpimpact.scene.model import Array, Model
-from warpimpact.scene.problems import sentence
+from warpimpact.scene.model import Array, Model, sentence
 from warpimpact.scene.units import Number, PositiveSpeed, Speed, Title, Whole
 from warpimpact.statistics.acceptance import fewest_shots
 

@@ -27,11 +27,9 @@ from warpimpact.results import variables as v
 from warpimpact.results.kinds import FIT
 from warpimpact.results.measures import STATUSES
 from warpimpact.scene import AnyCore, Impact, Interaction, Numerics, Plate, Record, Scatter, Scene, Target
-from warpimpact.scene.distributions import EDGE, AnyDistribution, Distribution
-from warpimpact.scene.model import Array, Model
-from warpimpact.scene.problems import complaint, sentence
+from warpimpact.scene.model import Array, Model, complaint, sentence
 from warpimpact.scene.quantities import OF_THE_SCENE, QUANTITIES
-from warpimpact.scene.scatter import check_range, in_si
+from warpimpact.scene.scatter import EDGE, AnyDistribution, Distribution, check_range, in_si
 from warpimpact.scene.units import (
     Angle,
     Length,

@@ -28,7 +28,7 @@ from warpimpact.records.variable import failures
 from warpimpact.results.measures import STATUSES
 from warpimpact.scene import IDENTITY, Hits, Plate, Sampler, Scene, Shots, Symmetry
 from warpimpact.scene.model import Array
-from warpimpact.scene.symmetry import irreducible_part, symmetries
+from warpimpact.scene.sampling import irreducible_part, symmetries
 from warpimpact.solver.limit import Limits, limit_velocity
 from warpimpact.solver.many import in_threads, simulate_many
 from warpimpact.solver.worker import Worker

@@ -19,9 +19,9 @@ from warpimpact.results import attributes as attr
 from warpimpact.results import posterior_file as p
 from warpimpact.results.kinds import POSTERIOR
 from warpimpact.results.variables import HIT_Y, HIT_Z
-from warpimpact.scene.display import STORED, UNITS, Unit
 from warpimpact.scene.model import Array
 from warpimpact.scene.quantities import QUANTITIES
+from warpimpact.scene.units import STORED, UNITS, Unit
 
 LARGEST_NOISE = 1.7
 """Largest standard error of ln L by the hits. Chains whose noise is larger hardly move (A. Doucet and others,

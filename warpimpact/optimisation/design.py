@@ -20,9 +20,8 @@ from warpimpact.optimisation.space import Space, read_space
 from warpimpact.results.kinds import DESIGN
 from warpimpact.results.measures import Measure
 from warpimpact.results.vocabulary import WEIGHTS
-from warpimpact.scene.bounds import Implausible
-from warpimpact.scene.model import Array, Model
-from warpimpact.scene.problems import sentence
+from warpimpact.scene.model import Array, Model, sentence
+from warpimpact.scene.quantities import Implausible
 from warpimpact.scene.units import Number, PositiveArealDensity, PositiveLength, Title, Whole, quoted
 
 _SAMPLER_HITS = 2**20

@@ -20,7 +20,7 @@ from warpimpact.results import attributes as attr
 from warpimpact.results.vocabulary import WEIGHTS
 from warpimpact.scene import EllipsePattern, Plate, Target
 from warpimpact.scene.model import Array
-from warpimpact.scene.patterns.pattern import LatticePattern
+from warpimpact.scene.pattern import LatticePattern
 from warpimpact.solver.limit import check_arrests
 from warpimpact.statistics.comparisons import ROUNDED
 from warpimpact.statistics.intervals import estimate_of

@@ -13,8 +13,7 @@ import numpy as np
 from warpimpact.campaign.places import is_table, labels_of, put, resolved
 from warpimpact.campaign.text import CampaignError
 from warpimpact.scene.model import Array
-from warpimpact.scene.unit_text import number_and_unit
-from warpimpact.scene.units import LARGEST, float_of, quoted
+from warpimpact.scene.units import LARGEST, float_of, number_and_unit, quoted
 
 _RANGE_DIGITS = 6
 """Significant digits of a value of a range without a step."""

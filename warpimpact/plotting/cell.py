@@ -29,8 +29,8 @@ from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
 from warpimpact.results.dataset import passed
 from warpimpact.results.layers import outlines
-from warpimpact.scene.display import MM, STORED
 from warpimpact.scene.model import Array
+from warpimpact.scene.units import MM, STORED
 
 Scale = tuple[Colormap, Normalize]
 

@@ -36,8 +36,8 @@ from warpimpact.results import variables as v
 from warpimpact.results.dataset import passed
 from warpimpact.results.files import OutputError
 from warpimpact.results.measures import Measure
-from warpimpact.scene.display import MM
 from warpimpact.scene.model import Array
+from warpimpact.scene.units import MM
 
 _MAIN = (v.RESIDUAL_VELOCITY, v.DEFLECTION, v.TILT)
 _MOST_COLUMNS = 3

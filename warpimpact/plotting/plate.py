@@ -29,8 +29,8 @@ from warpimpact.plotting.style import (
     in_style,
 )
 from warpimpact.scene import Core, Impact, NoPattern, Plate, Target
-from warpimpact.scene.display import MM
 from warpimpact.scene.model import Array
+from warpimpact.scene.units import MM
 
 _SIDE, _WIDEST, _NARROWEST = 5.0, 11.0, 5.5
 """Longer side of the plate, most width of the plate and the section beside it, and least width of a figure [inch]."""

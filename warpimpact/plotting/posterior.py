@@ -14,8 +14,8 @@ from warpimpact.plotting.cell import words
 from warpimpact.plotting.plate import draw_plate
 from warpimpact.plotting.style import BLUE, Figure, finish, in_style, sheet
 from warpimpact.results import posterior_file as p
-from warpimpact.scene.display import MM
 from warpimpact.scene.model import Array
+from warpimpact.scene.units import MM
 
 _GREY = "0.6"
 _POINTS = 600

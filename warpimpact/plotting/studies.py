@@ -38,7 +38,7 @@ from warpimpact.results import firing as f
 from warpimpact.results import variables as v
 from warpimpact.results.measures import Measure
 from warpimpact.results.references import reference
-from warpimpact.scene.display import STORED
+from warpimpact.scene.units import STORED
 from warpimpact.studies.limit_view import inclination, measures_of, promise_line, shown_unit
 from warpimpact.studies.sweep import inputs_of, sweep_table
 from warpimpact.studies.sweep import measures_of as measures_of_sweep

@@ -31,8 +31,8 @@ from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
 from warpimpact.results.dataset import passed
 from warpimpact.results.files import OutputError, aside
-from warpimpact.scene.display import MM
 from warpimpact.scene.model import Array
+from warpimpact.scene.units import MM
 
 _US = 1e6
 """Microseconds in a second."""

@@ -21,8 +21,8 @@ from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
 from warpimpact.results.dataset import hit_numbers
 from warpimpact.results.layers import outlines
-from warpimpact.scene.display import MM
 from warpimpact.scene.model import Array
+from warpimpact.scene.units import MM
 
 MOST_HITS = 12_000
 """Most hits on a page, for all results together: about 1 MB, compressed."""

@@ -37,7 +37,7 @@ from warpimpact.results import variables as v
 from warpimpact.results.kinds import FIRING, FRONT, HISTORY, POSTERIOR, SWEEP, Kind
 from warpimpact.results.replayed_hit import hit_view
 from warpimpact.results.vocabulary import WEIGHTS
-from warpimpact.scene.symmetry import IDENTITY, symmetries
+from warpimpact.scene.sampling import IDENTITY, symmetries
 from warpimpact.studies.sweep import sweep_view
 
 _MAP_PIXELS = 160

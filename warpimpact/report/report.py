@@ -54,7 +54,7 @@ from warpimpact.results.dataset import hit_numbers, passed
 from warpimpact.results.files import ResultError
 from warpimpact.results.layers import outlines
 from warpimpact.runs.replay import replay
-from warpimpact.scene.display import MM
+from warpimpact.scene.units import MM
 from warpimpact.studies.limit_view import in_short, limit_view
 
 

@@ -34,8 +34,7 @@ from warpimpact.results.vocabulary import (
     place_of_standoff,
 )
 from warpimpact.scene import units
-from warpimpact.scene.display import STORED, Unit
-from warpimpact.scene.units import quantity, quoted
+from warpimpact.scene.units import STORED, Unit, quantity, quoted
 from warpimpact.statistics.intervals import Estimate, RunningSums, SamplingDesign, estimate_of
 from warpimpact.statistics.shifts import shift_of_mean, shift_of_quantile, shift_of_share, shift_of_yes
 from warpimpact.statistics.tails import has_interval, worst_tenth

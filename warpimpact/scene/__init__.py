@@ -7,24 +7,20 @@ imports no other room: neither a kernel nor a Dataset.
 from .core import AnyCore, ConeCore, Core, MassProperties, OgiveCore, PolynomialCore, ProfileCore
 from .interaction import FreeSurface, Interaction
 from .numerics import PRESETS, Accuracy, Numerics
-from .patterns import (
+from .pattern import LatticePattern, NoPattern, Pattern
+from .sampling import IDENTITY, Sampler, Symmetry, make_shots, symmetries_used
+from .scatter import Scatter
+from .scene import Record, Scene
+from .shapes import (
     AnyPattern,
     CirclePattern,
     EllipsePattern,
     HexagonPattern,
-    LatticePattern,
-    NoPattern,
-    Pattern,
     PolygonsPattern,
     SlotPattern,
     SquarePattern,
     TrianglePattern,
 )
-from .plate import Plate
-from .sampling import Sampler, make_shots
-from .scatter import Scatter
-from .scene import Record, Scene
 from .shots import Hits, Impact, Shots
-from .symmetry import IDENTITY, Symmetry, symmetries_used
-from .target import Layer, Target
+from .target import Layer, Plate, Target
 from .units import Radians

@@ -1,16 +1,13 @@
-"""The quantities of a scene that may differ from shot to shot: their place in a campaign, their type, and their uses.
+"""The quantities of a scene that may differ from shot to shot, and the usual and possible range of each."""
 
-Units are in units.py. These and all other values of a campaign may be swept.
-"""
-
-from __future__ import annotations
-
+import math
 from collections.abc import Mapping
 from typing import Annotated, Any, NamedTuple
 
 from pydantic import Field
 
 from . import units
+from .units import UNITS
 
 
 class Quantity(NamedTuple):
@@ -86,3 +83,90 @@ def drawn_columns(layers: int) -> int:
 def drawn_column(name: str, layer: int = 0) -> int:
     """Column of random numbers of a quantity, which does not depend on the other quantities that scatter."""
     return drawn_columns(layer) + _OF_LAYERS_BEHIND.index(name) if layer else _OF_THE_PLATE.index(name)
+
+
+class Implausible(UserWarning):
+    """A possible value that is probably a mistake."""
+
+
+class Bounds(NamedTuple):
+    """Usual and possible range of a quantity, in SI or radians. Zero is always usual.
+
+    Attributes:
+        low, high: usual range, outside which there is a warning.
+        unit: SI unit.
+        least, most: possible range, outside which a value is refused.
+        why: reason for the possible range.
+    """
+
+    low: float
+    high: float
+    unit: str
+    least: float = 0.0
+    most: float = math.inf
+    why: str = ""
+
+    def complaint(self, place: str, value: float, *, usual: bool) -> str | None:
+        """A sentence about a value out of the usual range, or of the possible one; None within it."""
+        low, high, what = (self.low, self.high, "usual") if usual else (self.least, self.most, f"allowed: {self.why}")
+        if value == 0.0 or low <= abs(value) <= high:
+            return None
+        shown, in_degrees = UNITS[self.unit], math.degrees if self.unit == "rad" else float
+        read = shown.text(in_degrees(value)) if self.unit == "rad" else f"{value:g} {self.unit}".rstrip()
+        least = f"{low * shown.factor:g}" if low else "up"
+        advice = "but a hit list is in SI" if place.startswith("hits.file") else "which needs its unit"
+        slips = (
+            unit for unit, factor in _SLIPS.get(self.unit, {}).items() if self.low <= abs(value) * factor <= self.high
+        )
+        slip = next((f'; "{value:g} {unit}" was probably meant, {advice}' for unit in slips), "")
+        return f"{place}: read as {read}, but {least} to {shown.text(in_degrees(high))} is {what}{slip}"
+
+
+_SLIPS = {
+    "m": {"mm": 1e-3, "cm": 1e-2, "um": 1e-6},
+    "kg": {"g": 1e-3, "mg": 1e-6},
+    "kg/m^3": {"g/cm^3": 1e3},
+    "Pa": {"MPa": 1e6, "GPa": 1e9},
+    "s": {"us": 1e-6, "ns": 1e-9},
+    "m/s": {"km/s": 1e3},
+}
+"""Units that may have been left out, each with its factor to SI."""
+_MM, _DEG = 1e-3, math.radians(1.0)
+_OF_MATTER = "metals have up to 22,600 kg/m^3, and foams from 10 on"
+
+
+def _length(low: float, high: float, most: float = math.inf, why: str = "") -> Bounds:
+    """Bounds given in millimetres."""
+    return Bounds(low * _MM, high * _MM, "m", 0.0, most * _MM, why)
+
+
+USUAL = {
+    "core.length": _length(2.0, 300.0, 1_000.0, "the longest rods that guns fire are shorter"),
+    "core.diameter": _length(1.0, 60.0, 1_000.0, "no gun has a larger bore"),
+    "core.mass": Bounds(5e-5, 1.0, "kg"),
+    "core.density": Bounds(500.0, 25_000.0, "kg/m^3", 10.0, 25_000.0, _OF_MATTER),
+    "core.mean_density": Bounds(1_000.0, 25_000.0, "kg/m^3", 10.0, 25_000.0, _OF_MATTER),
+    "plate.thickness": _length(0.1, 200.0, 1_000.0, "no bullet goes through a metre of anything"),
+    "plate.size": _length(5.0, 20_000.0, 50_000.0, "no plate is larger; an unbounded one has no size"),
+    "plate.resistance": Bounds(1e7, 2e10, "Pa", 2e4, 2e11, "gelatine resists more than the least, diamond less"),
+    "plate.shear_coefficient": Bounds(0.0, 1.0, ""),
+    "plate.degradation_interval": Bounds(1e-9, 1e-3, "s", 0.0, 0.1, "any passage is over by then"),
+    "plate.degradation_length": _length(0.01, 20.0, 100.0, "a core weakens a plate about itself"),
+    "plate.density": Bounds(500.0, 25_000.0, "kg/m^3", 10.0, 25_000.0, _OF_MATTER),
+    "plate.pattern.cell": _length(0.5, 500.0, 2_000.0, "a plate with its holes as far apart is a solid one to a core"),
+    "plate.pattern.rotation": Bounds(0.0, 360.0 * _DEG, "rad", 0.0, 360.0 * _DEG, "a turn has 360 deg"),
+    "layer.gap": _length(0.05, 3_000.0),
+    "impact.velocity": Bounds(20.0, 3e3, "m/s", 1.0, 1e4, "a fall from 5 cm is faster, and no gun is as fast"),
+    "impact.azimuth": Bounds(0.0, 360.0 * _DEG, "rad"),
+    "impact.pitch": Bounds(0.0, 60.0 * _DEG, "rad"),
+    "impact.yaw": Bounds(0.0, 60.0 * _DEG, "rad"),
+    "impact.spin": Bounds(0.0, 1e5, "rad/s", 0.0, 1e6, "a core would burst"),
+    "output.standoffs": _length(5.0, 100_000.0, 1_000_000.0, "nothing behind a target is as far"),
+}
+"""Bounds by the place in a campaign. Most quantities have no smallest possible value, since foils, slow cores and
+shallow depths may be studied. Listed hits may lie anywhere, since a pattern repeats."""
+
+
+def hit_bounds(period: tuple[float, float], size: tuple[float, float] | None) -> Bounds:
+    """Usual coordinates of listed hits [m]: within a few cells from the origin, or on a finite plate."""
+    return _length(0.0, 1e3 * (10.0 * max(period) if size is None else 0.5 * max(size)))

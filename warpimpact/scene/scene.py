@@ -9,8 +9,7 @@ from .core import AnyCore, Core
 from .exclusions import BENDING, MASS_PROPERTIES, STRENGTH, check_together
 from .interaction import Interaction
 from .model import Model
-from .plate import Plate
-from .target import Target
+from .target import Plate, Target
 from .units import PositiveLength
 
 

@@ -13,9 +13,8 @@ from pydantic import Field, model_validator
 from .exclusions import SIZE, WHOLE_PLATE, check_together
 from .input_files import InputFile, read_columns
 from .model import Array, Model
-from .plate import Plate
 from .quantities import BY_LAYER, LISTED, QUANTITIES
-from .target import Target
+from .target import Plate, Target
 from .units import RIGHT_ANGLE, Angle, AngularVelocity, Obliquity, PositiveSpeed, Tilt, Whole
 
 FARTHEST_HIT = 100.0

@@ -1,16 +1,165 @@
-"""Target: layers, of which the plate is number 0 (docs/model.md §8)."""
+"""Target: layers of resisting material with holes, of which the plate is number 0 (docs/model.md §3, §4, §8)."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from functools import cached_property
 from itertools import accumulate
-from typing import Annotated, Self
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Self
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import Field, field_validator
+from pydantic import BaseModel, Field, ModelWrapValidatorHandler, ValidationInfo, field_validator, model_validator
 
+from . import units
+from .exclusions import AREAL_DENSITY, BY_PATH, BY_TIME, MARGIN, SIZE, THICKNESS, check_together
+from .geometry import BoolArray
 from .model import Array, Model
-from .plate import Plate
+from .pattern import NoPattern, Pattern
+from .shapes import AnyPattern
 from .units import Length
+
+INTERVAL = 1.0e-6
+"""Default of Δt_β if Δs_β is not given [s], as in the paper's rows (docs/model.md §4)."""
+
+
+class _Weight(BaseModel):
+    areal_density: units.PositiveArealDensity
+
+
+class Plate(Model):
+    """A perforated plate. It is unbounded, or rectangular if `size` is given.
+
+    Attributes:
+        thickness: thickness h of the material, along x [m].
+        areal_density: mass per area of the plate with its holes [kg/m²], in place of the thickness.
+        resistance: Y, the stress of the material against the core [Pa].
+        shear_coefficient: η, friction per normal stress.
+        degradation: β, share of Y that remains after contact for `degradation_interval` or over
+            `degradation_distance`, through the whole thickness; with 1 the material does not weaken.
+        degradation_interval: Δt_β [s], by default 1 us; None if exposure counts the path.
+        degradation_distance: Δs_β, a path of the centre of mass [m]; None if exposure counts the time. By path, the law
+            has no rate: outcomes depend on Y/v² alone.
+        degradation_length: ℓ, distance from a contact in the plane of the plate within which the material weakens [m].
+        density: of the material [kg/m³].
+        material: name in the catalogue. In a file it gives resistance, shear_coefficient and density, and the law of
+            [interaction]; a key beside it overrides its value. In Python it gives them for a `threat` (a name, or a
+            core) at an `obliquity`, on which Y depends, too; a copy with another thickness keeps its Y.
+        size: extent along y and z of a finite plate centred on the origin [m]; without it the plate is unbounded.
+        margin: width of a band along the rim without holes [m]; holes that reach into it are left out. Without a margin
+            the rim cuts holes.
+        pattern: shape and lattice of the holes; with a margin, only the holes on the plate.
+    """
+
+    thickness: units.PositiveLength
+    if TYPE_CHECKING:  # a material gives the resistance; the other two are taken, but are no fields
+        resistance: units.NonNegativeStress = 0.0
+        threat: Any = None
+        obliquity: float | str | None = None
+    else:
+        resistance: units.NonNegativeStress
+    shear_coefficient: units.NonNegativeNumber = 0.0
+    degradation: Annotated[units.Number, Field(ge=0, le=1)] = 1.0
+    degradation_interval: units.PositiveTime | None = None
+    degradation_distance: units.PositiveLength | None = None
+    degradation_length: units.PositiveLength = 0.5e-3
+    density: units.PositiveDensity = 7850.0
+    material: units.Title | None = None
+    size: tuple[units.PositiveLength, units.PositiveLength] | None = None
+    margin: units.PositiveLength | None = None
+    pattern: AnyPattern = NoPattern()
+    in_python: ClassVar[tuple[str, ...]] = ("threat", "obliquity")
+    of_material: ClassVar[Callable[[type["Plate"], dict[str, Any]], dict[str, Any]] | None] = None
+    """What turns the keys `material`, `threat` and `obliquity` into the other fields; the catalogue sets it."""
+
+    @model_validator(mode="wrap")
+    @classmethod
+    def _has_its_weight(cls, values: Any, read: ModelWrapValidatorHandler[Self]) -> Self:
+        if not isinstance(values, dict) or values.get("areal_density") is None:
+            return read(values)
+        check_together({THICKNESS: "thickness" in values, AREAL_DENSITY: True})
+        rest = {name: value for name, value in values.items() if name != "areal_density"}
+        weight = _Weight(areal_density=values["areal_density"]).areal_density
+        plate = read(rest | {"thickness": 1.0})
+        object.__setattr__(plate, "thickness", weight / plate.areal_density)  # which was that of 1 m
+        return plate
+
+    @model_validator(mode="wrap")
+    @classmethod
+    def _has_its_material(cls, values: Any, read: ModelWrapValidatorHandler[Self]) -> Self:
+        if cls.of_material is None or not isinstance(values, dict) or not isinstance(values.get("material"), str):
+            return read(values)
+        if "resistance" in values and not {"threat", "obliquity"} & values.keys():
+            return read(values)
+        return read(cls.of_material(cls, values))
+
+    @classmethod
+    def _keys(cls) -> list[str]:
+        return [*super()._keys(), "areal_density", *(() if cls.of_material is None else cls.in_python)]
+
+    @field_validator("pattern")
+    @classmethod
+    def _within_the_margin(cls, pattern: Pattern, info: ValidationInfo) -> Pattern:
+        return pattern.bounded(info.data.get("size"), info.data.get("margin"))
+
+    @model_validator(mode="before")
+    @classmethod
+    def _goes_together(cls, values: Any) -> Any:
+        if not isinstance(values, dict):
+            return values
+        keys = {BY_TIME: "degradation_interval", BY_PATH: "degradation_distance", MARGIN: "margin", SIZE: "size"}
+        given = {option: values.get(key) is not None for option, key in keys.items()}
+        check_together(given)
+        by_default = not given[BY_TIME] and not given[BY_PATH]
+        return values | {"degradation_interval": INTERVAL} if by_default else values
+
+    @property
+    def degradation_unit(self) -> float:
+        """Exposure over which β applies once: Δt_β [s], or Δs_β [m]."""
+        given = self.degradation_interval if self.degradation_distance is None else self.degradation_distance
+        assert given is not None  # one of the two is given
+        return given
+
+    @property
+    def open_area(self) -> float:
+        """Share of holes in a unit cell; with a margin, in the whole plate."""
+        return self.pattern.open_area
+
+    @cached_property
+    def ligament(self) -> float:
+        """Smallest distance between two holes, or between a whole hole and the rim [m]; inf without holes."""
+        return self.pattern.ligament(self.size)
+
+    def is_solid(self, y: Array, z: Array) -> BoolArray:
+        """Whether points y, z [m] lie on the plate and outside its holes, in their broadcast shape."""
+        half_y, half_z = (0.5 * side for side in self.size or (np.inf, np.inf))
+        return (np.abs(y) <= half_y) & (np.abs(z) <= half_z) & ~self.pattern.is_hole(y, z)
+
+    def edge_distance(self, y: Array, z: Array) -> Array:
+        """Distance of points y, z [m] from the nearest edge of a hole or of the plate, in their broadcast shape:
+        positive in material, negative in a hole and off the plate, NaN without an edge."""
+        of_holes = self.pattern.edge_distance(y, z)
+        if self.size is None:
+            return np.where(np.isinf(of_holes), np.nan, of_holes)
+        beyond_y, beyond_z = np.abs(y) - 0.5 * self.size[0], np.abs(z) - 0.5 * self.size[1]
+        off = np.hypot(np.maximum(beyond_y, 0.0), np.maximum(beyond_z, 0.0))
+        return np.where(off > 0.0, -off, np.minimum(of_holes, -np.maximum(beyond_y, beyond_z)))
+
+    @property
+    def sampled_cell(self) -> tuple[float, float]:
+        """Extent (y, z) of the cell that hits cover [m]: the unit cell, or a smaller plate."""
+        cell_y, cell_z = self.pattern.unit_cell
+        return (cell_y, cell_z) if self.size is None else (min(cell_y, self.size[0]), min(cell_z, self.size[1]))
+
+    @property
+    def solid(self) -> Self:
+        """The plate without holes, with the same material and areal density."""
+        thickness = self.thickness * (1.0 - self.open_area)
+        return self.model_copy(update={"thickness": thickness, "margin": None, "pattern": NoPattern()})
+
+    @property
+    def areal_density(self) -> float:
+        """Mass per area of the perforated plate [kg/m²]: in a unit cell, or with a margin in the whole plate."""
+        return self.density * self.thickness * (1 - self.open_area)
+
 
 _WIDEST_GAP = 10.0
 """Largest gap [m]: within it positions are exact to a micrometre. Air has no effect on the core."""

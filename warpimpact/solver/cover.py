@@ -16,9 +16,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from warpimpact.scene import Core, Pattern, Plate
+from warpimpact.scene import Core, NoPattern, Pattern, Plate
 from warpimpact.scene.interaction import FreeSurface
-from warpimpact.scene.patterns import NoPattern
 from warpimpact.solver.keys import Key
 from warpimpact.solver.tile import Check, Floats, Real, Tile, kept
 

@@ -11,8 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from warpimpact.scene import Impact, Numerics, Plate, Scene, Shots, Target
-from warpimpact.scene.patterns import NoPattern
+from warpimpact.scene import Impact, NoPattern, Numerics, Plate, Scene, Shots, Target
 from warpimpact.scene.quantities import BY_LAYER
 from warpimpact.solver.materials import Materials, decay_rate
 

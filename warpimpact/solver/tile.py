@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from scipy import ndimage
 
 from warpimpact.scene import Pattern, Plate
-from warpimpact.scene.patterns import WHOLE_CELL
+from warpimpact.scene.geometry import WHOLE_CELL
 from warpimpact.solver.device import SMALL_MEMORY, free_memory
 from warpimpact.solver.keys import Key
 

@@ -11,7 +11,7 @@ from warpimpact import Campaign
 from warpimpact.campaign.campaign import read_plates
 from warpimpact.campaign.plausible import doubted_holes, effective_thickness
 from warpimpact.campaign.text import CampaignError
-from warpimpact.scene.bounds import Implausible
+from warpimpact.scene.quantities import Implausible
 from warpimpact.studies.sweep import read_sweep
 
 CAMPAIGNS = Path(__file__).parents[3] / "campaigns"

@@ -22,8 +22,7 @@ from warpimpact.scene import (
     SquarePattern,
     TrianglePattern,
 )
-from warpimpact.scene.patterns import WHOLE_CELL
-from warpimpact.scene.patterns.geometry import LINES
+from warpimpact.scene.geometry import LINES, WHOLE_CELL
 
 MM = 1e-3
 SLOT = SlotPattern(length="12 mm", width="4 mm", spacing=["8 mm", "16 mm"], staggered=True)
@@ -187,7 +186,7 @@ def test_a_turned_hole_is_the_hole_turned(shape: LatticePattern, turn: float) ->
     ids=lambda pattern: getattr(pattern, "shape", pattern),
 )
 def test_shares_of_cells_in_holes_are_those_of_many_points(pattern: Any, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("warpimpact.scene.patterns.geometry._PARTS_PER_LOT", 100)  # several lots
+    monkeypatch.setattr("warpimpact.scene.geometry._PARTS_PER_LOT", 100)  # several lots
     counts, points = (57, 46), 12
     sides = pattern.period[0] / counts[0], pattern.period[1] / counts[1]
     y, z = ((np.arange(points * n) + 0.5) * side / points for n, side in zip(counts, sides, strict=True))

@@ -22,7 +22,7 @@ from warpimpact.scene import (
     make_shots,
     symmetries_used,
 )
-from warpimpact.scene.symmetry import SYMMETRIES, irreducible_part, symmetries
+from warpimpact.scene.sampling import SYMMETRIES, irreducible_part, symmetries
 
 MM = 1e-3
 HITS = Hits(count=1024, irreducible=True)

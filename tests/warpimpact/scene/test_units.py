@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 from pydantic import TypeAdapter, ValidationError
 
-from warpimpact.scene import display, units
-from warpimpact.scene.unit_text import factor
+from warpimpact.scene import units
+from warpimpact.scene.units import factor
 
 
 @pytest.mark.parametrize(
@@ -98,8 +98,8 @@ def test_an_angle_that_was_read_stays_an_angle_in_arithmetic(changed: Callable[[
     assert isinstance(units.Radians(2.0) * np.ones(2), np.ndarray)
 
 
-@pytest.mark.parametrize("unit", display.UNITS.items(), ids=lambda unit: unit[0])
-def test_units_of_a_result_can_be_typed(unit: tuple[str, display.Unit]) -> None:
+@pytest.mark.parametrize("unit", units.UNITS.items(), ids=lambda unit: unit[0])
+def test_units_of_a_result_can_be_typed(unit: tuple[str, units.Unit]) -> None:
     si_unit, stored = unit[0], unit[1].stored if unit[0] else ""
     assert factor(stored, si_unit) == (math.pi / 180 if si_unit == "rad" else 1.0)
 

@@ -12,10 +12,10 @@ import shapely
 from pydantic import Field, PrivateAttr, ValidationInfo, field_serializer, field_validator, model_validator
 from scipy.spatial import KDTree
 
-from ..exclusions import HOLES, STAGGERED, check_together
-from ..model import Array, Model
-from ..units import Angle, Length, PositiveLength, in_radians, quantity
+from .exclusions import HOLES, STAGGERED, check_together
 from .geometry import BoolArray, Counts, Range, distance_to, geometries, neighbours, placed, shares_in, shifts_into
+from .model import Array, Model
+from .units import Angle, Length, PositiveLength, in_radians, quantity
 
 _QUARTER = 16
 """Chords per quarter of a turn in an outline; a circle loses 1.6e-3 of its area."""

@@ -10,7 +10,7 @@ import numpy as np
 import shapely
 from numpy.typing import NDArray
 
-from ..model import Array
+from .model import Array
 
 BoolArray = NDArray[np.bool_]
 Counts = NDArray[np.int16]
