@@ -64,7 +64,7 @@ class MeasureReference(FromTheCode):
                     code(f"{entry.name}@…" if entry.has_standoff else entry.name),
                     STORED[entry.units].shown,
                     {True: "more", False: "less", None: ""}[entry.higher_is_better],
-                    f"{entry.definition} ({entry.source})",
+                    entry.definition,
                 )
                 for entry in entries.values()
             ]

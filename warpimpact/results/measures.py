@@ -59,20 +59,16 @@ _FORM = re.compile(
 )
 _LAYER = re.compile(r"layer\s*(\d+)")
 _STATISTICS = {
-    "mean": (", mean", " Mean over the hits.", ""),
+    "mean": (", mean", " Mean over the hits."),
     "worst_tenth": (
         ", worst tenth",
-        " Mean over the worst tenth of the hits.",
-        "; R. T. Rockafellar, S. Uryasev, Journal of Risk 2 (2000) 21",
+        " Mean over the worst tenth of the hits (R. T. Rockafellar, S. Uryasev, Journal of Risk 2 (2000) 21).",
     ),
-    "worst_point": (", worst point", " The worst of the hits, an observed extreme.", ""),
-    "quantile": (", {share:g} % quantile", " The value below which this share of the hits lies.", ""),
-    "probability": ("", " The share of the hits beyond the limit.", ""),
-    "share": ("", "", ""),
-    "target": ("", "", ""),
-    "by_hit": ("", "", ""),
+    "worst_point": (", worst point", " The worst of the hits, an observed extreme."),
+    "quantile": (", {share:g} % quantile", " The value below which this share of the hits lies."),
+    "probability": ("", " The share of the hits beyond the limit."),
 }
-"""Kinds of measures, with what each adds to label, definition and source of its quantity."""
+"""Statistics of a quantity, with what each adds to its label and its definition."""
 
 
 @dataclass(frozen=True)
@@ -110,42 +106,37 @@ class Measure:
         if text in WEIGHTS:
             return cls(text, "target", text)
         match = _FORM.fullmatch(NAMES.get(text, text))
-        statistic = match["statistic"] if match else None
-        if match is None or statistic not in ("mean", "worst_tenth", "worst_point", "quantile", "P"):
+        if match is None or match["statistic"] not in ("mean", "worst_tenth", "worst_point", "quantile", "P"):
             raise ValueError(
                 f"got {quoted(text)}, but it must be of the form mean(residual_velocity), worst_tenth(base_depth), "
                 "worst_point(base_depth), quantile(residual_velocity, 0.05), P(tilt@130mm > 30 deg) or P(perforated), "
                 f"or be one of {', '.join((*WEIGHTS, *NAMES))}{_meant(text)}"
             )
-        parts = match.groupdict()
-        if statistic == "P" and parts["relation"] is None:
-            name = _known(parts["name"], EVENTS)
-            if parts["place"] or parts["share"]:
+        statistic, name, place, share, relation, limit = match.groups()
+        if statistic == "P" and relation is None:
+            if place or share:
                 raise ValueError(f"got {quoted(text)}, but the event {name} has neither a place nor a share")
-            return cls(text, "share", name)
-        name = _known(parts["name"], QUANTITIES)
-        kind = "probability" if statistic == "P" else str(statistic)
-        if (kind == "probability") != (parts["limit"] is not None) or (kind == "quantile") != (
-            parts["share"] is not None
-        ):
-            needed = {
-                "probability": "a limit, as in P(tilt@130mm > 30 deg)",
-                "quantile": "a share, as in quantile(…, 0.05)",
-            }
-            raise ValueError(f"got {quoted(text)}, but {statistic}(…) takes {needed.get(kind, 'a quantity alone')}")
-        measure = cls(text, kind, name, **_place(parts["place"], QUANTITIES[name]))
-        if kind.startswith("worst") and measure.higher_is_better is None:
+            return cls(text, "share", _known(name, EVENTS))
+        kind = "probability" if statistic == "P" else statistic
+        if (kind == "probability") != (limit is not None) or (kind == "quantile") != (share is not None):
+            needed = {"P": "a limit, as in P(tilt@130mm > 30 deg)", "quantile": "a share, as in quantile(…, 0.05)"}
+            raise ValueError(
+                f"got {quoted(text)}, but {statistic}(…) takes {needed.get(statistic, 'a quantity alone')}"
+            )
+        per_hit = QUANTITIES[_known(name, QUANTITIES)]
+        measure = cls(text, kind, name, **_place(place, per_hit))
+        if kind.startswith("worst") and per_hit.higher_is_better is None:
             raise ValueError(
                 f"got {quoted(text)}, but neither a high nor a low {name} is worse; quantile({name}, 0.95) has an end"
             )
         if kind == "quantile":
-            share = quantity(units.Number)(parts["share"])
-            if not 0.0 < share < 1.0:
-                raise ValueError(f"got the quantile {share:g}, but it must lie between 0 and 1")
-            return replace(measure, share=share)
+            number = quantity(units.Number)(share)
+            if not 0.0 < number < 1.0:
+                raise ValueError(f"got the quantile {number:g}, but it must lie between 0 and 1")
+            return replace(measure, share=number)
         if kind == "probability":
-            limit = _stored(quantity(_KINDS[measure.quantity.units])(parts["limit"]), measure.quantity.units)
-            return replace(measure, above=parts["relation"] == ">", limit=limit)
+            number = _stored(quantity(_KINDS[per_hit.units])(limit), per_hit.units)
+            return replace(measure, above=relation == ">", limit=number)
         return measure
 
     @property
@@ -156,24 +147,19 @@ class Measure:
         return (EVENTS if self.kind == "share" else QUANTITIES)[self.name]
 
     @property
-    def place(self) -> str:
-        """Words for the place of the measurement, such as " at 130 mm"; empty where no place is given."""
-        if not self.quantity.has_standoff:
-            return ""
-        return " at the last stand-off" if self.standoff is None else f" at {self.standoff * 1e3:g} mm"
-
-    @property
     def label(self) -> str:
         """The measure in words, without its unit."""
         layer = "the layer" if self.layer is None else f"layer {self.layer}" if self.layer else "the plate"
-        label = self.quantity.label.format(layer=layer) + self.place
+        label = self.quantity.label.format(layer=layer)
+        if self.quantity.has_standoff:
+            label += " at the last stand-off" if self.standoff is None else f" at {self.standoff * 1e3:g} mm"
         if self.kind == "share":
             return f"P({label})"
         if self.kind == "probability":
             unit = STORED[self.quantity.units]
             either = self.quantity.or_else if self.above else ""
             return f"P({label} {'>' if self.above else '<'} {unit.text(self.limit)}{either})"
-        return label + _STATISTICS[self.kind][0].format(share=100.0 * self.share)
+        return label + _STATISTICS.get(self.kind, ("", ""))[0].format(share=100.0 * self.share)
 
     @property
     def title(self) -> str:
@@ -187,11 +173,7 @@ class Measure:
 
     @property
     def definition(self) -> str:
-        return self.quantity.definition + _STATISTICS[self.kind][1]
-
-    @property
-    def source(self) -> str:
-        return self.quantity.source + _STATISTICS[self.kind][2]
+        return self.quantity.definition + _STATISTICS.get(self.kind, ("", ""))[1]
 
     @property
     def higher_is_better(self) -> bool | None:

@@ -23,7 +23,7 @@ from warpimpact.results.files import ResultError
 from warpimpact.results.measures import Measure, shift_of
 from warpimpact.results.references import references_of, with_references
 from warpimpact.results.variables import LIMITS, STATUS
-from warpimpact.results.vocabulary import is_pierced, piercing_margin
+from warpimpact.results.vocabulary import piercing_margin
 from warpimpact.runs.compute import compute_limits
 from warpimpact.runs.describe import described
 from warpimpact.scene import Numerics
@@ -81,7 +81,7 @@ def quarter(make_plate_result) -> xarray.Dataset:
 
 
 def test_the_margin_of_piercing_has_the_sign_of_the_event(mixed) -> None:
-    margin, pierced = piercing_margin(mixed), is_pierced(mixed)
+    margin, pierced = piercing_margin(mixed), Measure.parse("P(base_pierced)").by_hit(mixed)
     np.testing.assert_allclose(margin, [np.inf, -4e-3, 7e-3, -np.inf, -np.inf, np.nan])
     np.testing.assert_array_equal(np.where(np.isnan(margin), np.nan, margin > 0.0), pierced)
 
