@@ -15,7 +15,7 @@ from continuum_cases import CASES
 
 from warpimpact import Continuum, Numerics, simulate
 from warpimpact.catalogue.catalogue import flow_entry
-from warpimpact.continuum.encounter import march_of
+from warpimpact.continuum.one_hit import prepare_hit
 from warpimpact.continuum.simulate import memory_of
 from warpimpact.solver.worker import Worker
 
@@ -30,9 +30,9 @@ def main() -> None:
     conditions = memory_of(CASE.scene, shots[:1], Worker("cpu", 1)).prepared.conditions
     times, elements, steps = [], 0, 0
     for _ in range(ROUNDS):
-        march = march_of(CASE.scene, shots[:1], 0, continuum, conditions)
-        elements = sum(int(sheet.alive.sum()) for sheet in march.hit.sheets)
-        ended, took = spent(march.ended)
+        hit = prepare_hit(CASE.scene, shots[:1], 0, continuum, conditions)
+        elements = sum(int(sheet.alive.sum()) for sheet in hit.sheets)
+        ended, took = spent(hit.march)
         steps = int(ended.flight["steps"])
         times.append(took)
     fast = partial(simulate, CASE.scene, numerics=Numerics(level=LEVEL), device="cpu", threads=1)

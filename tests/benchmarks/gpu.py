@@ -28,7 +28,7 @@ from roads import NORMAL, OBLIQUE, ROADS, base, scene_and_shots
 
 from warpimpact.campaign.campaign import Campaign
 from warpimpact.catalogue.catalogue import flow_entry
-from warpimpact.continuum.encounter import HitResult, march_of
+from warpimpact.continuum.one_hit import HitResult, prepare_hit
 from warpimpact.continuum.simulate import MOST, ManyHits, memory_of, outcomes_of, simulate, together
 from warpimpact.runs.run import run_to_file
 from warpimpact.scene import Numerics
@@ -170,11 +170,11 @@ def elements(device: str, sizes: Sizes) -> dict[str, Any]:
     scene, shots = scene_and_shots(SLOTTED, sizes.continuum)
     memory = memory_of(scene, shots, Worker("cpu"))
     numbers = [0, *range(len(shots))]
-    marches = [march_of(scene, shots, k, continuum, memory.prepared.conditions, device) for k in numbers]
-    ManyHits([marches.pop(0).hit]).advance(1)  # compiles
-    counts = np.array([sum(int(sheet.alive.sum()) for sheet in march.hit.sheets) for march in marches])
+    prepared = [prepare_hit(scene, shots, k, continuum, memory.prepared.conditions, device) for k in numbers]
+    ManyHits([prepared.pop(0)]).advance(1)  # compiles
+    counts = np.array([sum(int(sheet.alive.sum()) for sheet in hit.sheets) for hit in prepared])
     hits: dict[int, HitResult] = {}
-    taken = seconds(lambda: hits.update(together(marches)))
+    taken = seconds(lambda: hits.update(together(prepared)))
     there = outcomes_of(memory, [hits[number] for number in range(len(shots))])
     here = simulate(scene, shots[:COMPARED_ELEMENTS], numerics=continuum, device="cpu")
     work = sum(int(counts[number]) * int(hit.flight["steps"]) for number, hit in hits.items())

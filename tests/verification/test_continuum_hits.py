@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from warpimpact import CirclePattern, Continuum, Layer, Plate, Record, Scene, simulate
-from warpimpact.continuum import encounter
+from warpimpact.continuum import encounter, one_hit
 from warpimpact.continuum import simulate as elements
 from warpimpact.kernels.status import Status
 from warpimpact.records.outcomes import Outcomes
@@ -63,7 +63,7 @@ def _small_patch() -> Iterator[None]:
 def coarse(monkeypatch: pytest.MonkeyPatch) -> float:
     """Elements that are too coarse for a result [m], whose hourglasses take much; what they show does not depend on
     that."""
-    monkeypatch.setattr(encounter, "LARGEST_HOURGLASS_SHARE", 1.0)
+    monkeypatch.setattr(one_hit, "LARGEST_HOURGLASS_SHARE", 1.0)
     return 1.0e-3
 
 
@@ -127,11 +127,11 @@ def test_hits_that_march_together_end_as_those_that_march_alone(
     scene, continuum = Scene(core=CORE, target=target), Continuum(flows=(STEEL,), spacing=coarse)
     shots = replace(shots_at(*[(1e-3, 2e-3)] * 3, yaw=0.02, spin=1.7e4), velocity=np.array([500.0, 825.0, 650.0]))
     conditions = elements.memory_of(scene, shots, Worker("cpu", 1)).prepared.conditions
-    march = partial(encounter.march_of, scene, shots, continuum=continuum, conditions=conditions)
-    together = dict(elements.together(march(number=k, device=device) for k in range(3)))
+    prepared = partial(one_hit.prepare_hit, scene, shots, continuum=continuum, conditions=conditions)
+    together = dict(elements.together(prepared(number=k, device=device) for k in range(3)))
     assert sorted(together) == [0, 1, 2]
     for number, other in together.items():
-        alone = march(number=number).ended()
+        alone = prepared(number=number).march()
         assert other.status == alone.status == Status.PERFORATED
         assert other.touched.tolist() == alone.touched.tolist() == [True, True]
         assert other.flight["steps"] == pytest.approx(alone.flight["steps"], rel=1e-3)

@@ -88,7 +88,7 @@ class SheetMesh:
         return np.stack([np.repeat(self.x, self.plane), along_y, along_z])
 
 
-def meshed(
+def mesh_layer(
     plate: Plate, hit: tuple[float, float], front: float, spacing: float, extents: tuple[Extent, Extent]
 ) -> SheetMesh:
     """The mesh of a layer about a hit.
@@ -104,34 +104,36 @@ def meshed(
     y, z = np.meshgrid(along_y, along_z, indexing="ij")
     centre_y, centre_z = (0.25 * (at[:-1, :-1] + at[1:, :-1] + at[:-1, 1:] + at[1:, 1:]) for at in (y, z))
     solid = np.asarray(plate.is_solid(centre_y + hit[0], centre_z + hit[1]))
-    planes = _planes(plate.thickness, spacing)
     if not solid.all():
         y, z = _onto_edges(plate, hit, y, z, solid)
-        cells = np.outer(np.diff(along_y), np.diff(along_z))
-        solid = solid & (_areas(y, z) > SLIVER * cells)
-    return SheetMesh(y, z, solid, front + np.linspace(0.0, plate.thickness, planes + 1), spacing, (along_y, along_z))
+        dy, dz = (at[1:, 1:] - at[:-1, :-1] for at in (y, z))
+        ey, ez = (at[:-1, 1:] - at[1:, :-1] for at in (y, z))
+        areas = 0.5 * (dy * ez - dz * ey)  # half the cross product of the diagonals
+        solid = solid & (areas > SLIVER * np.outer(np.diff(along_y), np.diff(along_z)))
+    x = front + np.linspace(0.0, plate.thickness, _planes(plate.thickness, spacing))
+    return SheetMesh(y, z, solid, x, spacing, (along_y, along_z))
 
 
 def nodes_of(thickness: float, spacing: float, extents: tuple[Extent, Extent]) -> int:
     """Nodes of such a mesh."""
     along_y, along_z = (2 * (fine + len(wider)) + 1 for fine, wider in (_cells(extent, spacing) for extent in extents))
-    return (_planes(thickness, spacing) + 1) * along_y * along_z
+    return _planes(thickness, spacing) * along_y * along_z
 
 
 def _planes(thickness: float, spacing: float) -> int:
-    """Layers of elements through the thickness."""
-    return max(2, round(thickness / spacing))
+    """Planes of nodes through the thickness."""
+    return max(2, round(thickness / spacing)) + 1
 
 
 def _line(extent: Extent, spacing: float) -> Array:
-    """Coordinates of nodes along one axis: even in the fine part, then wider from cell to cell."""
+    """Coordinates of nodes along one axis."""
     fine, wider = _cells(extent, spacing)
     half = np.concatenate([[0.0], np.cumsum([spacing] * fine + wider)])
     return np.asarray(extent.middle + np.concatenate([-half[:0:-1], half]))
 
 
 def _cells(extent: Extent, spacing: float) -> tuple[int, list[float]]:
-    """Number of the fine cells on one side of the middle, and widths of the wider ones beyond [m]."""
+    """Number of the fine cells on one side of the middle, and widths of those beyond, wider from cell to cell [m]."""
     fine, width, wider = max(2, round(extent.fine / spacing)), spacing, list[float]()
     reach = fine * spacing
     while reach < extent.half:
@@ -145,8 +147,8 @@ def _onto_edges(
     plate: Plate, hit: tuple[float, float], y: Array, z: Array, solid: NDArray[np.bool_]
 ) -> tuple[Array, Array]:
     """Move the nodes between material and holes onto the edges; their neighbours follow."""
-    around = np.pad(solid, 1, mode="edge")
-    count = np.asarray(sum(around[i : i + y.shape[0], j : j + y.shape[1]].astype(int) for i in (0, 1) for j in (0, 1)))
+    around = np.pad(solid, 1, mode="edge").astype(int)
+    count = around[:-1, :-1] + around[1:, :-1] + around[:-1, 1:] + around[1:, 1:]
     between = (count > 0) & (count < 4)
     reach = 1e-3 * np.ptp(y[:2, 0])
 
@@ -176,13 +178,6 @@ def _onto_edges(
 def _shared(lengths: Array) -> Array:
     """Half of each length for the nodes at either end of it."""
     return np.asarray(0.5 * (np.pad(lengths, (1, 0)) + np.pad(lengths, (0, 1))))
-
-
-def _areas(y: Array, z: Array) -> Array:
-    """Of the columns [m²]; half the cross product of the diagonals."""
-    dy, dz = (at[1:, 1:] - at[:-1, :-1] for at in (y, z))
-    ey, ez = (at[:-1, 1:] - at[1:, :-1] for at in (y, z))
-    return np.asarray(0.5 * (dy * ez - dz * ey))
 
 
 def volumes_of(sheet: SheetMesh) -> tuple[Array, Array]:

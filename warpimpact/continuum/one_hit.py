@@ -1,66 +1,44 @@
-"""One hit: its mesh and its core in arrays of a device, its march on the CPU, and what it took from whom."""
+"""One hit: its meshes and its core in arrays of a device, its march on the CPU, and how it ended."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
 import warp as wp
 from numpy.typing import NDArray
 
+from warpimpact.continuum.encounter import NODE_NUMBERS, Encounter, Start, axis_of, encounters_of, start_of
 from warpimpact.continuum.meshing import SheetMesh, runs_of, volumes_of
-from warpimpact.kernels.continuum import choices, fields, march_one
-from warpimpact.kernels.status import RUNNING
+from warpimpact.kernels.continuum import choices, march_one
+from warpimpact.kernels.status import RUNNING, WAITING, Status
 from warpimpact.kernels.variant import Variant
-from warpimpact.scene import Core
-from warpimpact.scene.flow import Flow
+from warpimpact.scene import Core, Scene, Shots
+from warpimpact.scene.flow import Continuum, Flow
 from warpimpact.scene.model import Array
 from warpimpact.solver.device import find_device, load
 from warpimpact.solver.memory import built
+from warpimpact.solver.worker import NEVER, Cancel
 
 STATIONS = 2049
 """At which the radius of the core is tabulated."""
 STEPS = 100
 """Of a launch: between two of them a computation can be broken off."""
-NODE_NUMBERS = 55
-"""Numbers of a march for each node, with its element."""
+COMPONENTS = {
+    **{"position": 3, "velocity": 3, "inverse_mass": 1, "impedance": 3, "radiated": 1, "contact": 3, "contact_work": 1},
+    **{"near": 1, "volume": 1, "length": 1, "alive": 1, "stress": 6, "strain": 1, "damage": 1, "heat": 1, "work": 1},
+    **{"hourglass_work": 1, "crossing": 1, "force": 24},
+}
+"""Of the arrays of nodes and of elements of a mesh (kernels/continuum/fields.py)."""
 PENALTY = 0.5
 """Share of the stiffness of an element that the contact has."""
-FROM_ZERO = {
-    **{"velocity": 3, "contact": 3, "contact_work": 1, "stress": 6, "strain": 1, "damage": 1, "heat": 1},
-    **{"work": 1, "hourglass_work": 1, "radiated": 1, "force": fields.COMPONENTS},
-}
-"""Components of the arrays of a mesh that are 0 before a march."""
+LARGEST_IMBALANCE, LARGEST_HOURGLASS_SHARE = 0.02, 0.12
+"""Of the energy that the core lost: a hit beyond is a failure of the computation."""
 
 
-@dataclass(frozen=True)
-class Start:
-    """How the core of a hit begins: position from the hit [m], attitude, velocity [m/s], angular momentum [N m s]; its
-    mass [kg] and moments of inertia [kg m²]; and the friction of its surface."""
-
-    position: Array
-    attitude: Array
-    velocity: Array
-    angular_momentum: Array
-    mass: float
-    inertia_axial: float
-    inertia_transverse: float
-    friction: float
-
-
-class Unmeshed(NamedTuple):
-    """A layer that has no mesh yet: its front and rear face [m], and about as many nodes as its mesh will have."""
-
-    front: float
-    rear: float
-    nodes: int
-
-
-@dataclass(frozen=True)
-class Energies:
+class Energies(NamedTuple):
     """Where the kinetic energy that the core lost has gone [J].
 
     Attributes:
@@ -91,17 +69,36 @@ class Energies:
         return self.hourglass / self.lost if self.lost > 0.0 else 0.0
 
 
+class HitResult(NamedTuple):
+    """What became of one hit.
+
+    Attributes:
+        status: code of `Status`.
+        flight: state and clock of the core, a row of the kernels' Flight.
+        touched: whether the core touched each layer.
+        left: state with which it left each layer, shape [layers, 7]: velocity, axis, time.
+        energies: where the energy has gone.
+        eroded: elements that failed.
+    """
+
+    status: Status
+    flight: Any
+    touched: NDArray[np.bool_]
+    left: Array
+    energies: Energies
+    eroded: int
+
+
 class OneHit:
-    """A hit in memory. A layer may have its mesh later, where the core will meet it (`extend`).
+    """A hit in memory. A layer has its mesh when the core is in front of it, where the core will cross it.
 
     Args:
         sheets: meshes of the first layers, or of all.
         flows: materials of all layers.
-        unmeshed: the layers behind them, which have no mesh yet.
+        encounters: the layers behind, which have no mesh yet.
 
     Attributes:
         device: that its arrays are on; `advance` marches it on the CPU only.
-        flight: how far it is (kernels/continuum/fields.py).
         left: state with which the core left each layer, shape [layers, 7].
     """
 
@@ -109,93 +106,94 @@ class OneHit:
         self,
         core: Core,
         start: Start,
-        sheets: list[SheetMesh],
-        flows: list[Flow],
+        sheets: Sequence[SheetMesh],
+        flows: Sequence[Flow],
         double: bool = False,
         device: str = "cpu",
-        unmeshed: Sequence[Unmeshed] = (),
+        encounters: Sequence[Encounter] = (),
     ) -> None:
-        self.device, self.variant = find_device(device), Variant(double=double)
+        self.device, self.variant, self.start = find_device(device), Variant(double=double), start
         self.stage = built(march_one, self.variant)
         self.struct = self.stage.struct
         if self.device.is_cpu:
             load(self.stage.kernel, self.device)
         self.real, self.dtype = self.variant.real, np.dtype("f8" if double else "f4")
-        self.sheets, self.flows, self.unmeshed = sheets, flows, list(unmeshed)
-        self.speed = float(np.linalg.norm(start.velocity))
-        self.mesh = self._mesh()
-        self.core = self._core(core, start)
-        self.limits, rear = self.struct.Limits(), max([*(layer.rear for layer in unmeshed), float(sheets[-1].x[-1])])
-        self.limits.rear, self.limits.longest = rear, 30.0 * (rear + core.length) / self.speed
-        self.limits.unmeshed = unmeshed[0].front if unmeshed else math.inf
-        self.left = self._put(np.full((len(sheets) + len(unmeshed), 7), np.nan), wp.float64)
-        self.flights = self._flights(start)
+        self.flows, self.encounters = flows, list(encounters)
+        self.sheets, self.firsts = list[SheetMesh](), list[int]()
+        self.mesh = self.struct.Mesh()
+        self.inverse_mass, shortest = np.empty(0), math.inf
+        for sheet in sheets:
+            awake = sheet.x[0] < choices.BEHIND.value
+            least = self._append(sheet, awake)
+            shortest = min(shortest, least) if awake else shortest
+        self.core = self._core(core)
+        self.left = self._put(np.full((len(sheets) + len(encounters), 7), np.nan), wp.float64)
+        flight, state, step = self.struct.Flight(), self.struct.rigid.State(), 0.5 * choices.COURANT.value * shortest
+        state.position, state.velocity = wp.vec3d(*start.position), wp.vec3d(*start.velocity)
+        state.attitude, state.angular_momentum = wp.quatd(*start.attitude), wp.vec3d(*start.angular_momentum)
+        flight.state, flight.step, flight.before = state, step, step
+        flight.first_touch, flight.last_touch, flight.status = -1.0, -1.0, RUNNING
+        self.flights = wp.array([flight], dtype=self.struct.Flight, device=self.device)
+        self.limits, rear = self.struct.Limits(), max(float(sheets[-1].x[-1]), *(one.rear for one in encounters), 0.0)
+        self.limits.rear = rear
+        self.limits.longest = 30.0 * (rear + core.length) / float(np.linalg.norm(start.velocity))
+        self.limits.unmeshed = self.encounters[0].front if encounters else math.inf
         self.limits.impact_energy = self.core_energy
 
-    def extend(self, sheet: SheetMesh) -> None:
+    def extend(self) -> OneHit:
         """Give the next layer its mesh, at rest; all else stays as it is, and the march can go on."""
-        before, self.sheets = self.mesh, [*self.sheets, sheet]
-        self.mesh = mesh = self._mesh()
-        for name in (*FROM_ZERO, "position", "near", "alive", "crossing"):  # what a march changes
-            values = getattr(mesh, name).numpy().reshape(-1, mesh.size)
-            values[:, : before.size] = getattr(before, name).numpy().reshape(-1, before.size)
-            getattr(mesh, name).assign(values.ravel())
-        mesh.awake = self._put([*before.awake.numpy(), 1], wp.int32)
-        mesh.touched = self._put([*before.touched.numpy(), -1.0], wp.float64)
-        mesh.cylinder, mesh.kick = before.cylinder, before.kick
-        del self.unmeshed[0]
-        self.limits.unmeshed = self.unmeshed[0].front if self.unmeshed else math.inf
+        self._append(self.encounters.pop(0).mesh(*self._state), True)
+        self.limits.unmeshed = self.encounters[0].front if self.encounters else math.inf
         flights = self.flights.numpy()
         flights["status"] = RUNNING
         self.flights.assign(flights)
+        return self
 
     def _put(self, values: Any, dtype: Any) -> Any:
         return wp.array(np.ascontiguousarray(values), dtype=dtype, device=self.device)
 
-    def _mesh(self) -> Any:
-        mesh, first, firsts = self.struct.Mesh(), 0, []
-        for sheet in self.sheets:
-            pad = sheet.plane + sheet.row + 32
-            firsts.append(first + pad)
-            first += 2 * pad + sheet.nodes
-        self.firsts = firsts
-        size = mesh.size = first
-        position, impedance = np.zeros((2, 3, size))
-        inverse_mass, alive, near, volume = (np.zeros(size) for _ in range(4))
-        length, runs, node_runs = np.ones(size), [], []
-        awake = [sheet.x[0] < choices.BEHIND.value for sheet in self.sheets]
-        for k, (sheet, at, flow) in enumerate(zip(self.sheets, firsts, self.flows, strict=False)):
-            inside = slice(at, at + sheet.nodes)
-            position[:, inside], present = sheet.positions, sheet.alive
-            alive[inside], near[inside] = present, awake[k]
-            volume[inside], length[inside] = volumes_of(sheet)
-            mass = np.zeros(size)
-            for corner in (0, 1):
-                for offset in (0, sheet.row, sheet.plane, sheet.row + sheet.plane):
-                    mass[at + corner + offset : at + corner + offset + sheet.nodes] += (
-                        0.125 * flow.density * volume[inside] * present
-                    )
-            inverse_mass[inside] = np.divide(1.0, mass[inside], out=np.zeros(sheet.nodes), where=mass[inside] > 0.0)
-            upright, along = flow.density * flow.wave_speed, math.sqrt(flow.density * flow.shear_modulus)
-            impedance[:, inside] = np.array([[along, along], [upright, along], [along, upright]]) @ sheet.outer_faces
-            runs += [(*run, k) for run in runs_of(present, at)]
-            node_runs += [(*run, k) for run in runs_of(mass[inside] > 0.0, at)]
-        self.inverse_mass = inverse_mass
-        mesh.sheets = wp.array(
-            [self._sheet(sheet, flow) for sheet, flow in zip(self.sheets, self.flows, strict=False)],
-            dtype=self.struct.Sheet,
-            device=self.device,
-        )
-        mesh.runs, mesh.node_runs = self._put(np.ravel(runs), wp.int32), self._put(np.ravel(node_runs), wp.int32)
-        given = {"position": position, "inverse_mass": inverse_mass, "alive": alive, "volume": volume, "length": length}
-        given |= {"impedance": impedance, "near": near}
-        for name, values in given.items():
-            setattr(mesh, name, self._put(values.ravel().astype(self.dtype), self.real))
-        for name, count in FROM_ZERO.items():
-            setattr(mesh, name, wp.zeros(count * size, dtype=self.real, device=self.device))
-        mesh.awake, mesh.touched = self._put(awake, wp.int32), self._put(np.full(len(awake), -1.0), wp.float64)
-        mesh.crossing = wp.full(size, 1.0, dtype=self.real, device=self.device)
-        return mesh
+    def _append(self, sheet: SheetMesh, awake: bool) -> float:
+        """Add a layer at rest to the mesh. Returns the shortest time of a wave across an element of it [s]."""
+        flow, pad, before = self.flows[len(self.sheets)], sheet.plane + sheet.row + 32, self.mesh
+        old, layer = int(before.size), len(self.sheets)
+        inside, size = slice(pad, pad + sheet.nodes), 2 * pad + sheet.nodes
+        own = {name: np.zeros((count, size)) for name, count in COMPONENTS.items()}
+        own["length"][:], own["crossing"][:] = 1.0, 1.0
+        present, near = sheet.alive, sheet.x[0] < choices.BEHIND.value
+        own["position"][:, inside], own["alive"][0, inside], own["near"][0, inside] = sheet.positions, present, near
+        volume, length = volumes_of(sheet)
+        own["volume"][0, inside], own["length"][0, inside] = volume, length
+        mass, inverse_mass = np.zeros(size), own["inverse_mass"][0]
+        for corner in (0, 1):
+            for offset in (0, sheet.row, sheet.plane, sheet.row + sheet.plane):
+                at = pad + corner + offset
+                mass[at : at + sheet.nodes] += 0.125 * flow.density * volume * present
+        mass = mass[inside]
+        inverse_mass[inside] = np.divide(1.0, mass, out=np.zeros(sheet.nodes), where=mass > 0.0)
+        upright, along = flow.density * flow.wave_speed, math.sqrt(flow.density * flow.shear_modulus)
+        own["impedance"][:, inside] = np.array([[along, along], [upright, along], [along, upright]]) @ sheet.outer_faces
+        self.inverse_mass = np.concatenate([self.inverse_mass, inverse_mass])
+        self.sheets, self.firsts = [*self.sheets, sheet], [*self.firsts, old + pad]
+        self.mesh = mesh = self.struct.Mesh()
+        mesh.size = old + size
+        for name, values in own.items():
+            values = values.astype(self.dtype)
+            if layer:
+                values = np.concatenate([getattr(before, name).numpy().reshape(-1, old), values], axis=1)
+            setattr(mesh, name, self._put(values.ravel(), self.real))
+        grown: dict[str, tuple[Any, list[Any]]] = {
+            "runs": (wp.int32, [(*run, layer) for run in runs_of(present, old + pad)]),
+            "node_runs": (wp.int32, [(*run, layer) for run in runs_of(mass > 0.0, old + pad)]),
+            "awake": (wp.int32, [awake]),
+            "touched": (wp.float64, [-1.0]),
+        }
+        for name, (dtype, more) in grown.items():
+            there = getattr(before, name).numpy() if layer else []
+            setattr(mesh, name, self._put([*there, *np.ravel(more)], dtype))
+        pairs = zip(self.sheets, self.flows, strict=False)
+        mesh.sheets = wp.array([self._sheet(*pair) for pair in pairs], dtype=self.struct.Sheet, device=self.device)
+        mesh.cylinder, mesh.kick = before.cylinder, before.kick
+        return float(length[present].astype(self.dtype).min()) / flow.wave_speed
 
     def _sheet(self, sheet: SheetMesh, flow: Flow) -> Any:
         filled = self.struct.Sheet()
@@ -206,60 +204,67 @@ class OneHit:
             setattr(filled, name, value)
         return filled
 
-    def _core(self, core: Core, start: Start) -> Any:
-        filled = self.struct.Core()
+    def _core(self, core: Core) -> Any:
+        filled, body = self.struct.Core(), self.struct.rigid.Body()
         filled.length, filled.centre_of_mass = core.length, core.mass_properties.centre_of_mass
         radii = np.asarray(core.radius(np.linspace(0.0, core.length, STATIONS)))
         filled.largest, filled.radii = float(radii.max()), self._put(radii, wp.float64)
-        filled.friction = start.friction
-        body = self.struct.rigid.Body()
+        filled.friction = self.start.friction
         for name in ("mass", "inertia_axial", "inertia_transverse"):
-            setattr(body, name, getattr(start, name))
+            setattr(body, name, getattr(self.start, name))
         filled.body = body
-        self.start = start
         return filled
-
-    def _flights(self, start: Start) -> Any:
-        state = self.struct.rigid.State()
-        state.position, state.velocity = wp.vec3d(*start.position), wp.vec3d(*start.velocity)
-        state.attitude, state.angular_momentum = wp.quatd(*start.attitude), wp.vec3d(*start.angular_momentum)
-        flight = self.struct.Flight()
-        flight.state, flight.first_touch, flight.last_touch, flight.status = state, -1.0, -1.0, RUNNING
-        shortest = min(
-            float((self.mesh.length.numpy()[at : at + sheet.nodes][sheet.alive]).min()) / flow.wave_speed
-            for sheet, at, flow, awake in zip(
-                self.sheets, self.firsts, self.flows, self.mesh.awake.numpy(), strict=False
-            )
-            if awake
-        )
-        flight.step = flight.before = 0.5 * choices.COURANT.value * shortest
-        return wp.array([flight], dtype=self.struct.Flight, device=self.device)
 
     @property
     def bytes(self) -> int:
         """That its mesh takes with those to come."""
-        return NODE_NUMBERS * self.dtype.itemsize * (int(self.mesh.size) + sum(layer.nodes for layer in self.unmeshed))
+        later = sum(layer.nodes(*self._state) for layer in self.encounters)
+        return NODE_NUMBERS * self.dtype.itemsize * (int(self.mesh.size) + later)
 
     @property
     def flight(self) -> Any:
-        """How far the hit is, as a row of numpy."""
+        """How far the hit is (kernels/continuum/fields.py), as a row of numpy."""
         return self.flights.numpy()[0]
+
+    @property
+    def _state(self) -> tuple[Array, Array, Array]:
+        """Position, velocity and axis of the core."""
+        state = self.flight["state"]
+        return state["position"], state["velocity"], axis_of(state["attitude"])
 
     def advance(self, steps: int = STEPS) -> None:
         """March by some steps."""
-        wp.launch(
-            self.stage.kernel,
-            1,
-            inputs=[self.core, self.limits, steps, self.mesh],
-            outputs=[self.flights, self.left],
-            device=self.device,
-        )
+        inputs, outputs = [self.core, self.limits, steps, self.mesh], [self.flights, self.left]
+        wp.launch(self.stage.kernel, 1, inputs=inputs, outputs=outputs, device=self.device)
+
+    def march(
+        self, cancel: Cancel = NEVER, *, every: int = STEPS, follow: Callable[[OneHit], object] = lambda hit: None
+    ) -> HitResult:
+        """March to the end; `follow` is called at regular numbers of steps."""
+        while True:
+            edge = np.flatnonzero(self.mesh.impedance.numpy().reshape(3, -1).any(axis=0))
+            while self.flight["status"] == RUNNING:
+                cancel.check()
+                self.advance(every)
+                follow(self)
+                if self.mesh.near.numpy()[edge].any():
+                    return self.result(at_edge=True)
+            if self.flight["status"] != WAITING:
+                return self.result(at_edge=False)
+            self.extend()
+
+    def result(self, at_edge: bool) -> HitResult:
+        """What became of the hit, which has ended, or whose core is near the outer edge of a mesh."""
+        flight, energies = self.flight, self.energies
+        status = Status.LEFT_WINDOW if at_edge else status_by_energies(Status(int(flight["status"])), energies)
+        eroded = sum(int(sheet.alive.sum()) for sheet in self.sheets) - int((self.mesh.alive.numpy() > 0.0).sum())
+        return HitResult(status, flight, self.touched, self.left.numpy(), energies, eroded)
 
     @property
     def touched(self) -> NDArray[np.bool_]:
         """Whether the core touched each layer."""
         work, parts = self.mesh.contact_work.numpy(), zip(self.sheets, self.firsts, strict=True)
-        return np.array([*(work[at : at + sheet.nodes].any() for sheet, at in parts), *[False] * len(self.unmeshed)])
+        return np.array([*(work[at : at + sheet.nodes].any() for sheet, at in parts), *[False] * len(self.encounters)])
 
     @property
     def core_energy(self) -> float:
@@ -275,25 +280,43 @@ class OneHit:
     @property
     def energies(self) -> Energies:
         """Where the energy has gone so far."""
-        mesh, size = self.mesh, self.mesh.size
+        mesh, size = self.mesh, int(self.mesh.size)
         velocity = mesh.velocity.numpy().astype(np.float64).reshape(3, size)
         mass = np.divide(1.0, self.inverse_mass, out=np.zeros(size), where=self.inverse_mass > 0.0)
-        return Energies(
-            lost=self.limits.impact_energy - self.core_energy,
-            given=_total(mesh.contact_work),
-            kinetic=0.5 * float((mass * (velocity**2).sum(axis=0)).sum()),
-            work=_total(mesh.work),
-            hourglass=_total(mesh.hourglass_work),
-            radiated=_total(mesh.radiated),
+        given, work, hourglass, radiated = (
+            float(values.numpy().astype(np.float64).sum())
+            for values in (mesh.contact_work, mesh.work, mesh.hourglass_work, mesh.radiated)
         )
+        kinetic = 0.5 * float((mass * (velocity**2).sum(axis=0)).sum())
+        return Energies(self.limits.impact_energy - self.core_energy, given, kinetic, work, hourglass, radiated)
 
 
-def axis_of(attitude: Any) -> Array:
-    """The axis of a core, from its base to its nose."""
-    x, y, z, w = (float(part) for part in attitude)
-    return np.array([1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y + z * w), 2.0 * (x * z - y * w)])
+def status_by_energies(status: Status, energies: Energies) -> Status:
+    """The status of a hit, by its energies, too."""
+    if status.failed or energies.lost <= 0.0:
+        return status
+    if not energies.imbalance <= LARGEST_IMBALANCE:
+        return Status.UNBALANCED
+    return status if energies.hourglass_share <= LARGEST_HOURGLASS_SHARE else Status.HOURGLASSED
 
 
-def _total(values: Any) -> float:
-    """Sum of an array of the device."""
-    return float(values.numpy().astype(np.float64).sum())
+def prepare_hit(
+    scene: Scene,
+    shots: Shots,
+    number: int,
+    continuum: Continuum,
+    conditions: dict[str, NDArray[Any]],
+    device: str = "cpu",
+    wider: float = 1.0,
+) -> OneHit:
+    """One of the shots, ready to march.
+
+    Args:
+        conditions: as `prepare` has them.
+        device: that has its arrays.
+        wider: one of WIDER.
+    """
+    start = start_of(scene, shots, number, continuum.friction, conditions)
+    first, *later = encounters_of(scene, shots, number, continuum, wider)
+    flows = [continuum.flow(k) for k in range(1 + len(later))]
+    return OneHit(scene.core, start, [first.mesh(*start.arriving)], flows, continuum.double, device, later)

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from warpimpact.continuum.encounter import WIDER, HitResult, March, march_of
-from warpimpact.continuum.one_hit import OneHit
+from warpimpact.continuum.encounter import WIDER
+from warpimpact.continuum.one_hit import HitResult, OneHit, prepare_hit
 from warpimpact.continuum.simulate import check_continuum, memory_of, outcomes_of
 from warpimpact.kernels.status import Status
 from warpimpact.kernels.trace import WIDTH
@@ -34,37 +35,39 @@ def replay_continuum(scene: Scene, shots: Shots, continuum: Continuum, snapshots
     """
     check_continuum(scene, shots, continuum)
     memory = memory_of(scene, shots, Worker("cpu", 1))
+    prepared = partial(prepare_hit, scene, shots, 0, continuum, memory.prepared.conditions)
     for wider in WIDER:
-        march = march_of(scene, shots, 0, continuum, memory.prepared.conditions, wider=wider)
-        result, rows, _ = _followed(march, [])
+        hit = prepared(wider=wider)
+        result, rows, _ = _followed(hit, [])
         if result.status is not Status.LEFT_WINDOW:
             break
-    shown = np.unique(np.linspace(0, len(rows) - 1, snapshots).round().astype(int))
-    frames = list[Frame]()
+    shown, frames = np.unique(np.linspace(0, len(rows) - 1, snapshots).round().astype(int)), list[Frame]()
     if snapshots:
-        march = march_of(scene, shots, 0, continuum, memory.prepared.conditions, wider=wider)
-        _, _, frames = _followed(march, shown)
-    start = march.hit.start
-    body = scene.core.mass_properties._replace(
+        hit = prepared(wider=wider)
+        _, _, frames = _followed(hit, shown)
+    start, body = hit.start, scene.core.mass_properties
+    body = body._replace(
         mass=start.mass, inertia_axial=start.inertia_axial, inertia_transverse=start.inertia_transverse
     )
     trace = np.array(rows)  # as a trace has it, a row holds the load that follows; the last one has none
     trace[:-1, 14:21], trace[-1, 14:21] = trace[1:, 14:21], 0.0
-    sheet = march.hit.sheets[0]
+    sheet, first = hit.sheets[0], hit.firsts[0]
     # The columns of the fine part of the mesh, which are cells of one size.
     places = np.ix_(*(np.isclose(np.diff(edges), sheet.spacing, rtol=1e-6) for edges in sheet.edges))
     y, z = (0.5 * (edges[1:] + edges[:-1]) for edges in sheet.edges)
-    cell_y, cell_z = float(shots.hit_y[0]) + y[places[0][:, 0]], float(shots.hit_z[0]) + z[places[1][0]]
-    material = np.asarray(sheet.solid[places], dtype=np.float64)
-    elements = slice(march.hit.firsts[0], march.hit.firsts[0] + sheet.nodes)
-    planes = (frame.alive[elements].reshape(len(sheet.x), *sheet.y.shape)[:-1, :-1, :-1] for frame in frames)
-    share = np.array([alive.mean(axis=0)[places] for alive in planes], dtype=np.float64)
+    planes = (frame.alive[first : first + sheet.nodes].reshape(len(sheet.x), *sheet.y.shape) for frame in frames)
+    share = [alive[:-1, :-1, :-1].mean(axis=0)[places] for alive in planes]
+    plate = Weakened(
+        float(shots.hit_y[0]) + y[places[0][:, 0]],
+        float(shots.hit_z[0]) + z[places[1][0]],
+        np.array(share, dtype=np.float64).reshape(-1, *sheet.solid[places].shape),
+    )
     return Replay(
         outcomes=outcomes_of(memory, [result]),
         history=History.from_trace(trace, body),
-        plate_time=np.array([rows[row][0] for row in shown]),
-        plate=Weakened(cell_y, cell_z, share.reshape(-1, *material.shape)),
-        deformed=deformed(frames, march.hit) if frames else None,
+        plate_time=trace[shown, 0],
+        plate=plate,
+        deformed=_deformed(frames, hit) if frames else None,
     )
 
 
@@ -76,49 +79,17 @@ class Frame(NamedTuple):
     strain: NDArray[np.float32]
 
 
-def _followed(march: March, shown: Sequence[int] | NDArray[np.intp]) -> tuple[HitResult, list[Array], list[Frame]]:
+def _followed(hit: OneHit, shown: Sequence[int] | NDArray[np.intp]) -> tuple[HitResult, list[Array], list[Frame]]:
     """What became of a hit, the rows of its trace, and the meshes at some of them."""
     rows, frames = list[Array](), list[Frame]()
 
     def follow(hit: OneHit) -> None:
         if len(rows) in shown:
-            arrays = (getattr(hit.mesh, name).numpy().astype(np.float32) for name in Frame._fields)
-            frames.append(Frame(*arrays))
+            frames.append(Frame(*(getattr(hit.mesh, name).numpy().astype(np.float32) for name in Frame._fields)))
         rows.append(_row(hit, rows[-1] if rows else None))
 
-    follow(march.hit)
-    return march.ended(every=STRIDE, follow=follow), rows, frames
-
-
-def deformed(frames: list[Frame], hit: OneHit) -> Deformed:
-    """The elements that there were at the beginning, and their nodes."""
-    elements, corners = list[NDArray[np.intp]](), list[NDArray[np.intp]]()
-    for sheet, first in zip(hit.sheets, hit.firsts, strict=True):
-        present = first + np.flatnonzero(sheet.alive)
-        offsets = [x * sheet.plane + y * sheet.row + z for x, y, z in CORNERS]
-        elements.append(present)
-        corners.append(present[:, None] + np.array(offsets))
-    numbers, chosen = np.concatenate(elements), np.concatenate(corners)
-    nodes, renumbered = np.unique(chosen, return_inverse=True)
-    frames = [whole(frame, hit) for frame in frames]
-    return Deformed(
-        corners=renumbered.reshape(chosen.shape).astype(np.int32),
-        position=np.array([frame.position.reshape(3, -1)[:, nodes].T for frame in frames]),
-        left=np.array([frame.alive[numbers] > 0.0 for frame in frames]),
-        strain=np.array([frame.strain[numbers] for frame in frames]),
-    )
-
-
-def whole(frame: Frame, hit: OneHit) -> Frame:
-    """A frame with the layers that had no mesh yet, at rest."""
-    size, there = int(hit.mesh.size), len(frame.alive)
-    position, alive, strain = np.zeros((3, size), np.float32), np.zeros(size, np.float32), np.zeros(size, np.float32)
-    for sheet, first in zip(hit.sheets, hit.firsts, strict=True):
-        position[:, first : first + sheet.nodes] = sheet.positions
-        alive[first : first + sheet.nodes] = sheet.alive
-    position[:, :there], alive[:there] = frame.position.reshape(3, -1), frame.alive
-    strain[:there] = frame.strain
-    return Frame(position, alive, strain)
+    follow(hit)
+    return hit.march(every=STRIDE, follow=follow), rows, frames
 
 
 def _row(hit: OneHit, before: Array | None) -> Array:
@@ -132,3 +103,27 @@ def _row(hit: OneHit, before: Array | None) -> Array:
         row[14:17] = hit.start.mass * (row[8:11] - before[8:11]) / max(row[20], 1e-30)
         row[17:20] = (row[11:14] - before[11:14]) / max(row[20], 1e-30)
     return row
+
+
+def _deformed(frames: list[Frame], hit: OneHit) -> Deformed:
+    """The elements that there were at the beginning, and their nodes; layers without a mesh yet lie at rest."""
+    elements, corners = list[NDArray[np.intp]](), list[NDArray[np.intp]]()
+    position = np.zeros((3, int(hit.mesh.size)), dtype=np.float32)
+    for sheet, first in zip(hit.sheets, hit.firsts, strict=True):
+        elements.append(first + np.flatnonzero(sheet.alive))
+        offsets = np.array([x * sheet.plane + y * sheet.row + z for x, y, z in CORNERS])
+        corners.append(elements[-1][:, None] + offsets)
+        position[:, first : first + sheet.nodes] = sheet.positions
+    numbers, chosen = np.concatenate(elements), np.concatenate(corners)
+    nodes, renumbered = np.unique(chosen, return_inverse=True)
+    positions, left, strain = (
+        [],
+        np.ones((len(frames), len(numbers)), dtype=bool),
+        np.zeros((len(frames), len(numbers)), np.float32),
+    )
+    for k, frame in enumerate(frames):
+        there = numbers < len(frame.alive)
+        left[k, there], strain[k, there] = frame.alive[numbers[there]] > 0.0, frame.strain[numbers[there]]
+        places = np.hstack([frame.position.reshape(3, -1), position[:, len(frame.alive) :]])
+        positions.append(places[:, nodes].T)
+    return Deformed(renumbered.reshape(chosen.shape).astype(np.int32), np.array(positions), left, strain)

@@ -15,8 +15,8 @@ import numpy as np
 import warp as wp
 from numpy.typing import NDArray
 
-from warpimpact.continuum.encounter import WIDER, HitResult, March, cost_of, line_of_flight, march_of
-from warpimpact.continuum.one_hit import STEPS, OneHit, axis_of
+from warpimpact.continuum.encounter import WIDER, axis_of, cost_of, line_of_flight
+from warpimpact.continuum.one_hit import STEPS, HitResult, OneHit, prepare_hit
 from warpimpact.kernels.continuum import march_many
 from warpimpact.kernels.continuum.fields import PIECE
 from warpimpact.kernels.status import RUNNING, WAITING, Status
@@ -90,13 +90,13 @@ def simulate_elements(
     threads = min(worker.threads or cores(), len(shots)) if device.is_cpu else 1
     if device.is_cpu:
         check_cost(scene, shots, continuum, threads)
-    march = partial(march_of, scene, shots, continuum=continuum, conditions=memory.prepared.conditions)
+    prepared = partial(prepare_hit, scene, shots, continuum=continuum, conditions=memory.prepared.conditions)
 
     def computed(numbers: list[int], wider: float) -> Iterator[tuple[int, HitResult]]:
         if not device.is_cpu:
-            yield from together((march(k, device=device.alias, wider=wider) for k in numbers), worker.cancel)
+            yield from together((prepared(k, device=device.alias, wider=wider) for k in numbers), worker.cancel)
             return
-        compute = lambda k: march(k, wider=wider).ended(worker.cancel)  # noqa: E731
+        compute = lambda k: prepared(k, wider=wider).march(worker.cancel)  # noqa: E731
         with ThreadPoolExecutor(threads) as pool:  # one thread computes here, where its time counts
             yield from enumerate(map(compute, numbers) if threads == 1 else pool.map(compute, numbers))
 
@@ -145,67 +145,56 @@ def memory_of(scene: Scene, shots: Shots, worker: Worker) -> Memory:
 
 def outcomes_of(memory: Memory, hits: list[HitResult]) -> Outcomes:
     """The outcomes of some hits: their flight to the stand-offs is that of the fast law's cores."""
-    contact, count = memory.outcomes(), len(hits)
-    columns: dict[str, list[Any]] = {name: [] for name in contact._cls.vars}
-    for hit in hits:
-        state, touched = hit.flight["state"], hit.flight["first_touch"] >= 0.0
-        lost = hit.energies.lost if touched else 0.0
-        columns["status"].append(int(hit.status))
-        columns["steps"].append(int(hit.flight["steps"]))
-        columns["contact_duration"].append(hit.flight["last_touch"] - hit.flight["first_touch"] if touched else 0.0)
-        columns["energy_loss"].append(lost)
-        columns["position"].append(state["position"])
-        columns["axis"].append(axis_of(state["attitude"]))
-        columns["velocity"].append(state["velocity"])
-        columns["angular_momentum"].append(state["angular_momentum"])
+    contact = memory.outcomes()
+    flights = np.array([hit.flight for hit in hits])
+    states, touched = flights["state"], flights["first_touch"] >= 0.0
+    columns = {
+        "status": [int(hit.status) for hit in hits],
+        "steps": flights["steps"],
+        "contact_duration": np.where(touched, flights["last_touch"] - flights["first_touch"], 0.0),
+        "energy_loss": np.where(touched, [hit.energies.lost for hit in hits], 0.0),
+        "axis": [axis_of(attitude) for attitude in states["attitude"]],
+    } | {name: states[name] for name in ("position", "velocity", "angular_momentum")}
     for name, values in columns.items():
         array = getattr(contact, name)
         array.assign(np.asarray(values, dtype=array.numpy().dtype).reshape(array.numpy().shape))
     if memory.variant.layered:
         _fill_passage(memory, hits)
-    outcomes = memory.report(contact)
-    energies = [hit.energies for hit in hits]
-    return outcomes.assign(
-        **{
-            ENERGY_IMBALANCE: np.array([energy.imbalance for energy in energies]),
-            HOURGLASS_SHARE: np.array([energy.hourglass_share for energy in energies]),
-            ERODED_ELEMENTS: np.array([float(hit.eroded) for hit in hits]).reshape(count),
-        }
-    )
+    more = {
+        ENERGY_IMBALANCE: [hit.energies.imbalance for hit in hits],
+        HOURGLASS_SHARE: [hit.energies.hourglass_share for hit in hits],
+        ERODED_ELEMENTS: [float(hit.eroded) for hit in hits],
+    }
+    return memory.report(contact).assign(**{name: np.array(values) for name, values in more.items()})
 
 
 def _fill_passage(memory: Memory, hits: list[HitResult]) -> None:
     """How each core left each layer, as kernels/passage.py has it."""
     passage, shots, target = memory.passage, memory.prepared.shots, memory.prepared.scene.target
-    layers = len(target.layers)
     columns = {name: getattr(passage, name).numpy() for name in passage._cls.vars}  # views of memory on the CPU
     for values in columns.values():
         values[...] = np.nan if values.dtype.kind == "f" else -1
     for k, hit in enumerate(hits):
         flight = line_of_flight(float(shots.obliquity[k]), float(shots.azimuth[k]))
-        for layer in range(layers):
-            velocity, axis = hit.left[layer, :3], hit.left[layer, 3:6]
-            has_left = not math.isnan(hit.left[layer, 6])
-            columns["status"][k, layer] = _layer_status(hit.status, has_left, bool(hit.touched[layer]))
-            if has_left:
+        for layer, (velocity, axis) in enumerate(zip(hit.left[:, :3], hit.left[:, 3:6], strict=True)):
+            touched = bool(hit.touched[layer])
+            if not math.isnan(hit.left[layer, 6]):
+                status = Status.PERFORATED if touched else Status.UNTOUCHED
                 columns["velocity"][k, layer] = np.linalg.norm(velocity)
                 columns["tilt"][k, layer] = math.atan2(np.linalg.norm(np.cross(axis, flight)), axis @ flight)
-        resting = [layer for layer in range(layers) if columns["status"][k, layer] == Status.ARRESTED]
-        if hit.status is Status.ARRESTED and resting:
+            elif not touched:
+                status = Status.NOT_REACHED
+            else:
+                status = hit.status if hit.status.failed or hit.status is Status.ARRESTED else Status.RICOCHETED
+            columns["status"][k, layer] = status
+        resting = np.flatnonzero(columns["status"][k] == Status.ARRESTED)
+        if hit.status is Status.ARRESTED and len(resting):
             columns["stopped_in"][k] = resting[-1]
             state = hit.flight["state"]
             nose = memory.prepared.scene.core.mass_properties.centre_of_mass
             foremost = state["position"][0] + nose * axis_of(state["attitude"])[0]
             front, rear = target.faces[resting[-1]]
             columns["depth"][k] = min(foremost, rear) - front
-
-
-def _layer_status(status: Status, has_left: bool, touched: bool) -> Status:
-    if has_left:
-        return Status.PERFORATED if touched else Status.UNTOUCHED
-    if not touched:
-        return Status.NOT_REACHED
-    return status if status.failed or status is Status.ARRESTED else Status.RICOCHETED
 
 
 MOST = 256
@@ -301,32 +290,32 @@ def pieces_of(runs: NDArray[np.int32]) -> NDArray[np.int32]:
     return np.stack([np.repeat(runs[:, 0], counts) + PIECE * within, np.repeat(runs[:, 2], counts)], axis=1)
 
 
-def together(marches: Iterable[March], cancel: Cancel = NEVER) -> Iterator[tuple[int, HitResult]]:
+def together(hits: Iterable[OneHit], cancel: Cancel = NEVER) -> Iterator[tuple[int, HitResult]]:
     """What became of hits that march together on their device, with their numbers, as they end.
 
     Args:
-        marches: hits of one device and one precision; as many march at a time as fit half of the free memory of a GPU,
-            but at most MOST. The next one takes the place of one that has ended.
+        hits: of one device and one precision; as many march at a time as fit half of the free memory of a GPU, but at
+            most MOST. The next one takes the place of one that has ended.
     """
-    coming, first = enumerate(marches), list[tuple[int, March]]()
-    while len(first) < MOST and _has_room([march.hit for _, march in first]) and (one := next(coming, None)):
+    coming, first = enumerate(hits), list[tuple[int, OneHit]]()
+    while len(first) < MOST and _has_room([hit for _, hit in first]) and (one := next(coming, None)):
         first.append(one)
     if not first:
         return
-    running, many = dict(enumerate(first)), ManyHits([march.hit for _, march in first])
+    running, many = dict(enumerate(first)), ManyHits([hit for _, hit in first])
     del first  # ended hits make room
     while running:
         cancel.check()
         many.advance()
         for place, (status, at_edge) in enumerate(many.look()):
             if place in running and status == WAITING and not at_edge:
-                many.put(place, running[place][1].extended())
+                many.put(place, running[place][1].extend())
             elif place in running and (status != RUNNING or at_edge):
-                number, march = running.pop(place)
-                yield number, march.result(bool(at_edge))
+                number, hit = running.pop(place)
+                yield number, hit.result(bool(at_edge))
                 if one := next(coming, None):
                     running[place] = one
-                    many.put(place, one[1].hit)
+                    many.put(place, one[1])
 
 
 def _has_room(hits: list[OneHit]) -> bool:

@@ -8,7 +8,7 @@ import pytest
 
 from warpimpact import CirclePattern, Continuum, Layer, Plate, Record, Scene, simulate
 from warpimpact.catalogue.catalogue import flow_entry
-from warpimpact.continuum import encounter
+from warpimpact.continuum import encounter, one_hit
 from warpimpact.continuum import simulate as elements
 from warpimpact.continuum.meshing import nodes_of
 from warpimpact.continuum.one_hit import Energies
@@ -59,13 +59,13 @@ def test_a_hit_that_takes_too_much_is_refused_before_it_is_meshed(spacing: float
     ],
 )
 def test_a_hit_that_loses_energy_to_its_numerics_is_a_failure(energies: Energies, status: Status) -> None:
-    assert encounter.status_by_energies(Status.PERFORATED, energies) is status
-    assert encounter.status_by_energies(Status.NOT_FINITE, energies) is Status.NOT_FINITE
+    assert one_hit.status_by_energies(Status.PERFORATED, energies) is status
+    assert one_hit.status_by_energies(Status.NOT_FINITE, energies) is Status.NOT_FINITE
 
 
 def test_a_gpu_computes_the_hits_of_a_scene_together(monkeypatch: pytest.MonkeyPatch) -> None:
     """The CPU stands in for it. The slower hit ends last, and the outcomes have the order of the shots."""
-    monkeypatch.setattr(encounter, "LARGEST_HOURGLASS_SHARE", 1.0)
+    monkeypatch.setattr(one_hit, "LARGEST_HOURGLASS_SHARE", 1.0)
     gpu = SimpleNamespace(is_cpu=False, alias="cpu")
     monkeypatch.setattr(elements, "find_device", lambda name: gpu if name == "gpu" else find_device(name))
     shots = replace(Shots.joined([SHOT, SHOT]), velocity=np.array([500.0, 825.0]))
@@ -110,11 +110,11 @@ def test_a_march_has_what_belongs_to_its_shot_and_its_layers() -> None:
     soft = flow_entry("AA6082-T6").flow
     continuum = Continuum(flows=(STEEL, soft), spacing=1e-3, friction=0.07)
     conditions = elements.memory_of(scene, shot, Worker("cpu", 1)).prepared.conditions
-    march = encounter.march_of(scene, shot, 0, continuum, conditions)
-    assert march.hit.start.friction == 0.07
-    assert march.hit.flows == [STEEL, soft]
-    march.extended()
-    first, second = march.hit.sheets
+    hit = one_hit.prepare_hit(scene, shot, 0, continuum, conditions)
+    assert hit.start.friction == 0.07
+    assert hit.flows == [STEEL, soft]
+    hit.extend()
+    first, second = hit.sheets
     assert first.x[[0, -1]] == pytest.approx([0.0, 3e-3])
     assert second.x[[0, -1]] == pytest.approx([13e-3, 15e-3])
     assert not first.solid.all()
@@ -136,7 +136,7 @@ def test_a_core_that_reaches_the_edge_of_the_mesh_has_left_it(monkeypatch: pytes
     monkeypatch.setattr(elements, "WIDER", (1.0,))
     assert simulate(scene, SHOT, numerics=narrow).status[0] == Status.LEFT_WINDOW
     conditions = elements.memory_of(scene, SHOT, Worker("cpu", 1)).prepared.conditions
-    ((number, together),) = elements.together([encounter.march_of(scene, SHOT, 0, narrow, conditions, device)])
+    ((number, together),) = elements.together([one_hit.prepare_hit(scene, SHOT, 0, narrow, conditions, device)])
     assert (number, together.status) == (0, Status.LEFT_WINDOW)
 
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from warpimpact import CirclePattern, Plate, SlotPattern
-from warpimpact.continuum.meshing import Extent, SheetMesh, meshed, runs_of
+from warpimpact.continuum.meshing import Extent, SheetMesh, mesh_layer, runs_of
 from warpimpact.continuum.one_hit import volumes_of
 from warpimpact.scene import NoPattern
 
@@ -18,7 +18,7 @@ def plate_of(pattern: SlotPattern | CirclePattern | NoPattern) -> Plate:
 
 
 def mesh_of(pattern: SlotPattern | CirclePattern | NoPattern, hit: tuple[float, float] = (0.0, 0.0)) -> SheetMesh:
-    return meshed(plate_of(pattern), hit, 0.0, 0.5e-3, EXTENTS)
+    return mesh_layer(plate_of(pattern), hit, 0.0, 0.5e-3, EXTENTS)
 
 
 @pytest.mark.parametrize("pattern", [SLOTS, ROUND])

@@ -10,7 +10,7 @@ import pytest
 
 from warpimpact import Campaign, CampaignError, replay
 from warpimpact.cli import main
-from warpimpact.continuum import encounter
+from warpimpact.continuum import one_hit
 from warpimpact.export.paraview import write_vtk
 from warpimpact.results import attributes as attr
 from warpimpact.results import files
@@ -40,7 +40,7 @@ spacing = "1 mm"
 @pytest.fixture(autouse=True)
 def coarse(monkeypatch: pytest.MonkeyPatch) -> None:
     """Elements of 1 mm, whose hourglasses take much, are enough here."""
-    monkeypatch.setattr(encounter, "LARGEST_HOURGLASS_SHARE", 1.0)
+    monkeypatch.setattr(one_hit, "LARGEST_HOURGLASS_SHARE", 1.0)
 
 
 @pytest.fixture
@@ -71,15 +71,15 @@ def test_a_hit_that_is_there_is_not_computed_again(
     campaign_file: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     output, straight = tmp_path / "cut.nc", files.read(computed(tmp_path / "straight.nc", campaign_file))
-    march, calls = encounter.March.ended, []
+    march, calls = one_hit.OneHit.march, []
 
-    def broken_off(self: encounter.March, *arguments: Any, **more: Any) -> encounter.HitResult:
+    def broken_off(self: one_hit.OneHit, *arguments: Any, **more: Any) -> one_hit.HitResult:
         calls.append(self)
         if len(calls) == 3:
             raise KeyboardInterrupt
         return march(self, *arguments, **more)
 
-    monkeypatch.setattr(encounter.March, "ended", broken_off)
+    monkeypatch.setattr(one_hit.OneHit, "march", broken_off)
     with pytest.raises(KeyboardInterrupt, match="saved"):
         continuum_to_file(Campaign.from_toml(campaign_file), output, device="cpu")
     calls[:] = [None] * 3
