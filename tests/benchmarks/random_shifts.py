@@ -28,8 +28,8 @@ from warpimpact.scene import PRESETS, Numerics, Shots
 from warpimpact.solver.accuracy import pilot_size
 from warpimpact.solver.simulate import pilot_of, simulate
 from warpimpact.solver.worker import Worker
+from warpimpact.statistics.comparisons import change_of_mean, shift_of_mean, shift_of_share
 from warpimpact.statistics.intervals import estimate_of
-from warpimpact.statistics.shifts import change_of_mean, shift_of_mean, shift_of_share
 
 Array = NDArray[np.float64]
 ANSWER = 7

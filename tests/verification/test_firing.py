@@ -8,7 +8,7 @@ from scipy import special
 from warpimpact.firing.plan import Langlie, MilStd662F, Procedure
 from warpimpact.firing.simulate import Firings, Response, fire, reports
 from warpimpact.results import firing as f
-from warpimpact.statistics.acceptance import acceptance
+from warpimpact.statistics.quantal import acceptance
 
 Array = NDArray[np.float64]
 

@@ -9,20 +9,22 @@ Plates of different weight are compared by their ratios to the solid plate of th
 
 One rule: what is printed is what ranks. Every interval, of a value and of a difference, contains the shift by the
 numerics and the tolerance of a limit, and has the same confidence, so that all differences of a measure hold together
-(Bonferroni). Two plates are told apart where the interval of their difference excludes 0 by more than rounding, which
-it does where the intervals of the values do not meet. A rank is a range: from one more than the number of plates that
+(Bonferroni). A difference is significant where its interval excludes 0 by more than rounding, which it does where the
+intervals of the values do not meet. A rank is a range: from one more than the number of plates that
 are better, to the place that the plates that are worse leave open (J. Klein, T. Wright, J. Wieczorek, Journal of the
 Royal Statistical Society A 183 (2020) 1093).
+
+Two models of the same shots at one plate are compared hit by hit.
 """
 
 from __future__ import annotations
 
 import json
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from itertools import combinations, pairwise
-from typing import Any, NamedTuple
+from itertools import combinations
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -30,7 +32,6 @@ import xarray
 
 from warpimpact.analysis.effectiveness import (
     Score,
-    common_name,
     depth_note,
     measures_of,
     reference_name,
@@ -40,10 +41,11 @@ from warpimpact.analysis.effectiveness import (
     weights_of,
     weights_text,
 )
-from warpimpact.analysis.inspection import breaks_promise, hits_at_two_levels, sampling_note
+from warpimpact.analysis.inspection import hits_at_two_levels, sampling_note
 from warpimpact.analysis.numbers import View, html_of, interval_text, listed, of_each, rows_of
 from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
+from warpimpact.results.dataset import failed, hit_numbers, passed
 from warpimpact.results.files import ResultError
 from warpimpact.results.measures import Measure, sampling_design
 from warpimpact.results.vocabulary import base_thickness, has_base
@@ -52,18 +54,21 @@ from warpimpact.scene.quantities import QUANTITIES
 from warpimpact.scene.units import quantity as reader_of
 from warpimpact.statistics.comparisons import (
     ROUNDED,
-    confidence_of_each,
     difference_numbers,
     difference_of_independent,
     ratio_numbers,
 )
-from warpimpact.statistics.intervals import Array, Estimate, SamplingDesign, estimate_of
+from warpimpact.statistics.intervals import SamplingDesign, estimate_of
 
 _SAME_PLACE = 1e-9
 """Rounding of a place in units of the cell."""
 _ANGLES = ("obliquity", "azimuth", "pitch", "yaw")
 _SAME_WEIGHT = 1.01
 """Largest ratio of the areal densities of plates that count as equally heavy."""
+MOST_NAMED, MOST_WORST = 12, 3
+"""Most hits that are named as ending differently by two models, and as the largest differences of a quantity."""
+CONTRADICTION = 0.25
+"""Share of the hits that must end differently for two models to contradict each other."""
 
 
 @dataclass(frozen=True)
@@ -78,36 +83,32 @@ class Comparison:
             ratio_high; alone; numerics, the shift that low and high contain.
         differences: by measure a row for each pair of plates, `one` less `other`, by ratio where that ranks: value,
             low, high, and whether it is significant. The end of an interval that does not exist is NaN.
-        pairs: a row for each pair of plates: number of paired first hits; why they are independent, or "".
         by_ratio: measures that rank by the ratio to the solid reference.
         differ_in_weight: whether the weights count and differ.
         confidence: confidence at which the intervals of a measure's differences hold together.
         reference: name of the solid references.
+        hits_used: how the hits were compared, a sentence each.
+        cautions: what the ranks do not consider: a sentence each, by a few words for it.
         notes: further notes, a sentence each.
-        cautions: differences or unknowns of the plates that the ranks do not consider, in a few words.
     """
 
     plates: pd.DataFrame
     measures: dict[str, Measure]
     scores: dict[str, pd.DataFrame]
     differences: dict[str, pd.DataFrame]
-    pairs: pd.DataFrame
     by_ratio: frozenset[str]
     differ_in_weight: bool
     confidence: float
     reference: str
+    hits_used: tuple[str, ...]
+    cautions: dict[str, str]
     notes: tuple[str, ...]
-    cautions: tuple[str, ...]
-
-    @property
-    def compared(self) -> list[Measure]:
-        """The measures without worst points, which have no interval."""
-        return [measure for measure in self.measures.values() if measure.kind != "worst_point"]
 
     @property
     def ranking(self) -> list[Measure]:
         """The measures that rank plates: with a better direction and with intervals."""
-        return [one for one in self.compared if one.higher_is_better is not None and self.is_ranked(one.text)]
+        better = (one for one in self.measures.values() if one.higher_is_better is not None)
+        return [one for one in better if self.is_ranked(one.text)]
 
     def is_ranked(self, text: str) -> bool:
         """Whether a measure has intervals of differences. If not, the notes say why."""
@@ -125,7 +126,7 @@ class Comparison:
         better, worse = dict.fromkeys(names, 0), dict.fromkeys(names, 0)
         for pair in rows_of(self.differences[text]) if text in self.differences else ():
             if pair.significant:
-                first, last = (pair.one, pair.other)[:: 1 if names.index(pair.one) < names.index(pair.other) else -1]
+                first, last = sorted((pair.one, pair.other), key=names.index)
                 worse[first] += 1
                 better[last] += 1
         return {name: (1 + better[name], len(names) - worse[name]) for name in names}
@@ -145,7 +146,7 @@ class Comparison:
         return both[both.other == best].set_index("one").loc[others]
 
     def deciding(self) -> Measure | None:
-        """The first measure by which hits tell two plates apart, else the first that ranks plates; None without one.
+        """The first measure with a significant difference, else the first that ranks plates; None without one.
 
         Measures have the order of the texts, by default that of `effectiveness.SHOWN`: what reaches the base comes
         before what flies behind the target.
@@ -179,46 +180,55 @@ def compare(
         ResultError: core, impact or stand-offs differ, so that the question is not the same; or a plate lacks what a
             measure needs.
     """
-    for dataset, name in zip(datasets[1:], names[1:], strict=True):
-        _check_same_question(datasets[0], names[0], dataset, name)
-    places = list(combinations(range(len(datasets)), 2))
-    used = [(names[i], names[j], *_used(datasets[i], datasets[j])) for i, j in places]
-    pairs = pd.DataFrame(used, columns=["one", "other", "paired", "independent"])
+    first, *others = (_question(dataset, name) for dataset, name in zip(datasets, names, strict=True))
+    for other, name in zip(others, names[1:], strict=True):
+        if (mismatch := first_difference(first, other)) is not None:
+            place, was, now = mismatch
+            raise ResultError(f"{name}: cannot be compared with {names[0]}: {place} is {now} here and {was} there")
+    pairs = list(combinations(range(len(datasets)), 2))
+    used = {(i, j): _used(datasets[i], datasets[j]) for i, j in pairs}
     of_plates = [measures_of(dataset, texts) for dataset in datasets]
     common = set.intersection(*({measure.text for measure in measures} for measures in of_plates))
     measures = {measure.text: measure for measure in of_plates[0] if measure.text in common}
-    each, differ, by_ratio = confidence_of_each(confidence, len(places)), _differ_in_weight(datasets), set[str]()
+    plates = pd.DataFrame([_plate(dataset) for dataset in datasets], index=pd.Index(names, name="plate"))
+    is_weight = datasets[0].attrs.get(attr.LIMIT) == "thickness"  # then the limit itself is a weight
+    differ = not is_weight and plates.areal_density.max() > _SAME_WEIGHT * plates.areal_density.min()
+    each, by_ratio = 1.0 - (1.0 - confidence) / len(pairs), set[str]()
     bounds = all(map(has_base, datasets)) and _depths_are_bounds(datasets)
     tables, differences = dict[str, pd.DataFrame](), dict[str, pd.DataFrame]()
     for scored in zip(*(scores(dataset, list(measures.values()), each) for dataset in datasets), strict=True):
-        measure = scored[0].data.measure
+        measure = scored[0].measure
         shifts = [_shift(score, dataset) for score, dataset in zip(scored, datasets, strict=True)]
-        rows = [_row(score, shift) for score, shift in zip(scored, shifts, strict=True)]
-        tables[measure.text] = pd.DataFrame(rows, index=pd.Index(names, name="plate"))
+        tables[measure.text] = _scores_table(scored, shifts, names)
         if not measure.has_interval or (bounds and measure.name == "base_depth"):
             continue
-        if ratios := differ and not any(math.isnan(score.ratio.low) for score in scored):
+        kind = "quantile" if measure.kind == "quantile" else "share" if measure.is_binary else "mean"
+        if differ and not any(math.isnan(score.ratio.low) for score in scored):
             by_ratio.add(measure.text)
-        sides = [_side(score, shift, by_ratio=ratios) for score, shift in zip(scored, shifts, strict=True)]
-        compared = []
-        for (i, j), independent in zip(places, pairs.independent, strict=True):
+            kind = "quantile" if kind == "quantile" else "mean"
+            shifts = [shift / score.ratio.reference for score, shift in zip(scored, shifts, strict=True)]
+            scored = tuple(map(_as_ratio, scored))
+        rows = []
+        for i, j in pairs:
             options: SamplingDesign = {**sampling_design(datasets[i]), "confidence": each}
-            compared.append((names[i], names[j], *_difference(sides[i], sides[j], options, paired=not independent)))
+            paired = not used[i, j][1]
+            difference = _difference(scored[i], scored[j], shifts[i] + shifts[j], kind, options, paired=paired)
+            rows.append((names[i], names[j], *difference))
         columns = ["one", "other", "value", "low", "high", "significant"]
-        differences[measure.text] = pd.DataFrame(compared, columns=columns)
-    cautions = dict(_cautions(datasets, names))
+        differences[measure.text] = pd.DataFrame(rows, columns=columns)
+    references = {*map(reference_name, datasets)}
     return Comparison(
-        plates=pd.DataFrame([_plate(dataset) for dataset in datasets], index=pd.Index(names, name="plate")),
+        plates=plates,
         measures=measures,
         scores=tables,
         differences=differences,
-        pairs=pairs,
         by_ratio=frozenset(by_ratio),
         differ_in_weight=differ,
         confidence=confidence,
-        reference=common_name(map(reference_name, datasets)),
-        notes=(*cautions.values(), *_notes(datasets, names, bounds=bounds)),
-        cautions=tuple(cautions),
+        reference=references.pop() if len(references) == 1 else "solid reference",
+        hits_used=tuple(_hits_used(datasets, names, used)),
+        cautions=dict(_cautions(datasets, names)),
+        notes=tuple(_notes(datasets, names, bounds=bounds)),
     )
 
 
@@ -235,66 +245,56 @@ def _plate(dataset: xarray.Dataset) -> dict[str, Any]:
 
 def _shift(score: Score, dataset: xarray.Dataset) -> float:
     """Largest shift of a value by the numerics, and by the tolerance of a limit; 0 where it is unknown."""
-    measure, attributes = score.data.measure, dataset.attrs
+    measure, attributes = score.measure, dataset.attrs
     tolerance = 0.0 if measure.is_binary else float(attributes.get(attr.LIMIT_TOLERANCE, 0.0))
     is_weight = measure.name == "limit_areal_density"
     factor = attributes.get(attr.LIMIT_DENSITY, 0.0) if is_weight else measure.display.factor
-    return float(np.nan_to_num(score.data.estimate.numerics or 0.0)) + tolerance * factor
+    return float(np.nan_to_num(score.estimate.numerics or 0.0)) + tolerance * factor
 
 
-def _row(score: Score, shift: float) -> dict[str, float]:
-    """A row of `Comparison.scores`."""
-    estimate, measure, ratio = score.data.estimate, score.data.measure, score.ratio
-    wide = replace(estimate, low=estimate.low - shift, high=estimate.high + shift)
-    wide = wide.within(measure.display.factor * measure.least, measure.display.factor * measure.most)
-    of_ratio = shift / ratio.reference if ratio.reference else math.nan
-    return {
-        "value": estimate.value,
-        "low": wide.low,
-        "high": wide.high,
-        "solid": ratio.reference,
-        "ratio": ratio.value,
-        "ratio_low": float(np.fmax(ratio.low - of_ratio, 0.0)) if ratio.low == ratio.low else math.nan,
-        "ratio_high": ratio.high + of_ratio,
-        "alone": score.alone,
-        "numerics": float(np.nan_to_num(estimate.numerics or 0.0)),
-    }
+def _scores_table(scored: Sequence[Score], shifts: Sequence[float], names: Sequence[str]) -> pd.DataFrame:
+    """A table of `Comparison.scores`: the intervals contain the shifts."""
+    table, measure = (
+        pd.DataFrame([score.row for score in scored], index=pd.Index(names, name="plate")),
+        scored[0].measure,
+    )
+    shift, factor = np.array(shifts), measure.display.factor
+    of_ratio = shift / table.solid.where(table.solid != 0.0)
+    return table.assign(
+        low=(table.low - shift).clip(factor * measure.least, factor * measure.most),
+        high=(table.high + shift).clip(factor * measure.least, factor * measure.most),
+        ratio_low=(table.ratio_low - of_ratio).clip(0.0),
+        ratio_high=table.ratio_high + of_ratio,
+        numerics=table.numerics.fillna(0.0),
+    )
 
 
-class _Side(NamedTuple):
-    """What is compared of a plate: an estimate by the hits, numbers whose mean it is, its shift, and its kind."""
-
-    estimate: Estimate
-    numbers: Array
-    shift: float
-    kind: str
-
-
-def _side(score: Score, shift: float, *, by_ratio: bool) -> _Side:
-    """The value of a plate, or its ratio to the solid reference."""
-    estimate, numbers, ratio, measure = score.data.estimate, score.data.numbers, score.ratio, score.data.measure
-    kind = "quantile" if measure.kind == "quantile" else "share" if measure.is_binary and not by_ratio else "mean"
-    if by_ratio and score.solid is not None:
-        numbers, shift = ratio_numbers(numbers, score.solid, ratio.value), shift / ratio.reference
-        estimate = replace(estimate, value=ratio.value, low=ratio.low, high=ratio.high)
-    return _Side(estimate, numbers, shift, kind)
+def _as_ratio(score: Score) -> Score:
+    """The ratio to the solid reference in the place of the value."""
+    ratio, numbers = score.ratio, score.numbers
+    if score.solid is not None:
+        numbers = ratio_numbers(numbers, score.solid, ratio.value)
+    estimate = replace(score.estimate, value=ratio.value, low=ratio.low, high=ratio.high)
+    return replace(score, estimate=estimate, numbers=numbers)
 
 
-def _difference(one: _Side, other: _Side, options: SamplingDesign, *, paired: bool) -> tuple[float, float, float, bool]:
+def _difference(
+    one: Score, other: Score, shift: float, kind: str, options: SamplingDesign, *, paired: bool
+) -> tuple[float, float, float, bool]:
     """Difference of two plates, its interval, and whether it is significant. Rounding counts as 0.
 
     The interval is never wider than the intervals of both values leave open.
     """
-    a, b, shift = one.estimate, other.estimate, one.shift + other.shift
+    a, b = one.estimate, other.estimate
     value, (low, high) = a.value - b.value, difference_of_independent(a, b)
     if paired:
-        matched = one.kind == "share" and len(one.numbers) == len(other.numbers)
+        matched = kind == "share" and len(one.numbers) == len(other.numbers)
         numbers = difference_numbers(one.numbers, other.numbers)
         estimate = estimate_of("difference" if matched else "mean", numbers, **options)
         # Shares that agree in every shot are no more certain than each of them.
-        agrees = one.kind == "share" and estimate.half_width == 0.0 and a.half_width + b.half_width > 0.0
+        agrees = kind == "share" and estimate.half_width == 0.0 and a.half_width + b.half_width > 0.0
         if not agrees and not math.isnan(estimate.low + low + high):
-            value = value if one.kind == "quantile" else estimate.value  # pseudo-values give its error alone
+            value = value if kind == "quantile" else estimate.value  # pseudo-values give its error alone
             low, high = value + estimate.low - estimate.value, value + estimate.high - estimate.value
     low, high = float(np.fmax(low, a.low - b.high)), float(np.fmin(high, a.high - b.low))
     rounding = ROUNDED * max(abs(end) for end in (a.value, b.value) if math.isfinite(end) or not end)
@@ -302,29 +302,10 @@ def _difference(one: _Side, other: _Side, options: SamplingDesign, *, paired: bo
     return value, low, high, bool(low > 0.0 or high < 0.0)
 
 
-def _differ_in_weight(datasets: Sequence[xarray.Dataset]) -> bool:
-    """Whether the weights count and differ. In a search of thickness the limit itself is a weight."""
-    densities = [dataset.attrs[attr.AREAL_DENSITY] for dataset in datasets]
-    return datasets[0].attrs.get(attr.LIMIT) != "thickness" and max(densities) > _SAME_WEIGHT * min(densities)
-
-
 def _depths_are_bounds(datasets: Sequence[xarray.Dataset]) -> bool:
     """Whether depths cannot be ranked: cores pierce a base and count as its thickness, and the thicknesses differ."""
     thicknesses = [float(np.mean(base_thickness(dataset))) for dataset in datasets]
-    if max(thicknesses) <= _SAME_WEIGHT * min(thicknesses):
-        return False
-    return any(map(depth_note, datasets))
-
-
-def _check_same_question(result: xarray.Dataset, name: str, other: xarray.Dataset, other_name: str) -> None:
-    """Refuse results with another core, impact or stand-offs.
-
-    Raises:
-        ResultError: the message names the first difference.
-    """
-    if (mismatch := first_difference(_question(result, name), _question(other, other_name))) is not None:
-        place, was, now = mismatch
-        raise ResultError(f"{other_name}: cannot be compared with {name}: {place} is {now} here and {was} there")
+    return max(thicknesses) > _SAME_WEIGHT * min(thicknesses) and any(map(depth_note, datasets))
 
 
 def _question(dataset: xarray.Dataset, name: str) -> dict[str, Any]:
@@ -357,22 +338,26 @@ def _used(result: xarray.Dataset, other: xarray.Dataset) -> tuple[int, str]:
     return common, ""
 
 
+def _hits_used(
+    datasets: Sequence[xarray.Dataset], names: Sequence[str], used: Mapping[tuple[int, int], tuple[int, str]]
+) -> Iterator[str]:
+    """How many hits were compared and how."""
+    hits = [dataset.sizes["hit"] for dataset in datasets]
+    if len({*hits}) == 1 and not any(reason for _, reason in used.values()):
+        yield f"{hits[0]} hits of each plate, the same shots"
+        return
+    yield f"hits: {of_each(names, map(str, hits))}; all of them count"
+    for (i, j), (common, reason) in used.items():
+        shots = f"independent, because {reason}" if reason else f"the first {common} hits are the same shots"
+        yield f"{names[i]} and {names[j]}: {shots}"
+
+
 def _cautions(datasets: Sequence[xarray.Dataset], names: Sequence[str]) -> Iterator[tuple[str, str]]:
     """What the ranks do not consider, in a few words and in a sentence."""
     if len({d.attrs.get(attr.LAYERS, "") for d in datasets}) > 1:
         yield "layers", "The targets differ in the layers behind the plate."
     if differences := "; ".join(_materials(datasets, names)):
         yield "material", f"The plates differ in material, which no ranking allows for: {differences}."
-    texts = [dataset.attrs[attr.NUMERICS_GIVEN] for dataset in datasets if attr.NUMERICS_GIVEN in dataset.attrs]
-    differing = (first_difference(json.loads(first), json.loads(other)) for first, other in pairwise(texts))
-    if (caution := next(filter(None, differing), None)) is not None:
-        yield (
-            "different numerics",
-            "The plates were computed with different numerics: {} is {} and {}.".format(*caution),
-        )
-    if broken := [name for name, dataset in zip(names, datasets, strict=True) if breaks_promise(dataset)]:
-        sentence = f"The numerics are less exact than promised: {', '.join(broken)} (warpimpact inspect)."
-        yield "numerics less exact than promised", sentence
     if unknown := [name for name, dataset in zip(names, datasets, strict=True) if not hits_at_two_levels(dataset)]:
         sentence = f"numerics ± is not known of {', '.join(unknown)}: intervals are by the hits alone"
         yield "the error of the numerics", f"{sentence} (warpimpact inspect)."
@@ -384,33 +369,24 @@ def _materials(datasets: Sequence[xarray.Dataset], names: Sequence[str]) -> Iter
         n: json.loads(d.attrs[attr.MATERIAL]) for n, d in zip(names, datasets, strict=True) if attr.MATERIAL in d.attrs
     }
     for quantity in dict.fromkeys(key for material in known.values() for key in material):
-        values = {name: material.get(quantity) for name, material in known.items()}
-        if len(set(values.values())) > 1:
+        values = [material.get(quantity) for material in known.values()]
+        if len({*values}) > 1:
             read = reader_of(QUANTITIES[quantity].type).text if quantity in QUANTITIES else "{:g}".format
             shown = [
-                "not given" if value is None else value if isinstance(value, str) else read(value)
-                for value in values.values()
+                str(value or "not given") if value is None or isinstance(value, str) else read(value)
+                for value in values
             ]
-            yield f"{quantity} ({of_each(values, shown)})"
+            yield f"{quantity} ({of_each(known, shown)})"
 
 
 def _notes(datasets: Sequence[xarray.Dataset], names: Sequence[str], *, bounds: bool) -> Iterator[str]:
     """Notes on weights, solid references, sampling, and the bases behind the plates."""
-    if _differ_in_weight(datasets):
-        weights = of_each(
-            names, [weights_text(weights_of(one), ".4g").removeprefix("areal density ") for one in datasets]
-        )
-        yield (
-            f"The plates differ in weight ({weights}). They are ranked by the ratio to the solid reference of the same "
-            "areal density; a measure without that ratio says so."
-        )
     solid = {name: solid_note(dataset) for name, dataset in zip(names, datasets, strict=True)}
     alike = len(set(solid.values())) == 1
     yield from dict.fromkeys(note if alike else f"{name}: {note}" for name, note in solid.items() if note)
     yield from dict.fromkeys(filter(None, map(sampling_note, datasets)))
-    based = [has_base(dataset) for dataset in datasets]
-    if any(based) and not all(based) and attr.LIMIT not in datasets[0].attrs:
-        alone = [name for name, is_based in zip(names, based, strict=True) if not is_based]
+    alone = [name for name, dataset in zip(names, datasets, strict=True) if not has_base(dataset)]
+    if 0 < len(alone) < len(names) and attr.LIMIT not in datasets[0].attrs:
         yield f"Without layers, and so without a base: {', '.join(alone)}. Measures of a base are left out."
     elif bounds:
         yield (
@@ -423,88 +399,51 @@ def _notes(datasets: Sequence[xarray.Dataset], names: Sequence[str], *, bounds: 
 
 
 def short_view(comparison: Comparison, notes: Sequence[str] = ()) -> View:
-    """The deciding measure with its ranks and differences, what is not told apart, and last more notes."""
+    """The deciding measure with its ranks and differences, what is not significant, and last more notes."""
     measure = comparison.deciding()
     if measure is None:
-        return {"": [*hits_used(comparison), "no measure ranks these plates", *notes]}
-    plates, text = comparison.plates, measure.text
-    (best, *_), from_best, table = comparison.ordered(text), comparison.from_best(text), _scores_table(comparison, text)
-    less = f"{'ratio' if text in comparison.by_ratio else 'value'} less {best}"
-    table[less] = ["", *map("{:+#.3g}".format, from_best.value)]
-    table["its interval"] = ["", *map(interval_text, from_best.low, from_best.high)]
-    hits = f"{plates.hits.min()}" + ("" if plates.hits.nunique() == 1 else f" to {plates.hits.max()}")
-    same = "" if comparison.pairs.independent.any() else ", the same shots"
-    left_open = f"; not allowed for: {', '.join(comparison.cautions)}" if comparison.cautions else ""
-    used = f"{hits} hits of each plate{same}{left_open}"
-    return {_title(comparison, measure): [table, _undecided(comparison, measure), used, *notes]}
+        return {"": [*comparison.hits_used, "no measure ranks these plates", *notes]}
+    open_ = f"not allowed for: {', '.join(comparison.cautions)}"
+    used = "; ".join([*comparison.hits_used, *([open_] if comparison.cautions else [])])
+    table, *verdict = ranking_table(comparison, measure), _undecided(comparison, measure), used
+    return {_heading(comparison, measure): [table, *verdict, *notes]}
 
 
 def verdict_of(comparison: Comparison) -> list[str]:
-    """Sentences about the best plate by the deciding measure, and what is not told apart; empty where none decides."""
+    """Sentences about the best plate by the deciding measure, and on other measures; empty where none decides."""
     measure = comparison.deciding()
     if measure is None:
         return []
     best = comparison.first(measure.text)
-    first = "no two plates are told apart" if len(best) == len(comparison.plates) else f"{listed(best)} first"
-    return [f"{_title(comparison, measure)}: {first}", _undecided(comparison, measure)]
+    first = "no difference is significant" if len(best) == len(comparison.plates) else f"{listed(best)} first"
+    return [f"{_heading(comparison, measure)}: {first}", _undecided(comparison, measure)]
 
 
 def comparison_view(comparison: Comparison, notes: Sequence[str] = ()) -> View:
-    """What was compared, the best plates, then every measure as a ranking with differences in words."""
+    """What was compared, then every measure as a ranking."""
     together = (
-        f"Intervals contain the numerics where they are known. Differences of a measure hold together at "
-        f"{comparison.confidence:.0%} (Bonferroni over the pairs)."
+        f"Intervals contain the numerics where they are known, and not what the model leaves out. Differences of a "
+        f"measure hold together at {comparison.confidence:.0%} (Bonferroni over the pairs)."
     )
-    chance = "The intervals describe the hits that were drawn, not what the model leaves out."
-    sentences = [*hits_used(comparison), together, chance, *comparison.notes, *notes]
-    view: dict[str, list[str | pd.DataFrame]] = {"": [*sentences]}
-    if len(best := best_plates(comparison)):
-        view["best plates"] = [best.to_frame("plate")]
-    for measure in comparison.compared:
-        heading = f"{measure.title}; {measure.better}{_weighed(comparison, measure.text)}"
-        view[heading] = [_scores_table(comparison, measure.text)]
-        if measure.text in comparison.differences:
-            view[heading].append(_differences_table(comparison, measure))
+    notes = [*comparison.hits_used, together, *comparison.cautions.values(), *comparison.notes, *notes]
+    view: dict[str, list[str | pd.DataFrame]] = {"": [*notes]}
+    measures = (one for one in comparison.measures.values() if one.kind != "worst_point")
+    view |= {_heading(comparison, measure): [ranking_table(comparison, measure)] for measure in measures}
     return view
 
 
-def best_plates(comparison: Comparison) -> pd.Series:
-    """The plates that no other one is better than, in words, by the label of a measure."""
-    best = {}
-    for measure in comparison.compared:
-        if measure.higher_is_better is not None:
-            first, ranked = comparison.first(measure.text), comparison.is_ranked(measure.text)
-            undecided = "cannot be told apart" if ranked else "not ranked"
-            best[measure.label] = undecided if len(first) == len(comparison.plates) else listed(first)
-    return pd.Series(best, dtype=object).rename_axis("best at")
-
-
-def hits_used(comparison: Comparison) -> list[str]:
-    """How many hits were compared and how, a sentence each."""
-    hits, pairs = comparison.plates.hits, comparison.pairs
-    if hits.nunique() == 1 and not pairs.independent.any():
-        return [f"{hits.iloc[0]} hits of each plate: the same shots at every plate, compared shot by shot."]
-    lines = [f"Hits: {of_each(hits.index, map(str, hits))}; all of them count."]
-    for pair in rows_of(pairs):
-        left = {name: hits[name] - pair.paired for name in (pair.one, pair.other) if hits[name] > pair.paired}
-        how = f"the first {pair.paired} hits are the same shots, compared shot by shot"
-        how += "".join(f"; the other {count} of {name} count on their own" for name, count in left.items())
-        how = f"compared as independent, because {pair.independent}" if pair.independent else how
-        lines.append(f"{pair.one} and {pair.other}: {how}.")
-    return lines
-
-
-def _scores_table(comparison: Comparison, text: str) -> pd.DataFrame:
-    """Ranks, weights, values and ratios of the plates in a measure, the best value first."""
+def ranking_table(comparison: Comparison, measure: Measure) -> pd.DataFrame:
+    """Ranks, weights, values and ratios of the plates, and differences from the best one, which is first."""
+    text = measure.text
     ranks = comparison.ranks(text)
     plates, shown = comparison.plates.loc[list(ranks)], comparison.scores[text].loc[list(ranks)]
-    is_ranked = comparison.is_ranked(text) and comparison.measures[text].higher_is_better is not None
+    is_ranked = measure in comparison.ranking
     ends = [f"{first}" if first == last else f"{first} to {last}" for first, last in ranks.values()]
-    table = pd.DataFrame({"rank": ends if is_ranked else "-"}, index=plates.index)
-    has_base = bool(plates.add_on.notna().all())
-    if has_base:
+    table = pd.DataFrame({"rank": ends if is_ranked else "not ranked"}, index=plates.index)
+    has_add_on = bool(plates.add_on.notna().all())
+    if has_add_on:
         table["add-on kg/m²"] = plates.add_on.map("{:.2f}".format)
-    table["whole kg/m²" if has_base else "kg/m²"] = plates.areal_density.map("{:.2f}".format)
+    table["whole kg/m²" if has_add_on else "kg/m²"] = plates.areal_density.map("{:.2f}".format)
     table["value"] = shown.value
     table["interval"] = [*map(interval_text, shown.low, shown.high)]
     if shown.ratio.notna().any():
@@ -512,31 +451,29 @@ def _scores_table(comparison: Comparison, text: str) -> pd.DataFrame:
         table["interval of the ratio"] = [*map(interval_text, shown.ratio_low, shown.ratio_high)]
     if shown.alone.notna().any():
         table["base alone"] = shown.alone
+    if is_ranked:
+        (best, *_), others = ranks, comparison.from_best(text)
+        less = f"{'ratio' if text in comparison.by_ratio else 'value'} less {best}"
+        table[less] = ["", *map("{:+#.3g}".format, others.value)]
+        table["its interval"] = ["", *map(interval_text, others.low, others.high)]
     return table
 
 
-def _title(comparison: Comparison, measure: Measure) -> str:
-    """The deciding measure, its better direction, and the measures before it that tell no plates apart."""
-    before = [other.label for other in comparison.ranking]
-    before = before[: before.index(measure.label)]
-    tell = "tells" if len(before) == 1 else "tell"
-    undecided = f" ({listed(before)} {tell} no two plates apart)" if before else ""
-    return f"{measure.title}, {measure.better}{_weighed(comparison, measure.text)}{undecided}"
-
-
-def _weighed(comparison: Comparison, text: str) -> str:
-    """By what plates of different weight are ranked, to follow a name; empty where weights are the same."""
-    if not comparison.differ_in_weight:
-        return ""
-    by_ratio = text in comparison.by_ratio
-    return f"; ranked by the ratio to the {comparison.reference}" if by_ratio else "; ranked without regard to weight"
+def _heading(comparison: Comparison, measure: Measure) -> str:
+    """A measure, its better direction, and by what plates of different weight are ranked."""
+    by = ""
+    if comparison.differ_in_weight:
+        by_ratio = measure.text in comparison.by_ratio
+        by = f"; ranked by the ratio to the {comparison.reference}" if by_ratio else "; ranked without regard to weight"
+    return f"{measure.title}, {measure.better}{by}"
 
 
 def _undecided(comparison: Comparison, measure: Measure) -> str:
-    """Pairs that the measure does not tell apart, and other measures in which another plate is best."""
+    """Pairs without a significant difference, and other measures in which another plate is best."""
     pairs = comparison.differences[measure.text]
     alike = [f"{pair.one} and {pair.other}" for pair in rows_of(pairs) if not pair.significant]
-    sentences = [f"not told apart: {'no two of them' if len(alike) == len(pairs) else '; '.join(alike) or 'none'}"]
+    which = "any two" if len(alike) == len(pairs) else "; ".join(alike)
+    sentences = [f"no significant difference between {which}" if alike else "every difference is significant"]
     best = comparison.first(measure.text)
     for other in comparison.ranking:
         first = comparison.first(other.text)
@@ -545,19 +482,66 @@ def _undecided(comparison: Comparison, measure: Measure) -> str:
     return "; ".join(sentences)
 
 
-def _differences_table(comparison: Comparison, measure: Measure) -> pd.DataFrame:
-    """The difference of every pair of plates, with a verdict."""
-    table, than = (
-        comparison.differences[measure.text],
-        "higher than" if measure.higher_is_better is None else "better than",
+def shared_hits(datasets: Mapping[str, xarray.Dataset]) -> dict[str, xarray.Dataset] | None:
+    """The hits that both results have, in memory, the result by finite elements last; None unless there are two results
+    of the same shots, one of them by finite elements. Results are given and returned by their names."""
+    by_elements = [name for name, dataset in datasets.items() if attr.CONTINUUM in dataset.attrs]
+    if len(datasets) != 2 or len(by_elements) != 1:
+        return None
+    (reference,), (name,) = by_elements, {*datasets} - {*by_elements}
+    numbers, places, others = np.intersect1d(
+        hit_numbers(datasets[name]), hit_numbers(datasets[reference]), return_indices=True
     )
-    verdicts = []
-    for pair in rows_of(table):
-        one, other = (pair.one, pair.other)[
-            :: 1 if (pair.value > 0.0) == (measure.higher_is_better is not False) else -1
-        ]
-        verdicts.append(f"{one} {than} {other}" if pair.significant else "cannot be told apart")
-    what = "difference of the ratios" if measure.text in comparison.by_ratio else "difference"
-    intervals = [*map(interval_text, table["low"], table["high"])]
-    columns = {what: table["value"], "interval": intervals, "verdict": verdicts}
-    return pd.DataFrame(columns).set_axis(table["one"] + " less " + table["other"])
+    fast, slow = datasets[name].isel(hit=places).load(), datasets[reference].isel(hit=others).load()
+    shots = (v.HIT_Y, v.HIT_Z, *v.SHOT_VARIABLES)
+    if not len(numbers) or not all(np.allclose(fast[at], slow[at], atol=1e-9) for at in shots if at in fast):
+        return None
+    return {name: fast, reference: slow}
+
+
+def shot_by_shot(shared: Mapping[str, xarray.Dataset]) -> View:
+    """How two results differ, hit by hit: bias, root mean square, correlation of ranks and the worst hits by quantity.
+    The numbers describe these hits and have no intervals. Hits that failed in either result are left out, and counted.
+
+    Where many cores are stopped by one model and pass by the other, a difference of velocities means nothing; a
+    sentence says so in its place.
+    """
+    (name, one), (reference, other) = shared.items()
+    numbers, sound = hit_numbers(one), ~(failed(one) | failed(other))
+    differs = sound & (passed(one) != passed(other))
+    left_out = f"; {int((~sound).sum())} of them failed and count nowhere" if (~sound).any() else ""
+    parts: list[str | pd.DataFrame] = [f"{name} less {reference}, of the {len(numbers)} hits that both have{left_out}"]
+    if differs.any():
+        more = f" and {differs.sum() - MOST_NAMED} more" if differs.sum() > MOST_NAMED else ""
+        named = ", ".join(map(str, numbers[differs][:MOST_NAMED]))
+        parts.append(f"{name} and {reference} end differently at hits {named}{more}")
+    if differs.sum() >= CONTRADICTION * sound.sum() and differs.any():
+        counts = (f"{int(passed(result)[sound].sum())} pass by {label}" for label, result in shared.items())
+        parts.append(
+            f"The models contradict each other here: of {int(sound.sum())} hits, {' and '.join(counts)}. Believe "
+            "neither without a shot. Differences are of the hits that end alike."
+        )
+    standoffs, rows = np.intersect1d(one[v.STANDOFF], other[v.STANDOFF]), {}
+    ours, theirs = (_columns(result, standoffs).set_axis(numbers)[sound & ~differs] for result in (one, other))
+    for label in ours:
+        pair = pd.concat([ours[label], theirs[label]], axis=1, keys=["ours", "theirs"]).dropna()
+        difference = pair.ours - pair.theirs
+        if len(pair):
+            ranked = pair.rank().corr(min_periods=3).loc["ours", "theirs"]
+            worst = difference[difference.abs().nlargest(MOST_WORST).index]
+            rows[label] = {
+                "hits": str(len(difference)),
+                "bias": f"{difference.mean():.3g}",
+                "rms": f"{np.sqrt((difference**2).mean()):.3g}",
+                "rank correlation": "-" if math.isnan(ranked) else f"{ranked:.2f}",
+                "largest differences at hits": ", ".join(f"{hit} ({value:+.3g})" for hit, value in worst.items()),
+            }
+    table = pd.DataFrame.from_dict(rows, orient="index").rename_axis("quantity")
+    return {"shot by shot": [*parts, *([table] if rows else [])]}
+
+
+def _columns(result: xarray.Dataset, standoffs: Any) -> pd.DataFrame:
+    """Quantities of the hits with their units."""
+    columns = {"residual velocity, m/s": result[v.RESIDUAL_VELOCITY], "deflection, °": result[v.DEFLECTION]}
+    columns |= {f"tilt at {1e3 * at:g} mm, °": result[v.TILT].sel(standoff=at) for at in standoffs}
+    return pd.DataFrame({label: column.values.astype(float) for label, column in columns.items()})

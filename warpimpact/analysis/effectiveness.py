@@ -8,16 +8,15 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 import pandas as pd
 import xarray
 
-from warpimpact.analysis.estimates import MeasureData, by_hit_of, estimated, measure_data, measures_named
-from warpimpact.analysis.numbers import View, interval_text, rows_of, text_of
+from warpimpact.analysis.estimates import by_hit_of, estimated, measure_data, measures_named
+from warpimpact.analysis.numbers import View, interval_text, rows_of
 from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
 from warpimpact.results.measures import Measure, estimate_from, sampling_design
@@ -25,6 +24,7 @@ from warpimpact.results.references import reference as reference_of
 from warpimpact.results.references import references_of
 from warpimpact.results.vocabulary import Array
 from warpimpact.statistics.comparisons import Ratio
+from warpimpact.statistics.intervals import Estimate, pseudo_values
 
 
 def _three(quantity: str) -> tuple[str, ...]:
@@ -50,16 +50,31 @@ class Score:
     """A measure of a plate and of its references, in the display unit; NaN where something does not exist.
 
     Attributes:
-        data: the measure with its estimate, and the numbers of the shots behind it.
+        numbers: of the shots, whose mean is the measure; for a quantile pseudo-values (statistics/intervals.py).
+        worst: place of the shot that is a worst point, else -1.
         solid: numbers of the first shots at the solid reference, whose mean is its measure; None where there are none.
         ratio: value of the solid reference, and the ratio of the measure to it.
         alone: value of the base alone.
     """
 
-    data: MeasureData
+    measure: Measure
+    estimate: Estimate
+    numbers: Array
+    worst: int
     solid: Array | None
     ratio: Ratio
     alone: float
+
+    @property
+    def row(self) -> dict[str, float]:
+        """Value, interval and shift, the solid reference with the ratio to it, and the base alone."""
+        estimate, ratio = self.estimate, self.ratio
+        numerics = math.nan if estimate.numerics is None else estimate.numerics
+        return {
+            **{"value": estimate.value, "low": estimate.low, "high": estimate.high, "numerics": numerics},
+            **{"solid": ratio.reference, "ratio": ratio.value, "ratio_low": ratio.low, "ratio_high": ratio.high},
+            "alone": self.alone,
+        }
 
 
 def measures_of(dataset: xarray.Dataset, texts: Sequence[str] = ()) -> list[Measure]:
@@ -86,32 +101,34 @@ def effectiveness(dataset: xarray.Dataset, texts: Sequence[str] = ()) -> pd.Data
     Raises:
         ResultError: a text is no measure, or the result lacks what it needs.
     """
-    rows = []
-    for score in scores(dataset, measures_of(dataset, texts)):
-        estimate, ratio, worst = score.data.estimate, score.ratio, score.data.worst_shot
-        numerics = math.nan if estimate.numerics is None else estimate.numerics
-        hit = -1 if worst is None else int(dataset[v.HIT][worst])
-        rows.append(
-            (score.data.measure, estimate.value, estimate.low, estimate.high, numerics, *ratio, score.alone, hit)
-        )
-    columns = ["measure", "value", "low", "high", "numerics", "solid", "ratio", "ratio_low", "ratio_high", "alone"]
-    table = pd.DataFrame(rows, columns=[*columns, "hit"])
-    return table.set_index(pd.Index([row[0].text for row in rows], name="text"))
+    rows = {
+        score.measure.text: {
+            "measure": score.measure,
+            **score.row,
+            "hit": -1 if score.worst < 0 else int(dataset[v.HIT][score.worst]),
+        }
+        for score in scores(dataset, measures_of(dataset, texts))
+    }
+    return pd.DataFrame(list(rows.values()), index=pd.Index(rows, name="text"))
 
 
 def scores(dataset: xarray.Dataset, measures: Sequence[Measure], confidence: float = 0.95) -> Iterator[Score]:
     """Measures one after the other, with those of the references."""
     reference, base = (reference_of(dataset, name) for name in ("solid", "base_alone"))
-    for data in measure_data(dataset, measures, confidence):
-        measure, solid, alone = data.measure, None, math.nan
+    for measure, estimate, values in measure_data(dataset, measures, confidence):
+        solid, alone, worst = None, math.nan, -1
         if reference is not None and _is_comparable(measure, dataset, reference):
             solid = _reference_numbers(measure, reference)
         if base is not None and measure.kind != "target":
             of_base = _reference_numbers(measure, base)
             alone = float(np.nanmean(of_base)) if np.isfinite(of_base).any() else math.nan
-        numbers = data.values if measure.kind in ("quantile", "worst_point", "target") else data.numbers
-        ratio = Ratio.of(data.estimate, numbers, solid, {**sampling_design(dataset), "confidence": confidence})
-        yield Score(data, solid, ratio, alone)
+        if measure.kind == "worst_point" and not np.isnan(values).all():
+            worst = int(np.nanargmax(measure.worse * values))
+        numbers = measure.averaged(values)
+        ratio = Ratio.of(estimate, numbers, solid, {**sampling_design(dataset), "confidence": confidence})
+        if measure.kind == "quantile":
+            numbers = pseudo_values(values, measure.share)
+        yield Score(measure, estimate, numbers, worst, solid, ratio, alone)
 
 
 def _is_comparable(measure: Measure, dataset: xarray.Dataset, reference: xarray.Dataset) -> bool:
@@ -138,26 +155,15 @@ def effectiveness_view(dataset: xarray.Dataset, texts: Sequence[str] = ()) -> Vi
     """The scores of `effectiveness` as a table, with notes."""
     table = effectiveness(dataset, texts)
     with_solid = table.solid.notna().any()
-    notes = [depth_note(dataset), solid_note(dataset)]
-    if not with_solid and attr.OPEN_AREA in dataset.attrs and attr.LIMIT not in dataset.attrs:
-        notes.append(
-            "There is no solid plate or add-on to compare with. warpimpact run computes it into the file, unless "
-            "output.solid_reference is false."
-        )
+    notes = filter(None, (depth_note(dataset), solid_note(dataset)))
     shown = measures_table(table, reference_name(dataset) if with_solid else None)
-    return {f"effectiveness{plate_text(dataset)}": [shown, *filter(None, notes)]}
-
-
-def effectiveness_text(dataset: xarray.Dataset, texts: Sequence[str] = ()) -> str:
-    """The view of `effectiveness` as text."""
-    return text_of(effectiveness_view(dataset, texts))
+    return {"effectiveness": [shown, *notes]}
 
 
 def measures_table(table: pd.DataFrame, reference: str | None = "solid plate") -> pd.DataFrame:
     """The scores of `effectiveness` to be shown, with the solid reference of this name and the base alone."""
-    shown = pd.DataFrame({"value": table.value}).set_index(
-        pd.Index([one.title for one in table.measure], name="measure")
-    )
+    titles = pd.Index([one.title for one in table.measure], name="measure")
+    shown = pd.DataFrame({"value": table.value.to_numpy()}, titles)
     shown["95 % interval"] = [
         f"at hit {row.hit}" if row.hit >= 0 else interval_text(row.low, row.high, row.numerics)
         for row in rows_of(table)
@@ -208,17 +214,9 @@ def weights_of(dataset: xarray.Dataset) -> dict[str, float]:
     return {"add-on": add_on, "base": whole - add_on, "whole target": whole}
 
 
-def weights_text(weights: Mapping[str, float], digits: str = ".1f") -> str:
+def weights_text(weights: Mapping[str, float]) -> str:
     """Weights as one phrase."""
-    return ", ".join(f"{name} {weight:{digits}} kg/m²" for name, weight in weights.items())
-
-
-def plate_text(dataset: xarray.Dataset) -> str:
-    """Weights and open area, where a result carries them."""
-    if attr.AREAL_DENSITY not in dataset.attrs:
-        return ""
-    weights = weights_text(weights_of(dataset), ".4g").removeprefix("areal density ")
-    return f", {weights}, {dataset.attrs[attr.OPEN_AREA]:.1%} open"
+    return ", ".join(f"{name} {weight:.1f} kg/m²" for name, weight in weights.items())
 
 
 def reference_name(dataset: xarray.Dataset) -> str:
@@ -226,39 +224,31 @@ def reference_name(dataset: xarray.Dataset) -> str:
     return "solid add-on" if attr.ADD_ON_DENSITY in dataset.attrs else "solid plate"
 
 
-def common_name(references: Iterable[str]) -> str:
-    """The name that several references share, or a general one."""
-    names = {*references}
-    return names.pop() if len(names) == 1 else "solid reference"
-
-
 def solid_plate(dataset: xarray.Dataset) -> str:
     """Thickness and material of the solid reference as a phrase; empty where unknown."""
-    attributes, solid = dataset.attrs, references_of(dataset).get("solid")
+    solid = references_of(dataset).get("solid")
     if solid is None or attr.CAMPAIGN not in solid.attrs:
         return ""
     campaign = json.loads(solid.attrs[attr.CAMPAIGN])
     plates = [campaign["plate"], *campaign["layer"]]
-    plates = plates[:-1] or plates  # the last of several layers is the base
-    if attr.CONTINUUM in attributes:
-        materials = json.loads(attributes[attr.CONTINUUM])["materials"]
-        pairs = zip(plates, materials, strict=False)
-        return " and ".join(f"{1e3 * plate['thickness']:.3g} mm of {name} by finite elements" for plate, name in pairs)
-    names = [f"{plate['material']}, " if plate.get("material") else "" for plate in plates]
-    return " and ".join(
-        f"{1e3 * plate['thickness']:.3g} mm of {name}{1e-9 * plate['resistance']:.3g} GPa, {_weakening(plate)}"
-        for plate, name in zip(plates, names, strict=True)
-    )
+    names = json.loads(dataset.attrs.get(attr.CONTINUUM, "{}")).get("materials", [])
+    parts = []
+    for place, plate in enumerate(plates[:-1] or plates):  # the last of several layers is the base
+        name = f"{plate['material']}, " if plate.get("material") else ""
+        law = f"{names[place]} by finite elements" if names else f"{name}{_law(plate)}"
+        parts.append(f"{1e3 * plate['thickness']:.3g} mm of {law}")
+    return " and ".join(parts)
 
 
-def _weakening(material: Mapping[str, Any]) -> str:
-    if not (share := material.get("degradation", 1.0)) < 1.0:
-        return "which does not weaken"
-    if material.get("degradation_distance") is not None:
-        unit = f"{1e3 * material['degradation_distance']:.3g} mm of path"
-    else:
-        unit = f"{1e6 * material['degradation_interval']:.3g} µs of contact"
-    return f"which weakens, through its whole thickness at once, to {share:.3g} in {unit}"
+def _law(plate: Mapping[str, float]) -> str:
+    """Resistance and weakening of a solid plate."""
+    resistance = f"{1e-9 * plate['resistance']:.3g} GPa"
+    if not (share := plate.get("degradation", 1.0)) < 1.0:
+        return f"{resistance}, which does not weaken"
+    within = f"{1e6 * (plate.get('degradation_interval') or 0.0):.3g} µs of contact"
+    if (distance := plate.get("degradation_distance")) is not None:
+        within = f"{1e3 * distance:.3g} mm of path"
+    return f"{resistance}, which weakens, through its whole thickness at once, to {share:.3g} in {within}"
 
 
 def solid_note(dataset: xarray.Dataset) -> str:

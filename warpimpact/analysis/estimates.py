@@ -4,85 +4,90 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 import xarray
 
 from warpimpact.campaign.campaign import Campaign
-from warpimpact.campaign.text import CampaignError
+from warpimpact.campaign.text import as_campaign_error
 from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
-from warpimpact.results.dataset import SLICE, failed, finer_pair
+from warpimpact.results.dataset import SLICE, failed, finer_pair, passed
 from warpimpact.results.files import ResultError
 from warpimpact.results.measures import STATUSES, Measure, estimate_from, sampling_design, shift_of
 from warpimpact.results.vocabulary import Array
 from warpimpact.scene.units import quoted
 from warpimpact.statistics.intervals import Estimate, SamplingDesign, estimate_of
-from warpimpact.statistics.tails import pseudo_values
 
 _LIMITS = tuple(names.value for names in v.LIMITS.values())
 
 
-@dataclass(frozen=True)
-class MeasureData:
-    """A measure with the numbers behind it, in its display unit.
-
-    Attributes:
-        values: values of the shots for the measure, NaN where a shot does not count, shape [hits].
-    """
-
-    measure: Measure
-    estimate: Estimate
-    values: Array
-
-    @property
-    def numbers(self) -> Array:
-        """Numbers of the shots whose mean is the measure; of a quantile, pseudo-values (statistics/tails.py)."""
-        if self.measure.kind == "quantile":
-            return pseudo_values(self.values, self.measure.share)
-        return self.measure.averaged(self.values)
-
-    @property
-    def worst_shot(self) -> int | None:
-        """Index of the shot that is the worst point; None for other measures, and where no shot counts."""
-        known = ~np.isnan(self.values)
-        if self.measure.kind != "worst_point" or not known.any():
-            return None
-        return int(np.argmax(np.where(known, self.measure.worse * self.values, -np.inf)))
-
-
 def measure_data(
     dataset: xarray.Dataset, measures: Sequence[Measure], confidence: float = 0.95
-) -> Iterator[MeasureData]:
-    """Measures one after the other. Of an open file, one slice at a time and one number per hit are in memory."""
+) -> Iterator[tuple[Measure, Estimate, Array]]:
+    """Each measure with its estimate and the values of the shots, in its display unit.
+
+    Values have the shape [hits] and are NaN where a shot does not count. Of an open file, one slice at a time and one
+    number per hit are in memory. A quantile of limits is infinite where it is the largest value tried.
+    """
     needed = (v.STATUS, *v.FINER, *(name for measure in measures for name in measure.quantity.of))
     pair = finer_pair(dataset[[name for name in dict.fromkeys(needed) if name in dataset]])
     options: SamplingDesign = {**sampling_design(dataset), "confidence": confidence}
+    highest = dataset.attrs.get(attr.LIMIT_HIGHEST, math.inf)
     key, by_hit = None, np.empty(0)
     for measure in measures:
         if key != (key := (measure.quantity, measure.standoff)):
             by_hit = by_hit_of(dataset, measure)
         values, factor = measure.counted(by_hit), measure.display.factor
-        estimate = estimate_from(measure, values, **options)
-        estimate = replace(estimate, numerics=shift_of(measure, pair))
-        if measure.has_interval:
-            estimate = estimate.within(measure.least, measure.most)
+        estimate = replace(estimate_from(measure, values, **options), numerics=shift_of(measure, pair))
         if measure.kind == "quantile" and measure.name in _LIMITS:
-            estimate = _beyond(estimate, dataset.attrs.get(attr.LIMIT_HIGHEST, math.inf))
-        yield MeasureData(measure, estimate.times(factor), factor * values)
+            ends = (estimate.value, estimate.low, estimate.high)
+            value, low, high = (math.inf if end >= highest else end for end in ends)
+            estimate = replace(estimate, value=value, low=low, high=high)
+        yield measure, estimate.times(factor), factor * values
 
 
-def _beyond(estimate: Estimate, highest: float) -> Estimate:
-    """A quantile of limits whose end becomes infinite where it is the largest value tried."""
-    value, low, high = (math.inf if end >= highest else end for end in (estimate.value, estimate.low, estimate.high))
-    return replace(estimate, value=value, low=low, high=high)
+def estimated(dataset: xarray.Dataset, measures: Sequence[Measure]) -> dict[Measure, Estimate]:
+    """Measures of a result with their intervals, in their display units."""
+    return {measure: estimate for measure, estimate, _ in measure_data(dataset, measures)}
 
 
 def by_hit_of(dataset: xarray.Dataset, measure: Measure) -> Array:
     """The quantity of every hit, shape [hits]. Of an open file, one slice at a time is in memory."""
     names: list[str] = [name for name in (v.STATUS, *measure.quantity.of) if name in dataset]
     return np.concatenate([measure.by_hit(part) for part in slices(dataset[names])])
+
+
+def slices(dataset: xarray.Dataset) -> Iterator[xarray.Dataset]:
+    """Its hits in slices that are loaded one at a time."""
+    for first in range(0, dataset.sizes["hit"], SLICE):
+        yield dataset.isel(hit=slice(first, first + SLICE)).load()
+
+
+def passed_count(dataset: xarray.Dataset) -> int:
+    """Number of cores that passed."""
+    return sum(int(passed(part).sum()) for part in slices(dataset[[v.STATUS]]))
+
+
+def status_shares(dataset: xarray.Dataset) -> dict[str, Estimate]:
+    """Shares of the shots by status, for the statuses that occur."""
+    parts = [(part[v.STATUS].values, failed(part)) for part in slices(dataset[[v.STATUS]])]
+    status, none = (np.concatenate(columns) for columns in zip(*parts, strict=True))
+    values = {name: np.where(none, np.nan, status == code) for name, code in STATUSES.items()}
+    shares = {name: estimate_of("share", of_name, **sampling_design(dataset)) for name, of_name in values.items()}
+    return {name: share for name, share in shares.items() if share.value > 0.0}
+
+
+def means_of(dataset: xarray.Dataset, variables: Sequence[v.Variable]) -> list[Measure]:
+    """Means of the recorded quantities among some. A quantity with stand-offs has a mean at each of them."""
+    standoffs = dataset[v.STANDOFF].values.tolist()
+    return [
+        Measure.parse(f"mean({variable})" if at is None else f"mean({variable}@{at!r}m)")
+        for variable in variables
+        if variable in dataset
+        for at in (standoffs if v.STANDOFF in variable.dims else [None])
+    ]
 
 
 def measures_named(dataset: xarray.Dataset, texts: Sequence[str], default: Sequence[str]) -> list[Measure]:
@@ -113,47 +118,14 @@ def measures_of_runs(
     """
     measures = []
     for text in texts:
-        try:
+        with as_campaign_error("measure: "):
             measure = Measure.parse(text)
-        except ValueError as error:
-            raise CampaignError(f"measure: {error}") from None
-        if averaged and measure.kind in ("target", "worst_point"):
-            raise CampaignError(f"measure: got {quoted(text)}, but it must be a mean, a quantile or a probability")
-        if measure.is_limit:
-            raise CampaignError(f"measure: got {quoted(text)}, which warpimpact limit computes")
-        for name, campaign in campaigns.items():
-            if keys := campaign.lacking(measure):
-                raise CampaignError(f"measure: {text} needs {keys}{f', which {name} lacks' if name else ''}")
+            if averaged and measure.kind in ("target", "worst_point"):
+                raise ValueError(f"got {quoted(text)}, but it must be a mean, a quantile or a probability")
+            if measure.is_limit:
+                raise ValueError(f"got {quoted(text)}, which warpimpact limit computes")
+            for name, campaign in campaigns.items():
+                if keys := campaign.lacking(measure):
+                    raise ValueError(f"{text} needs {keys}{f', which {name} lacks' if name else ''}")
         measures.append(measure)
     return measures
-
-
-def estimated(dataset: xarray.Dataset, measures: Sequence[Measure]) -> dict[Measure, Estimate]:
-    """Measures of a result with their intervals, in their display units."""
-    return {data.measure: data.estimate for data in measure_data(dataset, measures)}
-
-
-def status_shares(dataset: xarray.Dataset) -> dict[str, Estimate]:
-    """Shares of the shots by status, for the statuses that occur."""
-    parts = [(part[v.STATUS].values, failed(part)) for part in slices(dataset[[v.STATUS]])]
-    status, none = (np.concatenate(columns) for columns in zip(*parts, strict=True))
-    values = {name: np.where(none, np.nan, status == code) for name, code in STATUSES.items()}
-    shares = {name: estimate_of("share", of_name, **sampling_design(dataset)) for name, of_name in values.items()}
-    return {name: share for name, share in shares.items() if share.value > 0.0}
-
-
-def means_of(dataset: xarray.Dataset, variables: Sequence[v.Variable]) -> list[Measure]:
-    """Means of the recorded quantities among some. A quantity with stand-offs has a mean at each of them."""
-    standoffs = dataset[v.STANDOFF].values.tolist()
-    return [
-        Measure.parse(f"mean({variable})" if at is None else f"mean({variable}@{at!r}m)")
-        for variable in variables
-        if variable in dataset
-        for at in (standoffs if v.STANDOFF in variable.dims else [None])
-    ]
-
-
-def slices(dataset: xarray.Dataset) -> Iterator[xarray.Dataset]:
-    """Its hits in slices that are loaded one at a time."""
-    for first in range(0, dataset.sizes["hit"], SLICE):
-        yield dataset.isel(hit=slice(first, first + SLICE)).load()

@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 import json
-from typing import Literal
 
 import numpy as np
 import xarray
 from numpy.typing import NDArray
 from scipy import special
-from scipy.interpolate import LinearNDInterpolator
 from scipy.spatial import KDTree
 
 from warpimpact.results import attributes as attr
@@ -17,22 +15,19 @@ from warpimpact.results import variables as v
 from warpimpact.results.dataset import passed
 from warpimpact.results.vocabulary import place_of_standoff
 from warpimpact.scene.sampling import IDENTITY, SYMMETRIES, Symmetry
+from warpimpact.statistics.intervals import wilson
 
 Array = NDArray[np.float64]
 
-PIXELS = 200
-"""Pixels along the longer side of a map."""
 _FARTHEST = 2.0
 """Largest distance of a place from the nearest hit, in mean hit spacings; farther places have too few hits. With random
 hits, 3e-6 of the places lie farther."""
-_CONTINUED = 4.0
-"""Width of the strip that continues a periodic cell, in mean hit spacings."""
 NEIGHBOURS = 24
 """Number of hits in the fit of a plane. It leaves 21 degrees of freedom for the scatter, and the fit stays local."""
-_BOTH_SIDES = 0.975
-"""Share below the upper end of a 95 % interval."""
 OF_PASSED = {v.RESIDUAL_VELOCITY, v.DEFLECTION}
 """Variables that count only for cores that passed: a core that ricocheted has them in front of the plate."""
+_DIMENSIONS = {("hit",), ("hit", "standoff"), ("hit", "layer")}
+"""Dimensions of variables with one number per hit, once a stand-off and a layer are chosen."""
 
 
 def hit_map(
@@ -41,23 +36,19 @@ def hit_map(
     *,
     standoff: float | None = None,
     layer: int | None = None,
-    method: Literal["nearest", "linear"] = "nearest",
-    pixels: int | None = None,
+    pixels: int = 200,
 ) -> xarray.DataArray:
     """One variable of a result over where the cores hit, on a regular grid of the unit cell.
 
-    A place has no value (NaN) where there are too few hits, or where the nearest hit has none; "linear" needs values of
-    all three hits around. Residual velocity and deflection are those of cores that passed the plate. The cell
-    continues across its edges unless the plate is finite.
+    A place has the value of the nearest hit. It has none (NaN) where there are too few hits. Residual velocity and
+    deflection are those of cores that passed the plate. The cell continues across its edges unless the plate is finite.
 
     Args:
         result: the Dataset of a campaign, or hits chosen from it.
         variable: name of a variable with one number per hit, or one per hit for each stand-off and layer.
         standoff: distance behind the plate, or the layer, [m] for a variable that has one; the largest if None.
         layer: number of the layer for a variable that has layers, 0 the plate; the last one if None.
-        method: "nearest" gives every place the value of the nearest hit. "linear" interpolates between three hits.
-        pixels: places along the longer side, 1 or more. None gives the places of the hits if they were sampled as a
-            grid (with means of hits at the same place), else 200.
+        pixels: places along the longer side, 1 or more.
 
     Returns:
         Map of shape [hit_z, hit_y], with these coordinates [m] and the attributes of the variable.
@@ -65,14 +56,10 @@ def hit_map(
     Raises:
         ValueError: the variable cannot be mapped, the result has no such stand-off, no hits, or hits outside the cell.
     """
-    if method not in ("nearest", "linear"):
-        raise ValueError(f'method: got "{method}", but it must be "nearest" or "linear"')
-    if pixels is not None and pixels < 1:
+    if pixels < 1:
         raise ValueError(f"pixels: got {pixels}, but it must be at least 1")
     result = mirrored(result)
     array = chosen(result, variable, standoff, layer)
-    if variable == v.STATUS and method == "linear":
-        raise ValueError('got "status" with method = "linear", but codes cannot be interpolated; use "nearest"')
     values = array.values.astype(np.float64)
     if variable in OF_PASSED:
         values = np.where(passed(result), values, np.nan)
@@ -81,20 +68,14 @@ def hit_map(
         raise ValueError("the result has no hits")
     if np.any(np.abs(hits) > period / 2 * (1.0 + 1e-9)):
         raise ValueError("the result has hits outside the cell, so a map of the cell cannot show them")
-    if pixels is None and (on_grid := _on_grid(result, hits, values)) is not None:
-        y, z, image = on_grid
-    else:
-        y, z = axes_of(period, pixels or PIXELS)
-        is_periodic = json.loads(result.attrs.get(attr.PLATE, "{}")).get("size") is None
-        places = np.stack(np.meshgrid(y, z), axis=-1)
-        image = _between(hits, values, places, period, wraps=is_periodic, method=method)
+    y, z = axes_of(period, pixels)
+    is_periodic = json.loads(result.attrs.get(attr.PLATE, "{}")).get("size") is None
+    tree = KDTree((hits + period / 2) % period % period, boxsize=period) if is_periodic else KDTree(hits + period / 2)
+    distance, nearest = tree.query(np.stack(np.meshgrid(y, z), axis=-1) + period / 2)
+    image = np.where(distance <= _FARTHEST * np.sqrt(period.prod() / len(hits)), values[nearest], np.nan)
     coordinates = {name: (name, along, name.attributes) for name, along in ((v.HIT_Z, z), (v.HIT_Y, y))}
     known = {name: array[name] for name in (v.STANDOFF,) if name in array.coords}
     return xarray.DataArray(image, coordinates | known, (v.HIT_Z, v.HIT_Y), str(variable), array.attrs)
-
-
-_DIMENSIONS = {("hit",), ("hit", "standoff"), ("hit", "layer")}
-"""Dimensions of variables with one number per hit, once a stand-off and a layer are chosen."""
 
 
 def chosen(
@@ -108,7 +89,8 @@ def chosen(
     """
     array = dataset.get(variable)
     if array is None or array.dims not in _DIMENSIONS or variable in (v.HIT, v.HIT_Y, v.HIT_Z):
-        raise ValueError(f'"{variable}" cannot be mapped; choose one of {", ".join(mappable(dataset))}')
+        known = [str(name) for name, one in dataset.data_vars.items() if one.dims in _DIMENSIONS]
+        raise ValueError(f'"{variable}" cannot be mapped; choose one of {", ".join(known)}')
     if "layer" in array.dims:
         layers = array.sizes["layer"]
         if layer is not None and not 0 <= layer < layers:
@@ -117,11 +99,6 @@ def chosen(
     if v.STANDOFF in array.dims:
         array = array.isel(standoff=-1 if standoff is None else place_of_standoff(dataset[v.STANDOFF].values, standoff))
     return array
-
-
-def mappable(dataset: xarray.Dataset) -> list[str]:
-    """Names of the variables with one number per hit, per stand-off and per layer."""
-    return [str(name) for name, array in dataset.data_vars.items() if array.dims in _DIMENSIONS]
 
 
 def symmetries_of(dataset: xarray.Dataset) -> list[Symmetry]:
@@ -160,35 +137,6 @@ def axes_of(period: Array, count: int) -> tuple[Array, Array]:
     return y, z
 
 
-def _on_grid(result: xarray.Dataset, hits: Array, values: Array) -> tuple[Array, Array, Array] | None:
-    """Places along y and z and the values there, if the hits were sampled as a grid and are all of its places."""
-    if result.attrs.get(attr.SAMPLING) != "grid":
-        return None
-    (y, at_y), (z, at_z) = (np.unique(column, return_inverse=True) for column in hits.T)
-    place = at_z * len(y) + at_y
-    count = np.bincount(place, minlength=len(y) * len(z))
-    if not count.all():
-        return None
-    return y, z, (np.bincount(place, values, minlength=len(count)) / count).reshape(len(z), len(y))
-
-
-def _between(hits: Array, values: Array, places: Array, period: Array, *, wraps: bool, method: str) -> Array:
-    """Values at places, shape [z, y, 2], from those of the hits."""
-    spacing = float(np.sqrt(period.prod() / len(hits)))
-    if wraps:  # with the hits of the neighbouring cells that lie near this one
-        shifts = [np.array([i, j]) for i in (0, -1, 1) for j in (0, -1, 1)]
-        moved = np.concatenate([hits + shift * period for shift in shifts])
-        inside = np.all(np.abs(moved) <= period / 2 + _CONTINUED * spacing, axis=1)
-        hits, values = moved[inside], np.tile(values, len(shifts))[inside]
-    distance, nearest = KDTree(hits).query(places)
-    image = values[nearest]
-    if method == "linear":
-        if len(hits) < 3:
-            raise ValueError(f"the result has {len(hits)} hits, but a linear map needs three")
-        image = LinearNDInterpolator(hits, values)(places)
-    return np.where(distance <= _FARTHEST * spacing, image, np.nan)
-
-
 def plane_fit(offsets: Array, values: Array) -> tuple[Array, Array]:
     """Value at points by least squares, and half the width of its 95 % interval, each of shape [points]: a plane
     through the values of the hits near each point (local linear regression, Cleveland and Devlin 1988, equal weights).
@@ -208,7 +156,7 @@ def plane_fit(offsets: Array, values: Array) -> tuple[Array, Array]:
     residual = values - np.einsum("phc,pc->ph", design, plane)
     freedom = values.shape[1] - design.shape[2]
     error = np.sqrt(np.sum(residual**2, axis=1) / freedom * np.sum(inverse[:, 0] ** 2, axis=1))
-    return plane[:, 0], float(special.stdtrit(freedom, _BOTH_SIDES)) * error
+    return plane[:, 0], float(special.stdtrit(freedom, 0.975)) * error
 
 
 def share_of(hits: Array) -> tuple[Array, Array]:
@@ -217,7 +165,5 @@ def share_of(hits: Array) -> tuple[Array, Array]:
     Args:
         hits: zeros and ones, shape [points, hits]; the results have the shape [points].
     """
-    count, share = hits.shape[1], hits.mean(axis=1)
-    z = float(special.ndtri(_BOTH_SIDES))
-    half_width = z * np.sqrt(share * (1.0 - share) / count + z**2 / (4.0 * count**2)) / (1.0 + z**2 / count)
-    return share, half_width
+    low, high = wilson(hits.sum(axis=1), hits.shape[1], 0.95)
+    return hits.mean(axis=1), 0.5 * (high - low)

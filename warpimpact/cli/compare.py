@@ -7,10 +7,9 @@ from pathlib import Path
 
 from xarray import Dataset
 
-from warpimpact.analysis.comparison import Comparison, compare, comparison_view, short_view
+from warpimpact.analysis.comparison import Comparison, compare, comparison_view, shared_hits, short_view, shot_by_shot
 from warpimpact.analysis.inspection import range_note
 from warpimpact.analysis.numbers import rows_of, text_of
-from warpimpact.analysis.shot_by_shot import shared_hits, shot_by_shot
 from warpimpact.campaign.campaign import read_plates
 from warpimpact.campaign.text import CampaignError
 from warpimpact.plotting import comparison_figure, variable_maps, weight_figure

@@ -7,8 +7,8 @@ from pathlib import Path
 
 from matplotlib.figure import Figure
 
-from warpimpact.analysis.effectiveness import effectiveness_text, plate_numbers
-from warpimpact.analysis.inspection import inspect_text
+from warpimpact.analysis.effectiveness import effectiveness_view, plate_numbers
+from warpimpact.analysis.inspection import inspect_view
 from warpimpact.analysis.numbers import text_of
 from warpimpact.analysis.paper import check_scene, closest_table, paper_campaign, validation_table
 from warpimpact.campaign.campaign import Campaign
@@ -37,7 +37,8 @@ def inspect_command(arguments: argparse.Namespace) -> None:
         if arguments.campaign:
             print(dataset.attrs[attr.CAMPAIGN])
         else:
-            print(effectiveness_text(dataset, arguments.measure) if arguments.measure else inspect_text(dataset))
+            texts = arguments.measure
+            print(text_of(effectiveness_view(dataset, texts) if texts else inspect_view(dataset)))
 
 
 def plot_command(arguments: argparse.Namespace) -> None:

@@ -16,7 +16,7 @@ from warpimpact.results.kinds import TEST
 from warpimpact.scene.input_files import InputFile
 from warpimpact.scene.model import Array, Model, sentence
 from warpimpact.scene.units import Number, PositiveSpeed, Speed, Title, Whole
-from warpimpact.statistics.acceptance import fewest_shots
+from warpimpact.statistics.quantal import fewest_shots
 
 Share = Annotated[Number, Field(gt=0, lt=1)]
 Count = Annotated[Whole, Field(ge=2, le=1000)]

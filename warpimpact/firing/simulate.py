@@ -31,9 +31,8 @@ from warpimpact.results.kinds import FIRING
 from warpimpact.results.measures import sampling_design
 from warpimpact.scene.model import Array
 from warpimpact.scene.sampling import stream
-from warpimpact.statistics.acceptance import acceptance, shown_stop_probability
 from warpimpact.statistics.intervals import Estimate, estimate_of
-from warpimpact.statistics.quantal import fit_quantal, likelihood_interval
+from warpimpact.statistics.quantal import acceptance, fit_quantal, likelihood_interval, shown_stop_probability
 from warpimpact.studies.limit import limit_to_file
 
 QUANTILES = (0.5, 0.05, 0.01)

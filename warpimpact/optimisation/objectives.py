@@ -23,8 +23,7 @@ from warpimpact.scene.model import Array
 from warpimpact.scene.pattern import LatticePattern
 from warpimpact.solver.limit import check_arrests
 from warpimpact.statistics.comparisons import ROUNDED
-from warpimpact.statistics.intervals import estimate_of
-from warpimpact.statistics.tails import pseudo_values
+from warpimpact.statistics.intervals import estimate_of, pseudo_values
 
 INVALID = "a campaign that is valid"
 SCRAMBLINGS = 16
@@ -50,7 +49,7 @@ def goal_numbers(
     if measure.kind == "target":
         return np.array([weights[measure.name]]), ""
     numbers = columns[:, design.columns.index(measure.column)]
-    if measure.kind == "quantile":  # of Harrell and Davis, a smooth function of the hits (statistics/tails.py)
+    if measure.kind == "quantile":  # of Harrell and Davis, a smooth function of the hits (statistics/intervals.py)
         numbers = np.array([pseudo_values(of_hits, measure.share) for of_hits in numbers])
     elif not measure.is_binary:
         numbers = np.array([measure.averaged(measure.counted(of_hits)) for of_hits in numbers])

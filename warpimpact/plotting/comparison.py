@@ -12,7 +12,7 @@ from matplotlib.axes import Axes
 from matplotlib.layout_engine import ConstrainedLayoutEngine
 from pandas import DataFrame, Series
 
-from warpimpact.analysis.comparison import Comparison, hits_used
+from warpimpact.analysis.comparison import Comparison
 from warpimpact.analysis.effectiveness import PIERCED
 from warpimpact.plotting.style import BLUE, GREY, VERMILION, Figure, bars, finish, hide_sides, in_style
 from warpimpact.results.measures import Measure
@@ -65,7 +65,7 @@ def comparison_figure(comparison: Comparison, *, every: bool = False) -> Figure:
         _draw_differences(right, comparison, alike[0], tables)
     title = "Plates compared" if decides is None or every else f"Plates by {decides.label}"
     together = f"intervals hold together at {comparison.confidence:.0%}; hollow marker: cannot be told apart"
-    finish(figure, together, *hits_used(comparison), title=title, legend=True, columns=4)
+    finish(figure, together, *comparison.hits_used, title=title, legend=True, columns=4)
     return figure
 
 

@@ -35,9 +35,15 @@ from warpimpact.results.vocabulary import (
 )
 from warpimpact.scene import units
 from warpimpact.scene.units import STORED, Unit, quantity, quoted
-from warpimpact.statistics.intervals import Estimate, RunningSums, SamplingDesign, estimate_of
-from warpimpact.statistics.shifts import shift_of_mean, shift_of_quantile, shift_of_share, shift_of_yes
-from warpimpact.statistics.tails import has_interval, worst_tenth
+from warpimpact.statistics.comparisons import shift_of_mean, shift_of_quantile, shift_of_share, shift_of_yes
+from warpimpact.statistics.intervals import (
+    Estimate,
+    RunningSums,
+    SamplingDesign,
+    estimate_of,
+    has_interval,
+    worst_tenth,
+)
 
 _KINDS: dict[str, Any] = {
     quantity(kind).display.stored: kind

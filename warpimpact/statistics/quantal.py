@@ -4,6 +4,9 @@ A test has levels x and answers y. P(y = 1 | x) = Φ((x − location) / scale). 
 location/scale and 1/scale. It has a maximum at a finite slope if the answers overlap: one 0 at a higher level than one
 1 (M. J. Silvapulle, Journal of the Royal Statistical Society B 43 (1981) 310). Newton's method finds it. Tests are rows
 of all arrays; `used` marks the levels that count.
+
+Acceptance by attributes: n shots of which at most k may perforate (exact binomial distribution). The plans of fewest
+shots are those of C. J. Clopper and E. S. Pearson, Biometrika 26 (1934) 404.
 """
 
 from __future__ import annotations
@@ -18,8 +21,6 @@ from scipy import optimize, special
 from warpimpact.statistics.intervals import Array
 
 Flags = NDArray[np.bool_]
-
-_LN_2_PI = math.log(2.0 * math.pi)
 
 
 @dataclass(frozen=True)
@@ -110,7 +111,7 @@ def _terms(t: Array, used: Flags) -> tuple[Array, Array, Array]:
     """ln F(t), its derivative and minus its second derivative; 0 where `used` is false."""
     t = np.clip(np.where(used, t, 0.0), -1e7, 1e7)
     value = special.log_ndtr(t)
-    rate = np.exp(-0.5 * (t * t + _LN_2_PI) - value)
+    rate = np.exp(-0.5 * (t * t + math.log(2.0 * math.pi)) - value)
     curve = rate * (rate + t)
     return np.where(used, value, 0.0), np.where(used, rate, 0.0), np.where(used, np.maximum(curve, 0.0), 0.0)
 
@@ -200,3 +201,34 @@ def scale_interval(levels: Array, answers: Flags, fit: QuantalFit, *, confidence
     low = reach * math.exp(optimize.brentq(above_floor, narrow, middle)) if fit.overlap[0] else 0.0
     high = math.inf if above_floor(wide) > 0.0 else reach * math.exp(optimize.brentq(above_floor, middle, wide))
     return low, high
+
+
+_LONGEST_PROOF = 100_000
+
+
+def acceptance(shots: int, allowed: int, perforation: Array | float) -> Array:
+    """Probability that at most `allowed` of `shots` independent shots perforate, each with probability `perforation`.
+
+    Where all shots of a test hit one random place, the probability of acceptance is the mean of this over the places.
+    """
+    return np.asarray(special.bdtr(float(allowed), shots, np.asarray(perforation, dtype=float)))
+
+
+def fewest_shots(allowed: int, stop_probability: float, confidence: float) -> int:
+    """Fewest shots that show P(stop) ≥ `stop_probability` at this confidence if at most `allowed` perforate.
+
+    Raises:
+        ValueError: more than 100 000 shots are needed.
+    """
+    counts = np.arange(allowed + 1, _LONGEST_PROOF)
+    enough = special.bdtr(float(allowed), counts, 1.0 - stop_probability) <= 1.0 - confidence
+    if not enough.any():
+        raise ValueError(f"got P(stop) >= {stop_probability:g}, which needs more than {_LONGEST_PROOF} shots")
+    return int(counts[enough.argmax()])
+
+
+def shown_stop_probability(shots: int, perforations: int, confidence: float) -> float:
+    """Largest lower bound of P(stop) at this confidence after this number of perforations."""
+    if perforations >= shots:
+        return 0.0
+    return 1.0 - float(special.betaincinv(perforations + 1.0, shots - perforations, confidence))

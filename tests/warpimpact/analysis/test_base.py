@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 import xarray
 
-from warpimpact.analysis.comparison import best_plates, compare, comparison_view
-from warpimpact.analysis.effectiveness import effectiveness, effectiveness_text
+from warpimpact.analysis.comparison import compare, comparison_view
+from warpimpact.analysis.effectiveness import effectiveness, effectiveness_view
 from warpimpact.analysis.inspection import summary_text
 from warpimpact.analysis.numbers import text_of
 from warpimpact.campaign.campaign import Campaign
@@ -108,10 +108,10 @@ def test_what_counts_in_the_base(mixed) -> None:
         pytest.approx(10.0),
         "mm",
     )
-    text = effectiveness_text(mixed)
+    text = text_of(effectiveness_view(mixed))
     assert text.index("P(base perforated)") < text.index("residual energy fraction")
     assert "40.0% of the cores pierce the base" in text
-    assert re.search(r"depth in the base, mm +5\.20", summary_text(mixed))
+    assert re.search(r"depth in the base, mean \[mm\] +5\.20", summary_text(mixed))
 
 
 def test_the_thickness_of_the_base_is_that_of_the_shot(mixed) -> None:
@@ -132,13 +132,12 @@ def test_targets_are_ranked_by_the_depth_in_bases_that_hold(make_plate_result) -
     result = make_plate_result(np.zeros(400), 0.0, Status.ARRESTED)
     good, bad = layered(result, held, depth), layered(result, held, depth + 1e-3)
     comparison = compare([bad, good], ["bad", "good"])
-    assert best_plates(comparison)["depth in the base, mean"] == "good"
     assert comparison.ranks("mean(base_depth)") == {"good": (1, 1), "bad": (2, 2)}
     # A thinner base that is pierced would win by its bound alone.
     thin = layered(result, held, depth + 1e-3, base=3e-3)
     comparison = compare([thin, good], ["thin", "good"])
-    assert best_plates(comparison)["depth in the base, mean"] == "not ranked"
-    assert best_plates(comparison)["P(base pierced)"] == "good"
+    assert not comparison.is_ranked("mean(base_depth)")
+    assert comparison.first("P(base_pierced)") == ["good"]
     assert "depths are not ranked" in text_of(comparison_view(comparison))
     assert "not ranked" in {axes.get_title(loc="left") for axes in comparison_figure(comparison, every=True).axes}
 
@@ -170,10 +169,10 @@ def test_targets_are_ranked_by_the_weight_that_they_need(make_plate_result) -> N
     assert measures["H50"].value == pytest.approx(1e3 * np.median(expected))
     needed = measures["quantile(limit_areal_density, 0.5)"]
     assert needed.value == pytest.approx(20.0 + 8000.0 * np.median(expected))
-    assert "solid plate" not in effectiveness_text(front)
+    assert "solid plate" not in text_of(effectiveness_view(front))
     comparison = compare([front, base.assign_attrs(areal_density=99.0)], ["with a plate", "base alone"])
-    assert best_plates(comparison)["limit thickness of layer 1, 50 % quantile"] == "with a plate"
-    assert best_plates(comparison)["areal density needed, 50 % quantile"] == "base alone"
+    assert comparison.first("H50") == ["with a plate"]
+    assert comparison.first("quantile(limit_areal_density, 0.5)") == ["base alone"]
     assert not comparison.differ_in_weight
     with pytest.raises(ResultError, match="limit"):
         compare([front, result], ["limits", "run"])
@@ -214,10 +213,13 @@ def test_what_the_solid_plate_is_stands_next_to_the_ratios(quarter) -> None:
 
     plate, by_time = "The solid plate is 3 mm of 2.6 GPa, which ", of(degradation=0.8, degradation_interval=1e-6)
     whole, never = "weakens, through its whole thickness at once, to 0.8 in 1", "it stops no core, however slow"
-    for text in (effectiveness_text(by_time), text_of(comparison_view(compare([by_time, by_time], ["a", "b"])))):
+    for text in (
+        text_of(effectiveness_view(by_time)),
+        text_of(comparison_view(compare([by_time, by_time], ["a", "b"]))),
+    ):
         assert plate + whole in text
         assert never in text
-    assert f"{plate}does not weaken" in effectiveness_text(of(degradation=1.0))
+    assert f"{plate}does not weaken" in text_of(effectiveness_view(of(degradation=1.0)))
 
 
 def test_limits_stand_over_the_weight_that_the_target_needs(make_plate_result) -> None:

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 import xarray
 
-from warpimpact.analysis.effectiveness import effectiveness, effectiveness_text
-from warpimpact.analysis.inspection import inspect_text
+from warpimpact.analysis.effectiveness import effectiveness, effectiveness_view
+from warpimpact.analysis.numbers import text_of
 from warpimpact.kernels.status import Status
 from warpimpact.results.files import ResultError
 
@@ -77,7 +77,7 @@ def test_numbers_without_a_valid_interval_have_none(make_plate_result) -> None:
 def test_failed_computations_alone_tell_nothing(make_plate_result) -> None:
     failed = make_plate_result(np.full(3, np.nan), status=Status.UNFINISHED)
     assert all(math.isnan(measure.value) and measure.hit < 0 for measure in named(failed).values())
-    assert "nan" not in effectiveness_text(failed)
+    assert "nan" not in text_of(effectiveness_view(failed))
 
 
 @pytest.mark.parametrize("count", [400, 1600])
@@ -109,13 +109,10 @@ def test_what_a_result_lacks_is_refused(mixed, text: str, sentence: str) -> None
 
 
 def test_the_table_says_what_a_result_carries(mixed, make_result) -> None:
-    by_hand = make_result(8)
-    text = inspect_text(by_hand)
+    text = text_of(effectiveness_view(make_result(8)))
     assert "residual energy fraction, mean" in text
     assert "solid plate" not in text  # no reference
     assert "proxy" not in text  # no core
-    message = effectiveness_text(with_solid(mixed, np.array([800.0])).assign_attrs(open_area=0.25, areal_density=23.55))
-    title, _, first, *_ = message.splitlines()
-    assert title == "effectiveness, 23.55 kg/m², 25.0% open"
+    _, _, first, *_ = text_of(effectiveness_view(with_solid(mixed, np.array([800.0])))).splitlines()
     assert first.split()[:5] == ["residual", "energy", "fraction,", "mean", "0.4000"]
     assert first.split()[-5:] == ["0.6400", "0.6250", "0.000", "to", "1.459"]

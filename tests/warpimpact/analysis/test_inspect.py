@@ -1,20 +1,38 @@
-"""What warpimpact inspect tells, and failures as data: inputs, a named status, a list, exit code 3."""
+"""What run and inspect print: numbers by hand, the accuracy, and failures as data: inputs, a list, exit code 3."""
 
+import sys
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from warpimpact import Campaign, run
-from warpimpact.analysis.inspection import failed_shots, inspect_text
+from warpimpact.analysis.estimates import estimated
+from warpimpact.analysis.inspection import failed_shots, inspect_view, summary_text
+from warpimpact.analysis.numbers import text_of
 from warpimpact.cli import main
 from warpimpact.kernels.status import Status
 from warpimpact.plotting import save_maps
 from warpimpact.results import files
+from warpimpact.results.dataset import passed
+from warpimpact.results.measures import Measure
 from warpimpact.runs.run import run_to_file
 
 SLOTTED_PLATE = (Path(__file__).parents[3] / "campaigns" / "slotted_plate.toml").read_text(encoding="utf-8")
 DRAFT = SLOTTED_PLATE.replace('"standard"', '"draft"').replace("count = 4096", "count = 512")
+
+
+MIXED = [Status.PERFORATED, Status.ARRESTED, Status.RICOCHETED, Status.UNTOUCHED, Status.UNFINISHED]
+
+
+@pytest.fixture
+def mixed(make_result):
+    dataset = make_result(MIXED)
+    dataset["residual_velocity"][:] = [700.0, 0.0, 300.0, 800.0, np.nan]
+    dataset["deflection"][:] = [3.0, np.nan, 120.0, 1.0, np.nan]
+    dataset["tilt"][:] = [[10.0, 40.0], [np.nan] * 2, [np.nan] * 2, [0.0, np.nan], [np.nan] * 2]
+    return dataset
 
 
 @pytest.fixture(scope="module")
@@ -37,9 +55,9 @@ def test_it_tells_origin_and_numbers_with_intervals(result: Path, capsys: pytest
     velocity = files.read(result)["residual_velocity"].values
     means = np.array([velocity[replicate::8].mean() for replicate in range(8)])
     half = 2.364624 * means.std(ddof=1) / np.sqrt(8)  # t of 7 degrees of freedom, 97.5 %
-    row = next(line for line in lines if line[:3] == ["residual", "velocity,", "m/s"])
-    assert row[3] == f"{means.mean():.2f}"
-    assert (row[4], row[6]) == (f"{means.mean() - half:.2f}", f"{means.mean() + half:.2f},")
+    row = next(line for line in lines if line[:4] == ["residual", "velocity,", "mean", "[m/s]"])
+    assert row[4] == f"{means.mean():.2f}"
+    assert (row[5], row[7]) == (f"{means.mean() - half:.2f}", f"{means.mean() + half:.2f},")
     assert lines[-1] == ["0", "of", "512", "shots", "failed"]
 
 
@@ -50,9 +68,9 @@ def test_it_gives_the_campaign_back(result: Path, capsys: pytest.CaptureFixture[
 
 def test_slices_change_nothing(result: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     dataset = files.read(result)
-    whole = inspect_text(dataset)
+    whole = text_of(inspect_view(dataset))
     monkeypatch.setattr("warpimpact.analysis.estimates.SLICE", 100)
-    assert inspect_text(dataset) == whole
+    assert text_of(inspect_view(dataset)) == whole
 
 
 def test_failed_shots_are_listed_with_their_inputs_and_count_in_no_number(make_result, monkeypatch) -> None:
@@ -65,7 +83,7 @@ def test_failed_shots_are_listed_with_their_inputs_and_count_in_no_number(make_r
     assert table["status"].to_dict() == {1: "unfinished", 4: "not_finite"}
     assert table.loc[4].tolist()[1:4] == [dataset["hit_y"][4], dataset["hit_z"][4], 825.0]
     assert sentence == "2 of 6 shots failed"
-    row = next(line for line in inspect_text(dataset).splitlines() if line.startswith("perforated"))
+    row = next(line for line in text_of(inspect_view(dataset)).splitlines() if line.startswith("perforated"))
     assert row.split()[1] == "100.00%"
 
 
@@ -90,7 +108,7 @@ def test_a_run_goes_on_and_ends_with_3_when_too_many_failed(
 
 
 def test_the_accuracy_is_reported(result: Path) -> None:
-    lines = inspect_text(files.read(result)).splitlines()
+    lines = text_of(inspect_view(files.read(result))).splitlines()
     (accuracy,) = (line for line in lines if line.startswith("accuracy"))
     assert "draft keeps its promise (5 m/s and 5 deg for 90 % of the hits); estimated errors: " in accuracy
 
@@ -101,7 +119,51 @@ def test_a_run_without_standoffs_is_reported_and_drawn(tmp_path: Path) -> None:
     dataset = run(campaign, device="cpu")
     assert dataset.sizes["standoff"] == 0
     files.write(dataset, tmp_path / "a.nc")
-    message = inspect_text(files.read(tmp_path / "a.nc"))
+    message = text_of(inspect_view(files.read(tmp_path / "a.nc")))
     assert "deflection" in message
     assert "tilt" not in message
     assert all(path.is_file() for path in save_maps(dataset, tmp_path, "a"))
+
+
+def test_a_failed_shot_is_no_broken_core(mixed) -> None:
+    assert ", broken 2 (40.0%)\n" in summary_text(mixed.assign(broken=("hit", [1.0, 0.0, 1.0, 0.0, np.nan])))
+    assert "broken" not in summary_text(mixed)
+
+
+@pytest.mark.parametrize(
+    ("measure", "expected"),
+    [
+        ("mean(residual_velocity)", (2, 750.0, 50.0)),
+        ("mean(deflection)", (2, 2.0, 1.0)),
+        ("mean(tilt@50mm)", (2, 5.0, 5.0)),
+        ("mean(tilt@130mm)", (1, 40.0, 0.0)),
+    ],
+)
+def test_means_count_only_what_passed_the_plate_and_exists(mixed, measure, expected) -> None:
+    assert passed(mixed).tolist() == [True, False, False, True, False]
+    (actual,) = estimated(mixed, [Measure.parse(measure).of(mixed)]).values()
+    assert (actual.count, actual.value, actual.spread) == expected
+
+
+def test_text_states_the_numbers_with_their_units(mixed) -> None:
+    text = summary_text(mixed)
+    for status in ("perforated", "arrested", "ricocheted", "untouched", "unfinished"):
+        assert f"{status} 1 (20.0%)" in text
+    lines = [line.split() for line in text.splitlines()]
+    assert ["residual", "velocity,", "mean", "[m/s]", "750.00", "not", "determined", "50.00"] in lines  # of two cores
+    assert "left window" not in text
+
+
+def test_a_plate_that_stops_everything_has_no_residual_velocity(make_result) -> None:
+    dataset = make_result([Status.ARRESTED] * 3)
+    assert "No core passed." in summary_text(dataset)
+    assert "nan" not in summary_text(dataset)
+
+
+@pytest.mark.parametrize(("shell", "shown"), [("ZMQInteractiveShell", True), ("TerminalInteractiveShell", False)])
+def test_a_run_has_a_bar_in_a_notebook(
+    shell: str, shown: bool, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setitem(sys.modules, "IPython", SimpleNamespace(get_ipython=type(shell, (), {})))
+    run(Campaign.from_text(DRAFT, name="a", folder=Path(), count=16), device="cpu")
+    assert ("16/16" in capsys.readouterr().err) == shown

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 import xarray
 
+from warpimpact.analysis.comparison import shared_hits, shot_by_shot
 from warpimpact.analysis.numbers import text_of
-from warpimpact.analysis.shot_by_shot import shared_hits, shot_by_shot
 from warpimpact.kernels.status import Status
 from warpimpact.results import attributes as attr
 

@@ -7,7 +7,8 @@ import pytest
 import xarray
 
 from warpimpact import Campaign, hit_map, run
-from warpimpact.analysis.inspection import inspect_text
+from warpimpact.analysis.inspection import inspect_view
+from warpimpact.analysis.numbers import text_of
 from warpimpact.plotting import trajectory
 from warpimpact.plotting.cell import shown
 from warpimpact.plotting.maps import layers_figure
@@ -71,7 +72,7 @@ def test_the_figure_of_layers_has_a_row_for_each(result: xarray.Dataset) -> None
 
 def test_figures_say_what_lies_behind(result: xarray.Dataset) -> None:
     weight = result.attrs["areal_density"]
-    assert f"whole target {weight:.1f} kg/m²" in inspect_text(result)
+    assert f"whole target {weight:.1f} kg/m²" in text_of(inspect_view(result))
     assert f"whole target {weight:.1f} kg/m²" in result_content("a", result)["scene"]
     assert shown(result, "tilt").title.startswith("tilt, 50 mm behind the target")
     assert "on impact and behind the target" in trajectory.flight(replay(result, 3, snapshots=0)).get_suptitle()

@@ -117,7 +117,9 @@ def test_measures_say_what_the_numerics_may_shift_them_by_and_a_finer_level_agre
     assert summary_text(truth).count("numerics ±") == 1
     assert "numerics ± is not known: numerics.level is given, so no hits" in summary_text(truth)
     assert "numerics ± is not known: none of these hits" in summary_text(message.isel(hit=slice(900, None)))
-    assert any("numerics ± is not known of b: " in note for note in compare([message, truth], ["a", "b"]).notes)
+    assert any(
+        "numerics ± is not known of b: " in note for note in compare([message, truth], ["a", "b"]).cautions.values()
+    )
 
 
 def test_a_stop_rule_counts_the_shift_by_the_numerics() -> None:

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from warpimpact.statistics.acceptance import acceptance, fewest_shots, shown_stop_probability
+from warpimpact.statistics.quantal import acceptance, fewest_shots, shown_stop_probability
 
 
 @pytest.mark.parametrize(("allowed", "shots"), [(0, 22), (1, 38), (2, 52), (3, 65)])

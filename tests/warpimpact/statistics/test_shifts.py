@@ -5,7 +5,13 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from warpimpact.statistics.shifts import SHIFT_MARGIN, shift_of_mean, shift_of_quantile, shift_of_share, shift_of_yes
+from warpimpact.statistics.comparisons import (
+    SHIFT_MARGIN,
+    shift_of_mean,
+    shift_of_quantile,
+    shift_of_share,
+    shift_of_yes,
+)
 
 Array = np.ndarray
 TRIALS, SHOTS = 400, 64

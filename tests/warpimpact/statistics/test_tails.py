@@ -8,8 +8,7 @@ import pytest
 from scipy.stats.mstats import hdquantiles
 from scipy.stats.qmc import Sobol
 
-from warpimpact.statistics.intervals import estimate_of
-from warpimpact.statistics.tails import FEWEST_SHOTS, pseudo_values, worst_tenth
+from warpimpact.statistics.intervals import FEWEST_SHOTS, estimate_of, pseudo_values, worst_tenth
 
 TRIALS = 100
 LEAST = 88  # 95 % of 100 trials: 95 ± 2.2, three standard deviations below
