@@ -8,6 +8,7 @@ import argparse
 import os
 import signal
 import sys
+import traceback
 from collections.abc import Sequence
 from contextlib import redirect_stderr, redirect_stdout, suppress
 from typing import NoReturn
@@ -15,7 +16,7 @@ from typing import NoReturn
 from warpimpact import __version__
 
 from .commands import DAILY, EXPERT
-from .messages import Plain, bug_report, message_of, say, show_log, show_warnings
+from .messages import Plain, message_of, say, show_log, show_warnings
 
 _EXAMPLE = """\
 warpimpact COMMAND --help explains a command. An example:
@@ -47,7 +48,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     than the campaign allows, 70 after a bug of warpimpact, 130 when interrupted, 141 when the reader of its output has
     closed it.
 
-    All errors end here, each in one sentence, never in a traceback.
+    All errors end here, each in one sentence; only a bug has a traceback.
     """
     with redirect_stderr(Plain(sys.stderr)):  # argparse quotes what the user typed
         arguments = parser().parse_args(argv)
@@ -66,7 +67,8 @@ def main(argv: Sequence[str] | None = None) -> int:
         if sentence := message_of(error):
             say(f"error: {sentence}")
             return 2
-        say(f"error: this is a bug, please report it: {bug_report(error)}")
+        traceback.print_exc(file=Plain(sys.stderr))
+        say(f"error: this is a bug of warpimpact {__version__}, please report it with the lines above")
         return 70
     return code
 

@@ -17,42 +17,31 @@ from warpimpact.results import files
 from warpimpact.results import variables as v
 from warpimpact.results.files import ResultError
 from warpimpact.results.references import as_plates
-from warpimpact.runs.computer import computer
 from warpimpact.runs.run import run_to_file
 from warpimpact.studies.sensitivity import plate_sensitivity, reversals
 
+from .common import PICTURES, check_folder, check_output, computer_of, failure_code, named
 from .messages import warn
-from .paths import PICTURES, check_folder, check_output, named
-from .progress import Step, show_progress, show_run
-from .run import failure_code
+from .progress import show_progress, show_run
 
 
 def compare_command(arguments: argparse.Namespace) -> int:
-    is_campaign = arguments.files[0].suffix == ".toml"
-    default = arguments.files[0].stem if is_campaign else "comparison"
-    figure = arguments.output or Path(f"{default}.png")
-    # The figure of a campaign belongs to it as its results do.
-    by_weight = figure.with_stem(f"{figure.stem}_weight")
-    tilts = figure.with_stem(f"{figure.stem}_tilt")
-    for picture in (figure, by_weight, tilts):
+    first, is_campaign = arguments.files[0], arguments.files[0].suffix == ".toml"
+    figure = arguments.output or Path(f"{first.stem if is_campaign else 'comparison'}.png")
+    by_weight, tilts = (figure.with_stem(f"{figure.stem}_{name}") for name in ("weight", "tilt"))
+    for picture in (figure, by_weight, tilts):  # the figure of a campaign belongs to it as its results do
         check_output(picture, *PICTURES, overwrite=arguments.overwrite or (is_campaign and arguments.output is None))
     if arguments.sensitivity and not is_campaign:
-        raise files.ResultError(
-            f"{arguments.files[0]}: --sensitivity computes the plates again. Give the campaign with their [[plate]]."
-        )
-    replaced = " (replaced)" if figure.exists() else ""
+        raise ResultError(f"{first}: --sensitivity computes the plates again. Give the campaign with their [[plate]].")
     paths = _plates_run(arguments, arguments.folder or figure.parent) if is_campaign else named(arguments.files)
     with ExitStack() as stack:
-        datasets = [stack.enter_context(files.opened(path)) for path in paths.values()]
-        plates = dict(zip(paths, datasets, strict=True))
-        if len(plates) < 2 and not (references := as_plates(datasets[0])):
-            raise files.ResultError(
-                f"{arguments.files[0]}: got one result without references, but compare needs at least two plates"
-            )
-        plates |= references if len(plates) < 2 else {}
-        code = max(failure_code(dataset, path) for dataset, path in zip(datasets, paths.values(), strict=True))
-        outside = range_note(dict(zip(paths, datasets, strict=True)))
-        if shared := shared_hits(dict(zip(paths, datasets, strict=True))):
+        results = {name: stack.enter_context(files.opened(path)) for name, path in paths.items()}
+        plates = results | (as_plates(results[next(iter(results))]) if len(results) < 2 else {})
+        if len(plates) < 2:
+            raise ResultError(f"{first}: got one result without references, but compare needs at least two plates")
+        code = max(failure_code(dataset, paths[name]) for name, dataset in results.items())
+        outside = range_note(results)
+        if shared := shared_hits(results):
             _print_models(arguments, shared, (figure, tilts))
             return code
         comparison = compare(list(plates.values()), list(plates), arguments.measure)
@@ -60,7 +49,7 @@ def compare_command(arguments: argparse.Namespace) -> int:
     if arguments.sensitivity:
         print(_sensitivity(arguments, comparison))
     comparison_figure(comparison, every=arguments.every).savefig(figure, dpi=150)
-    print(f"{figure}{replaced}" + ("" if arguments.every else "; every measure with --all"))
+    print(figure if arguments.every else f"{figure}; every measure with --all")
     if (against_weight := weight_figure(comparison)) is not None:
         against_weight.savefig(by_weight, dpi=150)
         print(by_weight)
@@ -78,7 +67,7 @@ def _sensitivity(arguments: argparse.Namespace, comparison: Comparison) -> str:
             measure.text,
             shifts={plate.Index: plate.numerics for plate in rows_of(comparison.scores[measure.text])},
             device=arguments.device,
-            progress=lambda done, total: show(Step(done, total)),
+            progress=show,
         )
     by_value = ", by value alone" if measure.text in comparison.by_ratio else ""
     text = table.to_string(float_format="{:.4g}".format, na_rep="-")
@@ -89,10 +78,7 @@ def _print_models(arguments: argparse.Namespace, shared: dict[str, Dataset], fig
     """Print how a map and a result by finite elements differ at the same shots; draw their maps of velocity and tilt
     side by side."""
     if arguments.measure:
-        raise files.ResultError(
-            f"{arguments.files[0]}: --measure is for plates, but these are the same shots at one plate by two models, "
-            "which are compared hit by hit"
-        )
+        raise ResultError(f"{arguments.files[0]}: --measure is for plates, but these are one plate by two models")
     print(text_of(shot_by_shot(shared)))
     for path, variable in zip(figures, (v.RESIDUAL_VELOCITY, v.TILT), strict=True):
         variable_maps(shared, variable).savefig(path, dpi=150)
@@ -102,13 +88,11 @@ def _print_models(arguments: argparse.Namespace, shared: dict[str, Dataset], fig
 def _plates_run(arguments: argparse.Namespace, folder: Path) -> dict[str, Path]:
     """Result files of a campaign's plates by name. Missing ones are computed."""
     if len(arguments.files) > 1:
-        raise CampaignError(
-            f"{arguments.files[0]}: got a campaign and other files, but compare takes either one campaign or results"
-        )
+        raise CampaignError(f"{arguments.files[0]}: got other files, too, but compare takes one campaign or results")
     check_folder(folder)
     campaigns = read_plates(arguments.files[0], count=arguments.count)
     paths = {name: folder / f"{name}.nc" for name in campaigns}
-    with computer(arguments.device, workers=arguments.workers, scheduler=arguments.scheduler, warn=warn) as device:
+    with computer_of(arguments) as device:
         for name, campaign in campaigns.items():
             print(f"plate {name}", file=sys.stderr)
             is_there = paths[name].exists() and not arguments.overwrite

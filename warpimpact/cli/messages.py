@@ -6,19 +6,15 @@ A title or a file may contain control characters, which a terminal would obey.
 import logging
 import os
 import sys
-import tempfile
-import traceback
 import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import IO, Any
 
-from warpimpact import __version__
-
 _LONGEST_SENTENCE = 2000
 """Most characters of a sentence on the error stream."""
-_WARNINGS = ("Implausible", "Costly")
-"""Names of the classes of warnings that are for the user; to import them takes seconds."""
+_OWN = "warpimpact."
+"""Begin of the modules whose errors and warnings are sentences for the user; to import all of them takes seconds."""
 
 
 class Plain:
@@ -49,9 +45,7 @@ def _plain(text: str, keep: str = "") -> str:
 
 def say(sentence: str) -> None:
     """Write one sentence for the user, on one line of the error stream."""
-    line = _plain(sentence)
-    cut = line if len(line) <= _LONGEST_SENTENCE else f"{line[: _LONGEST_SENTENCE - 1]}…"
-    print(f"warpimpact: {cut}", file=Plain(sys.stderr), flush=True)
+    print(f"warpimpact: {_plain(sentence)[:_LONGEST_SENTENCE]}", file=Plain(sys.stderr), flush=True)
 
 
 def warn(sentence: str) -> None:
@@ -61,12 +55,12 @@ def warn(sentence: str) -> None:
 
 @contextmanager
 def show_warnings() -> Iterator[None]:
-    """Report implausible values and long computations, each once, as a line on stderr."""
+    """Report the package's own warnings, each once, as a line on stderr."""
     with warnings.catch_warnings():
         show, shown = warnings.showwarning, set[str]()
 
         def show_once(message: Warning | str, category: type[Warning], *place: Any, **more: Any) -> None:
-            if category.__name__ not in _WARNINGS:
+            if not category.__module__.startswith(_OWN):
                 show(message, category, *place, **more)
             elif str(message) not in shown:
                 shown.add(str(message))
@@ -89,13 +83,7 @@ def show_log(verbose: int) -> None:
 
 def message_of(error: Exception) -> str | None:
     """Return the message for an error that the user can correct; None for a bug."""
-    from warpimpact.campaign.text import CampaignError
-    from warpimpact.results.files import OutputError, ResultError
-    from warpimpact.runs.computer import ClusterError
-    from warpimpact.solver.device import DeviceError
-    from warpimpact.solver.resolution import TooManySteps
-
-    if isinstance(error, CampaignError | ClusterError | OutputError | ResultError | DeviceError | TooManySteps):
+    if type(error).__module__.startswith(_OWN):
         return str(error)
     if isinstance(error, UnicodeEncodeError) and error.reason == "surrogates not allowed":
         return f"{ascii(error.object)[1:200]}: the name contains bytes that are not UTF-8; rename the file"
@@ -105,17 +93,3 @@ def message_of(error: Exception) -> str | None:
         name = f"{os.fsdecode(error.filename)[:200]}: " if isinstance(error.filename, str | bytes) else ""
         return f"{name}{error.strerror or str(error) or type(error).__name__}"
     return None
-
-
-def bug_report(error: Exception) -> str:
-    """Write the details of a bug to a file, and return a phrase with the error and the path."""
-    phrase = f"{type(error).__name__}: {str(error)[:200]}"
-    details = [f"warpimpact {__version__}, Python {sys.version}, {sys.platform}\n", f"{sys.argv[1:]}\n"]
-    try:
-        with tempfile.NamedTemporaryFile(
-            "w", prefix="warpimpact_bug_", suffix=".txt", delete=False, encoding="utf-8", errors="backslashreplace"
-        ) as file:
-            file.writelines([*details, *traceback.format_exception(error)])
-    except OSError as failure:
-        return f"{phrase}; no file of details could be written ({failure.strerror})"
-    return f"{phrase}; details are in {file.name}"

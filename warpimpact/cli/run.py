@@ -1,27 +1,32 @@
-"""The command run: compute the hit map of a campaign."""
+"""The commands run and continuum: hit maps by the fast law, and hits by finite elements."""
 
 import argparse
 from pathlib import Path
-from typing import Any
 
-import xarray
+from pydantic import ValidationError
 
 from warpimpact.analysis.inspection import promise_text, range_note, summary_text, symmetry_text
 from warpimpact.campaign.campaign import Campaign
+from warpimpact.campaign.continuum_settings import FiniteElements
+from warpimpact.campaign.text import CampaignError
 from warpimpact.results import attributes as attr
 from warpimpact.results import files
-from warpimpact.results.dataset import failed
+from warpimpact.results.dataset import hit_numbers
+from warpimpact.results.files import ResultError
+from warpimpact.runs.finite_elements import continuum_to_file
+from warpimpact.runs.replay import campaign_in
 from warpimpact.runs.run import run_to_file
+from warpimpact.scene.model import complaint
+from warpimpact.solver.simulate import spread_places
 
-from .messages import say, warn
-from .paths import check_output
-from .progress import show_run
+from .common import check_output, computing, failure_code
+from .progress import show_progress, show_run
 
 
 def run_command(arguments: argparse.Namespace) -> int:
     campaign = Campaign.from_toml(arguments.campaign, count=arguments.count)
     output = arguments.output or Path(arguments.campaign.stem + ".nc")
-    check_output(output, ".nc", overwrite=True)
+    check_output(output, ".nc", overwrite=True)  # the run decides on an earlier one
     with show_run(arguments) as progress:
         run_to_file(campaign, output, progress=progress, **computing(arguments))
     with files.opened(output) as dataset:
@@ -37,20 +42,65 @@ def run_command(arguments: argparse.Namespace) -> int:
         return failure_code(dataset, output)
 
 
-def computing(arguments: argparse.Namespace) -> dict[str, Any]:
-    """The options of a computation into a file, as `run_to_file` takes them."""
-    names = ("device", "workers", "scheduler", "resume", "overwrite")
-    return {name: getattr(arguments, name) for name in names} | {"warn": warn}
+def continuum_command(arguments: argparse.Namespace) -> int:
+    campaign, hits = _campaign_and_hits(arguments)
+    output = arguments.output or Path(f"{arguments.file.stem}_continuum.nc")
+    check_output(output, ".nc", overwrite=True)
+    campaign = campaign.computed_by(_elements(arguments, campaign))
+    with show_progress(arguments) as show:
+        try:
+            continuum_to_file(
+                campaign,
+                output,
+                hits=hits,
+                progress=lambda done, resumed, total: show(done, total, resumed=resumed),
+                **computing(arguments),
+            )
+        except ValueError as error:
+            raise CampaignError(f"{arguments.file}: {error}") from None
+    with files.opened(output) as dataset:
+        print(summary_text(dataset))
+        print(dataset.attrs[attr.CATALOGUE_NAMES])
+        computer = "core" if dataset.attrs[attr.DEVICE].startswith("cpu") else "GPU"
+        print(f"{dataset.attrs[attr.COMPUTE_TIME]:.4g} s of a {computer}")
+        print(f"written to {output}")
+        return failure_code(dataset, output)
 
 
-def failure_code(dataset: xarray.Dataset, path: Path) -> int:
-    """Return 3, with a message, if more shots failed than the campaign allows; else 0."""
-    share = float(failed(dataset).mean())
-    allowed = dataset.attrs[attr.FAILED_SHARE]
-    if share <= allowed:
-        return 0
-    say(
-        f"{share:.3g} of the shots failed, more than output.failed_share = {allowed:g}; "
-        f"warpimpact inspect {path} lists them"
-    )
-    return 3
+def _campaign_and_hits(arguments: argparse.Namespace) -> tuple[Campaign, tuple[int, ...] | None]:
+    """The campaign, and the numbers of the hits; None for all hits."""
+    path = arguments.file
+    if path.suffix == ".toml":
+        if arguments.hit or arguments.hits:
+            raise CampaignError(f"{path}: --hit and --hits are for a result; --count is for a campaign")
+        return Campaign.from_toml(path, count=arguments.count), None
+    result = files.read(path)
+    if arguments.count is not None:
+        raise ResultError(f"{path}: --count is for a campaign; --hits is for a result")
+    if attr.LIMIT in result.attrs:
+        raise ResultError(f"{path}: is a search of limits, but continuum takes a result of run")
+    numbers = hit_numbers(result)
+    if unknown := sorted({*(arguments.hit or ())} - {*numbers.tolist()}):
+        raise ResultError(f"--hit: got {unknown[0]}, but {path} has hits {numbers[0]} to {numbers[-1]}")
+    places = spread_places(len(numbers), min(len(numbers), arguments.hits or len(numbers)))
+    return campaign_in(result, path.parent), tuple(sorted({*(arguments.hit or numbers[places].tolist())}))
+
+
+def _elements(arguments: argparse.Namespace, campaign: Campaign) -> FiniteElements:
+    """The settings for the hits: those of the campaign, overridden by the options."""
+    settings = campaign.continuum.model_dump()
+    if campaign.plate.material and not campaign.continuum.materials:
+        settings["materials"] = (campaign.plate.material,)
+    if arguments.fidelity:
+        settings["spacing"] = None
+    options = {"materials": "material", "friction": "friction", "fidelity": "fidelity", "spacing": "element"}
+    settings |= {key: value for key, name in options.items() if (value := getattr(arguments, name)) is not None}
+    try:
+        elements = FiniteElements.model_validate(settings)
+        _ = elements.entries
+    except ValidationError as error:
+        problem = error.errors(include_url=False)[0]
+        raise CampaignError(f"--{options[str(problem['loc'][0])]}: {complaint(problem)}") from None
+    except ValueError as error:
+        raise CampaignError(f"{arguments.file}: {error}") from None
+    return elements

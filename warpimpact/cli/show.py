@@ -1,11 +1,10 @@
-"""The commands inspect, plot, plate, catalogue and validate: text and figures of what there is."""
+"""The commands inspect, plot, plate, catalogue, validate, replay, export and report: what there is, for people."""
 
 import argparse
 import re
-from collections.abc import Callable
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
-
-from matplotlib.figure import Figure
 
 from warpimpact.analysis.effectiveness import effectiveness_view, plate_numbers
 from warpimpact.analysis.inspection import inspect_view
@@ -17,15 +16,23 @@ from warpimpact.campaign.text import CampaignError
 from warpimpact.catalogue.catalogue import Catalogue
 from warpimpact.catalogue.catalogue_view import catalogue_view, material_view, threat_view
 from warpimpact.catalogue.entries import Material, Threat
+from warpimpact.export.drawing import SUFFIXES, write_drawing
+from warpimpact.export.paraview import write_vtk
+from warpimpact.export.spreadsheet import write_csv
 from warpimpact.plotting import measure_map, plate_figure, save_maps, save_side_by_side, variable_map
 from warpimpact.plotting.plate import core_figure
-from warpimpact.report.one_file import view_of
+from warpimpact.plotting.trajectory import FIGURES, save_animation, save_figures, writer_for
+from warpimpact.report.one_file import file_page, view_of
+from warpimpact.report.report import report_page
 from warpimpact.results import attributes as attr
 from warpimpact.results import files
-from warpimpact.results.kinds import HIT_MAP
+from warpimpact.results.kinds import HISTORY, HIT_MAP
+from warpimpact.results.replayed_hit import hit_view
+from warpimpact.runs.replay import replay
 from warpimpact.runs.run import run
 
-from .paths import PICTURES, check_folder, check_output, named
+from .common import PICTURES, check_folder, check_output, named, write_text
+from .progress import show_progress
 
 
 def inspect_command(arguments: argparse.Namespace) -> None:
@@ -43,42 +50,25 @@ def inspect_command(arguments: argparse.Namespace) -> None:
 
 def plot_command(arguments: argparse.Namespace) -> None:
     datasets = {name: files.read(path) for name, path in named(arguments.results).items()}
-    folder = arguments.folder or arguments.results[0].parent
+    folder, overwrite = arguments.folder or arguments.results[0].parent, arguments.overwrite
     check_folder(folder)
-    stem = "_".join(path.stem for path in arguments.results)
-    dataset, *others = datasets.values()
-    figures: dict[str, tuple[str | None, Callable[..., Figure]]] = {
-        "--measure": (arguments.measure, measure_map),
-        "--variable": (arguments.variable, variable_map),
-    }
-    for option, (quantity, draw) in figures.items():
-        if quantity is None:
-            continue
-        if others:
+    stem, dataset = "_".join(path.stem for path in arguments.results), next(iter(datasets.values()))
+    if quantity := arguments.measure or arguments.variable:
+        option, draw = ("--measure", measure_map) if arguments.measure else ("--variable", variable_map)
+        if len(datasets) > 1:
             raise files.ResultError(f"{option}: got {len(datasets)} results, but it draws the map of one")
+        words = re.findall(r"[\w.]+", quantity.replace(">", " above ").replace("<", " below "))
+        picture = folder / f"{stem}_{'_'.join(words)}.png"
+        check_output(picture, overwrite=overwrite)
         try:
-            figure = draw(dataset, quantity)
+            draw(dataset, quantity).savefig(picture, dpi=150)
         except ValueError as error:
             raise files.ResultError(f"{option}: {error}") from None
-        picture = folder / f"{stem}_{_file_name(quantity)}.png"
-        check_output(picture, *PICTURES, overwrite=arguments.overwrite)
-        figure.savefig(picture, dpi=150)
         print(picture)
-        return
-    overwrite = arguments.overwrite
-    saved = (
-        save_side_by_side(datasets, folder, stem, overwrite=overwrite)
-        if others
-        else save_maps(dataset, folder, stem, overwrite=overwrite)
-    )
-    for path in saved:
-        print(path)
-
-
-def _file_name(quantity: str) -> str:
-    """A part of a file name for a measure, such as "P_tilt_130mm_above_30_deg"."""
-    spoken = quantity.replace(">", " above ").replace("<", " below ")
-    return "_".join(re.findall(r"[\w.]+", spoken))
+    elif len(datasets) > 1:
+        print(*save_side_by_side(datasets, folder, stem, overwrite=overwrite), sep="\n")
+    else:
+        print(*save_maps(dataset, folder, stem, overwrite=overwrite), sep="\n")
 
 
 def plate_command(arguments: argparse.Namespace) -> None:
@@ -102,16 +92,17 @@ def catalogue_command(arguments: argparse.Namespace) -> None:
         entry = None if arguments.name is None else catalogue.entry(arguments.name)
     except ValueError as error:
         raise CampaignError(str(error)) from None
+    if isinstance(entry, Threat):
+        view = threat_view(entry)
+    elif isinstance(entry, Material):
+        view = material_view(entry, is_own=catalogue.is_own(entry))
+    else:
+        view = catalogue_view(catalogue)
     core = entry.shape if isinstance(entry, Threat) else None
     if arguments.output and core is None:
         raise CampaignError("--output: only a threat whose core is known can be drawn")
-    if entry is None:
-        print(text_of(catalogue_view(catalogue)))
-    else:
-        is_own = isinstance(entry, Material) and catalogue.is_own(entry)
-        view = threat_view(entry) if isinstance(entry, Threat) else material_view(entry, is_own=is_own)
-        print(text_of(view))
-    if arguments.output and core is not None and entry is not None:
+    print(text_of(view))
+    if arguments.output and isinstance(entry, Threat) and core is not None:
         check_output(arguments.output, *PICTURES, overwrite=arguments.overwrite)
         core_figure(core, entry.name, entry.evidence).savefig(arguments.output, dpi=150)
         print(arguments.output)
@@ -128,3 +119,80 @@ def validate_command(arguments: argparse.Namespace) -> None:
     campaign = Campaign.from_toml(path)
     check_scene(campaign, str(path))
     print(validation_table(run(campaign, device=arguments.device)))
+
+
+def replay_command(arguments: argparse.Namespace) -> None:
+    result, path, film = files.read(arguments.result), arguments.result, arguments.animation
+    output = arguments.output or path.with_name(f"{path.stem}_hit{arguments.hit}.nc")
+    check_output(output, ".nc", overwrite=arguments.overwrite)
+    for figure in FIGURES:
+        check_output(output.with_name(f"{output.stem}_{figure.__name__}.png"), overwrite=arguments.overwrite)
+    if film:
+        writer_for(film)
+        check_output(film, overwrite=arguments.overwrite)
+    with suggest_campaign_folder():
+        folder = arguments.campaign_folder or path.parent
+        history = replay(result, arguments.hit, folder=folder, snapshots=arguments.snapshots)
+    files.write(history, output)
+    print(text_of(hit_view(history)))
+    for written in (output, *save_figures(history, output.parent, output.stem)):
+        print(written)
+    if film:
+        save_animation(history, film)
+        print(film)
+
+
+def export_command(arguments: argparse.Namespace) -> None:
+    path, output = arguments.file, arguments.output
+    if path.suffix == ".toml":
+        output = output or path.with_suffix(".svg")
+        check_output(output, *SUFFIXES, overwrite=arguments.overwrite)
+        print(*write_drawing(Campaign.from_toml(path).plate, output), output, sep="\n")
+        return
+    with files.opened(path, HIT_MAP, HISTORY) as dataset:
+        if not files.is_history(dataset):
+            output = output or path.with_suffix(".csv")
+            check_output(output, ".csv", overwrite=arguments.overwrite)
+            write_csv(dataset, output)
+            print(output)
+            return
+        if output is not None:
+            raise files.OutputError(f"{output}: a history is written as a folder; name a new one with --folder")
+        folder = arguments.folder or path.with_name(f"{path.stem}_vtk")
+        if folder.exists():
+            raise files.OutputError(f"{folder}: exists already; name a new folder with --folder")
+        print(*write_vtk(dataset.load(), folder), sep="\n")
+
+
+def report_command(arguments: argparse.Namespace) -> None:
+    paths = arguments.results
+    output = arguments.output or paths[0].with_suffix(".html")
+    check_output(output, ".html", overwrite=arguments.overwrite)
+    for kind in {*map(files.kind_of, paths)} - {HIT_MAP}:
+        if len(paths) > 1:
+            raise files.ResultError(f"got {len(paths)} files, one of which is {kind.name}, which is reported alone")
+        write_text(file_page(paths[0], kind, arguments.campaign_folder or paths[0].parent), output)
+        print(output)
+        return
+    by_name = named(paths)
+    with ExitStack() as stack:
+        datasets = {name: stack.enter_context(files.opened(path)) for name, path in by_name.items()}
+        show = stack.enter_context(show_progress(arguments))
+        with suggest_campaign_folder(", or --trajectories 0, which needs none of them"):
+            page = report_page(
+                datasets,
+                folders={name: arguments.campaign_folder or path.parent for name, path in by_name.items()},
+                trajectories=arguments.trajectories,
+                progress=show,
+            )
+    write_text(page, output)
+    print(output)
+
+
+@contextmanager
+def suggest_campaign_folder(more: str = "") -> Iterator[None]:
+    """Add the option that may help to an error of the campaign in a result; `more` follows it."""
+    try:
+        yield
+    except CampaignError as error:
+        raise CampaignError(f"{error}; give the folder of the campaign's files with --campaign-folder{more}") from None

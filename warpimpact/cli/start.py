@@ -1,10 +1,14 @@
-"""The commands new and schema, which help to write a campaign."""
+"""The commands new and schema, which help to write a campaign, and design, a page where a plate is drawn."""
 
 import argparse
 import json
+import os
 import re
+import tempfile
 import tomllib
+import webbrowser
 from collections.abc import Callable, Iterator
+from contextlib import ExitStack
 from functools import partial
 from importlib.resources import files
 from pathlib import Path
@@ -12,6 +16,7 @@ from typing import Any
 
 from warpimpact.campaign.schema import campaign_schema, file_schema
 from warpimpact.campaign.text import CampaignError
+from warpimpact.design.designs import DesignStore, from_address, read_designs
 from warpimpact.firing.plan import FiringTest
 from warpimpact.identification.fit import FitFile
 from warpimpact.optimisation.design import design_schema
@@ -19,7 +24,8 @@ from warpimpact.results import kinds
 from warpimpact.scene.units import meant
 
 from .commands import SCHEMA
-from .paths import check_output, write_text
+from .common import check_output, write_text
+from .messages import say
 
 _FOLDERS = (".", "fits", "firing", "designs")
 """Folders of the examples: campaigns, and what identify, test and optimise take."""
@@ -85,3 +91,46 @@ def _schema_text(kind: str) -> str:
         "test": partial(file_schema, FiringTest, "warpimpact firing test"),
     }
     return json.dumps(schemas[kind](), indent=1, ensure_ascii=False) + "\n"
+
+
+def design_command(arguments: argparse.Namespace) -> None:
+    try:  # starlette and uvicorn are optional
+        from warpimpact.design.server import serve
+    except ModuleNotFoundError as error:
+        raise CampaignError(f"design needs {error.name}: pip install 'warpimpact[design]'") from None
+    given = arguments.designs or [str(files("warpimpact.campaigns") / "slotted_plate.toml")]
+    addresses = [name for name in given if name.startswith("http://")]
+    designs = {f"address {number}": from_address(address) for number, address in enumerate(addresses, 1)}
+    designs |= read_designs([Path(name) for name in given if name not in addresses])
+    with ExitStack() as opened:
+
+        def ready(address: str) -> None:
+            print(address, flush=True)
+            if not arguments.no_browser:
+                path = _redirecting_file(address)
+                opened.callback(path.unlink, missing_ok=True)
+                webbrowser.open(path.as_uri())
+
+        try:
+            serve(DesignStore(designs), port=arguments.port, device=arguments.device, ready=ready)
+        except (OSError, OverflowError) as error:
+            raise CampaignError(f"--port: got {arguments.port}, but it cannot be used ({error})") from None
+        except KeyboardInterrupt:
+            say("ended")
+
+
+def _redirecting_file(address: str) -> Path:
+    """Write a file that leads a browser to an address and that only its owner can read.
+
+    Every user of the machine can see the command line of a browser, so the address is not part of it. The file is in
+    the home folder, because browsers in a sandbox see neither temporary nor hidden files.
+    """
+    home = Path("~").expanduser()
+    folder = home if os.access(home, os.W_OK) else None
+    number, name = tempfile.mkstemp(".html", "warpimpact-design-", folder)
+    with os.fdopen(number, "w", encoding="utf-8") as file:
+        file.write(
+            f'<!DOCTYPE html><meta charset="utf-8"><meta name="referrer" content="no-referrer">'
+            f'<meta http-equiv="refresh" content="0;url={address}"><a href="{address}">warpimpact design</a>'
+        )
+    return Path(name)

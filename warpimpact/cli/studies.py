@@ -2,7 +2,6 @@
 
 import argparse
 import sys
-from contextlib import AbstractContextManager
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
@@ -30,7 +29,6 @@ from warpimpact.plotting.studies import firing_figure, limit_figure, sensitivity
 from warpimpact.results import files, front
 from warpimpact.results.kinds import SWEEP
 from warpimpact.results.posterior_file import INTERRUPTED
-from warpimpact.runs.computer import Computer, computer
 from warpimpact.scene.units import PositiveLength, PositiveSpeed, quantity
 from warpimpact.studies.limit import check_measures, limit_to_file, warning_of
 from warpimpact.studies.limit_view import limit_view
@@ -38,19 +36,15 @@ from warpimpact.studies.sensitivity import largest_move, sensitivity
 from warpimpact.studies.sweep import folder_of as points_of
 from warpimpact.studies.sweep import read_sweep, run_sweep, sweep_view
 
+from .common import check_output, computer_of, computing, failure_code, outputs, save_figure, write_text
 from .messages import say, warn
-from .paths import PICTURES, check_output, replaces, write_text
-from .progress import Step, show_progress, show_run
-from .run import computing, failure_code
+from .progress import show_progress, show_run
 
 
 def limit_command(arguments: argparse.Namespace) -> int:
     needs_velocity = arguments.quantity != "velocity"
     campaign = Campaign.from_toml(arguments.campaign, count=arguments.count, needs_velocity=needs_velocity)
-    output = arguments.output or Path(arguments.campaign.stem + "_limit.nc")
-    picture = output.with_suffix(".png")
-    check_output(output, ".nc", overwrite=True)
-    check_output(picture, *PICTURES, overwrite=replaces(arguments, output))
+    output, picture = outputs(arguments, f"{arguments.campaign.stem}_limit")
     check_measures(arguments.measure, arguments.quantity)
     if sentence := warning_of(campaign, arguments.quantity):
         warn(sentence)
@@ -68,8 +62,7 @@ def limit_command(arguments: argparse.Namespace) -> int:
     print(text_of(limit_view(dataset, arguments.measure)))
     for line in range_note({"": dataset}, str(output)):
         print(line)
-    limit_figure(dataset).savefig(picture, dpi=150)
-    print(f"written to {output}, figure in {picture}")
+    save_figure(limit_figure(dataset), picture, output)
     return failure_code(dataset, output)
 
 
@@ -90,29 +83,15 @@ def _tolerance(arguments: argparse.Namespace) -> float | None:
 def sweep_command(arguments: argparse.Namespace) -> None:
     sweep = read_sweep(arguments.campaign, count=arguments.count)
     measures_of_runs(arguments.measure, sweep.campaigns)
-    output = arguments.output or Path(arguments.campaign.stem + ".nc")
-    picture = output.with_suffix(".png")
-    check_output(output, ".nc", overwrite=True)
-    check_output(picture, *PICTURES, overwrite=replaces(arguments, output))
-
-    with (
-        show_run(arguments) as follow,
-        computer(arguments.device, workers=arguments.workers, scheduler=arguments.scheduler, warn=warn) as device,
-    ):
+    output, picture = outputs(arguments, arguments.campaign.stem)
+    with show_run(arguments) as follow, computer_of(arguments) as device:
 
         def named(name: str) -> Any:
             print(f"point {name}", file=sys.stderr)
             return follow
 
-        run_sweep(
-            sweep,
-            output,
-            device=device,
-            resume=arguments.resume,
-            overwrite=arguments.overwrite,
-            progress=named,
-            warn=warn,
-        )
+        options = {"resume": arguments.resume, "overwrite": arguments.overwrite, "warn": warn}
+        run_sweep(sweep, output, device=device, progress=named, **options)
     dataset = files.read(output, SWEEP)
     print(text_of(sweep_view(dataset, arguments.measure)))
     sweep_figure(dataset, arguments.measure).savefig(picture, dpi=150)
@@ -122,23 +101,19 @@ def sweep_command(arguments: argparse.Namespace) -> None:
 
 def sensitivity_command(arguments: argparse.Namespace) -> None:
     campaign = Campaign.from_toml(arguments.campaign)
-    output = arguments.output or Path(f"{arguments.campaign.stem}_sensitivity.csv")
-    picture = output.with_suffix(".png")
-    check_output(output, ".csv", overwrite=arguments.overwrite)
-    check_output(picture, *PICTURES, overwrite=arguments.overwrite)
+    output, picture = outputs(arguments, f"{arguments.campaign.stem}_sensitivity", ".csv")
     with show_progress(arguments) as show:
         table = sensitivity(
             campaign,
             hits=arguments.hits,
             measures=arguments.measure,
             device=arguments.device,
-            progress=lambda done, total: show(Step(done, total)),
+            progress=show,
         )
     print(table.to_string(float_format="{:.4g}".format, na_rep="-"))
     print(largest_move(table))
     write_text(table.to_csv(), output)
-    sensitivity_figure(table, campaign.title, arguments.hits).savefig(picture, dpi=150)
-    print(f"written to {output}, figure in {picture}")
+    save_figure(sensitivity_figure(table, campaign.title, arguments.hits), picture, output)
 
 
 def test_command(arguments: argparse.Namespace) -> None:
@@ -149,31 +124,23 @@ def test_command(arguments: argparse.Namespace) -> None:
 
 
 def _evaluate(arguments: argparse.Namespace) -> None:
-    output = arguments.output or Path(f"{arguments.test.stem}_v50.csv")
-    picture = output.with_suffix(".png")
-    check_output(output, ".csv", overwrite=arguments.overwrite)
-    check_output(picture, overwrite=arguments.overwrite)
+    output, picture = outputs(arguments, f"{arguments.test.stem}_v50", ".csv")
     shots = read_shots(arguments.test)
     result = v50(*shots)
     print(result)
     write_text(pd.Series(asdict(result), name="value").to_csv(index_label="number"), output)
-    shots_figure(shots, result, arguments.test.stem).savefig(picture, dpi=150)
-    print(f"written to {output}, figure in {picture}")
+    save_figure(shots_figure(shots, result, arguments.test.stem), picture, output)
 
 
 def _simulate(arguments: argparse.Namespace) -> None:
     test = read_test(arguments.test)
-    output = arguments.output or Path(arguments.test.stem + ".nc")
-    picture, resume, overwrite = output.with_suffix(".png"), arguments.resume, arguments.overwrite
-    check_output(output, ".nc", overwrite=overwrite or resume)
-    check_output(picture, overwrite=overwrite or resume)
+    output, picture = outputs(arguments, arguments.test.stem)
     with show_run(arguments) as progress:
         response = response_of(test, output, count=arguments.count, progress=progress, **computing(arguments))
     dataset = simulate_test(test, response)
     files.write(dataset, output)
     print(text_of(firing_view(dataset)))
-    firing_figure(dataset).savefig(picture, dpi=150)
-    print(f"written to {output}, figure in {picture}")
+    save_figure(firing_figure(dataset), picture, output)
 
 
 NONE_WITHIN_BOUNDS = 4
@@ -182,30 +149,15 @@ NONE_WITHIN_BOUNDS = 4
 
 def optimise_command(arguments: argparse.Namespace) -> int:
     design = read_design(arguments.design)
-    output = arguments.output or Path(arguments.design.stem + ".nc")
-    check_output(output, ".nc", overwrite=True)
-    picture = output.with_suffix(".png")
-    check_output(picture, overwrite=replaces(arguments, output))
-    with show_progress(arguments, "design") as show, _computer_of(arguments) as machine:
-        dataset = optimise(
-            design,
-            output,
-            device=machine,
-            resume=arguments.resume,
-            overwrite=arguments.overwrite,
-            progress=lambda done, total, text: show(Step(done, total, text=text)),
-            warn=warn,
-        )
+    output, picture = outputs(arguments, arguments.design.stem)
+    options = {"resume": arguments.resume, "overwrite": arguments.overwrite, "warn": warn}
+    with show_progress(arguments, "design") as show, computer_of(arguments) as machine:
+        dataset = optimise(design, output, device=machine, progress=show, **options)
     print(text_of(front_view(dataset)))
-    front_figure(dataset, design.folder).savefig(picture, dpi=150)
-    campaigns = f", campaigns in {folder_of(output)}" if dataset.sizes["front"] else ""
-    print(f"written to {output}, figure in {picture}{campaigns}")
+    save_figure(front_figure(dataset, design.folder), picture, output)
+    if dataset.sizes["front"]:
+        print(f"campaigns in {folder_of(output)}")
     return 0 if dataset.attrs[front.OUTCOME] == front.FEASIBLE else NONE_WITHIN_BOUNDS
-
-
-def _computer_of(arguments: argparse.Namespace) -> AbstractContextManager[Computer]:
-    """Return the computer for --device, --workers and --scheduler."""
-    return computer(arguments.device, workers=arguments.workers, scheduler=arguments.scheduler, warn=warn)
 
 
 def identify_command(arguments: argparse.Namespace) -> int:
@@ -214,16 +166,14 @@ def identify_command(arguments: argparse.Namespace) -> int:
     output = arguments.output or Path(f"{arguments.fit.stem}_fit.nc" if by_elements else f"{arguments.fit.stem}.nc")
     pictures = {output.with_name(f"{output.stem}_{name}.png"): draw for name, draw in FIGURES.items()}
     table = output.with_suffix(".csv")
-    check_output(output, ".nc", overwrite=arguments.overwrite)
-    for path in (table, *pictures):
-        check_output(path, overwrite=arguments.overwrite)
+    for path, suffixes in {output: [".nc"], **{path: [] for path in (table, *pictures)}}.items():
+        check_output(path, *suffixes, overwrite=arguments.overwrite)
     if fit.warning:
         warn(fit.warning)
     sampling = fit.file.sampling
     say(f"computes at most {sampling.sets} sets of parameters, {sampling.hits} hits of each shot")
-    with show_progress(arguments, "set") as show, _computer_of(arguments) as machine:
-        progress = lambda done, total, text: show(Step(done, total, text=text))  # noqa: E731
-        posterior = identify(fit, device=machine, progress=progress)
+    with show_progress(arguments, "set") as show, computer_of(arguments) as machine:
+        posterior = identify(fit, device=machine, progress=show)
     files.write(posterior, output)
     print(text_of(posterior_view(posterior)))
     print(f"written to {output}")

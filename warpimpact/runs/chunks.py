@@ -178,8 +178,8 @@ class Chunks:
                 "begin anew with --overwrite"
             )
         if self.output.exists() and not overwrite:
-            differs = " and differs from what is to be computed" if resume and not complete else ""
-            raise OutputError(f"{self.output}: exists already{differs}; name another file or give --overwrite")
+            other = ", and --resume adds no hits to what is complete" if resume else ""
+            raise OutputError(f"{self.output}: exists already{other}; name another file or give --overwrite")
         self.discard()
         with files.aside(self._manifest) as file:
             file.write_text(json.dumps({**self._content, "replaces": overwrite}, indent=1), encoding="utf-8")

@@ -27,6 +27,7 @@ from warpimpact.results import variables as v
 from warpimpact.results.dataset import failed
 from warpimpact.results.kinds import CAMPAIGN, SWEEP
 from warpimpact.results.measures import Measure
+from warpimpact.runs.chunks import Interrupted
 from warpimpact.runs.computer import Computer
 from warpimpact.runs.run import run_to_file
 from warpimpact.scene.units import quoted, reader_in
@@ -172,10 +173,18 @@ def run_sweep(
     except OSError as error:
         raise files.OutputError(f"{folder}: cannot be written into ({error.strerror})") from None
     paths = [folder / f"{name}.nc" for name in sweep.campaigns]
-    for (name, campaign), path in zip(sweep.campaigns.items(), paths, strict=True):
-        follow = progress(name) if progress else None
-        run_to_file(campaign, path, device=device, resume=resume, overwrite=overwrite, progress=follow, warn=warn)
-    files.write(joined(sweep, [files.read(path) for path in paths]), output)
+    done = 0
+    try:
+        for (name, campaign), path in zip(sweep.campaigns.items(), paths, strict=True):
+            follow = progress(name) if progress else None
+            run_to_file(campaign, path, device=device, resume=resume, overwrite=overwrite, progress=follow, warn=warn)
+            done += 1
+        files.write(joined(sweep, [files.read(path) for path in paths]), output)
+    except (files.OutputError, Interrupted) as error:
+        if not done:
+            raise
+        kept = f"{done} of {len(paths)} points before it are complete in {folder}; continue with --resume"
+        raise type(error)(f"{error}; {kept}") from None
 
 
 def joined(sweep: Sweep, points: Sequence[xarray.Dataset]) -> xarray.Dataset:

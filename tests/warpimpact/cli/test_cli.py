@@ -1,8 +1,8 @@
-"""The command: help, version, and exit code 2 with one sentence and nothing written."""
+"""The command: help, exit code 2 with one sentence and nothing written, and outputs that replace nothing unasked."""
 
 import argparse
+import errno
 from collections.abc import Callable
-from importlib.metadata import version
 from pathlib import Path
 
 import pytest
@@ -12,21 +12,14 @@ from warpimpact.cli import main, parser
 from warpimpact.results import files
 
 Refusal = Callable[[list[str]], str]
+ResultMaker = Callable[..., xarray.Dataset]
 SLOTTED_PLATE = Path(__file__).parents[3] / "campaigns" / "slotted_plate.toml"
 
 
-def test_every_command_has_an_example(capsys: pytest.CaptureFixture[str]) -> None:
-    (commands,) = (action for action in parser()._actions if isinstance(action, argparse._SubParsersAction))
-    assert all(f"example: warpimpact {name}" in one.format_help() for name, one in commands.choices.items())
-    with pytest.raises(SystemExit) as ended:
-        main(["--version"])
-    assert ended.value.code == 0
-    assert capsys.readouterr().out == f"warpimpact {version('warpimpact')}\n"
-
-
-def test_an_output_is_a_file_and_a_folder_has_its_own_option() -> None:
+def test_every_command_has_an_example_and_writes_a_file_or_a_folder() -> None:
     (commands,) = (action for action in parser()._actions if isinstance(action, argparse._SubParsersAction))
     for name, one in commands.choices.items():
+        assert f"example: warpimpact {name}" in one.format_help()
         options = {action.dest: str(action.metavar) for action in one._actions}
         assert "FOLDER" not in options.get("output", ""), name
         assert options.get("folder", "FOLDER") == "FOLDER", name
@@ -50,21 +43,28 @@ def test_an_existing_output_is_kept(in_tmp_path: Path, refusal: Refusal) -> None
     ("output", "sentence"),
     [
         ("nowhere/a.nc", "nowhere: cannot be written into (No such file or directory)"),
-        ("file/a.nc", "file: cannot be written into (Not a directory)"),
         (".", ".: is a folder, but the output is one file"),
     ],
 )
 def test_an_output_that_cannot_be_written_is_refused_before_computing(
     in_tmp_path: Path, refusal: Refusal, output: str, sentence: str
 ) -> None:
-    Path("file").touch()
     assert refusal(["run", str(SLOTTED_PLATE), "-o", output, "--overwrite"]) == sentence
-    assert [path.name for path in in_tmp_path.iterdir()] == ["file"]
+    assert not list(in_tmp_path.iterdir())
+
+
+def test_a_count_is_a_whole_number_however_it_is_written(capsys: pytest.CaptureFixture[str]) -> None:
+    for text, count in (("400", 400), ("1e4", 10_000), ("2.0", 2)):
+        assert parser().parse_args(["run", "a.toml", "--count", text]).count == count
+    for text in ("1.5", "0", "-3", "many", "nan", "inf"):
+        with pytest.raises(SystemExit):
+            main(["run", "a.toml", f"--count={text}"])
+        sentence = f'argument --count: got "{text}", but it must be a whole number of at least 1, such as 2 or 1e4\n'
+        assert capsys.readouterr().err.endswith(sentence)
 
 
 def test_an_absent_device_is_refused(in_tmp_path: Path, refusal: Refusal) -> None:
-    sentence = refusal(["run", str(SLOTTED_PLATE), "--count", "4", "--device", "cuda:99"])
-    assert 'got "cuda:99"' in sentence
+    assert 'got "cuda:99"' in refusal(["run", str(SLOTTED_PLATE), "--count", "4", "--device", "cuda:99"])
     assert not list(in_tmp_path.iterdir())
 
 
@@ -80,7 +80,7 @@ def test_memory_that_cannot_be_had_is_reported(
 
 
 def test_results_are_drawn_side_by_side(
-    in_tmp_path: Path, capsys: pytest.CaptureFixture[str], refusal: Refusal, make_result: Callable[..., xarray.Dataset]
+    in_tmp_path: Path, capsys: pytest.CaptureFixture[str], refusal: Refusal, make_result: ResultMaker
 ) -> None:
     Path("b").mkdir()
     for path in ("a.nc", "b/a.nc"):
@@ -90,3 +90,42 @@ def test_results_are_drawn_side_by_side(
         f"a_a_{name}.png" for name in ("residual_velocity", "deflection", "tilt")
     ]
     assert refusal(["plot", "a.nc", "a.nc"]) == "a.nc: got this result 2 times, but each result counts once"
+
+
+def test_pictures_of_a_result_are_not_replaced_unasked(
+    make_result: ResultMaker, tmp_path: Path, refusal: Refusal
+) -> None:
+    for name in "ab":
+        files.write(make_result(20), tmp_path / f"{name}.nc")
+    one, other = (str(tmp_path / f"{name}.nc") for name in "ab")
+    for command, picture in ((["plot", one], "a_overview.png"), (["plot", one, other], "a_b_tilt.png")):
+        (tmp_path / picture).write_text("mine")
+        assert f"{picture}: exists already" in refusal(command)
+        assert (tmp_path / picture).read_text() == "mine"
+        assert main([*command, "--overwrite"]) == 0
+        assert (tmp_path / picture).read_bytes().startswith(b"\x89PNG")
+
+
+@pytest.mark.parametrize("command", [["new", "slotted_plate"], ["plate", str(SLOTTED_PLATE)]])
+def test_a_full_disk_is_named_and_cuts_no_file(
+    command: list[str], in_tmp_path: Path, refusal: Refusal, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def is_full(*_: object) -> None:
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    monkeypatch.setattr("warpimpact.results.files._flush", is_full)
+    assert "slotted_plate" in (sentence := refusal(command))
+    assert sentence.endswith(": cannot be written (the disk is full)")
+    assert not list(in_tmp_path.iterdir())
+
+
+def test_what_is_requested_has_a_picture_of_its_own(
+    make_result: ResultMaker, in_tmp_path: Path, refusal: Refusal
+) -> None:
+    files.write(make_result(100), Path("a.nc"))
+    for quantity in ("P(tilt@130mm > 30 deg)", "P(tilt@130mm < 30 deg)"):
+        assert main(["plot", "a.nc", "--measure", quantity]) == 0
+    assert main(["plot", "a.nc", "--variable", "edge_distance"]) == 0
+    assert "--variable: " in refusal(["plot", "a.nc", "--variable", "edges"])
+    names = ("P_tilt_130mm_above_30_deg", "P_tilt_130mm_below_30_deg", "edge_distance")
+    assert {path.name for path in in_tmp_path.glob("*.png")} == {f"a_{name}.png" for name in names}

@@ -23,7 +23,6 @@ from warpimpact.scene.units import Length, quantity
 Refusal = Callable[[list[str]], str]
 SHIPPED = Path(__file__).parents[3] / "campaigns"
 BASE = (SHIPPED / "slotted_plate.toml").read_text(encoding="utf-8")
-BEFORE_PATTERN, AFTER_PATTERN = BASE.split("[plate.pattern]")[0], "[impact]" + BASE.split("[impact]")[1]
 
 
 def listed(name: str) -> str:
@@ -32,29 +31,22 @@ def listed(name: str) -> str:
     return f'{before}[hits]\nsampling = "list"\nfile = "{name}"\n\n[numerics]{after}'
 
 
-def with_polygons(polygons: object) -> str:
-    """The campaign with holes of these corners."""
-    pattern = f'[plate.pattern]\nshape = "polygons"\nspacing = ["16 mm", "8 mm"]\npolygons = {polygons}\n\n'
-    return BEFORE_PATTERN + pattern + AFTER_PATTERN
-
-
 ZIGZAG = np.random.default_rng(1).uniform((-8e-3, -4e-3), (8e-3, 4e-3), (400, 2)).tolist()
 CAMPAIGNS = {
     "nested arrays": ("a = " + "[" * 100_000 + "]" * 100_000, "nested too deep"),
-    "a long array": ("x = [" + "1," * 2_000_000 + "]\n" + BASE, "at most 1048576 characters"),
     "a tower of powers": (BASE.replace('"4 mm"', '"4 m**9**9**9"', 1), 'whose unit "m**9**9**9" is not one of names'),
     "a long file name": (listed("z" * 300), "which is no file name"),
     "a device": (listed("/dev/zero"), "but there is no file /dev/zero"),
     "a terminal's commands": (BASE.replace('title = "', 'title = "\\u001b[31m', 1), "without control characters"),
-    "a long title": (BASE.replace('title = "', 'title = "' + "t" * 5000, 1), "at most 200 characters"),
-    "a long number": (BASE.replace("seed = 1", "seed = 0x" + "f" * 5000), "hits.seed: got"),
     "a tiny length": (
         re.sub("degradation_length *= .*", 'degradation_length = "1 nm"', BASE),
         "at least 1/1000 of its radius",
     ),
-    "a zigzag": (with_polygons([ZIGZAG]), "got polygons that cross themselves or overlap"),
-    "many polygons": (with_polygons([[[0, 0], [1e-3, 0], [0, 1e-3]]] * 401), "at most 400 items"),
-    "corners far away": (with_polygons([[[0, 0], [1e30, 0], [0, 1e30]]]), "at most one spacing away"),
+    "a zigzag": (
+        f'{BASE.split("[plate.pattern]")[0]}[plate.pattern]\nshape = "polygons"\nspacing = ["16 mm", "8 mm"]\n'
+        f"polygons = {[ZIGZAG]}\n\n[impact]{BASE.split('[impact]')[1]}",
+        "got polygons that cross themselves or overlap",
+    ),
 }
 
 
@@ -65,33 +57,23 @@ def test_a_hostile_campaign_is_refused_in_a_sentence(case: str, in_tmp_path: Pat
     assert expected in refusal(["run", "a.toml"])
 
 
-def test_a_hostile_list_of_hits_is_refused_in_a_sentence(in_tmp_path: Path, refusal: Refusal) -> None:
+def test_a_hostile_list_of_hits_is_refused_without_its_text(in_tmp_path: Path, refusal: Refusal) -> None:
     Path("a.toml").write_text(listed("a.csv"), encoding="utf-8")
-    for content, expected in (
-        ("hit_y,hit_z\n" + "1" * 200_000 + ",1\n", "field larger than field limit"),
-        ("secret:x:0:0\nsecret\n", "line 1: the header must be hit_y,hit_z"),
-    ):
-        Path("a.csv").write_text(content, encoding="utf-8")
-        sentence = refusal(["run", "a.toml"])
-        assert expected in sentence
-        assert "secret" not in sentence
+    Path("a.csv").write_text("secret:x:0:0\nsecret\n", encoding="utf-8")
+    sentence = refusal(["run", "a.toml"])
+    assert "line 1: the header must be hit_y,hit_z" in sentence
+    assert "secret" not in sentence
 
 
-def test_a_bug_has_a_file_of_details(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
-
+def test_a_bug_has_a_traceback(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> None:
     def broken(*_: object, **__: object) -> None:
         raise ZeroDivisionError("a\x1b[31m")
 
     monkeypatch.setattr(Campaign, "from_toml", broken)
-    assert main(["plate", "a.toml", "-o", str(tmp_path / "a.png")]) == 70
-    sentence = capsys.readouterr().err
-    assert sentence.startswith("warpimpact: error: this is a bug, please report it: ZeroDivisionError: a\\x1b[31m; ")
-    (report,) = tmp_path.glob("warpimpact_bug_*.txt")
-    assert sentence.endswith(f"details are in {report}\n")
-    assert "in broken" in report.read_text(encoding="utf-8")
+    assert main(["plate", "a.toml"]) == 70
+    *lines, sentence = capsys.readouterr().err.splitlines()
+    assert lines[-1] == "ZeroDivisionError: a\\x1b[31m"
+    assert sentence.startswith("warpimpact: error: this is a bug of warpimpact ")
 
 
 def test_control_characters_are_never_printed(capsys: pytest.CaptureFixture[str]) -> None:

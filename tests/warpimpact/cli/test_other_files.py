@@ -97,12 +97,6 @@ def test_a_result_is_named_where_a_text_is_taken(make_result: ResultMaker, in_tm
             read("a.nc")
 
 
-def test_a_picture_is_neither(in_tmp_path: Path, refusal: Refusal) -> None:
-    Image.new("1", (2, 2)).save("a.png")
-    assert refusal(["inspect", "a.png"]) == "a.png: cannot be read as a netCDF file"
-    assert "a.png: is not valid TOML" in refusal(["run", "a.png"])
-
-
 @pytest.mark.parametrize(
     ("mark", "sentence"),
     [
@@ -119,7 +113,12 @@ def test_another_version_or_kind_is_named(
         assert sentence in refusal(arguments)
 
 
-def test_a_truncated_result_is_named(make_result: ResultMaker, in_tmp_path: Path, refusal: Refusal) -> None:
+def test_a_truncated_result_and_a_picture_are_named(
+    make_result: ResultMaker, in_tmp_path: Path, refusal: Refusal
+) -> None:
+    Image.new("1", (2, 2)).save("a.png")
+    assert refusal(["inspect", "a.png"]) == "a.png: cannot be read as a netCDF file"
+    assert "a.png: is not valid TOML" in refusal(["run", "a.png"])
     files.write(make_result(2000), Path("a.nc"))
     data = Path("a.nc").read_bytes()
     for size in (int(0.9 * len(data)), 0):

@@ -14,13 +14,12 @@ from warpimpact.runs.progress import RunProgress
 from warpimpact.statistics.intervals import Estimate
 
 LOUD = argparse.Namespace(quiet=False)
+VELOCITY = "mean(residual_velocity) 731.25 (730.5 to 732) m/s"
 
 
 def progress_at(done: int, *, failed: int = 0, resumed: int = 100) -> RunProgress:
-    velocity = Estimate(731.25, 730.5, 732.0, done, 10.0)
-    tilt = Estimate(23.0, 22.0, 24.0, done, 5.0)
-    measures = (Measure.parse("mean(residual_velocity)"), Measure.parse("mean(tilt@130mm)"))
-    return RunProgress(done, 1000, done, resumed, failed, dict(zip(measures, (velocity, tilt), strict=True)))
+    estimates = {Measure.parse("mean(residual_velocity)"): Estimate(731.25, 730.5, 732.0, done, 10.0)}
+    return RunProgress(done, 1000, done, resumed, failed, estimates)
 
 
 class Terminal(io.StringIO):
@@ -35,7 +34,7 @@ def clock(monkeypatch: pytest.MonkeyPatch) -> list[float]:
     return now
 
 
-def test_a_log_gets_a_line_per_tenth(capsys: pytest.CaptureFixture[str], clock: list[float]) -> None:
+def test_a_log_gets_a_line_per_tenth_and_per_minute(capsys: pytest.CaptureFixture[str], clock: list[float]) -> None:
     with show_run(LOUD) as show:
         for done in range(100, 1001, 10):
             clock[0] += 0.1
@@ -45,25 +44,20 @@ def test_a_log_gets_a_line_per_tenth(capsys: pytest.CaptureFixture[str], clock: 
     assert lines[0] == "100 of 1000 hits"
     # 100 hits a second; no rate stands in a line before 2 s have passed since the first of them.
     assert "hits/s" not in "".join(lines[:2])
-    assert lines[3] == (
-        "400 of 1000 hits, 100 hits/s, 6 s left; "
-        "mean(residual_velocity) 731.25 ± 0.75 m/s, mean(tilt@130mm) 23 ± 1°, 1 failed"
-    )
+    assert lines[3] == f"400 of 1000 hits, 100 hits/s, 6 s left; 1 failed, {VELOCITY}"
     assert lines[-1].startswith("1000 of 1000 hits, 100 hits/s, 0 s left; ")
-
-
-def test_a_slow_run_is_not_silent(capsys: pytest.CaptureFixture[str], clock: list[float]) -> None:
+    clock[0] = 0.0
     with show_run(LOUD) as show:
         for _ in range(100):
             show(progress_at(101))
             clock[0] += 60.0
-    assert len(capsys.readouterr().err.splitlines()) == 100  # of 100 minutes
+    assert len(capsys.readouterr().err.splitlines()) == 100
 
 
 def test_a_terminal_gets_one_line_that_never_goes_back(monkeypatch: pytest.MonkeyPatch, clock: list[float]) -> None:
     terminal = Terminal()
     monkeypatch.setattr(sys, "stderr", terminal)
-    monkeypatch.setattr("shutil.get_terminal_size", lambda: os.terminal_size((120, 24)))
+    monkeypatch.setattr("shutil.get_terminal_size", lambda: os.terminal_size((80, 24)))
     with show_run(LOUD) as show:
         for done in (100, 200, 600, 590, 1000):  # hits under way may be given up
             show(progress_at(done, failed=3))
@@ -71,10 +65,7 @@ def test_a_terminal_gets_one_line_that_never_goes_back(monkeypatch: pytest.Monke
     *lines, end = terminal.getvalue().split("\x1b[K")
     assert end == "\n"
     assert [line.split()[0] for line in lines] == ["100", "200", "600", "600", "1000"]
-    assert lines[-1].startswith(
-        "\r1000 of 1000 hits, 266.7 hits/s, 0 s left; mean(residual_velocity) 731.25 ± 0.75 m/s"
-    )
-    assert max(map(len, lines)) == 120
+    assert lines[-1] == f"\r1000 of 1000 hits, 266.7 hits/s, 0 s left; 3 failed, {VELOCITY}"[:80]
 
 
 def test_a_log_says_what_a_pilot_tries_and_counts_no_time_of_it(

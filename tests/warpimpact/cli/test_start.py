@@ -23,7 +23,7 @@ def test_examples_are_listed_with_their_questions(capsys: pytest.CaptureFixture[
     lines = capsys.readouterr().out.splitlines()
     paths = [path for kind in (".", "fits", "firing", "designs") for path in CAMPAIGNS.glob(f"{kind}/*.toml")]
     assert [line.split()[0] for line in lines] == sorted(path.stem for path in paths)
-    assert all("?" in line for line in lines)
+    assert all("?" in line and "campaigns/" not in line for line in lines)
 
 
 @pytest.mark.parametrize("name", ["slotted_plate", "paper_shots"])
@@ -55,32 +55,20 @@ def test_another_new_file_can_be_read(name: str, kind: str, is_read: Callable[[s
     assert [path.name for path in Path().glob("*.json")] == [f"warpimpact.{kind}.schema.json"]
 
 
-def test_new_overwrites_nothing(capsys: pytest.CaptureFixture[str]) -> None:
-    Path("slotted_plate.toml").write_text("mine")
-    assert main(["new", "slotted_plate"]) == 2
-    assert "exists already" in capsys.readouterr().err
-    assert Path("slotted_plate.toml").read_text() == "mine"
-    assert main(["new", "slotted_plate", "--overwrite"]) == 0
-    assert Path("slotted_plate.toml").read_text() != "mine"
-
-
-def test_the_schema_is_printed_or_written(capsys: pytest.CaptureFixture[str]) -> None:
+def test_the_schema_is_printed_or_written_once(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["schema"]) == 0
     printed = capsys.readouterr().out
-    assert main(["schema", "-o", "it.json"]) == 0
+    assert [main(["schema", "-o", "it.json"]) for _ in range(2)] == [0, 2]
     assert Path("it.json").read_text(encoding="utf-8") == printed
     assert json.loads(printed)["title"] == "warpimpact campaign"
-    assert main(["schema", "-o", "it.json"]) == 2
 
 
-def test_a_new_file_names_itself_in_its_commands(capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_new_file_names_itself_in_its_commands() -> None:
     for name in ("layered_target", "paper_fit"):
         assert main(["new", name, "-o", "my.toml", "--overwrite"]) == 0
         text = Path("my.toml").read_text(encoding="utf-8")
         assert " my.toml" in text
         assert "campaigns/" not in text
-    assert main(["new", "--list"]) == 0
-    assert "campaigns/" not in capsys.readouterr().out
 
 
 @pytest.mark.parametrize(

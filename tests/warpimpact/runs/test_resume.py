@@ -214,6 +214,9 @@ def test_an_interrupted_run_is_neither_lost_nor_overwritten_by_accident(
     before = broken_off.stat()
     run_to_file(campaign, broken_off, device="cpu", resume=True)  # a batch system that restarts what is complete
     assert broken_off.stat() == before
+    more = Campaign.from_text(campaign.text, name="a", folder=Path(), count=2 * COUNT)
+    with pytest.raises(OutputError, match="exists already, and --resume adds no hits to what is complete; name"):
+        run_to_file(more, broken_off, device="cpu", resume=True)
 
 
 def test_an_old_result_stays_until_the_new_one_is_complete(

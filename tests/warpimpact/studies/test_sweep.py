@@ -1,5 +1,6 @@
 """A sweep: every combination computed as it would be alone, joined with a dimension for every input."""
 
+import re
 from pathlib import Path
 
 import numpy as np
@@ -111,7 +112,7 @@ def test_a_point_is_a_result_and_a_sweep_says_that_it_is_one(folder: Path, capsy
     assert "this takes one combination of inputs; warpimpact sweep" in capsys.readouterr().err
 
 
-def test_an_interrupted_sweep_continues_with_the_points_that_are_there(
+def test_a_sweep_on_a_full_disk_says_what_is_kept_and_continues_with_it(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, folder: Path
 ) -> None:
     (tmp_path / "a.toml").write_text(TEXT + TWO, encoding="utf-8")
@@ -120,12 +121,13 @@ def test_an_interrupted_sweep_continues_with_the_points_that_are_there(
 
     def broken(campaign: Campaign, path: Path, **options: object) -> None:
         if len(computed) == 2:
-            raise KeyboardInterrupt
+            raise files.OutputError("the disk is full")
         computed.append(path.name)
         original(campaign, path, **options)
 
     monkeypatch.setattr(module, "run_to_file", broken)
-    with pytest.raises(KeyboardInterrupt):
+    kept = f"the disk is full; 2 of 6 points before it are complete in {folder_of(tmp_path / 'a.nc')}; continue with"
+    with pytest.raises(files.OutputError, match=re.escape(kept)):
         run_sweep(sweep, tmp_path / "a.nc", device="cpu")
     monkeypatch.setattr(module, "run_to_file", original)
     with pytest.raises(files.OutputError, match="a_points: exists already; give --resume"):
