@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import json
-import math
-import time
 from collections import OrderedDict
 from collections.abc import Mapping
 from typing import Annotated, Any, Literal
@@ -19,7 +17,7 @@ from warpimpact.campaign.resistances import catalogue_names
 from warpimpact.campaign.tested_range import outside_tested_range, range_line
 from warpimpact.campaign.text import parsed
 from warpimpact.design.controls import drawn, groups
-from warpimpact.design.designs import ROOT, DesignStore, Tables, ValidDesign, changed, choices, stages, work
+from warpimpact.design.designs import ROOT, DesignStore, Tables, ValidDesign, changed, choices, stages
 from warpimpact.plotting.style import data_url
 from warpimpact.plotting.trajectory import FIGURES
 from warpimpact.report.hit_data import MOST_HITS, PAGE_PIXELS, page_data, thinned, trajectory_data
@@ -35,10 +33,6 @@ _MOST_KEPT = 24
 _FIGURES = {draw.__name__.replace("_", " "): draw for draw in FIGURES}
 _COARSE = 96
 """Pixels along the longer side of a first map, which has few hits."""
-PACE, OVERHEAD = 1.8, 0.3
-"""Initial ratio of the time of a complete map to the time of a core for its hits (`work`), before it is measured; and
-the time of references and tables [s]."""
-_FIRST = "The error of the numerics is not known."
 THIS_DESIGN = "this design"
 """Name of the design on the page. The designs to compare with have names of their own."""
 
@@ -71,7 +65,6 @@ class Answers:
 
     def __init__(self, store: DesignStore, device: str = "auto") -> None:
         self.store, self._device = store, device
-        self._pace = PACE
         self._results: OrderedDict[str, xarray.Dataset] = OrderedDict()
         self._replayed = ("", 0, xarray.Dataset())
         self._environment = templates("design", "report")
@@ -107,41 +100,27 @@ class Answers:
         self._results.move_to_end(text)
         return self._results[text]
 
-    def maps(
-        self, name: str, designs: Mapping[str, ValidDesign], full: Mapping[str, ValidDesign], level: int, cancel: Cancel
-    ) -> dict[str, Any]:
+    def maps(self, stage: str, designs: Mapping[str, ValidDesign], total: int, cancel: Cancel) -> dict[str, Any]:
         """The maps of a design, and of the designs to compare with, at one stage.
 
         Args:
-            name: name of the stage.
             designs: the designs at this stage, by name; the design of the page is the first.
-            full: the designs at their last stage.
-            level: level of the hits, as far as it is known.
+            total: number of hits at the last stage.
         """
-        is_last, begin = name == "full", time.perf_counter()
-        new = [design for design in full.values() if design.text not in self._results]
-        seconds = sum(
-            OVERHEAD + work(design.campaign, level if design.campaign.numerics.explicit is None else None)
-            for design in new
-        )
         datasets = {label: self.result(design, cancel) for label, design in designs.items()}
         cancel.check()
-        design_data = datasets[THIS_DESIGN]
-        if is_last and 0.0 < seconds < math.inf:
-            self._pace = (time.perf_counter() - begin) / seconds
-        most = MOST_HITS // len(datasets)
-        resolution = json.loads(design_data.attrs[attr.RESOLUTION]) if attr.RESOLUTION in design_data.attrs else {}
+        own, most, is_first = datasets[THIS_DESIGN], MOST_HITS // len(datasets), stage == "first"
+        resolution = json.loads(own.attrs.get(attr.RESOLUTION, "{}"))
         return {
             "kind": "maps",
-            "stage": name,
-            "hits": design_data.sizes["hit"],
-            "total": full[THIS_DESIGN].campaign.hits.count or 0,
-            "ahead": 0.0 if is_last or seconds == math.inf else self._pace * seconds,
-            "numerics": _FIRST if name == "first" else numerics_sentence(design_data),
-            "kept": not breaks_promise(design_data),
+            "stage": stage,
+            "hits": own.sizes["hit"],
+            "total": total,
+            "numerics": "The error of the numerics is not known." if is_first else numerics_sentence(own),
+            "kept": not breaks_promise(own),
             "level": resolution.get("level"),
             "data": page_data(
-                [thinned(dataset, most) for dataset in datasets.values()], _COARSE if name == "first" else PAGE_PIXELS
+                [thinned(dataset, most) for dataset in datasets.values()], _COARSE if is_first else PAGE_PIXELS
             ),
         }
 

@@ -7,7 +7,6 @@ from collections.abc import Iterator, Mapping
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import BaseModel
 
 from warpimpact.analysis.effectiveness import plate_numbers
@@ -17,15 +16,12 @@ from warpimpact.design.designs import ValidDesign
 from warpimpact.plotting.cell import words
 from warpimpact.plotting.plate import Dimension, drawn_extent, hole_dimensions, smallest_ligament
 from warpimpact.plotting.style import fire_of
-from warpimpact.report import svg
 from warpimpact.scene import NoPattern, Plate, Target
-from warpimpact.scene.model import Model
+from warpimpact.scene.model import Array, Model
 from warpimpact.scene.pattern import LatticePattern
 from warpimpact.scene.units import MM, reader_in, typed
 
 Place = list[str | int]
-
-
 _UNITS = {"m": ("mm", 1e3), "Pa": ("MPa", 1e-6), "kg": ("g", 1e3), "rad": ("deg", math.degrees(1.0))}
 """Units in which the page writes, and their size. Others are written as they are."""
 _RANGES: Mapping[tuple[str, str], tuple[float, float, float]] = {
@@ -148,11 +144,12 @@ def drawn(campaign: Campaign) -> dict[str, Any]:
     extent = drawn_extent(plate, core) * MM
     half = extent / MM / 2
     rings = plate.pattern.outlines((-half[0], half[0]), (-half[1], half[1]))
+    outlines = ("L".join(f"{y:.3f},{-z:.3f}" for y, z in ring * MM) for ring in rings)
     ligament = smallest_ligament(plate)
     cell = None if isinstance(plate.pattern, NoPattern) else _rounded(np.array(plate.pattern.unit_cell) * MM)
     return {
         "extent": _rounded(extent),
-        "path": svg.path(rings),
+        "path": " ".join(f"M{outline}Z" for outline in outlines),
         "cell": cell,
         "core": round(core.max_radius * MM, _COORDINATE_DIGITS),
         "dimensions": [_line(hole_dimension) for hole_dimension in hole_dimensions(plate, ligament)],
@@ -190,13 +187,10 @@ def _handles(campaign: Campaign) -> Iterator[dict[str, Any]]:
             yield _handle(["plate", "pattern", name], place + reach * direction, direction, value / reach)
     for axis, direction in enumerate(np.array([[1.0, 0.0], [0.0, -1.0]])):  # where no dimension stands
         at = pattern.unit_cell[axis] / 2
-        key: list[str | int] = ["plate", "pattern", "spacing", axis]
-        yield _handle(key, at * direction, direction, pattern.spacing[axis] / at)
+        yield _handle(["plate", "pattern", "spacing", axis], at * direction, direction, pattern.spacing[axis] / at)
 
 
-def _handle(
-    path: list[str | int], at: NDArray[np.float64], direction: NDArray[np.float64], gain: float
-) -> dict[str, Any]:
+def _handle(path: Place, at: Array, direction: Array, gain: float) -> dict[str, Any]:
     return {"path": path, "at": _rounded(at * MM), "direction": _rounded(direction, 6), "gain": round(gain, 6)}
 
 
@@ -211,7 +205,7 @@ def _section(target: Target, half: float) -> dict[str, Any]:
         name = "plate" if number == 0 else f"layer {number}"
         text = f"{name}, {layer.thickness * MM:.4g} mm"
         layers.append({"front": float(front), "rear": float(rear), "parts": parts, "text": text})
-        table: list[str | int] = ["plate"] if number == 0 else ["layer", number - 1]
+        table: Place = ["plate"] if number == 0 else ["layer", number - 1]
         along = np.array([1.0, 0.0])
         handles.append(_handle([*table, "thickness"], np.array([rear / MM, 0.0]), along, 1.0))
         if number:
@@ -219,5 +213,5 @@ def _section(target: Target, half: float) -> dict[str, Any]:
     return {"half": round(half * MM, _COORDINATE_DIGITS), "layers": layers, "handles": handles}
 
 
-def _rounded(values: NDArray[np.float64], digits: int = _COORDINATE_DIGITS) -> list[float]:
+def _rounded(values: Array, digits: int = _COORDINATE_DIGITS) -> list[float]:
     return [float(value) for value in np.round(values, digits)]

@@ -6,7 +6,7 @@ import json
 import math
 import zlib
 from base64 import urlsafe_b64decode
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from copy import deepcopy
 from dataclasses import dataclass
 from functools import cached_property
@@ -173,20 +173,16 @@ def stages(store: DesignStore, design: ValidDesign, level: int) -> dict[str, Val
 
 def _first(store: DesignStore, design: ValidDesign, level: int) -> ValidDesign | None:
     """Return a design for its first map, as fine as FIRST_WORK allows; None if it cannot have one."""
-
-    def first(hits: int, level: int) -> ValidDesign | None:
-        few = (_variant(store, design, hits, {"level": level}, irreducible=part) for part in (True, False))
-        return next(filter(None, few), None)
-
-    finest = first(FEW, level)
+    few = ((part, _variant(store, design, FEW, {"level": level}, irreducible=part)) for part in (True, False))
+    part, finest = next(((part, one) for part, one in few if one), (False, None))
     if finest is None:
         return None
-    at, seconds = level, work(finest.campaign)
-    while not design.is_fixed and at > 0 and seconds > FIRST_WORK:
-        at -= 1
-        seconds = work(finest.campaign, at)
-    hits = FEW if seconds <= FIRST_WORK else max(FEWEST, int(FEW * FIRST_WORK / seconds) // FEWEST * FEWEST)
-    return finest if (at, hits) == (level, FEW) else first(hits, at)
+    for at in [level] if design.is_fixed else range(level, -1, -1):
+        seconds = work(finest.campaign, None if design.is_fixed else at)
+        if seconds <= FIRST_WORK:
+            break
+    hits = max(FEWEST, int(FEW * min(1.0, FIRST_WORK / seconds)) // FEWEST * FEWEST)
+    return _variant(store, design, hits, {"level": at}, irreducible=part)
 
 
 def _variant(
@@ -228,15 +224,16 @@ def work(campaign: Campaign, level: int | None = None) -> float:
         return math.inf
 
 
-_SIZES: Mapping[str, Callable[[float], dict[str, float]]] = {
-    "circle": lambda area: {"diameter": math.sqrt(4.0 * area / math.pi)},
-    "slot": lambda area: _oblong(math.sqrt(area / (2.0 + math.pi / 4.0)), 3.0),
-    "ellipse": lambda area: _oblong(math.sqrt(2.0 * area / math.pi), 2.0),
-    "triangle": lambda area: {"side": math.sqrt(4.0 * area / math.sqrt(3.0))},
-    "square": lambda area: {"side": math.sqrt(area)},
-    "hexagon": lambda area: {"width": math.sqrt(2.0 * area / math.sqrt(3.0))},
+_SLOT, _ELLIPSE = 1.0 / math.sqrt(2.0 + math.pi / 4.0), math.sqrt(2.0 / math.pi)
+_SIZES = {
+    "circle": {"diameter": math.sqrt(4.0 / math.pi)},
+    "slot": {"length": 3.0 * _SLOT, "width": _SLOT},
+    "ellipse": {"length": 2.0 * _ELLIPSE, "width": _ELLIPSE},
+    "triangle": {"side": math.sqrt(4.0 / math.sqrt(3.0))},
+    "square": {"side": 1.0},
+    "hexagon": {"width": math.sqrt(2.0 / math.sqrt(3.0))},
 }
-"""Lengths [m] of a hole with a given area [m²], by shape."""
+"""Lengths of a hole of the area 1, by shape."""
 SHAPES = ("none", *_SIZES)
 _SPACING = (8e-3, 16e-3)
 _OPEN = 0.25
@@ -245,10 +242,6 @@ _BASE = {"gap": "100 mm", "thickness": "10 mm"}
 """A layer that is added. Its material is that of the layer in front."""
 _SMALLER, _TRIES = 0.85, 24
 _OF_A_MATERIAL = ("resistance", "shear_coefficient", "density")
-
-
-def _oblong(width: float, slender: float) -> dict[str, float]:
-    return {"length": slender * width, "width": width}
 
 
 def choices(design: Tables) -> dict[str, list[str]]:
@@ -266,30 +259,23 @@ def changed(design: ValidDesign, store: DesignStore, change: str, layer: int, va
         layer: number of the changed layer, 0 the plate.
         value: the chosen name; "" is a core or a material of one's own.
     """
-    tables = deepcopy(design.tables)
+    tables, layers = deepcopy(design.tables), design.campaign.target.layers
+    every = [tables["plate"], *tables.get("layer", [])]
     match change:
         case "threat":
             _take_threat(tables, design, value)
         case "material":
-            _take_material(_plate(tables, layer), design.campaign.target.layers[layer], value)
+            _take_material(every[layer], layers[layer], value)
             if not value:
                 tables["interaction"] = design.campaign.interaction.model_dump(exclude_none=True)
         case "shape":
-            _take_shape(tables, design, store, layer, value)
+            _take_shape(tables, every[layer], layers[layer], store, value)
         case "add layer":
-            front = design.campaign.target.layers[-1]
-            of_front = {"material": front.material} if front.material else _own(front)
-            tables["layer"] = [*tables.get("layer", []), _BASE | of_front]
+            every.append(_BASE | ({"material": layers[-1].material} if layers[-1].material else _own(layers[-1])))
         case "remove layer":
-            tables["layer"] = [table for place, table in enumerate(tables["layer"]) if place != layer - 1]
-            if not tables["layer"]:
-                del tables["layer"]
-    return tables
-
-
-def _plate(tables: Tables, layer: int) -> Tables:
-    plate: Tables = tables["layer"][layer - 1] if layer else tables["plate"]
-    return plate
+            del every[layer]
+    tables["layer"] = every[1:]
+    return tables if every[1:] else {key: table for key, table in tables.items() if key != "layer"}
 
 
 def _own(plate: Plate) -> dict[str, Any]:
@@ -329,20 +315,18 @@ def _take_material(table: Tables, plate: Plate, name: str) -> None:
         table |= _own(plate)
 
 
-def _take_shape(tables: Tables, design: ValidDesign, store: DesignStore, layer: int, shape: str) -> None:
+def _take_shape(tables: Tables, table: Tables, plate: Plate, store: DesignStore, shape: str) -> None:
     """Take holes of another shape with the same area, or with the largest area that leaves ligaments."""
-    table, old = _plate(tables, layer), design.campaign.target.layers[layer].pattern
+    before = table.pop("pattern", {})
     if shape == "none":
-        table.pop("pattern", None)
         return
-    lattice = isinstance(old, LatticePattern)
-    spacing = old.spacing if isinstance(old, LatticePattern) else _SPACING
-    area = old.hole_area if isinstance(old, LatticePattern) else _OPEN * math.prod(_SPACING)
-    kept = {
-        key: value for key, value in table.get("pattern", {}).items() if lattice and key in ("staggered", "rotation")
-    }
+    old, kept = plate.pattern, {}
+    spacing, area = _SPACING, _OPEN * math.prod(_SPACING)
+    if isinstance(old, LatticePattern):
+        spacing, area = old.spacing, old.hole_area
+        kept = {key: before[key] for key in ("staggered", "rotation") if key in before}
     for _ in range(_TRIES):
-        sizes = {key: _mm(length) for key, length in _SIZES[shape](area).items()}
+        sizes = {key: _mm(length * math.sqrt(area)) for key, length in _SIZES[shape].items()}
         table["pattern"] = {"shape": shape, **sizes, "spacing": [_mm(side) for side in spacing], **kept}
         try:
             store.checked(tables)

@@ -141,15 +141,14 @@ def application(store: DesignStore, *, token: str, device: str = "auto") -> Star
 
 async def _compute(answers: Answers, jobs: JobQueue, query: Query) -> AsyncIterator[Any]:
     """Give the plate of a design at once, then maps and numbers of each stage."""
-    designs, level = answers.designs(query), query.level
+    designs = answers.designs(query)
     yield await run_in_threadpool(answers.plate, designs[THIS_DESIGN])
-    by_name = {name: stages(answers.store, design, level) for name, design in designs.items()}
+    by_name = {name: stages(answers.store, design, query.level) for name, design in designs.items()}
+    total = designs[THIS_DESIGN].campaign.hits.count or 0
     for stage in by_name[THIS_DESIGN]:
         at_stage = {name: others.get(stage, others["full"]) for name, others in by_name.items()}
         refines = stage != "first"
-        shown = await jobs.compute(partial(answers.maps, stage, at_stage, designs, level), refines=refines)
-        level = level if shown["level"] is None else shown["level"]
-        yield shown
+        yield await jobs.compute(partial(answers.maps, stage, at_stage, total), refines=refines)
         yield await jobs.compute(partial(answers.numbers, at_stage), refines=refines)
 
 
@@ -172,24 +171,14 @@ async def _stream(answer: Callable[[Query], AsyncIterator[Any]], request: Reques
 
     async def lines() -> AsyncIterator[str]:
         try:
-            async for value in answer(_query(body)):
+            async for value in answer(Query.model_validate_json(body)):
                 yield as_json(value) + "\n"
+        except ValidationError as error:
+            yield as_json(_refusal(CampaignError(sentence(error, {})))) + "\n"
         except Exception as error:
             yield as_json(_refusal(error)) + "\n"
 
     return StreamingResponse(lines(), media_type="application/x-ndjson")
-
-
-def _query(body: bytes) -> Query:
-    """Read a query.
-
-    Raises:
-        CampaignError: it is none.
-    """
-    try:
-        return Query.model_validate_json(body)
-    except ValidationError as error:
-        raise CampaignError(sentence(error, {})) from None
 
 
 def _refusal(error: Exception) -> dict[str, str]:

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from io import StringIO
 from pathlib import Path
-from types import MappingProxyType
-from typing import Any, NamedTuple
+from typing import Any
 
 import xarray
 from markupsafe import Markup
@@ -44,29 +43,18 @@ _MAP_PIXELS = 160
 """Pixels along the longer side of a map."""
 
 
-class _Contents(NamedTuple):
-    """What is shown of a kind.
-
-    Attributes:
-        view: its tables and sentences.
-        figures: figures by their headings.
-        input: attribute with the text of the file behind the result.
-    """
-
-    view: Callable[..., View]
-    figures: Mapping[str, Callable[[Any], PlainFigure]] = MappingProxyType({})
-    input: str = ""
-
-
-_FIT_FIGURES = {"Parameters, in pairs": pairs_figure, "Where the shots hit": hits_figure}
-_HIT_FIGURES = {draw.__name__.replace("_", " ").capitalize(): draw for draw in FIGURES}
-_CONTENTS = {
-    POSTERIOR: _Contents(posterior_view, _FIT_FIGURES, posterior_file.FIT_TEXT),
-    FRONT: _Contents(front_view, input=f.DESIGN),
-    SWEEP: _Contents(sweep_view, {"By input": sweep_figure}, attr.CAMPAIGN),
-    FIRING: _Contents(firing_view, {"What the tests report": firing_figure}, firing.TEST),
-    HISTORY: _Contents(hit_view, _HIT_FIGURES),
+_CONTENTS: dict[Kind, tuple[Callable[[Any], View], dict[str, Callable[[Any], PlainFigure]], str]] = {
+    POSTERIOR: (
+        posterior_view,
+        {"Parameters, in pairs": pairs_figure, "Where the shots hit": hits_figure},
+        posterior_file.FIT_TEXT,
+    ),
+    FRONT: (front_view, {}, f.DESIGN),
+    SWEEP: (sweep_view, {"By input": sweep_figure}, attr.CAMPAIGN),
+    FIRING: (firing_view, {"What the tests report": firing_figure}, firing.TEST),
+    HISTORY: (hit_view, {draw.__name__.capitalize(): draw for draw in FIGURES}, ""),
 }
+"""Of each kind: its view, figures by their headings, and the attribute with the text of the file behind the result."""
 
 
 def view_of(path: Path, kind: Kind, measures: Sequence[str] = ()) -> View:
@@ -81,7 +69,7 @@ def view_of(path: Path, kind: Kind, measures: Sequence[str] = ()) -> View:
     if measures and kind is not SWEEP:
         raise files.ResultError(f"--measure: got {kind.name}, but measures are those of a map of hits or a sweep")
     dataset = files.read(path, kind)
-    return sweep_view(dataset, measures) if kind is SWEEP else _CONTENTS[kind].view(dataset)
+    return sweep_view(dataset, measures) if kind is SWEEP else _CONTENTS[kind][0](dataset)
 
 
 def file_page(path: Path, kind: Kind, folder: Path) -> str:
@@ -93,9 +81,9 @@ def file_page(path: Path, kind: Kind, folder: Path) -> str:
     Raises:
         ResultError: the file cannot be read.
     """
-    dataset, contents = files.read(path, kind), _CONTENTS[kind]
+    dataset, (view_of_kind, figures, input_text) = files.read(path, kind), _CONTENTS[kind]
     title = str(dataset.attrs.get(attr.TITLE, path.stem))
-    view = {"" if heading == title else heading: parts for heading, parts in contents.view(dataset).items()}
+    view = {"" if heading == title else heading: parts for heading, parts in view_of_kind(dataset).items()}
     made = [str(dataset.attrs[name]) for name in (attr.HISTORY, attr.WARPIMPACT_VERSION) if name in dataset.attrs]
     front = StringIO()
     if kind is FRONT:
@@ -109,8 +97,8 @@ def file_page(path: Path, kind: Kind, folder: Path) -> str:
             front=Markup(drawing[drawing.find("<svg") :]),
             designs=[_design(dataset, place, folder) for place in range(dataset.sizes.get("front", 0))],
             view=Markup(html_of(view, "h2")),
-            figures=[(name, data_url(draw(dataset))) for name, draw in contents.figures.items()],
-            input=dataset.attrs.get(contents.input, ""),
+            figures=[(name, data_url(draw(dataset))) for name, draw in figures.items()],
+            input=dataset.attrs.get(input_text, ""),
             made=", ".join(made),
         )
     )

@@ -46,13 +46,11 @@ from warpimpact.analysis.numbers import html_of, interval_text, number_text, tab
 from warpimpact.plotting.cell import range_text, words
 from warpimpact.plotting.comparison import comparison_figure
 from warpimpact.plotting.style import data_url
-from warpimpact.report import svg
 from warpimpact.report.hit_data import MOST_HITS, page_data, thinned, trajectory_data, worst_and_spread
 from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
 from warpimpact.results.dataset import hit_numbers, passed
 from warpimpact.results.files import ResultError
-from warpimpact.results.layers import outlines
 from warpimpact.runs.replay import replay
 from warpimpact.scene.units import MM
 from warpimpact.studies.limit_view import in_short, limit_view
@@ -92,8 +90,8 @@ def report_page(
                 progress(done, total)
         drawn["first"] = largest_tilt(datasets[name], hits)
     comparison = compared(datasets) if len(datasets) > 1 else None
-    for result, few, drawing in zip(results, shown, cell_drawings(datasets), strict=True):
-        result |= {"shown": few.sizes["hit"], "plate": drawing}
+    for result, few in zip(results, shown, strict=True):
+        result["shown"] = few.sizes["hit"]
     verdicts = [] if comparison is None else comparison["verdict"]
     plotly = re.sub(r"https?://(?!www\.w3\.org/)", "", get_plotlyjs())  # addresses of maps and of where charts go
     page = templates("report").get_template("page.html")
@@ -132,20 +130,9 @@ def _first(keys: Sequence[str]) -> str:
 
 _CHANCE = "Intervals describe the hits that were drawn."
 _RIGID = "The core stays one rigid body, which overstates what comes through where cores break or erode."
-_PLATE_WIDTH = 240.0
-"""Width of the widest cell on the page [px]."""
 _PROVENANCE = (
-    attr.HISTORY,
-    attr.WARPIMPACT_VERSION,
-    attr.WARP_VERSION,
-    attr.DEVICE,
-    attr.NUMERICS,
-    attr.SAMPLING,
-    attr.SEED,
-    attr.REPLICATES,
-    attr.SYMMETRIES,
-    attr.FINGERPRINT,
-    attr.REFERENCES,
+    *(attr.HISTORY, attr.WARPIMPACT_VERSION, attr.WARP_VERSION, attr.DEVICE, attr.NUMERICS, attr.SAMPLING, attr.SEED),
+    *(attr.REPLICATES, attr.SYMMETRIES, attr.FINGERPRINT, attr.REFERENCES),
 )
 
 
@@ -173,7 +160,7 @@ def result_content(name: str, dataset: xarray.Dataset) -> dict[str, Any]:
         "tested": range_note({name: dataset}),
         "campaign": attributes.get(attr.CAMPAIGN, ""),
         "promise": promise_text(dataset),
-        "caveats": [*_caveats(dataset), *filter(None, [depth_note(dataset), solid_note(dataset)])],
+        "caveats": _caveats(dataset),
         "measures": measures,
         "through": Markup(html_of(limit_view(dataset)) if is_limit else table_html(_through(dataset), means_over)),
         "protects": Markup(table_html(measures_table(measures, reference_name(dataset)), against_solid)),
@@ -215,7 +202,7 @@ def _scene_text(dataset: xarray.Dataset) -> str:
 def _caveats(dataset: xarray.Dataset) -> list[str]:
     """Return the reservations about the numbers of a result, a sentence each."""
     notes = (numerics_sentence(dataset), _CHANCE, sampling_note(dataset), numerics_note(dataset), _RIGID)
-    return [sentence for sentence in notes if sentence]
+    return [sentence for sentence in (*notes, depth_note(dataset), solid_note(dataset)) if sentence]
 
 
 def _through(dataset: xarray.Dataset) -> pd.DataFrame:
@@ -229,15 +216,3 @@ def _through(dataset: xarray.Dataset) -> pd.DataFrame:
             name = f"mean {measure.column.label}, {measure.display.shown}"
             rows[name] = number_text(mean.value, ".2f"), interval_text(mean.low, mean.high, mean.numerics, ".2f")
     return pd.DataFrame.from_dict(rows, orient="index", columns=["value", "95 % interval"])
-
-
-def cell_drawings(datasets: Mapping[str, xarray.Dataset]) -> list[dict[str, Any]]:
-    """The cells that were hit, drawn at one scale, and their sides [mm]."""
-    halves = {name: 0.5 * np.asarray(dataset.attrs[attr.PLATE_PERIOD]) for name, dataset in datasets.items()}
-    scale = _PLATE_WIDTH / (2.0 * MM * max(half[0] for half in halves.values()))
-    drawings = []
-    for name, dataset in datasets.items():
-        half, holes = halves[name], outlines(dataset)
-        drawn = svg.drawing(svg.rings(holes["y"], holes["z"]), half, f"cell of the plate {name}", scale)
-        drawings.append({"drawing": Markup(drawn), "y": 2.0 * MM * half[0], "z": 2.0 * MM * half[1]})
-    return drawings

@@ -100,6 +100,8 @@ def test_a_slider_moves_and_the_numbers_are_those_of_run(
     assert page.text("#tested").startswith("Outside the tested range: weakening")
     assert "Outside the tested range: weakening" in page.text("#rests")
     assert page.values("#title") == ["7.62 mm P80 core against a slotted plate, width 5.2 mm"]
+    loaded = "return performance.getEntriesByType('resource').map((e) => new URL(e.name).host)"
+    assert set(page.driver.execute_script(loaded)) == {urlsplit(page.driver.current_url).netloc}  # nothing else
     assert page.errors() == []
 
 
@@ -128,23 +130,14 @@ def test_the_address_holds_the_design_and_undo_brings_it_back(page: Any) -> None
     page.open("about:blank")
     page.open(address)
     page.wait(lambda: page.values(thickness) == ["5"])
-    move(page, "control-impact-obliquity", 7)
-    page.wait(lambda: page.values("#title")[0].endswith("a slotted plate, thickness 5 mm, obliquity 7 deg"))
-    assert page.errors() == []
-
-
-def test_addresses_hold_the_design_and_a_copied_one_not_the_token(page: Any) -> None:
-    held = page.driver.execute_async_script(
-        "address.unpacked(location.hash.slice(1)).then((held) => arguments[0](JSON.stringify(held)))"
-    )
-    text = json.dumps(json.loads(held)["design"])
-    assert Campaign.from_text(text, name="address", folder=Path("/")).plate.thickness == 4e-3
     page.driver.execute_script("navigator.clipboard.writeText = async (text) => { window.copied = text; }")
     page.press("#copy")
     page.wait(lambda: page.text("#copy") == "Copied")
     copied = page.driver.execute_script("return window.copied")
-    assert urlsplit(copied)[:3] == (*urlsplit(page.driver.current_url)[:2], "/")
-    assert from_address(copied)["plate"]["thickness"] == "4 mm"
+    assert urlsplit(copied)[:3] == (*urlsplit(page.driver.current_url)[:2], "/")  # without the token
+    design = Campaign.from_text(json.dumps(from_address(copied)), name="address", folder=Path("/"))
+    assert design.plate.thickness == 5e-3
+    assert page.errors() == []
 
 
 def test_a_click_on_the_map_shows_that_hit(page: Any) -> None:
@@ -180,15 +173,6 @@ def test_a_pinned_design_is_compared_shot_by_shot(page: Any, coarse: Path) -> No
     assert page.errors() == []
 
 
-def test_nothing_leaves_this_machine(page: Any) -> None:
-    move(page, "control-impact-obliquity", 10)
-    settled(page)
-    hosts = page.driver.execute_script(
-        "return performance.getEntriesByType('resource').map((e) => new URL(e.name).host)"
-    )
-    assert set(hosts) == {urlsplit(page.driver.current_url).netloc}
-
-
 def test_an_address_of_others_is_only_text(page: Any, coarse: Path) -> None:
     others = tomllib.loads(coarse.read_text()) | {"title": "of others"}
     script = {"name": "<img src=x onerror='document.title=1'>", "design": others}
@@ -219,11 +203,8 @@ def test_text_of_others_is_text(browser: Any, serve: Callable[..., str], coarse:
     assert browser.values("#title") == [hostile]
     assert browser.driver.title == f"{hostile} · warpimpact design"
     assert not browser.find("img[src=x]")
-    assert browser.driver.execute_script("return document.documentElement.scrollWidth") <= 390
+    assert browser.driver.execute_script("return document.documentElement.scrollWidth") <= 390  # a phone
     browser.wait(lambda: browser.find("#answer table"), 60.0)
-    cut = "return [...document.querySelectorAll('#title, #answer .wide')].map((e) => [e.scrollWidth - e.clientWidth, "
-    cut += "e.scrollHeight - e.clientHeight]).flat().filter((rest) => rest > 1)"
-    assert browser.driver.execute_script(cut) == []
     assert browser.driver.execute_script("return document.getElementById('maps').offsetHeight / innerHeight") < 1 / 3
     assert browser.errors() == []
 
@@ -233,12 +214,7 @@ def test_a_grip_of_the_plate_is_dragged(page: Any) -> None:
 
     grips = page.find("#plate .grip")
     labels = [grip.get_attribute("aria-label") for grip in grips]
-    assert labels == [
-        "plate pattern width",
-        "plate pattern length",
-        "plate pattern spacing 0",
-        "plate pattern spacing 1",
-    ]
+    assert labels == [f"plate pattern {name}" for name in ("width", "length", "spacing 0", "spacing 1")]
     per_mm = page.driver.execute_script("const at = document.getElementById('plate'); return at.getScreenCTM().a")
     drag = ActionChains(page.driver).click_and_hold(grips[0])
     for _ in range(4):

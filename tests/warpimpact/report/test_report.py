@@ -106,14 +106,12 @@ def test_page_compares_the_plates(folder: Path, make_result: ResultMaker, tmp_pa
     assert "<p>other: " in page.read_text()
 
 
-def test_page_says_what_was_compared_and_leads_to_its_parts(folder: Path) -> None:
+def test_page_names_its_plates_leads_to_its_parts_and_says_each_note_once(folder: Path) -> None:
     text = (folder / "a.html").read_text()
     assert "<title>Plates compared: narrow, &lt;b&gt;wide</title>" in text
     anchors = re.findall(r'<a href="#(\w+)">', text)
-    assert len(anchors) == len(set(anchors)) >= 8
     assert anchors == re.findall(r'<h2 id="(\w+)">', text)
-    assert text.count("Intervals describe the hits that were drawn.") == 4  # beside both tables of both plates
-    assert text.count("The core stays one rigid body") == 4
+    assert [text.count(note) for note in ("Intervals describe the hits", "The core stays one rigid body")] == [2, 2]
     assert len(text) < 3e6
 
 
@@ -160,22 +158,16 @@ def test_trajectories_are_of_the_worst_and_of_evenly_spread_hits(make_result: Re
     assert hit_data.worst_and_spread(some, 16, first=[7])[:5] == [7, 511, 509, 507, 505]
 
 
-def test_what_is_missing_is_reported_and_nothing_written(
+def test_a_lost_file_is_reported_and_nothing_written(
     folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    result, page = str(folder / "narrow.nc"), str(tmp_path / "a.html")
-
     def lost(*_: object, **__: object) -> None:
         raise CampaignError("the campaign in the result: hits.file: there is no file hits.csv")
 
     monkeypatch.setattr(report, "replay", lost)
-    for command, sentence in (
-        (["-o", str(folder / "a.html")], "a.html: exists already"),
-        ([result, "-o", page], "got this result 2 times, but each result counts once"),
-        (["-o", page], "hits.csv; give the folder of the campaign's files with --campaign-folder, or --trajectories 0"),
-    ):
-        assert main(["report", result, *command]) == 2
-        assert sentence in capsys.readouterr().err
+    assert main(["report", str(folder / "narrow.nc"), "-o", str(tmp_path / "a.html")]) == 2
+    remedy = "give the folder of the campaign's files with --campaign-folder, or --trajectories 0"
+    assert f"hits.csv; {remedy}" in capsys.readouterr().err
     assert not list(tmp_path.iterdir())
 
 

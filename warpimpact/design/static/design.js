@@ -231,15 +231,12 @@
       for (const row of table.rows) [...row.cells].forEach((cell, k) => { if (k && heads[k]) cell.dataset.head = heads[k]; });
     }
   }
-  // A time as people say it, no more exact than it is known.
-  const about = (seconds) => (seconds < 90 ? `${Number(seconds.toPrecision(seconds < 10 ? 1 : 2))} s` : `${Math.round(seconds / 60)} min`);
   const NAMES = { first: "First look", draft: "Draft", full: "Complete" };
   async function show(line) {
     const same = shown && shown.stage === line.stage && JSON.stringify(shown.design) === JSON.stringify(line.design);
     shown = line;
     if (!same) chosen = null;
-    const soon = line.ahead >= 1 ? `: complete in about ${about(line.ahead)}` : "";
-    const more = line.stage === "full" ? "" : ` The map gets finer while nothing moves${soon}.`;
+    const more = line.stage === "full" ? "" : " The map gets finer while nothing moves.";
     const of = line.stage !== "full" && line.total > line.hits ? `${line.hits} of ${line.total}` : line.hits;
     at("status").replaceChildren(make("strong", {}, NAMES[line.stage]), `: ${of} hits. ${line.numerics}${more}`);
     at("status").classList.toggle("warns", !line.kept);
