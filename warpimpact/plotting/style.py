@@ -75,6 +75,12 @@ class Figure(PlainFigure):
         with aside(path) as file:
             super().savefig(file, **{"format": path.suffix[1:].lower() or "png"} | options)
 
+    def _repr_png_(self) -> bytes:
+        """The figure in a notebook."""
+        picture = BytesIO()
+        self.savefig(picture, format="png")
+        return picture.getvalue()
+
 
 def sheet(
     count: int, columns: int, size: Sequence[float], layout: Literal["compressed", "constrained"] = "compressed"
