@@ -78,7 +78,7 @@ def _print_models(arguments: argparse.Namespace, shared: dict[str, Dataset], fig
     """Print how a map and a result by finite elements differ at the same shots; draw their maps of velocity and tilt
     side by side."""
     if arguments.measure:
-        raise ResultError(f"{arguments.files[0]}: --measure is for plates, but these are one plate by two models")
+        raise ResultError(f"{arguments.files[0]}: --measure is for plates; two models of one are compared hit by hit")
     print(text_of(shot_by_shot(shared)))
     for path, variable in zip(figures, (v.RESIDUAL_VELOCITY, v.TILT), strict=True):
         variable_maps(shared, variable).savefig(path, dpi=150)
