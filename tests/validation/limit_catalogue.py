@@ -8,7 +8,7 @@ import json
 import numpy as np
 import pandas as pd
 
-from warpimpact.campaign.tested_range import nose_length
+from warpimpact.campaign.evidence import nose_length
 from warpimpact.catalogue.catalogue import FOLDERS, HERE, file_name
 from warpimpact.catalogue.entries import Material
 from warpimpact.catalogue.strength import FIT_FILE, NINETY, Plates, limit_fit

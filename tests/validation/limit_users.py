@@ -12,7 +12,7 @@ import numpy as np
 import pandas as pd
 
 from warpimpact.campaign.campaign import Campaign
-from warpimpact.campaign.resistances import limit_velocity_factors
+from warpimpact.campaign.evidence import limit_velocity_factors
 from warpimpact.catalogue import strength
 from warpimpact.solver.limit import limit_velocity
 

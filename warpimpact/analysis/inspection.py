@@ -14,7 +14,7 @@ import xarray
 from warpimpact.analysis.effectiveness import effectiveness_view, plate_numbers, reference_name, weights_of
 from warpimpact.analysis.estimates import estimated, means_of, passed_count, slices, status_shares
 from warpimpact.analysis.numbers import View, interval_text, number_text, text_of
-from warpimpact.campaign.tested_range import range_line
+from warpimpact.campaign.evidence import range_line
 from warpimpact.kernels.status import Status
 from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v

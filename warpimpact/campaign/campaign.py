@@ -1,28 +1,20 @@
-"""Campaign: one TOML file, validated, as one immutable value."""
+"""Campaign: one TOML file, validated once, as one immutable value, and its references."""
 
 import json
 import math
 import re
 import warnings
-from collections.abc import Sequence
-from copy import deepcopy
+from collections.abc import Callable, Sequence
+from dataclasses import replace
 from functools import cached_property, partial
 from pathlib import Path
 from typing import Annotated, Any, Self
 
 import numpy as np
-from pydantic import (
-    BaseModel,
-    Field,
-    PrivateAttr,
-    ValidationError,
-    ValidationInfo,
-    ValidatorFunctionWrapHandler,
-    field_serializer,
-    field_validator,
-    model_validator,
-)
+from pydantic import BaseModel, Field, PrivateAttr, ValidationError, ValidationInfo, model_validator
 
+from ..catalogue.catalogue import Catalogue
+from ..catalogue.entries import Material
 from ..catalogue.strength import Resistance
 from ..results.kinds import CAMPAIGN
 from ..results.measures import Measure
@@ -36,10 +28,10 @@ from ..scene import (
     Layer,
     Numerics,
     Plate,
-    Record,
     Sampler,
     Scatter,
     Scene,
+    Shots,
     Symmetry,
     Target,
     exclusions,
@@ -47,16 +39,16 @@ from ..scene import (
 )
 from ..scene.input_files import InputFile
 from ..scene.model import Model, sentence
-from ..scene.quantities import BY_LAYER, SCATTERED, Implausible
+from ..scene.quantities import BY_LAYER, Implausible
 from ..scene.sampling import unsymmetric
-from ..scene.scatter import Distribution, check_range
+from ..scene.scatter import check_range
 from ..scene.shots import FARTHEST_HIT
-from ..scene.target import MOST_LAYERS, layer_name
-from ..scene.units import Number, PositiveLength, Radians, Title, Whole, in_radians, quantity, quoted
-from .continuum_settings import FiniteElements
-from .materials import catalogue_of, known_resistance, with_materials, with_threat
+from ..scene.target import MOST_LAYERS
+from ..scene.units import Title, quoted
+from .names import catalogue_of, with_core, with_materials, with_scatter, with_velocity
 from .plausible import check_plausible, doubted
-from .references import ReferenceSampler, at_base_alone, at_solid
+from .resistance import SAME, resistance_under
+from .tables import FiniteElements, Output, Stop
 from .text import CampaignError, parsed, read_text
 
 _MOST_LENGTHS = 1000
@@ -64,64 +56,6 @@ _MOST_LENGTHS = 1000
 CORES_STAYED_WHOLE = "the cores of both published shots stayed whole at bending stresses of some 4.2 to 5.6 GPa"
 _PLATE_NAME = re.compile(r"\w[\w .+-]{,79}")
 """Names of plates; the result files get the same names."""
-
-
-class Output(Record):
-    """What is reported: the records of every shot, with at least one stand-off, and what a run adds.
-
-    Attributes:
-        failed_share: share of shots whose computation may fail; a run with more ends with exit code 3.
-        solid_reference: compute some hits of its references, too (`Campaign.references`), into groups of the file.
-        exit_state: store velocity, axis and position of every core at the end of contact.
-    """
-
-    standoffs: Annotated[tuple[PositiveLength, ...], Field(fail_fast=True, max_length=64)] = (0.05, 0.13)
-    failed_share: Annotated[Number, Field(ge=0, le=1)] = 0.01
-    solid_reference: Annotated[bool, Field(strict=True)] = True
-    exit_state: Annotated[bool, Field(strict=True)] = True
-
-
-class Stop(Model):
-    """When a run ends: as soon as a confidence interval is narrow enough.
-
-    Attributes:
-        quantity: a measure with an interval, such as `mean(residual_velocity)`, `quantile(tilt@130mm, 0.05)`,
-            `worst_tenth(residual_energy_density@130mm)` or `P(perforated)`.
-        half_width: largest half width of the interval, SI; that of an angle is given in degrees or with its unit.
-        confidence: of the interval.
-        max_count: number of shots after which the run ends in any case.
-    """
-
-    quantity: str
-    half_width: Annotated[float, Field(json_schema_extra={"type": ["number", "string"]})]
-    confidence: Annotated[Number, Field(gt=0, lt=1)] = 0.95
-    max_count: Annotated[Whole, Field(ge=1, le=2**30)]
-
-    @field_validator("quantity")
-    @classmethod
-    def _is_a_measure(cls, text: str) -> str:
-        if not Measure.parse(text).has_interval:
-            raise ValueError(f"got {quoted(text)}, but a run cannot stop by a number without an interval")
-        return text
-
-    @field_validator("half_width", mode="wrap")
-    @classmethod
-    def _in_si(cls, value: object, _: ValidatorFunctionWrapHandler, info: ValidationInfo) -> float:
-        if "quantity" not in info.data:
-            raise ValueError(f"got {quoted(value)}, but it needs a valid stop.quantity")
-        number = Measure.parse(info.data["quantity"]).in_units(value)
-        if number <= 0.0:
-            raise ValueError(f"got {quoted(value)}, but it must be greater than 0")
-        return number
-
-    @field_serializer("half_width", when_used="json")
-    def _as_read(self, value: float) -> float | str:
-        return in_radians(value) if isinstance(value, Radians) else value
-
-    @property
-    def measure(self) -> Measure:
-        """The measure that the quantity names."""
-        return Measure.parse(self.quantity)
 
 
 class Campaign(Model):
@@ -207,10 +141,10 @@ class Campaign(Model):
         if count is not None:
             _override_count(data, count)
         catalogue = catalogue_of(data, name, folder)
-        data = with_threat(data, catalogue, name, needs_velocity=needs_velocity)
-        data = with_materials(with_scatter(data, name), catalogue, name, folder)
+        data = with_velocity(with_core(data, catalogue, name), catalogue, name, is_needed=needs_velocity)
+        data, materials = with_materials(with_scatter(data, name), catalogue, name)
         try:
-            campaign = cls.model_validate(data, context={"folder": folder})
+            campaign = cls.model_validate(data, context={"folder": folder, "materials": materials})
         except ValidationError as error:
             raise CampaignError(f"{name}: {sentence(error, data)}") from None
         campaign._source = text
@@ -233,9 +167,7 @@ class Campaign(Model):
 
     def computed_by(self, elements: FiniteElements) -> Self:
         """The campaign, with its text, but with these settings for hits by finite elements."""
-        changed = self.model_copy(update={"continuum": elements})
-        changed._source = self._source
-        return changed
+        return BaseModel.model_copy(self, update={"continuum": elements})
 
     @property
     def replicates(self) -> int:
@@ -270,36 +202,56 @@ class Campaign(Model):
             known = None if solid == plate else self.catalogue_resistance(plate, solid.thickness)
             return solid if known is None else solid.model_copy(update={"resistance": known.median})
 
-        pairs = zip(self.target.layers, self.target.solid.layers, strict=True)
-        solid = Target(layers=tuple(of_its_thickness(*pair) for pair in pairs))
-        return self._reference(solid, ReferenceSampler(self.sampler(), partial(at_solid, self.target, solid)))
+        solid = Target(layers=tuple(map(of_its_thickness, self.target.layers, self.target.solid.layers)))
+        return self._reference(solid, partial(_at_solid, self.target, solid))
 
     def base_alone(self) -> Self:
         """The campaign with its last layer alone; the shots have the places and conditions of this campaign."""
         last = len(self.layer)
         own = {name: getattr(self.scatter, name)[last:] for name in BY_LAYER if not name.startswith("offset")}
         scatter = BaseModel.model_copy(self.scatter, update={"offset_y": (), "offset_z": ()} | own)
-        sampler = ReferenceSampler(self.sampler(), partial(at_base_alone, self.target))
-        return self._reference(self.target.base_alone, sampler, scatter=scatter)
+        return self._reference(self.target.base_alone, partial(_at_base_alone, last), scatter=scatter)
 
-    def _reference(self, target: Target, sampler: Sampler, **changed: Any) -> Self:
+    def _reference(self, target: Target, at_reference: Callable[[Shots], Shots], **changed: Any) -> Self:
         changed |= {"plate": target.layers[0], "layer": target.layers[1:]}
         changed["hits"] = BaseModel.model_copy(self.hits, update={"irreducible": False})  # not that of its own plate
         reference = BaseModel.model_copy(self, update=changed)
         for name in ("scene", "target"):  # cached ones of this campaign
             reference.__dict__.pop(name, None)
-        reference._source, reference._sampler = "", sampler
+        reference._source, reference._sampler = "", ReferenceSampler(self.sampler(), at_reference)
         return reference
 
     def catalogue_resistance(self, plate: Plate, thickness: float | None = None) -> Resistance | None:
         """The resistance of a plate, or of one of another thickness [m], by the catalogue; None where Y is the
         user's."""
-        return known_resistance(self.interaction, self.core, plate, self.impact.obliquity, self.catalogue, thickness)
+        catalogue = Catalogue.of(self.catalogue)
+        material = catalogue.all(Material).get(str(plate.material))
+        if material is None:
+            return None
+
+        def known(of: Plate) -> Resistance:
+            return resistance_under(self.interaction, material, self.core, of, self.impact.obliquity, catalogue)
+
+        given = known(plate)
+        if not math.isclose(given.median, plate.resistance, rel_tol=SAME):
+            return None
+        return given if thickness is None else known(plate.model_copy(update={"thickness": thickness}))
 
     def lacking(self, measure: Measure) -> str:
         """Keys that the campaign needs for a measure of its hits and does not have; empty if it lacks none."""
         output, layered, breakable = self.output, bool(self.layer), self._has_strength
         return lacking(measure, output.standoffs, layered=layered, bending=output.bending, breakable=breakable)
+
+    def _take_resistances(self, materials: dict[int, Material]) -> None:
+        """Replace Y of layers whose materials are given by their numbers."""
+        layers = list(self.target.layers)
+        for k, material in materials.items():
+            of_plate = self.interaction, material, self.core, layers[k], self.impact.obliquity
+            known = resistance_under(*of_plate, Catalogue.of(self.catalogue))
+            layers[k] = BaseModel.model_copy(layers[k], update={"resistance": known.median})
+        object.__setattr__(self, "plate", layers[0])
+        object.__setattr__(self, "layer", tuple(layers[1:]))
+        del self.__dict__["target"]  # of the former layers
 
     @property
     def _has_strength(self) -> bool:
@@ -314,8 +266,10 @@ class Campaign(Model):
         return values
 
     @model_validator(mode="after")
-    def _agrees(self) -> Self:
-        """Check what two tables must agree on."""
+    def _agrees(self, info: ValidationInfo) -> Self:
+        """Check what two tables must agree on, with the resistances of the materials that a file names."""
+        if materials := (info.context or {}).get("materials"):
+            self._take_resistances(materials)
         if not self.allow_implausible:  # first, as a slip of units breaks other rules, too
             try:
                 check_plausible(self.core, self.target, self.output, self.impact, self.hits)
@@ -323,9 +277,8 @@ class Campaign(Model):
                 raise ValueError(f"{error}; allow_implausible = true has it computed as it is") from None
         if self.stop is not None:
             object.__setattr__(self, "hits", self._hits_of_a_stop())
-        self._check_options()
-        if self.stop is not None:
             self._check_stop(self.stop)
+        self._check_options()
         self._check_hits()
         self._check_shots()
         self._check_lengths()
@@ -369,10 +322,6 @@ class Campaign(Model):
                 f"hits.count = {self.hits.count} and stop.max_count = {stop.max_count} cannot be combined: "
                 "[stop] sets the number of hits; leave out hits.count"
             )
-        if stop.measure.is_limit:
-            raise ValueError(
-                f'stop.quantity = "{stop.quantity}" is computed by warpimpact limit, which takes no [stop]'
-            )
         if keys := self.lacking(stop.measure):
             raise ValueError(f'stop.quantity = "{stop.quantity}" needs {keys}')
 
@@ -392,19 +341,15 @@ class Campaign(Model):
             )
 
     def _check_shots(self) -> None:
-        ranges = {name: (value, value) for name, value in self.impact}
-        for (name, _), distribution in self.scatter.given.items():
-            ranges[name] = distribution.ends
+        ranges = {name: distribution.ends for (name, _), distribution in self.scatter.given.items()}
         for name, column in (self.hits.listed or {}).items():
             ranges[name] = (float(column.min()), float(column.max()))
             try:
                 check_range(name, *ranges[name])
             except ValueError as error:
                 raise ValueError(f"got hits.file with a column {name} that {error}") from None
-        if ranges == {name: (value, value) for name, value in self.impact}:
-            return
-        largest = {name: max(map(abs, ends)) for name, ends in ranges.items()}
-        for name in ("pitch", "yaw"):  # the axis is built from projected angles, which flip at 90°
+        largest = {name: max(map(abs, ranges.get(name, (value,)))) for name, value in self.impact}
+        for name in ("pitch", "yaw") if ranges else ():  # the axis is built from projected angles, which flip at 90°
             if largest[name] + largest["obliquity"] >= math.pi / 2:
                 raise ValueError(
                     f"got shots with {name} up to {math.degrees(largest[name]):.4g} deg and obliquity up to "
@@ -413,13 +358,46 @@ class Campaign(Model):
 
     def _check_lengths(self) -> None:
         radius, listed = self.core.max_radius, (self.hits.listed or {}).get("degradation_length", [math.inf])
-        for name, plate in self.target.named:
-            shortest = min(plate.degradation_length, *listed) if name == "plate" else plate.degradation_length
-            if radius > _MOST_LENGTHS * shortest:
-                raise ValueError(
-                    f"got {name}.degradation_length = {shortest:g} m, but a core of radius {radius:g} "
-                    f"m needs at least 1/{_MOST_LENGTHS} of its radius, {radius / _MOST_LENGTHS:.4g} m"
-                )
+        shortest = float(min(*listed, *(plate.degradation_length for plate in self.target.layers)))
+        if radius > _MOST_LENGTHS * shortest:
+            raise ValueError(
+                f"got degradation_length = {shortest:g} m, but a core of radius {radius:g} m needs at least "
+                f"{radius / _MOST_LENGTHS:.4g} m"
+            )
+
+
+class ReferenceSampler(Sampler):
+    """The shots of another sampler, as they are at a reference."""
+
+    def __init__(self, of: Sampler, changed: Callable[[Shots], Shots]) -> None:
+        self._of, self._changed, self.cell = of, changed, of.cell
+
+    def __len__(self) -> int:
+        return len(self._of)
+
+    def shots(self, first: int, count: int) -> Shots:
+        return self._changed(self._of.shots(first, count))
+
+
+def _at_solid(target: Target, solid: Target, shots: Shots) -> Shots:
+    """Shots at a solid reference, whose add-on is as heavy as that of each shot."""
+    columns: dict[str, Any] = {}
+    for name in ("thickness", "resistance"):
+        if (column := shots.columns.get(name)) is not None:
+            pairs = zip(target.layers, solid.layers, strict=True)
+            values = [(getattr(old, name), getattr(new, name)) for old, new in pairs]
+            ratios = [1.0 if old == new else new / old for old, new in values]
+            columns[name] = column * np.array(ratios[: column.shape[1]])
+    return replace(shots, **columns)
+
+
+def _at_base_alone(last: int, shots: Shots) -> Shots:
+    """Shots at the same places of the face of the base alone, which is the last layer."""
+    columns: dict[str, Any] = {
+        name: shots.columns[name][:, last] if shots.varies(name, last) else None for name in BY_LAYER
+    }
+    columns |= dict.fromkeys(("offset_y", "offset_z", "degradation_length"))
+    return replace(shots, **columns)
 
 
 def _override_count(data: dict[str, Any], count: int) -> None:
@@ -456,39 +434,6 @@ def lacking(
     return f"{measure.standoff:g} m in output.standoffs, which are {', '.join(f'{at:g} m' for at in standoffs)}"
 
 
-def with_scatter(data: dict[str, Any], name: str) -> dict[str, Any]:
-    """Tables with distributions moved to `scatter`, and with their medians in the place of values."""
-    data, scatter = deepcopy(data), dict[str, Any]()
-    layers = data.get("layer") if isinstance(data.get("layer"), list) else []
-    for field, known in SCATTERED.items():
-        behind = [(layer_name(k), table) for k, table in enumerate(layers or [], start=1) if known.by_layer]
-        places = [(known.table, data.get(known.table)), *behind]
-        drawn = [_taken(table, field, f"{name}: {place}", k) for k, (place, table) in enumerate(places)]
-        if any(drawn):
-            scatter[field] = drawn if known.by_layer else drawn[0]
-    return data | {"scatter": scatter} if scatter else data
-
-
-def _taken(table: Any, field: str, place: str, layer: int) -> Distribution | None:
-    """Take the distribution of a quantity out of a table, which keeps its median."""
-    key, at = (field[:-2], "yz".index(field[-1])) if field.startswith("offset") else (field, None)
-    value = table.get(key) if isinstance(table, dict) else None
-    is_pair = isinstance(value, list) and len(value) == 2
-    entry = value if at is None else value[at] if is_pair and value else None
-    if not isinstance(entry, dict):
-        return None
-    known, label = SCATTERED[field], key if at is None else f"{key}[{at}]"
-    given = [*[None] * layer, entry] if known.by_layer else entry
-    try:
-        ((_, distribution),) = Scatter.model_validate({field: given}).given.items()
-    except ValidationError as error:
-        problem = sentence(error, {field: given}).removeprefix(field).removeprefix(f"[{layer}]")
-        raise CampaignError(f"{place}.{label}{problem}") from None
-    median = quantity(known.type).as_read(float(distribution.quantile(np.array(0.5))))
-    table[key] = median if at is None else [median if k == at else old for k, old in enumerate(value or ())]
-    return distribution
-
-
 def read_plates(path: str | Path, *, count: int | None = None) -> dict[str, Campaign]:
     """Read a campaign file with several tables `[[plate]]`, each with a `name`; everything else is shared.
 
@@ -506,7 +451,7 @@ def read_plates(path: str | Path, *, count: int | None = None) -> dict[str, Camp
     """
     path = Path(path)
     shared = parsed(read_text(path), str(path), CAMPAIGN)
-    plates, behind = shared.pop("plate", None), _layers(shared.pop("layer", []), f"{path}: layer")
+    plates, behind = shared.pop("plate", None), shared.pop("layer", [])
     if not isinstance(plates, list) or len(plates) < 2:
         raise CampaignError(f"{path}: plate: a comparison needs two or more tables [[plate]], each with a name")
     if isinstance(hits := shared.get("hits"), dict):
@@ -514,9 +459,7 @@ def read_plates(path: str | Path, *, count: int | None = None) -> dict[str, Camp
     campaigns: dict[str, Campaign] = {}
     for number, plate in enumerate(plates):
         place = f"{path}: plate[{number}]"
-        if not isinstance(plate, dict) or "name" not in plate:
-            raise CampaignError(f"{place}.name: is missing, but must be given")
-        name = plate["name"]
+        name = plate.get("name") if isinstance(plate, dict) else None
         if not isinstance(name, str) or not _PLATE_NAME.fullmatch(name):
             raise CampaignError(
                 f"{place}.name: got {quoted(name)}, but a name begins with a letter or a digit and contains only "
@@ -524,16 +467,16 @@ def read_plates(path: str | Path, *, count: int | None = None) -> dict[str, Camp
             )
         if name in campaigns:
             raise CampaignError(f'{place}.name: got "{name}" again, but each plate needs its own name')
-        layers = _layers(plate.get("layer", []), f"{place}.layer") + behind
         own: dict[str, Any] = {"plate": {key: value for key, value in plate.items() if key not in ("name", "layer")}}
-        own |= {"layer": layers} if layers else {}
-        own |= {"title": f"{shared['title']}: {name}"} if isinstance(shared.get("title"), str) else {}
+        if layers := _listed(plate.get("layer", [])) + _listed(behind):
+            own["layer"] = layers
+        if isinstance(shared.get("title"), str):
+            own["title"] = f"{shared['title']}: {name}"
         text = json.dumps(shared | own, indent=1, ensure_ascii=False, default=str)
         campaigns[name] = Campaign.from_text(text, name=f'{path}, plate "{name}"', folder=path.parent, count=count)
     return campaigns
 
 
-def _layers(tables: Any, place: str) -> list[Any]:
-    if not isinstance(tables, list):
-        raise CampaignError(f"{place}: got {quoted(tables)}, but it must be a list: tables [[layer]]")
-    return tables
+def _listed(tables: Any) -> list[Any]:
+    """Tables [[layer]] as a list; of something else the validation of the campaign says what is wrong."""
+    return tables if isinstance(tables, list) else [tables]

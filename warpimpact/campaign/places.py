@@ -1,12 +1,14 @@
-"""Dotted places of a campaign, such as "plate.pattern.width" or "layer 1.gap", resolved, filled and read; and the files
-that its tables name. Layer 0 is the plate, and layer 1 the first table [[layer]]."""
+"""Dotted places of a campaign, such as "plate.pattern.width" or "layer 1.gap", and the files that its tables name.
+
+Layer 0 is the plate, and layer 1 the first table [[layer]].
+"""
 
 from __future__ import annotations
 
 import json
 import os
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -17,17 +19,14 @@ from .text import CampaignError
 
 _TABLES: Mapping[str, Any] = {"impact": Impact, "plate": Plate, "interaction": Interaction}
 """Tables whose keys may be given without the table, because their names are unique."""
-_WHOLE = ("core", "plate", "plate.pattern", "interaction")
-"""Tables that may be given as a whole, beside those of layers."""
-_LAYER = re.compile(r"layer \d+(\.pattern)?")
+_WHOLE = re.compile(r"core|interaction|(plate|layer \d+)(\.pattern)?")
 """Tables that may be given as a whole."""
 _LAYER = re.compile(r"layer (\d{1,3})")
-_NAMES_A_FILE = ("file", "catalogue")
 
 
 def is_table(place: str) -> bool:
     """Whether a whole table stands at a place."""
-    return place in _WHOLE or re.fullmatch(r"layer \d+(\.pattern)?", place) is not None
+    return _WHOLE.fullmatch(place) is not None
 
 
 def resolved(key: str, name: str) -> str:
@@ -39,17 +38,15 @@ def resolved(key: str, name: str) -> str:
     """
     if key.startswith("layer."):
         raise CampaignError(f'{name}: got {quoted(key)}; write "layer 1" for the first table [[layer]]')
-    if re.match(r"layer 0(\.|$)", key):
-        return f"plate{key.removeprefix('layer 0')}"
     if "." in key or is_table(key):
-        return key
+        return re.sub(r"^layer 0\b", "plate", key)
     for table, model in _TABLES.items():
         if key in model._keys():
             return f"{table}.{key}"
     known = ", ".join(name for model in _TABLES.values() for name in model._keys())
     raise CampaignError(
-        f"{name}: got the unknown input {quoted(key)}; give one of {', '.join(_WHOLE)}, {known}, or a dotted "
-        'place such as "core.mass"'
+        f"{name}: got the unknown input {quoted(key)}; give one of core, plate, {known}, or a dotted place such as "
+        '"core.mass" or "plate.pattern"'
     )
 
 
@@ -67,10 +64,8 @@ def labels_of(options: list[Any], where: str, *, whole: bool) -> tuple[str, ...]
         raise CampaignError(f"{where}: must be a list of tables, each with a name")
     texts = [option["name"] if whole else option for option in options]
     labels = tuple(text if isinstance(text, str) else json.dumps(text, default=str) for text in texts)
-    if wrong := next((label for label in labels if not label.isprintable()), None):
-        raise CampaignError(f"{where}: got {quoted(wrong)}, but it must be one line without control characters")
-    if len(set(labels)) < len(labels):
-        raise CampaignError(f"{where}: got a value twice, but each must differ")
+    if len(set(labels)) < len(labels) or not all(map(str.isprintable, labels)):
+        raise CampaignError(f"{where}: got {quoted(labels)}, but each must differ, and be one line of printed text")
     return labels
 
 
@@ -81,20 +76,21 @@ def put(data: dict[str, Any], key: str, value: Any, name: str) -> None:
         CampaignError: the tables have no such place; `name` is as in `resolved`.
     """
     *tables, last = _parts(key)
-    if tables[:1] == ["layer"] and "layer" not in data:
-        raise CampaignError(f"{name}: got {quoted(key)}, but the campaign has no [[layer]]")
     inside: Any = data
     for part in tables:
-        entries: dict[Any, Any] = dict(enumerate(inside)) if isinstance(inside, list) else inside
-        inside = entries.setdefault(part, {} if entries is inside else None)
+        if isinstance(inside, dict) and part != "layer":
+            inside = inside.setdefault(part, {})
+        else:
+            inside = dict(enumerate(inside) if isinstance(inside, list) else inside).get(part)
         if not isinstance(inside, dict | list):
-            raise CampaignError(f"{name}: {key} leads through {part}, which is no table")
+            missing = "[[layer]]" if part == "layer" else "table at this place"
+            raise CampaignError(f"{name}: got {quoted(key)}, but the campaign has no {missing}")
     if isinstance(inside, list) and last not in range(len(inside)):
-        raise CampaignError(f"{name}: {key} leads to {last}, but its list has {len(inside)} entries")
+        raise CampaignError(f"{name}: got {quoted(key)}, but that list has {len(inside)} entries")
     inside[last] = value
 
 
-def _parts(key: str) -> list[str | int]:
+def _parts(key: str) -> list[Any]:
     """The parts of a dotted place. A number is the index of an entry in a list."""
     first, *rest = key.split(".")
     layer = _LAYER.fullmatch(first)
@@ -102,27 +98,25 @@ def _parts(key: str) -> list[str | int]:
     return [*parts, *(int(part) if part.isdecimal() else part for part in rest)]
 
 
-def files_in(tables: Any, key: str = "") -> Iterator[str]:
-    """Names of the files that the tables of a campaign, a design file or a fit file refer to."""
+def with_files(tables: Any, change: Callable[[str], str], key: str = "") -> Any:
+    """Tables of a campaign, a design file or a fit file with the names of files in them changed."""
     if isinstance(tables, Mapping):
-        for name, value in tables.items():
-            yield from files_in(value, name)
-    elif isinstance(tables, list):
-        for value in tables:
-            yield from files_in(value)
-    elif key in _NAMES_A_FILE and isinstance(tables, str):
-        yield tables
-
-
-def relocated(tables: Any, before: Path, now: Path, key: str = "") -> Any:
-    """Tables whose file names count from the folder `now` instead of `before`."""
-    if isinstance(tables, Mapping):
-        return {name: relocated(value, before, now, name) for name, value in tables.items()}
+        return {name: with_files(value, change, name) for name, value in tables.items()}
     if isinstance(tables, list):
-        return [relocated(value, before, now) for value in tables]
-    if key in _NAMES_A_FILE and isinstance(tables, str) and not Path(tables).is_absolute():
-        return os.path.relpath(before / tables, now)
-    return tables
+        return [with_files(value, change) for value in tables]
+    return change(tables) if key in ("file", "catalogue") and isinstance(tables, str) else tables
+
+
+def files_in(tables: Any) -> list[str]:
+    """Names of the files that tables refer to."""
+    names: dict[str, str] = {}
+    with_files(tables, lambda name: names.setdefault(name, name))
+    return [*names]
+
+
+def relocated(tables: Any, before: Path, now: Path) -> Any:
+    """Tables whose file names count from the folder `now` instead of `before`."""
+    return with_files(tables, lambda name: name if Path(name).is_absolute() else os.path.relpath(before / name, now))
 
 
 def type_at(key: str, campaign: Campaign) -> Any:

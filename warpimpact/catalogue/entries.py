@@ -9,7 +9,7 @@ from typing import Annotated, Any
 from pydantic import Field, TypeAdapter, ValidationError, ValidationInfo, field_validator
 
 from warpimpact.catalogue.strength import NINETY, Resistance
-from warpimpact.scene import AnyCore, Core, units
+from warpimpact.scene import AnyCore, Core, Interaction, units
 from warpimpact.scene.model import Model, complaint
 
 CORE: TypeAdapter[Core] = TypeAdapter(AnyCore)
@@ -156,6 +156,11 @@ class Material(Model):
     hardness: units.NonNegativeNumber | None = None
     known: dict[str, units.Title] = Field(default_factory=dict)
     assumed: dict[str, units.Title] = Field(default_factory=dict)
+
+    @property
+    def law(self) -> Interaction:
+        """The law that the resistance was found with."""
+        return Interaction(linear=self.linear, quadratic=self.quadratic, onset=self.onset)
 
     def resistance_at(self, calibres: float) -> Resistance:
         """Resistance of a plate by the numbers of the entry alone, with its thickness in diameters of the core."""

@@ -7,7 +7,7 @@ from pydantic import ValidationError
 
 from warpimpact.analysis.inspection import promise_text, range_note, summary_text, symmetry_text
 from warpimpact.campaign.campaign import Campaign
-from warpimpact.campaign.continuum_settings import FiniteElements
+from warpimpact.campaign.tables import FiniteElements
 from warpimpact.campaign.text import CampaignError
 from warpimpact.results import attributes as attr
 from warpimpact.results import files

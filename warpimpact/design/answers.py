@@ -12,9 +12,8 @@ from pydantic import BaseModel, Field
 
 from warpimpact.analysis.inspection import breaks_promise, numerics_sentence
 from warpimpact.analysis.numbers import text_of
+from warpimpact.campaign.evidence import catalogue_names, outside_tested_range, range_line
 from warpimpact.campaign.plausible import doubted, doubted_holes
-from warpimpact.campaign.resistances import catalogue_names
-from warpimpact.campaign.tested_range import outside_tested_range, range_line
 from warpimpact.campaign.text import parsed
 from warpimpact.design.controls import drawn, groups
 from warpimpact.design.designs import ROOT, DesignStore, Tables, ValidDesign, changed, choices, stages

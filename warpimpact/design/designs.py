@@ -16,7 +16,7 @@ from typing import Any
 import tomli_w
 
 from warpimpact.campaign.campaign import Campaign, read_plates
-from warpimpact.campaign.materials import catalogue_of
+from warpimpact.campaign.names import catalogue_of
 from warpimpact.campaign.text import CampaignError, parsed, read_text
 from warpimpact.catalogue.entries import Material, Threat
 from warpimpact.results import attributes as attr

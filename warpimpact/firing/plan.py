@@ -198,7 +198,7 @@ class FiringTest(Model):
 
     title: Title
     tests: Annotated[Whole, Field(ge=1, le=100_000)] = 1000
-    seed: Annotated[Whole, Field(ge=0, lt=2**63)] = 0
+    seed: Annotated[Whole, Field(ge=0, le=2**63 - 1)] = 0
     target: FiringTarget
     procedure: Annotated[Procedure, Field(discriminator="name")] | None = None
     gun: Gun = Gun()

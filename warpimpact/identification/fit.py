@@ -17,11 +17,13 @@ import numpy as np
 from pydantic import AfterValidator, BeforeValidator, Field, TypeAdapter, ValidationError
 from scipy.special import ndtr
 
-from warpimpact.campaign.materials import catalogue_of, with_cores, with_materials
+from warpimpact.campaign.names import catalogue_of, with_core, with_materials
 from warpimpact.campaign.places import put
 from warpimpact.campaign.plausible import check_plausible
+from warpimpact.campaign.resistance import resistance_under
 from warpimpact.campaign.text import CampaignError, parsed, read_text
 from warpimpact.catalogue.catalogue import Catalogue
+from warpimpact.catalogue.entries import Material
 from warpimpact.records.outcomes import Outcomes
 from warpimpact.results import variables as v
 from warpimpact.results.kinds import FIT
@@ -292,7 +294,7 @@ class Sampling(Model):
     hits: Annotated[Whole, Field(ge=32, le=2**16, multiple_of=8)] = 256
     draws: Annotated[Whole, Field(ge=50, le=2**16)] = 1000
     effective: Annotated[Whole, Field(ge=10, le=2**16)] = 400
-    seed: Annotated[Whole, Field(ge=0, lt=2**63)] = 0
+    seed: Annotated[Whole, Field(ge=0, le=2**63 - 1)] = 0
 
 
 def _at_a_level(numerics: Any) -> Any:
@@ -337,7 +339,7 @@ class MeasuredShot:
     hit: HitPlace | None
     impact: Impact
     scatter: Scatter
-    tables: Mapping[str, Any]
+    tables: dict[str, Any]
     own: frozenset[str]
     observations: tuple[Observation, ...]
     status: str | None
@@ -414,7 +416,13 @@ def fit_from(text: str, name: str, folder: Path) -> Fit:
     """Read a fit from its text; `name` is the name of the file in errors."""
     data = parsed(text, name, FIT)
     catalogue = catalogue_of(data, name, folder)
-    file: FitFile = _validated(FitFile, with_cores(data, catalogue, name), name)
+    data = with_core(data, catalogue, name)
+    if isinstance(shots := data.get("shot"), list):
+        data["shot"] = [
+            with_core(shot, catalogue, f"{name}: shot[{k}]") if isinstance(shot, dict) else shot
+            for k, shot in enumerate(shots)
+        ]
+    file: FitFile = _validated(FitFile, data, name)
     tables = deepcopy(file.tables)
     parameters = [*_read_priors(file.prior, "", tables, name)]
     names = [_short_name(parameter.place) for parameter in parameters]
@@ -422,15 +430,16 @@ def fit_from(text: str, name: str, folder: Path) -> Fit:
         replace(parameter, name=short if names.count(short) == 1 else parameter.place.replace(".", "_"))
         for short, parameter in zip(names, parameters, strict=True)
     ]
-    shots = tuple(
+    given = [
         _shot(shot, [*data["shot"][k]["measured"]], tables, file.record, f"{name}: shot[{k}]", parameters, catalogue)
         for k, shot in enumerate(file.shot)
-    )
+    ]
+    shots = tuple(shot for shot, _ in given)
     scales, fixed = _discrepancy(file.discrepancy, {one.kind for shot in shots for one in shot.observations}, name)
     ordered = sorted((*parameters, *scales), key=lambda parameter: parameter.is_column)
     fit = Fit(file, text, folder, tuple(ordered), fixed, shots)
-    for k, shot in enumerate(shots):
-        _check_scene(fit, shot, f"{name}: shot[{k}]")
+    for k, (shot, material) in enumerate(given):
+        _check_scene(fit, shot, material, catalogue, f"{name}: shot[{k}]")
     return fit
 
 
@@ -520,8 +529,8 @@ def _shot(
     place: str,
     parameters: Sequence[Parameter],
     catalogue: Catalogue,
-) -> MeasuredShot:
-    """A shot; `measured` are the names of its measured numbers in their order."""
+) -> tuple[MeasuredShot, Material | None]:
+    """A shot, and the material that gives its Y; `measured` are the names of its measured numbers in their order."""
     impact = dict(given.impact)
     scattered = {key: value for key, value in impact.items() if isinstance(value, dict)}
     for key, value in scattered.items():
@@ -541,8 +550,8 @@ def _shot(
     if limits:  # the search of limits begins at these values
         impact.setdefault("velocity", limits[0])
     # The known values of the plate's material; a prior overrides them.
-    resolved = with_materials(_merged(tables, given.tables) | {"impact": impact}, catalogue, place)
-    return MeasuredShot(
+    resolved, materials = with_materials(_merged(tables, given.tables), catalogue, place)
+    shot = MeasuredShot(
         name=given.name or place.partition(": ")[2],
         hit=given.hit,
         impact=_validated(Impact, impact, f"{place}.impact"),
@@ -552,6 +561,7 @@ def _shot(
         observations=tuple(observations),
         status=status,
     )
+    return shot, materials.get(0)
 
 
 def _observations(measured: Measured, name: str, standoffs: Sequence[float], place: str) -> Iterator[Observation]:
@@ -611,10 +621,14 @@ def _discrepancy(given: DiscrepancyTable, kinds: set[str], name: str) -> tuple[l
     return scales, fixed
 
 
-def _check_scene(fit: Fit, shot: MeasuredShot, where: str) -> None:
-    """Refuse a scene that is not possible at the medians of the priors, or stops no core if a limit is measured."""
+def _check_scene(fit: Fit, shot: MeasuredShot, material: Material | None, catalogue: Catalogue, where: str) -> None:
+    """Refuse a scene that is not possible at the medians of the priors, or stops no core if a limit is measured. A
+    material gives its Y there."""
     try:
         scene = fit.scene_of(shot)
+        if material is not None:
+            of_plate = scene.interaction, material, scene.core, scene.target.layers[0], shot.impact.obliquity
+            shot.tables["plate"]["resistance"] = resistance_under(*of_plate, catalogue).median
         check_plausible(scene.core, scene.target, scene.record, shot.impact)
         if any(observation.is_limit for observation in shot.observations):
             weakest = [parameter for parameter in fit.scene_parameters if "degradation" in parameter.place]

@@ -11,7 +11,7 @@ import numpy as np
 import xarray
 
 from warpimpact.campaign.campaign import Campaign
-from warpimpact.campaign.resistances import resistance_by_thickness
+from warpimpact.campaign.evidence import resistance_by_thickness
 from warpimpact.optimisation.design import Design
 from warpimpact.optimisation.objectives import goal_numbers, mean_of
 from warpimpact.records.variable import failures

@@ -15,8 +15,8 @@ import xarray
 from numpy.typing import NDArray
 
 from warpimpact.analysis.numbers import View, interval_text, number_text
+from warpimpact.campaign.evidence import outside_tested_range
 from warpimpact.campaign.places import relocated
-from warpimpact.campaign.tested_range import outside_tested_range
 from warpimpact.optimisation.design import Bound, Design, DesignThreat
 from warpimpact.optimisation.evaluate import DesignPoint
 from warpimpact.optimisation.objectives import goal_numbers, interval_of

@@ -14,7 +14,7 @@ import xarray
 from numpy.typing import NDArray
 
 from warpimpact.campaign.campaign import Campaign
-from warpimpact.campaign.resistances import resistance_by_thickness
+from warpimpact.campaign.evidence import resistance_by_thickness
 from warpimpact.campaign.text import CampaignError
 from warpimpact.records.outcomes import Outcomes
 from warpimpact.results import attributes as attr

@@ -9,8 +9,7 @@ from typing import Any
 import xarray
 
 from warpimpact.campaign.campaign import Campaign
-from warpimpact.campaign.resistances import catalogue_names, limit_velocity_factors
-from warpimpact.campaign.tested_range import outside_tested_range
+from warpimpact.campaign.evidence import catalogue_names, limit_velocity_factors, outside_tested_range
 from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
 from warpimpact.results.dataset import stored_columns

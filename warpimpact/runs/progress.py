@@ -10,7 +10,8 @@ from typing import Any
 
 import xarray
 
-from warpimpact.campaign.campaign import Campaign, Stop
+from warpimpact.campaign.campaign import Campaign
+from warpimpact.campaign.tables import Stop
 from warpimpact.results import attributes as attr
 from warpimpact.results.dataset import failed, finer_pair
 from warpimpact.results.measures import Measure, Tally, shift_of

@@ -81,7 +81,7 @@ class Hits(Model):
 
     sampling: Literal["sobol", "grid", "random", "list"] = "sobol"
     count: Annotated[Whole, Field(ge=1, le=2**30)] | None = None
-    seed: Annotated[Whole, Field(ge=0, lt=2**63)] = 0
+    seed: Annotated[Whole, Field(ge=0, le=2**63 - 1)] = 0
     file: InputFile | None = None
     area: Literal["cell", "plate"] = "cell"
     irreducible: Annotated[bool, Field(strict=True)] = False

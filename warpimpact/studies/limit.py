@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from warpimpact.campaign.campaign import Campaign
-from warpimpact.campaign.resistances import resistance_by_thickness
+from warpimpact.campaign.evidence import resistance_by_thickness
 from warpimpact.campaign.text import CampaignError
 from warpimpact.results.measures import Measure
 from warpimpact.results.vocabulary import LIMIT_VELOCITY

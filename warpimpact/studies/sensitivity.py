@@ -18,8 +18,8 @@ from pydantic import ValidationError
 
 from warpimpact.analysis.estimates import measures_named, measures_of_runs
 from warpimpact.campaign.campaign import Campaign
-from warpimpact.campaign.materials import StraightPassage
-from warpimpact.campaign.resistances import is_drawn
+from warpimpact.campaign.evidence import is_drawn
+from warpimpact.campaign.resistance import StraightPassage
 from warpimpact.results import variables as v
 from warpimpact.results.dataset import narrow_dataset
 from warpimpact.results.measures import Measure, estimate_from

@@ -9,7 +9,7 @@ import xarray
 
 from warpimpact import Campaign, Hits, Impact, Numerics, Plate, PolygonsPattern, SlotPattern, hit_map, run
 from warpimpact.analysis.hit_map import mirrored
-from warpimpact.campaign.campaign import Output
+from warpimpact.campaign.tables import Output
 from warpimpact.cli import main
 from warpimpact.plotting.cell import nearest_hits, shots_text
 from warpimpact.report.hit_data import page_data, thinned

@@ -7,9 +7,9 @@ from typing import Any
 import pytest
 
 from warpimpact import Campaign
-from warpimpact.campaign.materials import SEARCHED_FROM, StraightPassage
-from warpimpact.campaign.resistances import catalogue_names, limit_velocity_factors
-from warpimpact.campaign.tested_range import outside_tested_range, range_line
+from warpimpact.campaign.evidence import catalogue_names, limit_velocity_factors, outside_tested_range, range_line
+from warpimpact.campaign.names import SEARCHED_FROM
+from warpimpact.campaign.resistance import StraightPassage
 from warpimpact.campaign.text import CampaignError
 from warpimpact.identification.fit import fit_from
 

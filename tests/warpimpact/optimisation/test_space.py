@@ -49,7 +49,7 @@ def test_points_of_a_finite_space_each_once() -> None:
         (('[variables]\nthickness = "4 mm"', WEIGHT_AND_ENERGY), 'thickness: got "4 mm", but it must be a range'),
         (('[variables]\nthickness = { low = "5 mm", high = "4 mm" }', WEIGHT_AND_ENERGY), "low must not be greater"),
         (('[variables]\nthickness = { low = "5 mm", high = "1 cm" }', WEIGHT_AND_ENERGY), "they must be one"),
-        (('[variables]\nthickness = ["3 mm", "3 mm"]', WEIGHT_AND_ENERGY), "got a value twice"),
+        (('[variables]\nthickness = ["3 mm", "3 mm"]', WEIGHT_AND_ENERGY), "but each must differ"),
         (('[variables]\nthicknes = ["3 mm"]', WEIGHT_AND_ENERGY), 'unknown input "thicknes"'),
         (('[variables]\n"plate.pattern" = [{ shape = "none" }]', WEIGHT_AND_ENERGY), "each with a name"),
         (('[[objectives]]\nmeasure = "weight"',), 'objectives[0].measure: got "weight"'),

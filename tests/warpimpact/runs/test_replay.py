@@ -8,7 +8,8 @@ import pytest
 import xarray
 
 from warpimpact import Campaign, CirclePattern, Hits, Impact, Numerics, Plate
-from warpimpact.campaign.campaign import CampaignError, Output
+from warpimpact.campaign.tables import Output
+from warpimpact.campaign.text import CampaignError
 from warpimpact.cli import main
 from warpimpact.kernels.status import Status
 from warpimpact.results import files

@@ -121,7 +121,7 @@ def test_a_run_goes_on_as_long_as_hits_may_make_up_for_the_numerics(
     [
         ("mean(speed)", "1 m/s", 'stop.quantity: got "speed", but it must be one of base_depth, residual_energy'),
         ("mean(depth)", "1 mm", 'stop.quantity = "mean(depth)" needs a table [[layer]]'),
-        ("V50", "1 m/s", 'stop.quantity = "V50" is computed by warpimpact limit'),
+        ("V50", "1 m/s", 'stop.quantity: got "V50", which warpimpact limit computes'),
         ("areal_density", "1 kg/m^2", "a run cannot stop by a number without an interval"),
         ("mean(tilt@100mm)", "1 deg", "needs 0.1 m in output.standoffs, which are 0.05 m, 0.13 m"),
         ("mean(residual_velocity)", "1 deg", 'stop.half_width: got "1 deg", which is not a speed'),

@@ -1,0 +1,167 @@
+"""Names and distributions in the tables of a file, replaced by numbers: what stands for a threat, a material, a median.
+
+A key beside a name overrides its value.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from copy import deepcopy
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from pydantic import ValidationError
+
+from ..catalogue.catalogue import Catalogue
+from ..catalogue.entries import Material, Threat
+from ..scene import Core, Scatter
+from ..scene.model import sentence
+from ..scene.quantities import SCATTERED
+from ..scene.scatter import Distribution
+from ..scene.target import layer_name
+from ..scene.units import quantity, quoted
+from .text import CampaignError, as_campaign_error
+
+Tables = dict[str, Any]
+SEARCHED_FROM = 800.0
+"""Impact velocity at which a search of limit velocities begins if the threat has none [m/s]."""
+
+
+def catalogue_of(data: Mapping[str, Any], name: str, folder: Path) -> Catalogue:
+    """The catalogue of a file: the package's entries, and those in the file that its key `catalogue` names.
+
+    Raises:
+        CampaignError: that file cannot be read; `name` is the campaign's name in errors.
+    """
+    given = data.get("catalogue")
+    if not isinstance(given, str) or not (folder / given).is_file():
+        return Catalogue()  # the validation of the campaign refuses a wrong name
+    with as_campaign_error(f"{name}: catalogue: "):
+        return Catalogue.of(folder / given)
+
+
+def with_core(data: Tables, catalogue: Catalogue, name: str) -> Tables:
+    """Tables with the core of their threat, overridden by the keys beside its name.
+
+    Raises:
+        CampaignError: the catalogue has no such threat, or does not know its core.
+    """
+    core = data.get("core")
+    if not isinstance(core, dict) or not isinstance(core.get("threat"), str):
+        return data
+    with as_campaign_error(f"{name}: core.threat: "):
+        threat = catalogue.named(Threat, core["threat"])
+        base = {} if threat.shape is None else threat.shape.model_dump(exclude_unset=True)
+        if threat.shape is None and "shape" not in core:
+            raise ValueError(
+                f'the catalogue does not know the core of "{threat.name}", only its velocities; give shape and what '
+                "belongs to it"
+            )
+    if core.get("shape", base.get("shape")) != base.get("shape"):
+        base = {key: value for key, value in base.items() if key in Core.model_fields}
+    if any(core.get(key) is not None for key in ("mass", "density")):
+        base = {key: value for key, value in base.items() if key not in ("mass", "density")}
+    return data | {"core": base | core | {"threat": threat.name}}
+
+
+def with_velocity(data: Tables, catalogue: Catalogue, name: str, *, is_needed: bool = True) -> Tables:
+    """Tables with the velocity of their threat by its standard, or its distribution, unless they give one. If none is
+    needed, a threat without one gets `SEARCHED_FROM`.
+
+    Raises:
+        CampaignError: the entry lacks what is asked for.
+    """
+    core, impact = data.get("core"), data.get("impact", {})
+    if not isinstance(core, dict) or not isinstance(core.get("threat"), str):
+        return data
+    if not isinstance(impact, dict) or "velocity" in impact:
+        return data
+    velocities, standard = catalogue.named(Threat, core["threat"]).velocities, core.get("standard")
+    if not velocities and standard is None and not is_needed:
+        return data | {"impact": {"velocity": SEARCHED_FROM} | impact}
+    with as_campaign_error(f"{name}: core.threat: "):
+        if not velocities:
+            raise ValueError(f'the catalogue has no velocity of "{core["threat"]}"; give impact.velocity')
+        velocity = next((one for one in velocities if standard in (None, one.standard)), None)
+        if velocity is None:
+            known = ", ".join(one.standard for one in velocities)
+            raise ValueError(f"got standard = {quoted(standard)}, but it must be one of {known}")
+        value: Any = velocity.value
+        if core.get("velocity_tolerance") is True:
+            if velocity.tolerance is None:
+                raise ValueError(f"the catalogue has no tolerance of {velocity.standard}; give impact.velocity")
+            low, high = velocity.value - velocity.tolerance, velocity.value + velocity.tolerance
+            value = {"distribution": "uniform", "low": low, "high": high}
+    return data | {"impact": {"velocity": value} | impact}
+
+
+def with_materials(data: Tables, catalogue: Catalogue, name: str) -> tuple[Tables, dict[int, Material]]:
+    """Tables with the numbers of the materials of plate and layers, and with their law.
+
+    Y depends on core, plate, law and shot. So that of the entry stands in the tables of these layers, until
+    `resistance_under` computes it from the valid ones.
+
+    Returns:
+        The tables, and the material of each layer that takes its Y from the catalogue.
+
+    Raises:
+        CampaignError: the catalogue has no such material, or the laws of two materials differ.
+    """
+    resolved, layers, interaction = dict(data), data.get("layer"), data.get("interaction", {})
+    places = {0: data.get("plate"), **(dict(enumerate(layers, start=1)) if isinstance(layers, list) else {})}
+    materials: dict[int, Material] = {}
+    unknown: dict[int, Material] = {}
+    for k, table in places.items():
+        if isinstance(table, dict) and isinstance(table.get("material"), str):
+            with as_campaign_error(f"{name}: {layer_name(k)}.material: "):
+                materials[k] = material = catalogue.named(Material, table["material"])
+            if "resistance" not in table:
+                unknown[k] = material
+            places[k] = material.table(table, material.resistance)
+    resolved |= {key: value for key, value in (("plate", places.pop(0)),) if key in data}
+    if isinstance(layers, list):
+        resolved["layer"] = [*places.values()]
+    if not materials or not isinstance(interaction, dict):
+        return resolved, unknown
+    law: dict[str, float] = {}  # one for the whole target
+    for key in ("linear", "quadratic", "onset"):
+        values = {getattr(material, key): layer_name(k) for k, material in materials.items()}
+        if len(values) > 1 and key not in interaction:
+            found = " and ".join(f"{value:g} ({place})" for value, place in values.items())
+            raise CampaignError(f"{name}: interaction.{key}: the materials were found with {found}; give one value")
+        law[key] = next(iter(values))
+    return resolved | {"interaction": law | interaction}, unknown
+
+
+def with_scatter(data: Tables, name: str) -> Tables:
+    """Tables with distributions moved to `scatter`, and with their medians in the place of values."""
+    data, scatter = deepcopy(data), Tables()
+    layers = data.get("layer") if isinstance(data.get("layer"), list) else []
+    for field, known in SCATTERED.items():
+        behind = [(layer_name(k), table) for k, table in enumerate(layers or [], start=1) if known.by_layer]
+        places = [(known.table, data.get(known.table)), *behind]
+        drawn = [_taken(table, field, f"{name}: {place}", k) for k, (place, table) in enumerate(places)]
+        if any(drawn):
+            scatter[field] = drawn if known.by_layer else drawn[0]
+    return data | {"scatter": scatter} if scatter else data
+
+
+def _taken(table: Any, field: str, place: str, layer: int) -> Distribution | None:
+    """Take the distribution of a quantity out of a table, which keeps its median."""
+    key, at = (field[:-2], "yz".index(field[-1])) if field.startswith("offset") else (field, None)
+    value = table.get(key) if isinstance(table, dict) else None
+    is_pair = isinstance(value, list) and len(value) == 2
+    entry = value if at is None else value[at] if is_pair and value else None
+    if not isinstance(entry, dict):
+        return None
+    known, label = SCATTERED[field], key if at is None else f"{key}[{at}]"
+    given = [*[None] * layer, entry] if known.by_layer else entry
+    try:
+        ((_, distribution),) = Scatter.model_validate({field: given}).given.items()
+    except ValidationError as error:
+        problem = sentence(error, {field: given}).removeprefix(field).removeprefix(f"[{layer}]")
+        raise CampaignError(f"{place}.{label}{problem}") from None
+    median = quantity(known.type).as_read(float(distribution.quantile(np.array(0.5))))
+    table[key] = median if at is None else [median if k == at else old for k, old in enumerate(value or ())]
+    return distribution

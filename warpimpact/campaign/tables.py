@@ -1,0 +1,133 @@
+"""The tables of a campaign that are not of its scene: [output], [stop] and [continuum]."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+from pydantic import Field, ValidationInfo, ValidatorFunctionWrapHandler, field_serializer, field_validator
+
+from ..catalogue.catalogue import FlowEntry, flow_entry, flow_names
+from ..results.measures import Measure
+from ..scene import Record
+from ..scene.flow import Continuum
+from ..scene.input_files import input_file
+from ..scene.model import Model
+from ..scene.target import MOST_LAYERS
+from ..scene.units import Number, PositiveLength, Radians, Title, Whole, in_radians, quoted
+
+
+class Output(Record):
+    """What is reported: the records of every shot, with at least one stand-off, and what a run adds.
+
+    Attributes:
+        failed_share: share of shots whose computation may fail; a run with more ends with exit code 3.
+        solid_reference: compute some hits of its references, too (`Campaign.references`), into groups of the file.
+        exit_state: store velocity, axis and position of every core at the end of contact.
+    """
+
+    standoffs: Annotated[tuple[PositiveLength, ...], Field(fail_fast=True, max_length=64)] = (0.05, 0.13)
+    failed_share: Annotated[Number, Field(ge=0, le=1)] = 0.01
+    solid_reference: Annotated[bool, Field(strict=True)] = True
+    exit_state: Annotated[bool, Field(strict=True)] = True
+
+
+class Stop(Model):
+    """When a run ends: as soon as a confidence interval is narrow enough.
+
+    Attributes:
+        quantity: a measure with an interval, such as `mean(residual_velocity)`, `quantile(tilt@130mm, 0.05)`,
+            `worst_tenth(residual_energy_density@130mm)` or `P(perforated)`.
+        half_width: largest half width of the interval, SI; that of an angle is given in degrees or with its unit.
+        confidence: of the interval.
+        max_count: number of shots after which the run ends in any case.
+    """
+
+    quantity: str
+    half_width: Annotated[float, Field(json_schema_extra={"type": ["number", "string"]})]
+    confidence: Annotated[Number, Field(gt=0, lt=1)] = 0.95
+    max_count: Annotated[Whole, Field(ge=1, le=2**30)]
+
+    @field_validator("quantity")
+    @classmethod
+    def _is_a_measure(cls, text: str) -> str:
+        measure = Measure.parse(text)
+        if measure.is_limit:
+            raise ValueError(f"got {quoted(text)}, which warpimpact limit computes, and it takes no [stop]")
+        if not measure.has_interval:
+            raise ValueError(f"got {quoted(text)}, but a run cannot stop by a number without an interval")
+        return text
+
+    @field_validator("half_width", mode="wrap")
+    @classmethod
+    def _in_si(cls, value: object, _: ValidatorFunctionWrapHandler, info: ValidationInfo) -> float:
+        if "quantity" not in info.data:
+            raise ValueError(f"got {quoted(value)}, but it needs a valid stop.quantity")
+        number = Measure.parse(info.data["quantity"]).in_units(value)
+        if number <= 0.0:
+            raise ValueError(f"got {quoted(value)}, but it must be greater than 0")
+        return number
+
+    @field_serializer("half_width", when_used="json")
+    def _as_read(self, value: float) -> float | str:
+        return in_radians(value) if isinstance(value, Radians) else value
+
+    @property
+    def measure(self) -> Measure:
+        """The measure that the quantity names."""
+        return Measure.parse(self.quantity)
+
+
+class FiniteElements(Model):
+    """How `warpimpact continuum` computes the hits of a campaign; its options come before this table.
+
+    Attributes:
+        materials: of the layers, the plate first: names of the continuum's catalogue, or TOML files with a set of
+            constants each. One serves all layers; without any, the name of the plate's material counts.
+        friction: Coulomb's coefficient between core and target, which nobody has measured at these speeds.
+        fidelity: size of the elements: "draft", "standard" or "reference".
+        spacing: size of the elements [m], in place of a fidelity.
+    """
+
+    materials: Annotated[tuple[Title, ...], Field(fail_fast=True, max_length=MOST_LAYERS + 1)] = ()
+    friction: Annotated[Number, Field(ge=0, le=1)] = 0.0
+    fidelity: Literal["draft", "standard", "reference"] = "draft"
+    spacing: PositiveLength | None = None
+
+    @field_validator("materials")
+    @classmethod
+    def _are_known(cls, names: tuple[str, ...], info: ValidationInfo) -> tuple[str, ...]:
+        """Check that every name is in the catalogue, or is a file, whose path becomes absolute."""
+        paths = tuple(str(input_file(name, info)) if name.endswith(".toml") else name for name in names)
+        for name in paths:
+            flow_entry(name)
+        return paths
+
+    @property
+    def entries(self) -> list[FlowEntry]:
+        """Entries of the materials.
+
+        Raises:
+            ValueError: there are none.
+        """
+        if not self.materials:
+            raise ValueError(
+                f"the continuum needs a material: give continuum.materials or --material with one of "
+                f"{', '.join(flow_names())}, or a TOML file"
+            )
+        return [flow_entry(name) for name in self.materials]
+
+    @property
+    def solver(self) -> Continuum:
+        """These settings for `simulate`, in place of its numerics.
+
+        Raises:
+            ValueError: as `entries`.
+        """
+        flows = tuple(entry.flow for entry in self.entries)
+        return Continuum(flows=flows, friction=self.friction, fidelity=self.fidelity, spacing=self.spacing)
+
+    @property
+    def words(self) -> str:
+        """The settings in words."""
+        size = self.fidelity if self.spacing is None else f"{1e3 * self.spacing:.4g} mm"
+        return f"finite elements, {size}, friction {self.friction:g}, {', '.join(e.name for e in self.entries)}"
