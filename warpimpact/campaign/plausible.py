@@ -90,7 +90,7 @@ def _values(
         for side in plate.size or ():
             yield f"{place}.size", "plate.size", side
         if plate.open_area > 0.0:
-            for side in plate.pattern.unit_cell:
+            for side in plate.pattern.period:
                 yield f"{place}.pattern: cell", "plate.pattern.cell", side
             yield f"{place}.pattern.rotation", "plate.pattern.rotation", getattr(plate.pattern, "rotation", 0.0)
     for k, gap in enumerate(target.gaps[1:], start=1):

@@ -146,7 +146,7 @@ def drawn(campaign: Campaign) -> dict[str, Any]:
     rings = plate.pattern.outlines((-half[0], half[0]), (-half[1], half[1]))
     outlines = ("L".join(f"{y:.3f},{-z:.3f}" for y, z in ring * MM) for ring in rings)
     ligament = smallest_ligament(plate)
-    cell = None if isinstance(plate.pattern, NoPattern) else _rounded(np.array(plate.pattern.unit_cell) * MM)
+    cell = None if isinstance(plate.pattern, NoPattern) else _rounded(np.array(plate.pattern.period) * MM)
     return {
         "extent": _rounded(extent),
         "path": " ".join(f"M{outline}Z" for outline in outlines),
@@ -175,7 +175,7 @@ def _handles(campaign: Campaign) -> Iterator[dict[str, Any]]:
     turn = float(pattern.rotation)
     across = np.array([math.cos(turn), math.sin(turn)])
     along = np.array([-across[1], across[0]])
-    half = np.array(pattern.unit_cell) / 2
+    half = np.array(pattern.period) / 2
     rings = pattern.outlines((-half[0], half[0]), (-half[1], half[1]))
     place = np.zeros(2) if pattern.holes is None else np.array(pattern.holes[0][:2])
     ring = min(rings, key=lambda outline: float(np.linalg.norm(outline.mean(axis=0) - place)), default=None)
@@ -186,7 +186,7 @@ def _handles(campaign: Campaign) -> Iterator[dict[str, Any]]:
             value = float(getattr(pattern, name))
             yield _handle(["plate", "pattern", name], place + reach * direction, direction, value / reach)
     for axis, direction in enumerate(np.array([[1.0, 0.0], [0.0, -1.0]])):  # where no dimension stands
-        at = pattern.unit_cell[axis] / 2
+        at = pattern.period[axis] / 2
         yield _handle(["plate", "pattern", "spacing", axis], at * direction, direction, pattern.spacing[axis] / at)
 
 

@@ -42,7 +42,7 @@ def write_drawing(plate: Plate, output: Path) -> list[str]:
         notes = [f"The drawing has one period: {count}, to be repeated every {steps} mm."]
     else:
         cut = int((np.maximum(high, -low) > sides / 2 * (1.0 + _SAME_PLACE)).any(axis=1).sum())
-        notes = [f"The rim cuts {cut} of {len(spines)} holes. plate.margin leaves such holes out."] if cut else []
+        notes = [f"The rim cuts {cut} of {len(spines)} holes. List whole holes in a cell of this size."] if cut else []
     holes = [_vertices(shapely.get_coordinates(spine) * MM, pattern.rounding * MM) for spine in spines]
     with aside(output) as file:
         if output.suffix.lower() == ".svg":

@@ -143,7 +143,7 @@ def hole_sizes(plate: Plate) -> tuple[float, float]:
     if isinstance(plate.pattern, LatticePattern):
         return plate.pattern.hole_size
     narrow, wide = math.inf, 0.0
-    for outline in plate.pattern.outlines(*((-0.5 * side, 0.5 * side) for side in plate.pattern.unit_cell)):
+    for outline in plate.pattern.outlines(*((-0.5 * side, 0.5 * side) for side in plate.pattern.period)):
         hull = np.asarray(shapely.get_coordinates(shapely.convex_hull(shapely.multipoints(outline))))
         extent = float(np.linalg.norm(hull[:, None] - hull[None], axis=-1).max())
         radius = shapely.length(shapely.maximum_inscribed_circle(shapely.polygons(outline), 0.25e-3 * extent))

@@ -76,10 +76,7 @@ def plate_figure(
     draw_plate(axes, plate, extent / 2)
     axes.set(xlabel="y [mm]", ylabel="z [mm]")
     if not isinstance(plate.pattern, NoPattern):
-        _draw_frame(axes, plate.pattern.unit_cell, label="unit cell", edgecolor=BLUE, linestyle="--")
-    if plate.size is not None and plate.margin is not None:
-        inner = [side - 2.0 * plate.margin for side in plate.size]
-        _draw_frame(axes, inner, label=f"margin, {plate.margin * MM:g} mm", edgecolor="0.35", linestyle=":")
+        _draw_frame(axes, plate.pattern.period, label="unit cell", edgecolor=BLUE, linestyle="--")
     if core is not None:
         radius = core.max_radius * MM
         of_core = {"label": f"largest section of the core, \u2300 {2 * radius:.2f} mm", "edgecolor": VERMILION}
@@ -101,7 +98,7 @@ def drawn_extent(plate: Plate, core: Core | None) -> Array:
     if plate.size is not None:
         return np.array(plate.size)
     least = 0.0 if core is None else 4.0 * core.max_radius
-    return np.asarray(np.maximum(_UNIT_CELLS * np.array(plate.pattern.unit_cell), least))
+    return np.asarray(np.maximum(_UNIT_CELLS * np.array(plate.pattern.period), least))
 
 
 @in_style
@@ -156,7 +153,7 @@ def hole_dimensions(plate: Plate, ligament: Dimension | None) -> list[Dimension]
     if isinstance(plate.pattern, NoPattern) or not (holes := _holes(plate)):
         return []
     low_y, low_z, high_y, high_z = holes[0].bounds
-    period_y, period_z = plate.pattern.unit_cell
+    period_y, period_z = plate.pattern.period
     on_the_right = ligament is not None and ligament.start[0] + ligament.end[0] < 0.0  # where the ligament is not
     upright = high_y + _FROM_SIDE * period_y if on_the_right else low_y - _FROM_SIDE * period_y
     below = low_z - _FROM_BOTTOM * period_z
@@ -191,7 +188,7 @@ def _dimension(
 
 def _holes(plate: Plate) -> list[shapely.Polygon]:
     """Holes within the rim, the nearest to the middle first."""
-    cell = np.array(plate.pattern.unit_cell)
+    cell = np.array(plate.pattern.period)
     reach = 1.5 * cell if plate.size is None else np.minimum(1.5 * cell, 0.5 * np.array(plate.size))
     outlines = plate.pattern.outlines((-reach[0], reach[0]), (-reach[1], reach[1]))
     holes = [shapely.Polygon(outline) for outline in outlines if len(outline) > 3]

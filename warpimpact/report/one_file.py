@@ -134,7 +134,7 @@ def _design_figure(dataset: xarray.Dataset, place: int, campaign: Campaign) -> F
         xarray.Dataset(
             {"value": ("hit", dataset[f.HIT_VALUE].values[place, 0])},
             {name: ("hit", dataset[stored].values[place]) for name, stored in points.items()},
-            {attr.PLATE_PERIOD: plate.pattern.unit_cell, attr.SYMMETRIES: "; ".join(map(str, group))},
+            {attr.PLATE_PERIOD: plate.pattern.period, attr.SYMMETRIES: "; ".join(map(str, group))},
         )
     )
     _, places = nearest(hits, pixels(hits, _MAP_PIXELS))

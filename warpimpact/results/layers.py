@@ -75,7 +75,7 @@ def outlines(dataset: xarray.Dataset, layer: int = 0) -> dict[str, NDArray[np.fl
     NaN between two outlines. They are empty if no attribute tells the layer."""
     layers = {"0": json.loads(dataset.attrs.get(attr.PLATE, "{}")), **json.loads(dataset.attrs.get(attr.LAYERS, "{}"))}
     fields = layers.get(str(layer), {})
-    given = {name: fields[name] for name in ("size", "margin", "pattern") if name in fields}
+    given = {name: fields[name] for name in ("size", "pattern") if name in fields}
     try:
         plate = Plate.model_validate({"thickness": 1.0, "resistance": 0.0, **given})  # the given ones may scatter
     except ValueError:

@@ -133,7 +133,7 @@ def campaign_attributes(campaign: Campaign) -> dict[str, Any]:
 
 def _material(campaign: Campaign) -> str:
     """The resistance of the plate as JSON: its material and the law of its stress."""
-    of_plate = campaign.plate.model_dump(exclude={"thickness", "size", "margin", "pattern"})
+    of_plate = campaign.plate.model_dump(exclude={"thickness", "size", "pattern"})
     law = campaign.interaction.model_dump(exclude={"free_surface"})
     free = campaign.interaction.free_surface
     of_surfaces = {} if free is None else {f"free_surface.{key}": value for key, value in free.model_dump().items()}

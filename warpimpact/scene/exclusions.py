@@ -17,9 +17,8 @@ HOLED_LAYERS = "a [[layer]] with a pattern or a rim"
 UNEVEN = 'hits.sampling = "grid" or "list"'
 ONE_SCRAMBLING = "hits.replicates = 1"
 LISTED_STRENGTH = "a column strength in hits.file"
-WHOLE_PLATE, SIZE, MARGIN = 'hits.area = "plate"', "size of the plate", "margin"
+WHOLE_PLATE, SIZE = 'hits.area = "plate"', "size of the plate"
 BY_TIME, STAGGERED, HOLES = "plate.degradation_interval", "staggered", "holes"
-POLYGONS = 'shape = "polygons"'
 THICKNESS, AREAL_DENSITY = "thickness", "areal_density"
 FREE_SURFACE = "interaction.free_surface"
 LIMIT_COMMAND = "warpimpact limit"
@@ -39,7 +38,6 @@ EXCLUDED = (
     Rule(BY_TIME, BY_PATH, "exposure counts either time or path"),
     Rule(THICKNESS, AREAL_DENSITY, "with the holes each gives the other"),
     Rule(STAGGERED, HOLES, "it stands for two holes; list all holes of the cell"),
-    Rule(MARGIN, POLYGONS, "it has no single holes to leave out; give polygons in a cell as large as the plate"),
     Rule(LAYERS, NODAL, "the nodal scheme knows one plate and no layers behind it"),
     Rule(BY_PATH, NODAL, "the nodal scheme weakens the plate once per time step"),
     Rule(BENDING, NODAL, "the nodal scheme has no bending moment"),
@@ -55,7 +53,6 @@ NEEDS = (
     Rule(LISTED_STRENGTH, BENDING, "a core breaks by its bending stress"),
     Rule(STRENGTH, BENDING, "a core breaks by its bending stress"),
     Rule(WHOLE_PLATE, SIZE, "only a finite plate can be covered"),
-    Rule(MARGIN, SIZE, "only a finite plate has a rim"),
 )
 
 

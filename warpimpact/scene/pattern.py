@@ -2,15 +2,14 @@
 
 import math
 from abc import ABC, abstractmethod
-from copy import copy
 from functools import cached_property
 from numbers import Real
-from typing import Annotated, Any, ClassVar, Literal, NamedTuple, Self
+from typing import Annotated, Any, ClassVar, Literal, NamedTuple
 
 import numpy as np
 import shapely
-from pydantic import Field, PrivateAttr, ValidationInfo, field_serializer, field_validator, model_validator
-from scipy.spatial import KDTree
+from pydantic import Field, ValidationInfo, field_serializer, field_validator, model_validator
+from shapely.affinity import scale, translate
 
 from .exclusions import HOLES, STAGGERED, check_together
 from .geometry import BoolArray, Counts, Range, distance_to, geometries, neighbours, placed, shares_in, shifts_into
@@ -23,7 +22,6 @@ _FINE_QUARTER = 45
 """Chords per quarter of a turn in shares of cells; they lie within 0.8e-4 of the diameter of a circle."""
 _PIECE = 16
 """Chords per piece of an outline, in a search for the nearest one."""
-_MOST_HOLES = 20_000
 EQUAL_LENGTHS = 1e-9
 """Largest difference of two equal lengths, as a share of the period."""
 
@@ -36,22 +34,18 @@ class Pattern(Model, ABC):
     @property
     @abstractmethod
     def period(self) -> tuple[float, float]:
-        """Extent along y and z [m] of the rectangle, centred on the origin, that repeats."""
-
-    @property
-    def unit_cell(self) -> tuple[float, float]:
-        """Extent along y and z [m] of the cell that represents the pattern: the period, unless the pattern is
-        bounded."""
-        return self.period
+        """Extent along y and z [m] of the unit cell: the smallest rectangle, centred on the origin, that repeats."""
 
     @property
     @abstractmethod
     def open_area(self) -> float:
         """Share of holes in a period."""
 
+    @property
     @abstractmethod
-    def spines(self, y_range: Range, z_range: Range) -> Any:
-        """Spines of the holes that reach into a rectangle, as an array of shapely geometries."""
+    def _holes(self) -> list[tuple[Array, Array]]:
+        """Spines, each with the origins [m] and turns [rad] of its holes in a period, shape [holes, 3]. A spine is a
+        polygon, anticlockwise, the ends of a line, or a point, shape [corners, 2] [m]."""
 
     @property
     def rounding(self) -> float:
@@ -61,7 +55,32 @@ class Pattern(Model, ABC):
     @property
     def _edge(self) -> float:
         """Distance from its hole within which a point lies on the edge [m]."""
-        return EQUAL_LENGTHS * max(self.unit_cell)
+        return EQUAL_LENGTHS * max(self.period)
+
+    def _reaching(self, y_range: Range, z_range: Range) -> list[tuple[Array, Array]]:
+        """Holes that reach into a rectangle, in the form of `_holes`."""
+        reaching = []
+        for spine, places in self._holes:
+            corners = placed(spine, places)
+            boxes = zip(corners.min(axis=1) - self.rounding, corners.max(axis=1) + self.rounding, strict=True)
+            shifts = [shifts_into(low, high, self.period, y_range, z_range) for low, high in boxes]
+            repeated = [place + np.pad(of_it, ((0, 0), (0, 1))) for place, of_it in zip(places, shifts, strict=True)]
+            reaching.append((spine, np.concatenate(repeated)))
+        return reaching
+
+    def spines(self, y_range: Range, z_range: Range) -> Any:
+        """Spines of the holes that reach into a rectangle, as an array of shapely geometries."""
+        holes = [geometries(placed(spine, places)) for spine, places in self._reaching(y_range, z_range)]
+        return np.concatenate([np.empty(0, dtype=object), *holes])
+
+    def outlines(self, y_range: Range, z_range: Range, *, quarter: int = _QUARTER) -> list[Array]:
+        """Closed outlines, anticlockwise, each of shape [points, 2] [m], of the holes that reach into a rectangle; arcs
+        have this number of chords in a quarter of a turn."""
+        rings: list[Array] = []
+        for spine, places in self._reaching(y_range, z_range):
+            hole = shapely.buffer(geometries(spine[None])[0], self.rounding, quad_segs=quarter)
+            rings += list(placed(shapely.get_coordinates(shapely.orient_polygons(hole)), places))
+        return rings
 
     def is_hole(self, y: Array, z: Array) -> BoolArray:
         """Whether points y, z [m] lie in a hole or on its edge; bool, of their broadcast shape."""
@@ -75,11 +94,8 @@ class Pattern(Model, ABC):
     def shares_in_holes(self, counts: tuple[int, int], sides: tuple[float, float]) -> Counts:
         """Share of every cell that lies in holes, in parts of WHOLE_CELL, shape `counts`: cells of a period along y and
         z with these sides [m], from the origin on. Arcs are chords here, within 1e-4 of the size of a hole."""
-        return shares_in(self.outlines(*_about(counts, sides)), counts, sides)
-
-    def outlines(self, y_range: Range, z_range: Range) -> list[Array]:
-        """Closed outlines, anticlockwise, each of shape [points, 2] [m], of the holes that reach into a rectangle."""
-        return [shapely.get_coordinates(hole) for hole in shapely.orient_polygons(self.spines(y_range, z_range))]
+        about = ((-side, side * (count + 1)) for side, count in zip(sides, counts, strict=True))
+        return shares_in(self.outlines(*about, quarter=_FINE_QUARTER), counts, sides)
 
     def edge_distance(self, y: Array, z: Array) -> Array:
         """Distance of points y, z [m] from the nearest outline of a hole, of their broadcast shape: negative in a hole,
@@ -101,7 +117,7 @@ class Pattern(Model, ABC):
         """Smallest distance between two holes, or between a whole hole and the rim of a plate of this `size` [m]; inf
         where there is none. A hole that the rim cuts has no distance to it. An ellipse is a polygon here."""
         if size is None:
-            return self._gap
+            return self._nearest[0]
         sides, half = np.array(self.period), 0.5 * np.array(size)
         low, high = self._corners(self.spines(*((-side, side) for side in 0.5 * sides)))
         reach = (high - low).max(axis=0, initial=0.0)
@@ -117,24 +133,33 @@ class Pattern(Model, ABC):
         bounds = shapely.bounds(spines)
         return np.stack([bounds[:, :2] - self.rounding, bounds[:, 2:] + self.rounding])
 
-    @property
-    @abstractmethod
-    def _gap(self) -> float:
-        """Smallest distance between two holes of the unbounded pattern [m]."""
+    @cached_property
+    def _nearest(self) -> tuple[float, Array, Array]:
+        """Smallest distance between two holes of the unbounded pattern [m], and the origins of both [m]."""
+        low, high = self._corners(np.concatenate([geometries(placed(*holes)) for holes in self._holes]))
+        counts = 1 + np.ceil((high - low).max(axis=0) / self.period)
+        around = [np.arange(-count, count + 1) * step for count, step in zip(counts, self.period, strict=True)]
+        shifts = np.stack(np.meshgrid(*around, 0.0, indexing="ij"), axis=-1).reshape(-1, 3)
+        shifts = shifts[np.argsort(np.abs(shifts).sum(axis=1), kind="stable")]  # the cell itself comes first
+        images = [(spine, shift + places) for shift in shifts for spine, places in self._holes]
+        spines = np.concatenate([geometries(placed(spine, places)) for spine, places in images])
+        origins = np.concatenate([places[:, :2] for _, places in images])
+        gap, first, second = neighbours(spines, low.shape[0])
+        return gap - 2.0 * self.rounding, origins[first], origins[second]
 
-    @abstractmethod
     def is_symmetric(self, along_y: int, along_z: int, *, centred: bool) -> bool:
         """Whether (y, z) → (along_y·y, along_z·z), with 1, or −1 for a mirror image, then half a period along both if
         `centred`, changes nothing."""
+        holes, image = self._cut_out(0.0), scale(self._cut_out(0.5 * centred), along_y, along_z, origin=(0.0, 0.0))
+        return bool(holes.symmetric_difference(image).area <= EQUAL_LENGTHS * max(self.period) * holes.length)
 
-    def bounded(self, size: tuple[float, float] | None, margin: float | None) -> Self:
-        """The pattern without the holes that reach into a `margin` along the rim of a plate of this `size` [m], which
-        becomes its period. Without both it has all holes.
-
-        Raises:
-            ValueError: says why that is impossible.
-        """
-        return self
+    def _cut_out(self, shift: float) -> Any:
+        """Holes of the rectangle of a period that is shifted by this share of it, seen from its middle."""
+        at, half = shift * np.array(self.period), 0.5 * np.array(self.period)
+        low, high = at - half, at + half
+        spines = self.spines((low[0], high[0]), (low[1], high[1]))
+        holes: Any = shapely.multipolygons(shapely.buffer(spines, self.rounding, quad_segs=4))  # as symmetric as arcs
+        return translate(holes.intersection(shapely.box(*low, *high)), *-at)
 
 
 class NoPattern(Pattern):
@@ -155,15 +180,12 @@ class NoPattern(Pattern):
     def open_area(self) -> float:
         return 0.0
 
-    def spines(self, y_range: Range, z_range: Range) -> Any:
-        return np.empty(0, dtype=object)
-
     @property
-    def _gap(self) -> float:
-        return math.inf
+    def _holes(self) -> list[tuple[Array, Array]]:
+        return []
 
-    def is_symmetric(self, along_y: int, along_z: int, *, centred: bool) -> bool:
-        return True
+    def ligament(self, size: tuple[float, float] | None = None) -> float:
+        return math.inf
 
 
 class HolePlace(NamedTuple):
@@ -197,10 +219,8 @@ class LatticePattern(Pattern):
 
     staggered: Annotated[bool, Field(strict=True)] = False
     spacing: _PAIR
-    holes: Annotated[tuple[HolePlace, ...], Field(fail_fast=True, min_length=1, max_length=_MOST_HOLES)] | None = None
+    holes: Annotated[tuple[HolePlace, ...], Field(fail_fast=True, min_length=1, max_length=20_000)] | None = None
     rotation: Angle = 0.0
-    _plate: tuple[tuple[float, float], float] | None = PrivateAttr(None)
-    """Size and margin of the plate that bounds the pattern; None if it is unbounded."""
 
     @field_serializer("holes", when_used="json-unless-none")
     def _with_units(self, holes: tuple[HolePlace, ...]) -> list[tuple[float, float, str]]:
@@ -239,16 +259,11 @@ class LatticePattern(Pattern):
         longest = np.linalg.norm(self.spine[:, None] - self.spine[None], axis=-1).max()
         return 2.0 * self.inradius, float(longest) + 2.0 * self.rounding
 
-    @property
-    def _marks(self) -> Array:
-        """Points that identify a hole of the shape, shape [marks, 2] [m]."""
-        return self.spine
-
     def _check_shape(self) -> None:
         """Raise a ValueError if the sizes make no hole."""
 
     @model_validator(mode="after")
-    def _leaves_ligaments(self) -> Self:
+    def _leaves_ligaments(self) -> Any:
         check_together({STAGGERED: self.staggered, HOLES: self.holes is not None})
         self._check_shape()
         if self.open_area >= 1:
@@ -262,132 +277,22 @@ class LatticePattern(Pattern):
         return self
 
     @property
-    def unit_cell(self) -> tuple[float, float]:
-        """Extent along y and z [m] of the smallest rectangle that repeats: two rows of a staggered lattice."""
+    def period(self) -> tuple[float, float]:
+        """Extent of the unit cell along y and z [m]: two rows of a staggered lattice."""
         a, b = self.spacing
         return (2 * a, b) if self.staggered else (a, b)
 
     @property
-    def period(self) -> tuple[float, float]:
-        """Extent of the unit cell, or size of the plate that bounds the pattern [m]."""
-        return self.unit_cell if self._plate is None else self._plate[0]
-
-    @property
     def open_area(self) -> float:
-        return float(len(self._places) * self.hole_area / math.prod(self.period))
-
-    def bounded(self, size: tuple[float, float] | None, margin: float | None) -> Self:
-        plate = None if size is None or margin is None else (size, margin)
-        if self._plate == plate:
-            return self
-        pattern = copy(self)
-        pattern.__dict__ = {name: getattr(self, name) for name in type(self).model_fields}  # no computed values
-        pattern._plate = plate
-        if size is not None and margin is not None and not len(pattern._places):
-            raise ValueError(
-                f"got size = {_millimetres(size)} and margin = {1e3 * margin:g} mm, but they leave no hole on the plate"
-            )
-        return pattern
-
-    def spines(self, y_range: Range, z_range: Range) -> Any:
-        return geometries(placed(self.spine, self._reaching(y_range, z_range)))
-
-    def outlines(self, y_range: Range, z_range: Range) -> list[Array]:
-        return self._outlines(self._reaching(y_range, z_range), _QUARTER)
-
-    def shares_in_holes(self, counts: tuple[int, int], sides: tuple[float, float]) -> Counts:
-        places = self._repeated(self._places, self.period, *_about(counts, sides))
-        return shares_in(self._outlines(places, _FINE_QUARTER), counts, sides)
-
-    def _outlines(self, places: Array, quarter: int) -> list[Array]:
-        """Outlines of the holes at these places, with this number of chords in a quarter of a turn."""
-        hole = shapely.buffer(geometries(self.spine[None])[0], self.rounding, quad_segs=quarter)
-        return list(placed(shapely.get_coordinates(shapely.orient_polygons(hole)), places))
-
-    @property
-    def _gap(self) -> float:
-        return self._nearest[0]
-
-    def is_symmetric(self, along_y: int, along_z: int, *, centred: bool) -> bool:
-        period, mirror = np.array(self.period), np.array([along_y, along_z])
-        middles, marks, tree = self._marked
-        images = middles * mirror + (period / 2 if centred else 0.0)
-        distances, nearest = tree.query(images % period % period)
-        if distances.max() > EQUAL_LENGTHS * period.max():
-            return False
-        mirrored = (marks * mirror)[:, :, None] - marks[nearest][:, None]
-        return bool(np.linalg.norm(mirrored, axis=-1).min(axis=-1).max() <= EQUAL_LENGTHS * period.max())
+        return float(len(self._holes[0][1]) * self.hole_area / math.prod(self.period))
 
     @cached_property
-    def _marked(self) -> tuple[Array, Array, KDTree]:
-        """Middles of the holes of a period [m], their marks relative to these [m], and a tree of the middles."""
-        period, marks = np.array(self.period), placed(self._marks, self._places)
-        middles = marks.mean(axis=1)
-        return middles, marks - middles[:, None], KDTree(middles % period % period, boxsize=period)
-
-    @cached_property
-    def _cell_places(self) -> Array:
-        """Origin [m] and turn [rad] of every hole of a unit cell, shape [holes, 3]."""
+    def _holes(self) -> list[tuple[Array, Array]]:
         a, b = self.spacing
         places = np.array(self.holes or ((0.0, 0.0, 0.0), (a, b / 2, 0.0))[: 1 + self.staggered])
-        places[:, :2] -= np.round(places[:, :2] / self.unit_cell) * self.unit_cell
+        places[:, :2] -= np.round(places[:, :2] / self.period) * self.period
         places[:, 2] += self.rotation
-        return places
-
-    @cached_property
-    def _places(self) -> Array:
-        """Origin [m] and turn [rad] of every hole of a period, shape [holes, 3]."""
-        if self._plate is None:
-            return self._cell_places
-        size, margin = self._plate
-        if (count := len(self._cell_places) * math.prod(size) / math.prod(self.unit_cell)) > _MOST_HOLES:
-            raise ValueError(
-                f"got size = {_millimetres(size)}, a plate of some {count:.3g} holes, but with a margin at most "
-                f"{_MOST_HOLES} holes are allowed"
-            )
-        inner = np.array(size) / 2 - margin
-        places = self._repeated(self._cell_places, self.unit_cell, (-inner[0], inner[0]), (-inner[1], inner[1]))
-        kept: Array = places[(np.abs(self._boxes(places)) <= inner * (1 + EQUAL_LENGTHS)).all(axis=(1, 2))]
-        return kept
-
-    def _reaching(self, y_range: Range, z_range: Range) -> Array:
-        """Places of the holes that reach into a rectangle, shape [holes, 3]; none lies beyond the plate."""
-        if self._plate is None:
-            return self._repeated(self._places, self.period, y_range, z_range)
-        boxes, (low, high) = self._boxes(self._places), np.array([y_range, z_range]).T
-        kept: Array = self._places[((boxes[:, 0] <= high) & (boxes[:, 1] >= low)).all(axis=1)]
-        return kept
-
-    def _repeated(self, places: Array, period: tuple[float, float], y_range: Range, z_range: Range) -> Array:
-        """Places repeated by whole periods whose holes reach into a rectangle, shape [holes, 3]."""
-        shifts = [shifts_into(low, high, period, y_range, z_range) for low, high in self._boxes(places)]
-        return np.concatenate(
-            [place + np.pad(of_it, ((0, 0), (0, 1))) for place, of_it in zip(places, shifts, strict=True)]
-        )
-
-    def _boxes(self, places: Array) -> Array:
-        """Lower and upper corners (y, z) of the holes at these places, shape [holes, 2, 2] [m]."""
-        spines = placed(self.spine, places)
-        return np.stack([spines.min(axis=1) - self.rounding, spines.max(axis=1) + self.rounding], axis=1)
-
-    @cached_property
-    def _nearest(self) -> tuple[float, Array, Array]:
-        """Smallest distance between two holes of the unbounded lattice [m], and the origins of both [m]."""
-        extent, cell = np.ptp(self._boxes(self._cell_places), axis=1).max(axis=0), np.array(self.unit_cell)
-        around = [
-            np.arange(-count, count + 1) * step for count, step in zip(1 + np.ceil(extent / cell), cell, strict=True)
-        ]
-        shifts = np.stack(np.meshgrid(*around, 0.0, indexing="ij"), axis=-1).reshape(-1, 3)
-        shifts = shifts[np.argsort(np.abs(shifts).sum(axis=1), kind="stable")]  # the cell itself comes first
-        places = (shifts[:, None] + self._cell_places).reshape(-1, 3)
-        gap, first, second = neighbours(geometries(placed(self.spine, places)), len(self._cell_places))
-        return gap - 2 * self.rounding, places[first, :2], places[second, :2]
-
-
-def _about(counts: tuple[int, int], sides: tuple[float, float]) -> tuple[Range, Range]:
-    """Ranges of cells from the origin on, with one more around them [m]."""
-    (low_y, high_y), (low_z, high_z) = ((-side, side * (count + 1)) for side, count in zip(sides, counts, strict=True))
-    return (low_y, high_y), (low_z, high_z)
+        return [(self.spine, places)]
 
 
 def is_pitch(value: Any) -> bool:

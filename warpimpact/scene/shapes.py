@@ -7,10 +7,9 @@ from typing import Annotated, Any, Literal, Self
 import numpy as np
 import shapely
 from pydantic import Field, ValidationInfo, field_validator, model_validator
-from shapely.affinity import scale, translate
+from shapely.affinity import translate
 
-from .exclusions import MARGIN, POLYGONS, check_together
-from .geometry import Range, neighbours, shifts_into
+from .geometry import shifts_into
 from .model import Array
 from .pattern import EQUAL_LENGTHS, LatticePattern, NoPattern, Pattern, is_pitch
 from .units import Length, NonNegativeLength, PositiveLength
@@ -107,10 +106,6 @@ class EllipsePattern(_OblongPattern):
     def hole_area(self) -> float:
         """Area of one ellipse [m²], exact."""
         return np.pi / 4 * self.length * self.width
-
-    @property
-    def _marks(self) -> Array:
-        return self.spine[:: _ELLIPSE_CHORDS // 4]
 
 
 class _PolygonPattern(LatticePattern):
@@ -214,9 +209,7 @@ class HexagonPattern(_PolygonPattern):
         return self.width / 2
 
 
-_MOST_POLYGONS, _MOST_CORNERS = 400, 400  # which are read and drawn within seconds
-
-_Corners = Annotated[tuple[tuple[Length, Length], ...], Field(min_length=3, max_length=_MOST_CORNERS, fail_fast=True)]
+_Corners = Annotated[tuple[tuple[Length, Length], ...], Field(min_length=3, max_length=400, fail_fast=True)]
 
 
 class PolygonsPattern(Pattern):
@@ -232,7 +225,7 @@ class PolygonsPattern(Pattern):
     shape: Literal["polygons"] = "polygons"
     spacing: tuple[PositiveLength, PositiveLength]
     staggered: Annotated[bool, Field(strict=True)] = False
-    polygons: Annotated[tuple[_Corners, ...], Field(min_length=1, max_length=_MOST_POLYGONS, fail_fast=True)]
+    polygons: Annotated[tuple[_Corners, ...], Field(min_length=1, max_length=400, fail_fast=True)]
 
     @field_validator("polygons")
     @classmethod
@@ -264,50 +257,27 @@ class PolygonsPattern(Pattern):
 
     @property
     def period(self) -> tuple[float, float]:
-        """Extent of a period along y and z [m]: two rows of a staggered pattern."""
         return (2.0 if self.staggered else 1.0) * self.spacing[0], self.spacing[1]
 
     @property
     def open_area(self) -> float:
-        return float(self._cut_out(0.0).area / np.prod(self.period))
-
-    def _cut_out(self, shift: float) -> Any:
-        """Holes of the rectangle of a period that is shifted by this share of it, seen from its middle."""
-        at, half = shift * np.array(self.period), 0.5 * np.array(self.period)
-        low, high = at - half, at + half
-        holes = shapely.union_all(self.spines((low[0], high[0]), (low[1], high[1])))
-        return translate(holes.intersection(shapely.box(*low, *high)), *-at)
-
-    def spines(self, y_range: Range, z_range: Range) -> Any:
-        """Holes that reach into a rectangle, as an array of shapely polygons; what a hole surrounds belongs to it."""
-        (a, b), images = self.period, []
-        window = shapely.box(y_range[0], z_range[0], y_range[1], z_range[1])
-        for corners in map(np.array, self.polygons):
-            for stagger in np.array([(-a, -b), (a, b)]) / 4 if self.staggered else np.zeros((1, 2)):
-                low, high = corners.min(axis=0) + stagger, corners.max(axis=0) + stagger
-                around = (y_range[0] - a, y_range[1] + a), (z_range[0] - b, z_range[1] + b)
-                images += [corners + stagger + shift for shift in shifts_into(low, high, self.period, *around)]
-        holes = shapely.get_parts(shapely.union_all([shapely.Polygon(corners) for corners in images]))
-        holes = shapely.get_parts(shapely.union_all(shapely.polygons(shapely.get_exterior_ring(holes))))
-        return holes[shapely.intersects(holes, window)]
+        return float(sum(shapely.Polygon(spine).area for spine, _ in self._holes) / np.prod(self.period))
 
     @cached_property
-    def _gap(self) -> float:
-        """Smallest distance between two holes of the unbounded pattern [m]."""
-        period = np.array(self.period)
-        holes = self.spines(*((-length, length) for length in period))
-        low, high = np.split(shapely.bounds(holes), 2, axis=1)
-        in_cell = ((low < 0.5 * period) & (high > -0.5 * period)).all(axis=1)
-        return neighbours(np.concatenate([holes[in_cell], holes[~in_cell]]), int(in_cell.sum()))[0]
-
-    def is_symmetric(self, along_y: int, along_z: int, *, centred: bool) -> bool:
-        holes, image = self._cut_out(0.0), scale(self._cut_out(0.5 * centred), along_y, along_z, origin=(0.0, 0.0))
-        return bool(holes.symmetric_difference(image).area <= EQUAL_LENGTHS * max(self.period) * holes.length)
-
-    def bounded(self, size: tuple[float, float] | None, margin: float | None) -> Self:
-        """Refuse a margin: a cell of polygons has no single holes to leave out."""
-        check_together({MARGIN: margin is not None, POLYGONS: True})
-        return self
+    def _holes(self) -> list[tuple[Array, Array]]:
+        """Unions of the polygons of all cells; what a hole surrounds belongs to it."""
+        period, images = np.array(self.period), []
+        rows = np.array([(-0.25, -0.25), (0.25, 0.25)]) * period if self.staggered else np.zeros((1, 2))
+        around = [(-1.5 * side, 1.5 * side) for side in self.period]
+        for corners in (np.array(polygon) + row for polygon in self.polygons for row in rows):
+            shifts = shifts_into(corners.min(axis=0), corners.max(axis=0), self.period, *around)
+            images += [shapely.Polygon(corners + shift) for shift in shifts]
+        united = shapely.get_parts(shapely.union_all(images))
+        holes = shapely.polygons(shapely.get_exterior_ring(united))
+        holes = shapely.orient_polygons(shapely.get_parts(shapely.union_all(holes)))
+        middles = shapely.get_coordinates(shapely.centroid(holes)) / period
+        of_the_period = (np.floor(middles + 0.5 + EQUAL_LENGTHS) == 0.0).all(axis=1)
+        return [(shapely.get_coordinates(hole)[:-1], np.zeros((1, 3))) for hole in holes[of_the_period]]
 
 
 AnyPattern = Annotated[

@@ -7,13 +7,13 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Self
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import BaseModel, Field, ModelWrapValidatorHandler, ValidationInfo, field_validator, model_validator
+from pydantic import BaseModel, Field, ModelWrapValidatorHandler, field_validator, model_validator
 
 from . import units
-from .exclusions import AREAL_DENSITY, BY_PATH, BY_TIME, MARGIN, SIZE, THICKNESS, check_together
+from .exclusions import AREAL_DENSITY, BY_PATH, BY_TIME, THICKNESS, check_together
 from .geometry import BoolArray
 from .model import Array, Model
-from .pattern import NoPattern, Pattern
+from .pattern import NoPattern
 from .shapes import AnyPattern
 from .units import Length
 
@@ -44,9 +44,7 @@ class Plate(Model):
             [interaction]; a key beside it overrides its value. In Python it gives them for a `threat` (a name, or a
             core) at an `obliquity`, on which Y depends, too; a copy with another thickness keeps its Y.
         size: extent along y and z of a finite plate centred on the origin [m]; without it the plate is unbounded.
-        margin: width of a band along the rim without holes [m]; holes that reach into it are left out. Without a margin
-            the rim cuts holes.
-        pattern: shape and lattice of the holes; with a margin, only the holes on the plate.
+        pattern: shape and lattice of the holes; the rim cuts holes.
     """
 
     thickness: units.PositiveLength
@@ -64,7 +62,6 @@ class Plate(Model):
     density: units.PositiveDensity = 7850.0
     material: units.Title | None = None
     size: tuple[units.PositiveLength, units.PositiveLength] | None = None
-    margin: units.PositiveLength | None = None
     pattern: AnyPattern = NoPattern()
     in_python: ClassVar[tuple[str, ...]] = ("threat", "obliquity")
     of_material: ClassVar[Callable[[type["Plate"], dict[str, Any]], dict[str, Any]] | None] = None
@@ -95,17 +92,12 @@ class Plate(Model):
     def _keys(cls) -> list[str]:
         return [*super()._keys(), "areal_density", *(() if cls.of_material is None else cls.in_python)]
 
-    @field_validator("pattern")
-    @classmethod
-    def _within_the_margin(cls, pattern: Pattern, info: ValidationInfo) -> Pattern:
-        return pattern.bounded(info.data.get("size"), info.data.get("margin"))
-
     @model_validator(mode="before")
     @classmethod
     def _goes_together(cls, values: Any) -> Any:
         if not isinstance(values, dict):
             return values
-        keys = {BY_TIME: "degradation_interval", BY_PATH: "degradation_distance", MARGIN: "margin", SIZE: "size"}
+        keys = {BY_TIME: "degradation_interval", BY_PATH: "degradation_distance"}
         given = {option: values.get(key) is not None for option, key in keys.items()}
         check_together(given)
         by_default = not given[BY_TIME] and not given[BY_PATH]
@@ -120,7 +112,7 @@ class Plate(Model):
 
     @property
     def open_area(self) -> float:
-        """Share of holes in a unit cell; with a margin, in the whole plate."""
+        """Share of holes in a unit cell."""
         return self.pattern.open_area
 
     @cached_property
@@ -146,18 +138,18 @@ class Plate(Model):
     @property
     def sampled_cell(self) -> tuple[float, float]:
         """Extent (y, z) of the cell that hits cover [m]: the unit cell, or a smaller plate."""
-        cell_y, cell_z = self.pattern.unit_cell
+        cell_y, cell_z = self.pattern.period
         return (cell_y, cell_z) if self.size is None else (min(cell_y, self.size[0]), min(cell_z, self.size[1]))
 
     @property
     def solid(self) -> Self:
         """The plate without holes, with the same material and areal density."""
         thickness = self.thickness * (1.0 - self.open_area)
-        return self.model_copy(update={"thickness": thickness, "margin": None, "pattern": NoPattern()})
+        return self.model_copy(update={"thickness": thickness, "pattern": NoPattern()})
 
     @property
     def areal_density(self) -> float:
-        """Mass per area of the perforated plate [kg/m²]: in a unit cell, or with a margin in the whole plate."""
+        """Mass per area of the perforated plate [kg/m²]: in a unit cell."""
         return self.density * self.thickness * (1 - self.open_area)
 
 

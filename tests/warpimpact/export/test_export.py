@@ -116,11 +116,12 @@ def test_a_drawing_has_every_hole_of_a_period_once(
 def test_holes_that_the_rim_cuts_are_counted(tmp_path: Path) -> None:
     plate = Plate(thickness=4e-3, resistance=1e9, pattern=SLOTS, size=["40 mm", "30 mm"])
     assert write_drawing(plate, tmp_path / "a.dxf") == [
-        "The rim cuts 6 of 13 holes. plate.margin leaves such holes out."
+        "The rim cuts 6 of 13 holes. List whole holes in a cell of this size."
     ]
     space = ezdxf.readfile(tmp_path / "a.dxf").modelspace()
     assert [len(space.query(f'*[layer=="{layer}"]')) for layer in ("HOLES", "RIM")] == [13, 1]
-    within = Plate(**plate.model_dump() | {"margin": "1 mm"})
+    whole = SLOTS | {"holes": [[0, 0]], "staggered": False, "spacing": ["40 mm", "30 mm"]}
+    within = plate.model_copy(update={"pattern": whole})
     assert write_drawing(within, tmp_path / "b.dxf") == []
 
 

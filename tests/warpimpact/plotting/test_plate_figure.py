@@ -64,13 +64,13 @@ def test_the_core_is_drawn_as_wide_as_it_is() -> None:
     assert any("largest section of the core, ⌀ 6.00 mm" in text.get_text() for text in figure.legends[0].get_texts())
 
 
-def test_a_finite_plate_is_drawn_to_its_rim_without_what_the_margin_leaves_out() -> None:
-    figure = plate_figure(plate(size=["50 mm", "44 mm"], margin="3 mm"), title="a plate")
+def test_a_finite_plate_is_drawn_to_its_rim() -> None:
+    figure = plate_figure(plate(size=["50 mm", "44 mm"]), title="a plate")
     axes = figure.axes[0]
     assert (*axes.get_xlim(), *axes.get_ylim()) == pytest.approx((-25, 25, -22, 22))
-    np.testing.assert_allclose(colours(figure, (0, 16), (16, 1), (8, 9)), [STEEL, HOLE, HOLE], atol=0.01)
+    np.testing.assert_allclose(colours(figure, (0, 16), (16, 1), (4.5, 3)), [HOLE, HOLE, STEEL], atol=0.01)
     legend = [text.get_text() for text in figure.legends[0].get_texts()]
-    assert legend == ["plate, 4 mm thick", "hole", "unit cell", "margin, 3 mm"]
+    assert legend == ["plate, 4 mm thick", "hole", "unit cell"]
     assert figure.get_suptitle() == "a plate"
 
 

@@ -51,8 +51,6 @@ def test_the_ligament_is_that_of_the_corners() -> None:
     at = (np.arange(200) - 99.5) * 5e-5
     distances = (abs(pattern.edge_distance(at[:, None], at)) for pattern in (cells, lattice))
     np.testing.assert_allclose(*distances, rtol=0, atol=4e-6)
-    with pytest.raises(ValueError, match=r"margin cannot be combined with shape = .*: it has no single holes"):
-        cells.bounded((6e-3, 8e-3), 1e-3)
 
 
 def test_polygons_that_overlap_those_of_the_next_cell_unite() -> None:
