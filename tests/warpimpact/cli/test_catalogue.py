@@ -35,10 +35,7 @@ LINES = (
 )
 
 
-def test_names_are_carried_along(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    monkeypatch.chdir(tmp_path)
+def test_names_are_carried_along(in_tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     Path("own.toml").write_text(OWN, encoding="utf-8")
     Path("named.toml").write_text(CAMPAIGN, encoding="utf-8")
     assert main(["run", "named.toml", "--device", "cpu"]) == 0
@@ -56,45 +53,31 @@ def test_names_are_carried_along(
     dataset = files.read(Path("named.nc"))
     assert dataset.attrs[attr.CATALOGUE_NAMES].splitlines() == list(LINES[1:3])
     assert json.loads(dataset.attrs[attr.OUTSIDE_TESTED_RANGE]) == [LINES[3]]
-    figure = variable_map(dataset, "residual_velocity")
-    assert figure.get_suptitle() == "named"
-    below = " ".join(figure.legends[0].get_title().get_text().split())
+    below = " ".join(variable_map(dataset, "residual_velocity").legends[0].get_title().get_text().split())
     assert all(line in below for line in dataset.attrs[attr.CATALOGUE_NAMES].splitlines())
     assert main(["report", "named.nc", "-o", "named.html"]) == 0
     page = Path("named.html").read_text(encoding="utf-8")
     assert all(line in page for line in LINES[:3])
 
 
-def test_the_command_lists_shows_and_draws(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    own = tmp_path / "own.toml"
-    own.write_text(OWN, encoding="utf-8")
-    assert main(["catalogue", "--file", str(own)]) == 0
+def test_the_command_lists_shows_and_draws(in_tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    Path("own.toml").write_text(OWN, encoding="utf-8")
+    assert main(["catalogue", "--file", "own.toml"]) == 0
     listed = capsys.readouterr().out
-    assert "14.5 mm BS41" in listed
-    assert "own steel" in listed
-    assert main(["catalogue", "14.5 mm B32", "-o", str(tmp_path / "core.png")]) == 0
+    assert all(name in listed for name in ("14.5 mm BS41", "own steel"))
+    assert main(["catalogue", "14.5 mm B32", "-o", "core.png"]) == 0
     assert "STANAG 4569 level 4" in capsys.readouterr().out
-    assert (tmp_path / "core.png").stat().st_size > 10_000
-    assert main(["catalogue", "7.62x39 API BZ", "-o", str(tmp_path / "no.png")]) == 2
-    assert main(["catalogue", "P81"]) == 2
+    assert Path("core.png").stat().st_size > 10_000
+    assert [main(["catalogue", *name]) for name in (["7.62x39 API BZ", "-o", "no.png"], ["P81"])] == [2, 2]
 
 
-def test_limit_tells_where_a_test_is_expected(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    campaign = tmp_path / "hha.toml"
-    changes = {
-        'catalogue = "own.toml"\n': "",
-        "7.62x51 P80 AP": ".30 AP M2",
-        '"own steel", thickness = "20 mm"': '"HHA Class 1", thickness = "6 mm"',
-        "count = 4": "count = 1",
-    }
-    text = CAMPAIGN
-    for old, new in changes.items():
-        text = text.replace(old, new)
-    campaign.write_text(text, encoding="utf-8")
-    assert main(["limit", str(campaign), "-o", str(tmp_path / "limit.nc"), "--device", "cpu"]) == 0
+def test_limit_tells_where_a_test_is_expected(in_tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    text = CAMPAIGN.replace('catalogue = "own.toml"\n', "").replace("7.62x51 P80 AP", ".30 AP M2").replace("= 4", "= 1")
+    text = text.replace('"own steel", thickness = "20 mm"', '"HHA Class 1", thickness = "6 mm"')
+    Path("hha.toml").write_text(text, encoding="utf-8")
+    assert main(["limit", "hha.toml", "-o", "limit.nc", "--device", "cpu"]) == 0
     (line,) = (line for line in capsys.readouterr().out.splitlines() if "a test of this material" in line)
     low, high = (float(word) for word in line.split() if word.replace(".", "").isdigit())
-    dataset = files.read(tmp_path / "limit.nc")
-    factors = dataset.attrs[attr.LIMIT_FACTORS]
-    value = float(dataset["limit_velocity"].item())
+    dataset = files.read(Path("limit.nc"))
+    factors, value = dataset.attrs[attr.LIMIT_FACTORS], float(dataset["limit_velocity"].item())
     assert (low, high) == pytest.approx((value * factors[0], value * factors[1]), rel=1e-3)

@@ -32,7 +32,9 @@ def test_a_bad_campaign_is_refused(in_tmp_path: Path, refusal: Refusal) -> None:
     assert [path.name for path in in_tmp_path.iterdir()] == ["wrong.toml"]
 
 
-def test_an_existing_output_is_kept(in_tmp_path: Path, refusal: Refusal) -> None:
+def test_an_existing_output_is_kept_and_an_absent_device_named(in_tmp_path: Path, refusal: Refusal) -> None:
+    assert 'got "cuda:99"' in refusal(["run", str(SLOTTED_PLATE), "--count", "4", "--device", "cuda:99"])
+    assert not list(in_tmp_path.iterdir())
     Path("slotted_plate.nc").write_text("precious")
     sentence = refusal(["run", str(SLOTTED_PLATE)])
     assert sentence == "slotted_plate.nc: exists already; name another file or give --overwrite"
@@ -61,11 +63,6 @@ def test_a_count_is_a_whole_number_however_it_is_written(capsys: pytest.CaptureF
             main(["run", "a.toml", f"--count={text}"])
         sentence = f'argument --count: got "{text}", but it must be a whole number of at least 1, such as 2 or 1e4\n'
         assert capsys.readouterr().err.endswith(sentence)
-
-
-def test_an_absent_device_is_refused(in_tmp_path: Path, refusal: Refusal) -> None:
-    assert 'got "cuda:99"' in refusal(["run", str(SLOTTED_PLATE), "--count", "4", "--device", "cuda:99"])
-    assert not list(in_tmp_path.iterdir())
 
 
 def test_memory_that_cannot_be_had_is_reported(

@@ -83,6 +83,9 @@ def test_control_characters_are_never_printed(capsys: pytest.CaptureFixture[str]
     assert shown.out == "a\\x1b]0;title\\x07\\x9b31m\\u202eb\n"
     assert shown.err.startswith("warpimpact: c\\x1b[2J\\nd")
     assert len(shown.err) < 2100
+    with pytest.raises(SystemExit):
+        main(["run", "a.toml", "--nonsense", "\x1b[31m"])
+    assert capsys.readouterr().err.endswith("unrecognized arguments: --nonsense \\x1b[31m\n")
 
 
 SMALL = settings(max_examples=60, deadline=None, derandomize=True, suppress_health_check=list(HealthCheck))
@@ -100,12 +103,6 @@ def test_a_campaign_file_with_anything_in_it_is_read_or_refused(at: int, taken: 
 def test_any_quantity_is_read_or_refused(text: str) -> None:
     with suppress(ValueError):
         assert np.isfinite(quantity(Length)(text))
-
-
-def test_an_escape_sequence_in_an_argument_reaches_no_terminal(capsys: pytest.CaptureFixture[str]) -> None:
-    with pytest.raises(SystemExit):
-        main(["run", "a.toml", "--nonsense", "\x1b[31m"])
-    assert capsys.readouterr().err.endswith("unrecognized arguments: --nonsense \\x1b[31m\n")
 
 
 def test_a_closed_stream_a_backend_and_a_name_end_in_no_bug(tmp_path: Path) -> None:

@@ -22,12 +22,9 @@ from warpimpact.runs.run import run
 
 def settled(browser: Any) -> None:
     """Wait for the last stage of a design, after a change."""
-    browser.wait(lambda: "Complete" not in browser.text("#status") or measured(browser), 60.0)
+    measured = "return performance.getEntriesByName('first map').length"
+    browser.wait(lambda: "Complete" not in browser.text("#status") or browser.driver.execute_script(measured), 60.0)
     browser.wait(lambda: "Complete" in browser.text("#status"), 120.0)
-
-
-def measured(browser: Any) -> list[float]:
-    return browser.driver.execute_script("return performance.getEntriesByName('first map').map((e) => e.duration)")
 
 
 def move(browser: Any, control: str, value: float) -> None:
@@ -59,13 +56,12 @@ def coarse(small: Path) -> Path:
     return path
 
 
-def opened(browser: Any, address: str) -> Any:
+def opened(browser: Any, address: str, width: int = 1400) -> Any:
     browser.open("about:blank")
-    browser.open(address, 1400)
+    browser.open(address, width)
     browser.wait(lambda: "Complete" in browser.text("#status"), 180.0)
-    browser.wait(
-        lambda: len(browser.driver.execute_script("return location.hash")) > 1
-    )  # a design that stays for a while
+    # A design that stays for a while is in the address.
+    browser.wait(lambda: len(browser.driver.execute_script("return location.hash")) > 1)
     return browser
 
 
@@ -176,20 +172,14 @@ def test_a_pinned_design_is_compared_shot_by_shot(page: Any, coarse: Path) -> No
 def test_an_address_of_others_is_only_text(page: Any, coarse: Path) -> None:
     others = tomllib.loads(coarse.read_text()) | {"title": "of others"}
     script = {"name": "<img src=x onerror='document.title=1'>", "design": others}
+    held = {"design": others, "pins": [None, script], "variable": ["<img src=x>"]}
     address = page.driver.current_url.partition("#")[0]
-    for held, title in (
-        ({"design": "no table", "pins": 3}, "7.62 mm P80 core against a slotted plate"),
-        ({"design": others, "pins": "<img src=x>", "variable": ["<img src=x>"]}, "of others"),
-        ({"design": others, "pins": [None, script]}, "of others"),
-    ):
-        packed = page.driver.execute_async_script("address.packed(arguments[0]).then(arguments[1])", held)
-        page.open("about:blank")
-        page.open(f"{address}#{packed}")
-        page.wait(lambda: "Complete" in page.text("#status"), 120.0)
-        assert page.values("#title") == [title]
-        assert ("<img src=x" in page.text("#maps")) == isinstance(held["pins"], list)
-        assert not page.find("img[src=x]")
-        assert page.errors() == []
+    packed = page.driver.execute_async_script("address.packed(arguments[0]).then(arguments[1])", held)
+    opened(page, f"{address}#{packed}")
+    assert page.values("#title") == ["of others"]
+    assert "<img src=x" in page.text("#maps")
+    assert not page.find("img[src=x]")
+    assert page.errors() == []
 
 
 def test_text_of_others_is_text(browser: Any, serve: Callable[..., str], coarse: Path, tmp_path: Path) -> None:
@@ -198,8 +188,7 @@ def test_text_of_others_is_text(browser: Any, serve: Callable[..., str], coarse:
     path.write_text(
         coarse.read_text().replace('title = "7.62 mm P80 core against a slotted plate"', f"title = '''{hostile}'''")
     )
-    browser.open(serve(path), 390)
-    browser.wait(lambda: "Complete" in browser.text("#status"), 180.0)
+    opened(browser, serve(path), 390)
     assert browser.values("#title") == [hostile]
     assert browser.driver.title == f"{hostile} · warpimpact design"
     assert not browser.find("img[src=x]")
@@ -216,11 +205,9 @@ def test_a_grip_of_the_plate_is_dragged(page: Any) -> None:
     labels = [grip.get_attribute("aria-label") for grip in grips]
     assert labels == [f"plate pattern {name}" for name in ("width", "length", "spacing 0", "spacing 1")]
     per_mm = page.driver.execute_script("const at = document.getElementById('plate'); return at.getScreenCTM().a")
-    drag = ActionChains(page.driver).click_and_hold(grips[0])
-    for _ in range(4):
-        drag = drag.move_by_offset(round(0.25 * per_mm), 0).pause(0.1)
-    drag.release().perform()
-    width = 4.0 + 2.0 * 4 * round(0.25 * per_mm) / per_mm  # a grip is at half the width
+    way = round(per_mm)
+    ActionChains(page.driver).click_and_hold(grips[0]).move_by_offset(way, 0).pause(0.1).release().perform()
+    width = 4.0 + 2.0 * way / per_mm  # a grip is at half the width
     page.wait(lambda: float(page.values("#control-plate-pattern-width")[0]) == pytest.approx(width, abs=0.11))
     page.find("#plate .grip")[0].send_keys("\ue012")  # arrow to the left
     page.wait(lambda: float(page.values("#control-plate-pattern-width")[0]) == pytest.approx(width - 0.1, abs=0.11))

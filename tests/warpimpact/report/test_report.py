@@ -83,10 +83,9 @@ def test_page_says_how_well_each_plate_protects(folder: Path) -> None:
             numbers = (measure.value, measure.solid, measure.ratio)
             row = r"\s+.*\s+".join(re.escape(number_text(number)) for number in numbers)
             assert re.search(rf"{re.escape(measure.measure.label)}.*\s+{row}", text)
-            assert measure.measure.definition in text
 
 
-def test_page_compares_the_plates(folder: Path, make_result: ResultMaker, tmp_path: Path) -> None:
+def test_page_compares_the_plates(folder: Path) -> None:
     text = html.unescape((folder / "a.html").read_text())
     names = ["narrow", "<b>wide"]
     with files.opened(folder / "narrow.nc") as narrow, files.opened(folder / "<b>wide.nc") as wide:
@@ -99,11 +98,6 @@ def test_page_compares_the_plates(folder: Path, make_result: ResultMaker, tmp_pa
     assert html.unescape(html_of(short_view(comparison, range_note(stored)))) in text
     assert html.unescape(html_of(comparison_view(comparison))) in text
     assert text.count('<img src="data:image/png;base64,') == 1
-    files.write(make_result(100), tmp_path / "other.nc")
-    page = tmp_path / "a.html"
-    command = ["report", str(folder / "narrow.nc"), str(tmp_path / "other.nc"), "-o", str(page), "--trajectories", "0"]
-    assert main(command) == 0
-    assert "<p>other: " in page.read_text()
 
 
 def test_page_names_its_plates_leads_to_its_parts_and_says_each_note_once(folder: Path) -> None:
@@ -152,8 +146,6 @@ def test_trajectories_are_of_the_worst_and_of_evenly_spread_hits(make_result: Re
     offset = points[:, None] - points[chosen]
     offset -= dataset.attrs["plate_period"] * np.round(offset / dataset.attrs["plate_period"])
     assert np.linalg.norm(offset, axis=-1).min(axis=1).max() < 4e-3  # of a cell of 16 mm x 8 mm
-    assert len(hit_data.worst_and_spread(dataset.isel(hit=slice(5)), 16)) == 5
-    assert hit_data.worst_and_spread(dataset, 16, first=[7, 509])[:5] == [7, 509, 511, 507, 505]
     some = dataset.isel(hit=slice(7, None)).assign_coords(hit=np.arange(7, 512))
     assert hit_data.worst_and_spread(some, 16, first=[7])[:5] == [7, 511, 509, 507, 505]
 
@@ -176,11 +168,6 @@ def open_report(browser: Any, page: Path, width: int) -> None:
     browser.wait(lambda: browser.find("#map-1 .nsewdrag") and browser.find("#map-0 .nsewdrag"))
 
 
-def point_at(browser: Any, y: float, z: float, *, click: bool = False) -> None:
-    """Move to a place [mm] of the first map, 16 mm x 16 mm in size."""
-    browser.point_at("#map-0 .nsewdrag", y / 16, -z / 16, click=click)
-
-
 @pytest.mark.parametrize("width", [1280, 390])
 def test_browser_shows_a_hit_on_hover_and_its_trajectory_on_click(browser: Any, folder: Path, width: int) -> None:
     dataset = files.read(folder / "narrow.nc")
@@ -190,7 +177,8 @@ def test_browser_shows_a_hit_on_hover_and_its_trajectory_on_click(browser: Any, 
     open_report(browser, folder / "a.html", width)
     assert "Trajectory of hit" in browser.text("#note-0")
 
-    point_at(browser, *place * 1e3)
+    there = place / 16e-3 * [1, -1]  # of a cell of 16 mm x 16 mm
+    browser.point_at("#map-0 .nsewdrag", *there)
     browser.wait(lambda: "hit " in browser.text("#map-0 .hovertext"))
     shown = browser.text("#map-0 .hovertext")
     hit = int(re.search(r"hit (\d+): perforated", shown)[1])
@@ -199,7 +187,7 @@ def test_browser_shows_a_hit_on_hover_and_its_trajectory_on_click(browser: Any, 
     velocity = float(re.search(r"residual velocity: ([\d.]+) m/s", shown)[1])
     assert velocity == pytest.approx(float(dataset["residual_velocity"][hit]), abs=0.06)
 
-    point_at(browser, *place * 1e3, click=True)
+    browser.point_at("#map-0 .nsewdrag", *there, click=True)
     browser.wait(lambda: browser.text("#hit-text-0").startswith("hit ") and "nearest" in browser.text("#note-0"))
     picked = int(re.match(r"hit (\d+): perforated", browser.text("#hit-text-0"))[1])
     assert picked in near
@@ -231,10 +219,6 @@ def test_browser_changes_the_map_and_keeps_one_scale(browser: Any, folder: Path)
             "return [0, 1].map((k) => document.getElementById(`map-${k}`).data[0]).map((t) => [t.zmin, t.zmax])"
         )
         assert scales[0] == scales[1]
-        if key == "tilt at 130 mm":
-            largest = max(float(files.read(folder / f"{name}.nc")["tilt"].max()) for name in ("narrow", "<b>wide"))
-            assert scales[0][1] == pytest.approx(largest, rel=1e-4)
-        if key == "pitch at 50 mm":
-            assert scales[0][0] == -scales[0][1]
+        assert key != "pitch at 50 mm" or scales[0][0] == -scales[0][1]
     assert "⊙ fire" in browser.text("#map-0 .annotation-text")
     assert browser.errors() == []
