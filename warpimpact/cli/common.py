@@ -1,25 +1,40 @@
-"""What several commands share: names of results, outputs that are refused early, what computes, exit codes."""
+"""What several commands share: outputs that are refused early, what computes, exit codes, and progress.
+
+Progress is one line that is rewritten on a terminal, and lines in a log.
+"""
 
 import argparse
+import shutil
+import sys
 import tempfile
-from collections.abc import Sequence
-from contextlib import AbstractContextManager
+import time
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import AbstractContextManager, contextmanager
 from pathlib import Path
 from typing import Any
 
 import xarray
 from matplotlib.figure import Figure
 
+from warpimpact.analysis.numbers import interval_text
 from warpimpact.results import attributes as attr
 from warpimpact.results.dataset import failed
 from warpimpact.results.files import OutputError, ResultError, aside
 from warpimpact.runs.chunks import is_begun
 from warpimpact.runs.computer import Computer, computer
+from warpimpact.runs.progress import RunProgress
 
 from .messages import say, warn
 
 PICTURES = (".png", ".pdf", ".svg")
 """Formats of figures."""
+_SILENCE = {True: 0.1, False: 60.0}
+"""Longest time between two lines [s], by whether they go to a terminal."""
+_SHORT = 2.0
+"""Seconds after which a pilot is announced, and after the first item a rate."""
+
+Show = Callable[..., None]
+"""Shows numbers of done items and of all; `_Display.show` has the arguments."""
 
 
 def named(paths: Sequence[Path]) -> dict[str, Path]:
@@ -95,3 +110,84 @@ def failure_code(dataset: xarray.Dataset, path: Path) -> int:
         f"warpimpact inspect {path} lists them"
     )
     return 3
+
+
+@contextmanager
+def show_progress(arguments: argparse.Namespace, unit: str = "hit") -> Iterator[Show]:
+    """Show the progress of a computation, or of several one after another.
+
+    Args:
+        arguments: with --quiet nothing is shown.
+        unit: name of the counted items.
+    """
+    display = _Display(unit)
+    yield (lambda *_, **__: None) if arguments.quiet else display.show
+    display.end()
+
+
+@contextmanager
+def show_run(arguments: argparse.Namespace) -> Iterator[Callable[[RunProgress], None]]:
+    """Show the progress of a run, with its running estimates."""
+    with show_progress(arguments) as show:
+        yield lambda run: show(run.done, run.total, _estimates(run), resumed=run.resumed, before=_pilot(run))
+
+
+class _Display:
+    """Writes a line at the start, after every tenth, and after a silence; on a terminal over the one before."""
+
+    def __init__(self, unit: str) -> None:
+        self._unit, self._is_terminal = unit, sys.stderr.isatty()
+        self._begin = self._last = time.monotonic()
+        self._done = self._first = 0
+        self._computation, self._phase = (0, False), ""
+
+    def show(self, done: int, total: int, text: str = "", *, resumed: int = 0, before: str = "") -> None:
+        """Take in the progress of the computation.
+
+        Args:
+            text: further information.
+            resumed: items that an earlier computation had done, which do not count for the rate.
+            before: what is running before the first item; its time does not count for the rate.
+        """
+        now, computation = time.monotonic(), (total, bool(before))
+        if computation != self._computation or done < self._done == total:  # another one
+            self._computation, self._begin, self._first, self._phase = computation, now, resumed, ""
+        else:
+            done = max(done, self._done)  # items under way may be given up
+            if self._first == resumed < done:  # kernels may have been compiled before the first item
+                self._begin, self._first = now, done
+        self._done, elapsed, fresh = done, now - self._begin, done - self._first
+        phase = before or f"{10 * done // total}"
+        is_recent = now - self._last < _SILENCE[self._is_terminal]
+        if (is_recent and phase == self._phase) or (before and elapsed < _SHORT):
+            return
+        self._last, self._phase = now, phase
+        line = f"{before}, for {elapsed:.0f} s so far" if before else f"{done} of {total} {self._unit}s"
+        if fresh > 0 and elapsed >= _SHORT:
+            line += f", {fresh / elapsed:.4g} {self._unit}s/s, {(total - done) * elapsed / fresh:.0f} s left"
+        if text and done > resumed:
+            line += f"; {text}"
+        if self._is_terminal:
+            line = f"\r{line[: shutil.get_terminal_size().columns - 1]}\x1b[K"
+        print(line, end="" if self._is_terminal else "\n", file=sys.stderr, flush=True)
+
+    def end(self) -> None:
+        """Go to the next line of a terminal."""
+        if self._is_terminal and self._phase:
+            print(file=sys.stderr)
+
+
+def _pilot(run: RunProgress) -> str:
+    level = "" if run.level is None else f", level {run.level}"
+    return f"a pilot looks for the resolution{level}" if run.piloting else ""
+
+
+def _estimates(run: RunProgress) -> str:
+    """Write running estimates and failed shots as one short line."""
+    parts = [f"{run.failed} failed"] if run.failed else []
+    for measure, estimate in run.estimates.items():
+        if estimate.count > 1:
+            shown = estimate.times(measure.display.factor)
+            interval = interval_text(shown.low, shown.high, digits=".5g")
+            parts.append(f"{measure.text} {shown.value:.5g} ({interval}){measure.display.suffix}")
+    return ", ".join(parts)

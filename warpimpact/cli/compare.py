@@ -20,9 +20,8 @@ from warpimpact.results.references import as_plates
 from warpimpact.runs.run import run_to_file
 from warpimpact.studies.sensitivity import plate_sensitivity, reversals
 
-from .common import PICTURES, check_folder, check_output, computer_of, failure_code, named
+from .common import PICTURES, check_folder, check_output, computer_of, failure_code, named, show_progress, show_run
 from .messages import warn
-from .progress import show_progress, show_run
 
 
 def compare_command(arguments: argparse.Namespace) -> int:

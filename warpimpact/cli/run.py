@@ -19,8 +19,7 @@ from warpimpact.runs.run import run_to_file
 from warpimpact.scene.model import complaint
 from warpimpact.solver.simulate import spread_places
 
-from .common import check_output, computing, failure_code
-from .progress import show_progress, show_run
+from .common import check_output, computing, failure_code, show_progress, show_run
 
 
 def run_command(arguments: argparse.Namespace) -> int:

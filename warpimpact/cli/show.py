@@ -31,8 +31,7 @@ from warpimpact.results.replayed_hit import hit_view
 from warpimpact.runs.replay import replay
 from warpimpact.runs.run import run
 
-from .common import PICTURES, check_folder, check_output, named, write_text
-from .progress import show_progress
+from .common import PICTURES, check_folder, check_output, named, show_progress, write_text
 
 
 def inspect_command(arguments: argparse.Namespace) -> None:

@@ -36,9 +36,18 @@ from warpimpact.studies.sensitivity import largest_move, sensitivity
 from warpimpact.studies.sweep import folder_of as points_of
 from warpimpact.studies.sweep import read_sweep, run_sweep, sweep_view
 
-from .common import check_output, computer_of, computing, failure_code, outputs, save_figure, write_text
+from .common import (
+    check_output,
+    computer_of,
+    computing,
+    failure_code,
+    outputs,
+    save_figure,
+    show_progress,
+    show_run,
+    write_text,
+)
 from .messages import say, warn
-from .progress import show_progress, show_run
 
 
 def limit_command(arguments: argparse.Namespace) -> int:

@@ -8,7 +8,7 @@ from dataclasses import replace
 
 import pytest
 
-from warpimpact.cli.progress import show_run
+from warpimpact.cli.common import show_run
 from warpimpact.results.measures import Measure
 from warpimpact.runs.progress import RunProgress
 from warpimpact.statistics.intervals import Estimate
@@ -30,7 +30,7 @@ class Terminal(io.StringIO):
 @pytest.fixture
 def clock(monkeypatch: pytest.MonkeyPatch) -> list[float]:
     now = [0.0]
-    monkeypatch.setattr("warpimpact.cli.progress.time.monotonic", lambda: now[0])
+    monkeypatch.setattr("warpimpact.cli.common.time.monotonic", lambda: now[0])
     return now
 
 
