@@ -1,4 +1,4 @@
-"""Finite plates: holes listed in a cell as large as the plate are those of the unbounded plate; elsewhere it is solid."""
+"""Finite plates: holes in a cell as large as the plate are those of the unbounded plate; elsewhere it is solid."""
 
 import numpy as np
 
