@@ -16,8 +16,7 @@ from warpimpact.campaign.text import CampaignError
 from warpimpact.firing.plan import read_test
 from warpimpact.firing.simulate import firing_view, response_of, simulate_test
 from warpimpact.firing.v50 import read_shots, v50
-from warpimpact.identification.computed_shots import fit_of_result
-from warpimpact.identification.fit import read_fit
+from warpimpact.identification.fit import fit_of_result, read_fit
 from warpimpact.identification.identify import identify
 from warpimpact.identification.posterior import material_draws, posterior_view
 from warpimpact.optimisation.design import read_design
@@ -177,8 +176,6 @@ def identify_command(arguments: argparse.Namespace) -> int:
     table = output.with_suffix(".csv")
     for path, suffixes in {output: [".nc"], **{path: [] for path in (table, *pictures)}}.items():
         check_output(path, *suffixes, overwrite=arguments.overwrite)
-    if fit.warning:
-        warn(fit.warning)
     sampling = fit.file.sampling
     say(f"computes at most {sampling.sets} sets of parameters, {sampling.hits} hits of each shot")
     with show_progress(arguments, "set") as show, computer_of(arguments) as machine:

@@ -1,11 +1,12 @@
-"""A fit file: measured shots, their scenes, and priors of the unknown numbers.
+"""A fit: measured shots, their scenes, and priors of the unknown numbers, from a file or from hits by finite elements.
 
 A parameter is an unknown number at a dotted place of the scene, such as "plate.pattern.spacing.0". Priors are in SI and
-radians. A mistake in the file becomes one sentence, a doubt a warning.
+radians. A mistake in the file becomes one sentence.
 """
 
 from __future__ import annotations
 
+import json
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from copy import deepcopy
@@ -14,37 +15,26 @@ from pathlib import Path
 from typing import Annotated, Any, Literal, NamedTuple, get_args
 
 import numpy as np
-from pydantic import AfterValidator, BeforeValidator, Field, TypeAdapter, ValidationError
+from pydantic import AfterValidator, BeforeValidator, Field, TypeAdapter, ValidationError, model_validator
 from scipy.special import ndtr
 
-from warpimpact.campaign.names import catalogue_of, with_core, with_materials
+from warpimpact.campaign.names import catalogue_of, with_core, with_materials, with_scatter
 from warpimpact.campaign.places import put
 from warpimpact.campaign.plausible import check_plausible
 from warpimpact.campaign.resistance import resistance_under
-from warpimpact.campaign.text import CampaignError, parsed, read_text
+from warpimpact.campaign.text import CampaignError, as_campaign_error, parsed, read_text
 from warpimpact.catalogue.catalogue import Catalogue
-from warpimpact.catalogue.entries import Material
 from warpimpact.records.outcomes import Outcomes
+from warpimpact.results import attributes as attr
+from warpimpact.results import files
 from warpimpact.results import variables as v
+from warpimpact.results.dataset import failed, hit_numbers
 from warpimpact.results.kinds import FIT
 from warpimpact.results.measures import STATUSES
-from warpimpact.scene import AnyCore, Impact, Interaction, Numerics, Plate, Record, Scatter, Scene, Target
-from warpimpact.scene.model import Array, Model, complaint, sentence
+from warpimpact.scene import AnyCore, Impact, Interaction, Numerics, Plate, Record, Scatter, Scene, units
+from warpimpact.scene.model import Array, Model, sentence
 from warpimpact.scene.quantities import OF_THE_SCENE, QUANTITIES
 from warpimpact.scene.scatter import EDGE, AnyDistribution, Distribution, check_range, in_si
-from warpimpact.scene.units import (
-    Angle,
-    Length,
-    PositiveSpeed,
-    Speed,
-    Title,
-    Whole,
-    meant,
-    quantity,
-    quoted,
-    reader_in,
-    typed,
-)
 from warpimpact.solver.limit import check_arrests
 from warpimpact.solver.materials import decay_rate
 
@@ -58,10 +48,15 @@ TABLES: dict[str, Any] = {"plate": Plate, "interaction": Interaction, "core": An
 _DISTRIBUTION: TypeAdapter[Distribution] = TypeAdapter(AnyDistribution)
 MIRRORS = {str(one): one.mirror for one in (v.RESIDUAL_VELOCITY, v.DEFLECTION, v.TILT, v.PITCH, v.YAW, v.TOTAL_YAW)}
 """Factor of a symmetry that a mirror image applies to a measured number; None if it does not change."""
-
-
-class FitError(CampaignError):
-    """A fit that cannot be computed: one sentence naming file, field, value and what is allowed."""
+VELOCITY_ERROR, NEAR_ERROR, FAR_ERROR = 5.0, "5 deg", "10 deg"
+"""Uncertainty of finite elements by their numerics: of a velocity [m/s], and of a tilt at the first stand-off and at
+the others (docs/continuum.md)."""
+PRIORS: dict[str, Any] = {
+    "resistance": {"distribution": "uniform", "low": "0.3 GPa", "high": "6 GPa"},
+    "shear_coefficient": {"distribution": "uniform", "low": 0, "high": 0.2},
+    "degradation": {"distribution": "uniform", "low": 0.6, "high": 1.0},
+}
+"""Priors of Y, η and β, the parameters of a fit to hits by finite elements."""
 
 
 @dataclass(frozen=True)
@@ -89,10 +84,6 @@ class Parameter:
         """Smallest and largest value that can be drawn."""
         low, high = self.prior.quantile(np.array([EDGE, 1.0 - EDGE]))
         return float(low), float(high)
-
-    @property
-    def median(self) -> float:
-        return float(self.prior.quantile(np.array(0.5)))
 
     @property
     def is_of_scene(self) -> bool:
@@ -144,41 +135,36 @@ class Observation(NamedTuple):
         return np.remainder(missed + np.pi, 2.0 * np.pi) - np.pi if self.kind == "angle" else missed
 
 
-def read_distribution(read: Any, given: Mapping[str, Any], place: str) -> Distribution:
-    """A distribution of a quantity, in SI.
-
-    Raises:
-        FitError: the message names the place.
-    """
-    try:
-        return _DISTRIBUTION.validate_python(in_si(read, given))
-    except ValidationError as error:
-        problem = error.errors(include_url=False)[0]
-        where = ".".join(str(part) for part in problem["loc"] if part != given.get("distribution"))
-        words = complaint(problem)
-        words = f"got {quoted(dict(given))}, but: {words}" if problem["type"] == "value_error" else words
-        raise FitError(f"{place}{'.' if where else ''}{where}: {words}") from None
-    except ValueError as error:
-        raise FitError(f"{place}.{error}") from None
+# --- The tables of a fit file ---
 
 
 def _is_distribution(value: Any) -> bool:
     return isinstance(value, Mapping) and "distribution" in value
 
 
-# --- The tables of a fit file ---
+def _distribution(read: Any, given: Mapping[str, Any]) -> Distribution:
+    """A distribution of a quantity, in SI.
+
+    Raises:
+        ValueError: the message names the parameter of the distribution.
+    """
+    try:
+        return _DISTRIBUTION.validate_python(in_si(read, given))
+    except ValidationError as error:
+        raise ValueError(sentence(error, dict(given))) from None
 
 
-def _coordinate(given: Any) -> float | Distribution:
-    read = quantity(Length)
-    return read_distribution(read, given, "") if _is_distribution(given) else float(read(given))
+def _or_distribution(kind: Any) -> BeforeValidator:
+    """The reader of a quantity, or of its distribution."""
+    read = units.quantity(kind)
+    return BeforeValidator(lambda given: _distribution(read, given) if _is_distribution(given) else read(given))
 
 
 class HitPlace(Model):
     """A measured hit point: each coordinate is a length or a distribution."""
 
-    y: Annotated[Any, BeforeValidator(_coordinate)]
-    z: Annotated[Any, BeforeValidator(_coordinate)]
+    y: Annotated[Any, _or_distribution(units.Length)]
+    z: Annotated[Any, _or_distribution(units.Length)]
 
     @property
     def is_exact(self) -> bool:
@@ -194,31 +180,29 @@ class HitPlace(Model):
         return y, z
 
 
-class MeasuredSpeed(Model):
-    """A speed and its standard uncertainty."""
-
-    value: Speed
-    std: PositiveSpeed
-
-
-def _by_standoff(given: Any) -> Any:
+def _listed(given: Any) -> Any:
+    """A list of numbers, None for nan; a single number is a list of one."""
     values = given if isinstance(given, list) else [given]
     return [None if isinstance(value, float) and math.isnan(value) else value for value in values]
 
 
+class MeasuredSpeed(Model):
+    """A speed and its standard uncertainty."""
+
+    value: Annotated[tuple[units.Speed], BeforeValidator(_listed)]
+    std: Annotated[tuple[units.PositiveSpeed], BeforeValidator(_listed)]
+
+
 class MeasuredAngles(Model):
-    """Angles and their standard uncertainties, one for each stand-off; nan for one that was not measured.
+    """Angles and their standard uncertainties, one for each stand-off; nan for one that was not measured."""
 
-    A single number is a list of one.
-    """
-
-    value: Annotated[tuple[Angle | None, ...], BeforeValidator(_by_standoff)]
-    std: Annotated[tuple[Annotated[Angle, Field(gt=0)] | None, ...], BeforeValidator(_by_standoff)]
+    value: Annotated[tuple[units.Angle | None, ...], BeforeValidator(_listed)]
+    std: Annotated[tuple[units.PositiveAngle | None, ...], BeforeValidator(_listed)]
 
 
 def _known_status(status: str) -> str:
     if status not in STATUSES:
-        raise ValueError(f"got {quoted(status)}, but it must be one of {', '.join(STATUSES)}")
+        raise ValueError(f"got {units.quoted(status)}, but it must be one of {', '.join(STATUSES)}")
     return status
 
 
@@ -240,6 +224,36 @@ class Measured(Model):
     total_yaw: MeasuredAngles | None = None
     status: Annotated[str, AfterValidator(_known_status)] | None = None
 
+    @model_validator(mode="after")
+    def _passed_for_its_numbers(self) -> Measured:
+        numbers = sorted(self.model_fields_set - {"status"})
+        if self.status in ("arrested", "ricocheted") and numbers:
+            raise ValueError(
+                f'status = "{self.status}" and {numbers[0]} cannot be combined: only a core that passed the plate has '
+                "that number"
+            )
+        return self
+
+    def observations(self, name: str, standoffs: int) -> Iterator[Observation]:
+        """The measured numbers of a name, with so many stand-offs.
+
+        Raises:
+            ValueError: it has another number of values.
+        """
+        given = getattr(self, name)
+        if not isinstance(given, MeasuredSpeed | MeasuredAngles):
+            return
+        places = [*range(standoffs)] if name in ("tilt", "pitch", "yaw", "total_yaw") else [None]
+        stds = given.std * len(given.value) if len(given.std) == 1 else given.std
+        if not len(given.value) == len(stds) == len(places):
+            raise ValueError(
+                f"{name}: got {len(given.value)} values and {len(stds)} std at {len(places)} stand-offs, but each "
+                "stand-off of [record] takes one; nan stands for one that was not measured"
+            )
+        for index, value, std in zip(places, given.value, stds, strict=True):
+            if value is not None and std is not None:
+                yield Observation(name, index, float(value), float(std))
+
 
 class _WithScene(Model):
     """Tables of a scene, which are read when their priors are known."""
@@ -256,7 +270,7 @@ class _WithScene(Model):
 class ShotTable(_WithScene):
     """A measured shot; its own values of the scene override those of the fit."""
 
-    name: Title = ""
+    name: units.Title = ""
     hit: Annotated[
         HitPlace | None,
         BeforeValidator(
@@ -271,11 +285,13 @@ class ShotTable(_WithScene):
 class DiscrepancyTable(Model):
     """Scales of what the model itself misses, each a number or a prior; by default half of a normal distribution."""
 
-    velocity: Any = Field(
-        {"distribution": "truncated_normal", "mean": "0 m/s", "std": "10 m/s", "low": "0 m/s", "high": "50 m/s"}
+    velocity: Annotated[Any, _or_distribution(units.Speed)] = Field(
+        {"distribution": "truncated_normal", "mean": "0 m/s", "std": "10 m/s", "low": "0 m/s", "high": "50 m/s"},
+        validate_default=True,
     )
-    angle: Any = Field(
-        {"distribution": "truncated_normal", "mean": "0 deg", "std": "5 deg", "low": "0 deg", "high": "25 deg"}
+    angle: Annotated[Any, _or_distribution(units.Angle)] = Field(
+        {"distribution": "truncated_normal", "mean": "0 deg", "std": "5 deg", "low": "0 deg", "high": "25 deg"},
+        validate_default=True,
     )
 
 
@@ -290,28 +306,21 @@ class Sampling(Model):
         seed: seed of all random numbers.
     """
 
-    sets: Annotated[Whole, Field(ge=64, le=2**24)] = 16384
-    hits: Annotated[Whole, Field(ge=32, le=2**16, multiple_of=8)] = 256
-    draws: Annotated[Whole, Field(ge=50, le=2**16)] = 1000
-    effective: Annotated[Whole, Field(ge=10, le=2**16)] = 400
-    seed: Annotated[Whole, Field(ge=0, le=2**63 - 1)] = 0
-
-
-def _at_a_level(numerics: Any) -> Any:
-    """Numerics of level 0 by default. They may not ask for an accuracy."""
-    if not isinstance(numerics, dict):
-        return numerics
-    if named := next((key for key in ("fidelity", "accuracy") if key in numerics), None):
-        raise ValueError(f"got {named}, but a fit has no pilot; give level = 0 to 9, or single settings")
-    return {"level": 0} | numerics
+    sets: Annotated[units.Whole, Field(ge=64, le=2**24)] = 16384
+    hits: Annotated[units.Whole, Field(ge=32, le=2**16, multiple_of=8)] = 256
+    draws: Annotated[units.Whole, Field(ge=50, le=2**16)] = 1000
+    effective: Annotated[units.Whole, Field(ge=10, le=2**16)] = 400
+    seed: Annotated[units.Whole, Field(ge=0, le=2**63 - 1)] = 0
 
 
 class FitFile(_WithScene):
-    """A fit file."""
+    """A fit file. It has no pilot, so its numerics have a level, 0 by default."""
 
-    title: Title = ""
+    title: units.Title = ""
     record: Record = Record()
-    numerics: Annotated[Numerics, BeforeValidator(_at_a_level)] = Numerics(level=0)
+    numerics: Annotated[
+        Numerics, BeforeValidator(lambda given: {"level": 0} | given if isinstance(given, dict) else given)
+    ] = Numerics(level=0)
     prior: Annotated[_Table, Field(min_length=1)]
     discrepancy: DiscrepancyTable = DiscrepancyTable()
     sampling: Sampling = Sampling()
@@ -367,46 +376,25 @@ class Fit:
     def scene_parameters(self) -> tuple[Parameter, ...]:
         return tuple(parameter for parameter in self.parameters if parameter.is_of_scene)
 
-    def largest_discrepancy(self, kind: str) -> float:
-        """The discrepancy of a kind that its prior exceeds in 1 of 100 draws."""
-        priors = (parameter.prior for parameter in self.parameters if parameter.place == f"discrepancy.{kind}")
-        return max((float(prior.quantile(np.array(0.99))) for prior in priors), default=self.discrepancy.get(kind, 0.0))
-
     def scene_of(self, shot: MeasuredShot, values: Mapping[str, float] | None = None) -> Scene:
         """The scene of a shot at these values of the parameters, by place, at the medians of the others.
 
         Raises:
             ValidationError: such a scene is not possible.
         """
-        tables, values = deepcopy(dict(shot.tables)), values or {}
+        tables, values, context = deepcopy(shot.tables), values or {}, {"folder": self.folder}
         for unknown in self.scene_parameters:
             if unknown.place in values and unknown.place not in shot.own:
                 put(tables, unknown.place, unknown.as_read(float(values[unknown.place])), "fit")
-        context = {"folder": self.folder}
-        target = Target(layers=(Plate.model_validate(tables["plate"], context=context),))
-        interaction = Interaction.model_validate(tables.get("interaction", {}), context=context)
-        parts = {"core": tables["core"], "target": target, "interaction": interaction, "record": self.file.record}
-        return Scene.model_validate(parts, context=context)
-
-    @property
-    def warning(self) -> str:
-        """A sentence if the data say less than they seem to; else empty."""
-        numbers = sum(len(shot.observations) + (shot.status is not None) for shot in self.shots)
-        unknown = len(self.scene_parameters)
-        if numbers >= unknown:
-            return ""
-        return (
-            f"got {numbers} measured number{'s' if numbers > 1 else ''} against {unknown} parameters: the posterior "
-            "keeps its prior in most directions"
-        )
+        tables["target"] = Plate.model_validate(tables.pop("plate"), context=context)
+        return Scene.model_validate(tables | {"record": self.file.record}, context=context)
 
 
 def read_fit(path: str | Path) -> Fit:
     """Read a fit file; file names in it count from its folder.
 
     Raises:
-        FitError: the file has a value that is not allowed.
-        CampaignError: the file is missing, or is not TOML.
+        CampaignError: the file is missing, is not TOML, or has a value that is not allowed.
     """
     path = Path(path)
     return fit_from(read_text(path), str(path), path.parent)
@@ -415,53 +403,44 @@ def read_fit(path: str | Path) -> Fit:
 def fit_from(text: str, name: str, folder: Path) -> Fit:
     """Read a fit from its text; `name` is the name of the file in errors."""
     data = parsed(text, name, FIT)
-    catalogue = catalogue_of(data, name, folder)
-    data = with_core(data, catalogue, name)
-    if isinstance(shots := data.get("shot"), list):
-        data["shot"] = [
-            with_core(shot, catalogue, f"{name}: shot[{k}]") if isinstance(shot, dict) else shot
-            for k, shot in enumerate(shots)
-        ]
-    file: FitFile = _validated(FitFile, data, name)
-    tables = deepcopy(file.tables)
+    catalogue, file = catalogue_of(data, name, folder), _validated(FitFile, data, name)
+    tables = deepcopy(with_core(file.tables, catalogue, name))
     parameters = [*_read_priors(file.prior, "", tables, name)]
-    names = [_short_name(parameter.place) for parameter in parameters]
+    names = [one.name for one in parameters]
     parameters = [
-        replace(parameter, name=short if names.count(short) == 1 else parameter.place.replace(".", "_"))
-        for short, parameter in zip(names, parameters, strict=True)
+        one if names.count(one.name) == 1 else replace(one, name=one.place.replace(".", "_")) for one in parameters
     ]
-    given = [
-        _shot(shot, [*data["shot"][k]["measured"]], tables, file.record, f"{name}: shot[{k}]", parameters, catalogue)
+    fixed = {kind: float(value) for kind, value in file.discrepancy if not isinstance(value, Distribution)}
+    fit = Fit(file, text, folder, tuple(parameters), fixed, ())
+    shots = tuple(
+        _shot(fit, shot, [*data["shot"][k]["measured"]], tables, f"{name}: shot[{k}]", catalogue)
         for k, shot in enumerate(file.shot)
-    ]
-    shots = tuple(shot for shot, _ in given)
-    scales, fixed = _discrepancy(file.discrepancy, {one.kind for shot in shots for one in shot.observations}, name)
-    ordered = sorted((*parameters, *scales), key=lambda parameter: parameter.is_column)
-    fit = Fit(file, text, folder, tuple(ordered), fixed, shots)
-    for k, (shot, material) in enumerate(given):
-        _check_scene(fit, shot, material, catalogue, f"{name}: shot[{k}]")
-    return fit
+    )
+    kinds = {one.kind for shot in shots for one in shot.observations}
+    for kind, unit in (("velocity", "m/s"), ("angle", "rad")):
+        if kind in kinds and isinstance(scale := getattr(file.discrepancy, kind), Distribution):
+            parameters.append(Parameter(f"discrepancy.{kind}", f"discrepancy_{kind}", unit, scale))
+    return replace(fit, parameters=tuple(sorted(parameters, key=lambda one: one.is_column)), shots=shots)
 
 
 def _validated(kind: Any, data: Any, place: str) -> Any:
     try:
         return kind.model_validate(data)
     except ValidationError as error:
-        raise FitError(f"{place}: {sentence(error, data)}") from None
+        raise CampaignError(f"{place}: {sentence(error, data)}") from None
 
 
 def _read_priors(node: Any, place: str, tables: _Table, name: str) -> Iterator[Parameter]:
     """The parameters of a part of the table [prior]; their medians, and known entries of lists, go into the tables."""
+    where = f"{name}: prior.{place}"
     if place and _is_distribution(node):
-        where, (table, _, key) = f"{name}: prior.{place}", place.partition(".")
-        read = _reader(place, tables, where)
-        parameter = Parameter(place, "", read.unit, read_distribution(read, node, where))
-        if key in QUANTITIES and QUANTITIES[key].table == table:
-            try:
+        with as_campaign_error(f"{where}: "):
+            read = _reader(place, tables)
+            parameter = Parameter(place, _short_name(place), read.unit, _distribution(read, node))
+            key = place.rpartition(".")[2]
+            if key in QUANTITIES and place == f"{QUANTITIES[key].table}.{key}":
                 check_range(key, *parameter.ends)
-            except ValueError as error:
-                raise FitError(f"{where}: {error}; bound it, as uniform and truncated_normal do") from None
-        put(tables, place, parameter.as_read(parameter.median), name)
+        put(tables, place, parameter.as_read(float(parameter.prior.quantile(np.array(0.5)))), name)
         yield parameter
     elif isinstance(node, Mapping):
         for key, inner in node.items():
@@ -472,8 +451,8 @@ def _read_priors(node: Any, place: str, tables: _Table, name: str) -> Iterator[P
             if _is_distribution(inner):
                 yield from _read_priors(inner, f"{place}.{index}", tables, name)
     else:
-        raise FitError(
-            f"{name}: prior.{place}: got {quoted(node)}, but a prior is a distribution such as "
+        raise CampaignError(
+            f"{where}: got {units.quoted(node)}, but a prior is a distribution such as "
             '{ distribution = "uniform", low = 1, high = 2 }; a known value belongs in the table of the scene'
         )
 
@@ -485,101 +464,77 @@ def _short_name(place: str) -> str:
     return f"{before}_{'yz'[int(last)] if before in ('spacing', 'size') and last in '01' else last}"
 
 
-def _reader(place: str, tables: _Table, where: str) -> Any:
-    """The reader of the quantity at a place of the scene."""
+def _reader(place: str, tables: _Table) -> Any:
+    """The reader of the quantity at a place of the scene.
+
+    Raises:
+        ValueError: no number stands there.
+    """
     table, *path = place.split(".")
     if table not in TABLES:
-        raise FitError(f'{where}: got the table "{table}", but a prior belongs in one of {", ".join(TABLES)}')
+        raise ValueError(f'got the table "{table}", but a prior belongs in one of {", ".join(TABLES)}')
     annotation, node, reader = TABLES[table], tables.get(table, {}), None
     for part in path:
         if part.isdecimal():  # an entry of a list
-            reader = next(_readers(annotation), None)
+            reader = next(filter(None, map(units.reader_in, _parts(annotation))), None)
             break
-        models, shape = [*_models(annotation)], node.get("shape", "none") if isinstance(node, Mapping) else "none"
+        node = node if isinstance(node, Mapping) else {}
+        models = [kind for kind in _parts(annotation) if isinstance(kind, type) and issubclass(kind, Model)]
+        shape = node.get("shape", "none")
         named = [model for model in models if getattr(model.model_fields.get("shape"), "default", None) == shape]
         fields = next((model.model_fields for model in named or models), {})
         if part not in fields:
-            raise FitError(f'{where}: got the unknown key "{part}"; {meant(part, fields)}')
-        annotation, node = typed(fields[part]), node.get(part, {}) if isinstance(node, Mapping) else {}
-        reader = reader_in(annotation)
+            raise ValueError(f'got the unknown key "{part}"; {units.meant(part, fields)}')
+        annotation, node = units.typed(fields[part]), node.get(part, {})
+        reader = units.reader_in(annotation)
     if reader is None:
-        raise FitError(f"{where}: is no number, but only a number can have a prior")
+        raise ValueError("is no number, but only a number can have a prior")
     return reader
 
 
-def _readers(annotation: Any) -> Iterator[Any]:
-    if (reader := reader_in(annotation)) is not None:
-        yield reader
+def _parts(annotation: Any) -> Iterator[Any]:
+    """A type and all types in it."""
+    yield annotation
     for inner in get_args(annotation):
-        yield from _readers(inner)
-
-
-def _models(annotation: Any) -> Iterator[type[Model]]:
-    if isinstance(annotation, type) and issubclass(annotation, Model):
-        yield annotation
-    for inner in get_args(annotation):
-        yield from _models(inner)
+        yield from _parts(inner)
 
 
 def _shot(
-    given: ShotTable,
-    measured: Sequence[str],
-    tables: _Table,
-    record: Record,
-    place: str,
-    parameters: Sequence[Parameter],
-    catalogue: Catalogue,
-) -> tuple[MeasuredShot, Material | None]:
-    """A shot, and the material that gives its Y; `measured` are the names of its measured numbers in their order."""
-    impact = dict(given.impact)
-    scattered = {key: value for key, value in impact.items() if isinstance(value, dict)}
-    for key, value in scattered.items():
-        if key not in QUANTITIES or QUANTITIES[key].table != "impact":
-            raise FitError(f"{place}.impact.{key}: got {quoted(value)}, but no such quantity of an impact scatters")
-        read = quantity(QUANTITIES[key].type)
-        median = float(read_distribution(read, value, f"{place}.impact.{key}").quantile(np.array(0.5)))
-        impact[key] = read.as_read(median)
-    observations = [one for name in measured for one in _observations(given.measured, name, record.standoffs, place)]
-    status = given.measured.status
-    if status in ("arrested", "ricocheted") and observations:
-        raise FitError(
-            f'{place}.measured.status: "{status}" and {observations[0].name} cannot be combined: only a core that '
-            "passed the plate has that number"
-        )
-    limits = [observation.value for observation in observations if observation.is_limit]
+    fit: Fit, given: ShotTable, measured: Sequence[str], tables: _Table, place: str, catalogue: Catalogue
+) -> MeasuredShot:
+    """A shot; `measured` are the names of its measured numbers in their order. A scene is refused that is not possible
+    at the medians of the priors, or that stops no core if a limit is measured."""
+    record, impact = fit.file.record, with_scatter({"impact": given.impact}, place)
+    with as_campaign_error(f"{place}.measured."):
+        numbers = [one for name in measured for one in given.measured.observations(name, len(record.standoffs))]
+    limits = [number.value for number in numbers if number.is_limit]
     if limits:  # the search of limits begins at these values
-        impact.setdefault("velocity", limits[0])
+        impact["impact"].setdefault("velocity", limits[0])
     # The known values of the plate's material; a prior overrides them.
-    resolved, materials = with_materials(_merged(tables, given.tables), catalogue, place)
+    resolved, materials = with_materials(_merged(tables, with_core(given.tables, catalogue, place)), catalogue, place)
     shot = MeasuredShot(
         name=given.name or place.partition(": ")[2],
         hit=given.hit,
-        impact=_validated(Impact, impact, f"{place}.impact"),
-        scatter=_validated(Scatter, scattered, f"{place}.impact"),
-        tables={name: resolved[name] for name in given.tables},
-        own=frozenset(parameter.place for parameter in parameters if _has(given.tables, parameter.place)),
-        observations=tuple(observations),
-        status=status,
+        impact=_validated(Impact, impact["impact"], f"{place}.impact"),
+        scatter=Scatter(**impact.get("scatter", {})),
+        tables=resolved,
+        own=frozenset(one.place for one in fit.parameters if _has(given.tables, one.place)),
+        observations=tuple(numbers),
+        status=given.measured.status,
     )
-    return shot, materials.get(0)
-
-
-def _observations(measured: Measured, name: str, standoffs: Sequence[float], place: str) -> Iterator[Observation]:
-    """The measured numbers of a name."""
-    given = getattr(measured, name)
-    if isinstance(given, MeasuredSpeed):
-        yield Observation(name, None, float(given.value), float(given.std))
-    elif isinstance(given, MeasuredAngles):
-        places = [None] if name == "deflection" else [*range(len(standoffs))]
-        stds = given.std * len(given.value) if len(given.std) == 1 else given.std
-        if not len(given.value) == len(stds) == len(places):
-            raise FitError(
-                f"{place}.measured.{name}: got {len(given.value)} values and {len(stds)} std at {len(places)} "
-                "stand-offs, but each stand-off of [record] takes one; nan stands for one that was not measured"
-            )
-        for index, value, std in zip(places, given.value, stds, strict=True):
-            if value is not None and std is not None:
-                yield Observation(name, index, float(value), float(std))
+    try:
+        scene = fit.scene_of(shot)
+        for material in materials.values():
+            of_plate = scene.interaction, material, scene.core, scene.target.layers[0], shot.impact.obliquity
+            resolved["plate"]["resistance"] = resistance_under(*of_plate, catalogue).median
+        check_plausible(scene.core, scene.target, scene.record, shot.impact)
+        if limits:
+            weakest = [one for one in fit.parameters if "degradation" in one.place]
+            check_arrests(fit.scene_of(shot, {one.place: one.ends[0] for one in weakest}))
+    except ValueError as error:
+        reason = sentence(error, resolved) if isinstance(error, ValidationError) else error
+        raise CampaignError(f"{place}: {reason}") from None
+    return shot
 
 
 def _merged(tables: Any, of_shot: Any) -> Any:
@@ -593,49 +548,12 @@ def _merged(tables: Any, of_shot: Any) -> Any:
 def _has(tables: Any, place: str) -> bool:
     """Whether nested tables have a value at a place."""
     for part in place.split("."):
-        if part.isdecimal():
+        if not isinstance(tables, Mapping):
             return isinstance(tables, list)
-        if not isinstance(tables, Mapping) or part not in tables:
+        if part not in tables:
             return False
         tables = tables[part]
     return True
-
-
-def _discrepancy(given: DiscrepancyTable, kinds: set[str], name: str) -> tuple[list[Parameter], dict[str, float]]:
-    """Scales of discrepancy: the unknown ones as parameters, and the fixed ones by kind."""
-    scales, fixed = list[Parameter](), dict[str, float]()
-    for kind, value in given:
-        read, place = quantity(Speed if kind == "velocity" else Angle), f"{name}: discrepancy.{kind}"
-        if isinstance(value, dict):
-            prior = read_distribution(read, value, place)
-            least = float(prior.quantile(np.array(EDGE)))
-            if kind in kinds:
-                scales.append(Parameter(f"discrepancy.{kind}", f"discrepancy_{kind}", read.unit, prior))
-        else:
-            try:
-                least = fixed[kind] = float(read(value))
-            except ValueError as error:
-                raise FitError(f"{place}: {error}") from None
-        if least < 0.0:
-            raise FitError(f"{place}: got {quoted(value)}, but a scale is at least 0")
-    return scales, fixed
-
-
-def _check_scene(fit: Fit, shot: MeasuredShot, material: Material | None, catalogue: Catalogue, where: str) -> None:
-    """Refuse a scene that is not possible at the medians of the priors, or stops no core if a limit is measured. A
-    material gives its Y there."""
-    try:
-        scene = fit.scene_of(shot)
-        if material is not None:
-            of_plate = scene.interaction, material, scene.core, scene.target.layers[0], shot.impact.obliquity
-            shot.tables["plate"]["resistance"] = resistance_under(*of_plate, catalogue).median
-        check_plausible(scene.core, scene.target, scene.record, shot.impact)
-        if any(observation.is_limit for observation in shot.observations):
-            weakest = [parameter for parameter in fit.scene_parameters if "degradation" in parameter.place]
-            check_arrests(fit.scene_of(shot, {parameter.place: parameter.ends[0] for parameter in weakest}))
-    except ValueError as error:
-        reason = sentence(error, dict(shot.tables)) if isinstance(error, ValidationError) else error
-        raise FitError(f"{where}: {reason}") from None
 
 
 def columns_of(values: Mapping[str, Array], plate: Plate) -> dict[str, Array]:
@@ -651,3 +569,51 @@ def columns_of(values: Mapping[str, Array], plate: Plate) -> dict[str, Array]:
             base = columns.get("degradation", np.full_like(values[place], plate.degradation))
             columns["degradation"] = np.exp(decay_rate(base, 1.0) * plate.degradation_unit / values[place])
     return columns
+
+
+# --- Hits by finite elements as measured shots ---
+
+
+def fit_of_result(path: Path) -> Fit:
+    """The fit of Y, η and β to the hits of a result by finite elements, whose hit points are known.
+
+    Raises:
+        ResultError, CampaignError: the file is no such result, has layers behind its plate, or no hit that passed the
+            plate.
+    """
+    result = files.read(path)
+    if attr.CONTINUUM not in result.attrs:
+        raise CampaignError(
+            f"{path}: is a map of hits of the fast law; a fit takes one of warpimpact continuum, or a fit file"
+        )
+    tables = parsed(result.attrs[attr.CAMPAIGN], f"the campaign in {path}")
+    passed = ~failed(result) & ~np.isnan(result[v.TILT].values).any(axis=1)
+    if tables.get("layer") or not passed.any():
+        raise CampaignError(f"{path}: a fit is of one plate, and of hits that passed it")
+    numbers, impact = hit_numbers(result), {variable.field: variable for variable in v.SHOT_VARIABLES}
+    errors = [NEAR_ERROR, *[FAR_ERROR] * result.sizes[v.STANDOFF]][: result.sizes[v.STANDOFF]]
+    shots = [
+        {
+            "name": f"hit {numbers[place]}",
+            "hit": {"y": float(hit[v.HIT_Y]), "z": float(hit[v.HIT_Z])},
+            "impact": {name: float(hit[variable]) for name, variable in impact.items()},
+            "measured": {
+                "residual_velocity": {"value": float(hit[v.RESIDUAL_VELOCITY]), "std": VELOCITY_ERROR},
+                "tilt": {"value": hit[v.TILT].values.tolist(), "std": errors},
+            },
+        }
+        for place in np.flatnonzero(passed)
+        for hit in [result.isel(hit=place)]
+    ]
+    fit: dict[str, Any] = {
+        "title": f"{tables['title']}: by finite elements",
+        **{key: tables[key] for key in ("core", "interaction", "catalogue") if key in tables},
+        "plate": {key: value for key, value in tables["plate"].items() if key not in (*PRIORS, "material")},
+        "record": {
+            "standoffs": result[v.STANDOFF].values.tolist(),
+            "standoff_point": result.attrs[attr.STANDOFF_POINT],
+        },
+        "prior": {"plate": PRIORS},
+        "shot": shots,
+    }
+    return fit_from(json.dumps(fit), str(path), path.parent)

@@ -18,7 +18,8 @@ import xarray
 from scipy.special import ndtri
 from scipy.stats.qmc import Sobol
 
-from warpimpact.identification.fit import Fit, FitError
+from warpimpact.campaign.text import CampaignError
+from warpimpact.identification.fit import Fit
 from warpimpact.identification.likelihood import Scores, evaluate
 from warpimpact.identification.posterior import Chains, to_dataset
 from warpimpact.results.posterior_file import SETS
@@ -46,17 +47,17 @@ def identify(
     """The posterior of a fit (posterior.py). An interrupt ends the sampling, and the draws so far are the result.
 
     Raises:
-        FitError: the priors exclude what was measured, or emcee is not installed.
+        CampaignError: the priors exclude what was measured, or emcee is not installed.
         KeyboardInterrupt: the user interrupted before there were draws.
     """
     if missing := [name for name in ("emcee", "arviz_stats") if find_spec(name) is None]:
-        raise FitError(f"identify needs {missing[0]}: pip install 'warpimpact[identify]'")
+        raise CampaignError(f"identify needs {missing[0]}: pip install 'warpimpact[identify]'")
     with computer(device) if isinstance(device, str) else nullcontext(device) as machine:
         density = _Density(fit, machine, progress)
         start = prior_points(fit, FROM_PRIOR * walkers_of(fit))
         scored = density(start)
         check_reach(fit, density.scores(scored))
-        chains = sampled(density, start, scored, fit)
+        chains = sampled(density, start, scored, fit, density.report)
         posterior = to_dataset(fit, chains, density.scores(chains.blobs), machine.made_by)
         return posterior.assign_attrs({SETS: density.done})
 
@@ -112,37 +113,37 @@ def _scored(fit: Fit, points: Array, uniform: Array, *, worker: Worker, report: 
     return evaluate(fit, points, uniform, worker)
 
 
-def sampled(density: Any, start: Array, scored: Array, fit: Fit) -> Chains:
+def sampled(
+    density: Any, start: Array, scored: Array, fit: Fit, report: Callable[[str], object] = lambda text: None
+) -> Chains:
     """Chains of an ensemble until the effective sample size is reached, or all sets are computed.
 
     Args:
         density: function of points that gives ln (prior · likelihood) in the first column.
         start: sets from the prior; `scored` is their density.
+        report: called with words on the effective sample size.
     """
     import emcee
 
-    walkers, (count, dimensions) = walkers_of(fit), start.shape
-    rng = np.random.default_rng([fit.file.sampling.seed, 1])
+    walkers, (count, dimensions), sampling = walkers_of(fit), start.shape, fit.file.sampling
     log_likelihood = scored[:, 0] + 0.5 * (start**2).sum(axis=1)
-    chosen = np.argsort(log_likelihood + rng.gumbel(size=count))[-walkers:]  # without replacement, by likelihood
+    gumbel = np.random.default_rng([sampling.seed, 1]).gumbel(size=count)
+    chosen = np.argsort(log_likelihood + gumbel)[-walkers:]  # without replacement, by likelihood
     state = emcee.State(
         start[chosen],
         log_prob=scored[chosen, 0],
         blobs=scored[chosen, 1:],
-        random_state=np.random.RandomState(fit.file.sampling.seed % 2**32).get_state(),
+        random_state=np.random.RandomState(sampling.seed % 2**32).get_state(),
     )
     sampler = emcee.EnsembleSampler(walkers, dimensions, density, moves=emcee.moves.KDEMove(), vectorize=True)
-    steps = max(3 * LOOK_EVERY, (fit.file.sampling.sets - count) // walkers)
-    interrupted = False
+    steps, interrupted = max(3 * LOOK_EVERY, (sampling.sets - count) // walkers), False
     try:
         for step, _ in enumerate(sampler.sample(state, iterations=steps), start=1):
-            if step % LOOK_EVERY or step < 3 * LOOK_EVERY:
-                continue
-            chains = Chains.of(sampler, interrupted=False)
-            if isinstance(density, _Density):
-                density.report(f", effective sample size {chains.effective.min():.0f}")
-            if chains.is_converged(fit.file.sampling.effective):
-                break
+            if step % LOOK_EVERY == 0 and step >= 3 * LOOK_EVERY:
+                chains = Chains.of(sampler, interrupted=False)
+                report(f", effective sample size {chains.effective.min():.0f}")
+                if chains.is_converged(sampling.effective):
+                    break
     except KeyboardInterrupt:
         if sampler.iteration < 3 * LOOK_EVERY:
             raise
@@ -154,19 +155,18 @@ def check_reach(fit: Fit, scores: Scores) -> None:
     """Refuse priors all of whose sets are far from the measurements.
 
     Raises:
-        FitError: the message names the shot and how far the nearest set is.
+        CampaignError: the message names the shot and how far the nearest set is.
     """
+    scales = dict(fit.discrepancy)
+    for one in fit.parameters:
+        if not one.is_of_scene:
+            scales[one.place.removeprefix("discrepancy.")] = float(one.prior.quantile(np.array(0.99)))
     for shot, misfit in zip(fit.shots, scores.misfit.T, strict=True):
-        if not np.isfinite(misfit).any():
-            raise FitError(
-                f'the priors exclude shot "{shot.name}": in {len(misfit)} sets of parameters no core ended as it did'
-            )
-        widened = [
-            number.std / np.hypot(number.std, fit.largest_discrepancy(number.kind)) for number in shot.observations
-        ]
-        nearest = float(np.sqrt(misfit.min())) * max(widened, default=0.0)
-        if nearest > FARTHEST * np.sqrt(len(shot.observations)):
-            raise FitError(
-                f'the priors exclude shot "{shot.name}": the nearest of {len(misfit)} sets of parameters is '
-                f"{nearest:.3g} standard deviations off. Widen the priors."
+        widened = [number.std / np.hypot(number.std, scales[number.kind]) for number in shot.observations]
+        nearest = float(np.sqrt(misfit.min())) * max(widened, default=1.0)
+        if nearest > FARTHEST * np.sqrt(max(1, len(shot.observations))):
+            what = f"is {nearest:.3g} standard deviations off" if np.isfinite(nearest) else "ended otherwise"
+            raise CampaignError(
+                f'the priors exclude shot "{shot.name}": the nearest of {len(misfit)} sets of parameters {what}. Widen '
+                "the priors."
             )

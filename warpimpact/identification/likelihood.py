@@ -72,14 +72,6 @@ class HitPoints(NamedTuple):
     cell: tuple[float, float]
 
 
-class Run(NamedTuple):
-    """A shot at the sets of parameters with these numbers, which share a scene."""
-
-    which: NDArray[np.int64]
-    scene: Scene
-    points: HitPoints
-
-
 def evaluate(fit: Fit, points: Array, uniform: Array, worker: Worker) -> Scores:
     """Score every shot of a fit at sets of parameters. The score of a set does not depend on the other sets.
 
@@ -90,15 +82,19 @@ def evaluate(fit: Fit, points: Array, uniform: Array, worker: Worker) -> Scores:
     """
     shape = len(points), len(fit.shots)
     scores = Scores(np.full(shape, -np.inf), np.zeros(shape), np.full(shape, np.inf), np.zeros(shape), np.zeros(shape))
-    scales = discrepancies(fit, points)
+    scales = {kind: np.full(len(points), value) for kind, value in fit.discrepancy.items()}
+    for column, parameter in enumerate(fit.parameters):
+        if not parameter.is_of_scene:
+            scales[parameter.place.removeprefix("discrepancy.")] = parameter.at(points[:, column])
     for alike in alike_shots(fit):
         runs = [*_runs(fit, fit.shots[alike[0]], points, uniform[:, :2])]
-        for run, outcomes in zip(runs, _outcomes(fit, alike, runs, worker), strict=True):
+        scenes = [(scene, hits.shots) for _, scene, hits in runs]
+        for (rows, _, hits), outcomes in zip(runs, _outcomes(fit, alike, scenes, worker), strict=True):
+            spread = {kind: scale[rows] for kind, scale in scales.items()}
             for place in alike:
-                spread = {kind: scale[run.which] for kind, scale in scales.items()}
-                score = score_shot(fit.shots[place], run.points, outcomes, spread, uniform[run.which, 2 + place])
-                for column, values in zip(scores, score, strict=True):
-                    column[run.which, place] = values
+                score = score_shot(fit.shots[place], hits, outcomes, spread, uniform[rows, 2 + place])
+                for kept, values in zip(scores, score, strict=True):
+                    kept[rows, place] = values
     return scores
 
 
@@ -109,15 +105,6 @@ def alike_shots(fit: Fit) -> list[list[int]]:
         key = repr((shot.hit, shot.impact, shot.scatter, shot.tables, sorted(shot.own)))
         places_of.setdefault(key, []).append(place)
     return [*places_of.values()]
-
-
-def discrepancies(fit: Fit, points: Array) -> dict[str, Array]:
-    """Standard deviation of the discrepancy by kind at sets of parameters, each of shape [sets]."""
-    scales = {kind: np.full(len(points), value) for kind, value in fit.discrepancy.items()}
-    for column, parameter in enumerate(fit.parameters):
-        if not parameter.is_of_scene:
-            scales[parameter.place.removeprefix("discrepancy.")] = parameter.at(points[:, column])
-    return scales
 
 
 def hit_points(fit: Fit, shot: MeasuredShot, plate: Plate, shifts: Array) -> HitPoints:
@@ -143,8 +130,11 @@ def hit_points(fit: Fit, shot: MeasuredShot, plate: Plate, shifts: Array) -> Hit
     return HitPoints(replace(shots[number], hit_y=hit_y, hit_z=hit_z), group, cell)
 
 
-def _runs(fit: Fit, shot: MeasuredShot, points: Array, shifts: Array) -> Iterator[Run]:
-    """The runs of a shot, without those of sets whose scene is not possible."""
+def _runs(
+    fit: Fit, shot: MeasuredShot, points: Array, shifts: Array
+) -> Iterator[tuple[NDArray[np.int64], Scene, HitPoints]]:
+    """Numbers of the sets of parameters that share a scene, the scene, and its points. Sets whose scene is not possible
+    are left out."""
     by_place = {
         parameter.place: parameter.at(points[:, column])
         for column, parameter in enumerate(fit.parameters)
@@ -167,14 +157,14 @@ def _runs(fit: Fit, shot: MeasuredShot, points: Array, shifts: Array) -> Iterato
         columns = columns_of({at: column[rows] for at, column in by_place.items() if at not in own_scene}, plate)
         each = len(own.shots) // len(rows)  # sets have equal numbers of shots, one set after the other
         of_shots: dict[str, Any] = {name: np.repeat(column, each) for name, column in columns.items()}
-        yield Run(rows, scene, own._replace(shots=replace(own.shots, **of_shots)))
+        yield rows, scene, own._replace(shots=replace(own.shots, **of_shots))
 
 
-def _outcomes(fit: Fit, alike: Sequence[int], runs: Sequence[Run], worker: Worker) -> list[Outcomes]:
+def _outcomes(fit: Fit, alike: Sequence[int], scenes: Sequence[tuple[Scene, Shots]], worker: Worker) -> list[Outcomes]:
     """The outcomes that the observations of shots need: at impact velocity, limit velocities, or both."""
     measured = [fit.shots[place] for place in alike]
     limited = [observation.is_limit for shot in measured for observation in shot.observations]
-    scenes, numerics = [(run.scene, run.points.shots) for run in runs], fit.file.numerics
+    numerics = fit.file.numerics
     if not any(limited):
         return simulate_many(scenes, numerics, worker)
 

@@ -43,14 +43,12 @@ class Chains:
     Attributes:
         points: standard normal numbers, shape [steps, walkers, parameters].
         blobs: what the density gave beside its logarithm, shape [steps, walkers, columns]; None if nothing.
-        computed: number of steps, those left out included.
         effective, r_hat: effective sample size and R-hat of each parameter. R-hat compares four groups of walkers
             (C. C. Margossian and others, "Nested R-hat", 2022).
     """
 
     points: Array
     blobs: Any
-    computed: int
     effective: Array
     r_hat: Array
     interrupted: bool
@@ -66,7 +64,7 @@ class Chains:
         of_each = [column.T for column in np.moveaxis(points, 2, 0)]
         effective = np.array([float(array_stats.ess(of, chain_axis=0, draw_axis=1)) for of in of_each])
         r_hat = [float(array_stats.rhat_nested(of, group, chain_axis=0, draw_axis=1)) for of in of_each]
-        return cls(points, sampler.get_blobs(discard=done // 3), done, effective, np.array(r_hat), interrupted)
+        return cls(points, sampler.get_blobs(discard=done // 3), effective, np.array(r_hat), interrupted)
 
     def is_converged(self, effective: int) -> bool:
         """Whether all parameters have this effective sample size and a small R-hat."""
@@ -150,7 +148,7 @@ def unit_of(array: xarray.DataArray) -> tuple[str, float]:
 
 def posterior_view(posterior: xarray.Dataset) -> View:
     """What the shots say of each parameter, and how good the computation is."""
-    names, rows = parameters_of(posterior), dict[str, dict[str, str]]()
+    names, attributes, rows = parameters_of(posterior), posterior.attrs, dict[str, dict[str, str]]()
     for name in names:
         array = posterior[name]
         unit, factor = unit_of(array)
@@ -171,24 +169,17 @@ def posterior_view(posterior: xarray.Dataset) -> View:
         if abs(value := float(ranks[i, k])) > STRONG
     ]
     table = pd.DataFrame.from_dict(rows, orient="index").rename_axis("parameter")
-    return {str(posterior.attrs[attr.TITLE]): [table, *correlations], "quality": _quality(posterior)}
-
-
-def _quality(posterior: xarray.Dataset) -> list[str]:
-    attributes = posterior.attrs
     effective, r_hat, noise = (float(attributes[name]) for name in (p.EFFECTIVE, p.R_HAT, p.HIT_NOISE))
-    misfit = posterior[p.MISFIT].values.sum(axis=1).min()
-    lines = [
-        f"{attributes[p.SETS]} sets of parameters, smallest misfit {misfit:.3g}; effective sample size "
-        f"{effective:.0f}, R-hat {r_hat:.3f}; the hits leave ±{noise:.2g} in ln L"
+    quality = [
+        f"{attributes[p.SETS]} sets of parameters, smallest misfit {posterior[p.MISFIT].values.sum(axis=1).min():.3g}; "
+        f"effective sample size {effective:.0f}, R-hat {r_hat:.3f}; the hits leave ±{noise:.2g} in ln L"
     ]
-    if attributes[p.CONVERGED]:
-        return lines
-    wanted = int(attributes[p.WANTED])
-    causes = [
-        (attributes[p.INTERRUPTED], "it was interrupted"),
-        (effective < wanted, f"the effective sample size is below {wanted}: give more sets"),
-        (r_hat > LARGEST_R_HAT, f"R-hat is above {LARGEST_R_HAT}: give more sets"),
-        (noise > LARGEST_NOISE, f"the hits leave more than ±{LARGEST_NOISE} in ln L: give more hits"),
-    ]
-    return [*lines, "NOT CONVERGED: " + "; ".join(text for failed, text in causes if failed)]
+    causes = {
+        "it was interrupted": attributes[p.INTERRUPTED],
+        f"the effective sample size is below {attributes[p.WANTED]}: give more sets": effective < attributes[p.WANTED],
+        f"R-hat is above {LARGEST_R_HAT}: give more sets": r_hat > LARGEST_R_HAT,
+        f"the hits leave more than ±{LARGEST_NOISE} in ln L: give more hits": noise > LARGEST_NOISE,
+    }
+    if not attributes[p.CONVERGED]:
+        quality.append("NOT CONVERGED: " + "; ".join(text for text, applies in causes.items() if applies))
+    return {str(attributes[attr.TITLE]): [table, *correlations], "quality": quality}

@@ -7,8 +7,7 @@ import pytest
 
 from warpimpact import Campaign, run
 from warpimpact.cli import main
-from warpimpact.identification.computed_shots import PRIORS, fit_of_result
-from warpimpact.identification.fit import HitPlace
+from warpimpact.identification.fit import PRIORS, HitPlace, fit_of_result
 from warpimpact.results import attributes as attr
 from warpimpact.results import files
 
