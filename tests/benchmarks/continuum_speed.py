@@ -17,7 +17,7 @@ from warpimpact import Continuum, Numerics, simulate
 from warpimpact.catalogue.catalogue import flow_entry
 from warpimpact.continuum.one_hit import prepare_hit
 from warpimpact.continuum.simulate import memory_of
-from warpimpact.solver.worker import Worker
+from warpimpact.solver.device import Worker
 
 CASE = CASES["slotted"]
 ROUNDS, FAST_HITS, LEVEL = 3, 1024, 2

@@ -33,11 +33,10 @@ from warpimpact.continuum.simulate import MOST, ManyHits, memory_of, outcomes_of
 from warpimpact.runs.run import run_to_file
 from warpimpact.scene import Numerics
 from warpimpact.scene.flow import Continuum
-from warpimpact.solver.device import find_device
+from warpimpact.solver.device import Worker, find_device
 from warpimpact.solver.marching import march
 from warpimpact.solver.memory import Memory
 from warpimpact.solver.prepare import prepare
-from warpimpact.solver.worker import Worker
 
 
 class Sizes(NamedTuple):

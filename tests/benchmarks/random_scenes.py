@@ -50,10 +50,10 @@ from warpimpact.scene import (
 )
 from warpimpact.scene.interaction import NEAR_EDGES
 from warpimpact.solver.accuracy import PILOT_LIMITS, pilot_size
+from warpimpact.solver.device import Worker
 from warpimpact.solver.limit import HIGHEST_VELOCITY, VELOCITY_TOLERANCE, LimitSpec, limit_velocity, pilot_of_limits
 from warpimpact.solver.resolution import Level
 from warpimpact.solver.simulate import pilot_of, simulate
-from warpimpact.solver.worker import Worker
 
 Array = NDArray[np.float64]
 

@@ -26,8 +26,8 @@ from warpimpact.kernels.status import Status
 from warpimpact.records.outcomes import Outcomes
 from warpimpact.scene import PRESETS, Numerics, Shots
 from warpimpact.solver.accuracy import pilot_size
+from warpimpact.solver.device import Worker
 from warpimpact.solver.simulate import pilot_of, simulate
-from warpimpact.solver.worker import Worker
 from warpimpact.statistics.comparisons import change_of_mean, shift_of_mean, shift_of_share
 from warpimpact.statistics.intervals import estimate_of
 

@@ -25,9 +25,9 @@ from random_scenes import draw
 from warpimpact import Campaign, Numerics, Scene
 from warpimpact.scene import PRESETS, Shots
 from warpimpact.solver.accuracy import pilot_size
+from warpimpact.solver.device import Worker
 from warpimpact.solver.prepare import prepare
 from warpimpact.solver.simulate import computed, pilot_of
-from warpimpact.solver.worker import Worker
 
 RUN, SMALL = 16384, 1024
 """Hits of the run that a pilot is made for; likewise of scenes that are drawn, whose pilots may take long."""

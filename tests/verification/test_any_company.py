@@ -8,6 +8,7 @@ import pytest
 
 from warpimpact.scene import Interaction, Layer, Numerics, Plate, Record, Scene, Shots, Target
 from warpimpact.solver import grid, marching
+from warpimpact.solver.memory import Memory
 from warpimpact.solver.simulate import simulate
 
 from .scenes import BASE, PAPER_CORE, STANDOFFS, paper_plate, scattered_hits, shots_at
@@ -95,14 +96,14 @@ def test_threads_and_chunks_change_no_bit(
 
 @pytest.fixture
 def marched(monkeypatch: pytest.MonkeyPatch) -> list[int]:
-    """Numbers of shots that march in windows of one size."""
-    counts, march_some = list[int](), marching._march_some
+    """An entry for each march in windows of one size."""
+    counts, scratches = list[int](), Memory.scratches
 
-    def counted(*arguments: Any) -> None:
-        counts.append(len(arguments[3]))
-        march_some(*arguments)
+    def counted(self: Memory, *arguments: Any) -> Any:
+        counts.append(len(self.prepared.shots))
+        return scratches(self, *arguments)
 
-    monkeypatch.setattr(marching, "_march_some", counted)
+    monkeypatch.setattr(Memory, "scratches", counted)
     return counts
 
 

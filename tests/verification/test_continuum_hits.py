@@ -16,7 +16,7 @@ from warpimpact.kernels.status import Status
 from warpimpact.records.outcomes import Outcomes
 from warpimpact.scene import NoPattern, PolynomialCore, Shots
 from warpimpact.scene.flow import Flow
-from warpimpact.solver.worker import Worker
+from warpimpact.solver.device import Worker
 
 CORE = PolynomialCore(coefficients=(3.0e-4, 0.24, -5.29), length=27.86e-3, mass=4.0e-3)
 STEEL = Flow(yield_stress=2.03e9, hardening=568e6, rate_exponent=0.001, fracture_work=2.31e9)

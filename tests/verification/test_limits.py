@@ -9,8 +9,7 @@ from scipy.optimize import brentq
 
 from warpimpact.kernels.status import Status
 from warpimpact.scene import ConeCore, Core, Interaction, Numerics, Plate, Scene, Shots
-from warpimpact.solver.limit import Limits, limit_thickness, limit_velocity
-from warpimpact.solver.limit_search import MOST_RUNS
+from warpimpact.solver.limit import MOST_RUNS, Limits, limit_thickness, limit_velocity
 
 from . import references, scenes
 from .scenes import PAPER_CORE, paper_plate, scattered_hits, shots_at, solid_plate

@@ -8,7 +8,7 @@ import pytest
 
 from warpimpact.kernels.status import Status
 from warpimpact.scene import Impact, Interaction, Numerics, ProfileCore, Scene
-from warpimpact.solver import materials
+from warpimpact.solver import resolution as materials
 from warpimpact.solver.resolution import resolve
 
 from . import references

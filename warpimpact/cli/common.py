@@ -22,7 +22,7 @@ from warpimpact.results.dataset import failed
 from warpimpact.results.files import OutputError, ResultError, aside
 from warpimpact.runs.chunks import is_begun
 from warpimpact.runs.computer import Computer, computer
-from warpimpact.runs.progress import RunProgress
+from warpimpact.runs.run import RunProgress
 
 from .messages import say, warn
 

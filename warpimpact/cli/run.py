@@ -13,9 +13,8 @@ from warpimpact.results import attributes as attr
 from warpimpact.results import files
 from warpimpact.results.dataset import hit_numbers
 from warpimpact.results.files import ResultError
-from warpimpact.runs.finite_elements import continuum_to_file
 from warpimpact.runs.replay import campaign_in
-from warpimpact.runs.run import run_to_file
+from warpimpact.runs.run import continuum_to_file, run_to_file
 from warpimpact.scene.model import complaint
 from warpimpact.solver.simulate import spread_places
 

@@ -18,9 +18,8 @@ from warpimpact.kernels.variant import Variant
 from warpimpact.scene import Core, Scene, Shots
 from warpimpact.scene.flow import Continuum, Flow
 from warpimpact.scene.model import Array
-from warpimpact.solver.device import find_device, load
+from warpimpact.solver.device import NEVER, Cancel, find_device, load
 from warpimpact.solver.memory import built
-from warpimpact.solver.worker import NEVER, Cancel
 
 STATIONS = 2049
 """At which the radius of the core is tabulated."""

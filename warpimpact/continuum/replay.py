@@ -17,8 +17,8 @@ from warpimpact.kernels.trace import WIDTH
 from warpimpact.scene import Scene, Shots
 from warpimpact.scene.flow import Continuum
 from warpimpact.scene.model import Array
+from warpimpact.solver.device import Worker
 from warpimpact.solver.replay import Deformed, History, Replay, Weakened
-from warpimpact.solver.worker import Worker
 
 STRIDE = 20
 """Steps between two rows of a history."""

@@ -24,12 +24,11 @@ from warpimpact.records.outcomes import Outcomes
 from warpimpact.records.registry import ENERGY_IMBALANCE, ERODED_ELEMENTS, HOURGLASS_SHARE
 from warpimpact.scene import Numerics, Scene, Shots
 from warpimpact.scene.flow import Continuum
-from warpimpact.solver.device import block_size, cores, find_device, free_memory, load
+from warpimpact.solver.device import NEVER, Cancel, Worker, block_size, cores, find_device, free_memory, load
 from warpimpact.solver.marching import Progress
 from warpimpact.solver.memory import MEMORY_SHARE, Memory, built
 from warpimpact.solver.prepare import prepare
 from warpimpact.solver.simulate import simulate as by_fast_law
-from warpimpact.solver.worker import NEVER, Cancel, Worker
 
 
 def simulate(

@@ -25,7 +25,7 @@ from warpimpact.results import attributes as attr
 from warpimpact.results.replayed_hit import hit_view
 from warpimpact.runs.replay import replay
 from warpimpact.runs.run import run
-from warpimpact.solver.worker import Cancel
+from warpimpact.solver.device import Cancel
 
 _MOST_KEPT = 24
 """Most results that are kept, so that a return to a design computes nothing."""

@@ -31,9 +31,8 @@ from warpimpact.design.designs import DesignStore, as_json, stages
 from warpimpact.results.files import ResultError
 from warpimpact.scene.model import sentence
 from warpimpact.scene.quantities import Implausible
-from warpimpact.solver.device import DeviceError
+from warpimpact.solver.device import Cancel, Cancelled, DeviceError
 from warpimpact.solver.resolution import TooManySteps
-from warpimpact.solver.worker import Cancel, Cancelled
 
 Result = TypeVar("Result")
 

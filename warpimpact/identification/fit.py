@@ -36,7 +36,7 @@ from warpimpact.scene.model import Array, Model, sentence
 from warpimpact.scene.quantities import OF_THE_SCENE, QUANTITIES
 from warpimpact.scene.scatter import EDGE, AnyDistribution, Distribution, check_range, in_si
 from warpimpact.solver.limit import check_arrests
-from warpimpact.solver.materials import decay_rate
+from warpimpact.solver.resolution import decay_rate
 
 _Table = dict[str, Any]
 COLUMN_OF = {f"{QUANTITIES[name].table}.{name}": name for name in OF_THE_SCENE}

@@ -25,7 +25,7 @@ from warpimpact.identification.posterior import Chains, to_dataset
 from warpimpact.results.posterior_file import SETS
 from warpimpact.runs.computer import Computer, computer
 from warpimpact.scene.model import Array
-from warpimpact.solver.worker import Worker
+from warpimpact.solver.device import Worker
 
 MOST_WALKERS, WALKERS_PER_PARAMETER = 128, 8
 """Most walkers, and fewest of each parameter."""

@@ -29,9 +29,9 @@ from warpimpact.results.measures import STATUSES
 from warpimpact.scene import IDENTITY, Hits, Plate, Sampler, Scene, Shots, Symmetry
 from warpimpact.scene.model import Array
 from warpimpact.scene.sampling import irreducible_part, symmetries
+from warpimpact.solver.device import Worker
 from warpimpact.solver.limit import Limits, limit_velocity
-from warpimpact.solver.many import in_threads, simulate_many
-from warpimpact.solver.worker import Worker
+from warpimpact.solver.simulate import in_threads, simulate_many
 
 HIT_REPLICATES = 8
 """Parts of the hit points, every eighth point each. Their spread gives the standard error of ln L."""

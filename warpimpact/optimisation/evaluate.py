@@ -23,6 +23,7 @@ from warpimpact.runs.computer import Computer
 from warpimpact.scene import Numerics, Shots
 from warpimpact.scene.model import Array
 from warpimpact.solver.accuracy import PILOT_LIMITS, pilot_size
+from warpimpact.solver.device import Worker
 from warpimpact.solver.limit import (
     HIGHEST_VELOCITY,
     THICKNESS_TOLERANCE,
@@ -32,9 +33,7 @@ from warpimpact.solver.limit import (
     pilot_of_limits,
     thickest,
 )
-from warpimpact.solver.many import in_threads, simulate_many
-from warpimpact.solver.simulate import pilot_of
-from warpimpact.solver.worker import Worker
+from warpimpact.solver.simulate import in_threads, pilot_of, simulate_many
 
 BATCH = 16
 """Number of hit jobs that are computed side by side and saved together."""

@@ -40,11 +40,7 @@ MACHINE = "machine"
 PROCESSOR = "processor"
 DEVICE = "device"
 NUMERICS = "numerics"
-"""The numerics as used, in words. The next attributes are their numbers."""
-PATCHES_AXIAL = "patches_axial"
-PATCHES_AROUND = "patches_around"
-GRID_SPACING = _declared("grid_spacing", "m")
-TIME_STEP = _declared("time_step", "s")
+"""The numerics as used, in words."""
 PRECISION = "precision"
 NUMERICS_GIVEN = _declared("numerics_given", _SI)
 RESOLUTION = "resolution"

@@ -118,8 +118,8 @@ def call_in_thread(function: Callable[..., Value], *arguments: Any, **options: A
 
 
 @contextmanager
-def aside(path: Path, *, named: Callable[[Path], Path] | None = None) -> Iterator[Path]:
-    """A temporary path next to `path`. After the block the file is flushed and renamed to it, or to `named(file)`.
+def aside(path: Path) -> Iterator[Path]:
+    """A temporary path next to `path`. After the block the file is flushed and renamed to it.
 
     Where `path` is a symbolic link, the file that it leads to is written, and the link stays.
 
@@ -131,7 +131,7 @@ def aside(path: Path, *, named: Callable[[Path], Path] | None = None) -> Iterato
     try:
         yield written
         _flush(written, os.O_RDWR)
-        os.replace(written, named(written) if named else target)
+        os.replace(written, target)
         if os.name == "posix":  # elsewhere a folder cannot be opened, and needs no flushing
             _flush(target.parent, os.O_RDONLY)
     except OutputError:

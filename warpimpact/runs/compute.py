@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import json
+import math
 import time
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
-from dataclasses import replace
+from collections.abc import Callable
+from dataclasses import asdict, replace
 from typing import Any
 
 import numpy as np
@@ -14,58 +14,55 @@ import xarray
 from numpy.typing import NDArray
 
 from warpimpact.campaign.campaign import Campaign
-from warpimpact.campaign.evidence import resistance_by_thickness
-from warpimpact.campaign.text import CampaignError
+from warpimpact.campaign.evidence import (
+    catalogue_names,
+    limit_velocity_factors,
+    outside_tested_range,
+    resistance_by_thickness,
+)
+from warpimpact.campaign.text import as_campaign_error
+from warpimpact.continuum.simulate import simulate_elements
 from warpimpact.records.outcomes import Outcomes
 from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
-from warpimpact.results.dataset import to_dataset
+from warpimpact.results.dataset import stored_columns, to_dataset
 from warpimpact.runs.chunks import digest
-from warpimpact.scene import Numerics, Shots
-from warpimpact.solver.accuracy import PILOT_LIMITS, PilotResult, pilot_size
-from warpimpact.solver.device import find_device
+from warpimpact.scene import Accuracy, Numerics, Shots
+from warpimpact.scene.flow import Continuum
+from warpimpact.scene.quantities import QUANTITIES
+from warpimpact.solver.accuracy import PILOT_LIMITS, UNITS, pilot_size
+from warpimpact.solver.device import Worker, find_device
 from warpimpact.solver.limit import LimitSpec, limits, pilot_of_limits, short_steps, thickest
+from warpimpact.solver.marching import march
 from warpimpact.solver.memory import Memory
 from warpimpact.solver.prepare import prepare
-from warpimpact.solver.resolution import TooManySteps
-from warpimpact.solver.simulate import marched, pilot_of, spread_places
-from warpimpact.solver.worker import Worker
+from warpimpact.solver.resolution import resolve, weakens
+from warpimpact.solver.simulate import pilot_of, spread_places
 
 Report = Callable[[int], None]
 FEWEST, MOST, CHUNKS = 2**11, 2**16, 32
-"""Fewest and most shots per chunk, and the number of chunks within these bounds. A chunk costs some 30 ms."""
+"""Fewest and most hits per chunk on a CPU, and the number of chunks within these bounds. A chunk costs some 30 ms."""
+GPU_CHUNK = 2**17
+"""Hits per chunk on a GPU, which fewer would not fill."""
+PILOT = (attr.RESOLUTION, attr.PROMISE_KEPT, attr.ACCURACY, *UNITS, *(f"{name}_units" for name in UNITS))
+"""Attributes that a pilot gives a result."""
 
 
-def extent(count: int) -> int:
-    """Shots per chunk of a campaign of `count` shots: a power of two. It depends on the campaign alone."""
-    return min(MOST, max(FEWEST, 1 << (count // CHUNKS).bit_length()))
+def chunk_size(count: int, device: str) -> int:
+    """Hits per chunk of a campaign of `count` hits, on this kind of device."""
+    return min(MOST, max(FEWEST, 1 << (count // CHUNKS).bit_length())) if device == "cpu" else GPU_CHUNK
 
 
 def manifest(campaign: Campaign, made_by: dict[str, str], limit: LimitSpec | None = None) -> dict[str, Any]:
     """What determines every bit of a result: the campaign with the contents of its files, the limit that is searched,
     versions and kind of device."""
     content = json.loads(json.dumps(campaign.model_dump(), default=digest))
-    searched = {}
-    if limit is not None:
-        of_layer = f" of layer {limit.layer}" if limit.layer else ""
-        curve = ", with the resistance of each thickness" if limit.by_thickness else ""
-        searched["limit"] = f"{limit.quantity}{of_layer} within {limit.tolerance:g}, at most {limit.highest:g}{curve}"
-    sizes = {"replicates": campaign.replicates, "extent": extent(len(campaign.sampler()))}
-    return {"campaign": content, **sizes, **made_by, **searched}
-
-
-@contextmanager
-def model_errors() -> Iterator[None]:
-    """Raise as CampaignError what the model cannot compute."""
-    try:
-        yield
-    except TooManySteps:
-        raise
-    except ValueError as error:
-        raise error if isinstance(error, CampaignError) else CampaignError(str(error)) from None
+    sizes = {"replicates": campaign.replicates, "chunk": chunk_size(len(campaign.sampler()), made_by[attr.DEVICE])}
+    return {"campaign": content, **sizes, **made_by, **({} if limit is None else {"limit": asdict(limit)})}
 
 
 def compute_hits(
+    limit: LimitSpec | None,
     campaign: Campaign,
     numerics: Numerics,
     shots: Shots,
@@ -74,37 +71,42 @@ def compute_hits(
     worker: Worker,
     report: Report = lambda done: None,
 ) -> xarray.Dataset:
-    """How shots of a campaign end; `first` is the number of the first one. Reports how many are done."""
+    """How shots of a campaign end, or their limits with the shots as they just perforate; `first` is the number of the
+    first one. Reports how many are done."""
     begin = time.perf_counter()
-    with model_errors():
-        memory = Memory(prepare(campaign.scene, shots, numerics), find_device(worker.device), worker.cancel)
-    building = memory.build()
-    outcomes = marched(memory, worker, lambda done, total: report(done))
-    elapsed = time.perf_counter() - begin - building
-    return dataset_of_shots(campaign, shots, outcomes, np.arange(first, first + len(shots)), worker, elapsed)
+    with as_campaign_error():
+        if limit is None:
+            memory = Memory(prepare(campaign.scene, shots, numerics), find_device(worker.device), worker.cancel)
+            begin += memory.build()
+            memory, _, contact = march(memory, worker, lambda done, total: report(done))
+            outcomes = memory.report(contact)
+        else:
+            found = limits(campaign.scene, shots, limit, numerics, worker, lambda done, total: report(done))
+            shots, outcomes = found.shots, found.recorded(limit.quantity)
+    seconds, numbers = time.perf_counter() - begin, np.arange(first, first + len(shots))
+    return dataset_of_shots(campaign, shots, outcomes, numbers, worker, seconds)
 
 
-def compute_limits(
-    limit: LimitSpec,
+def compute_elements(
     campaign: Campaign,
-    numerics: Numerics,
-    shots: Shots,
-    first: int,
+    numbers: NDArray[np.int64],
+    continuum: Continuum,
     *,
     worker: Worker,
-    report: Report = lambda done: None,
+    report: Callable[[float], None],
 ) -> xarray.Dataset:
-    """The limits of shots of a campaign, with the shots as they just perforate."""
-    begin = time.perf_counter()
-    with model_errors():
-        searched = limits(campaign.scene, shots, limit, numerics, worker, lambda done, total: report(done))
-    elapsed = time.perf_counter() - begin
-    tried = searched.shots.velocity
-    if limit.quantity == "thickness":
-        tried = searched.shots.layer_value(campaign.target, "thickness", limit.layer)
-    at_limit = limit.with_trial(campaign.target, shots, tried)
-    outcomes, numbers = searched.recorded(limit.quantity), np.arange(first, first + len(shots))
-    return dataset_of_shots(campaign, at_limit, outcomes, numbers, worker, elapsed)
+    """Some hits of a campaign by their numbers, by one core or by a GPU. Reports the share that is done."""
+    clock = time.thread_time if find_device(worker.device).is_cpu else time.perf_counter
+    shots, begin = shots_of(campaign, numbers), clock()
+    outcomes = simulate_elements(
+        campaign.scene, shots, continuum, replace(worker, threads=1), lambda done, total: report(done / total)
+    )
+    return dataset_of_shots(campaign, shots, outcomes, numbers, worker, clock() - begin, double=True)
+
+
+def shots_of(campaign: Campaign, numbers: NDArray[np.int64]) -> Shots:
+    """Shots of a campaign by their numbers."""
+    return Shots.joined([campaign.sampler().shots(int(number), 1) for number in numbers])
 
 
 def dataset_of_shots(
@@ -138,54 +140,54 @@ def dataset_of_shots(
 
 def find_resolution(
     campaign: Campaign, limit: LimitSpec | None, *, worker: Worker, report: Report = lambda level: None
-) -> PilotResult | None:
-    """The result of a pilot with hits of the campaign; None if the campaign fixes the resolution.
-
-    Reports every level that it computes.
-    """
-    numerics = campaign.numerics
+) -> xarray.Dataset:
+    """What a pilot adds to a result: resolution, errors, hits at a finer level. It is empty if the campaign fixes the
+    resolution. Reports every level that it computes."""
+    numerics, sampler = campaign.numerics, campaign.sampler()
     if numerics.explicit is not None:
-        return None
-    with model_errors():
+        return xarray.Dataset()
+    # They depend on the campaign alone: its first hits, or ones at even distances of a grid or list.
+    count = min(pilot_size(numerics.required, *(() if limit is None else (PILOT_LIMITS,))), len(sampler))
+    numbers, shots = np.arange(count), sampler.shots(0, count)
+    if campaign.hits.sampling not in ("sobol", "random"):
+        numbers = spread_places(len(sampler), count)
+        shots = shots_of(campaign, numbers)
+    with as_campaign_error():
         if limit is None:
-            shots, numbers = pilot_shots(campaign, pilot_size(numerics.required))
             pilot = pilot_of(campaign.scene, shots, numerics, worker, report)
         else:
-            shots, numbers = pilot_shots(campaign, pilot_size(numerics.required, PILOT_LIMITS))
             pilot = pilot_of_limits(campaign.scene, shots, limit, numerics, worker, report)
-    return replace(pilot, numbers=numbers)
+    bounds = {name: getattr(numerics.required, name) for name in Accuracy.model_fields}
+    attributes = {
+        attr.RESOLUTION: pilot.numerics.model_dump_json(),
+        attr.PROMISE_KEPT: int(pilot.kept),
+        attr.ACCURACY: json.dumps({name: of for name, of in bounds.items() if of is not None and math.isfinite(of)}),
+        **pilot.errors,
+    }
+    finer: dict[str, Any] = {}
+    if pilot.finer is not None:
+        finer = {name: getattr(pilot.finer, of) for name, of in v.FINER_VARIABLES.items() if of in pilot.finer}
+        finer[v.FINER_HIT] = numbers.astype("int32")
+    single = () if numerics.precision == "double" else v.computed_variables()
+    columns = stored_columns((name for name in v.FINER if name in finer), finer, single)
+    return xarray.Dataset(coords=columns, attrs=attr.with_units(attributes))
 
 
-def pilot_shots(campaign: Campaign, most: int) -> tuple[Shots, NDArray[np.int64]]:
-    """At most so many hits that stand for all hits of a campaign, and their numbers.
-
-    They depend on the campaign alone: the first ones of a Sobol or random sampling, or ones at even distances of a grid
-    or list.
-    """
-    sampler = campaign.sampler()
-    count = min(most, len(sampler))
-    if campaign.hits.sampling in ("sobol", "random"):
-        return sampler.shots(0, count), np.arange(count)
-    places = spread_places(len(sampler), count)
-    return Shots.joined([sampler.shots(int(place), 1) for place in places]), places
+def numerics_of(campaign: Campaign, pilot: xarray.Dataset, *, limited: bool) -> Numerics:
+    """The numerics of the hits: those of the campaign, or what its pilot found; shorter steps for limits. `pilot` is of
+    `find_resolution`, or a result with its attributes."""
+    found = pilot.attrs.get(attr.RESOLUTION)
+    numerics = campaign.numerics if found is None else Numerics.model_validate_json(found)
+    return short_steps(numerics) if limited else numerics
 
 
-def numerics_of(campaign: Campaign, pilot: PilotResult | None, limit: LimitSpec | None = None) -> Numerics:
-    """The numerics of the hits: those of the campaign, or what its pilot found; shorter steps for limits."""
-    numerics = campaign.numerics if pilot is None else pilot.numerics
-    return numerics if limit is None else short_steps(numerics)
-
-
-def limit_of_reference(limit: LimitSpec, campaign: Campaign, name: str) -> LimitSpec | None:
-    """The limit that is searched for a reference of the campaign; None if it has none.
-
-    The thickness of a layer in front of the base is none of the base alone.
-    """
-    if name == "base_alone":
-        has_limit = limit.quantity == "velocity" or limit.layer == len(campaign.layer)
-        return replace(limit, layer=0) if has_limit else None
-    if limit.quantity == "velocity":
+def limit_of_reference(limit: LimitSpec | None, campaign: Campaign, name: str) -> LimitSpec | None:
+    """The limit that is searched for a reference of the campaign; None if it has none: the thickness of a layer in
+    front of the base is none of the base alone."""
+    if limit is None or limit.quantity == "velocity":
         return limit
+    if name == "base_alone":
+        return replace(limit, layer=0) if limit.layer == len(campaign.layer) else None
     solid = campaign.references[name]
     highest = thickest(solid.scene, limit.layer)
     return replace(limit, highest=highest, by_thickness=resistance_by_thickness(solid, limit.layer, highest))
@@ -194,9 +196,93 @@ def limit_of_reference(limit: LimitSpec, campaign: Campaign, name: str) -> Limit
 def reference_shots(reference: Campaign, most: int) -> Shots:
     """The first shots of a reference. One stands for all where the first ones differ only in their places, and all
     layers are solid and unbounded."""
-    shots = reference.sampler().shots(0, extent(len(reference.sampler())))
-    elsewhere = (v.HIT_Y, v.HIT_Z, "offset_y", "offset_z")
-    conditions = [values for name, values in shots.columns.items() if name not in elsewhere]
-    unbounded = all(layer == layer.solid and layer.size is None for layer in reference.target.layers)
-    alike = unbounded and not any(np.nan_to_num(np.ptp(values, axis=0)).any() for values in conditions)
-    return shots[: 1 if alike else max(1, most)]
+    shots = reference.sampler().shots(0, min(most, chunk_size(len(reference.sampler()), "cpu")))
+    places = (v.HIT_Y, v.HIT_Z, "offset_y", "offset_z")
+    alike = all(layer == layer.solid and layer.size is None for layer in reference.target.layers) and not any(
+        np.nan_to_num(np.ptp(values, axis=0)).any() for name, values in shots.columns.items() if name not in places
+    )
+    return shots[:1] if alike else shots
+
+
+def described(
+    dataset: xarray.Dataset, campaign: Campaign, pilot: xarray.Dataset, limit: LimitSpec | None = None
+) -> xarray.Dataset:
+    """The first hits of a result with the attributes of the whole; `pilot` as in `numerics_of`."""
+    shots, numerics = campaign.sampler().shots(0, dataset.sizes["hit"]), campaign.numerics
+    used = numerics_of(campaign, pilot, limited=limit is not None)
+    resolution = resolve(campaign.scene, used, weakens(campaign.target, shots))
+    requested = "given resolution" if numerics.level is None else f"level {numerics.level}"
+    if numerics.explicit is None:
+        requested = f"{numerics.fidelity} fidelity" if numerics.accuracy is None else "accuracy in numbers"
+    precision = "double" if resolution.double else "single"
+    attributes = {
+        **campaign_attributes(campaign),
+        attr.NUMERICS: f"{requested}, {numerics.scheme} scheme, "
+        f"time_step {resolution.step_in(campaign.impact, campaign.target):.4g} s, "
+        f"patches_axial {resolution.patches_axial}, patches_around {resolution.patches_around}, "
+        f"grid_spacing {resolution.grid_spacing:.4g} m, precision {precision}",
+        attr.NUMERICS_GIVEN: json.dumps(dict(numerics), default=lambda accuracy: accuracy.model_dump()),
+        attr.PRECISION: precision,
+        attr.OUTSIDE_TESTED_RANGE: json.dumps(outside_tested_range(campaign), ensure_ascii=False),
+        **({} if limit is None else _limit_attributes(campaign, limit)),
+    }
+    found = {name: pilot.attrs[name] for name in PILOT if name in pilot.attrs}
+    return dataset.assign_attrs(attr.with_units(attributes) | found)
+
+
+def _limit_attributes(campaign: Campaign, limit: LimitSpec) -> dict[str, Any]:
+    """Attributes on the limits that were searched."""
+    attributes = {
+        attr.HISTORY: attr.history_line(f"limit --quantity {limit.quantity}"),
+        attr.LIMIT: limit.quantity,
+        attr.LIMIT_LAYER: limit.layer,
+        attr.LIMIT_TOLERANCE: limit.tolerance,
+        attr.LIMIT_HIGHEST: limit.highest,
+    }
+    if limit.quantity == "thickness":  # from it follows the areal density of the target
+        layer = campaign.target.layers[limit.layer]
+        attributes[attr.LIMIT_DENSITY] = layer.areal_density / layer.thickness
+        attributes[attr.LIMIT_ELSEWHERE] = campaign.target.areal_density - layer.areal_density
+    elif (factors := limit_velocity_factors(campaign)) is not None:
+        attributes[attr.LIMIT_FACTORS] = list(factors)
+    return attributes
+
+
+def campaign_attributes(campaign: Campaign) -> dict[str, Any]:
+    """Attributes that follow from a campaign alone. Scattered quantities have their distributions."""
+    plate, law, scatter = campaign.plate, campaign.interaction, campaign.scatter.given
+    free = {} if law.free_surface is None else law.free_surface.model_dump()
+    layers = {str(k): json.loads(layer.model_dump_json()) for k, layer in enumerate(campaign.layer, start=1)}
+    for (name, k), given in scatter.items():
+        if k:
+            layers[str(k)][name] = given.model_dump()
+    attributes = {
+        attr.TITLE: campaign.title,
+        attr.HISTORY: attr.history_line("run"),
+        attr.CAMPAIGN: campaign.text,
+        attr.CATALOGUE_NAMES: "\n".join(catalogue_names(campaign)) or None,
+        attr.SAMPLING: campaign.hits.sampling,
+        attr.SEED: campaign.hits.seed,
+        attr.COUNT: campaign.hits.count,
+        attr.REPLICATES: campaign.replicates,
+        attr.SYMMETRIES: "; ".join(map(str, campaign.symmetries)) if campaign.hits.irreducible else None,
+        attr.STANDOFF_POINT: campaign.output.standoff_point,
+        attr.OPEN_AREA: plate.open_area,
+        attr.LIGAMENT: plate.ligament if math.isfinite(plate.ligament) else None,
+        attr.AREAL_DENSITY: campaign.target.areal_density,
+        attr.ADD_ON_DENSITY: campaign.target.weights["add-on"] if layers else None,
+        attr.CORE: campaign.core.model_dump_json(),
+        attr.PLATE: json.dumps(plate.model_dump(mode="json")),
+        attr.LAYERS: json.dumps(layers) if layers else None,
+        attr.IMPACT: json.dumps(
+            dict(campaign.impact)
+            | {name: of.model_dump() for (name, _), of in scatter.items() if not QUANTITIES[name].by_layer}
+        ),
+        attr.MATERIAL: json.dumps(
+            plate.model_dump(exclude={"thickness", "size", "pattern"})
+            | law.model_dump(exclude={"free_surface"})
+            | {f"free_surface.{key}": value for key, value in free.items()}
+        ),
+        attr.FAILED_SHARE: campaign.output.failed_share,
+    }
+    return {name: value for name, value in attributes.items() if value is not None}

@@ -17,10 +17,10 @@ from warpimpact.results import variables as v
 from warpimpact.results.dataset import history_dataset, hit_numbers, stored_columns, to_dataset
 from warpimpact.results.files import ResultError
 from warpimpact.results.layers import values_of
-from warpimpact.scene import Numerics, Scene, Shots
+from warpimpact.runs.compute import numerics_of
+from warpimpact.scene import Scene, Shots
 from warpimpact.scene.flow import Continuum
 from warpimpact.solver import replay as solver
-from warpimpact.solver.limit import short_steps
 
 DEVICE_ROUNDING = {v.RESIDUAL_VELOCITY: 0.1, v.DEFLECTION: 0.5, v.TILT: 0.5}
 """Largest change of an outcome by the rounding of another device [m/s, degree]. Between single and double precision,
@@ -48,32 +48,26 @@ def replay(result: xarray.Dataset, hit: int, *, folder: str | Path = ".", snapsh
         ResultError: there is no such hit, or the campaign and its files now give another hit.
         CampaignError: the campaign in the result cannot be read, for example because a file that it names is missing.
     """
-    hits, numbers = result.sizes["hit"], hit_numbers(result)
-    places = np.flatnonzero(numbers == hit)
-    if not len(places):
-        choice = "hits" if numbers.max() - numbers.min() + 1 == hits else f"{hits} of the hits"
+    numbers = hit_numbers(result)
+    if hit not in numbers:
+        choice = "hits" if np.ptp(numbers) + 1 == len(numbers) else f"{len(numbers)} of the hits"
         raise ResultError(f"hit: got {hit}, but the result has {choice} {numbers.min()} to {numbers.max()}")
-    place = int(places[0])
-    campaign = campaign_in(result, Path(folder))
-    sampler = campaign.sampler()
+    stored, campaign = result.isel(hit=int(np.flatnonzero(numbers == hit)[0])), campaign_in(result, Path(folder))
+    sampler, scene = campaign.sampler(), campaign.scene
     if hit >= len(sampler):
         raise ResultError(f"hit: got {hit}, but the campaign and the files it names give only {len(sampler)} hits")
-    scene = campaign.scene
-    computed = _at_their_limit(scene, sampler.shots(hit, 1), result, place)
+    shots, double = _at_its_limit(scene, sampler.shots(hit, 1), stored), campaign.numerics.precision == "double"
     if attr.CONTINUUM in result.attrs:
-        settings = json.loads(result.attrs[attr.CONTINUUM])
+        settings, double = json.loads(result.attrs[attr.CONTINUUM]), True
         continuum = Continuum.model_validate({name: value for name, value in settings.items() if name != "materials"})
-        again = replay_continuum(scene, computed, continuum, snapshots)
+        again = replay_continuum(scene, shots, continuum, snapshots)
     else:
-        again = solver.replay(scene, computed, numerics=_numerics(campaign, result), snapshots=snapshots)
-    period = campaign.hits.covered(campaign.plate)
-    double = campaign.numerics.precision == "double" or attr.CONTINUUM in result.attrs
-    number = np.array([hit])
-    ended = to_dataset(
-        scene, computed[-1:], again.outcomes, period=period, attributes={}, numbers=number, double=double
+        numerics = numerics_of(campaign, result, limited=attr.LIMIT in result.attrs)
+        again = solver.replay(scene, shots, numerics=numerics, snapshots=snapshots)
+    period, number = campaign.hits.covered(campaign.plate), np.array([hit])
+    end = to_dataset(scene, shots, again.outcomes, period=period, attributes={}, numbers=number, double=double).isel(
+        hit=0
     )
-    end = ended.isel(hit=0)
-    stored = result.isel(hit=place)
     if not _same(end, stored, (v.HIT_Y, v.HIT_Z, *v.shot_variables(end))):
         raise ResultError(
             f"hit: got {hit}, but the campaign and the files it names now give another shot than the stored one"
@@ -86,41 +80,29 @@ def replay(result: xarray.Dataset, hit: int, *, folder: str | Path = ".", snapsh
         attr.DEVICE: "cpu",
     }
     history = history_dataset(scene, end, again, attributes=attributes)
-    return history if again.deformed is None else _with_mesh(history, again.deformed)
-
-
-def _with_mesh(history: xarray.Dataset, deformed: solver.Deformed) -> xarray.Dataset:
-    """The history with the finite elements of the layers as they deform, in the plate frame."""
+    if (mesh := again.deformed) is None:
+        return history
     home = np.array([0.0, float(history[v.HIT_Y]), float(history[v.HIT_Z])], dtype=np.float32)
     columns: dict[str, Any] = {
-        v.ELEMENT_CORNER: deformed.corners,
-        v.NODE_POSITION: deformed.position + home,
-        v.ELEMENT_LEFT: deformed.left,
-        v.ELEMENT_STRAIN: deformed.strain,
+        v.ELEMENT_CORNER: mesh.corners,
+        v.NODE_POSITION: mesh.position + home,
+        v.ELEMENT_LEFT: mesh.left,
+        v.ELEMENT_STRAIN: mesh.strain,
     }
     return history.assign(stored_columns(v.MESH_VARIABLES, columns))
 
 
-def _at_their_limit(scene: Scene, shots: Shots, result: xarray.Dataset, place: int) -> Shots:
-    """Shots at their limit, for a result of limits; else as given."""
-    if attr.LIMIT not in result.attrs:
+def _at_its_limit(scene: Scene, shots: Shots, stored: xarray.Dataset) -> Shots:
+    """The shot at its limit, for a hit of a result of limits; else as given."""
+    if (quantity := stored.attrs.get(attr.LIMIT)) is None:
         return shots
-    layer = int(result.attrs[attr.LIMIT_LAYER])
-    if result.attrs[attr.LIMIT] == "velocity":
-        return replace(shots, velocity=np.full(len(shots), float(result[v.IMPACT_VELOCITY][place])))
-    hit = result.isel(hit=place)
-    values = {name: values_of(scene.target, hit, name)[layer] for name in ("thickness", "resistance")}
-    given = scene.target.value("resistance", layer)
-    if values["resistance"] == given:  # the shot has the resistance of the scene
+    if quantity == "velocity":
+        return replace(shots, velocity=np.full(1, float(stored[v.IMPACT_VELOCITY])))
+    layer = int(stored.attrs[attr.LIMIT_LAYER])
+    values = {name: values_of(scene.target, stored, name)[layer] for name in ("thickness", "resistance")}
+    if values["resistance"] == scene.target.value("resistance", layer):  # the shot has the resistance of the scene
         del values["resistance"]
-    return shots.assign({name: np.full(len(shots), value) for name, value in values.items()}, layer)
-
-
-def _numerics(campaign: Campaign, result: xarray.Dataset) -> Numerics:
-    """The numerics of the hits of a result."""
-    has_pilot = attr.RESOLUTION in result.attrs
-    numerics = Numerics.model_validate_json(result.attrs[attr.RESOLUTION]) if has_pilot else campaign.numerics
-    return short_steps(numerics) if attr.LIMIT in result.attrs else numerics
+    return shots.assign({name: np.full(1, value) for name, value in values.items()}, layer)
 
 
 def campaign_in(result: xarray.Dataset, folder: Path) -> Campaign:
@@ -132,11 +114,12 @@ def campaign_in(result: xarray.Dataset, folder: Path) -> Campaign:
     """
     if attr.CAMPAIGN not in result.attrs:
         raise ResultError("the result does not contain its campaign")
-    count = int(result.attrs[attr.COUNT]) if attr.COUNT in result.attrs else None  # a list of hits has none
-    name = "the campaign in the result"
-    is_sought = result.attrs.get(attr.LIMIT) == "velocity"
     return Campaign.from_text(
-        result.attrs[attr.CAMPAIGN], name=name, folder=folder, count=count, needs_velocity=not is_sought
+        result.attrs[attr.CAMPAIGN],
+        name="the campaign in the result",
+        folder=folder,
+        count=int(result.attrs[attr.COUNT]) if attr.COUNT in result.attrs else None,  # a list of hits has none
+        needs_velocity=result.attrs.get(attr.LIMIT) != "velocity",
     )
 
 
@@ -153,11 +136,9 @@ def _agreement(end: xarray.Dataset, stored: xarray.Dataset) -> str:
         np.allclose(end[name], stored[name], rtol=0.0, atol=tolerance, equal_nan=True)
         for name, tolerance in DEVICE_ROUNDING.items()
     )
-    return "within rounding" if close and all(_alike(end[name], stored[name]) for name in names) else "different"
-
-
-def _alike(values: xarray.DataArray, other: xarray.DataArray) -> bool:
-    """Whether codes are equal, and numbers stand in the same places."""
-    if values.dtype.kind == "f":
-        values, other = values.isnull(), other.isnull()
-    return bool((values == other).all())
+    exact = tuple(name for name in names if end[name].dtype.kind != "f")
+    return (
+        "within rounding"
+        if close and _same(end, stored, exact) and _same(end.isnull(), stored.isnull(), names)
+        else "different"
+    )

@@ -1,60 +1,79 @@
-"""From a campaign to its Dataset, in memory or as a file. A run into a file survives interrupts and can be resumed."""
+"""From a campaign to its Dataset, in memory or as a file, by the fast law or by finite elements.
+
+A run into a file survives interrupts and can be resumed.
+"""
 
 from __future__ import annotations
 
+import json
 import warnings
 from collections.abc import Callable, Iterator
 from contextlib import closing
-from dataclasses import replace
-from functools import cache, partial
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import xarray
 
 from warpimpact.campaign.campaign import Campaign
-from warpimpact.records.registry import LIMITS
+from warpimpact.campaign.tables import Stop
+from warpimpact.continuum.simulate import MOST, check_continuum, check_cost
 from warpimpact.results import attributes as attr
 from warpimpact.results import files
-from warpimpact.results.dataset import joined
+from warpimpact.results.dataset import failed, finer_pair, joined
+from warpimpact.results.measures import Measure, Tally, shift_of
 from warpimpact.results.references import with_references
 from warpimpact.runs.chunks import Chunks, open_chunks
 from warpimpact.runs.compute import (
+    campaign_attributes,
+    chunk_size,
+    compute_elements,
     compute_hits,
-    compute_limits,
-    extent,
+    described,
     find_resolution,
     limit_of_reference,
     manifest,
-    model_errors,
     numerics_of,
     reference_shots,
+    shots_of,
 )
 from warpimpact.runs.computer import Computer, computer
-from warpimpact.runs.describe import described, pilot_in
-from warpimpact.runs.progress import Follow, RunProgress, Watch, followed
-from warpimpact.scene import Numerics
-from warpimpact.solver.accuracy import PilotResult
-from warpimpact.solver.limit import PASSAGES, LimitSpec
-from warpimpact.solver.prepare import prepare
-from warpimpact.solver.resolution import at_level
-from warpimpact.solver.worker import NEVER, Cancel
+from warpimpact.solver.device import NEVER, Cancel, cores
+from warpimpact.solver.limit import LimitSpec
+from warpimpact.statistics.intervals import Estimate, looks
 
-SLOW, SLOW_BEFORE = 1.0, 5.0
-"""Seconds of a core above which the cost is announced: of a hit, and of what comes before the first hit."""
-LARGE = 2**30
-"""Bytes of the windows of a hit above which they are announced. Each thread has its own."""
-CUDA_SHOTS = 2**17
-"""Shots per task on a GPU. Fewer shots would not fill it."""
-CPU_SHOTS, CPU_SECONDS = 2**14, 0.5
-"""Most shots of a task on the CPU of this machine, and the time that it shall take, beside which its set-up on one core
-is short. A task is at least one chunk; another process computes one chunk per task."""
 REFERENCE_HITS, REFERENCE_LIMITS = 2**12, 256
 """Most hits, and most limits, of a reference."""
+NUMERICS_SHARE = 0.5
+"""Share of a half width that the numerics may take before more hits are of no use."""
 
 
-class Costly(UserWarning):
-    """A computation that takes far longer than usual."""
+@dataclass(frozen=True)
+class RunProgress:
+    """The progress of a run.
+
+    Attributes:
+        done, total: numbers of shots; `total` is the most that a stop rule allows.
+        saved: shots of whole chunks, which no interrupt loses; `done` also counts those of unfinished chunks.
+        resumed: shots that an earlier run had computed.
+        failed: shots whose computation failed.
+        estimates: estimate of the quantity of a stop rule, when it looked last.
+        piloting: whether the pilot is still running. No shot is done then.
+        level: level that the pilot computes; None where unknown.
+    """
+
+    done: int
+    total: int
+    saved: int = 0
+    resumed: int = 0
+    failed: int = 0
+    estimates: dict[Measure, Estimate] = field(default_factory=dict)
+    piloting: bool = False
+    level: int | None = None
+
+
+Follow = Callable[[RunProgress], object]
 
 
 def run(
@@ -62,20 +81,19 @@ def run(
     *,
     references: bool = False,
     device: str = "auto",
-    progress: Follow | None = None,
+    progress: Follow = lambda now: None,
     cancel: Cancel = NEVER,
 ) -> xarray.Dataset:
-    """Compute every hit of a campaign, in memory. `run(campaign.solid())` computes its solid reference.
+    """Compute every hit of a campaign, in memory: a Dataset with one entry per hit (results/dataset.py).
+
+    `run(campaign.solid())` computes its solid reference.
 
     Args:
         campaign: the campaign, or its file.
         references: compute some hits of its references, too, with which `inspect` and `compare` then compare it.
         device: "auto" (every CUDA device if there is one, else the CPU), "cpu", "cuda:0", "cuda:0,cuda:1", …
-        progress: called several times a second; without it a notebook shows a bar.
+        progress: called several times a second.
         cancel: ends the run from another thread.
-
-    Returns:
-        The Dataset of results/dataset.py, one entry per hit.
 
     Raises:
         CampaignError: the file is no campaign, or has a value that is not allowed.
@@ -98,7 +116,7 @@ def run_to_file(
     references: bool | None = None,
     resume: bool = False,
     overwrite: bool = False,
-    progress: Follow | None = None,
+    progress: Follow = lambda now: None,
     cancel: Cancel = NEVER,
     warn: Callable[[str], object] = warnings.warn,
 ) -> xarray.Dataset | None:
@@ -123,146 +141,214 @@ def run_to_file(
         Interrupted: the user interrupted the run; what is saved can be resumed.
     """
     campaign = campaign if isinstance(campaign, Campaign) else Campaign.from_toml(campaign)
-    path, size, sampler = None if output is None else Path(output), extent(len(campaign.sampler())), campaign.sampler()
-    compute = compute_hits if limit is None else partial(compute_limits, limit)
+    path, sampler = None if output is None else Path(output), campaign.sampler()
     with (
         computer(device, workers=workers, scheduler=scheduler, cancel=cancel, warn=warn) as computing,
         open_chunks(
             path, manifest(campaign, computing.made_by, limit), resume=resume, overwrite=overwrite, warn=warn
         ) as chunks,
-        followed(progress) as follow,
     ):
         if chunks is None:
             return None
-        watch = Watch(campaign, chunks, size, () if limit is None else (f"mean({LIMITS[limit.quantity].value})",))
-        check_cost = cost_warning(campaign, computing.made_by[attr.DEVICE], 1 if limit is None else PASSAGES)
+        kind = computing.made_by[attr.DEVICE]
+        watch, size = Watch(campaign, chunks, kind), chunk_size(len(sampler), kind)
 
         def piloting(levels: list[int]) -> None:
-            for level in levels:
-                check_cost(at_level(level, campaign.numerics))
-            follow(RunProgress(0, len(sampler), piloting=True, level=next(iter(levels), None)))
+            progress(RunProgress(0, len(sampler), piloting=True, level=next(iter(levels), None)))
 
-        if (first := chunks.load(0)) is not None:
-            pilot = pilot_in(first)
-        else:
+        if (pilot := chunks.load(0)) is None:
             pilot = computing.call(find_resolution, campaign, limit, tick=piloting)
-        numerics = numerics_of(campaign, pilot)
-        check_cost(numerics)
+        numerics = numerics_of(campaign, pilot, limited=limit is not None)
 
-        def tasks() -> Iterator[tuple[range, tuple[Any, ...]]]:
-            for task in _ranges(chunks, watch, lambda: _task_size(computing, campaign, watch) // size):
-                yield task, (campaign, numerics, sampler.shots(task.start * size, len(task) * size), task.start * size)
+        def tasks() -> Iterator[tuple[int, tuple[Any, ...]]]:
+            for number in range(watch.count):
+                if number not in watch.seconds and not watch.stop:
+                    shots = sampler.shots(number * size, size)
+                    yield number, (limit, campaign, numerics, shots, number * size)
 
-        follow(watch.progress(pilot))
-        results = computing.map(compute, tasks(), lambda done: follow(watch.progress(pilot, sum(done))))
-        with closing(results):
-            while not watch.ended:
-                task, dataset = next(results)
-                for number, chunk in _split(dataset, task, size):
-                    if number == 0:
-                        chunk = described(chunk, campaign, numerics_of(campaign, pilot, limit), pilot, limit)
-                    chunks.save(number, chunk)
-                    watch.add(number, chunk)
-                follow(watch.progress(pilot))
-        if references is None:
-            references = path is not None and campaign.output.solid_reference
-        of_references = _references(campaign, limit, pilot, computing) if references else {}
-        return _finished(chunks, watch, of_references, path)
-
-
-def _ranges(chunks: Chunks, watch: Watch, most: Callable[[], int]) -> Iterator[range]:
-    """Ranges of missing chunks. Each has about as many as `most` returns when the range begins."""
-    there, first = chunks.numbers, 0
-    while first < watch.count:
-        stop, last = first, min(first + max(1, most()), watch.count)
-        while stop < last and stop not in there:
-            stop += 1
-        if stop > first:
-            yield range(first, stop)
-        first = max(stop, first + 1)
+        progress(watch.progress())
+        with closing(computing.map(compute_hits, tasks(), lambda done: progress(watch.progress(sum(done))))) as results:
+            for number, chunk in results:
+                if number == 0:
+                    chunk = described(chunk.assign_coords(pilot.coords), campaign, pilot, limit)
+                chunks.save(number, chunk)
+                watch.add(number, chunk)
+                progress(watch.progress())
+                if watch.stop:
+                    break
+        wanted = path is not None and campaign.output.solid_reference if references is None else references
+        of_references = _references(campaign, limit, pilot, computing) if wanted else {}
+        every = (chunk for number in range(watch.count) if (chunk := chunks.load(number)) is not None)
+        seconds = sum(watch.seconds[number] for number in range(watch.count))
+        rate = {attr.COMPUTE_TIME: seconds, attr.HITS_PER_SECOND: watch.hits(watch.count) / seconds}
+        attributes = attr.with_units(rate) | watch.stop
+        if path is None:
+            return with_references(joined(every).assign_attrs(attributes), of_references)
+        attributes[attr.FINGERPRINT] = chunks.fingerprint
+        files.call_in_thread(files.write_joined, every, path, attributes=attributes, references=of_references)
+    return None
 
 
-def _task_size(computing: Computer, campaign: Campaign, watch: Watch) -> int:
-    """Shots per task, at the rate so far; 0 stands for one chunk."""
-    if computing.made_by[attr.DEVICE] != "cpu":
-        return CUDA_SHOTS
-    if computing.is_remote or campaign.stop is not None or not watch.time:
-        return 0
-    return min(CPU_SHOTS, int(CPU_SECONDS * watch.hits / watch.time))
+class Watch:
+    """Follows a run: finished and failed shots, computing time, and whether its stop rule is met.
 
+    The rule takes the chunks in the order of their shots, so that a run ends with the same shots however it was
+    computed.
 
-def _split(dataset: xarray.Dataset, task: range, size: int) -> Iterator[tuple[int, xarray.Dataset]]:
-    """The chunks of a task, each with its share of the time."""
-    for place, number in enumerate(task):
-        chunk = dataset.isel(hit=slice(place * size, (place + 1) * size))
-        share = chunk.sizes["hit"] / dataset.sizes["hit"]
-        yield number, chunk.assign_attrs({attr.COMPUTE_TIME: dataset.attrs[attr.COMPUTE_TIME] * share})
+    Attributes:
+        count: the number of chunks, fewer once the stop rule is met.
+        seconds: computing times of the finished chunks, by their numbers.
+        stop: attributes on how the stop rule ended the run; empty as long as it goes on.
+    """
+
+    def __init__(self, campaign: Campaign, chunks: Chunks, device: str) -> None:
+        self._total = len(campaign.sampler())
+        self._size = chunk_size(self._total, device)
+        self.count, self.seconds, self.stop = -(-self._total // self._size), dict[int, float](), dict[str, Any]()
+        self._chunks, self._rule, self._next, self._failed = chunks, campaign.stop, 0, 0
+        self._estimates = dict[Measure, Estimate]()
+        self._shift: float | None = None
+        if (rule := campaign.stop) is not None:
+            self._tally = Tally(rule.measure, replicates=campaign.replicates, confidence=rule.confidence)
+            self._looks = {*looks(campaign.hits.sampling, self.count)}
+        for number in sorted(chunks.numbers):
+            if (chunk := chunks.load(number)) is not None:
+                self.add(number, chunk)
+        self._resumed = self._saved
+
+    def hits(self, chunks: int) -> int:
+        """Number of shots of the first chunks."""
+        return min(chunks * self._size, self._total)
+
+    def add(self, number: int, chunk: xarray.Dataset) -> None:
+        """Take in a finished chunk, which is saved."""
+        self.seconds[number] = chunk.attrs[attr.COMPUTE_TIME]
+        self._failed += int(failed(chunk).sum())
+        while self._rule is not None and not self.stop and self._next in self.seconds:
+            following = self._chunks.load(self._next)
+            assert following is not None
+            if self._next == 0:  # the first chunk has hits at two levels
+                self._shift = shift_of(self._rule.measure, finer_pair(following), self._rule.confidence)
+            self._tally.add(following)
+            self._next += 1
+            if self._next in self._looks:
+                self._look(self._rule)
+
+    def _look(self, rule: Stop) -> None:
+        """Find whether the rule ends the run after the hits so far."""
+        estimate, wanted, shift = self._tally.estimate(), rule.measure.shown(rule.half_width), self._shift or 0.0
+        met, left = estimate.half_width + shift <= wanted, max(wanted - shift, 0.0)
+        # The half width is about proportional to 1/√hits.
+        in_reach = self.hits(self._next) * estimate.half_width**2 <= left**2 * self._total
+        no_use = not met and not in_reach and estimate.half_width <= (1.0 - NUMERICS_SHARE) * wanted
+        self._estimates = {rule.measure: estimate}
+        if met or no_use or self._next == self.count:
+            self.count = self._next
+            self.stop = {
+                attr.STOP_QUANTITY: rule.quantity,
+                attr.STOP_REASON: "half_width" if met else "numerics" if no_use else "max_count",
+                **({} if self._shift is None else {attr.ESTIMATE_NUMERICS: self._shift}),
+                attr.ESTIMATE: estimate.value,
+                attr.ESTIMATE_INTERVAL: [estimate.low, estimate.high],
+                attr.ESTIMATE_UNITS: rule.measure.units,
+                attr.CONFIDENCE: rule.confidence,
+            }
+
+    @property
+    def _saved(self) -> int:
+        return sum(self.hits(number + 1) - self.hits(number) for number in self.seconds)
+
+    def progress(self, underway: int = 0) -> RunProgress:
+        """The progress of the run, with shots of unfinished chunks."""
+        saved, total = self._saved, self._total
+        done = saved if saved == total else min(saved + underway, total - 1)
+        return RunProgress(done, total, saved, self._resumed, self._failed, self._estimates)
 
 
 def _references(
-    campaign: Campaign, limit: LimitSpec | None, pilot: PilotResult | None, computing: Computer
+    campaign: Campaign, limit: LimitSpec | None, pilot: xarray.Dataset, computing: Computer
 ) -> dict[str, xarray.Dataset]:
     """Some hits of the references of a campaign, by their names, at the resolution of the campaign."""
-    pilot = None if pilot is None else replace(pilot, finer=None, numbers=None)
     datasets = dict[str, xarray.Dataset]()
     for name, reference in campaign.references.items():
-        compute, searched, most = compute_hits, limit, REFERENCE_HITS
-        if limit is not None:
-            if (searched := limit_of_reference(limit, campaign, name)) is None:
-                continue
-            compute, most = partial(compute_limits, searched), REFERENCE_LIMITS
-        shots = reference_shots(reference, most)
-        dataset = computing.call(compute, reference, numerics_of(reference, pilot), shots, 0)
-        datasets[name] = described(dataset, reference, numerics_of(reference, pilot, searched), pilot, searched)
+        searched = limit_of_reference(limit, campaign, name)
+        if limit is None or searched is not None:
+            shots = reference_shots(reference, REFERENCE_HITS if limit is None else REFERENCE_LIMITS)
+            numerics = numerics_of(reference, pilot, limited=limit is not None)
+            dataset = computing.call(compute_hits, searched, reference, numerics, shots, 0)
+            datasets[name] = described(dataset, reference, pilot, searched)
     return datasets
 
 
-def _finished(
-    chunks: Chunks, watch: Watch, references: dict[str, xarray.Dataset], path: Path | None
-) -> xarray.Dataset | None:
-    """Join the chunks into the result: a file, or in memory."""
-    every = (chunk for number in range(watch.count) if (chunk := chunks.load(number)) is not None)
-    attributes = attr.with_units({attr.COMPUTE_TIME: watch.time, attr.HITS_PER_SECOND: watch.hits / watch.time})
-    attributes |= watch.stop
-    if path is not None:
-        attributes[attr.FINGERPRINT] = chunks.fingerprint
-        files.call_in_thread(files.write_joined, every, path, attributes=attributes, references=references)
-        return None
-    return with_references(joined(every).assign_attrs(attributes), references)
+def continuum_to_file(
+    campaign: Campaign,
+    output: Path,
+    *,
+    hits: tuple[int, ...] | None = None,
+    device: str | Computer = "auto",
+    workers: int | None = None,
+    scheduler: str | None = None,
+    resume: bool = False,
+    overwrite: bool = False,
+    progress: Callable[[int, int, int], object] = lambda done, resumed, total: None,
+    warn: Callable[[str], object] = warnings.warn,
+) -> None:
+    """Compute hits of a campaign by finite elements, as its table [continuum] says, into a result file. Each chunk is
+    on the disk when it has ended: one hit on a CPU, where every core computes one.
 
+    Args:
+        hits: by their numbers in the campaign; None is all of them.
+        progress: called with the hits that are done, how many of them an earlier call had computed, and all hits.
+        device, workers, scheduler, resume, overwrite, warn: as in `run_to_file`.
 
-def cost_warning(campaign: Campaign, device: str, passages: int = 1) -> Callable[[Numerics], None]:
-    """Return a function that warns (`Costly`), once for each numerics, of hits that are slow on a CPU. It raises what
-    `prepare` does: TooManySteps, MemoryError."""
+    Raises:
+        ValueError: the continuum does not compute this campaign.
+    """
+    elements, sampler, continuum = campaign.continuum, campaign.sampler(), campaign.continuum.solver
+    numbers = np.array(range(len(sampler)) if hits is None else hits)
+    check_continuum(campaign.scene, sampler.shots(0, 1), continuum)
+    with computer(device, workers=workers, scheduler=scheduler) as computing:
+        settings = json.loads(continuum.model_dump_json())
+        content = manifest(campaign, computing.made_by) | {"continuum": settings, "numbers": hits}
+        together = MOST
+        if computing.made_by[attr.DEVICE] == "cpu":
+            together, some = 1, shots_of(campaign, numbers[:: max(1, len(numbers) // 16)])
+            if announcement := check_cost(campaign.scene, some, continuum, min(cores(), len(numbers))):
+                warn(announcement)
+        parts = [numbers[first : first + together] for first in range(0, len(numbers), together)]
+        tasks = {number: (campaign, part, continuum) for number, part in enumerate(parts)}
+        solid = campaign.references.get("solid") if campaign.output.solid_reference else None
+        if solid is not None:
+            tasks[len(parts)] = solid, numbers[:1], continuum
+        with open_chunks(output, content, resume=resume, overwrite=overwrite, warn=warn) as chunks:
+            if chunks is None:
+                return
+            resumed = sum(len(part) for number, part in enumerate(parts) if number in chunks.numbers)
 
-    @cache
-    def check(numerics: Numerics) -> None:
-        if device == "cpu" and (sentence := estimate_cost(campaign, numerics, passages)) is not None:
-            warnings.warn(sentence, Costly, stacklevel=2)
+            def tick(shares: list[float]) -> None:
+                done = sum(len(part) for number, part in enumerate(parts) if number in chunks.numbers)
+                progress(min(done + int(sum(shares) * together), len(numbers)), resumed, len(numbers))
 
-    return check
+            tick([])
+            missing = [task for task in tasks.items() if task[0] not in chunks.numbers]
+            for number, dataset in computing.map(compute_elements, missing, tick, per_core=True):
+                chunks.save(number, dataset)
+                tick([])
+            datasets = [chunk for number in tasks if (chunk := chunks.load(number)) is not None]
+            seconds = float(sum(dataset.attrs[attr.COMPUTE_TIME] for dataset in datasets[: len(parts)]))
+            attributes = {
+                attr.CONTINUUM: json.dumps({"materials": [entry.name for entry in elements.entries], **settings}),
+                attr.NUMERICS: elements.words,
+                attr.PRECISION: "single",
+                attr.CATALOGUE_NAMES: "\n".join(f"{entry.name}: {entry.evidence}" for entry in elements.entries),
+                attr.COMPUTE_TIME: seconds,
+                attr.HITS_PER_SECOND: len(numbers) / seconds,
+                attr.FINGERPRINT: chunks.fingerprint,
+            }
 
+            def described(dataset: xarray.Dataset, of: Campaign) -> xarray.Dataset:
+                return dataset.assign_attrs(attr.with_units(campaign_attributes(of) | attributes))
 
-def estimate_cost(campaign: Campaign, numerics: Numerics, passages: int = 1) -> str | None:
-    """A sentence about the cost of hits on a CPU, with numerics that fix the resolution; None where it is low. An
-    unhindered first hit of the campaign stands for all."""
-    sampler = campaign.sampler()
-    with model_errors():
-        prepared = prepare(campaign.scene, sampler.shots(0, 1), numerics)
-    seconds, hits = passages * prepared.seconds, len(sampler)
-    level = "" if numerics.level is None else f"at level {numerics.level} "
-    if seconds < SLOW and prepared.window_bytes < LARGE:
-        before, size = (sum(getattr(tile, name) for tile in prepared.tiles) for name in ("seconds", "bytes"))
-        return (
-            f"{level}the holes of the plates take about {before:.2g} s of a core and {size / 2**30:.2g} GiB before the "
-            "first hit; a smaller period of the pattern, and a longer degradation_length, take less"
-            if before >= SLOW_BEFORE
-            else None
-        )
-    total = seconds * hits
-    time = f"{total:.2g} s" if total < 120.0 else f"{total / 3600.0:.2g} h"
-    return (
-        f"{level}a hit takes about {seconds:.2g} s of a core, and {hits} hits {time}: at "
-        f"least {prepared.steps} steps, and windows of {prepared.window_nodes:.2g} nodes, "
-        f"{prepared.window_bytes / 2**30:.2g} GiB; a lower level, and a longer degradation_length, take less"
-    )
+            references = {} if solid is None else {"solid": described(datasets[-1], solid)}
+            result = described(joined(datasets[: len(parts)]), campaign)
+            files.write(with_references(result, references), output)

@@ -62,7 +62,7 @@ class LevelErrors(NamedTuple):
 
 
 class TooLong(Exception):
-    """A pilot would take longer than it may."""
+    """A pilot would take longer than it may; the message is for the user."""
 
 
 @dataclass(frozen=True)
@@ -72,24 +72,14 @@ class PilotResult:
     Attributes:
         numerics: the level, with the precision and layout of the run.
         kept: whether the errors are within the accuracy.
-        share: share of the hits that are within the errors.
         errors: by the names of UNITS; infinite where no finer level could be computed.
         finer: outcomes of the pilot's hits two levels finer; None without a comparison.
-        numbers: numbers of the pilot's hits in their campaign; None without a campaign.
     """
 
     numerics: Numerics
     kept: bool
-    share: float
     errors: Mapping[str, float] = field(default_factory=dict)
     finer: Outcomes | None = field(default=None, compare=False, repr=False)
-    numbers: NDArray[np.int64] | None = field(default=None, compare=False, repr=False)
-
-    @property
-    def phrase(self) -> str:
-        """A phrase with the errors for a line of progress."""
-        kept = "" if self.kept else ", not as promised"
-        return f"accuracy {errors_text(self.errors)} for {share_text(self.share)}{kept}"
 
 
 def pilot_size(accuracy: Accuracy, least: int = PILOT_HITS) -> int:
@@ -97,10 +87,32 @@ def pilot_size(accuracy: Accuracy, least: int = PILOT_HITS) -> int:
     return max(least, math.ceil(1.6 / (1.0 - accuracy.share) - 1e-9))
 
 
+class Pilot:
+    """Hits that are computed at several levels, at each once, within LONGEST_PILOT seconds."""
+
+    def __init__(self, compute: Callable[[int], Outcomes]) -> None:
+        self._compute, self._outcomes, self._seconds = compute, dict[int, Outcomes](), dict[int, float]()
+
+    def outcomes(self, level: int) -> Outcomes:
+        """The outcomes at a level."""
+        if level not in self._outcomes:
+            finest, spent = max(self._seconds, default=level), sum(self._seconds.values())
+            taken = self._seconds.get(finest, 0.0)
+            if self._seconds and spent + 2.0 ** (level - finest) * taken > LONGEST_PILOT:
+                raise TooLong(
+                    f"the pilot ended after {spent:.0f} s, as its hits at level {finest} took {taken:.2g} s: the "
+                    "resolution may be too coarse; give numerics.level to choose it"
+                )
+            begin = time.perf_counter()
+            self._outcomes[level] = self._compute(level)
+            self._seconds[level] = time.perf_counter() - begin
+        return self._outcomes[level]
+
+
 def choose_level(
     numerics: Numerics,
     first: int,
-    outcomes: Callable[[int], Outcomes],
+    compute: Callable[[int], Outcomes],
     errors: Callable[[Outcomes, Outcomes], LevelErrors],
     seconds: Callable[[int], float],
 ) -> PilotResult:
@@ -108,49 +120,31 @@ def choose_level(
 
     Args:
         first: coarsest level to try.
-        outcomes: computes the pilot's hits at a level, once.
+        compute: computes the pilot's hits at a level.
         errors: errors of a level, from its outcomes and those two levels finer.
         seconds: foreseen time of the pilot's hits at a level.
     """
-    tried, taken = dict[int, LevelErrors](), dict[int, float]()
-
-    def timed(level: int) -> Outcomes:
-        if level not in taken:
-            if (
-                sum(taken.values()) + max((2.0 ** (level - at) * taken[at] for at in taken), default=0.0)
-                > LONGEST_PILOT
-            ):
-                raise TooLong
-            begin = time.perf_counter()
-            outcomes(level)
-            taken[level] = time.perf_counter() - begin
-        return outcomes(level)
-
-    def result(level: int) -> PilotResult:
-        (actual, excess), share = tried[level], numerics.required.share
-        return PilotResult(at_level(level, numerics), excess <= 1.0, share, actual, outcomes(level + 2))
-
+    pilot, tried = Pilot(compute), dict[int, LevelErrors]()
     for level in range(first, len(LADDER) - 2):
         try:
             if tried and sum(seconds(at) for at in range(first, level + 3)) > PILOT_SECONDS:
                 break
-            tried[level] = errors(timed(level), timed(level + 2))
+            tried[level] = errors(pilot.outcomes(level), pilot.outcomes(level + 2))
         except (MemoryError, TooManySteps):
             break
-        except TooLong:
-            warnings.warn(
-                f"the pilot ended after {sum(taken.values()):.0f} s, as its hits at level {max(taken)} took "
-                f"{taken[max(taken)]:.2g} s: the resolution may be too coarse; give numerics.level to choose it",
-                stacklevel=2,
-            )
+        except TooLong as late:
+            warnings.warn(str(late), stacklevel=2)
             break
         _logger.info("pilot: level %d errs by %s", level, errors_text(tried[level].errors))
         if tried[level].excess <= 1.0:
-            return result(level)
+            break
     if not tried:
-        return PilotResult(at_level(first, numerics), False, numerics.required.share)
-    alike = ERROR_PER_CHANGE * min(of_level.excess for of_level in tried.values())
-    return result(next(level for level, of_level in tried.items() if of_level.excess <= alike))
+        return PilotResult(at_level(first, numerics), kept=False)
+    least = min(of_level.excess for of_level in tried.values())
+    alike = least if least <= 1.0 else ERROR_PER_CHANGE * least
+    level = next(level for level, of_level in tried.items() if of_level.excess <= alike)
+    chosen = tried[level]
+    return PilotResult(at_level(level, numerics), chosen.excess <= 1.0, chosen.errors, pilot.outcomes(level + 2))
 
 
 def hit_errors(coarse: Outcomes, fine: Outcomes, accuracy: Accuracy, free: Sequence[bool]) -> LevelErrors:

@@ -18,8 +18,7 @@ from numpy.typing import NDArray
 
 from warpimpact.scene import Core, NoPattern, Pattern, Plate
 from warpimpact.scene.interaction import FreeSurface
-from warpimpact.solver.keys import Key
-from warpimpact.solver.tile import Check, Floats, Real, Tile, kept
+from warpimpact.solver.tile import Check, Floats, Key, Real, Tile, kept
 
 Array = NDArray[np.float64]
 

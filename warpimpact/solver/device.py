@@ -1,4 +1,4 @@
-"""The device that computes, and Warp on it."""
+"""Who computes: a device with Warp on it, its threads, and a token by which another thread ends the computation."""
 
 from __future__ import annotations
 
@@ -8,11 +8,13 @@ import shutil
 import tempfile
 import threading
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager, nullcontext, suppress
+from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any
 
 import psutil
 import warp as wp
@@ -21,11 +23,55 @@ from filelock import FileLock
 from warpimpact.kernels import lanes
 
 _logger = logging.getLogger(__name__)
-Scratch = TypeVar("Scratch")
 
 
 class DeviceError(RuntimeError):
     """The requested device does not exist; the message is for the user."""
+
+
+class Cancelled(Exception):
+    """The computation was cancelled."""
+
+
+class Cancel:
+    """A token that the march checks between two launches of a kernel."""
+
+    def __init__(self, outer: Cancel | None = None) -> None:
+        """Create a token that is also cancelled with an outer one."""
+        self._requested, self._outer = threading.Event(), outer
+
+    def cancel(self) -> None:
+        """Cancel all computations that were given this token."""
+        self._requested.set()
+
+    @property
+    def cancelled(self) -> bool:
+        """Whether the token, or its outer one, was cancelled."""
+        return self._requested.is_set() or (self._outer is not None and self._outer.cancelled)
+
+    def check(self) -> None:
+        """Raise Cancelled if the token was cancelled."""
+        if self.cancelled:
+            raise Cancelled
+
+
+NEVER = Cancel()
+"""Token of computations that nobody cancels."""
+
+
+@dataclass(frozen=True)
+class Worker:
+    """Who computes.
+
+    Attributes:
+        device: "auto" (CUDA if there is one, else CPU), "cpu", "cuda:0", …
+        threads: number of threads on a CPU; None is one for every core that this process may use.
+        cancel: token that ends the computation with Cancelled.
+    """
+
+    device: str = "auto"
+    threads: int | None = None
+    cancel: Cancel = NEVER
 
 
 def find_device(name: str) -> Any:
@@ -110,7 +156,7 @@ def block_size(kernel: Any, device: Any) -> int:
     return threads if device.is_cuda or wp.config.enable_cpu_blocks else 1
 
 
-_LOADING = threading.RLock()
+_LOADING = threading.Lock()
 
 
 def load(kernel: Any, device: Any) -> None:
@@ -120,24 +166,27 @@ def load(kernel: Any, device: Any) -> None:
     A module is compiled for one block size. By default Warp loads with the block size of CUDA on a CPU, too, and
     compiles again at the launch.
     """
+    block, module = block_size(kernel, device), kernel.module
     with _LOADING:
-        _load(kernel, device)
+        loaded = module.execs.get((device.context, block))
+        if loaded is not None and loaded.module_hash == module.get_module_hash(block):
+            return
+    pool = ThreadPoolExecutor(1)  # so that Ctrl-C does not wait for the compiler
+    try:
+        pool.submit(_load, module, device, block).result()
+    finally:
+        pool.shutdown(wait=False)
 
 
-def _load(kernel: Any, device: Any) -> None:
-    begin, block = time.perf_counter(), block_size(kernel, device)
-    module = kernel.module
-    loaded = module.execs.get((device.context, block))
-    if loaded is not None and loaded.module_hash == module.get_module_hash(block):
-        return
-    folder = Path(wp.config.kernel_cache_dir, module.get_module_identifier(block))
-    with nullcontext() if folder.exists() else _alone(folder):
+def _load(module: Any, device: Any, block: int) -> None:
+    begin, folder = time.perf_counter(), Path(wp.config.kernel_cache_dir, module.get_module_identifier(block))
+    with _LOADING, nullcontext() if folder.exists() else _alone(folder):
         try:
             module.load(device, block)
         except Exception:  # a file of the cache is damaged; a kernel that cannot be compiled fails again
             shutil.rmtree(folder, ignore_errors=True)
             module.load(device, block)
-    _logger.debug("%s on %s: loaded in %.2f s", kernel.key, device, time.perf_counter() - begin)
+    _logger.debug("%s on %s: loaded in %.2f s", module.name, device, time.perf_counter() - begin)
 
 
 @contextmanager
@@ -151,21 +200,3 @@ def _alone(folder: Path) -> Iterator[None]:
         yield
     finally:
         lock.release()
-
-
-def halving(slots: int, allocate: Callable[[int], Scratch]) -> tuple[int, Scratch]:
-    """Number of slots and their scratch. The number is halved until the allocation succeeds, because the free memory is
-    only an estimate.
-
-    Raises:
-        MemoryError: there is no memory for one slot.
-    """
-    while True:
-        try:
-            return slots, allocate(slots)
-        except (RuntimeError, MemoryError) as error:
-            if not (isinstance(error, MemoryError) or "allocate" in str(error)):
-                raise
-            if slots == 1:
-                raise MemoryError(str(error)) from error
-        slots //= 2

@@ -11,8 +11,7 @@ from numpy.typing import NDArray
 
 from warpimpact.scene import Core, Plate, Shots
 from warpimpact.solver.cover import Cover, Pushed, cover_of
-from warpimpact.solver.materials import Materials
-from warpimpact.solver.resolution import Resolution
+from warpimpact.solver.resolution import Materials, Resolution
 from warpimpact.solver.tile import Tile, tile_of
 
 Array = NDArray[np.float64]

@@ -5,9 +5,8 @@ from __future__ import annotations
 import math
 import threading
 import time
-from collections.abc import Callable
-from concurrent.futures import FIRST_EXCEPTION, ThreadPoolExecutor, wait
-from functools import partial
+from collections.abc import Callable, Iterator
+from concurrent.futures import FIRST_EXCEPTION, Future, ThreadPoolExecutor, wait
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -15,11 +14,10 @@ import warp as wp
 from numpy.typing import NDArray
 
 from warpimpact.kernels.status import Status
-from warpimpact.solver.device import halving, launching, load
+from warpimpact.solver.device import Worker, launching, load
 from warpimpact.solver.grid import Cells
 from warpimpact.solver.memory import Memory
 from warpimpact.solver.prepare import Prepared
-from warpimpact.solver.worker import NEVER, Cancel
 
 Numbers = NDArray[np.int64]
 Progress = Callable[[int, int], None]
@@ -29,9 +27,9 @@ FEWEST_CELLS = 16
 MAX_DOUBLINGS = 6
 """Most times that the windows are doubled for shots that leave theirs."""
 SHARES = 3
-"""Fewest chunks per thread into which the remaining shots would be divided."""
+"""Fewest batches per thread into which the remaining shots would be divided."""
 SHORTEST, LONGEST = 0.002, 0.25
-"""Shortest and longest time that a chunk shall take [s]. A computation can be cancelled between two chunks."""
+"""Shortest and longest time that a batch shall take [s]. A computation can be cancelled between two batches."""
 REPORT_INTERVAL = 0.1
 """Time between two reports of progress while threads compute [s]."""
 STRIP = 5e-4
@@ -53,40 +51,60 @@ class March(NamedTuple):
 
 
 def march(
-    memory: Memory,
-    threads: int | None = None,
-    progress: Progress | None = None,
-    cancel: Cancel = NEVER,
-    cells: Cells | None = None,
+    memory: Memory, worker: Worker | None = None, progress: Progress | None = None, cells: Cells | None = None
 ) -> March:
     """March all shots, and march those again in wider windows which leave theirs.
 
+    A CPU launch runs its shots one after another on the calling thread, without the interpreter lock. Signals reach
+    the main thread, so it computes nothing where others do: an interrupt need not wait for a long shot.
+
     Args:
-        threads, progress, cancel: as in `simulate`.
+        progress: as in `simulate`.
         cells: cells of the plate's window; by default as many as shots need.
 
     Raises:
         MemoryError: no window that holds a core fits.
     """
-    count, outcomes = len(memory.prepared.shots), memory.outcomes()
-    threads, sizes = max(1, min(launching(threads), count)), MAX_DOUBLINGS if cells is None else 1
-    cells = cells or _first_cells(memory, threads)
-    memory, pending = memory.with_windows(cells), np.arange(count)
+    worker = worker or Worker()
+    count, outcomes, device = len(memory.prepared.shots), memory.outcomes(), memory.device
+    threads, sizes = max(1, min(launching(worker.threads), count)), MAX_DOUBLINGS if cells is None else 1
+    cells, pending, finished = cells or _first_cells(memory, threads), np.arange(count), 0
+
+    def report(done: int) -> None:
+        worker.cancel.check()
+        if progress is not None:
+            progress(finished + done, count)
+
     for size in range(1, sizes + 1):
-
-        def report(done: int, finished: int = count - len(pending)) -> None:
-            cancel.check()
-            if progress is not None:
-                progress(finished + done, count)
-
-        _march_some(memory, cells, threads, pending, outcomes, report)
+        memory = memory.with_windows(cells)
+        load(memory.stage.kernel, device)
+        slots, scratches = memory.scratches(cells, threads)
+        in_order = memory.variant.free_surface and device.is_cpu
+        order = memory.put(cache_order(memory.prepared, pending) if in_order else pending, wp.int32)
+        if len(scratches) == 1:
+            batches = Batches(len(pending), 1, report, of=slots if device.is_cuda else None)
+            memory.launch(order, outcomes, scratches[0], slots, batches)
+        else:
+            batches, pool = Batches(len(pending), SHARES * len(scratches)), ThreadPoolExecutor(len(scratches))
+            try:
+                working = set[Future[None]]()
+                for scratch in scratches:
+                    working.add(pool.submit(memory.launch, order, outcomes, scratch, slots, batches))
+                while working:
+                    ended, working = wait(working, REPORT_INTERVAL, FIRST_EXCEPTION)
+                    for thread in ended:
+                        thread.result()
+                    report(batches.done)
+            finally:
+                batches.end()
+                pool.shutdown(wait=False, cancel_futures=True)
         pending = np.flatnonzero(outcomes.status.numpy() == Status.LEFT_WINDOW)
-        wider = 2 * cells[0], 2 * cells[1]
+        finished, wider = count - len(pending), (2 * cells[0], 2 * cells[1])
         if not len(pending) or size == sizes or memory.slots(wider, threads) == 0:
             break
-        cells, memory = wider, memory.with_windows(wider)
-    if progress is not None:
-        progress(count, count)
+        cells = wider
+    finished = 0
+    report(count)
     return March(memory, cells, outcomes)
 
 
@@ -100,76 +118,38 @@ def _first_cells(memory: Memory, threads: int) -> Cells:
     return cells
 
 
-def _march_some(
-    memory: Memory, cells: Cells, threads: int, which: Numbers, outcomes: Any, report: Callable[[int], None]
-) -> None:
-    """March the shots of the given numbers in windows of one size.
+class Batches:
+    """Some shots in batches, each as its first place and its number of shots; iterated by several threads at once.
 
-    A CPU launch runs its shots one after another on the calling thread, without the interpreter lock. Signals reach
-    the main thread, so it computes nothing where others do: an interrupt need not wait for a long shot.
-    """
-    load(memory.stage.kernel, memory.device)
-    slots = memory.slots(cells, threads)
-    if not memory.device.is_cpu:
-        slots, scratch = halving(slots, lambda slots: memory.scratch(slots, cells))
-        order = memory.put(which, wp.int32)
-        for first in range(0, len(which), slots):
-            count = min(slots, len(which) - first)
-            memory.launch(order, outcomes, scratch, slots, first, count)
-            wp.synchronize_device(memory.device)
-            report(first + count)
-        return
-    slots, scratches = halving(slots, lambda slots: [memory.scratch(1, cells) for _ in range(slots)])
-    order = memory.put(cache_order(memory.prepared, which) if memory.variant.free_surface else which, wp.int32)
-    chunks = Chunks(len(which), SHARES * slots if slots > 1 else 1)
-    launches = [partial(memory.launch, order, outcomes, scratch, 1) for scratch in scratches]
-    if slots == 1:
-        chunks.launch_all(launches[0], report)
-        return
-    pool = ThreadPoolExecutor(slots)
-    try:
-        working = {pool.submit(chunks.launch_all, launch) for launch in launches}
-        while working:
-            ended, working = wait(working, REPORT_INTERVAL, FIRST_EXCEPTION)
-            for thread in ended:
-                thread.result()
-            report(chunks.done)
-    finally:
-        chunks.end()
-        pool.shutdown(wait=False, cancel_futures=True)
-
-
-class Chunks:
-    """Some shots in chunks; safe to use by several threads.
-
-    The first chunks have one shot each, because some scenes take seconds per shot. The last ones are small, so that no
+    The first batches have one shot each, because some scenes take seconds per shot. The last ones are small, so that no
     thread waits long for another.
 
     Args:
         total: number of shots.
-        shares: fewest chunks into which the remaining shots would be divided, unless these take no time.
+        shares: fewest batches into which the remaining shots would be divided, unless these take no time.
+        report: called with the number of shots that are done, after each batch.
+        of: number of shots of every batch.
     """
 
-    def __init__(self, total: int, shares: int) -> None:
-        self.total, self.done, self._shares = total, 0, shares
+    def __init__(
+        self, total: int, shares: int, report: Callable[[int], object] = lambda done: None, of: int | None = None
+    ) -> None:
+        self.total, self.done, self._shares, self._report, self._of = total, 0, shares, report, of
         self._begun, self._pace, self._lock = 0, math.inf, threading.Lock()
 
-    def launch_all(
-        self, launch: Callable[[int, int], object], report: Callable[[int], object] = lambda done: None
-    ) -> None:
-        """Launch chunks, each with its first place and its number of shots, until none is left."""
-        while (chunk := self._next())[1]:
+    def __iter__(self) -> Iterator[tuple[int, int]]:
+        while (batch := self._next())[1]:
             begin = time.perf_counter()
-            launch(*chunk)
+            yield batch
             with self._lock:
-                self.done += chunk[1]
-                self._pace = max(time.perf_counter() - begin, 1e-9) / chunk[1]
-            report(self.done)
+                self.done += batch[1]
+                self._pace = max(time.perf_counter() - begin, 1e-9) / batch[1]
+            self._report(self.done)
 
     def _next(self) -> tuple[int, int]:
         with self._lock:
             left, fewest, most = self.total - self._begun, SHORTEST / self._pace, LONGEST / self._pace
-            count = min(max(left // self._shares, int(fewest)), int(most))
+            count = self._of or min(max(left // self._shares, int(fewest)), int(most))
             first, count = self._begun, min(max(1, count), left)
             self._begun += count
             return first, count

@@ -6,6 +6,7 @@ from __future__ import annotations
 import math
 import threading
 import time
+from collections.abc import Iterable
 from dataclasses import replace
 from functools import partial
 from types import ModuleType
@@ -20,11 +21,10 @@ from warpimpact.kernels.trace import WIDTH
 from warpimpact.kernels.variant import Variant
 from warpimpact.records.outcomes import Outcomes
 from warpimpact.records.variable import Returned
-from warpimpact.solver.device import SMALL_MEMORY, free_memory, load
+from warpimpact.solver.device import NEVER, SMALL_MEMORY, Cancel, free_memory, load
 from warpimpact.solver.grid import Cells
 from warpimpact.solver.prepare import Prepared
 from warpimpact.solver.structs import Put, empty, filled, inputs_of
-from warpimpact.solver.worker import NEVER, Cancel
 
 Array = NDArray[np.float64]
 
@@ -42,7 +42,7 @@ class Memory:
         stage, flight: builds of the march and of the free flight that the scene needs.
         put: puts values on the device.
         inputs: what a launch of the march reads.
-        rings, patches: numbers of the largest surface.
+        rings, patches: numbers of the largest surface; no patches in the nodal scheme, which keeps none.
         bending, passage, history: what the march fills beside the outcomes.
     """
 
@@ -56,7 +56,8 @@ class Memory:
         self.put = Put(device.alias, variant.real)
         self.inputs, self._kept = inputs_of(self.stage, prepared, self.put)
         self.rings = max(len(surface.rings.station) for surface in prepared.surfaces)
-        self.patches = max(len(surface.rings.station) * surface.around for surface in prepared.surfaces)
+        every = (len(surface.rings.station) * surface.around for surface in prepared.surfaces)
+        self.patches = 0 if variant.nodal else max(every)
         self.bending = wp.empty(count if variant.bends else 0, dtype=self.stage.Bending, device=device)
         self.history = wp.empty((count * prepared.rows, WIDTH), dtype=variant.real, device=device)
         recorded = count if variant.layered else 0
@@ -101,11 +102,6 @@ class Memory:
             return ["filtered"]
         return ["share", "touched"] if self.variant.nodal else ["exposure", "gain", "filtered"]
 
-    @property
-    def _patches(self) -> int:
-        """Patches per slot in the Touches."""
-        return 0 if self.variant.nodal else self.patches
-
     def slots(self, cells: Cells, threads: int) -> int:
         """Slots of scratch that the free memory of the device and 32-bit indices allow; on a CPU at most one per
         thread."""
@@ -117,15 +113,10 @@ class Memory:
 
     def too_large(self, cells: Cells) -> str:
         """A message that says why there is no slot for a plate's window of these cells."""
-        prepared = self.prepared
-        windows = [
-            f"{place}: {y} × {z} nodes"
-            for (place, _), (y, z) in zip(prepared.scene.target.named, prepared.windows(cells), strict=True)
-        ]
         return (
-            f"a shot needs {self.slot_bytes(cells) / 2**30:.3g} GiB in {sum(prepared.nodes(cells)):.3g} nodes about "
-            f"its way through the target ({', '.join(windows)}), but {MEMORY_SHARE * self._free / 2**30:.3g} GiB and "
-            "2.15e+09 nodes are allowed; give a lower level or a longer degradation_length"
+            f"a shot needs {self.slot_bytes(cells) / 2**30:.3g} GiB in {sum(self.prepared.nodes(cells)):.3g} nodes "
+            f"about its way through the target, but {MEMORY_SHARE * self._free / 2**30:.3g} GiB and 2.15e+09 nodes are "
+            "allowed; give a lower level or a longer degradation_length"
         )
 
     @property
@@ -138,7 +129,7 @@ class Memory:
         nodes = sum(self.prepared.nodes(cells))
         size = 8 if self.variant.double else 4
         per_ring: int = size + (wp.types.type_size_in_bytes(self.stage.Sums) if self.variant.bends else 0)
-        patches = self._patches * (8 * size + 3 * 4)
+        patches = self.patches * (8 * size + 3 * 4)
         return int(len(self.fields) * nodes * size + patches + self.rings * per_ring)
 
     def scratch(self, slots: int, cells: Cells) -> Any:
@@ -150,7 +141,7 @@ class Memory:
         fields.cells_y, fields.cells_z = (put(column, wp.int32) for column in np.array(self.prepared.windows(cells)).T)
         for name in self.fields:
             setattr(fields, name, room(slots * fields.nodes))
-        patches, rings = slots * self._patches, slots * self.rings
+        patches, rings = slots * self.patches, slots * self.rings
         members = ["area", "slope", "shift", "gain", "y", "z"]
         free = self.variant.free_surface
         members += [f"cover_{name}" * free for name in ("y", "z", "turn", "decay")]
@@ -167,16 +158,38 @@ class Memory:
             stack.first_cells = put(self.prepared.windows_behind(self.prepared.first_cells), wp.int32)
         return filled(stage.Scratch, fields=fields, touches=touches, stack=stack)
 
-    def launch(self, order: Any, outcomes: Any, scratch: Any, slots: int, first: int, count: int) -> None:
-        """March `count` shots from order[first] on."""
+    def scratches(self, cells: Cells, threads: int) -> tuple[int, list[Any]]:
+        """Scratch for all threads: the slots of each, and one for each thread of a CPU, or one for a GPU.
+
+        There are fewer slots where the free memory, which is only an estimate, does not suffice.
+
+        Raises:
+            MemoryError: there is no memory for one slot.
+        """
+        slots = self.slots(cells, threads)
+        while True:
+            each, count = (1, slots) if self.device.is_cpu else (slots, 1)
+            try:
+                return each, [self.scratch(each, cells) for _ in range(count)]
+            except (RuntimeError, MemoryError) as error:
+                if not (isinstance(error, MemoryError) or "allocate" in str(error)):
+                    raise
+                if slots == 1:
+                    raise MemoryError(str(error)) from error
+            slots //= 2
+
+    def launch(self, order: Any, outcomes: Any, scratch: Any, slots: int, batches: Iterable[tuple[int, int]]) -> None:
+        """March batches of shots, each given by its first place in `order` and its number of shots."""
         results = filled(
             self.stage.Results, outcomes=outcomes, passage=self.passage, bending=self.bending, trace=self.history
         )
-        launch = partial(wp.launch, dim=count, block_dim=lanes.THREADS if self.device.is_cuda else 1)
+        launch = partial(wp.launch, block_dim=lanes.THREADS if self.device.is_cuda else 1)
         if self.variant.window:
-            launch = partial(wp.launch_tiled, dim=[count], block_dim=lanes.LANES)
-        inputs = [first, slots, order, self.inputs, scratch]
-        launch(self.stage.kernel, inputs=inputs, outputs=[results], device=self.device)
+            launch = partial(wp.launch_tiled, block_dim=lanes.LANES)
+        for first, count in batches:
+            inputs = [first, slots, order, self.inputs, scratch]
+            launch(self.stage.kernel, dim=[count], inputs=inputs, outputs=[results], device=self.device)
+            wp.synchronize_device(self.device)
 
     def report(self, contact: Any) -> Outcomes:
         """Compute the free flight to the stand-offs of shots that have marched; returns all that the scene records."""

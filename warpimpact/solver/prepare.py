@@ -14,8 +14,15 @@ from warpimpact.kernels.variant import Variant
 from warpimpact.scene import Numerics, Plate, Scene, Shots, exclusions
 from warpimpact.solver.cover import Pushed
 from warpimpact.solver.grid import Cells, Grid, block_window, first_windows, grids_of, windows_behind
-from warpimpact.solver.materials import Materials, materials_of
-from warpimpact.solver.resolution import Resolution, conditions_of, layer_steps, resolve, steps_of
+from warpimpact.solver.resolution import (
+    Materials,
+    Resolution,
+    conditions_of,
+    layer_steps,
+    materials_of,
+    resolve,
+    steps_of,
+)
 from warpimpact.solver.rings import Rings, Sections, azimuths_of, rings_of, sections_of
 from warpimpact.solver.tile import Tile, check_tiles
 

@@ -230,7 +230,7 @@ def _share_after(memory: Memory, cells: Cells, scratch: Any, steps: int, time_st
     """
     prepared, outcomes, fields = memory.prepared, memory.outcomes(), scratch.fields
     memory.give_up_after((steps - 0.5) * time_step * prepared.shots.velocity[-1])
-    memory.launch(memory.put(np.arange(1), wp.int32), outcomes, scratch, 1, 0, 1)
+    memory.launch(memory.put(np.arange(1), wp.int32), outcomes, scratch, 1, [(0, 1)])
     if memory.variant.nodal:
         return np.array(fields.share.numpy().reshape(cells), dtype=np.float64)
     if not prepared.materials[0].weakens:

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpimpact.scene import Core
-from warpimpact.solver.keys import Key
+from warpimpact.solver.tile import Key
 
 Array = NDArray[np.float64]
 

@@ -3,8 +3,12 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor, as_completed
+from dataclasses import replace
 from functools import cache
+from threading import Lock
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,14 +16,14 @@ from numpy.typing import NDArray
 from warpimpact.records.outcomes import Outcomes
 from warpimpact.scene import Numerics, Scene, Shots
 from warpimpact.solver.accuracy import LevelErrors, PilotResult, choose_level, hit_errors, pilot_size
-from warpimpact.solver.device import find_device
+from warpimpact.solver.device import NEVER, Cancel, Worker, find_device, launching
 from warpimpact.solver.marching import Progress, march
 from warpimpact.solver.memory import Memory
 from warpimpact.solver.prepare import Prepared, prepare
 from warpimpact.solver.resolution import at_level, coarsest_level
-from warpimpact.solver.worker import NEVER, Cancel, Worker
 
 Array = NDArray[np.float64]
+Value = TypeVar("Value")
 
 
 def simulate(
@@ -55,13 +59,8 @@ def simulate(
 
 def computed(prepared: Prepared, worker: Worker, progress: Progress | None = None) -> Outcomes:
     """Compute a prepared scene; see `simulate`."""
-    return marched(Memory(prepared, find_device(worker.device), worker.cancel), worker, progress)
-
-
-def marched(memory: Memory, worker: Worker, progress: Progress | None = None) -> Outcomes:
-    """Compute a scene in the memory of a device."""
-    end = march(memory, worker.threads, progress, worker.cancel)
-    return end.memory.report(end.outcomes)
+    memory, _, contact = march(Memory(prepared, find_device(worker.device), worker.cancel), worker, progress)
+    return memory.report(contact)
 
 
 def numerics_for(scene: Scene, shots: Shots, numerics: Numerics, worker: Worker) -> Numerics:
@@ -91,21 +90,21 @@ def pilot_of(
     if math.isinf(required.residual_velocity) and math.isinf(required.tilt):
         raise ValueError("accuracy: needs residual_velocity or tilt; a limit alone is for a search of limits")
 
-    @cache
-    def outcomes(level: int) -> Outcomes:
+    def compute(level: int) -> Outcomes:
         trying(level)
         return computed(prepare(scene, pilot, at_level(level, numerics)), worker)
-
-    @cache
-    def seconds(level: int) -> float:
-        return len(pilot) * prepare(scene, pilot[:1], at_level(level, numerics)).seconds
 
     def errors(coarse: Outcomes, fine: Outcomes) -> LevelErrors:
         return hit_errors(coarse, fine, required, scene.free_behind)
 
     first = coarsest_level(required.strictness)
     build_kernels(scene, pilot, at_level(first, numerics), worker)
-    return choose_level(numerics, first, outcomes, errors, seconds)
+    return choose_level(numerics, first, compute, errors, foreseen(scene, pilot, numerics))
+
+
+def foreseen(scene: Scene, pilot: Shots, numerics: Numerics, passages: int = 1) -> Callable[[int], float]:
+    """A function of a level: the time that some passages of a pilot's shots take there [s]."""
+    return cache(lambda level: passages * len(pilot) * prepare(scene, pilot[:1], at_level(level, numerics)).seconds)
 
 
 def build_kernels(scene: Scene, shots: Shots, numerics: Numerics, worker: Worker) -> None:
@@ -123,3 +122,56 @@ def spread_places(places: int, count: int) -> NDArray[np.int64]:
     digits = max(1, (count - 1).bit_length())
     order = np.array([int(f"{k:0{digits}b}"[::-1], 2) for k in range(2**digits)])
     return np.asarray(np.linspace(0, places, count, endpoint=False).astype(np.int64)[order[order < count]])
+
+
+def simulate_many(
+    scenes: Sequence[tuple[Scene, Shots]],
+    numerics: Numerics,
+    worker: Worker | None = None,
+    progress: Progress | None = None,
+) -> list[Outcomes]:
+    """Compute the shots of many scenes. The outcomes of each are those of `simulate`, bit for bit.
+
+    Args:
+        scenes: scenes with their shots. They may differ in everything: cores, layers, records.
+        numerics: a fixed resolution, such as Numerics(level=2), for all scenes. There is no pilot.
+        progress: called with (shots done, all shots), by any thread.
+
+    Raises:
+        DeviceError: the device is absent.
+        ValueError, MemoryError: as in `prepare`, for a scene that cannot be computed.
+    """
+    done, total, lock = [0] * len(scenes), sum(len(shots) for _, shots in scenes), Lock()
+
+    def compute(number: int, share: Worker) -> Outcomes:
+        def report(now: int, _: int) -> None:
+            with lock:
+                done[number] = now
+                if progress is not None:
+                    progress(sum(done), total)
+
+        return computed(prepare(*scenes[number], numerics), share, report)
+
+    return in_threads(compute, len(scenes), worker or Worker())
+
+
+def in_threads(compute: Callable[[int, Worker], Value], count: int, worker: Worker) -> list[Value]:
+    """The values of `compute` for the numbers 0 … count − 1, in order: on a CPU one per thread, on a GPU one by one.
+
+    Args:
+        compute: called with a number, and a worker with a share of the threads.
+
+    Raises:
+        DeviceError: the device is absent.
+    """
+    threads = launching(worker.threads) if find_device(worker.device).is_cpu else 1
+    stop, pool = Cancel(worker.cancel), ThreadPoolExecutor(threads)
+    share = replace(worker, threads=max(1, threads // max(1, count)), cancel=stop)
+    try:
+        values = [pool.submit(compute, number, share) for number in range(count)]
+        for value in as_completed(values):
+            value.result()  # raises the first error
+    finally:  # after an error or an interrupt the other results are not needed, and nobody waits for them
+        stop.cancel()
+        pool.shutdown(wait=False, cancel_futures=True)
+    return [value.result() for value in values]

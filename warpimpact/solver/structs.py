@@ -14,10 +14,9 @@ from numpy.typing import NDArray
 
 from warpimpact.scene import Core
 from warpimpact.solver.grid import Grid
-from warpimpact.solver.keys import Key
 from warpimpact.solver.prepare import Prepared
 from warpimpact.solver.rings import Rings
-from warpimpact.solver.tile import Tile
+from warpimpact.solver.tile import Key, Tile
 
 Array = NDArray[np.float64]
 

@@ -9,7 +9,7 @@ from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property, partial
 from threading import Lock
-from typing import Any, TypeVar
+from typing import Any, Generic, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,8 +17,8 @@ from scipy import ndimage
 
 from warpimpact.scene import Pattern, Plate
 from warpimpact.scene.geometry import WHOLE_CELL
+from warpimpact.scene.model import Model
 from warpimpact.solver.device import SMALL_MEMORY, free_memory
-from warpimpact.solver.keys import Key
 
 Array = NDArray[np.float64]
 Floats = NDArray[np.floating[Any]]
@@ -27,6 +27,7 @@ Real = type[np.floating[Any]]
 Check = Callable[[], object]
 """What is called often, and raises to end the work."""
 Kept = TypeVar("Kept", bound="Tile")
+Value = TypeVar("Value", bound=Model)
 
 BLUR = 3
 """Cells over which the material is averaged, in each direction, so that a patch crosses an edge gradually. Odd."""
@@ -42,6 +43,26 @@ PER_CELL, PER_SHARP_CELL = 5.0e-8, 1.0e-7
 """Seconds of a core per cell (tests/benchmarks/NOTES.md)."""
 MOST_KEPT = 16
 """Most tiles, built or not, that are kept for later shots at the same plate."""
+
+
+@dataclass(frozen=True, eq=False)
+class Key(Generic[Value]):
+    """A model as the key of a cache. Two keys are equal if their models have the same fields. A model that reads a file
+    equals itself only, because the file may have changed between two readings."""
+
+    value: Value
+
+    @property
+    def _reads(self) -> bool:
+        return "file" in type(self.value).model_fields
+
+    def __eq__(self, other: object) -> bool:
+        if not isinstance(other, Key):
+            return False
+        return self.value is other.value or (not self._reads and bool(self.value == other.value))
+
+    def __hash__(self) -> int:
+        return id(self.value) if self._reads else hash(self.value)
 
 
 @dataclass(frozen=True, eq=False)

@@ -24,7 +24,7 @@ from warpimpact.scene.model import Array
 from warpimpact.scene.quantities import QUANTITIES
 from warpimpact.scene.units import quantity as reader_of
 from warpimpact.solver.accuracy import errors_text, share_text
-from warpimpact.solver.limit_search import MOST_RUNS
+from warpimpact.solver.limit import MOST_RUNS
 
 _MOST_LISTED = 12
 

@@ -26,10 +26,9 @@ from warpimpact.results.measures import Measure, estimate_from
 from warpimpact.scene import Interaction, Numerics, Plate, Radians, Shots
 from warpimpact.scene.interaction import NEAR_EDGES
 from warpimpact.scene.model import Array
-from warpimpact.solver.many import simulate_many
+from warpimpact.solver.device import Worker
 from warpimpact.solver.marching import Progress
-from warpimpact.solver.simulate import numerics_for, spread
-from warpimpact.solver.worker import Worker
+from warpimpact.solver.simulate import numerics_for, simulate_many, spread
 from warpimpact.statistics.intervals import estimate_of
 
 AS_GIVEN = "as given"

@@ -29,7 +29,7 @@ from warpimpact.results.kinds import CAMPAIGN, SWEEP
 from warpimpact.results.measures import Measure
 from warpimpact.runs.chunks import Interrupted
 from warpimpact.runs.computer import Computer
-from warpimpact.runs.run import run_to_file
+from warpimpact.runs.run import RunProgress, run_to_file
 from warpimpact.scene.units import quoted, reader_in
 
 SHOWN = (f"mean({v.RESIDUAL_VELOCITY})", f"mean({v.DEFLECTION})", f"mean({v.TILT})", "P(perforated)")
@@ -152,7 +152,7 @@ def run_sweep(
     device: str | Computer = "auto",
     resume: bool = False,
     overwrite: bool = False,
-    progress: Callable[[str], Any] | None = None,
+    progress: Callable[[str], Callable[[RunProgress], object]] = lambda name: lambda now: None,
     warn: Callable[[str], object] = warnings.warn,
 ) -> None:
     """Compute every point of a sweep by `run_to_file`, and join their files into one.
@@ -176,8 +176,9 @@ def run_sweep(
     done = 0
     try:
         for (name, campaign), path in zip(sweep.campaigns.items(), paths, strict=True):
-            follow = progress(name) if progress else None
-            run_to_file(campaign, path, device=device, resume=resume, overwrite=overwrite, progress=follow, warn=warn)
+            run_to_file(
+                campaign, path, device=device, resume=resume, overwrite=overwrite, progress=progress(name), warn=warn
+            )
             done += 1
         files.write(joined(sweep, [files.read(path) for path in paths]), output)
     except (files.OutputError, Interrupted) as error:

@@ -24,10 +24,9 @@ from warpimpact.results.measures import Measure, shift_of
 from warpimpact.results.references import references_of, with_references
 from warpimpact.results.variables import LIMITS, STATUS
 from warpimpact.results.vocabulary import piercing_margin
-from warpimpact.runs.compute import compute_limits
-from warpimpact.runs.describe import described
+from warpimpact.runs.compute import compute_hits, described
 from warpimpact.scene import Numerics
-from warpimpact.solver.worker import Worker
+from warpimpact.solver.device import Worker
 from warpimpact.studies.limit import limit_of
 from warpimpact.studies.limit_view import limit_view, proxy
 
@@ -235,8 +234,8 @@ def test_the_proxy_next_to_the_limit_thickness() -> None:
     """The ratio of base armour that a core needs at 0° and at 85°: 2.8 by the kernel, 4.4 by the proxy."""
     campaign = Campaign.from_toml(CAMPAIGNS / "base_armour.toml")
     limit, numerics = limit_of(campaign, "thickness"), Numerics(level=2)
-    dataset = compute_limits(limit, campaign, numerics, campaign.sampler().shots(0, 7), 0, worker=Worker("cpu"))
-    dataset = described(dataset, campaign, numerics, limit=limit)
+    dataset = compute_hits(limit, campaign, numerics, campaign.sampler().shots(0, 7), 0, worker=Worker("cpu"))
+    dataset = described(dataset, campaign, xarray.Dataset(), limit)
     thickness, actual = 1e3 * dataset["limit_thickness"].values, proxy(dataset)
     assert actual is not None
     assert actual["inclination [°]"].tolist() == pytest.approx([0, 15, 30, 45, 60, 75, 85])

@@ -10,7 +10,7 @@ import pytest
 
 from warpimpact.cli.common import show_run
 from warpimpact.results.measures import Measure
-from warpimpact.runs.progress import RunProgress
+from warpimpact.runs.run import RunProgress
 from warpimpact.statistics.intervals import Estimate
 
 LOUD = argparse.Namespace(quiet=False)

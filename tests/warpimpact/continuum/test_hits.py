@@ -14,8 +14,7 @@ from warpimpact.continuum.meshing import nodes_of
 from warpimpact.continuum.one_hit import Energies
 from warpimpact.kernels.status import Status
 from warpimpact.scene import PolynomialCore, Shots
-from warpimpact.solver.device import find_device
-from warpimpact.solver.worker import Worker
+from warpimpact.solver.device import Worker, find_device
 
 CORE = PolynomialCore(coefficients=(3.0e-4, 0.24, -5.29), length=27.86e-3, mass=4.0e-3)
 PLATE = Plate(thickness=4e-3, resistance=2.6e9)

@@ -31,7 +31,7 @@ from warpimpact.results import files, front
 from warpimpact.scene.input_files import input_file
 from warpimpact.scene.model import Model
 from warpimpact.solver import simulate
-from warpimpact.solver.worker import Cancel
+from warpimpact.solver.device import Cancel
 
 CAMPAIGNS = Path(__file__).parents[3] / "campaigns"
 
@@ -192,9 +192,9 @@ def test_who_leaves_ends_the_work(address: str, small: Path, monkeypatch: pytest
     tables["hits"]["count"] = 2**18
     marched, march = [], simulate.march
 
-    def marching(memory: Any, threads: Any, progress: Any, cancel: Any) -> Any:
-        marched.append(cancel)
-        return march(memory, threads, progress, cancel)
+    def marching(memory: Any, worker: Any, progress: Any) -> Any:
+        marched.append(worker.cancel)
+        return march(memory, worker, progress)
 
     monkeypatch.setattr(simulate, "march", marching)
     place = urlsplit(address)

@@ -14,7 +14,7 @@ from warpimpact.campaign.text import CampaignError
 from warpimpact.identification.fit import Fit, fit_from
 from warpimpact.identification.identify import identify
 from warpimpact.identification.likelihood import alike_shots, evaluate
-from warpimpact.solver.worker import Worker
+from warpimpact.solver.device import Worker
 
 FitMaker = Callable[..., Fit]
 RESISTANCE = 'resistance = { distribution = "uniform", low = "1 GPa", high = "4 GPa" }'

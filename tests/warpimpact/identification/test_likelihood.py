@@ -13,8 +13,8 @@ from warpimpact.kernels.status import Status
 from warpimpact.records.outcomes import Outcomes
 from warpimpact.records.registry import OUTCOME_VARIABLES
 from warpimpact.scene import IDENTITY, Shots, Symmetry
+from warpimpact.solver.device import Worker
 from warpimpact.solver.simulate import simulate
-from warpimpact.solver.worker import Worker
 
 FitMaker = Callable[..., Fit]
 POINTS, SETS = 16, 2

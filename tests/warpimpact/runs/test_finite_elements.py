@@ -15,7 +15,7 @@ from warpimpact.export.paraview import write_vtk
 from warpimpact.results import attributes as attr
 from warpimpact.results import files
 from warpimpact.results.references import references_of
-from warpimpact.runs.finite_elements import continuum_to_file
+from warpimpact.runs.run import continuum_to_file
 
 CAMPAIGN = """
 title = "slots"

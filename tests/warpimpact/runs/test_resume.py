@@ -22,8 +22,7 @@ from warpimpact.results import files
 from warpimpact.results.files import OutputError
 from warpimpact.runs.chunks import Chunks, Interrupted, first_difference, folder_of
 from warpimpact.runs.compute import manifest
-from warpimpact.runs.progress import RunProgress
-from warpimpact.runs.run import run, run_to_file
+from warpimpact.runs.run import RunProgress, run, run_to_file
 
 SameBits = Callable[[Path, Path], None]
 SLOTTED_PLATE = (Path(__file__).parents[3] / "campaigns" / "slotted_plate.toml").read_text(encoding="utf-8")
@@ -171,7 +170,7 @@ def test_a_kill_between_any_two_steps_on_the_disk_is_survived(
                 run_to_file(small, output, device="cpu", resume=True)
             except Killed:
                 steps += 1
-    assert steps >= 6
+    assert steps >= 5
     assert_same_bits(output, straight)
 
 
@@ -196,7 +195,7 @@ def stopped_after(chunks: int, error: BaseException) -> object:
 def broken_off(campaign: Campaign, tmp_path: Path) -> Path:
     """A result file whose run was interrupted."""
     output = tmp_path / "a.nc"
-    with pytest.raises(Interrupted, match=r"^interrupted; \d+ chunks are saved in .*a.nc.parts; continue with"):
+    with pytest.raises(Interrupted, match=r"^interrupted; what is computed is saved in .*a.nc.parts; continue with"):
         run_to_file(campaign, output, device="cpu", progress=stopped_after(2, KeyboardInterrupt()))
     assert not output.exists()
     return output
@@ -292,8 +291,8 @@ def test_damaged_chunks_are_computed_again(campaign: Campaign, tmp_path: Path, f
     warnings: list[str] = []
     standings: list[RunProgress] = []
     finished(output, warn=warnings.append, progress=standings.append)
-    assert len(warnings) == 1
-    assert "and 3 more: damaged; computed again" in warnings[0]
+    assert len(warnings) == 4
+    assert all(sentence.endswith("damaged; computed again") for sentence in warnings)
     assert standings[0].resumed == min(256 * len(saved), COUNT) - 256 * 4
     assert not folder_of(output).exists()
 
@@ -327,7 +326,7 @@ def test_a_disk_that_is_full_at_the_end_loses_nothing(
     done = _with_files_up_to(undisturbed.stat().st_size // 2, *command)
     assert done.returncode == 2, done.stderr
     assert "a.nc: cannot be written" in done.stderr
-    assert f"16 chunks are saved in {output}.parts; continue with --resume" in done.stderr
+    assert f"what is computed is saved in {output}.parts; continue with --resume" in done.stderr
     assert "Traceback" not in done.stderr
     assert not output.exists()
     assert main([*command, "--resume"]) == 0

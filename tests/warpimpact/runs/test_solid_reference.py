@@ -61,17 +61,6 @@ def test_it_takes_the_shots_of_the_first_shard_if_they_differ_and_none_if_not_re
     assert {name: one.sizes["hit"] for name, one in references.items()} == ({"solid": shots} if shots else {})
 
 
-def test_tasks_of_many_shards_give_the_same_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, assert_same_bits):
-    (tmp_path / "a.toml").write_text(SMALL, encoding="utf-8")
-    campaign = Campaign.from_toml(tmp_path / "a.toml")
-    run_to_file(campaign, tmp_path / "one.nc", device="cpu")
-    monkeypatch.setattr("warpimpact.runs.run._task_size", lambda *_: 2**17)
-    run_to_file(campaign, tmp_path / "many.nc", device="cpu")
-    assert_same_bits(tmp_path / "one.nc", tmp_path / "many.nc")
-    with open_result(tmp_path / "many.nc", group="solid") as solid:
-        assert solid["status"].dims == ("hit",)
-
-
 def test_it_is_a_campaign_of_its_own(tmp_path: Path) -> None:
     dataset = computed(
         tmp_path, ('"825 m/s" ', '{ distribution = "uniform", low = 700, high = 850 } '), ("= 600", "= 32")

@@ -14,9 +14,8 @@ from warpimpact.campaign.campaign import CampaignError
 from warpimpact.results import files
 from warpimpact.results.measures import Measure, Tally
 from warpimpact.runs.chunks import Chunks, Interrupted
-from warpimpact.runs.progress import RunProgress, Watch
 from warpimpact.runs.replay import replay
-from warpimpact.runs.run import run, run_to_file
+from warpimpact.runs.run import RunProgress, Watch, run, run_to_file
 
 from ..results.test_measures import LEAST, TRIALS, TRUTHS, shard_of
 
@@ -74,11 +73,11 @@ def test_intervals_of_replicates_hold_as_often_as_they_say_and_are_narrower(
 def watched(campaign: Campaign, count: int) -> Watch:
     """Follow made-up hits until the stop rule is met."""
     chunks, values = Chunks(None, {}), surface(campaign, 0, count)
-    watch = Watch(campaign, chunks, 256)
+    watch = Watch(campaign, chunks, "cpu")
     for number in range(count // 256):
         chunks.save(number, shard_of(values[number * 256 : (number + 1) * 256]))
-        watch.add(number)
-        if watch.ended:
+        watch.add(number, chunks.load(number))
+        if watch.stop:
             break
     return watch
 
@@ -113,7 +112,7 @@ def test_a_run_goes_on_as_long_as_hits_may_make_up_for_the_numerics(
     low, high = watch.stop["estimate_interval"]
     assert watch.stop["stop_reason"] == reason
     assert 0.5 * (high - low) <= (0.05 - shift if reason == "half_width" else 0.025)
-    assert watch.hits < 2**13  # where more are of no use the half that is left to hits is met
+    assert watch.hits(watch.count) < 2**13  # where more are of no use the half that is left to hits is met
 
 
 @pytest.mark.parametrize(

@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 from warpimpact import Campaign, run
 from warpimpact.kernels.status import Status
 from warpimpact.records.outcomes import Outcomes
-from warpimpact.runs.describe import pilot_in
 from warpimpact.runs.replay import replay
 from warpimpact.scene import (
     PRESETS,
@@ -55,18 +54,16 @@ def chosen(
     first: int = 0,
 ) -> tuple[PilotResult, list[int]]:
     """The level chosen for residual velocities that depend on the level, and the levels computed."""
-    computed = dict[int, Outcomes]()
+    levels = list[int]()
 
-    def outcomes(level: int) -> Outcomes:
-        if level not in computed:
-            computed[level] = outcomes_of(speeds(level))
-        return computed[level]
+    def compute(level: int) -> Outcomes:
+        levels.append(level)
+        return outcomes_of(speeds(level))
 
     def errors(coarse: Outcomes, fine: Outcomes) -> LevelErrors:
         return hit_errors(coarse, fine, accuracy, (True,))
 
-    actual = choose_level(Numerics(accuracy=accuracy), first, outcomes, errors, seconds)
-    return actual, list(computed)
+    return choose_level(Numerics(accuracy=accuracy), first, compute, errors, seconds), levels
 
 
 @pytest.mark.parametrize("ratio", [0.5, 0.25])
@@ -94,7 +91,6 @@ def test_an_accuracy_that_no_level_keeps_is_not_promised() -> None:
     assert (actual.kept, actual.numerics.level) == (False, FINEST)  # where errors fall, the finest level is best
     change = 1e4 * (0.5**FINEST - 0.5 ** (FINEST + 2))
     assert actual.errors["residual_velocity_error"] == pytest.approx(ERROR_PER_CHANGE * change)
-    assert actual.phrase.endswith("for 90 % of the hits, not as promised")
     stalled, _ = chosen(lambda level: np.full(8, 500.0 + 30.0 * 0.5**level + 40.0 * (level // 2 % 2)))
     assert (stalled.kept, stalled.numerics.level) == (False, 0)  # where errors stall, the coarsest one is as good
 
@@ -119,7 +115,6 @@ def test_a_pilot_ends_where_hits_take_too_long_or_do_not_fit() -> None:
         assert chosen(speeds)[0].numerics.level == 2
         unknown, _ = chosen(speeds, first=3)
         assert (unknown.kept, unknown.numerics.level, unknown.errors) == (False, 3, {})
-        assert unknown.phrase == "accuracy unknown for 90 % of the hits, not as promised"
 
 
 def test_a_pilot_ends_by_the_time_that_it_takes_and_says_so(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -177,9 +172,6 @@ def test_a_result_has_its_promise_and_replays_on_its_level() -> None:
     before, after = text.split("[hits]")[0], '\n[numerics]\nfidelity = "draft"\n'
     campaign = Campaign.from_text(f"{before}[hits]\ncount = 12{after}", name="t", folder=Path())
     result = run(campaign, device="cpu")
-    actual = pilot_in(result)
-    assert actual is not None
-    assert actual.kept
     assert result.attrs["promise_kept"] == 1
-    assert 0.0 < result.attrs["residual_velocity_error"] == actual.errors["residual_velocity_error"] <= 5.0
+    assert 0.0 < result.attrs["residual_velocity_error"] <= 5.0
     assert replay(result, 5, folder=Path()).attrs["agreement"] == "bit-identical"

@@ -11,11 +11,10 @@ from warpimpact.kernels.status import Status
 from warpimpact.records.outcomes import Outcomes
 from warpimpact.scene import CirclePattern, Layer, Numerics, OgiveCore, Plate, Scene, Shots, Target
 from warpimpact.solver import limit
-from warpimpact.solver.limit import LimitSpec, limit_thickness, limit_velocity
-from warpimpact.solver.limit_search import MOST_RUNS
+from warpimpact.solver.device import Cancel, Cancelled, Worker
+from warpimpact.solver.limit import MOST_RUNS, LimitSpec, limit_thickness, limit_velocity
 from warpimpact.solver.prepare import Prepared
 from warpimpact.solver.simulate import simulate
-from warpimpact.solver.worker import Cancel, Cancelled, Worker
 
 Array = NDArray[np.float64]
 

@@ -7,8 +7,8 @@ import pytest
 
 from warpimpact import Campaign, Numerics, Scene, simulate
 from warpimpact.scene import Shots
-from warpimpact.solver.many import simulate_many
-from warpimpact.solver.worker import Cancel, Cancelled, Worker
+from warpimpact.solver.device import Cancel, Cancelled, Worker
+from warpimpact.solver.simulate import simulate_many
 
 CAMPAIGNS = Path(__file__).parents[3] / "campaigns"
 LEVEL = Numerics(level=0)

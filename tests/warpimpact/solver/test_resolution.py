@@ -13,14 +13,19 @@ from warpimpact.scene import (
     PolynomialCore,
     Scene,
 )
+from warpimpact.solver.prepare import prepare
 from warpimpact.solver.resolution import (
     LADDER,
+    MOST_STEPS,
     NODAL_SETTINGS,
     SLENDER,
     WEAKENING,
     Resolution,
+    TooManySteps,
     resolve,
 )
+
+from ...verification.scenes import shots_at
 
 PAPER = PolynomialCore(coefficients=(3.0e-4, 0.24, -5.29), length=27.86e-3, density=7850.0)
 PLATE = Plate(thickness=4e-3, resistance=2.6e9, degradation_length=0.6e-3)
@@ -71,3 +76,12 @@ def test_step_is_bounded_by_what_contact_takes_off_the_resistance() -> None:
         if 0.0 < degradation < 1.0:
             bound = WEAKENING * LADDER[2].travel * interval / -np.log(degradation)
         assert step == pytest.approx(min(free, max(bound, 0.25 * free)))
+
+
+def test_a_shot_of_too_many_steps_is_refused() -> None:
+    steps = prepare(SCENE, shots_at(np.zeros(1)), Numerics(time_step=1e-7)).steps
+    shortest = 1e-7 * steps / MOST_STEPS
+    slow = prepare(SCENE, shots_at(np.zeros(1)), Numerics(time_step=1.1 * shortest))
+    assert slow.steps == pytest.approx(MOST_STEPS / 1.1, rel=0.05)
+    with pytest.raises(TooManySteps, match=r"takes 1\..*e\+07 steps of .* ns, but at most 1e\+07 are computed"):
+        prepare(SCENE, shots_at(np.zeros(1)), Numerics(time_step=0.9 * shortest))

@@ -12,9 +12,9 @@ from warpimpact.scene import (
     SlotPattern,
     TrianglePattern,
 )
+from warpimpact.solver.device import Cancelled
 from warpimpact.solver.grid import FINER, tent_taps
 from warpimpact.solver.tile import check_tiles, forget_tiles, tile_of
-from warpimpact.solver.worker import Cancelled
 
 PLATE = Plate(thickness=4e-3, resistance=2.6e9, degradation_length=0.6e-3)
 PATTERNS = [

@@ -22,9 +22,8 @@ from warpimpact.runs import compute
 from warpimpact.runs.replay import replay
 from warpimpact.scene import Numerics, make_shots
 from warpimpact.solver.accuracy import PILOT_LIMITS
-from warpimpact.solver.limit import limit_velocity
-from warpimpact.solver.limit_search import MOST_RUNS
-from warpimpact.solver.worker import Worker
+from warpimpact.solver.device import Worker
+from warpimpact.solver.limit import MOST_RUNS, limit_velocity
 from warpimpact.studies.limit import limit_of, limit_to_file
 from warpimpact.studies.limit_view import limit_view
 
@@ -235,7 +234,7 @@ def test_limits_do_not_depend_on_the_tasks(quantity: str, monkeypatch: pytest.Mo
     of = campaign(TEXT.replace('fidelity = "draft"', "level = 0"))
     limit, shots = limit_of(of, quantity), of.sampler().shots(0, 32)
     whole, *parts = (
-        compute.compute_limits(limit, of, of.numerics, shots[first:end], first, worker=Worker("cpu"))
+        compute.compute_hits(limit, of, of.numerics, shots[first:end], first, worker=Worker("cpu"))
         for first, end in ((0, 32), (0, 8), (8, 32))
     )
     for name in v.LIMITS[quantity]:
