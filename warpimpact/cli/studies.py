@@ -29,8 +29,7 @@ from warpimpact.results import files, front
 from warpimpact.results.kinds import SWEEP
 from warpimpact.results.posterior_file import INTERRUPTED
 from warpimpact.scene.units import PositiveLength, PositiveSpeed, quantity
-from warpimpact.studies.limit import check_measures, limit_to_file, warning_of
-from warpimpact.studies.limit_view import limit_view
+from warpimpact.studies.limit import check_measures, limit_to_file, limit_view
 from warpimpact.studies.sensitivity import largest_move, sensitivity
 from warpimpact.studies.sweep import folder_of as points_of
 from warpimpact.studies.sweep import read_sweep, run_sweep, sweep_view
@@ -54,8 +53,8 @@ def limit_command(arguments: argparse.Namespace) -> int:
     campaign = Campaign.from_toml(arguments.campaign, count=arguments.count, needs_velocity=needs_velocity)
     output, picture = outputs(arguments, f"{arguments.campaign.stem}_limit")
     check_measures(arguments.measure, arguments.quantity)
-    if sentence := warning_of(campaign, arguments.quantity):
-        warn(sentence)
+    if (arguments.quantity, 0) in campaign.scatter.given:
+        warn(f"a limit {arguments.quantity} does not depend on its scatter, which says where the searches begin")
     with show_run(arguments) as progress:
         limit_to_file(
             campaign,

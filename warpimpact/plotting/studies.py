@@ -39,7 +39,7 @@ from warpimpact.results import variables as v
 from warpimpact.results.measures import Measure
 from warpimpact.results.references import reference
 from warpimpact.scene.units import STORED
-from warpimpact.studies.limit_view import inclination, measures_of, promise_line, shown_unit
+from warpimpact.studies.limit import UNITS, inclination, measures_of, promise_line
 from warpimpact.studies.sweep import inputs_of, sweep_table
 from warpimpact.studies.sweep import measures_of as measures_of_sweep
 
@@ -82,7 +82,7 @@ def _draw_over_obliquity(axes: Axes, dataset: xarray.Dataset) -> None:
     """Draw the limits of hits at one place against the obliquity, beside the secant law through the least oblique hit.
     If all hits have one obliquity, draw them against the inclination of the core."""
     quantity = dataset.attrs[attr.LIMIT]
-    unit, factor = shown_unit(quantity)
+    unit, factor = UNITS[quantity]
     value, obliquity = dataset[v.LIMITS[quantity].value].values, dataset[v.OBLIQUITY].values
     yawed = np.ptp(obliquity) == 0.0
     along = np.degrees(inclination(dataset)) if yawed else obliquity
@@ -113,7 +113,7 @@ def _draw_curve(axes: Axes, dataset: xarray.Dataset) -> None:
     """Draw the cumulative share of the limits, with the references and measures. Limits beyond the largest value tried
     keep it below 1."""
     quantity, layer = dataset.attrs[attr.LIMIT], int(dataset.attrs[attr.LIMIT_LAYER])
-    unit, factor = shown_unit(quantity)
+    unit, factor = UNITS[quantity]
     values = dataset[v.LIMITS[quantity].value].values
     values = factor * np.sort(values[~np.isnan(values)])
     finite = values[np.isfinite(values)]

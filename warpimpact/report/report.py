@@ -53,7 +53,7 @@ from warpimpact.results.dataset import hit_numbers, passed
 from warpimpact.results.files import ResultError
 from warpimpact.runs.replay import replay
 from warpimpact.scene.units import MM
-from warpimpact.studies.limit_view import in_short, limit_view
+from warpimpact.studies.limit import in_short, limit_view
 
 
 def report_page(

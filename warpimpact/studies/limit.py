@@ -2,25 +2,45 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import json
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+import pandas as pd
+import xarray
+from pydantic import TypeAdapter
+
+from warpimpact.analysis.effectiveness import reference_name
+from warpimpact.analysis.estimates import estimated, measures_named
+from warpimpact.analysis.inspection import numerics_note
+from warpimpact.analysis.numbers import View, interval_text
 from warpimpact.campaign.campaign import Campaign
 from warpimpact.campaign.evidence import resistance_by_thickness
-from warpimpact.campaign.text import CampaignError
-from warpimpact.results.measures import Measure
-from warpimpact.results.vocabulary import LIMIT_VELOCITY
+from warpimpact.campaign.text import CampaignError, as_campaign_error
+from warpimpact.results import attributes as attr
+from warpimpact.results import variables as v
+from warpimpact.results.measures import NAMES, Measure
+from warpimpact.results.references import reference
+from warpimpact.results.vocabulary import LIMIT_VELOCITY, needed_density
 from warpimpact.runs.run import run_to_file
-from warpimpact.scene import exclusions
+from warpimpact.scene import AnyCore, Core, exclusions
+from warpimpact.scene.model import Array
+from warpimpact.solver.accuracy import errors_text, share_text
 from warpimpact.solver.limit import (
     HIGHEST_VELOCITY,
+    MOST_RUNS,
     THICKNESS_TOLERANCE,
     VELOCITY_TOLERANCE,
     LimitSpec,
     check_arrests,
     thickest,
 )
+
+_MOST_LISTED = 12
+UNITS = {"velocity": ("m/s", 1.0), "thickness": ("mm", 1e3)}
+"""Display unit of a limit, and the factor to it."""
 
 
 def limit_to_file(
@@ -57,12 +77,10 @@ def limit_of(
     Raises:
         CampaignError: the campaign has no limits, or this search cannot find them.
     """
-    try:
+    with as_campaign_error():
         stop = {exclusions.STOP: campaign.stop is not None}
         exclusions.check_together({exclusions.LIMIT_COMMAND: True} | stop)
         check_arrests(campaign.scene, campaign.sampler().shots(0, 1))
-    except ValueError as error:
-        raise CampaignError(str(error)) from None
     if quantity == "velocity":
         return LimitSpec(quantity, tolerance or VELOCITY_TOLERANCE, HIGHEST_VELOCITY)
     plates = campaign.target.layers
@@ -80,19 +98,150 @@ def check_measures(texts: Sequence[str], quantity: str) -> None:
         CampaignError: the message names the measure.
     """
     for text in texts:
-        try:
+        with as_campaign_error("--measure: "):
             measure = Measure.parse(text)
-        except ValueError as error:
-            raise CampaignError(f"--measure: {error}") from None
-        if not measure.is_limit or (measure.quantity.need is LIMIT_VELOCITY) != (quantity == "velocity"):
-            raise CampaignError(f"--measure: {text} does not follow from each hit's limit {quantity}")
+            if not measure.is_limit or (measure.quantity.need is LIMIT_VELOCITY) != (quantity == "velocity"):
+                raise ValueError(f"{text} does not follow from each hit's limit {quantity}")
 
 
-def warning_of(campaign: Campaign, quantity: str) -> str | None:
-    """A warning about a campaign whose limits are searched; None if there is nothing to warn of."""
-    if (quantity, 0) not in campaign.scatter.given:
-        return None
-    return (
-        f"the {quantity} scatters in this campaign, but a limit {quantity} does not depend on that: the scatter only "
-        "says where the searches begin"
+def measures_of(dataset: xarray.Dataset, texts: Sequence[str] = ()) -> list[Measure]:
+    """The measures with these texts for a search of limits; by default V50 and V05, or H50 and H05.
+
+    Raises:
+        ResultError: a text is no measure, or the result lacks what it needs.
+    """
+    return measures_named(dataset, texts, list(NAMES))
+
+
+def limit_view(dataset: xarray.Dataset, texts: Sequence[str] = ()) -> View:
+    """Every hit of a short list, or the measures of a search; its references; notes.
+
+    Args:
+        texts: texts of measures, which are also shown for a short list; by default as in `measures_of`.
+    """
+    quantity = dataset.attrs[attr.LIMIT]
+    short = len(dataset[v.LIMITS[quantity].value]) <= _MOST_LISTED
+    view: dict[str, list[str | pd.DataFrame]] = {f"limit {quantity}": [_hits(dataset)] if short else []}
+    if short and (table := proxy(dataset)) is not None:
+        view["proxy: energy over presented area and resistance, as a depth, and its ratio to the limit"] = [table]
+    if texts or not short:
+        rows = {
+            measure.text: {
+                "value": f"{estimate.value:.5g}",
+                "95 % interval": interval_text(estimate.low, estimate.high, estimate.numerics, ".5g"),
+                "meaning": measure.title,
+            }
+            for measure, estimate in estimated(dataset, measures_of(dataset, texts)).items()
+        }
+        view["measures"] = [pd.DataFrame.from_dict(rows, orient="index").rename_axis("measure")]
+    view["references and notes"] = [*_left_out(dataset), *_references(dataset)]
+    runs = dataset[v.LIMITS[quantity].runs].values
+    cost = f"{runs.mean():.2g} runs of a hit on average, {runs.max()} at most"
+    return view | {"cost and accuracy": [cost, promise_line(dataset), numerics_note(dataset)]}
+
+
+def in_short(dataset: xarray.Dataset) -> str:
+    """A sentence with V50 and V05, or H50 and H05, and their intervals; for a short list the range of its limits."""
+    quantity = dataset.attrs[attr.LIMIT]
+    unit, factor = UNITS[quantity]
+    values = factor * dataset[v.LIMITS[quantity].value].values
+    known = values[np.isfinite(values)]
+    if len(values) <= _MOST_LISTED:
+        ends = f"{known.min():.5g} to {known.max():.5g} {unit}" if len(known) else "not found"
+        return f"limit {quantity} of {len(values)} hits: {ends}"
+    return ", ".join(
+        f"{measure.text} {estimate.value:.5g} {unit} ({interval_text(estimate.low, estimate.high, digits='.5g')})"
+        for measure, estimate in estimated(dataset, measures_of(dataset)).items()
     )
+
+
+def _hits(dataset: xarray.Dataset) -> pd.DataFrame:
+    """Every hit with its limit and the two ends that enclose it."""
+    quantity = dataset.attrs[attr.LIMIT]
+    unit, factor = UNITS[quantity]
+    columns = {"obliquity [°]": [f"{angle:.4g}" for angle in dataset[v.OBLIQUITY].values]}
+    for head, name in zip((f"limit {quantity}", "lower end", "upper end"), v.LIMITS[quantity], strict=False):
+        columns[f"{head} [{unit}]"] = [f"{number:.5g}" for number in factor * dataset[name].values]
+    return pd.DataFrame(columns).rename_axis("hit")
+
+
+def _left_out(dataset: xarray.Dataset) -> Iterator[str]:
+    """Hits without a limit, less accurate limits, and where a test would find the limit velocity."""
+    attributes, quantity = dataset.attrs, dataset.attrs[attr.LIMIT]
+    unit, factor = UNITS[quantity]
+    value, _, _, _, converged = (dataset[name].values for name in v.LIMITS[quantity])
+    if failed := int(np.isnan(value).sum()):
+        yield f"{failed} hits failed, and count in none of these numbers"
+    if beyond := int(np.isposinf(value).sum()):
+        yield f"{beyond} hits have no limit {quantity} up to {factor * attributes[attr.LIMIT_HIGHEST]:g} {unit}"
+    if untouched := int((value == 0.0).sum()):
+        yield f"{untouched} hits touch no material"
+    if open_ := int((converged == 0).sum()) - failed:
+        yield f"{open_} hits were not found to {factor * attributes[attr.LIMIT_TOLERANCE]:g} {unit} in {MOST_RUNS} runs"
+    known = value[np.isfinite(value)]
+    if attr.LIMIT_FACTORS in attributes and len(known):
+        low, high = (float(np.median(known)) * float(factor) for factor in attributes[attr.LIMIT_FACTORS])
+        yield (
+            f"a test of this material is expected between {low:.4g} and {high:.4g} m/s (90 %): Y is not better known, "
+            "and tests scatter"
+        )
+
+
+def _references(dataset: xarray.Dataset) -> Iterator[str]:
+    """The limits of the solid reference and of the base alone; empty without them."""
+    quantity, density = dataset.attrs[attr.LIMIT], float(dataset.attrs[attr.AREAL_DENSITY])
+    unit, factor = UNITS[quantity]
+    for name, label in (("solid", reference_name(dataset)), ("base_alone", "base alone")):
+        if (one := reference(dataset, name)) is None:
+            continue
+        value, hits = one[v.LIMITS[quantity].value].values, one.sizes["hit"]
+        text = f"{label}: limit {quantity} {factor * float(np.nanmean(value)):.5g} {unit}" + ", mean" * (hits > 1)
+        if name == "solid":
+            weight = f"of {density:.4g} kg/m² as the target"
+            if quantity == "thickness":
+                needed = float(np.nanmean(needed_density(one, 0.0)))
+                weight = f"{needed:.4g} kg/m² (the target as given has {density:.4g} kg/m²)"
+            text += f", {weight}; {hits} hit{'s' * (hits > 1)} searched in {float(one.attrs[attr.COMPUTE_TIME]):.2g} s"
+        yield text
+
+
+def promise_line(dataset: xarray.Dataset) -> str:
+    """A line with the estimated error of the limits."""
+    attributes = dataset.attrs
+    unit, factor = UNITS[attributes[attr.LIMIT]]
+    of_layer = f"thickness of layer {attributes[attr.LIMIT_LAYER]}; " if attributes[attr.LIMIT_LAYER] else ""
+    ends = f"{of_layer}ends of a limit at most {factor * attributes[attr.LIMIT_TOLERANCE]:g} {unit} apart"
+    if attr.RESOLUTION not in attributes:
+        return f"{ends}; the error of the numerics was not measured, as the campaign fixes the resolution"
+    kept = "" if attributes[attr.PROMISE_KEPT] else ", more than was asked for"
+    hits = share_text(json.loads(attributes[attr.ACCURACY])["share"])
+    return f"{ends}; against a finer level {hits} are within {errors_text(attributes)}{kept}"
+
+
+def proxy(dataset: xarray.Dataset) -> pd.DataFrame | None:
+    """The proxy of every hit: kinetic energy over presented area and resistance, as a depth, and its ratio to the
+    limit thickness; None where the target is not one solid plate whose limit thickness is known."""
+    attributes, limit = dataset.attrs, v.LIMITS["thickness"].value
+    is_solid = attributes.get(attr.OPEN_AREA) == 0.0 and v.LAYER_STATUS not in dataset
+    if limit not in dataset or not is_solid or not {attr.CORE, attr.MATERIAL} <= attributes.keys():
+        return None
+    core: Core = TypeAdapter[Core](AnyCore).validate_json(attributes[attr.CORE])
+    resistance = dataset.get(v.RESISTANCE, json.loads(attributes[attr.MATERIAL])["resistance"])
+    mass = dataset.get(v.MASS, core.mass_properties.mass)
+    tilt = inclination(dataset)
+    energy = 0.5 * np.asarray(mass) * dataset[v.IMPACT_VELOCITY].values ** 2
+    depth = energy / (core.presented_area(tilt) * np.asarray(resistance, dtype=np.float64))
+    columns = {"inclination [°]": np.degrees(tilt), "proxy [mm]": 1e3 * depth, "ratio": depth / dataset[limit].values}
+    return pd.DataFrame(columns).rename_axis("hit")
+
+
+def inclination(dataset: xarray.Dataset) -> Array:
+    """Angle between the axis and the line of fire [rad]. The projected angles of the axis add to those of the line."""
+    names = (v.OBLIQUITY, v.AZIMUTH, v.IMPACT_PITCH, v.IMPACT_YAW)
+    obliquity, azimuth, pitch, yaw = (np.radians(dataset[name].values) for name in names)
+    along_y, along_z = np.tan(obliquity) * np.cos(azimuth), np.tan(obliquity) * np.sin(azimuth)
+    ones = np.ones_like(obliquity)
+    flight = np.stack([ones, along_y, along_z], axis=-1)
+    axis = np.stack([ones, np.tan(np.arctan(along_y) + yaw), np.tan(np.arctan(along_z) + pitch)], axis=-1)
+    across = np.linalg.norm(np.cross(axis, flight), axis=-1)
+    return np.asarray(np.arctan2(across, (axis * flight).sum(axis=-1)))

@@ -8,8 +8,9 @@ from __future__ import annotations
 
 import math
 import warnings
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import suppress
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -63,8 +64,8 @@ def sensitivity(
     Raises:
         CampaignError: a text is no measure, or the campaign lacks what it needs.
     """
-    computed = _computed({"": campaign}, measures, hits, device, progress)[""]
-    rows = {name: {one.title: _value(one, of) for one, of in values.items()} for name, values in computed.items()}
+    computed = _computed({"": campaign}, measures, hits, device, progress)
+    rows = {name: {one.title: _value(one, of) for one, of in row.items()} for (_, name), row in computed.items()}
     return pd.DataFrame.from_dict(rows, orient="index").rename_axis("change")
 
 
@@ -94,13 +95,23 @@ def plate_sensitivity(
         options: hits, device and progress of `sensitivity`.
     """
     computed = _computed(campaigns, (text,), **options)
-    rows, replicates = {}, next(iter(campaigns.values())).replicates
-    for name in dict.fromkeys(name for numbers in computed.values() for name in numbers):
-        of_plates = {plate: numbers.get(name, numbers[AS_GIVEN]) for plate, numbers in computed.items()}
-        (measure,) = {one for values in of_plates.values() for one in values}
-        values = {plate: by_measure[measure] for plate, by_measure in of_plates.items()}
-        best = _best(measure, values, shifts or {}, replicates)
-        rows[name] = {plate: _value(measure, of_plate) for plate, of_plate in values.items()} | {"best": best}
+    (measure,), replicates, rows = next(iter(computed.values())), next(iter(campaigns.values())).replicates, {}
+    sign, shifts = measure.display.factor * (1.0 if measure.higher_is_better else -1.0), shifts or {}
+
+    def is_better(values: Mapping[str, Array], one: str, other: str) -> bool:
+        numbers = (sign * measure.averaged(values[plate]) for plate in (one, other))
+        difference = estimate_of("mean", np.subtract(*numbers), replicates=replicates)
+        return bool(difference.low > np.nan_to_num(shifts.get(one, 0.0) + shifts.get(other, 0.0)))
+
+    for name in dict.fromkeys(name for _, name in computed):
+        values = {
+            plate: of_plate
+            for plate in campaigns
+            for of_plate in computed.get((plate, name), computed[plate, AS_GIVEN]).values()
+        }
+        best = (one for one in values if all(is_better(values, one, other) for other in values if other != one))
+        numbers = {plate: _value(measure, of_plate) for plate, of_plate in values.items()}
+        rows[name] = {**numbers, "best": next(best, "")}
     return pd.DataFrame.from_dict(rows, orient="index").rename_axis("change")
 
 
@@ -123,28 +134,15 @@ def _value(measure: Measure, values: Array) -> float:
     return measure.display.factor * estimate_from(measure, values).value
 
 
-def _best(measure: Measure, values: Mapping[str, Array], shifts: Mapping[str, float], replicates: int) -> str:
-    """The plate that is significantly better than every other one; empty if none is."""
-    sign = measure.display.factor * (1.0 if measure.higher_is_better else -1.0)
-    numbers = {plate: sign * measure.averaged(of_plate) for plate, of_plate in values.items()}
-
-    def is_better(one: str, other: str) -> bool:
-        difference = estimate_of("mean", numbers[one] - numbers[other], replicates=replicates)
-        return bool(difference.low > np.nan_to_num(shifts.get(one, 0.0) + shifts.get(other, 0.0)))
-
-    best = (one for one in numbers if all(is_better(one, other) for other in numbers if other != one))
-    return next(best, "")
-
-
 def _computed(
     campaigns: Mapping[str, Campaign],
     texts: Sequence[str],
     hits: int = HITS,
     device: str = "auto",
     progress: Progress | None = None,
-) -> dict[str, dict[str, dict[Measure, Array]]]:
-    """Values of the hits by plate, change and measure, in the units of the Dataset, NaN where a hit does not count; all
-    at the finest level that the pilots of the campaigns find."""
+) -> dict[tuple[str, str], dict[Measure, Array]]:
+    """Values of the hits by plate and change, and by measure, in the units of the Dataset, NaN where a hit does not
+    count; all at the finest level that the pilots of the campaigns find."""
     measures = measures_of_runs(texts or SHOWN, campaigns if texts else {}, averaged=True)
     # A change may break a symmetry, so hits are over the whole cell.
     campaigns = {plate: _with(campaign, "hits", irreducible=False) for plate, campaign in campaigns.items()}
@@ -153,8 +151,7 @@ def _computed(
         for plate, campaign in campaigns.items()
         for name, changed in {AS_GIVEN: campaign, **changes(campaign)}.items()
     }
-    shots = {row: _shots(changed, hits) for row, changed in rows.items()}
-    worker = Worker(device)
+    shots, worker = {row: _shots(changed, hits) for row, changed in rows.items()}, Worker(device)
     of_plates = [
         numerics_for(campaign.scene, shots[plate, AS_GIVEN], _numerics(campaign), worker)
         for plate, campaign in campaigns.items()
@@ -162,12 +159,11 @@ def _computed(
     numerics = max(of_plates, key=lambda each: each.level or 0)
     outcomes = simulate_many([(rows[row].scene, shots[row]) for row in rows], numerics, worker, progress)
     needed = {v.STATUS, v.STOPPED_IN, *(name for measure in measures for name in measure.quantity.of)}
-    computed: dict[str, dict[str, dict[Measure, Array]]] = {plate: {} for plate in campaigns}
-    for ((plate, name), changed), outcome in zip(rows.items(), outcomes, strict=True):
-        labelled = changed.scene.model_copy(update={"record": campaigns[plate].output})  # stand-offs as given
-        dataset = narrow_dataset(labelled, shots[plate, name], outcome, needed)
-        known = measures_named(dataset, texts, SHOWN)
-        computed[plate][name] = {measure: measure.values(dataset) for measure in known}
+    computed = {}
+    for (row, changed), outcome in zip(rows.items(), outcomes, strict=True):
+        labelled = changed.scene.model_copy(update={"record": campaigns[row[0]].output})  # stand-offs as given
+        dataset = narrow_dataset(labelled, shots[row], outcome, needed)
+        computed[row] = {measure: measure.values(dataset) for measure in measures_named(dataset, texts, SHOWN)}
     return computed
 
 
@@ -190,28 +186,14 @@ def _shots(campaign: Campaign, most: int) -> Shots:
 def changes(campaign: Campaign) -> dict[str, Campaign]:
     """The campaign with one thing otherwise, by the name of the change. Columns of shots do not change."""
     changed_campaigns, layers = dict[str, Campaign](), range(len(campaign.target.layers))
-    for name, quantities, change in CHANGES:
+    for name, quantities, change in _changes(campaign):
         if any(is_drawn(campaign, quantity, layers) for quantity in quantities):
             continue
         with warnings.catch_warnings(), suppress(ValidationError):  # not every change is a campaign
             warnings.simplefilter("ignore")
-            if (changed := change(campaign)) != campaign:
+            if (changed := change()) != campaign:
                 changed_campaigns[name] = changed
     return changed_campaigns
-
-
-Change = Callable[[Campaign], Campaign]
-
-
-def _plates(change: Callable[[Campaign, Plate], Mapping[str, Any]], **law: Any) -> Change:
-    """A change of the keys of all plates, and of the law."""
-
-    def changed(campaign: Campaign) -> Campaign:
-        plate, *layer = (one.model_copy(update=change(campaign, one)) for one in campaign.target.layers)
-        interaction = campaign.interaction.model_copy(update=law)
-        return campaign.model_copy(update={"plate": plate, "layer": tuple(layer), "interaction": interaction})
-
-    return changed
 
 
 def _with(campaign: Campaign, table: str, **keys: Any) -> Campaign:
@@ -219,113 +201,90 @@ def _with(campaign: Campaign, table: str, **keys: Any) -> Campaign:
     return campaign.model_copy(update={table: getattr(campaign, table).model_copy(update=keys)})
 
 
-def _catalogue_interval(campaign: Campaign, plate: Plate) -> tuple[float, float] | None:
-    """90 % interval of the catalogue's Y of a plate [Pa]; None where Y is the user's."""
-    known = campaign.catalogue_resistance(plate)
-    return known.ends if known is not None and known.deviation else None
+def _changes(given: Campaign) -> Iterator[tuple[str, tuple[str, ...], Callable[[], Campaign]]]:
+    """Changes in the order of a table: name, quantities that must not differ from shot to shot, and the change."""
+    Keys = Mapping[str, Any]
 
+    def plates(keys: Callable[[Plate], Keys], **law: Any) -> Callable[[], Campaign]:
+        def changed() -> Campaign:
+            plate, *layer = (one.model_copy(update=keys(one)) for one in given.target.layers)
+            interaction = given.interaction.model_copy(update=law)
+            return given.model_copy(update={"plate": plate, "layer": tuple(layer), "interaction": interaction})
 
-def _resistance(end: int) -> Change:
-    """Y at the low (0) or high (1) end of the catalogue's interval, or 30 % off where it is the user's."""
-    ends = 1.0 - UNKNOWN_SHARE, 1.0 + UNKNOWN_SHARE
-    return _plates(
-        lambda campaign, plate: {
-            "resistance": (_catalogue_interval(campaign, plate) or [plate.resistance * share for share in ends])[end]
-        }
-    )
+        return changed
 
+    def interval(plate: Plate) -> tuple[float, float] | None:
+        """90 % interval of the catalogue's Y of a plate [Pa]; None where Y is the user's."""
+        known = given.catalogue_resistance(plate)
+        return known.ends if known is not None and known.deviation else None
 
-def _law(friction: float | None = None, **law: float) -> Change:
-    """Another friction or another law. Y of the catalogue follows, because it was fitted with both."""
+    def resistance(plate: Plate, end: int) -> Keys:
+        unknown = plate.resistance * (1.0 - UNKNOWN_SHARE), plate.resistance * (1.0 + UNKNOWN_SHARE)
+        return {"resistance": (interval(plate) or unknown)[end]}
 
-    def keys(campaign: Campaign, plate: Plate) -> dict[str, float]:
-        other = campaign.interaction.model_copy(update=law)
-        coefficient = plate.shear_coefficient if friction is None else friction
-        same = other == campaign.interaction and coefficient == plate.shear_coefficient
-        if same or _catalogue_interval(campaign, plate) is None:
-            return {"shear_coefficient": coefficient}
-        return {"shear_coefficient": coefficient, "resistance": _alike(campaign, plate, other, coefficient)}
+    def alike(plate: Plate, law: Interaction, friction: float, velocity: float = 0.0) -> float:
+        """Y with which a solid plate takes as much from the core under another law and friction (docs/model.md §6.2):
+        its limit velocity stays, or what it takes from a core of this velocity [m/s]."""
+        as_given = given.interaction, plate.shear_coefficient, plate.thickness, plate.density
+        passage = StraightPassage(given.core, *as_given, given.impact.obliquity)
+        return passage.resistance_under(law, friction, plate.resistance, velocity)
 
-    return _plates(keys, **law)
+    def law(friction: float | None = None, **onset: float) -> Callable[[], Campaign]:
+        """Another friction or another law. Y of the catalogue follows, because it was fitted with both."""
 
+        def keys(plate: Plate) -> Keys:
+            other = given.interaction.model_copy(update=onset)
+            coefficient = plate.shear_coefficient if friction is None else friction
+            same = other == given.interaction and coefficient == plate.shear_coefficient
+            follows = {} if same or interval(plate) is None else {"resistance": alike(plate, other, coefficient)}
+            return {"shear_coefficient": coefficient, **follows}
 
-def _alike(campaign: Campaign, plate: Plate, law: Interaction, friction: float, velocity: float = 0.0) -> float:
-    """Y with which a solid plate takes as much from the core under another law and friction (docs/model.md §6.2): its
-    limit velocity stays, or what it takes from a core of this velocity [m/s]."""
-    given = campaign.interaction, plate.shear_coefficient, plate.thickness, plate.density
-    passage = StraightPassage(campaign.core, *given, campaign.impact.obliquity)
-    return passage.resistance_under(law, friction, plate.resistance, velocity)
+        return plates(keys, **onset)
 
+    def edges() -> Campaign:
+        """Free surfaces in place of a constant stress and weakening (docs/model.md §4.9). A plate without holes takes
+        as much from the core as before."""
+        near = NEAR_EDGES.model_copy(update={"onset": given.interaction.onset})
+        if given.interaction != Interaction(onset=near.onset) or not any(one.open_area for one in given.target.layers):
+            return given
 
-def _edges(campaign: Campaign) -> Campaign:
-    """Free surfaces in place of a constant stress and weakening (docs/model.md §4.9). A plate without holes takes as
-    much from the core as before."""
-    law = NEAR_EDGES.model_copy(update={"onset": campaign.interaction.onset})
-    holed = any(plate.open_area for plate in campaign.target.layers)
-    if not holed or campaign.interaction != Interaction(onset=law.onset):
-        return campaign
+        def keys(plate: Plate) -> Keys:
+            arriving = given.impact.velocity if interval(plate) is None else 0.0
+            return {"resistance": alike(plate, near, plate.shear_coefficient, arriving), "degradation": 1.0}
 
-    def keys(campaign: Campaign, plate: Plate) -> dict[str, float]:
-        arriving = campaign.impact.velocity if _catalogue_interval(campaign, plate) is None else 0.0
-        return {"resistance": _alike(campaign, plate, law, plate.shear_coefficient, arriving), "degradation": 1.0}
+        return plates(keys, **dict(near))()
 
-    return _plates(keys, **dict(law))(campaign)
+    def weakens(key: str, changed: Callable[[float], float]) -> Callable[[], Campaign]:
+        return plates(lambda plate: {key: changed(getattr(plate, key))} if plate.degradation < 1.0 else {})
 
+    def turned(name: str, degrees: float) -> Campaign:
+        """The campaign with a larger angle of the shots, unless they are steep already."""
+        angle = Radians(getattr(given.impact, name) + math.radians(degrees))
+        return _with(given, "impact", **{name: angle}) if given.impact.obliquity < math.radians(75.0) else given
 
-def _turned(campaign: Campaign, name: str, degrees: float) -> Campaign:
-    """The campaign with an angle of the shots larger by so much, unless they are steep already."""
-    angle = Radians(getattr(campaign.impact, name) + math.radians(degrees))
-    return _with(campaign, "impact", **{name: angle}) if campaign.impact.obliquity < math.radians(75.0) else campaign
+    def strength(share: float) -> Campaign:
+        known = given.core.strength
+        return given if known is None else _with(given, "core", strength=(1.0 + share) * known)
 
-
-def _nearer(campaign: Campaign) -> Campaign:
-    return _with(campaign, "output", standoffs=tuple(0.5 * at for at in campaign.output.standoffs))
-
-
-def _weakening(_: Campaign, plate: Plate) -> dict[str, Any]:
-    """The paper's weakening of a plate with holes that is given without it."""
     paper = {"degradation": 0.8, "degradation_interval": 1e-6, "degradation_distance": None}
-    return paper if plate.open_area and plate.degradation == 1.0 else {}
-
-
-def _weakens(key: str, changed: Callable[[float], float]) -> Change:
-    """Another number of the weakening of plates that weaken."""
-    return _plates(lambda _, plate: {key: changed(getattr(plate, key))} if plate.degradation < 1.0 else {})
-
-
-def _strength(campaign: Campaign, factor: float) -> Campaign:
-    """The campaign with another strength of its core, if that may break."""
-    strength = campaign.core.strength
-    return campaign if strength is None else _with(campaign, "core", strength=factor * strength)
-
-
-_FIT = ("resistance", "degradation", "static", "linear", "quadratic")
-CHANGES: tuple[tuple[str, tuple[str, ...], Change], ...] = (
-    ("Y at its low end", ("resistance",), _resistance(0)),
-    ("Y at its high end", ("resistance",), _resistance(1)),
-    ("no weakening (β = 1)", ("degradation",), _plates(lambda _, one: {"degradation": 1.0})),
-    ("weakening (β = 0.8 in 1 µs)", ("degradation",), _plates(_weakening)),
-    ("weakens half as fast", ("degradation",), _weakens("degradation", lambda share: share**0.5)),
-    ("weakens twice as fast", ("degradation",), _weakens("degradation", lambda share: share**2)),
-    (
-        "weakening reaches half as far",
-        ("degradation_length",),
-        _weakens("degradation_length", lambda length: 0.5 * length),
-    ),
-    (
-        "weakening reaches twice as far",
-        ("degradation_length",),
-        _weakens("degradation_length", lambda length: 2.0 * length),
-    ),
-    ("friction η = 0", ("shear_coefficient",), _law(0.0)),
-    ("friction η = 0.1", ("shear_coefficient",), _law(0.1)),
-    ("onset κ = 0", ("onset",), _law(onset=0.0)),
-    ("onset κ = 0.02", ("onset",), _law(onset=0.02)),
-    ("less resistance near edges", _FIT, _edges),
-    ("5° more oblique", ("obliquity",), lambda campaign: _turned(campaign, "obliquity", 5.0)),
-    ("2° of yaw", ("yaw",), lambda campaign: _turned(campaign, "yaw", 2.0)),
-    ("half the stand-off", (), _nearer),
-    ("a core 30 % weaker", ("strength",), lambda campaign: _strength(campaign, 1.0 - UNKNOWN_SHARE)),
-    ("a core 30 % stronger", ("strength",), lambda campaign: _strength(campaign, 1.0 + UNKNOWN_SHARE)),
-)
-"""Changes in the order of a table: name, quantities that must not differ from shot to shot, and the change."""
+    y, weak, length, friction = ("resistance",), ("degradation",), ("degradation_length",), ("shear_coefficient",)
+    yield "Y at its low end", y, plates(lambda plate: resistance(plate, 0))
+    yield "Y at its high end", y, plates(lambda plate: resistance(plate, 1))
+    yield "no weakening (β = 1)", weak, plates(lambda _: {"degradation": 1.0})
+    untouched = plates(lambda plate: paper if plate.open_area and plate.degradation == 1.0 else {})
+    yield "weakening (β = 0.8 in 1 µs)", weak, untouched
+    yield "weakens half as fast", weak, weakens("degradation", lambda share: share**0.5)
+    yield "weakens twice as fast", weak, weakens("degradation", lambda share: share**2)
+    yield "weakening reaches half as far", length, weakens("degradation_length", lambda reach: 0.5 * reach)
+    yield "weakening reaches twice as far", length, weakens("degradation_length", lambda reach: 2.0 * reach)
+    yield "friction η = 0", friction, law(0.0)
+    yield "friction η = 0.1", friction, law(0.1)
+    yield "onset κ = 0", ("onset",), law(onset=0.0)
+    yield "onset κ = 0.02", ("onset",), law(onset=0.02)
+    yield "less resistance near edges", (*y, *weak, "static", "linear", "quadratic"), edges
+    yield "5° more oblique", ("obliquity",), partial(turned, "obliquity", 5.0)
+    yield "2° of yaw", ("yaw",), partial(turned, "yaw", 2.0)
+    nearer = tuple(0.5 * at for at in given.output.standoffs)
+    yield "half the stand-off", (), partial(_with, given, "output", standoffs=nearer)
+    yield "a core 30 % weaker", ("strength",), partial(strength, -UNKNOWN_SHARE)
+    yield "a core 30 % stronger", ("strength",), partial(strength, UNKNOWN_SHARE)

@@ -7,7 +7,7 @@ import json
 import math
 import re
 import warnings
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -36,13 +36,6 @@ SHOWN = (f"mean({v.RESIDUAL_VELOCITY})", f"mean({v.DEFLECTION})", f"mean({v.TILT
 """Default measures of a sweep, as far as it has them."""
 _MOST = 10_000
 """Most points of a sweep."""
-_OF_A_POINT = (
-    *(attr.CAMPAIGN, attr.HISTORY, attr.FINGERPRINT, attr.COMPUTE_TIME, attr.HITS_PER_SECOND, attr.TITLE),
-    *(attr.RESOLUTION, attr.PROMISE_KEPT, attr.RESIDUAL_VELOCITY_ERROR, attr.TILT_ERROR, attr.NUMERICS_GIVEN),
-    *(attr.STOP_QUANTITY, attr.STOP_REASON, attr.ESTIMATE, attr.ESTIMATE_INTERVAL, attr.ESTIMATE_UNITS),
-    *(attr.DEPTH_ERROR, attr.STATUS_ERROR, attr.CONFIDENCE, attr.SYMMETRIES, attr.ESTIMATE_NUMERICS),
-)
-"""Attributes that only the result of a single point has."""
 
 
 @dataclass(frozen=True)
@@ -194,38 +187,35 @@ def joined(sweep: Sweep, points: Sequence[xarray.Dataset]) -> xarray.Dataset:
     A variable has the dimensions of the swept inputs in front of its own if it differs from point to point. Outcomes
     always have them. Hits that a point does not have are NaN. Points are in the order of `sweep.campaigns`.
     """
-    every: dict[str, Any] = {v.HIT: np.arange(max(point.sizes["hit"] for point in points), dtype=np.int32)}
-    every[v.STANDOFF] = np.unique(np.concatenate([point[v.STANDOFF].values for point in points]))
-    same = [_with(every, point) for point in points]
-    names = tuple(swept.name for swept in sweep.inputs)
-    first = same[0]
-    outcomes = {str(name) for name in v.outcome_variables(first)}
-    data: dict[str, Any] = {}
-    coordinates: dict[str, Any] = {swept.name: _coordinate(swept, sweep) for swept in sweep.inputs}
-    for name, array in first.variables.items():
-        if str(name) in names:
-            continue
-        columns = [point.variables[name] for point in same if name in point.variables]
-        if len(columns) < len(same) or len({column.shape for column in columns}) > 1:
-            continue
-        into = coordinates if name in first.coords else data
-        alike = (np.array_equal(array, column, equal_nan=array.dtype.kind == "f") for column in columns)
-        if str(name) not in outcomes and all(alike):
-            into[str(name)] = array
-        else:
+    others = {dim for point in points for dim in point.dims} - {v.HIT, v.STANDOFF}
+    first, *_ = points = xarray.align(*points, join="outer", exclude=others)
+    names, outcomes = tuple(swept.name for swept in sweep.inputs), {*map(str, v.outcome_variables(first))}
+    shapes = [{name: column.shape for name, column in point.variables.items()} for point in points]
+    kept = {name for name, shape in shapes[0].items() if all(other.get(name) == shape for other in shapes)}
+    result = first.drop_vars({*first.variables} - kept | {*names} & {*first.variables})
+    for name, array in list(result.variables.items()):
+        columns = [point.variables[name] for point in points]
+        if name in outcomes or not all(map(array.equals, columns)):
             stacked = np.stack([column.values for column in columns]).reshape(sweep.shape + array.shape)
-            into[str(name)] = ((*names, *array.dims), stacked, array.attrs)
-    periods = np.array([point.attrs[attr.PLATE_PERIOD] for point in same])
+            result[name] = (*names, *array.dims), stacked, array.attrs
+    periods = np.array([point.attrs[attr.PLATE_PERIOD] for point in points])
     if np.ptp(periods, axis=0).any():
         sides = {"units": "m", "long_name": "extent of the unit cell along y and z"}
-        data[attr.PLATE_PERIOD] = (*names, "side"), periods.reshape(*sweep.shape, 2), sides
-    return xarray.Dataset(data, coordinates, _attributes(sweep, same))
-
-
-def _with(every: Mapping[str, Any], point: xarray.Dataset) -> xarray.Dataset:
-    """A point with these values along its dimensions where they differ."""
-    other = {name: values for name, values in every.items() if not np.array_equal(point[name].values, values)}
-    return point.reindex(other) if other else point
+        result[attr.PLATE_PERIOD] = (*names, "side"), periods.reshape(*sweep.shape, 2), sides
+    attributes = [point.attrs for point in points]
+    shared = {
+        name: value
+        for name, value in first.attrs.items()
+        if all(name in other and np.array_equal(other[name], value) for other in attributes)
+    }
+    result.attrs = {name: value for name, value in shared.items() if name.removesuffix("_units") in shared} | {
+        attr.KIND: SWEEP.mark,
+        attr.TITLE: sweep.title,
+        attr.HISTORY: attr.history_line("sweep"),
+        attr.CAMPAIGN: sweep.text,
+        attr.SWEEP: json.dumps({swept.name: list(swept.labels) for swept in sweep.inputs}),
+    }
+    return result.assign_coords({swept.name: _coordinate(swept, sweep) for swept in sweep.inputs})
 
 
 def _coordinate(swept: Input, sweep: Sweep) -> tuple[Any, ...]:
@@ -239,23 +229,6 @@ def _coordinate(swept: Input, sweep: Sweep) -> tuple[Any, ...]:
     reader, values = reader_in(kind), np.array(numbers, dtype=float)
     units = reader.display.stored if reader else "1"
     return swept.name, np.degrees(values) if units == "degree" else values, {"units": units, "long_name": swept.key}
-
-
-def _attributes(sweep: Sweep, points: Sequence[xarray.Dataset]) -> dict[str, Any]:
-    first, *others = (point.attrs for point in points)
-    shared = {
-        name: value
-        for name, value in first.items()
-        if name.removesuffix("_units") not in _OF_A_POINT
-        and all(name in other and np.array_equal(other[name], value) for other in others)
-    }
-    return shared | {
-        attr.KIND: SWEEP.mark,
-        attr.TITLE: sweep.title,
-        attr.HISTORY: attr.history_line("sweep"),
-        attr.CAMPAIGN: sweep.text,
-        attr.SWEEP: json.dumps({swept.name: list(swept.labels) for swept in sweep.inputs}),
-    }
 
 
 def measures_of(sweep: xarray.Dataset, texts: Sequence[str] = ()) -> list[Measure]:
@@ -296,27 +269,17 @@ def sweep_table(sweep: xarray.Dataset, measures: Sequence[Measure]) -> pd.DataFr
 
 
 def sweep_view(sweep: xarray.Dataset, texts: Sequence[str] = ()) -> View:
-    """A table with a row for every combination and its measures. If there are texts of measures, each measure has a
-    table, with its shifts by the numerics, and the hits that count."""
+    """A table with a row for every combination and its measures.
+
+    Measures with these texts have their shifts by the numerics, too.
+    """
     measures = measures_of(sweep, texts)
     table = sweep_table(sweep, measures).rename_axis(index=lambda name: name.replace("_", " "))
-    title = str(sweep.attrs.get(attr.TITLE, "untitled"))
-    inputs = ", ".join(inputs_of(sweep)).replace("_", " ")
-    sentence = f"{len(table)} combinations of {inputs}, with at most {sweep.sizes[v.HIT]} hits each; 95 % intervals"
-    short, view = pd.DataFrame(index=table.index), dict[str, list[str | pd.DataFrame]]({title: [sentence]})
+    shown, inputs = pd.DataFrame(index=table.index), ", ".join(inputs_of(sweep)).replace("_", " ")
     for measure in measures:
         own = table[measure.text]
-        numerics = own.numerics if texts else [None] * len(own)
-        intervals = [*map(interval_text, own.low, own.high, numerics)]
-        if texts:
-            columns = {
-                "value": own.value,
-                "95 % interval": intervals,
-                "hits that count": own.share.map("{:.1%}".format),
-            }
-            view[measure.title] = [pd.DataFrame(columns)]
-        else:
-            pairs = zip(own.value, intervals, strict=True)
-            short[measure.title] = [f"{number_text(value)} ({interval})" for value, interval in pairs]
-    more = "means are over the cores that passed; --measure TEXT tells how far the numerics may shift it"
-    return view if texts else {title: [sentence, short, more]}
+        intervals = map(interval_text, own.low, own.high, own.numerics if texts else [None] * len(own))
+        shown[measure.title] = [f"{number_text(value)} ({of})" for value, of in zip(own.value, intervals, strict=True)]
+    sentence = f"{len(table)} combinations of {inputs}, with at most {sweep.sizes[v.HIT]} hits each; 95 % intervals"
+    more = "Means are over the cores that passed. --measure TEXT shows how far the numerics may shift it."
+    return {str(sweep.attrs.get(attr.TITLE, "untitled")): [sentence, shown, *([] if texts else [more])]}

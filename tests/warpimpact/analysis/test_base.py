@@ -27,8 +27,7 @@ from warpimpact.results.vocabulary import piercing_margin
 from warpimpact.runs.compute import compute_hits, described
 from warpimpact.scene import Numerics
 from warpimpact.solver.device import Worker
-from warpimpact.studies.limit import limit_of
-from warpimpact.studies.limit_view import limit_view, proxy
+from warpimpact.studies.limit import limit_of, limit_view, proxy
 
 from .references import with_solid
 

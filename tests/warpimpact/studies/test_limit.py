@@ -24,8 +24,7 @@ from warpimpact.scene import Numerics, make_shots
 from warpimpact.solver.accuracy import PILOT_LIMITS
 from warpimpact.solver.device import Worker
 from warpimpact.solver.limit import MOST_RUNS, limit_velocity
-from warpimpact.studies.limit import limit_of, limit_to_file
-from warpimpact.studies.limit_view import limit_view
+from warpimpact.studies.limit import limit_of, limit_to_file, limit_view
 
 CAMPAIGNS = Path(__file__).parents[3] / "campaigns"
 TEXT = """\

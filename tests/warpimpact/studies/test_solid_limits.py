@@ -12,8 +12,7 @@ from warpimpact.analysis.effectiveness import effectiveness
 from warpimpact.analysis.numbers import text_of
 from warpimpact.results import files
 from warpimpact.results.references import references_of
-from warpimpact.studies.limit import limit_to_file
-from warpimpact.studies.limit_view import limit_view
+from warpimpact.studies.limit import limit_to_file, limit_view
 
 LAYER = '[[layer]]\ngap = "60 mm"\nthickness = "2 mm"\nresistance = "2600 MPa"\n'
 TEXT = """\
