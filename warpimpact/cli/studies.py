@@ -28,8 +28,9 @@ from warpimpact.plotting.studies import firing_figure, limit_figure, sensitivity
 from warpimpact.results import files, front
 from warpimpact.results.kinds import SWEEP
 from warpimpact.results.posterior_file import INTERRUPTED
+from warpimpact.runs.run import run_to_file
 from warpimpact.scene.units import PositiveLength, PositiveSpeed, quantity
-from warpimpact.studies.limit import check_measures, limit_to_file, limit_view
+from warpimpact.studies.limit import check_measures, limit_of, limit_view
 from warpimpact.studies.sensitivity import largest_move, sensitivity
 from warpimpact.studies.sweep import folder_of as points_of
 from warpimpact.studies.sweep import read_sweep, run_sweep, sweep_view
@@ -56,15 +57,8 @@ def limit_command(arguments: argparse.Namespace) -> int:
     if (arguments.quantity, 0) in campaign.scatter.given:
         warn(f"a limit {arguments.quantity} does not depend on its scatter, which says where the searches begin")
     with show_run(arguments) as progress:
-        limit_to_file(
-            campaign,
-            output,
-            arguments.quantity,
-            tolerance=_tolerance(arguments),
-            layer=arguments.layer,
-            progress=progress,
-            **computing(arguments),
-        )
+        limit = limit_of(campaign, arguments.quantity, _tolerance(arguments), arguments.layer)
+        run_to_file(campaign, output, limit=limit, progress=progress, **computing(arguments))
     dataset = files.read(output)
     print(text_of(limit_view(dataset, arguments.measure)))
     for line in range_note({"": dataset}, str(output)):

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from pathlib import Path
-from typing import Annotated, Any, Literal, NamedTuple
+from typing import Annotated, Any, Literal
 
 import numpy as np
+from numpy.typing import NDArray
 from pydantic import Field, PrivateAttr, ValidationError, model_validator
 from scipy import special
 
@@ -18,6 +18,7 @@ from warpimpact.scene.model import Array, Model, sentence
 from warpimpact.scene.units import Number, PositiveSpeed, Speed, Title, Whole
 from warpimpact.statistics.quantal import fewest_shots
 
+Flags = NDArray[np.bool_]
 Share = Annotated[Number, Field(gt=0, lt=1)]
 Count = Annotated[Whole, Field(ge=2, le=1000)]
 
@@ -62,13 +63,6 @@ class Gun(Model):
         return np.asarray(self.deviation * special.ndtri(share))
 
 
-class Shot(NamedTuple):
-    """A fired shot: its velocity [m/s], and whether it perforated."""
-
-    velocity: float
-    perforated: bool
-
-
 class MilStd662F(Model):
     """Up and down until equal numbers of the slowest perforations and the fastest stops lie within a span.
 
@@ -92,19 +86,18 @@ class MilStd662F(Model):
     span: PositiveSpeed = 27.0
     most_shots: Count = 30
 
-    def chosen(self, shots: Sequence[Shot]) -> list[float] | None:
+    def chosen(self, velocity: Array, perforated: Flags) -> list[float] | None:
         """Velocities that V50 is the mean of; None until they lie within the span."""
-        stops, perforations = ([shot.velocity for shot in shots if shot.perforated is way] for way in (False, True))
-        return within_span(stops, perforations, self.pairs, self.span)
+        return within_span(velocity[~perforated].tolist(), velocity[perforated].tolist(), self.pairs, self.span)
 
-    def aim(self, shots: Sequence[Shot]) -> float | None:
-        """Velocity of the next shot [m/s]; None at the end of the test."""
-        if not shots:
+    def aim(self, velocity: Array, perforated: Flags) -> float | None:
+        """Velocity of the next shot [m/s] after those of a test; None at its end."""
+        if not len(velocity):
             return self.start
-        if len(shots) == self.most_shots or self.chosen(shots) is not None:
+        if self.chosen(velocity, perforated) is not None:
             return None
-        change = self.first_change if len({shot.perforated for shot in shots}) == 1 else self.change
-        return shots[-1].velocity + (-change if shots[-1].perforated else change)
+        change = self.first_change if perforated.all() or not perforated.any() else self.change
+        return float(velocity[-1]) + (-change if perforated[-1] else change)
 
 
 class Langlie(Model):
@@ -126,9 +119,8 @@ class Langlie(Model):
     @model_validator(mode="after")
     def _rises(self) -> Langlie:
         if self.lowest >= self.highest:
-            raise ValueError(
-                f"got lowest = {self.lowest:g} m/s and highest = {self.highest:g} m/s, but lowest must be less"
-            )
+            ends = f"lowest = {self.lowest:g} m/s and highest = {self.highest:g} m/s"
+            raise ValueError(f"got {ends}, but lowest must be less")
         return self
 
     @property
@@ -136,19 +128,13 @@ class Langlie(Model):
         """Shots of a test."""
         return self.shots
 
-    def aim(self, shots: Sequence[Shot]) -> float | None:
-        """Velocity of the next shot [m/s]; None at the end of the test."""
-        if len(shots) == self.shots:
-            return None
-        if not shots:
+    def aim(self, velocity: Array, perforated: Flags) -> float | None:
+        """Velocity of the next shot [m/s] after those of a test."""
+        if not len(velocity):
             return 0.5 * (self.lowest + self.highest)
-        other, balance = self.lowest if shots[-1].perforated else self.highest, 0
-        for shot in reversed(shots):
-            balance += 1 if shot.perforated else -1
-            if balance == 0:
-                other = shot.velocity
-                break
-        return 0.5 * (shots[-1].velocity + other)
+        end = self.lowest if perforated[-1] else self.highest
+        even = np.cumsum(np.where(perforated, 1, -1)[::-1]) == 0
+        return 0.5 * float(velocity[-1] + (velocity[::-1][even.argmax()] if even.any() else end))
 
 
 Procedure = MilStd662F | Langlie
@@ -203,12 +189,8 @@ class FiringTest(Model):
     procedure: Annotated[Procedure, Field(discriminator="name")] | None = None
     gun: Gun = Gun()
     proof: Proof | None = None
-    _source: str = PrivateAttr("")
-
-    @property
-    def text(self) -> str:
-        """The TOML file as it was read; of a test made in Python, its values as JSON."""
-        return self._source or self.model_dump_json()
+    _text: str = PrivateAttr("")
+    """The TOML file as it was read."""
 
 
 def read_test(path: str | Path) -> FiringTest:
@@ -218,15 +200,11 @@ def read_test(path: str | Path) -> FiringTest:
         CampaignError: the file is missing, is not TOML, or has a value that is not allowed.
     """
     path = Path(path)
-    return firing_test(read_text(path), str(path), path.parent)
-
-
-def firing_test(text: str, name: str, folder: Path) -> FiringTest:
-    """Read a test from its text; `name` is the name of the file in errors."""
-    data: dict[str, Any] = parsed(text, name, TEST)
+    text = read_text(path)
+    data: dict[str, Any] = parsed(text, str(path), TEST)
     try:
-        test = FiringTest.model_validate(data, context={"folder": folder})
+        test = FiringTest.model_validate(data, context={"folder": path.parent})
     except ValidationError as error:
-        raise CampaignError(f"{name}: {sentence(error, data)}") from None
-    test._source = text
+        raise CampaignError(f"{path}: {sentence(error, data)}") from None
+    test._text = text
     return test

@@ -14,13 +14,12 @@ from typing import Any, NamedTuple
 import numpy as np
 import pandas as pd
 import xarray
-from numpy.typing import NDArray
 from scipy import special
 
 from warpimpact.analysis.numbers import View
 from warpimpact.campaign.campaign import Campaign
-from warpimpact.campaign.text import CampaignError
-from warpimpact.firing.plan import FiringTest, MilStd662F, Procedure, Proof, Shot
+from warpimpact.campaign.text import as_campaign_error
+from warpimpact.firing.plan import FiringTest, Flags, MilStd662F, Procedure
 from warpimpact.records.variable import Variable
 from warpimpact.results import attributes as attr
 from warpimpact.results import files
@@ -29,11 +28,12 @@ from warpimpact.results import variables as v
 from warpimpact.results.dataset import dataset_of, failed
 from warpimpact.results.kinds import FIRING
 from warpimpact.results.measures import sampling_design
+from warpimpact.runs.run import run_to_file
 from warpimpact.scene.model import Array
 from warpimpact.scene.sampling import stream
 from warpimpact.statistics.intervals import Estimate, estimate_of
 from warpimpact.statistics.quantal import acceptance, fit_quantal, likelihood_interval, shown_stop_probability
-from warpimpact.studies.limit import limit_to_file
+from warpimpact.studies.limit import limit_of
 
 QUANTILES = (0.5, 0.05, 0.01)
 """Shares of perforations whose velocities are given: V50, V05, V01."""
@@ -65,9 +65,8 @@ class Response:
     def quantile(self, share: float) -> Estimate:
         """The velocity at which this share of the places perforates, with its 95 % interval; infinite if none is."""
         estimate = estimate_of("quantile", np.minimum(self.limits, _NONE), share=share, replicates=self.replicates)
-        value, low, high = (
-            np.inf if end > 0.1 * _NONE else end for end in (estimate.value, estimate.low, estimate.high)
-        )
+        ends = (estimate.value, estimate.low, estimate.high)
+        value, low, high = (np.inf if end > 0.1 * _NONE else end for end in ends)
         return replace(estimate, value=value, low=low, high=high)
 
 
@@ -101,20 +100,18 @@ def response_of(test: FiringTest, output: Path, *, count: int | None = None, **o
     if test.target.campaign is not None:
         listed = Campaign.from_toml(test.target.campaign).hits.listed is not None
         campaign = Campaign.from_toml(test.target.campaign, count=None if listed else count or test.target.count)
-        limit_to_file(campaign, limits, tolerance=TOLERANCE, **options)
+        run_to_file(campaign, limits, limit=limit_of(campaign, tolerance=TOLERANCE), **options)
     dataset = files.read(limits)
-    try:
+    with as_campaign_error(f"{limits}: "):
         return response_of_limits(dataset)
-    except ValueError as error:
-        raise CampaignError(f"{limits}: {error}") from None
 
 
 class Firings(NamedTuple):
     """The shots of all tests, each of shape [tests, shots]: velocity [m/s], perforated, and whether it was fired."""
 
     velocity: Array
-    perforated: NDArray[np.bool_]
-    used: NDArray[np.bool_]
+    perforated: Flags
+    used: Flags
 
 
 def fire(procedure: Procedure, limits: Array, errors: Array) -> Firings:
@@ -126,13 +123,14 @@ def fire(procedure: Procedure, limits: Array, errors: Array) -> Firings:
     """
     velocity = np.zeros(limits.shape)
     perforated, used = np.zeros((2, *limits.shape), dtype=bool)
-    for test in range(len(limits)):
-        shots = list[Shot]()
-        while (aim := procedure.aim(shots)) is not None:
-            place = test, len(shots)
-            velocity[place] = max(aim + errors[place], _LEAST)
-            perforated[place], used[place] = velocity[place] > limits[place], True
-            shots.append(Shot(float(velocity[place]), bool(perforated[place])))
+    for test, shot in np.ndindex(limits.shape):
+        if shot and not used[test, shot - 1]:
+            continue
+        before = (test, slice(shot))
+        if (aim := procedure.aim(velocity[before], perforated[before])) is not None:
+            speed = max(aim + float(errors[test, shot]), _LEAST)
+            velocity[test, shot], perforated[test, shot] = speed, speed > limits[test, shot]
+            used[test, shot] = True
     return Firings(velocity, perforated, used)
 
 
@@ -142,7 +140,7 @@ def reports(firings: Firings, procedure: Procedure) -> dict[Variable, Array]:
     v50, spread, low, high = np.full((4, len(velocity)), np.nan)
     if isinstance(procedure, MilStd662F):
         for test, shots in enumerate(used):
-            chosen = procedure.chosen([*map(Shot, velocity[test, shots], perforated[test, shots].tolist())])
+            chosen = procedure.chosen(velocity[test, shots], perforated[test, shots])
             v50[test] = np.nan if chosen is None else np.mean(chosen)
     else:
         fit = fit_quantal(*firings)
@@ -153,12 +151,17 @@ def reports(firings: Firings, procedure: Procedure) -> dict[Variable, Array]:
 
 def simulate_test(test: FiringTest, response: Response) -> xarray.Dataset:
     """Fire a test many times at a target whose response is known."""
-    limits, velocity = response.limits, _grid(response, test.proof)
-    shares = _estimates([response.estimate(float(speed)) for speed in velocity])
-    quantiles = _estimates([response.quantile(share) for share in QUANTILES])
+    limits = response.limits
+    ends = [*limits[np.isfinite(limits)], *([] if test.proof is None else [test.proof.velocity])]
+    margin = 0.05 * max(np.ptp(ends), 0.02 * max(ends))  # from where nothing perforates to where all does
+    grid = np.linspace(max(1.0, min(ends) - margin), max(ends) + margin, _CURVE_POINTS)
+    velocity = grid if test.proof is None else np.union1d(grid, test.proof.velocity)
     columns: dict[Variable, Any] = {f.VELOCITY: velocity, f.QUANTILE: np.array(QUANTILES)}
-    columns |= zip((f.SHARE, f.SHARE_LOW, f.SHARE_HIGH), shares, strict=True)
-    columns |= zip((f.QUANTILE_VELOCITY, f.QUANTILE_LOW, f.QUANTILE_HIGH), quantiles, strict=True)
+    for names, estimates in (
+        ((f.SHARE, f.SHARE_LOW, f.SHARE_HIGH), map(response.estimate, velocity.tolist())),
+        ((f.QUANTILE_VELOCITY, f.QUANTILE_LOW, f.QUANTILE_HIGH), map(response.quantile, QUANTILES)),
+    ):
+        columns |= zip(names, np.array([(one.value, one.low, one.high) for one in estimates]).T, strict=True)
     if test.procedure is not None:
         number = range(test.procedure.most_shots)
         places, errors = (
@@ -185,7 +188,7 @@ def simulate_test(test: FiringTest, response: Response) -> xarray.Dataset:
         attr.TITLE: test.title,
         attr.HISTORY: attr.history_line("test"),
         attr.WARPIMPACT_VERSION: attr.versions()[attr.WARPIMPACT_VERSION],
-        f.TEST: test.text,
+        f.TEST: test._text or test.model_dump_json(),
         f.SETTINGS: test.model_dump_json(exclude_none=True),
         f.TRUE_V50: true,
         f.TRUE_SPREAD: 0.5 * (v84 - v16),
@@ -195,42 +198,21 @@ def simulate_test(test: FiringTest, response: Response) -> xarray.Dataset:
     return dataset_of(columns, f.FIXED | attributes)
 
 
-def _estimates(estimates: Sequence[Estimate]) -> Array:
-    """Values, lower and upper ends, shape [3, estimates]."""
-    return np.array([(estimate.value, estimate.low, estimate.high) for estimate in estimates]).T
-
-
-def _grid(response: Response, proof: Proof | None) -> Array:
-    """Velocities of the curves, from where nothing perforates to where all does. The proof's velocity is among them."""
-    finite = response.limits[np.isfinite(response.limits)]
-    of_proof = [] if proof is None else [proof.velocity]
-    low, high = np.min([*finite, *of_proof]), np.max([*finite, *of_proof])
-    margin = 0.05 * max(high - low, 0.02 * high)
-    return np.unique([*np.linspace(max(1.0, low - margin), high + margin, _CURVE_POINTS), *of_proof])
-
-
 def firing_view(dataset: xarray.Dataset) -> View:
     """The target of a test, the reports of the tests, and the meaning of the plan of a proof."""
-    quantiles = pd.DataFrame(
-        {
-            "velocity [m/s]": [f"{value:.5g}" for value in dataset[f.QUANTILE_VELOCITY].values],
-            "95 % interval": [
-                " to ".join(f"{end:.5g}" if np.isfinite(end) else "open" for end in ends)
-                for ends in zip(dataset[f.QUANTILE_LOW].values, dataset[f.QUANTILE_HIGH].values, strict=True)
-            ],
-        },
-        pd.Index([f"V{100 * share:02.0f}" for share in dataset[f.QUANTILE].values], name="target"),
-    )
+    columns = (f.QUANTILE, f.QUANTILE_VELOCITY, f.QUANTILE_LOW, f.QUANTILE_HIGH)
+    rows = {}
+    for share, value, *ends in zip(*(dataset[name].values for name in columns), strict=True):
+        interval = " to ".join(f"{end:.5g}" if np.isfinite(end) else "open" for end in ends)
+        rows[f"V{100 * share:02.0f}"] = {"velocity [m/s]": f"{value:.5g}", "95 % interval": interval}
+    quantiles = pd.DataFrame.from_dict(rows, orient="index").rename_axis("target")
     spread = f"Half the distance from V16 to V84 is {float(dataset.attrs[f.TRUE_SPREAD]):.3g} m/s."
-    view: dict[str, list[str | pd.DataFrame]] = {
+    view: dict[str, Sequence[str | pd.DataFrame]] = {
         str(dataset.attrs[attr.TITLE]): [str(dataset.attrs[f.DISCLAIMER]), quantiles, spread]
     }
     if f.V50 in dataset:
-        view[tests_title(dataset)] = [*report_lines(dataset)]
-    if f.PASS in dataset:
-        title, *lines = _proof_lines(dataset)
-        view[title] = [*lines]
-    return view
+        view[tests_title(dataset)] = report_lines(dataset)
+    return view | dict(_proof_view(dataset) if f.PASS in dataset else {})
 
 
 def tests_title(dataset: xarray.Dataset) -> str:
@@ -251,42 +233,38 @@ def report_lines(dataset: xarray.Dataset) -> list[str]:
     off = v50[known] - true
     lines.append(f"reported V50: {off.mean():+.3g} m/s off on average, standard deviation {off.std():.3g} m/s")
     if bounded.any():
-        is_spread = np.isfinite(spread)
-        median = f"{np.median(spread[is_spread]):.3g}" if is_spread.any() else "-"
-        held = ((low <= true) & (true <= high))[bounded]
-        is_open = (np.isinf(low) | np.isinf(high))[bounded]
+        finite = spread[np.isfinite(spread)]
+        median = f"{np.median(finite):.3g}" if len(finite) else "-"
+        unknown, held, is_open = ~np.isfinite(spread), (low <= true) & (true <= high), np.isinf(low) | np.isinf(high)
         lines += [
             f"reported spread: median {median} m/s, of {float(dataset.attrs[f.TRUE_SPREAD]):.3g} m/s; not determined "
-            f"in {_share(~is_spread)}",
-            f"reported 95 % interval of V50: contains the true V50 in {_share(held)}; open in {_share(is_open)}",
+            f"in {_share(unknown)}",
+            f"reported 95 % interval of V50: contains the true V50 in {_share(held[bounded])}; open in "
+            f"{_share(is_open[bounded])}",
         ]
     return lines
 
 
-def _share(answers: NDArray[np.bool_]) -> str:
+def _share(answers: Flags) -> str:
     """A share of the tests with its interval."""
-    estimate = estimate_of("share", answers.astype(float))
-    return f"{100 * estimate.value:.3g} % ({100 * estimate.low:.3g} to {100 * estimate.high:.3g} %)"
+    estimate = estimate_of("share", answers.astype(float)).times(100.0)
+    return f"{estimate.value:.3g} % ({estimate.low:.3g} to {estimate.high:.3g} %)"
 
 
-def _proof_lines(dataset: xarray.Dataset) -> list[str]:
+def _proof_view(dataset: xarray.Dataset) -> View:
     """The plan of the proof, what a pass of it shows, and how often this target passes."""
     proof, shots = json.loads(dataset.attrs[f.SETTINGS])["proof"], int(dataset.attrs[f.PROOF_SHOTS])
-    allowed, velocity, stop, confidence = (
-        proof[key] for key in ("allowed", "velocity", "stop_probability", "confidence")
-    )
+    allowed, velocity, confidence = (proof[key] for key in ("allowed", "velocity", "confidence"))
     row = int(np.abs(dataset[f.VELOCITY].values - velocity).argmin())
     perforation, passed, same = (float(dataset[name][row]) for name in (f.PROOF_PERFORATION, f.PASS, f.PASS_SAME_PLACE))
-    consumer = float(acceptance(shots, allowed, 1.0 - stop))
-    is_good = 1.0 - perforation >= stop
+    is_good = 1.0 - perforation >= proof["stop_probability"]
     risk = f"rejects it in {100 * (1.0 - passed):.3g} %" if is_good else f"accepts it in {100 * passed:.3g} %"
     shown = 100 * shown_stop_probability(shots, allowed, confidence)
-    return [
-        f"proof: {shots} shots at {velocity:g} m/s, at most {allowed} perforate",
+    sentences = [
         f"a pass shows P(stop) >= {shown:.3g} % at {100 * confidence:g} % confidence, if every shot may hit any place",
-        f"a target of P(stop) = {100 * stop:g} % passes in {100 * consumer:.3g} % of the tests",
         f"this target: P(stop) = {100 * (1.0 - perforation):.4g} %; the plan {risk} of the tests "
         f"({'producer' if is_good else 'consumer'}'s risk)",
         f"if all shots of a test hit the same place, it passes in {100 * same:.3g} % of the tests, in place of "
         f"{100 * passed:.3g} %",
     ]
+    return {f"proof: {shots} shots at {velocity:g} m/s, at most {allowed} perforate": sentences}

@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from warpimpact.campaign.text import CampaignError
+from warpimpact.campaign.text import CampaignError, as_campaign_error
 from warpimpact.scene.input_files import read_rows
 from warpimpact.scene.model import Array
 from warpimpact.scene.units import PositiveSpeed, brief, quantity
@@ -71,10 +71,11 @@ class V50:
     @property
     def lines(self) -> list[str]:
         """V50, spread, V50 by the standard, and what the shots do not determine: a sentence each."""
-        value = f"not determined by {self.shots} shots"
+        value, spread = f"not determined by {self.shots} shots", "not determined"
         if not math.isnan(self.value):
             value = f"{self.value:.4g} m/s, 95 % interval {_interval(self.low, self.high, 4)}"
-        spread = "not determined" if math.isnan(self.spread) else f"{self.spread:.3g} m/s"
+        if not math.isnan(self.spread):
+            spread = f"{self.spread:.3g} m/s"
         if not math.isnan(self.spread_low):
             spread += f", 95 % interval {_interval(self.spread_low, self.spread_high, 3)}"
         if 0.0 < (width := self.fastest_stop - self.slowest_perforation) < math.inf:
@@ -86,9 +87,8 @@ class V50:
                 f"{self.standard:.4g} m/s, mean of {self.pairs} stops and {self.pairs} perforations within "
                 f"{self.span:.3g} m/s (allowed {STANDARD_SPANS[self.pairs]:.3g} m/s)"
             )
-        by = ("V50 by maximum likelihood", "spread", "V50 by MIL-STD-662F")
-        texts = (value, spread, standard)
-        return [*(f"{name}: {text}" for name, text in zip(by, texts, strict=True)), self.undetermined]
+        by = (f"V50 by maximum likelihood: {value}", f"spread: {spread}", f"V50 by MIL-STD-662F: {standard}")
+        return [*by, self.undetermined]
 
     def __str__(self) -> str:
         return "\n".join(self.lines)
@@ -131,19 +131,17 @@ def v50(velocity: ArrayLike, perforated: ArrayLike) -> V50:
     speed, answers = np.asarray(velocity, dtype=float), np.asarray(perforated)
     if speed.ndim != 1 or speed.shape != answers.shape or not len(speed):
         raise ValueError(f"got {speed.shape} velocities and {answers.shape} answers. Give one answer for each shot.")
-    if not np.isfinite(speed).all() or not (speed > 0.0).all():
+    if not (np.isfinite(speed) & (speed > 0.0)).all():
         raise ValueError("velocity: a value is not a finite number above 0.")
     if not np.isin(answers, (0, 1)).all():
         raise ValueError("perforated: a value is neither true nor false, 1 nor 0.")
-    through = answers.astype(bool)
+    through, fitted, standard = answers.astype(bool), (math.nan,) * 6, (math.nan, 0, math.nan)
     stops, perforations = speed[~through].tolist(), speed[through].tolist()
-    fitted = (math.nan,) * 6
     if np.ptp(speed) > 0.0:
         sample = speed[None], through[None], np.ones((1, len(speed)), dtype=bool)
         fit = fit_quantal(*sample)
         low, high = (float(end[0]) for end in likelihood_interval(*sample, fit))
         fitted = (float(fit.location[0]), low, high, float(fit.scale[0]), *scale_interval(speed, through, fit))
-    standard = (math.nan, 0, math.nan)
     for pairs, span in STANDARD_SPANS.items():
         if (chosen := within_span(stops, perforations, pairs, span + 1e-9)) is not None:
             standard = float(np.mean(chosen)), pairs, max(chosen) - min(chosen)
@@ -168,30 +166,26 @@ def read_shots(path: Path) -> Shots:
     Raises:
         CampaignError: the message names the file, the line and its fault.
     """
-    try:
+    with as_campaign_error():
         rows = [*read_rows(path)]
-    except ValueError as error:
-        raise CampaignError(str(error)) from None
     if len(rows) < 2:
         raise CampaignError(f"{path}: has no shots. Give a header, velocity,perforated, and a row for each shot.")
     (_, header), *cells = rows
     (velocity, unit), (result, _) = (_column(path, header, what) for what in _HEADERS)
     shots = []
     for number, row in cells:
-        place = f"{path}, line {number}"
-        if len(row) <= max(velocity, result):
-            raise CampaignError(f"{place}: has {len(row)} columns, fewer than the header.")
-        text, answer = row[velocity], row[result].strip()
-        try:
-            speed = quantity(PositiveSpeed)(text if re.search(r"[a-zA-Z]{2}|/", text) else f"{text} {unit}")
-            if speed <= 0.0:
-                raise ValueError(f'got "{text}", but it must be greater than 0')
-        except ValueError as error:
-            raise CampaignError(f"{place}: velocity: {error}") from None
-        if answer.lower() not in (*_YES, *_NO):
-            allowed = f"{', '.join(_YES[:6])} or {', '.join(_NO[:6])}"
-            raise CampaignError(f'{place}: got the result "{brief(answer)}". Give {allowed}.')
-        shots.append((speed, answer.lower() in _YES))
+        with as_campaign_error(f"{path}, line {number}: "):
+            if len(row) <= max(velocity, result):
+                raise ValueError(f"has {len(row)} columns, fewer than the header.")
+            text, answer = row[velocity], row[result].strip().lower()
+            with as_campaign_error("velocity: "):
+                speed = quantity(PositiveSpeed)(text if re.search(r"[a-zA-Z]{2}|/", text) else f"{text} {unit}")
+                if speed <= 0.0:
+                    raise ValueError(f'got "{text}", but it must be greater than 0')
+            if answer not in (*_YES, *_NO):
+                allowed = f"{', '.join(_YES[:6])} or {', '.join(_NO[:6])}"
+                raise ValueError(f'got the result "{brief(answer)}". Give {allowed}.')
+        shots.append((speed, answer in _YES))
     return Shots(np.array([speed for speed, _ in shots]), np.array([through for _, through in shots], dtype=bool))
 
 

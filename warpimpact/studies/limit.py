@@ -4,13 +4,10 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterator, Sequence
-from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pandas as pd
 import xarray
-from pydantic import TypeAdapter
 
 from warpimpact.analysis.effectiveness import reference_name
 from warpimpact.analysis.estimates import estimated, measures_named
@@ -24,8 +21,7 @@ from warpimpact.results import variables as v
 from warpimpact.results.measures import NAMES, Measure
 from warpimpact.results.references import reference
 from warpimpact.results.vocabulary import LIMIT_VELOCITY, needed_density
-from warpimpact.runs.run import run_to_file
-from warpimpact.scene import AnyCore, Core, exclusions
+from warpimpact.scene import exclusions
 from warpimpact.scene.model import Array
 from warpimpact.solver.accuracy import errors_text, share_text
 from warpimpact.solver.limit import (
@@ -43,31 +39,10 @@ UNITS = {"velocity": ("m/s", 1.0), "thickness": ("mm", 1e3)}
 """Display unit of a limit, and the factor to it."""
 
 
-def limit_to_file(
-    campaign: Campaign,
-    output: Path,
-    quantity: str = "velocity",
-    *,
-    tolerance: float | None = None,
-    layer: int = 0,
-    **options: Any,
-) -> None:
-    """Search the limit of every hit of a campaign into a file.
-
-    Args:
-        output, options: as in `run_to_file`.
-        quantity, tolerance, layer: as in `limit_of`.
-
-    Raises:
-        CampaignError: as in `limit_of`.
-    """
-    run_to_file(campaign, output, limit=limit_of(campaign, quantity, tolerance, layer), **options)
-
-
 def limit_of(
     campaign: Campaign, quantity: str = "velocity", tolerance: float | None = None, layer: int = 0
 ) -> LimitSpec:
-    """The limit of a campaign that is to be searched.
+    """The limit of a campaign, which `run_to_file` then searches.
 
     Args:
         quantity: "velocity" or "thickness".
@@ -122,8 +97,6 @@ def limit_view(dataset: xarray.Dataset, texts: Sequence[str] = ()) -> View:
     quantity = dataset.attrs[attr.LIMIT]
     short = len(dataset[v.LIMITS[quantity].value]) <= _MOST_LISTED
     view: dict[str, list[str | pd.DataFrame]] = {f"limit {quantity}": [_hits(dataset)] if short else []}
-    if short and (table := proxy(dataset)) is not None:
-        view["proxy: energy over presented area and resistance, as a depth, and its ratio to the limit"] = [table]
     if texts or not short:
         rows = {
             measure.text: {
@@ -141,14 +114,8 @@ def limit_view(dataset: xarray.Dataset, texts: Sequence[str] = ()) -> View:
 
 
 def in_short(dataset: xarray.Dataset) -> str:
-    """A sentence with V50 and V05, or H50 and H05, and their intervals; for a short list the range of its limits."""
-    quantity = dataset.attrs[attr.LIMIT]
-    unit, factor = UNITS[quantity]
-    values = factor * dataset[v.LIMITS[quantity].value].values
-    known = values[np.isfinite(values)]
-    if len(values) <= _MOST_LISTED:
-        ends = f"{known.min():.5g} to {known.max():.5g} {unit}" if len(known) else "not found"
-        return f"limit {quantity} of {len(values)} hits: {ends}"
+    """A sentence with V50 and V05, or H50 and H05, and their intervals."""
+    unit, _ = UNITS[dataset.attrs[attr.LIMIT]]
     return ", ".join(
         f"{measure.text} {estimate.value:.5g} {unit} ({interval_text(estimate.low, estimate.high, digits='.5g')})"
         for measure, estimate in estimated(dataset, measures_of(dataset)).items()
@@ -216,23 +183,6 @@ def promise_line(dataset: xarray.Dataset) -> str:
     kept = "" if attributes[attr.PROMISE_KEPT] else ", more than was asked for"
     hits = share_text(json.loads(attributes[attr.ACCURACY])["share"])
     return f"{ends}; against a finer level {hits} are within {errors_text(attributes)}{kept}"
-
-
-def proxy(dataset: xarray.Dataset) -> pd.DataFrame | None:
-    """The proxy of every hit: kinetic energy over presented area and resistance, as a depth, and its ratio to the
-    limit thickness; None where the target is not one solid plate whose limit thickness is known."""
-    attributes, limit = dataset.attrs, v.LIMITS["thickness"].value
-    is_solid = attributes.get(attr.OPEN_AREA) == 0.0 and v.LAYER_STATUS not in dataset
-    if limit not in dataset or not is_solid or not {attr.CORE, attr.MATERIAL} <= attributes.keys():
-        return None
-    core: Core = TypeAdapter[Core](AnyCore).validate_json(attributes[attr.CORE])
-    resistance = dataset.get(v.RESISTANCE, json.loads(attributes[attr.MATERIAL])["resistance"])
-    mass = dataset.get(v.MASS, core.mass_properties.mass)
-    tilt = inclination(dataset)
-    energy = 0.5 * np.asarray(mass) * dataset[v.IMPACT_VELOCITY].values ** 2
-    depth = energy / (core.presented_area(tilt) * np.asarray(resistance, dtype=np.float64))
-    columns = {"inclination [°]": np.degrees(tilt), "proxy [mm]": 1e3 * depth, "ratio": depth / dataset[limit].values}
-    return pd.DataFrame(columns).rename_axis("hit")
 
 
 def inclination(dataset: xarray.Dataset) -> Array:

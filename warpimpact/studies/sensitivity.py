@@ -24,7 +24,7 @@ from warpimpact.campaign.resistance import StraightPassage
 from warpimpact.results import variables as v
 from warpimpact.results.dataset import narrow_dataset
 from warpimpact.results.measures import Measure, estimate_from
-from warpimpact.scene import Interaction, Numerics, Plate, Radians, Shots
+from warpimpact.scene import Interaction, Plate, Radians, Shots
 from warpimpact.scene.interaction import NEAR_EDGES
 from warpimpact.scene.model import Array
 from warpimpact.solver.device import Worker
@@ -121,13 +121,10 @@ def reversals(table: pd.DataFrame) -> str:
     if not best:
         return "No plate is significantly the best as given."
     turned = [name for name, other in zip(table.index[1:], others, strict=True) if other not in ("", best)]
-    undecided = others.count("")
-    return (
-        f"{best} stays the best with {others.count(best)} of {len(others)} changes"
-        + (f"; another plate is the best with: {', '.join(turned)}" if turned else "")
-        + (f"; {undecided} do not decide" if undecided else "")
-        + "."
-    )
+    parts = [f"{best} stays the best with {others.count(best)} of {len(others)} changes"]
+    parts += [f"another plate is the best with: {', '.join(turned)}"] if turned else []
+    parts += [f"{others.count('')} do not decide"] if "" in others else []
+    return f"{'; '.join(parts)}."
 
 
 def _value(measure: Measure, values: Array) -> float:
@@ -144,8 +141,7 @@ def _computed(
     """Values of the hits by plate and change, and by measure, in the units of the Dataset, NaN where a hit does not
     count; all at the finest level that the pilots of the campaigns find."""
     measures = measures_of_runs(texts or SHOWN, campaigns if texts else {}, averaged=True)
-    # A change may break a symmetry, so hits are over the whole cell.
-    campaigns = {plate: _with(campaign, "hits", irreducible=False) for plate, campaign in campaigns.items()}
+    campaigns = {plate: _prepared(campaign) for plate, campaign in campaigns.items()}
     rows = {
         (plate, name): changed
         for plate, campaign in campaigns.items()
@@ -153,7 +149,7 @@ def _computed(
     }
     shots, worker = {row: _shots(changed, hits) for row, changed in rows.items()}, Worker(device)
     of_plates = [
-        numerics_for(campaign.scene, shots[plate, AS_GIVEN], _numerics(campaign), worker)
+        numerics_for(campaign.scene, shots[plate, AS_GIVEN], campaign.numerics, worker)
         for plate, campaign in campaigns.items()
     ]
     numerics = max(of_plates, key=lambda each: each.level or 0)
@@ -167,12 +163,12 @@ def _computed(
     return computed
 
 
-def _numerics(campaign: Campaign) -> Numerics:
-    """The campaign's own accuracy or level; else draft, whose errors all rows share."""
+def _prepared(campaign: Campaign) -> Campaign:
+    """The campaign over the whole cell, as a change may break a symmetry, at draft if it has no accuracy of its own."""
     numerics = campaign.numerics
-    if numerics.explicit is not None or {"fidelity", "accuracy"} & numerics.model_fields_set:
-        return numerics
-    return numerics.model_copy(update={"fidelity": "draft"})
+    if numerics.explicit is None and not {"fidelity", "accuracy"} & numerics.model_fields_set:
+        campaign = _with(campaign, "numerics", fidelity="draft")
+    return _with(campaign, "hits", irreducible=False)
 
 
 def _shots(campaign: Campaign, most: int) -> Shots:

@@ -39,49 +39,27 @@ _MOST = 10_000
 
 
 @dataclass(frozen=True)
-class Input:
-    """A swept input.
-
-    Attributes:
-        key: dotted place in the campaign, such as "impact.obliquity".
-        labels: its values as written, or the names of tables.
-        values: the values for the campaign.
-    """
-
-    key: str
-    labels: tuple[str, ...]
-    values: tuple[Any, ...]
-
-    @property
-    def name(self) -> str:
-        """Name of the dimension: that of the hit map's variable for the input, else the last part of the key; for a
-        layer the whole key, such as "layer_1_thickness"."""
-        last = self.key.rpartition(".")[2]
-        if self.key.startswith("layer "):
-            return self.key.replace(" ", "_").replace(".", "_")
-        return next((str(variable) for variable in v.SHOT_VARIABLES if variable.field == last), last)
-
-
-@dataclass(frozen=True)
 class Sweep:
-    """A campaign and its swept inputs.
+    """A campaign and its swept inputs, each by the name of its dimension, in the order of the file.
 
     Attributes:
         title: title of the campaign.
         text: the campaign file.
-        inputs: in the order of the file; the last one changes fastest.
-        campaigns: campaigns of all combinations in this order, by names that are fit for files.
+        places: dotted place of each input, such as "impact.obliquity".
+        options: its values for the campaign, by their labels: as written, or the names of tables.
+        campaigns: campaigns of all combinations, by names that are fit for files; the last input changes fastest.
     """
 
     title: str
     text: str
-    inputs: tuple[Input, ...]
+    places: dict[str, str]
+    options: dict[str, dict[str, Any]]
     campaigns: dict[str, Campaign]
 
     @property
     def shape(self) -> tuple[int, ...]:
         """Number of values of every input."""
-        return tuple(len(swept.values) for swept in self.inputs)
+        return tuple(map(len, self.options.values()))
 
 
 def read_sweep(path: str | Path, *, count: int | None = None) -> Sweep:
@@ -99,38 +77,42 @@ def read_sweep(path: str | Path, *, count: int | None = None) -> Sweep:
     path = Path(path)
     text = read_text(path)
     shared = parsed(text, str(path), CAMPAIGN)
-    swept = shared.pop("sweep", None)
+    swept, where = shared.pop("sweep", None), f"{path}: sweep"
     if not isinstance(swept, dict) or not swept:
-        raise CampaignError(f'{path}: sweep: needs a table [sweep] of lists, as obliquity = ["0 deg", "15 deg"]')
-    inputs = tuple(_input(key, values, str(path)) for key, values in swept.items())
-    if len({swept.name for swept in inputs}) < len(inputs):
-        raise CampaignError(f"{path}: sweep: got two lists for one input")
-    points = math.prod(len(swept.values) for swept in inputs)
-    if points > _MOST:
-        raise CampaignError(f"{path}: sweep: got {points} combinations, but at most {_MOST} are computed")
-    campaigns = {}
-    every = itertools.product(*(zip(swept.labels, swept.values, strict=True) for swept in inputs))
-    for number, combination in enumerate(every):
-        data, labels = json.loads(json.dumps(shared, default=str)), [label for label, _ in combination]
-        for swept, (_, value) in zip(inputs, combination, strict=True):
-            put(data, swept.key, value, f"{path}: sweep")
-        inputs_text = ", ".join(f"{swept.name} = {label}" for swept, label in zip(inputs, labels, strict=True))
+        raise CampaignError(f'{where}: needs a table [sweep] of lists, as obliquity = ["0 deg", "15 deg"]')
+    places, options, campaigns = dict[str, str](), dict[str, dict[str, Any]](), {}
+    for key, values in swept.items():
+        place = resolved(key, where)
+        if not isinstance(values, list) or not values:
+            raise CampaignError(f"{where}.{key}: got {quoted(values)}, but it must be a list of values")
+        labels = labels_of(values, f"{where}.{key}", whole=is_table(place))
+        if is_table(place):
+            values = [{name: part for name, part in value.items() if name != "name"} for value in values]
+        if (name := _dimension(place)) in places:
+            raise CampaignError(f"{where}: got two lists for one input")
+        places[name], options[name] = place, dict(zip(labels, values, strict=True))
+    if (points := math.prod(map(len, options.values()))) > _MOST:
+        raise CampaignError(f"{where}: got {points} combinations, but at most {_MOST} are computed")
+    for number, combination in enumerate(itertools.product(*options.values())):
+        data, point = json.loads(json.dumps(shared, default=str)), dict(zip(options, combination, strict=True))
+        for name, label in point.items():
+            put(data, places[name], options[name][label], where)
+        words = ", ".join(f"{name} = {label}" for name, label in point.items())
         if isinstance(data.get("title"), str):
-            data["title"] = f"{data['title']}: {inputs_text}"[:200]
+            data["title"] = f"{data['title']}: {words}"[:200]
         content = json.dumps(data, indent=1, ensure_ascii=False)
-        name = f"{number:04d}_{'_'.join(re.findall(r'[A-Za-z0-9.+-]+', inputs_text))}"[:100]
-        campaigns[name] = Campaign.from_text(content, name=f"{path}, {inputs_text}", folder=path.parent, count=count)
-    return Sweep(str(shared.get("title", "")), text, inputs, campaigns)
+        file = f"{number:04d}_{'_'.join(re.findall(r'[A-Za-z0-9.+-]+', words))}"[:100]
+        campaigns[file] = Campaign.from_text(content, name=f"{path}, {words}", folder=path.parent, count=count)
+    return Sweep(str(shared.get("title", "")), text, places, options, campaigns)
 
 
-def _input(key: str, values: Any, path: str) -> Input:
-    place = resolved(key, f"{path}: sweep")
-    if not isinstance(values, list) or not values:
-        raise CampaignError(f"{path}: sweep.{key}: got {quoted(values)}, but it must be a list of values")
-    labels = labels_of(values, f"{path}: sweep.{key}", whole=is_table(place))
-    if is_table(place):
-        values = [{name: part for name, part in value.items() if name != "name"} for value in values]
-    return Input(place, labels, tuple(values))
+def _dimension(place: str) -> str:
+    """Name of the dimension of an input: that of the hit map's variable, else the last part of its place; for a layer
+    the whole place, such as "layer_1_thickness"."""
+    if place.startswith("layer "):
+        return place.replace(" ", "_").replace(".", "_")
+    last = place.rpartition(".")[2]
+    return next((str(variable) for variable in v.SHOT_VARIABLES if variable.field == last), last)
 
 
 def folder_of(output: Path) -> Path:
@@ -189,7 +171,7 @@ def joined(sweep: Sweep, points: Sequence[xarray.Dataset]) -> xarray.Dataset:
     """
     others = {dim for point in points for dim in point.dims} - {v.HIT, v.STANDOFF}
     first, *_ = points = xarray.align(*points, join="outer", exclude=others)
-    names, outcomes = tuple(swept.name for swept in sweep.inputs), {*map(str, v.outcome_variables(first))}
+    names, outcomes = tuple(sweep.options), {*map(str, v.outcome_variables(first))}
     shapes = [{name: column.shape for name, column in point.variables.items()} for point in points]
     kept = {name for name, shape in shapes[0].items() if all(other.get(name) == shape for other in shapes)}
     result = first.drop_vars({*first.variables} - kept | {*names} & {*first.variables})
@@ -213,22 +195,22 @@ def joined(sweep: Sweep, points: Sequence[xarray.Dataset]) -> xarray.Dataset:
         attr.TITLE: sweep.title,
         attr.HISTORY: attr.history_line("sweep"),
         attr.CAMPAIGN: sweep.text,
-        attr.SWEEP: json.dumps({swept.name: list(swept.labels) for swept in sweep.inputs}),
+        attr.SWEEP: json.dumps({name: list(labels) for name, labels in sweep.options.items()}),
     }
-    return result.assign_coords({swept.name: _coordinate(swept, sweep) for swept in sweep.inputs})
+    return result.assign_coords({name: _coordinate(sweep, name) for name in names})
 
 
-def _coordinate(swept: Input, sweep: Sweep) -> tuple[Any, ...]:
+def _coordinate(sweep: Sweep, name: str) -> tuple[Any, ...]:
     """Coordinate of an input: numbers with their unit if it is a quantity, else its labels."""
-    kind = type_at(swept.key, next(iter(sweep.campaigns.values())))
-    stride = math.prod(sweep.shape[sweep.inputs.index(swept) + 1 :])
-    campaigns = list(sweep.campaigns.values())[:: max(1, stride)][: len(swept.values)]
-    numbers = [value_at(swept.key, campaign) for campaign in campaigns]
+    place, labels, campaigns = sweep.places[name], list(sweep.options[name]), list(sweep.campaigns.values())
+    stride = math.prod(sweep.shape[list(sweep.options).index(name) + 1 :])
+    numbers = [value_at(place, campaign) for campaign in campaigns[::stride][: len(labels)]]
+    kind = type_at(place, campaigns[0])
     if kind is None or not all(isinstance(number, int | float) for number in numbers):
-        return swept.name, np.array(swept.labels), {"long_name": swept.key}
+        return name, np.array(labels), {"long_name": place}
     reader, values = reader_in(kind), np.array(numbers, dtype=float)
     units = reader.display.stored if reader else "1"
-    return swept.name, np.degrees(values) if units == "degree" else values, {"units": units, "long_name": swept.key}
+    return name, np.degrees(values) if units == "degree" else values, {"units": units, "long_name": place}
 
 
 def measures_of(sweep: xarray.Dataset, texts: Sequence[str] = ()) -> list[Measure]:

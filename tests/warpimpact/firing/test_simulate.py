@@ -12,7 +12,7 @@ from scipy import stats
 from warpimpact.analysis.numbers import text_of
 from warpimpact.campaign.text import CampaignError
 from warpimpact.cli import main
-from warpimpact.firing.plan import Gun, Langlie, MilStd662F, Procedure, Shot, firing_test
+from warpimpact.firing.plan import Gun, Langlie, MilStd662F, Procedure, read_test
 from warpimpact.firing.simulate import Response, firing_view, response_of_limits, simulate_test
 from warpimpact.kernels.status import Status
 from warpimpact.plotting.studies import firing_figure
@@ -27,9 +27,15 @@ LANGLIE = '[procedure]\nname = "langlie"\nlowest = "650 m/s"\nhighest = "950 m/s
 TEXT = TARGET + LANGLIE + '[gun]\ndeviation = "5 m/s"\n[proof]\nvelocity = "0.76 km/s"\nallowed = 1\n'
 
 
-@pytest.fixture(scope="module")
-def dataset() -> xarray.Dataset:
-    return simulate_test(firing_test(TEXT, "a.toml", Path()), NORMAL)
+def reported(text: str) -> xarray.Dataset:
+    """What the test of this file reports, in the working directory."""
+    Path("a.toml").write_text(text, encoding="utf-8")
+    return simulate_test(read_test("a.toml"), NORMAL)
+
+
+@pytest.fixture
+def dataset(in_tmp_path: Path) -> xarray.Dataset:
+    return reported(TEXT)
 
 
 @pytest.mark.parametrize(
@@ -48,9 +54,10 @@ def dataset() -> xarray.Dataset:
         (TARGET + "[gun]\ndeviation = -1\n", "gun.deviation: got -1"),
     ],
 )
+@pytest.mark.usefixtures("in_tmp_path")
 def test_a_mistake_becomes_one_sentence(text: str, message: str) -> None:
     with pytest.raises(CampaignError, match=r"^a\.toml: ") as error:
-        firing_test(text, "a.toml", Path())
+        reported(text)
     assert message in str(error.value)
 
 
@@ -67,11 +74,10 @@ def test_a_mistake_becomes_one_sentence(text: str, message: str) -> None:
 def test_the_velocities_follow_the_published_rules(
     procedure: Procedure, answers: Sequence[int], velocities: Sequence[float]
 ) -> None:
-    aims, shots = list[float](), list[Shot]()
-    for answer in (*answers, 0):
-        if (aim := procedure.aim(shots)) is not None:
+    aims = list[float]()
+    for shot in range(len(answers) + 1):
+        if (aim := procedure.aim(np.array(aims), np.array(answers[:shot], dtype=bool))) is not None:
             aims.append(aim)
-            shots.append(Shot(aim, bool(answer)))
     assert aims == pytest.approx(velocities)
 
 
@@ -103,8 +109,7 @@ def test_quantiles_of_a_normal_response(share: float) -> None:
 
 def test_shot_k_of_test_t_does_not_depend_on_their_numbers(dataset: xarray.Dataset) -> None:
     text = TEXT.replace("tests = 200", "tests = 50").replace('highest = "950 m/s"', 'highest = "950 m/s"\nshots = 7')
-    fewer = simulate_test(firing_test(text, "a.toml", Path()), NORMAL)
-    assert np.array_equal(fewer[f.SHOT_VELOCITY].values, dataset[f.SHOT_VELOCITY].values[:50, :7])
+    assert np.array_equal(reported(text)[f.SHOT_VELOCITY].values, dataset[f.SHOT_VELOCITY].values[:50, :7])
 
 
 def test_numbers_of_a_known_target(dataset: xarray.Dataset) -> None:
@@ -131,7 +136,7 @@ def test_the_text_and_the_figure_say_what_it_is(dataset: xarray.Dataset) -> None
     assert len(figure.axes) == 3
     assert f.SENTENCE in " ".join(figure.legends[0].get_title().get_text().split())
     standard = TARGET + '[procedure]\nname = "mil_std_662f"\nstart = 815\n'
-    text = text_of(firing_view(simulate_test(firing_test(standard, "a", Path()), NORMAL)))
+    text = text_of(firing_view(reported(standard)))
     assert "reports a V50 in " in text
     assert "interval of V50" not in text
 

@@ -9,7 +9,7 @@ import pytest
 import xarray
 
 from warpimpact import Campaign
-from warpimpact.firing.plan import firing_test
+from warpimpact.firing.plan import read_test
 from warpimpact.firing.simulate import Response, simulate_test
 from warpimpact.results import files
 from warpimpact.runs.run import run
@@ -40,7 +40,9 @@ def test_a_hit_map_complies(result: xarray.Dataset, tmp_path: Path) -> None:
 def test_a_firing_test_complies(tmp_path: Path) -> None:
     (tmp_path / "limits.nc").touch()
     text = (CAMPAIGNS / "firing" / "v50_test.toml").read_text(encoding="utf-8").replace("tests = 1000", "tests = 20")
-    test = firing_test(text.replace('campaign = "plate_and_base.toml"', 'limits = "limits.nc"'), "a", tmp_path)
+    text = text.replace('campaign = "plate_and_base.toml"', 'limits = "limits.nc"')
+    (tmp_path / "a.toml").write_text(text, encoding="utf-8")
+    test = read_test(tmp_path / "a.toml")
     files.write(simulate_test(test, Response(np.linspace(800.0, 1100.0, 20))), tmp_path / "a.nc")
     message = report(tmp_path / "a.nc")
     assert "All tests passed!" in message, message

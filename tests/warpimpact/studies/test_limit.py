@@ -1,6 +1,7 @@
 """Limits of a campaign: the command, its file, its figure, resuming it, and what it refuses."""
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -20,11 +21,12 @@ from warpimpact.results import variables as v
 from warpimpact.results.measures import Measure
 from warpimpact.runs import compute
 from warpimpact.runs.replay import replay
+from warpimpact.runs.run import run_to_file
 from warpimpact.scene import Numerics, make_shots
 from warpimpact.solver.accuracy import PILOT_LIMITS
 from warpimpact.solver.device import Worker
 from warpimpact.solver.limit import MOST_RUNS, limit_velocity
-from warpimpact.studies.limit import limit_of, limit_to_file, limit_view
+from warpimpact.studies.limit import limit_of, limit_view
 
 CAMPAIGNS = Path(__file__).parents[3] / "campaigns"
 TEXT = """\
@@ -52,8 +54,8 @@ def campaign(text: str = TEXT) -> Campaign:
     return Campaign.from_text(text, name="text", folder=Path())
 
 
-def search(of: Campaign, path: Path, **how: object) -> xarray.Dataset:
-    limit_to_file(of, path, device="cpu", **how)
+def search(of: Campaign, path: Path, *how: Any) -> xarray.Dataset:
+    run_to_file(of, path, device="cpu", limit=limit_of(of, *how))
     return files.read(path)
 
 
@@ -122,7 +124,7 @@ def test_a_hit_can_be_replayed(result: xarray.Dataset) -> None:
 
 def test_thickness_of_a_campaign(tmp_path: Path) -> None:
     solid = TEXT.replace('pattern = { shape = "circle", diameter = "5 mm", spacing = ["8 mm", "8 mm"] }', "")
-    actual = search(campaign(solid.replace("count = 64", "count = 4")), tmp_path / "thickness.nc", quantity="thickness")
+    actual = search(campaign(solid.replace("count = 64", "count = 4")), tmp_path / "thickness.nc", "thickness")
     assert (actual["thickness"] == actual["limit_thickness_lower"]).all()
     assert (actual["limit_thickness"] > 4e-3).all()
     assert "mm" in text_of(limit_view(actual))
@@ -138,7 +140,7 @@ def test_the_resistance_of_the_catalogue_follows_the_thickness(tmp_path: Path) -
         search(
             campaign(f'{text}[plate]\nmaterial = "HHA Class 1"\nthickness = "{thickness} mm"\n'),
             tmp_path / f"{thickness}.nc",
-            quantity="thickness",
+            "thickness",
         )
         for thickness in (5, 10)
     ]
@@ -159,7 +161,7 @@ shear_coefficient = 0.05
 def test_thickness_of_the_base_behind_a_perforated_plate(tmp_path: Path) -> None:
     given = TEXT.replace("count = 64", "count = 4").replace(PROMISED, GIVEN)
     behind = campaign(given + LAYER)
-    limit_to_file(behind, tmp_path / "base.nc", "thickness", layer=1, device="cpu")
+    run_to_file(behind, tmp_path / "base.nc", device="cpu", limit=limit_of(behind, "thickness", layer=1))
     actual = files.read(tmp_path / "base.nc")
     passed = (actual["status"] == Status.PERFORATED).values
     assert passed.any()

@@ -12,7 +12,8 @@ from warpimpact.analysis.effectiveness import effectiveness
 from warpimpact.analysis.numbers import text_of
 from warpimpact.results import files
 from warpimpact.results.references import references_of
-from warpimpact.studies.limit import limit_to_file, limit_view
+from warpimpact.runs.run import run_to_file
+from warpimpact.studies.limit import limit_of, limit_view
 
 LAYER = '[[layer]]\ngap = "60 mm"\nthickness = "2 mm"\nresistance = "2600 MPa"\n'
 TEXT = """\
@@ -43,7 +44,7 @@ NONE = '{ shape = "none" }'
 def search(path: Path, quantity: str = "velocity", of_layer: int = 0, **given: str) -> xarray.Dataset:
     text = TEXT.format(**{"pattern": HOLES, "layer": "", "solid": "true"} | given)
     of = Campaign.from_text(text, name="text", folder=Path())
-    limit_to_file(of, path, quantity, layer=of_layer, device="cpu")
+    run_to_file(of, path, device="cpu", limit=limit_of(of, quantity, layer=of_layer))
     return files.read(path)
 
 
@@ -57,7 +58,7 @@ def thickness(tmp_path_factory: pytest.TempPathFactory) -> xarray.Dataset:
     return search(tmp_path_factory.mktemp("limit") / "thickness.nc", "thickness", 1, layer=LAYER)
 
 
-def limit_of(dataset: xarray.Dataset, reference: str = "solid") -> float:
+def solid_limit(dataset: xarray.Dataset, reference: str = "solid") -> float:
     return float(references_of(dataset)[reference][f"limit_{dataset.attrs['limit']}"][0])
 
 
@@ -67,10 +68,10 @@ def test_it_is_the_search_of_a_solid_plate_that_is_as_heavy(velocity: xarray.Dat
     alone = search(tmp_path / "a.nc", pattern=NONE)
     thin = TEXT.format(pattern=NONE, layer="", solid="true").replace('"4 mm"', f"{density / 7850.0}")
     of = Campaign.from_text(thin, name="text", folder=Path(), count=1)
-    limit_to_file(of, tmp_path / "b.nc", device="cpu")
+    run_to_file(of, tmp_path / "b.nc", device="cpu", limit=limit_of(of))
     assert not references_of(alone)  # it is its own
     expected = files.read(tmp_path / "b.nc")["limit_velocity"].values
-    assert limit_of(velocity) == pytest.approx(expected.item(), abs=1.0)
+    assert solid_limit(velocity) == pytest.approx(expected.item(), abs=1.0)
     assert references_of(velocity)["solid"].sizes["hit"] == 1  # the hits differ in their places alone
 
 
@@ -78,9 +79,9 @@ def test_the_base_alone_is_a_plate_of_its_own(tmp_path: Path) -> None:
     with_base = search(tmp_path / "a.nc", layer=LAYER)
     text = TEXT.format(pattern=NONE, layer="", solid="true").replace('"4 mm"', '"2 mm"')
     base = Campaign.from_text(text.replace("shear_coefficient = 0.05", ""), name="text", folder=Path(), count=1)
-    limit_to_file(base, tmp_path / "b.nc", device="cpu")
+    run_to_file(base, tmp_path / "b.nc", device="cpu", limit=limit_of(base))
     expected = files.read(tmp_path / "b.nc")["limit_velocity"].values
-    assert limit_of(with_base, "base_alone") == pytest.approx(expected.item(), abs=1.0)
+    assert solid_limit(with_base, "base_alone") == pytest.approx(expected.item(), abs=1.0)
     measure = effectiveness(with_base).loc["V50"]
     assert measure.alone == pytest.approx(expected.item() * measure.measure.display.factor, rel=2e-3)
     assert "base alone: limit" in text_of(limit_view(with_base))
@@ -95,7 +96,7 @@ def test_it_changes_no_bit_of_the_hits(velocity: xarray.Dataset, tmp_path: Path)
 
 def test_a_limit_velocity_has_measures_and_a_ratio(velocity: xarray.Dataset) -> None:
     v50, v05, worst_tenth, worst = effectiveness(velocity).itertuples()
-    values, solid = velocity["limit_velocity"].values, limit_of(velocity)
+    values, solid = velocity["limit_velocity"].values, solid_limit(velocity)
     assert [one.Index for one in (v50, v05)] == ["V50", "V05"]
     assert v50.value == pytest.approx(np.median(values))
     assert v50.measure.higher_is_better
@@ -118,8 +119,8 @@ def test_limits_within_their_tolerance_are_not_distinguished(
 def test_of_a_thickness_it_tells_the_areal_density_that_a_solid_plate_needs(thickness: xarray.Dataset) -> None:
     measures = effectiveness(thickness)
     plate = 7850.0 * 4e-3 * (1.0 - np.pi * 2.5**2 / 64.0)
-    solid = plate + 7850.0 * limit_of(thickness)
+    solid = plate + 7850.0 * solid_limit(thickness)
     density = measures.loc["quantile(limit_areal_density, 0.5)"]
     assert (density.solid, density.ratio) == (pytest.approx(solid), pytest.approx(density.value / solid))
-    assert measures.solid["H50"] == pytest.approx(1e3 * limit_of(thickness))
+    assert measures.solid["H50"] == pytest.approx(1e3 * solid_limit(thickness))
     assert f"{solid:.4g} kg/m² (the target as given has" in text_of(limit_view(thickness))

@@ -56,7 +56,7 @@ def test_a_layer_is_swept_by_its_number(tmp_path: Path) -> None:
     given = '[sweep]\n"layer 2.thickness" = ["3 mm", "5 mm"]\n"layer 1.pattern" = [{ name = "a", shape = "none" }]\n'
     (tmp_path / "a.toml").write_text(TEXT.replace("[hits]", f"{layers}[hits]") + given, encoding="utf-8")
     sweep = read_sweep(tmp_path / "a.toml")
-    assert [one.name for one in sweep.inputs] == ["layer_2_thickness", "layer_1_pattern"]
+    assert list(sweep.options) == ["layer_2_thickness", "layer_1_pattern"]
     assert [one.layer[1].thickness for one in sweep.campaigns.values()] == [3e-3, 5e-3]
     actual = joined(sweep, [run(one, device="cpu") for one in sweep.campaigns.values()])
     assert actual["layer_2_thickness"].values.tolist() == [3e-3, 5e-3]
