@@ -3,12 +3,11 @@
 import csv
 import json
 import math
+import os
 import re
 import stat
 import tomllib
-from array import array
 from collections.abc import Iterator, Mapping
-from itertools import chain
 from pathlib import Path
 from types import MappingProxyType
 from typing import Annotated, Any
@@ -22,8 +21,6 @@ from .units import brief, quantity, quoted
 _LONGEST_PATH = 255
 """Characters of a path that a message quotes."""
 _NAME_AND_UNIT = re.compile(r"(\w+)\s*(?:\[\s*([^\[\]]*?)\s*\])?")
-_MOST_BYTES, _MOST_ROWS = 2**28, 2**22
-"""Largest size and number of rows of a table."""
 _WITH_A_COMMA = re.compile(r"[-+]?[0-9]*,[0-9]+(?:[eE][-+]?[0-9]+)?(?: .*)?")
 _THOUSANDS = re.compile(r"[-+]?[1-9][0-9]{0,2},[0-9]{3}")
 _BARE_VALUE = re.compile(r"""([\w.-]+)\s*=\s*([^"'\[{\s](?:[^,}\]#]|,(?=\d))*)""")
@@ -39,37 +36,26 @@ def input_file(name: object, info: ValidationInfo) -> Path:
     if not isinstance(name, str | Path):
         raise ValueError(f"got {quoted(name)}, which is not a file name")
     path = Path((info.context or {}).get("folder", "")) / name
-    try:
-        exists = path.is_file()
-    except (OSError, ValueError) as error:  # the name may be too long, or have a character that no name can have
-        raise ValueError(f"got {quoted(name)}, which is no file name ({_reason(error)})") from None
-    if not exists:
+    if not os.path.isfile(path):
         got, place = (brief(str(text), _LONGEST_PATH) for text in (name, path))
         raise ValueError(f'got "{got}", but there is no file {place}')
     return path.absolute()
 
 
-def _reason(error: Exception) -> str:
-    return (error.strerror if isinstance(error, OSError) else None) or str(error)
-
-
-def check_file(path: Path, most: int | None = None) -> None:
-    """Refuse, before it is read, a pipe or a device, which may have no end, and a file of more than `most` bytes.
+def check_file(path: Path) -> None:
+    """Refuse, before it is read, a pipe or a device, which may have no end.
 
     Raises:
         ValueError: the message names the file and its fault.
     """
-    name = brief(str(path), _LONGEST_PATH)
+    reason = None
     try:
-        status = path.stat()
-    except FileNotFoundError:
-        raise ValueError(f"{name}: cannot be read (it is not there)") from None
+        if not stat.S_ISREG(path.stat().st_mode):
+            reason = f"it is {'a folder' if path.is_dir() else 'no file'}"
     except (OSError, ValueError) as error:
-        raise ValueError(f"{name}: cannot be read ({_reason(error)})") from None
-    if not stat.S_ISREG(status.st_mode):
-        raise ValueError(f"{name}: cannot be read (it is {'a folder' if path.is_dir() else 'no file'})")
-    if most is not None and status.st_size > most:
-        raise ValueError(f"{name}: has {status.st_size / 2**20:.4g} MiB, but at most {most / 2**20:g} MiB are read")
+        reason = "it is not there" if isinstance(error, FileNotFoundError) else getattr(error, "strerror", str(error))
+    if reason is not None:
+        raise ValueError(f"{brief(str(path), _LONGEST_PATH)}: cannot be read ({reason})")
 
 
 InputFile = Annotated[Path, BeforeValidator(input_file)]
@@ -93,9 +79,18 @@ def read_columns(
     rows = read_rows(path)
     _, header = next(rows, (0, []))
     columns = _header(path.name, header, kinds, required, exported)
-    values_by_column = _numbers(path.name, header, rows, [place for place, _ in columns.values()]).T
+    numbers = []
+    for line, row in rows:
+        if len(row) != len(header):
+            raise ValueError(
+                f'{path.name}, line {line}: got "{brief(",".join(row))}", but a row has {len(header)} finite numbers; '
+                "decimal commas need semicolons between columns"
+            )
+        numbers.append([_number(row[at], f"{path.name}, line {line}: {header[at]}") for at, _ in columns.values()])
+    if not numbers:
+        raise ValueError(f"{path.name} has no rows below its header")
     table = {}
-    for (name, (_, unit)), values in zip(columns.items(), values_by_column, strict=True):
+    for (name, (_, unit)), values in zip(columns.items(), np.array(numbers).T, strict=True):
         kind = quantity(kinds[name])
         try:
             factor = kind(f"1 {unit}") if unit else math.radians(1.0) if kind.unit == "rad" else 1.0
@@ -111,44 +106,27 @@ def _header(
 ) -> dict[str, tuple[int, str]]:
     """Place and unit of each column by name."""
     matches = [_NAME_AND_UNIT.fullmatch(column) for column in header]
-    columns = [
-        (match[1], (place, match[2] or "")) if match else ("", (place, "")) for place, match in enumerate(matches)
-    ]
-    if header[:1] == ["hit"]:
-        columns = [(exported.get(name, name), column) for name, column in columns]
-        columns = [(name, column) for name, column in columns if name in kinds]
-        first: list[str] = [name for name in required if name in dict(columns)]
-    else:
-        first = [name for name, _ in columns[: len(required)]]
-    if first != list(required) or not dict(columns).keys() <= kinds.keys() or len(dict(columns)) < len(columns):
+    names = [(match[1], match[2] or "") if match else ("", "") for match in matches]
+    if is_exported := header[:1] == ["hit"]:
+        names = [(exported.get(name, name), unit) for name, unit in names]
+    columns = {name: (place, unit) for place, (name, unit) in enumerate(names) if name in kinds}
+    in_order = tuple(columns)[: len(required)] == required and len(columns) == len(header)
+    if not (columns.keys() >= set(required) if is_exported else in_order):
         got = f'got "{brief(",".join(header))}", but ' if set(header) & set(kinds) else ""  # no unrelated file
         optional = [name for name in kinds if name not in required]
         parts = [",".join(required)] * bool(required) + [f"any of {', '.join(optional)}"] * bool(optional)
         raise ValueError(f"{file}, line 1: {got}the header must be {' and then '.join(parts)}")
-    return dict(columns)
+    return columns
 
 
-def _numbers(file: str, header: list[str], rows: Iterator[tuple[int, list[str]]], places: list[int]) -> Array:
-    """Numbers of the columns at these places, shape [rows, columns]."""
-    numbers = array("d")
-    for number, row in rows:
-        line = f"{file}, line {number}:"
-        if len(row) != len(header):
-            got = f'{line} got "{brief(",".join(row))}", but a row has {len(header)} finite numbers'
-            raise ValueError(got + ", separated by commas" * (len(row) > len(header)))
-        for place in places:
-            try:
-                value = float(row[place])
-            except ValueError:
-                value = math.nan
-            if not math.isfinite(value):
-                raise ValueError(f'{line} {header[place]}: got "{brief(row[place])}", but it must be a finite number')
-            numbers.append(value)
-        if len(numbers) > _MOST_ROWS * len(places):
-            raise ValueError(f"{file} has more than {_MOST_ROWS} rows")
-    if not numbers:
-        raise ValueError(f"{file} has no rows below its header")
-    return np.array(numbers).reshape(-1, len(places))
+def _number(cell: str, place: str) -> float:
+    try:
+        value = float(cell)
+    except ValueError:
+        value = math.nan
+    if not math.isfinite(value):
+        raise ValueError(f'{place}: got "{brief(cell)}", but it must be a finite number')
+    return value
 
 
 def read_rows(path: Path) -> Iterator[tuple[int, list[str]]]:
@@ -160,20 +138,19 @@ def read_rows(path: Path) -> Iterator[tuple[int, list[str]]]:
     Raises:
         ValueError: the message names the file, the line and its fault.
     """
-    check_file(path, _MOST_BYTES)
+    check_file(path)
     try:
-        with path.open(encoding="utf-8-sig", newline="") as lines:
-            top, before = "#", 0
-            separator = ""
-            while top and (top.startswith(("#", "sep=")) or not top.strip()):
-                separator = top.strip("\r\n")[4:] if top.startswith("sep=") else separator
-                top, before = next(lines, ""), before + 1
-            separator = separator or next((mark for mark in ";\t" if mark in top), ",")
-            reader = csv.reader(chain([top], lines), delimiter=separator, skipinitialspace=True)
-            for row in reader:
-                if any(map(str.strip, row)) and not row[0].startswith("#"):
-                    number = before + reader.line_num - 1
-                    yield number, [_with_a_point(cell.strip(), separator, path.name, number) for cell in row]
+        lines = path.read_text(encoding="utf-8-sig").split("\n")
+        given = next((line[4:] for line in lines if line.startswith("sep=")), "")
+        header = next((line for line in lines if line.strip() and not line.startswith(("#", "sep="))), "")
+        separator = given or next((mark for mark in ";\t" if mark in header), ",")
+        reader = csv.reader(lines, delimiter=separator, skipinitialspace=True)
+        for row in reader:
+            if any(map(str.strip, row)) and not row[0].startswith(("#", "sep=")):
+                yield (
+                    reader.line_num,
+                    [_with_a_point(cell.strip(), separator, path.name, reader.line_num) for cell in row],
+                )
     except UnicodeDecodeError:
         raise ValueError(f"{path.name} cannot be read as a table: it is not UTF-8; save it as CSV UTF-8") from None
     except (OSError, TypeError, csv.Error) as error:  # a TypeError of a separator of several characters

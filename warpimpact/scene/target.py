@@ -69,46 +69,34 @@ class Plate(Model):
 
     @model_validator(mode="wrap")
     @classmethod
-    def _has_its_weight(cls, values: Any, read: ModelWrapValidatorHandler[Self]) -> Self:
-        if not isinstance(values, dict) or values.get("areal_density") is None:
+    def _completed(cls, values: Any, read: ModelWrapValidatorHandler[Self]) -> Self:
+        """Read the keys that stand for others: a material, an areal density, and the default of the exposure."""
+        if not isinstance(values, dict):
             return read(values)
-        check_together({THICKNESS: "thickness" in values, AREAL_DENSITY: True})
+        resists = "resistance" in values and values.keys().isdisjoint(cls.in_python)
+        if cls.of_material is not None and isinstance(values.get("material"), str) and not resists:
+            values = cls.of_material(cls, values)
+        given = {BY_TIME: "degradation_interval", BY_PATH: "degradation_distance", AREAL_DENSITY: "areal_density"}
+        used: dict[str, str | bool] = {option: values.get(key) is not None for option, key in given.items()}
+        check_together({THICKNESS: "thickness" in values, **used})
+        if not used[BY_TIME] and not used[BY_PATH]:
+            values = values | {"degradation_interval": INTERVAL}
+        if not used[AREAL_DENSITY]:
+            return read(values)
         rest = {name: value for name, value in values.items() if name != "areal_density"}
         weight = _Weight(areal_density=values["areal_density"]).areal_density
         plate = read(rest | {"thickness": 1.0})
         object.__setattr__(plate, "thickness", weight / plate.areal_density)  # which was that of 1 m
         return plate
 
-    @model_validator(mode="wrap")
-    @classmethod
-    def _has_its_material(cls, values: Any, read: ModelWrapValidatorHandler[Self]) -> Self:
-        if cls.of_material is None or not isinstance(values, dict) or not isinstance(values.get("material"), str):
-            return read(values)
-        if "resistance" in values and not {"threat", "obliquity"} & values.keys():
-            return read(values)
-        return read(cls.of_material(cls, values))
-
     @classmethod
     def _keys(cls) -> list[str]:
         return [*super()._keys(), "areal_density", *(() if cls.of_material is None else cls.in_python)]
 
-    @model_validator(mode="before")
-    @classmethod
-    def _goes_together(cls, values: Any) -> Any:
-        if not isinstance(values, dict):
-            return values
-        keys = {BY_TIME: "degradation_interval", BY_PATH: "degradation_distance"}
-        given = {option: values.get(key) is not None for option, key in keys.items()}
-        check_together(given)
-        by_default = not given[BY_TIME] and not given[BY_PATH]
-        return values | {"degradation_interval": INTERVAL} if by_default else values
-
     @property
     def degradation_unit(self) -> float:
         """Exposure over which β applies once: Δt_β [s], or Δs_β [m]."""
-        given = self.degradation_interval if self.degradation_distance is None else self.degradation_distance
-        assert given is not None  # one of the two is given
-        return given
+        return self.degradation_distance or self.degradation_interval or INTERVAL
 
     @property
     def open_area(self) -> float:
@@ -190,8 +178,7 @@ class Target(Model):
     def _begins_at_the_origin(cls, layers: tuple[Plate, ...]) -> tuple[Plate, ...]:
         if isinstance(front := layers[0], Layer) and (front.gap, *front.offset) != (0.0, 0.0, 0.0):
             raise ValueError(
-                f"got gap = {front.gap:g} m and offset = {front.offset} m of the first layer, but it has its front "
-                "face and its origin at 0: give a Plate"
+                f"got gap = {front.gap:g} m or an offset of the first layer, but it starts at 0: give a Plate"
             )
         return layers
 
@@ -221,8 +208,8 @@ class Target(Model):
     def faces(self) -> NDArray[np.float64]:
         """Front and rear faces of all layers [m], shape [layers, 2]."""
         thickness = [np.array(layer.thickness) for layer in self.layers]
-        fronts = np.array(self.fronts(thickness))
-        return np.stack([fronts, fronts + np.array(thickness)], axis=1)
+        fronts = self.fronts(thickness)
+        return np.stack([fronts, np.add(fronts, thickness)], axis=1)
 
     @property
     def depth(self) -> float:
@@ -251,11 +238,10 @@ class Target(Model):
     def solid(self) -> Self:
         """The target whose add-on, or whose plate if it stands alone, has no holes, the same materials and the same
         weight."""
-        solid = tuple(layer.solid for layer in self.add_on)
-        return self.model_copy(update={"layers": (*solid, *self.layers[len(solid) :])})
+        solid = [layer.solid for layer in self.add_on]
+        return type(self)(layers=(*solid, *self.layers[len(solid) :]))
 
     @property
     def base_alone(self) -> Self:
         """The base at its place without the other layers."""
-        base = Plate(**{name: getattr(self.layers[-1], name) for name in Plate.model_fields})
-        return self.model_copy(update={"layers": (base,)})
+        return type(self)(layers=(Plate(**{name: getattr(self.layers[-1], name) for name in Plate.model_fields}),))

@@ -35,7 +35,7 @@ ZIGZAG = np.random.default_rng(1).uniform((-8e-3, -4e-3), (8e-3, 4e-3), (400, 2)
 CAMPAIGNS = {
     "nested arrays": ("a = " + "[" * 100_000 + "]" * 100_000, "nested too deep"),
     "a tower of powers": (BASE.replace('"4 mm"', '"4 m**9**9**9"', 1), 'whose unit "m**9**9**9" is not one of names'),
-    "a long file name": (listed("z" * 300), "which is no file name"),
+    "a long file name": (listed("z" * 300), "but there is no file"),
     "a device": (listed("/dev/zero"), "but there is no file /dev/zero"),
     "a terminal's commands": (BASE.replace('title = "', 'title = "\\u001b[31m', 1), "without control characters"),
     "a tiny length": (

@@ -31,7 +31,7 @@ def test_tables_of_any_spreadsheet_are_read(tmp_path: Path, text: str) -> None:
     [
         ("hit_y\thit_z\n1,250\t0\n", 'line 2: got "1,250", whose comma may stand for thousands'),
         ("hit_y;hit_z\n1.250,5;0\n", 'line 2: hit_y: got "1.250,5", but it must be a finite number'),
-        ("hit_y,hit_z\n0,001,0,002\n", "but a row has 2 finite numbers, separated by commas"),
+        ("hit_y,hit_z\n0,001,0,002\n", "but a row has 2 finite numbers; decimal commas need semicolons"),
     ],
 )
 def test_a_comma_of_two_meanings_is_refused(tmp_path: Path, text: str, sentence: str) -> None:
