@@ -67,25 +67,19 @@ def unsymmetric(scatter: Scatter, layers: Sequence[Layer] = ()) -> dict[str, str
 
 
 def symmetries(plate: Plate, impact: Impact) -> tuple[Symmetry, ...]:
-    """The common symmetries of plate and shot, in the order of SYMMETRIES."""
-    return tuple(s for s in SYMMETRIES if s == IDENTITY or (_of_shot(s, impact) and of_plate(s, plate)))
-
-
-def _of_shot(symmetry: Symmetry, impact: Impact) -> bool:
-    """Whether the image of the shot is the shot itself, except for its hit point."""
+    """The maps that change neither plate nor shot except for its hit point, in the order of SYMMETRIES."""
     across = math.sin(impact.obliquity)
-    of_y = across * math.cos(impact.azimuth), impact.yaw
-    of_z = across * math.sin(impact.azimuth), impact.pitch
-    turned = [*(of_y if symmetry.along_y < 0 else ()), *(of_z if symmetry.along_z < 0 else ())]
-    keeps_spin = symmetry.along_y * symmetry.along_z > 0  # spin is an axial vector along the core
-    return all(abs(value) < _ROUNDING for value in turned) and (keeps_spin or impact.spin == 0.0)
+    turned_y = max(abs(across * math.cos(impact.azimuth)), abs(impact.yaw)) >= _ROUNDING
+    turned_z = max(abs(across * math.sin(impact.azimuth)), abs(impact.pitch)) >= _ROUNDING
 
+    def keeps(s: Symmetry) -> bool:
+        if (turned_y and s.along_y < 0) or (turned_z and s.along_z < 0):
+            return False
+        if (impact.spin and s.along_y != s.along_z) or (plate.size is not None and s.centred):
+            return False  # spin is an axial vector along the core; a rim removes the centring
+        return plate.pattern.is_symmetric(s.along_y, s.along_z, centred=s.centred)
 
-def of_plate(symmetry: Symmetry, plate: Plate) -> bool:
-    """Whether the image of the plate is the plate itself."""
-    if plate.size is not None and symmetry.centred:
-        return False  # a rim removes the centring
-    return plate.pattern.is_symmetric(symmetry.along_y, symmetry.along_z, centred=symmetry.centred)
+    return tuple(s for s in SYMMETRIES if s == IDENTITY or keeps(s))
 
 
 def irreducible_part(group: Sequence[Symmetry]) -> tuple[tuple[float, float], tuple[float, float]]:
@@ -120,9 +114,6 @@ class Sampler:
 
     Attributes:
         cell: extent along y and z [m] of the whole cell or plate, centred on the origin.
-
-    Raises:
-        ValueError: scatter that removes the symmetry of hits.irreducible; hits on the whole of an unbounded plate.
     """
 
     def __init__(
@@ -131,15 +122,13 @@ class Sampler:
         scatter = scatter or Scatter()
         check_together({IRREDUCIBLE: hits.irreducible} | unsymmetric(scatter))
         self._impact, self._hits, self.cell = impact, hits, hits.covered(plate)
-        (low_y, high_y), (low_z, high_z) = irreducible_part(symmetries_used(impact, hits, plate))
-        self._extent = self.cell[0] * (high_y - low_y), self.cell[1] * (high_z - low_z)
-        self._middle = 0.5 * self.cell[0] * (high_y + low_y), 0.5 * self.cell[1] * (high_z + low_z)
-        self._scatter = scatter.given
+        low, high = np.array(irreducible_part(symmetries_used(impact, hits, plate))).T
+        self._extent, self._middle = np.multiply(self.cell, high - low), 0.5 * np.array(self.cell) * (high + low)
+        self._scatter, self._replicates = scatter.given, replicates
         self._dimensions = _HIT_COLUMNS + (drawn_columns(scatter.layers) if self._scatter else 0)
-        self._replicates = replicates
 
     def __len__(self) -> int:
-        return self._hits.total(self._extent)
+        return self._hits.total((self._extent[0], self._extent[1]))
 
     def shots(self, first: int, count: int) -> Shots:
         """`count` shots from number `first` on, fewer at the end of the campaign."""
@@ -154,9 +143,10 @@ class Sampler:
         for ((name, layer), distribution), share in zip(self._scatter.items(), uniform, strict=True):
             shots = shots.assign({name: distribution.quantile(np.clip(share, EDGE, 1.0 - EDGE))}, layer)
         if self._hits.listed is not None:
-            listed, length = self._hits.sampling == "list", len(next(iter(self._hits.listed.values())))
-            uniform_rows = stream(self._hits.seed, (_ROWS,), first, count) * length
-            rows = np.arange(first, first + count) % length if listed else uniform_rows.astype(np.int64)
+            rows = np.arange(first, first + count)
+            if self._hits.sampling != "list":
+                length = len(next(iter(self._hits.listed.values())))
+                rows = (stream(self._hits.seed, (_ROWS,), first, count) * length).astype(np.int64)
             shots = shots.assign({name: column[rows] for name, column in self._hits.listed.items()})
         return shots
 
@@ -165,8 +155,8 @@ class Sampler:
         if self._hits.sampling == "sobol":
             return list(self._net(columns, first, count))
         if self._hits.sampling == "grid":  # centres of cells, row by row
-            along_y, along_z = self._hits.grid(self._extent)
-            cell = np.arange(first, first + count) % (along_y * along_z)
+            along_y, along_z = self._hits.grid((self._extent[0], self._extent[1]))
+            cell = np.arange(first, first + count)
             hits = [(cell // along_z + 0.5) / along_y, (cell % along_z + 0.5) / along_z]
         else:  # shot k has the draws 2k and 2k + 1
             pairs = _draws(np.random.Philox(self._hits.seed), 2 * first, 2 * count)
@@ -175,23 +165,17 @@ class Sampler:
 
     def _net(self, columns: list[int], first: int, count: int) -> Array:
         """Sobol coordinates, shape [columns, count]; the replicates give one point in turn."""
-        replicates, last = self._replicates, first + count
-        points = np.empty((len(columns), count))
-        for offset in range(replicates):
-            start, stop = (-((offset - end) // replicates) for end in (first, last))  # points of this replicate
+        every, points = self._replicates, np.empty((len(columns), count))
+        for offset in range(every):
+            start, stop = (-((offset - end) // every) for end in (first, first + count))  # points of this replicate
             if stop > start:
                 sobol = _sequence(self._dimensions, self._hits.seed, offset)
-                points[:, start * replicates + offset - first :: replicates] = sobol.points(
-                    columns, start, stop - start
-                )
+                points[:, start * every + offset - first :: every] = sobol.points(columns, start, stop - start)
         return points
 
 
 def make_shots(impact: Impact, hits: Hits, plate: Plate, scatter: Scatter | None = None) -> Shots:
-    """All shots at once. Hit points cover one unit cell of the plate, or the whole plate (`Hits.area`).
-
-    A `Sampler` gives the shots of a large campaign in parts.
-    """
+    """All shots at once; a `Sampler` gives those of a large campaign in parts."""
     sampler = Sampler(impact, hits, plate, scatter, hits.scramblings)
     return sampler.shots(0, len(sampler))
 

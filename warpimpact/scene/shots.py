@@ -71,7 +71,6 @@ class Hits(Model):
             those quantities: angles in degrees, all else in SI, or in the unit behind the name, as in "hit_y [mm]".
             A result that `warpimpact export` wrote is such a list, too. With another sampling, a file without hit
             points: each shot takes a random row, as of the draws that `warpimpact identify` writes.
-        repeats: number of shots at every hit of a grid or a list, each with other draws of the quantities that scatter.
         replicates: number of independent scramblings of a sobol sampling, 16 by default; shots are dealt to them in
             turn. Their spread gives the error of a mean.
         area: what the sampling covers: one unit cell (or a smaller plate), or all of a finite "plate".
@@ -85,19 +84,14 @@ class Hits(Model):
     file: InputFile | None = None
     area: Literal["cell", "plate"] = "cell"
     irreducible: Annotated[bool, Field(strict=True)] = False
-    repeats: Annotated[Whole, Field(ge=1, le=2**20)] = 1
     replicates: Literal[1, 8, 16, 32, 64] | None = None
 
     @model_validator(mode="after")
     def _is_complete(self) -> Self:
-        needed, foreign = ("file", {"count", "area", "irreducible"}) if self.sampling == "list" else ("count", set())
+        needed, foreign = ("file", ["area", "count", "irreducible"]) if self.sampling == "list" else ("count", [])
         if getattr(self, needed) is None:
             raise ValueError(f'sampling = "{self.sampling}" needs {needed}')
-        if self.sampling in ("sobol", "random"):
-            foreign = foreign | {"repeats"}
-        if self.sampling != "sobol":
-            foreign = foreign | {"replicates"}
-        for name in sorted(foreign):
+        for name in foreign + ["replicates"] * (self.sampling != "sobol"):
             if getattr(self, name) != type(self).model_fields[name].default:
                 raise ValueError(f'{name} and sampling = "{self.sampling}" cannot be combined; leave out {name}')
         if self.file is not None and self.irreducible:
@@ -122,29 +116,21 @@ class Hits(Model):
         return self.replicates or (_REPLICATES if self.sampling == "sobol" else 1)
 
     def covered(self, plate: Plate) -> tuple[float, float]:
-        """Extent along y and z [m] of the rectangle about the origin that the hits cover.
-
-        Raises:
-            ValueError: it is an unbounded plate.
-        """
-        if self.area == "cell":
-            return plate.sampled_cell
-        check_together({WHOLE_PLATE: True, SIZE: plate.size is not None})
-        assert plate.size is not None  # checked
-        return plate.size
+        """Extent along y and z [m] of the rectangle about the origin that the hits cover."""
+        check_together({WHOLE_PLATE: self.area == "plate", SIZE: plate.size is not None})
+        return plate.size if self.area == "plate" and plate.size is not None else plate.sampled_cell
 
     def total(self, period: tuple[float, float]) -> int:
         """Number of shots over a unit cell of this extent along y and z [m]."""
         if self.sampling == "list" and self.listed is not None:
-            return len(self.listed["hit_y"]) * self.repeats
-        assert self.count is not None  # validated
-        return math.prod(self.grid(period)) * self.repeats if self.sampling == "grid" else self.count
+            return len(self.listed["hit_y"])
+        return math.prod(self.grid(period)) if self.sampling == "grid" else self.count or 0
 
     def grid(self, period: tuple[float, float]) -> tuple[int, int]:
         """Cells of a grid along y and z, nearly square and at most `count`."""
-        assert self.count is not None  # validated
-        along_y = min(self.count, max(1, round(math.sqrt(self.count * period[0] / period[1]))))
-        return along_y, self.count // along_y
+        count = self.count or 0  # a list has none
+        along_y = min(count, max(1, round(math.sqrt(count * period[0] / period[1]))))
+        return along_y, count // along_y
 
 
 @dataclass(frozen=True)
@@ -217,25 +203,18 @@ class Shots:
 
     def layer_value(self, target: Target, name: str, layer: int) -> Array:
         """A quantity of a layer of the target; shapes as in `value`."""
-        otherwise = target.value(name, layer)
-        if not self.varies(name, layer):
-            return np.array([otherwise])
-        column = self.columns[name][:, layer]
-        return np.where(np.isnan(column), otherwise, column)
+        own = self.columns[name][:, layer] if self.varies(name, layer) else np.array([np.nan])
+        return np.where(np.isnan(own), target.value(name, layer), own)
 
     def assign(self, values: Mapping[str, Array], layer: int = 0) -> Self:
         """A copy with these values by quantity, shape [shots] each; quantities of layers change in this layer alone."""
-        columns: dict[str, Any] = {
-            name: self._put(name, column, layer) if name in BY_LAYER else column for name, column in values.items()
-        }
+        columns: dict[str, Any] = dict(values)
+        for name in columns.keys() & set(BY_LAYER):
+            before = self.columns.get(name, np.empty((len(self), 0)))
+            missing = max(0, layer + 1 - before.shape[1])
+            columns[name] = np.pad(before, ((0, 0), (0, missing)), constant_values=np.nan)
+            columns[name][:, layer] = values[name]
         return replace(self, **columns)
-
-    def _put(self, name: str, values: Array, layer: int) -> Array:
-        before = self.columns.get(name, np.empty((len(self), 0)))
-        columns = np.full((len(self), max(layer + 1, before.shape[1])), np.nan)
-        columns[:, : before.shape[1]] = before
-        columns[:, layer] = values
-        return columns
 
     @classmethod
     def joined(cls, parts: Sequence[Self]) -> Self:
