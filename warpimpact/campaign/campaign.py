@@ -150,11 +150,6 @@ class Campaign(Model):
         campaign._source = text
         return campaign
 
-    @property
-    def _values(self) -> tuple[Any, ...]:
-        """Values by which two campaigns are compared. The form of their text does not count."""
-        return tuple(getattr(self, name) for name in type(self).model_fields)
-
     @cached_property
     def scene(self) -> Scene:
         """Core, target, interaction and records."""

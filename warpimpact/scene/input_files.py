@@ -16,13 +16,13 @@ import numpy as np
 from pydantic import BeforeValidator, ValidationInfo
 
 from .model import Array
-from .units import brief, quantity, quoted
+from .units import THOUSANDS, brief, quantity, quoted
 
 _LONGEST_PATH = 255
 """Characters of a path that a message quotes."""
 _NAME_AND_UNIT = re.compile(r"(\w+)\s*(?:\[\s*([^\[\]]*?)\s*\])?")
 _WITH_A_COMMA = re.compile(r"[-+]?[0-9]*,[0-9]+(?:[eE][-+]?[0-9]+)?(?: .*)?")
-_THOUSANDS = re.compile(r"[-+]?[1-9][0-9]{0,2},[0-9]{3}")
+
 _BARE_VALUE = re.compile(r"""([\w.-]+)\s*=\s*([^"'\[{\s](?:[^,}\]#]|,(?=\d))*)""")
 _PLAIN_NUMBER = re.compile(r"[-+]?[0-9_]+(?:\.[0-9_]+)?(?:e[-+]?[0-9]+)?|true|false")
 _TRUTHS = {"true": "true", "yes": "true", "on": "true", "false": "false", "no": "false", "off": "false"}
@@ -161,7 +161,7 @@ def _with_a_point(cell: str, separator: str, file: str, line: int) -> str:
     """A cell whose number has a point in the place of a decimal comma."""
     if separator == "," or not _WITH_A_COMMA.fullmatch(cell):
         return cell
-    if separator != ";" and _THOUSANDS.fullmatch(cell):
+    if separator != ";" and THOUSANDS.fullmatch(cell):
         raise ValueError(f'{file}, line {line}: got "{cell}", whose comma may stand for thousands; write a point')
     return cell.replace(",", ".")
 

@@ -74,12 +74,9 @@ class Model(BaseModel):
         return type(self).model_validate(kept | dict(update or {}))
 
     def __eq__(self, other: object) -> bool:
-        """Whether all fields are equal. Cached values do not count."""
-        return isinstance(other, Model) and type(self) is type(other) and self._values == other._values
-
-    @property
-    def _values(self) -> tuple[Any, ...]:
-        return *(getattr(self, name) for name in type(self).model_fields), self.__pydantic_private__
+        """Whether all fields are equal; cached values and the text of a file do not count."""
+        names = type(self).model_fields
+        return type(self) is type(other) and all(getattr(self, name) == getattr(other, name) for name in names)
 
     @classmethod
     def _keys(cls) -> list[str]:
@@ -93,20 +90,13 @@ _MOST_PROBLEMS = 8
 
 def sentence(error: ValidationError, data: dict[str, Any]) -> str:
     """The first problems as a sentence, and how many more there are."""
-    problems = [problem for problem in error.errors(include_url=False) if not _follows(problem, error)]
+    problems = error.errors(include_url=False)
     described = [
         ": ".join(filter(None, (_place(problem, data), complaint(problem)))) for problem in problems[:_MOST_PROBLEMS]
     ]
     if (more := len(problems) - len(described)) > 0:
         described.append(f"{more} more problem{'s' if more > 1 else ''}")
     return "; also ".join(described)
-
-
-def _follows(problem: ErrorDetails, error: ValidationError) -> bool:
-    """Whether a list is too short only because its items are wrong, which another problem reports."""
-    place = problem["loc"]
-    inner = (other["loc"] for other in error.errors(include_url=False) if len(other["loc"]) > len(place))
-    return problem["type"] == "too_short" and any(other[: len(place)] == place for other in inner)
 
 
 def _place(problem: ErrorDetails, data: Any) -> str:
@@ -125,23 +115,23 @@ def _place(problem: ErrorDetails, data: Any) -> str:
     return brief(place.removeprefix("."))
 
 
+_ALLOWED = {
+    **dict.fromkeys(("model_type", "model_attributes_type", "dict_type"), "it must be a table"),
+    **dict.fromkeys(("tuple_type", "list_type"), "it must be a list"),
+    "too_short": "it must have at least {min_length} items",
+    "too_long": "it must have at most {max_length} items",
+}
+"""What is allowed, by types of problems for which pydantic has words of Python."""
+
+
 def complaint(problem: ErrorDetails) -> str:
     """Sentence on what was found and what is allowed."""
-    context = problem.get("ctx", {})
-    match problem["type"]:
-        case "missing" | "union_tag_not_found":
-            return "is missing, but must be given"
-        case "value_error":
-            return str(context["error"])
-        case "union_tag_invalid":
-            return f'got "{brief(str(context["tag"]))}", but it must be one of {context["expected_tags"]}'
-        case "model_type" | "model_attributes_type" | "dict_type":
-            return f"got {quoted(problem['input'])}, but it must be a table"
-        case "too_short":
-            return f"got {quoted(problem['input'])}, but it must have at least {context['min_length']} items"
-        case "too_long":
-            return f"got {quoted(problem['input'])}, but it must have at most {context['max_length']} items"
-        case "tuple_type" | "list_type":
-            return f"got {quoted(problem['input'])}, but it must be a list"
-    allowed = problem["msg"].replace("Input should", "it must")
+    kind, context = problem["type"], problem.get("ctx", {})
+    if kind in ("missing", "union_tag_not_found"):
+        return "is missing, but must be given"
+    if kind == "value_error":
+        return str(context["error"])
+    if kind == "union_tag_invalid":
+        return f'got "{brief(str(context["tag"]))}", but it must be one of {context["expected_tags"]}'
+    allowed = _ALLOWED.get(kind, "").format(**context) or problem["msg"].replace("Input should", "it must")
     return f"got {quoted(problem['input'])}, but {allowed}"

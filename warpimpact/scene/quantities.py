@@ -115,22 +115,23 @@ class Bounds(NamedTuple):
         read = shown.text(in_degrees(value)) if self.unit == "rad" else f"{value:g} {self.unit}".rstrip()
         least = f"{low * shown.factor:g}" if low else "up"
         advice = "but a hit list is in SI" if place.startswith("hits.file") else "which needs its unit"
-        slips = (
-            unit for unit, factor in _SLIPS.get(self.unit, {}).items() if self.low <= abs(value) * factor <= self.high
-        )
-        slip = next((f'; "{value:g} {unit}" was probably meant, {advice}' for unit in slips), "")
-        return f"{place}: read as {read}, but {least} to {shown.text(in_degrees(high))} is {what}{slip}"
+        meant = [
+            f'; "{value:g} {unit}" was probably meant, {advice}'
+            for unit in _LEFT_OUT.get(self.unit, ())
+            if self.low <= abs(value) * units.factor(unit, self.unit) <= self.high
+        ]
+        return f"{place}: read as {read}, but {least} to {shown.text(in_degrees(high))} is {what}{''.join(meant[:1])}"
 
 
-_SLIPS = {
-    "m": {"mm": 1e-3, "cm": 1e-2, "um": 1e-6},
-    "kg": {"g": 1e-3, "mg": 1e-6},
-    "kg/m^3": {"g/cm^3": 1e3},
-    "Pa": {"MPa": 1e6, "GPa": 1e9},
-    "s": {"us": 1e-6, "ns": 1e-9},
-    "m/s": {"km/s": 1e3},
+_LEFT_OUT = {
+    "m": ("mm", "cm", "um"),
+    "kg": ("g", "mg"),
+    "kg/m^3": ("g/cm^3",),
+    "Pa": ("MPa", "GPa"),
+    "s": ("us", "ns"),
+    "m/s": ("km/s",),
 }
-"""Units that may have been left out, each with its factor to SI."""
+"""Units that may have been left out."""
 _MM, _DEG = 1e-3, math.radians(1.0)
 _OF_MATTER = "metals have up to 22,600 kg/m^3, and foams from 10 on"
 

@@ -1,7 +1,7 @@
 """Scatter: distributions of quantities that differ from shot to shot."""
 
 import math
-from abc import ABC
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping
 from typing import Annotated, Any, Literal, Self
 
@@ -20,13 +20,14 @@ from pydantic import (
 from scipy import stats
 
 from .model import Array, Model
-from .quantities import LISTED, QUANTITIES, SCATTERED
-from .shots import Shots
+from .quantities import QUANTITIES, SCATTERED
 from .units import Radians, in_radians, quantity
 
 EDGE = 2.0**-31
 """Uniform numbers lie between EDGE and 1 − EDGE. EDGE is half a step of the Sobol sequence. So a normal distribution
 ends at 6.2 standard deviations, and its range is known in advance."""
+_PURE_NUMBERS = {"distribution", "sigma", "shape"}
+"""Fields without the unit of the quantity."""
 
 _Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 _Finite = Annotated[float, Field(allow_inf_nan=False)]
@@ -41,36 +42,20 @@ class Distribution(Model, ABC):
 
     distribution: str
 
+    @property
+    @abstractmethod
+    def _frozen(self) -> Any:
+        """The distribution of scipy."""
+
     def quantile(self, share: Array) -> Array:
         """Values that exceed these shares of the distribution, same shape."""
-        return np.asarray(_SCIPY[self.distribution](self).ppf(share))
+        return np.asarray(self._frozen.ppf(share))
 
     @property
     def ends(self) -> tuple[float, float]:
         """Smallest and largest value that is drawn."""
         low, high = self.quantile(np.array([EDGE, 1.0 - EDGE]))
         return float(low), float(high)
-
-
-class _Bounded(Distribution, ABC):
-    """A distribution that ends at low and high.
-
-    Attributes:
-        low: smallest value.
-        high: largest value.
-    """
-
-    low: _Finite
-    high: _Finite
-
-    @model_validator(mode="after")
-    def _ordered(self) -> Self:
-        if not self.low < self.high:
-            raise ValueError(f"got low = {self.low:g} and high = {self.high:g}, but high must be above low")
-        return self
-
-    def quantile(self, share: Array) -> Array:
-        return np.clip(super().quantile(share), self.low, self.high)  # rounding may exceed the ends
 
 
 class Normal(Distribution):
@@ -85,8 +70,38 @@ class Normal(Distribution):
     mean: _Finite
     std: _Positive
 
+    @property
+    def _frozen(self) -> Any:
+        return stats.norm(self.mean, self.std)
 
-class TruncatedNormal(_Bounded):
+
+class Uniform(Distribution):
+    """Evenly between low and high.
+
+    Attributes:
+        low: smallest value.
+        high: largest value.
+    """
+
+    distribution: Literal["uniform"] = "uniform"
+    low: _Finite
+    high: _Finite
+
+    @model_validator(mode="after")
+    def _ordered(self) -> Self:
+        if not self.low < self.high:
+            raise ValueError(f"got low = {self.low:g} and high = {self.high:g}, but high must be above low")
+        return self
+
+    @property
+    def _frozen(self) -> Any:
+        return stats.uniform(self.low, self.high - self.low)
+
+    def quantile(self, share: Array) -> Array:
+        return np.clip(super().quantile(share), self.low, self.high)  # rounding may exceed the ends
+
+
+class TruncatedNormal(Uniform):
     """The part of a normal distribution between low and high; `mean` and `std` are those of the whole.
 
     Attributes:
@@ -94,32 +109,14 @@ class TruncatedNormal(_Bounded):
         std: standard deviation of the whole distribution.
     """
 
-    distribution: Literal["truncated_normal"] = "truncated_normal"
+    distribution: Literal["truncated_normal"] = "truncated_normal"  # type: ignore[assignment]
     mean: _Finite
     std: _Positive
 
-
-class Uniform(_Bounded):
-    """Evenly between low and high."""
-
-    distribution: Literal["uniform"] = "uniform"
-
-
-class Triangular(_Bounded):
-    """From low to high with its peak at mode.
-
-    Attributes:
-        mode: where the peak is.
-    """
-
-    distribution: Literal["triangular"] = "triangular"
-    mode: _Finite
-
-    @model_validator(mode="after")
-    def _peaks_within(self) -> Self:
-        if not self.low <= self.mode <= self.high:
-            raise ValueError(f"got mode = {self.mode:g}, but it must lie between low and high")
-        return self
+    @property
+    def _frozen(self) -> Any:
+        low, high = (self.low - self.mean) / self.std, (self.high - self.mean) / self.std
+        return stats.truncnorm(low, high, loc=self.mean, scale=self.std)
 
 
 class Lognormal(Distribution):
@@ -134,6 +131,10 @@ class Lognormal(Distribution):
     median: _Positive
     sigma: _Positive
 
+    @property
+    def _frozen(self) -> Any:
+        return stats.lognorm(self.sigma, scale=self.median)
+
 
 class Weibull(Distribution):
     """The strength of the weakest link.
@@ -147,51 +148,15 @@ class Weibull(Distribution):
     shape: _Positive
     scale: _Positive
 
-
-class Discrete(Distribution):
-    """One of several values.
-
-    Attributes:
-        values: the possible values.
-        weights: proportional to the probabilities; without weights all values are equally probable.
-    """
-
-    distribution: Literal["discrete"] = "discrete"
-    values: Annotated[tuple[_Finite, ...], Field(min_length=1)]
-    weights: tuple[_Positive, ...] | None = None
-
-    @model_validator(mode="after")
-    def _paired(self) -> Self:
-        if self.weights is not None and len(self.weights) != len(self.values):
-            raise ValueError(
-                f"got {len(self.values)} values and {len(self.weights)} weights, but each value needs one weight"
-            )
-        return self
-
-    def quantile(self, share: Array) -> Array:
-        weights = np.ones(len(self.values)) if self.weights is None else np.array(self.weights)
-        order = np.argsort(self.values)
-        ends = np.cumsum(weights[order])
-        which = np.searchsorted(ends[:-1] / ends[-1], share, side="right")
-        return np.asarray(np.array(self.values)[order][which])
+    @property
+    def _frozen(self) -> Any:
+        return stats.weibull_min(self.shape, scale=self.scale)
 
 
-_SCIPY: dict[str, Callable[[Any], Any]] = {
-    "normal": lambda d: stats.norm(d.mean, d.std),
-    "truncated_normal": lambda d: stats.truncnorm(
-        (d.low - d.mean) / d.std, (d.high - d.mean) / d.std, loc=d.mean, scale=d.std
-    ),
-    "uniform": lambda d: stats.uniform(d.low, d.high - d.low),
-    "triangular": lambda d: stats.triang((d.mode - d.low) / (d.high - d.low), d.low, d.high - d.low),
-    "lognormal": lambda d: stats.lognorm(d.sigma, scale=d.median),
-    "weibull": lambda d: stats.weibull_min(d.shape, scale=d.scale),
-}
 AnyDistribution = Annotated[
-    Normal | TruncatedNormal | Uniform | Triangular | Lognormal | Weibull | Discrete,
-    Field(discriminator="distribution"),
+    Normal | TruncatedNormal | Uniform | Lognormal | Weibull, Field(discriminator="distribution")
 ]
-PURE_NUMBERS = {"distribution", "sigma", "shape", "weights"}
-"""Fields without the unit of the quantity."""
+_ByLayer = tuple[AnyDistribution | None, ...]
 
 
 def check_range(name: str, low: float, high: float) -> None:
@@ -211,27 +176,19 @@ def check_range(name: str, low: float, high: float) -> None:
             raise ValueError(f"reaches {reached}, but {allowed}") from None
 
 
-def in_si(read: Any, given: Mapping[str, Any]) -> dict[str, Any]:
+def in_si(read: Callable[[Any], float], given: Mapping[str, Any]) -> dict[str, Any]:
     """The parameters of a distribution in SI; `read` is the reader of its quantity.
 
     Raises:
         ValueError: the message names the parameter.
     """
-    values = {}
-    for name, part in given.items():
+    values = dict(given)
+    for name in values.keys() - _PURE_NUMBERS:
         try:
-            values[name] = part if name in PURE_NUMBERS else _of_each(read, part)
+            values[name] = read(values[name])
         except ValueError as error:
             raise ValueError(f"{name}: {error}") from None
     return values
-
-
-def _of_each(change: Callable[[Any], Any], value: Any) -> Any:
-    """The changed value, or a list of the changed values of a list."""
-    return [change(number) for number in value] if isinstance(value, list | tuple) else change(value)
-
-
-_ByLayer = tuple[AnyDistribution | None, ...]
 
 
 class Scatter(Model):
@@ -264,17 +221,21 @@ class Scatter(Model):
         known = SCATTERED[str(info.field_name)]
         if known.by_layer and isinstance(value, dict | Distribution):
             value = (value,)
-        return _of_each(lambda given: in_si(quantity(known.type), given) if isinstance(given, dict) else given, value)
+        of_layers = value if isinstance(value, list | tuple) else (value,)
+        read = [in_si(quantity(known.type), one) if isinstance(one, dict) else one for one in of_layers]
+        return read if of_layers is value else read[0]
 
     @field_validator("*", mode="after")
     @classmethod
     def _is_possible(cls, value: Any, info: ValidationInfo) -> Any:
         for distribution in value if isinstance(value, tuple) else (value,):
-            if isinstance(distribution, Distribution):
-                try:
+            try:
+                if distribution is not None:
                     check_range(str(info.field_name), *distribution.ends)
-                except ValueError as error:
-                    raise ValueError(f"got a {distribution.distribution} distribution that {error}") from None
+            except ValueError as error:
+                raise ValueError(f"got a {distribution.distribution} distribution that {error}") from None
+        if str(info.field_name).startswith("offset") and value and value[0] is not None:
+            raise ValueError("got a distribution for the plate, but only layers behind it have an offset")
         return value
 
     @field_serializer("*", mode="wrap")
@@ -284,31 +245,15 @@ class Scatter(Model):
         if not isinstance(written, dict) or quantity(SCATTERED[info.field_name].type).unit != "rad":
             return written
         mark = in_radians if info.mode == "json" else Radians
-        return {name: part if name in PURE_NUMBERS else _of_each(mark, part) for name, part in written.items()}
-
-    @field_validator("offset_y", "offset_z")
-    @classmethod
-    def _of_a_layer(cls, value: _ByLayer) -> _ByLayer:
-        if value and value[0] is not None:
-            raise ValueError("got a distribution for the plate, but only layers behind it have an offset")
-        return value
+        return {name: part if name in _PURE_NUMBERS else mark(part) for name, part in written.items()}
 
     @property
     def given(self) -> dict[tuple[str, int], Distribution]:
         """The given distributions by name and layer; the layer is 0, the plate, for quantities of the shot."""
-        by_layer = {name: value if isinstance(value := getattr(self, name), tuple) else (value,) for name in SCATTERED}
-        return {
-            (name, layer): distribution
-            for name, layers in by_layer.items()
-            for layer, distribution in enumerate(layers)
-            if distribution is not None
-        }
+        by_layer = {name: value if isinstance(value, tuple) else (value,) for name, value in self}
+        return {(name, k): given for name, layers in by_layer.items() for k, given in enumerate(layers) if given}
 
     @property
     def layers(self) -> int:
         """One more than the number of the last layer with a distribution."""
         return 1 + max((layer for _, layer in self.given), default=0)
-
-
-assert set(SCATTERED) == set(Scatter.model_fields)
-assert {*LISTED, *SCATTERED} == set(Shots.__dataclass_fields__)

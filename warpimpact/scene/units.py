@@ -73,24 +73,19 @@ _SPELLINGS = (
     | {"MOA": "arcmin", "rev": "turn", "revs": "turn", "turns": "turn", "kph": "kmh", "%": "percent"}
 )
 """Other spellings, and the unit of each."""
-_AMBIGUOUS = (
-    dict.fromkeys(
-        ("mil", "mils"),
-        'is an angle or a thousandth of an inch: write "nato_mil" (6400 to a turn), "mrad", or "thou"',
-    )
-    | dict.fromkeys(
-        ("grad", "grade"), 'is gon in some countries and degrees in others: write "gon" (400 to a turn) or "deg"'
-    )
-    | dict.fromkeys(("gr", "grs"), 'is grains to some and grams to others: write "grain" or "g"')
-    | dict.fromkeys(("ton", "tons"), 'is 907, 1000 or 1016 kg: write "t" for 1000 kg, or kg')
-)
-"""Names that mean two things to those who type them, in small letters."""
+_AMBIGUOUS = {
+    "mil": 'is an angle or a thousandth of an inch: write "nato_mil" (6400 to a turn), "mrad", or "thou"',
+    "grad": 'is gon in some countries and degrees in others: write "gon" (400 to a turn) or "deg"',
+    "gr": 'is grains to some and grams to others: write "grain" or "g"',
+    "ton": 'is 907, 1000 or 1016 kg: write "t" for 1000 kg, or kg',
+}
+"""Names that mean two things to those who type them, in small letters and without an ending of "e" or "s"."""
 
 _SCATTERS = re.compile(r"±|\+\s*/?\s*-|[0-9]\s*(?:\.\.|…)\s*[0-9]")
 _NUMBER = re.compile(
     r"[-+]?(?:(?P<above>[0-9]+)\s*/\s*(?P<below>[0-9]+)(?![0-9.,])|(?:[0-9]+(?:\.[0-9]*|,[0-9]+)?|[.,][0-9]+)(?:[eE][-+]?[0-9]+)?)"
 )
-_THOUSANDS = re.compile(r"[-+]?[1-9][0-9]{0,2},[0-9]{3}")
+THOUSANDS = re.compile(r"[-+]?[1-9][0-9]{0,2},[0-9]{3}")
 _FACTOR = re.compile(
     r"\s*(?:(?P<plain>1(?=\s*/)|\((?!\s*\)))|(?:(?P<close>\))|(?P<name>(?:[^\W\d]|[°%])++))"
     r"(?:\s*(?:\^|\*\*)\s*(?P<power>[-+]?[0-9]|\([-+]?[0-9]\))|(?P<attached>[-+]?[0-9]))?(?![0-9.,^]))"
@@ -116,7 +111,7 @@ def number_and_unit(text: str) -> tuple[float, str]:
     match = _NUMBER.match(text)
     if match is None:
         raise UnitError("which does not begin with a number")
-    if _THOUSANDS.fullmatch(match[0]):
+    if THOUSANDS.fullmatch(match[0]):
         raise UnitError("whose comma may stand for thousands or decimals; write a point for decimals, and no thousands")
     if match["below"] is not None:
         if int(match["below"]) == 0:
@@ -179,13 +174,11 @@ def _unit(name: str) -> _Unit:
         number, _, rest = _UNITS[known].partition(" ")
         size, powers = _evaluated(rest)
         return Fraction(number) * size, powers
-    if reason := _AMBIGUOUS.get(name.lower()):
+    if reason := _AMBIGUOUS.get(name.lower().rstrip("es")):
         raise UnitError(f'whose unit "{name}" {reason}')
     spellings = [*_BASES, *_UNITS, *_SPELLINGS]
-    other_case = [spelling for spelling in spellings if spelling.lower() == name.lower()]
-    close = other_case or get_close_matches(
-        name, [spelling for spelling in spellings if len(spelling) > 2], n=1, cutoff=0.8
-    )
+    close = [one for one in spellings if one.lower() == name.lower()]
+    close += get_close_matches(name, [one for one in spellings if len(one) > 2], n=1, cutoff=0.8)
     raise UnitError(f'whose unit "{name}" is unknown' + (f'; did you mean "{close[0]}"?' if close else ""))
 
 
@@ -307,18 +300,33 @@ class _Quantity:
         Raises:
             ValueError: the message says what is allowed.
         """
+        try:
+            return self.as_read(self._number(value))
+        except UnitError as error:
+            unit = "deg" if self.unit == "rad" else self.unit
+            raise ValueError(
+                f"got {quoted(value)}, {str(error) or f'which is not {self.name}'}; "
+                f'give a number{f" in {unit}" if unit else ""} or a string such as "{self.example}"'
+            ) from None
+
+    def _number(self, value: object) -> float:
         if isinstance(value, str):
-            number = self._from_text(value)
+            if len(value) > MOST_QUOTED:
+                raise UnitError(f"which has more than {MOST_QUOTED} characters")
+            number, unit = number_and_unit(value)
+            if self.unit and not unit:
+                raise UnitError("which has no unit")
+            number *= factor(unit, self.unit)
         elif isinstance(value, Real) and not isinstance(value, bool):
             in_degrees = self.unit == "rad" and not isinstance(value, Radians)
             number = math.radians(float_of(value)) if in_degrees else float_of(value)
         else:
-            raise self._error(value, f"which is not {self.name}")
+            raise UnitError
         if not math.isfinite(number):
-            raise self._error(value, "which is not finite")
+            raise UnitError("which is not finite")
         if abs(number) > LARGEST:
-            raise self._error(value, f"which is more than {LARGEST:g}")
-        return self.as_read(number)
+            raise UnitError(f"which is more than {LARGEST:g}")
+        return number
 
     def as_read(self, number: float) -> float:
         """A number in SI as a value that the reader does not convert."""
@@ -332,24 +340,6 @@ class _Quantity:
     def text(self, value: float) -> str:
         """A value in SI as text."""
         return self.display.text(math.degrees(value) if self.unit == "rad" else value)
-
-    def _from_text(self, text: str) -> float:
-        if len(text) > MOST_QUOTED:
-            raise self._error(text, f"which has more than {MOST_QUOTED} characters")
-        try:
-            number, unit = number_and_unit(text)
-            if self.unit and not unit:
-                raise UnitError("which has no unit")
-            return number * factor(unit, self.unit)
-        except UnitError as error:
-            raise self._error(text, str(error) or f"which is not {self.name}") from None
-
-    def _error(self, value: object, complaint: str) -> ValueError:
-        unit = "deg" if self.unit == "rad" else self.unit
-        in_unit = f" in {unit}" if unit else ""
-        return ValueError(
-            f'got {quoted(value)}, {complaint}; give a number{in_unit} or a string such as "{self.example}"'
-        )
 
 
 def float_of(value: Real | float | str) -> float:
@@ -449,23 +439,26 @@ Angle = Annotated[
 """A plain number is in degrees. The field holds radians, and JSON says so."""
 
 
-def _is_obliquity(angle: float) -> float:
-    if not 0.0 <= angle < RIGHT_ANGLE:
-        raise PydanticCustomError("obliquity", "Input should be at least 0 and less than 90 deg")
-    return angle
+def _within(is_allowed: Callable[[float], bool], allowed: str) -> AfterValidator:
+    """A range of angles, which the message has in degrees."""
 
+    def check(angle: float) -> float:
+        if not is_allowed(angle):
+            raise PydanticCustomError("angle", f"Input should be {allowed} 90 deg")
+        return angle
 
-def _is_tilt(angle: float) -> float:
-    if not abs(angle) < RIGHT_ANGLE:
-        raise PydanticCustomError("tilt", "Input should be greater than -90 and less than 90 deg")
-    return angle
+    return AfterValidator(check)
 
 
 Obliquity = Annotated[
-    Angle, AfterValidator(_is_obliquity), Field(json_schema_extra={"minimum": 0, "exclusiveMaximum": 90})
+    Angle,
+    _within(lambda angle: 0.0 <= angle < RIGHT_ANGLE, "at least 0 and less than"),
+    Field(json_schema_extra={"minimum": 0, "exclusiveMaximum": 90}),
 ]
 Tilt = Annotated[
-    Angle, AfterValidator(_is_tilt), Field(json_schema_extra={"exclusiveMinimum": -90, "exclusiveMaximum": 90})
+    Angle,
+    _within(lambda angle: abs(angle) < RIGHT_ANGLE, "greater than -90 and less than"),
+    Field(json_schema_extra={"exclusiveMinimum": -90, "exclusiveMaximum": 90}),
 ]
 AngularVelocity = Annotated[Read, _quantity("an angular velocity", "rad/s", "17000 rad/s")]
 Energy = Annotated[Read, _quantity("an energy", "J", "10 J")]

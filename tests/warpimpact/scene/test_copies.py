@@ -39,7 +39,7 @@ LISTED = STRAIGHT + '[hits]\nsampling = "list"\nfile = "hits.csv"\n'
 SCATTERED = """\
 [impact]
 velocity = { distribution = "normal", mean = "820 m/s", std = "10 m/s" }
-yaw = { distribution = "discrete", values = ["0 deg", "2 deg"] }
+yaw = { distribution = "uniform", low = "0 deg", high = "2 deg" }
 [hits]
 seed = 7
 [stop]
@@ -128,7 +128,7 @@ velocity = 825
 obliquity = 30
 azimuth = "0.5 rad"
 pitch = { distribution = "normal", mean = 1, std = 0.5 }
-yaw = { distribution = "discrete", values = [0, 2], weights = [1, 3] }
+yaw = { distribution = "uniform", low = 0, high = 4 }
 """
 
 
@@ -140,8 +140,7 @@ def test_numbers_of_angles_are_degrees_and_their_text_gives_them_again() -> None
     assert [hole.rotation for hole in campaign.plate.pattern.holes] == pytest.approx([np.radians(10), 0.2])
     assert campaign.stop.half_width == pytest.approx(np.radians(2))
     assert campaign.scatter.pitch.std == pytest.approx(np.radians(0.5))
-    assert campaign.scatter.yaw.values == pytest.approx((0.0, np.radians(2)))
-    assert campaign.scatter.yaw.weights == (1, 3)
+    assert campaign.scatter.yaw.high == pytest.approx(np.radians(4))
     assert (campaign.impact.pitch, campaign.impact.yaw) == pytest.approx((np.radians(1), np.radians(2)))  # the medians
     changed = campaign.model_copy(update={"plate": campaign.plate.model_copy(update={"thickness": 3e-3})})
     again = Campaign.from_text(changed.text, name="text", folder=Path())
