@@ -7,6 +7,7 @@ import warnings
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import cached_property, partial
+from itertools import chain
 from pathlib import Path
 from typing import Annotated, Any, Self
 
@@ -129,15 +130,10 @@ class Campaign(Model):
             CampaignError: the text is not TOML, or has a value that is not allowed.
         """
         data = parsed(text, name, CAMPAIGN)
-        if isinstance(plates := data.get("plate"), list):
-            raise CampaignError(
-                f"{name}: plate: got {len(plates)} plates, but this takes one; warpimpact compare {name} runs them all "
-                "and compares them"
-            )
-        if "sweep" in data:
-            raise CampaignError(
-                f"{name}: sweep: this takes one combination of inputs; warpimpact sweep {name} runs them all"
-            )
+        for key, is_several in (("plate", isinstance(data.get("plate"), list)), ("sweep", "sweep" in data)):
+            if is_several:
+                command = {"plate": "compare"}.get(key, key)
+                raise CampaignError(f"{name}: {key}: this takes one; warpimpact {command} {name} runs all of them")
         if count is not None:
             _override_count(data, count)
         catalogue = catalogue_of(data, name, folder)
@@ -176,9 +172,7 @@ class Campaign(Model):
 
     def sampler(self) -> Sampler:
         """The sampler of its shots."""
-        if self._sampler is not None:
-            return self._sampler
-        return Sampler(self.impact, self.hits, self.plate, self.scatter, self.replicates)
+        return self._sampler or Sampler(self.impact, self.hits, self.plate, self.scatter, self.replicates)
 
     @property
     def references(self) -> dict[str, Self]:
@@ -234,8 +228,8 @@ class Campaign(Model):
 
     def lacking(self, measure: Measure) -> str:
         """Keys that the campaign needs for a measure of its hits and does not have; empty if it lacks none."""
-        output, layered, breakable = self.output, bool(self.layer), self._has_strength
-        return lacking(measure, output.standoffs, layered=layered, bending=output.bending, breakable=breakable)
+        has = {"layered": bool(self.layer), "bending": self.output.bending, "breakable": self._has_strength}
+        return lacking(measure, self.output.standoffs, **has)
 
     def _take_resistances(self, materials: dict[int, Material]) -> None:
         """Replace Y of layers whose materials are given by their numbers."""
@@ -321,11 +315,9 @@ class Campaign(Model):
             raise ValueError(f'stop.quantity = "{stop.quantity}" needs {keys}')
 
     def _check_hits(self) -> None:
-        covered, listed = self.hits.covered(self.plate), self.hits.listed
-        if listed is None or "hit_y" not in listed:
-            farthest = 0.5 * max(covered)
-        else:
-            farthest = max(float(np.abs(listed[name]).max()) for name in ("hit_y", "hit_z"))
+        covered, listed = self.hits.covered(self.plate), self.hits.listed or {}
+        places = [listed[name] for name in ("hit_y", "hit_z") if name in listed] or 0.5 * np.array(covered)
+        farthest = float(np.abs(places).max())
         # Cells of the plate have 32-bit numbers, counted from the origin.
         cell = min(self.plate.degradation_length / 25.0, (self.numerics.grid_spacing or math.inf) / 5.0)
         allowed = min(FARTHEST_HIT, 2**30 * cell)
@@ -379,10 +371,8 @@ def _at_solid(target: Target, solid: Target, shots: Shots) -> Shots:
     columns: dict[str, Any] = {}
     for name in ("thickness", "resistance"):
         if (column := shots.columns.get(name)) is not None:
-            pairs = zip(target.layers, solid.layers, strict=True)
-            values = [(getattr(old, name), getattr(new, name)) for old, new in pairs]
-            ratios = [1.0 if old == new else new / old for old, new in values]
-            columns[name] = column * np.array(ratios[: column.shape[1]])
+            values = [(target.value(name, k), solid.value(name, k)) for k in range(column.shape[1])]
+            columns[name] = column * np.array([1.0 if old == new else new / old for old, new in values])
     return replace(shots, **columns)
 
 
@@ -453,25 +443,18 @@ def read_plates(path: str | Path, *, count: int | None = None) -> dict[str, Camp
         shared["hits"] = {"irreducible": False} | hits  # the same hits for plates of different symmetry
     campaigns: dict[str, Campaign] = {}
     for number, plate in enumerate(plates):
-        place = f"{path}: plate[{number}]"
         name = plate.get("name") if isinstance(plate, dict) else None
-        if not isinstance(name, str) or not _PLATE_NAME.fullmatch(name):
+        if not isinstance(name, str) or not _PLATE_NAME.fullmatch(name) or name in campaigns:
             raise CampaignError(
-                f"{place}.name: got {quoted(name)}, but a name begins with a letter or a digit and contains only "
-                "letters, digits, blanks and the characters _ . + -, 80 at most"
+                f"{path}: plate[{number}].name: got {quoted(name)}, but each plate needs its own name: a letter or a "
+                "digit, then letters, digits, blanks and the characters _ . + -, 80 at most"
             )
-        if name in campaigns:
-            raise CampaignError(f'{place}.name: got "{name}" again, but each plate needs its own name')
         own: dict[str, Any] = {"plate": {key: value for key, value in plate.items() if key not in ("name", "layer")}}
-        if layers := _listed(plate.get("layer", [])) + _listed(behind):
+        listed = (tables if isinstance(tables, list) else [tables] for tables in (plate.get("layer", []), behind))
+        if layers := [*chain(*listed)]:  # something else is refused as a layer
             own["layer"] = layers
         if isinstance(shared.get("title"), str):
             own["title"] = f"{shared['title']}: {name}"
         text = json.dumps(shared | own, indent=1, ensure_ascii=False, default=str)
         campaigns[name] = Campaign.from_text(text, name=f'{path}, plate "{name}"', folder=path.parent, count=count)
     return campaigns
-
-
-def _listed(tables: Any) -> list[Any]:
-    """Tables [[layer]] as a list; of something else the validation of the campaign says what is wrong."""
-    return tables if isinstance(tables, list) else [tables]

@@ -10,7 +10,6 @@ import math
 import re
 from collections.abc import Collection, Iterable, Iterator, Mapping
 from functools import cache
-from typing import Any
 
 import numpy as np
 
@@ -19,7 +18,6 @@ from ..catalogue.entries import Material, Threat
 from ..catalogue.strength import NINETY
 from ..scene import Core, Plate
 from .campaign import CORES_STAYED_WHOLE, Campaign
-from .resistance import SAME, resistance_under
 
 Curve = tuple[tuple[float, ...], tuple[float, ...]]
 Sentences = Iterator[tuple[str, str]]
@@ -37,8 +35,8 @@ _STRONG = 2.0e9
 """Resistance from which a steel may be hard [Pa]; below a calibre its resistance falls."""
 _NOSE, _SHORT = 0.95, 0.75
 """Share of the largest radius at which a nose ends; length in diameters below which it is blunt."""
-_STRAIGHT = math.radians(2.0)
-"""Obliquity or yaw that a straight shot may have [rad]."""
+_STRAIGHT = 2.0
+"""Obliquity or yaw that a straight shot may have [degree]."""
 _HOLED_CALIBRES, _HOLED_LIGAMENT, _SIMILAR_RATIO = 0.66, 1.0, 1.5
 """The plate of the two shots: its thickness in calibres, and its approximate ligament over its thickness, because the
 spacing of the slots is not published (the paper's §2); and the chosen ratio up to which another plate is similar."""
@@ -81,43 +79,22 @@ def limit_velocity_factors(campaign: Campaign) -> tuple[float, float] | None:
 
 
 def catalogue_names(campaign: Campaign) -> list[str]:
-    """A line for each name of the catalogue in a campaign: how well it is known, and which values are the user's."""
-    catalogue, core, law, lines = Catalogue.of(campaign.catalogue), campaign.core, campaign.interaction, list[str]()
+    """A line for each name of the catalogue in a campaign: how well it is known, and whether Y is the user's."""
+    catalogue, core, lines = Catalogue.of(campaign.catalogue), campaign.core, list[str]()
     if core.threat is not None:
-        threat = catalogue.all(Threat).get(core.threat)
-        shape = None if threat is None else threat.shape
-        keys = {} if shape is None else shape.model_dump(exclude={"threat", "standard", "velocity_tolerance"})
-        lines.append(f"core: {core.threat}{_with_another(keys, core.model_dump())}{_evidence(threat)}")
+        lines.append(f"core: {core.threat}{_evidence(catalogue.all(Threat).get(core.threat))}")
     for place, plate in campaign.target.named:
-        if plate.material is None:
-            continue
-        material, details = catalogue.all(Material).get(plate.material), ""
-        if material is not None:
-            known = resistance_under(law, material, core, plate, campaign.impact.obliquity, catalogue)
-            keys = {"resistance": known.median, **material.model_dump(include={"shear_coefficient", "density"})}
-            another = _with_another(keys | material.law.model_dump(exclude={"static"}), plate.model_dump() | dict(law))
-            low, high = (end / 1e9 for end in known.ends)
-            is_known = known.deviation and _is_same(known.median, plate.resistance)
-            interval = f", {low:.3g} to {high:.3g} with 90 %" if is_known else ""
-            details = f"{another}, Y {plate.resistance / 1e9:.3g} GPa{interval}"
-        lines.append(f"{place}: {plate.material}{details}{_evidence(material)}")
+        if plate.material is not None:
+            known, y = campaign.catalogue_resistance(plate), f"{plate.resistance / 1e9:.3g} GPa"
+            low, high = (0.0, 0.0) if known is None else (end / 1e9 for end in known.ends)
+            interval = f", {low:.3g} to {high:.3g} with 90 %" if low < high else ""
+            of_plate = f", your Y {y}" if known is None else f", Y {y}{interval}"
+            lines.append(f"{place}: {plate.material}{of_plate}{_evidence(catalogue.all(Material).get(plate.material))}")
     return lines
 
 
 def _evidence(entry: Threat | Material | None) -> str:
     return ", which is not in the catalogue" if entry is None else f" ({entry.evidence})"
-
-
-def _with_another(known: Mapping[str, Any], given: Mapping[str, Any]) -> str:
-    """The keys whose values are not those of the catalogue."""
-    changed = [key.replace("_", " ") for key, value in known.items() if not _is_same(value, given.get(key))]
-    return f" with another {', '.join(changed)}" if changed else ""
-
-
-def _is_same(first: object, other: object) -> bool:
-    if isinstance(first, float) and isinstance(other, float):
-        return math.isclose(first, other, rel_tol=SAME)
-    return first == other
 
 
 def outside_tested_range(campaign: Campaign) -> list[str]:
@@ -157,7 +134,7 @@ def _figures() -> Mapping[str, Mapping[str, float]]:
 def _of_shot(campaign: Campaign) -> Sentences:
     """Properties of core and shot that leave what was measured."""
     core, impact, layers = campaign.core, campaign.impact, campaign.target.layers
-    nose, rows, oblique = nose_length(core), _figures()["core"], impact.obliquity > _STRAIGHT
+    nose, rows, oblique = nose_length(core), _figures()["core"], math.degrees(impact.obliquity) > _STRAIGHT
     if nose < _SHORT:
         yield (
             "the blunt nose",
@@ -168,7 +145,7 @@ def _of_shot(campaign: Campaign) -> Sentences:
         "the diameter of the core", 2e3 * core.max_radius, rows["diameter_low"], rows["diameter_high"], "mm"
     )
     yield from _outside("the impact velocity", impact.velocity, rows["velocity_low"], rows["velocity_high"], "m/s")
-    if max(abs(impact.pitch), abs(impact.yaw)) > _STRAIGHT:
+    if math.degrees(max(abs(impact.pitch), abs(impact.yaw))) > _STRAIGHT:
         yield "yaw on impact", "no shot whose numbers we could read had any"
     if len(layers) > 1:
         yield "several layers", "no shot whose numbers we could read was at more than one"
@@ -210,7 +187,7 @@ def _of_plate(campaign: Campaign, plate: Plate, material: Material | None) -> Se
         high = material.calibres_high or math.inf
         yield from _outside("thickness", calibres, material.calibres_low, high, "calibres", name)
         farthest = math.inf if material.obliquity_high is None else material.obliquity_high  # 0: no row is oblique
-        yield from _oblique(campaign, material.obliquity_low, farthest, name, has_rows=True)
+        yield from _oblique(campaign, material.obliquity_low, farthest, name, "; Y is extrapolated over {:.3g}°")
         if core.threat not in material.rows:
             threat = "this core" if core.threat is None else f"the {core.threat}"
             yield "the threat", f"no limit velocity of {name} is of {threat}, but of {', '.join(material.rows)}"
@@ -235,15 +212,12 @@ def _of_plate(campaign: Campaign, plate: Plate, material: Material | None) -> Se
         )
 
 
-def _oblique(campaign: Campaign, low: float, high: float, whose: str, *, has_rows: bool = False) -> Sentences:
+def _oblique(campaign: Campaign, low: float, high: float, whose: str, note: str = "") -> Sentences:
     """An obliquity beyond the measured range [rad], with a tolerance for the shots of a test."""
-    obliquity = campaign.impact.obliquity
-    beyond = max(low - obliquity, obliquity - high)
-    if beyond > _STRAIGHT:
-        ends = math.degrees(obliquity), math.degrees(low), math.degrees(high)
-        extrapolated = f"; Y is extrapolated over {math.degrees(beyond):.3g}°" if has_rows else ""
-        for subject, text in _outside("obliquity", *ends, "°", whose):
-            yield subject, text + extrapolated
+    at, first, last = (math.degrees(angle) for angle in (campaign.impact.obliquity, low, high))
+    beyond = max(first - at, at - last)
+    for subject, text in _outside("obliquity", at, first, last, "°", whose) if beyond > _STRAIGHT else ():
+        yield subject, text + note.format(beyond)
 
 
 def _similar(value: float, other: float) -> bool:

@@ -83,10 +83,10 @@ def with_velocity(data: Tables, catalogue: Catalogue, name: str, *, is_needed: b
     with as_campaign_error(f"{name}: core.threat: "):
         if not velocities:
             raise ValueError(f'the catalogue has no velocity of "{core["threat"]}"; give impact.velocity')
-        velocity = next((one for one in velocities if standard in (None, one.standard)), None)
-        if velocity is None:
-            known = ", ".join(one.standard for one in velocities)
-            raise ValueError(f"got standard = {quoted(standard)}, but it must be one of {known}")
+        known = {one.standard: one for one in velocities}
+        if standard is not None and standard not in known:
+            raise ValueError(f"got standard = {quoted(standard)}, but it must be one of {', '.join(known)}")
+        velocity = velocities[0] if standard is None else known[standard]
         value: Any = velocity.value
         if core.get("velocity_tolerance") is True:
             if velocity.tolerance is None:
@@ -108,22 +108,19 @@ def with_materials(data: Tables, catalogue: Catalogue, name: str) -> tuple[Table
     Raises:
         CampaignError: the catalogue has no such material, or the laws of two materials differ.
     """
-    resolved, layers, interaction = dict(data), data.get("layer"), data.get("interaction", {})
-    places = {0: data.get("plate"), **(dict(enumerate(layers, start=1)) if isinstance(layers, list) else {})}
-    materials: dict[int, Material] = {}
-    unknown: dict[int, Material] = {}
-    for k, table in places.items():
+    layers, interaction = data.get("layer"), data.get("interaction", {})
+    tables = [data.get("plate"), *(layers if isinstance(layers, list) else ())]
+    materials, unknown = dict[int, Material](), dict[int, Material]()
+    for k, table in enumerate(tables):
         if isinstance(table, dict) and isinstance(table.get("material"), str):
             with as_campaign_error(f"{name}: {layer_name(k)}.material: "):
                 materials[k] = material = catalogue.named(Material, table["material"])
-            if "resistance" not in table:
-                unknown[k] = material
-            places[k] = material.table(table, material.resistance)
-    resolved |= {key: value for key, value in (("plate", places.pop(0)),) if key in data}
-    if isinstance(layers, list):
-        resolved["layer"] = [*places.values()]
+            unknown |= {} if "resistance" in table else {k: material}
+            tables[k] = material.table(table, material.resistance)
+    filled = {"plate": tables[0]} if "plate" in data else {}
+    filled |= {"layer": tables[1:]} if isinstance(layers, list) else {}
     if not materials or not isinstance(interaction, dict):
-        return resolved, unknown
+        return data | filled, unknown
     law: dict[str, float] = {}  # one for the whole target
     for key in ("linear", "quadratic", "onset"):
         values = {getattr(material, key): layer_name(k) for k, material in materials.items()}
@@ -131,7 +128,7 @@ def with_materials(data: Tables, catalogue: Catalogue, name: str) -> tuple[Table
             found = " and ".join(f"{value:g} ({place})" for value, place in values.items())
             raise CampaignError(f"{name}: interaction.{key}: the materials were found with {found}; give one value")
         law[key] = next(iter(values))
-    return resolved | {"interaction": law | interaction}, unknown
+    return data | filled | {"interaction": law | interaction}, unknown
 
 
 def with_scatter(data: Tables, name: str) -> Tables:
@@ -149,19 +146,23 @@ def with_scatter(data: Tables, name: str) -> Tables:
 
 def _taken(table: Any, field: str, place: str, layer: int) -> Distribution | None:
     """Take the distribution of a quantity out of a table, which keeps its median."""
-    key, at = (field[:-2], "yz".index(field[-1])) if field.startswith("offset") else (field, None)
-    value = table.get(key) if isinstance(table, dict) else None
-    is_pair = isinstance(value, list) and len(value) == 2
-    entry = value if at is None else value[at] if is_pair and value else None
+    holder: Any = table
+    key: Any = field
+    if field.startswith("offset") and isinstance(table, dict):
+        holder, key = table.get("offset"), "yz".index(field[-1])
+    label = field if holder is table else f"offset[{key}]"
+    try:
+        entry = holder[key]
+    except (TypeError, KeyError, IndexError):
+        return None
     if not isinstance(entry, dict):
         return None
-    known, label = SCATTERED[field], key if at is None else f"{key}[{at}]"
+    known = SCATTERED[field]
     given = [*[None] * layer, entry] if known.by_layer else entry
     try:
         ((_, distribution),) = Scatter.model_validate({field: given}).given.items()
     except ValidationError as error:
         problem = sentence(error, {field: given}).removeprefix(field).removeprefix(f"[{layer}]")
         raise CampaignError(f"{place}.{label}{problem}") from None
-    median = quantity(known.type).as_read(float(distribution.quantile(np.array(0.5))))
-    table[key] = median if at is None else [median if k == at else old for k, old in enumerate(value or ())]
+    holder[key] = quantity(known.type).as_read(float(distribution.quantile(np.array(0.5))))
     return distribution

@@ -3,37 +3,31 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
+from typing import Any
 
 import numpy as np
 
 from ..scene import Core, Hits, Impact, Plate, Record, Scene, Target
-from ..scene.quantities import QUANTITIES, USUAL, hit_bounds
+from ..scene.quantities import QUANTITIES, USUAL, Bounds, hit_bounds
 from ..scene.target import layer_name
 
 _OF_A_PLATE = [name for name in Plate.model_fields if f"plate.{name}" in USUAL and name != "size"]
-_MOST_OPEN = 0.6
-"""Open area of a plate above which a warning says that hits meet little."""
-_THIN = 0.25
-"""Ligament over thickness below which a web is called thin: a beam four times as deep as wide."""
 LEAST_EFFECTIVE_SHARE = 0.5
 """Effective thickness over thickness below which a plate that weakens is doubted. The paper's plate has 0.61."""
 
 
 def check_plausible(core: Core, target: Target, record: Record, impact: Impact, hits: Hits | None = None) -> None:
     """Raise a ValueError if a value is beyond what any core or target has."""
-    for place, kind, value in _values(core, target, record, impact, hits):
-        if kind in USUAL and (sentence := USUAL[kind].complaint(place, value, usual=False)) is not None:
-            raise ValueError(sentence)
+    for sentence in _complaints(USUAL, core, target, record, impact, hits, usual=False):
+        raise ValueError(sentence)
 
 
 def doubted(scene: Scene, impact: Impact, hits: Hits) -> Iterator[str]:
     """Sentences about values that are possible but unusual."""
     plate = scene.target.layers[0]
-    usual = USUAL | {"hits": hit_bounds(plate.sampled_cell, plate.size)}
-    for place, kind, value in _values(scene.core, scene.target, scene.record, impact, hits):
-        if kind in usual and (sentence := usual[kind].complaint(place, value, usual=True)) is not None:
-            yield sentence
+    bounds = USUAL | {"hits": hit_bounds(plate.sampled_cell, plate.size)}
+    yield from _complaints(bounds, scene.core, scene.target, scene.record, impact, hits, usual=True)
     for place, plate in scene.target.named:
         share = effective_thickness(plate, impact.velocity) / plate.thickness
         if share < LEAST_EFFECTIVE_SHARE:
@@ -56,20 +50,10 @@ def effective_thickness(plate: Plate, velocity: float) -> float:
     return (1.0 - math.exp(-decay * plate.thickness)) / decay
 
 
-def doubted_holes(target: Target) -> Iterator[str]:
-    """Sentences about plates with little between their holes. Finding a ligament may take a while."""
-    for place, plate in target.named:
-        if plate.open_area > _MOST_OPEN:
-            yield (
-                f"{place}: open area of {plate.open_area:.0%}, where the plate of the two published shots has some "
-                "35 %: most hits meet one web or none"
-            )
-        if plate.open_area > 0.0 and plate.ligament < _THIN * plate.thickness:
-            yield (
-                f"{place}: ligaments of {1e3 * plate.ligament:.2g} mm, {plate.ligament / plate.thickness:.2g} of the "
-                "thickness: such webs bend and tear, which the model does not know; those of the two published shots "
-                "were 4 mm wide and thick"
-            )
+def _complaints(bounds: Mapping[str, Bounds], *scene: Any, usual: bool) -> Iterator[str]:
+    for place, kind, value in _values(*scene):
+        if kind in bounds and (sentence := bounds[kind].complaint(place, value, usual=usual)) is not None:
+            yield sentence
 
 
 def _values(
@@ -100,10 +84,8 @@ def _values(
     for standoff in record.standoffs:
         yield "output.standoffs", "output.standoffs", standoff
     for name, column in ((hits and hits.listed) or {}).items():
-        table = QUANTITIES[name].table
-        kind = table if table == "hits" else f"{table}.{name}"
-        ends = [float(column[np.abs(column).argmax()])]
-        if kind != "hits":  # hits may be as near to the origin as they like
-            ends.append(float(column[np.abs(column).argmin()]))
-        for value in dict.fromkeys(ends):
+        of_hits, sizes = QUANTITIES[name].table == "hits", np.abs(column)
+        kind = "hits" if of_hits else f"{QUANTITIES[name].table}.{name}"
+        ends = [sizes.argmax()] if of_hits else [sizes.argmax(), sizes.argmin()]  # hits may be near the origin
+        for value in dict.fromkeys(float(column[end]) for end in ends):
             yield f"hits.file, column {name}", kind, value

@@ -22,7 +22,6 @@ class Entries(Mapping[str, Entry], Generic[Entry]):
     """
 
     def __init__(self, kind: type[Entry]) -> None:
-        """Take the entries of a kind."""
         self.kind: type[Entry] = kind
 
     def __call__(self, name: str) -> Entry:

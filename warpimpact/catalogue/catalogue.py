@@ -52,10 +52,10 @@ class Catalogue:
         if path is None:
             return cls()
         data = parsed(read_text(path), path.name)
-        if foreign := [key for key in data if key not in ("threat", "material")]:
-            raise ValueError(f"{path.name}: got the unknown key {quoted(foreign[0])}; allowed are threat, material")
-        kinds: dict[type[Any], str] = {Threat: "threat", Material: "material"}
-        return cls({kind: _entries(kind, data.get(key, []), f"{path.name}: {key}") for kind, key in kinds.items()})
+        kinds: dict[str, type[Any]] = {"threat": Threat, "material": Material}
+        if foreign := data.keys() - kinds.keys():
+            raise ValueError(f"{path.name}: got the unknown key {quoted(min(foreign))}; allowed are threat, material")
+        return cls({kind: _entries(kind, data.get(key, []), f"{path.name}: {key}") for key, kind in kinds.items()})
 
     def resistance(self, material: Material, core: Core, thickness: float, obliquity: float) -> Resistance:
         """What is known of the resistance of a plate of this thickness [m] against a core at an obliquity [rad]."""

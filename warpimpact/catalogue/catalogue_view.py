@@ -6,7 +6,6 @@ import math
 from collections import Counter
 from collections.abc import Iterator, Sequence
 
-import numpy as np
 import pandas as pd
 
 from warpimpact.catalogue.catalogue import Catalogue
@@ -15,9 +14,6 @@ from warpimpact.catalogue.strength import limit_fit, resistance_of
 from warpimpact.scene import Core
 
 _MM, _G = 1e3, 1e3
-_COLUMNS, _ROWS = 64, 6
-"""Size of the drawing of a core in characters: its length, and its radius if that were a quarter of the length."""
-_BLOCKS = " ▁▂▃▄▅▆▇█"
 View = dict[str, list[str | pd.DataFrame]]
 
 
@@ -35,7 +31,7 @@ def _labelled(rows: Sequence[tuple[str, str]]) -> list[str | pd.DataFrame]:
 
 
 def threat_view(threat: Threat) -> View:
-    """A threat: its core drawn, its mass properties beside the published mass, its velocities and its evidence."""
+    """A threat: its mass properties beside the published mass, its velocities and its evidence."""
     unknown = [("core", "not known; give its shape in [core]")]
     rows = unknown if threat.shape is None else list(_core(threat, threat.shape))
     rows += [("core material", threat.core_material)] if threat.core_material else []
@@ -47,8 +43,7 @@ def threat_view(threat: Threat) -> View:
         rows.append(("velocity", f"{velocity.value:g} m/s, {tolerance}, {distance}: {velocity.standard}"))
     if not threat.velocities:
         rows.append(("velocity", "none known; give impact.velocity"))
-    picture = [] if threat.shape is None else drawn(threat.shape)
-    return {threat.name: [*picture, *_labelled([*rows, *_sources(threat.known, threat.assumed)])]}
+    return {threat.name: _labelled([*rows, *_sources(threat.known, threat.assumed)])}
 
 
 def material_view(material: Material, *, is_own: bool = False) -> View:
@@ -73,20 +68,9 @@ def material_view(material: Material, *, is_own: bool = False) -> View:
     return {material.name: _labelled([*rows, *_sources(material.known, material.assumed)])}
 
 
-def drawn(core: Core) -> list[str]:
-    """The upper half of the profile of a core, nose to the left, in blocks of text. A column is as high as two are
-    wide."""
-    edge = core.length / _COLUMNS
-    radius = core.radius(np.asarray((np.arange(_COLUMNS) + 0.5) * edge)) / (2.0 * edge)  # in rows
-    rows = min(_ROWS, math.ceil(radius.max()))
-    filled = np.clip(radius[None, :] - np.arange(rows)[::-1, None], 0.0, 1.0)
-    lines = ["".join(_BLOCKS[round(8 * share)] for share in row).rstrip() for row in filled.tolist()]
-    scale = f"{_MM * core.length:.4g} mm long, {2 * _MM * core.max_radius:.4g} mm wide; the upper half is drawn"
-    return [*lines, "─" * _COLUMNS, scale]
-
-
 def _core(threat: Threat, core: Core) -> Iterator[tuple[str, str]]:
     properties = core.mass_properties
+    yield "core", f"{_MM * core.length:.4g} mm long, {2 * _MM * core.max_radius:.4g} mm wide"
     published = "" if threat.core_mass is None else f"; published {_G * threat.core_mass:.4g} g"
     if threat.core_density is not None:
         by_volume = core.model_copy(update={"mass": None, "density": threat.core_density}).mass_properties.mass

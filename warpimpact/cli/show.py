@@ -11,7 +11,6 @@ from warpimpact.analysis.inspection import inspect_view
 from warpimpact.analysis.numbers import text_of
 from warpimpact.analysis.paper import check_scene, closest_table, paper_campaign, validation_table
 from warpimpact.campaign.campaign import Campaign
-from warpimpact.campaign.plausible import doubted_holes
 from warpimpact.campaign.text import CampaignError
 from warpimpact.catalogue.catalogue import Catalogue
 from warpimpact.catalogue.catalogue_view import catalogue_view, material_view, threat_view
@@ -82,7 +81,7 @@ def plate_command(arguments: argparse.Namespace) -> None:
         behind = f"{1e3 * layer.gap:g} mm behind the one before"
         rows[f"layer {place}"] = f"{1e3 * layer.thickness:g} mm, {behind}, {layer.open_area:.1%} open"
     lines = (f"{label:<17}  {text}" for label, text in rows.items())
-    print(campaign.title, *lines, *doubted_holes(campaign.target), output, sep="\n")
+    print(campaign.title, *lines, output, sep="\n")
 
 
 def catalogue_command(arguments: argparse.Namespace) -> None:

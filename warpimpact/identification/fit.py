@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import Annotated, Any, Literal, NamedTuple, get_args
 
 import numpy as np
-from pydantic import AfterValidator, BeforeValidator, Field, TypeAdapter, ValidationError, model_validator
+from pydantic import AfterValidator, BeforeValidator, Field, TypeAdapter, ValidationError
 from scipy.special import ndtr
 
 from warpimpact.campaign.names import catalogue_of, with_core, with_materials, with_scatter
@@ -189,8 +189,8 @@ def _listed(given: Any) -> Any:
 class MeasuredSpeed(Model):
     """A speed and its standard uncertainty."""
 
-    value: Annotated[tuple[units.Speed], BeforeValidator(_listed)]
-    std: Annotated[tuple[units.PositiveSpeed], BeforeValidator(_listed)]
+    value: units.Speed
+    std: units.PositiveSpeed
 
 
 class MeasuredAngles(Model):
@@ -224,16 +224,6 @@ class Measured(Model):
     total_yaw: MeasuredAngles | None = None
     status: Annotated[str, AfterValidator(_known_status)] | None = None
 
-    @model_validator(mode="after")
-    def _passed_for_its_numbers(self) -> Measured:
-        numbers = sorted(self.model_fields_set - {"status"})
-        if self.status in ("arrested", "ricocheted") and numbers:
-            raise ValueError(
-                f'status = "{self.status}" and {numbers[0]} cannot be combined: only a core that passed the plate has '
-                "that number"
-            )
-        return self
-
     def observations(self, name: str, standoffs: int) -> Iterator[Observation]:
         """The measured numbers of a name, with so many stand-offs.
 
@@ -244,13 +234,14 @@ class Measured(Model):
         if not isinstance(given, MeasuredSpeed | MeasuredAngles):
             return
         places = [*range(standoffs)] if name in ("tilt", "pitch", "yaw", "total_yaw") else [None]
-        stds = given.std * len(given.value) if len(given.std) == 1 else given.std
-        if not len(given.value) == len(stds) == len(places):
+        values, stds = (one if isinstance(one, tuple) else (one,) for one in (given.value, given.std))
+        stds = stds * len(values) if len(stds) == 1 else stds
+        if not len(values) == len(stds) == len(places):
             raise ValueError(
-                f"{name}: got {len(given.value)} values and {len(stds)} std at {len(places)} stand-offs, but each "
+                f"{name}: got {len(values)} values and {len(stds)} std at {len(places)} stand-offs, but each "
                 "stand-off of [record] takes one; nan stands for one that was not measured"
             )
-        for index, value, std in zip(places, given.value, stds, strict=True):
+        for index, value, std in zip(places, values, stds, strict=True):
             if value is not None and std is not None:
                 yield Observation(name, index, float(value), float(std))
 

@@ -148,8 +148,8 @@ def test_names_come_with_how_well_they_are_known_and_what_is_outside(folder: Pat
         impact={"obliquity": "45 deg"},
     )
     core, plate = catalogue_names(beyond)
-    assert core.startswith("core: 7.62x51 P80 AP with another mass (")
-    assert plate.startswith("plate: plate A with another resistance, Y 1 GPa (")
+    assert core.startswith("core: 7.62x51 P80 AP (")
+    assert plate.startswith("plate: plate A, your Y 1 GPa (")
     sentences = outside_tested_range(beyond)
     assert range_line(sentences) == "Outside the tested range: thickness, obliquity, the threat."
     assert sentences == [

@@ -9,7 +9,7 @@ from scipy.optimize import brentq
 
 from warpimpact import Campaign
 from warpimpact.campaign.campaign import read_plates
-from warpimpact.campaign.plausible import doubted_holes, effective_thickness
+from warpimpact.campaign.plausible import effective_thickness
 from warpimpact.campaign.text import CampaignError
 from warpimpact.scene.quantities import Implausible
 from warpimpact.studies.sweep import read_sweep
@@ -125,13 +125,3 @@ def test_what_nothing_has_is_refused_unless_it_is_allowed(change: tuple[str, str
         warned(TEXT.replace(*change), folder)
     assert str(refused.value).startswith(sentence)
     assert warned("allow_implausible = true\n" + TEXT.replace(*change), folder)
-
-
-def test_thin_webs_and_large_holes_get_a_word(folder: Path) -> None:
-    def shown(change: tuple[str, str]) -> list[str]:
-        campaign = Campaign.from_text(TEXT.replace(*change), name="text", folder=folder)
-        return [sentence.split(",")[0].split(":", 2)[1] for sentence in doubted_holes(campaign.target)]
-
-    assert shown(("", "")) == []
-    assert shown(('diameter = "5 mm"', 'diameter = "7.9 mm"')) == [" open area of 77%", " ligaments of 0.1 mm"]
-    assert shown(('thickness = "4 mm"', 'thickness = "13 mm"')) == [" ligaments of 3 mm"]

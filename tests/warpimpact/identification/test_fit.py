@@ -86,7 +86,7 @@ def test_a_shot_may_have_its_own_plate(make_fit: FitMaker) -> None:
         (('hit = "unknown"', 'hit = "between holes"'), 'hit: got "between holes", but it must be a table'),
         (("[[shot]]", "[[shot]]\ntypo = 1"), 'got the unknown key "typo"'),
         (('hit = "unknown"', "hit = { y = 1 }"), "hit.z: is missing, but must be given"),
-        (('std = "10 m/s"', "std = 0"), "residual_velocity.std[0]: got 0, but it must be greater than 0"),
+        (('std = "10 m/s"', "std = 0"), "residual_velocity.std: got 0, but it must be greater than 0"),
         (("[10]", "[10, 20]"), "got 2 values and 2 std at 1 stand-offs"),
         (("tilt = {", "tlit = {"), 'got the unknown key "tlit"; did you mean "tilt"?'),
         (('title = "Two', 'tilte = "Two'), 'got the unknown key "tilte"'),

@@ -109,7 +109,7 @@ def test_a_point_is_a_result_and_a_sweep_says_that_it_is_one(folder: Path, capsy
     assert sum(line.strip().startswith(("0 deg", "30 deg")) for line in table) == 6  # one table, a row for each point
     assert len(table) <= 14
     assert main(["run", str(folder / "a.toml")]) == 2
-    assert "this takes one combination of inputs; warpimpact sweep" in capsys.readouterr().err
+    assert "this takes one; warpimpact sweep" in capsys.readouterr().err
 
 
 def test_a_sweep_on_a_full_disk_says_what_is_kept_and_continues_with_it(
