@@ -112,6 +112,11 @@ def test_every_source_file_has_a_budget() -> None:
     assert total == lines(CHECKOUT / "kernels") + lines(CHECKOUT / "warpimpact")
 
 
+def test_source_has_few_files() -> None:
+    """A file is a chapter of 150 to 500 lines."""
+    assert sum(1 for room in ("kernels", "warpimpact") for _ in (CHECKOUT / room).rglob("*.py")) <= 200
+
+
 def defined_names(tree: ast.AST) -> set[str]:
     """Functions, classes, arguments, variables and attributes that a file defines; those of libraries are only used."""
     names = set[str]()
