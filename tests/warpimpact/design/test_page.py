@@ -10,7 +10,7 @@ from urllib.parse import urlsplit
 
 import pytest
 
-from warpimpact.analysis.comparison import compare, comparison_view, short_view
+from warpimpact.analysis.comparison import compare, short_view
 from warpimpact.analysis.effectiveness import effectiveness
 from warpimpact.analysis.numbers import number_text
 from warpimpact.campaign.campaign import Campaign
@@ -108,8 +108,6 @@ def test_an_impossible_plate_shows_the_sentence(page: Any) -> None:
     assert page.text("#sentence") == sentence
     assert page.text("#status").startswith("No map of this design.")
     assert page.find("#save")[0].get_property("disabled")  # there is no campaign that run takes
-    move(page, "control-plate-pattern-width", 4.0)
-    page.wait(lambda: not page.text("#sentence"))
     assert page.errors() == []
 
 
@@ -158,10 +156,6 @@ def test_a_pinned_design_is_compared_shot_by_shot(page: Any, coarse: Path) -> No
     comparison = compare(results, ["this design", "pin A"])
     assert next(iter(short_view(comparison))) in page.text("#answer")
     assert "better than" not in page.text("#answer")
-    page.press("#every summary")
-    shown = page.text("#answer")
-    for parts in comparison_view(comparison).values():
-        assert all(part in shown for part in parts if isinstance(part, str))
     scales = page.driver.execute_script(
         "return [0, 1].map((k) => document.getElementById(`map-${k}`).data[0]).map((t) => [t.zmin, t.zmax])"
     )

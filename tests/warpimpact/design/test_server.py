@@ -36,18 +36,20 @@ from warpimpact.solver.device import Cancel
 CAMPAIGNS = Path(__file__).parents[3] / "campaigns"
 
 
-def request(
-    address: str, path: str = "", body: Any = None, *, host: str | None = None, origin: str | None = "own"
-) -> tuple[int, str]:
-    """Status and text of an answer."""
+def posted(address: str, path: str, text: str | None, **headers: str) -> http.client.HTTPConnection:
+    """A connection with a request of the page itself, unless headers say otherwise."""
     place = urlsplit(address)
     connection = http.client.HTTPConnection(place.hostname, place.port, timeout=120)
-    headers = {"Host": host or place.netloc}
-    if origin is not None:
-        headers["Origin"] = f"http://{place.netloc}" if origin == "own" else origin
-    text = None if body is None else body if isinstance(body, str) else json.dumps(body)
-    connection.request("GET" if body is None else "POST", f"{place.path}{path}", text, headers)
-    response = connection.getresponse()
+    sent = {"Host": place.netloc, "Origin": f"http://{place.netloc}"} | headers
+    sent = {name: value for name, value in sent.items() if value}
+    connection.request("GET" if text is None else "POST", f"{place.path}{path}", text, sent)
+    return connection
+
+
+def request(address: str, path: str = "", body: Any = None, **headers: str) -> tuple[int, str]:
+    """Status and text of an answer."""
+    text = body if body is None or isinstance(body, str) else json.dumps(body)
+    response = posted(address, path, text, **headers).getresponse()
     return response.status, response.read().decode()
 
 
@@ -70,9 +72,9 @@ def address(serve: Callable[..., str], small: Path) -> str:
     ("given", "path", "status"),
     [
         ({}, "", 200),
-        ({"host": "evil.example"}, "", 400),
-        ({"origin": "http://evil.example", "body": {}}, "compute", 403),
-        ({"origin": None, "body": {}}, "compute", 403),
+        ({"Host": "evil.example"}, "", 400),
+        ({"Origin": "http://evil.example", "body": {}}, "compute", 403),
+        ({"Origin": "", "body": {}}, "compute", 403),
         ({"body": {}}, "compute", 200),
         ({}, "files/plotly.min.js", 200),
         ({}, "files/server.py", 404),
@@ -197,10 +199,7 @@ def test_who_leaves_ends_the_work(address: str, small: Path, monkeypatch: pytest
         return march(memory, worker, progress)
 
     monkeypatch.setattr(simulate, "march", marching)
-    place = urlsplit(address)
-    connection = http.client.HTTPConnection(place.hostname, place.port, timeout=60)
-    headers = {"Origin": f"http://{place.netloc}"}
-    connection.request("POST", f"{place.path}compute", json.dumps({"design": tables}), headers)
+    connection = posted(address, "compute", json.dumps({"design": tables}))
     response = connection.getresponse()
     for _ in range(5):  # plate; maps and numbers of two stages
         response.readline()

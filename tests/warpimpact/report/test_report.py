@@ -72,8 +72,6 @@ def test_page_holds_the_hits_of_each_result(folder: Path) -> None:
         assert str(shown["first"]) in shown["trajectories"]
         history = shown["trajectories"][str(fastest)]
         assert [len(history[part]) for part in ("inside", "behind")] == [5, 2]
-        y, tilt = history["behind"][1]["y"], dataset["tilt"][fastest, 1]
-        assert np.ptp(y[0]) == pytest.approx(27.86 * np.cos(np.radians(tilt)), abs=3.0)
 
 
 def test_page_says_how_well_each_plate_protects(folder: Path) -> None:
@@ -103,8 +101,7 @@ def test_page_compares_the_plates(folder: Path) -> None:
 def test_page_names_its_plates_leads_to_its_parts_and_says_each_note_once(folder: Path) -> None:
     text = (folder / "a.html").read_text()
     assert "<title>Plates compared: narrow, &lt;b&gt;wide</title>" in text
-    anchors = re.findall(r'<a href="#(\w+)">', text)
-    assert anchors == re.findall(r'<h2 id="(\w+)">', text)
+    assert re.findall(r'<a href="#(\w+)">', text) == re.findall(r'<h2 id="(\w+)">', text)
     assert [text.count(note) for note in ("Intervals describe the hits", "The core stays one rigid body")] == [2, 2]
     assert len(text) < 3e6
 
