@@ -16,8 +16,7 @@ from PIL import Image
 
 from warpimpact import Campaign, replay, run, sensitivity
 from warpimpact.plotting import dispersion, marginals, overview, trajectory, uncertainty, variable_maps
-from warpimpact.plotting.posterior import hits_figure, pairs_figure
-from warpimpact.plotting.studies import sensitivity_figure
+from warpimpact.plotting.studies import hits_figure, pairs_figure, sensitivity_figure
 from warpimpact.plotting.trajectory import pressure
 from warpimpact.results import files
 from warpimpact.results.kinds import POSTERIOR

@@ -197,9 +197,8 @@ DAILY = (
         "compare",
         "compare plates: which protects better",
         "Compare plates under the same shots: the measure that decides, ranks, differences with intervals, and a "
-        "figure. FIGURE_weight.png shows targets with layers, and limits, against their weight. A campaign with "
-        "several plates is run first, each into NAME.nc unless that exists. A map and a result of continuum of the "
-        "same shots are compared hit by hit.",
+        "figure. A campaign with several plates is run first, each into NAME.nc unless that exists. A map and a result "
+        "of continuum of the same shots are compared hit by hit.",
         [
             file("files", "RESULT.nc", "results, one with references, or a campaign with several [[plate]]", nargs="+"),
             output("FIGURE.png", "figure as PNG, PDF or SVG (default: comparison.png, or the campaign's name)"),

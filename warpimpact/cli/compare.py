@@ -12,7 +12,7 @@ from warpimpact.analysis.inspection import range_note
 from warpimpact.analysis.numbers import rows_of, text_of
 from warpimpact.campaign.campaign import read_plates
 from warpimpact.campaign.text import CampaignError
-from warpimpact.plotting import comparison_figure, variable_maps, weight_figure
+from warpimpact.plotting import comparison_figure, variable_maps
 from warpimpact.results import files
 from warpimpact.results import variables as v
 from warpimpact.results.files import ResultError
@@ -27,8 +27,8 @@ from .messages import warn
 def compare_command(arguments: argparse.Namespace) -> int:
     first, is_campaign = arguments.files[0], arguments.files[0].suffix == ".toml"
     figure = arguments.output or Path(f"{first.stem if is_campaign else 'comparison'}.png")
-    by_weight, tilts = (figure.with_stem(f"{figure.stem}_{name}") for name in ("weight", "tilt"))
-    for picture in (figure, by_weight, tilts):  # the figure of a campaign belongs to it as its results do
+    tilts = figure.with_stem(f"{figure.stem}_tilt")
+    for picture in (figure, tilts):  # the figure of a campaign belongs to it as its results do
         check_output(picture, *PICTURES, overwrite=arguments.overwrite or (is_campaign and arguments.output is None))
     if arguments.sensitivity and not is_campaign:
         raise ResultError(f"{first}: --sensitivity computes the plates again. Give the campaign with their [[plate]].")
@@ -49,9 +49,6 @@ def compare_command(arguments: argparse.Namespace) -> int:
         print(_sensitivity(arguments, comparison))
     comparison_figure(comparison, every=arguments.every).savefig(figure, dpi=150)
     print(figure if arguments.every else f"{figure}; every measure with --all")
-    if (against_weight := weight_figure(comparison)) is not None:
-        against_weight.savefig(by_weight, dpi=150)
-        print(by_weight)
     return code
 
 

@@ -4,14 +4,13 @@ Change axes, colours and layout here; a number that a figure shows is computed i
 analysis and the rooms below it, but neither export nor report. Text in figures is never mathtext.
 """
 
-from warpimpact.plotting.comparison import comparison_figure, weight_figure
+from warpimpact.plotting.comparison import comparison_figure
 from warpimpact.plotting.maps import (
     dispersion,
     layers_figure,
     marginals,
     measure_map,
     overview,
-    probability_map,
     save_maps,
     save_side_by_side,
     uncertainty,
@@ -35,15 +34,9 @@ __all__ = [
     "passage",
     "plate_figure",
     "pressure",
-    "probability_map",
     "save_maps",
     "save_side_by_side",
     "uncertainty",
     "variable_map",
     "variable_maps",
-    "weight_figure",
 ]
-
-
-def __dir__() -> list[str]:
-    return __all__

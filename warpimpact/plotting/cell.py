@@ -189,10 +189,17 @@ def scale_of(columns: Sequence[Array], *, signed: bool = False) -> Scale:
 def draw_map(axes: Axes, dataset: xarray.Dataset, column: Shown) -> ScalarMappable:
     """Draw a variable with its title, the holes and the fire, with labels for a legend; return the coloured artist.
 
-    A hit without a value is grey, with how it ended as the label.
+    An image, and hits that cover the cell, are drawn as an image, other hits as points. A hit without a value is grey,
+    with how it ended as the label.
     """
     values, exists = column.values, np.isfinite(column.values)
-    artist = _paint(axes, dataset, values, column.scale or scale_of([values], signed=column.signed))
+    scale = column.scale or scale_of([values], signed=column.signed)
+    if values.ndim == 2 or (places := nearest_hits(dataset)) is not None:
+        artist = paint_pixels(axes, dataset, values if values.ndim == 2 else values[places], scale)
+    else:
+        point: dict[str, Any] = {"s": 36, "edgecolors": "black", "linewidths": 0.6, "plotnonfinite": True, "zorder": 3}
+        y, z = hit_points(dataset).T * MM
+        artist = axes.scatter(y, z, c=values, cmap=scale[0], norm=scale[1], **point)
     colours = {}
     if column.scale is _OF_STATUS:
         colours = {name: STATUS_COLOURS[code] for code, name in status_names(values).items()}
@@ -257,14 +264,3 @@ def paint_pixels(axes: Axes, dataset: xarray.Dataset, image: Array, scale: Scale
     y, z = np.asarray(dataset.attrs[attr.PLATE_PERIOD]) / 2 * MM
     cmap, norm = scale
     return axes.imshow(image, cmap=cmap, norm=norm, origin="lower", extent=(-y, y, -z, z), interpolation="nearest")
-
-
-def _paint(axes: Axes, dataset: xarray.Dataset, values: Array, scale: Scale) -> ScalarMappable:
-    """Colour the cell by an image, or by values of hits: as an image if these cover it, otherwise as points."""
-    if values.ndim == 2:
-        return paint_pixels(axes, dataset, values, scale)
-    if (places := nearest_hits(dataset)) is not None:
-        return paint_pixels(axes, dataset, values[places], scale)
-    y, z = hit_points(dataset).T * MM
-    point: dict[str, Any] = {"s": 36, "edgecolors": "black", "linewidths": 0.6, "plotnonfinite": True, "zorder": 3}
-    return axes.scatter(y, z, c=values, cmap=scale[0], norm=scale[1], **point)

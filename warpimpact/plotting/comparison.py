@@ -1,4 +1,4 @@
-"""Figures of a comparison: measures and differences of plates with intervals, and targets against their weight."""
+"""Figure of a comparison: measures and differences of plates with intervals."""
 
 from __future__ import annotations
 
@@ -10,10 +10,9 @@ from typing import Any
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.layout_engine import ConstrainedLayoutEngine
-from pandas import DataFrame, Series
+from pandas import DataFrame
 
 from warpimpact.analysis.comparison import Comparison
-from warpimpact.analysis.effectiveness import PIERCED
 from warpimpact.plotting.style import BLUE, GREY, VERMILION, Figure, bars, finish, hide_sides, in_style
 from warpimpact.results.measures import Measure
 
@@ -24,10 +23,6 @@ _STYLES = {
     "worst_point": ("worst hit", "x", "#000000", 0.12),
 }
 """Label, marker, colour, and distance from the line of a plate, by the kind of a measure."""
-_WEIGHED = ("mean", "share", "quantile", "worst_tenth", "worst_point")
-"""Kinds of measures that are drawn against the weight."""
-_AGAINST_WEIGHT = ("base_perforated", "base_depth", "limit_velocity")
-_THICKNESS, _NEEDED = "limit_thickness", "limit_areal_density"
 _WIDE = 40
 """Most characters in a line of the weights of a plate."""
 _ROW, _MARGIN, _LINE = 0.42, 0.75, 0.15
@@ -65,8 +60,7 @@ def comparison_figure(comparison: Comparison, *, every: bool = False) -> Figure:
         _draw_differences(right, comparison, alike[0], tables)
     title = "Plates compared" if decides is None or every else f"Plates by {decides.label}"
     together = f"intervals hold together at {comparison.confidence:.0%}; hollow marker: cannot be told apart"
-    finish(figure, together, *comparison.hits_used, title=title, legend=True, columns=4)
-    return figure
+    return finish(figure, together, *comparison.hits_used, title=title, legend=True, columns=4)
 
 
 def _shown_differences(comparison: Comparison, measures: Sequence[Measure], *, every: bool) -> dict[str, DataFrame]:
@@ -84,11 +78,14 @@ def _quantity(measure: Measure) -> tuple[str, bool]:
 
 
 def _draw_plates(axes: Axes, comparison: Comparison, measures: Sequence[Measure]) -> None:
-    """Draw the measures of one quantity, a line per plate."""
+    """Draw the measures of one quantity, a line per plate, and the solid references as hollow diamonds."""
     lines = np.arange(len(comparison.plates))
     for measure in measures:
         _draw_intervals(axes, comparison.scores[measure.text], lines, measure.kind, label=_STYLES[measure.kind][0])
-    _draw_solid(axes, comparison, comparison.scores[measures[0].text]["solid"], lines + _STYLES[measures[0].kind][3])
+    solid = comparison.scores[measures[0].text]["solid"].to_numpy()
+    if (there := np.isfinite(solid)).any():
+        places, label = lines[there] + _STYLES[measures[0].kind][3], f"{comparison.reference} of equal weight"
+        axes.plot(solid[there], places, "D", label=label, color=GREY, fillstyle="none", markersize=10.0)
     axes.set_title(f"{measures[0].axis}; {measures[0].better}", fontsize="medium", loc="left")
 
 
@@ -116,17 +113,8 @@ def _draw_differences(axes: Axes, comparison: Comparison, measure: Measure, tabl
 def _draw_intervals(axes: Axes, table: DataFrame, lines: Any, kind: str, **style: Any) -> None:
     """Draw the rows of a table with their intervals, each on its line."""
     _, marker, colour, offset = _STYLES[kind]
-    ends = bars(table["value"], table["low"], table["high"])
     drawn: dict[str, Any] = {"fmt": marker, "color": colour, "markersize": 6.5, "capsize": 3.0, "zorder": 3} | style
-    axes.errorbar(table["value"], lines + offset, xerr=ends, **drawn)
-
-
-def _draw_solid(axes: Axes, comparison: Comparison, x: Any, y: Any) -> None:
-    """Draw the solid references as hollow diamonds."""
-    there = np.isfinite(x) & np.isfinite(y)
-    if there.any():
-        style: dict[str, Any] = {"color": GREY, "fillstyle": "none", "markersize": 10.0}
-        axes.plot(x[there], y[there], "D", label=f"{comparison.reference} of equal weight", **style)
+    axes.errorbar(table["value"], lines + offset, xerr=bars(table["value"], table["low"], table["high"]), **drawn)
 
 
 def _furnish(axes: Axes, lines: Sequence[str]) -> None:
@@ -138,82 +126,3 @@ def _furnish(axes: Axes, lines: Sequence[str]) -> None:
     axes.ticklabel_format(axis="x", useOffset=False)
     hide_sides(axes, "top", "right", "left")
     axes.tick_params(axis="y", length=0.0)
-
-
-@in_style
-def weight_figure(comparison: Comparison) -> Figure | None:
-    """Measures of the base, or limits, against the areal density of the whole target, with intervals; None if the
-    plates have none of them.
-
-    A limit thickness is drawn at the areal density that the target then has. A hollow diamond is the solid reference of
-    the same areal density; a line is the need of a target with it."""
-    by_name = {name: _by_kind(comparison, name) for name in (*_AGAINST_WEIGHT, _THICKNESS, _NEEDED)}
-    needed = by_name.pop(_NEEDED)
-    wanted = {name: kinds for name, kinds in by_name.items() if kinds and (needed or name != _THICKNESS)}
-    if not wanted:
-        return None
-    figure = Figure(figsize=(1.2 + 5.2 * len(wanted), 4.6), layout="constrained")
-    for axes, (name, measures) in zip(figure.subplots(1, len(wanted), squeeze=False)[0], wanted.items(), strict=True):
-        _draw_against_weight(axes, comparison, measures, needed if name == _THICKNESS else {})
-    thicknesses: dict[str, list[str]] = {}
-    for solid in filter(None, comparison.plates["solid"]):
-        thickness, _, material = solid.partition(" mm of ")
-        thicknesses.setdefault(material, []).append(thickness)
-    solids = [f"{comparison.reference}s: {', '.join(of)} mm of {material}" for material, of in thicknesses.items()]
-    finish(figure, *solids, title="Targets against their weight, with intervals", legend=True, columns=4)
-    return figure
-
-
-def _by_kind(comparison: Comparison, name: str) -> dict[str, Measure]:
-    """The measures of a quantity, the first of each kind that has a style; empty where none ranks."""
-    by_kind: dict[str, Measure] = {}
-    for measure in (one for one in comparison.measures.values() if one.name == name and one.kind in _WEIGHED):
-        by_kind.setdefault(measure.kind, measure)
-    return by_kind if {"mean", "share", "quantile"} & by_kind.keys() else {}
-
-
-def _draw_against_weight(
-    axes: Axes, comparison: Comparison, measures: Mapping[str, Measure], needed: Mapping[str, Measure]
-) -> None:
-    """Draw one effect of every target over its areal density, or over the areal density that it needs."""
-    first, densities = next(iter(measures.values())), comparison.plates["areal_density"]
-    of_target = DataFrame({"value": densities, "low": np.nan, "high": np.nan})
-    for kind, measure in measures.items():
-        if needed and kind not in needed:
-            continue
-        label, marker, colour, _ = _STYLES[kind]
-        table, weights = comparison.scores[measure.text], comparison.scores[needed[kind].text] if needed else of_target
-        across, up = (bars(part["value"], part["low"], part["high"]) for part in (weights, table))
-        style: dict[str, Any] = {"fmt": marker, "color": colour, "markersize": 6.5, "capsize": 3.0, "zorder": 3}
-        axes.errorbar(weights["value"], table["value"], xerr=across, yerr=up, label=label, **style)
-        if measure is first:
-            _name_places(axes, weights["value"], table["value"])
-    if needed:
-        solids = comparison.scores[needed[first.kind].text]["solid"]
-        for solid in solids.dropna().unique().tolist():
-            axes.axvline(solid, color=GREY, linestyle="--", label=f"what the {comparison.reference} needs")
-    else:
-        _draw_solid(axes, comparison, densities, comparison.scores[first.text]["solid"])
-    what = "that the target needs" if needed else "of the whole target"
-    axes.set(xlabel=f"areal density {what} [kg/m²]", ylabel=first.axis)
-    pierced = first.name == "base_depth" and PIERCED in comparison.scores
-    is_bound = pierced and comparison.scores[PIERCED]["value"].max() > 0.0
-    title = "lower bounds: cores pierce a base, and count with its thickness" if is_bound else first.better
-    axes.set_title(title, fontsize="medium", loc="left")
-    if first.most == 1.0:
-        axes.set_ylim(-0.04, 1.04)
-    axes.grid(color="0.92")
-    axes.margins(x=0.18)
-    axes.ticklabel_format(axis="both", useOffset=False)
-    hide_sides(axes, "top", "right")
-
-
-def _name_places(axes: Axes, x: Series, y: Series) -> None:
-    """Write the names of targets beside their points, towards the middle; those at one place together."""
-    middle, places = 0.5 * float(x.min() + x.max()), dict[tuple[str, str], list[str]]()
-    for name in x.index:
-        places.setdefault((f"{x[name]:.3g}", f"{y[name]:.2g}"), []).append(name)
-    for names in places.values():
-        at = x[names[0]], y[names[0]]
-        side, ha = (7, "left") if at[0] <= middle else (-7, "right")
-        axes.annotate(", ".join(names), at, xytext=(side, 6), textcoords="offset points", ha=ha, fontsize="small")

@@ -43,8 +43,7 @@ def front_figure(dataset: xarray.Dataset, folder: Path = Path()) -> Figure:
     left, right = rows[-1].subfigures(1, 2, width_ratios=(1.7, 1.0))
     _draw_front(left.subplots(), dataset, names)
     _draw_variables(right, dataset, confirmed)
-    finish(figure, f"of each plate {THUMBNAIL:g} mm × {THUMBNAIL:g} mm" if names else "", result=dataset)
-    return figure
+    return finish(figure, f"of each plate {THUMBNAIL:g} mm × {THUMBNAIL:g} mm" if names else "", result=dataset)
 
 
 def _draw_plates(figure: SubFigure, dataset: xarray.Dataset, names: dict[int, str], folder: Path) -> None:
@@ -73,15 +72,14 @@ def _draw_front(axes: Axes, dataset: xarray.Dataset, names: dict[int, str]) -> N
     labels, signs = dataset[f.GOAL_LABEL].values, dataset[f.GOAL_SIGN].values
     goals = np.flatnonzero(np.isnan(dataset[f.GOAL_LIMIT].values))
     across, up = goals[0], goals[min(1, len(goals) - 1)]
-    every, fresh = dataset[f.RESULT].values, dataset[f.FRESH].values
-    axes.plot(every[:, across], every[:, up], ".", color="0.82", markersize=3, zorder=1, label="other designs")
-    confirmed = dataset[f.CONFIRMED].values == 1
-    of_fresh = [dataset[name].values[:, up] for name in (f.FRESH, f.FRESH_LOW, f.FRESH_HIGH)]
+    axes.plot(*dataset[f.RESULT].values[:, [across, up]].T, ".", color="0.82", ms=3, zorder=1, label="other designs")
+    confirmed, fresh = dataset[f.CONFIRMED].values == 1, dataset[f.FRESH].values
+    of_fresh = np.stack([dataset[name].values[:, up] for name in (f.FRESH, f.FRESH_LOW, f.FRESH_HIGH)])
     groups = ((confirmed, "front, fresh hits, 95 %", BLUE), (~confirmed, "not on the front by fresh hits", "white"))
     for which, label, face in groups:
         if which.any():
             style: dict[str, Any] = {"color": BLUE, "markerfacecolor": face, "markersize": 6, "capsize": 2, "zorder": 4}
-            ends = bars(*(values[which] for values in of_fresh))
+            ends = bars(*of_fresh[:, which])
             axes.errorbar(fresh[which, across], fresh[which, up], yerr=ends, fmt="o", label=label, **style)
     if len(fresh):
         links = axes.scatter(fresh[:, across], fresh[:, up], s=60, alpha=0.01, zorder=7)
@@ -111,10 +109,6 @@ def _draw_variables(figure: SubFigure, dataset: xarray.Dataset, places: Any) -> 
     over = dataset[f.FRESH].values[places, 0]
     for place, axes in zip(shown, panels, strict=True):
         axes.plot(over, values[:, place], "o-", color=GREEN, markersize=4, linewidth=0.8)
-        every = dataset[f.VALUE].values[:, place]
-        low, high = np.nanmin(every), np.nanmax(every)
-        if low < high:
-            axes.set_ylim(low - 0.05 * (high - low), high + 0.05 * (high - low))
         labels, unit = json.loads(str(dataset[f.LABELS].values[place]) or "[]"), str(dataset[f.UNIT].values[place])
         if labels:
             axes.set_yticks(range(len(labels)), labels)

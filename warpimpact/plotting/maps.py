@@ -42,7 +42,8 @@ from warpimpact.scene.units import MM
 _MAIN = (v.RESIDUAL_VELOCITY, v.DEFLECTION, v.TILT)
 _MOST_COLUMNS = 3
 _BANDS = {"5 to 95 %": (0.05, 0.95, 0.2), "25 to 75 %": (0.25, 0.75, 0.4)}
-"""Two quantiles and the opacity of each band."""
+_SHARES = (0.05, 0.25, 0.5, 0.75, 0.95)
+"""Quantiles; the ends and the opacity of each band of them."""
 _PER_STRIP, _MOST_STRIPS = 50, 48
 """Fewest hits of a strip, and most strips along an axis."""
 _FINE = 100
@@ -71,21 +72,32 @@ def variable_map(dataset: xarray.Dataset, variable: str, standoff: float | None 
 
 @in_style
 def measure_map(dataset: xarray.Dataset, text: str) -> Figure:
-    """Map of a measure: of a probability from the nearest hits (`probability_map`), or of its quantity.
+    """Map of a measure: of its quantity, or of a probability.
+
+    Where shots scatter, a probability is the share of the nearest hits, with half the width of its 95 % interval
+    (`hit_map.share_of`).
+
+    Args:
+        text: such as `mean(tilt@50mm)`, `P(bending_stress > 1.5 GPa)` or `P(base_perforated)`.
 
     Raises:
-        ValueError: the text is no measure of hits, or the result does not have it.
+        ValueError: the text is no measure of hits, the result does not have it, or its hits do not cover the cell.
     """
     dataset = mirrored(dataset)
     measure = Measure.parse(text).of(dataset)
-    if measure.is_binary:
-        return probability_map(dataset, text)
     if measure.kind == "target":
         raise ValueError(f'got "{text}", which is one number of the whole target')
-    values = measure.display.factor * measure.by_hit(dataset)
-    finite = np.where(np.isfinite(values), values, np.nan)
-    column = Shown(finite, measure.axis, measure.column.label, signed=measure.least < 0.0)
-    return _maps(dataset, [column], 1)
+    if not measure.is_binary:
+        values = measure.display.factor * measure.by_hit(dataset)
+        finite = np.where(np.isfinite(values), values, np.nan)
+        return _maps(dataset, [Shown(finite, measure.axis, measure.column.label, signed=measure.least < 0.0)], 1)
+    values, places, whole = measure.values(dataset), _covered(dataset), scale_of([np.array([0.0, 1.0])])
+    if not shots_scatter(dataset):
+        note = "each hit has one outcome, 1 or 0; nearest hit"
+        return _maps(dataset, [Shown(values[places], text, scale=whole)], 1, note)
+    share, half_width = _local(dataset, values, places, lambda near: share_of(near[1]))
+    columns = [Shown(share, text, scale=whole), Shown(half_width, "half width of its 95 % interval")]
+    return _maps(dataset, columns, 2, f"share of the {NEIGHBOURS} nearest hits, Wilson's interval")
 
 
 @in_style
@@ -99,8 +111,7 @@ def variable_maps(datasets: Mapping[str, xarray.Dataset], variable: str, standof
         artist = draw_map(axes, dataset, column._replace(title=f"{name}\n{shots_text(dataset)}", scale=scale))
     figure.colorbar(artist, ax=panels, label=columns[0].label)
     note = f"{SEEN}s; colours and lengths to the same scale"
-    finish(figure, note, title=columns[0].title.partition("\n")[0], legend=True)
-    return figure
+    return finish(figure, note, title=columns[0].title.partition("\n")[0], legend=True)
 
 
 @in_style
@@ -155,8 +166,7 @@ def _maps(dataset: xarray.Dataset, columns: Sequence[Shown | None], across: int,
         if column.label and np.isfinite(column.values).any():
             figure.colorbar(artist, ax=axes, label=column.label)
     text = f"{shots_text(dataset)}; {SEEN}"
-    finish(figure, *notes, text, result=dataset, legend=True, columns=2 * across)
-    return figure
+    return finish(figure, *notes, text, result=dataset, legend=True, columns=2 * across)
 
 
 @in_style
@@ -184,20 +194,21 @@ def marginals(dataset: xarray.Dataset, variable: str, standoff: float | None = N
         histogram.yaxis.set_label_position("right")
     above.set_ylabel(column.label.replace(" [", "\n["))
     right.set_xlabel(column.label.replace(" [", "\n["))
-    finish(figure, column.title, f"{shots_text(dataset)}; {SEEN}", result=dataset, legend=True, columns=4)
-    return figure
+    return finish(figure, column.title, f"{shots_text(dataset)}; {SEEN}", result=dataset, legend=True, columns=4)
 
 
 def _with_margins(size: Array) -> tuple[Figure, Axes, Axes, Axes, Axes]:
     """A figure with a panel of this size [inch], one above, one on the right with its own heights, and one further
     right."""
     figure = Figure(figsize=(size[0] + 2 * _STRIP + 2.4, size[1] + _STRIP + 1.0), layout="compressed")
-    grid = figure.add_gridspec(2, 3, width_ratios=(size[0], _STRIP, _STRIP), height_ratios=(_STRIP, size[1]))
-    centre = figure.add_subplot(grid[1, 0])
-    above, right = figure.add_subplot(grid[0, 0], sharex=centre), figure.add_subplot(grid[1, 1], sharey=centre)
+    ratios: dict[str, Any] = {"width_ratios": (size[0], _STRIP, _STRIP), "height_ratios": (_STRIP, size[1])}
+    panels = figure.subplot_mosaic("a..;crf", **ratios)
+    centre, above, right, free = (panels[name] for name in "carf")
+    above.sharex(centre)
+    right.sharey(centre)
     above.tick_params(labelbottom=False)
     right.tick_params(labelleft=False)
-    return figure, centre, above, right, figure.add_subplot(grid[1, 2])
+    return figure, centre, above, right, free
 
 
 @in_style
@@ -206,8 +217,7 @@ def dispersion(dataset: xarray.Dataset, standoff: float | None = None) -> Figure
     figure, centre, above, right, free = _with_margins(np.array([5.0, 5.0]))
     free.remove()
     tilt, velocity = (shown(dataset, name, standoff) for name in (v.TILT, v.RESIDUAL_VELOCITY))
-    both = np.isfinite(tilt.values) & np.isfinite(velocity.values)
-    x, y = tilt.values[both], velocity.values[both]
+    x, y = np.stack([tilt.values, velocity.values])[:, np.isfinite(tilt.values) & np.isfinite(velocity.values)]
     if len(x) > _MOST_POINTS:
         density = centre.hexbin(x, y, gridsize=60, mincnt=1, bins="log", cmap="viridis", linewidths=0.1)
         figure.colorbar(density, ax=centre, location="bottom", shrink=0.6, label="hits per hexagon", format="{x:g}")
@@ -224,8 +234,7 @@ def dispersion(dataset: xarray.Dataset, standoff: float | None = None) -> Figure
     centre.set(xlabel=f"{tilt.title.partition(chr(10))[0]} [°]", ylabel=velocity.label)
     above.set_ylabel("hits")
     right.set_xlabel("hits")
-    finish(figure, f"cores that passed the {target_word(dataset)}; {shots_text(dataset)}", result=dataset)
-    return figure
+    return finish(figure, f"cores that passed the {target_word(dataset)}; {shots_text(dataset)}", result=dataset)
 
 
 @in_style
@@ -240,18 +249,11 @@ def uncertainty(dataset: xarray.Dataset, variable: str, standoff: float | None =
     dataset = mirrored(dataset)
     column = shown(dataset, variable, standoff)
     if not shots_scatter(dataset):
-        raise ValueError(
-            f'got "{variable}" of shots that all arrive alike, so nothing is uncertain that a map could show'
-        )
+        raise ValueError(f'got "{variable}" of shots that all arrive alike, so nothing is uncertain')
     images = _local(dataset, column.values, _covered(dataset), lambda near: plane_fit(*near)[:2])
     labels = f"local mean of {column.label}", f"half width of its 95 % interval [{column.label.partition('[')[2]}"
     method = f"plane through the {NEIGHBOURS} nearest hits, Student's interval; bends of the map widen it"
     return _maps(dataset, [*map(Shown, images, labels)], 2, column.title, method)
-
-
-def is_uncertain(dataset: xarray.Dataset) -> bool:
-    """Whether `uncertainty` has something to show."""
-    return nearest_hits(dataset) is not None and shots_scatter(dataset)
 
 
 def shots_scatter(dataset: xarray.Dataset) -> bool:
@@ -259,36 +261,9 @@ def shots_scatter(dataset: xarray.Dataset) -> bool:
     return any(np.ptp(dataset[name].values) > 0.0 for name in v.shot_variables(dataset))
 
 
-@in_style
-def probability_map(dataset: xarray.Dataset, quantity: str) -> Figure:
-    """Map of a probability from the nearest hits, and half the width of its 95 % interval (`hit_map.share_of`).
-
-    Args:
-        dataset: a result whose hits cover the cell.
-        quantity: such as ``P(bending_stress > 1.5 GPa)`` or ``P(perforated)``, as in a campaign's ``stop.quantity``; or
-            a share among the measures of protection, such as ``P(base perforated)``.
-
-    Raises:
-        ValueError: the quantity is no probability, the result does not have it, or the hits do not cover the cell.
-    """
-    dataset = mirrored(dataset)
-    measure = Measure.parse(quantity).of(dataset)
-    if not measure.is_binary:
-        raise ValueError(f'got "{quantity}", but a map of a probability needs P(…), such as P(perforated)')
-    values, places = measure.values(dataset), _covered(dataset)
-    whole = scale_of([np.array([0.0, 1.0])])
-    if not shots_scatter(dataset):
-        note = "each hit has one outcome, 1 or 0; nearest hit"
-        return _maps(dataset, [Shown(values[places], quantity, scale=whole)], 1, note)
-    share, half_width = _local(dataset, values, places, lambda near: share_of(near[1]))
-    columns = [Shown(share, quantity, scale=whole), Shown(half_width, "half width of its 95 % interval")]
-    return _maps(dataset, columns, 2, f"share of the {NEIGHBOURS} nearest hits, Wilson's interval")
-
-
 def _covered(dataset: xarray.Dataset) -> NDArray[np.intp]:
     """Index of the hit nearest to every pixel. Raises ValueError if the hits do not cover the cell."""
-    places = nearest_hits(dataset, _FINE)
-    if places is None:
+    if (places := nearest_hits(dataset, _FINE)) is None:
         raise ValueError("the hits do not cover the cell, so there is no estimate between them; more hits are needed")
     return places
 
@@ -299,12 +274,12 @@ def _local(
     places: NDArray[np.intp],
     estimate: Callable[[tuple[Array, Array]], tuple[Array, Array]],
 ) -> Array:
-    """Local estimates at every pixel, shape [2, pixels_z, pixels_y]: the value, and half the width of its interval.
+    """Local estimates at every pixel, shape [2, z, y]: the value, and half the width of its interval.
 
     Both are NaN where the nearest hit has no value.
 
     Args:
-        places: index of the hit nearest to each pixel, shape [pixels_z, pixels_y].
+        places: index of the hit nearest to each pixel, shape [z, y].
         estimate: computes both from offsets [m] and values of the nearest hits with a value.
     """
     images = np.full((2, *places.shape), np.nan)
@@ -322,14 +297,11 @@ def _draw_strips(axes: Axes, places: Array, values: Array, *, upright: bool) -> 
     """Draw quantiles of the values against their places; `upright` puts the places on the vertical axis."""
     strips = np.array_split(np.argsort(places), np.clip(len(places) // _PER_STRIP, 1, _MOST_STRIPS))
     middles = [places[strip].mean() for strip in strips]
-
-    def quantiles(share: float) -> list[float]:
-        return [float(np.quantile(values[strip], share)) for strip in strips]
-
+    quantiles = {share: [np.quantile(values[strip], share) for strip in strips] for share in _SHARES}
     band: Any = axes.fill_betweenx if upright else axes.fill_between
     for label, (low, high, alpha) in _BANDS.items():
-        band(middles, quantiles(low), quantiles(high), color=BLUE, alpha=alpha, lw=0, label=label)
-    median = (quantiles(0.5), middles) if upright else (middles, quantiles(0.5))
+        band(middles, quantiles[low], quantiles[high], color=BLUE, alpha=alpha, lw=0, label=label)
+    median = (quantiles[0.5], middles) if upright else (middles, quantiles[0.5])
     axes.plot(*median, color="black", lw=1.2, label="median")
 
 
@@ -343,16 +315,15 @@ def save_maps(dataset: xarray.Dataset, folder: Path, stem: str, *, overwrite: bo
     dataset = mirrored(dataset)
     figures: dict[str, PlainFigure] = {"overview": overview(dataset)}
     for variable in (name for name in v.shown_by("plot") if name in dataset):
-        at_standoffs = v.STANDOFF in variable.dims
-        for standoff in dataset[v.STANDOFF].values.tolist() if at_standoffs else [None]:
-            name = variable if standoff is None else f"{variable}_{standoff * MM:g}mm"
+        for standoff in dataset[v.STANDOFF].values.tolist() if v.STANDOFF in variable.dims else [None]:
             if np.isfinite(shown(dataset, variable, standoff).values).any():
+                name = variable if standoff is None else f"{variable}_{standoff * MM:g}mm"
                 figures[name] = variable_map(dataset, variable, standoff)
     if passed(dataset).any():
         figures["marginals"] = marginals(dataset, v.RESIDUAL_VELOCITY)
         if dataset.sizes["standoff"]:
             figures["dispersion"] = dispersion(dataset)
-    if is_uncertain(dataset):
+    if shots_scatter(dataset) and nearest_hits(dataset) is not None:
         figures["uncertainty"] = uncertainty(dataset, v.RESIDUAL_VELOCITY)
     if v.LAYER_STATUS in dataset:
         figures["layers"] = layers_figure(dataset)
@@ -362,23 +333,14 @@ def save_maps(dataset: xarray.Dataset, folder: Path, stem: str, *, overwrite: bo
 def save_side_by_side(
     datasets: Mapping[str, xarray.Dataset], folder: Path, stem: str, *, overwrite: bool = False
 ) -> list[Path]:
-    """Write maps of several results side by side as PNG files ``<stem>_<map>.png`` and return their paths.
-
-    Raises:
-        OutputError: one of them exists, and must not be replaced.
-    """
+    """Write maps of several results side by side, as `save_maps` does."""
     with_tilt = all(dataset.sizes["standoff"] for dataset in datasets.values())
     variables = [variable for variable in _MAIN if variable != v.TILT or with_tilt]
-    figures: dict[str, PlainFigure] = {variable: variable_maps(datasets, variable) for variable in variables}
-    return save_all(figures, folder, stem, overwrite=overwrite)
+    return save_all({name: variable_maps(datasets, name) for name in variables}, folder, stem, overwrite=overwrite)
 
 
 def save_all(figures: Mapping[str, PlainFigure], folder: Path, stem: str, *, overwrite: bool) -> list[Path]:
-    """Write figures as PNG files ``<stem>_<name>.png`` and return their paths.
-
-    Raises:
-        OutputError: one of them exists, and must not be replaced.
-    """
+    """Write figures as `save_maps` does."""
     folder.mkdir(parents=True, exist_ok=True)
     paths = {folder / f"{stem}_{name}.png": figure for name, figure in figures.items()}
     if not overwrite and (existing := next(filter(Path.exists, paths), None)):

@@ -17,17 +17,7 @@ from matplotlib.patches import Circle, PathPatch, Rectangle
 from matplotlib.path import Path
 
 from warpimpact.analysis.effectiveness import plate_numbers
-from warpimpact.plotting.style import (
-    BLUE,
-    PURPLE,
-    STEEL,
-    VERMILION,
-    Figure,
-    draw_fire,
-    finish,
-    fire_of,
-    in_style,
-)
+from warpimpact.plotting.style import BLUE, PURPLE, STEEL, VERMILION, Figure, draw_fire, finish, fire_of, in_style
 from warpimpact.scene import Core, Impact, NoPattern, Plate, Target
 from warpimpact.scene.model import Array
 from warpimpact.scene.units import MM
@@ -76,7 +66,9 @@ def plate_figure(
     draw_plate(axes, plate, extent / 2)
     axes.set(xlabel="y [mm]", ylabel="z [mm]")
     if not isinstance(plate.pattern, NoPattern):
-        _draw_frame(axes, plate.pattern.period, label="unit cell", edgecolor=BLUE, linestyle="--")
+        y, z = MM * np.array(plate.pattern.period)
+        style: dict[str, Any] = {"fill": False, "linewidth": 1.6, "edgecolor": BLUE, "linestyle": "--"}
+        axes.add_patch(Rectangle((-y / 2, -z / 2), y, z, label="unit cell", **style))
     if core is not None:
         radius = core.max_radius * MM
         of_core = {"label": f"largest section of the core, \u2300 {2 * radius:.2f} mm", "edgecolor": VERMILION}
@@ -89,8 +81,7 @@ def plate_figure(
     numbers = plate_numbers(plate.open_area, plate.ligament, target.weights)
     parts = (f"{name} {number}".replace(" ", "\u00a0") for name, number in numbers.items())  # no break within a part
     note = "to scale, dimensions in mm, smallest ligament in pink; seen from behind the plate"
-    finish(figure, ", ".join(parts), note, title=title, legend=True, columns=2)
-    return figure
+    return finish(figure, ", ".join(parts), note, title=title, legend=True, columns=2)
 
 
 def drawn_extent(plate: Plate, core: Core | None) -> Array:
@@ -117,12 +108,6 @@ def draw_holes(axes: Axes, plate: Plate, **style: Any) -> None:
         axes.add_patch(PathPatch(path, **drawn))
 
 
-def _draw_frame(axes: Axes, extent: Sequence[float], **style: Any) -> None:
-    """Draw a rectangle of an extent [m], centred on the origin."""
-    along_y, along_z = (side * MM for side in extent)
-    axes.add_patch(Rectangle((-along_y / 2, -along_z / 2), along_y, along_z, fill=False, linewidth=1.6, **style))
-
-
 def _draw_section(axes: Axes, target: Target, up: float) -> None:
     """Draw the layers in the section y = 0, up to a height [mm]."""
     z = np.linspace(-up, up, _STATIONS)
@@ -146,6 +131,12 @@ class Dimension(NamedTuple):
     text: str
     on_left: bool = False
 
+    @classmethod
+    def between(cls, start: Any, end: Any, length: float | None = None, *, on_left: bool = False) -> Dimension:
+        """A dimension; `length` [m] replaces the distance of its ends if it is known better."""
+        start, end = np.asarray(start), np.asarray(end)
+        return cls(start, end, f"{MM * (np.linalg.norm(end - start) if length is None else length):.3g}", on_left)
+
 
 def hole_dimensions(plate: Plate, ligament: Dimension | None) -> list[Dimension]:
     """Width and height of the hole that is nearest to the middle, away from the smallest ligament, and the periods of
@@ -156,12 +147,12 @@ def hole_dimensions(plate: Plate, ligament: Dimension | None) -> list[Dimension]
     period_y, period_z = plate.pattern.period
     on_the_right = ligament is not None and ligament.start[0] + ligament.end[0] < 0.0  # where the ligament is not
     upright = high_y + _FROM_SIDE * period_y if on_the_right else low_y - _FROM_SIDE * period_y
-    below = low_z - _FROM_BOTTOM * period_z
+    below, corner = low_z - _FROM_BOTTOM * period_z, (-period_y / 2, period_z / 2)
     return [
-        _dimension((low_y, below), (high_y, below)),
-        _dimension((upright, low_z), (upright, high_z)),
-        _dimension((-period_y / 2, period_z / 2), (period_y / 2, period_z / 2)),
-        _dimension((-period_y / 2, -period_z / 2), (-period_y / 2, period_z / 2))._replace(on_left=True),
+        Dimension.between((low_y, below), (high_y, below)),
+        Dimension.between((upright, low_z), (upright, high_z)),
+        Dimension.between(corner, (period_y / 2, period_z / 2)),
+        Dimension.between((-period_y / 2, -period_z / 2), corner, on_left=True),
     ]
 
 
@@ -169,21 +160,13 @@ def smallest_ligament(plate: Plate) -> Dimension | None:
     """The smallest ligament between two holes that lies nearest to the middle; None if there is none."""
     pairs = list(combinations(_holes(plate), 2))
     lengths = np.array([first.distance(other) for first, other in pairs])
-    if not lengths.min(initial=np.inf) > 0.0 or not pairs:
+    if not pairs or not lengths.min() > 0.0:
         return None
     small = np.flatnonzero(lengths <= _EQUALLY_SMALL * lengths.min())
     lines = [shapely.shortest_line(*pairs[place]) for place in small]
     start, end = np.asarray(min(lines, key=lambda line: line.distance(shapely.Point(0.0, 0.0))).coords)
     smallest = plate.ligament
-    return _dimension(start, end, smallest if lengths.min() <= _EQUALLY_SMALL * smallest else None)
-
-
-def _dimension(
-    start: tuple[float, float] | Array, end: tuple[float, float] | Array, length: float | None = None
-) -> Dimension:
-    """A dimension; `length` [m] replaces the distance of its ends if it is known better."""
-    start, end = np.asarray(start), np.asarray(end)
-    return Dimension(start, end, f"{(float(np.linalg.norm(end - start)) if length is None else length) * MM:.3g}")
+    return Dimension.between(start, end, smallest if lengths.min() <= _EQUALLY_SMALL * smallest else None)
 
 
 def _holes(plate: Plate) -> list[shapely.Polygon]:
@@ -199,41 +182,30 @@ def draw_dimensions(axes: Axes, plate: Plate) -> None:
     """Draw the dimensions on axes in mm, each a line with arrows and its length [mm] beside the middle."""
     ligament = smallest_ligament(plate)
     coloured = [(dimension, BLUE) for dimension in hole_dimensions(plate, ligament)]
+    text: dict[str, Any] = {"textcoords": "offset points", "fontsize": "small", "zorder": 6}
+    text["bbox"] = {"boxstyle": "round,pad=0.1", "facecolor": "white", "edgecolor": "none", "alpha": 0.75}
     for dimension, colour in [*coloured, *([] if ligament is None else [(ligament, PURPLE)])]:
         start, end = dimension.start * MM, dimension.end * MM
-        style = {"arrowstyle": "<->", "color": colour, "linewidth": 1.2, "shrinkA": 0.0, "shrinkB": 0.0}
-        axes.annotate("", tuple(end), tuple(start), arrowprops=style, zorder=5)
-        upright = abs(end[1] - start[1]) > abs(end[0] - start[0])
-        side = -1.0 if dimension.on_left else 1.0
-        axes.annotate(
-            dimension.text,
-            tuple(0.5 * (start + end)),
-            (4.0 * side, 0.0) if upright else (0.0, 3.0),
-            textcoords="offset points",
-            ha=("right" if dimension.on_left else "left") if upright else "center",
-            va="center" if upright else "bottom",
-            color=colour,
-            fontsize="small",
-            zorder=6,
-            bbox={"boxstyle": "round,pad=0.1", "facecolor": "white", "edgecolor": "none", "alpha": 0.75},
-        )
+        arrow = {"arrowstyle": "<->", "color": colour, "linewidth": 1.2, "shrinkA": 0.0, "shrinkB": 0.0}
+        axes.annotate("", tuple(end), tuple(start), arrowprops=arrow, zorder=5)
+        offset, ha, va = (0.0, 3.0), "center", "bottom"
+        if abs(end[1] - start[1]) > abs(end[0] - start[0]):
+            offset, ha, va = ((-4.0, 0.0), "right", "center") if dimension.on_left else ((4.0, 0.0), "left", "center")
+        axes.annotate(dimension.text, tuple(0.5 * (start + end)), offset, ha=ha, va=va, color=colour, **text)
 
 
 @in_style
 def core_figure(core: Core, title: str, evidence: str) -> Figure:
     """Draw a core in its section, nose to the left, with its evidence below."""
     s = np.linspace(0.0, core.length, _STATIONS)
-    r = core.radius(s)
-    figure = Figure(
-        figsize=(_CORE_WIDTH, 0.95 * _CORE_WIDTH * 2.0 * core.max_radius / core.length + 0.7), layout="compressed"
-    )
+    r, properties = core.radius(s), core.mass_properties
+    height = 0.95 * _CORE_WIDTH * 2.0 * core.max_radius / core.length + 0.7
+    figure = Figure(figsize=(_CORE_WIDTH, height), layout="compressed")
     axes = figure.subplots()
     axes.fill_between(s * MM, -r * MM, r * MM, facecolor="0.8", edgecolor="black", linewidth=1.0)
-    properties = core.mass_properties
     centre = properties.centre_of_mass * MM, 0.0
     axes.plot(*centre, "+", color=VERMILION, ms=12, mew=2)
     axes.annotate("centre of mass", centre, (10.0, 0.0), textcoords="offset points", va="center")
     axes.set(aspect="equal", xlabel="behind the nose [mm]", ylabel="radius [mm]")
     numbers = f"{core.length * MM:.4g} mm, \u2300 {2 * core.max_radius * MM:.4g} mm, {properties.mass * 1e3:.4g} g"
-    finish(figure, evidence, title=f"{title}: {numbers}")
-    return figure
+    return finish(figure, evidence, title=f"{title}: {numbers}")

@@ -1,9 +1,10 @@
-"""Figures of studies: limits, sweeps, sensitivity, and firing tests."""
+"""Figures of studies: limits, sweeps, sensitivity, firing tests, and posteriors."""
 
 from __future__ import annotations
 
 import json
 from collections.abc import Sequence
+from pathlib import Path
 from textwrap import fill
 from typing import Any
 
@@ -18,7 +19,10 @@ from warpimpact.analysis.estimates import estimated
 from warpimpact.analysis.hit_map import hit_points
 from warpimpact.firing.simulate import report_lines, tests_title
 from warpimpact.firing.v50 import V50, Shots
+from warpimpact.identification.fit import fit_from
+from warpimpact.identification.posterior import parameters_of, unit_of
 from warpimpact.plotting.cell import draw_map, map_size, shown, to_scale, words
+from warpimpact.plotting.plate import draw_plate
 from warpimpact.plotting.style import (
     BLUE,
     GREEN,
@@ -35,10 +39,12 @@ from warpimpact.plotting.style import (
 )
 from warpimpact.results import attributes as attr
 from warpimpact.results import firing as f
+from warpimpact.results import posterior_file as p
 from warpimpact.results import variables as v
 from warpimpact.results.measures import Measure
 from warpimpact.results.references import reference
-from warpimpact.scene.units import STORED
+from warpimpact.scene.model import Array
+from warpimpact.scene.units import MM, STORED
 from warpimpact.studies.limit import UNITS, inclination, measures_of, promise_line
 from warpimpact.studies.sweep import inputs_of, sweep_table
 from warpimpact.studies.sweep import measures_of as measures_of_sweep
@@ -47,8 +53,6 @@ _CURVE = {
     "velocity": ("impact velocity", "share of the hits that perforate"),
     "thickness": ("thickness of {}", "share of the hits whose limit is thinner"),
 }
-_NAMED_ABOVE = 0.03, 0.15
-"""Shares between which a name stands above its point; V01 and V05 are often close together."""
 _MOST_LINES = 12
 """Most lines in a panel of a sweep."""
 _PANEL = (5.0, 3.75)
@@ -56,6 +60,10 @@ _PANEL = (5.0, 3.75)
 _ROW, _MEASURE, _CHANGES = 0.24, 2.6, 2.4
 """Of a sensitivity: height of a row, and widths of a panel and of the names of the changes [inch]."""
 _VELOCITY = "impact velocity [m/s]"
+_POINTS, _PRIOR_GREY = 600, "0.6"
+"""Most draws of a posterior in a panel, and colour of its prior."""
+_MOST_CELLS = 5.0
+"""Most cells of holes that a figure shows on either side of the middle. A fit searches hits in the first."""
 
 
 @in_style
@@ -74,8 +82,7 @@ def limit_figure(dataset: xarray.Dataset) -> Figure:
         to_scale(at, dataset)
         figure.colorbar(draw_map(at, dataset, column), ax=at, label=column.label)
         _draw_curve(curve, dataset)
-    finish(figure, f"{dataset.sizes['hit']} hits, {promise_line(dataset)}", result=dataset)
-    return figure
+    return finish(figure, f"{dataset.sizes['hit']} hits, {promise_line(dataset)}", result=dataset)
 
 
 def _draw_over_obliquity(axes: Axes, dataset: xarray.Dataset) -> None:
@@ -83,20 +90,19 @@ def _draw_over_obliquity(axes: Axes, dataset: xarray.Dataset) -> None:
     If all hits have one obliquity, draw them against the inclination of the core."""
     quantity = dataset.attrs[attr.LIMIT]
     unit, factor = UNITS[quantity]
-    value, obliquity = dataset[v.LIMITS[quantity].value].values, dataset[v.OBLIQUITY].values
-    yawed = np.ptp(obliquity) == 0.0
-    along = np.degrees(inclination(dataset)) if yawed else obliquity
-    axes.plot(along, factor * value, "o", color=BLUE, label=f"limit {quantity}")
-    first = int(np.argmin(obliquity))
-    if not yawed and np.isfinite(value[first]):
-        angles = np.linspace(obliquity.min(), obliquity.max())
-        growth = np.cos(np.radians(obliquity[first])) / np.cos(np.radians(angles))
+    value, along = factor * dataset[v.LIMITS[quantity].value].values, dataset[v.OBLIQUITY].values
+    across, first = "obliquity", int(np.argmin(along))
+    if np.ptp(along) == 0.0:
+        across, along = "between axis and line of fire on impact", np.degrees(inclination(dataset))
+    elif np.isfinite(value[first]):
+        angles = np.linspace(along.min(), along.max())
+        growth = np.cos(np.radians(along[first])) / np.cos(np.radians(angles))
         law, label = (growth, "as 1/cos") if quantity == "velocity" else (1.0 / growth, "as cos")
-        axes.plot(angles, factor * value[first] * law, color="0.5", linewidth=1.0, label=f"{label}(obliquity)")
+        axes.plot(angles, value[first] * law, color="0.5", linewidth=1.0, label=f"{label}(obliquity)")
+    axes.plot(along, value, "o", color=BLUE, label=f"limit {quantity}")
     if (of_solid := reference(dataset, "solid")) is not None:
-        solid = np.broadcast_to(of_solid[v.LIMITS[quantity].value].values, value.shape)
-        axes.plot(along, factor * solid, "D", color=GREY, fillstyle="none", label=_solid_label(dataset))
-    across = "between axis and line of fire on impact" if yawed else "obliquity"
+        solid = np.broadcast_to(factor * of_solid[v.LIMITS[quantity].value].values, value.shape)
+        axes.plot(along, solid, "D", color=GREY, fillstyle="none", label=_solid_label(dataset))
     furnish(axes, xlabel=f"{across} [°]", ylabel=f"limit {quantity} [{unit}]")
 
 
@@ -118,18 +124,13 @@ def _draw_curve(axes: Axes, dataset: xarray.Dataset) -> None:
     values = factor * np.sort(values[~np.isnan(values)])
     finite = values[np.isfinite(values)]
     if len(finite):
-        margin = 0.05 * max(np.ptp(finite), 0.02 * finite.max())
         share = np.arange(len(finite) + 1) / len(values)
-        ends = finite[0] - margin, finite[-1] + margin
-        axes.step([ends[0], *finite, ends[1]], [*share, share[-1]], where="post", color=BLUE, linewidth=1.5)
-        axes.set_xlim(ends)
+        axes.step([finite[0], *finite], share, where="post", color=BLUE, linewidth=1.5)
     for name, label, style in (("solid", _solid_label(dataset), "--"), ("base_alone", "base alone", "-.")):
         known = reference(dataset, name)
         mean = np.nan if known is None else factor * float(np.nanmean(known[v.LIMITS[quantity].value].values))
         if np.isfinite(mean):
             axes.axvline(mean, linewidth=1.2, color=GREY, linestyle=style, label=label)
-            low, high = axes.get_xlim()
-            axes.set_xlim(min(low, mean - 0.03 * (high - low)), max(high, mean + 0.03 * (high - low)))
     for measure, estimate in estimated(dataset, measures_of(dataset)).items():
         if np.isfinite(estimate.value):
             _mark_quantile(axes, measure.text, unit, measure.share, estimate.value, estimate.low, estimate.high)
@@ -142,9 +143,9 @@ def _mark_quantile(axes: Axes, text: str, unit: str, share: float, value: float,
     """Mark a quantile with its interval on a cumulative curve, its name above it or, where there is no room, below."""
     axes.plot([low, high], [share, share], color=VERMILION, linewidth=4, alpha=0.4, solid_capstyle="butt")
     axes.plot(value, share, "o", color=VERMILION, markersize=5)
-    low_share, high_share = _NAMED_ABOVE
     on_right = value < 0.5 * sum(axes.get_xlim())
-    offset = (8 if on_right else -8, -12 if on_right and not low_share < share < high_share else 5)
+    above = not on_right or 0.03 < share < 0.15  # V01 and V05 are often close together
+    offset = (8 if on_right else -8, 5 if above else -12)
     style: dict[str, Any] = {"textcoords": "offset points", "ha": "left" if on_right else "right"}
     axes.annotate(f"{text} = {value:.4g} {unit}", (value, share), offset, **style)
 
@@ -178,8 +179,7 @@ def sweep_figure(sweep: xarray.Dataset, texts: Sequence[str] = ()) -> Figure:
     more = len(lines) - _MOST_LINES
     note = f"{sweep.sizes['hit']} hits at every point, 95 % intervals; {counted}"
     note += f"; {more} more combinations are not shown" if more > 0 else ""
-    finish(figure, note, result=sweep, legend=len(inputs) > 1, columns=3)
-    return figure
+    return finish(figure, note, result=sweep, legend=len(inputs) > 1, columns=3)
 
 
 def _draw_line(
@@ -224,15 +224,13 @@ def sensitivity_figure(table: pd.DataFrame, title: str = "", hits: int = 0) -> F
         hide_sides(axes, "top", "right", "left")
     panels[0].invert_yaxis()
     note = f"{hits} hits, the same with every change. " if hits else ""
-    finish(figure, f"{note}A bar begins at the value as given.", title=title or "sensitivity")
-    return figure
+    return finish(figure, f"{note}A bar begins at the value as given.", title=title or "sensitivity")
 
 
 @in_style
 def shots_figure(shots: Shots, estimate: V50, title: str) -> Figure:
     """Fired shots, the fitted probability of perforation, and V50 by maximum likelihood and by the standard."""
-    figure = Figure(figsize=(7.6, 4.4), layout="constrained")
-    axes = figure.subplots()
+    figure, (axes,) = sheet(1, 1, (7.6, 4.4), "constrained")
     margin = 0.15 * max(float(np.ptp(shots.velocity)), 0.02 * float(shots.velocity.max()))
     low, high = float(shots.velocity.min()) - margin, float(shots.velocity.max()) + margin
     if estimate.slowest_perforation < estimate.fastest_stop:
@@ -252,22 +250,19 @@ def shots_figure(shots: Shots, estimate: V50, title: str) -> Figure:
     if np.isfinite(estimate.standard):
         axes.axvline(estimate.standard, color=GREEN, linestyle="--", linewidth=1.2, label="V50 by MIL-STD-662F")
     furnish(axes, xlabel=_VELOCITY, ylabel="probability of perforation", xlim=(low, high), ylim=(-0.08, 1.08))
-    finish(figure, *estimate.lines, title=title)
-    return figure
+    return finish(figure, *estimate.lines, title=title)
 
 
 @in_style
 def firing_figure(dataset: xarray.Dataset) -> Figure:
     """The response of the target, the reported V50 beside the true one, and the operating characteristic of a proof."""
-    panels = [_draw_response]
-    panels += [_draw_reported] if f.V50 in dataset else []
-    panels += [_draw_proof] if f.PASS in dataset else []
-    figure = Figure(figsize=(5.4 * len(panels), 4.2), layout="constrained")
-    for draw, axes in zip(panels, np.ravel(figure.subplots(1, len(panels), squeeze=False)), strict=True):
+    parts = {f.VELOCITY: _draw_response, f.V50: _draw_reported, f.PASS: _draw_proof}
+    draws = [draw for name, draw in parts.items() if name in dataset]
+    figure, panels = sheet(len(draws), len(draws), (5.4, 4.2), "constrained")
+    for draw, axes in zip(draws, panels, strict=True):
         draw(axes, dataset)
     notes = report_lines(dataset) if f.V50 in dataset else []
-    finish(figure, *notes, str(dataset.attrs[f.DISCLAIMER]), title=str(dataset.attrs[attr.TITLE]))
-    return figure
+    return finish(figure, *notes, str(dataset.attrs[f.DISCLAIMER]), title=str(dataset.attrs[attr.TITLE]))
 
 
 def _draw_response(axes: Axes, dataset: xarray.Dataset) -> None:
@@ -285,9 +280,8 @@ def _draw_reported(axes: Axes, dataset: xarray.Dataset) -> None:
     v50, true = dataset[f.V50].values, float(dataset.attrs[f.TRUE_V50])
     known = v50[np.isfinite(v50)]
     if len(known):
-        axes.hist(
-            np.clip(known, *np.quantile(known, [0.005, 0.995])), bins=40, color=BLUE, alpha=0.55, label="reported"
-        )
+        shown_values = np.clip(known, *np.quantile(known, [0.005, 0.995]))
+        axes.hist(shown_values, bins=40, color=BLUE, alpha=0.55, label="reported")
     axes.axvline(true, color="black", linewidth=1.5, label=f"true V50, {true:.4g} m/s")
     furnish(axes, title=tests_title(dataset), xlabel="reported V50 [m/s]", ylabel="tests")
 
@@ -302,3 +296,71 @@ def _draw_proof(axes: Axes, dataset: xarray.Dataset) -> None:
     axes.axvline(proof["velocity"], color=VERMILION, linestyle="--", linewidth=1.2, label="velocity of the proof")
     title = f"proof: {int(dataset.attrs[f.PROOF_SHOTS])} shots, at most {proof['allowed']} perforate"
     furnish(axes, title=title, xlabel=_VELOCITY, ylabel="probability", ylim=(-0.03, 1.03))
+
+
+@in_style
+def pairs_figure(posterior: xarray.Dataset) -> Figure:
+    """Every two parameters against each other, and each beside its prior."""
+    names = parameters_of(posterior)
+    size = max(4.5, 1.75 * len(names))
+    figure = Figure(figsize=(size + 1.2, size), layout="constrained")
+    panels = figure.subplots(len(names), len(names), squeeze=False)
+    drawn = [_draws(posterior, name) for name in names]
+    for (row, column), axes in np.ndenumerate(panels):
+        (x, prior, limits, label), (y, prior_below, limits_below, label_below) = drawn[column], drawn[row]
+        if row == column:
+            for values, colour in ((prior, _PRIOR_GREY), (x, BLUE)):
+                axes.hist(
+                    values, bins=np.linspace(limits[0], limits[1], 31).tolist(), density=True, color=colour, alpha=0.55
+                )
+            axes.set_title(posterior[names[row]].attrs[p.VERDICT].replace(" by these shots", ""), fontsize="x-small")
+            axes.set(yticks=[], xlim=limits)
+        else:
+            some = slice(None, None, max(1, len(x) // _POINTS))
+            axes.scatter(prior[some], prior_below[some], s=2, color=_PRIOR_GREY, alpha=0.25, lw=0)
+            axes.scatter(x[some], y[some], s=4, color=BLUE, alpha=0.45, lw=0)
+            axes.set(xlim=limits, ylim=limits_below)
+            axes.set_ylabel(label_below, fontsize="small")
+        axes.set_xlabel(label, fontsize="small")
+        axes.tick_params(labelsize="x-small")
+        axes.label_outer()
+        if column > row:
+            axes.remove()
+    return finish(figure, f"posterior (blue) and prior (grey); {_worth(posterior)}", result=posterior)
+
+
+def _draws(posterior: xarray.Dataset, name: str) -> tuple[Array, Array, Array, str]:
+    """Draws of a parameter and of its prior in its display unit, limits of their axis, and its label."""
+    unit, factor = unit_of(posterior[name])
+    values, prior = factor * posterior[name].values, factor * posterior[name].attrs[p.PRIOR]
+    prior = np.random.default_rng(len(name)).choice(prior, values.size)
+    ends = np.quantile(np.concatenate([prior, values]), [0.002, 0.998])
+    return values, prior, ends + np.ptp(ends) * np.array([-0.03, 0.03]), words(name) + (f"\n[{unit}]" if unit else "")
+
+
+def _worth(posterior: xarray.Dataset) -> str:
+    ended = "" if posterior.attrs[p.CONVERGED] else ", NOT CONVERGED"
+    return f"effective sample size {posterior.attrs[p.EFFECTIVE]:.0f}{ended}"
+
+
+@in_style
+def hits_figure(posterior: xarray.Dataset) -> Figure:
+    """Where each shot hit, on the plate: draws of the posterior.
+
+    The plate is drawn at the posterior's medians; where the spacing of its holes is unknown, so are their places.
+    """
+    fit = fit_from(str(posterior.attrs[p.FIT_TEXT]), "the fit of this posterior", Path())
+    medians = {one.place: float(np.median(posterior[one.name])) for one in fit.scene_parameters if one.unit != "rad"}
+    figure, panels = sheet(len(fit.shots), 3, (4.5, 4.6))
+    for place, (axes, shot) in enumerate(zip(panels, fit.shots, strict=True)):
+        plate = fit.scene_of(shot, medians).target.layers[0]
+        hits = MM * np.stack([posterior[name].values[:, place] for name in p.HITS])
+        cell, far = MM * np.array(plate.sampled_cell), 1.05 * np.abs(hits).max(axis=1)
+        draw_plate(axes, plate, np.minimum(np.maximum(0.55 * cell, far), _MOST_CELLS * cell))
+        axes.scatter(hits[0], hits[1], s=5, color=BLUE, alpha=0.35, lw=0)
+        axes.set(xlabel="y [mm]", ylabel="z [mm]", title=str(posterior["shot"].values[place]))
+    return finish(figure, f"where the shots hit, {_worth(posterior)}", result=posterior)
+
+
+POSTERIOR_FIGURES = {"pairs": pairs_figure, "hits": hits_figure}
+"""All figures of a posterior, by the endings of their files."""

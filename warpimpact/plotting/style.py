@@ -103,14 +103,14 @@ def data_url(figure: PlainFigure, dpi: int = 110) -> str:
 
 
 def finish(
-    figure: PlainFigure,
+    figure: Figure,
     *notes: str,
     title: str = "",
     result: xarray.Dataset | None = None,
     legend: bool = False,
     columns: int | None = None,
-) -> None:
-    """Write title, notes and a shared legend outside all panels.
+) -> Figure:
+    """Write title, notes and a shared legend outside all panels; return the figure.
 
     The figure grows by their height, so panels keep their size.
 
@@ -141,6 +141,7 @@ def finish(
             entries.values(), entries, loc="outside lower center", ncols=columns, frameon=False, title="\n".join(lines)
         )
         below.get_title().set(color="0.3", size="small", multialignment="center")
+    return figure
 
 
 def furnish(axes: Axes, *, along: Literal["x", "y", "both"] = "both", legend: bool = True, **labels: Any) -> None:
@@ -190,13 +191,12 @@ def fire_of(obliquity: float, azimuth: float) -> Fire:
 
 def draw_fire(axes: Axes, fire: Fire) -> None:
     """Draw an arrow with its angle, or along the normal a point in a circle."""
-    middle: dict[str, Any] = {"xy": _FIRE_CORNER, "xycoords": "axes fraction", "annotation_clip": False, "zorder": 6}
+    corner: dict[str, Any] = {"xy": _FIRE_CORNER, "xycoords": "axes fraction", "annotation_clip": False, "zorder": 6}
     outline = [withStroke(linewidth=2.5, foreground="white")]
-    if fire.along == (0.0, 0.0):
-        axes.annotate(fire.text, ha="center", va="center", fontsize="small", path_effects=outline, **middle)
-        return
-    tail = tuple(-_FIRE_LENGTH * np.array(fire.along))
-    arrow = {"arrowstyle": "-|>", "color": "black", "linewidth": 1.5, "path_effects": outline}
-    axes.annotate("", xytext=tail, textcoords="offset points", arrowprops=arrow, **middle)
-    above: dict[str, Any] = {"xytext": (6.0, 9.0), "textcoords": "offset points", "ha": "right", "va": "bottom"}
-    axes.annotate(fire.text, fontsize="small", path_effects=outline, **above, **middle)
+    text: dict[str, Any] = {"ha": "center", "va": "center"}
+    if any(fire.along):
+        text = {"xytext": (6.0, 9.0), "textcoords": "offset points", "ha": "right", "va": "bottom"}
+        tail = tuple(-_FIRE_LENGTH * np.array(fire.along))
+        arrow = {"arrowstyle": "-|>", "color": "black", "linewidth": 1.5, "path_effects": outline}
+        axes.annotate("", xytext=tail, textcoords="offset points", arrowprops=arrow, **corner)
+    axes.annotate(fire.text, fontsize="small", path_effects=outline, **text, **corner)

@@ -6,7 +6,7 @@ through the hit point.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Sequence
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any, NamedTuple
@@ -20,13 +20,12 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.cm import ScalarMappable
 from matplotlib.colors import Normalize
 from matplotlib.patches import Polygon
-from matplotlib.ticker import MaxNLocator
 from scipy.spatial import ConvexHull
 
 from warpimpact.analysis.replay_geometry import POINTS_AROUND, depth_of, largest_in_plate, pressed, slabs
 from warpimpact.plotting.cell import draw_hole_edges, target_word, words
 from warpimpact.plotting.maps import save_all
-from warpimpact.plotting.style import BLUE, GREY, STEEL, VERMILION, Figure, finish, in_style, sheet
+from warpimpact.plotting.style import BLUE, GREY, STEEL, VERMILION, Figure, finish, furnish, in_style, sheet
 from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
 from warpimpact.results.dataset import passed
@@ -59,10 +58,14 @@ class Pose(NamedTuple):
     axis: Array
 
 
+def _pose_at(dataset: xarray.Dataset, step: int) -> Pose:
+    return Pose(dataset[v.PLATE_POSITION].values[step], dataset[v.CORE_AXIS].values[step])
+
+
 def poses_in_plate(dataset: xarray.Dataset) -> dict[str, Pose]:
     """Poses of the core at equal intervals of its passage through the plate, by time."""
     steps = np.linspace(0, dataset.sizes["time"] - 1, INSTANTS).round().astype(int)
-    return {f"{float(dataset[v.TIME][step]) * _US:.0f} µs": _pose_at_step(dataset, step) for step in steps}
+    return {f"{float(dataset[v.TIME][step]) * _US:.0f} µs": _pose_at(dataset, step) for step in steps}
 
 
 def poses_behind(dataset: xarray.Dataset) -> dict[str, Pose]:
@@ -83,10 +86,6 @@ def poses_behind(dataset: xarray.Dataset) -> dict[str, Pose]:
     return poses
 
 
-def _pose_at_step(dataset: xarray.Dataset, step: int) -> Pose:
-    return Pose(dataset[v.PLATE_POSITION].values[step], dataset[v.CORE_AXIS].values[step])
-
-
 def silhouette(dataset: xarray.Dataset, pose: Pose, view: str) -> Array:
     """Outline of the core [m], shape [points, 2]: x, and y or z as `view` says.
 
@@ -100,28 +99,36 @@ def silhouette(dataset: xarray.Dataset, pose: Pose, view: str) -> Array:
     return outline
 
 
-def _two_views(dataset: xarray.Dataset, poses: Iterable[Pose], *, room: float) -> tuple[Figure, dict[str, Axes]]:
-    """A figure with two views to scale that contain the plate, all poses of the core and a margin `room` [mm]."""
-    corners, poses = {}, list(poses)
+def _two_views(
+    dataset: xarray.Dataset, poses: Sequence[Pose], *, room: float, path: Array | None = None
+) -> tuple[Figure, dict[str, Axes]]:
+    """A figure with two views to scale of the plate, with room for poses of the core and a margin [mm].
+
+    Args:
+        path: positions of the centre of mass that are drawn as a line [m], shape [steps, 3].
+    """
+    corners = {}
     for view in _ANGLE_SHOWN:
         outlines = np.concatenate([silhouette(dataset, pose, view) for pose in poses])
         hit = [depth_of(dataset), float(dataset[v.HIT_POINT[view]])]
         points = np.vstack([outlines, [[0.0, hit[1]], hit]]) * MM
-        corners[view] = points.min(axis=0) - room, points.max(axis=0) + room
-    heights = [high[1] - low[1] for low, high in corners.values()]
-    width = corners["y"][1][0] - corners["y"][0][0]
+        corners[view] = np.stack([points.min(axis=0) - room, points.max(axis=0) + room], axis=1)
+    heights = [np.ptp(up) for _, up in corners.values()]
+    width = np.ptp(corners["y"][0])
     inch = min(9.0 / width, 8.0 / sum(heights))  # per mm
     figure = Figure(figsize=(inch * width + 1.0, inch * sum(heights) + 1.2), layout="compressed")
     panels = dict(zip(corners, figure.subplots(2, 1, height_ratios=heights), strict=True))
     for view, axes in panels.items():
-        low, high = corners[view]
-        axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), aspect="equal")
-        axes.set(xlabel="x [mm]", ylabel=f"{view} [mm]")
+        across, up = corners[view]
+        axes.set(xlim=across, ylim=up, aspect="equal", xlabel="x [mm]", ylabel=f"{view} [mm]")
         axes.autoscale(False)
         along = (dataset[v.SECTION] + dataset[v.HIT_POINT[view]]) * MM
         for front, rear, solid in slabs(dataset, view):
             style: dict[str, Any] = {"where": solid, "step": "mid", "color": STEEL, "ec": "none", "zorder": 0}
             axes.fill_betweenx(along, front * MM, rear * MM, **style)
+        if path is not None:
+            label = "centre of mass"
+            axes.plot(*path[:, [0, "xyz".index(view)]].T * MM, color="black", lw=0.8, ls="--", label=label, zorder=2)
     return figure, panels
 
 
@@ -131,45 +138,36 @@ def _draw_core(axes: Axes, dataset: xarray.Dataset, pose: Pose, view: str, **sty
     return core
 
 
-def _draw_path(axes: Axes, positions: Array, view: str) -> None:
-    path = positions[:, [0, "xyz".index(view)]].T * MM
-    axes.plot(*path, color="black", lw=0.8, ls="--", label="centre of mass")
-
-
-def _finish(figure: Figure, dataset: xarray.Dataset, what: str, *, legend: bool = False) -> None:
+def _finish(figure: Figure, dataset: xarray.Dataset, what: str, *, legend: bool = False) -> Figure:
     """Write the number of the hit and what a figure shows of it as the title."""
-    finish(figure, title=f"hit {dataset.attrs[attr.HIT]}: {what}", result=dataset, legend=legend)
+    return finish(figure, title=f"hit {dataset.attrs[attr.HIT]}: {what}", result=dataset, legend=legend)
 
 
 @in_style
 def passage(dataset: xarray.Dataset) -> Figure:
     """The core at equal intervals of its passage through the plate (the paper's figs. 7 and 9)."""
     poses = poses_in_plate(dataset)
-    figure, views = _two_views(dataset, poses.values(), room=5.0)
+    figure, views = _two_views(dataset, [*poses.values()], room=5.0, path=dataset[v.PLATE_POSITION].values)
     colours = colormaps["viridis"](np.linspace(0.0, 0.9, len(poses)))
     for view, axes in views.items():
         for (label, pose), colour in zip(poses.items(), colours, strict=True):
             style: dict[str, Any] = {"facecolor": (*colour[:3], 0.3), "edgecolor": colour, "lw": 1.4, "label": label}
             _draw_core(axes, dataset, pose, view, **style)
-        _draw_path(axes, dataset[v.PLATE_POSITION].values, view)
-    _finish(figure, dataset, f"passage through the {target_word(dataset)}", legend=True)
-    return figure
+    return _finish(figure, dataset, f"passage through the {target_word(dataset)}", legend=True)
 
 
 @in_style
 def flight(dataset: xarray.Dataset) -> Figure:
     """The core on impact, and at the stand-offs if it passes the plate (the paper's figs. 8 and 10)."""
-    poses = {"impact": _pose_at_step(dataset, 0), **poses_behind(dataset)}
-    figure, views = _two_views(dataset, poses.values(), room=15.0)
+    poses = {"impact": _pose_at(dataset, 0), **poses_behind(dataset)}
+    figure, views = _two_views(dataset, [*poses.values()], room=15.0)
     for view, axes in views.items():
         for label, pose in poses.items():
             outline = _draw_core(axes, dataset, pose, view).get_xy()
             angle = np.degrees(np.arctan2(pose.axis["xyz".index(view)], pose.axis[0]))
-            angle = round(float(angle), 1) + 0.0  # no "-0.0"
-            text = f"{label}: {_ANGLE_SHOWN[view]} {angle:.1f}°".replace("-", "−")
+            text = f"{label}: {_ANGLE_SHOWN[view]} {round(float(angle), 1) + 0.0:.1f}°".replace("-", "−")  # no "-0.0"
             axes.text(outline[:, 0].mean(), outline[:, 1].max() + 1.0, text, ha="center", va="bottom")
-    _finish(figure, dataset, f"on impact and behind the {target_word(dataset)}")
-    return figure
+    return _finish(figure, dataset, f"on impact and behind the {target_word(dataset)}")
 
 
 @in_style
@@ -188,24 +186,18 @@ def course(dataset: xarray.Dataset) -> Figure:
     for panel, (label, values) in zip(panels.flat, by_axis.items(), strict=False):
         for component, colour in _COMPONENTS.items():
             panel.plot(time, values.sel(axis=component), color=colour, label=component)
-        panel.set_ylabel(label)
+        furnish(panel, ylabel=label)
+    for view, angle in _ANGLE_SHOWN.items():
+        turned = np.unwrap(np.arctan2(axis.sel(axis=view), axis.sel(axis="x")))
+        angles.plot(time, np.degrees(turned), color=_COMPONENTS[view], label=angle)
+    furnish(angles, xlabel="time [µs]", ylabel="angle of the axis [°]")
+    furnish(energies, xlabel="time [µs]")
     sides = {v.TRANSLATIONAL_ENERGY: (energies, "black"), v.ROTATIONAL_ENERGY: (energies.twinx(), VERMILION)}
     for energy, (side, colour) in sides.items():
         side.plot(time, dataset[energy], color=colour)
         side.set_ylabel(f"{words(energy)} [J]", color=colour)
         side.tick_params(axis="y", colors=colour)
-    for view, angle in _ANGLE_SHOWN.items():
-        turned = np.unwrap(np.arctan2(axis.sel(axis=view), axis.sel(axis="x")))
-        angles.plot(time, np.degrees(turned), color=_COMPONENTS[view], label=angle)
-    angles.set_ylabel("angle of the axis [°]")
-    for panel in panels.flat:
-        panel.grid(color="0.9")
-        if panel is not energies:
-            panel.legend(frameon=False)
-    for panel in panels[-1]:
-        panel.set_xlabel("time [µs]")
-    _finish(figure, dataset, f"course through the {target_word(dataset)}")
-    return figure
+    return _finish(figure, dataset, f"course through the {target_word(dataset)}")
 
 
 @in_style
@@ -232,8 +224,7 @@ def plate(dataset: xarray.Dataset) -> Figure:
         panel.plot(dataset[v.HIT_Y] * MM, dataset[v.HIT_Z] * MM, "+", color=VERMILION, ms=10, mew=2)
         panel.set_title(f"{float(image[v.SNAPSHOT]) * _US:.1f} µs")
     figure.colorbar(drawn, ax=panels, label="share of the resistance left; + is the hit point")
-    _finish(figure, dataset, "resistance left in the plate, seen from behind")
-    return figure
+    return _finish(figure, dataset, "resistance left in the plate, seen from behind")
 
 
 @in_style
@@ -258,14 +249,12 @@ def pressure(dataset: xarray.Dataset) -> Figure:
     axes.quiver(*tails.T, *arrows.T, colors=colours(scale(surface.stress[some])), **style)
     axes.set(xlabel="x [mm]", ylabel="y [mm]", zlabel="z [mm]", aspect="equal")
     axes.set_box_aspect([np.ptp(axes.get_xlim()), np.ptp(axes.get_ylim()), np.ptp(axes.get_zlim())], zoom=1.3)
-    for side in (axes.yaxis, axes.zaxis):
-        side.set_major_locator(MaxNLocator(4))
+    axes.locator_params(nbins=4)
     label = "normal stress, share of the untouched plate's"
     figure.colorbar(ScalarMappable(scale, colours), ax=axes, shrink=0.6, pad=0.1, label=label)
     force, moment = (float(np.linalg.norm(dataset[name][step])) for name in (v.FORCE, v.MOMENT))
     when = f"{force / 1e3:.3g} kN and {moment:.3g} N m at {float(dataset[v.TIME][step]) * _US:.1f} µs"
-    _finish(figure, dataset, f"normal stress under the largest force, {when}")
-    return figure
+    return _finish(figure, dataset, f"normal stress under the largest force, {when}")
 
 
 FIGURES = (passage, flight, pressure, course, plate)
@@ -284,16 +273,13 @@ def animation(dataset: xarray.Dataset) -> FuncAnimation:
     """
     times = np.linspace(float(dataset[v.TIME][0]), float(dataset[v.TIME][-1]), FRAMES)
     between = dataset[[v.PLATE_POSITION, v.CORE_AXIS, v.VELOCITY]].interp(time=times)
-    every = (_pose_at_step(between, frame) for frame in range(FRAMES))
-    poses = [Pose(pose.position, pose.axis / np.linalg.norm(pose.axis)) for pose in every]
-    velocities = between[v.VELOCITY].values
+    positions, axes, velocities = (between[name].values for name in between)
+    poses = [*map(Pose, positions, axes / np.linalg.norm(axes, axis=1, keepdims=True))]
     speeds = np.linalg.norm(velocities, axis=1)
-    figure, views = _two_views(dataset, poses, room=4.0)
+    figure, views = _two_views(dataset, poses, room=4.0, path=positions)
     _finish(figure, dataset, "")
     FigureCanvasAgg(figure)
-    cores = {view: _draw_core(axes, dataset, poses[0], view) for view, axes in views.items()}
-    for view, axes in views.items():
-        _draw_path(axes, np.array([pose.position for pose in poses]), view)
+    cores = {view: _draw_core(panel, dataset, poses[0], view) for view, panel in views.items()}
 
     def show(frame: int) -> list[Polygon]:
         for view, core in cores.items():
@@ -323,11 +309,9 @@ def writer_for(path: Path) -> AbstractMovieWriter:
     Raises:
         OutputError: the name ends neither in .gif nor in .mp4, or FFmpeg is missing for an MP4.
     """
-    match path.suffix.lower():
-        case ".gif":
-            return PillowWriter(fps=_PER_SECOND)
-        case ".mp4" if FFMpegWriter.isAvailable():
-            return FFMpegWriter(fps=_PER_SECOND)
-        case ".mp4":
-            raise OutputError(f"{path}: an MP4 needs the program ffmpeg, which was not found; a GIF does not need it")
-    raise OutputError(f"{path}: the name of a film must end in .gif or .mp4")
+    suffix = path.suffix.lower()
+    if suffix not in (".gif", ".mp4"):
+        raise OutputError(f"{path}: the name of a film must end in .gif or .mp4")
+    if suffix == ".mp4" and not FFMpegWriter.isAvailable():
+        raise OutputError(f"{path}: an MP4 needs the program ffmpeg, which was not found; a GIF does not need it")
+    return PillowWriter(fps=_PER_SECOND) if suffix == ".gif" else FFMpegWriter(fps=_PER_SECOND)

@@ -24,8 +24,7 @@ from warpimpact.optimisation.front import front_table, front_view, variables_tab
 from warpimpact.plotting.cell import nearest, paint_pixels, pixels
 from warpimpact.plotting.front import THUMBNAIL, campaign_at, front_figure
 from warpimpact.plotting.plate import draw_holes, draw_plate
-from warpimpact.plotting.posterior import hits_figure, pairs_figure
-from warpimpact.plotting.studies import firing_figure, sweep_figure
+from warpimpact.plotting.studies import firing_figure, hits_figure, pairs_figure, sweep_figure
 from warpimpact.plotting.style import Figure, data_url, in_style
 from warpimpact.plotting.trajectory import FIGURES
 from warpimpact.report.report import templates

@@ -16,7 +16,7 @@ from warpimpact.analysis.inspection import summary_text
 from warpimpact.analysis.numbers import text_of
 from warpimpact.campaign.campaign import Campaign
 from warpimpact.kernels.status import Status
-from warpimpact.plotting import comparison_figure, weight_figure
+from warpimpact.plotting import comparison_figure
 from warpimpact.results import attributes as attr
 from warpimpact.results.dataset import stored_columns
 from warpimpact.results.files import ResultError
@@ -187,20 +187,6 @@ def test_limits_are_ranked_by_their_median(make_plate_result) -> None:
     assert not any(text.startswith("mean") for text in comparison.measures)
 
 
-def test_the_figure_against_weight_shows_the_base_next_to_the_solid_plate(quarter, make_plate_result) -> None:
-    comparison = compare([quarter, quarter.assign_attrs(areal_density=60.0)], ["a", "b"])
-    figure = weight_figure(comparison)
-    share, depth = figure.axes
-    assert share.get_ylabel() == "P(base perforated)"
-    assert depth.get_ylabel() == "depth in the base [mm]"
-    points = {tuple(point) for line in share.lines for point in line.get_xydata()}
-    assert {(23.55, 0.25), (60.0, 0.25), (23.55, 1.0), (60.0, 1.0)} <= points  # 1: the solid plate is perforated
-    assert {text.get_text() for text in share.texts} == {"a", "b"}
-    assert depth.get_title(loc="left").startswith("lower bounds")  # a quarter of the cores pass
-    alone = make_plate_result(np.full(6, 500.0))
-    assert weight_figure(compare([alone, alone], ["a", "b"])) is None
-
-
 def test_what_the_solid_plate_is_stands_next_to_the_ratios(quarter) -> None:
 
     def of(**material: float) -> xarray.Dataset:
@@ -220,13 +206,11 @@ def test_what_the_solid_plate_is_stands_next_to_the_ratios(quarter) -> None:
     assert f"{plate}does not weaken" in text_of(effectiveness_view(of(degradation=1.0)))
 
 
-def test_limits_stand_over_the_weight_that_the_target_needs(make_plate_result) -> None:
+def test_the_solid_plate_has_the_weight_that_it_needs(make_plate_result) -> None:
     result, thickness = make_plate_result(np.zeros(400)), np.random.default_rng(2).uniform(4e-3, 6e-3, 400)
     solid = limits(result, np.full(400, 9e-3), 0.0).isel(hit=[0]).assign_attrs(limit_density=7850.0)
-    one, other = (with_references(limits(result, thickness, elsewhere), {"solid": solid}) for elsewhere in (20.0, 0.0))
-    measures = named(one)
+    measures = named(with_references(limits(result, thickness, 20.0), {"solid": solid}))
     assert measures["quantile(limit_areal_density, 0.5)"].solid == pytest.approx(7850.0 * 9e-3)
-    assert weight_figure(compare([one, other], ["one", "other"])) is not None
 
 
 def test_the_proxy_next_to_the_limit_thickness() -> None:

@@ -16,7 +16,7 @@ from warpimpact.identification import identify as identifying
 from warpimpact.identification.fit import Fit
 from warpimpact.identification.identify import identify, prior_points, sampled
 from warpimpact.identification.posterior import material_draws, parameters_of, posterior_view
-from warpimpact.plotting.posterior import hits_figure, pairs_figure
+from warpimpact.plotting.studies import hits_figure, pairs_figure
 from warpimpact.results import files
 from warpimpact.results.kinds import POSTERIOR
 from warpimpact.runs.computer import computer

@@ -27,9 +27,7 @@ def legend_texts(figure):
 
 def nearest_hits(dataset, shape):
     """Brute force: the hit nearest to each pixel of the periodic cell of 16 mm by 8 mm."""
-    y, z = (
-        side * ((np.arange(count) + 0.5) / count - 0.5) for side, count in zip((16e-3, 8e-3), shape[::-1], strict=True)
-    )
+    z, y = (side * ((np.arange(n) + 0.5) / n - 0.5) for side, n in zip((8e-3, 16e-3), shape, strict=True))
     places = np.stack(np.meshgrid(y, z), axis=-1)[:, :, None]
     offset = np.stack([dataset["hit_y"], dataset["hit_z"]], axis=-1) - places
     period = np.array(dataset.attrs["plate_period"])
@@ -50,30 +48,23 @@ def test_a_pixel_has_the_value_of_the_nearest_hit_that_has_one(covered, variable
 
 
 def test_map_is_to_scale_in_millimetres(covered):
-    figure = variable_map(covered, "residual_velocity")
-    axes, _ = figure.axes
-    figure.draw_without_rendering()
-    assert (axes.get_xlabel(), axes.get_ylabel()) == ("hit y [mm]", "hit z [mm]")
-    np.testing.assert_allclose([*axes.get_xlim(), *axes.get_ylim()], [-8.0, 8.0, -4.0, 4.0])
+    axes, _ = variable_map(covered, "residual_velocity").axes
+    assert (axes.get_xlabel(), axes.get_ylabel(), axes.get_aspect()) == ("hit y [mm]", "hit z [mm]", 1.0)
+    np.testing.assert_allclose([axes.get_xlim(), axes.get_ylim()], [(-8.0, 8.0), (-4.0, 4.0)])
     np.testing.assert_allclose(axes.images[0].get_extent(), [-8.0, 8.0, -4.0, 4.0])
-    origin, right, up = axes.transData.transform([(0, 0), (1, 0), (0, 1)])
-    assert right[0] - origin[0] == pytest.approx(up[1] - origin[1])
 
 
 @pytest.mark.parametrize(
     ("variable", "standoff", "label", "ends"),
     [
-        ("residual_velocity", None, "residual velocity [m/s]", (710.0, 800.0)),
         ("tilt", 0.05, "tilt [°]", (np.degrees(0.05), np.degrees(0.5))),
-        ("tilt", None, "tilt [°]", (np.degrees(0.15), np.degrees(1.5))),  # at the largest stand-off
         ("pitch", None, "pitch [°]", (-np.degrees(1.3), np.degrees(1.3))),  # signed, with a neutral zero
     ],
 )
 def test_colour_bar_states_quantity_and_unit(make_result, variable, standoff, label, ends):
     axes, bar = variable_map(make_result(512), variable, standoff).axes
-    norm = axes.images[0].norm
     assert bar.get_ylabel() == label
-    assert (norm.vmin, norm.vmax) == pytest.approx(ends)
+    assert axes.images[0].get_clim() == pytest.approx(ends)
 
 
 def test_few_hits_are_points(make_result):
@@ -90,8 +81,6 @@ def test_status_map_has_a_colour_and_a_share_for_each_status_that_occurs(covered
     figure = variable_map(covered, "status")
     assert legend_texts(figure) == ["perforated", "arrested", "ricocheted", "untouched", "edge of hole"]
     assert "perforated 25.0%" in figure.axes[0].get_title()
-    handles = figure.legends[0].legend_handles
-    assert [to_rgb(handle.get_color()) for handle in handles[:4]] == [to_rgb(STATUS_COLOURS[code]) for code in MIXED]
     image = figure.axes[0].images[0]
     np.testing.assert_allclose(image.to_rgba(MIXED)[:, :3], [to_rgb(STATUS_COLOURS[code]) for code in MIXED], atol=4e-3)
 
@@ -108,11 +97,6 @@ def test_uniform_results_draw_without_complaint(make_result, status):
     assert shown == (["residual velocity", "deflection"] if status == Status.PERFORATED else ["status"])
 
 
-def test_what_cannot_be_mapped_is_named(covered):
-    with pytest.raises(ValueError, match=r'"angular_velocity" cannot be mapped; choose one of .*residual_velocity'):
-        variable_map(covered, "angular_velocity")
-
-
 def test_save_maps_writes_one_png_per_map(covered, tmp_path):
     paths = save_maps(covered, tmp_path / "maps", "plate")
     maps = ["overview", "residual_velocity", "deflection", "tilt_50mm", "tilt_130mm", "marginals", "dispersion"]
@@ -124,16 +108,14 @@ def test_save_maps_writes_one_png_per_map(covered, tmp_path):
 
 def test_maps_side_by_side_have_one_scale_of_colour_and_of_length(make_result, tmp_path):
     wide, small = make_result(512), make_result(256)
+    small = small.assign({name: small[name] / 2 for name in ("hit_y", "hit_z")})
     small = small.assign(residual_velocity=small["residual_velocity"] - 300.0)
     small.attrs["plate_period"] = wide.attrs["plate_period"] / 2
-    for axis in "yz":
-        small[f"hit_{axis}"] = small[f"hit_{axis}"] / 2
     figure = variable_maps({"wide": wide, "small": small}, "residual_velocity")
     *maps_, bar = figure.axes  # one bar for equal scales
     assert [axes.get_title().split("\n")[0] for axes in maps_] == ["wide", "small"]
-    norms = [axes.images[0].norm for axes in maps_]
-    assert [(norm.vmin, norm.vmax) for norm in norms] == [pytest.approx((410.0, 800.0))] * 2
-    assert bar.get_ylim() == pytest.approx((410.0, 800.0))
+    for scale in (*(axes.images[0].get_clim() for axes in maps_), bar.get_ylim()):
+        assert scale == pytest.approx((410.0, 800.0))
     figure.draw_without_rendering()
     lengths = [np.diff(axes.transData.transform([(0, 0), (1, 0)])[:, 0]).item() for axes in maps_]
     assert lengths[0] == pytest.approx(lengths[1])

@@ -86,17 +86,14 @@ def test_dimensions_are_those_of_the_plate() -> None:
     assert sorted(filter(None, shown)) == ["12", "16", "16", "4", "4"]
 
 
-def test_the_command_draws_a_plate_and_prints_its_numbers(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    monkeypatch.chdir(tmp_path)
+@pytest.mark.usefixtures("in_tmp_path")
+def test_the_command_draws_a_plate_and_prints_its_numbers(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["plate", str(CAMPAIGNS / "slotted_plate.toml")]) == 0
     title, thickness, area, smallest, density, picture = capsys.readouterr().out.splitlines()
     assert title == Campaign.from_toml(CAMPAIGNS / "slotted_plate.toml").title
     assert (thickness.split()[1:], smallest.split("ligament")[1].strip()) == (["4", "mm"], "4.00 mm")
-    # The share of 31.4 kg/m² of steel that the holes leave, in the shown digits.
     share = float(area.split()[-1].rstrip("%")) / 100
-    assert float(density.split()[-2]) == pytest.approx(31.4 * (1 - share), abs=0.07)
+    assert float(density.split()[-2]) == pytest.approx(31.4 * (1 - share), abs=0.07)  # of 31.4 kg/m² of steel
     assert plt.imread(picture).shape[2] == 4
 
 
